@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """tools/m7 as it runs, and who stands between its board and a host."""
+import collections
 import json
 import os
 import pathlib
@@ -22,6 +23,19 @@ FIRST_BUILD_S = 240  # and the packages, where tools/test has not installed them
 def m7(*arguments):
     return subprocess.run([M7, *arguments], capture_output=True, text=True, timeout=FIRST_BUILD_S,
                           check=False)
+
+
+def steps_of(states, period_ms):
+    """The steps of T, in the grid of the period. A board that was never late (LATE) leaves nothing out, and nothing is
+    lost. Where a busy machine made it late, each late period is left out, and may have cost one more state: one that
+    still waited to be sent gives way to the next."""
+    steps = [(later['t'] - earlier['t']) % 2**32 for earlier, later in zip(states, states[1:])]
+    assert all(step != 0 and step % period_ms == 0 for step in steps), steps
+    missing = sum(steps) // period_ms - len(steps)
+    late = states[-1]['fields']['LATE'] - states[0]['fields']['LATE']
+    print(f'{len(states)} states, {missing} missing, {late} late; steps of T: {collections.Counter(steps)}')
+    assert late <= missing <= 2 * late
+    return steps
 
 
 class M7Board:

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The board's firmware on an emulated Cortex-M7 (tools/m7) and r4 as the host, by UART and by UDP."""
-import collections
 import itertools
 import os
 import signal
@@ -8,7 +7,7 @@ import socket
 
 import pytest
 
-from m7_board import M7Board, Relay, Watcher, m7
+from m7_board import M7Board, Relay, Watcher, m7, steps_of
 from machine import within_ms
 from r4_process import PATIENCE_S, driving, is_link, is_state, monitor, objects, run
 
@@ -38,18 +37,6 @@ def states_of(url, count):
         host.next(is_link('active'))
         host.next(lambda each: is_state(each) and mark in each['fields'])
         return [host.next(is_state) for _ in range(count)]
-
-
-def steps_of(states, period_ms):
-    """The steps of T. A period that is left out is the board's, and told: none was lost on the way."""
-    steps = []
-    for earlier, later in zip(states, states[1:]):
-        step = (later['t'] - earlier['t']) % 2**32
-        left_out = later['fields']['LATE'] - earlier['fields']['LATE']
-        assert step == period_ms * (1 + left_out), (earlier, later)
-        steps.append(step)
-    print(collections.Counter(steps))
-    return steps
 
 
 def test_streams_at_100_hz_with_nothing_lost(url):
