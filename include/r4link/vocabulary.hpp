@@ -255,9 +255,9 @@ constexpr Peer everyone = 0;
 
 // What a datagram is to the transport that sends it.
 enum class Priority : std::uint8_t {
-  state,   // newest wins: an older waiting state is replaced
-  lease,   // W, by which a watcher asks for states. It is renewed each second, and waits as `normal`
-           // does. A bus carries it as a frame of its own (docs/can.md, "Who watches")
+  state,  // newest wins: an older waiting state is replaced
+  lease,  // W, by which a watcher asks for states. It is renewed each second, and waits as `normal`
+          // does. A bus carries it as a frame of its own (docs/can.md, "Who watches")
   normal,  // waits its turn; refused when the queue is full
   stop,    // overtakes everything and is never dropped
 };
