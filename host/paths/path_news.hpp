@@ -20,11 +20,11 @@ class PathNews {
 
   // --- numbers: of each datagram that is let through, before it is asked whether it is new
 
-  void on_number(std::size_t path, std::uint32_t pnum);
+  void on_number(std::size_t index, std::uint32_t pnum);
   // Of an answer, which is always new. Those that come before the first other datagram do not count.
-  void on_answer(std::size_t path, std::uint32_t pnum);
+  void on_answer(std::size_t index, std::uint32_t pnum);
   // Other numbers follow.
-  void restart(std::size_t path);
+  void restart(std::size_t index);
 
   // --- is it new? Each of them counts it.
 
