@@ -167,6 +167,7 @@ void Application::write_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t 
   char buffer[short_datagram];
   const Text nonce = authentication_.nonce();
   if (pnum == 0 && !nonce.empty()) ++pnum;  // that would say CONNECTING
+  link_.shown(t_ms);
   transmit(to, pnum, write_board_heartbeat(buffer, sizeof buffer, pnum++, t_ms, safe, nonce),
            Priority::normal);
 }

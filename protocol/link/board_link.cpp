@@ -235,18 +235,15 @@ void BoardLink::heartbeat_sent(std::uint32_t t_ms) {
   // A session may last for months, and so may the time without one.
   keep_near(lost_ms_, t_ms);
   keep_near(newest_echo_ms_, t_ms);
-  if (state_ != BoardLinkState::connecting) remember_sent(t_ms);  // connecting: those carry T:0
 }
 
-std::uint32_t BoardLink::answer_time(std::uint32_t t_ms) {
+std::uint32_t BoardLink::answer_time(std::uint32_t t_ms) const {
   const std::uint32_t newest = sent_[(sent_next_ + sent_count - 1) % sent_count];
   const bool recent = sent_used_ != 0 && t_ms - newest < answer_spacing_ms;
-  if (recent && (state_ != BoardLinkState::lost || reached(newest, lost_ms_))) return newest;
-  remember_sent(t_ms);
-  return t_ms;
+  return recent && (state_ != BoardLinkState::lost || reached(newest, lost_ms_)) ? newest : t_ms;
 }
 
-void BoardLink::remember_sent(std::uint32_t t_ms) {
+void BoardLink::shown(std::uint32_t t_ms) {
   if (is_echo(t_ms)) return;
   sent_[sent_next_] = t_ms;
   sent_next_ = (sent_next_ + 1) % sent_count;

@@ -102,11 +102,13 @@ class BoardLink {
   // each send one at once.
   bool heartbeat_due(std::uint32_t now_ms) const;
   void heartbeat_sent(std::uint32_t t_ms);
+  // A heartbeat shows this T, to whomever it is sent: it can be echoed.
+  void shown(std::uint32_t t_ms);
   // The next one is wanted at once: it brings news.
   void send_soon() { send_now_ = true; }
   // The T of a heartbeat that answers one peer. Answers within answer_spacing_ms share it, so that hosts
   // which ask often do not push out of the memory what another host is about to echo.
-  std::uint32_t answer_time(std::uint32_t t_ms);
+  std::uint32_t answer_time(std::uint32_t t_ms) const;
 
   // Milliseconds until poll() or heartbeat_due() may have something to say; 0 is now.
   std::uint32_t due_in(std::uint32_t now_ms) const;
@@ -154,7 +156,6 @@ class BoardLink {
   bool in_window(std::uint32_t pnum) const;
   Refusal code_of_spent(std::uint32_t pnum) const;
   bool lacks_echo() const;
-  void remember_sent(std::uint32_t t_ms);
 
   Timing timing_;
   BoardLinkState state_ = BoardLinkState::connecting;

@@ -78,7 +78,9 @@ struct World::Host final : Session::Handler {
   void look_at_clock(const ReceivedState& state) {
     if (state.sampled_error == ReceivedState::unknown) return;
     const auto age_ms = static_cast<std::int32_t>(world.board_ms() - state.t_ms);
-    if (age_ms < 0 || age_ms > 60'000) return;  // of a boot before, by another clock
+    const auto since_boot_ms = static_cast<std::int32_t>(state.t_ms - world.boot_offset_ms_);
+    if (age_ms < 0 || age_ms > 60'000 || since_boot_ms < 0)
+      return;  // of a boot before, by another clock
     const Time truth{
         static_cast<std::int64_t>(world.when_board_shows(state.t_ms) + clock_offset_us)};
     const Time off = std::chrono::round<Time>(state.sampled.time_since_epoch()) - truth;

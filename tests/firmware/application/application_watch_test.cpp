@@ -85,6 +85,21 @@ TEST(ApplicationWatch, ABoardWithoutAHostStreamsToWhoWatchesItAndIsSafe) {
   EXPECT_TRUE(watcher.take(MessageKind::state).empty()) << "its lease is over";
 }
 
+// On a bus hosts hear what is meant for those who watch.
+TEST(ApplicationWatch, WhatAHeartbeatShowsToWhoWatchesCanBeEchoed) {
+  TestBoard board;
+  TestWatcher watcher{board, Source{0, 9}};
+  board.run(100);
+  watcher.watch("50");
+  board.run(500);
+  ASSERT_EQ(board.state(), BoardState::connecting);
+  const std::vector<Heard> heartbeats = watcher.take(MessageKind::board_heartbeat);
+  ASSERT_FALSE(heartbeats.empty());
+  TestHost host(board, our_session);
+  host.heartbeat(heartbeats.back().t_ms);
+  EXPECT_EQ(board.state(), BoardState::active);
+}
+
 // Who asks says nothing but that somebody watches (docs/can.md).
 TEST(ApplicationWatch, OnABusABoardStreamsToWhoAsksUntilAHostIsThere) {
   TestBoard board({}, 2);

@@ -30,10 +30,15 @@ struct BoardLinkTest : testing::Test {
   void send_due() {
     if (!link.heartbeat_due(now)) return;
     link.heartbeat_sent(now);
+    link.shown(now);
     sent.push_back(now);
   }
   // The board answers one peer; returns the T.
-  std::uint32_t answer() { return link.answer_time(now); }
+  std::uint32_t answer() {
+    const std::uint32_t t = link.answer_time(now);
+    link.shown(t);
+    return t;
+  }
 
   static BoardLink::HostHeartbeat numbered(std::uint32_t pnum, std::uint64_t t, HostId host) {
     BoardLink::HostHeartbeat heartbeat;

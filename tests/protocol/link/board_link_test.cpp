@@ -152,6 +152,7 @@ TEST_F(BoardLinkTest, ACopyOfAnOldHeartbeatDoesNotBeginTheSessionAnew) {
   command(first_number + 2);
   now += 400;
   link.heartbeat_sent(now);
+  link.shown(now);
   ASSERT_EQ(heartbeat(first_number + 3, now), HeartbeatEffect::fed);
   ASSERT_TRUE(link.lose(now));
   EXPECT_EQ(heartbeat(first_number + 3, now), HeartbeatEffect::stale);

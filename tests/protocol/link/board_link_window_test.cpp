@@ -26,10 +26,11 @@ std::uint32_t idle(BoardLink& link, std::uint32_t& now_ms, std::uint32_t pnum,
   for (std::uint32_t i = 0; i < count; ++i, now_ms += 100) {
     if (link.heartbeat_due(now_ms)) {
       link.heartbeat_sent(now_ms);
+      link.shown(now_ms);
       echo = now_ms;
     }
     const std::uint32_t t = i == 0 ? 0 : i == 1 ? now_ms : echo;
-    if (i == 1) link.answer_time(now_ms);  // the answer to its first
+    if (i == 1) link.shown(link.answer_time(now_ms));  // the answer to its first
     link.on_heartbeat(numbered(pnum++, t), now_ms);
     link.poll(now_ms);
   }
