@@ -222,15 +222,14 @@ def test_an_end_that_is_killed_within_a_transfer_is_followed_by_the_next_one():
     with monitor_of_several(url, plain) as host:
         for _ in range(2):
             with Board(url, options=options) as board:
-                host.next(is_link('active'), timeout=20)
+                board.state('ACTIVE', timeout=20)
                 for _ in range(3):
                     host.next(is_state)
                 board.signal(signal.SIGKILL)
                 board.wait()
         with Board(url, options=options) as board:
             since = time.monotonic()
-            host.next(is_link('active'), timeout=20)
-            host.next(is_state)
+            board.state('ACTIVE', timeout=20)
             print(f'streams {(time.monotonic() - since) * 1000:.0f} ms after the board began again')
             host.signal(signal.SIGKILL)
             host.wait()
