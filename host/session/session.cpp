@@ -25,6 +25,8 @@ namespace {
 constexpr Time soon_interval{102'300};
 constexpr Time first_goal{500}, later_goal{1'000};
 constexpr int first_questions = 100, questions_in_vain = 10;
+// Where nothing is due: no clock can tell Time::max() in smaller units.
+constexpr Time longest_wait = std::chrono::hours{1};
 
 // Before anything is made of them: their times may be too long to be reckoned with.
 SessionOptions checked(SessionOptions options) {
@@ -141,7 +143,7 @@ Time Session::next_poll(Time now) {
     next = std::min(next, pending.deadline);
     if (pending.is_out()) next = std::min(next, pending.retry);
   }
-  if (leaving_) return next;
+  if (leaving_) return std::min(next, now + longest_wait);
   Time link = now + std::chrono::milliseconds{link_.due_in(to_ms(now))};
   // due_in() counts whole milliseconds; aim behind the edge, not before it.
   link = std::chrono::duration_cast<std::chrono::milliseconds>(link) + Time{0};
@@ -152,7 +154,7 @@ Time Session::next_poll(Time now) {
   if (hears_board()) next = std::min(next, question_.next(question_interval()));
   if (role_.refused(now)) next = std::min(next, role_.refused_until());
   if (group_waits_) next = std::min(next, groups_.next());
-  return next;
+  return std::min(next, now + longest_wait);
 }
 
 void Session::on_transport(std::size_t path, bool up, Time now, bool can_ask) {
