@@ -258,7 +258,10 @@ Wire AsyncBoard::Impl::report(std::size_t wire) const {
 
 const std::string& AsyncBoard::Impl::name() {
   names.clear();
-  for (const auto& wire : wires) names += (names.empty() ? "" : " ") + wire->carrier->name();
+  for (const auto& wire : wires) {  // without a temporary: programs ask for it with each state
+    if (!names.empty()) names += ' ';
+    names += wire->carrier->name();
+  }
   return names;
 }
 

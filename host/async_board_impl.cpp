@@ -201,8 +201,8 @@ void AsyncBoard::Impl::open() {
   if (!all) open_again();
 }
 
-// One that cannot be opened yet is tried again where another is open. `problem`: the first of all. Then nothing that is
-// wrong with one wire, a device of another kind in its place for example, touches the others.
+// If at least one wire is open, the others are tried again later. From then on trouble with one wire
+// does not touch the others. `problem`: set to the first error of all wires.
 bool AsyncBoard::Impl::open_wire(BoardWire& wire, std::optional<Problem>& problem) {
   try {
     with_system_errors(wire.carrier->name(), [&] { wire.carrier->open(wire); });

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a board needs of its end of some transports, besides datagrams. A carrier that has any of it
-// is also a BoardEnd; of any other one, board_end_of() gives an end where nothing has to be done.
+// Functions of a transport that only boards use. A carrier with such a function is also a BoardEnd.
+// For any other carrier board_end_of() returns an end whose functions do nothing.
 //
-//     UDP     hosts come and go, and send from many places: which of them is in control
+//     UDP     hosts send from many peers: which of them are in control
 //     CAN     datagrams have a packed form
-//     pty     stands for the cable of the board's own
+//     pty     stands for the board's own cable
 #pragma once
 
 #include "r4link/carrier.hpp"
@@ -13,18 +13,18 @@ namespace r4 {
 
 class BoardEnd {
  public:
-  // That peer is in control. It keeps its number, however many others send, until another peer is
-  // held. Where nothing reaches everyone at once, what is sent to everyone goes to it. `everyone`:
-  // nobody on this transport is in control.
+  // That peer is in control: it keeps its number, however many other peers send, until another peer
+  // is held. On UDP, datagrams for `everyone` go to it. `everyone`: no peer of this transport is in
+  // control.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
   // The host in control is also heard from that peer, which is held besides the first until hold()
   // is called.
   virtual void also_hold(Peer peer) { static_cast<void>(peer); }
-  // True if that peer gets what is sent to everyone.
+  // True if that peer gets the datagrams for `everyone`.
   virtual bool reaches(Peer peer) const { return peer == everyone; }
-  // Sends the packed form from now on, or text. Received are both at any time.
+  // Sends the packed form from now on, or text. Both forms are always received.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
-  // True for a cable of the board's own, over which it takes the settings of its place.
+  // True for the board's own cable, over which the board takes keys, passwords and its node.
   virtual bool is_own_cable() const { return false; }
 
  protected:

@@ -8,7 +8,6 @@
 #include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/message.hpp"
 #include "../../protocol/messages/site_settings.hpp"
-#include "../../transports/board_end.hpp"
 #include "../../transports/file_descriptor.hpp"
 
 namespace r4 {
@@ -218,9 +217,8 @@ bool BridgedPair::is_judged(const Datagram& heartbeat) const {
 void BridgedPair::follow_hosts(Time now) {
   if (!known_.poll(now)) return;
   const std::vector<Peer>& served = known_.served();
-  BoardEnd& end = board_end_of(*hosts_.carrier);
-  end.hold(served.empty() ? everyone : served.front());
-  for (const Peer peer : served) end.also_hold(peer);
+  hosts_.end.hold(served.empty() ? everyone : served.front());
+  for (const Peer peer : served) hosts_.end.also_hold(peer);
   if (served.empty() || !watch_.asked()) return;
   std::array<char, max_datagram> buffer;  // the board's states are for that host now
   DatagramWriter writer(buffer.data(), buffer.size());
@@ -312,8 +310,7 @@ void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time
   for (std::size_t i = 1; i < served.size(); ++i) copy(served[i]);
   if (audience_.empty()) return;
   const auto has_it = [&](Peer peer) {
-    return known_.is_served_at(peer) ||
-           (to_everyone && board_end_of(*hosts_.carrier).reaches(peer));
+    return known_.is_served_at(peer) || (to_everyone && hosts_.end.reaches(peer));
   };
   audience_.for_each_watcher(now, [&](Peer peer) {
     if (!has_it(peer)) copy(peer);

@@ -34,6 +34,7 @@
 
 #include "../../protocol/datagram/datagram_writer.hpp"
 #include "../../protocol/link/answer_budget.hpp"
+#include "../../transports/board_end.hpp"
 #include "../measurement/boot_clock.hpp"
 #include "bridge_audience.hpp"
 #include "bridge_guard.hpp"
@@ -82,7 +83,7 @@ class BridgedPair {
  private:
   struct Side final : Carrier::Handler {
     Side(BridgedPair& owner, BridgeSide side, std::unique_ptr<Carrier> by)
-        : pair(owner), which(side), carrier(std::move(by)) {}
+        : pair(owner), which(side), carrier(std::move(by)), end(board_end_of(*carrier)) {}
     void on_datagram(std::string_view bytes, Peer from) override;
     void on_carrier_event(const CarrierEvent& event) override;
     void on_drained() override { waiting.on_drained(pair.now_()); }
@@ -91,6 +92,7 @@ class BridgedPair {
     BridgedPair& pair;
     const BridgeSide which;
     const std::unique_ptr<Carrier> carrier;
+    BoardEnd& end;  // of the carrier
     bool opened = false;
     std::string obstacle;  // why it could not be opened, as told last
     Time tried;

@@ -7,9 +7,10 @@
 //         |                                                              ^
 //         +----------- BUSY: full; refused otherwise: unknown -----------+
 //
-// `watching` is worth nothing when no state has come for 1 s: then a refusal counts, as in `asking`.
+// `watching` is worth nothing when no state has come for 1 s: then a refusal counts, as in
+// `asking`.
 //
-//     asking    W is sent every 500 ms; at once with a LEASE to echo, and on a transport that has come up
+//     asking    W is sent every 500 ms; at once with a LEASE to echo, and when a transport comes up
 //     watching  likewise: a lease lasts 2 s
 //     full      the board has no room for another watcher; it is asked once a second
 //     unknown   the board does not know of watchers; likewise, for another may come to its place
@@ -74,26 +75,26 @@ inline LeaseTrouble Lease::trouble(Time now) const {
   return state_ == State::unknown ? LeaseTrouble::unknown : LeaseTrouble::none;
 }
 
-// One for each path of a session.
+// The leases of a session, one for each path.
 class Leases {
  public:
   explicit Leases(std::size_t paths) : leases_(paths) {}
 
   Lease& operator[](std::size_t path) { return leases_[path]; }
   void renew(std::size_t path, Time now) { leases_[path].renew(now); }
-  // Do states come by any of them?
+  // True if states come on any path.
   bool streaming(Time now) const {
     return std::any_of(leases_.begin(), leases_.end(),
                        [now](const Lease& lease) { return lease.streaming(now); });
   }
-  // What is wrong with all of them.
+  // The worst trouble of all leases; none if one of them brings states.
   LeaseTrouble trouble(Time now) const {
     LeaseTrouble worst = LeaseTrouble::none;
     if (streaming(now)) return worst;
     for (const Lease& lease : leases_) worst = std::max(worst, lease.trouble(now));
     return worst;
   }
-  // When one of a path in `paths` (bit i: path i) is due.
+  // When the first lease of `paths` (bit i: path i) is due.
   Time next(std::uint8_t paths) const {
     Time next = Time::max();
     for (std::size_t i = 0; i < leases_.size(); ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One of the paths of a session: its transport, whose board it leads to, and what it has brought (paths.hpp).
+// One path of a session (paths.hpp): its transport, the board at its end, and that board's clock.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +15,8 @@ namespace r4 {
 using PathSet = std::uint8_t;
 constexpr PathSet path_bit(std::size_t index) { return static_cast<PathSet>(1U << index); }
 
-// The board's T as it should be now, by one that was heard. It is never ahead of the board, for each T comes
-// after it was shown, and behind it by what the network held that one back.
+// The board's T as extrapolated from a received T. A T arrives after the board sent it, so this
+// clock is never ahead of the board's, and it lags by the delay of that datagram.
 class PathClock {
  public:
   bool known() const { return known_; }
@@ -26,25 +26,25 @@ class PathClock {
     board_ms_ = t_ms;
     at_ms_ = to_ms(now);
   }
-  // How far `t_ms` is ahead of what it should be at that time, in ms.
+  // By how many ms `t_ms` is ahead of this clock at that time.
   std::int32_t ahead(std::uint32_t t_ms, Time at) const {
     return static_cast<std::int32_t>(t_ms - (board_ms_ + (to_ms(at) - at_ms_)));
   }
-  // May the board show `t_ms` at that time, if it may be this much late?
+  // True if a T that arrives now may be of this boot: at most `late_ms` late, and not from the
+  // future.
   bool fits(std::uint32_t t_ms, Time now, std::int32_t late_ms) const {
     const std::int32_t off = ahead(t_ms, now);
     return off >= -late_ms && off <= tolerance_ms;
   }
-  // The same between `since` and `now`.
+  // The same for a T that was sent after `since`.
   bool fits(std::uint32_t t_ms, Time since, Time now, std::int32_t late_ms) const {
     return ahead(t_ms, since) >= -late_ms && ahead(t_ms, now) <= tolerance_ms;
   }
 
-  // A T this far from where the board's clock should be is of another boot.
+  // A T further off than this is of another boot.
   static constexpr std::int32_t tolerance_ms = 10'000;
-  // This far behind, if the board has said that it is booting (`PNum:0;T:0`), which a network may also have
-  // held back since the boot before, or if it has answered a question: the paper's boards begin at 0 each time, so
-  // their T after a quick restart is not far off.
+  // How late a T may be after a heartbeat `PNum:0;T:0`, or in an answer to a question. The paper's
+  // boards count T from 0 at each boot, so T is only a little smaller after a quick restart.
   static constexpr std::int32_t restart_tolerance_ms = 1'000;
 
  private:
@@ -53,33 +53,33 @@ class PathClock {
   std::uint32_t at_ms_ = 0;
 };
 
-// The questions who its board is (Q:ID) that were sent on a path.
+// The questions Q:ID on a path.
 struct PathQuestions {
   IdentityQuestion open{Time{0}};
-  bool answered = false;  // one was, since the transport has come
-  int unanswered = 0;     // since then
+  bool answered = false;  // at least one, since the transport came up
+  int unanswered = 0;     // since the last answer
   Time asked_at{0};
   Time ask_at{0};
   Time round_trip{0};
 };
 
-// Where a path has answered BUSY.
+// BUSY on a path.
 struct PathBusy {
   Time until{0};
-  bool here = false;           // our own end hears another host in our place
-  std::uint32_t board_ms = 0;  // else the board's T of the newest BUSY
+  bool here = false;           // heard by this program's transport, not answered by the board
+  std::uint32_t board_ms = 0;  // the board's T of its newest BUSY
 };
 
 struct Path {
   bool up = false;
   bool can_ask = true;
-  bool known = false;       // its board is the session's
-  bool other = false;       // it is not
-  bool connecting = false;  // said so last
+  bool known = false;       // leads to the session's board
+  bool other = false;       // leads to another board
+  bool connecting = false;  // its last heartbeat was `PNum:0`
   std::uint32_t boot = 0;
   PathClock clock;
   Time heard{0};
-  Time heard_until{0};  // silent from then on
+  Time heard_until{0};
   PathQuestions questions;
   PathBusy busy;
   std::string board_id;

@@ -28,7 +28,7 @@ void PathNews::restart(std::size_t index) {
   if (tracker.started()) tracker.restart();
 }
 
-// Its T is newer; or of the same millisecond, on the same path, behind the newest. That is it then.
+// True if T is newer, or equal with a newer number on the same path. Then it becomes the newest.
 bool PathNews::is_new(First& newest, std::size_t path, std::uint32_t t_ms) const {
   const std::uint32_t pnum = paths_[path].pnum;
   const bool behind = newest.t_ms == t_ms && newest.path == path && newer(pnum, newest.pnum);
@@ -69,7 +69,7 @@ bool PathNews::is_newest(std::uint32_t t_ms) {
   return true;
 }
 
-// A copy of a command is answered, too: as the first one was, or as a duplicate of what was executed.
+// The board answers a duplicate of a command like the first one, or with DUPLICATE.
 bool PathNews::is_copy(const Nack& nack) {
   if (nack.code == Refusal::duplicate) return true;
   for (const Told& each : told_) {
@@ -96,14 +96,14 @@ void PathNews::count_copy(Numbers& path) {
   path.others -= std::min(path.others, path.gap + 1);
 }
 
-// What is missing before it, and no other path has brought.
+// Counts the missing numbers, less those that other paths have brought.
 void PathNews::count_gap(Numbers& path) {
   if (path.gap <= path.others) return;
   path.lost += path.gap - path.others;
   counters_.lost += path.gap - path.others;
 }
 
-// True if it was counted lost, and comes late.
+// True if it was counted as lost and comes late.
 bool PathNews::take_back(Numbers& path) {
   if (path.arrival != Arrival::late || path.lost == 0) return false;
   --path.lost;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What of all that the paths of a session bring is new, and what is lost (paths.hpp). Each path has the board's packet
-// numbers of its own; so across paths T tells what is newer, and what is a copy.
+// Separates the new datagrams of a session from duplicates, and counts lost ones (paths.hpp). Packet
+// numbers differ between paths, so T orders the datagrams of different paths. Numbers order those of
+// one path within a millisecond.
 #pragma once
 
 #include <array>
@@ -18,49 +19,50 @@ class PathNews {
  public:
   explicit PathNews(std::size_t paths) : paths_(paths) {}
 
-  // --- numbers: of each datagram that is let through, before it is asked whether it is new
+  // --- the packet number of each admitted datagram, before the question whether it is new
 
   void on_number(std::size_t index, std::uint32_t pnum);
-  // Of an answer, which is always new. Those that come before the first other datagram do not count.
+  // An answer is always new. It counts once a state or a heartbeat has come.
   void on_answer(std::size_t index, std::uint32_t pnum);
-  // Other numbers follow.
+  // The next number is unrelated to the last one.
   void restart(std::size_t index);
 
-  // --- is it new? Each of them counts it.
+  // --- whether it is new: each of these also counts it
 
-  // Is the heartbeat no copy of what another path has brought, and not older?
+  // True if the heartbeat is not a duplicate from another path, and not older.
   bool take_heartbeat(std::size_t path, std::uint32_t t_ms);
-  // Is a state of the newest T of all states? What is older never replaces it.
+  // False if a newer state is known: an older one never replaces it.
   bool is_newest_state(std::size_t path, std::uint32_t t_ms);
-  // Is it no copy? The state of a T may come in parts: then each part brings fields that those before had not.
+  // True if the state is not a duplicate. States of one T may each hold a part of the fields: then
+  // a state is new if it brings a field that no state of this T has brought.
   bool take_state(std::size_t path, std::uint32_t t_ms, FieldSet present);
-  // Is nothing newer known of the board? Then it is the newest.
+  // True if no newer T is known. Then this is the newest.
   bool is_newest(std::uint32_t t_ms);
-  // Each path may bring an answer to its copy of a command. True of those that say nothing new.
+  // Each path may bring an answer to its duplicate of a command. True if this answer adds nothing.
   bool is_copy(const Nack& nack);
 
-  // The board has begun again, by another clock.
+  // The board has restarted: its T is unrelated to before.
   void forget() { newest_ = {}; }
-  // It says that it is booting: whatever it sends then is new.
+  // The board says that it is booting: its next heartbeat is new.
   void on_connecting() { newest_.any = newest_.heartbeat.any = false; }
 
-  // Of the session: lost is what no path has brought, a duplicate what another has brought first.
+  // For the session: `lost` counts datagrams that no path has brought.
   const PacketCounters& counters() const { return counters_; }
-  // Of one path.
+  // For one path.
   const PacketCounters& counters(std::size_t path) const { return paths_[path].tracker.counters(); }
   std::uint64_t copies(std::size_t path) const { return paths_[path].copies; }
 
  private:
   struct Numbers {
     PacketTracker tracker;
-    std::uint32_t pnum = 0;            // of the datagram that is looked at
+    std::uint32_t pnum = 0;            // of the datagram being handled
     Arrival arrival = Arrival::first;  // likewise
-    std::uint32_t gap = 0;             // before it
-    std::uint32_t others = 0;          // that others brought first since its newest one
-    std::uint32_t lost = 0;  // that were counted lost because of it, and have not come late
+    std::uint32_t gap = 0;             // missing numbers before it
+    std::uint32_t others = 0;          // that came first on other paths since its newest
+    std::uint32_t lost = 0;            // counted as lost because of this path
     std::uint64_t copies = 0;
   };
-  // A datagram, as it came first: of those of one T the numbers of that path tell which is newer.
+  // The newest datagram of a kind, and the path that brought it first.
   struct First {
     bool any = false;
     std::uint32_t t_ms = 0;
@@ -78,14 +80,14 @@ class PathNews {
     bool any = false;
     std::uint32_t t_ms = 0;
     First heartbeat, state;
-    FieldSet fields;  // what the states of that T have brought
+    FieldSet fields;  // of all states with that T
   } newest_;
   PacketCounters counters_;
   struct Told {
     std::uint32_t pnum = 0;
     Refusal code = Refusal::none;
   };
-  std::array<Told, 16> told_{};  // the answers that were told last
+  std::array<Told, 16> told_{};  // the newest answers
   std::size_t answers_ = 0;
 };
 

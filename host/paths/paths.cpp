@@ -27,7 +27,7 @@ void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
   Path& path = paths_[index];
   path.up = up;
   path.can_ask = can_ask;
-  path.known = up && (!can_ask || is_only(path));
+  path.known = up && (!can_ask || is_only());
   path.other = path.connecting = false;
   path.questions.answered = false;
   path.questions.unanswered = 0;
@@ -37,7 +37,7 @@ void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
   if (path.known && first_answer_.count() == 0) first_answer_ = now;
   anew_ = anew_ || all_down();
   if (!up) return;
-  // It may bring other numbers from now on; and a lease may have ended.
+  // The numbers may begin anew, and a lease may have ended.
   news_.restart(index);
   leases_.renew(index, now);
 }
@@ -84,7 +84,7 @@ void Paths::asked(std::size_t index, std::uint32_t pnum, Time now) {
   questions.ask_at = path.known ? Time::max() : again;
 }
 
-// A path whose T does not fit.
+// At once, but at most ten times a second.
 void Paths::ask_soon(Path& path, Time now) {
   if (!path.can_ask) return;
   PathQuestions& questions = path.questions;
@@ -96,13 +96,14 @@ Paths::Admission Paths::admit_identity(std::size_t index, const Identity& identi
   Path& path = paths_[index];
   if (!path.up) return Admission::no;
   const std::optional<Time> asked = path.questions.open.answered(identity);
-  // Told to somebody else, or once more: it says who is there and not when.
+  // An answer to another program, or a duplicate, proves nothing of the boot.
   if (!asked && path.can_ask) return path.known ? Admission::yes : Admission::no;
   const std::string_view id(identity.board_id.data(), identity.board_id.size());
   if (path.board_id != id) path.board_id = id;
-  // The first board that answers, until the session begins: while no other path leads to it, it may have been a mistake.
+  // The only path may lead to another board later. Beside other paths the id may change until the
+  // session begins, while no other path leads to that board.
   const bool others = (known() & ~path_bit(index)) != 0;
-  if (!id_ || is_only(path) || (!begun_ && !others)) id_ = id;
+  if (!id_ || is_only() || (!begun_ && !others)) id_ = id;
   path.other = *id_ != id;
   path.known = !path.other;
   if (path.other) {
@@ -115,9 +116,9 @@ Paths::Admission Paths::admit_identity(std::size_t index, const Identity& identi
   path.questions.answered = true;
   path.questions.unanswered = 0;
   path.questions.round_trip = now - *asked;
-  // Of two boots the later one is that which answered what was asked after the other had answered.
+  // The later of two boots is the one that answered a question from after the other's answer.
   const bool later = *asked > proven_;
-  // The board has answered between the question and now, which tells boots apart that are close together.
+  // The answer was sent between the question and now, which bounds its T closely.
   const bool same = clock_.known() ? clock_.fits(t_ms, *asked, now, PathClock::restart_tolerance_ms)
                                    : fits_others(path, t_ms, now);
   if (!same && !later) {
@@ -146,7 +147,7 @@ PathSet Paths::known() const {
 bool Paths::poll(Time now) {
   if (begun_ || known() == 0 || two_boards()) return false;
   const bool asking = std::any_of(paths_.begin(), paths_.end(), [this](const Path& path) {
-    const bool compared = path.can_ask || path.clock.known() || is_only(path);
+    const bool compared = path.can_ask || path.clock.known() || is_only();
     return path.up && !(path.known && compared);
   });
   if (asking && now < first_answer_ + patience) return false;
@@ -169,12 +170,10 @@ Time Paths::next(Time now) const {
 // --- what they bring
 
 bool Paths::in_clock(const Path& path, std::uint32_t t_ms, Time now) {
-  const std::int32_t late =
-      path.connecting ? PathClock::restart_tolerance_ms : PathClock::tolerance_ms;
-  return path.clock.known() && path.clock.fits(t_ms, now, late);
+  return path.clock.known() && path.clock.fits(t_ms, now, late_of(path));
 }
 
-// Before the link knows the board's clock, only the other paths do: of them one may have answered before a restart.
+// True unless another path of this boot contradicts that T.
 bool Paths::fits_others(const Path& path, std::uint32_t t_ms, Time now) const {
   return std::all_of(paths_.begin(), paths_.end(), [&](const Path& each) {
     const bool knows = &each != &path && each.known && each.clock.known() && each.boot == boot_;
@@ -182,13 +181,11 @@ bool Paths::fits_others(const Path& path, std::uint32_t t_ms, Time now) const {
   });
 }
 
-// Is what a believed path brings of the session's board, by its T? Before the session begins the other paths know
-// its clock alone.
+// True if a believed path's T fits the session. Before the session begins, the other paths' clocks
+// decide.
 bool Paths::fits(const Path& path, std::uint32_t t_ms, Time now) const {
   if (!begun_) return fits_others(path, t_ms, now);
-  const std::int32_t late =
-      path.connecting ? PathClock::restart_tolerance_ms : PathClock::tolerance_ms;
-  return !clock_.known() || clock_.fits(t_ms, now, late);
+  return !clock_.known() || clock_.fits(t_ms, now, late_of(path));
 }
 
 void Paths::set_clock(std::size_t index, std::uint32_t t_ms, Time now) {
@@ -199,7 +196,7 @@ void Paths::set_clock(std::size_t index, std::uint32_t t_ms, Time now) {
   news_.restart(index);
 }
 
-// In whole milliseconds, in which the link counts, so that both fall silent at once (HostLink::poll()).
+// In whole milliseconds, as HostLink counts, so that the path and the link fall silent together.
 void Paths::hear(Path& path, Time now) const {
   path.heard = now;
   path.heard_until = std::chrono::floor<std::chrono::milliseconds>(now) + timeout_;
@@ -212,8 +209,8 @@ void Paths::begin_boot(std::uint32_t t_ms, Time now) {
   clock_.set(t_ms, now);
 }
 
-// The board has said its T on a path that was asked: those that cannot be asked, and had another, are of another
-// board, or have yet to bring what is of this boot.
+// An answer has set the clock. A path that cannot be asked and whose clock differs leads to another
+// board, or has yet to bring a datagram of this boot.
 void Paths::compare_those_that_listen(std::uint32_t t_ms, Time now) {
   anew_ = false;
   for (Path& each : paths_) {
@@ -238,7 +235,7 @@ Paths::Admission Paths::admit(std::size_t index, std::uint32_t pnum, std::uint32
       return Admission::no;
     }
     if (!fits(path, t_ms, now)) {
-      // A restart, if it has carried and no other one knows better.
+      // The board has restarted, if this path has carried and no other path carries now.
       const bool carried = path.clock.known() && path.boot == boot_;
       if (!carried && !anew_) turn_away(path);
       if ((!carried && !anew_) || others_carry(path, now)) return Admission::no;
@@ -257,8 +254,8 @@ Paths::Admission Paths::admit(std::size_t index, std::uint32_t pnum, std::uint32
   return begun_ ? admission : Admission::no;
 }
 
-// One that comes late is no sign that the board has begun again: who has its heartbeats learns that by the answer of
-// its clock, for which the path is asked now.
+// A late one must not end the session while heartbeats of the board are recent, so the board is
+// asked instead.
 bool Paths::admit_connecting(std::size_t index, Time now) {
   Path& path = paths_[index];
   if (!path.known) return false;
@@ -268,7 +265,7 @@ bool Paths::admit_connecting(std::size_t index, Time now) {
     news_.restart(index);
   }
   const bool believed = is_believed(path);
-  if (!believed) ask_soon(path, now);  // what it sends next is of another clock
+  if (!believed) ask_soon(path, now);
   if (!begun_ || !all_connecting(now)) return false;
   const bool recent =
       link_.echo() != 0 && r4::is_heard(link_.state()) && clock_.known() &&
@@ -286,7 +283,7 @@ bool Paths::admit_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_
       if (path.known) ask_soon(path, now);
       return false;
     }
-    // On a bus the states come only once a lease was answered.
+    // On a bus the answer to a lease comes before the first state.
     if (!path.known || path.clock.known()) return false;
     if (!fits(path, t_ms, now)) {
       if (!anew_) turn_away(path);

@@ -1,26 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The paths over which a session has its board: to which of them it speaks, and what of all that they bring is new.
-// Without I/O, part of a session (docs/redundancy.md). Nobody else knows how many there are.
+// The paths over which a session has its board. This part of a session, without I/O, decides to
+// which paths the session speaks, and which datagrams it takes (docs/redundancy.md). No other code
+// knows how many paths there are.
 //
-//             up           its board says who it is           something comes
-//     down -------> asking ------------------------> silent <----------------> carrying
-//                    |  ^                                     for the timeout
-//        another is  |  |   it is asked every second,        nothing
-//        there       v  |   and says who it is
+//             up           its board answers Q:ID             a datagram comes
+//     down -------> asking -----------------------> silent <-------------------> carrying
+//                    |  ^                                    none for the timeout
+//     another board  |  |  asked every second,
+//     answers        v  |  it gives the right id
 //                   other
 //
-//     down leads out of each of them to `down`; an answer of another board from each to `other`. Where there is
-//     nothing to compare with (the only path; a bus on which this program may not ask) `asking` is passed by
+//     Each of them leads to `down`. An answer of another board leads from each to `other`. The only
+//     path, and a bus on which this program may not send questions, skip `asking`: there is nothing
+//     to compare the board with.
 //
-// Until its board has said who it is, a path is sent nothing but the question and stops, and what it brings is
-// passed over. The board that answers first is the session's, unless all other paths lead elsewhere. The session begins
-// when all paths that are up have answered, or 300 ms after the first.
+// Before its board has answered, a path is sent only the question and stops, and its datagrams are
+// dropped. The first board that answers is the session's board, unless all other paths lead to
+// another one. The session begins when all paths that are up have answered, or 300 ms after the
+// first answer.
 //
-// Each path has the board's packet numbers of its own; so what is newest is told by T. A path also has its view of
-// the board's clock, by the answers to its own questions: a T that does not fit it, of a board that has begun again
-// or of a path that brings what is old, is passed over, and the path is asked. An answer that was asked for after the
-// newest other answer, and whose T fits no more, shows that the board has begun again. A board that does not answer (the
-// paper's release) is believed what it sends.
+// Packet numbers differ between paths, so the board's time T decides which datagram is newest. Each
+// path keeps the board's clock as that path shows it. A datagram whose T does not fit is late, or
+// the board has restarted: it is dropped, and the board is asked. The answer proves a restart if
+// its T does not fit either, and if the question was sent after the newest answer of the known
+// boot. A board that does not answer questions (the paper's release) is believed without an answer.
 #pragma once
 
 #include <cstddef>
@@ -52,70 +55,70 @@ class Paths {
 
   // --- the transports
 
-  // `can_ask`: not where who watches may say nothing, on a bus. Such a path is believed what its URL says while it is the
-  // only one; beside others the T that it brings must fit the board's clock, which begins at random.
+  // `can_ask`: false on a bus for a watcher, which may not send questions. The only path is then
+  // believed. Beside other paths its T must fit the board's clock, which starts at random.
   void on_transport(std::size_t index, bool up, bool can_ask, Time now);
   bool all_down() const;
-  // This computer slept: who the board is counts on, but each path has to say again what the
-  // board's clock is.
+  // This computer slept, or the board was silent for days: its clock is unknown on every path. The
+  // boards' ids stay known.
   void on_sleep(Time now);
 
-  // --- to which of them the session speaks
+  // --- sending
 
-  // Heartbeats, leases and commands: none before the session has begun.
+  // The paths for heartbeats, leases and commands: none before the session has begun.
   PathSet speaking() const { return begun_ ? known() : PathSet{0}; }
   bool begun() const { return begun_; }
   bool is_known(std::size_t index) const { return paths_[index].known; }
-  // Those that are to be asked now who their board is, by one question.
+  // The paths that are to be sent Q:ID now.
   PathSet to_ask(Time now) const;
   void asked(std::size_t index, std::uint32_t pnum, Time now);
-  // Lets time pass; true if the session begins.
+  // Lets time pass. True if the session begins.
   bool poll(Time now);
   Time next(Time now) const;
 
-  // --- what they bring, in two steps: is it of the session's board as it is now, and is it new?
+  // --- receiving, in two steps: admit a datagram of the board's present boot, then ask news()
 
   enum class Admission : std::uint8_t {
     no,
-    restarted,  // yes, and it shows that the board has begun again
+    restarted,  // yes, and the board has restarted
     yes,
   };
   // A state or a heartbeat.
   Admission admit(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, Time now);
-  // An answer. `counts`: its number is among those of the states.
+  // An answer to this session. `counts`: it is numbered with the states.
   bool admit_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool counts,
                     Time now);
-  // The answer to who the board is.
+  // The answer to Q:ID.
   Admission admit_identity(std::size_t index, const Identity& identity, std::uint32_t t_ms,
                            Time now);
-  // A heartbeat that says that the board is booting. True if that is so.
+  // A heartbeat `PNum:0`, by which a board says that it is booting. True if that is believed.
   bool admit_connecting(std::size_t index, Time now);
 
-  // Is it new, and what is lost?
   PathNews& news() { return news_; }
-  // Is nothing newer known of the board? Then it is the newest.
+  // True if no datagram with a newer T was admitted. Then this T sets the board's clock.
   bool is_newest(std::uint32_t t_ms, Time now);
 
-  // --- who has the board
+  // --- BUSY: another host is in control
 
-  // The board, at its time `t_ms`, has answered BUSY there; none: a transport hears another host in our place.
+  // The board answered BUSY at its time `t_ms`. Without a time: a transport on CAN hears another
+  // host with this program's ids.
   void on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now);
-  // A state of its time `t_ms` shows that the board is ours: a BUSY from before that says nothing any more.
+  // A state of the board's time `t_ms` names a command of this session, so an older BUSY is void.
   void on_own_state(std::uint32_t t_ms, Time now) { own_ = {true, now, t_ms}; }
-  // Do all that are heard say that another host has the board?
+  // True if BUSY holds on all paths that carry.
   bool all_busy(Time now) const;
-  // For so long they do, if none is answered again.
+  // When that ends, unless another BUSY comes.
   Time all_busy_until(Time now) const;
 
-  // Of who watches: one for each path.
+  // A watcher's leases, one for each path.
   Leases& leases() { return leases_; }
   const Leases& leases() const { return leases_; }
 
-  // --- in numbers
+  // --- reports
 
   PathSet carrying(Time now) const;
   bool two_boards() const;
-  // All of it but its name.
+  // Everything but the name.
   Wire report(std::size_t index, Time now) const;
   const PacketCounters& counters() const { return news_.counters(); }
 
@@ -123,14 +126,18 @@ class Paths {
   static constexpr Time ask_interval = std::chrono::milliseconds{100};
   static constexpr Time ask_other_interval = std::chrono::seconds{1};
   static constexpr Time patience = std::chrono::milliseconds{300};
-  // So many questions that a board does not answer while it sends what does not fit make a path believed.
+  // After this many unanswered questions the board is believed without an answer.
   static constexpr int most_unanswered = 10;
-  // As that of a role (host_role.hpp).
+  // As in host_role.hpp.
   static constexpr Time busy_memory = std::chrono::milliseconds{300};
-  // An older state is not compared with: the board's T wraps.
+  // T wraps, so BUSY is not compared with an older state.
   static constexpr Time own_state_memory = std::chrono::hours{1};
 
-  bool is_only(const Path& path) const { return paths_.size() == 1 && &path == paths_.data(); }
+  bool is_only() const { return paths_.size() == 1; }
+  // How late a T may be on a path.
+  static std::int32_t late_of(const Path& path) {
+    return path.connecting ? PathClock::restart_tolerance_ms : PathClock::tolerance_ms;
+  }
   PathSet known() const;
   static bool is_heard(const Path& path, Time now) { return path.known && now < path.heard_until; }
   void hear(Path& path, Time now) const;
@@ -157,13 +164,13 @@ class Paths {
   std::vector<Path> paths_;
   Time timeout_;
   const HostLink& link_;
-  std::optional<std::string> id_;  // of the session's board
+  std::optional<std::string> id_;  // the session's board
   bool begun_ = false;
-  bool anew_ = true;  // nothing has come since all paths were down
+  bool anew_ = true;  // no datagram since all paths were down
   Time first_answer_{0};
   std::uint32_t boot_ = 0;
-  Time proven_{0};   // when the newest proof of the boot came
-  PathClock clock_;  // by what is newest
+  Time proven_{0};   // when the boot was proved last
+  PathClock clock_;  // by the newest T of all paths
   struct OwnState {
     bool any = false;
     Time at{0};

@@ -25,7 +25,7 @@ namespace {
 constexpr Time soon_interval{102'300};
 constexpr Time first_goal{500}, later_goal{1'000};
 constexpr int first_questions = 100, questions_in_vain = 10;
-// Where nothing is due: no clock can tell Time::max() in smaller units.
+// The longest wait when nothing is due: Time::max() overflows when it is converted to nanoseconds.
 constexpr Time longest_wait = std::chrono::hours{1};
 
 // Before anything is made of them: their times may be too long to be reckoned with.

@@ -42,7 +42,7 @@ void Session::on_heartbeat_datagram(std::size_t path, const Datagram& datagram, 
   const bool connecting = is_connecting_heartbeat(datagram);
   const SafeReport report = heartbeat_report(datagram);
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
-  // Said to hosts, on a bus that others listen to; who watches is told by the states that there is none.
+  // On a bus a watcher hears this, too, although it is meant for hosts. The states report it to watchers.
   const bool passed_over = connecting && watches() && paths_.leases().streaming(now);
   bool taken = false;
   if (connecting) {
@@ -53,7 +53,7 @@ void Session::on_heartbeat_datagram(std::size_t path, const Datagram& datagram, 
     taken = admission != Paths::Admission::no && paths_.news().take_heartbeat(path, t_ms);
   }
   if (!taken) {
-    if (paths_.is_known(path)) confirm_stop(report, now);  // its number is proof enough
+    if (paths_.is_known(path)) confirm_stop(report, now);  // the stop's number proves it
     return;
   }
   const bool current = connecting || paths_.is_newest(t_ms, now);
@@ -85,7 +85,7 @@ void Session::on_state_datagram(std::size_t path, const Datagram& datagram, Time
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   const Paths::Admission admission = paths_.admit(path, datagram.pnum(), t_ms, now);
   if (admission == Paths::Admission::no) return;
-  if (admission == Paths::Admission::restarted) on_restarted(now);  // nothing of the boot before
+  if (admission == Paths::Admission::restarted) on_restarted(now);
   link_.on_heard(to_ms(now));
   paths_.leases()[path].on_state(now);
   if (!paths_.news().is_newest_state(path, t_ms)) return;
@@ -100,7 +100,7 @@ void Session::on_state_datagram(std::size_t path, const Datagram& datagram, Time
   }
   if (!paths_.news().take_state(path, t_ms, fresh.present)) return;
   const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
-  // One that a heartbeat has overtaken, in a queue where those go first, is still the newest state.
+  // Heartbeats overtake states in a queue. An overtaken state is still the newest state.
   const bool current = paths_.is_newest(t_ms, now);
   collector_.on_state(fresh.t_ms, now);
   if (current) {
@@ -130,7 +130,7 @@ void Session::on_nack_datagram(std::size_t path, const Datagram& datagram, Time 
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   if (!paths_.admit_answer(path, datagram.pnum(), t_ms, nack.has_session, now)) return;
   if (nack.sid != session_id() || !link_.is_taken(nack.pnum)) {
-    // On a CAN bus, on a path that is shared and in a recording the answers to other hosts are heard, too.
+    // Answers to other hosts are heard on a CAN bus, on a shared transport and in a recording.
     if (watches() && nack.has_session) link_.on_heard(to_ms(now));
     return;
   }
@@ -144,7 +144,7 @@ void Session::on_nack_datagram(std::size_t path, const Datagram& datagram, Time 
   }
   const bool not_taken = nack.code == Refusal::auth && !is_cable_only(nack.pnum);
   if (not_taken) key_.on_refusal(now);
-  // AUTH refuses one copy: another, sent again or over another path, may have been executed.
+  // AUTH refuses one copy. A repetition, or the copy on another path, may have been executed.
   const bool other_copy =
       nack.code == Refusal::auth && ((not_taken && key_.has_key()) || others_speak(path));
   const bool proof = !other_copy && is_proof(nack);
@@ -232,7 +232,7 @@ bool Session::counts(const Identity& identity) const {
   return to_watcher || !(identity.has_busy && identity.busy);
 }
 
-// A path has shown that the board has begun again.
+// A path has proved a restart of the board.
 void Session::on_restarted(Time now) {
   link_.on_restart();
   link_.on_heard(to_ms(now));
@@ -264,14 +264,14 @@ void Session::on_sleep(Time now) {
     transmit_now(Command::leave(), link_.echo(), Priority::normal, now);
   }
   repetition_.cancel();
+  arming_.on_sleep();
   forget_board(now);
   notice_restart(now);
   refresh_status(now);
 }
 
-// What was known of it says nothing any more: the times of the two cannot be compared.
+// The board's T cannot be compared with what was heard before.
 void Session::forget_board(Time now) {
-  arming_.on_sleep();
   link_.begin_anew();
   paths_.on_sleep(now);
 }

@@ -35,8 +35,8 @@ SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Pri
   return send_over(writer, {command.kind, link_.last_pnum(), paths}, priority, now);
 }
 
-// The one way out: a stop goes to every path, whoever is there; anything else to those whose board is known, and
-// takes our key.
+// A stop goes to every path. Anything else goes to the paths that lead to the session's board, if that
+// board has our key.
 SendResult Session::send_over(DatagramWriter& writer, Way way, Priority priority, Time now) {
   const bool stop = way.kind == CommandKind::stop;
   if (key_.refuses_board() && !stop) return SendResult::down;

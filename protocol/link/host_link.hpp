@@ -21,29 +21,29 @@ namespace r4 {
 
 class HostLink {
  public:
-  // `first_pnum` is random, so that the number of a command which another host's session has executed (CMD) is
-  // none of ours.
+  // `first_pnum` is random, so that the number of a command which another host's session has
+  // executed (CMD) is none of ours.
   HostLink(LinkTiming timing, std::uint32_t first_pnum)
       : timing_(timing), first_pnum_(first_pnum), next_pnum_(first_pnum) {}
 
-  // The id of the session. Nothing may be sent while wants_session(): then begin_session() is given a new random one.
+  // The id of the session. Nothing may be sent while wants_session(): then begin_session() is given
+  // a new random one.
   SessionId session() const { return session_; }
   bool wants_session() const { return session_ == no_session; }
   void begin_session(SessionId id) { session_ = id; }
 
-  // --- what the board says. Whoever feeds this has told what is new from copies and from what is late
-  // (host/paths/paths.hpp).
+  // --- datagrams of the board. Duplicates and late ones are dropped before (host/paths/paths.hpp).
 
   // A heartbeat, answered at once by heartbeat_due(). `t_ms`: its T, not older than echo().
   void on_heartbeat(std::uint32_t t_ms);
-  // What the newest state or heartbeat gives as SAFE; none if it carries none.
+  // The field SAFE of the newest state or heartbeat; none without that field.
   void on_reason(SafeReason reason, std::uint32_t now_ms);
-  // The board is there, whatever it said.
+  // Any datagram of the board.
   void on_heard(std::uint32_t now_ms);
-  // It says that it is booting: it knows nothing of us.
+  // The board says that it is booting, so it knows no session.
   void on_booting(SafeReason reason, std::uint32_t now_ms);
-  // It has begun again. If it has not said so itself, the host's own clock may have stood still: a new session is
-  // wanted.
+  // The board has restarted. Unless it said so itself (on_booting()), a new session is wanted,
+  // because the host's own clock may have stood still instead.
   void on_restart();
 
   // Nothing that is known of the board counts any more, because this computer slept: the board is
@@ -92,7 +92,7 @@ class HostLink {
   // How often the board was found to have begun again.
   std::uint32_t restarts() const { return restarts_; }
   SafeReason reason() const { return reason_; }
-  // Has the board been silent for 12 days? Then the times of the two cannot be compared any more
+  // True if the board was silent for 12 days. Then its T has wrapped too far to be compared
   // (datagram/wrapping.hpp), and begin_anew() is needed.
   bool long_silent(std::uint32_t now_ms) const { return heard_ && now_ms - heard_ms_ > long_ago; }
 

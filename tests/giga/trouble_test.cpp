@@ -339,8 +339,8 @@ TEST(GigaReport, ReportsHowManyPathsTheSessionHas) {
   bench.usb_lines();
   bench.usb()(with_crc(named + "PNum:1;T:0;"));
   bench.run_ms(20);
-  std::string
-      offered;  // "H:R4-ROS2;PNum:1;T:…;^…^"; beside it is said that the board is free, with PNum:0
+  // The answer is "H:R4-ROS2;PNum:1;T:…;^…^". The T of a heartbeat with PNum:0 cannot be echoed.
+  std::string offered;
   for (const std::string& line : bench.usb_lines()) {
     if (line.find(";PNum:0;") == std::string::npos) offered = line;
   }

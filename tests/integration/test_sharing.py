@@ -225,9 +225,7 @@ def test_where_as_many_share_it_as_may_a_stop_is_obeyed_and_control_is_taken(fol
 def test_a_driving_program_that_is_stopped_is_named(board):
     with driving(board.host_url, 'O:358,1,1') as host:
         host.signal(signal.SIGSTOP)
-        status = pathlib.Path(f'/proc/{host.process.pid}/status')
-        while 'State:\tT' not in status.read_text('utf-8'):
-            time.sleep(0.01)
+        os.waitid(os.P_PID, host.process.pid, os.WSTOPPED | os.WNOWAIT)
         try:
             refused = run('send', board.host_url, 'O:1,1,1')
             assert refused.returncode != 0

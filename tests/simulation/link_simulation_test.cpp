@@ -150,7 +150,8 @@ Report run_all(std::uint64_t schedules, World::Beside beside) {
   EXPECT_GT(sum.executed_signed, schedules / 10);
   EXPECT_GT(sum.strangers, 5 * schedules);
   EXPECT_GT(sum.strangers_sessions, schedules / 100);
-  EXPECT_GT(sum.strangers_executed, schedules / 1000);
+  // Rare: at a few hundred schedules it is only seen to occur.
+  EXPECT_GT(sum.strangers_executed, schedules < 4000 ? 0 : schedules / 400);
   EXPECT_GT(sum.leases, schedules / 10);
   EXPECT_GT(sum.watched, schedules);
   EXPECT_GT(sum.forged_leases, schedules);

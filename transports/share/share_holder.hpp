@@ -34,7 +34,7 @@ class ShareHolder {
   // Called on the loop's thread. Any of these may release the holder.
   class Owner {
    public:
-    // What a program that comes has to know of the transport.
+    // The events that a new program has to know: whether the transport is up, and its trouble.
     virtual std::vector<CarrierEvent> standing() const = 0;
     // Another program's E:STOP, which is one.
     virtual void on_stop_of_another(std::string_view datagram) = 0;

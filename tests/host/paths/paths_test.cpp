@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the paths of a session let through, and what they take for news: without a session. Several paths are in
-// session_paths_test.cpp.
+// Which datagrams the paths of a session admit, and which of them are new: one path, without a session.
+// tests/host/session/session_paths_test.cpp has two and more paths.
 #include "host/paths/paths.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ struct OnePath : testing::Test {
     if (admission != Admission::no) paths.is_newest(board_t(), now);
     return admission;
   }
-  // As a session does it; true if its T is answered at once.
+  // Handled as by a session. True if the heartbeat is new.
   bool heartbeat(std::uint32_t t_ms, std::uint32_t pnum) {
     const Admission admission = paths.admit(0, pnum, t_ms, now);
     if (admission == Admission::restarted) link.on_restart();
@@ -33,7 +33,7 @@ struct OnePath : testing::Test {
   bool heartbeat() { return heartbeat(board_t(), board_pnum++); }
   bool booting() { return paths.admit_connecting(0, now); }
   void pass(int ms) { now += std::chrono::milliseconds{ms}; }
-  // The session asks, as poll() does.
+  // Sends a question.
   void ask() { paths.asked(0, ++question, now); }
   Admission answer() {
     Identity identity{Text("0.1.0"), Text("board"), Text("udp")};
@@ -54,22 +54,22 @@ struct OnePath : testing::Test {
   std::uint32_t question = 100;
 };
 
-TEST_F(OnePath, IsSpokenToAsSoonAsItsTransportIsThere) {
+TEST_F(OnePath, TheSessionSpeaksAsSoonAsTheTransportIsUp) {
   EXPECT_EQ(paths.speaking(), 1);
-  EXPECT_EQ(paths.to_ask(now), 0) << "there is nothing to compare its board with";
+  EXPECT_EQ(paths.to_ask(now), 0) << "there is no other path to compare the board with";
   paths.on_transport(0, false, true, now);
   EXPECT_EQ(paths.speaking(), 0);
   EXPECT_TRUE(paths.all_down());
 }
 
-TEST_F(OnePath, ItsNumbersTellWhatIsNewerWithinAMillisecond) {
+TEST_F(OnePath, NumbersOrderTheHeartbeatsOfOneMillisecond) {
   EXPECT_TRUE(heartbeat());
   EXPECT_TRUE(heartbeat());
   EXPECT_FALSE(heartbeat(board_t(), board_pnum - 1)) << "the same";
   EXPECT_FALSE(heartbeat(board_t(), board_pnum - 2)) << "late";
 }
 
-TEST_F(OnePath, TakesNothingOlderForNews) {
+TEST_F(OnePath, OlderDatagramsAndDuplicatesAreDropped) {
   pass(100);
   ASSERT_TRUE(heartbeat(board_t(), 10));
   EXPECT_FALSE(heartbeat(board_t() - 20, 5));
@@ -82,7 +82,7 @@ TEST_F(OnePath, TakesNothingOlderForNews) {
   EXPECT_FALSE(paths.news().is_newest_state(0, board_t() - 1));
 }
 
-TEST_F(OnePath, CountsWhatIsLostAndTakesBackWhatComesLate) {
+TEST_F(OnePath, LostDatagramsAreCountedAndLateOnesAreTakenBack) {
   heartbeat(board_t(), 10);
   pass(10);
   heartbeat(board_t(), 14);
@@ -98,7 +98,7 @@ TEST_F(OnePath, CountsWhatIsLostAndTakesBackWhatComesLate) {
   EXPECT_EQ(paths.counters().received, 4U) << "one to a host without control does not";
 }
 
-TEST_F(OnePath, NoticesABootWhoseHeartbeatsWereLost) {
+TEST_F(OnePath, ARestartIsNoticedWhenItsFirstHeartbeatsAreLost) {
   heartbeat();
   pass(300);
   reboot();
@@ -108,7 +108,7 @@ TEST_F(OnePath, NoticesABootWhoseHeartbeatsWereLost) {
   EXPECT_EQ(paths.counters().lost, 0U) << "new numbers are no loss";
 }
 
-TEST_F(OnePath, BelievesABoardThatSaysThatItBoots) {
+TEST_F(OnePath, ABoardWithoutAnswersIsBelievedWhenItSaysThatItBoots) {
   EXPECT_TRUE(booting());
   EXPECT_TRUE(booting());
   EXPECT_EQ(state(), Admission::yes) << "the first boot that is heard is no restart";
@@ -118,7 +118,7 @@ TEST_F(OnePath, BelievesABoardThatSaysThatItBoots) {
   EXPECT_EQ(state(), Admission::restarted);
 }
 
-TEST_F(OnePath, AWordOfBootingThatTheNetworkHeldBackIsNoRestart) {
+TEST_F(OnePath, ALateBootHeartbeatIsNotARestart) {
   booting();
   heartbeat();
   pass(400);
@@ -128,7 +128,7 @@ TEST_F(OnePath, AWordOfBootingThatTheNetworkHeldBackIsNoRestart) {
   EXPECT_EQ(state(), Admission::yes) << "the clock goes on";
 }
 
-TEST_F(OnePath, NoticesTheRestartOfABoardThatCountsItsTimeFromZero) {
+TEST_F(OnePath, ARestartIsNoticedIfTheBoardCountsItsTimeFromZero) {
   board_offset = 0U - to_ms(now);
   heartbeat();
   pass(6000);
@@ -139,14 +139,14 @@ TEST_F(OnePath, NoticesTheRestartOfABoardThatCountsItsTimeFromZero) {
   EXPECT_EQ(state(), Admission::restarted);
 }
 
-TEST_F(OnePath, ADelayOfSecondsIsNoRestart) {
+TEST_F(OnePath, ADelayOfSecondsIsNotARestart) {
   heartbeat();
   pass(9000);
   EXPECT_EQ(paths.admit(0, board_pnum++, board_t() - 9000, now), Admission::yes);
   pass(10);
   EXPECT_EQ(state(), Admission::yes);
   ask();
-  EXPECT_EQ(answer(), Admission::yes) << "what was heard before was late, and the answer is not";
+  EXPECT_EQ(answer(), Admission::yes) << "the earlier datagrams were late, the answer is not";
 }
 
 TEST_F(OnePath, TheBoardsClockMayWrap) {
@@ -157,8 +157,7 @@ TEST_F(OnePath, TheBoardsClockMayWrap) {
   EXPECT_TRUE(paths.is_newest(board_t(), now));
 }
 
-// Of a board that answers questions.
-TEST_F(OnePath, PassesOverWhatIsOfAnEarlierBootAndAsks) {
+TEST_F(OnePath, ADatagramOfAnEarlierBootIsDroppedAndTheBoardIsAsked) {
   heartbeat();
   ask();
   ASSERT_EQ(answer(), Admission::yes);
@@ -166,11 +165,11 @@ TEST_F(OnePath, PassesOverWhatIsOfAnEarlierBootAndAsks) {
   EXPECT_EQ(paths.admit(0, 5, board_t() - 3'600'000, now), Admission::no);
   EXPECT_EQ(paths.to_ask(now), 1);
   ask();
-  EXPECT_EQ(answer(), Admission::yes) << "the board is as it was";
+  EXPECT_EQ(answer(), Admission::yes) << "the board has not restarted";
   EXPECT_EQ(state(), Admission::yes);
 }
 
-TEST_F(OnePath, TheAnswerShowsThatTheBoardHasBegunAgain) {
+TEST_F(OnePath, AnAnswerProvesARestart) {
   heartbeat();
   ask();
   ASSERT_EQ(answer(), Admission::yes);
@@ -183,7 +182,16 @@ TEST_F(OnePath, TheAnswerShowsThatTheBoardHasBegunAgain) {
   EXPECT_EQ(state(), Admission::yes);
 }
 
-TEST_F(OnePath, IsBelievedWhereTheBoardAnswersNoMore) {
+TEST_F(OnePath, AnAnswerToAnotherProgramProvesNoRestart) {
+  heartbeat();
+  ask();
+  ASSERT_EQ(answer(), Admission::yes);
+  reboot();
+  EXPECT_EQ(answer(), Admission::yes) << "the board is known";
+  EXPECT_EQ(state(), Admission::no) << "the restart is not proved";
+}
+
+TEST_F(OnePath, ABoardThatStopsAnsweringIsBelievedAfterTenQuestions) {
   heartbeat();
   ask();
   ASSERT_EQ(answer(), Admission::yes);
@@ -195,10 +203,10 @@ TEST_F(OnePath, IsBelievedWhereTheBoardAnswersNoMore) {
     ask();
     ++questions;
   }
-  EXPECT_EQ(questions, 10) << "another firmware runs there";
+  EXPECT_EQ(questions, 10) << "another firmware may run now";
 }
 
-TEST_F(OnePath, MayLeadToAnotherBoardLater) {
+TEST_F(OnePath, TheOnlyPathMayLeadToAnotherBoardLater) {
   state();
   ask();
   ASSERT_EQ(answer(), Admission::yes);
@@ -213,15 +221,15 @@ TEST_F(OnePath, MayLeadToAnotherBoardLater) {
   EXPECT_FALSE(paths.two_boards());
 }
 
-TEST_F(OnePath, IsBusyUntilAStateShowsThatTheBoardIsOursAgain) {
+TEST_F(OnePath, BusyEndsWhenAStateNamesACommandOfThisSession) {
   heartbeat();
   paths.on_busy(0, board_t(), now);
   EXPECT_TRUE(paths.all_busy(now));
   pass(10);
   paths.on_own_state(board_t(), now);
-  EXPECT_FALSE(paths.all_busy(now)) << "its later word";
+  EXPECT_FALSE(paths.all_busy(now)) << "the state is newer than BUSY";
   paths.on_busy(0, {}, now);
-  EXPECT_TRUE(paths.all_busy(now)) << "our own end hears another host in our place";
+  EXPECT_TRUE(paths.all_busy(now)) << "the transport hears another host";
   pass(300);
   EXPECT_FALSE(paths.all_busy(now));
 }

@@ -192,6 +192,29 @@ TEST(SessionPaths, TellARefusalOnce) {
   EXPECT_EQ(robot.nacks.size(), 1U);
 }
 
+// AUTH refuses one copy of a command. While another path speaks, its copy may be executed.
+TEST(SessionPaths, EndACommandByAuthOnlyWhenNoOtherPathSpeaks) {
+  WiredRobot robot(Cables{{1}, {1}});
+  robot.connect();
+  for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
+  const Ticket ticket =
+      robot.session->send(Command::setting("node", "3"), WiredRobot::timeout, robot.now());
+  robot.run(5);
+  Datagram first;
+  Datagram command;
+  ASSERT_TRUE(read_datagram(robot.cables[0].all('H').front(), first));
+  ASSERT_TRUE(read_datagram(robot.cables[0].all('C').back(), command));
+  const std::string refused = with_crc(
+      "N:" + std::to_string(command.pnum()) + ",AUTH;SESSION:" + std::to_string(first.pnum()) +
+      ";SID:0000000000000065;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
+  robot.bring(0, refused);
+  EXPECT_EQ(robot.results.count(ticket), 0U);
+  robot.plug(1, false);
+  robot.bring(0, refused);
+  ASSERT_EQ(robot.results.count(ticket), 1U);
+  EXPECT_EQ(robot.results[ticket].code, Refusal::auth);
+}
+
 TEST(SessionPaths, AreRefusedWhenAllOfThemAre) {
   WiredRobot robot(Cables{{1}, {1}});
   robot.connect();

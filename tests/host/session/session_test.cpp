@@ -225,6 +225,22 @@ TEST(Session, IsLostWhenTheBoardFallsSilentAndComesBackByItself) {
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
 }
 
+// T wraps after 49 days: after half of that it cannot be compared.
+TEST(Session, HearsABoardAgainAfterAMonthOfSilence) {
+  ScriptedLink link;
+  link.connect();
+  for (int day = 0; day < 30; ++day) {
+    link.now += 24h;
+    link.session.poll(link.now);
+  }
+  EXPECT_EQ(link.restarts, 1) << "the board may have restarted";
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::restart) << "this computer has not slept";
+  EXPECT_EQ(link.session.link().state, HostLinkState::lost);
+  link.heartbeat();
+  EXPECT_EQ(link.session.link().state, HostLinkState::active);
+  EXPECT_EQ(link.restarts, 1) << "T is new, and not a second restart";
+}
+
 TEST(Session, AsksForItsFieldsWhenTheLinkComesUpAndAgainWhenTheyAreMissing) {
   ScriptedLink link;
   link.heartbeat();

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "../shell/wires.hpp"
+
 namespace r4::tool::ros2 {
 namespace {
 
@@ -64,7 +66,7 @@ void BoardNode::connect() {
     if (event.kind == CarrierEvent::Kind::up) return;
     log(LogLevel::warning, event.problem.text());
   });
-  board_.on_wire([this](const Wire& wire) {
+  on_wires(board_, [this](const Wire& wire) {
     log(wire.state == WireState::carrying ? LogLevel::info : LogLevel::warning,
         fmt::format("wire {}: {}", wire.name, to_text(wire.state)));
     tell_health();

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <utility>
 #include <vector>
 
 #include "json.hpp"
@@ -39,7 +40,13 @@ inline Json wire_json(const Wire& wire) {
           {"age_ms", milliseconds(wire.age_us)}};
 }
 
-// All of them; null of one alone, of which nothing is to be told that the link does not tell.
+// Calls `report` when a wire begins to carry, or ceases to. The link reports as much of a board's only wire.
+template <class Board, class Report>
+void on_wires(Board& board, Report report) {
+  if (board.wires().size() > 1) board.on_wire(std::move(report));
+}
+
+// All wires. Null for the only wire, of which the link reports as much.
 inline Json wires_json(const AsyncBoard& board) {
   const std::vector<Wire> wires = board.wires();
   if (wires.size() < 2) return nullptr;

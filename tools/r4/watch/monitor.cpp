@@ -130,7 +130,7 @@ class Monitor {
       if (leads_to_two_boards(status)) io_.stop();
     });
     board_.on_event([this](const CarrierEvent& event) { view_->on_event(event); });
-    board_.on_wire([this](const Wire& wire) { view_->on_wire(wire); });
+    on_wires(board_, [this](const Wire& wire) { view_->on_wire(wire); });
   }
 
   // A host that was killed keeps its board until the board's timeout.

@@ -99,7 +99,7 @@ class BoardsMonitor {
         view.on_bad_datagram(result, bytes);
       });
       board.on_link([&view](const LinkStatus& status) { view.on_link(status); });
-      board.on_wire([&view](const Wire& wire) { view.on_wire(wire); });
+      on_wires(board, [&view](const Wire& wire) { view.on_wire(wire); });
     }
     board.on_state([this, &one](const ReceivedState& state, const Datagram& datagram) {
       if (io_.stopped()) return;  // what came together with the last one

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <utility>
 
+#include "../shell/wires.hpp"
 #include "control.hpp"
 #include "r4link/error.hpp"
 
@@ -145,7 +146,7 @@ void WebBoard::connect() {
     if (event.kind != CarrierEvent::Kind::up) say(Level::warning, event.problem.text());
     events_.on_change(number_);
   });
-  board_->on_wire([this](const Wire& wire) {
+  on_wires(*board_, [this](const Wire& wire) {
     const bool carries = wire.state == WireState::carrying;
     say(carries ? Level::info : Level::warning,
         fmt::format("wire {}: {}", wire.name, to_text(wire.state)));
