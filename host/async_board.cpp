@@ -24,7 +24,7 @@ std::vector<std::unique_ptr<Carrier>> only(std::unique_ptr<Carrier> carrier) {
 }
 
 std::vector<std::unique_ptr<Carrier>> checked(std::vector<std::unique_ptr<Carrier>> carriers) {
-  require_wires(carriers.size());
+  require_paths(carriers.size());
   return carriers;
 }
 
@@ -205,7 +205,7 @@ void AsyncBoard::start_link_timing(Duration board_timeout, Duration heartbeat, D
 void AsyncBoard::require_sendable(const Command& command) const {
   require_valid(command);
   r4::require_control(impl_->session.board_role(), command);
-  for (const auto& wire : impl_->wires) require_cable(wire->carrier->name(), command);
+  for (const auto& path : impl_->paths) require_cable(path->carrier->name(), command);
 }
 void AsyncBoard::require_sendable(const Setpoints& setpoints) const {
   require_any(setpoints);
@@ -242,45 +242,45 @@ const BoardIdentity& AsyncBoard::identity() const { return impl_->identity; }
 Statistics AsyncBoard::statistics() const { return impl_->session.statistics(Impl::steady_now()); }
 const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->counters(); }
 const std::string& AsyncBoard::name() const { return impl_->name(); }
-std::vector<Wire> AsyncBoard::wires() const {
-  std::vector<Wire> reports;
-  for (std::size_t i = 0; i < impl_->wires.size(); ++i) reports.push_back(impl_->report(i));
+std::vector<PathStatus> AsyncBoard::paths() const {
+  std::vector<PathStatus> reports;
+  for (std::size_t i = 0; i < impl_->paths.size(); ++i) reports.push_back(impl_->report(i));
   return reports;
 }
 
-// --- the wires
+// --- the paths
 
-Wire AsyncBoard::Impl::report(std::size_t wire) const {
-  Wire made = session.path(wire, steady_now());
-  made.name = carrier(wire).name();
+PathStatus AsyncBoard::Impl::report(std::size_t path) const {
+  PathStatus made = session.path(path, steady_now());
+  made.name = carrier(path).name();
   return made;
 }
 
 const std::string& AsyncBoard::Impl::name() {
   names.clear();
-  for (const auto& wire : wires) {  // without a temporary: programs ask for it with each state
+  for (const auto& path : paths) {  // without a temporary: programs ask for it with each state
     if (!names.empty()) names += ' ';
-    names += wire->carrier->name();
+    names += path->carrier->name();
   }
   return names;
 }
 
 const CarrierCounters& AsyncBoard::Impl::counters() {
   counted = CarrierCounters();
-  for (const auto& wire : wires) counted += wire->carrier->counters();
+  for (const auto& path : paths) counted += path->carrier->counters();
   return counted;
 }
 
 // Which have begun to carry, or ceased to; and that one leads to another board.
-void AsyncBoard::Impl::tell_wires(const LinkStatus& status) {
+void AsyncBoard::Impl::tell_paths(const LinkStatus& status) {
   const LinkStatus before_that = std::exchange(told, status);
-  for (std::size_t i = 0; i < wires.size(); ++i) {
+  for (std::size_t i = 0; i < paths.size(); ++i) {
     if (((before_that.carrying ^ status.carrying) & path_bit(i)) == 0) continue;
-    if (is_open()) call(wire_callbacks, report(i));
+    if (is_open()) call(path_callbacks, report(i));
   }
   if (status.two_boards && !before_that.two_boards && is_open()) {
-    std::vector<Wire> reports;
-    for (std::size_t i = 0; i < wires.size(); ++i) reports.push_back(report(i));
+    std::vector<PathStatus> reports;
+    for (std::size_t i = 0; i < paths.size(); ++i) reports.push_back(report(i));
     call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, explain(reports)});
   }
 }
@@ -300,13 +300,13 @@ void AsyncBoard::Impl::describe(const Device& device) {
 
 // What is known already comes first.
 void AsyncBoard::Impl::record(const std::shared_ptr<Recorder>& recorder) {
-  for (const auto& wire : wires) {
-    const Carrier& transport = *wire->carrier;
-    wire->tap.attach(recorder, transport.name());
+  for (const auto& path : paths) {
+    const Carrier& transport = *path->carrier;
+    path->tap.attach(recorder, transport.name());
     if (!transport.up()) continue;
-    wire->tap.on_carrier_event({CarrierEvent::Kind::up, {{}, transport.name(), {}, {}}});
+    path->tap.on_carrier_event({CarrierEvent::Kind::up, {{}, transport.name(), {}, {}}});
   }
-  wires[0]->tap.on_link(session.link());
+  paths[0]->tap.on_link(session.link());
   name_in_recording();
   for (const Device& device : devices) describe_in_recording(device);
 }
@@ -314,21 +314,21 @@ void AsyncBoard::Impl::record(const std::shared_ptr<Recorder>& recorder) {
 void AsyncBoard::Impl::name_in_recording() {
   const std::string& board = identity.name.empty() ? identity.board_id : identity.name;
   if (board.empty()) return;
-  for (const auto& wire : wires) wire->tap.on_name(board);
+  for (const auto& path : paths) path->tap.on_name(board);
 }
 
 // The link goes on without it.
 void AsyncBoard::Impl::tell_of_recordings() {
   std::optional<Problem> problem;
-  for (const auto& wire : wires) {
-    std::optional<Problem> news = wire->tap.take_news();
+  for (const auto& path : paths) {
+    std::optional<Problem> news = path->tap.take_news();
     if (news && !problem) problem = std::move(news);
   }
   if (problem) call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, *problem});
 }
 
 void AsyncBoard::Impl::describe_in_recording(const Device& device) {
-  for (const auto& wire : wires) wire->tap.on_device(device);
+  for (const auto& path : paths) path->tap.on_device(device);
 }
 
 Subscription AsyncBoard::on_state(
@@ -351,8 +351,8 @@ Subscription AsyncBoard::on_overheard(std::function<void(std::string_view)> call
 Subscription AsyncBoard::on_link(std::function<void(const LinkStatus&)> callback) {
   return impl_->link_callbacks.add(std::move(callback));
 }
-Subscription AsyncBoard::on_wire(std::function<void(const Wire&)> callback) {
-  return impl_->wire_callbacks.add(std::move(callback));
+Subscription AsyncBoard::on_path(std::function<void(const PathStatus&)> callback) {
+  return impl_->path_callbacks.add(std::move(callback));
 }
 Subscription AsyncBoard::on_event(std::function<void(const CarrierEvent&)> callback) {
   return impl_->event_callbacks.add(std::move(callback));

@@ -24,7 +24,7 @@ SessionOptions with_clock(SessionOptions options, Time now) {
 constexpr Time held_up{std::chrono::milliseconds{50}};
 // What was due so long ago is told of: two heartbeats were late.
 constexpr Time very_late{std::chrono::milliseconds{200}};
-// From one attempt to open a wire to the next.
+// From one attempt to open a path to the next.
 constexpr std::chrono::seconds open_interval{1};
 
 }  // namespace
@@ -39,7 +39,7 @@ AsyncBoard::Impl::Impl(asio::io_context& context, std::vector<std::unique_ptr<Ca
       timer(context),
       reopening(context) {
   for (std::unique_ptr<Carrier>& each : transports) {
-    wires.push_back(std::make_unique<BoardWire>(*this, wires.size(), std::move(each)));
+    paths.push_back(std::make_unique<BoardPath>(*this, paths.size(), std::move(each)));
   }
 }
 
@@ -183,15 +183,15 @@ void AsyncBoard::Impl::open() {
   std::optional<Problem> problem;
   bool any = false;
   bool all = true;
-  for (const auto& wire : wires) {
-    const bool opened = open_wire(*wire, problem);
+  for (const auto& path : paths) {
+    const bool opened = open_path(*path, problem);
     any = any || opened;
     all = all && opened;
     if (phase != Phase::made) return;  // closed by the callback that was told that it is open
   }
   if (!any) throw Error(*problem);
-  for (const auto& wire : wires) {
-    if (wire->trouble) tell_trouble(*wire);
+  for (const auto& path : paths) {
+    if (path->trouble) tell_trouble(*path);
     if (phase != Phase::made) return;
   }
   phase = Phase::open;
@@ -201,23 +201,23 @@ void AsyncBoard::Impl::open() {
   if (!all) open_again();
 }
 
-// If at least one wire is open, the others are tried again later. From then on trouble with one wire
-// does not touch the others. `problem`: set to the first error of all wires.
-bool AsyncBoard::Impl::open_wire(BoardWire& wire, std::optional<Problem>& problem) {
+// If at least one path is open, the others are tried again later. From then on trouble with one path
+// does not touch the others. `problem`: set to the first error of all paths.
+bool AsyncBoard::Impl::open_path(BoardPath& path, std::optional<Problem>& problem) {
   try {
-    with_system_errors(wire.carrier->name(), [&] { wire.carrier->open(wire); });
-    wire.opened = true;
-    wire.trouble.reset();
+    with_system_errors(path.carrier->name(), [&] { path.carrier->open(path); });
+    path.opened = true;
+    path.trouble.reset();
     return true;
   } catch (const Error& error) {
     if (phase == Phase::made && error.kind() == ErrorKind::usage) {
-      for (const auto& each : wires) each->carrier->close();
+      for (const auto& each : paths) each->carrier->close();
       throw;
     }
     if (!problem) problem = error.problem();
-    const bool news = !wire.trouble || wire.trouble->text() != error.problem().text();
-    wire.trouble = error.problem();
-    if (news && phase == Phase::open) tell_trouble(wire);
+    const bool news = !path.trouble || path.trouble->text() != error.problem().text();
+    path.trouble = error.problem();
+    if (news && phase == Phase::open) tell_trouble(path);
   }
   return false;
 }
@@ -228,9 +228,9 @@ void AsyncBoard::Impl::open_again() {
     if (error || !self->has_link()) return;
     bool all = true;
     std::optional<Problem> problem;
-    for (const auto& wire : self->wires) {
-      if (wire->opened || !self->has_link()) continue;
-      self->guarded([&] { all = self->open_wire(*wire, problem) && all; });
+    for (const auto& path : self->paths) {
+      if (path->opened || !self->has_link()) continue;
+      self->guarded([&] { all = self->open_path(*path, problem) && all; });
     }
     if (!all && self->has_link()) self->open_again();
   });
@@ -246,7 +246,7 @@ void AsyncBoard::Impl::close() {
   // Said once; nobody waits for an answer.
   if (is_open()) enter(Completion::How::post, [this] { leave(Time{0}); });
   phase = Phase::closed;
-  for (const auto& wire : wires) wire->carrier->close();
+  for (const auto& path : paths) path->carrier->close();
   timer.cancel();
   reopening.cancel();
   how = Completion::How::post;
@@ -281,14 +281,14 @@ void AsyncBoard::Impl::on_timer() {
   if (undrained >= 2) tell_backlog();
 }
 
-// --- BoardWire::Owner
+// --- BoardPath::Owner
 
-void AsyncBoard::Impl::on_datagram(BoardWire& wire, std::string_view bytes) {
+void AsyncBoard::Impl::on_datagram(BoardPath& path, std::string_view bytes) {
   enter(Completion::How::dispatch, [&] {
-    wire.tap.on_received(bytes, now);
+    path.tap.on_received(bytes, now);
     if (waking != 0) return;
-    session.receive(wire.index, bytes, now);
-    wires[0]->tap.on_packets(session.packets());
+    session.receive(path.index, bytes, now);
+    paths[0]->tap.on_packets(session.packets());
     poll_wanted = true;
   });
 }
@@ -311,21 +311,21 @@ void AsyncBoard::Impl::tell_backlog() {
   });
 }
 
-void AsyncBoard::Impl::on_carrier_event(BoardWire& wire, const CarrierEvent& event) {
+void AsyncBoard::Impl::on_carrier_event(BoardPath& path, const CarrierEvent& event) {
   enter(Completion::How::dispatch, [&] {
-    wire.tap.on_carrier_event(event);
+    path.tap.on_carrier_event(event);
     call(event_callbacks, event);
     if (event.kind != CarrierEvent::Kind::warning) {
-      session.on_transport(wire.index, event.kind == CarrierEvent::Kind::up, now,
-                           !only_listens(wire.index));
+      session.on_transport(path.index, event.kind == CarrierEvent::Kind::up, now,
+                           !only_listens(path.index));
     }
     poll_wanted = true;
   });
 }
 
-void AsyncBoard::Impl::on_overheard(BoardWire& wire, std::string_view bytes) {
+void AsyncBoard::Impl::on_overheard(BoardPath& path, std::string_view bytes) {
   enter(Completion::How::dispatch, [&] {
-    wire.tap.on_sent(bytes);
+    path.tap.on_sent(bytes);
     std::array<char, max_datagram + masking_room> room;
     const Text shown = without_secrets(Text(bytes.substr(0, max_datagram)), room.data());
     call(overheard_callbacks, std::string_view(shown.data(), shown.size()));
@@ -335,26 +335,26 @@ void AsyncBoard::Impl::on_overheard(BoardWire& wire, std::string_view bytes) {
 // --- Session::Handler
 
 // Who only watches says nothing on a bus but stops and leases.
-bool AsyncBoard::Impl::only_listens(std::size_t wire) const {
-  return session.board_role() == BoardRole::watch && carrier(wire).is_shared();
+bool AsyncBoard::Impl::only_listens(std::size_t path) const {
+  return session.board_role() == BoardRole::watch && carrier(path).is_shared();
 }
 
-SendResult AsyncBoard::Impl::transmit(std::size_t wire, std::string_view datagram,
+SendResult AsyncBoard::Impl::transmit(std::size_t path, std::string_view datagram,
                                       Priority priority) {
   if (!has_link()) return SendResult::down;
   const bool may_pass = priority == Priority::stop || priority == Priority::lease;
-  if (only_listens(wire) && !may_pass) return SendResult::down;
-  const SendResult result = carrier(wire).send(datagram, priority);
-  if (result == SendResult::sent) wires[wire]->tap.on_sent(datagram);
+  if (only_listens(path) && !may_pass) return SendResult::down;
+  const SendResult result = carrier(path).send(datagram, priority);
+  if (result == SendResult::sent) paths[path]->tap.on_sent(datagram);
   return result;
 }
 
-// One wire that is well is enough.
-WireTrouble AsyncBoard::Impl::trouble() const {
-  WireTrouble common = WireTrouble::none;
-  for (const auto& wire : wires) {
-    common = wire->carrier->trouble();
-    if (common == WireTrouble::none) break;
+// One path that is well is enough.
+TransportTrouble AsyncBoard::Impl::trouble() const {
+  TransportTrouble common = TransportTrouble::none;
+  for (const auto& path : paths) {
+    common = path->carrier->trouble();
+    if (common == TransportTrouble::none) break;
   }
   return common;
 }
@@ -378,7 +378,7 @@ void AsyncBoard::Impl::on_identity(const Identity& fresh) {
   identity.board_id.assign(fresh.board_id.data(), fresh.board_id.size());
   identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
   identity.name.assign(fresh.name.data(), fresh.name.size());
-  if (wires[0]->tap.attached()) name_in_recording();
+  if (paths[0]->tap.attached()) name_in_recording();
 }
 
 void AsyncBoard::Impl::on_nack(const Nack& nack, const Datagram& datagram) {
@@ -390,8 +390,8 @@ void AsyncBoard::Impl::on_bad_datagram(const ReadResult& result, std::string_vie
 }
 
 void AsyncBoard::Impl::on_link(const LinkStatus& status) {
-  wires[0]->tap.on_link(status);
-  tell_wires(status);
+  paths[0]->tap.on_link(status);
+  tell_paths(status);
   if (!is_open()) return;
   // As it is by then: the one before may have changed it.
   link_callbacks.each([&](auto& one) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is behind an AsyncBoard: a session, its wires and its timer, and who waits for what.
+// What is behind an AsyncBoard: a session, its paths and its timer, and who waits for what.
 //
 // Every call of the session is made inside enter(). The outermost one tells the results and sets the
 // timer afterwards; so no handler runs inside the session, or inside the call that started its command.
@@ -19,7 +19,7 @@
 #include <utility>
 #include <vector>
 
-#include "board_wire.hpp"
+#include "board_path.hpp"
 #include "measurement/boot_clock.hpp"
 #include "r4link/async_board.hpp"
 #include "session/session.hpp"
@@ -28,7 +28,7 @@
 namespace r4 {
 
 // Outlives the AsyncBoard where a callback or handler destroys that.
-struct AsyncBoard::Impl final : BoardWire::Owner,
+struct AsyncBoard::Impl final : BoardPath::Owner,
                                 Session::Handler,
                                 std::enable_shared_from_this<AsyncBoard::Impl> {
   // A command under way, and one that has ended. By its id it is cancelled: the ticket of its first step.
@@ -146,9 +146,9 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   bool has_come(const Waiter& waiter) const;
   void cancel(Ticket id);
   void open();
-  bool open_wire(BoardWire& wire, std::optional<Problem>& problem);
-  void tell_trouble(BoardWire& wire) {
-    on_carrier_event(wire, {CarrierEvent::Kind::down, *wire.trouble});
+  bool open_path(BoardPath& path, std::optional<Problem>& problem);
+  void tell_trouble(BoardPath& path) {
+    on_carrier_event(path, {CarrierEvent::Kind::down, *path.trouble});
   }
   void open_again();
   // Says farewell: its ticket, or 0 if there is nobody to say it to.
@@ -170,18 +170,18 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   void arm();
   void on_timer();
 
-  // --- BoardWire::Owner
+  // --- BoardPath::Owner
 
-  void on_datagram(BoardWire& wire, std::string_view bytes) override;
+  void on_datagram(BoardPath& path, std::string_view bytes) override;
   void on_drained() override;
   void tell_backlog();
-  void on_carrier_event(BoardWire& wire, const CarrierEvent& event) override;
-  void on_overheard(BoardWire& wire, std::string_view bytes) override;
+  void on_carrier_event(BoardPath& path, const CarrierEvent& event) override;
+  void on_overheard(BoardPath& path, std::string_view bytes) override;
 
   // --- Session::Handler
 
-  SendResult transmit(std::size_t wire, std::string_view datagram, Priority priority) override;
-  WireTrouble trouble() const override;
+  SendResult transmit(std::size_t path, std::string_view datagram, Priority priority) override;
+  TransportTrouble trouble() const override;
   void on_state(const ReceivedState& state, const Datagram& datagram) override;
   void on_board_heartbeat(const Datagram& datagram) override;
   void on_identity(const Identity& fresh) override;
@@ -193,17 +193,17 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   void on_refused(const RefusedPost& refused) override;
   void on_result(Ticket ticket, const CommandResult& result) override;
 
-  // --- the wires
+  // --- the paths
 
-  Carrier& carrier(std::size_t wire) const { return *wires[wire]->carrier; }
-  bool only_listens(std::size_t wire) const;
-  Wire report(std::size_t wire) const;
+  Carrier& carrier(std::size_t path) const { return *paths[path]->carrier; }
+  bool only_listens(std::size_t path) const;
+  PathStatus report(std::size_t path) const;
   const std::string& name();
   const CarrierCounters& counters();
-  void tell_wires(const LinkStatus& status);
+  void tell_paths(const LinkStatus& status);
 
   asio::io_context& io;
-  std::vector<std::unique_ptr<BoardWire>> wires;
+  std::vector<std::unique_ptr<BoardPath>> paths;
   std::vector<Device> devices;  // that recordings tell of
   std::vector<const Device*> attaching;
   std::uint32_t boots = 0;           // of the board, while we have known it
@@ -218,7 +218,7 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   Subscribers<ReadResult, std::string_view> bad_callbacks;
   Subscribers<std::string_view> overheard_callbacks;
   Subscribers<LinkStatus> link_callbacks;
-  Subscribers<Wire> wire_callbacks;
+  Subscribers<PathStatus> path_callbacks;
   Subscribers<CarrierEvent> event_callbacks;
   Subscribers<> restart_callbacks;
   Subscribers<DisarmCause> arming_callbacks;
@@ -244,9 +244,9 @@ struct AsyncBoard::Impl final : BoardWire::Owner,
   Time due{0};
   asio::steady_timer timer;
   asio::steady_timer reopening;
-  std::string names;        // of the wires
+  std::string names;        // of the paths
   CarrierCounters counted;  // of all of them together
-  LinkStatus told;          // of the wires
+  LinkStatus told;          // of the paths
   bool armed = false;
   Time armed_for{0};
   std::atomic<Time::rep> fed{0};  // when feed() was called last; 0: the session knows it

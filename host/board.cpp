@@ -39,7 +39,7 @@ void Board::close() { impl_->close(); }
 void Board::wait_active(Duration timeout) {
   require_wait("wait_active()", timeout);
   const auto impl = impl_;
-  // Its wires lead to two boards, and it never began.
+  // Its paths lead to two boards, and it never began.
   const auto refused = [](const LinkStatus& link) {
     return link.two_boards && link.state == HostLinkState::connecting;
   };
@@ -50,7 +50,7 @@ void Board::wait_active(Duration timeout) {
     return link.state == HostLinkState::active && impl->in_control && !link.gated();
   });
   const LinkStatus link = impl->link_now();
-  if (refused(link)) throw Error(explain(wires()));
+  if (refused(link)) throw Error(explain(paths()));
   if (!active) throw Error(explain(impl->name_now(), link));
 }
 
@@ -222,14 +222,14 @@ CarrierCounters Board::carrier_counters() const {
   return *report;
 }
 
-std::vector<Wire> Board::wires() const {
+std::vector<PathStatus> Board::paths() const {
   const auto impl = impl_;
-  auto report = std::make_shared<std::vector<Wire>>();
+  auto report = std::make_shared<std::vector<PathStatus>>();
   {
     const std::lock_guard lock(impl->mutex);
-    *report = impl->last_wires;
+    *report = impl->last_paths;
   }
-  impl->run_on_loop("wires()", [impl, report] { *report = impl->async.wires(); });
+  impl->run_on_loop("paths()", [impl, report] { *report = impl->async.paths(); });
   return *report;
 }
 
@@ -254,8 +254,8 @@ Subscription Board::on_link(std::function<void(const LinkStatus&)> callback) {
 Subscription Board::on_event(std::function<void(const CarrierEvent&)> callback) {
   return impl_->callbacks.on_event(std::move(callback));
 }
-Subscription Board::on_wire(std::function<void(const Wire&)> callback) {
-  return impl_->callbacks.on_wire(std::move(callback));
+Subscription Board::on_path(std::function<void(const PathStatus&)> callback) {
+  return impl_->callbacks.on_path(std::move(callback));
 }
 Subscription Board::on_restart(std::function<void()> callback) {
   return impl_->callbacks.on_restart(std::move(callback));

@@ -45,7 +45,7 @@ Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallback
   if (first.on_state) callbacks.on_state(std::move(first.on_state));
   if (first.on_link) callbacks.on_link(std::move(first.on_link));
   if (first.on_event) callbacks.on_event(std::move(first.on_event));
-  if (first.on_wire) callbacks.on_wire(std::move(first.on_wire));
+  if (first.on_path) callbacks.on_path(std::move(first.on_path));
   if (first.on_restart) callbacks.on_restart(std::move(first.on_restart));
   if (first.on_arming) callbacks.on_arming(std::move(first.on_arming));
   if (first.on_refused) callbacks.on_refused(std::move(first.on_refused));
@@ -120,7 +120,7 @@ void Board::Impl::listen() {
     take_name();  // a board that was plugged in again may be at another port
     tell(event);
   });
-  async.on_wire([this](const Wire& wire) { tell(wire); });
+  async.on_path([this](const PathStatus& path) { tell(path); });
   async.on_arming([this](DisarmCause fresh) {
     {
       const std::lock_guard lock(mutex);
@@ -140,11 +140,11 @@ void Board::Impl::listen() {
 }
 
 void Board::Impl::take_name() {
-  const std::vector<Wire> wires = async.wires();
+  const std::vector<PathStatus> paths = async.paths();
   const std::lock_guard lock(mutex);
   name = async.name();
-  wire_names.clear();
-  for (const Wire& wire : wires) wire_names.push_back(wire.name);
+  path_names.clear();
+  for (const PathStatus& path : paths) path_names.push_back(path.name);
 }
 
 void Board::Impl::tell(CallbackThread::Notice notice) { callbacks.tell(std::move(notice)); }
@@ -213,7 +213,7 @@ void Board::Impl::shut() {
     for_each_queue([](States::Queue& queue) { queue.end(); });
     last_statistics = async.statistics();
     last_counters = async.carrier_counters();
-    last_wires = async.wires();
+    last_paths = async.paths();
   });
   if (!first) return;
   look_timer.cancel();
@@ -227,7 +227,7 @@ void Board::Impl::require_sendable(const Command& command) {
   require_control(role, command);
   if (command.kind != CommandKind::setting) return;
   const std::lock_guard lock(mutex);
-  for (const std::string& wire : wire_names) require_cable(wire, command);
+  for (const std::string& path : path_names) require_cable(path, command);
 }
 
 std::shared_ptr<const Board::Impl::Call> Board::Impl::execute(const Command& command,

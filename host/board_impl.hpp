@@ -111,7 +111,7 @@ struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
 
   // What both sides see. News are those of the state and the link.
   std::string name;  // the transport's, as the loop knows it
-  std::vector<std::string> wire_names;
+  std::vector<std::string> path_names;
   ReceivedState state;
   std::uint64_t states = 0;
   std::vector<std::weak_ptr<States::Queue>> queues;
@@ -129,7 +129,7 @@ struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
   std::uint64_t refused_here = 0;  // posts that did not get as far as the loop
   Statistics last_statistics;
   CarrierCounters last_counters;
-  std::vector<Wire> last_wires;
+  std::vector<PathStatus> last_paths;
 };
 
 }  // namespace r4

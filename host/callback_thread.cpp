@@ -131,7 +131,7 @@ void CallbackThread::call(const Notice& notice) {
                    }
                    call_each(event_callbacks_, event);
                  },
-                 [&](const Wire& wire) { call_each(wire_callbacks_, wire); },
+                 [&](const PathStatus& path) { call_each(path_callbacks_, path); },
                  [&](DisarmCause cause) {
                    arming_ = cause;
                    call_each(arming_callbacks_, cause);
@@ -177,8 +177,8 @@ Subscription CallbackThread::on_event(Subscribers<CarrierEvent>::Function callba
     if (warning_ && !ended_) one(*warning_);
   });
 }
-Subscription CallbackThread::on_wire(Subscribers<Wire>::Function callback) {
-  return add(wire_callbacks_, std::move(callback), [](auto&) {});
+Subscription CallbackThread::on_path(Subscribers<PathStatus>::Function callback) {
+  return add(path_callbacks_, std::move(callback), [](auto&) {});
 }
 Subscription CallbackThread::on_restart(Subscribers<>::Function callback) {
   return add(restart_callbacks_, std::move(callback), [](auto&) {});

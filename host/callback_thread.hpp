@@ -42,7 +42,7 @@ class CallbackThread {
   struct UartNews {
     int channel;
   };
-  using Notice = std::variant<Restart, ReceivedState, LinkStatus, CarrierEvent, Wire, DisarmCause,
+  using Notice = std::variant<Restart, ReceivedState, LinkStatus, CarrierEvent, PathStatus, DisarmCause,
                               RefusedPost, UartNews>;
   static constexpr std::size_t capacity = 64;
 
@@ -69,7 +69,7 @@ class CallbackThread {
   Subscription on_state(Subscribers<ReceivedState>::Function callback);
   Subscription on_link(Subscribers<LinkStatus>::Function callback);
   Subscription on_event(Subscribers<CarrierEvent>::Function callback);
-  Subscription on_wire(Subscribers<Wire>::Function callback);
+  Subscription on_path(Subscribers<PathStatus>::Function callback);
   Subscription on_restart(Subscribers<>::Function callback);
   Subscription on_arming(Subscribers<DisarmCause>::Function callback);
   Subscription on_refused(Subscribers<RefusedPost>::Function callback);
@@ -105,7 +105,7 @@ class CallbackThread {
   Subscribers<ReceivedState> state_callbacks_;
   Subscribers<LinkStatus> link_callbacks_;
   Subscribers<CarrierEvent> event_callbacks_;
-  Subscribers<Wire> wire_callbacks_;
+  Subscribers<PathStatus> path_callbacks_;
   Subscribers<> restart_callbacks_;
   Subscribers<DisarmCause> arming_callbacks_;
   Subscribers<RefusedPost> refused_callbacks_;

@@ -123,7 +123,7 @@ Words link_words(const LinkStatus& link) {
             "plug it in or switch it on; it is opened again by itself"};
   }
   if (link.two_boards && !is_heard(link.state)) {
-    return {"its wires lead to two boards", "give the URLs of one board"};
+    return {"its paths lead to two boards", "give the URLs of one board"};
   }
   if (link.gate == Gate::watchdog) {
     return {
@@ -135,7 +135,7 @@ Words link_words(const LinkStatus& link) {
     return {"a callback does not return, so our heartbeats and commands have stopped",
             "do its work in another thread; BoardOptions::callback_limit is the time that it has"};
   }
-  if (link.trouble == WireTrouble::foreign_frames) {
+  if (link.trouble == TransportTrouble::foreign_frames) {
     return {
         "frames that make no R4 datagram come on the board's command id (0x180 + node): another "
         "protocol, such as CANopen, uses it",
@@ -153,7 +153,7 @@ Words link_words(const LinkStatus& link) {
   if (link.lease != LeaseTrouble::none) return lease_words(link.lease);
   const bool hears_us = link.state == HostLinkState::active ||
                         (link.state == HostLinkState::safe && link.reason != SafeReason::link);
-  if (link.trouble == WireTrouble::late_frames && is_heard(link.state)) {
+  if (link.trouble == TransportTrouble::late_frames && is_heard(link.state)) {
     return {fmt::format("{}flow control of the board does not come within 20 ms: the bus, or a "
                         "tunnel or adapter on it, holds frames back or loses them",
                         hears_us ? "" : "the board does not hear our heartbeats: "),
@@ -179,7 +179,7 @@ Words link_words(const LinkStatus& link) {
 
 bool link_is_well(const LinkStatus& link) {
   return link.state == HostLinkState::active && !link.busy && !link.gated() &&
-         link.key == KeyTrouble::none && link.trouble == WireTrouble::none;
+         link.key == KeyTrouble::none && link.trouble == TransportTrouble::none;
 }
 
 // Is it a setting that a board takes over its own cable only?
@@ -247,7 +247,7 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
 Words unconfirmed_stop_words(const CommandResult& result, LinkStatus link) {
   link.gate = Gate::open;
   link.busy = false;
-  link.trouble = WireTrouble::none;
+  link.trouble = TransportTrouble::none;
   link.key = KeyTrouble::none;
   Words why = link_words(link);
   if (link.state == HostLinkState::active && !link.transport_down) {
@@ -340,13 +340,13 @@ Problem explain(KeyTrouble trouble) {
   return {ErrorKind::refused, "key", std::move(words.reason), std::move(words.fix)};
 }
 
-const char* to_text(WireTrouble trouble) {
+const char* to_text(TransportTrouble trouble) {
   switch (trouble) {
-    case WireTrouble::none:
+    case TransportTrouble::none:
       break;
-    case WireTrouble::foreign_frames:
+    case TransportTrouble::foreign_frames:
       return "foreign frames";
-    case WireTrouble::late_frames:
+    case TransportTrouble::late_frames:
       return "late frames";
   }
   return "none";
@@ -381,15 +381,15 @@ Problem explain(std::string_view name, const LinkStatus& link) {
   return {ErrorKind::refused, std::string(name), std::move(words.reason), std::move(words.fix)};
 }
 
-Problem explain(const std::vector<Wire>& wires) {
+Problem explain(const std::vector<PathStatus>& paths) {
   std::string names;
   std::string boards;
-  for (const Wire& wire : wires) {
-    const bool unnamed = wire.board_id.empty();  // on a bus nobody asks who watches
-    if (unnamed && wire.state != WireState::other_board) continue;
-    names += (names.empty() ? "" : ", ") + wire.name;
-    boards += (boards.empty() ? "" : ", ") + wire.name + " to " +
-              (unnamed ? "one with another clock" : wire.board_id);
+  for (const PathStatus& path : paths) {
+    const bool unnamed = path.board_id.empty();  // on a bus nobody asks who watches
+    if (unnamed && path.state != PathState::other_board) continue;
+    names += (names.empty() ? "" : ", ") + path.name;
+    boards += (boards.empty() ? "" : ", ") + path.name + " to " +
+              (unnamed ? "one with another clock" : path.board_id);
   }
   return {ErrorKind::refused, std::move(names), "they lead to two boards: " + boards,
           "give the URLs of one board, or open each board by itself"};

@@ -27,7 +27,7 @@ Registry with_all() {
                   }
                   return sim::make_sim_carrier(io, url);
                 }});
-  registry.add({"replay", "replay:FILE[?speed=1&wire=1&from=0]", "what a board said in a recording",
+  registry.add({"replay", "replay:FILE[?speed=1&path=1&from=0]", "what a board said in a recording",
                 make_replay_carrier});
   return registry;
 }
@@ -46,8 +46,8 @@ std::string lower(std::string text) {
   return text;
 }
 
-// The same for URLs of the same wire, as far as they tell.
-std::string wire_of(const std::string& text) {
+// The same for URLs of the same path, as far as they tell.
+std::string path_of(const std::string& text) {
   Url url = Url::parse(text);
   url.take("share");
   const auto value = [&url](std::string_view key, std::string_view otherwise) {
@@ -67,9 +67,9 @@ std::string wire_of(const std::string& text) {
 
 }  // namespace
 
-void require_wires(std::size_t count) {
+void require_paths(std::size_t count) {
   if (count >= 1 && count <= Session::most_paths) return;
-  throw Error(ErrorKind::usage, std::to_string(count) + " wires to one board",
+  throw Error(ErrorKind::usage, std::to_string(count) + " paths to one board",
               "one to " + std::to_string(Session::most_paths) + " are possible",
               "give the URLs of one board, at most " + std::to_string(Session::most_paths));
 }
@@ -79,10 +79,10 @@ std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
                                                          BoardRole role) {
   std::vector<std::string> all;
   for (const std::string& text : urls) {
-    for (std::string& url : split_wires(text)) all.push_back(std::move(url));
+    for (std::string& url : split_paths(text)) all.push_back(std::move(url));
   }
-  require_wires(all.size());
-  std::vector<std::string> wires;
+  require_paths(all.size());
+  std::vector<std::string> paths;
   std::vector<std::unique_ptr<Carrier>> carriers;
   bool has_host_port = false;
   for (const std::string& url : all) {
@@ -92,13 +92,13 @@ std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
         make_host_carrier(io, udp && has_host_port ? with_own_port(url) : url, role));
     has_host_port = has_host_port || udp;
     if (all.size() > 1 && (scheme == "sim" || scheme == "replay")) {
-      throw Error(ErrorKind::usage, url, "it is a board of its own, not a wire to another",
+      throw Error(ErrorKind::usage, url, "it is a board of its own, not a path to another",
                   "open it alone");
     }
-    wires.push_back(wire_of(url));
-    if (std::count(wires.begin(), wires.end(), wires.back()) > 1) {
-      throw Error(ErrorKind::usage, url, "the same wire is given twice",
-                  "give each wire to the board once");
+    paths.push_back(path_of(url));
+    if (std::count(paths.begin(), paths.end(), paths.back()) > 1) {
+      throw Error(ErrorKind::usage, url, "the same path is given twice",
+                  "give each path to the board once");
     }
   }
   return carriers;

@@ -20,7 +20,7 @@ const Registry& standard_registry();
 std::unique_ptr<Carrier> make_host_carrier(asio::io_context& io, std::string_view url,
                                            BoardRole role);
 
-// Those of several wires to one board; a text may join several (url_pattern.hpp). Throws Error{usage} for none, for more than a session has, for the same one
+// Those of several paths to one board; a text may join several (url_pattern.hpp). Throws Error{usage} for none, for more than a session has, for the same one
 // twice, and for several of which one is a board of its own (sim:, replay:). Of several udp: URLs only the first
 // has the port of hosts, unless they name one.
 std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
@@ -28,6 +28,6 @@ std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
                                                          BoardRole role);
 
 // Throws Error{usage} if a session cannot have so many.
-void require_wires(std::size_t count);
+void require_paths(std::size_t count);
 
 }  // namespace r4

@@ -95,8 +95,8 @@ std::vector<std::string> numbers_of(std::string_view pattern, std::string_view l
   return numbers;
 }
 
-// Of one wire.
-std::vector<PatternUrl> expand_wire(std::string_view pattern) {
+// Of one path.
+std::vector<PatternUrl> expand_path(std::string_view pattern) {
   std::vector<PatternUrl> all{{"", ""}};
   std::string text = with_braces(pattern);
   std::string_view rest = text;
@@ -132,17 +132,17 @@ std::vector<PatternUrl> expand_wire(std::string_view pattern) {
 
 std::vector<PatternUrl> expand_urls(std::string_view pattern) {
   std::vector<PatternUrl> boards;
-  for (const std::string& wire : split_wires(pattern)) {
-    std::vector<PatternUrl> urls = expand_wire(wire);
+  for (const std::string& path : split_paths(pattern)) {
+    std::vector<PatternUrl> urls = expand_path(path);
     if (boards.empty()) {
       boards = std::move(urls);
       continue;
     }
     if (urls.size() != boards.size()) {
       throw Error(ErrorKind::usage, std::string(pattern),
-                  "its wires lead to " + std::to_string(boards.size()) + " and to " +
+                  "its paths lead to " + std::to_string(boards.size()) + " and to " +
                       std::to_string(urls.size()) + " boards",
-                  "give each wire a range of the same length, as in "
+                  "give each path a range of the same length, as in "
                   "can://can0?node=0-7+can://can1?node=0-7");
     }
     for (std::size_t i = 0; i < boards.size(); ++i) boards[i].url += "+" + urls[i].url;
@@ -164,7 +164,7 @@ std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns) {
   return boards;
 }
 
-std::vector<std::string> split_wires(std::string_view text) {
+std::vector<std::string> split_paths(std::string_view text) {
   std::vector<std::string> urls;
   std::size_t begin = 0;
   for (std::size_t plus = text.find('+'); plus != std::string_view::npos;
@@ -179,14 +179,14 @@ std::vector<std::string> split_wires(std::string_view text) {
   return urls;
 }
 
-bool has_wire(std::string_view text, std::string_view scheme) {
-  const std::vector<std::string> urls = split_wires(text);
+bool has_path(std::string_view text, std::string_view scheme) {
+  const std::vector<std::string> urls = split_paths(text);
   return std::any_of(urls.begin(), urls.end(), [scheme](const std::string& url) {
     return Url::parse(url).scheme() == scheme;
   });
 }
 
-std::string join_wires(const std::vector<std::string>& urls) {
+std::string join_paths(const std::vector<std::string>& urls) {
   std::string text;
   for (const std::string& url : urls) text += (text.empty() ? "" : "+") + url;
   return text;

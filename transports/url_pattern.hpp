@@ -6,7 +6,7 @@
 // A range of nodes or of ports needs no braces. Of several braces the last counts fastest. A number that begins with 0
 // keeps its width: {07-12} is 07, 08 …
 //
-// And for those of several wires to one board (docs/redundancy.md):
+// And for those of several paths to one board (docs/redundancy.md):
 //
 //     serial:auto+udp://192.168.0.125          can://can0?node=0-7+can://can1?node=0-7
 //
@@ -23,7 +23,7 @@
 namespace r4 {
 
 struct PatternUrl {
-  std::string url;     // of several wires: joined
+  std::string url;     // of several paths: joined
   std::string number;  // what the pattern has become, "7" or "3-7"; empty where the text is a URL
 };
 
@@ -36,10 +36,10 @@ std::vector<PatternUrl> expand_urls(std::string_view pattern);
 // Of several texts, each of other boards: throws Error{usage} for a URL that is there twice, too.
 std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns);
 
-// The URLs of the wires that a text joins; of one URL that alone. They are not looked at.
-std::vector<std::string> split_wires(std::string_view text);
-std::string join_wires(const std::vector<std::string>& urls);
+// The URLs of the paths that a text joins; of one URL that alone. They are not looked at.
+std::vector<std::string> split_paths(std::string_view text);
+std::string join_paths(const std::vector<std::string>& urls);
 // Has one of them that scheme?
-bool has_wire(std::string_view text, std::string_view scheme);
+bool has_path(std::string_view text, std::string_view scheme);
 
 }  // namespace r4

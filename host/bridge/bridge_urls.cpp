@@ -75,11 +75,11 @@ void require_board(const Url& board) {
   }
 }
 
-void require_one_wire(std::string_view side) {
-  if (split_wires(side).size() == 1) return;
+void require_one_path(std::string_view side) {
+  if (split_paths(side).size() == 1) return;
   throw Error(ErrorKind::usage, std::string(side),
-              "a side of a bridge is one wire, and these are several",
-              "begin a bridge for each wire of the board; its host joins them, as in "
+              "a side of a bridge is one path, and these are several",
+              "begin a bridge for each path of the board; its host joins them, as in "
               "udp://ROBOT:2018+udp://ROBOT:2019");
 }
 
@@ -99,8 +99,8 @@ bool is_of_this_computer(const std::string& hosts) {
 }
 
 std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board) {
-  require_one_wire(hosts);
-  require_one_wire(board);
+  require_one_path(hosts);
+  require_one_path(board);
   std::vector<PatternUrl> a = expand_urls(hosts);
   std::vector<PatternUrl> b = expand_urls(board);
   if (a.size() != b.size()) {

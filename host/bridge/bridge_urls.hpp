@@ -13,7 +13,7 @@ struct BridgedUrls {
   std::string board;
 };
 
-// Throws Error{usage} for patterns of different lengths, for a side of several wires, for a side that would be
+// Throws Error{usage} for patterns of different lengths, for a side of several paths, for a side that would be
 // joined to itself, and for what cannot be a side.
 std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board);
 

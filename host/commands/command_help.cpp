@@ -180,7 +180,7 @@ Problem failed_transfer(std::string_view command, I2cOutcome outcome) {
   Problem problem{ErrorKind::refused, std::string(command), to_text(outcome), ""};
   switch (outcome) {
     case I2cOutcome::no_acknowledge:
-      problem.fix = "X:SCAN shows which addresses answer; look at supply, wires and pull-ups";
+      problem.fix = "X:SCAN shows which addresses answer; look at supply, paths and pull-ups";
       break;
     case I2cOutcome::bus_stuck:
       problem.fix =
@@ -219,12 +219,12 @@ void require_any(const Setpoints& group) {
 }
 
 void require_cable(std::string_view url, std::string_view secret) {
-  for (const std::string& wire : split_wires(url)) {
+  for (const std::string& path : split_paths(url)) {
     const bool own =
-        wire.starts_with("serial:") || wire.starts_with("sim:") || wire.starts_with("memory:");
+        path.starts_with("serial:") || path.starts_with("sim:") || path.starts_with("memory:");
     if (own) continue;
     throw Error(ErrorKind::usage, std::string(secret),
-                fmt::format("a board takes it over USB only, and at {} others would see it", wire),
+                fmt::format("a board takes it over USB only, and at {} others would see it", path),
                 "use serial:auto");
   }
 }

@@ -60,7 +60,7 @@ Problem failed_transfer(std::string_view command, I2cOutcome outcome);
 // Throws Error{usage} for a group of no commands. There are none with wrong ones.
 void require_any(const Setpoints& group);
 
-// Throws Error{usage} unless `url`, each of several wires, is of a board's own cable: elsewhere, on a network or a bus, others
+// Throws Error{usage} unless `url`, each of several paths, is of a board's own cable: elsewhere, on a network or a bus, others
 // would see what the board does not even take there: `secret`, in words.
 void require_cable(std::string_view url, std::string_view secret);
 // The same for a command with a secret; others may go anywhere.

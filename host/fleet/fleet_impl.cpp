@@ -162,7 +162,7 @@ BoardHealth Fleet::Impl::health_of(std::size_t board) const {
   health.in_control = async.in_control();
   health.disarmed_by = async.disarmed_by();
   health.statistics = async.statistics();
-  if (std::vector<Wire> wires = async.wires(); wires.size() > 1) health.wires = std::move(wires);
+  if (std::vector<PathStatus> paths = async.paths(); paths.size() > 1) health.paths = std::move(paths);
   return health;
 }
 

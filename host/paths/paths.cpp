@@ -5,17 +5,17 @@
 
 namespace r4 {
 
-const char* to_text(WireState state) {
+const char* to_text(PathState state) {
   switch (state) {
-    case WireState::down:
+    case PathState::down:
       return "down";
-    case WireState::asking:
+    case PathState::asking:
       return "asking";
-    case WireState::other_board:
+    case PathState::other_board:
       return "other board";
-    case WireState::silent:
+    case PathState::silent:
       return "silent";
-    case WireState::carrying:
+    case PathState::carrying:
       return "carrying";
   }
   return "unknown";
@@ -347,17 +347,17 @@ PathSet Paths::carrying(Time now) const {
   return set;
 }
 
-WireState Paths::state(const Path& path, Time now) const {
-  if (!path.up) return WireState::down;
-  if (path.other) return WireState::other_board;
-  if (!path.known) return WireState::asking;
-  return is_heard(path, now) ? WireState::carrying : WireState::silent;
+PathState Paths::state(const Path& path, Time now) const {
+  if (!path.up) return PathState::down;
+  if (path.other) return PathState::other_board;
+  if (!path.known) return PathState::asking;
+  return is_heard(path, now) ? PathState::carrying : PathState::silent;
 }
 
-Wire Paths::report(std::size_t index, Time now) const {
+PathStatus Paths::report(std::size_t index, Time now) const {
   const auto microseconds = [](Time time) { return static_cast<double>(time.count()); };
   const Path& path = paths_[index];
-  Wire report;
+  PathStatus report;
   report.state = state(path, now);
   report.age_us = path.heard.count() != 0 ? microseconds(now - path.heard) : 0;
   report.busy = now < path.busy.until;

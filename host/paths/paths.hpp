@@ -119,7 +119,7 @@ class Paths {
   PathSet carrying(Time now) const;
   bool two_boards() const;
   // Everything but the name.
-  Wire report(std::size_t index, Time now) const;
+  PathStatus report(std::size_t index, Time now) const;
   const PacketCounters& counters() const { return news_.counters(); }
 
  private:
@@ -159,7 +159,7 @@ class Paths {
   bool all_connecting(Time now) const;
   bool others_carry(const Path& path, Time now) const;
   bool refuses(const Path& path, Time now) const;
-  WireState state(const Path& path, Time now) const;
+  PathState state(const Path& path, Time now) const;
 
   std::vector<Path> paths_;
   Time timeout_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a recording is made of (docs/recordings.md): records, each at its time and of one wire.
+// What a recording is made of (docs/recordings.md): records, each at its time and of one path.
 #pragma once
 
 #include <cstdint>
@@ -17,25 +17,25 @@ enum class RecordKind : std::uint8_t {
 };
 
 // The recording itself, of which some events are.
-constexpr std::uint16_t no_wire = 0;
+constexpr std::uint16_t no_path = 0;
 
 struct Record {
   Time time{0};  // microseconds since 1970, UTC
-  std::uint16_t wire = no_wire;
+  std::uint16_t path = no_path;
   RecordKind kind = RecordKind::event;
   std::string_view bytes;  // the datagram without its terminator, or the event's words
 };
 
 // How one board is reached.
-struct RecordedWire {
+struct RecordedPath {
   std::uint16_t number = 1;
   std::string url;
   std::string name;  // the board's, or its id; empty while it has not told
 };
 
-// A described device of the board at a wire, and the text of its description (docs/described-devices.md).
+// A described device of the board at a path, and the text of its description (docs/described-devices.md).
 struct RecordedDevice {
-  std::uint16_t wire = 1;
+  std::uint16_t path = 1;
   std::string place;  // "bno055@0x28:1"
   std::string description;
 };

@@ -19,7 +19,7 @@ using std::chrono::year_month_day;
 constexpr std::chrono::seconds second{1};
 constexpr std::size_t decimals = 6;
 constexpr std::string_view header_words = "# r4log ";
-constexpr std::string_view wire_words = "# wire ";
+constexpr std::string_view path_words = "# path ";
 constexpr std::string_view device_words = "# device ";
 constexpr std::string_view hex_digits = "0123456789abcdef";
 
@@ -117,14 +117,14 @@ bool take_number(std::string_view& text, char end, std::uint32_t limit, std::uin
   return true;
 }
 
-constexpr std::uint32_t max_wire = std::numeric_limits<std::uint16_t>::max();
+constexpr std::uint32_t max_path = std::numeric_limits<std::uint16_t>::max();
 
 // "1 WORD" or "1 WORD OTHER".
-bool read_of_wire(std::string_view text, std::uint16_t& wire, std::string& word,
+bool read_of_path(std::string_view text, std::uint16_t& path, std::string& word,
                   std::string& other) {
   std::uint32_t number = 0;
-  if (!take_number(text, ' ', max_wire, number) || number == no_wire) return false;
-  wire = static_cast<std::uint16_t>(number);
+  if (!take_number(text, ' ', max_path, number) || number == no_path) return false;
+  path = static_cast<std::uint16_t>(number);
   word.clear();
   other.clear();
   const std::size_t blank = text.find(' ');
@@ -144,21 +144,21 @@ LineKind read_comment(std::string_view line, RecordLine& out) {
                ? LineKind::header
                : damaged(out, "a header without a version");
   }
-  if (line.starts_with(wire_words)) {
-    line.remove_prefix(wire_words.size());
-    if (!read_of_wire(line, out.wire.number, out.wire.url, out.wire.name)) {
-      return damaged(out, "no wire is written so");
+  if (line.starts_with(path_words)) {
+    line.remove_prefix(path_words.size());
+    if (!read_of_path(line, out.path.number, out.path.url, out.path.name)) {
+      return damaged(out, "no path is written so");
     }
     // Elsewhere it becomes a cell, a topic or a label: what no board is called is no name.
-    if (!is_board_id(Text(out.wire.name))) out.wire.name.clear();
-    return LineKind::wire;
+    if (!is_board_id(Text(out.path.name))) out.path.name.clear();
+    return LineKind::path;
   }
   if (line.starts_with(device_words)) {
     line.remove_prefix(device_words.size());
     if (line.empty() || line[0] < '0' || line[0] > '9') return LineKind::comment;  // a person's
     RecordedDevice& device = out.device;
     // It is shown as it is.
-    return read_of_wire(line, device.wire, device.place, device.description) &&
+    return read_of_path(line, device.path, device.place, device.description) &&
                    std::all_of(device.place.begin(), device.place.end(), is_plain)
                ? LineKind::device
                : damaged(out, "no device is written so");
@@ -175,13 +175,13 @@ LineKind read_record(std::string_view line, RecordLine& out) {
   line.remove_prefix(time_size + 1);
   const std::size_t blank = line.find(' ');
   if (blank == std::string_view::npos || blank < 2 || !kind_of(line[blank - 1], out.record.kind)) {
-    return damaged(out, "no wire and direction behind the time");
+    return damaged(out, "no path and direction behind the time");
   }
-  std::uint32_t wire = 0;
-  if (!parse_number(Text(line.substr(0, blank - 1)), wire) || wire > max_wire) {
-    return damaged(out, "no wire and direction behind the time");
+  std::uint32_t path = 0;
+  if (!parse_number(Text(line.substr(0, blank - 1)), path) || path > max_path) {
+    return damaged(out, "no path and direction behind the time");
   }
-  out.record.wire = static_cast<std::uint16_t>(wire);
+  out.record.path = static_cast<std::uint16_t>(path);
   out.text.clear();
   if (!append_unescaped(out.text, line.substr(blank + 1))) {
     return damaged(out, "what is not printable is not written as \\xNN");
@@ -221,7 +221,7 @@ bool append_unescaped(std::string& out, std::string_view text) {
 
 Record without_secrets(Record record, RecordRoom& room) {
   record.bytes = record.bytes.substr(0, max_record_bytes);
-  // Of events only this one has bytes of a wire.
+  // Of events only this one has bytes of a path.
   constexpr std::string_view oversize = "oversize ";
   std::size_t before = 0;
   if (record.kind == RecordKind::event) {
@@ -239,25 +239,25 @@ void write_record_header(std::string& out) {
   out += header_words;
   append_number(out, record_version);
   out += " by r4 " R4LINK_VERSION
-         "\n# seconds since 1970 (UTC), the number of the wire, < from the board > to the board ! "
+         "\n# seconds since 1970 (UTC), the number of the path, < from the board > to the board ! "
          "event; \\xNN is a byte\n";
 }
 
-void write_wire(std::string& out, const RecordedWire& wire) {
-  out += wire_words;
-  append_number(out, wire.number);
+void write_path(std::string& out, const RecordedPath& path) {
+  out += path_words;
+  append_number(out, path.number);
   out += ' ';
-  append_word(out, wire.url);
-  if (!wire.name.empty()) {
+  append_word(out, path.url);
+  if (!path.name.empty()) {
     out += ' ';
-    append_word(out, wire.name);
+    append_word(out, path.name);
   }
   out += '\n';
 }
 
 void write_device(std::string& out, const RecordedDevice& device) {
   out += device_words;
-  append_number(out, device.wire);
+  append_number(out, device.path);
   out += ' ';
   append_word(out, device.place);
   out += ' ';
@@ -269,7 +269,7 @@ void write_record(std::string& out, const Record& record) {
   std::array<char, 2 * max_number_text + decimals> head;
   char* end = write_time(head.data(), record.time);
   *end++ = ' ';
-  end = write_number(end, std::uint32_t{record.wire});
+  end = write_number(end, std::uint32_t{record.path});
   *end++ = mark_of(record.kind);
   *end++ = ' ';
   out.append(head.data(), static_cast<std::size_t>(end - head.data()));

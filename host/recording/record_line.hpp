@@ -2,7 +2,7 @@
 // The lines of a recording: written, and read back.
 //
 //     # r4log 1 by r4 0.1.0
-//     # wire 1 serial:///dev/ttyACM0 left-arm
+//     # path 1 serial:///dev/ttyACM0 left-arm
 //     # device 1 bno055@0x28:1 name bno055\x0atitle…
 //     # from 2026-11-23T21:11:33.404765Z
 //     1795468293.404765 1< AIN24:24.28;PNum:7434;T:79090;^0xf07cfd9a^
@@ -25,7 +25,7 @@ namespace r4 {
 constexpr std::uint32_t record_version = 1;
 // What a record may hold; a datagram is shorter, what a damaged stream gives may not be.
 constexpr std::size_t max_record_bytes = 4096;
-// The longest line there is, without its end: all of it escaped, and its time and wire before it.
+// The longest line there is, without its end: all of it escaped, and its time and path before it.
 constexpr std::size_t max_record_line = 4 * max_record_bytes + 64;
 
 // A record as it may be kept: its datagram, or what begins one in an event `oversize`, is
@@ -38,7 +38,7 @@ Record without_secrets(Record record, RecordRoom& room);
 void write_record_header(std::string& out);
 // For people: when the first record is from.
 void write_beginning(std::string& out, Time time);
-void write_wire(std::string& out, const RecordedWire& wire);
+void write_path(std::string& out, const RecordedPath& path);
 // At most max_record_bytes of description.
 void write_device(std::string& out, const RecordedDevice& device);
 // Bytes beyond max_record_bytes are left out. A time outside of the years 1970 to 9999 is written as the next
@@ -51,7 +51,7 @@ enum class LineKind : std::uint8_t {
   damaged,  // none of these: `problem` says why
   record,
   header,
-  wire,
+  path,
   device,
   comment,  // another line that begins with #; of a later version, or a person's
 };
@@ -61,7 +61,7 @@ struct RecordLine {
   LineKind kind = LineKind::damaged;
   const char* problem = "";
   Record record;  // its bytes are in `text`
-  RecordedWire wire;
+  RecordedPath path;
   RecordedDevice device;
   std::uint32_t version = 0;
   std::string text;

@@ -67,20 +67,20 @@ Time Recorder::steady_now() {
 
 // --- any thread
 
-std::uint16_t Recorder::add_wire(std::string url) {
+std::uint16_t Recorder::add_path(std::string url) {
   const std::lock_guard lock(mutex_);
-  const auto number = static_cast<std::uint16_t>(wires_.size() + 1);
-  wires_.push_back({number, std::move(url), {}});
+  const auto number = static_cast<std::uint16_t>(paths_.size() + 1);
+  paths_.push_back({number, std::move(url), {}});
   undeclared_.push_back(number);
   return number;
 }
 
-void Recorder::name_wire(std::uint16_t wire, std::string name) {
+void Recorder::name_path(std::uint16_t path, std::string name) {
   const std::lock_guard lock(mutex_);
-  RecordedWire& known = wires_[wire - 1U];
+  RecordedPath& known = paths_[path - 1U];
   if (known.name == name) return;
   known.name = std::move(name);
-  undeclared_.push_back(wire);
+  undeclared_.push_back(path);
 }
 
 void Recorder::add_device(RecordedDevice device) {
@@ -89,7 +89,7 @@ void Recorder::add_device(RecordedDevice device) {
   undeclared_devices_.push_back(std::move(device));
 }
 
-void Recorder::record(std::uint16_t wire, RecordKind kind, std::string_view bytes, Time at) {
+void Recorder::record(std::uint16_t path, RecordKind kind, std::string_view bytes, Time at) {
   if (ended()) return;
   bytes = bytes.substr(0, max_record_bytes);
   const std::lock_guard lock(mutex_);
@@ -99,7 +99,7 @@ void Recorder::record(std::uint16_t wire, RecordKind kind, std::string_view byte
     ++dropped_;
     return;
   }
-  const Head head{recorded(at), static_cast<std::uint32_t>(bytes.size()), wire, kind};
+  const Head head{recorded(at), static_cast<std::uint32_t>(bytes.size()), path, kind};
   waiting_.resize(before + sizeof head + bytes.size());
   std::memcpy(&waiting_[before], &head, sizeof head);
   std::copy(bytes.begin(), bytes.end(), &waiting_[before + sizeof head]);
@@ -142,7 +142,7 @@ void Recorder::run() {
   batch_.reserve(capacity);
   try {
     for (bool last = false; !last;) {
-      std::vector<RecordedWire> fresh;
+      std::vector<RecordedPath> fresh;
       std::vector<RecordedDevice> devices;
       {
         std::unique_lock lock(mutex_);
@@ -150,11 +150,11 @@ void Recorder::run() {
                          [this] { return closing_ || waiting_.size() > capacity / 2; });
         last = closing_;
         batch_.swap(waiting_);
-        for (const std::uint16_t number : undeclared_) fresh.push_back(wires_[number - 1U]);
+        for (const std::uint16_t number : undeclared_) fresh.push_back(paths_[number - 1U]);
         undeclared_.clear();
         devices.swap(undeclared_devices_);
       }
-      for (const RecordedWire& wire : fresh) writer_.declare(wire);
+      for (const RecordedPath& path : fresh) writer_.declare(path);
       for (const RecordedDevice& device : devices) writer_.declare(device);
       written_until_ = last ? now() : now() - settled;
       write();
@@ -191,7 +191,7 @@ void Recorder::write() {
   std::vector<char> rest;
   for (const auto& [head, at] : order_) {
     if (head.time <= written_until_) {
-      writer_.append({head.time, head.wire, head.kind, {at + sizeof head, head.size}});
+      writer_.append({head.time, head.path, head.kind, {at + sizeof head, head.size}});
     } else {
       rest.insert(rest.end(), at, at + sizeof head + head.size);
     }
@@ -210,7 +210,7 @@ void Recorder::put_in_order(const std::vector<char>& records) {
 }
 
 void Recorder::write_event(const std::string& text) {
-  writer_.append({written_until_, no_wire, RecordKind::event, text});
+  writer_.append({written_until_, no_path, RecordKind::event, text});
 }
 
 void Recorder::tell_of_what_was_dropped() {

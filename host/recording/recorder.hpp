@@ -34,17 +34,17 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  // The number of a new wire.
-  std::uint16_t add_wire(std::string url);
+  // The number of a new path.
+  std::uint16_t add_path(std::string url);
   // What the board there calls itself.
-  void name_wire(std::uint16_t wire, std::string name);
+  void name_path(std::uint16_t path, std::string name);
   // What the bytes of one of its devices mean.
   void add_device(RecordedDevice device);
   // Copies it. Allocates nothing; beyond max_record_bytes it is cut. `at`: when it was, by the steady clock; records
   // are written in the order of their times if none is told of more than `settled` later.
-  void record(std::uint16_t wire, RecordKind kind, std::string_view bytes, Time at);
-  void record(std::uint16_t wire, RecordKind kind, std::string_view bytes) {
-    record(wire, kind, bytes, steady_now());
+  void record(std::uint16_t path, RecordKind kind, std::string_view bytes, Time at);
+  void record(std::uint16_t path, RecordKind kind, std::string_view bytes) {
+    record(path, kind, bytes, steady_now());
   }
 
   // Writes what waits and ends the file.
@@ -67,7 +67,7 @@ class Recorder {
   struct Head {
     Time time;
     std::uint32_t size;
-    std::uint16_t wire;
+    std::uint16_t path;
     RecordKind kind;
   };
   struct Place {
@@ -104,7 +104,7 @@ class Recorder {
   mutable std::mutex mutex_;  // of what follows
   std::condition_variable wanted_;
   std::vector<char> waiting_;
-  std::vector<RecordedWire> wires_;
+  std::vector<RecordedPath> paths_;
   std::vector<std::uint16_t> undeclared_;
   std::vector<RecordedDevice> undeclared_devices_;
   std::uint64_t records_ = 0;

@@ -33,26 +33,26 @@ class Tour final : public RecordingReader::Handler {
     states_.clear();
     visitor_.on_beginning();
   }
-  void on_wire(const RecordedWire& wire) override {
-    visitor_.on_wire(wire.number, wire.url, wire.name);
+  void on_path(const RecordedPath& path) override {
+    visitor_.on_path(path.number, path.url, path.name);
   }
   void on_record(const Record& record) override {
     if (record.kind == RecordKind::event) {
-      return visitor_.on_event(record.wire, record.time, record.bytes);
+      return visitor_.on_event(record.path, record.time, record.bytes);
     }
     const bool from_board = record.kind == RecordKind::from_board;
-    visitor_.on_datagram(record.wire, record.time, from_board, record.bytes);
+    visitor_.on_datagram(record.path, record.time, from_board, record.bytes);
     Datagram datagram;
     if (!from_board || !read_datagram(record.bytes, datagram) ||
         kind_of(datagram) != MessageKind::state) {
       return;
     }
-    State& state = states_[record.wire];
-    if (read_state(datagram, state)) visitor_.on_state(record.wire, record.time, state);
+    State& state = states_[record.path];
+    if (read_state(datagram, state)) visitor_.on_state(record.path, record.time, state);
   }
   void on_device(const RecordedDevice& device) override {
     try {
-      visitor_.on_device(device.wire, Device::parse(device.place, device.description));
+      visitor_.on_device(device.path, Device::parse(device.place, device.description));
     } catch (const Error& error) {
       visitor_.on_damage(error.what());
     }

@@ -54,14 +54,14 @@ const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream)
       recognised_ = true;
       ended_ = false;
       damage_ = Damage::none;
-      wires_.clear();
+      paths_.clear();
       handler_.on_header();
       break;
-    case LineKind::wire: {
-      Wire& wire = wires_[read_.wire.number];
-      if (!wire.url.empty() && wire.url != read_.wire.url) on_sign_of_mixture();
-      wire = {read_.wire.url, std::nullopt};
-      handler_.on_wire(read_.wire);
+    case LineKind::path: {
+      Path& path = paths_[read_.path.number];
+      if (!path.url.empty() && path.url != read_.path.url) on_sign_of_mixture();
+      path = {read_.path.url, std::nullopt};
+      handler_.on_path(read_.path);
       return nullptr;
     }
     case LineKind::device:
@@ -75,17 +75,17 @@ const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream)
 }
 
 void RecordingLines::on_record(const Record& record, std::uint32_t stream, std::string_view url) {
-  Wire& wire = wires_[record.wire];
-  if (wire.stream.value_or(stream) != stream) on_sign_of_mixture();
-  if (!wire.url.empty() && !url.empty() && wire.url != url) on_sign_of_mixture();
-  wire.stream = stream;
+  Path& path = paths_[record.path];
+  if (path.stream.value_or(stream) != stream) on_sign_of_mixture();
+  if (!path.url.empty() && !url.empty() && path.url != url) on_sign_of_mixture();
+  path.stream = stream;
   tell(record);
 }
 
 void RecordingLines::tell(const Record& record) {
   if (ended_) on_sign_of_mixture();
   after_header_ = false;
-  ended_ = record.wire == no_wire && record.kind == RecordKind::event && record.bytes == "end";
+  ended_ = record.path == no_path && record.kind == RecordKind::event && record.bytes == "end";
   handler_.on_record(record);
 }
 

@@ -34,11 +34,11 @@ struct RecordingDamage {
 class RecordingHandler {
  public:
   virtual void on_record(const Record& record) = 0;
-  // Comes before the first record of that wire, and again when more is known of it. Behind a new header wires
+  // Comes before the first record of that path, and again when more is known of it. Behind a new header paths
   // may be others than before.
-  virtual void on_wire(const RecordedWire& wire) = 0;
+  virtual void on_path(const RecordedPath& path) = 0;
   virtual void on_damage(const RecordingDamage& damage) = 0;
-  // What is at that place of that wire from now on, until a header.
+  // What is at that place of that path from now on, until a header.
   virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
   // A recording begins here, or goes on: one file may hold several.
   virtual void on_header() {}
@@ -52,12 +52,12 @@ class RecordingHandler {
 // Reads the lines of the native format, in a file of their own or in one of another format.
 //
 // One file may hold several recordings one after the other, each behind its header. It may not hold several that are
-// mixed, as `sort -m`, `mergecap` and `mcap merge` make them: the number of a wire means another board in each
+// mixed, as `sort -m`, `mergecap` and `mcap merge` make them: the number of a path means another board in each
 // recording, so the states of one board would be told as those of another. Such a file is refused. Its signs are
 // - a header that follows a header, or a record that follows the end of the recording,
-// - a wire whose URL changes without a header,
-// - lines, or datagrams of one wire, that come from another stream (an interface of a capture, a channel of MCAP)
-//   where no header or wire begins.
+// - a path whose URL changes without a header,
+// - lines, or datagrams of one path, that come from another stream (an interface of a capture, a channel of MCAP)
+//   where no header or path begins.
 // Where something could not be read before, the missing part may explain such a sign. Then the file is read on, and the
 // line damage_line is told, so that a copy of what was read can be read, too.
 class RecordingLines {
@@ -86,7 +86,7 @@ class RecordingLines {
   bool recognised() const { return recognised_; }
 
  private:
-  struct Wire {
+  struct Path {
     std::string url;
     std::optional<std::uint32_t> stream;
   };
@@ -101,7 +101,7 @@ class RecordingLines {
   bool ended_ = false;         // of the newest recording
   Damage damage_ = Damage::none;
   std::optional<std::uint32_t> stream_;  // of the lines, since the newest header
-  std::map<std::uint16_t, Wire> wires_;
+  std::map<std::uint16_t, Path> paths_;
 };
 
 class RecordingReader {

@@ -12,7 +12,7 @@ namespace r4 {
 
 void RecordingTap::attach(std::shared_ptr<Recorder> recorder, const std::string& url) {
   recorder_ = std::move(recorder);
-  wire_ = recorder_->add_wire(url);
+  path_ = recorder_->add_path(url);
   known_news_ = recorder_->news_count();
   state_ = HostLinkState::connecting;
   reason_ = SafeReason::none;
@@ -56,7 +56,7 @@ void RecordingTap::on_packets(const PacketCounters& packets) {
 }
 
 void RecordingTap::on_name(std::string_view name) {
-  if (recorder_) recorder_->name_wire(wire_, std::string(name));
+  if (recorder_) recorder_->name_path(path_, std::string(name));
 }
 
 void RecordingTap::on_device(const Device& device) {
@@ -68,7 +68,7 @@ void RecordingTap::on_device(const Device& device) {
         fmt::format("warning {}: its description has {} bytes and is left out; {} are room",
                     device.place(), description.size(), max_record_bytes));
   }
-  recorder_->add_device({wire_, device.place(), description});
+  recorder_->add_device({path_, device.place(), description});
 }
 
 }  // namespace r4

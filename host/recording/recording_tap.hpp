@@ -25,9 +25,9 @@ class RecordingTap {
 
   // `at`: when it came, by the steady clock.
   void on_received(std::string_view bytes, Time at) {
-    if (recorder_) recorder_->record(wire_, RecordKind::from_board, bytes, at);
+    if (recorder_) recorder_->record(path_, RecordKind::from_board, bytes, at);
   }
-  // By whoever: this program, or another one on the same wire.
+  // By whoever: this program, or another one on the same path.
   void on_sent(std::string_view bytes) { record(RecordKind::to_board, bytes); }
   void on_oversize(std::string_view beginning);
   void on_carrier_event(const CarrierEvent& event);
@@ -38,12 +38,12 @@ class RecordingTap {
 
  private:
   void record(RecordKind kind, std::string_view bytes) {
-    if (recorder_) recorder_->record(wire_, kind, bytes);
+    if (recorder_) recorder_->record(path_, kind, bytes);
   }
 
   std::shared_ptr<Recorder> recorder_;
   unsigned known_news_ = 0;
-  std::uint16_t wire_ = no_wire;
+  std::uint16_t path_ = no_path;
   HostLinkState state_ = HostLinkState::connecting;
   SafeReason reason_ = SafeReason::none;
   std::uint32_t lost_ = 0;

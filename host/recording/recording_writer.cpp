@@ -33,25 +33,25 @@ void RecordingWriter::begin_file() {
   // Whoever wrote the last line was ended in the midst of it; it stays a line of its own.
   if (file_->torn()) text_ += '\n';
   write_record_header(text_);
-  for (const RecordedWire& wire : wires_) write_wire(text_, wire);
+  for (const RecordedPath& path : paths_) write_path(text_, path);
   for (const RecordedDevice& device : devices_) write_device(text_, device);
 }
 
-void RecordingWriter::declare(const RecordedWire& wire) {
-  const auto known = std::find_if(wires_.begin(), wires_.end(), [&](const RecordedWire& each) {
-    return each.number == wire.number;
+void RecordingWriter::declare(const RecordedPath& path) {
+  const auto known = std::find_if(paths_.begin(), paths_.end(), [&](const RecordedPath& each) {
+    return each.number == path.number;
   });
-  if (known == wires_.end()) {
-    wires_.push_back(wire);
+  if (known == paths_.end()) {
+    paths_.push_back(path);
   } else {
-    *known = wire;
+    *known = path;
   }
-  write_wire(text_, wire);
+  write_path(text_, path);
 }
 
 void RecordingWriter::declare(const RecordedDevice& device) {
   std::erase_if(devices_, [&](const RecordedDevice& each) {
-    return each.wire == device.wire && each.place == device.place;
+    return each.path == device.path && each.place == device.place;
   });
   devices_.push_back(device);
   write_device(text_, device);

@@ -24,9 +24,9 @@ class RecordingWriter {
   // Opens the file. Throws Error.
   RecordingWriter(const std::string& path, const RecordingOptions& options);
 
-  // A wire, before its first record, or with more that is known of it. Throws as append() does.
-  void declare(const RecordedWire& wire);
-  // A device: in this file, and in those that follow; instead of another at that place of that wire.
+  // A path, before its first record, or with more that is known of it. Throws as append() does.
+  void declare(const RecordedPath& path);
+  // A device: in this file, and in those that follow; instead of another at that place of that path.
   void declare(const RecordedDevice& device);
   // Without the secrets in it. Each may write, and throws Error when that cannot be done.
   void append(const Record& record);
@@ -52,7 +52,7 @@ class RecordingWriter {
   std::optional<RecordingFile> file_;
   std::optional<Problem> trouble_;
   std::optional<ZstdWriter> zstd_;
-  std::vector<RecordedWire> wires_;
+  std::vector<RecordedPath> paths_;
   std::vector<RecordedDevice> devices_;
   RecordRoom room_;            // used again and again
   std::string text_;           // not written yet

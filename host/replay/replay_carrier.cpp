@@ -37,20 +37,20 @@ class ReplayCarrier final : public Carrier {
  public:
   ReplayCarrier(asio::io_context& io, const Url& url)
       : name_(url.text()),
-        path_(url.host().empty() ? url.path() : std::string()),
-        wire_(static_cast<std::uint16_t>(url.get_number("wire", 1, 65535, 1))),
+        file_(url.host().empty() ? url.path() : std::string()),
+        path_(static_cast<std::uint16_t>(url.get_number("path", 1, 65535, 1))),
         speed_(speed_of(url)),
         start_(ReplayStart::of(url.text(), url.get("from").value_or("0"))),
         timer_(io) {
-    url.allow_only("speed wire from");
-    if (path_.empty()) {
+    url.allow_only("speed path from");
+    if (file_.empty()) {
       throw Error(ErrorKind::usage, name_, "names no recording", "write replay:drive.r4log");
     }
   }
   ~ReplayCarrier() override { close(); }
 
   void open(Carrier::Handler& handler) override {
-    records_.emplace(name_, path_, wire_, start_);
+    records_.emplace(name_, file_, path_, start_);
     handler_ = &handler;
     first_ = records_->next()->time;
     began_ = std::chrono::steady_clock::now();
@@ -145,8 +145,8 @@ class ReplayCarrier final : public Carrier {
   }
 
   const std::string name_;
-  const std::string path_;
-  const std::uint16_t wire_;
+  const std::string file_;
+  const std::uint16_t path_;
   const double speed_;
   const ReplayStart start_;
   asio::steady_timer timer_;

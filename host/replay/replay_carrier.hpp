@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A recording as a transport: `replay:FILE[?speed=1&wire=1&from=0]`.
+// A recording as a transport: `replay:FILE[?speed=1&path=1&from=0]`.
 //
 //     speed   so many times as fast as it was, 0.01-1000
-//     wire    the number of the board in the recording
+//     path    the number of the board in the recording
 //     from    so many seconds of the recording are passed over; or the time at which it begins, in UTC:
 //             2026-11-23T21:20:00
 //
@@ -20,7 +20,7 @@
 namespace r4 {
 
 // Throws Error{usage} for a URL that replay does not take. open() throws Error for a file that is no recording, or
-// has no such wire.
+// has no such path.
 std::unique_ptr<Carrier> make_replay_carrier(asio::io_context& io, const Url& url, Role role);
 
 }  // namespace r4

@@ -11,11 +11,11 @@
 namespace r4 {
 namespace {
 
-const std::string& readable(const std::string& thing, const std::string& path) {
+const std::string& readable(const std::string& thing, const std::string& file) {
   std::error_code error;
-  const std::filesystem::file_status file = std::filesystem::status(path, error);
-  if (std::filesystem::is_regular_file(file)) return path;
-  const bool directory = std::filesystem::is_directory(file);
+  const std::filesystem::file_status status = std::filesystem::status(file, error);
+  if (std::filesystem::is_regular_file(status)) return file;
+  const bool directory = std::filesystem::is_directory(status);
   throw Error(ErrorKind::open, thing,
               error       ? error.message()
               : directory ? "is a directory"
@@ -39,20 +39,20 @@ ReplayStart ReplayStart::of(const std::string& thing, const std::string& text) {
               "write seconds such as 12.5, or a time in UTC such as 2026-11-23T21:20:00");
 }
 
-ReplayRecords::ReplayRecords(const std::string& thing, const std::string& path, std::uint16_t wire,
+ReplayRecords::ReplayRecords(const std::string& thing, const std::string& file, std::uint16_t path,
                              const ReplayStart& start)
-    : wire_(wire), start_(start), input_(readable(thing, path)), reader_(*this, path) {
+    : path_(path), start_(start), input_(readable(thing, file)), reader_(*this, file) {
   while (waiting_.empty() && read_on()) {
   }
   if (!waiting_.empty()) return;
   if (passed_over_) {
     throw Error(ErrorKind::data, thing,
-                "the last of that wire is of " + record_time_text(*passed_over_) +
+                "the last of that path is of " + record_time_text(*passed_over_) +
                     ", before the beginning that was asked for",
-                "begin earlier; r4 info " + path + " tells from when to when it goes");
+                "begin earlier; r4 info " + file + " tells from when to when it goes");
   }
-  throw Error(ErrorKind::data, thing, "nothing of that wire is there",
-              "r4 info " + path + " lists the wires");
+  throw Error(ErrorKind::data, thing, "nothing of that path is there",
+              "r4 info " + file + " lists the paths");
 }
 
 ReplayRecords::Item ReplayRecords::take() {
@@ -71,7 +71,7 @@ bool ReplayRecords::read_on() {
 
 void ReplayRecords::on_record(const Record& record) {
   if (!std::exchange(start_.absolute, true)) start_.time += record.time;
-  if (record.wire != wire_ || record.kind == RecordKind::to_board) return;
+  if (record.path != path_ || record.kind == RecordKind::to_board) return;
   if (record.kind == RecordKind::event && !is_of_the_transport(record.bytes)) return;
   if (record.time < start_.time) {
     passed_over_ = record.time;

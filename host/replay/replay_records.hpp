@@ -30,9 +30,9 @@ class ReplayRecords final : private RecordingReader::Handler {
     std::string bytes;
   };
 
-  // What is read must not wait for anybody: only files are. Reads as far as the first of that wire from `start` on.
+  // What is read must not wait for anybody: only files are. Reads as far as the first of that path from `start` on.
   // Throws Error, about `thing`.
-  ReplayRecords(const std::string& thing, const std::string& path, std::uint16_t wire,
+  ReplayRecords(const std::string& thing, const std::string& file, std::uint16_t path,
                 const ReplayStart& start);
 
   // The next one, if the file has been read so far: then take() it.
@@ -43,15 +43,15 @@ class ReplayRecords final : private RecordingReader::Handler {
 
  private:
   void on_record(const Record& record) override;
-  void on_wire(const RecordedWire&) override {}
+  void on_path(const RecordedPath&) override {}
   void on_damage(const RecordingDamage& damage) override;
 
-  const std::uint16_t wire_;
+  const std::uint16_t path_;
   ReplayStart start_;  // absolute, once a record was read
   RecordingInput input_;
   RecordingReader reader_;
   bool ended_ = false;
-  std::optional<Time> passed_over_;  // the latest record of that wire before the start
+  std::optional<Time> passed_over_;  // the latest record of that path before the start
   std::optional<Time> latest_;       // of what is there, as far as it was read
   std::deque<Item> waiting_;
 };

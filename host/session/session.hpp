@@ -81,7 +81,7 @@ class Session {
    public:
     virtual SendResult transmit(std::size_t path, std::string_view datagram, Priority priority) = 0;
     // Of the transports: what all of them have.
-    virtual WireTrouble trouble() const { return WireTrouble::none; }
+    virtual TransportTrouble trouble() const { return TransportTrouble::none; }
     virtual void on_state(const ReceivedState& state, const Datagram& datagram) = 0;
     virtual void on_board_heartbeat(const Datagram& datagram) = 0;
     virtual void on_identity(const Identity& identity) = 0;
@@ -182,7 +182,7 @@ class Session {
   // Of the board's datagrams.
   const PacketCounters& packets() const { return paths_.counters(); }
   // All of it but its name.
-  Wire path(std::size_t index, Time now) const { return paths_.report(index, now); }
+  PathStatus path(std::size_t index, Time now) const { return paths_.report(index, now); }
 
   static constexpr std::size_t max_pending = 64;
   static constexpr std::size_t max_stops = 16;

@@ -54,11 +54,11 @@ class AsyncBoard {
   using Duration = std::chrono::milliseconds;
   using executor_type = asio::io_context::executor_type;
 
-  // Throws Error{usage} for a wrong URL. The io_context must outlive the board. '+' joins several wires to it.
+  // Throws Error{usage} for a wrong URL. The io_context must outlive the board. '+' joins several paths to it.
   AsyncBoard(const executor_type& executor, std::string_view url, BoardOptions options = {});
   AsyncBoard(asio::io_context& io, std::string_view url, BoardOptions options = {})
       : AsyncBoard(io.get_executor(), url, std::move(options)) {}
-  // Over several wires at once, up to four, all to the same board (docs/redundancy.md). Throws Error{usage} also
+  // Over several paths at once, up to four, all to the same board (docs/redundancy.md). Throws Error{usage} also
   // for one that is there twice, and for sim: and replay:, which are boards of their own.
   AsyncBoard(const executor_type& executor, const std::vector<std::string>& urls,
              BoardOptions options = {});
@@ -236,10 +236,10 @@ class AsyncBoard {
   DisarmCause disarmed_by() const;
   const BoardIdentity& identity() const;
   Statistics statistics() const;
-  const CarrierCounters& carrier_counters() const;  // of several wires: of all together
+  const CarrierCounters& carrier_counters() const;  // of several paths: of all together
   const std::string& name() const;                  // of several: all names
-  // How each of its wires does, in the order of the URLs.
-  std::vector<Wire> wires() const;
+  // How each of its paths does, in the order of the URLs.
+  std::vector<PathStatus> paths() const;
 
   // Any number of callbacks of each kind, called in the order in which they were added; the handle ends
   // one (subscription.hpp). Of the states that came while the event loop was held up for more than
@@ -249,13 +249,13 @@ class AsyncBoard {
   Subscription on_board_heartbeat(std::function<void(const Datagram&)> callback);
   Subscription on_nack(std::function<void(const Nack&, const Datagram&)> callback);
   Subscription on_bad_datagram(std::function<void(const ReadResult&, std::string_view)> callback);
-  // What other programs send to the board on a shared wire (docs/sharing.md): heartbeats and commands
+  // What other programs send to the board on a shared transport (docs/sharing.md): heartbeats and commands
   // of the controlling host, stops of any. Dots stand for a key or a password.
   Subscription on_overheard(std::function<void(std::string_view)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
-  // A wire has begun to carry, or ceased to. A transport that tells that it is gone is told of at
+  // A path has begun to carry, or ceased to. A transport that tells that it is gone is told of at
   // once, any other after SessionOptions::timing's timeout.
-  Subscription on_wire(std::function<void(const Wire&)> callback);
+  Subscription on_path(std::function<void(const PathStatus&)> callback);
   // The transport, and a warning where the event loop was held up for so long that heartbeats were late.
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
   // The board has begun again, or this computer slept for longer than the board waits for its host:

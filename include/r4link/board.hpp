@@ -53,7 +53,7 @@ struct BoardCallbacks {
   std::function<void(const ReceivedState&)> on_state;
   std::function<void(const LinkStatus&)> on_link;
   std::function<void(const CarrierEvent&)> on_event;
-  std::function<void(const Wire&)> on_wire;
+  std::function<void(const PathStatus&)> on_path;
   std::function<void()> on_restart;
   std::function<void(DisarmCause)> on_arming;
   std::function<void(const RefusedPost&)> on_refused;
@@ -104,9 +104,9 @@ class R4LINK_API Board {
 
   // Opens the transport and begins the link; returns without waiting for the board. Throws Error.
   explicit Board(std::string_view url, BoardOptions options = {}, BoardCallbacks callbacks = {});
-  // Over several wires at once, up to four, all to the same board: {"serial:auto", "udp://192.168.0.125"}
+  // Over several paths at once, up to four, all to the same board: {"serial:auto", "udp://192.168.0.125"}
   // (docs/redundancy.md); in one text, wherever that is opened as a board, '+' joins them. Throws Error{usage} also
-  // for one that is there twice, and for sim: and replay:, which are boards of their own. A wire that cannot be
+  // for one that is there twice, and for sim: and replay:, which are boards of their own. A path that cannot be
   // opened yet is tried again every second, and on_event tells why; it throws if none can be opened.
   explicit Board(const std::vector<std::string>& urls, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
@@ -327,12 +327,12 @@ class R4LINK_API Board {
   States states(StatesOptions options = {});
   LinkStatus link() const;
   Statistics statistics() const;
-  // What the transport has carried; of several wires all together.
+  // What the transport has carried; of several paths all together.
   CarrierCounters carrier_counters() const;
-  // The transport, for people; of several wires all of them. A USB board that is plugged in again may have another.
+  // The transport, for people; of several paths all of them. A USB board that is plugged in again may have another.
   std::string name() const;
-  // How each of its wires does, in the order of the URLs; after close() as it was then.
-  std::vector<Wire> wires() const;
+  // How each of its paths does, in the order of the URLs; after close() as it was then.
+  std::vector<PathStatus> paths() const;
 
   // Any number of callbacks of each kind, called in the order in which they were added. Each is told
   // first what there is already: the newest state, the link, the newest up or down of the transport and
@@ -340,8 +340,8 @@ class R4LINK_API Board {
   Subscription on_state(std::function<void(const ReceivedState&)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
-  // A wire has begun to carry, or ceased to.
-  Subscription on_wire(std::function<void(const Wire&)> callback);
+  // A path has begun to carry, or ceased to.
+  Subscription on_path(std::function<void(const PathStatus&)> callback);
   // The board has begun again, or this computer slept for longer than the board waits for its host:
   // what it was told is gone, thresholds of U too. Comes before its new state.
   Subscription on_restart(std::function<void()> callback);

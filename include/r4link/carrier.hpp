@@ -32,14 +32,14 @@ enum class SendResult : std::uint8_t {
 };
 
 // Why datagrams do not pass although the transport is up (CAN).
-enum class WireTrouble : std::uint8_t {
+enum class TransportTrouble : std::uint8_t {
   none,
   // frames that make no R4 datagram come on the board's command id: another protocol uses it
   foreign_frames,
   late_frames,  // flow control does not come in time: frames are held back, or lost
 };
 // "none", "foreign frames", "late frames".
-R4LINK_API const char* to_text(WireTrouble trouble);
+R4LINK_API const char* to_text(TransportTrouble trouble);
 
 // Where a datagram travels in several frames (CAN): what became of the transfers, of both directions.
 struct TransferCounters {
@@ -178,7 +178,7 @@ class R4LINK_API Carrier {
 
   virtual bool up() const = 0;
   // Why datagrams do not pass although the transport is up, as far as it can tell.
-  virtual WireTrouble trouble() const { return WireTrouble::none; }
+  virtual TransportTrouble trouble() const { return TransportTrouble::none; }
   // For people: the URL, with what `auto` found.
   virtual const std::string& name() const = 0;
   virtual const CarrierCounters& counters() const = 0;

@@ -11,7 +11,7 @@
 //     fleet.stop();                                // all of them, at once
 //
 // Boards count from 0, in the order of the URLs; a pattern stands for its boards in order (docs/fleet.md), and '+' joins
-// several wires to a board: "can://can0?node=0-7+can://can1?node=0-7". Their links live on one thread and one loop; those
+// several paths to a board: "can://can0?node=0-7+can://can1?node=0-7". Their links live on one thread and one loop; those
 // on a CAN bus share one socket. Each is a link of its own: a board that is silent disturbs no other one, and every
 // state has its time on this computer's clock (ReceivedState::sampled).
 //
@@ -53,7 +53,7 @@ struct BoardHealth {
   bool in_control = false;  // commands go out at once
   DisarmCause disarmed_by = DisarmCause::not_yet;
   Statistics statistics;
-  std::vector<Wire> wires;  // of several; of one alone it is empty
+  std::vector<PathStatus> paths;  // of several; of one alone it is empty
   // Its commands go out and nothing is wrong: ACTIVE and in control.
   bool well() const { return in_control && link.state == HostLinkState::active && !link.gated(); }
 };

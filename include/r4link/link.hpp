@@ -49,8 +49,8 @@ enum class LeaseTrouble : std::uint8_t {
 // "none", "full", "unknown".
 R4LINK_API const char* to_text(LeaseTrouble trouble);
 
-// How one of the wires to a board is (docs/redundancy.md). The only wire of a board is never asking or other_board.
-enum class WireState : std::uint8_t {
+// How one of the paths to a board is (docs/redundancy.md). The only path of a board is never asking or other_board.
+enum class PathState : std::uint8_t {
   down,         // its transport is gone, or could not be opened yet
   asking,       // it is up, and the board there has not said yet who it is
   other_board,  // another board is there: nothing but stops is sent on it
@@ -58,21 +58,21 @@ enum class WireState : std::uint8_t {
   carrying,
 };
 // "down", "asking", "other board", "silent", "carrying".
-R4LINK_API const char* to_text(WireState state);
+R4LINK_API const char* to_text(PathState state);
 
 struct LinkStatus {
   HostLinkState state = HostLinkState::connecting;
   SafeReason reason = SafeReason::none;     // why the board is safe
   bool busy = false;                        // another host controls the board
-  WireTrouble trouble = WireTrouble::none;  // foreign_frames: what keeps us busy is no R4 host
+  TransportTrouble trouble = TransportTrouble::none;  // foreign_frames: what keeps us busy is no R4 host
   Gate gate = Gate::open;
   KeyTrouble key = KeyTrouble::none;
   LeaseTrouble lease = LeaseTrouble::none;
   bool in_control = false;  // the board takes our commands: they go out at once
   bool transport_down =
       false;  // it is gone: unplugged, its interface switched off. Of several: all are
-  std::uint8_t carrying = 0;  // the wires that carry: bit 0 is the first
-  bool two_boards = false;    // a wire leads to another board than the rest
+  std::uint8_t carrying = 0;  // the paths that carry: bit 0 is the first
+  bool two_boards = false;    // a path leads to another board than the rest
   ChipFault chip{};           // of a fault: the chip that is the cause, if it is one
   bool gated() const { return gate != Gate::open; }
   friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
@@ -215,7 +215,7 @@ struct Statistics {
   std::uint64_t states = 0;
   std::uint64_t damaged = 0;  // bad checksum, syntax or length
   std::uint64_t copies = 0;   // what had been brought before; not among `received`
-  // lost, duplicate, late: lost is what no wire has brought, a duplicate what one had brought
+  // lost, duplicate, late: lost is what no path has brought, a duplicate what one had brought
   // before. `restarts` are those of the board, as its clock tells them: a sleep of this computer
   // that is longer than the board's timeout counts as one.
   PacketCounters packets;
@@ -243,14 +243,14 @@ struct Statistics {
   }
 };
 
-// One of the wires to a board, and how well it does.
-struct Wire {
+// One of the paths to a board, and how well it does.
+struct PathStatus {
   std::string name;  // of its transport, for people
-  WireState state = WireState::down;
+  PathState state = PathState::down;
   bool busy = false;         // the board there answers that another host controls it
   std::string board_id;      // the board that answered there last
-  PacketCounters packets;    // of the board's datagrams on this wire; `restarts`: of their numbers
-  std::uint64_t copies = 0;  // of them, what another wire had brought before
+  PacketCounters packets;    // of the board's datagrams on this path; `restarts`: of their numbers
+  std::uint64_t copies = 0;  // of them, what another path had brought before
   double round_trip_us = 0;  // question to answer, the newest; 0: none yet
   double age_us = 0;         // since the newest datagram; 0: none yet
   // Lost share of the board's datagrams, 0-1.
@@ -269,8 +269,8 @@ inline constexpr std::string_view stop_last_resort = "CUT THE POWER if it must s
 // board" and "stop it, or …". `name` is the board's. Of kind refused.
 R4LINK_API Problem explain(std::string_view name, const LinkStatus& link);
 
-// Which of the wires leads to another board, and what to do; of kind refused.
-R4LINK_API Problem explain(const std::vector<Wire>& wires);
+// Which of the paths leads to another board, and what to do; of kind refused.
+R4LINK_API Problem explain(const std::vector<PathStatus>& paths);
 
 // What is wrong with keys, and what to do; of kind refused. Not for KeyTrouble::none.
 R4LINK_API Problem explain(KeyTrouble trouble);

@@ -47,28 +47,28 @@ struct RecordingOptions {
 class RecordingVisitor {
  public:
   virtual ~RecordingVisitor() = default;
-  // A recording begins, or another one in the same file: its wires and devices may be others.
+  // A recording begins, or another one in the same file: its paths and devices may be others.
   virtual void on_beginning() {}
-  // How a board is reached, before the first record of that wire, and again when its name is known: its own or its id.
-  virtual void on_wire(int wire, const std::string& url, const std::string& name) {
-    static_cast<void>(wire), static_cast<void>(url), static_cast<void>(name);
+  // How a board is reached, before the first record of that path, and again when its name is known: its own or its id.
+  virtual void on_path(int path, const std::string& url, const std::string& name) {
+    static_cast<void>(path), static_cast<void>(url), static_cast<void>(name);
   }
-  // A described device of that wire's board, from now on: device.readings(state) is what it has measured.
-  virtual void on_device(int wire, const Device& device) {
-    static_cast<void>(wire), static_cast<void>(device);
+  // A described device of that path's board, from now on: device.readings(state) is what it has measured.
+  virtual void on_device(int path, const Device& device) {
+    static_cast<void>(path), static_cast<void>(device);
   }
   // A state, whose fields are merged over those before.
-  virtual void on_state(int wire, Time at, const State& state) {
-    static_cast<void>(wire), static_cast<void>(at), static_cast<void>(state);
+  virtual void on_state(int path, Time at, const State& state) {
+    static_cast<void>(path), static_cast<void>(at), static_cast<void>(state);
   }
   // Every datagram, also of states and damaged ones.
-  virtual void on_datagram(int wire, Time at, bool from_board, std::string_view bytes) {
-    static_cast<void>(wire), static_cast<void>(at), static_cast<void>(from_board),
+  virtual void on_datagram(int path, Time at, bool from_board, std::string_view bytes) {
+    static_cast<void>(path), static_cast<void>(at), static_cast<void>(from_board),
         static_cast<void>(bytes);
   }
-  // "up udp://192.168.0.125", "link safe stop": docs/recordings.md. Wire 0 is the recording itself.
-  virtual void on_event(int wire, Time at, std::string_view words) {
-    static_cast<void>(wire), static_cast<void>(at), static_cast<void>(words);
+  // "up udp://192.168.0.125", "link safe stop": docs/recordings.md. Path 0 is the recording itself.
+  virtual void on_event(int path, Time at, std::string_view words) {
+    static_cast<void>(path), static_cast<void>(at), static_cast<void>(words);
   }
   // A place that cannot be read, or a description, in words; what is behind it is read again.
   virtual void on_damage(const std::string& words) { static_cast<void>(words); }

@@ -109,7 +109,7 @@ def sending(url):
 def reading(folder):
     path = folder / 'hour.r4log'
     with open(path, 'w', encoding='ascii') as log:
-        log.write('# r4log 1 by r4 0.1.0\n# wire 1 udp://192.168.0.125 left-arm\n')
+        log.write('# r4log 1 by r4 0.1.0\n# path 1 udp://192.168.0.125 left-arm\n')
         for i in range(360_000):
             body = (f'AIN24:24.{i % 40 + 10};AIN12:12.15;AIN5:5.09;AINDMH:12.18;DMHSTA:1;AINSTEER:2.50;DHB1A:0,1;'
                     f'OSMC1:{i % 4096},1;STEP1POS:{i};SERVO1POS:1500;RELAYS:1;SAFE:0;CMD:{i};PNum:{i};T:{i * 10};^')

@@ -91,8 +91,8 @@ def recorded(path, url, seconds):
     """The share of r4 record, states a second, and bytes a state."""
     share, _ = share_of([R4, 'record', url, '-o', path], seconds)
     told = json.loads(subprocess.run([R4, 'info', '--json', path], check=True, capture_output=True, text=True).stdout)
-    assert len(told['wires']) == BOARDS and not told['damage'] and told['dropped'] == 0, told
-    states = sum(wire['states'] for wire in told['wires'])
+    assert len(told['paths']) == BOARDS and not told['damage'] and told['dropped'] == 0, told
+    states = sum(path['states'] for path in told['paths'])
     size = os.path.getsize(path)
     os.remove(path)
     return share, states / told['seconds'], size / states

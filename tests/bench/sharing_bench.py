@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What it costs a program that drives a board when others watch it by the same wire.
+"""What it costs a program that drives a board when others watch it by the same path.
 
     PYTHONPATH=build/python R4=build/r4 tests/bench/sharing_bench.py udp|pty|can|usb|URL [SECONDS] [ROUNDS] [--trouble]
 
@@ -269,7 +269,7 @@ def main():
                 subprocess.run([R4, 'send', board.url, 'E:CLEAR'], check=True, stdout=subprocess.DEVNULL)
             version = statistics.median(time_of(R4, '--version') for _ in range(5))
             print(f'r4 stop beside all: the board reports it {ms(statistics.median(each[0] for each in stops))} ms after '
-                  f'the wire was opened, at most {ms(max(each[0] for each in stops))} ms')
+                  f'the path was opened, at most {ms(max(each[0] for each in stops))} ms')
             if stops[0][1] is not None:
                 print(f'                    outputs safe {ms(statistics.median(each[1] for each in stops))} ms after it '
                       f'was started; r4 --version takes {ms(version)} ms')

@@ -28,21 +28,21 @@ class Lines final : public RecordingReader::Handler {
     require(line.size() <= max_record_line + 1);
     require(read_record_line(std::string_view(line).substr(0, line.size() - 1), again));
     require(again.kind == LineKind::record && again.record.bytes == record.bytes &&
-            again.record.time == record.time && again.record.wire == record.wire &&
+            again.record.time == record.time && again.record.path == record.path &&
             again.record.kind == record.kind);
     text += line;
     if (!beginning) beginning = record.time;
     const bool played = record.kind == RecordKind::from_board && record.time >= *beginning;
-    if (record.wire == 1 && played) said.emplace_back(record.bytes);
+    if (record.path == 1 && played) said.emplace_back(record.bytes);
   }
-  void on_wire(const RecordedWire& wire) override { write_wire(text, wire); }
+  void on_path(const RecordedPath& path) override { write_path(text, path); }
   void on_damage(const RecordingDamage& damage) override {
     text += std::to_string(damage.line) + ' ' + std::to_string(damage.offset) + '\n';
   }
 
   std::string text;
   std::optional<Time> beginning;
-  std::vector<std::string> said;  // by the board of the first wire, since then
+  std::vector<std::string> said;  // by the board of the first path, since then
 };
 
 // What is told of it. Of compression that is damaged, how much is read depends on the pieces.
@@ -76,7 +76,7 @@ class File {
   const int file_;
 };
 
-// What is played of the first wire.
+// What is played of the first path.
 std::vector<std::string> played(const std::string& path, const ReplayStart& start) {
   std::vector<std::string> said;
   try {

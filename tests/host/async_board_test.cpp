@@ -66,7 +66,7 @@ TEST_F(AsyncBoardTest, SendsItsFirstHeartbeatWhenItOpens) {
   board_end->close();
 }
 
-// A wire on which another host is heard.
+// A path on which another host is heard.
 class Overhearing final : public Carrier {
  public:
   void open(Handler& handler) override { handler_ = &handler; }
@@ -84,9 +84,9 @@ class Overhearing final : public Carrier {
 };
 
 TEST_F(AsyncBoardTest, TellsNoSecretOfAnotherHost) {
-  auto wire = std::make_unique<Overhearing>();
-  Overhearing& other = *wire;
-  AsyncBoard watching(io, std::move(wire), at_will());
+  auto path = std::make_unique<Overhearing>();
+  Overhearing& other = *path;
+  AsyncBoard watching(io, std::move(path), at_will());
   std::vector<std::string> heard;
   const auto subscription =
       watching.on_overheard([&](std::string_view bytes) { heard.emplace_back(bytes); });

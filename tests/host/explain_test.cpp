@@ -19,7 +19,7 @@ CommandResult timed_out_command() {
 }
 
 TEST(Explain, NamesAnotherProtocolInsteadOfAnotherHost) {
-  const LinkStatus link{.busy = true, .trouble = WireTrouble::foreign_frames};
+  const LinkStatus link{.busy = true, .trouble = TransportTrouble::foreign_frames};
   EXPECT_EQ(reason_of_link(link).substr(0, 36), "frames that make no R4 datagram come");
   const Problem problem = explain("R:1,On", timed_out_command(), link);
   EXPECT_NE(problem.reason.find("another protocol, such as CANopen"), std::string::npos);
@@ -29,19 +29,19 @@ TEST(Explain, NamesAnotherProtocolInsteadOfAnotherHost) {
 TEST(Explain, SaysThatFlowControlIsLateWhileTheBoardIsHeard) {
   for (const HostLinkState state : {HostLinkState::active, HostLinkState::safe}) {
     const LinkStatus link{
-        .state = state, .reason = SafeReason::link, .trouble = WireTrouble::late_frames};
+        .state = state, .reason = SafeReason::link, .trouble = TransportTrouble::late_frames};
     EXPECT_NE(reason_of_link(link).find("does not come within 20 ms"), std::string::npos);
     const Problem problem = explain("R:1,On", timed_out_command(), link);
     EXPECT_NE(problem.reason.find("does not come within 20 ms"), std::string::npos);
   }
-  const LinkStatus lost{.state = HostLinkState::lost, .trouble = WireTrouble::late_frames};
+  const LinkStatus lost{.state = HostLinkState::lost, .trouble = TransportTrouble::late_frames};
   EXPECT_EQ(reason_of_link(lost), "the board has fallen silent");
 }
 
 TEST(Explain, BlamesNoFramesForAStopWhichIsAFrameOfItsOwn) {
   const LinkStatus link{.state = HostLinkState::safe,
                         .reason = SafeReason::handle,
-                        .trouble = WireTrouble::late_frames};
+                        .trouble = TransportTrouble::late_frames};
   const Problem problem = explain("E:STOP", timed_out_command(), link);
   EXPECT_EQ(problem.reason.find("20 ms"), std::string::npos) << problem.reason;
 }

@@ -309,7 +309,7 @@ def test_first_steps_in_either_order():
         assert send(BUS, 'E:CLEAR', 'O:1,1,1').returncode == 0
 
 
-# As of two computers, where the bus has two ends: they share no wire.
+# As of two computers, where the bus has two ends: they share no path.
 @pytest.mark.parametrize('url, host_url', [(BUS, BUS), ('can://can0?node=3', 'can://can1?node=3')])
 def test_who_watches_sends_a_frame_of_its_own_and_only_while_nobody_drives(url, host_url):
     with Board(url, options=PATIENTLY), watch(url) as watcher, Dump(url.split('/')[2].split('?')[0]) as dump:
@@ -422,7 +422,7 @@ def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
                 wait_for(recording, rf'^[0-9.]+ {number}<')
             assert recorder.end() == 0, recorder.errors
         [told] = objects(run('info', '--json', str(recording)).stdout)
-        assert sorted(each['url'] for each in told['wires']) == [f'can://vcan0?node={node}' for node in (2, 3, 4)]
+        assert sorted(each['url'] for each in told['paths']) == [f'can://vcan0?node={node}' for node in (2, 3, 4)]
 
         *rows, total = objects(run('bus', 'can://vcan0', '--json', '--duration', '1', timeout=60).stdout)
         load = {row['id']: row['load'] for row in rows}
@@ -448,7 +448,7 @@ def test_a_recording_is_a_board_on_the_bus(tmp_path):
     path.write_text('\n'.join(lines + ['']), encoding='ascii')
     was = {each['pnum']: each['fields'] for each in objects(run('decode', stdin='\n'.join(said)).stdout)
            if each.get('type') == 'state'}
-    with Running('replay', str(path), BUS, '--wire', '2', '--json') as replay, Dump('vcan0') as dump:
+    with Running('replay', str(path), BUS, '--path', '2', '--json') as replay, Dump('vcan0') as dump:
         assert replay.next(lambda each: each['type'] == 'listening')['host_url'] == BUS
         shown = objects(run('monitor', BUS, '--json', '--count', '5', timeout=60).stdout)
         assert replay.end() == 0, replay.errors

@@ -13,7 +13,7 @@ from machine import SANITIZED
 ALWAYS = ['can_bridge_inside.py', 'can_isotp_inside.py']
 # slcan is the guest's: few kernels have it loaded.
 UNSANITIZED = ['can_inside.py', 'can_doctor_inside.py', 'can_python_inside.py', 'can_loss_inside.py',
-               'can_faults_inside.py', 'can_wires_inside.py', 'with_can_inside.py']
+               'can_faults_inside.py', 'can_paths_inside.py', 'with_can_inside.py']
 PYTHON = ['../python/pytest_plugin_can_inside.py'] if PACKAGE.is_dir() else []
 
 

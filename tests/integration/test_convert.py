@@ -24,7 +24,7 @@ MOST_MIB = 20
 
 def capture(path, url='udp://192.168.0.125'):
     """The paper's capture as a recording, 10 ms apart."""
-    lines = ['# r4log 1 by r4 0.1.0', f'# wire 1 {url} left-arm', '# from 2026-11-23T21:11:33.404765Z',
+    lines = ['# r4log 1 by r4 0.1.0', f'# path 1 {url} left-arm', '# from 2026-11-23T21:11:33.404765Z',
              f'1795468293.404765 1! up {url}']
     with open(f'{DATA}/paper_capture.tsv', encoding='ascii') as file:
         for index, line in enumerate(file):
@@ -53,7 +53,7 @@ def test_pandas_reads_csv_with_the_right_types(native, tmp_path):
     assert f'73 records; left out are {73 - len(table)} that are no state' in said
     kinds = {name: kind.kind for name, kind in table.dtypes.items()}
     assert kinds['time [s]'] == kinds['AIN24 [V]'] == 'f'
-    for name in ('wire', 'PNum', 'T [ms]', 'DMHSTA [0/1]', 'OSMC1 pwm [0-4095]', 'STEP1POS [steps]'):
+    for name in ('path', 'PNum', 'T [ms]', 'DMHSTA [0/1]', 'OSMC1 pwm [0-4095]', 'STEP1POS [steps]'):
         assert kinds[name] == 'i', name
     first = table.iloc[0]
     assert (first['board'], first['PNum'], first['AIN24 [V]']) == ('left-arm', 7434, 24.28)
@@ -110,7 +110,7 @@ def read_mcap(path):
 def in_several_chunks(native):
     """The capture's lines again and again, and a second board."""
     lines = native.read_text().splitlines(True)
-    native.write_text(''.join(lines[:2]) + '# wire 2 can://can0?node=2\n' +
+    native.write_text(''.join(lines[:2]) + '# path 2 can://can0?node=2\n' +
                       ''.join(lines[2:-1] + [line.replace(' 1', ' 2', 1) for line in lines[4:-1]]) * 40 + lines[-1])
     return native
 
@@ -121,18 +121,18 @@ def test_mcaps_own_reader_has_every_message_by_every_index(two_boards, tmp_path)
     assert read.returncode == 0, read.stderr
     told = json.loads(read.stdout)
     assert told['topics'] == {
-        '/r4log': ['r4.Line', {'wire': '0'}],
-        '/left-arm': ['r4.Record', {'wire': '1', 'url': 'udp://192.168.0.125', 'name': 'left-arm'}],
-        '/board2': ['r4.Record', {'wire': '2', 'url': 'can://can0?node=2'}]}
+        '/r4log': ['r4.Line', {'path': '0'}],
+        '/left-arm': ['r4.Record', {'path': '1', 'url': 'udp://192.168.0.125', 'name': 'left-arm'}],
+        '/board2': ['r4.Record', {'path': '2', 'url': 'can://can0?node=2'}]}
     convert(two_boards, tmp_path / 'drive.jsonl')
     expected = {1: [], 2: []}
     for each in objects((tmp_path / 'drive.jsonl').read_text()):
-        time, wire = round(each.pop('time') * 1e6), each.pop('wire')
+        time, path = round(each.pop('time') * 1e6), each.pop('path')
         each.pop('board', None)
-        expected.get(wire, []).append([time, each])
+        expected.get(path, []).append([time, each])
     assert len(expected[1]) == 40 * 72 and expected[1][1][1]['fields']['DHB1A'] == [4095, 1]
-    for wire, topic in (1, '/left-arm'), (2, '/board2'):
-        assert [each[1:] for each in told['messages'] if each[0] == topic] == expected[wire]
+    for path, topic in (1, '/left-arm'), (2, '/board2'):
+        assert [each[1:] for each in told['messages'] if each[0] == topic] == expected[path]
     lines = [each[2]['line'] for each in told['messages'] if each[0] == '/r4log']
     assert lines == [line for line in two_boards.read_text().splitlines() if line[0] == '#' or ' 0! ' in line]
     convert(tmp_path / 'drive.mcap', tmp_path / 'again.r4log')
@@ -186,7 +186,7 @@ def test_info_shows_a_file_of_another_format_whatever_its_name(tmp_path, ending)
     convert(tmp_path / 'drive.r4log', tmp_path / f'drive{ending}')
     (tmp_path / f'drive{ending}').rename(tmp_path / 'drive.txt')
     told = objects(run('info', str(tmp_path / 'drive.txt'), '--json').stdout)[0]
-    assert [(wire['url'], wire['states']) for wire in told['wires']] == [('can://can0?node=3', 60)]
+    assert [(path['url'], path['states']) for path in told['paths']] == [('can://can0?node=3', 60)]
 
 
 def test_what_mergecap_has_mixed_is_refused_and_what_it_appends_is_read(tmp_path):
@@ -217,7 +217,7 @@ def test_a_pipe_is_read_and_nothing_is_replaced_unasked(native, tmp_path):
     ('x.r4log', 'zeros', DATA_BAD, 'no recording'),
     ('x.r4log', b'', DATA_BAD, 'no recording'),
     ('x.r4log', b'# r4log 2 by r4 9.0\n', DATA_BAD, 'a recording of a later version'),
-    ('x.csv', b'time [s],wire\n', USAGE, '.csv is only written'),
+    ('x.csv', b'time [s],path\n', USAGE, '.csv is only written'),
     ('x.r4log', None, OPEN, 'No such file'),
     ('x.r4log', 'directory', OPEN, 'Is a directory'),
     ('x.mcap', 'directory', OPEN, 'Is a directory'),
@@ -288,7 +288,7 @@ def test_a_size_that_a_header_claims_takes_no_memory(tmp_path, ending):
 def two_minutes_of_eight_boards(tmp_path_factory):
     """On a CAN bus, each with a hundred states a second: 24 MB of text."""
     path = tmp_path_factory.mktemp('long') / 'drive.r4log'
-    lines = ['# r4log 1 by r4 0.1.0', *(f'# wire {1 + node} can://can0?node={node}' for node in range(8))]
+    lines = ['# r4log 1 by r4 0.1.0', *(f'# path {1 + node} can://can0?node={node}' for node in range(8))]
     for number in range(20_000 if SANITIZED else 120_000):
         pnum, node = divmod(number, 8)
         fields = (f'AIN24:24.{pnum % 100:02};AIN12:12.12;AIN5:5.12;AINDMH:12.11;DMHSTA:1;AINSTEER:1.03;DHB1A:4095,1;'
@@ -308,7 +308,7 @@ def test_a_long_recording_takes_little_memory_and_comes_back(eight_boards, tmp_p
         assert result.returncode == 0 and not result.stderr, result
         print(f'{source.suffix} to {target.suffix}: {result.peak_mib:.1f} MiB')
         assert SANITIZED or result.peak_mib < MOST_MIB
-    if ending == '.log':  # its wires are told before their first records
+    if ending == '.log':  # its paths are told before their first records
         assert datagrams(back) == datagrams(eight_boards)
     elif len(ways) == 2:
         assert back.read_bytes() == eight_boards.read_bytes()

@@ -103,7 +103,7 @@ def test_a_recording_tells_what_the_bytes_of_its_devices_mean(board, tmp_path):
         monitor.next(is_reading('mine@0x40', 'volts'))
         assert run('record', board.host_url, '-o', str(log), '--duration', '0.5', *devices).returncode == 0
     mine.unlink()
-    assert objects(run('info', str(log), '--json').stdout)[0]['wires'][0]['devices'] == ['bno055@0x28:1', 'mine@0x40:7']
+    assert objects(run('info', str(log), '--json').stdout)[0]['paths'][0]['devices'] == ['bno055@0x28:1', 'mine@0x40:7']
     assert run('convert', str(log), '-o', str(table)).returncode == 0
     with open(table, encoding='ascii') as file:
         rows = list(csv.DictReader(file))

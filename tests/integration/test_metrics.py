@@ -75,18 +75,18 @@ def test_what_was_lost_on_the_way_is_counted():
         metrics.until(some_are_lost)
 
 
-def test_tells_of_each_of_several_wires(tmp_path):
+def test_tells_of_each_of_several_paths(tmp_path):
     with Board('udp://127.0.0.1:0', f'pty:{tmp_path}/board') as board:
         with Metrics(f'{board.host_url}+serial://{tmp_path}/board') as metrics:
-            def of_the_wires(samples, name):
+            def of_the_paths(samples, name):
                 [one] = samples.values()
-                return [value for key, value in one.items() if key[0] == f'r4_wire_{name}']
-            samples = metrics.until(lambda samples: min(of_the_wires(samples, 'received_total'), default=0) > 10)
-            assert of_the_wires(samples, 'carrying') == [1, 1] and sum(of_the_wires(samples, 'copies_total')) > 0
+                return [value for key, value in one.items() if key[0] == f'r4_path_{name}']
+            samples = metrics.until(lambda samples: min(of_the_paths(samples, 'received_total'), default=0) > 10)
+            assert of_the_paths(samples, 'carrying') == [1, 1] and sum(of_the_paths(samples, 'copies_total')) > 0
             for name in ('round_trip_seconds', 'age_seconds'):
-                assert len(of_the_wires(samples, name)) == 2 and min(of_the_wires(samples, name)) > 0
+                assert len(of_the_paths(samples, name)) == 2 and min(of_the_paths(samples, name)) > 0
             board.end()
-            metrics.until(lambda samples: sum(of_the_wires(samples, 'carrying')) < 2)
+            metrics.until(lambda samples: sum(of_the_paths(samples, 'carrying')) < 2)
             assert any(key[1:] == (board.host_url,) for key in samples[f'{board.host_url}+serial://{tmp_path}/board'])
 
 

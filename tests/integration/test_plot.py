@@ -22,14 +22,14 @@ def good(fields):
 @pytest.fixture(name='native')
 def a_drive(tmp_path):
     """Two boards, ten times a second for 4 s; left-arm is stopped from 1 s to 2 s and silent from 2 s to 3.5 s."""
-    lines = ['# r4log 1 by r4 0.1.0', '# wire 1 udp://192.168.0.125 left-arm', '# wire 2 udp://192.168.0.126 right-arm']
+    lines = ['# r4log 1 by r4 0.1.0', '# path 1 udp://192.168.0.125 left-arm', '# path 2 udp://192.168.0.126 right-arm']
     for i in range(40):
         stopped = 10 <= i < 20
-        for wire in (1, 2):
-            if wire == 1 and 20 <= i < 35:
+        for path in (1, 2):
+            if path == 1 and 20 <= i < 35:
                 continue
-            fields = f'AIN24:{24 + i / 10:.2f};OSMC1:{100 * (i % 7)},{int(i < 5)};SAFE:{2 if wire == 1 and stopped else 0};'
-            lines.append(f'{1795468293 + i / 10:.6f} {wire}< {good(f"{fields}PNum:{i};T:{100 * i};")}')
+            fields = f'AIN24:{24 + i / 10:.2f};OSMC1:{100 * (i % 7)},{int(i < 5)};SAFE:{2 if path == 1 and stopped else 0};'
+            lines.append(f'{1795468293 + i / 10:.6f} {path}< {good(f"{fields}PNum:{i};T:{100 * i};")}')
     path = tmp_path / 'drive.r4log'
     path.write_text('\n'.join(lines + ['1795468297.000000 0! end', '']), encoding='ascii')
     return path
@@ -72,8 +72,8 @@ def test_draws_curves_safe_states_and_gaps(native, tmp_path):
 
 
 def test_shows_names_of_others_and_of_files_as_they_are(native, tmp_path):
-    wires = native.read_text().replace('192.168.0.125 left-arm', r'$\x5cfoo$\x1b[2J&<b>').replace(' right-arm', '')
-    (tmp_path / '$x^$.r4log').write_text(wires)
+    paths = native.read_text().replace('192.168.0.125 left-arm', r'$\x5cfoo$\x1b[2J&<b>').replace(' right-arm', '')
+    (tmp_path / '$x^$.r4log').write_text(paths)
     result = run('plot', str(tmp_path / '$x^$.r4log'), 'AIN24', '-o', str(tmp_path / 'others.svg'))
     assert result.returncode == 0 and not result.stderr, result
     texts = [text.text for text in ElementTree.parse(tmp_path / 'others.svg').getroot().iter(f'{SVG}text')]
@@ -102,7 +102,7 @@ def test_says_what_cannot_be_drawn(native, tmp_path, arguments, code, message):
 
 
 def test_damage_is_told_and_the_rest_is_drawn(native, tmp_path):
-    native.write_text(native.read_text().replace('# wire 2', 'wire 2', 1))
+    native.write_text(native.read_text().replace('# path 2', 'path 2', 1))
     result = run('plot', str(native), 'AIN24', '-o', str(tmp_path / 'a.svg'))
     assert result.returncode == DATA_BAD and 'some of it could not be read' in result.stderr, result
     assert (tmp_path / 'a.svg').exists()

@@ -36,11 +36,11 @@ def info(*paths):
     return objects(told.stdout), told.returncode
 
 
-def test_has_what_a_program_sends_by_the_wire_that_both_share(tmp_path):
+def test_has_what_a_program_sends_by_the_path_that_both_share(tmp_path):
     path = tmp_path / 'drive.r4log'
     with Board(f'pty:{tmp_path}/r4') as board, record(board.host_url, '-o', path) as recorder:
         wait_for(path, r'^[0-9.]+ 1< AIN24')
-        # It hears those that are sent when it has come to the program that has taken the wire.
+        # It hears those that are sent when it has come to the program that has taken the path.
         commands = [f'O:{pwm},1,1' for pwm in range(319, 359)]
         with driving(board.host_url, *commands) as host:
             wait_for(path, r'^[0-9.]+ 1> H:ROS2-R4')
@@ -49,7 +49,7 @@ def test_has_what_a_program_sends_by_the_wire_that_both_share(tmp_path):
         wait_for(path, r'OSMC1:0,.*SAFE:1;')
         assert recorder.end() == 0, recorder.errors
     (told,), code = info(path)
-    assert code == 0 and told['ended'] and told['wires'][0]['heartbeats'] > 0, told
+    assert code == 0 and told['ended'] and told['paths'][0]['heartbeats'] > 0, told
 
 
 @pytest.mark.parametrize('name', ['drive.r4log', 'drive.r4log.zst'])
@@ -65,11 +65,11 @@ def test_records_beside_a_program_that_drives(board, tmp_path, name):
     assert not [each for each in board.log if each.get('reason') == 'watchdog']
     (told,), code = info(path)
     assert code == 0 and told['ended'] and not told['damage'], told
-    wire = told['wires'][0]
-    assert wire['name'] == 'sim-1' and wire['url'].startswith('udp://127.0.0.1:')
-    assert wire['damaged'] == 0 and wire['lost'] == 0 and wire['states'] >= 10, wire
-    assert wire['safe']['link'] >= 1
-    assert wire['heartbeats'] == 0, 'who watches sends none'
+    path = told['paths'][0]
+    assert path['name'] == 'sim-1' and path['url'].startswith('udp://127.0.0.1:')
+    assert path['damaged'] == 0 and path['lost'] == 0 and path['states'] >= 10, path
+    assert path['safe']['link'] >= 1
+    assert path['heartbeats'] == 0, 'who watches sends none'
     lines = [line for line in text_of(path).splitlines() if ' 1< ' in line]
     assert run('decode', stdin='\n'.join(line.split('< ', 1)[1] for line in lines)).returncode == 0
     assert lines == sorted(lines, key=lambda line: float(line.split(' ')[0]))
@@ -135,7 +135,7 @@ def test_a_replay_goes_step_by_step_from_anywhere_and_tells_damage(recorded):
     for start in ('0.2', datetime.datetime.fromtimestamp(first + 0.2, datetime.timezone.utc).isoformat()[:26]):
         late = run('replay', str(recorded), 'udp://127.0.0.1:0', '--step', '--from', start, stdin='\n')
         assert late.stdout.splitlines()[1].split(' ', 1)[1] == then, late
-    for arguments, code in ((['--wire', '7'], DATA_BAD), (['--speed', '0'], USAGE), (['--from', 'x'], USAGE)):
+    for arguments, code in ((['--path', '7'], DATA_BAD), (['--speed', '0'], USAGE), (['--from', 'x'], USAGE)):
         wrong = run('replay', str(recorded), *arguments)
         assert wrong.returncode == code and ERROR.search(wrong.stderr), wrong
 
@@ -147,8 +147,8 @@ def test_records_several_boards_into_one_file(tmp_path):
         assert ended.returncode == 0, ended.stderr
         assert re.search(r'two.r4log: \d+ datagrams and events in 1\.\d s', ended.stdout)
     (told,), code = info(path)
-    assert code == 0 and [wire['wire'] for wire in told['wires']] == [1, 2]
-    assert all(wire['states'] >= 10 for wire in told['wires']), told
+    assert code == 0 and [path['path'] for path in told['paths']] == [1, 2]
+    assert all(path['states'] >= 10 for path in told['paths']), told
 
 
 @pytest.mark.parametrize('name, most_bytes', [('many.r4log', 200), ('many.r4log.zst', 40)])
@@ -160,8 +160,8 @@ def test_records_many_boards_by_one_pattern(tmp_path, name, most_bytes):
         ended = run('record', f'{ports}?listen=0', '-o', str(path), '--duration', '1')
         assert ended.returncode == 0, ended.stderr
     (told,), code = info(path)
-    assert code == 0 and [wire['name'] for wire in told['wires']] == [f'sim-{first + i}' for i in range(10)]
-    assert all(wire['states'] >= 10 for wire in told['wires']), told
+    assert code == 0 and [path['name'] for path in told['paths']] == [f'sim-{first + i}' for i in range(10)]
+    assert all(path['states'] >= 10 for path in told['paths']), told
     text = text_of(path)
     states = re.findall(r'^[0-9.]+ [0-9]+< AIN24.*\n', text, re.MULTILINE)
     state_bytes = path.stat().st_size * len(''.join(states)) / len(text) / len(states)
@@ -170,9 +170,9 @@ def test_records_many_boards_by_one_pattern(tmp_path, name, most_bytes):
 
 
 def newest_states(path):
-    """When the newest state of each wire was heard."""
+    """When the newest state of each path was heard."""
     found = re.findall(r'^([\d.]+) (\d+)< AIN24.*\^$', text_of(path), re.MULTILINE) if path.exists() else []
-    return {wire: float(when) for when, wire in found}
+    return {path: float(when) for when, path in found}
 
 
 @pytest.mark.parametrize('name', ['drive.r4log', 'drive.r4log.zst'])
@@ -195,7 +195,7 @@ def test_who_is_killed_under_load_has_lost_a_second_at_most(tmp_path, name):
             print(f'{name}: {before - min(newest.values()):.3f} s of it are missing')
             assert len(newest) == 8 and before - min(newest.values()) <= 1.0
             (told,), code = info(path)
-            assert not told['ended'] and all(wire['states'] >= 10 for wire in told['wires'])
+            assert not told['ended'] and all(path['states'] >= 10 for path in told['paths'])
             for each in told['damage']:
                 assert each['kind'] in ('torn', 'zstd'), told['damage']
             assert code == (DATA_BAD if told['damage'] else 0)
@@ -228,7 +228,7 @@ def test_a_file_that_others_take_away_is_begun_anew_and_the_exit_code_tells_a_lo
         assert recorder.end() == 0, recorder.errors
     for each in (path, moved):
         (told,), code = info(each)
-        assert code == 0 and told['wires'][0]['name'] == 'sim-1' and not told['damage'], told
+        assert code == 0 and told['paths'][0]['name'] == 'sim-1' and not told['damage'], told
     for name, lose in (('removed', pathlib.Path.unlink), ('truncated', lambda each: each.write_text(''))):
         path = tmp_path / f'{name}.r4log'
         with record(board.host_url, '-o', path) as recorder:
@@ -264,14 +264,14 @@ def test_keeps_the_beginning_of_what_is_too_long_for_a_datagram(tmp_path):
             talker.sendto(b'x' * 3000, host)
             wait_for(path, r'^[0-9.]+ 1! oversize x{1024}$')
     (told,), _ = info(path)
-    assert told['wires'][0]['oversize'] == 1 and told['wires'][0]['damaged'] == 0, told
+    assert told['paths'][0]['oversize'] == 1 and told['paths'][0]['damaged'] == 0, told
 
 
 def test_files_that_follow_one_another_are_whole_in_themselves(board, tmp_path):
     with record(board.host_url, '-o', tmp_path / 'drive.r4log', '--rotate', '1s', '--rotate', '1M'):
         wait_for(tmp_path / 'drive-00003.r4log', ' 1< AIN24')
     told, _ = info(*sorted(tmp_path.glob('drive-*.r4log')))
-    assert len(told) >= 3 and all(each['wires'][0]['name'] == 'sim-1' for each in told[1:])
+    assert len(told) >= 3 and all(each['paths'][0]['name'] == 'sim-1' for each in told[1:])
     assert all(each['seconds'] <= 1.0 for each in told)
 
 
@@ -300,7 +300,7 @@ def test_info_reads_a_pipe():
 
 def test_what_others_wrote_moves_no_terminal(tmp_path):
     path = tmp_path / 'others.r4log'
-    path.write_text('# r4log 1 by r4 0.1.0\n# wire 1 udp://x\\x1b]0;owned\\x07\\x0afake arm\\x1b]0;owned\\x07\n'
+    path.write_text('# r4log 1 by r4 0.1.0\n# path 1 udp://x\\x1b]0;owned\\x07\\x0afake arm\\x1b]0;owned\\x07\n'
                     '1795468293.000000 1< garbage\\x1b]0;owned\\x07\n'
                     '1795468293.000001 1! down \\x1b]0;owned\\x07\n')
     for arguments in (('info', path), ('info', '--json', path), ('replay', path, 'udp://127.0.0.1:0', '--step'),

@@ -7,7 +7,7 @@ from machine import within
 from r4_process import Board, lasts
 from ros2_peer import (DIAGNOSTICS, FLOAT32, STRING, Peer, Ros2, again, armed, drive, float32, health_of, join,
                        own_domain, pwm, text)
-from wired_host import Wire, has_joined, has_left
+from host_on_paths import Relay, has_joined, has_left
 
 
 def test_what_it_drove_is_safe_when_it_is_killed_and_it_begins_again():
@@ -71,22 +71,22 @@ def test_a_command_that_was_held_up_is_not_executed():
         assert not any(each.get('state') == 'SAFE' for each in board.log)
 
 
-def test_a_board_of_two_wires_is_driven_on_when_one_is_pulled():
+def test_a_board_of_two_paths_is_driven_on_when_one_is_pulled():
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer:
         port = board.url.rsplit(':', 1)[1]
-        wires = [Wire('udp', port), Wire('udp', port)]
-        with Ros2(domain, '+'.join(wire.url for wire in wires), '--arm') as ros2:
+        paths = [Relay('udp', port), Relay('udp', port)]
+        with Ros2(domain, '+'.join(path.url for path in paths), '--arm') as ros2:
             ros2.armed()
             board.next(has_joined(2))
             join(ros2, peer, 'osmc1/command', FLOAT32)
             drive(board, peer, 'rt/osmc1/command', float32(0.5), lambda each: pwm(each, 1) == 2048)
-            wires[0].pull()
+            paths[0].pull()
             board.next(has_left(1))
             drive(board, peer, 'rt/osmc1/command', float32(0.25), lambda each: pwm(each, 1) == 1024)
             assert not any(each.get('state') == 'SAFE' and each['reason'] == 'link' for each in board.log)
             assert ros2.end() == 0, ros2.errors
-        wires[1].pull()
+        paths[1].pull()
         peer.end()
 
 

@@ -18,7 +18,7 @@ from machine import within
 from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, free_port, is_state, objects, run, stop_takes_ms,
                         wait_for, watch)
 
-# The others take a wire over within 100 ms; as much again is for a machine that is busy.
+# The others take a path over within 100 ms; as much again is for a machine that is busy.
 TAKEN_OVER_WITHIN_S = 0.2
 
 
@@ -30,7 +30,7 @@ def where_anybody_may_look():
 
 
 @pytest.fixture(name='board', params=['pty', 'udp'])
-def on_a_wire(request, folder):
+def on_a_path(request, folder):
     url = f'pty:{folder}/tty' if request.param == 'pty' else 'udp://127.0.0.1:0'
     with Board(url) as board:
         if request.param == 'udp':
@@ -119,7 +119,7 @@ def test_of_five_that_watch_one_sleeps_one_dies_and_nobody_else_loses_anything(b
     for path in paths:
         datagrams = from_to(received(path), 'OSMC1:358,1;', 'SAFE:1;')
         pairs = list(itertools.pairwise(datagrams))
-        # Only while the dead one's wire was nobody's something was lost.
+        # Only while the dead one's path was nobody's something was lost.
         holes = [(a, b) for a, b in pairs if b[1] != a[1] + 1]
         assert len(holes) <= 1 and all(b[0] > killed_at for _, b in holes), holes
         assert all(0 < b[1] - a[1] - 1 <= 100 * within(TAKEN_OVER_WITHIN_S) for a, b in holes), holes
@@ -186,11 +186,11 @@ def test_a_stopped_holder_loses_the_serial_port_and_takes_no_byte_of_it_when_it_
             assert len(numbers) > 20 and numbers == sorted(set(numbers))
             # A board that is held up leaves whole states out.
             [told] = objects(run('info', '--json', str(path)).stdout)
-            assert told['wires'][0]['damaged'] == 0, told
+            assert told['paths'][0]['damaged'] == 0, told
             path.unlink()
 
 
-def test_two_spellings_of_a_board_are_one_wire():
+def test_two_spellings_of_a_board_are_one_path():
     with Board('udp://127.0.0.1:0') as board:
         listen = free_port()
         url = board.host_url.replace('?listen=0', f'?listen={listen}')
@@ -200,7 +200,7 @@ def test_two_spellings_of_a_board_are_one_wire():
             refused = run('send', other_url, 'O:1,1,1')
             assert refused.returncode == 3, refused
             assert f'controlled by r4 (pid {host.process.pid})' in refused.stderr, refused
-            # One that only a resolver knows is another wire, at the same port.
+            # One that only a resolver knows is another path, at the same port.
             refused = run('send', url.replace('127.0.0.1', '127.1'), 'O:1,1,1')
             assert refused.returncode == 4, refused
             assert f'UDP port {listen} is in use by r4 (pid {host.process.pid})' in refused.stderr, refused
@@ -273,7 +273,7 @@ def test_programs_of_another_user_that_connect_again_and_again_hold_up_neither_t
         board.state('SAFE', 'stop')
 
 
-def test_another_user_shares_a_wire_where_both_say_so(board, nobody):
+def test_another_user_shares_a_path_where_both_say_so(board, nobody):
     shared = board.host_url + ('&' if '?' in board.host_url else '?') + 'share=nogroup'
     with driving(shared, 'O:358,1,1') as host:
         watched = nobody('monitor', shared, '--json', '--count', '3')

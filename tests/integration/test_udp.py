@@ -69,7 +69,7 @@ def stays_with_its_host_in(board, flooded):
             assert all((each['fields']['state'], each['fields']['busy']) == ('active', False)
                        for each in during if each['type'] == 'link')
             assert not any(each['fields'].get('SAFE') for each in during if is_state(each))
-            assert not any(each['type'] == 'wire' for each in host.log), 'the link reports as much of the only wire'
+            assert not any(each['type'] == 'path' for each in host.log), 'the link reports as much of the only path'
             steps = [later['t'] - earlier['t'] for earlier, later in itertools.pairwise(
                 each for each in during if is_state(each))]
             print(f'{len(sent)} datagrams of others; {len(steps) + 1} states, at most {max(steps)} ms apart')

@@ -2,7 +2,7 @@
 """The serial transport on a USB serial port with its real driver, in the guest of tools/with-can.
 
 The board at the far end of the cable is simulated, outside. Inside runs usb_serial_inside.py, whose input and output
-are another wire to that board.
+are another path to that board.
 """
 import json
 import os
@@ -28,7 +28,7 @@ def carry(source, destination):
     threading.Thread(target=run, daemon=True).start()
 
 
-def test_listed_streamed_unplugged_under_way_and_found_again_and_one_of_two_wires(tmp_path):
+def test_listed_streamed_unplugged_under_way_and_found_again_and_one_of_two_paths(tmp_path):
     cable, other, told, commands = (tmp_path / name for name in ('board', 'other', 'told', 'commands'))
     with Board(f'pty:{cable}', f'pty:{other}') as board, open(told, 'wb') as errors:
         end = os.open(other, os.O_RDWR | os.O_NOCTTY)

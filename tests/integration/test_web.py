@@ -35,11 +35,11 @@ def motor_is_driven(outputs):
     return outputs['osmc'][0] != [0, 0]
 
 
-def test_a_page_is_told_of_each_of_several_wires(tmp_path):
+def test_a_page_is_told_of_each_of_several_paths(tmp_path):
     with Board('udp://127.0.0.1:0', f'pty:{tmp_path}/board') as board:
         url = f'{board.host_url}+serial://{tmp_path}/board'
         with Web(url) as web, Page(web) as page:
-            page.next('board', lambda each: [wire['state'] for wire in each.get('wires', [])] == 2 * ['carrying'])
+            page.next('board', lambda each: [path['state'] for path in each.get('paths', [])] == 2 * ['carrying'])
             assert page.hello['boards'][0]['url'] == url
 
 

@@ -248,7 +248,7 @@ def test_the_button_records_and_tells_where(browser, tmp_path):
         page.until('document.querySelector("#record").textContent === "Record"')
         [path] = tmp_path.iterdir()
         [told] = objects(run('info', '--json', str(path)).stdout)
-        assert told['wires'][0]['states'] > 0, told
+        assert told['paths'][0]['states'] > 0, told
         assert page.errors() == []
 
 

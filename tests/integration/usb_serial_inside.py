@@ -2,7 +2,7 @@
 """What test_usb_serial.py runs inside the guest; fails by an exception.
 
 The USB serial port is real to everything here: the kernel's driver, sysfs, libserialport. Our input and output are
-another wire to the same board; what there is to tell goes to the errors.
+another path to the same board; what there is to tell goes to the errors.
 """
 import json
 import os
@@ -20,7 +20,7 @@ import tty
 
 from r4_process import Running, driving, free_port, is_link, is_state, monitor, objects, run, send, stop_takes_ms, watch
 from test_usb_serial import carry
-from wired_host import WiredHost
+from host_on_paths import HostOnPaths
 
 NETLINK_KOBJECT_UEVENT = 15
 PORT = '/dev/ttyUSB0'
@@ -42,7 +42,7 @@ def kernel_reports():
     return reports
 
 
-def other_wire():
+def other_path():
     """A terminal that leads to the board by our input and output, which are used for nothing else from now on."""
     near, far = pty.openpty()
     tty.setraw(far)
@@ -132,7 +132,7 @@ def shared_by_programs():
         assert cleared.returncode == 0, cleared
 
 
-def one_of_two_wires(terminal, commands):
+def one_of_two_paths(terminal, commands):
     """The other is UDP, by a gateway; `commands`: the file for those that the board must have executed."""
     reports = kernel_reports()
     port = free_port()
@@ -148,7 +148,7 @@ def one_of_two_wires(terminal, commands):
             return at
         return act
 
-    with gateway() as first, WiredHost([f'serial://{PORT}', f'udp://127.0.0.2:{port}?listen=0'],
+    with gateway() as first, HostOnPaths([f'serial://{PORT}', f'udp://127.0.0.2:{port}?listen=0'],
                                        [PORT, '127.0.0.2']) as host:
         def both():
             host.goes_on(50)  # until the board, too, has joined them
@@ -172,10 +172,10 @@ def one_of_two_wires(terminal, commands):
             assert second.process.poll() is None
 
 
-TERMINAL = other_wire()
+TERMINAL = other_path()
 listed_with_who_controls_it()
 streams_at_the_boards_rate()
 shared_by_programs()
 unplugged_and_plugged_in_again('serial:?sn=R4-0001', times=2)
 unplugged_and_plugged_in_again(f'serial://{PORT}', times=1)
-one_of_two_wires(TERMINAL, pathlib.Path(sys.argv[1]))
+one_of_two_paths(TERMINAL, pathlib.Path(sys.argv[1]))

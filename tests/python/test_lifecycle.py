@@ -119,7 +119,7 @@ def test_in_a_fork_each_call_is_refused_or_does_nothing_and_none_hangs(tmp_path)
         states = board.states()
         subscription = board.on_state(hold)
         assert in_callback.wait(10)
-        refused = [lambda: board.state, lambda: board.identify(), board.stop, board.stop_async, lambda: board.wires,
+        refused = [lambda: board.state, lambda: board.identify(), board.stop, board.stop_async, lambda: board.paths,
                    lambda: board.post(r4link.Setpoints().osmc(1, 5)), lambda: board.on_link(print), lambda: next(states),
                    states.take, lambda: states.ended, lambda: board.watchdog(1), lambda: fleet.stop(),
                    fleet.health, lambda: fleet.post({0: r4link.Setpoints().osmc(1, 5)}), fleet.next_event,

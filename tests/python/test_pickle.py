@@ -90,7 +90,7 @@ def test_copies_of_values_tell_the_same(sim, board):
     with r4link.Fleet('sim:') as fleet:
         fleet.wait_active()
         values = [board.state, board.next_state(), board.link, board.statistics, board.carrier_counters, board.identify(),
-                  *board.wires, r4link.Command.osmc(1, 5, 1), *fleet.health(), *fleet.stop(), sim.look(),
+                  *board.paths, r4link.Command.osmc(1, 5, 1), *fleet.health(), *fleet.stop(), sim.look(),
                   r4link.Device('bno055@0x29')]
         events = []
         board.on_event(events.append)

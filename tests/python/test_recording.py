@@ -11,12 +11,12 @@ import pytest
 import r4link
 
 DESCRIPTIONS = pathlib.Path(__file__).parents[2] / 'host' / 'devices'
-HEADER = '# r4log 1 by r4 0.1.0\n# wire 1 udp://192.168.0.125 left-arm\n'
+HEADER = '# r4log 1 by r4 0.1.0\n# path 1 udp://192.168.0.125 left-arm\n'
 
 
-def line(at, fields, wire=1, direction='<'):
+def line(at, fields, path=1, direction='<'):
     body = f'{fields}^'
-    return f'{1795468293 + at:.6f} {wire}{direction} {body}0x{zlib.crc32(body.encode()):x}^\n'
+    return f'{1795468293 + at:.6f} {path}{direction} {body}0x{zlib.crc32(body.encode()):x}^\n'
 
 
 def test_a_file_that_was_removed_is_begun_anew_and_the_recording_tells(sim, tmp_path, wait):
@@ -63,9 +63,9 @@ def test_what_was_recorded_is_there(sim, tmp_path):
 
 def test_fields_that_come_later_two_boards_and_damage(tmp_path):
     path = tmp_path / 'two.r4log'
-    path.write_text(HEADER + '# wire 2 serial:auto\n' + line(0.5, 'AIN24:24.10;PNum:1;T:10;')
+    path.write_text(HEADER + '# path 2 serial:auto\n' + line(0.5, 'AIN24:24.10;PNum:1;T:10;')
                     + line(0.6, 'AIN24:24.20;STEP1POS:-7;SAFE:2;PNum:4294967295;T:4294967295;')
-                    + line(0.7, 'AIN24:1.00;PNum:1;T:5;', wire=2) + 'no line of a recording\n'
+                    + line(0.7, 'AIN24:1.00;PNum:1;T:5;', path=2) + 'no line of a recording\n'
                     + line(0.8, 'AIN24:24.30;PNum:3;T:30;').replace('24.30', '24.31'))
     log = r4link.read(path)
     left, other = log.boards
@@ -90,16 +90,16 @@ def test_an_error_shows_bytes_of_a_file_that_are_no_text(tmp_path):
 
 def test_texts_of_a_recording_are_shown_whatever_bytes_they_are(tmp_path):
     path = tmp_path / 'others.r4log'
-    path.write_text('# r4log 1 by r4 0.1.0\n# wire 1 udp://\\xff\\x1b]0;owned arm\\xff\n'
+    path.write_text('# r4log 1 by r4 0.1.0\n# path 1 udp://\\xff\\x1b]0;owned arm\\xff\n'
                     '1795468293.000000 1! down \\xff\\x1b]0;owned\n')
     [board] = r4link.read(path).boards
     assert (board.url, board.name) == (r'udp://\xff\x1b]0;owned', '')
     assert [each.words for each in board.events] == [r'down \xff\x1b]0;owned']
 
 
-def device(place, text, wire=1):
+def device(place, text, path=1):
     escaped = text.replace('\\', '\\x5c').replace('\n', '\\x0a')
-    return f'# device {wire} {place} {escaped}\n'
+    return f'# device {path} {place} {escaped}\n'
 
 
 def test_a_device_that_another_has_replaced_measures_nothing_any_more(tmp_path):

@@ -48,7 +48,7 @@ struct Packet {
 };
 
 // What is under way, and what waits for a host that does nothing for half a minute.
-class Wire {
+class Path {
   auto later() const {
     return [this](std::uint8_t a, std::uint8_t b) {
       return std::tie(packets_[a].at_us, packets_[a].came_us) >
@@ -57,7 +57,7 @@ class Wire {
   }
 
  public:
-  Wire() { std::iota(order_.begin(), order_.end(), std::uint8_t{0}); }
+  Path() { std::iota(order_.begin(), order_.end(), std::uint8_t{0}); }
 
   std::uint64_t next_us() const { return count_ == 0 ? UINT64_MAX : packets_[order_[0]].at_us; }
   Packet take() {
@@ -92,13 +92,13 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
 
   void run_until(std::uint64_t end_us) {
     for (;;) {
-      const std::uint64_t packet_us = wire_.next_us();
+      const std::uint64_t packet_us = path_.next_us();
       const std::uint64_t host_us = std::max(host_due_us_, held_until_us_);
       const std::uint64_t next_us = std::min({packet_us, board_due_us_, host_us});
       if (next_us > end_us) break;
       now_us_ = std::max(now_us_, next_us);
       if (packet_us == next_us) {
-        deliver(wire_.take());
+        deliver(path_.take());
       } else if (board_due_us_ == next_us) {
         poll_board();
       } else {
@@ -191,13 +191,13 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
       std::copy_n(bytes.begin(), packet.size, packet.bytes.begin());
       packet.intact = !random_.chance(damaged);
       if (!packet.intact) packet.bytes[random_.below(packet.size)] ^= 1;
-      if (packet.size < bytes.size() || !wire_.put(packet)) ++overflows;
+      if (packet.size < bytes.size() || !path_.put(packet)) ++overflows;
     }
   }
   void deliver(Packet packet) {
     if (!packet.to_board && now_us_ < held_until_us_) {
       packet.at_us = held_until_us_;
-      if (!wire_.put(packet)) ++overflows;
+      if (!path_.put(packet)) ++overflows;
       return;
     }
     const std::string_view bytes(packet.bytes.data(), packet.size);
@@ -237,7 +237,7 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
   std::uint64_t cut_until_us_ = 0, held_until_us_ = 0, restarted_us_ = 0;
   std::uint32_t boot_ms_ = 0;
   bool was_active_ = false;
-  Wire wire_;
+  Path path_;
   std::optional<firmware::Application> application_;
   std::optional<Session> session_;
 };

@@ -60,7 +60,7 @@ void add(Report& sum, const Report& report) {
   sum.waited += report.waited;
   sum.waited_to_feed += report.waited_to_feed;
   sum.joins += report.joins;
-  sum.wire_losses += report.wire_losses;
+  sum.path_losses += report.path_losses;
   sum.failovers += report.failovers;
   sum.timed_on_good += report.timed_on_good;
   sum.copies += report.copies;
@@ -173,20 +173,20 @@ TEST(LinkSimulation, KeepsEveryPromiseOfABoardThatStandsStillNowAndThen) {
   EXPECT_GT(sum.waited_to_feed, schedules);
 }
 
-TEST(LinkSimulation, KeepsEveryPromiseOverSeveralWires) {
-  if (std::getenv("R4_SEED") != nullptr) return replay(World::Beside::wires);
+TEST(LinkSimulation, KeepsEveryPromiseOverSeveralPaths) {
+  if (std::getenv("R4_SEED") != nullptr) return replay(World::Beside::paths);
   const std::uint64_t schedules = schedules_for(10);  // a schedule takes four times as long
-  const Report sum = run_all(schedules, World::Beside::wires);
+  const Report sum = run_all(schedules, World::Beside::paths);
   fmt::print(
-      "several wires: {} joined, {} lost while the session went on, {} failovers; {} copies at "
+      "several paths: {} joined, {} lost while the session went on, {} failovers; {} copies at "
       "hosts; {} "
-      "commands of {} ended beside a wire that met the limits throughout, in {:.1f} h with one; {} "
+      "commands of {} ended beside a path that met the limits throughout, in {:.1f} h with one; {} "
       "datagrams of an hour ago\n",
-      sum.joins, sum.wire_losses, sum.failovers, sum.copies, sum.timed_on_good,
+      sum.joins, sum.path_losses, sum.failovers, sum.copies, sum.timed_on_good,
       sum.confirmed + sum.refused + sum.timed_out, static_cast<double>(sum.served_us) / 3.6e9,
       sum.replayed);
   EXPECT_GT(sum.joins, schedules);
-  EXPECT_GT(sum.wire_losses, schedules / 5);
+  EXPECT_GT(sum.path_losses, schedules / 5);
   EXPECT_GT(sum.failovers, schedules / 50);
   EXPECT_GT(sum.timed_on_good, schedules);
   EXPECT_GT(sum.copies, 10 * schedules);
@@ -197,15 +197,15 @@ TEST(LinkSimulation, KeepsEveryPromiseOverSeveralWires) {
 // What was mended stays so.
 TEST(LinkSimulation, KeepsEveryPromiseOfSeedsThatBrokeOneOnce) {
   // The last BUSY of one that lags made the others wait for longer than what they had been told (415); a BUSY from
-  // before a wire had joined counted beside those of the others, and held the commands back (18012, which the mend
+  // before a path had joined counted beside those of the others, and held the commands back (18012, which the mend
   // of 415 mends as well).
-  // Before the session's first heartbeat one wire's answer was from before a restart, which another showed: each wire
+  // Before the session's first heartbeat one path's answer was from before a restart, which another showed: each path
   // had a clock of its own (98796, 103256). One that said late that the board was booting made the host begin again,
   // beside others that had said so earlier and nothing since (104104, 115880), or while they were silent (271382, 446043).
   // A heartbeat of the millisecond of a state that the farewell came behind passed for its confirmation (756480).
   for (const std::uint64_t seed :
        {415U, 18012U, 98796U, 103256U, 104104U, 115880U, 271382U, 446043U, 756480U}) {
-    EXPECT_EQ(World(seed, false, World::Beside::wires).run().violation, "") << "seed " << seed;
+    EXPECT_EQ(World(seed, false, World::Beside::paths).run().violation, "") << "seed " << seed;
   }
 }
 
@@ -215,7 +215,7 @@ TEST(LinkSimulation, RepeatsASeedToTheSameTrace) {
     const Report second = World(seed, true).run();
     ASSERT_EQ(first.trace, second.trace) << "seed " << seed;
     ASSERT_EQ(first.trace_hash, World(seed, false).run().trace_hash) << "seed " << seed;
-    for (const World::Beside beside : {World::Beside::standstills, World::Beside::wires}) {
+    for (const World::Beside beside : {World::Beside::standstills, World::Beside::paths}) {
       ASSERT_EQ(World(seed, true, beside).run().trace, World(seed, true, beside).run().trace);
     }
   }

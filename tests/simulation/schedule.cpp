@@ -120,23 +120,23 @@ void Schedule::add_drift(Random& random) {
       static_cast<std::int64_t>(random.below(2 * most_drift_ppm + 1)) - most_drift_ppm;
 }
 
-const ChannelFaults& Schedule::faults(int wire, bool toward_board) const {
-  if (wire == 0) return toward_board ? to_board : to_host;
-  const WireFaults& faults = more_wires[static_cast<std::size_t>(wire) - 1];
+const ChannelFaults& Schedule::faults(int path, bool toward_board) const {
+  if (path == 0) return toward_board ? to_board : to_host;
+  const PathFaults& faults = more_paths[static_cast<std::size_t>(path) - 1];
   return toward_board ? faults.to_board : faults.to_host;
 }
 
-// Mostly one of them is good as long as nothing happens to it; what happens to wires happens to one of them, or to
+// Mostly one of them is good as long as nothing happens to it; what happens to paths happens to one of them, or to
 // several at once.
-void Schedule::add_wires(Random& random) {
+void Schedule::add_paths(Random& random) {
   for (std::uint64_t n = random.between(1, 2); n != 0; --n) {
-    more_wires.push_back({random_faults(random), random_faults(random)});
+    more_paths.push_back({random_faults(random), random_faults(random)});
   }
-  const auto count = static_cast<std::uint64_t>(wires());
+  const auto count = static_cast<std::uint64_t>(paths());
   for (std::uint64_t n = random.chance(0.8) ? random.between(1, count) : 0; n != 0; --n) {
     const std::uint64_t good = random.below(count);
-    for (ChannelFaults* const faults : {good == 0 ? &to_board : &more_wires[good - 1].to_board,
-                                        good == 0 ? &to_host : &more_wires[good - 1].to_host}) {
+    for (ChannelFaults* const faults : {good == 0 ? &to_board : &more_paths[good - 1].to_board,
+                                        good == 0 ? &to_host : &more_paths[good - 1].to_host}) {
       static constexpr std::uint32_t delays_us[] = {100, 1'000, 10'000, 50'000};
       static constexpr std::uint32_t jitters_us[] = {0, 2'000, 20'000};
       static constexpr double shares[] = {0, 0.2};
@@ -147,11 +147,11 @@ void Schedule::add_wires(Random& random) {
     }
   }
   one_port = random.chance(0.4);
-  const auto some_wires = [&] {
+  const auto some_paths = [&] {
     if (random.chance(0.2)) return static_cast<std::uint8_t>(random.between(1, 7));
     return static_cast<std::uint8_t>(1U << random.below(count));
   };
-  for (Happening& happening : happenings) happening.wires = some_wires();
+  for (Happening& happening : happenings) happening.paths = some_paths();
   static constexpr Happening::Kind kinds[] = {
       Happening::Kind::cut,    Happening::Kind::cut,   Happening::Kind::cut_to_board,
       Happening::Kind::unplug, Happening::Kind::stall, Happening::Kind::cut_to_host};
@@ -161,11 +161,11 @@ void Schedule::add_wires(Random& random) {
     happening.at_us = random.below(duration_us);
     happening.length_us = random.between(1'000, 2'500'000);
     happening.host = 0;
-    happening.wires = some_wires();
+    happening.paths = some_paths();
     happenings.push_back(happening);
   }
-  attacked_wire = static_cast<int>(random.below(count));
-  if (random.chance(0.2)) replaying_wire = static_cast<int>(random.below(count));
+  attacked_path = static_cast<int>(random.below(count));
+  if (random.chance(0.2)) replaying_path = static_cast<int>(random.below(count));
   reboots_after_capture = random.chance(0.3);
 }
 

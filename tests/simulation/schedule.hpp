@@ -39,20 +39,20 @@ struct Happening {
     leave,    // the host process says farewell and ends; it comes back after `length_us`
     watch,    // a program watches for `length_us`; `host` is the number of it
     watcher_stops,  // … and asks for an emergency stop
-    unplug,  // the host's end of a wire is gone for `length_us`, which the system tells, and the board's
-             // port with it, where each wire has one
-    stall,  // what is sent on a wire waits until `length_us` are over
+    unplug,  // the host's end of a path is gone for `length_us`, which the system tells, and the board's
+             // port with it, where each path has one
+    stall,  // what is sent on a path waits until `length_us` are over
   };
   Kind kind;
   std::uint64_t at_us;
   std::uint64_t length_us;
   int host;
-  // Bit w: it happens to wire w, of what happens to wires; an unplug to the lowest of them.
-  std::uint8_t wires = 0xFF;
+  // Bit w: it happens to path w, of what happens to paths; an unplug to the lowest of them.
+  std::uint8_t paths = 0xFF;
 };
 
-// The two directions of a wire.
-struct WireFaults {
+// The two directions of a path.
+struct PathFaults {
   ChannelFaults to_board, to_host;
 };
 
@@ -67,15 +67,15 @@ struct Schedule {
   int hosts = 1;              // the second one meddles
   bool shared_place = false;  // the stopper's place is the first host's, as on a CAN bus
   Settings settings;
-  ChannelFaults to_board, to_host;  // of the first wire
-  std::vector<WireFaults> more_wires;
-  bool one_port = false;  // the wires are places at one port of the board; else each has its own
-  // Before all this the first host had the board for a second, an hour ago: this wire replays what was sent
+  ChannelFaults to_board, to_host;  // of the first path
+  std::vector<PathFaults> more_paths;
+  bool one_port = false;  // the paths are places at one port of the board; else each has its own
+  // Before all this the first host had the board for a second, an hour ago: this path replays what was sent
   // then, both ways. -1: none does.
-  int replaying_wire = -1;
+  int replaying_path = -1;
   bool reboots_after_capture = false;
-  int attacked_wire = 0;
-  // A stranger (stranger.hpp) on the attacked wire sends about so often while a host is in control,
+  int attacked_path = 0;
+  // A stranger (stranger.hpp) on the attacked path sends about so often while a host is in control,
   // and else at a share of these times; 0: there is none.
   std::uint32_t stranger_interval_us = 0;
   double stranger_claims = 0;  // that share
@@ -101,10 +101,10 @@ struct Schedule {
   void add_standstills(Random& random);
   void add_watchers(Random& random);
   void add_drift(Random& random);
-  void add_wires(Random& random);
+  void add_paths(Random& random);
   void add_stranger(Random& random);
-  int wires() const { return 1 + static_cast<int>(more_wires.size()); }
-  const ChannelFaults& faults(int wire, bool to_board) const;
+  int paths() const { return 1 + static_cast<int>(more_paths.size()); }
+  const ChannelFaults& faults(int path, bool to_board) const;
 };
 
 const char* to_text(Happening::Kind kind);

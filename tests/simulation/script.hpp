@@ -23,7 +23,7 @@ class World::Script {
 
   virtual void set(SessionOptions& options) const = 0;
   // True if that host is on that path.
-  virtual bool has_place(int host, int wire) const = 0;
+  virtual bool has_place(int host, int path) const = 0;
 
   // A host or the board has sent this datagram. The script delivers it.
   virtual void on_sent(const Packet& sent) = 0;

@@ -25,9 +25,9 @@ World::World(std::uint64_t seed, bool keep_trace, Beside beside)
   Random watch_random(seed + 0x5eed);  // what else happens in a schedule without them is as it was
   if (watch_random.chance(0.3)) schedule_.add_watchers(watch_random);
   if (beside == Beside::standstills) schedule_.add_standstills(loop_random_);
-  if (beside == Beside::wires) {
-    schedule_.add_wires(wires_random_);
-    if (wires_random_.chance(0.15)) schedule_.add_standstills(loop_random_);
+  if (beside == Beside::paths) {
+    schedule_.add_paths(paths_random_);
+    if (paths_random_.chance(0.15)) schedule_.add_standstills(loop_random_);
   }
   Random drift_random(seed + 0xd21f7);
   schedule_.add_drift(drift_random);
@@ -40,7 +40,7 @@ World::World(std::uint64_t seed, Schedule schedule, bool keep_trace)
       schedule_(std::move(schedule)),
       keep_trace_(keep_trace),
       stranger_random_(seed + 0x57a96e),
-      wires_random_(seed + 0x311e5) {
+      paths_random_(seed + 0x311e5) {
   report_.seed = seed;
 }
 
@@ -55,7 +55,7 @@ Report World::run() {
   report_.trace_hash = 0xcbf29ce484222325U;
   commands_.emplace_back();  // 0 is where steppers stand: no command is named so
   boot_board();
-  if (schedule_.replaying_wire >= 0) record();
+  if (schedule_.replaying_path >= 0) record();
   for (int i = 0; i < schedule_.hosts; ++i) {
     if (hosts_.size() == static_cast<std::size_t>(i)) {
       hosts_.push_back(std::make_unique<Host>(*this, i));
@@ -98,7 +98,7 @@ void World::run_until(std::uint64_t end_us) {
     check_lost();
     check_silence();
     if (script_ != nullptr) script_->check();
-    if (several() && !recording_ && hosts_.front()->places.size() > 1) check_wires();
+    if (several() && !recording_ && hosts_.front()->places.size() > 1) check_paths();
   }
 }
 

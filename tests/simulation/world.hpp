@@ -36,10 +36,10 @@
 //              intact
 //   joined     a peer becomes a path of a session only by what that session's host has sent to it, and nothing
 //              that was recorded an hour ago feeds
-//   wires      a wire meets the limits while it loses, damages and holds back nothing, takes at most 100 ms each
+//   paths      a path meets the limits while it loses, damages and holds back nothing, takes at most 100 ms each
 //              way, is not disturbed, and both ends go on. One that both ends have used for a second and that
 //              meets them is used on; while there is one, there is no false trip, no command times out for
-//              which there was time on that wire alone, and the newest state is never older than the newest
+//              which there was time on that path alone, and the newest state is never older than the newest
 //              that it has brought, nor than two periods and its delay. Beside one, another that meets them
 //              for 2.5 s is used. The host tells no BUSY beside one that it has used for 0.4 s without being told
 //              any there
@@ -101,20 +101,20 @@ struct Report {
   std::uint32_t waited = 0;            // datagrams that arrived meanwhile
   std::uint32_t waited_to_feed = 0;    // … and fed
   std::uint64_t worst_silence_us = 0;  // last heartbeat in to outputs safe
-  // Of several wires.
+  // Of several paths.
   std::uint32_t joins = 0;
-  std::uint32_t wire_losses = 0;    // of sessions that went on
-  std::uint32_t failovers = 0;      // a wire that served was disturbed, and another served on
-  std::uint32_t timed_on_good = 0;  // commands that ended while a wire met the limits all the time
+  std::uint32_t path_losses = 0;    // of sessions that went on
+  std::uint32_t failovers = 0;      // a path that served was disturbed, and another served on
+  std::uint32_t timed_on_good = 0;  // commands that ended while a path met the limits all the time
   std::uint64_t copies = 0;         // that came to hosts
   std::uint32_t replayed = 0;       // datagrams of an hour ago
-  std::uint64_t served_us = 0;      // for so long there was a wire that met the limits
+  std::uint64_t served_us = 0;      // for so long there was a path that met the limits
 };
 
 class World : public firmware::Hal, public firmware::Observer {
  public:
-  // What is beside the usual: the board's loop stands still now and then, or there are several wires.
-  enum class Beside : std::uint8_t { nothing, standstills, wires };
+  // What is beside the usual: the board's loop stands still now and then, or there are several paths.
+  enum class Beside : std::uint8_t { nothing, standstills, paths };
 
   World(std::uint64_t seed, bool keep_trace, Beside beside = Beside::nothing);
   // The same with a given scenario.
@@ -265,22 +265,22 @@ class World : public firmware::Hal, public firmware::Observer {
   void deliver(int slot);
   void hand_over(int slot);
   void release(int slot);
-  // world_wires.cpp
+  // world_paths.cpp
   void place(Host& host);
-  std::uint8_t port_of(int wire) const {
-    return static_cast<std::uint8_t>(schedule_.one_port ? 0 : wire);
+  std::uint8_t port_of(int path) const {
+    return static_cast<std::uint8_t>(schedule_.one_port ? 0 : path);
   }
-  // For so long both ends have used a wire before it must not be given up.
+  // For so long both ends have used a path before it must not be given up.
   static constexpr std::uint64_t settled_us = 1'000'000;
   bool has_keys() const { return schedule_.keys || schedule_.attack_interval_us != 0; }
-  bool several() const { return schedule_.wires() > 1; }
-  bool meets_limits(int wire) const;
+  bool several() const { return schedule_.paths() > 1; }
+  bool meets_limits(int path) const;
   bool serves_since(std::uint64_t at_us) const;
   bool should_be_confirmed(const Sent& sent) const;
-  void check_wires();
-  void check_age(int wire);
-  void on_told_state(int wire, std::string_view bytes);
-  void disturb(int wire, Happening::Kind kind, std::uint64_t until_us);
+  void check_paths();
+  void check_age(int path);
+  void on_told_state(int path, std::string_view bytes);
+  void disturb(int path, Happening::Kind kind, std::uint64_t until_us);
   void unplug(const Happening& happening, bool over);
   void record();
   std::uint32_t first_time();
@@ -375,9 +375,9 @@ class World : public firmware::Hal, public firmware::Observer {
     World& world;
     std::uint8_t number;
   };
-  static constexpr int most_wires = 3;
-  BoardPort ports_[most_wires] = {{*this, 0}, {*this, 1}, {*this, 2}};
-  struct Wire {
+  static constexpr int most_paths = 3;
+  BoardPort ports_[most_paths] = {{*this, 0}, {*this, 1}, {*this, 2}};
+  struct Path {
     std::uint64_t cut_to_board_until_us = 0;
     std::uint64_t cut_to_host_until_us = 0;
     std::uint64_t stalled_until_us = 0;
@@ -392,8 +392,8 @@ class World : public firmware::Hal, public firmware::Observer {
     bool brought_state = false;
     std::uint32_t newest_t = 0;  // of the states that it has brought
   };
-  Wire wires_[most_wires];
-  Random wires_random_;
+  Path paths_[most_paths];
+  Random paths_random_;
   std::uint64_t start_us_ = 0;  // of the schedule: an hour after what was recorded
   std::uint64_t looked_us_ = 0;
   struct Recorded {

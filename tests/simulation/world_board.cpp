@@ -44,7 +44,7 @@ void World::boot_board() {
   had_owner_ = false;
   shown_.clear();
   fed_.clear();
-  for (Wire& wire : wires_) wire.brought_state = wire.serves = false;
+  for (Path& path : paths_) path.brought_state = path.serves = false;
   standing_ = false;
   ports_lost_meanwhile_.clear();
   for (const int slot : waiting_) release(slot);
@@ -62,7 +62,7 @@ void World::boot_board() {
     config.chance = chance;
   }
   board_ = std::make_unique<firmware::Application>(*this, config, this);
-  for (int i = 0; i < (schedule_.one_port ? 1 : schedule_.wires()); ++i)
+  for (int i = 0; i < (schedule_.one_port ? 1 : schedule_.paths()); ++i)
     board_->add_port(ports_[i]);
   note("board boots");
   board_->start(board_ms());
@@ -102,7 +102,7 @@ void World::go_on() {
     board_->port_down(port, board_ms());
   }
   if (loop_random_.chance(0.5)) {
-    for (int w = 0; w < schedule_.wires(); ++w) board_->drained(port_of(w));
+    for (int w = 0; w < schedule_.paths(); ++w) board_->drained(port_of(w));
   }
   poll_board();
 }
@@ -194,7 +194,7 @@ void World::send(std::uint8_t port, Text datagram, Priority priority, std::uint3
   for (int i = 0; i < static_cast<int>(hosts_.size()); ++i) {
     const Host& host = *hosts_[static_cast<std::size_t>(i)];
     for (std::size_t at = 0; at < host.places.size(); ++at) {
-      if (port_of(host.places[at].wire) != port) continue;
+      if (port_of(host.places[at].path) != port) continue;
       if (peer == everyone ? !host.watcher : peer == host.places[at].peer) {
         transfer(false, i, static_cast<int>(at), bytes);
       }
@@ -207,7 +207,7 @@ void World::on_state(std::uint32_t, firmware::BoardState state, SafeReason reaso
   if (state == firmware::BoardState::safe && reason == SafeReason::link) {
     ++report_.link_losses;
     if (serves_since(now_us_ - std::min(now_us_, settled_us))) {
-      violate("wires: the link was lost beside a good wire");
+      violate("paths: the link was lost beside a good path");
     }
   }
   was_lost_ = state == firmware::BoardState::safe && reason == SafeReason::link;

@@ -42,7 +42,7 @@ void World::transfer(bool to_board, int host, int place, std::string_view bytes)
   const Host::Place at_host =
       hosts_[static_cast<std::size_t>(host)]->places[static_cast<std::size_t>(place)];
   const std::uint32_t incarnation = hosts_[static_cast<std::size_t>(host)]->incarnation;
-  if (recording_ && at_host.wire == schedule_.replaying_wire) {
+  if (recording_ && at_host.path == schedule_.replaying_path) {
     recorded_.push_back({now_us_, to_board, std::string(bytes)});
   }
   if (to_board) {
@@ -50,19 +50,19 @@ void World::transfer(bool to_board, int host, int place, std::string_view bytes)
   } else {
     if (has_keys()) attacker_.on_board(bytes);
     const bool busy = bytes.find(",BUSY;") != std::string_view::npos;
-    if (host == 0 && busy) wires_[at_host.wire].told_busy_us = now_us_;
+    if (host == 0 && busy) paths_[at_host.path].told_busy_us = now_us_;
   }
   mix(bytes.data(), bytes.size());
   if (keep_trace_) {
-    const std::string over = several() ? fmt::format(" over {}", at_host.wire) : "";
+    const std::string over = several() ? fmt::format(" over {}", at_host.path) : "";
     show(fmt::format("{} host {}{} {}", to_board ? "->" : "<-", host, over, bytes));
   }
-  const ChannelFaults& faults = schedule_.faults(at_host.wire, to_board);
+  const ChannelFaults& faults = schedule_.faults(at_host.path, to_board);
   Packet sent;
   sent.to_board = to_board;
   sent.host = host;
   sent.place = place;
-  sent.port = port_of(at_host.wire);
+  sent.port = port_of(at_host.path);
   sent.peer = at_host.peer;
   sent.incarnation = incarnation;
   sent.sent_us = now_us_;
@@ -77,8 +77,8 @@ void World::transfer(bool to_board, int host, int place, std::string_view bytes)
     }
   }
   if (script_ != nullptr) return script_->on_sent(sent);
-  const Wire& wire = wires_[at_host.wire];
-  if (now_us_ < (to_board ? wire.cut_to_board_until_us : wire.cut_to_host_until_us)) return;
+  const Path& path = paths_[at_host.path];
+  if (now_us_ < (to_board ? path.cut_to_board_until_us : path.cut_to_host_until_us)) return;
   const int copies = 1 + (random_.chance(faults.duplicate) ? 1 : 0);
   for (int i = 0; i < copies; ++i) {
     if (random_.chance(faults.loss)) continue;
@@ -112,7 +112,7 @@ void World::transfer(bool to_board, int host, int place, std::string_view bytes)
     }
     std::uint64_t delay = faults.delay_us + random_.below(faults.jitter_us + 1);
     if (random_.chance(faults.straggle)) delay += random_.below(faults.straggle_us + 1);
-    at(std::max(now_us_, wire.stalled_until_us) + delay, Event::Kind::packet, slot);
+    at(std::max(now_us_, path.stalled_until_us) + delay, Event::Kind::packet, slot);
   }
 }
 
@@ -170,11 +170,11 @@ void World::hand_over(int slot) {
   } else {
     Host& host = *hosts_[static_cast<std::size_t>(packet.host)];
     const Host::Place& place = host.places[static_cast<std::size_t>(packet.place)];
-    const bool plugged = now_us_ >= wires_[place.wire].unplugged_until_us;
+    const bool plugged = now_us_ >= paths_[place.path].unplugged_until_us;
     if (host.alive && plugged && place.peer == packet.peer) {
       if (several() && packet.host == 0 && packet.intact && !packet.recorded &&
           packet.sent_us > boot_us_) {
-        on_told_state(place.wire, packet.bytes);
+        on_told_state(place.path, packet.bytes);
       }
       host.session->receive(static_cast<std::size_t>(packet.place), packet.bytes, host.time());
       poll_host(packet.host);

@@ -22,8 +22,8 @@ void World::happen(const Happening& happening, bool over) {
     case Happening::Kind::cut_to_host:
     case Happening::Kind::stall:
     case Happening::Kind::port_down:
-      for (int w = 0; w < schedule_.wires(); ++w) {
-        if ((happening.wires >> w & 1U) != 0) disturb(w, happening.kind, end_us);
+      for (int w = 0; w < schedule_.paths(); ++w) {
+        if ((happening.paths >> w & 1U) != 0) disturb(w, happening.kind, end_us);
       }
       return;
     case Happening::Kind::unplug:
@@ -64,8 +64,8 @@ void World::happen(const Happening& happening, bool over) {
     case Happening::Kind::address:
       if (over && random_.chance(0.5)) return;
       for (Host::Place& place : host.places) {
-        if ((happening.wires >> place.wire & 1U) == 0) continue;
-        disturb(place.wire, happening.kind, now_us_);
+        if ((happening.paths >> place.path & 1U) == 0) continue;
+        disturb(place.path, happening.kind, now_us_);
         std::swap(place.peer, place.other_peer);
         if (place.peer == 0) whose_[place.peer = next_peer_++] = host.index;
       }
@@ -128,11 +128,11 @@ void World::attack() {
   ++report_.attacks;
   note(fmt::format("attacker at {}: {} {}", attack.host, to_text(attack.kind), attack.bytes));
   constexpr std::uint32_t own_address = 0xFFFF;
-  const std::uint8_t port = port_of(schedule_.attacked_wire);
+  const std::uint8_t port = port_of(schedule_.attacked_path);
   std::uint32_t address = own_address;
   if (attack.host >= 0) {
     const Host::Place* const place =
-        hosts_[static_cast<std::size_t>(attack.host)]->on(schedule_.attacked_wire);
+        hosts_[static_cast<std::size_t>(attack.host)]->on(schedule_.attacked_path);
     if (place != nullptr) address = place->peer;
   }
   const BoardLink& link = board_->link();

@@ -40,8 +40,8 @@ struct World::Host final : Session::Handler {
         std::make_unique<Session>(*this, options, watcher ? BoardRole::watch : BoardRole::control,
                                   places.size(), [this] { return world.random_.next(); });
     for (std::size_t i = 0; i < places.size(); ++i) {
-      const Wire& wire = world.wires_[places[i].wire];
-      session->on_transport(i, world.now_us_ >= wire.unplugged_until_us, time());
+      const Path& path = world.paths_[places[i].path];
+      session->on_transport(i, world.now_us_ >= path.unplugged_until_us, time());
     }
     tickets.clear();
   }
@@ -58,7 +58,7 @@ struct World::Host final : Session::Handler {
   }
   Time time() const { return Time{static_cast<std::int64_t>(world.now_us_ + clock_offset_us)}; }
 
-  SendResult transmit(std::size_t wire, std::string_view bytes, Priority priority) override {
+  SendResult transmit(std::size_t path, std::string_view bytes, Priority priority) override {
     Datagram datagram;
     if (priority == Priority::stop && read_datagram(Text(bytes), datagram))
       stop_pnum = datagram.pnum();
@@ -66,8 +66,8 @@ struct World::Host final : Session::Handler {
     if (stopper && world.schedule_.shared_place && priority != Priority::stop) {
       return SendResult::busy;
     }
-    if (world.now_us_ < world.wires_[places[wire].wire].unplugged_until_us) return SendResult::down;
-    world.transfer(true, index, static_cast<int>(wire), bytes);
+    if (world.now_us_ < world.paths_[places[path].path].unplugged_until_us) return SendResult::down;
+    world.transfer(true, index, static_cast<int>(path), bytes);
     return SendResult::sent;
   }
   void on_state(const ReceivedState& state, const Datagram&) override {
@@ -111,15 +111,15 @@ struct World::Host final : Session::Handler {
   bool watcher = false;
   bool leaving = false;  // ends at its next turn: its stop is confirmed, or its farewell over
   struct Place {
-    int wire = 0;
+    int path = 0;
     std::uint32_t peer = 0;        // its address there
     std::uint32_t other_peer = 0;  // the one before or next; 0: none yet
   };
-  std::vector<Place> places;  // the wires of its session
+  std::vector<Place> places;  // the paths of its session
   // None: where it is not.
-  const Place* on(int wire) const {
+  const Place* on(int path) const {
     for (const Place& each : places) {
-      if (each.wire == wire) return &each;
+      if (each.path == path) return &each;
     }
     return nullptr;
   }

@@ -58,7 +58,7 @@ void World::Host::on_result(Ticket ticket, const CommandResult& result) {
     case Outcome::timed_out:
       ++world.report_.timed_out;
       if (index == 0 && world.should_be_confirmed(sent)) {
-        world.violate(fmt::format("wires: command {} timed out beside a good wire", id));
+        world.violate(fmt::format("paths: command {} timed out beside a good path", id));
       }
       break;
     case Outcome::none:

@@ -53,11 +53,11 @@ void World::stranger() {
   Packet packet;
   packet.bytes = stranger_.say(stranger_random_, host.next_pnum);
   describe(packet);
-  packet.port = port_of(schedule_.attacked_wire);
+  packet.port = port_of(schedule_.attacked_path);
   packet.peer = Stranger::address;
   if (stranger_random_.chance(0.3)) {
     const Host::Place* const place =
-        hosts_[stranger_random_.below(hosts_.size())]->on(schedule_.attacked_wire);
+        hosts_[stranger_random_.below(hosts_.size())]->on(schedule_.attacked_path);
     if (place != nullptr) packet.peer = place->peer;
   }
   note(fmt::format("stranger at {}: {}", packet.peer, packet.bytes));

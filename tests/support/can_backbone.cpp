@@ -189,11 +189,11 @@ class Stream {
     std::array<std::uint8_t, max_datagram> packed;
     const std::size_t size =
         options_.packed ? pack(Text(message.plain), packed.data(), packed.size()) : 0;
-    wire_ =
+    path_ =
         size == 0 ? message.plain : std::string(reinterpret_cast<const char*>(packed.data()), size);
-    flow_.bytes += static_cast<std::uint32_t>(wire_.size());
+    flow_.bytes += static_cast<std::uint32_t>(path_.size());
     under_way_.push_back(std::move(message));
-    sender_.begin(Text(wire_), bus_.now_us());
+    sender_.begin(Text(path_), bus_.now_us());
   }
   void arrived() {
     std::array<char, max_datagram> unpacked;
@@ -229,7 +229,7 @@ class Stream {
   Flow& flow_;
   std::deque<Message> waiting_;
   std::deque<Message> under_way_;
-  std::string wire_;
+  std::string path_;
   bool sender_in_controller_ = false;
   bool receiver_in_controller_ = false;
   std::uint64_t heartbeat_ns_ = 0;

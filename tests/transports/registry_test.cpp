@@ -60,7 +60,7 @@ TEST(Registry, ACarrierOfOnesOwnIsSharedWithNobodyWhateverTheUrlSays) {
       << "a board shares nothing";
 }
 
-TEST(Registry, SharesAWireWithAGroupThatIsThere) {
+TEST(Registry, SharesAPathWithAGroupThatIsThere) {
   asio::io_context io;
   const Registry registry = Registry::standard();
   EXPECT_NE(registry.make_shared(io, "can://can0?node=2&share=root", BoardRole::watch), nullptr);

@@ -73,12 +73,12 @@ TEST(UrlPattern, APlusJoinsWhereAUrlFollows) {
            {"+udp:auto", {"", "udp:auto"}},  // which Url refuses
            {"", {""}},
        }) {
-    EXPECT_EQ(split_wires(text), urls) << text;
-    EXPECT_EQ(join_wires(urls), text[0] == '+' ? text + 1 : text);
+    EXPECT_EQ(split_paths(text), urls) << text;
+    EXPECT_EQ(join_paths(urls), text[0] == '+' ? text + 1 : text);
   }
 }
 
-TEST(UrlPattern, WiresOfOneBoardAreJoinedAndEachBoardHasTheNextOfEach) {
+TEST(UrlPattern, PathsOfOneBoardAreJoinedAndEachBoardHasTheNextOfEach) {
   EXPECT_EQ(urls_of("serial:auto+udp://10.0.0.1"), (Texts{"serial:auto+udp://10.0.0.1"}));
   EXPECT_EQ(urls_of("can://can0?node=0-1+can://can1?node=2-3"),
             (Texts{"can://can0?node=0+can://can1?node=2", "can://can0?node=1+can://can1?node=3"}));
@@ -104,8 +104,8 @@ TEST(UrlPattern, WhatIsNoneIsRefusedWithTheReason) {
            Refused{"udp://10.{0-255}.{0-255}.1", "stands for more than 10000 boards"},
            Refused{"udp://arm-{0-4294967295}", "stands for more than 10000 boards"},
            Refused{"udp://127.0.0.1:65535-65536", "'65536' is not a port"},
-           Refused{"can://can0?node=0-7+serial:auto", "its wires lead to 8 and to 1 boards"},
-           Refused{"serial:auto+udp://arm-{1-3}", "its wires lead to 1 and to 3 boards"},
+           Refused{"can://can0?node=0-7+serial:auto", "its paths lead to 8 and to 1 boards"},
+           Refused{"serial:auto+udp://arm-{1-3}", "its paths lead to 1 and to 3 boards"},
        }) {
     try {
       expand_urls(pattern);

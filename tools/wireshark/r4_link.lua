@@ -8,7 +8,7 @@ local datagram = require("r4_datagram")
 local M = {}
 
 local window, far = 64, 65536
-local most_sequences = 8 -- of one direction: programs that share a wire, answers to hosts not in control
+local most_sequences = 8 -- of one direction: programs that share a transport, answers to hosts not in control
 
 local links, notes, stops = {}, {}, {}
 
@@ -211,11 +211,11 @@ end
 
 -- Answers have a count of their own where their host is not in control, and heartbeats that of the host where states
 -- have that of a watcher. So nothing is said of these, but a number that they have is not missing. Nor is one of a
--- watcher, who is not heard while another program drives the board over a shared wire.
+-- watcher, who is not heard while another program drives the board over a shared transport.
 local answers = { refusal = true, identity = true }
 
 -- A checked datagram: `fields` with kind, from and pnum (or nil). `key` is of the board and
--- its host, `bus` of the wire.
+-- its host, `bus` of the transport.
 function M.look(key, bus, fields, frame, time)
   local link = links[key]
   if not link then

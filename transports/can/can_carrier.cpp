@@ -41,7 +41,7 @@ class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member
   SendResult send(std::string_view bytes, Priority priority, Peer) override;
   void use_packed_form(bool wanted) override { node_.use_packed_form(wanted); }
   bool up() const override { return handler_ != nullptr && bus_->up(); }
-  WireTrouble trouble() const override;
+  TransportTrouble trouble() const override;
   bool is_shared() const override { return true; }
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override;
@@ -261,8 +261,8 @@ void CanCarrier::count_late_transfers() {
   if (count != trouble_.late()) trouble_.on_late(count, Clock::now());
 }
 
-WireTrouble CanCarrier::trouble() const {
-  return role_ == Role::host && up() ? trouble_.now(Clock::now()) : WireTrouble::none;
+TransportTrouble CanCarrier::trouble() const {
+  return role_ == Role::host && up() ? trouble_.now(Clock::now()) : TransportTrouble::none;
 }
 
 // Begins the next datagram of each lane that has become idle. True if there was one.

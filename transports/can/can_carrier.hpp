@@ -23,7 +23,7 @@ namespace r4 {
 
 std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role);
 
-// What programs that share the wire call it: the interface and the board's number.
+// What programs that share the path call it: the interface and the board's number.
 ShareName can_share_name(const Url& url);
 
 }  // namespace r4

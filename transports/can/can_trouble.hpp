@@ -48,11 +48,11 @@ class CanTrouble {
   bool hears_host(Time now) const {
     return now - host_heard_ < host_silence && !hears_foreign_frames(now);
   }
-  WireTrouble now(Time now) const {
-    if (hears_foreign_frames(now)) return WireTrouble::foreign_frames;
+  TransportTrouble now(Time now) const {
+    if (hears_foreign_frames(now)) return TransportTrouble::foreign_frames;
     const Time oldest = late_[place(late_count_)];
     const bool late = late_count_ >= late_.size() && now - oldest < late_within;
-    return late && hears_board(now) ? WireTrouble::late_frames : WireTrouble::none;
+    return late && hears_board(now) ? TransportTrouble::late_frames : TransportTrouble::none;
   }
 
  private:

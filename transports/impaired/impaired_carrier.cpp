@@ -55,7 +55,7 @@ class Impaired final : public ImpairedCarrier, public BoardEnd, private Carrier:
   bool is_own_cable() const override { return end_.is_own_cable(); }
   bool is_shared() const override { return below_->is_shared(); }
   bool up() const override { return below_->up(); }
-  WireTrouble trouble() const override { return below_->trouble(); }
+  TransportTrouble trouble() const override { return below_->trouble(); }
   const std::string& name() const override { return below_->name(); }
   const CarrierCounters& counters() const override { return below_->counters(); }
   const ImpairmentCounters& received() const override { return in_->counters(); }

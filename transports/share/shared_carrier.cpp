@@ -56,7 +56,7 @@ class SharedCarrier final : public Carrier,
   void close() noexcept override;
   SendResult send(std::string_view bytes, Priority priority, Peer to) override;
   bool up() const override { return up_; }
-  WireTrouble trouble() const override { return own_->trouble(); }
+  TransportTrouble trouble() const override { return own_->trouble(); }
   // The board would take what is sent to another program's transport for the holder's.
   bool is_shared() const override { return is_served() || own_->is_shared(); }
   const std::string& name() const override { return name_; }

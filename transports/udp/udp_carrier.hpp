@@ -44,7 +44,7 @@ std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, 
 std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& url, Role role,
                                                HostLookup lookup, BoardSearch search = {});
 
-// What programs that share the wire call it: the board, as it is written, and the port of hosts. Empty
+// What programs that share the path call it: the board, as it is written, and the port of hosts. Empty
 // where that is any free one: then each has its own.
 ShareName udp_share_name(const Url& text);
 bool udp_has_own_port(const Url& text);

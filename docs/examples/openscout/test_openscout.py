@@ -88,7 +88,7 @@ def running(*arguments, **options):
             program.kill()
 
 
-class Wire:
+class Relay:
     """The way to a board on UDP, that can be cut."""
 
     def __init__(self, url):
@@ -157,7 +157,7 @@ def test_it_keeps_to_its_course_behind_the_simulated_board(arguments, places):
 
 class Scene(NamedTuple):
     sim: r4link.SimBoard
-    wire: Wire
+    path: Relay
     program: subprocess.Popen
 
 
@@ -174,18 +174,18 @@ def killed(scene):
 
 
 def cut(scene):
-    scene.wire.cut = True
+    scene.path.cut = True
 
 
 @pytest.mark.parametrize('happens, notice_s, told', [(let_go, 0.0, 'handle'), (obstacle, 0.5, 'proximity'),
                                                      (killed, TIMEOUT_S, ''), (cut, TIMEOUT_S, 'newest state')],
                          ids=['handle let go', 'obstacle', 'killed', 'link lost'])
 def test_it_stands_within_its_braking_distance_and_one_timeout(happens, notice_s, told):
-    with r4link.SimBoard('udp://127.0.0.1:0') as sim, Behind(sim) as model, Wire(sim.url) as wire:
-        with running(wire.url, '--course', '50,0') as program:
+    with r4link.SimBoard('udp://127.0.0.1:0') as sim, Behind(sim) as model, Relay(sim.url) as path:
+        with running(path.url, '--course', '50,0') as program:
             until(lambda: model.speed > 0.9 * CRUISE)
             speed, begun = model.speed, model.travelled
-            happens(Scene(sim, wire, program))
+            happens(Scene(sim, path, program))
             until(lambda: model.speed < 0.001 and sim.look().is_safe)
             rolled = model.travelled - begun
             if happens is not killed:

@@ -293,7 +293,7 @@ void bind_board(py::module_& module) {
           "carrier_counters", [](PyBoard& board) { return board->carrier_counters(); }, Released())
       .def("name", [](PyBoard& board) { return board->name(); })
       .def(
-          "wires", [](PyBoard& board) { return board->wires(); }, Released())
+          "paths", [](PyBoard& board) { return board->paths(); }, Released())
       .def(
           "record",
           [](PyBoard& board, const std::string& path, std::uint64_t rotate_bytes,
@@ -332,10 +332,10 @@ void bind_board(py::module_& module) {
              return board.subscribe(std::move(function),
                                     [&](const Callback& each) { return board->on_event(each); });
            })
-      .def("on_wire",
+      .def("on_path",
            [](PyBoard& board, py::object function) {
              return board.subscribe(std::move(function),
-                                    [&](const Callback& each) { return board->on_wire(each); });
+                                    [&](const Callback& each) { return board->on_path(each); });
            })
       .def("on_restart",
            [](PyBoard& board, py::object function) {

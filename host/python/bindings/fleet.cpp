@@ -98,7 +98,7 @@ void bind_fleet(py::module_& module) {
       .def_property_readonly("disarmed_by",
                              [](const BoardHealth& health) { return to_text(health.disarmed_by); })
       .def_readonly("statistics", &BoardHealth::statistics)
-      .def_readonly("wires", &BoardHealth::wires)
+      .def_readonly("paths", &BoardHealth::paths)
       .def_property_readonly("well", &BoardHealth::well);
 
   // The Error of a board that did not confirm is made in r4link/fleet.py.

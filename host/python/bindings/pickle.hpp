@@ -82,13 +82,13 @@ inline void members_of(Pickle& pickle, CarrierEvent& it) { pickle(it.kind, it.pr
 inline void members_of(Pickle& pickle, BoardIdentity& it) {
   pickle(it.firmware, it.board_id, it.capabilities, it.name);
 }
-inline void members_of(Pickle& pickle, Wire& it) {
+inline void members_of(Pickle& pickle, PathStatus& it) {
   pickle(it.name, it.state, it.busy, it.board_id, it.packets, it.copies, it.round_trip_us,
          it.age_us);
 }
 inline void members_of(Pickle& pickle, BoardHealth& it) {
   pickle(it.board, it.url, it.identity, it.link, it.in_control, it.disarmed_by, it.statistics,
-         it.wires);
+         it.paths);
 }
 inline void members_of(Pickle& pickle, FleetResult& it) { pickle(it.board, it.result, it.problem); }
 

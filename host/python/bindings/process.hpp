@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What belongs to one process. In a fork of that process its threads are missing, its locks may be held for ever, and
-// its wire is the parent's: there it is left alone.
+// its path is the parent's: there it is left alone.
 #pragma once
 
 #include <unistd.h>

@@ -84,22 +84,22 @@ class Columns final : public RecordingVisitor {
   explicit Columns(bool datagrams) : with_datagrams_(datagrams) {}
 
   // Texts of the file are printable(): any bytes may be there, and a str of Python has none.
-  void on_wire(int wire, const std::string& told, const std::string& name) override {
+  void on_path(int path, const std::string& told, const std::string& name) override {
     const std::string url = printable(told);
     const auto known = std::find_if(boards_.begin(), boards_.end(),
                                     [&url](const RecordedBoard& each) { return each.url == url; });
     const auto index = static_cast<std::size_t>(known - boards_.begin());
     if (known == boards_.end()) boards_.emplace_back().url = url;
     if (!name.empty()) boards_[index].name = name;
-    index_of_[wire] = index;
+    index_of_[path] = index;
   }
   void on_beginning() override {
     for (RecordedBoard& board : boards_) {
       for (Measured& each : board.measured) each.here = false;
     }
   }
-  void on_device(int wire, const Device& told) override {
-    RecordedBoard& board = of(wire);
+  void on_device(int path, const Device& told) override {
+    RecordedBoard& board = of(path);
     for (Measured& each : board.measured)
       each.here = each.here && !told.takes_place_of(*each.device);
     const auto device = std::make_shared<const Device>(told);
@@ -123,8 +123,8 @@ class Columns final : public RecordingVisitor {
       }
     }
   }
-  void on_state(int wire, Time at, const State& state) override {
-    RecordedBoard& board = of(wire);
+  void on_state(int path, Time at, const State& state) override {
+    RecordedBoard& board = of(path);
     for (const StateField field : state.present) {
       if (board.fields.has(field)) continue;
       board.fields.add(field);
@@ -147,23 +147,23 @@ class Columns final : public RecordingVisitor {
       each.numbers.push_back(number);
     }
   }
-  void on_datagram(int wire, Time at, bool from_board, std::string_view bytes) override {
+  void on_datagram(int path, Time at, bool from_board, std::string_view bytes) override {
     Datagram datagram;
-    RecordedBoard& board = of(wire);
+    RecordedBoard& board = of(path);
     if (!read_datagram(Text(bytes.data(), bytes.size()), datagram)) ++board.damaged;
     if (with_datagrams_) board.datagrams.emplace_back(at.count(), from_board, bytes);
   }
-  void on_event(int wire, Time at, std::string_view words) override {
-    (wire == 0 ? events_ : of(wire).events).emplace_back(at.count(), printable(words));
+  void on_event(int path, Time at, std::string_view words) override {
+    (path == 0 ? events_ : of(path).events).emplace_back(at.count(), printable(words));
   }
   void on_damage(const std::string& words) override { damage_.push_back(printable(words)); }
 
   py::tuple take();
 
  private:
-  RecordedBoard& of(int wire) {
-    if (!index_of_.contains(wire)) on_wire(wire, "wire " + std::to_string(wire), "");
-    return boards_[index_of_[wire]];
+  RecordedBoard& of(int path) {
+    if (!index_of_.contains(path)) on_path(path, "path " + std::to_string(path), "");
+    return boards_[index_of_[path]];
   }
 
   const bool with_datagrams_;

@@ -135,28 +135,28 @@ void bind_values(py::module_& module) {
       .has("transport_down", &LinkStatus::transport_down)
       .has("carrying",
            [](const LinkStatus& link) {
-             py::list wires;
+             py::list paths;
              for (int i = 0; link.carrying >> i != 0; ++i) {
-               if ((link.carrying >> i & 1) != 0) wires.append(i);
+               if ((link.carrying >> i & 1) != 0) paths.append(i);
              }
-             return py::tuple(wires);
+             return py::tuple(paths);
            })
       .has("two_boards", &LinkStatus::two_boards)
       .has("chip", [](const LinkStatus& link) -> py::object {
         if (!link.chip.any()) return py::none();
         return py::str("{}: {}").format(chip_name(link.chip.address), to_text(link.chip.trouble));
       });
-  Record<Wire>(module, "Wire")
-      .has("name", &Wire::name)
-      .has("state", [](const Wire& wire) { return to_text(wire.state); })
-      .has("busy", &Wire::busy)
-      .has("board_id", &Wire::board_id)
-      .has("received", [](const Wire& wire) { return wire.packets.received; })
-      .has("lost", [](const Wire& wire) { return wire.packets.lost; })
-      .has("loss", [](const Wire& wire) { return wire.loss(); })
-      .has("copies", &Wire::copies)
-      .has("round_trip_us", &Wire::round_trip_us)
-      .has("age_us", &Wire::age_us);
+  Record<PathStatus>(module, "PathStatus")
+      .has("name", &PathStatus::name)
+      .has("state", [](const PathStatus& path) { return to_text(path.state); })
+      .has("busy", &PathStatus::busy)
+      .has("board_id", &PathStatus::board_id)
+      .has("received", [](const PathStatus& path) { return path.packets.received; })
+      .has("lost", [](const PathStatus& path) { return path.packets.lost; })
+      .has("loss", [](const PathStatus& path) { return path.loss(); })
+      .has("copies", &PathStatus::copies)
+      .has("round_trip_us", &PathStatus::round_trip_us)
+      .has("age_us", &PathStatus::age_us);
   Record<BoardIdentity>(module, "Identity")
       .has("firmware", &BoardIdentity::firmware)
       .has("board_id", &BoardIdentity::board_id)

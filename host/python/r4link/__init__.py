@@ -8,7 +8,7 @@ if _importlib.find_spec('r4link._core') is None:
 
 from . import aio, control, devices  # pylint: disable=wrong-import-position
 from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State,
-                    Statistics, Subscription, Wire, __version__)
+                    Statistics, Subscription, PathStatus, __version__)
 from .board import Board, States
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
 from .channels import (BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, Setpoints, StepperChannel, Uart)
@@ -31,6 +31,6 @@ __all__ = [
     'NotConfirmedError', 'OpenError', 'PostResult', 'REVERSE', 'RecordedBoard', 'RecordedDatagram', 'RecordedEvent',
     'Recording', 'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State',
     'States', 'Statistics', 'StepperChannel', 'Subscription', 'Uart', 'UartBytes', 'UartData', 'UnsupportedError',
-    'UsageError', 'Wire', 'aio', 'control', 'devices',
+    'UsageError', 'PathStatus', 'aio', 'control', 'devices',
     'read', 'with_link', '__version__',
 ]

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Callable, Iterable, Type, TypeVar
 
 from . import board as blocking, channels
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
-                    Subscription, Wire)
+                    Subscription, PathStatus)
 from .channels import Setpoints
 from .devices import Device
 from .errors import ClosedError
@@ -385,8 +385,8 @@ class Board:
         return self._board.name
 
     @property
-    def wires(self) -> list[Wire]:
-        return self._board.wires
+    def paths(self) -> list[PathStatus]:
+        return self._board.paths
 
     def states(self, most: int | None = None, *, lossless: bool = False) -> States:
         """The states from now on, until the board is closed: as those of r4link.Board."""
@@ -403,8 +403,8 @@ class Board:
     def on_link(self, callback: Callable[[LinkStatus], object]) -> Subscription:
         return self._board.on_link(_on_loop(callback))
 
-    def on_wire(self, callback: Callable[[Wire], object]) -> Subscription:
-        return self._board.on_wire(_on_loop(callback))
+    def on_path(self, callback: Callable[[PathStatus], object]) -> Subscription:
+        return self._board.on_path(_on_loop(callback))
 
     def on_event(self, callback: Callable[[Event], object]) -> Subscription:
         return self._board.on_event(_on_loop(callback))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, Type, TypeV
 
 from . import _core
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
-                    Subscription, Wire)
+                    Subscription, PathStatus)
 from .channels import (BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, Setpoints, StepperChannel, _ms,
                        _Uarts)
 from .devices import Device
@@ -84,7 +84,7 @@ class Board:
             board.arm()                 # closes relay 1, the motor supply
             board.osmc(1).set(358)      # the board's own state has confirmed it
 
-    Several URLs are wires to the one board (docs/redundancy.md): r4link.Board(['serial:auto', 'udp://192.168.0.125']).
+    Several URLs are paths to the one board (docs/redundancy.md): r4link.Board(['serial:auto', 'udp://192.168.0.125']).
     """
 
     def __init__(self, url: str | Iterable[str], *, role: str = 'control', arming: bool = True, fields: str = 'DEFAULT',
@@ -93,12 +93,12 @@ class Board:
                  stop_linger: float = 0.2, identify_interval: float = 1.0, callback_limit: float = 0.5) -> None:
         if role not in ('control', 'watch'):
             raise UsageError(f'role {role!r}', 'there is no such role', "give 'control' or 'watch'")
-        wires = [url] if isinstance(url, str) else list(url)
-        link = next((bad for bad in (getattr(each, 'link', '') for each in wires) if bad), '')
-        if link and (len(wires) > 1):
-            raise UsageError(f'a bad link {link}', 'it is for a board of one wire', 'open that URL alone')
+        paths = [url] if isinstance(url, str) else list(url)
+        link = next((bad for bad in (getattr(each, 'link', '') for each in paths) if bad), '')
+        if link and (len(paths) > 1):
+            raise UsageError(f'a bad link {link}', 'it is for a board of one path', 'open that URL alone')
         self._core = _core.Board(
-            '+'.join(wires), link=link, watch=role == 'watch', arming=arming, fields=fields,
+            '+'.join(paths), link=link, watch=role == 'watch', arming=arming, fields=fields,
             key=None if key is None else os.path.expanduser(os.fspath(key)),
             watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout),
             command_retry=_ms(command_retry), stop_retry=_ms(stop_retry), stop_linger=_ms(stop_linger),
@@ -252,13 +252,13 @@ class Board:
 
     @property
     def name(self) -> str:
-        """The transport, for people; of several wires all of them."""
+        """The transport, for people; of several paths all of them."""
         return self._core.name()
 
     @property
-    def wires(self) -> list[Wire]:
-        """How each of its wires does, in the order of the URLs."""
-        return self._core.wires()
+    def paths(self) -> list[PathStatus]:
+        """How each of its paths does, in the order of the URLs."""
+        return self._core.paths()
 
     # --- callbacks: each is told first what there is already. As functions or as decorators.
 
@@ -268,9 +268,9 @@ class Board:
     def on_link(self, callback: Callable[[LinkStatus], object]) -> Subscription:
         return self._core.on_link(callback)
 
-    def on_wire(self, callback: Callable[[Wire], object]) -> Subscription:
-        """A wire has begun to carry, or ceased to."""
-        return self._core.on_wire(callback)
+    def on_path(self, callback: Callable[[PathStatus], object]) -> Subscription:
+        """A path has begun to carry, or ceased to."""
+        return self._core.on_path(callback)
 
     def on_event(self, callback: Callable[[Event], object]) -> Subscription:
         """The transport went up or down, or something is to be warned of."""

@@ -98,7 +98,7 @@ class Fleet:
         for url in urls:
             if not isinstance(url, str):
                 raise UsageError(f'a fleet of {url!r}', 'each URL is a text of its own',
-                                 "write r4link.Fleet(*urls); several wires to one board are 'URL+URL'")
+                                 "write r4link.Fleet(*urls); several paths to one board are 'URL+URL'")
             if getattr(url, 'link', ''):
                 raise UsageError(url, 'with_link() is for a Board alone, not for one of a Fleet',
                                  'open it by a Board, or let the simulated board have the bad link (r4 sim --link)')

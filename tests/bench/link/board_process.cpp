@@ -45,7 +45,7 @@ bool read_line(int fd) {
 
 }  // namespace
 
-const char* to_text(Wire wire) { return wire == Wire::udp ? "udp" : "pty"; }
+const char* to_text(Transport path) { return path == Transport::udp ? "udp" : "pty"; }
 
 Usage own_usage() {
   rusage used;
@@ -58,8 +58,8 @@ Usage own_usage() {
 
 // --- the board
 
-BoardProcess::BoardProcess(Wire wire, bool unbound) {
-  if (fork_child()) serve(wire, unbound);
+BoardProcess::BoardProcess(Transport path, bool unbound) {
+  if (fork_child()) serve(path, unbound);
   std::array<char, 256> text{};
   read_all(control_, text.data(), text.size());
   url_ = text.data();
@@ -72,7 +72,7 @@ Usage BoardProcess::usage() const {
   return usage;
 }
 
-void BoardProcess::serve(Wire wire, bool unbound) {
+void BoardProcess::serve(Transport path, bool unbound) {
   asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE};
   std::uint32_t virtual_ms = 0;
   sim::SimulatedBoard::Options options;
@@ -84,14 +84,14 @@ void BoardProcess::serve(Wire wire, bool unbound) {
   }
   sim::SimulatedBoard board(io, std::move(options));
   auto carrier =
-      Registry::standard().make(io, wire == Wire::udp ? "udp://127.0.0.1:0" : "pty:", Role::board);
+      Registry::standard().make(io, path == Transport::udp ? "udp://127.0.0.1:0" : "pty:", Role::board);
   const Carrier& end = *carrier;
   board.add_carrier(std::move(carrier));
   board.start();
   std::array<char, 256> text{};
   const std::string& name = end.name();
   const std::string url =
-      wire == Wire::udp ? name + "?listen=0" : "serial://" + name.substr(name.find(':') + 1);
+      path == Transport::udp ? name + "?listen=0" : "serial://" + name.substr(name.find(':') + 1);
   std::memcpy(text.data(), url.data(), url.size());
   write_all(control_, text.data(), text.size());
 
@@ -124,9 +124,9 @@ void BoardProcess::serve(Wire wire, bool unbound) {
 
 // --- the plain program
 
-EchoProcess::EchoProcess(Wire wire, std::size_t question_size, std::size_t answer_size)
-    : wire_(wire), question_(question_size, 'q'), answer_(answer_size, 'a') {
-  if (wire == Wire::udp) {
+EchoProcess::EchoProcess(Transport path, std::size_t question_size, std::size_t answer_size)
+    : path_(path), question_(question_size, 'q'), answer_(answer_size, 'a') {
+  if (path == Transport::udp) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
@@ -154,7 +154,7 @@ EchoProcess::EchoProcess(Wire wire, std::size_t question_size, std::size_t answe
 void EchoProcess::serve() {
   std::array<char, 2048> buffer;
   for (;;) {
-    if (wire_ == Wire::udp) {
+    if (path_ == Transport::udp) {
       if (::recv(theirs_, buffer.data(), buffer.size(), 0) <= 0) end_child();
     } else if (!read_line(theirs_)) {
       end_child();
@@ -166,7 +166,7 @@ void EchoProcess::serve() {
 double EchoProcess::round_trip() {
   const auto start = std::chrono::steady_clock::now();
   write_all(ours_, question_.data(), question_.size());
-  if (wire_ == Wire::udp) {
+  if (path_ == Transport::udp) {
     std::array<char, 2048> buffer;
     require(::recv(ours_, buffer.data(), buffer.size(), 0) > 0, "recv");
   } else {

@@ -19,32 +19,32 @@ struct Usage {
 };
 Usage own_usage();
 
-enum class Wire { udp, pty };
-const char* to_text(Wire wire);
+enum class Transport { udp, pty };
+const char* to_text(Transport path);
 
 // A simulated board. With `unbound` its clock runs as fast as it can be served, so that its 1000 Hz
 // become as many as go.
 class BoardProcess : public ChildProcess {
  public:
-  BoardProcess(Wire wire, bool unbound);
+  BoardProcess(Transport path, bool unbound);
   const std::string& url() const { return url_; }
   Usage usage() const;
 
  private:
-  [[noreturn]] void serve(Wire wire, bool unbound);
+  [[noreturn]] void serve(Transport path, bool unbound);
   std::string url_;
 };
 
 // Answers each packet (line) with one of `answer_size` bytes, with blocking calls and nothing else.
 class EchoProcess : public ChildProcess {
  public:
-  EchoProcess(Wire wire, std::size_t question_size, std::size_t answer_size);
+  EchoProcess(Transport path, std::size_t question_size, std::size_t answer_size);
   // Seconds from the question to the answer, by blocking calls.
   double round_trip();
 
  private:
   [[noreturn]] void serve();
-  Wire wire_;
+  Transport path_;
   std::string question_, answer_;
   int ours_ = -1, theirs_ = -1;
 };

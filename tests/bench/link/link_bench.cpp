@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The link between two processes: round trip against a plain ping-pong, heap, and streaming.
 //
-//     r4_link_bench [round-trips a wire, default 20000 [part: round-trip, heap or stream]]
+//     r4_link_bench [round-trips a path, default 20000 [part: round-trip, heap or stream]]
 //
 // The three ways of asking take turns in blocks, so that what else the machine does meets all of
 // them. Exit code 1 if a bar of the plan is missed: asynchronous p50 at most 1.3 times the plain
@@ -105,12 +105,12 @@ struct AsyncHost {
 
 // --- (a)
 
-void compare_round_trips(Wire wire, int count, bool judged) {
+void compare_round_trips(Transport path, int count, bool judged) {
   // Sizes of Q:ID and of the simulated board's answer, as sent; a line has CR LF behind it.
-  const std::size_t line_end = wire == Wire::udp ? 0 : 2;
-  EchoProcess plain(wire, 42 + line_end, 55 + line_end);
-  BoardProcess board_for_async(wire, false);
-  BoardProcess board_for_blocking(wire, false);
+  const std::size_t line_end = path == Transport::udp ? 0 : 2;
+  EchoProcess plain(path, 42 + line_end, 55 + line_end);
+  BoardProcess board_for_async(path, false);
+  BoardProcess board_for_blocking(path, false);
   AsyncHost host(board_for_async.url());
 
   std::vector<double> raw, async, blocking;
@@ -135,26 +135,26 @@ void compare_round_trips(Wire wire, int count, bool judged) {
   const Percentiles r = percentiles(raw);
   const Percentiles a = percentiles(async);
   const Percentiles b = percentiles(blocking);
-  std::printf("%s  plain ping-pong   p50 %6.1f us   p99 %6.1f us\n", to_text(wire), r.p50, r.p99);
-  std::printf("%s  async_identify    p50 %6.1f us   p99 %6.1f us   %.2f times%s%s\n", to_text(wire),
+  std::printf("%s  plain ping-pong   p50 %6.1f us   p99 %6.1f us\n", to_text(path), r.p50, r.p99);
+  std::printf("%s  async_identify    p50 %6.1f us   p99 %6.1f us   %.2f times%s%s\n", to_text(path),
               a.p50, a.p99, a.p50 / r.p50, judged ? ", bar 1.30: " : "",
               judged ? verdict(a.p50 <= 1.3 * r.p50) : "");
-  std::printf("%s  Board::identify   p50 %6.1f us   p99 %6.1f us   %.2f times\n", to_text(wire),
+  std::printf("%s  Board::identify   p50 %6.1f us   p99 %6.1f us   %.2f times\n", to_text(path),
               b.p50, b.p99, b.p50 / r.p50);
 }
 
 // --- (b)
 
-void print_allocations(Wire wire, const char* what, std::uint64_t host, std::uint64_t board,
+void print_allocations(Transport path, const char* what, std::uint64_t host, std::uint64_t board,
                        std::uint64_t datagrams) {
   std::printf("%s  %-34s %6llu datagrams   host %llu, board %llu allocations, bar 0: %s\n",
-              to_text(wire), what, static_cast<unsigned long long>(datagrams),
+              to_text(path), what, static_cast<unsigned long long>(datagrams),
               static_cast<unsigned long long>(host), static_cast<unsigned long long>(board),
               verdict(host == 0 && board == 0));
 }
 
-void count_allocations(Wire wire) {
-  BoardProcess process(wire, false);
+void count_allocations(Transport path) {
+  BoardProcess process(path, false);
   {
     AsyncHost host(process.url());
     std::vector<double> seconds;
@@ -190,7 +190,7 @@ void count_allocations(Wire wire) {
       run_counted(start);
       const Statistics now = host.board.statistics();
       const Usage board_after = process.usage();
-      print_allocations(wire, what, count.made, board_after.allocations - board_before.allocations,
+      print_allocations(path, what, count.made, board_after.allocations - board_before.allocations,
                         now.received - then.received + now.heartbeats - then.heartbeats +
                             now.commands - then.commands);
     };
@@ -238,7 +238,7 @@ void count_allocations(Wire wire) {
       Send{count}.send();
     });
   }
-  BoardProcess other(wire, false);
+  BoardProcess other(path, false);
   Board board(other.url(), test::at_will());
   board.wait_active();
   for (int i = 0; i < 300; ++i) {  // also the deques of the loop have their size now
@@ -252,15 +252,15 @@ void count_allocations(Wire wire) {
     if (i % 10 == 0) board.next_state();
   }
   const std::uint64_t made = allocations() - before;
-  print_allocations(wire, "Board::post() and next_state()", made,
+  print_allocations(path, "Board::post() and next_state()", made,
                     other.usage().allocations - board_before.allocations, 1100);
 }
 
 // --- (c)
 
-void stream(Wire wire, int rate_hz) {
+void stream(Transport path, int rate_hz) {
   const bool unbound = rate_hz == 0;
-  BoardProcess process(wire, unbound);
+  BoardProcess process(path, unbound);
   AsyncHost host(process.url());
   if (!unbound) {
     bool set = false;
@@ -289,7 +289,7 @@ void stream(Wire wire, int rate_hz) {
   std::printf(
       "%s  %s Hz   sent %8.0f/s   received %8.0f/s   CPU a datagram: board %5.2f us, "
       "host %5.2f us   of a core: board %5.2f %%, host %5.2f %%",
-      to_text(wire), wanted, sent / seconds, received / seconds, board_cpu / sent * 1e6,
+      to_text(path), wanted, sent / seconds, received / seconds, board_cpu / sent * 1e6,
       host_cpu / received * 1e6, board_cpu / seconds * 100, host_cpu / seconds * 100);
   if (rate_hz == 100) {
     const bool met = board_cpu <= 0.02 * seconds && host_cpu <= 0.02 * seconds;
@@ -306,20 +306,20 @@ int run(int count, const std::string& part) {
     for (const Placement placement : {Placement::two_cores, Placement::one_core}) {
       place(placement);
       std::printf("  %s\n", to_text(placement));
-      for (const Wire wire : {Wire::udp, Wire::pty}) {
-        compare_round_trips(wire, count, placement == Placement::two_cores);
+      for (const Transport path : {Transport::udp, Transport::pty}) {
+        compare_round_trips(path, count, placement == Placement::two_cores);
       }
     }
     place(Placement::two_cores);
   }
   if (wanted("heap")) {
     std::printf("\nallocations in the steady state\n");
-    for (const Wire wire : {Wire::udp, Wire::pty}) count_allocations(wire);
+    for (const Transport path : {Transport::udp, Transport::pty}) count_allocations(path);
   }
   if (wanted("stream")) {
     std::printf("\nstreaming, 2 s each\n");
-    for (const Wire wire : {Wire::udp, Wire::pty}) {
-      for (const int rate : {100, 1000, 0}) stream(wire, rate);
+    for (const Transport path : {Transport::udp, Transport::pty}) {
+      for (const int rate : {100, 1000, 0}) stream(path, rate);
     }
   }
   return all_met ? 0 : 1;

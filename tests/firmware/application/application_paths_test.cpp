@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A session with several paths: how they join and leave, and that they are one session.
-#include "tests/firmware/wired_host.hpp"
+#include "tests/firmware/host_on_paths.hpp"
 #include "tests/support/signing.hpp"
 
 namespace r4 {
@@ -13,7 +13,7 @@ using test::our_session;
 using test::state_of;
 using test::TestBoard;
 using test::TestHost;
-using test::WiredHost;
+using test::HostOnPaths;
 using Lines = std::vector<std::string>;
 using Numbers = std::vector<std::uint32_t>;
 
@@ -24,7 +24,7 @@ constexpr Source path_c{2, 6};
 struct ApplicationPaths : testing::Test {
   const SessionPaths& paths() const { return board.application->paths(); }
   // … with the counters of what came.
-  State newest_state(WiredHost& host, int port = 0) {
+  State newest_state(HostOnPaths& host, int port = 0) {
     host.command("F:RXLOST,RXDUP,RXREF");
     board.take(port);
     host.run(20);
@@ -78,11 +78,11 @@ TEST_F(ApplicationPaths, APathJoinsWithAFreshEchoOfTheSession) {
 }
 
 TEST_F(ApplicationPaths, ANewPathKeepsTheSessionAlive) {
-  WiredHost host(board, {{path_a}, {path_b}});
-  host.wires[1].cut = true;
+  HostOnPaths host(board, {{path_a}, {path_b}});
+  host.paths[1].cut = true;
   host.connect();
-  host.wires[0].cut = true;
-  host.wires[1].cut = false;
+  host.paths[0].cut = true;
+  host.paths[1].cut = false;
   board.log.states.clear();
   host.run(3000);
   EXPECT_EQ(board.log.states, Lines());
@@ -122,7 +122,7 @@ TEST_F(ApplicationPaths, AnEchoThatIsNotFreshMakesNoPath) {
 }
 
 TEST_F(ApplicationPaths, NoMoreThanFour) {
-  WiredHost host(board, {{path_a}, {path_b}, {path_c}, {Source{0, 5}}});
+  HostOnPaths host(board, {{path_a}, {path_b}, {path_c}, {Source{0, 5}}});
   host.connect();
   EXPECT_EQ(paths().size(), 4);
   forget();
@@ -143,7 +143,7 @@ TEST_F(ApplicationPaths, APaperHostHasOne) {
 }
 
 TEST_F(ApplicationPaths, AnAnswerNamesTheSessionOfTheAskerAloneAndTellsOthersBusy) {
-  WiredHost host(board, {{path_a}, {path_b}});
+  HostOnPaths host(board, {{path_a}, {path_b}});
   host.connect();
   forget();
   for (const Source from : {path_a, path_c}) {
@@ -162,12 +162,12 @@ TEST_F(ApplicationPaths, AnAnswerNamesTheSessionOfTheAskerAloneAndTellsOthersBus
 
 // --- commands over all of them
 
-TEST_F(ApplicationPaths, ACommandIsExecutedOnceWhicheverWireBringsIt) {
-  WiredHost host(board, {{path_a}, {path_b}});
+TEST_F(ApplicationPaths, ACommandIsExecutedOnceWhicheverPathBringsIt) {
+  HostOnPaths host(board, {{path_a}, {path_b}});
   host.connect();
   forget();
   const std::uint32_t both = host.command("O:358,1,1");
-  host.wires[0].cut = true;
+  host.paths[0].cut = true;
   const std::uint32_t second = host.command("Z:1");
   EXPECT_EQ(board.log.executed, (Numbers{both, second}));
   EXPECT_EQ(board.hal.zeroed, std::vector<int>{1});
@@ -179,8 +179,8 @@ TEST_F(ApplicationPaths, ACommandIsExecutedOnceWhicheverWireBringsIt) {
   EXPECT_EQ(state.rx_lost, 0U);
 }
 
-TEST_F(ApplicationPaths, WhatOneWireRepeatsIsCounted) {
-  WiredHost host(board, {{path_a}, {path_b}});
+TEST_F(ApplicationPaths, WhatOnePathRepeatsIsCounted) {
+  HostOnPaths host(board, {{path_a}, {path_b}});
   host.connect();
   host.command("Z:1");
   board.receive_raw(host.last, path_b);
@@ -190,7 +190,7 @@ TEST_F(ApplicationPaths, WhatOneWireRepeatsIsCounted) {
 }
 
 TEST_F(ApplicationPaths, ACopyOfARefusedCommandIsToldTheSame) {
-  WiredHost host(board, {{path_a}, {path_b, 200}});
+  HostOnPaths host(board, {{path_a}, {path_b, 200}});
   host.connect();
   host.run(1000);
   forget();
@@ -211,19 +211,19 @@ TEST_F(ApplicationPaths, ACopyOfARefusedCommandIsToldTheSame) {
   EXPECT_TRUE(board.safe());
 }
 
-// 400 commands a second over a wire that lags, then also over a fast one, then over that one only. Commands have
-// numbers, too: the fast wire is far ahead.
-void expect_a_fast_wire_takes_over(TestBoard& board, WiredHost& host, std::uint32_t lag_ms) {
-  host.wires[0].cut = true;
-  host.wires[1].lag_ms = lag_ms;
+// 400 commands a second over a path that lags, then also over a fast one, then over that one only. Commands have
+// numbers, too: the fast path is far ahead.
+void expect_a_fast_path_takes_over(TestBoard& board, HostOnPaths& host, std::uint32_t lag_ms) {
+  host.paths[0].cut = true;
+  host.paths[1].lag_ms = lag_ms;
   host.connect();
   host.run(1000);
   ASSERT_EQ(board.state(), BoardState::active);
   board.log.states.clear();
   Numbers sent;
   for (int ms = 0; ms < 6000; ms += 10) {
-    if (ms == 1000) host.wires[0].cut = false;
-    if (ms == 3000) host.wires[1].cut = true;
+    if (ms == 1000) host.paths[0].cut = false;
+    if (ms == 3000) host.paths[1].cut = true;
     if (ms == 2000) board.log.executed.clear();
     for (int channel = 1; channel <= 4; ++channel) {
       const std::string end = ",1," + std::to_string(channel);
@@ -237,9 +237,9 @@ void expect_a_fast_wire_takes_over(TestBoard& board, WiredHost& host, std::uint3
   EXPECT_EQ(board.application->paths()[0], path_a);
 }
 
-TEST_F(ApplicationPaths, AFastWireTakesOverFromOneThatLagsAtAnyRateOfCommands) {
-  WiredHost host(board, {{path_a}, {path_b}});
-  expect_a_fast_wire_takes_over(board, host, 500);
+TEST_F(ApplicationPaths, AFastPathTakesOverFromOneThatLagsAtAnyRateOfCommands) {
+  HostOnPaths host(board, {{path_a}, {path_b}});
+  expect_a_fast_path_takes_over(board, host, 500);
 }
 
 // --- a board with a key
@@ -260,7 +260,7 @@ class ApplicationPathsWithAKey : public testing::Test {
   const Key key = test::key_of(1);
   std::uint64_t counter = 1000;
   TestBoard board{test::settings_with(test::key_of(1)), 4};
-  WiredHost host{board, {{path_a}, {path_b, 100}}};
+  HostOnPaths host{board, {{path_a}, {path_b, 100}}};
 };
 
 TEST_F(ApplicationPathsWithAKey, EachPathHasASignatureOfItsOwnAndACommandIsExecutedOnce) {
@@ -269,9 +269,9 @@ TEST_F(ApplicationPathsWithAKey, EachPathHasASignatureOfItsOwnAndACommandIsExecu
   ASSERT_EQ(paths().size(), 2);
   board.log.rejected.clear();
   for (int i = 0; i < 200; ++i) {
-    host.wires[0].cut = i % 10 == 0;  // now and then one brings it alone, later
+    host.paths[0].cut = i % 10 == 0;  // now and then one brings it alone, later
     host.command("Z:1");
-    host.wires[0].cut = false;
+    host.paths[0].cut = false;
     host.run(10);
   }
   EXPECT_EQ(board.log.rejected, Lines());
@@ -296,14 +296,14 @@ TEST_F(ApplicationPathsWithAKey, ADuplicateFromAnotherPlaceIsAReplay) {
   EXPECT_EQ(board.log.rejected.back(), "missing") << "the session id alone is no proof";
 }
 
-TEST_F(ApplicationPathsWithAKey, AFastWireTakesOverFromOneThatLagsAtAnyRateOfCommands) {
-  expect_a_fast_wire_takes_over(board, host, 200);
+TEST_F(ApplicationPathsWithAKey, AFastPathTakesOverFromOneThatLagsAtAnyRateOfCommands) {
+  expect_a_fast_path_takes_over(board, host, 200);
 }
 
-// --- the end of wires
+// --- the end of paths
 
-TEST_F(ApplicationPaths, ALostPortTakesTheLinkOnlyWithTheLastWire) {
-  WiredHost host(board, {{path_a}, {path_b}});
+TEST_F(ApplicationPaths, ALostPortTakesTheLinkOnlyWithTheLastPath) {
+  HostOnPaths host(board, {{path_a}, {path_b}});
   host.connect();
   host.command("O:358,1,1");
   board.application->port_down(0, board.now_ms);
@@ -318,29 +318,29 @@ TEST_F(ApplicationPaths, ALostPortTakesTheLinkOnlyWithTheLastWire) {
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationPaths, ASessionIsResumedFromAnyOfItsWires) {
+TEST_F(ApplicationPaths, ASessionIsResumedFromAnyOfItsPaths) {
   for (const std::size_t first : {0U, 1U}) {
     TestBoard fresh({}, 4);
-    WiredHost host(fresh, {{path_a}, {path_b}});
+    HostOnPaths host(fresh, {{path_a}, {path_b}});
     host.connect();
     host.command("O:358,1,1");
-    host.wires[0].cut = host.wires[1].cut = true;
+    host.paths[0].cut = host.paths[1].cut = true;
     host.run(1500);
     ASSERT_EQ(fresh.reason(), SafeReason::link);
-    host.wires[first].cut = false;
+    host.paths[first].cut = false;
     host.run(300);
     EXPECT_EQ(fresh.state(), BoardState::active);
     EXPECT_EQ(fresh.outputs().osmc[0].pwm, 358) << "the same session";
     host.command("O:7,1,1");
     EXPECT_EQ(fresh.outputs().osmc[0].pwm, 7);
-    host.wires[1 - first].cut = false;
+    host.paths[1 - first].cut = false;
     host.run(300);
     EXPECT_EQ(fresh.application->paths().size(), 2);
   }
 }
 
-TEST_F(ApplicationPaths, TheFarewellByAllWiresIsObeyedOnce) {
-  WiredHost host(board, {{path_a}, {path_b, 80}});
+TEST_F(ApplicationPaths, TheFarewellByAllPathsIsObeyedOnce) {
+  HostOnPaths host(board, {{path_a}, {path_b, 80}});
   host.connect();
   host.command("O:358,1,1");
   host.run(85);
@@ -348,7 +348,7 @@ TEST_F(ApplicationPaths, TheFarewellByAllWiresIsObeyedOnce) {
   const std::uint32_t leave = host.command("E:LEAVE");
   EXPECT_EQ(board.reason(), SafeReason::link);
   EXPECT_TRUE(board.safe());
-  host.wires[0].cut = host.wires[1].cut = true;  // it has ended; what is under way comes
+  host.paths[0].cut = host.paths[1].cut = true;  // it has ended; what is under way comes
   host.run(90);
   EXPECT_EQ(board.log.executed, Numbers{leave});
   EXPECT_EQ(answers(1), Lines{"DUPLICATE"});
@@ -357,8 +357,8 @@ TEST_F(ApplicationPaths, TheFarewellByAllWiresIsObeyedOnce) {
 
 // --- the stop
 
-TEST_F(ApplicationPaths, TheSameStopByAllWiresIsOneCause) {
-  WiredHost host(board, {{path_a}, {path_b, 50}, {path_c, 90}});
+TEST_F(ApplicationPaths, TheSameStopByAllPathsIsOneCause) {
+  HostOnPaths host(board, {{path_a}, {path_b, 50}, {path_c, 90}});
   host.connect();
   host.command("O:358,1,1");
   host.run(150);
@@ -370,7 +370,7 @@ TEST_F(ApplicationPaths, TheSameStopByAllWiresIsOneCause) {
   host.command("E:CLEAR," + std::to_string(cause));
   host.run(200);
   EXPECT_EQ(board.state(), BoardState::active);
-  host.wires[0].cut = true;
+  host.paths[0].cut = true;
   host.command("E:STOP");
   host.run(50);
   EXPECT_EQ(board.reason(), SafeReason::stop) << "by any of them";
@@ -380,7 +380,7 @@ TEST_F(ApplicationPaths, TheSameStopByAllWiresIsOneCause) {
 
 TEST_F(ApplicationPaths, TwoPlacesOnOnePortGetTheSame) {
   const Source other{0, 5};
-  WiredHost host(board, {{path_a}, {other}});
+  HostOnPaths host(board, {{path_a}, {other}});
   host.connect();
   EXPECT_EQ(board.ports[0].held, path_a.peer);
   EXPECT_EQ(board.ports[0].also_held, std::vector<std::uint32_t>{other.peer});
@@ -400,7 +400,7 @@ TEST_F(ApplicationPaths, TwoPlacesOnOnePortGetTheSame) {
   }
   EXPECT_GE(at_a.size(), 50U);
   EXPECT_EQ(at_a, at_other) << "the answers, too: they have numbers of the same count";
-  host.wires[1].cut = true;
+  host.paths[1].cut = true;
   host.run(1200);
   EXPECT_EQ(board.ports[0].also_held, std::vector<std::uint32_t>());
 }
@@ -408,7 +408,7 @@ TEST_F(ApplicationPaths, TwoPlacesOnOnePortGetTheSame) {
 // An answer carries the SID of its question, which its host alone may know.
 TEST_F(ApplicationPaths, AnotherHostAtAPathGetsItsAnswersAlone) {
   const Source other{0, 5};
-  WiredHost host(board, {{path_a}, {other}});
+  HostOnPaths host(board, {{path_a}, {other}});
   host.connect();
   forget();
   board.receive("Q:ID;" + test::stamp_of(another_session, 7, 0), path_a);
@@ -422,7 +422,7 @@ TEST_F(ApplicationPaths, AnotherHostAtAPathGetsItsAnswersAlone) {
   EXPECT_EQ(answers, 2);
 }
 
-TEST_F(ApplicationPaths, AWatcherBecomesAWireAndNeedsNoLeaseAnyMore) {
+TEST_F(ApplicationPaths, AWatcherBecomesAPathAndNeedsNoLeaseAnyMore) {
   TestHost host(board, our_session, path_a);
   host.connect();
   const Source place{2, 6};

@@ -220,7 +220,7 @@ TEST_F(BridgeHostsTest, AHostThatWasServedComesBackAtOnceAfterASilenceThoughStra
   EXPECT_TRUE(hears_states(1000));
 }
 
-TEST_F(BridgeHostsTest, AFloodOfAHostThatIsNotServedDoesNotReachTheBoardsWire) {
+TEST_F(BridgeHostsTest, AFloodOfAHostThatIsNotServedDoesNotReachTheBoardsPath) {
   begin();
   heartbeat(other_sid, waiting);
   busy(other_sid);

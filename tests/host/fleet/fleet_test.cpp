@@ -245,12 +245,12 @@ TEST(Fleet, AllItsBoardsGoIntoOneRecording) {
     fleet.close();
     recording.close();
   }
-  struct Wires final : RecordingVisitor {
-    std::set<int> wires;
-    void on_state(int wire, Time, const State&) override { wires.insert(wire); }
+  struct Paths final : RecordingVisitor {
+    std::set<int> paths;
+    void on_state(int path, Time, const State&) override { paths.insert(path); }
   } read;
   read_recording(path.string(), read);
-  EXPECT_EQ(read.wires.size(), 4U);
+  EXPECT_EQ(read.paths.size(), 4U);
   std::filesystem::remove(path);
 }
 

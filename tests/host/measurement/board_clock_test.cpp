@@ -111,7 +111,7 @@ TEST(BoardClock, ARoundTripBoundsItFromBothSides) {
   EXPECT_NEAR(static_cast<double>(clock.at(1000).error->count()), 1000, 2);
 }
 
-TEST(BoardClock, OnAFastWireItIsWithinSevenTenthsOfAMillisecond) {
+TEST(BoardClock, OnAFastPathItIsWithinSevenTenthsOfAMillisecond) {
   for (unsigned seed = 1; seed <= 200; ++seed) {
     ClockBench bench({.drift_ppm = static_cast<double>(seed % 201) - 100, .seed = seed});
     EXPECT_LE(bench.run(0, 20'000, 2'000), 700) << "seed " << seed;

@@ -24,7 +24,7 @@ struct Heard final : RecordingReader::Handler {
     ++count;
     if (record.kind == RecordKind::event) events.emplace_back(record.bytes);
   }
-  void on_wire(const RecordedWire& wire) override { wires.push_back(wire); }
+  void on_path(const RecordedPath& path) override { paths.push_back(path); }
   void on_device(const RecordedDevice& device) override { devices.push_back(device); }
   void on_damage(const RecordingDamage& each) override {
     damage.push_back({each.kind, each.line, each.offset});
@@ -35,7 +35,7 @@ struct Heard final : RecordingReader::Handler {
   int count = 0;
   int headers = 0;
   std::vector<std::string> events;
-  std::vector<RecordedWire> wires;
+  std::vector<RecordedPath> paths;
   std::vector<RecordedDevice> devices;
   std::vector<Damage> damage;
 };

@@ -15,11 +15,11 @@ namespace r4::test {
 namespace {
 
 struct VisitorOfAll final : RecordingVisitor {
-  void on_wire(int wire, const std::string& url, const std::string& name) override {
-    wires.push_back(std::to_string(wire) + " " + url + " " + name);
+  void on_path(int path, const std::string& url, const std::string& name) override {
+    paths.push_back(std::to_string(path) + " " + url + " " + name);
   }
-  void on_state(int wire, Time at, const State& state) override {
-    EXPECT_EQ(wire, 1);
+  void on_state(int path, Time at, const State& state) override {
+    EXPECT_EQ(path, 1);
     EXPECT_GT(at, last);
     last = at;
     pwm.push_back(state.osmc[0].pwm);
@@ -27,12 +27,12 @@ struct VisitorOfAll final : RecordingVisitor {
   void on_datagram(int, Time, bool from_board, std::string_view) override {
     ++(from_board ? from : to);
   }
-  void on_event(int wire, Time, std::string_view words) override {
-    events.push_back(std::to_string(wire) + " " + std::string(words));
+  void on_event(int path, Time, std::string_view words) override {
+    events.push_back(std::to_string(path) + " " + std::string(words));
   }
   void on_damage(const std::string& words) override { ADD_FAILURE() << words; }
 
-  std::vector<std::string> wires, events;
+  std::vector<std::string> paths, events;
   std::vector<int> pwm;
   Time last{0};
   int from = 0, to = 0;
@@ -53,7 +53,7 @@ TEST(ReadRecording, VisitsAllThatWasRecorded) {
   VisitorOfAll visitor;
   read_recording(path, visitor);
   std::filesystem::remove(path);
-  EXPECT_EQ(visitor.wires.back(), "1 sim: sim-1");
+  EXPECT_EQ(visitor.paths.back(), "1 sim: sim-1");
   EXPECT_NE(std::find(visitor.pwm.begin(), visitor.pwm.end(), 358), visitor.pwm.end());
   EXPECT_EQ(visitor.pwm.back(), 10);
   EXPECT_GE(visitor.from + 10, static_cast<int>(live.received)) << "but what came before record()";

@@ -22,7 +22,7 @@ std::string line_of(const Record& record) {
   return line;
 }
 
-TEST(RecordLine, IsTimeWireDirectionAndTheDatagramAsItStands) {
+TEST(RecordLine, IsTimePathDirectionAndTheDatagramAsItStands) {
   EXPECT_EQ(line_of({sample, 1, RecordKind::from_board, "AIN24:24.28;PNum:1;T:2;^0xf07cfd9a^"}),
             "1795468293.404765 1< AIN24:24.28;PNum:1;T:2;^0xf07cfd9a^");
   EXPECT_EQ(line_of({Time{5}, 12, RecordKind::to_board, ""}), "0.000005 12> ");
@@ -58,17 +58,17 @@ TEST(RecordLine, OfAStateHasTwoHundredBytesAtMost) {
   EXPECT_LE(line_of({sample, 1, RecordKind::from_board, state}).size() + 1, 200);
 }
 
-RC_GTEST_PROP(RecordLine, GivesAnyBytesBack, (const std::string& bytes, std::uint16_t wire)) {
+RC_GTEST_PROP(RecordLine, GivesAnyBytesBack, (const std::string& bytes, std::uint16_t path)) {
   const auto kind =
       *rc::gen::element(RecordKind::from_board, RecordKind::to_board, RecordKind::event);
   const Time time{*rc::gen::inRange<std::int64_t>(0, 253402300799999999)};
-  const std::string line = line_of({time, wire, kind, bytes});
+  const std::string line = line_of({time, path, kind, bytes});
   for (const char c : line) RC_ASSERT(c >= ' ' && c <= '~');
   RecordLine read;
   RC_ASSERT(read_record_line(line, read));
   RC_ASSERT(read.kind == LineKind::record);
   RC_ASSERT(read.record.time == time);
-  RC_ASSERT(read.record.wire == wire);
+  RC_ASSERT(read.record.path == path);
   RC_ASSERT(read.record.kind == kind);
   RC_ASSERT(read.record.bytes == bytes);
 }
@@ -106,9 +106,9 @@ TEST(RecordLine, TellsWhatIsNoLineOfARecording) {
            "# r4log",
            "# r4log x",
            "# r4log 99999999999 by r4",
-           "# wire 0 udp://x",
-           "# wire 65536 udp://x",
-           "# wire x",
+           "# path 0 udp://x",
+           "# path 65536 udp://x",
+           "# path x",
        }) {
     RecordLine read;
     const bool good = read_record_line(line, read);
@@ -119,32 +119,32 @@ TEST(RecordLine, TellsWhatIsNoLineOfARecording) {
   }
 }
 
-TEST(RecordLine, OfAWireHasItsUrlAndTheBoardsName) {
+TEST(RecordLine, OfAPathHasItsUrlAndTheBoardsName) {
   for (const std::string& name : {std::string(), std::string("left-arm"), std::string("0042AF")}) {
     std::string text;
-    write_wire(text, {7, "udp:?id=a b\n\xff", name});
+    write_path(text, {7, "udp:?id=a b\n\xff", name});
     text.pop_back();
     EXPECT_EQ(text.find('\n'), std::string::npos);
     RecordLine read;
     ASSERT_TRUE(read_record_line(text, read)) << text;
-    EXPECT_EQ(read.kind, LineKind::wire);
-    EXPECT_EQ(read.wire.number, 7);
-    EXPECT_EQ(read.wire.url, "udp:?id=a b\n\xff");
-    EXPECT_EQ(read.wire.name, name);
+    EXPECT_EQ(read.kind, LineKind::path);
+    EXPECT_EQ(read.path.number, 7);
+    EXPECT_EQ(read.path.url, "udp:?id=a b\n\xff");
+    EXPECT_EQ(read.path.name, name);
   }
 }
 
-TEST(RecordLine, OfAWireHasNoNameThatNoBoardMayHave) {
+TEST(RecordLine, OfAPathHasNoNameThatNoBoardMayHave) {
   for (const std::string& name :
        {std::string("=1+cmd|calc!A0"), std::string("arm\x1b]0;owned\x07"), std::string("a b"),
         std::string("a/b"), std::string("\xff"), std::string(65, 'n')}) {
     std::string text;
-    write_wire(text, {7, "udp://robot", name});
+    write_path(text, {7, "udp://robot", name});
     text.pop_back();
     RecordLine read;
     ASSERT_TRUE(read_record_line(text, read)) << text;
-    EXPECT_EQ(read.wire.url, "udp://robot");
-    EXPECT_EQ(read.wire.name, "") << text;
+    EXPECT_EQ(read.path.url, "udp://robot");
+    EXPECT_EQ(read.path.name, "") << text;
   }
 }
 
@@ -167,7 +167,7 @@ TEST(RecordLine, IsMadeOfARecordWithoutItsSecrets) {
     const Record kept = without_secrets(Record{sample, 3, c.kind, c.bytes}, room);
     EXPECT_EQ(kept.bytes, c.kept);
     EXPECT_EQ(kept.time, sample);
-    EXPECT_EQ(kept.wire, 3);
+    EXPECT_EQ(kept.path, 3);
     EXPECT_EQ(kept.kind, c.kind);
   }
 }
@@ -181,7 +181,7 @@ TEST(RecordLine, OfADeviceHasItsPlaceAndTheTextOfItsDescription) {
   RecordLine read;
   ASSERT_TRUE(read_record_line(text, read)) << text;
   EXPECT_EQ(read.kind, LineKind::device);
-  EXPECT_EQ(read.device.wire, 3);
+  EXPECT_EQ(read.device.path, 3);
   EXPECT_EQ(read.device.place, "my one@0x28:1");
   EXPECT_EQ(read.device.description, "device mine\naddress 0x40\n# \\\xff\n");
   // The longest is a line that is read.

@@ -57,10 +57,10 @@ TEST_F(RecordingOfABoard, HasBothDirectionsAndWhatHappened) {
   }
   const Heard all = heard();
   EXPECT_TRUE(all.damage.empty());
-  ASSERT_FALSE(all.wires.empty());
-  EXPECT_EQ(all.wires.front().number, 1);
-  EXPECT_TRUE(contains(all.wires.front().url, "sim:"));
-  EXPECT_EQ(all.wires.back().name, "sim-1");
+  ASSERT_FALSE(all.paths.empty());
+  EXPECT_EQ(all.paths.front().number, 1);
+  EXPECT_TRUE(contains(all.paths.front().url, "sim:"));
+  EXPECT_EQ(all.paths.back().name, "sim-1");
   for (const char* const line :
        {" 1! up sim:", " 1> H:ROS2-R4;", " 1< AIN24:", " 1> O:358,1,1;", " 1! link active",
         " 1> E:STOP;", " 1! link safe stop", " 1< I:R4,", " 1> E:LEAVE;", " 0! end"}) {
@@ -140,9 +140,9 @@ TEST_F(RecordingOfABoard, IsInTheOrderInWhichItCameAndNotInThatInWhichItWasTold)
   const Time began = std::chrono::duration_cast<Time>(
       (std::chrono::steady_clock::now() - 20ms).time_since_epoch());
   Recorder recorder(path(), {});
-  const std::uint16_t left = recorder.add_wire("a"), right = recorder.add_wire("b");
-  for (const auto& [wire, at] : {std::pair{left, 5ms}, {left, 15ms}, {right, 1ms}, {right, 15ms}}) {
-    recorder.record(wire, RecordKind::from_board, std::to_string(at.count()), began + at);
+  const std::uint16_t left = recorder.add_path("a"), right = recorder.add_path("b");
+  for (const auto& [path, at] : {std::pair{left, 5ms}, {left, 15ms}, {right, 1ms}, {right, 15ms}}) {
+    recorder.record(path, RecordKind::from_board, std::to_string(at.count()), began + at);
   }
   recorder.close();
   const Heard all = heard();
@@ -152,11 +152,11 @@ TEST_F(RecordingOfABoard, IsInTheOrderInWhichItCameAndNotInThatInWhichItWasTold)
 
 TEST_F(RecordingOfABoard, TakesADatagramWithoutMemoryAndTellsWhatItHadNoRoomFor) {
   Recorder recorder(path(), {});
-  const std::uint16_t wire = recorder.add_wire("sim:");
+  const std::uint16_t path = recorder.add_path("sim:");
   const std::string datagram(1000, 'x');
   const std::uint64_t before = bench::allocations_of_this_thread();
   // Sooner than any disk takes them.
-  for (int i = 0; i < 50'000; ++i) recorder.record(wire, RecordKind::from_board, datagram);
+  for (int i = 0; i < 50'000; ++i) recorder.record(path, RecordKind::from_board, datagram);
   EXPECT_EQ(bench::allocations_of_this_thread(), before);
   recorder.close();
   const Heard all = heard();

@@ -22,7 +22,7 @@ using DamageKind = RecordingDamage::Kind;
 std::string head() {
   std::string text;
   write_record_header(text);
-  write_wire(text, {1, "udp://robot", "left"});
+  write_path(text, {1, "udp://robot", "left"});
   return text;
 }
 
@@ -51,8 +51,8 @@ TEST(RecordingReader, GivesEveryRecordHoweverTheBytesCome) {
       const Heard heard = heard_in(file, piece);
       EXPECT_EQ(heard.records, text) << piece;
       EXPECT_TRUE(heard.damage.empty()) << piece;
-      ASSERT_EQ(heard.wires.size(), 1);
-      EXPECT_EQ(heard.wires[0].name, "left");
+      ASSERT_EQ(heard.paths.size(), 1);
+      EXPECT_EQ(heard.paths[0].name, "left");
     }
   }
 }
@@ -241,14 +241,14 @@ TEST(RecordingReader, RefusesRecordingsThatAreMixed) {
   const std::string end = "1795468299.000000 0! end\n";
   std::string other;
   write_record_header(other);
-  write_wire(other, {1, "udp://another-robot", "right"});
+  write_path(other, {1, "udp://another-robot", "right"});
   const std::string left = head() + lines(0, 5) + end;
   const std::string right = other + lines(3, 5) + end;
-  const std::string no_header = right.substr(right.find("# wire"));
+  const std::string no_header = right.substr(right.find("# path"));
   for (const std::string& file : {
            merged_by_sort(left, right),
            merged_by_sort(left, left),
-           head() + lines(0, 2) + no_header,                  // the wire is another
+           head() + lines(0, 2) + no_header,                  // the path is another
            head() + other + lines(0, 9) + end + lines(9, 1),  // behind the end
            head() + other + lines(0, 9) + end + end,
        }) {
@@ -261,7 +261,7 @@ TEST(RecordingReader, RefusesRecordingsThatAreMixed) {
 TEST(RecordingReader, ReadsRecordingsOneAfterTheOtherThoughTheHeaderBetweenThemIsDamaged) {
   std::string other;
   write_record_header(other);
-  write_wire(other, {1, "udp://another-robot", "right"});
+  write_path(other, {1, "udp://another-robot", "right"});
   other[0] = '$';
   const std::string end = "1795468299.000000 0! end\n";
   const Heard heard = heard_in(head() + lines(0, 2) + end + other + lines(2, 2) + end);
@@ -269,10 +269,10 @@ TEST(RecordingReader, ReadsRecordingsOneAfterTheOtherThoughTheHeaderBetweenThemI
   EXPECT_EQ(heard.damage.size(), 1);
 }
 
-TEST(RecordingReader, ReadsRecordingsWithOtherWiresOneAfterTheOther) {
+TEST(RecordingReader, ReadsRecordingsWithOtherPathsOneAfterTheOther) {
   std::string other;
   write_record_header(other);
-  write_wire(other, {1, "udp://another-robot", "right"});
+  write_path(other, {1, "udp://another-robot", "right"});
   const std::string end = "1795468299.000000 0! end\n";
   const Heard heard = heard_in(head() + lines(0, 2) + end + other + lines(2, 2) + head() + end);
   EXPECT_EQ(heard.records, lines(0, 2) + end + lines(2, 2) + end);

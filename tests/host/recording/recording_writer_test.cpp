@@ -84,13 +84,13 @@ TEST_F(RecordingWriterTest, WhatWasFlushedIsInTheFile) {
   for (const char* const name : {"a.r4log", "a.r4log.zst"}) {
     all.clear();
     RecordingWriter writer(path(name), {});
-    writer.declare(RecordedWire{1, "udp://robot", ""});
+    writer.declare(RecordedPath{1, "udp://robot", ""});
     for (int i = 0; i < 10; ++i) {
       append(writer);
       writer.flush();
       const Heard heard = heard_in(content(name));
       EXPECT_EQ(heard.records, all) << name;
-      EXPECT_EQ(heard.wires.size(), 1);
+      EXPECT_EQ(heard.paths.size(), 1);
     }
     writer.close();
     EXPECT_TRUE(heard_in(content(name)).damage.empty());
@@ -149,7 +149,7 @@ TEST_F(RecordingWriterTest, AFileThatWasMovedIsLeftWholeAndBegunAnew) {
   for (const std::string ending : {".r4log", ".r4log.zst"}) {
     all.clear();
     RecordingWriter writer(path("a" + ending), {});
-    writer.declare(RecordedWire{1, "udp://robot", "left"});
+    writer.declare(RecordedPath{1, "udp://robot", "left"});
     for (int i = 0; i < 10; ++i) append(writer);
     writer.flush();
     fs::rename(path("a" + ending), path("moved" + ending));
@@ -167,7 +167,7 @@ TEST_F(RecordingWriterTest, AFileThatWasMovedIsLeftWholeAndBegunAnew) {
     const Heard anew = heard_in(content("a" + ending));
     EXPECT_EQ(moved.records + anew.records, all);
     EXPECT_TRUE(moved.damage.empty() && anew.damage.empty());
-    EXPECT_EQ(anew.wires.back().name, "left") << "each is whole in itself";
+    EXPECT_EQ(anew.paths.back().name, "left") << "each is whole in itself";
   }
 }
 
@@ -175,7 +175,7 @@ TEST_F(RecordingWriterTest, AFileThatWasRemovedOrTruncatedIsBegunAnewAndTheLossI
   for (const std::string ending : {".r4log", ".r4log.zst"}) {
     for (const bool removed : {true, false}) {
       RecordingWriter writer(path("a" + ending), {});
-      writer.declare(RecordedWire{1, "udp://robot", "left"});
+      writer.declare(RecordedPath{1, "udp://robot", "left"});
       for (int i = 0; i < 10; ++i) append(writer);
       writer.flush();
       removed ? static_cast<void>(fs::remove(path("a" + ending)))
@@ -192,7 +192,7 @@ TEST_F(RecordingWriterTest, AFileThatWasRemovedOrTruncatedIsBegunAnewAndTheLossI
       const Heard anew = heard_in(content("a" + ending));
       EXPECT_EQ(anew.records, all);
       EXPECT_TRUE(anew.damage.empty());
-      EXPECT_EQ(anew.wires.back().name, "left");
+      EXPECT_EQ(anew.paths.back().name, "left");
       fs::remove(path("a" + ending));
     }
   }
@@ -256,7 +256,7 @@ TEST_F(RecordingWriterTest, BeginsANewFileAfterASize) {
     RecordingOptions options;
     options.rotate_bytes = 20'000;
     RecordingWriter writer(path("drive") + ending, options);
-    writer.declare(RecordedWire{1, "udp://robot", "left"});
+    writer.declare(RecordedPath{1, "udp://robot", "left"});
     for (int i = 0; i < 3000; ++i) {
       append(writer);
       if (i % 50 == 0) writer.flush();
@@ -268,7 +268,7 @@ TEST_F(RecordingWriterTest, BeginsANewFileAfterASize) {
     EXPECT_LE(fs::file_size(path(name)), 30'000) << name;
     const Heard heard = heard_in(content(name));
     EXPECT_EQ(heard.headers, 1) << "each is whole in itself: " << name;
-    EXPECT_EQ(heard.wires.back().name, "left") << name;
+    EXPECT_EQ(heard.paths.back().name, "left") << name;
     (name.ends_with(".zst") ? read_zst : read) += heard.records;
   }
   EXPECT_EQ(names().front(), "drive-00001.r4log");
@@ -290,7 +290,7 @@ TEST_F(RecordingWriterTest, TellsOfItsDevicesInEachFile) {
   RecordingOptions options;
   options.rotate_after = 2s;
   RecordingWriter writer(path("drive.r4log"), options);
-  writer.declare(RecordedWire{1, "udp://robot", ""});
+  writer.declare(RecordedPath{1, "udp://robot", ""});
   writer.declare(RecordedDevice{1, "bno055@0x28:1", "older"});
   for (int i = 0; i < 100; ++i) append(writer);
   writer.declare(RecordedDevice{1, "bno055@0x28:1", "newer"});

@@ -28,8 +28,8 @@ struct Replay : testing::Test {
   Replay() { write_record_header(text); }
   ~Replay() override { fs::remove(path); }
   void add(Time at, const std::string& bytes, RecordKind kind = RecordKind::from_board,
-           std::uint16_t wire = 1) {
-    write_record(text, {Time{1795468293s} + at, wire, kind, bytes});
+           std::uint16_t path = 1) {
+    write_record(text, {Time{1795468293s} + at, path, kind, bytes});
   }
   // All of it, as fast as that.
   void play(const std::string& options) {
@@ -80,10 +80,10 @@ TEST_F(Replay, KeepsThePaceThatIsAskedFor) {
   EXPECT_LE(took, 5s);
 }
 
-TEST_F(Replay, BeginsWhereItIsAskedToAndWithThatWire) {
+TEST_F(Replay, BeginsWhereItIsAskedToAndWithThatPath) {
   for (int i = 0; i < 10; ++i)
     add(i * 1s, std::to_string(i), RecordKind::from_board, i % 2 == 0 ? 1 : 2);
-  play("?speed=1000&from=4.5&wire=2");
+  play("?speed=1000&from=4.5&path=2");
   ASSERT_EQ(heard.datagrams.size(), 3);
   EXPECT_EQ(heard.datagrams[0].text, "5");
 }
@@ -95,7 +95,7 @@ TEST_F(Replay, BeginsAtATimeOfTheRecordingsClock) {
   EXPECT_EQ(heard.datagrams[0].text, "5");
   const Problem late = problem_of([&] { play("?from=2026-11-23T21:11:42.5Z"); });
   EXPECT_EQ(late.kind, ErrorKind::data);
-  EXPECT_TRUE(late.reason.starts_with("the last of that wire is of 2026-11-23T21:11:42.000000Z"));
+  EXPECT_TRUE(late.reason.starts_with("the last of that path is of 2026-11-23T21:11:42.000000Z"));
   EXPECT_EQ(problem_of([&] { play("?from=11"); }).reason, late.reason);
   for (const char* wrong :
        {"", "x", "-1", "1795468293", "2026-11-23", "2026-11-23T21:11:37+01:00"}) {
@@ -148,7 +148,7 @@ TEST_F(Replay, OfABoardIsThatBoardForAProgramThatWatches) {
 
 TEST_F(Replay, RefusesWhatItCannotPlay) {
   add(0ms, "one");
-  EXPECT_EQ(problem_of([&] { play("?wire=3"); }).reason, "nothing of that wire is there");
+  EXPECT_EQ(problem_of([&] { play("?path=3"); }).reason, "nothing of that path is there");
   EXPECT_EQ(problem_of([&] { play("?speed=0"); }).kind, ErrorKind::usage);
   EXPECT_EQ(problem_of([&] { play("?pace=2"); }).kind, ErrorKind::usage);
   EXPECT_EQ(problem_of([&] { Board("replay:"); }).kind, ErrorKind::usage);

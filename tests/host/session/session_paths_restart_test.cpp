@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One session over several wires, opposite a board that begins again, and what looks like it (docs/redundancy.md).
+// One session over several paths, opposite a board that begins again, and what looks like it (docs/redundancy.md).
 #include <gtest/gtest.h>
 
 #include "tests/support/datagrams.hpp"
 #include "tests/support/signing.hpp"
-#include "wired_robot.hpp"
+#include "robot_on_paths.hpp"
 
 namespace r4::test {
 namespace {
 
-using Cable = WiredRobot::Cable;
-using Cables = WiredRobot::Cables;
+using Cable = RobotOnPaths::Cable;
+using Cables = RobotOnPaths::Cables;
 
 TEST(SessionPaths, ShowOneRestartOfTheBoardAndAreBack) {
   for (const std::uint32_t lag : {1U, 30U, 200U}) {
-    WiredRobot robot(Cables{{1}, {lag}});
+    RobotOnPaths robot(Cables{{1}, {lag}});
     robot.connect();
     robot.run(1000);
     robot.drive(1);
@@ -31,7 +31,7 @@ TEST(SessionPaths, ShowOneRestartOfTheBoardAndAreBack) {
 }
 
 TEST(SessionPaths, PassOverWhatIsAnHourOld) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   const auto old = [&](std::uint32_t back_ms) {
     return with_crc("AIN24:1.00;SAFE:0;PNum:17;T:" + std::to_string(robot.board_ms(0) - back_ms) +
@@ -51,10 +51,10 @@ TEST(SessionPaths, PassOverWhatIsAnHourOld) {
 }
 
 TEST(SessionPaths, BringWhatTheBoardSaidWhileItBootedTooLate) {
-  SessionOptions options = WiredRobot::at_will();
+  SessionOptions options = RobotOnPaths::at_will();
   options.key = key_of(1);
   options.clock_start = std::chrono::hours{1};
-  WiredRobot robot(Cables{{1}, {1}}, options, BoardRole::control, settings_with(key_of(1)));
+  RobotOnPaths robot(Cables{{1}, {1}}, options, BoardRole::control, settings_with(key_of(1)));
   robot.connect();
   robot.links.clear();
   const std::string t = std::to_string(robot.board_ms(0) - 600);
@@ -68,10 +68,10 @@ TEST(SessionPaths, BringWhatTheBoardSaidWhileItBootedTooLate) {
   EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
 }
 
-// Whether the other wire is heard or not.
+// Whether the other path is heard or not.
 TEST(SessionPaths, AreNotEndedByALateWordThatTheBoardIsBooting) {
   for (const bool alone : {false, true}) {
-    WiredRobot robot(Cables{{1}, {1}});
+    RobotOnPaths robot(Cables{{1}, {1}});
     robot.connect();
     if (alone) robot.plug(1, false);
     robot.run(500);
@@ -89,14 +89,14 @@ TEST(SessionPaths, AreNotEndedByALateWordThatTheBoardIsBooting) {
 }
 
 TEST(SessionPaths, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   robot.run(500);
   for (Cable& cable : robot.cables) cable.sent.clear();
   robot.bring(0, with_crc("H:R4-ROS2;PNum:0;T:0;"));
   robot.run(110);
   EXPECT_EQ(robot.cables[0].all('Q').size(), robot.cables[1].all('Q').size() + 1)
-      << "that wire is asked besides";
+      << "that path is asked besides";
   EXPECT_EQ(robot.restarts, 0);
   robot.reboot(0);
   robot.run(1500);
@@ -105,9 +105,9 @@ TEST(SessionPaths, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
 }
 
 TEST(SessionPaths, BeginAnewWhereNothingElseComes) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
-  for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
+  for (const std::size_t path : {0U, 1U}) robot.cut(path);
   // No answer tells of another clock: it began again with nearly the same one.
   for (int i = 0; i < 15; ++i) {
     robot.bring(1, with_crc("H:R4-ROS2;PNum:0;T:0;"));
@@ -119,9 +119,9 @@ TEST(SessionPaths, BeginAnewWhereNothingElseComes) {
 
 // The board answers who it is, and its clock is nearly that of the boot before.
 TEST(SessionPaths, BeginAnewWhereTheBoardOnlySaysThatItBoots) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
-  for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
+  for (const std::size_t path : {0U, 1U}) robot.cut(path);
   const std::string id = robot.session->path(1, robot.now()).board_id;
   const std::string question = robot.cables[1].all('Q').back();
   const std::string sid = question.substr(question.find("SID:"), 21);

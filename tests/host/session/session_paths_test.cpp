@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One session over several wires, opposite the real board (docs/redundancy.md).
+// One session over several paths, opposite the real board (docs/redundancy.md).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,22 +7,22 @@
 #include "r4link/error.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/signing.hpp"
-#include "wired_robot.hpp"
+#include "robot_on_paths.hpp"
 
 namespace r4::test {
 namespace {
 
-using Cable = WiredRobot::Cable;
-using Cables = WiredRobot::Cables;
+using Cable = RobotOnPaths::Cable;
+using Cables = RobotOnPaths::Cables;
 
-bool executed_once(const WiredRobot& robot) {
+bool executed_once(const RobotOnPaths& robot) {
   const auto& executed = robot.executed(0);
   return std::all_of(executed.begin(), executed.end(),
                      [](const auto& each) { return each.second == 1; });
 }
 
 // The board's answer to the newest heartbeat if another host is in control.
-std::string busy_for(const WiredRobot& robot) {
+std::string busy_for(const RobotOnPaths& robot) {
   Datagram datagram;
   EXPECT_TRUE(read_datagram(robot.cables[0].all('H').back(), datagram));
   return with_crc("N:" + std::to_string(datagram.pnum()) +
@@ -30,7 +30,7 @@ std::string busy_for(const WiredRobot& robot) {
 }
 
 TEST(SessionPaths, AskWhoIsThereBeforeAnythingElseIsSaid) {
-  WiredRobot robot(Cables{{5}, {5}});
+  RobotOnPaths robot(Cables{{5}, {5}});
   robot.plug(0, true);
   robot.plug(1, true);
   robot.run(9);
@@ -38,16 +38,16 @@ TEST(SessionPaths, AskWhoIsThereBeforeAnythingElseIsSaid) {
     ASSERT_EQ(cable.sent.size(), 1U);
     EXPECT_EQ(cable.sent[0].substr(0, 5), "Q:ID;");
   }
-  EXPECT_EQ(robot.session->path(0, robot.now()).state, WireState::asking);
+  EXPECT_EQ(robot.session->path(0, robot.now()).state, PathState::asking);
   robot.run(500);
   EXPECT_TRUE(robot.session->in_control(robot.now()));
-  EXPECT_EQ(robot.session->path(0, robot.now()).state, WireState::carrying);
-  EXPECT_EQ(robot.session->path(1, robot.now()).state, WireState::carrying);
+  EXPECT_EQ(robot.session->path(0, robot.now()).state, PathState::carrying);
+  EXPECT_EQ(robot.session->path(1, robot.now()).state, PathState::carrying);
   EXPECT_EQ(robot.session->link().carrying, 3);
 }
 
 TEST(SessionPaths, CarryTheSameBytes) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   robot.drive(100);
   EXPECT_EQ(robot.cables[0].all('H'), robot.cables[1].all('H'));
@@ -57,7 +57,7 @@ TEST(SessionPaths, CarryTheSameBytes) {
 }
 
 TEST(SessionPaths, BringEachStateOnce) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   robot.told_states = 0;
   robot.run(1000);
@@ -71,7 +71,7 @@ TEST(SessionPaths, BringEachStateOnce) {
 }
 
 TEST(SessionPaths, OneThatLagsNeverReplacesNewerState) {
-  WiredRobot robot(Cables{{1}, {200}});
+  RobotOnPaths robot(Cables{{1}, {200}});
   robot.connect();
   robot.run(1000);
   EXPECT_EQ(robot.session->link().carrying, 3);
@@ -92,7 +92,7 @@ TEST(SessionPaths, OneThatLagsNeverReplacesNewerState) {
 
 // The bar of the plan: one of two cut under full load, 1000 times.
 TEST(SessionPaths, OneIsCutAThousandTimesAndNothingIsMissed) {
-  WiredRobot robot(Cables{{1}, {2}});
+  RobotOnPaths robot(Cables{{1}, {2}});
   robot.connect();
   robot.run(500);
   robot.keeps_states = false;
@@ -100,13 +100,13 @@ TEST(SessionPaths, OneIsCutAThousandTimesAndNothingIsMissed) {
   robot.longest_gap_ms = 0;
   int unconfirmed = 0;
   for (int i = 0; i < 1000; ++i) {
-    const auto wire = static_cast<std::size_t>(i % 2);
-    i % 4 < 2 ? robot.cut(wire) : robot.plug(wire, false);
+    const auto path = static_cast<std::size_t>(i % 2);
+    i % 4 < 2 ? robot.cut(path) : robot.plug(path, false);
     for (int n = 0; n < 3; ++n) {
       unconfirmed += robot.drive(i % 4096).outcome == Outcome::confirmed ? 0 : 1;
     }
     robot.run(10 + static_cast<std::uint32_t>(i * 7 % 40));
-    i % 4 < 2 ? robot.cut(wire, false) : robot.plug(wire, true);
+    i % 4 < 2 ? robot.cut(path, false) : robot.plug(path, true);
     robot.run(150);
     robot.results.clear();
     robot.links.clear();
@@ -121,11 +121,11 @@ TEST(SessionPaths, OneIsCutAThousandTimesAndNothingIsMissed) {
 }
 
 TEST(SessionPaths, TellAtOnceWhatTheTransportTells) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   robot.plug(0, false);
   EXPECT_EQ(robot.links.back().carrying, 2);
-  EXPECT_EQ(robot.session->path(0, robot.now()).state, WireState::down);
+  EXPECT_EQ(robot.session->path(0, robot.now()).state, PathState::down);
   EXPECT_FALSE(robot.links.back().transport_down);
   EXPECT_EQ(robot.links.back().state, HostLinkState::active);
   robot.plug(0, true);
@@ -135,21 +135,21 @@ TEST(SessionPaths, TellAtOnceWhatTheTransportTells) {
 }
 
 TEST(SessionPaths, TellWithinTheTimeoutWhatNobodyTells) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   robot.cut(1);
   robot.run(990);
   EXPECT_EQ(robot.session->link().carrying, 3);
   robot.run(20);
   EXPECT_EQ(robot.session->link().carrying, 1);
-  EXPECT_EQ(robot.session->path(1, robot.now()).state, WireState::silent);
+  EXPECT_EQ(robot.session->path(1, robot.now()).state, PathState::silent);
   EXPECT_EQ(robot.session->link().state, HostLinkState::active);
 }
 
 TEST(SessionPaths, AreLostTogetherAndComeBackOneByOne) {
-  WiredRobot robot(Cables{{1}, {1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}, {1}});
   robot.connect();
-  for (std::size_t wire = 0; wire < 3; ++wire) robot.cut(wire);
+  for (std::size_t path = 0; path < 3; ++path) robot.cut(path);
   robot.run(1100);
   EXPECT_EQ(robot.session->link().state, HostLinkState::lost);
   EXPECT_EQ(robot.session->link().carrying, 0);
@@ -157,7 +157,7 @@ TEST(SessionPaths, AreLostTogetherAndComeBackOneByOne) {
   robot.run(1000);
   EXPECT_EQ(robot.session->link().carrying, 4);
   EXPECT_EQ(robot.drive(5).outcome, Outcome::confirmed);
-  for (std::size_t wire = 0; wire < 3; ++wire) robot.plug(wire, false);
+  for (std::size_t path = 0; path < 3; ++path) robot.plug(path, false);
   EXPECT_TRUE(robot.session->link().transport_down);
   EXPECT_EQ(robot.session->link().state, HostLinkState::lost);
   robot.cut(0, false);
@@ -169,7 +169,7 @@ TEST(SessionPaths, AreLostTogetherAndComeBackOneByOne) {
 }
 
 TEST(SessionPaths, ConfirmACommandThatOneCarriesAndAnotherAnswers) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   robot.cables[0].cut_to_host = true;
   robot.cables[1].cut_to_board = true;
@@ -178,13 +178,13 @@ TEST(SessionPaths, ConfirmACommandThatOneCarriesAndAnotherAnswers) {
 }
 
 TEST(SessionPaths, TellARefusalOnce) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   robot.nacks.clear();
   robot.drive(1);
   EXPECT_TRUE(robot.nacks.empty()) << "that a copy was executed before is nothing to tell";
   const Ticket ticket =
-      robot.session->send(Command::setting("timeout", "100"), WiredRobot::timeout, robot.now());
+      robot.session->send(Command::setting("timeout", "100"), RobotOnPaths::timeout, robot.now());
   const CommandResult result = robot.finish(ticket);  // not above the heartbeat interval
   EXPECT_EQ(result.outcome, Outcome::refused);
   EXPECT_EQ(result.code, Refusal::range);
@@ -194,11 +194,11 @@ TEST(SessionPaths, TellARefusalOnce) {
 
 // AUTH refuses one copy of a command. While another path speaks, its copy may be executed.
 TEST(SessionPaths, EndACommandByAuthOnlyWhenNoOtherPathSpeaks) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
-  for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
+  for (const std::size_t path : {0U, 1U}) robot.cut(path);
   const Ticket ticket =
-      robot.session->send(Command::setting("node", "3"), WiredRobot::timeout, robot.now());
+      robot.session->send(Command::setting("node", "3"), RobotOnPaths::timeout, robot.now());
   robot.run(5);
   Datagram first;
   Datagram command;
@@ -216,7 +216,7 @@ TEST(SessionPaths, EndACommandByAuthOnlyWhenNoOtherPathSpeaks) {
 }
 
 TEST(SessionPaths, AreRefusedWhenAllOfThemAre) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   robot.bring(1, busy_for(robot));
   EXPECT_FALSE(robot.session->link().busy);
@@ -226,7 +226,7 @@ TEST(SessionPaths, AreRefusedWhenAllOfThemAre) {
 }
 
 TEST(SessionPaths, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   const std::string busy = busy_for(robot);
   robot.run(50);  // states with CMD
@@ -237,7 +237,7 @@ TEST(SessionPaths, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) 
 }
 
 TEST(SessionPaths, AreBackInControlAsSoonAsAStateShowsIt) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   const std::string busy = busy_for(robot);
   robot.bring(0, busy);
@@ -249,13 +249,13 @@ TEST(SessionPaths, AreBackInControlAsSoonAsAStateShowsIt) {
 }
 
 TEST(SessionPaths, ToTwoBoardsAreRefused) {
-  WiredRobot robot(Cables{{1}, {1, 1}});
+  RobotOnPaths robot(Cables{{1}, {1, 1}});
   robot.connect();
   EXPECT_TRUE(robot.session->link().two_boards);
-  EXPECT_EQ(robot.session->path(1, robot.now()).state, WireState::other_board);
+  EXPECT_EQ(robot.session->path(1, robot.now()).state, PathState::other_board);
   EXPECT_EQ(robot.session->path(0, robot.now()).board_id, "board-0");
   EXPECT_EQ(robot.session->path(1, robot.now()).board_id, "board-1");
-  robot.session->send(Command::osmc(1, Direction::forward, 1), WiredRobot::timeout, robot.now());
+  robot.session->send(Command::osmc(1, Direction::forward, 1), RobotOnPaths::timeout, robot.now());
   robot.run(1000);
   for (const Cable& cable : robot.cables) {
     EXPECT_EQ(cable.all('Q').size(), cable.sent.size()) << "nothing but questions";
@@ -268,9 +268,9 @@ TEST(SessionPaths, ToTwoBoardsAreRefused) {
 }
 
 TEST(SessionPaths, TakeTheBoardToWhichAllOfThemLeadWhicheverAnsweredFirst) {
-  WiredRobot robot(Cables{{1}, {1, 1}});
+  RobotOnPaths robot(Cables{{1}, {1, 1}});
   robot.connect();
-  ASSERT_EQ(robot.session->path(1, robot.now()).state, WireState::other_board);
+  ASSERT_EQ(robot.session->path(1, robot.now()).state, PathState::other_board);
   robot.plug(0, false);
   robot.cables[0].board = 1;  // that was the wrong one
   robot.plug(0, true);
@@ -281,7 +281,7 @@ TEST(SessionPaths, TakeTheBoardToWhichAllOfThemLeadWhicheverAnsweredFirst) {
 }
 
 TEST(SessionPaths, GoOnWhenOneIsPluggedIntoAnotherBoard) {
-  WiredRobot robot(Cables{{1}, {1}, {1, 1}});
+  RobotOnPaths robot(Cables{{1}, {1}, {1, 1}});
   robot.plug(0, true);
   robot.plug(1, true);
   robot.run(500);
@@ -295,11 +295,11 @@ TEST(SessionPaths, GoOnWhenOneIsPluggedIntoAnotherBoard) {
 }
 
 TEST(SessionPaths, BeginWithoutOneWhoseBoardDoesNotAnswer) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.cut(1);
   robot.connect();
   EXPECT_TRUE(robot.session->in_control(robot.now()));
-  EXPECT_EQ(robot.session->path(1, robot.now()).state, WireState::asking);
+  EXPECT_EQ(robot.session->path(1, robot.now()).state, PathState::asking);
   EXPECT_EQ(robot.cables[1].all('Q').size(), robot.cables[1].sent.size());
   robot.cut(1, false);
   robot.run(200);
@@ -307,7 +307,7 @@ TEST(SessionPaths, BeginWithoutOneWhoseBoardDoesNotAnswer) {
 }
 
 TEST(SessionPaths, TakeAStateInPartsFromWhicheverBringsThem) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   robot.run(3);
   const std::string t = std::to_string(robot.board_ms(0) + 1);
@@ -322,7 +322,7 @@ TEST(SessionPaths, TakeAStateInPartsFromWhicheverBringsThem) {
 }
 
 TEST(SessionPaths, TellOfAStateOnlyWhatItHasBrought) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   robot.run(3);
   const std::uint32_t t_ms = robot.board_ms(0) + 1;
@@ -335,7 +335,7 @@ TEST(SessionPaths, TellOfAStateOnlyWhatItHasBrought) {
 }
 
 TEST(SessionPaths, CountAsLostWhatNoneBrings) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   robot.run(100);
   robot.cut(0);
@@ -354,35 +354,35 @@ TEST(SessionPaths, CountAsLostWhatNoneBrings) {
 }
 
 TEST(SessionPaths, AllCarryAStopWhoeverIsThere) {
-  WiredRobot robot(Cables{{1}, {1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}, {1}});
   robot.plug(0, true);
   robot.plug(1, true);
-  const Ticket early = robot.session->stop(WiredRobot::timeout, robot.now());
-  for (const std::size_t wire : {0U, 1U}) {
-    EXPECT_EQ(robot.cables[wire].all('E').size(), 1U) << "also before its board is known";
+  const Ticket early = robot.session->stop(RobotOnPaths::timeout, robot.now());
+  for (const std::size_t path : {0U, 1U}) {
+    EXPECT_EQ(robot.cables[path].all('E').size(), 1U) << "also before its board is known";
   }
   EXPECT_EQ(robot.finish(early).outcome, Outcome::confirmed);
   robot.run(1000);
-  robot.finish(robot.session->send(Command::clear(), WiredRobot::timeout, robot.now()));
+  robot.finish(robot.session->send(Command::clear(), RobotOnPaths::timeout, robot.now()));
   robot.cut(0);
-  EXPECT_EQ(robot.finish(robot.session->stop(WiredRobot::timeout, robot.now())).outcome,
+  EXPECT_EQ(robot.finish(robot.session->stop(RobotOnPaths::timeout, robot.now())).outcome,
             Outcome::confirmed);
 }
 
 TEST(SessionPaths, AreLeftTogether) {
-  WiredRobot robot(Cables{{1}, {3}});
+  RobotOnPaths robot(Cables{{1}, {3}});
   robot.connect();
   robot.drive(1);
-  EXPECT_EQ(robot.finish(robot.session->leave(WiredRobot::timeout, robot.now())).outcome,
+  EXPECT_EQ(robot.finish(robot.session->leave(RobotOnPaths::timeout, robot.now())).outcome,
             Outcome::confirmed);
   EXPECT_FALSE(robot.board(0).link().has_owner());
 }
 
 TEST(SessionPaths, AreNotLeftByWhatTheBoardSaidBefore) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
-  for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
-  const Ticket ticket = robot.session->leave(WiredRobot::timeout, robot.now());
+  for (const std::size_t path : {0U, 1U}) robot.cut(path);
+  const Ticket ticket = robot.session->leave(RobotOnPaths::timeout, robot.now());
   const std::uint32_t newest_ms = robot.session->state().t_ms;
   const auto safe = [](std::uint32_t t_ms) {
     return with_crc("H:R4-ROS2;PNum:9;T:" + std::to_string(t_ms) + ";SAFE:1;");
@@ -395,19 +395,19 @@ TEST(SessionPaths, AreNotLeftByWhatTheBoardSaidBefore) {
 }
 
 TEST(SessionPaths, AreLeftBeforeAStateHasCome) {
-  WiredRobot robot(Cables{{1}, {1}});
+  RobotOnPaths robot(Cables{{1}, {1}});
   robot.reboot(0, 0xC0000000U);  // whatever T: this one is not newer than 0
   robot.plug(0, true);
   robot.plug(1, true);
-  robot.run(2);  // each wire's board has said who it is
-  for (const std::size_t wire : {0U, 1U}) robot.cut(wire);
+  robot.run(2);  // each path's board has said who it is
+  for (const std::size_t path : {0U, 1U}) robot.cut(path);
   const auto at = [&](std::uint32_t later_ms) {
     return ";PNum:9;T:" + std::to_string(robot.board_ms(0) + later_ms) + ";";
   };
   robot.bring(0, with_crc("H:R4-ROS2" + at(0)));
   robot.run(5);
   ASSERT_EQ(robot.told_states, 0U);
-  const Ticket ticket = robot.session->leave(WiredRobot::timeout, robot.now());
+  const Ticket ticket = robot.session->leave(RobotOnPaths::timeout, robot.now());
   ASSERT_NE(ticket, 0U);
   robot.bring(1, with_crc("AIN24:1.00;SAFE:0" + at(1)));
   EXPECT_EQ(robot.results.count(ticket), 0U);
@@ -417,10 +417,10 @@ TEST(SessionPaths, AreLeftBeforeAStateHasCome) {
 }
 
 TEST(SessionPaths, AreSignedEachByItsOwnSignature) {
-  SessionOptions options = WiredRobot::at_will();
+  SessionOptions options = RobotOnPaths::at_will();
   options.key = key_of(1);
   options.clock_start = std::chrono::hours{24};
-  WiredRobot robot(Cables{{1}, {20}}, options, BoardRole::control, settings_with(key_of(1)));
+  RobotOnPaths robot(Cables{{1}, {20}}, options, BoardRole::control, settings_with(key_of(1)));
   robot.connect();
   robot.run(1000);
   ASSERT_TRUE(robot.session->in_control(robot.now()));
@@ -440,9 +440,9 @@ TEST(SessionPaths, AreSignedEachByItsOwnSignature) {
 }
 
 TEST(SessionPaths, AreArmedTogether) {
-  WiredRobot robot(Cables{{1}, {1}}, SessionOptions{});
+  RobotOnPaths robot(Cables{{1}, {1}}, SessionOptions{});
   robot.connect();
-  EXPECT_EQ(robot.finish(robot.session->arm(WiredRobot::timeout, robot.now())).outcome,
+  EXPECT_EQ(robot.finish(robot.session->arm(RobotOnPaths::timeout, robot.now())).outcome,
             Outcome::confirmed);
   robot.cut(0);
   robot.run(1500);
@@ -451,7 +451,7 @@ TEST(SessionPaths, AreArmedTogether) {
 }
 
 TEST(SessionPaths, HaveALeaseEachForWhoWatches) {
-  WiredRobot robot(Cables{{1}, {1}}, SessionOptions{}, BoardRole::watch);
+  RobotOnPaths robot(Cables{{1}, {1}}, SessionOptions{}, BoardRole::watch);
   robot.connect();
   robot.run(2000);
   EXPECT_EQ(robot.session->link().carrying, 3);

@@ -3,32 +3,32 @@
 // another session.
 #include <gtest/gtest.h>
 
-#include "wired_robot.hpp"
+#include "robot_on_paths.hpp"
 
 namespace r4::test {
 namespace {
 
-using Cable = WiredRobot::Cable;
-using Cables = WiredRobot::Cables;
+using Cable = RobotOnPaths::Cable;
+using Cables = RobotOnPaths::Cables;
 
 class SleepingHost : public ::testing::TestWithParam<Cables> {
  protected:
-  static bool drives(WiredRobot& robot) { return robot.board(0).outputs().osmc[0].pwm != 0; }
+  static bool drives(RobotOnPaths& robot) { return robot.board(0).outputs().osmc[0].pwm != 0; }
 
-  void cut_all(WiredRobot& of, bool is_cut = true) {
-    for (std::size_t wire = 0; wire < of.cables.size(); ++wire) of.cut(wire, is_cut);
+  void cut_all(RobotOnPaths& of, bool is_cut = true) {
+    for (std::size_t path = 0; path < of.cables.size(); ++path) of.cut(path, is_cut);
   }
   // Longer than the board waits for its host, and shorter or longer than the tolerance of a board's
   // clock.
   static constexpr std::uint32_t naps_ms[] = {1500, 9000, 60'000};
 
-  WiredRobot robot{GetParam()};
+  RobotOnPaths robot{GetParam()};
 };
 
 // The board's setting `recovery` is `last`: it drives on where a session goes on.
 TEST_P(SleepingHost, FindsTheMotorsOffAndLeavesThemOff) {
   for (const std::uint32_t nap_ms : naps_ms) {
-    WiredRobot sleeper(GetParam());
+    RobotOnPaths sleeper(GetParam());
     sleeper.connect();
     ASSERT_EQ(sleeper.drive(100).outcome, Outcome::confirmed);
     sleeper.sleep(nap_ms);
@@ -60,7 +60,7 @@ TEST_P(SleepingHost, FindsTheMotorsOffAlsoAfterAPauseOfItsVirtualMachine) {
 TEST_P(SleepingHost, CancelsACommandAndAnArmThatItAskedForBefore) {
   enum class Link { never_heard, lost, restarted };
   for (const Link link : {Link::never_heard, Link::lost, Link::restarted}) {
-    WiredRobot armed(GetParam(), SessionOptions());
+    RobotOnPaths armed(GetParam(), SessionOptions());
     if (link == Link::never_heard) cut_all(armed);
     armed.connect();
     if (link != Link::never_heard) cut_all(armed);
@@ -86,7 +86,7 @@ TEST_P(SleepingHost, CancelsACommandAndAnArmThatItAskedForBefore) {
 TEST_P(SleepingHost, SwitchesTheMotorsOffAtOnceWhereTheBoardWaitsForLonger) {
   Settings settings;
   settings.timeout_ms = 10'000;
-  WiredRobot patient(GetParam(), WiredRobot::at_will(), BoardRole::control, settings);
+  RobotOnPaths patient(GetParam(), RobotOnPaths::at_will(), BoardRole::control, settings);
   patient.connect();
   ASSERT_EQ(patient.drive(100).outcome, Outcome::confirmed);
   patient.sleep(3000);
@@ -102,7 +102,7 @@ TEST_P(SleepingHost, SwitchesTheMotorsOffAtOnceWhereTheBoardWaitsForLonger) {
 // It was on its way when the lid was closed, and may come late or never.
 TEST_P(SleepingHost, RepeatsNothingThatItHadSent) {
   for (const std::uint32_t later_ms : {0U, 10U, 60U}) {
-    WiredRobot sender(GetParam());
+    RobotOnPaths sender(GetParam());
     sender.connect();
     cut_all(sender);
     const auto command = Command::osmc(100, Direction::forward, 1);
@@ -130,7 +130,7 @@ TEST_P(SleepingHost, StopsTheBoardAllTheSame) {
 }
 
 TEST_P(SleepingHost, HasItsStatesAgainIfItOnlyWatches) {
-  WiredRobot watcher(GetParam(), WiredRobot::at_will(), BoardRole::watch);
+  RobotOnPaths watcher(GetParam(), RobotOnPaths::at_will(), BoardRole::watch);
   watcher.connect();
   watcher.run(1000);
   ASSERT_GT(watcher.told_states, 50U);
@@ -141,7 +141,7 @@ TEST_P(SleepingHost, HasItsStatesAgainIfItOnlyWatches) {
   EXPECT_GT(watcher.told_states, 50U);
 }
 
-INSTANTIATE_TEST_SUITE_P(Wires, SleepingHost,
+INSTANTIATE_TEST_SUITE_P(Paths, SleepingHost,
                          ::testing::Values(Cables{{1}}, Cables{{40}}, Cables{{1}, {5}}));
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include "r4link/error.hpp"
 #include "scripted_link.hpp"
 #include "tests/support/datagrams.hpp"
-#include "wired_robot.hpp"
+#include "robot_on_paths.hpp"
 
 namespace r4::test {
 namespace {
@@ -115,11 +115,11 @@ TEST(SessionFarewell, IsConfirmedByAHeartbeatOfTheSameMillisecond) {
 
 // Of a board that had lost its host and had it again.
 TEST(SessionFarewell, IsNotConfirmedByAHeartbeatThatMayBeOfBefore) {
-  WiredRobot robot(WiredRobot::Cables{{40}});
+  RobotOnPaths robot(RobotOnPaths::Cables{{40}});
   robot.connect();
   robot.run(1500);
   const std::string before = std::to_string(robot.board_ms(0) - 20);
-  const Ticket ticket = robot.session->leave(WiredRobot::timeout, robot.now());
+  const Ticket ticket = robot.session->leave(RobotOnPaths::timeout, robot.now());
   robot.bring(0, with_crc("H:R4-ROS2;PNum:400;T:" + before + ";SAFE:1;"));
   EXPECT_EQ(robot.session->link().state, HostLinkState::safe) << "it counts, but not for that";
   EXPECT_EQ(robot.results.count(ticket), 0U);

@@ -47,7 +47,7 @@ TEST_F(SessionWatch, EchoesAtOnceWhatItIsSent) {
   EXPECT_EQ(link.last('W').t, 7U);
 }
 
-// So it hears the board again when the program whose wire it shared has ended.
+// So it hears the board again when the program whose path it shared has ended.
 TEST_F(SessionWatch, AsksAtOnceOnATransportThatHasComeUp) {
   link.place_taken = true;
   link.pass(600ms);

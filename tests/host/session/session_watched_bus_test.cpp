@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who watches a board over a bus beside another wire: on a bus nobody may be asked who is there.
+// Who watches a board over a bus beside another path: on a bus nobody may be asked who is there.
 #include <gtest/gtest.h>
 
 #include <optional>
 #include <string>
 
 #include "tests/support/datagrams.hpp"
-#include "wired_robot.hpp"
+#include "robot_on_paths.hpp"
 
 namespace r4::test {
 namespace {
 
-using Cables = WiredRobot::Cables;
+using Cables = RobotOnPaths::Cables;
 
-// Two wires, of which the second, or both, are buses.
+// Two paths, of which the second, or both, are buses.
 class WatchedBus : public testing::Test {
  protected:
   explicit WatchedBus(std::size_t board_of_bus = 0, bool first_is_asked = true) {
@@ -22,14 +22,14 @@ class WatchedBus : public testing::Test {
     cables[1].listens = true;
     robot_.emplace(cables, SessionOptions{}, BoardRole::watch);
   }
-  WiredRobot& robot() { return *robot_; }
-  WireState state(std::size_t wire) { return robot().session->path(wire, robot().now()).state; }
+  RobotOnPaths& robot() { return *robot_; }
+  PathState state(std::size_t path) { return robot().session->path(path, robot().now()).state; }
 
  private:
-  std::optional<WiredRobot> robot_;
+  std::optional<RobotOnPaths> robot_;
 };
 
-TEST_F(WatchedBus, CarriesBesideAWireThatWasAsked) {
+TEST_F(WatchedBus, CarriesBesideAPathThatWasAsked) {
   robot().connect();
   robot().run(2000);
   EXPECT_EQ(robot().session->link().carrying, 3);
@@ -37,7 +37,7 @@ TEST_F(WatchedBus, CarriesBesideAWireThatWasAsked) {
   robot().cut(0);
   robot().told_states = 0;
   robot().run(1500);
-  EXPECT_EQ(state(0), WireState::silent);
+  EXPECT_EQ(state(0), PathState::silent);
   EXPECT_NEAR(static_cast<double>(robot().told_states), 150, 3);
   EXPECT_EQ(robot().restarts, 0);
 }
@@ -52,7 +52,7 @@ TEST_F(WatchedBus, IsBelievedAgainAfterARestartOfTheBoard) {
     robot().reboot(0);
     robot().run(3000);
     EXPECT_EQ(robot().restarts, restarts + 1);
-    EXPECT_EQ(state(1), WireState::carrying) << alone;
+    EXPECT_EQ(state(1), PathState::carrying) << alone;
     EXPECT_FALSE(robot().session->link().two_boards);
   }
 }
@@ -65,7 +65,7 @@ TEST_F(WatchedBusOfAnother, IsNeverUsed) {
   robot().connect();
   robot().run(3000);
   EXPECT_TRUE(robot().session->link().two_boards);
-  EXPECT_EQ(state(1), WireState::other_board);
+  EXPECT_EQ(state(1), PathState::other_board);
   robot().cut(0);
   robot().told_states = 0;
   robot().run(3000);
@@ -74,7 +74,7 @@ TEST_F(WatchedBusOfAnother, IsNeverUsed) {
 }
 
 TEST_F(WatchedBusOfAnother, EndsTheSessionBeforeItBeginsIfItBringsAnythingByThen) {
-  for (const std::size_t wire : {0U, 1U}) robot().plug(wire, true);
+  for (const std::size_t path : {0U, 1U}) robot().plug(path, true);
   robot().bring(1, with_crc("AIN24:24;PNum:5;T:" + std::to_string(robot().board_ms(1)) + ";"));
   robot().run(1000);
   EXPECT_TRUE(robot().session->link().two_boards);
@@ -90,7 +90,7 @@ TEST_F(TwoWatchedBuses, CarryBothAndAreBelievedAfterAPowerCycleOfTheirAdapters) 
   robot().connect();
   robot().run(2000);
   EXPECT_EQ(robot().session->link().carrying, 3);
-  for (const std::size_t wire : {0U, 1U}) robot().plug(wire, false);
+  for (const std::size_t path : {0U, 1U}) robot().plug(path, false);
   robot().reboot(0);
   robot().connect();
   robot().run(2000);
@@ -106,7 +106,7 @@ TEST_F(TwoWatchedBusesOfTwoBoards, AreNotBothUsed) {
   robot().connect();
   robot().run(2000);
   EXPECT_TRUE(robot().session->link().two_boards);
-  EXPECT_NE(state(0) == WireState::other_board, state(1) == WireState::other_board);
+  EXPECT_NE(state(0) == PathState::other_board, state(1) == PathState::other_board);
 }
 
 }  // namespace

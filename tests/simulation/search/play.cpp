@@ -23,7 +23,7 @@ Schedule Play::schedule_of(const Story& story) {
   schedule.duration_us = (story.faults_until_ms + Story::recovery_ms) * 1000ULL;
   schedule.hosts = story.hosts;
   schedule.settings.state_rate_hz = 5;
-  schedule.more_wires.resize(static_cast<std::size_t>(story.paths) - 1);
+  schedule.more_paths.resize(static_cast<std::size_t>(story.paths) - 1);
   schedule.one_port = story.one_port;
   schedule.command_timeout_us = 2'000'000;
   schedule.keys = story.keys;
@@ -54,9 +54,9 @@ void Play::set(SessionOptions& options) const {
   options.watch_rate_hz = 5;
 }
 
-bool Play::has_place(int host, int wire) const {
-  if (host == 0) return (story_.paths_of_first >> wire & 1) != 0;
-  return wire == story_.paths - 1;
+bool Play::has_place(int host, int path) const {
+  if (host == 0) return (story_.paths_of_first >> path & 1) != 0;
+  return path == story_.paths - 1;
 }
 
 Play::Host& Play::host(int index) { return *world_.hosts_[static_cast<std::size_t>(index)]; }
@@ -137,20 +137,20 @@ bool Play::applies(Fault fault) const {
 void Play::on_sent(const Packet& sent) {
   const auto number = static_cast<int>(steps_.size());
   const Host& at = host(sent.host);
-  const int path = at.places[static_cast<std::size_t>(sent.place)].wire;
-  const World::Wire& wire = world_.wires_[path];
+  const int index = at.places[static_cast<std::size_t>(sent.place)].path;
+  const World::Path& path = world_.paths_[index];
   Step step;
   step.at_us = world_.now_us_;
   step.to_board = sent.to_board;
   step.host = sent.host;
-  step.path = path;
+  step.path = index;
   step.passes =
-      world_.now_us_ >= (sent.to_board ? wire.cut_to_board_until_us : wire.cut_to_host_until_us);
+      world_.now_us_ >= (sent.to_board ? path.cut_to_board_until_us : path.cut_to_host_until_us);
   step.alive = at.alive && !at.suspended;
   step.first = event_of_step_ != world_.handled_;
   if (step.first) hosts_of_event_.clear();
   event_of_step_ = world_.handled_;
-  const std::pair<int, int> who{sent.host, path};
+  const std::pair<int, int> who{sent.host, index};
   for (const auto& before : hosts_of_event_) {
     step.first_of_host = step.first_of_host && before.first != who.first;
     step.first_of_path = step.first_of_path && before != who;
@@ -195,9 +195,9 @@ void Play::on_sent(const Packet& sent) {
         continue;
     }
     const std::uint64_t until_us = world_.now_us_ + std::max(first_us, second_us.value_or(0));
-    world_.disturb(path, Happening::Kind::address, world_.now_us_);
-    world_.wires_[path].disturbed_until_us =
-        std::max(world_.wires_[path].disturbed_until_us, until_us + disturbed_us);
+    world_.disturb(index, Happening::Kind::address, world_.now_us_);
+    world_.paths_[index].disturbed_until_us =
+        std::max(world_.paths_[index].disturbed_until_us, until_us + disturbed_us);
   }
   for (std::size_t i = 0; i < overtaken_.size(); ++i) {
     const Packet& before = overtaken_[i];
@@ -205,7 +205,7 @@ void Play::on_sent(const Packet& sent) {
         before.to_board == sent.to_board && before.host == sent.host && before.place == sent.place;
     if (!same) continue;
     deliver_in(delay_us + 1, before);
-    world_.disturb(path, Happening::Kind::address, world_.now_us_);
+    world_.disturb(index, Happening::Kind::address, world_.now_us_);
     overtaken_.erase(overtaken_.begin() + static_cast<std::ptrdiff_t>(i--));
   }
   if (!first_copy) return;
@@ -215,7 +215,7 @@ void Play::on_sent(const Packet& sent) {
   }
   // A path keeps the order of the datagrams that it holds back.
   const std::uint64_t held_us =
-      wire.stalled_until_us - std::min(wire.stalled_until_us, world_.now_us_);
+      path.stalled_until_us - std::min(path.stalled_until_us, world_.now_us_);
   deliver_in(std::max(held_us + delay_us, first_us), sent);
   if (second_us) deliver_in(std::max(held_us + delay_us, *second_us), sent);
 }

@@ -73,7 +73,7 @@ class Play final : World::Script {
   void on_event(int index) override;
   void check() override;
   void set(SessionOptions& options) const override;
-  bool has_place(int host, int wire) const override;
+  bool has_place(int host, int path) const override;
   void on_sent(const Packet& sent) override;
   bool takes(const Packet& arrived) override;
   void before_board(const Packet& packet) override;

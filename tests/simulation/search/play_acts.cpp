@@ -20,7 +20,7 @@ constexpr std::uint64_t stopper_us = 400'000;
 void Play::disturb_all(std::uint64_t until_us) {
   for (int w = 0; w < story_.paths; ++w) {
     world_.disturb(w, Happening::Kind::address, world_.now_us_);
-    std::uint64_t& disturbed = world_.wires_[w].disturbed_until_us;
+    std::uint64_t& disturbed = world_.paths_[w].disturbed_until_us;
     disturbed = std::max(disturbed, until_us + disturbed_us);
   }
 }
@@ -96,7 +96,7 @@ void Play::begin_fault(Fault::Kind kind, int index, int path, const std::string&
       return pause(index);
     case Fault::Kind::moves:
       for (Host::Place& place : host(index).places) {
-        if (place.wire != path) continue;
+        if (place.path != path) continue;
         world_.disturb(path, Happening::Kind::address, world_.now_us_);
         std::swap(place.peer, place.other_peer);
         if (place.peer == 0) world_.whose_[place.peer = world_.next_peer_++] = index;
@@ -132,7 +132,7 @@ void Play::begin_fault(Fault::Kind kind, int index, int path, const std::string&
     case Fault::Kind::stranger_elsewhere:
       return carry_on(kind, world_.port_of(0), own);
     case Fault::Kind::stranger_inherits:
-      return carry_on(kind, world_.port_of(host(0).places.front().wire), first_peer_);
+      return carry_on(kind, world_.port_of(host(0).places.front().path), first_peer_);
     case Fault::Kind::stranger_copies:
       return repeat(bytes);
     default:

@@ -66,7 +66,7 @@ TEST(DoctorLink, IsAnErrorWhereTheBoardDoesNotAnswer) {
   EXPECT_EQ(verdict(sample),
             "error link.answer: the board does not answer a question: it does not hear this "
             "computer\n");
-  sample.trouble = WireTrouble::foreign_frames;
+  sample.trouble = TransportTrouble::foreign_frames;
   EXPECT_EQ(verdict(sample), "error link.answer: the link's reason\n");
 }
 

@@ -36,7 +36,7 @@ TEST(CandumpLog, CarriesEveryDatagramOfTheCaptureThereAndBack) {
 TEST(CandumpLog, HasTheFramesThatAreOnTheBus) {
   std::string native;
   write_record_header(native);
-  write_wire(native, {7, "can://can0?node=3&pack=0", "arm"});
+  write_path(native, {7, "can://can0?node=3&pack=0", "arm"});
   write_record(native, {Time{1436509052249713}, 7, RecordKind::to_board, "E:1;^0x1^"});
   EXPECT_EQ(converted(native, ".r4log", ".log").bytes,
             "(1436509052.249713) can0 183#1009453A313B5E30\n"
@@ -53,7 +53,7 @@ TEST(CandumpLog, TellsOfStopsAndOfBoardsThatWentSafe) {
                                  .bytes;
   EXPECT_TRUE(contains(native, "1436509052.249713 0! stop can0\n"));
   EXPECT_TRUE(contains(native, "1436509052.250713 1! link safe stop\n"));
-  EXPECT_TRUE(contains(native, "# wire 1 can://can0?node=3\n"));
+  EXPECT_TRUE(contains(native, "# path 1 can://can0?node=3\n"));
 }
 
 TEST(CandumpLog, TellsThePlaceOfWhatCannotBeRead) {
@@ -147,7 +147,7 @@ TEST(CandumpLog, RefusesWhatIsNoneAndWhatItCannotHold) {
 TEST(CandumpLog, LeavesOutWhatNoTransferCanHold) {
   std::string native;
   write_record_header(native);
-  write_wire(native, {1, "can://can0", ""});
+  write_path(native, {1, "can://can0", ""});
   for (const std::string& bytes : {std::string(), std::string("\x80 x"), std::string(1025, 'x')}) {
     write_record(native, {Time{1}, 1, RecordKind::from_board, bytes});
   }

@@ -22,7 +22,7 @@ TEST(Conversion, GivesANativeRecordingAsItWas) {
 TEST(Conversion, CopiesNoSecretIntoAnotherFile) {
   std::string native;
   write_record_header(native);
-  write_wire(native, {1, "can://can0?node=1", "arm"});
+  write_path(native, {1, "can://can0?node=1", "arm"});
   for (const char* setting : {"C:password,letmein!;", "C:key,1:letmein!;", "C:pasword,letmein!;"}) {
     write_record(native, {Time{1795468293000001}, 1, RecordKind::to_board,
                           with_crc(std::string(setting) + "PNum:1;T:2;")});
@@ -71,12 +71,12 @@ TEST(Conversion, GivesWhatHasNoHeaderOneAndAnEnd) {
   StringOutput output;
   const auto sink = tool::make_sink("x.r4log", output);
   tool::Conversion conversion(*sink, {});
-  conversion.on_wire({1, "can://can0?node=1", ""});
+  conversion.on_path({1, "can://can0?node=1", ""});
   conversion.on_record({Time{1795468293404765}, 1, RecordKind::event, "up"});
   conversion.finish();
   EXPECT_TRUE(output.bytes.starts_with("# r4log 1 by r4 "));
   EXPECT_TRUE(
-      output.bytes.ends_with("# wire 1 can://can0?node=1\n"
+      output.bytes.ends_with("# path 1 can://can0?node=1\n"
                              "# from 2026-11-23T21:11:33.404765Z\n"
                              "1795468293.404765 1! up\n"
                              "1795468293.404765 0! end\n"));
@@ -91,7 +91,7 @@ TEST(Conversion, RefusesEndingsThatAreNoFormat) {
   }
   struct Nobody final : RecordingReader::Handler {
     void on_record(const Record&) override {}
-    void on_wire(const RecordedWire&) override {}
+    void on_path(const RecordedPath&) override {}
     void on_damage(const RecordingDamage&) override {}
   } nobody;
   for (const char* name : {"x.csv", "x.jsonl"}) {

@@ -9,7 +9,7 @@ namespace r4::test {
 std::string recorded_capture(const std::string& url) {
   std::string native;
   write_record_header(native);
-  write_wire(native, {1, url, "left-arm"});
+  write_path(native, {1, url, "left-arm"});
   Time time{1795468293404765};
   write_beginning(native, time);
   write_record(native, {time, 1, RecordKind::event, "up " + url});
@@ -18,24 +18,24 @@ std::string recorded_capture(const std::string& url) {
     write_record(native, {time, 1, line.from_board ? RecordKind::from_board : RecordKind::to_board,
                           line.bytes});
   }
-  write_record(native, {time, no_wire, RecordKind::event, "end"});
+  write_record(native, {time, no_path, RecordKind::event, "end"});
   return native;
 }
 
 std::string generated_recording(unsigned seed, int records) {
   std::mt19937 random(seed);
-  const auto url_of = [](std::uint16_t wire) {
-    return wire == 2 ? "serial:///dev/tty ACM0" : "udp://10.0.0.1:2018";
+  const auto url_of = [](std::uint16_t path) {
+    return path == 2 ? "serial:///dev/tty ACM0" : "udp://10.0.0.1:2018";
   };
   const auto below = [&random](unsigned n) { return static_cast<unsigned>(random() % n); };
   std::string native = "# r4log 1 by r4 0.0.7\n# an older one\n";
-  for (std::uint16_t wire = 1; wire <= 3; ++wire) {
-    write_wire(native, {wire, url_of(wire), ""});
+  for (std::uint16_t path = 1; path <= 3; ++path) {
+    write_path(native, {path, url_of(path), ""});
   }
   Time time{1795468293404765};
   for (int i = 0; i < records; ++i) {
     time += Time{static_cast<std::int64_t>(below(20'000)) - 1000};
-    const auto wire = static_cast<std::uint16_t>(1 + below(3));
+    const auto path = static_cast<std::uint16_t>(1 + below(3));
     std::string bytes =
         with_crc("AIN24:" + std::to_string(below(30)) + ".25;PNum:" + std::to_string(i) +
                  ";T:" + std::to_string(10 * i) + ";");
@@ -47,12 +47,12 @@ std::string generated_recording(unsigned seed, int records) {
       std::replace(bytes.begin(), bytes.end(), 'C', 'c');  // no setting, which might be a secret
     }
     if (what == 6) native += "# a comment \xff \\x20\n";
-    if (what == 7) write_wire(native, {wire, url_of(wire), "arm-" + std::to_string(i % 100)});
+    if (what == 7) write_path(native, {path, url_of(path), "arm-" + std::to_string(i % 100)});
     if (what == 8) native += "# r4log 1 by r4 9.9.9\n";
     const RecordKind kind = what == 9   ? RecordKind::event
                             : what < 20 ? RecordKind::to_board
                                         : RecordKind::from_board;
-    write_record(native, {time, what == 10 ? no_wire : wire, kind, bytes});
+    write_record(native, {time, what == 10 ? no_path : path, kind, bytes});
   }
   return native;
 }

@@ -67,8 +67,8 @@ inline std::string and_back(const std::string& native, const std::string& by) {
 // The paper's capture as a recording of one board, of both directions, with the two damaged datagrams.
 std::string recorded_capture(const std::string& url = "udp://192.168.0.125");
 
-// A recording of that many records of three wires, by a seed: datagrams, damaged ones, any bytes, events, comments,
-// wires that get a name, times that go back.
+// A recording of that many records of three paths, by a seed: datagrams, damaged ones, any bytes, events, comments,
+// paths that get a name, times that go back.
 std::string generated_recording(unsigned seed, int records);
 
 }  // namespace r4::test

@@ -22,9 +22,9 @@ std::vector<std::string> lines_of(const std::string& text) {
 std::string one_state(const std::string& fields) {
   std::string native;
   write_record_header(native);
-  write_wire(native, {1, "udp://robot", ""});
+  write_path(native, {1, "udp://robot", ""});
   write_record(native, {Time{1795468293000001}, 1, RecordKind::from_board, with_crc(fields)});
-  write_wire(native, {1, "udp://robot", "left-arm"});
+  write_path(native, {1, "udp://robot", "left-arm"});
   return native;
 }
 
@@ -32,7 +32,7 @@ TEST(Csv, HasARowForEachStateAndAColumnForEachValue) {
   const Converted csv = converted(recorded_capture(), ".r4log", ".csv");
   const std::vector<std::string> lines = lines_of(csv.bytes);
   EXPECT_EQ(lines[0],
-            "time [s],wire,board,PNum,T [ms],AIN24 [V],AIN12 [V],AIN5 [V],AINDMH [V],DMHSTA [0/1],"
+            "time [s],path,board,PNum,T [ms],AIN24 [V],AIN12 [V],AIN5 [V],AINDMH [V],DMHSTA [0/1],"
             "AINSTEER [V],DHB1A pwm [0-4095],DHB1A direction [0/1],OSMC1 pwm [0-4095],"
             "OSMC1 direction [0/1],STEP1POS [steps],SERVO1POS [us]");
   EXPECT_EQ(lines[1],
@@ -56,7 +56,7 @@ TEST(Csv, HasTheFieldsThatAreThereAndLeavesAPlaceWhereOneIsMissing) {
   const std::vector<std::string> lines = lines_of(converted(two, ".r4log", ".csv").bytes);
   ASSERT_EQ(lines.size(), 3);
   EXPECT_EQ(lines[0],
-            "time [s],wire,board,PNum,T [ms],ENC1 [counts],US2 [cm],BLDC1 speed [0-4095],"
+            "time [s],path,board,PNum,T [ms],ENC1 [counts],US2 [cm],BLDC1 speed [0-4095],"
             "BLDC1 direction [0/1],BLDC1 brake [0/1]");
   EXPECT_EQ(lines[1], "1795468293.000001,1,left-arm,1,2,-5,,1,0,1");
   EXPECT_EQ(lines[2], "1795468293.000002,1,left-arm,2,3,,30,,,");
@@ -81,7 +81,7 @@ TEST(Csv, HasNoCellThatASpreadsheetTakesForAFormula) {
   for (const auto& c : cases) {
     std::string native;
     write_record_header(native);
-    write_wire(native, {1, c.url, ""});
+    write_path(native, {1, c.url, ""});
     write_record(native, {Time{1795468293000001}, 1, RecordKind::from_board,
                           with_crc("STEP1POS:-100;PNum:1;T:2;")});
     const auto lines = lines_of(converted(native, ".r4log", ".csv").bytes);
@@ -116,14 +116,14 @@ TEST(Csv, HasWhatDescribedDevicesMeasured) {
                Error);
 }
 
-// Of wire 1 and 2 at different slots.
+// Of path 1 and 2 at different slots.
 std::string recording_of_two_with_devices() {
-  std::string all = "# r4log 1 by r4 0.1.0\n# wire 1 udp://a\n# wire 2 udp://b\n";
+  std::string all = "# r4log 1 by r4 0.1.0\n# path 1 udp://a\n# path 2 udp://b\n";
   write_device(all, {1, "ina219@0x40:3", std::string(DeviceDescription::text_of("ina219"))});
   write_device(all, {2, "ina219@0x40:1", std::string(DeviceDescription::text_of("ina219"))});
   write_device(all, {2, "odd@0x40:5", "no description"});
-  const auto state = [&all](std::uint16_t wire, const std::string& fields) {
-    write_record(all, {Time{1795468293000000 + wire}, wire, RecordKind::from_board,
+  const auto state = [&all](std::uint16_t path, const std::string& fields) {
+    write_record(all, {Time{1795468293000000 + path}, path, RecordKind::from_board,
                        with_crc(fields + "PNum:1;T:1010;")});
   };
   state(1, "I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;");
@@ -132,7 +132,7 @@ std::string recording_of_two_with_devices() {
   return all;
 }
 
-TEST(Csv, HasTheDevicesThatTheRecordingTellsOfEachOfItsWire) {
+TEST(Csv, HasTheDevicesThatTheRecordingTellsOfEachOfItsPath) {
   const std::string recording = recording_of_two_with_devices();
   const Converted csv = converted(recording, ".r4log", ".csv");
   const auto lines = lines_of(csv.bytes);
@@ -143,7 +143,7 @@ TEST(Csv, HasTheDevicesThatTheRecordingTellsOfEachOfItsWire) {
   EXPECT_TRUE(lines[2].ends_with(",11.984,0.2")) << lines[2];
   EXPECT_TRUE(lines[3].ends_with(",x5d98,,")) << lines[3] << ": those slots are the other board's";
   EXPECT_TRUE(csv.left_out.find("odd@0x40:5, line 1") != std::string::npos) << csv.left_out;
-  // Named ones count instead, of every wire.
+  // Named ones count instead, of every path.
   const Converted named =
       converted(recording, ".r4log", ".csv", 1000, {Device::from("ina219@0x40:3")});
   EXPECT_TRUE(lines_of(named.bytes)[2].ends_with(",,,,"));
@@ -152,7 +152,7 @@ TEST(Csv, HasTheDevicesThatTheRecordingTellsOfEachOfItsWire) {
 
 TEST(Csv, DevicesOfOneRecordingAreNotThoseOfTheNextInTheFile) {
   const std::string two = recording_of_two_with_devices() +
-                          "# r4log 1 by r4 0.1.0\n# wire 1 udp://c\n" +
+                          "# r4log 1 by r4 0.1.0\n# path 1 udp://c\n" +
                           one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;PNum:1;T:1010;");
   const auto lines = lines_of(converted(two, ".r4log", ".csv").bytes);
   EXPECT_TRUE(lines[1].ends_with(",11.98,0.2"));
@@ -167,13 +167,13 @@ TEST(Csv, HasNoColumnOfTheRecordingsDevicesWhereOthersAreNamed) {
   EXPECT_NE(lines[0].find("as5600@0x36 angle [rad]"), std::string::npos) << lines[0];
 }
 
-TEST(Csv, WhatADeviceCountsIsSaidByItsOwnWire) {
-  std::string all = "# r4log 1 by r4 0.1.0\n# wire 1 udp://a\n# wire 2 udp://b\n";
-  for (const std::uint16_t wire : {std::uint16_t{1}, std::uint16_t{2}}) {
-    write_device(all, {wire, "as5600@0x36:1", std::string(DeviceDescription::text_of("as5600"))});
+TEST(Csv, WhatADeviceCountsIsSaidByItsOwnPath) {
+  std::string all = "# r4log 1 by r4 0.1.0\n# path 1 udp://a\n# path 2 udp://b\n";
+  for (const std::uint16_t path : {std::uint16_t{1}, std::uint16_t{2}}) {
+    write_device(all, {path, "as5600@0x36:1", std::string(DeviceDescription::text_of("as5600"))});
   }
-  const auto state = [&all](std::uint16_t wire, const std::string& fields) {
-    write_record(all, {Time{1795468293000000 + wire}, wire, RecordKind::from_board,
+  const auto state = [&all](std::uint16_t path, const std::string& fields) {
+    write_record(all, {Time{1795468293000000 + path}, path, RecordKind::from_board,
                        with_crc(fields + "PNum:1;T:1010;")});
   };
   state(1, "I2C2:1000,0,x20;");    // its magnet is there

@@ -18,14 +18,14 @@ TEST(JsonLines, HasAnObjectForEachRecord) {
   for (std::string line; std::getline(stream, line);) objects.push_back(tool::Json::parse(line));
   ASSERT_EQ(objects.size(), paper_capture().size() + 2);
   EXPECT_EQ(objects[0].dump(),
-            R"({"time":1795468293.404765,"wire":1,"board":"left-arm","type":"event",)"
+            R"({"time":1795468293.404765,"path":1,"board":"left-arm","type":"event",)"
             R"("event":"up udp://192.168.0.125"})");
   EXPECT_EQ(objects[1]["type"], "state");
   EXPECT_EQ(objects[1]["fields"]["AIN24"], 24.28);
   EXPECT_EQ(objects[1]["fields"]["DHB1A"], (tool::Json{4095, 1}));
   EXPECT_EQ(objects[1]["text"], paper_capture()[0].bytes);
   EXPECT_EQ(objects.back().dump(),
-            R"({"time":1795468294.114765,"wire":0,"type":"event","event":"end"})");
+            R"({"time":1795468294.114765,"path":0,"type":"event","event":"end"})");
   const auto bad = std::count_if(objects.begin(), objects.end(), [](const tool::Json& each) {
     return each.value("error", "") == "crc" && each["ok"] == false;
   });

@@ -63,14 +63,14 @@ TEST(Mcap, ReadsTheWholeChunksOfATornFile) {
 TEST(Mcap, NamesATopicByTheBoardFromTheBeginning) {
   std::string native;
   write_record_header(native);
-  write_wire(native, {1, "udp://a", ""});
-  write_wire(native, {2, "serial:b", ""});
-  write_wire(native, {3, "udp://c", ""});
-  for (std::uint16_t wire = 1; wire <= 3; ++wire) {
-    write_record(native, {Time{5}, wire, RecordKind::event, "up"});
+  write_path(native, {1, "udp://a", ""});
+  write_path(native, {2, "serial:b", ""});
+  write_path(native, {3, "udp://c", ""});
+  for (std::uint16_t path = 1; path <= 3; ++path) {
+    write_record(native, {Time{5}, path, RecordKind::event, "up"});
   }
-  write_wire(native, {1, "udp://a", "arm"});
-  write_wire(native, {2, "serial:b", "arm"});
+  write_path(native, {1, "udp://a", "arm"});
+  write_path(native, {2, "serial:b", "arm"});
   write_record(native, {Time{6}, 1, RecordKind::event, "up"});
   const std::string mcap = converted(native, ".r4log", ".mcap").bytes;
   // Channels are repeated behind the data: id, schema, topic.
@@ -208,7 +208,7 @@ TEST(Mcap, ReadsATopicThatAFilterHasLeftWithTheNameOfItsBoard) {
   });
   const Converted read = converted(mcap_file("", as_records(records)), ".mcap", ".r4log");
   EXPECT_TRUE(read.damage.empty());
-  EXPECT_TRUE(contains(read.bytes, "# wire 1 udp://192.168.0.125 left-arm\n"));
+  EXPECT_TRUE(contains(read.bytes, "# path 1 udp://192.168.0.125 left-arm\n"));
   EXPECT_TRUE(contains(read.bytes, "1< AIN24:24.28"));
 }
 

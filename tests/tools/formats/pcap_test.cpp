@@ -118,7 +118,7 @@ TEST(Pcap, ReadsUdpOfEitherOrderFromEveryKindOfLink) {
   for (const auto& [link, bytes] : links) {
     for (const ByteOrder order : {ByteOrder::little, ByteOrder::big}) {
       const std::string native = native_of(pcap(order, link, bytes));
-      EXPECT_TRUE(contains(native, "# wire 1 udp://10.0.0.7\n")) << link;
+      EXPECT_TRUE(contains(native, "# path 1 udp://10.0.0.7\n")) << link;
       EXPECT_TRUE(contains(native, "1795468293.404765 1< " + state + "\n")) << link;
     }
   }
@@ -128,7 +128,7 @@ TEST(Pcap, ReadsBothDirectionsAndPassesOverOthers) {
   const auto one = [](std::uint16_t from, std::uint16_t to) {
     return native_of(pcap(ByteOrder::little, 228, ipv4(udp(from, to, "x")), 0xA1B23C4D));
   };
-  EXPECT_TRUE(contains(one(2390, 2018), "# wire 1 udp://10.0.0.9\n"));
+  EXPECT_TRUE(contains(one(2390, 2018), "# path 1 udp://10.0.0.9\n"));
   EXPECT_TRUE(contains(one(2390, 2018), "1795468293.000404 1> x\n"));  // in nanoseconds
 }
 
@@ -174,7 +174,7 @@ TEST(Pcap, ReadsCanFramesOfCookedCapturesWhateverTheOrderOfTheirIds) {
       const std::string sll = std::string(14, '\0') + std::string("\0\x0C", 2) + frame;
       EXPECT_TRUE(contains(native_of(pcap(ByteOrder::little, 113, sll)), " 1> abc\n")) << node;
       const std::string native = native_of(pcap(ByteOrder::little, 276, cooked(4, frame)));
-      EXPECT_TRUE(contains(native, fmt::format("# wire 1 can://if4?node={}\n", node))) << native;
+      EXPECT_TRUE(contains(native, fmt::format("# path 1 can://if4?node={}\n", node))) << native;
       EXPECT_TRUE(contains(native, " 1> abc\n")) << node;
     }
     // The number of a stop fits in either order: the frame before tells.
@@ -203,9 +203,9 @@ TEST(Pcap, KeepsTheInterfacesOfACookedCaptureApart) {
     file += in_pcap(ByteOrder::little, packet);
   }
   const std::string native = native_of(file);
-  EXPECT_TRUE(contains(native, "# wire 1 can://if4?node=3\n")) << native;
+  EXPECT_TRUE(contains(native, "# path 1 can://if4?node=3\n")) << native;
   EXPECT_TRUE(contains(native, " 1< ABCDEFGH\n"));
-  EXPECT_TRUE(contains(native, "# wire 2 can://if5?node=3\n"));
+  EXPECT_TRUE(contains(native, "# path 2 can://if5?node=3\n"));
   EXPECT_TRUE(contains(native, " 2< abcdefgh\n"));
 }
 
@@ -327,7 +327,7 @@ TEST(Pcapng, RefusesRecordingsThatMergecapHasMixed) {
       EXPECT_TRUE(contains(problem.reason, "several recordings are mixed")) << problem.reason;
     }
   }
-  // A capture has numbers of its own for its wires.
+  // A capture has numbers of its own for its paths.
   const std::string recording = packets("udp://192.168.0.125");
   std::string interface, packet;
   append_number(interface, std::uint64_t{228});

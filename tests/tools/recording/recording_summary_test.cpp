@@ -20,10 +20,10 @@ using namespace std::chrono_literals;
 struct RecordingSummaryTest : testing::Test {
   RecordingSummaryTest() {
     summary.on_header();
-    summary.on_wire({1, "udp://robot", "left"});
+    summary.on_path({1, "udp://robot", "left"});
   }
-  void add(RecordKind kind, const std::string& bytes, std::uint16_t wire = 1) {
-    summary.on_record({now, wire, kind, bytes});
+  void add(RecordKind kind, const std::string& bytes, std::uint16_t path = 1) {
+    summary.on_record({now, path, kind, bytes});
   }
   // From the board, 10 ms after the one before.
   void hear(const std::string& fields) {
@@ -31,7 +31,7 @@ struct RecordingSummaryTest : testing::Test {
     add(RecordKind::from_board,
         test::with_crc(fields + ";PNum:" + std::to_string(++pnum) + ";T:5;"));
   }
-  Json wire() const { return summary.json("x")["wires"][0]; }
+  Json path() const { return summary.json("x")["paths"][0]; }
 
   RecordingSummary summary;
   Time now{std::chrono::hours{24 * 365 * 50}};
@@ -43,10 +43,10 @@ TEST_F(RecordingSummaryTest, HasTheRateOfStatesAndWhatWasLostAndDamaged) {
   pnum += 3;
   hear("AIN24:24.28");
   add(RecordKind::from_board, "AIN24:24.28;PNum:1;T:5;^0x1^");
-  EXPECT_EQ(wire()["states"], 102);
-  EXPECT_NEAR(wire()["states_hz"].get<double>(), 100, 0.01);
-  EXPECT_EQ(wire()["lost"], 3);
-  EXPECT_EQ(wire()["damaged"], 1);
+  EXPECT_EQ(path()["states"], 102);
+  EXPECT_NEAR(path()["states_hz"].get<double>(), 100, 0.01);
+  EXPECT_EQ(path()["lost"], 3);
+  EXPECT_EQ(path()["damaged"], 1);
 }
 
 TEST_F(RecordingSummaryTest, HasTheSafeStatesAndHowLongTheyWere) {
@@ -55,9 +55,9 @@ TEST_F(RecordingSummaryTest, HasTheSafeStatesAndHowLongTheyWere) {
   hear("AIN24:24.28");
   hear("AIN24:24.28;SAFE:1");
   hear("AIN24:24.28;SAFE:0");
-  EXPECT_EQ(wire()["safe"]["stop"], 1);
-  EXPECT_EQ(wire()["safe"]["link"], 1);
-  EXPECT_NEAR(wire()["safe_s"].get<double>(), 0.52, 0.001);
+  EXPECT_EQ(path()["safe"]["stop"], 1);
+  EXPECT_EQ(path()["safe"]["link"], 1);
+  EXPECT_NEAR(path()["safe_s"].get<double>(), 0.52, 0.001);
   EXPECT_TRUE(test::contains(summary.text("x"), "safe for 0.5 s, link (1 times), stop (1 times)"));
 }
 
@@ -67,16 +67,16 @@ TEST_F(RecordingSummaryTest, HasTheGaps) {
   hear("AIN24:24.28");
   now += 3s;
   hear("AIN24:24.28");
-  EXPECT_EQ(wire()["gaps"], 2);
-  EXPECT_NEAR(wire()["longest_gap_s"].get<double>(), 3.01, 0.001);
+  EXPECT_EQ(path()["gaps"], 2);
+  EXPECT_NEAR(path()["longest_gap_s"].get<double>(), 3.01, 0.001);
 }
 
 TEST_F(RecordingSummaryTest, HasWhatWasSentToTheBoard) {
   add(RecordKind::to_board, test::with_crc("H:ROS2-R4;PNum:1;T:5;"));
   add(RecordKind::to_board, test::with_crc("E:STOP;PNum:2;T:5;"));
-  EXPECT_EQ(wire()["sent"], 2);
-  EXPECT_EQ(wire()["heartbeats"], 1);
-  EXPECT_EQ(wire()["stops"], 1);
+  EXPECT_EQ(path()["sent"], 2);
+  EXPECT_EQ(path()["heartbeats"], 1);
+  EXPECT_EQ(path()["stops"], 1);
 }
 
 TEST_F(RecordingSummaryTest, CountsARebootAsNoLoss) {
@@ -84,7 +84,7 @@ TEST_F(RecordingSummaryTest, CountsARebootAsNoLoss) {
   add(RecordKind::from_board, test::with_crc("H:R4-ROS2;PNum:0;T:0;"));
   pnum = 5000;
   hear("AIN24:24.28");
-  EXPECT_EQ(wire()["lost"], 0);
+  EXPECT_EQ(path()["lost"], 0);
 }
 
 TEST_F(RecordingSummaryTest, SaysWhetherItWasEndedAndWhatTheDiskWasTooSlowFor) {
@@ -94,7 +94,7 @@ TEST_F(RecordingSummaryTest, SaysWhetherItWasEndedAndWhatTheDiskWasTooSlowFor) {
   EXPECT_TRUE(summary.json("x")["ended"]);
   EXPECT_EQ(summary.json("x")["dropped"], 17);
   add(RecordKind::event, "down udp://robot: gone", 1);
-  EXPECT_EQ(wire()["downs"], 1);
+  EXPECT_EQ(path()["downs"], 1);
 }
 
 TEST_F(RecordingSummaryTest, TellsTwentyPlacesOfDamageAndCountsTheRest) {

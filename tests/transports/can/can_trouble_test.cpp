@@ -14,13 +14,13 @@ TEST(CanTrouble, TakesFramesThatMakeNoDatagramForThoseOfAnotherProtocol) {
   CanTrouble trouble;
   for (auto after = 0ms; after < 500ms; after += 10ms) {
     trouble.on_host_frame(trouble_start + after);
-    EXPECT_EQ(trouble.now(trouble_start + after), WireTrouble::none) << after.count();
+    EXPECT_EQ(trouble.now(trouble_start + after), TransportTrouble::none) << after.count();
     EXPECT_TRUE(trouble.hears_host(trouble_start + after)) << "it may be one";
   }
   trouble.on_host_frame(trouble_start + 500ms);
-  EXPECT_EQ(trouble.now(trouble_start + 500ms), WireTrouble::foreign_frames);
+  EXPECT_EQ(trouble.now(trouble_start + 500ms), TransportTrouble::foreign_frames);
   EXPECT_FALSE(trouble.hears_host(trouble_start + 500ms));
-  EXPECT_EQ(trouble.now(trouble_start + 1500ms), WireTrouble::none) << "they have ended";
+  EXPECT_EQ(trouble.now(trouble_start + 1500ms), TransportTrouble::none) << "they have ended";
 }
 
 TEST(CanTrouble, TakesAHostThatIsHeldUpOrEndsForNoOtherProtocol) {
@@ -28,10 +28,10 @@ TEST(CanTrouble, TakesAHostThatIsHeldUpOrEndsForNoOtherProtocol) {
   trouble.on_host_frame(trouble_start);
   trouble.on_host_datagram(trouble_start + 1ms);
   for (auto after = 1ms; after < 2s; after += 10ms) {
-    EXPECT_EQ(trouble.now(trouble_start + after), WireTrouble::none) << after.count();
+    EXPECT_EQ(trouble.now(trouble_start + after), TransportTrouble::none) << after.count();
   }
   trouble.on_host_frame(trouble_start + 900ms);  // the first of a heartbeat
-  EXPECT_EQ(trouble.now(trouble_start + 900ms), WireTrouble::none);
+  EXPECT_EQ(trouble.now(trouble_start + 900ms), TransportTrouble::none);
   EXPECT_TRUE(trouble.hears_host(trouble_start + 900ms));
 }
 
@@ -40,7 +40,7 @@ TEST(CanTrouble, TakesAHostForNoOtherProtocol) {
   for (auto after = 0ms; after < 5s; after += 100ms) {
     trouble.on_host_frame(trouble_start + after);
     trouble.on_host_datagram(trouble_start + after + 1ms);
-    EXPECT_EQ(trouble.now(trouble_start + after + 99ms), WireTrouble::none);
+    EXPECT_EQ(trouble.now(trouble_start + after + 99ms), TransportTrouble::none);
     EXPECT_TRUE(trouble.hears_host(trouble_start + after + 99ms));
   }
   EXPECT_FALSE(trouble.hears_host(trouble_start + 6s));
@@ -50,12 +50,12 @@ TEST(CanTrouble, TellsOfFramesThatComeTooLateWhileTheBoardIsHeard) {
   CanTrouble trouble;
   trouble.on_late(2, trouble_start);
   trouble.on_board(trouble_start);
-  EXPECT_EQ(trouble.now(trouble_start), WireTrouble::none) << "two may be chance";
+  EXPECT_EQ(trouble.now(trouble_start), TransportTrouble::none) << "two may be chance";
   trouble.on_late(3, trouble_start + 1900ms);
-  EXPECT_EQ(trouble.now(trouble_start + 1950ms), WireTrouble::late_frames);
-  EXPECT_EQ(trouble.now(trouble_start + 2100ms), WireTrouble::none) << "they were long ago";
+  EXPECT_EQ(trouble.now(trouble_start + 1950ms), TransportTrouble::late_frames);
+  EXPECT_EQ(trouble.now(trouble_start + 2100ms), TransportTrouble::none) << "they were long ago";
   trouble.on_late(10, trouble_start + 4s);
-  EXPECT_EQ(trouble.now(trouble_start + 4s), WireTrouble::none) << "the board has gone";
+  EXPECT_EQ(trouble.now(trouble_start + 4s), TransportTrouble::none) << "the board has gone";
 }
 
 }  // namespace

@@ -308,15 +308,15 @@ TEST_F(UdpCarrierTest, SaysThatThePortIsInUse) {
   EXPECT_EQ(at_the_board->kind(), ErrorKind::open);
 }
 
-TEST_F(UdpCarrierTest, IsOneWireHoweverTheAddressIsWritten) {
-  const auto wire = [](const char* url) { return udp_share_name(Url::parse(url)).text; };
-  EXPECT_EQ(wire("udp://localhost"), wire("udp://127.0.0.1:2018?listen=2390"));
-  EXPECT_EQ(wire("udp://LocalHost"), wire("udp://localhost"));
-  EXPECT_EQ(wire("udp://[0:0::1]"), wire("udp://[::1]"));
-  EXPECT_EQ(wire("udp://Robot.local"), wire("udp://robot.local"));
-  EXPECT_NE(wire("udp://127.0.0.2"), wire("udp://127.0.0.1"));
-  EXPECT_NE(wire("udp://127.0.0.1:2019"), wire("udp://127.0.0.1"));
-  EXPECT_NE(wire("udp://127.0.0.1?listen=2391"), wire("udp://127.0.0.1"));
+TEST_F(UdpCarrierTest, IsOnePathHoweverTheAddressIsWritten) {
+  const auto path = [](const char* url) { return udp_share_name(Url::parse(url)).text; };
+  EXPECT_EQ(path("udp://localhost"), path("udp://127.0.0.1:2018?listen=2390"));
+  EXPECT_EQ(path("udp://LocalHost"), path("udp://localhost"));
+  EXPECT_EQ(path("udp://[0:0::1]"), path("udp://[::1]"));
+  EXPECT_EQ(path("udp://Robot.local"), path("udp://robot.local"));
+  EXPECT_NE(path("udp://127.0.0.2"), path("udp://127.0.0.1"));
+  EXPECT_NE(path("udp://127.0.0.1:2019"), path("udp://127.0.0.1"));
+  EXPECT_NE(path("udp://127.0.0.1?listen=2391"), path("udp://127.0.0.1"));
 }
 
 TEST_F(UdpCarrierTest, SaysWhichHostItDoesNotFind) {

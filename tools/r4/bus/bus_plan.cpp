@@ -152,7 +152,7 @@ struct Sum {
            bool worst) {
     std::array<std::uint8_t, max_datagram> packed;
     const std::size_t size = plan.packed ? pack(Text(plain), packed.data(), packed.size()) : 0;
-    const std::string wire =
+    const std::string path =
         size == 0 ? plain : std::string(reinterpret_cast<const char*>(packed.data()), size);
     IsotpSenderOptions options;
     options.channel.id = kind.to_board ? command_id(node) : telemetry_id(node);
@@ -160,7 +160,7 @@ struct Sum {
     options.tx_dl = options.channel.fd ? max_fd_size : max_classic_size;
     options.flow_control = false;  // nobody answers here
     IsotpSender sender(options);
-    sender.begin(Text(wire), 0);
+    sender.begin(Text(path), 0);
     std::uint32_t count = 0;
     for (CanFrame frame; sender.offer(0, frame); sender.frame_sent(0), ++count) {
       add_frame(frame, plan, worst);
@@ -172,7 +172,7 @@ struct Sum {
       add_frame(clear_to_send, plan, worst);
     }
     ++datagrams;
-    bytes += static_cast<double>(wire.size());
+    bytes += static_cast<double>(path.size());
   }
 };
 

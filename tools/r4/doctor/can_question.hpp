@@ -30,7 +30,7 @@ class CanQuestion final : private Carrier::Handler {
   // How long ago the first question went out; 0: none did.
   double asked_since_s() const;
   // What stands in the way, at its worst.
-  WireTrouble trouble() const { return trouble_; }
+  TransportTrouble trouble() const { return trouble_; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -43,7 +43,7 @@ class CanQuestion final : private Carrier::Handler {
   std::optional<Clock::time_point> first_asked_;
   std::optional<Clock::time_point> asked_;  // the newest question that is not answered
   double answer_us_ = 0;
-  WireTrouble trouble_ = WireTrouble::none;
+  TransportTrouble trouble_ = TransportTrouble::none;
 };
 
 }  // namespace r4::tool

@@ -223,10 +223,10 @@ void print_summary(const Findings& findings, bool json) {
   }
 }
 
-// Each wire is a link of its own here.
+// Each path is a link of its own here.
 int doctor(const Options& given) {
   Options options = given;
-  options.urls = split_wires(join_wires(given.urls));
+  options.urls = split_paths(join_paths(given.urls));
   if (given.urls.empty()) options.urls.clear();
   if (options.udev_rules) {
     print_text(udev_rules);

@@ -90,7 +90,7 @@ class Listening {
       for (Finding& each : check_can_load(interface_, load))
         result.findings.push_back(std::move(each));
       // Frames that come too late make no datagram, whosever they are.
-      if (result.sample.trouble != WireTrouble::late_frames) {
+      if (result.sample.trouble != TransportTrouble::late_frames) {
         for (Finding& each : check_foreign_frames(bus_->survey(), interface_, node_))
           result.findings.push_back(std::move(each));
       }
@@ -111,7 +111,7 @@ class Listening {
     if (statistics.round_trip_us > 0 || by_anyone) return Answered::yes;
     const bool asked = question_ ? question_->asked_since_s() >= asked_for_s
                                  : !is_recording_ && seconds >= asked_for_s;
-    return asked || link().trouble != WireTrouble::none ? Answered::no : Answered::not_asked;
+    return asked || link().trouble != TransportTrouble::none ? Answered::no : Answered::not_asked;
   }
   void listen_to_bus(asio::io_context& io, const Url& url) {
     const std::string& name = can_interface_of(url);
@@ -176,13 +176,13 @@ Findings judge_link(const std::string& url, const LinkSample& sample) {
               ErrorKind::refused));
   }
   if (sample.answered == Answered::no) {
-    const bool known = sample.trouble != WireTrouble::none;
+    const bool known = sample.trouble != TransportTrouble::none;
     findings.push_back(
         found(url, Severity::error, "link.answer",
               known ? sample.link.reason
                     : "the board does not answer a question: it does not hear this computer",
               known ? sample.link.fix
-                    : "look at the way to the board (its RX wire, firewall): r4 bench " + url,
+                    : "look at the way to the board (its RX path, firewall): r4 bench " + url,
               ErrorKind::refused));
   } else if (sample.answer_us > slow_answer_us) {
     findings.push_back(found(url, Severity::warning, "link.answer",

@@ -29,7 +29,7 @@ struct LinkSample {
   double jitter_us = 0;
   Answered answered = Answered::not_asked;
   double answer_us = 0;  // question to answer, the fastest; 0: not measured
-  WireTrouble trouble = WireTrouble::none;
+  TransportTrouble trouble = TransportTrouble::none;
   Problem link;  // what explain() says of the link
 };
 

@@ -19,7 +19,7 @@
 #include "../shell/options.hpp"
 #include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
-#include "../shell/wires.hpp"
+#include "../shell/paths.hpp"
 #include "host/commands/command_help.hpp"
 #include "host/session/limits.hpp"
 #include "protocol/datagram/numbers.hpp"
@@ -151,7 +151,7 @@ class Sender {
     send_next();
     io_.run();
     require_one_board(board_);
-    tell_wires_down(board_.wires(), options_.json);
+    tell_paths_down(board_.paths(), options_.json);
     say_farewell(io_, board_);
     if (failure_) throw Error(*failure_);
     return 0;
@@ -328,7 +328,7 @@ class Sender {
 
 int send(const SendOptions& given) {
   SendOptions options = given;
-  take_wires(options.url, options.commands, "CMD");
+  take_paths(options.url, options.commands, "CMD");
   std::vector<Order> orders;
   for (const std::string& text : options.commands) {
     orders.push_back(order_of(text, options.url));
@@ -355,7 +355,7 @@ Examples:
   r4 send udp://192.168.0.125 R:1,On O:358,1,1 --hold 5      R:1,On: the motors have supply
   r4 send serial:auto R:1,On D:1000,1,1 S:1500,3 R:2,On --hold 60
   r4 send serial:auto R:1,On 'O:358,1,1;O:358,1,2' --hold 5  both wheels at once
-  r4 send serial:auto udp://192.168.0.125 S:1500,3 --hold 60  two wires: either may be pulled
+  r4 send serial:auto udp://192.168.0.125 S:1500,3 --hold 60  two paths: either may be pulled
   r4 send serial:auto E:CLEAR                 after an emergency stop
   r4 send serial:auto C:timeout,300 C:heartbeat,100     side by side: one step, in any order
   r4 send udp://127.0.0.1 Q:ID                who is it?

@@ -14,7 +14,7 @@
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "../shell/wires.hpp"
+#include "../shell/paths.hpp"
 #include "host/standard_registry.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
@@ -36,16 +36,16 @@ struct StopOptions {
 // Beside whatever program controls the board, and on ways of its own where there are any: that may hang.
 std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
   BoardOptions options;
-  auto wires = make_host_carriers(io, {url}, BoardRole::watch);
-  const std::vector<std::string> urls = split_wires(url);
+  auto paths = make_host_carriers(io, {url}, BoardRole::watch);
+  const std::vector<std::string> urls = split_paths(url);
   for (std::size_t i = 0; i < urls.size(); ++i) {
     if (Url::parse(urls[i]).scheme() == "serial") {
       options.role = BoardRole::watch;
     } else {
-      wires[i] = standard_registry().make(io, with_any_port(urls[i]), Role::host);
+      paths[i] = standard_registry().make(io, with_any_port(urls[i]), Role::host);
     }
   }
-  auto board = std::make_unique<AsyncBoard>(io, std::move(wires), options);
+  auto board = std::make_unique<AsyncBoard>(io, std::move(paths), options);
   try {
     board->open();
   } catch (const Error& error) {
@@ -64,14 +64,14 @@ void print_confirmed(const StopOptions& options, const CommandResult& result) {
     fmt::print(
         "stopped: the board reports SAFE (stop), after {:.1f} ms\n"
         "it stays so until: r4 send {} E:CLEAR\n",
-        ms, join_wires(options.urls));
+        ms, join_paths(options.urls));
     std::fflush(stdout);
   }
 }
 
 int stop(const StopOptions& options) {
   asio::io_context io(1);
-  const std::string url = join_wires(options.urls);
+  const std::string url = join_paths(options.urls);
   const std::unique_ptr<AsyncBoard> board = open(io, url);
   std::optional<CommandResult> result;
   asio::steady_timer repeating(io);
@@ -85,9 +85,9 @@ int stop(const StopOptions& options) {
   });
   io.run();
   const LinkStatus link = board->link();
-  const std::vector<Wire> wires = board->wires();
+  const std::vector<PathStatus> paths = board->paths();
   board->close();
-  tell_wires_down(wires, options.json);
+  tell_paths_down(paths, options.json);
   if (!result || result->outcome != Outcome::confirmed) {
     Problem problem = explain(fmt::format("E:STOP to {}", board->name()), link);
     problem.reason = fmt::format("the board did not confirm the stop within {} ms: {}",
@@ -97,14 +97,14 @@ int stop(const StopOptions& options) {
     throw Error(problem);
   }
   // The stop went to both, and one has confirmed it.
-  if (link.two_boards) throw Error(explain(wires));
+  if (link.two_boards) throw Error(explain(paths));
   return 0;
 }
 
 constexpr const char* stop_footer =
     R"(Works whoever controls the board, and without waiting for a link: the stop is repeated every 20 ms
 until the board reports that it has obeyed this one, and for a moment longer. It stays stopped until
-E:CLEAR. By several wires to the board one that works is enough.
+E:CLEAR. By several paths to the board one that works is enough.
 
 Examples:
   r4 stop udp://192.168.0.125
@@ -119,7 +119,7 @@ void add_stop(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<StopOptions>();
   CLI::App* const command = add_subcommand(
       root, chosen, "stop", "Emergency stop: all outputs off, now", stop_footer, options, stop);
-  add_wires(*command, options->urls);
+  add_paths(*command, options->urls);
   add_seconds(*command, "--timeout", options->timeout,
               "how long to repeat it for a confirmation (default 2); it is sent in any case",
               Zero::allowed);

@@ -85,9 +85,9 @@ void BusRecords::on_datagram(const BusTransfers::Lane& lane) {
     }
     datagram = {plain.data(), result.size};
   }
-  const std::uint16_t wire = wire_of(lane.interface, lane.meaning.node);
+  const std::uint16_t path = path_of(lane.interface, lane.meaning.node);
   const bool from_host = lane.meaning.kind == CanIdKind::command;
-  tell({time_of(lane.last), wire, from_host ? RecordKind::to_board : RecordKind::from_board,
+  tell({time_of(lane.last), path, from_host ? RecordKind::to_board : RecordKind::from_board,
         datagram});
 }
 
@@ -101,24 +101,24 @@ void BusRecords::on_failure(const BusTransfers::Lane& lane, const BusTransfers::
 void BusRecords::on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
                               const CanFrame& frame, const BusTransfers::Place& place) {
   if (meaning.kind == CanIdKind::emergency_stop) {
-    return tell({time_of(place), no_wire, RecordKind::event, "stop " + interface});
+    return tell({time_of(place), no_path, RecordKind::event, "stop " + interface});
   }
   if (meaning.kind == CanIdKind::watch) return;  // no news of the board
   const std::uint8_t number = frame.size == 0 ? 0 : frame.data[0];
   const SafeReason reason = number == 0 ? SafeReason::fault : to_safe_reason(number);
   const std::string words = fmt::format("link safe {}", to_text(reason));
-  tell({time_of(place), wire_of(interface, meaning.node), RecordKind::event, words});
+  tell({time_of(place), path_of(interface, meaning.node), RecordKind::event, words});
 }
 
-std::uint16_t BusRecords::wire_of(const std::string& interface, std::uint8_t node) {
-  const auto [known, added] = wires_.try_emplace({interface, node}, no_wire);
-  if (added) known->second = add_wire(bus_url(interface, node));
+std::uint16_t BusRecords::path_of(const std::string& interface, std::uint8_t node) {
+  const auto [known, added] = paths_.try_emplace({interface, node}, no_path);
+  if (added) known->second = add_path(bus_url(interface, node));
   return known->second;
 }
 
-std::uint16_t BusRecords::add_wire(const std::string& url) {
-  handler_.on_wire({++last_wire_, url, ""});
-  return last_wire_;
+std::uint16_t BusRecords::add_path(const std::string& url) {
+  handler_.on_path({++last_path_, url, ""});
+  return last_path_;
 }
 
 void BusRecords::tell(const Record& record) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The frames of CAN buses as records: a wire for each node of each interface, can://can0?node=3, in the order in which
+// The frames of CAN buses as records: a path for each node of each interface, can://can0?node=3, in the order in which
 // they are first heard. A datagram has the time of its last frame.
 //
-// An emergency stop is an event of no wire, "stop can0"; a board that goes safe one of its own, "link safe stop".
+// An emergency stop is an event of no path, "stop can0"; a board that goes safe one of its own, "link safe stop".
 #pragma once
 
 #include <cstdint>
@@ -33,8 +33,8 @@ class BusRecords final : BusTransfers::Handler {
   void finish();
   // True if a record or damage was told.
   bool told() const { return told_; }
-  // The number of a wire that is told of now; those of other sources of the same recording count on.
-  std::uint16_t add_wire(const std::string& url);
+  // The number of a path that is told of now; those of other sources of the same recording count on.
+  std::uint16_t add_path(const std::string& url);
 
  private:
   void on_datagram(const BusTransfers::Lane& lane) override;
@@ -42,14 +42,14 @@ class BusRecords final : BusTransfers::Handler {
                   IsotpError error) override;
   void on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
                     const CanFrame& frame, const BusTransfers::Place& place) override;
-  std::uint16_t wire_of(const std::string& interface, std::uint8_t node);
+  std::uint16_t path_of(const std::string& interface, std::uint8_t node);
   void tell(const Record& record);
   void damage(const BusTransfers::Place& place, const std::string& reason);
 
   RecordingReader::Handler& handler_;
   BusTransfers transfers_{*this};
-  std::map<std::pair<std::string, std::uint8_t>, std::uint16_t> wires_;
-  std::uint16_t last_wire_ = 0;
+  std::map<std::pair<std::string, std::uint8_t>, std::uint16_t> paths_;
+  std::uint16_t last_path_ = 0;
   bool told_ = false;
 };
 

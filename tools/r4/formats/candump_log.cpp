@@ -100,9 +100,9 @@ void CandumpSource::fail_as_none() const {
   fail("no log of CAN frames", "candump -L can0 > FILE makes one");
 }
 
-std::optional<CandumpSink::Place> CandumpSink::place_of(const RecordedWire& wire) {
+std::optional<CandumpSink::Place> CandumpSink::place_of(const RecordedPath& path) {
   try {
-    const Url url = Url::parse(wire.url);
+    const Url url = Url::parse(path.url);
     if (url.scheme() != "can" || url.host().empty()) return std::nullopt;
     const std::string interface = bus_interface(url.host());
     if (!is_interface_name(interface)) return std::nullopt;
@@ -113,19 +113,19 @@ std::optional<CandumpSink::Place> CandumpSink::place_of(const RecordedWire& wire
   }
 }
 
-void CandumpSink::on_wire(const RecordedWire& wire, Time) {
-  if (const auto place = place_of(wire)) {
-    wires_.insert_or_assign(wire.number, *place);
+void CandumpSink::on_path(const RecordedPath& path, Time) {
+  if (const auto place = place_of(path)) {
+    paths_.insert_or_assign(path.number, *place);
   } else {
-    wires_.erase(wire.number);
-    elsewhere_ = wire.url;
+    paths_.erase(path.number);
+    elsewhere_ = path.url;
   }
 }
 
 void CandumpSink::on_record(const Record& record) {
-  const auto wire = wires_.find(record.wire);
-  const bool written = record.kind != RecordKind::event && wire != wires_.end() &&
-                       write_frames(wire->second, record);
+  const auto path = paths_.find(record.path);
+  const bool written = record.kind != RecordKind::event && path != paths_.end() &&
+                       write_frames(path->second, record);
   ++(written ? written_ : others_);
 }
 

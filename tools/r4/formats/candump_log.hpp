@@ -55,7 +55,7 @@ class CandumpSink final : public Sink {
   explicit CandumpSink(Output& output) : output_(output) {}
   void on_comment(std::string_view, Time) override {}
   // Throws Error{data} where the recording has nothing that went over a CAN bus.
-  void on_wire(const RecordedWire& wire, Time time) override;
+  void on_path(const RecordedPath& path, Time time) override;
   void on_record(const Record& record) override;
   void finish() override;
   std::string left_out() const override;
@@ -66,15 +66,15 @@ class CandumpSink final : public Sink {
     std::uint8_t node;
     bool fd, packed;
   };
-  static std::optional<Place> place_of(const RecordedWire& wire);
+  static std::optional<Place> place_of(const RecordedPath& path);
   bool write_frames(const Place& place, const Record& record);
 
   Output& output_;
-  std::map<std::uint16_t, Place> wires_;
-  std::string elsewhere_;  // the URL of a wire that is no CAN bus
+  std::map<std::uint16_t, Place> paths_;
+  std::string elsewhere_;  // the URL of a path that is no CAN bus
   std::string text_;
   std::uint64_t written_ = 0;
-  std::uint64_t others_ = 0;  // events, and datagrams that no transfer holds or of other wires
+  std::uint64_t others_ = 0;  // events, and datagrams that no transfer holds or of other paths
 };
 
 }  // namespace r4::tool

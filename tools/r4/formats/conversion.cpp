@@ -13,8 +13,8 @@ const char* tell_line(std::string_view line, RecordLine& read, RecordingReader::
     case LineKind::record:
       handler.on_record(read.record);
       return nullptr;
-    case LineKind::wire:
-      handler.on_wire(read.wire);
+    case LineKind::path:
+      handler.on_path(read.path);
       return nullptr;
     case LineKind::header:
       if (read.version != record_version) return "of a later version: read it with a newer r4";
@@ -37,9 +37,9 @@ void Conversion::on_record(const Record& record) {
   sink_.on_record(without_secrets(record, room_));
 }
 
-void Conversion::on_wire(const RecordedWire& wire) {
-  if (!begun_) return wait({true, wire, {}});
-  sink_.on_wire(wire, time_);
+void Conversion::on_path(const RecordedPath& path) {
+  if (!begun_) return wait({true, path, {}});
+  sink_.on_path(path, time_);
 }
 
 void Conversion::on_comment(std::string_view line) {
@@ -66,8 +66,8 @@ void Conversion::begin(Time time) {
   begun_ = true;
   time_ = time;
   for (const Waiting& line : waiting_) {
-    if (line.is_wire) {
-      sink_.on_wire(line.wire, time);
+    if (line.is_path) {
+      sink_.on_path(line.path, time);
     } else {
       sink_.on_comment(line.comment, time);
     }

@@ -45,15 +45,15 @@ class Output {
 class Sink {
  public:
   virtual ~Sink() = default;
-  // Does it want to be told of all wires and records by survey() first? Where a file can be read once only, it is not.
+  // Does it want to be told of all paths and records by survey() first? Where a file can be read once only, it is not.
   virtual bool wants_survey() const { return false; }
-  virtual void survey(const RecordedWire& wire) { static_cast<void>(wire); }
+  virtual void survey(const RecordedPath& path) { static_cast<void>(path); }
   virtual void survey(const RecordedDevice& device) { static_cast<void>(device); }
   virtual void survey(const Record& record) { static_cast<void>(record); }
   // A line that begins with #; such lines have no time of their own, so it is that of the record before, and of the
   // first one for those at the beginning.
   virtual void on_comment(std::string_view line, Time time) = 0;
-  virtual void on_wire(const RecordedWire& wire, Time time) = 0;
+  virtual void on_path(const RecordedPath& path, Time time) = 0;
   // Comes before its line does by on_comment(); that of a header, too.
   virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
   virtual void on_header() {}
@@ -69,7 +69,7 @@ class Survey final : public RecordingReader::Handler {
  public:
   explicit Survey(Sink& sink) : sink_(sink) {}
   void on_record(const Record& record) override { sink_.survey(record); }
-  void on_wire(const RecordedWire& wire) override { sink_.survey(wire); }
+  void on_path(const RecordedPath& path) override { sink_.survey(path); }
   void on_device(const RecordedDevice& device) override { sink_.survey(device); }
   void on_damage(const RecordingDamage&) override {}
 
@@ -86,7 +86,7 @@ class Conversion final : public RecordingReader::Handler {
 
   // Whatever the source is, no secret gets into another file.
   void on_record(const Record& record) override;
-  void on_wire(const RecordedWire& wire) override;
+  void on_path(const RecordedPath& path) override;
   void on_comment(std::string_view line) override;
   void on_header() override { sink_.on_header(); }
   void on_device(const RecordedDevice& device) override { sink_.on_device(device); }
@@ -101,8 +101,8 @@ class Conversion final : public RecordingReader::Handler {
   // So many lines wait for the first record's time; a file that has more is none that r4 wrote.
   static constexpr std::size_t most_waiting = 1000;
   struct Waiting {
-    bool is_wire;
-    RecordedWire wire;
+    bool is_path;
+    RecordedPath path;
     std::string comment;
   };
   void wait(Waiting line);

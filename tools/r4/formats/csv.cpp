@@ -83,12 +83,12 @@ void CsvSink::on_header() {
 
 bool CsvSink::read(const Record& record) {
   return record.kind == RecordKind::from_board && read_datagram(Text(record.bytes), datagram_) &&
-         kind_of(datagram_) == MessageKind::state && read_state(datagram_, states_[record.wire]) &&
-         !states_[record.wire].present.empty();
+         kind_of(datagram_) == MessageKind::state && read_state(datagram_, states_[record.path]) &&
+         !states_[record.path].present.empty();
 }
 
 void CsvSink::survey(const Record& record) {
-  if (read(record)) columns_.add(states_[record.wire].present);
+  if (read(record)) columns_.add(states_[record.path].present);
 }
 
 void CsvSink::write_header() {
@@ -97,7 +97,7 @@ void CsvSink::write_header() {
     columns_ = FieldSet::all();
     columns_.add(StateField::fault);
   }
-  row_ = "time [s],wire,board,PNum,T [ms]";
+  row_ = "time [s],path,board,PNum,T [ms]";
   for (const StateField field : columns_) {
     const StateUnits units = units_of(field);
     for (std::size_t i = 0; i < units.count; ++i) {
@@ -120,7 +120,7 @@ void CsvSink::on_record(const Record& record) {
     ++others_;
     return;
   }
-  const State& state = states_[record.wire];
+  const State& state = states_[record.path];
   // A field's values as they came: read_state() has found that they are numbers, and how many.
   std::array<std::string_view, state_field_count + 1> values;
   for (const Field& field : datagram_) {
@@ -129,8 +129,8 @@ void CsvSink::on_record(const Record& record) {
   row_.clear();
   const auto out = std::back_inserter(row_);
   const auto us = record.time.count();
-  fmt::format_to(out, "{}.{:06},{},", us / 1'000'000, us % 1'000'000, record.wire);
-  append_cell(row_, names_.of(record.wire));
+  fmt::format_to(out, "{}.{:06},{},", us / 1'000'000, us % 1'000'000, record.path);
+  append_cell(row_, names_.of(record.path));
   row_ += ',';
   if (datagram_.has_pnum()) fmt::format_to(out, "{}", datagram_.pnum());
   row_ += ',';
@@ -145,19 +145,19 @@ void CsvSink::on_record(const Record& record) {
   }
   for (const DeviceColumn& column : device_columns_) {
     row_ += ',';
-    append_measured(column, record.wire);
+    append_measured(column, record.path);
   }
   row_ += '\n';
   output_.write(row_);
 }
 
-void CsvSink::append_measured(const DeviceColumn& column, std::uint16_t wire) {
+void CsvSink::append_measured(const DeviceColumn& column, std::uint16_t path) {
   for (const RecordedDevices::Known& known : devices_.all()) {
     const Device& device = known.device;
-    if (!known.is_of(wire) || device.text() != column.device) continue;
+    if (!known.is_of(path) || device.text() != column.device) continue;
     const auto value = device.description().find(column.value);
     if (!value || device.description().values[*value].unit != column.unit) continue;
-    const State& state = states_[wire];
+    const State& state = states_[path];
     if (!state.present.has(device.field(*value))) continue;
     if (const auto number = device.reading(state, *value).number) {
       fmt::format_to(std::back_inserter(row_), "{}", *number);

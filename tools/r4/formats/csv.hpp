@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // .csv: the states of a recording, a row each, a column a value with its unit in the header (RFC 4180).
 //
-//     time [s],wire,board,PNum,T [ms],AIN24 [V],OSMC1 pwm [0-4095],OSMC1 direction [0/1]
+//     time [s],path,board,PNum,T [ms],AIN24 [V],OSMC1 pwm [0-4095],OSMC1 direction [0/1]
 //     1795468293.405588,1,left-arm,7434,79090,24.28,400,1
 #pragma once
 
@@ -15,7 +15,7 @@
 #include "r4link/devices/device.hpp"
 #include "r4link/state.hpp"
 #include "recorded_devices.hpp"
-#include "wire_names.hpp"
+#include "path_names.hpp"
 
 namespace r4::tool {
 
@@ -25,11 +25,11 @@ class CsvSink final : public Sink {
   explicit CsvSink(Output& output, std::vector<Device> devices = {});
   // The columns are those of the fields that were there; of all fields if nothing was surveyed.
   bool wants_survey() const override { return true; }
-  void survey(const RecordedWire& wire) override { names_.on_wire(wire); }
+  void survey(const RecordedPath& path) override { names_.on_path(path); }
   void survey(const RecordedDevice& device) override;
   void survey(const Record& record) override;
   void on_comment(std::string_view, Time) override {}
-  void on_wire(const RecordedWire& wire, Time) override { names_.on_wire(wire); }
+  void on_path(const RecordedPath& path, Time) override { names_.on_path(path); }
   void on_device(const RecordedDevice& device) override;
   void on_header() override;
   void on_record(const Record& record) override;
@@ -39,22 +39,22 @@ class CsvSink final : public Sink {
  private:
   bool read(const Record& record);
   void write_header();
-  // A value of a device, whichever wire's.
+  // A value of a device, whichever path's.
   struct DeviceColumn {
     std::string device;  // "bno055@0x28"
     std::string value;
     std::string unit;
   };
   void add_columns(const Device& device);
-  void append_measured(const DeviceColumn& column, std::uint16_t wire);
+  void append_measured(const DeviceColumn& column, std::uint16_t path);
 
   Output& output_;
   RecordedDevices devices_;
   RecordedDevices surveyed_;
   std::vector<DeviceColumn> device_columns_;
-  WireNames names_;
+  PathNames names_;
   Datagram datagram_;
-  std::map<std::uint16_t, State> states_;  // of each wire: what is merged is one board's
+  std::map<std::uint16_t, State> states_;  // of each path: what is merged is one board's
   FieldSet columns_;
   bool begun_ = false;
   std::string row_;

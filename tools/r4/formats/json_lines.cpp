@@ -19,8 +19,8 @@ void add_record_json(Json& object, const Record& record) {
 }
 
 void JsonLinesSink::on_record(const Record& record) {
-  Json object{{"time", static_cast<double>(record.time.count()) / 1e6}, {"wire", record.wire}};
-  if (record.wire != no_wire) object["board"] = names_.of(record.wire);
+  Json object{{"time", static_cast<double>(record.time.count()) / 1e6}, {"path", record.path}};
+  if (record.path != no_path) object["board"] = names_.of(record.path);
   add_record_json(object, record);
   measured_.add_to(object, record, devices_);
   output_.write(line_of(object));
@@ -31,10 +31,10 @@ void MeasuredJson::add_to(Json& object, const Record& record, const RecordedDevi
       !read_datagram(Text(record.bytes), datagram_) || kind_of(datagram_) != MessageKind::state) {
     return;
   }
-  State& state = states_[record.wire];
+  State& state = states_[record.path];
   if (!read_state(datagram_, state)) return;
   for (const RecordedDevices::Known& known : devices.all()) {
-    if (!known.is_of(record.wire)) continue;
+    if (!known.is_of(record.path)) continue;
     const Device& device = known.device;
     const std::vector<DeviceValue>& values = device.description().values;
     for (std::size_t i = 0; i < values.size(); ++i) {

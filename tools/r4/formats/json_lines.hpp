@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // .jsonl: every record of a recording, one JSON object a line, its datagram as `r4 decode` shows it.
 //
-//     {"time":1795468293.405588,"wire":1,"board":"left-arm","from":"board","ok":true,"type":"state",…}
-//     {"time":1795468293.404765,"wire":1,"board":"left-arm","type":"event","event":"up udp://192.168.0.125"}
+//     {"time":1795468293.405588,"path":1,"board":"left-arm","from":"board","ok":true,"type":"state",…}
+//     {"time":1795468293.404765,"path":1,"board":"left-arm","type":"event","event":"up udp://192.168.0.125"}
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@
 #include "r4link/devices/device.hpp"
 #include "r4link/state.hpp"
 #include "recorded_devices.hpp"
-#include "wire_names.hpp"
+#include "path_names.hpp"
 
 namespace r4::tool {
 
@@ -30,12 +30,12 @@ void add_record_json(Json& object, const Record& record);
 class MeasuredJson {
  public:
   void add_to(Json& object, const Record& record, const RecordedDevices& devices);
-  // Another recording begins, whose wires may be others.
+  // Another recording begins, whose paths may be others.
   void on_header() { states_.clear(); }
 
  private:
   Datagram datagram_;                      // used again and again
-  std::map<std::uint16_t, State> states_;  // of each wire: what is merged is one board's
+  std::map<std::uint16_t, State> states_;  // of each path: what is merged is one board's
 };
 
 class JsonLinesSink final : public Sink {
@@ -44,10 +44,10 @@ class JsonLinesSink final : public Sink {
   explicit JsonLinesSink(Output& output, std::vector<Device> devices = {})
       : output_(output), devices_(std::move(devices)) {}
   bool wants_survey() const override { return true; }
-  void survey(const RecordedWire& wire) override { names_.on_wire(wire); }
+  void survey(const RecordedPath& path) override { names_.on_path(path); }
   void survey(const Record&) override {}
   void on_comment(std::string_view, Time) override {}
-  void on_wire(const RecordedWire& wire, Time) override { names_.on_wire(wire); }
+  void on_path(const RecordedPath& path, Time) override { names_.on_path(path); }
   void on_device(const RecordedDevice& device) override { devices_.on_device(device); }
   void on_header() override {
     devices_.on_header();
@@ -61,7 +61,7 @@ class JsonLinesSink final : public Sink {
   Output& output_;
   RecordedDevices devices_;
   MeasuredJson measured_;
-  WireNames names_;
+  PathNames names_;
 };
 
 }  // namespace r4::tool

@@ -30,9 +30,9 @@ void NativeSink::on_comment(std::string_view line, Time) {
   write_out(false);
 }
 
-void NativeSink::on_wire(const RecordedWire& wire, Time) {
+void NativeSink::on_path(const RecordedPath& path, Time) {
   begin();
-  write_wire(text_, wire);
+  write_path(text_, path);
   write_out(false);
 }
 
@@ -41,14 +41,14 @@ void NativeSink::on_record(const Record& record) {
   if (ours_ && !told_when_) write_beginning(text_, record.time);
   told_when_ = true;
   time_ = record.time;
-  ended_ = record.wire == no_wire && record.kind == RecordKind::event && record.bytes == "end";
+  ended_ = record.path == no_path && record.kind == RecordKind::event && record.bytes == "end";
   write_record(text_, record);
   write_out(false);
 }
 
 void NativeSink::finish() {
   begin();
-  if (ours_ && !ended_) write_record(text_, {time_, no_wire, RecordKind::event, "end"});
+  if (ours_ && !ended_) write_record(text_, {time_, no_path, RecordKind::event, "end"});
   write_out(true);
 }
 

@@ -26,7 +26,7 @@ class NativeSink final : public Sink {
  public:
   NativeSink(Output& output, bool compressed);
   void on_comment(std::string_view line, Time time) override;
-  void on_wire(const RecordedWire& wire, Time time) override;
+  void on_path(const RecordedPath& path, Time time) override;
   void on_record(const Record& record) override;
   void finish() override;
 

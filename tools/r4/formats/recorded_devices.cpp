@@ -16,7 +16,7 @@ constexpr std::size_t most_problems = 1000;  // bytes
 }  // namespace
 
 RecordedDevices::RecordedDevices(std::vector<Device> named) : named_(!named.empty()) {
-  for (Device& each : named) all_.push_back({no_wire, std::move(each)});
+  for (Device& each : named) all_.push_back({no_path, std::move(each)});
 }
 
 const Device* RecordedDevices::on_device(const RecordedDevice& told) {
@@ -24,10 +24,10 @@ const Device* RecordedDevices::on_device(const RecordedDevice& told) {
   try {
     Device device = Device::parse(told.place, told.description);
     std::erase_if(all_, [&](const Known& each) {
-      return each.wire == told.wire && device.takes_place_of(each.device);
+      return each.path == told.path && device.takes_place_of(each.device);
     });
     if (all_.size() < most_devices) {
-      return &all_.emplace_back(Known{told.wire, std::move(device)}).device;
+      return &all_.emplace_back(Known{told.path, std::move(device)}).device;
     }
     add_problem(told.place + ": one device too many");
   } catch (const Error& error) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whose bytes are whose in a recording: the devices that it describes, of each wire, or instead of them those that the
-// user has named, of every wire.
+// Whose bytes are whose in a recording: the devices that it describes, of each path, or instead of them those that the
+// user has named, of every path.
 #pragma once
 
 #include <cstdint>
@@ -19,13 +19,13 @@ class RecordedDevices {
 
   // The recording tells of one, instead of what has had its address or slots. Nothing if it is not taken.
   const Device* on_device(const RecordedDevice& told);
-  // Another recording begins, whose wires may be others.
+  // Another recording begins, whose paths may be others.
   void on_header();
 
   struct Known {
-    std::uint16_t wire;  // no_wire: each
+    std::uint16_t path;  // no_path: each
     Device device;
-    bool is_of(std::uint16_t number) const { return wire == no_wire || wire == number; }
+    bool is_of(std::uint16_t number) const { return path == no_path || path == number; }
   };
   const std::vector<Known>& all() const { return all_; }
   // Why some are none, for people; empty: all are understood.

@@ -67,7 +67,7 @@ class NodeQuestion final : private Carrier::Handler {
   void ask() {
     if (board_.identity) return;
     const SendResult result = carrier_->send(identity_question(), Priority::normal);
-    board_.foreign_frames = carrier_->trouble() == WireTrouble::foreign_frames;
+    board_.foreign_frames = carrier_->trouble() == TransportTrouble::foreign_frames;
     board_.other_host = result == SendResult::busy && !board_.foreign_frames;
     if (result == SendResult::sent) ++asked_;
     if (board_.identity || asked_ == most_questions) return;

@@ -36,7 +36,7 @@ int info(const InfoOptions& options) {
 }
 
 constexpr const char* info_footer =
-    R"(Of each recording: from when to when; of each wire the rate of its states, what was damaged and lost,
+    R"(Of each recording: from when to when; of each path the rate of its states, what was damaged and lost,
 the safe states and for how long, and gaps: times longer than a second in which the board said
 nothing. A file of another format that r4 convert reads is shown as the recording that it makes.
 Everything that can be read is read; where a line is damaged, its number and place are told, and the
@@ -44,7 +44,7 @@ exit code is 1. The last line is torn where a recording was killed in the midst 
 
 Examples:
   r4 info drive.r4log
-  r4 info robot-*.r4log.zst --json | jq .wires
+  r4 info robot-*.r4log.zst --json | jq .paths
   zstdcat robot-00007.r4log.zst | r4 info -
 
 Exit codes: 0 all of it could be read; 1 some could not, or it is no recording; 4, 5 the file cannot be

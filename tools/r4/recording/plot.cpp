@@ -47,7 +47,7 @@ struct PlotOptions {
 
 // A field as it was asked for: "AIN24", "left-arm:AIN24".
 struct Wanted {
-  std::string board;  // its name, URL or number of wire; empty: all
+  std::string board;  // its name, URL or number of path; empty: all
   StateField field;
 };
 
@@ -82,8 +82,8 @@ struct Span {
   Time from, to;
 };
 
-struct PlottedWire {
-  RecordedWire wire;
+struct PlottedPath {
+  RecordedPath recorded;
   std::map<StateField, Curve> curves;
   std::vector<Span> spans;
   SafeReason safe = SafeReason::none;
@@ -96,7 +96,7 @@ class Curves final : public RecordingReader::Handler {
  public:
   explicit Curves(const std::vector<Wanted>& wanted) : wanted_(wanted) {}
 
-  void on_wire(const RecordedWire& wire) override { wires_[wire.number].wire = wire; }
+  void on_path(const RecordedPath& path) override { paths_[path.number].recorded = path; }
   void on_damage(const RecordingDamage&) override { ++damage_; }
   void on_record(const Record& record) override {
     if (!any_) first_ = record.time;
@@ -105,25 +105,25 @@ class Curves final : public RecordingReader::Handler {
     if (record.kind != RecordKind::from_board) return;
     Datagram datagram;
     if (!read_datagram(Text(record.bytes), datagram)) return;
-    PlottedWire& wire = wires_[record.wire];
-    wire.wire.number = record.wire;
-    if (wire.heard && record.time - wire.last > shortest_gap) {
-      end_safe(wire, wire.last);
-      wire.spans.push_back({-1, wire.last, record.time});
-      wire.safe_since = record.time;
+    PlottedPath& path = paths_[record.path];
+    path.recorded.number = record.path;
+    if (path.heard && record.time - path.last > shortest_gap) {
+      end_safe(path, path.last);
+      path.spans.push_back({-1, path.last, record.time});
+      path.safe_since = record.time;
     }
-    wire.heard = true;
-    wire.last = record.time;
+    path.heard = true;
+    path.last = record.time;
     const MessageKind kind = kind_of(datagram);
     if (kind != MessageKind::state && kind != MessageKind::board_heartbeat) return;
     State state;
     if (kind == MessageKind::state && !read_state(datagram, state)) return;
-    be_safe(wire, heartbeat_report(datagram).reason, record.time);
-    if (kind == MessageKind::state) take(wire, datagram, state, record.time);
+    be_safe(path, heartbeat_report(datagram).reason, record.time);
+    if (kind == MessageKind::state) take(path, datagram, state, record.time);
   }
   // All is read.
   void finish() {
-    for (auto& [number, wire] : wires_) end_safe(wire, wire.last);
+    for (auto& [number, path] : paths_) end_safe(path, path.last);
   }
 
   bool damaged() const { return damage_ != 0; }
@@ -132,32 +132,32 @@ class Curves final : public RecordingReader::Handler {
   }
   Time first() const { return first_; }
   Time last() const { return last_; }
-  const std::map<std::uint16_t, PlottedWire>& wires() const { return wires_; }
+  const std::map<std::uint16_t, PlottedPath>& paths() const { return paths_; }
 
-  static std::string name_of(const PlottedWire& wire) {
-    if (!wire.wire.name.empty()) return wire.wire.name;
-    if (wire.wire.url.empty()) return fmt::format("wire {}", wire.wire.number);
-    return printable(wire.wire.url);
+  static std::string name_of(const PlottedPath& path) {
+    if (!path.recorded.name.empty()) return path.recorded.name;
+    if (path.recorded.url.empty()) return fmt::format("path {}", path.recorded.number);
+    return printable(path.recorded.url);
   }
-  static bool is_called(const PlottedWire& wire, const std::string& name) {
-    return name.empty() || name == wire.wire.name || name == wire.wire.url ||
-           name == std::to_string(wire.wire.number);
+  static bool is_called(const PlottedPath& path, const std::string& name) {
+    return name.empty() || name == path.recorded.name || name == path.recorded.url ||
+           name == std::to_string(path.recorded.number);
   }
 
  private:
-  static void end_safe(PlottedWire& wire, Time now) {
-    if (wire.safe == SafeReason::none || now <= wire.safe_since) return;
-    wire.spans.push_back({static_cast<int>(wire.safe), wire.safe_since, now});
+  static void end_safe(PlottedPath& path, Time now) {
+    if (path.safe == SafeReason::none || now <= path.safe_since) return;
+    path.spans.push_back({static_cast<int>(path.safe), path.safe_since, now});
   }
-  static void be_safe(PlottedWire& wire, SafeReason reason, Time now) {
-    if (reason == wire.safe) return;
-    end_safe(wire, now);
-    wire.safe = reason;
-    wire.safe_since = now;
+  static void be_safe(PlottedPath& path, SafeReason reason, Time now) {
+    if (reason == path.safe) return;
+    end_safe(path, now);
+    path.safe = reason;
+    path.safe_since = now;
   }
-  void take(PlottedWire& wire, const Datagram& datagram, const State& state, Time now) {
+  void take(PlottedPath& path, const Datagram& datagram, const State& state, Time now) {
     for (const Wanted& each : wanted_) {
-      if (!state.present.has(each.field) || !is_called(wire, each.board)) continue;
+      if (!state.present.has(each.field) || !is_called(path, each.board)) continue;
       std::array<Text, 3> values;
       const Text text = datagram.find(r4::name_of(each.field)).values();
       const std::size_t count = datagram.find(r4::name_of(each.field)).split(values.data(), 3);
@@ -165,7 +165,7 @@ class Curves final : public RecordingReader::Handler {
       const Text first = count > 1 ? values[0] : text;
       std::from_chars(first.begin(), first.end(), value);
       if (is_signed(each.field) && values[1] == Text("0")) value = -value;
-      Curve& curve = wire.curves[each.field];
+      Curve& curve = path.curves[each.field];
       const double at = seconds_of(now);
       if (!curve.times.empty() && curve.times.back() == at) continue;  // it was asked for twice
       curve.times.push_back(at);
@@ -178,7 +178,7 @@ class Curves final : public RecordingReader::Handler {
   }
 
   const std::vector<Wanted>& wanted_;
-  std::map<std::uint16_t, PlottedWire> wires_;
+  std::map<std::uint16_t, PlottedPath> paths_;
   bool any_ = false;
   Time first_{0}, last_{0};
   std::uint64_t damage_ = 0;
@@ -231,14 +231,14 @@ FileDescriptor make_plan(const Curves& curves, const std::vector<Wanted>& wanted
             {"spans", Json::array()}};
   std::vector<const Curve*> drawn;
   const auto plotted = static_cast<std::size_t>(
-      std::count_if(curves.wires().begin(), curves.wires().end(),
+      std::count_if(curves.paths().begin(), curves.paths().end(),
                     [](const auto& each) { return !each.second.curves.empty(); }));
-  for (const auto& [number, wire] : curves.wires()) {
-    if (wire.curves.empty()) continue;
-    const std::string board = plotted > 1 ? Curves::name_of(wire) + " " : "";
+  for (const auto& [number, path] : curves.paths()) {
+    if (path.curves.empty()) continue;
+    const std::string board = plotted > 1 ? Curves::name_of(path) + " " : "";
     for (const Wanted& each : wanted) {
-      const auto found = wire.curves.find(each.field);
-      if (found == wire.curves.end() || !Curves::is_called(wire, each.board)) continue;
+      const auto found = path.curves.find(each.field);
+      if (found == path.curves.end() || !Curves::is_called(path, each.board)) continue;
       const Curve& curve = found->second;
       if (std::find(drawn.begin(), drawn.end(), &curve) != drawn.end()) continue;
       const Text name = name_of(each.field);
@@ -247,7 +247,7 @@ FileDescriptor make_plan(const Curves& curves, const std::vector<Wanted>& wanted
                                 {"count", curve.times.size()}});
       drawn.push_back(&curve);
     }
-    for (const Span& span : wire.spans) {
+    for (const Span& span : path.spans) {
       const char* const reason =
           span.reason < 0 ? "no data" : to_text(static_cast<SafeReason>(span.reason));
       plan["spans"].push_back({{"label", board + (span.reason < 0 ? "" : "safe: ") + reason},
@@ -315,7 +315,7 @@ int plot(const PlotOptions& options) {
   read_file(options.file, curves);
   curves.finish();
   for (std::size_t i = 0; i < wanted.size(); ++i) {
-    const bool found = std::any_of(curves.wires().begin(), curves.wires().end(), [&](auto& each) {
+    const bool found = std::any_of(curves.paths().begin(), curves.paths().end(), [&](auto& each) {
       return Curves::is_called(each.second, wanted[i].board) &&
              each.second.curves.contains(wanted[i].field);
     });
@@ -341,7 +341,7 @@ int plot(const PlotOptions& options) {
 
 constexpr const char* plot_footer =
     R"(A field of docs/protocol.md, in small letters if you like; of one board only, where the recording has
-several: left-arm:AIN24, by its name, its URL or the number of its wire. A drive is drawn with its
+several: left-arm:AIN24, by its name, its URL or the number of its path. A drive is drawn with its
 direction, backwards below zero. What has the same unit shares an axis. Safe states are shaded by their
 reason, and so is where a board said nothing for more than a second. It takes python3-matplotlib.
 

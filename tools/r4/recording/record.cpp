@@ -19,7 +19,7 @@
 #include "../shell/options.hpp"
 #include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
-#include "../shell/wires.hpp"
+#include "../shell/paths.hpp"
 #include "host/standard_registry.hpp"
 #include "limits.hpp"
 #include "r4link/async_board.hpp"
@@ -62,7 +62,7 @@ BoardOptions board_options(const RecordOptions& options, const std::vector<Devic
 
 // can://can0, without a node: all boards that are heard on it.
 bool is_whole_bus(const std::string& text) {
-  return split_wires(text).size() == 1 && Url::parse(text).scheme() == "can" &&
+  return split_paths(text).size() == 1 && Url::parse(text).scheme() == "can" &&
          text.find('?') == std::string::npos;
 }
 
@@ -173,7 +173,7 @@ class Recorders {
 int record(const RecordOptions& options) { return Recorders(options).run(options); }
 
 constexpr const char* record_footer =
-    R"(Every datagram of every board, in both directions, with the host's time and the wire that it came
+    R"(Every datagram of every board, in both directions, with the host's time and the path that it came
 by; damaged ones, too; and what happened to the links. It watches, as r4 monitor does: it takes no
 control, and a program that drives a board is not disturbed. It goes on when a transport is lost and
 comes back. If another program moves, removes or truncates the file, it is begun anew, and told of.
@@ -185,7 +185,7 @@ A recording that is there goes on at its end. A crash costs at most the last sec
 Examples:
   r4 record udp://192.168.0.125 -o drive.r4log
   r4 record serial:auto 'can://can0?node=3' -o drive.r4log.zst --duration 60
-  r4 record serial:auto+udp://192.168.0.125 -o drive.r4log    one board, by both wires
+  r4 record serial:auto+udp://192.168.0.125 -o drive.r4log    one board, by both paths
   r4 record serial:auto -o drive.r4log --device bno055@0x28:1    which another program has set up
   r4 record can://can0 -o bus.r4log     every board that is heard on the bus
   r4 record 'udp://10.0.0.{1-30}?listen=0' -o lab.r4log.zst     thirty boards

@@ -14,16 +14,16 @@
 namespace r4::tool {
 namespace {
 
-// Of a file so damaged that it seems to have more wires, they are counted as one.
-constexpr std::size_t most_wires = 1000;
+// Of a file so damaged that it seems to have more paths, they are counted as one.
+constexpr std::size_t most_paths = 1000;
 // More than a board has slots are in no recording but one of many parts.
 constexpr std::size_t most_devices = 64;
 
 double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
 
-double rate_of(const WireSummary& wire) {
-  const double heard = seconds_of(wire.last - wire.first);
-  return heard > 0 && wire.states > 1 ? static_cast<double>(wire.states - 1) / heard : 0;
+double rate_of(const PathSummary& path) {
+  const double heard = seconds_of(path.last - path.first);
+  return heard > 0 && path.states > 1 ? static_cast<double>(path.states - 1) / heard : 0;
 }
 
 std::string_view word_after(std::string_view text, std::string_view first) {
@@ -51,35 +51,35 @@ void RecordingSummary::on_header() {
   ended_ = false;
 }
 
-// What the files of one program have in common is one wire.
-void RecordingSummary::on_wire(const RecordedWire& wire) {
-  const auto known = std::find_if(wires_.begin(), wires_.end(), [&wire](const WireSummary& each) {
-    return each.wire.number == wire.number && (each.wire.url == wire.url || each.wire.url.empty());
+// What the files of one program have in common is one path.
+void RecordingSummary::on_path(const RecordedPath& path) {
+  const auto known = std::find_if(paths_.begin(), paths_.end(), [&path](const PathSummary& each) {
+    return each.recorded.number == path.number && (each.recorded.url == path.url || each.recorded.url.empty());
   });
-  const auto index = static_cast<std::size_t>(known - wires_.begin());
-  numbers_[wire.number] = known == wires_.end() ? add(wire.number) : index;
-  of(wire.number).wire = wire;
+  const auto index = static_cast<std::size_t>(known - paths_.begin());
+  numbers_[path.number] = known == paths_.end() ? add(path.number) : index;
+  of(path.number).recorded = path;
 }
 
 void RecordingSummary::on_device(const RecordedDevice& device) {
-  std::vector<std::string>& known = of(device.wire).devices;
+  std::vector<std::string>& known = of(device.path).devices;
   if (known.size() == most_devices || std::count(known.begin(), known.end(), device.place) != 0)
     return;
   known.push_back(device.place);
 }
 
-WireSummary& RecordingSummary::of(std::uint16_t number) {
+PathSummary& RecordingSummary::of(std::uint16_t number) {
   const auto known = numbers_.find(number);
-  if (known != numbers_.end()) return wires_[known->second];
-  return wires_[numbers_[number] = add(number)];
+  if (known != numbers_.end()) return paths_[known->second];
+  return paths_[numbers_[number] = add(number)];
 }
 
 std::size_t RecordingSummary::add(std::uint16_t number) {
-  if (wires_.size() < most_wires) {
-    wires_.emplace_back();
-    wires_.back().wire.number = number;
+  if (paths_.size() < most_paths) {
+    paths_.emplace_back();
+    paths_.back().recorded.number = number;
   }
-  return wires_.size() - 1;
+  return paths_.size() - 1;
 }
 
 void RecordingSummary::on_record(const Record& record) {
@@ -88,74 +88,74 @@ void RecordingSummary::on_record(const Record& record) {
   any_ = true;
   ++records_;
   if (record.kind == RecordKind::event) return on_event(record);
-  WireSummary& wire = of(record.wire);
+  PathSummary& path = of(record.path);
   if (record.kind == RecordKind::from_board) {
-    on_received(wire, record);
+    on_received(path, record);
   } else {
-    on_sent(wire, record);
+    on_sent(path, record);
   }
 }
 
 void RecordingSummary::on_event(const Record& record) {
-  if (record.wire == no_wire) {
+  if (record.path == no_path) {
     std::uint64_t count = 0;
     if (parse_number(Text(word_after(record.bytes, "dropped ")), count)) dropped_ += count;
     if (record.bytes == "end") ended_ = true;
   } else if (record.bytes.starts_with("down ")) {
-    ++of(record.wire).downs;
+    ++of(record.path).downs;
   } else if (record.bytes.starts_with("oversize ")) {
-    ++of(record.wire).oversize;
+    ++of(record.path).oversize;
   }
 }
 
-void RecordingSummary::on_received(WireSummary& wire, const Record& record) {
-  const bool heard = wire.received != 0;
-  if (heard && record.time - wire.last > shortest_gap) {
-    ++wire.gaps;
-    if (record.time - wire.last > wire.longest_gap) {
-      wire.longest_gap = record.time - wire.last;
-      wire.longest_gap_at = wire.last;
+void RecordingSummary::on_received(PathSummary& path, const Record& record) {
+  const bool heard = path.received != 0;
+  if (heard && record.time - path.last > shortest_gap) {
+    ++path.gaps;
+    if (record.time - path.last > path.longest_gap) {
+      path.longest_gap = record.time - path.last;
+      path.longest_gap_at = path.last;
     }
   }
   Datagram datagram;
   if (!read_datagram(Text(record.bytes), datagram)) {
-    ++wire.damaged;
+    ++path.damaged;
     return;
   }
-  if (!heard) wire.first = record.time;
-  wire.last = record.time;
-  ++wire.received;
+  if (!heard) path.first = record.time;
+  path.last = record.time;
+  ++path.received;
   const MessageKind kind = kind_of(datagram);
   if (kind == MessageKind::board_heartbeat && is_connecting_heartbeat(datagram)) {
-    wire.packets.restart();
+    path.packets.restart();
   } else if (datagram.has_pnum()) {
-    wire.packets.on(datagram.pnum());
+    path.packets.on(datagram.pnum());
   }
-  if (kind == MessageKind::state) ++wire.states;
+  if (kind == MessageKind::state) ++path.states;
   if (kind != MessageKind::state && kind != MessageKind::board_heartbeat) return;
   // A board that is not safe may leave it out.
   const Field safe = datagram.find("SAFE");
   std::uint32_t reason = 0;
   if (!safe.name().empty() && !parse_number(safe.values(), reason)) return;
-  be_safe(wire, to_safe_reason(reason), record.time);
+  be_safe(path, to_safe_reason(reason), record.time);
 }
 
-void RecordingSummary::be_safe(WireSummary& wire, SafeReason reason, Time now) {
-  if (wire.safe != SafeReason::none) wire.safe_for += std::max(Time{0}, now - wire.safe_since);
-  if (reason != wire.safe && reason != SafeReason::none) {
-    ++wire.safe_times[static_cast<std::size_t>(reason)];
+void RecordingSummary::be_safe(PathSummary& path, SafeReason reason, Time now) {
+  if (path.safe != SafeReason::none) path.safe_for += std::max(Time{0}, now - path.safe_since);
+  if (reason != path.safe && reason != SafeReason::none) {
+    ++path.safe_times[static_cast<std::size_t>(reason)];
   }
-  wire.safe = reason;
-  wire.safe_since = now;
+  path.safe = reason;
+  path.safe_since = now;
 }
 
-void RecordingSummary::on_sent(WireSummary& wire, const Record& record) {
-  ++wire.sent;
+void RecordingSummary::on_sent(PathSummary& path, const Record& record) {
+  ++path.sent;
   Datagram datagram;
   if (!read_datagram(Text(record.bytes), datagram)) return;
-  if (kind_of(datagram) == MessageKind::host_heartbeat) ++wire.heartbeats;
+  if (kind_of(datagram) == MessageKind::host_heartbeat) ++path.heartbeats;
   const Field stop = datagram.find("E");
-  if (!stop.name().empty() && stop.values() == Text("STOP")) ++wire.stops;
+  if (!stop.name().empty() && stop.values() == Text("STOP")) ++path.stops;
 }
 
 void RecordingSummary::on_damage(const RecordingDamage& damage) {
@@ -175,9 +175,9 @@ std::string RecordingSummary::text(const std::string& name) const {
     line("to",
          fmt::format("{}, {:.1f} s later", record_time_text(last_), seconds_of(last_ - first_)));
   }
-  for (const WireSummary& each : wires_) {
-    line(fmt::format("wire {}", each.wire.number).c_str(),
-         each.wire.url + (each.wire.name.empty() ? "" : "  " + each.wire.name));
+  for (const PathSummary& each : paths_) {
+    line(fmt::format("path {}", each.recorded.number).c_str(),
+         each.recorded.url + (each.recorded.name.empty() ? "" : "  " + each.recorded.name));
     line("", fmt::format(
                  "{} datagrams from the board: {} states, {:.1f} a second; {} damaged, {} lost{}",
                  each.received + each.damaged, each.states, rate_of(each), each.damaged,
@@ -222,15 +222,15 @@ Json RecordingSummary::json(const std::string& name) const {
   object["records"] = records_;
   object["dropped"] = dropped_;
   object["ended"] = ended_ && unended_ == 0;
-  object["wires"] = Json::array();
-  for (const WireSummary& each : wires_) {
+  object["paths"] = Json::array();
+  for (const PathSummary& each : paths_) {
     Json safe = Json::object();
     for (std::size_t i = 1; i < each.safe_times.size(); ++i) {
       if (each.safe_times[i] != 0) safe[to_text(static_cast<SafeReason>(i))] = each.safe_times[i];
     }
-    object["wires"].push_back({{"wire", each.wire.number},
-                               {"url", each.wire.url},
-                               {"name", each.wire.name},
+    object["paths"].push_back({{"path", each.recorded.number},
+                               {"url", each.recorded.url},
+                               {"name", each.recorded.name},
                                {"devices", each.devices},
                                {"received", each.received},
                                {"states", each.states},

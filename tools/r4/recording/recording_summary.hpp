@@ -17,8 +17,8 @@ namespace r4::tool {
 // A board that says nothing for longer than this has a gap: it speaks at least twice a second.
 constexpr Time shortest_gap{std::chrono::seconds{1}};
 
-struct WireSummary {
-  RecordedWire wire;
+struct PathSummary {
+  RecordedPath recorded;
   std::vector<std::string> devices;  // "bno055@0x28:1"
   // From the board.
   std::uint64_t received = 0;  // valid ones
@@ -45,7 +45,7 @@ struct WireSummary {
 class RecordingSummary final : public RecordingReader::Handler {
  public:
   void on_header() override;
-  void on_wire(const RecordedWire& wire) override;
+  void on_path(const RecordedPath& path) override;
   void on_device(const RecordedDevice& device) override;
   void on_record(const Record& record) override;
   void on_damage(const RecordingDamage& damage) override;
@@ -62,16 +62,16 @@ class RecordingSummary final : public RecordingReader::Handler {
     std::string reason;
   };
 
-  WireSummary& of(std::uint16_t number);
+  PathSummary& of(std::uint16_t number);
   std::size_t add(std::uint16_t number);
   void on_event(const Record& record);
-  static void on_received(WireSummary& wire, const Record& record);
-  static void on_sent(WireSummary& wire, const Record& record);
-  static void be_safe(WireSummary& wire, SafeReason reason, Time now);
+  static void on_received(PathSummary& path, const Record& record);
+  static void on_sent(PathSummary& path, const Record& record);
+  static void be_safe(PathSummary& path, SafeReason reason, Time now);
 
-  // By the number that a wire has since the last header, and all of them, by number and URL.
+  // By the number that a path has since the last header, and all of them, by number and URL.
   std::map<std::uint16_t, std::size_t> numbers_;
-  std::vector<WireSummary> wires_;
+  std::vector<PathSummary> paths_;
   bool any_ = false;
   Time first_{0}, last_{0};
   std::uint64_t records_ = 0;

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "../shell/wires.hpp"
+#include "../shell/paths.hpp"
 
 namespace r4::tool::ros2 {
 namespace {
@@ -66,9 +66,9 @@ void BoardNode::connect() {
     if (event.kind == CarrierEvent::Kind::up) return;
     log(LogLevel::warning, event.problem.text());
   });
-  on_wires(board_, [this](const Wire& wire) {
-    log(wire.state == WireState::carrying ? LogLevel::info : LogLevel::warning,
-        fmt::format("wire {}: {}", wire.name, to_text(wire.state)));
+  on_paths(board_, [this](const PathStatus& path) {
+    log(path.state == PathState::carrying ? LogLevel::info : LogLevel::warning,
+        fmt::format("path {}: {}", path.name, to_text(path.state)));
     tell_health();
   });
   board_.on_restart([this] {
@@ -155,12 +155,12 @@ Health BoardNode::health() const {
     health.message = "armed";
   }
   // One fault more, and the board is lost.
-  const std::vector<Wire> wires = board_.wires();
-  for (const Wire& wire : wires) {
-    if (wires.size() < 2 || wire.state == WireState::carrying || health.level > Health::warning)
+  const std::vector<PathStatus> paths = board_.paths();
+  for (const PathStatus& path : paths) {
+    if (paths.size() < 2 || path.state == PathState::carrying || health.level > Health::warning)
       continue;
     health.level = Health::warning;
-    health.message += fmt::format("; wire {}: {}", wire.name, to_text(wire.state));
+    health.message += fmt::format("; path {}: {}", path.name, to_text(path.state));
   }
   const auto lost = std::find_if(mismatches_.begin(), mismatches_.end(), [](const auto& each) {
     return each.second.weight == Mismatch::Weight::lost;
@@ -173,13 +173,13 @@ Health BoardNode::health() const {
     health.values.emplace_back(key, std::move(value));
   };
   add("url", board_.name());
-  for (const Wire& wire : wires) {
-    if (wires.size() < 2) break;
+  for (const PathStatus& path : paths) {
+    if (paths.size() < 2) break;
     health.values.emplace_back(
-        "wire " + wire.name,
+        "path " + path.name,
         fmt::format("{}, loss {:.3f} %, round trip {:.2f} ms, age {:.0f} ms, copies {}",
-                    to_text(wire.state), wire.loss() * 100, wire.round_trip_us / 1e3,
-                    wire.age_us / 1e3, wire.copies));
+                    to_text(path.state), path.loss() * 100, path.round_trip_us / 1e3,
+                    path.age_us / 1e3, path.copies));
   }
   add("name", who.name);
   add("firmware", who.firmware);

@@ -148,7 +148,7 @@ class Bridge {
  private:
   void add(const NamedUrl& named, NodeOptions shown) {
     BoardOptions board_options = with_key(options_.key);
-    const bool bus = has_wire(named.url, "can");
+    const bool bus = has_path(named.url, "can");
     board_options.session.fields = !options_.fields.empty() ? options_.fields
                                    : bus                    ? "DEFAULT"
                                                             : component_fields;

@@ -71,10 +71,10 @@ CLI::Option* url(CLI::App& command, Out& out, const char* meaning) {
   return command.add_option("URL", out, meaning)->required()->type_name(url_type);
 }
 
-constexpr const char* wires_meaning =
-    "where the board is, such as udp://192.168.0.125; several are wires to it";
+constexpr const char* paths_meaning =
+    "where the board is, such as udp://192.168.0.125; several are paths to it";
 constexpr const char* boards_meaning =
-    "where boards are, such as udp://192.168.0.125; a + joins the wires to one of them";
+    "where boards are, such as udp://192.168.0.125; a + joins the paths to one of them";
 
 }  // namespace
 
@@ -138,17 +138,17 @@ CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning) 
   return command.add_flag("--json", out, meaning);
 }
 
-CLI::Option* add_wires(CLI::App& command, std::vector<std::string>& out) {
-  return url(command, out, wires_meaning);
+CLI::Option* add_paths(CLI::App& command, std::vector<std::string>& out) {
+  return url(command, out, paths_meaning);
 }
 CLI::Option* add_boards(CLI::App& command, std::vector<std::string>& out) {
   return url(command, out, boards_meaning);
 }
 
 CLI::Option* add_url(CLI::App& command, std::string& out) {
-  return url(command, out, wires_meaning);
+  return url(command, out, paths_meaning);
 }
-void take_wires(std::string& url, std::vector<std::string>& words, const std::string& what) {
+void take_paths(std::string& url, std::vector<std::string>& words, const std::string& what) {
   const auto is = [](const std::string& word) { return is_url(word); };
   const auto first = std::find_if_not(words.begin(), words.end(), is);
   for (auto word = words.begin(); word != first; ++word) url += "+" + *word;
@@ -159,7 +159,7 @@ void take_wires(std::string& url, std::vector<std::string>& words, const std::st
   const auto late = std::find_if(words.begin(), words.end(), is);
   if (late == words.end()) return;
   throw Error(ErrorKind::usage, *late, "a URL cannot stand behind " + words.front(),
-              "write all wires to the board in front");
+              "write all paths to the board in front");
 }
 
 bool is_url(std::string_view text) {

@@ -59,19 +59,19 @@ CLI::Option* add_number(CLI::App& command, const std::string& name,
 
 CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning);
 
-// Where a board is. A text may join the URLs of several wires to it by '+' (transports/url_pattern.hpp), for every
-// command. One that has a single board takes several URLs for its wires, too:
+// Where a board is. A text may join the URLs of several paths to it by '+' (transports/url_pattern.hpp), for every
+// command. One that has a single board takes several URLs for its paths, too:
 //
 //     r4 stop serial:auto udp://192.168.0.125             is         r4 stop serial:auto+udp://192.168.0.125
 //
 // Of several boards each URL is one.
-CLI::Option* add_wires(CLI::App& command, std::vector<std::string>& out);
+CLI::Option* add_paths(CLI::App& command, std::vector<std::string>& out);
 CLI::Option* add_boards(CLI::App& command, std::vector<std::string>& out);
 
 // URL... and then other words: the URLs in front of those are put to `url`. Throws Error{usage} for a URL behind a
 // word, and if no word is left, which `what` names.
 CLI::Option* add_url(CLI::App& command, std::string& out);
-void take_wires(std::string& url, std::vector<std::string>& words, const std::string& what);
+void take_paths(std::string& url, std::vector<std::string>& words, const std::string& what);
 
 // Does it begin as the URL of a transport?
 bool is_url(std::string_view text);

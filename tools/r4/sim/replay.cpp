@@ -33,7 +33,7 @@ using Clock = std::chrono::steady_clock;
 struct ReplayOptions {
   std::string file;
   std::string url = "udp://127.0.0.1:2018";
-  std::uint64_t wire = 1;
+  std::uint64_t path = 1;
   double speed = 1;
   ReplayStart start;
   std::optional<Milliseconds> duration;
@@ -52,7 +52,7 @@ class Replay : private Carrier::Handler {
  public:
   explicit Replay(const ReplayOptions& options)
       : options_(options),
-        records_(options.file, options.file, static_cast<std::uint16_t>(options.wire),
+        records_(options.file, options.file, static_cast<std::uint16_t>(options.path),
                  options.start),
         carrier_(standard_registry().make(io_, options.url, Role::board)),
         timer_(io_),
@@ -201,7 +201,7 @@ Examples:
   r4 replay drive.r4log                         at udp://127.0.0.1:2018
   r4 replay drive.r4log.zst pty:/tmp/r4 --from 12 --speed 0.5
   r4 replay drive.r4log --from 2026-11-23T21:20:00
-  r4 replay robots.r4log 'can://vcan0?node=3' --wire 2
+  r4 replay robots.r4log 'can://vcan0?node=3' --path 2
   r4 replay drive.r4log --step                  press Return
 
 Exit codes: 0 the recording has ended, or --duration or Ctrl-C; 1 some of it could not be read, or it is no
@@ -216,7 +216,7 @@ void add_replay(CLI::App& root, Action& chosen) {
   add_text(*command, "FILE", options->file, "a recording", file_type, Need::required);
   add_text(*command, "URL", options->url, "where it listens (default udp://127.0.0.1:2018)",
            url_type);
-  add_number(*command, "--wire", options->wire, 1, 65535,
+  add_number(*command, "--path", options->path, 1, 65535,
              "which board of the recording: its number in r4 info (default 1)");
   add_text(
       *command, "--speed",

@@ -96,11 +96,11 @@ std::vector<Plan> plans_of(const SimOptions& options) {
     std::vector<Plan> plans;
     plans.reserve(urls.size());
     for (PatternUrl& each : urls) {
-      plans.push_back({split_wires(each.url), id + "-" + each.number, plans.size()});
+      plans.push_back({split_paths(each.url), id + "-" + each.number, plans.size()});
     }
     return plans;
   }
-  return {{split_wires(join_wires(options.urls)),
+  return {{split_paths(join_paths(options.urls)),
            options.board_id.empty() ? "sim-1" : options.board_id, 0}};
 }
 

@@ -21,7 +21,7 @@
 #include "../shell/options.hpp"
 #include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
-#include "../shell/wires.hpp"
+#include "../shell/paths.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
@@ -73,7 +73,7 @@ class Bench {
  public:
   explicit Bench(const BenchOptions& options)
       : options_(options),
-        board_(io_, join_wires(options.urls), bench_board(options.key)),
+        board_(io_, join_paths(options.urls), bench_board(options.key)),
         timer_(io_),
         pause_(io_) {}
 
@@ -280,7 +280,7 @@ void add_bench(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<BenchOptions>();
   CLI::App* const command = add_subcommand(root, chosen, "bench", "Measure the link to a board",
                                            bench_footer, options, bench);
-  add_wires(*command, options->urls);
+  add_paths(*command, options->urls);
   add_duration(*command, options->duration, "how long to measure (default 5)");
   add_key(*command, options->key);
   add_json(*command, options->json, "print JSON");

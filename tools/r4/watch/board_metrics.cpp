@@ -22,32 +22,32 @@ std::uint64_t lost_in_turn(const PacketCounters& packets) {
   return std::uint64_t{packets.lost} + packets.late;
 }
 
-// Of several wires to a board each one.
-void describe_wires(const MetricBoard& each, const MetricLabels& one, MetricFamilies& out) {
-  const std::vector<std::string> urls = split_wires(each.url);
-  const std::vector<Wire> wires = each.board->wires();
-  if (wires.size() < 2) return;
-  for (std::size_t i = 0; i < wires.size(); ++i) {
-    const Wire& wire = wires[i];
-    const MetricLabels labels = with(one, "wire", urls[i]);
-    out.gauge("r4_wire_carrying", "Of several wires to the board, does this one carry?", labels,
-              wire.state == WireState::carrying ? 1 : 0);
-    out.count("r4_wire_received_total", "Datagrams of the board by this wire.", labels,
-              wire.packets.received);
-    out.count("r4_wire_lost_total", "Those that it did not bring in their turn.", labels,
-              lost_in_turn(wire.packets));
-    out.count("r4_wire_late_total", "Those of them that it brought later.", labels,
-              wire.packets.late);
-    out.count("r4_wire_copies_total", "Those that another wire had brought before.", labels,
-              wire.copies);
-    if (wire.round_trip_us > 0) {
-      out.gauge("r4_wire_round_trip_seconds",
-                "From the newest question on this wire to its answer.", labels,
-                wire.round_trip_us / 1e6);
+// Of several paths to a board each one.
+void describe_paths(const MetricBoard& each, const MetricLabels& one, MetricFamilies& out) {
+  const std::vector<std::string> urls = split_paths(each.url);
+  const std::vector<PathStatus> paths = each.board->paths();
+  if (paths.size() < 2) return;
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    const PathStatus& path = paths[i];
+    const MetricLabels labels = with(one, "path", urls[i]);
+    out.gauge("r4_path_carrying", "Of several paths to the board, does this one carry?", labels,
+              path.state == PathState::carrying ? 1 : 0);
+    out.count("r4_path_received_total", "Datagrams of the board by this path.", labels,
+              path.packets.received);
+    out.count("r4_path_lost_total", "Those that it did not bring in their turn.", labels,
+              lost_in_turn(path.packets));
+    out.count("r4_path_late_total", "Those of them that it brought later.", labels,
+              path.packets.late);
+    out.count("r4_path_copies_total", "Those that another path had brought before.", labels,
+              path.copies);
+    if (path.round_trip_us > 0) {
+      out.gauge("r4_path_round_trip_seconds",
+                "From the newest question on this path to its answer.", labels,
+                path.round_trip_us / 1e6);
     }
-    if (wire.age_us > 0) {
-      out.gauge("r4_wire_age_seconds", "Since the newest datagram by this wire.", labels,
-                wire.age_us / 1e6);
+    if (path.age_us > 0) {
+      out.gauge("r4_path_age_seconds", "Since the newest datagram by this path.", labels,
+                path.age_us / 1e6);
     }
   }
 }
@@ -87,7 +87,7 @@ void describe(const MetricBoard& each, MetricFamilies& out) {
             carrier.rx_bytes);
   out.count("r4_transport_bytes_total", "", with(one, "direction", "sent"), carrier.tx_bytes);
   out.count("r4_transport_downs_total", "Times the transport was lost.", one, carrier.downs);
-  describe_wires(each, one, out);
+  describe_paths(each, one, out);
   if (!up) return;
   out.gauge("r4_state_rate_hertz", "States a second, over the last.", one,
             statistics.state_rate_hz);

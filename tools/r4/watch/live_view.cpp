@@ -66,8 +66,8 @@ class LiveView final : public MonitorView {
                                               : event.problem.text());
   }
 
-  void on_wire(const Wire& wire) override {
-    note(fmt::format("{}: {}", wire.name, to_text(wire.state)));
+  void on_path(const PathStatus& path) override {
+    note(fmt::format("{}: {}", path.name, to_text(path.state)));
   }
 
   void on_tick() override {
@@ -109,7 +109,7 @@ class LiveView final : public MonitorView {
                     "jitter {:.0f} us   age {:.0f} ms",
                     now.state_rate_hz, now.packets.lost, now.loss() * 100, now.damaged,
                     now.round_trip_us, now.jitter_us, now.state_age_us / 1000));
-    add_wires(lines);
+    add_paths(lines);
     lines.push_back(fmt::format("PNum {}   T {} ms   states {}   heartbeats {} in, {} out", pnum_,
                                 t_ms_, now.states, heartbeats_, now.heartbeats));
     if (fault_.any()) {
@@ -120,18 +120,18 @@ class LiveView final : public MonitorView {
   }
 
   // A line each, where there are several.
-  void add_wires(std::vector<std::string>& lines) const {
-    const std::vector<Wire> wires = board_.wires();
-    if (wires.size() < 2) return;
+  void add_paths(std::vector<std::string>& lines) const {
+    const std::vector<PathStatus> paths = board_.paths();
+    if (paths.size() < 2) return;
     std::size_t width = 0;
-    for (const Wire& wire : wires) width = std::max(width, wire.name.size());
-    for (const Wire& wire : wires) {
+    for (const PathStatus& path : paths) width = std::max(width, path.name.size());
+    for (const PathStatus& path : paths) {
       const auto known = [](double us, std::string text) { return us > 0 ? text : "-"; };
       lines.push_back(fmt::format(
-          "  {:<{}}  {:<11}  lost {} ({:.2f} %)   round trip {}   age {}   copies {}", wire.name,
-          width, wire.busy ? "busy" : to_text(wire.state), wire.packets.lost, wire.loss() * 100,
-          known(wire.round_trip_us, fmt::format("{:.0f} us", wire.round_trip_us)),
-          known(wire.age_us, fmt::format("{:.0f} ms", wire.age_us / 1000)), wire.copies));
+          "  {:<{}}  {:<11}  lost {} ({:.2f} %)   round trip {}   age {}   copies {}", path.name,
+          width, path.busy ? "busy" : to_text(path.state), path.packets.lost, path.loss() * 100,
+          known(path.round_trip_us, fmt::format("{:.0f} us", path.round_trip_us)),
+          known(path.age_us, fmt::format("{:.0f} ms", path.age_us / 1000)), path.copies));
     }
   }
 

@@ -89,8 +89,8 @@ class MetricsCommand final : web::ServerEvents {
     for (const PatternUrl& each : expand_urls(options.urls)) {
       boards_.push_back(std::make_unique<AsyncBoard>(io_, each.url, board_options));
       described_.push_back({each.url, boards_.back().get()});
-      for (const std::string& wire : split_wires(each.url)) {
-        const Url url = Url::parse(wire);
+      for (const std::string& path : split_paths(each.url)) {
+        const Url url = Url::parse(path);
         if (url.scheme() == "can") interfaces_.try_emplace(can_interface_of(url));
       }
     }

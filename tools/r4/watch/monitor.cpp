@@ -19,7 +19,7 @@
 #include "../shell/options.hpp"
 #include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
-#include "../shell/wires.hpp"
+#include "../shell/paths.hpp"
 #include "monitor_boards.hpp"
 #include "monitor_bus.hpp"
 #include "monitor_view.hpp"
@@ -117,7 +117,7 @@ class Monitor {
     });
     board_.on_board_heartbeat([this](const Datagram& d) { view_->on_heartbeat(d); });
     board_.on_nack([this](const Nack& nack, const Datagram& d) {
-      // A wire that is about to join is answered so, while another one carries.
+      // A path that is about to join is answered so, while another one carries.
       const LinkStatus link = board_.link();
       if (nack.code == Refusal::busy && link.carrying != 0 && !link.busy) return;
       view_->on_nack(nack, d);
@@ -130,7 +130,7 @@ class Monitor {
       if (leads_to_two_boards(status)) io_.stop();
     });
     board_.on_event([this](const CarrierEvent& event) { view_->on_event(event); });
-    on_wires(board_, [this](const Wire& wire) { view_->on_wire(wire); });
+    on_paths(board_, [this](const PathStatus& path) { view_->on_path(path); });
   }
 
   // A host that was killed keeps its board until the board's timeout.
@@ -222,7 +222,7 @@ int monitor_devices(MonitorOptions options, const std::string& url) {
 
 // can://can0 and nothing else: all boards.
 bool is_whole_bus(const std::string& text) {
-  if (split_wires(text).size() > 1) return false;
+  if (split_paths(text).size() > 1) return false;
   const Url url = Url::parse(text);
   return url.scheme() == "can" && text.find('?') == std::string::npos;
 }
@@ -263,8 +263,8 @@ the board is ACTIVE. It goes on when the transport is lost and comes back. On a 
 no host controls streams five times a second; without a node it only listens, and shows every board that it
 hears. Of several boards, by URLs or a pattern, it is a table, or the JSON of each.
 
-Where + joins several wires to a board, it has a line for each of them, and one when a wire begins to carry or
-ceases to; in JSON of type wire, also at the end.
+Where + joins several paths to a board, it has a line for each of them, and one when a path begins to carry or
+ceases to; in JSON of type path, also at the end.
 
 With --device it shows what a sensor on the user's I2C bus measures, with units; in JSON a line of type
 reading, whose t is when the board read it. r4 devices lists what is described; NAME may be the path of a
@@ -275,7 +275,7 @@ as that host has set them up.
 Examples:
   r4 monitor udp://192.168.0.125
   r4 monitor serial:auto --fields DEFAULT,ENC1,US1
-  r4 monitor serial:auto+udp://192.168.0.125    one board by two wires
+  r4 monitor serial:auto+udp://192.168.0.125    one board by two paths
   r4 monitor 'udp:?id=left-arm'         the board of that name, wherever it is; r4 list shows them
   r4 monitor serial:auto --device bno055@0x28 --device ina219@0x40
   r4 monitor can://can0                 every board on the bus; can://can0?node=3 is one

@@ -14,7 +14,7 @@
 #include "../shell/line_writer.hpp"
 #include "../shell/run_end.hpp"
 #include "../shell/screen.hpp"
-#include "../shell/wires.hpp"
+#include "../shell/paths.hpp"
 #include "monitor_view.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
@@ -41,12 +41,12 @@ struct ShownBoard {
 };
 
 // "; udp://10.0.0.7:2018: silent", of several those that do not carry.
-std::string lost_wires(const AsyncBoard& board) {
-  const std::vector<Wire> wires = board.wires();
+std::string lost_paths(const AsyncBoard& board) {
+  const std::vector<PathStatus> paths = board.paths();
   std::string text;
-  for (const Wire& wire : wires) {
-    if (wires.size() < 2 || wire.state == WireState::carrying) continue;
-    text += fmt::format("; {}: {}", wire.name, to_text(wire.state));
+  for (const PathStatus& path : paths) {
+    if (paths.size() < 2 || path.state == PathState::carrying) continue;
+    text += fmt::format("; {}: {}", path.name, to_text(path.state));
   }
   return text;
 }
@@ -99,7 +99,7 @@ class BoardsMonitor {
         view.on_bad_datagram(result, bytes);
       });
       board.on_link([&view](const LinkStatus& status) { view.on_link(status); });
-      on_wires(board, [&view](const Wire& wire) { view.on_wire(wire); });
+      on_paths(board, [&view](const PathStatus& path) { view.on_path(path); });
     }
     board.on_state([this, &one](const ReceivedState& state, const Datagram& datagram) {
       if (io_.stopped()) return;  // what came together with the last one
@@ -147,7 +147,7 @@ class BoardsMonitor {
           well, fmt::format("{:<{}}  {:>7.1f} {:>8} {:>8}  {}{}{}{}", one->url, width,
                             statistics.state_rate_hz, statistics.packets.lost, statistics.damaged,
                             link_text(link), one->note.empty() ? "" : "; ", one->note,
-                            lost_wires(one->board)));
+                            lost_paths(one->board)));
     }
     if (live_) {
       std::stable_partition(rows.begin(), rows.end(), [](const auto& row) { return !row.first; });

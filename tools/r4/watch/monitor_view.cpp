@@ -12,7 +12,7 @@
 
 #include "../shell/json.hpp"
 #include "../shell/line_writer.hpp"
-#include "../shell/wires.hpp"
+#include "../shell/paths.hpp"
 #include "host/commands/command_help.hpp"
 #include "protocol/link/host_link.hpp"
 #include "protocol/messages/settings.hpp"
@@ -82,10 +82,10 @@ class JsonView final : public MonitorView {
                 {"reason", to_text(status.reason)},
                 {"busy", status.busy},
                 {"gated", status.gated()}};
-    if (status.trouble != WireTrouble::none) fields["trouble"] = to_text(status.trouble);
+    if (status.trouble != TransportTrouble::none) fields["trouble"] = to_text(status.trouble);
     if (status.key != KeyTrouble::none) fields["key"] = to_text(status.key);
     if (status.lease != LeaseTrouble::none) fields["lease"] = to_text(status.lease);
-    if (Json wires = wires_json(board_); !wires.is_null()) fields["wires"] = std::move(wires);
+    if (Json paths = paths_json(board_); !paths.is_null()) fields["paths"] = std::move(paths);
     lines_.write(line_of(object("link", std::move(fields))));
   }
   void on_event(const CarrierEvent& event) override {
@@ -97,13 +97,13 @@ class JsonView final : public MonitorView {
     }
     on_link(board_.link());
   }
-  void on_wire(const Wire& wire) override {
-    lines_.write(line_of(object("wire", wire_json(wire))));
+  void on_path(const PathStatus& path) override {
+    lines_.write(line_of(object("path", path_json(path))));
   }
   void on_end() override {
-    const std::vector<Wire> wires = board_.wires();
-    for (const Wire& wire : wires) {
-      if (wires.size() > 1) on_wire(wire);
+    const std::vector<PathStatus> paths = board_.paths();
+    for (const PathStatus& path : paths) {
+      if (paths.size() > 1) on_path(path);
     }
     Json transfers = transfers_json(board_.carrier_counters());
     if (!transfers.is_null()) lines_.write(line_of(object("transfers", std::move(transfers))));
@@ -169,8 +169,8 @@ class PlainView final : public MonitorView {
       lines_.write(event.problem.text() + "\n");
     }
   }
-  void on_wire(const Wire& wire) override {
-    lines_.write(fmt::format("wire {}: {}\n", wire.name, to_text(wire.state)));
+  void on_path(const PathStatus& path) override {
+    lines_.write(fmt::format("path {}: {}\n", path.name, to_text(path.state)));
   }
   std::uint64_t skipped() const override { return lines_.lost(); }
 
@@ -211,12 +211,12 @@ std::string link_text(const LinkStatus& status) {
       text = "LOST: the board is silent";
       break;
   }
-  if (status.trouble != WireTrouble::none) {
+  if (status.trouble != TransportTrouble::none) {
     text += fmt::format(", {} on the bus", to_text(status.trouble));
   } else if (status.busy) {
     text += ", another host controls the board";
   }
-  if (status.two_boards) text += ", its wires lead to two boards";
+  if (status.two_boards) text += ", its paths lead to two boards";
   if (status.gated()) text += ", our heartbeats are stopped";
   if (status.key != KeyTrouble::none) text += ", " + explain(status.key).text();
   if (status.lease != LeaseTrouble::none) text += ", " + explain(status.lease).text();

@@ -48,7 +48,7 @@ class MonitorView {
   virtual void on_link(const LinkStatus& status) = 0;
   virtual void on_event(const CarrierEvent& event) = 0;
   // One of several has begun to carry, or ceased to.
-  virtual void on_wire(const Wire& wire) = 0;
+  virtual void on_path(const PathStatus& path) = 0;
   // Ten times a second.
   virtual void on_tick() {}
   // Lines that were left out because nobody read the output.

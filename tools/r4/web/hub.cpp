@@ -31,7 +31,7 @@ std::int64_t wall_ms() { return wall_time<std::chrono::milliseconds>().count(); 
 
 BoardOptions options_for(const std::string& url, const HubOptions& options) {
   BoardOptions board = options.board;
-  const bool bus = has_wire(url, "can");
+  const bool bus = has_path(url, "can");
   board.session.fields = !options.fields.empty() ? options.fields : bus ? "DEFAULT" : "ALL";
   for (const Device& each : options.devices) board.session.fields += "," + each.fields();
   return board;

@@ -7,7 +7,7 @@
 #include <iterator>
 #include <limits>
 
-#include "../shell/wires.hpp"
+#include "../shell/paths.hpp"
 #include "r4link/config.hpp"
 
 namespace r4::tool::web {
@@ -101,7 +101,7 @@ std::string board_text(std::size_t number, WebBoard& slot) {
   object["loss"] = statistics.loss();
   object["round_trip_ms"] = statistics.round_trip_us / 1e3;
   object["age_ms"] = statistics.state_age_us / 1e3;
-  if (Json wires = wires_json(*board); !wires.is_null()) object["wires"] = std::move(wires);
+  if (Json paths = paths_json(*board); !paths.is_null()) object["paths"] = std::move(paths);
   return text_of(object);
 }
 

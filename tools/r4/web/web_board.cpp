@@ -7,7 +7,7 @@
 #include <chrono>
 #include <utility>
 
-#include "../shell/wires.hpp"
+#include "../shell/paths.hpp"
 #include "control.hpp"
 #include "r4link/error.hpp"
 
@@ -146,10 +146,10 @@ void WebBoard::connect() {
     if (event.kind != CarrierEvent::Kind::up) say(Level::warning, event.problem.text());
     events_.on_change(number_);
   });
-  on_wires(*board_, [this](const Wire& wire) {
-    const bool carries = wire.state == WireState::carrying;
+  on_paths(*board_, [this](const PathStatus& path) {
+    const bool carries = path.state == PathState::carrying;
     say(carries ? Level::info : Level::warning,
-        fmt::format("wire {}: {}", wire.name, to_text(wire.state)));
+        fmt::format("path {}: {}", path.name, to_text(path.state)));
     events_.on_change(number_);
   });
   board_->on_restart([this] { say(Level::warning, "the board has begun again"); });

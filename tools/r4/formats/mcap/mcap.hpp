@@ -39,8 +39,8 @@ constexpr std::size_t message_head = 22;
 constexpr std::string_view profile = "r4log";
 constexpr std::string_view record_schema = "r4.Record";
 constexpr std::string_view line_schema = "r4.Line";
-// The key of a channel's metadata that has the number of its wire; 0: it is that of lines.
-constexpr std::string_view wire_key = "wire";
+// The key of a channel's metadata that has the number of its path; 0: it is that of lines.
+constexpr std::string_view path_key = "path";
 // And how its board is reached and is called, escaped as in the native format.
 constexpr std::string_view url_key = "url";
 constexpr std::string_view name_key = "name";

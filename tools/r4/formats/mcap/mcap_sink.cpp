@@ -21,7 +21,7 @@ using mcap::Op;
 constexpr std::uint16_t record_schema_id = 1;
 constexpr std::uint16_t line_schema_id = 2;
 constexpr std::string_view chunk_compression = "zstd";
-// More wires than that are in no recording.
+// More paths than that are in no recording.
 constexpr std::size_t most_channels = 1000;
 
 std::uint64_t nanoseconds(Time time) {
@@ -70,7 +70,7 @@ void McapSink::begin() {
   schemas_ = schema(record_schema_id, mcap::record_schema, mcap::record_schema_text()) +
              schema(line_schema_id, mcap::line_schema, mcap::line_schema_text());
   chunk_ = schemas_;
-  lines_ = &add_channel(no_wire, "/r4log", line_schema_id);
+  lines_ = &add_channel(no_path, "/r4log", line_schema_id);
 }
 
 void McapSink::write(std::string_view bytes) {
@@ -81,17 +81,17 @@ void McapSink::write(std::string_view bytes) {
 
 void McapSink::on_comment(std::string_view line, Time time) { write_line(line, time); }
 
-void McapSink::on_wire(const RecordedWire& wire, Time time) {
+void McapSink::on_path(const RecordedPath& path, Time time) {
   std::string line;
-  r4::write_wire(line, wire);
+  r4::write_path(line, path);
   line.pop_back();
   write_line(line, time);
-  names_.on_wire(wire);
-  urls_[wire.number] = wire.url;
-  current_.erase(wire.number);
+  names_.on_path(path);
+  urls_[path.number] = path.url;
+  current_.erase(path.number);
 }
 
-// The wires of the recording that begins may be others.
+// The paths of the recording that begins may be others.
 void McapSink::on_header() {
   devices_.on_header();
   measured_.on_header();
@@ -100,7 +100,7 @@ void McapSink::on_header() {
 }
 
 void McapSink::on_record(const Record& record) {
-  if (record.wire == no_wire) {
+  if (record.path == no_path) {
     std::string line;
     r4::write_record(line, record);
     line.pop_back();
@@ -109,9 +109,9 @@ void McapSink::on_record(const Record& record) {
   begin();
   Json object = Json::object();
   add_record_json(
-      object, {record.time, record.wire, record.kind, record.bytes.substr(0, max_record_bytes)});
+      object, {record.time, record.path, record.kind, record.bytes.substr(0, max_record_bytes)});
   measured_.add_to(object, record, devices_);
-  write_message(channel_of(record.wire), record.time,
+  write_message(channel_of(record.path), record.time,
                 object.dump(-1, ' ', true, Json::error_handler_t::replace));
 }
 
@@ -250,40 +250,40 @@ void McapSink::write_group(Op op, std::string_view records) {
   write(records);
 }
 
-// A name that two wires have, for a board has two links, gets the number behind it.
-std::string McapSink::topic_of(std::uint16_t wire) {
-  const std::string& name = names_.name_of(wire);
-  if (name.empty()) return fmt::format("/board{}", wire);
+// A name that two paths have, for a board has two links, gets the number behind it.
+std::string McapSink::topic_of(std::uint16_t path) {
+  const std::string& name = names_.name_of(path);
+  if (name.empty()) return fmt::format("/board{}", path);
   std::string topic = "/" + plain(name);
   const bool taken = std::any_of(channels_.begin(), channels_.end(), [&](const auto& each) {
-    return each.first.topic == topic && each.first.wire != wire;
+    return each.first.topic == topic && each.first.path != path;
   });
-  return taken ? fmt::format("{}_{}", topic, wire) : topic;
+  return taken ? fmt::format("{}_{}", topic, path) : topic;
 }
 
-McapSink::Channel& McapSink::channel_of(std::uint16_t wire) {
-  Channel*& current = current_[wire];
+McapSink::Channel& McapSink::channel_of(std::uint16_t path) {
+  Channel*& current = current_[path];
   if (current != nullptr) return *current;
-  const std::string topic = topic_of(wire);
-  const auto known = channels_.find({wire, topic, urls_[wire]});
-  current = known != channels_.end() ? &known->second : &add_channel(wire, topic, record_schema_id);
+  const std::string topic = topic_of(path);
+  const auto known = channels_.find({path, topic, urls_[path]});
+  current = known != channels_.end() ? &known->second : &add_channel(path, topic, record_schema_id);
   return *current;
 }
 
-McapSink::Channel& McapSink::add_channel(std::uint16_t wire, const std::string& topic,
+McapSink::Channel& McapSink::add_channel(std::uint16_t path, const std::string& topic,
                                          std::uint16_t schema_id) {
   if (channels_.size() == most_channels) {
     throw Error(ErrorKind::data, topic, "the recording has more than 1000 boards",
                 "is it damaged? r4 info FILE tells; convert it to .jsonl");
   }
-  const std::string& url = urls_[wire];
-  Channel& channel = channels_[{wire, topic, url}];
+  const std::string& url = urls_[path];
+  Channel& channel = channels_[{path, topic, url}];
   channel.id = static_cast<std::uint16_t>(channels_.size());
   std::string metadata;
-  append_pair(metadata, mcap::wire_key, std::to_string(wire));
-  if (wire != no_wire) {
+  append_pair(metadata, mcap::path_key, std::to_string(path));
+  if (path != no_path) {
     append_pair(metadata, mcap::url_key, plain(url));
-    const std::string& name = names_.name_of(wire);
+    const std::string& name = names_.name_of(path);
     if (!name.empty()) append_pair(metadata, mcap::name_key, plain(name));
   }
   std::string content;

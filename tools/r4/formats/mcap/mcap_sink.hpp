@@ -14,7 +14,7 @@
 #include "../conversion.hpp"
 #include "../json_lines.hpp"
 #include "../recorded_devices.hpp"
-#include "../wire_names.hpp"
+#include "../path_names.hpp"
 #include "host/recording/zstd_stream.hpp"
 #include "mcap.hpp"
 
@@ -26,10 +26,10 @@ class McapSink final : public Sink {
   explicit McapSink(Output& output, std::vector<Device> devices = {})
       : output_(output), devices_(std::move(devices)) {}
   bool wants_survey() const override { return true; }
-  void survey(const RecordedWire& wire) override { names_.on_wire(wire); }
+  void survey(const RecordedPath& path) override { names_.on_path(path); }
   void survey(const Record&) override {}
   void on_comment(std::string_view line, Time time) override;
-  void on_wire(const RecordedWire& wire, Time time) override;
+  void on_path(const RecordedPath& path, Time time) override;
   void on_device(const RecordedDevice& device) override { devices_.on_device(device); }
   void on_header() override;
   // Throws Error{data} for a time beyond the year 2554, which MCAP cannot write.
@@ -47,7 +47,7 @@ class McapSink final : public Sink {
     std::string index;  // of the chunk that is being made
   };
   struct ChannelKey {
-    std::uint16_t wire;
+    std::uint16_t path;
     std::string topic, url;
     bool operator==(const ChannelKey&) const = default;
     auto operator<=>(const ChannelKey&) const = default;  // NOLINT(modernize-use-nullptr)
@@ -60,19 +60,19 @@ class McapSink final : public Sink {
   void write_chunk();
   void write_group(mcap::Op op, std::string_view records);
   void write_summary();
-  std::string topic_of(std::uint16_t wire);
-  Channel& channel_of(std::uint16_t wire);
-  Channel& add_channel(std::uint16_t wire, const std::string& topic, std::uint16_t schema);
+  std::string topic_of(std::uint16_t path);
+  Channel& channel_of(std::uint16_t path);
+  Channel& add_channel(std::uint16_t path, const std::string& topic, std::uint16_t schema);
 
   Output& output_;
   RecordedDevices devices_;
   MeasuredJson measured_;
-  WireNames names_;
+  PathNames names_;
   ZstdWriter zstd_;
   bool begun_ = false;
   std::map<ChannelKey, Channel> channels_;
-  std::map<std::uint16_t, Channel*> current_;  // by wire
-  std::map<std::uint16_t, std::string> urls_;  // by wire, of this recording
+  std::map<std::uint16_t, Channel*> current_;  // by path
+  std::map<std::uint16_t, std::string> urls_;  // by path, of this recording
   Channel* lines_ = nullptr;
 
   std::uint64_t offset_ = 0;                // in the file

@@ -57,7 +57,7 @@ void McapSource::finish() {
   if (part_ == Part::magic || part_ == Part::header) fail_as_none();
   if (part_ != Part::end) damage("the file ends here; it is not whole");
   const bool any_of_ours = std::any_of(channels_.begin(), channels_.end(), [](const auto& each) {
-    return each.second.wire.has_value();
+    return each.second.path.has_value();
   });
   if (!ours_ && !any_of_ours) {
     throw Error(ErrorKind::data, name_, "an MCAP file that is no recording of r4",
@@ -151,9 +151,9 @@ void McapSource::on_channel(std::string_view content) {
   while (!metadata.rest().empty()) {
     const std::string_view key = metadata.string();
     const std::string_view value = metadata.string();
-    std::uint32_t wire = 0;
-    if (key == mcap::wire_key && parse_number(Text(value), wire) && wire <= 65535) {
-      channel.wire = static_cast<std::uint16_t>(wire);
+    std::uint32_t path = 0;
+    if (key == mcap::path_key && parse_number(Text(value), path) && path <= 65535) {
+      channel.path = static_cast<std::uint16_t>(path);
     }
     std::string* const text = key == mcap::url_key    ? &channel.url
                               : key == mcap::name_key ? &channel.name
@@ -161,10 +161,10 @@ void McapSource::on_channel(std::string_view content) {
     if (text != nullptr && !append_unescaped(*text, value)) text->clear();
   }
   if (!fields.good() || !metadata.good()) return damage("a channel that is not whole");
-  if (encoding != "json") channel.wire.reset();
+  if (encoding != "json") channel.path.reset();
   // Each chunk repeats the channels of its messages.
   Channel& known = channels_[id];
-  channel.told = known.told && known.wire == channel.wire;
+  channel.told = known.told && known.path == channel.path;
   known = std::move(channel);
 }
 
@@ -216,7 +216,7 @@ void McapSource::on_message(std::string_view content) {
   const auto time_ns = fields.number<std::uint64_t>();
   static_cast<void>(fields.number<std::uint64_t>());
   if (!fields.good() || channel == channels_.end()) return damage("a message of no channel");
-  if (!channel->second.wire) return;  // of another program, in the same file
+  if (!channel->second.path) return;  // of another program, in the same file
   const Json object = Json::parse(fields.rest(), nullptr, false);
   const auto text_of = [&object](const char* key) {
     const auto found = object.find(key);
@@ -225,16 +225,16 @@ void McapSource::on_message(std::string_view content) {
   };
   if (!object.is_object()) return damage("a message that is no JSON object");
   bytes_.clear();
-  const std::uint16_t wire = *channel->second.wire;
+  const std::uint16_t path = *channel->second.path;
   const std::string* const event = text_of("event");
   const std::string* const from = text_of("from");
-  const std::string* const text = wire == no_wire    ? text_of("line")
+  const std::string* const text = path == no_path    ? text_of("line")
                                   : event != nullptr ? event
                                                      : text_of("text");
   const bool good =
       text != nullptr && append_unescaped(bytes_, *text) && bytes_.size() <= max_record_line;
   if (!good) return damage("a message that is no record");
-  if (wire == no_wire) {
+  if (path == no_path) {
     const char* const problem = lines_.on_line(bytes_, channel->first);
     if (problem != nullptr) damage(problem);
     return;
@@ -243,12 +243,12 @@ void McapSource::on_message(std::string_view content) {
   const RecordKind kind = event != nullptr   ? RecordKind::event
                           : *from == "board" ? RecordKind::from_board
                                              : RecordKind::to_board;
-  // A filter may have left out the topic of the lines, which declare the wires.
+  // A filter may have left out the topic of the lines, which declare the paths.
   if (!channel->second.told && !lines_.recognised() && !channel->second.url.empty()) {
-    handler_.on_wire({wire, channel->second.url, channel->second.name});
+    handler_.on_path({path, channel->second.url, channel->second.name});
   }
   channel->second.told = true;
-  lines_.on_record({Time{static_cast<std::int64_t>(time_ns / 1000)}, wire, kind,
+  lines_.on_record({Time{static_cast<std::int64_t>(time_ns / 1000)}, path, kind,
                     std::string_view(bytes_).substr(0, max_record_bytes)},
                    channel->first, channel->second.url);
 }

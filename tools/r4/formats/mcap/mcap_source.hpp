@@ -27,8 +27,8 @@ class McapSource final : public Source {
 
  private:
   struct Channel {
-    std::optional<std::uint16_t> wire;  // none: it is of another program
-    std::string url, name;              // of the wire; empty: not told
+    std::optional<std::uint16_t> path;  // none: it is of another program
+    std::string url, name;              // of the path; empty: not told
     bool told = false;                  // a record of it was
   };
   enum class Part : std::uint8_t { magic, header, data, summary, end };

@@ -24,7 +24,7 @@ constexpr std::uint16_t ether_ipv6 = 0x86DD;
 constexpr std::uint16_t ether_can = 0x000C;  // as Linux has it in "cooked" captures
 constexpr std::uint16_t ether_can_fd = 0x000D;
 // More boards than that are on no network.
-constexpr std::size_t most_wires = 1000;
+constexpr std::size_t most_paths = 1000;
 
 // SocketCAN (linux/can.h), in the order of the network.
 constexpr std::uint32_t can_extended = 0x80000000;
@@ -96,7 +96,7 @@ void PacketRecords::on_packet(const PacketInterface& interface, const Packet& pa
   const std::string_view bytes = packet.bytes;
   ++packets_;
   if (interface.description == lines_interface) return on_line(interface, packet);
-  if (interface.description.starts_with(wire_interface)) return on_own(interface, packet);
+  if (interface.description.starts_with(path_interface)) return on_own(interface, packet);
   switch (interface.link_type) {
     case link_ethernet: {
       std::size_t at = 12;
@@ -133,7 +133,7 @@ void PacketRecords::on_packet(const PacketInterface& interface, const Packet& pa
   }
 }
 
-// The file is a recording, or a capture. A mixture of the two has the numbers of wires twice.
+// The file is a recording, or a capture. A mixture of the two has the numbers of paths twice.
 void PacketRecords::be(Kind kind) {
   told_ = true;
   const bool other = kind_ != Kind::none ? kind_ != kind : kind == Kind::recorded && bus_.told();
@@ -199,12 +199,12 @@ void PacketRecords::on_line(const PacketInterface& interface, const Packet& pack
   if (problem != nullptr) damage(packet, problem);
 }
 
-// A datagram of that wire, as PcapngSink writes it.
+// A datagram of that path, as PcapngSink writes it.
 void PacketRecords::on_own(const PacketInterface& interface, const Packet& packet) {
-  const auto wire = std::string_view(interface.description).substr(wire_interface.size());
+  const auto path = std::string_view(interface.description).substr(path_interface.size());
   Udp udp;
   std::uint32_t number = 0;
-  if (!parse_number(Text(wire), number) || number > 65535 || !read_ip(packet.bytes, udp)) {
+  if (!parse_number(Text(path), number) || number > 65535 || !read_ip(packet.bytes, udp)) {
     return damage(packet, "no datagram of a recording");
   }
   if (packet.cut || udp.cut) return damage(packet, "the packet is cut");
@@ -257,9 +257,9 @@ void PacketRecords::on_ip(std::string_view bytes, const Packet& packet) {
   if (udp.cut) return damage(packet, "the packet is cut: capture it whole, tcpdump -s 0");
   if (is_repeated(udp, packet.time)) return;
   be(Kind::captured);
-  const std::uint16_t wire = wire_of(from_board ? udp.from : udp.to);
-  if (wire == no_wire) return damage(packet, "more than 1000 boards");
-  handler_.on_record({packet.time, wire, from_board ? RecordKind::from_board : RecordKind::to_board,
+  const std::uint16_t path = path_of(from_board ? udp.from : udp.to);
+  if (path == no_path) return damage(packet, "more than 1000 boards");
+  handler_.on_record({packet.time, path, from_board ? RecordKind::from_board : RecordKind::to_board,
                       without_end(udp.payload)});
 }
 
@@ -301,15 +301,15 @@ void PacketRecords::on_can(std::string_view interface, std::uint32_t id, std::st
                 {0, packet.offset, static_cast<std::uint64_t>(packet.time.count()), {}});
 }
 
-std::uint16_t PacketRecords::wire_of(const std::string& address) {
-  const auto known = wires_.find(address);
-  if (known != wires_.end()) return known->second;
-  if (wires_.size() == most_wires) return no_wire;
+std::uint16_t PacketRecords::path_of(const std::string& address) {
+  const auto known = paths_.find(address);
+  if (known != paths_.end()) return known->second;
+  if (paths_.size() == most_paths) return no_path;
   const std::string url = "udp://" + address;
-  const std::uint16_t wire =
-      bus_.add_wire(port_ == board_port ? url : fmt::format("{}:{}", url, port_));
-  wires_.emplace(address, wire);
-  return wire;
+  const std::uint16_t path =
+      bus_.add_path(port_ == board_port ? url : fmt::format("{}:{}", url, port_));
+  paths_.emplace(address, path);
+  return path;
 }
 
 void PacketRecords::damage(const Packet& packet, std::string_view reason) {

@@ -73,7 +73,7 @@ class PacketRecords {
                  const Packet& packet);
   std::uint32_t cooked_id(std::string_view bytes);
   bool is_repeated(const Udp& udp, Time time);
-  std::uint16_t wire_of(const std::string& address);
+  std::uint16_t path_of(const std::string& address);
   void damage(const Packet& packet, std::string_view reason);
 
   struct Seen {
@@ -86,7 +86,7 @@ class PacketRecords {
   RecordingLines lines_;
   BusRecords bus_;
   const std::uint16_t port_;
-  std::map<std::string, std::uint16_t> wires_;
+  std::map<std::string, std::uint16_t> paths_;
   std::optional<ByteOrder>
       cooked_order_;           // of the ids of CAN frames in cooked captures, as far as is known
   std::array<Seen, 64> seen_;  // the newest datagrams, to find repeated ones

@@ -121,13 +121,13 @@ void PcapngSink::add_interface(std::uint16_t link_type, std::string_view name,
 
 void PcapngSink::on_comment(std::string_view line, Time time) { write_line(line, time); }
 
-void PcapngSink::on_wire(const RecordedWire& wire, Time time) {
+void PcapngSink::on_path(const RecordedPath& path, Time time) {
   text_.clear();
-  write_wire(text_, wire);
+  write_path(text_, path);
   text_.pop_back();
   write_line(text_, time);
-  Wire& known = wires_[wire.number];
-  if (known.url != wire.url) known = {wire.url, 0, 0, 0};
+  Path& known = paths_[path.number];
+  if (known.url != path.url) known = {path.url, 0, 0, 0};
 }
 
 void PcapngSink::on_record(const Record& record) {
@@ -138,37 +138,37 @@ void PcapngSink::on_record(const Record& record) {
     return write_line(text_, record.time);
   }
   begin();
-  const Wire& wire = wire_of(record.wire);
+  const Path& path = path_of(record.path);
   const std::string_view bytes = record.bytes.substr(0, max_record_bytes);
   if (record.kind == RecordKind::from_board) {
-    write_head(head_, wire.address, wire.port, made_up_host, host_port, bytes.size());
-    write_packet(wire.interface, record.time, head_, bytes, inbound);
+    write_head(head_, path.address, path.port, made_up_host, host_port, bytes.size());
+    write_packet(path.interface, record.time, head_, bytes, inbound);
   } else {
-    write_head(head_, made_up_host, host_port, wire.address, wire.port, bytes.size());
-    write_packet(wire.interface, record.time, head_, bytes, outbound);
+    write_head(head_, made_up_host, host_port, path.address, path.port, bytes.size());
+    write_packet(path.interface, record.time, head_, bytes, outbound);
   }
 }
 
-PcapngSink::Wire& PcapngSink::wire_of(std::uint16_t number) {
-  Wire& wire = wires_[number];
-  if (wire.interface != 0) return wire;
-  wire.interface = interfaces_;
-  wire.address = made_up_board + number;
-  wire.port = board_port;
+PcapngSink::Path& PcapngSink::path_of(std::uint16_t number) {
+  Path& path = paths_[number];
+  if (path.interface != 0) return path;
+  path.interface = interfaces_;
+  path.address = made_up_board + number;
+  path.port = board_port;
   try {
-    const Url url = Url::parse(wire.url);
+    const Url url = Url::parse(path.url);
     in_addr address{};
     if (url.scheme() == "udp" && ::inet_pton(AF_INET, url.host().c_str(), &address) == 1 &&
         ntohl(address.s_addr) != made_up_host) {
-      wire.address = ntohl(address.s_addr);
-      wire.port = url.port().value_or(board_port);
+      path.address = ntohl(address.s_addr);
+      path.port = url.port().value_or(board_port);
     }
   } catch (const Error&) {  // no URL, or none that we know: the address is made up
   }
   add_interface(link_ipv4,
-                wire.url.size() <= max_interface_text ? printable(wire.url) : std::string(),
-                fmt::format("{}{}", wire_interface, number));
-  return wire;
+                path.url.size() <= max_interface_text ? printable(path.url) : std::string(),
+                fmt::format("{}{}", path_interface, number));
+  return path;
 }
 
 void PcapngSink::write_line(std::string_view line, Time time) {

@@ -26,7 +26,7 @@ class Card {
   #arm = element('button', {type: 'button', disabled: true}, 'Arm');
   #clear = element('button', {type: 'button', disabled: true}, 'Clear');
   #identity = element('span', {className: 'hint'});
-  #wires = element('p', {className: 'hint'});
+  #paths = element('p', {className: 'hint'});
 
   constructor(board, link) {
     for (const figure of ['rate', 'loss', 'round trip', 'age']) {
@@ -47,7 +47,7 @@ class Card {
     this.node = element('article', {className: 'card', 'aria-label': `Board ${board_name(board)}`},
       element('div', {className: 'head'}, element('h2', {title: board.url}, board_name(board)), this.#identity),
       element('p', {className: 'state', role: 'status'}, this.#state, this.#why),
-      this.#figures, this.#wires, element('div', {className: 'act'}, this.#arm, this.#clear, this.#answer));
+      this.#figures, this.#paths, element('div', {className: 'act'}, this.#arm, this.#clear, this.#answer));
     this.show(null);
   }
 
@@ -62,8 +62,8 @@ class Card {
     put(this.#values.get('loss'), there ? `${(100 * health.loss).toFixed(1)} %` : '–');
     put(this.#values.get('round trip'), there && health.round_trip_ms !== null ?
       `${health.round_trip_ms.toFixed(1)} ms` : '–');
-    put(this.#wires, (health?.wires ?? []).map((wire) => `${wire.name}: ${wire.state}`).join(' · '));
-    this.#wires.hidden = !health?.wires;
+    put(this.#paths, (health?.paths ?? []).map((path) => `${path.name}: ${path.state}`).join(' · '));
+    this.#paths.hidden = !health?.paths;
     put(this.#values.get('age'), health && health.age_ms !== null ? age_text(health.age_ms) : '–');
   }
 

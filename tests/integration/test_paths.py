@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several wires to one board, as real ones: two UDP paths and a pty, pulled and plugged in while a host drives."""
+"""Several paths to one board, as real ones: two UDP paths and a pty, pulled and plugged in while a host drives."""
 import contextlib
 import os
 import pathlib
@@ -13,51 +13,51 @@ from lan import Lan
 from machine import within
 from r4_process import (ERROR, PATIENCE_S, Board, Running, free_port, is_link, is_state, lasts, monitor, objects,
                         run, text_of)
-from wired_host import (BACK_WITHIN_S, LONGEST_GAP_S, REPORTED_WITHIN_S, TIMEOUT_S, WiredHost, Wire, has_joined,
+from host_on_paths import (BACK_WITHIN_S, LONGEST_GAP_S, REPORTED_WITHIN_S, TIMEOUT_S, HostOnPaths, Relay, has_joined,
                         has_left)
 
 
 @contextlib.contextmanager
 def wired(*kinds):
-    """A board, and a wire of each kind to it."""
-    folder = pathlib.Path(os.environ.get('TMPDIR', '/tmp')) / f'r4-wires-{os.getpid()}'
+    """A board, and a path of each kind to it."""
+    folder = pathlib.Path(os.environ.get('TMPDIR', '/tmp')) / f'r4-paths-{os.getpid()}'
     folder.mkdir(exist_ok=True)
-    wires = []
+    paths = []
     try:
         with Board('udp://127.0.0.1:0', f'pty:{folder}/board') as board:
             port = board.url.rsplit(':', 1)[1]
             ends = {'udp': (port,), 'pty': (f'{folder}/host', f'{folder}/board')}
             for kind in kinds:
-                wires.append(Wire(kind, *ends[kind]))
-            yield board, wires
+                paths.append(Relay(kind, *ends[kind]))
+            yield board, paths
     finally:
-        for wire in wires:
-            if wire.process.poll() is None:
-                wire.signal(signal.SIGCONT)
-                wire.pull()
+        for path in paths:
+            if path.process.poll() is None:
+                path.signal(signal.SIGCONT)
+                path.pull()
         for left in folder.iterdir():
             left.unlink()
         folder.rmdir()
 
 
-def is_wire(wire, carries=True):
-    """Of the monitor: that wire begins to carry, or ceases to."""
-    place = re.search(r'[\d.]+:\d+|/[^?]+', wire.url)[0]
-    return lambda each: (each['type'] == 'wire' and place in each['fields']['name'] and
+def is_path(path, carries=True):
+    """Of the monitor: that path begins to carry, or ceases to."""
+    place = re.search(r'[\d.]+:\d+|/[^?]+', path.url)[0]
+    return lambda each: (each['type'] == 'path' and place in each['fields']['name'] and
                          (each['fields']['state'] == 'carrying') == carries)
 
 
-def of_two(wires):
-    return '+'.join(wire.url for wire in wires)
+def of_two(paths):
+    return '+'.join(path.url for path in paths)
 
 
-def carried(wires):
-    """A host that has control of a board, as a process; all wires carry."""
-    host = monitor('+'.join(wire.url for wire in wires))
+def carried(paths):
+    """A host that has control of a board, as a process; all paths carry."""
+    host = monitor('+'.join(path.url for path in paths))
     host.next(is_link('active'))
-    for wire in wires:
-        if not any(is_wire(wire)(each) for each in host.log):
-            host.next(is_wire(wire))
+    for path in paths:
+        if not any(is_path(path)(each) for each in host.log):
+            host.next(is_path(path))
     host.next(is_state)
     return host
 
@@ -78,19 +78,19 @@ def judge(host, began, what):
 
 
 def test_a_cable_is_pulled_and_plugged_in_again_and_nothing_is_missed():
-    with wired('pty', 'udp') as (board, wires), carried(wires) as host:
+    with wired('pty', 'udp') as (board, paths), carried(paths) as host:
         def told(event, **counts):
-            wire = board.next(lambda each: each.get('path', {}).get('event') == event)['path']
-            assert {name: wire[name] for name in counts} == counts, wire
+            path = board.next(lambda each: each.get('path', {}).get('event') == event)['path']
+            assert {name: path[name] for name in counts} == counts, path
 
         told('joined', paths=2, joins=1, losses=0)
         began = time.monotonic()
-        cable = wires[0]
+        cable = paths[0]
         cable.pull()
-        lost = host.next(is_wire(cable, carries=False))['came'] - began
+        lost = host.next(is_path(cable, carries=False))['came'] - began
         plugged = time.monotonic()
         cable.plug_in()
-        back = host.next(is_wire(cable))['came'] - plugged
+        back = host.next(is_path(cable))['came'] - plugged
         told('left', paths=1, joins=1, losses=1)
         told('joined', paths=2, joins=2, losses=1)
         judge(host, began, f'told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
@@ -98,25 +98,25 @@ def test_a_cable_is_pulled_and_plugged_in_again_and_nothing_is_missed():
 
 
 def test_a_path_that_is_held_up_and_then_brings_what_is_old_disturbs_nothing():
-    with wired('udp', 'udp') as (board, wires), carried(wires) as host:
+    with wired('udp', 'udp') as (board, paths), carried(paths) as host:
         began = time.monotonic()
-        wires[0].signal(signal.SIGSTOP)  # the system cannot tell
-        lost = host.next(is_wire(wires[0], carries=False))['came'] - began
+        paths[0].signal(signal.SIGSTOP)  # the system cannot tell
+        lost = host.next(is_path(paths[0], carries=False))['came'] - began
         went_on = time.monotonic()
-        wires[0].signal(signal.SIGCONT)
-        back = host.next(is_wire(wires[0]))['came'] - went_on
+        paths[0].signal(signal.SIGCONT)
+        back = host.next(is_path(paths[0]))['came'] - went_on
         judge(host, began, f'told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
-        wires[0].pull()  # and the other one has it alone
-        host.next(is_wire(wires[0], carries=False))
+        paths[0].pull()  # and the other one has it alone
+        host.next(is_path(paths[0], carries=False))
         judge(host, began, 'the other one pulled')
         board.never('SAFE', 0.2)
     assert lost <= within(TIMEOUT_S + REPORTED_WITHIN_S) and back <= within(BACK_WITHIN_S)
 
 
-def test_commands_are_executed_once_each_while_wires_come_and_go():
+def test_commands_are_executed_once_each_while_paths_come_and_go():
     commands = [f'S:{1000 + i % 1000},{i % 16 + 1}' for i in range(400)]
-    with wired('pty', 'udp') as (board, wires):
-        with Running('send', *(wire.url for wire in wires), *commands, '--json', '--hold', '60') as host:
+    with wired('pty', 'udp') as (board, paths):
+        with Running('send', *(path.url for path in paths), *commands, '--json', '--hold', '60') as host:
             results = []
 
             def confirmed(most):
@@ -128,16 +128,16 @@ def test_commands_are_executed_once_each_while_wires_come_and_go():
 
             both()
             confirmed(50)
-            wires[0].pull()
+            paths[0].pull()
             confirmed(120)
-            wires[0].plug_in()
+            paths[0].plug_in()
             both()  # before that there is only one, which must not go
             confirmed(190)
-            wires[1].signal(signal.SIGSTOP)
+            paths[1].signal(signal.SIGSTOP)
             confirmed(260)
-            wires[1].signal(signal.SIGCONT)
+            paths[1].signal(signal.SIGCONT)
             confirmed(330)
-            wires[1].pull()
+            paths[1].pull()
             confirmed(400)
             slowest = max(each['ms'] for each in results)
         executed = [each['executed']['command'] for each in board.rest() if 'executed' in each]
@@ -147,7 +147,7 @@ def test_commands_are_executed_once_each_while_wires_come_and_go():
 
 
 @pytest.mark.parametrize('signals', [(signal.SIGSTOP, signal.SIGCONT), (signal.SIGKILL, None)])
-def test_a_bridge_that_is_one_of_two_wires_stands_still_or_dies(tmp_path, signals):
+def test_a_bridge_that_is_one_of_two_paths_stands_still_or_dies(tmp_path, signals):
     tty = tmp_path / 'board'
     with Board('udp://127.0.0.1:0', f'pty:{tty}') as board, contextlib.ExitStack() as bridges:
         port = free_port()
@@ -162,7 +162,7 @@ def test_a_bridge_that_is_one_of_two_wires_stands_still_or_dies(tmp_path, signal
                 bridge()
 
         running = bridge()
-        with WiredHost([board.host_url, f'udp://127.0.0.2:{port}?listen=0'], ['127.0.0.1', '127.0.0.2']) as host:
+        with HostOnPaths([board.host_url, f'udp://127.0.0.2:{port}?listen=0'], ['127.0.0.1', '127.0.0.2']) as host:
             board.next(has_joined(2))
             host.loses_by_silence('127.0.0.2', lambda: running.signal(signals[0]))
             board.next(has_left(1))
@@ -171,11 +171,11 @@ def test_a_bridge_that_is_one_of_two_wires_stands_still_or_dies(tmp_path, signal
             host.ends(board)
 
 
-def test_a_board_of_one_address_has_a_wire_by_each_interface_of_this_computer():
+def test_a_board_of_one_address_has_a_path_by_each_interface_of_this_computer():
     with Lan() as lan:
         robot, desk = lan.computer('10.77.0.1'), lan.computer('10.77.0.2', '10.77.0.3')
         by_switch, by_cable = desk.addresses
-        with Board('udp://10.77.0.1', **robot.inside) as board, WiredHost(
+        with Board('udp://10.77.0.1', **robot.inside) as board, HostOnPaths(
                 [f'udp://10.77.0.1?local={address}' for address in desk.addresses], desk.addresses,
                 **desk.inside) as host:
             board.next(has_joined(2))
@@ -189,10 +189,10 @@ def test_a_board_of_one_address_has_a_wire_by_each_interface_of_this_computer():
             host.ends(board)
 
 
-def test_each_command_takes_the_wires_of_a_board(tmp_path):
-    with wired('udp', 'pty') as (board, wires):
-        urls = [wire.url for wire in wires]
-        joined = of_two(wires)
+def test_each_command_takes_the_paths_of_a_board(tmp_path):
+    with wired('udp', 'pty') as (board, paths):
+        urls = [path.url for path in paths]
+        joined = of_two(paths)
         assert run('send', *urls, 'R:1,On', 'Q:ID').returncode == 0
         measured = run('bench', *reversed(urls), '--duration', '0.5', '--json')
         assert measured.returncode == 0, measured
@@ -204,19 +204,19 @@ def test_each_command_takes_the_wires_of_a_board(tmp_path):
         assert run('record', joined, '-o', drive, '--duration', '1').returncode == 0
         text = text_of(drive)
         for number in (1, 2):
-            assert re.search(rf' {number}< AIN24', text), f'no state by wire {number}'
+            assert re.search(rf' {number}< AIN24', text), f'no state by path {number}'
         seen = run('info', drive).stdout
         assert '127.0.0.2' in seen and '/host' in seen, seen
 
         stop = run('stop', *urls)
         assert stop.returncode == 0 and f'r4 send {joined} E:CLEAR' in stop.stdout, stop
         # One that works is enough.
-        wires[0].pull()
+        paths[0].pull()
         assert run('stop', *urls).returncode == 0
         assert run('stop', 'serial:///dev/nothing', urls[1]).returncode == 0
 
 
-def test_wires_that_lead_to_two_boards_are_refused_with_both_names():
+def test_paths_that_lead_to_two_boards_are_refused_with_both_names():
     boards = [Board('udp://127.0.0.1:0', options=('--board-id', name)) for name in ('left', 'right')]
     with boards[0] as left, boards[1] as right:
         for command in (('send', left.host_url, right.host_url, 'R:1,On'),
@@ -233,14 +233,14 @@ def test_wires_that_lead_to_two_boards_are_refused_with_both_names():
 
 
 @pytest.mark.parametrize('arguments, told', [
-    (('send', 'udp://127.0.0.1', 'udp://127.0.0.1', 'R:1,On'), 'the same wire is given twice'),
+    (('send', 'udp://127.0.0.1', 'udp://127.0.0.1', 'R:1,On'), 'the same path is given twice'),
     (('send', 'udp://127.0.0.1', 'udp:auto'), 'CMD: is missing'),
     (('send', 'udp://127.0.0.1', 'R:1,On', 'udp:auto'), 'a URL cannot stand behind R:1,On'),
     (('send', 'sim:', 'udp://127.0.0.1', 'R:1,On'), 'a board of its own'),
     (('send', 'serial:auto', 'udp://127.0.0.1', 'C:key,1:' + 64 * 'a'), 'others would see it'),
     (('stop', *(f'udp://127.0.0.{i}' for i in range(1, 6))), 'one to 4 are possible'),
     (('monitor', 'serial:auto+upd://127.0.0.1'), "there is no transport 'upd'"),
-    (('monitor', 'can://can0?node=0-3+udp://127.0.0.1:20-21'), 'its wires lead to 4 and to 2 boards'),
+    (('monitor', 'can://can0?node=0-3+udp://127.0.0.1:20-21'), 'its paths lead to 4 and to 2 boards'),
 ])
 def test_what_cannot_be_is_one_clear_line(arguments, told):
     refused = run(*arguments)
@@ -248,9 +248,9 @@ def test_what_cannot_be_is_one_clear_line(arguments, told):
     assert len(refused.stderr.splitlines()) == 1, refused
 
 
-def test_a_monitor_for_people_has_a_line_for_a_wire_that_ceases_to_carry():
-    with wired('pty', 'udp') as (_, wires):
-        with Running('monitor', of_two(wires), '--control') as host:
+def test_a_monitor_for_people_has_a_line_for_a_path_that_ceases_to_carry():
+    with wired('pty', 'udp') as (_, paths):
+        with Running('monitor', of_two(paths), '--control') as host:
             came = []
 
             def line_with(words):
@@ -260,5 +260,5 @@ def test_a_monitor_for_people_has_a_line_for_a_wire_that_ceases_to_carry():
             line_with('/host: carrying')
             line_with('udp://127.0.0.2')
             lasts(0.2)
-            wires[0].pull()
+            paths[0].pull()
             line_with('/host: down')

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Several wires: where the hosts are on them, what happens to them, what comes over them that no host has sent now,
+// Several paths: where the hosts are on them, what happens to them, what comes over them that no host has sent now,
 // and the promises about them.
 #include <fmt/format.h>
 
@@ -25,16 +25,16 @@ bool is_fine(const ChannelFaults& faults) {
 
 }  // namespace
 
-// The first host is on all wires, others on some.
+// The first host is on all paths, others on some.
 void World::place(Host& host) {
   const bool bus_stopper = host.stopper && schedule_.shared_place;
-  for (int w = 0; w < schedule_.wires(); ++w) {
+  for (int w = 0; w < schedule_.paths(); ++w) {
     if (script_ != nullptr && !script_->has_place(host.index, w)) continue;
     if (script_ == nullptr && several() && host.index != 0 &&
-        (bus_stopper ? w != 0 : wires_random_.chance(0.4)))
+        (bus_stopper ? w != 0 : paths_random_.chance(0.4)))
       continue;
     Host::Place place;
-    place.wire = w;
+    place.path = w;
     const bool shared =
         w == 0 && (bus_stopper || (host.watcher && script_ == nullptr && random_.chance(0.1)));
     place.peer = shared ? hosts_.front()->places.front().peer : next_peer_++;
@@ -43,42 +43,42 @@ void World::place(Host& host) {
   }
   if (!host.places.empty()) return;
   Host::Place place;
-  place.wire = schedule_.wires() - 1;
+  place.path = schedule_.paths() - 1;
   place.peer = next_peer_++;
   whose_.emplace(place.peer, host.index);
   host.places.push_back(place);
 }
 
-// --- what happens to a wire
+// --- what happens to a path
 
 void World::disturb(int index, Happening::Kind kind, std::uint64_t end_us) {
-  Wire& wire = wires_[index];
+  Path& path = paths_[index];
   std::uint64_t until_us = end_us;
   switch (kind) {
     case Happening::Kind::cut:
     case Happening::Kind::unplug:
-      wire.cut_to_board_until_us = wire.cut_to_host_until_us = end_us;
+      path.cut_to_board_until_us = path.cut_to_host_until_us = end_us;
       break;
     case Happening::Kind::cut_to_board:
-      wire.cut_to_board_until_us = end_us;
+      path.cut_to_board_until_us = end_us;
       break;
     case Happening::Kind::cut_to_host:
-      wire.cut_to_host_until_us = end_us;
+      path.cut_to_host_until_us = end_us;
       break;
     case Happening::Kind::stall:
-      wire.stalled_until_us = end_us;
+      path.stalled_until_us = end_us;
       until_us += most_delay_us;
       break;
     default:
       until_us = now_us_ + most_delay_us;
       break;
   }
-  wire.disturbed_until_us = std::max(wire.disturbed_until_us, until_us);
-  const bool served = std::exchange(wire.serves, false);
-  wire.fine = false;
+  path.disturbed_until_us = std::max(path.disturbed_until_us, until_us);
+  const bool served = std::exchange(path.serves, false);
+  path.fine = false;
   if (served && serves_since(now_us_ - std::min(now_us_, settled_us))) ++report_.failovers;
   if (kind != Happening::Kind::port_down) return;
-  for (int w = 0; w < schedule_.wires(); ++w) {
+  for (int w = 0; w < schedule_.paths(); ++w) {
     if (w != index && port_of(w) == port_of(index)) disturb(w, Happening::Kind::address, now_us_);
   }
   lose_port(port_of(index));
@@ -86,14 +86,14 @@ void World::disturb(int index, Happening::Kind kind, std::uint64_t end_us) {
 
 void World::unplug(const Happening& happening, bool over) {
   int index = 0;
-  while (index + 1 < schedule_.wires() && (happening.wires >> index & 1U) == 0) ++index;
-  Wire& wire = wires_[index];
+  while (index + 1 < schedule_.paths() && (happening.paths >> index & 1U) == 0) ++index;
+  Path& path = paths_[index];
   if (!over) {
     const std::uint64_t end_us = now_us_ + happening.length_us;
-    wire.unplugged_until_us = std::max(wire.unplugged_until_us, end_us);
-    disturb(index, happening.kind, wire.unplugged_until_us);
+    path.unplugged_until_us = std::max(path.unplugged_until_us, end_us);
+    disturb(index, happening.kind, path.unplugged_until_us);
     if (!schedule_.one_port) lose_port(port_of(index));
-  } else if (now_us_ < wire.unplugged_until_us) {
+  } else if (now_us_ < path.unplugged_until_us) {
     return;
   }
   for (const auto& host : hosts_) {
@@ -128,7 +128,7 @@ void World::record() {
     poll_board();
   }
   for (int times = 0; times < 2; ++times) {
-    const std::uint64_t from_us = start_us_ + wires_random_.below(schedule_.duration_us);
+    const std::uint64_t from_us = start_us_ + paths_random_.below(schedule_.duration_us);
     for (std::size_t i = 0; i < recorded_.size(); ++i) {
       at(from_us + recorded_[i].at_us, Event::Kind::replay, static_cast<int>(i));
     }
@@ -138,14 +138,14 @@ void World::record() {
 void World::replay(int index) {
   const Recorded& recorded = recorded_[static_cast<std::size_t>(index)];
   const Host& host = *hosts_.front();
-  const Host::Place& place = *host.on(schedule_.replaying_wire);
+  const Host::Place& place = *host.on(schedule_.replaying_path);
   ++report_.replayed;
   const int slot = take_slot();
   Packet& packet = packets_[static_cast<std::size_t>(slot)];
   packet = Packet();
   packet.to_board = recorded.to_board;
   packet.place = static_cast<int>(&place - host.places.data());
-  packet.port = port_of(place.wire);
+  packet.port = port_of(place.path);
   packet.peer = place.peer;
   packet.recorded = true;
   packet.bytes = recorded.bytes;
@@ -158,7 +158,7 @@ void World::replay(int index) {
 void World::on_path(std::uint32_t, Source path, bool joined) {
   note(fmt::format("path {} {}/{}", joined ? "joins" : "leaves", path.port, path.peer));
   if (!joined) {
-    ++report_.wire_losses;
+    ++report_.path_losses;
     if (board_->paths().size() == 0) return;
     // What it brought has fed, though it is the session's no longer.
     std::uint64_t& heard_us = heard_us_[board_->paths()[0].peer];
@@ -175,16 +175,16 @@ void World::on_path(std::uint32_t, Source path, bool joined) {
 
 bool World::meets_limits(int index) const {
   return is_fine(schedule_.faults(index, true)) && is_fine(schedule_.faults(index, false)) &&
-         now_us_ >= wires_[index].disturbed_until_us && index != schedule_.replaying_wire;
+         now_us_ >= paths_[index].disturbed_until_us && index != schedule_.replaying_path;
 }
 
 bool World::serves_since(std::uint64_t at_us) const {
-  return std::any_of(std::begin(wires_), std::end(wires_), [at_us](const Wire& wire) {
-    return wire.serves && wire.serves_since_us <= at_us;
+  return std::any_of(std::begin(paths_), std::end(paths_), [at_us](const Path& path) {
+    return path.serves && path.serves_since_us <= at_us;
   });
 }
 
-// A good wire served when the command was asked for, and so long before that the host knew that it has the board: no
+// A good path served when the command was asked for, and so long before that the host knew that it has the board: no
 // BUSY from before counts any more, and its F has been confirmed. The command goes there, and the state that shows it
 // or the answer to a copy comes back.
 bool World::should_be_confirmed(const Sent& sent) const {
@@ -195,7 +195,7 @@ bool World::should_be_confirmed(const Sent& sent) const {
          schedule_.command_timeout_us >= 150'000 + there_and_back_us;
 }
 
-void World::check_wires() {
+void World::check_paths() {
   const Host& host = *hosts_.front();
   const bool in_control = !standing_ && host.alive && !host.frozen && !host.leaving &&
                           host.farewell_ticket == 0 && controls({0, host.incarnation});
@@ -204,27 +204,27 @@ void World::check_wires() {
   // Another one that both ends have used so long that this one has had its time to join.
   const bool alone = !serves_since(now_us_ - std::min(now_us_, used_again_us));
   const bool crowded = schedule_.attack_interval_us != 0;
-  for (int w = 0; w < schedule_.wires(); ++w) {
-    Wire& wire = wires_[w];
+  for (int w = 0; w < schedule_.paths(); ++w) {
+    Path& path = paths_[w];
     if (!in_control || !meets_limits(w)) {
-      wire.fine = wire.serves = false;
+      path.fine = path.serves = false;
       continue;
     }
-    if (!wire.fine) wire.fine_since_us = now_us_;
-    wire.fine = true;
+    if (!path.fine) path.fine_since_us = now_us_;
+    path.fine = true;
     const auto at = static_cast<std::size_t>(w);
     const bool serves = board_->paths().has({port_of(w), host.places[at].peer}) &&
-                        host.session->path(at, host.time()).state == WireState::carrying;
-    const bool settled = wire.serves && now_us_ - wire.serves_since_us >= settled_us;
-    if (settled && !serves) violate(fmt::format("wires: wire {} is good and given up", w));
-    if (serves && !wire.serves) wire.serves_since_us = now_us_;
-    wire.serves = serves;
+                        host.session->path(at, host.time()).state == PathState::carrying;
+    const bool settled = path.serves && now_us_ - path.serves_since_us >= settled_us;
+    if (settled && !serves) violate(fmt::format("paths: path {} is good and given up", w));
+    if (serves && !path.serves) path.serves_since_us = now_us_;
+    path.serves = serves;
     if (settled && serves) check_age(w);
-    const std::uint64_t quiet_since_us = std::max(wire.serves_since_us, wire.told_busy_us);
-    const bool known = wire.serves && now_us_ - quiet_since_us > busy_memory_us + most_delay_us;
-    if (known && host.session->link().busy) violate("wires: BUSY is told beside a good wire");
-    if (!serves && !alone && !crowded && now_us_ - wire.fine_since_us >= used_again_us) {
-      violate(fmt::format("wires: wire {} is good and not used", w));
+    const std::uint64_t quiet_since_us = std::max(path.serves_since_us, path.told_busy_us);
+    const bool known = path.serves && now_us_ - quiet_since_us > busy_memory_us + most_delay_us;
+    if (known && host.session->link().busy) violate("paths: BUSY is told beside a good path");
+    if (!serves && !alone && !crowded && now_us_ - path.fine_since_us >= used_again_us) {
+      violate(fmt::format("paths: path {} is good and not used", w));
     }
   }
 }
@@ -232,20 +232,20 @@ void World::check_wires() {
 void World::on_told_state(int index, std::string_view bytes) {
   Datagram datagram;
   if (!read_datagram(Text(bytes), datagram) || kind_of(datagram) != MessageKind::state) return;
-  Wire& wire = wires_[index];
+  Path& path = paths_[index];
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
-  if (!wire.brought_state || newer(t_ms, wire.newest_t)) wire.newest_t = t_ms;
-  wire.brought_state = true;
+  if (!path.brought_state || newer(t_ms, path.newest_t)) path.newest_t = t_ms;
+  path.brought_state = true;
 }
 
 // Of the newest state that the host has.
 void World::check_age(int index) {
-  const Wire& wire = wires_[index];
+  const Path& path = paths_[index];
   const ReceivedState& state = hosts_.front()->session->state();
-  if (!state.any()) return violate("wires: no state beside a good wire");
-  if (wire.brought_state && newer(wire.newest_t, state.t_ms)) {
-    return violate(fmt::format("wires: the newest state is {} ms older than what wire {} brought",
-                               wire.newest_t - state.t_ms, index));
+  if (!state.any()) return violate("paths: no state beside a good path");
+  if (path.brought_state && newer(path.newest_t, state.t_ms)) {
+    return violate(fmt::format("paths: the newest state is {} ms older than what path {} brought",
+                               path.newest_t - state.t_ms, index));
   }
   const ChannelFaults& faults = schedule_.faults(index, false);
   const std::uint32_t limit_us = 2 * schedule_.settings.state_period_ms() * 1000U +
@@ -253,7 +253,7 @@ void World::check_age(int index) {
                                  5'000;
   const std::uint32_t age_ms = board_ms() - state.t_ms;
   if (age_ms > limit_us / 1000) {
-    violate(fmt::format("wires: the newest state is {} ms old beside good wire {}", age_ms, index));
+    violate(fmt::format("paths: the newest state is {} ms old beside good path {}", age_ms, index));
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host session over several wires opposite real boards in virtual time, in steps of a millisecond: each wire has its
+// A host session over several paths opposite real boards in virtual time, in steps of a millisecond: each path has its
 // own delay, and can be cut, told or untold, in one direction or both.
 #pragma once
 
@@ -17,7 +17,7 @@
 
 namespace r4::test {
 
-class WiredRobot final : private Session::Handler {
+class RobotOnPaths final : private Session::Handler {
  public:
   struct Cable {
     Cable(std::uint32_t its_lag_ms, std::size_t its_board = 0)
@@ -32,12 +32,12 @@ class WiredRobot final : private Session::Handler {
 
   using Cables = std::vector<Cable>;
 
-  explicit WiredRobot(Cables its_cables, SessionOptions options = at_will(),
+  explicit RobotOnPaths(Cables its_cables, SessionOptions options = at_will(),
                       BoardRole role = BoardRole::control, Settings settings = {});
-  ~WiredRobot();
+  ~RobotOnPaths();
   static SessionOptions at_will();
 
-  // The transports of all wires come up, and the link has half a second.
+  // The transports of all paths come up, and the link has half a second.
   void connect();
   void run(std::uint32_t ms);
   // The host's computer sleeps: its clock stands still, and what comes meanwhile is lost. When it
@@ -46,13 +46,13 @@ class WiredRobot final : private Session::Handler {
   // The same of a virtual machine that is paused: no clock tells.
   void pause(std::uint32_t ms);
   // Untold: as a cable that is cut somewhere in a network.
-  void cut(std::size_t wire, bool is_cut = true);
+  void cut(std::size_t path, bool is_cut = true);
   // The transport tells: unplugged.
-  void plug(std::size_t wire, bool in);
+  void plug(std::size_t path, bool in);
   // It begins again, with another clock.
   void reboot(std::size_t board, std::uint32_t t_ms = 50);
-  // Hands a datagram to the host, as if that wire had brought it.
-  void bring(std::size_t wire, std::string_view bytes);
+  // Hands a datagram to the host, as if that path had brought it.
+  void bring(std::size_t path, std::string_view bytes);
   // Waits for the end of what was asked for.
   CommandResult finish(Ticket ticket, std::uint32_t most_ms = 2000);
   CommandResult drive(int pwm) {
@@ -86,13 +86,13 @@ class WiredRobot final : private Session::Handler {
   struct Board;
   struct Packet {
     std::int64_t at_ms;
-    std::size_t wire;
+    std::size_t path;
     bool to_board;
     std::string bytes;
   };
-  void put(std::size_t wire, bool to_board, std::string_view bytes);
+  void put(std::size_t path, bool to_board, std::string_view bytes);
 
-  SendResult transmit(std::size_t wire, std::string_view bytes, Priority priority) override;
+  SendResult transmit(std::size_t path, std::string_view bytes, Priority priority) override;
   void on_state(const ReceivedState& state, const Datagram&) override;
   void on_board_heartbeat(const Datagram&) override { ++heartbeats; }
   void on_identity(const Identity&) override {}

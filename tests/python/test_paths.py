@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Boards of several wires: one of them is pulled and plugged in again while a program drives."""
+"""Boards of several paths: one of them is pulled and plugged in again while a program drives."""
 import asyncio
 import json
 import os
@@ -14,7 +14,7 @@ import r4link
 from machine import within
 from r4link import aio
 
-RELAY = pathlib.Path(__file__).resolve().parents[1] / 'support' / 'wire_relay.py'
+RELAY = pathlib.Path(__file__).resolve().parents[1] / 'support' / 'relay.py'
 LONGEST_GAP_S = 0.1  # states come every 10 ms
 
 
@@ -36,9 +36,9 @@ class Pty:
         self.process.stdout.close()
 
 
-@pytest.fixture(name='wires')
+@pytest.fixture(name='paths')
 def udp_and_pty(tmp_path):
-    """The URLs of a board's two wires, and the cable of the second."""
+    """The URLs of a board's two paths, and the cable of the second."""
     cable = Pty(tmp_path)
     with subprocess.Popen([os.environ['R4'], 'sim', 'udp://127.0.0.1:0', f'pty:{tmp_path}/board', '--json'],
                           stdout=subprocess.PIPE, text=True) as sim:
@@ -53,14 +53,14 @@ def udp_and_pty(tmp_path):
 
 
 def states_of(board):
-    return [wire.state for wire in board.wires]
+    return [path.state for path in board.paths]
 
 
-def test_one_is_pulled_and_plugged_in_again_while_the_program_drives(wires, wait):
-    urls, cable = wires
+def test_one_is_pulled_and_plugged_in_again_while_the_program_drives(paths, wait):
+    urls, cable = paths
     told, links = [], []
     with r4link.Board(urls) as board:
-        board.on_wire(lambda wire: told.append((wire.state, time.monotonic())))
+        board.on_path(lambda path: told.append((path.state, time.monotonic())))
         board.wait_active()
         wait(lambda: states_of(board) == ['carrying', 'carrying'])
         board.arm()
@@ -84,8 +84,8 @@ def test_one_is_pulled_and_plugged_in_again_while_the_program_drives(wires, wait
         cable.plug_in()
         drive(lambda: told[-1][0] == 'carrying')
         back = told[-1][1] - plugged
-        drive(lambda: board.wires[1].copies + board.wires[0].copies > 20)
-        statistics, first = board.statistics, board.wires[0]
+        drive(lambda: board.paths[1].copies + board.paths[0].copies > 20)
+        statistics, first = board.statistics, board.paths[0]
     gap = max(later - earlier for earlier, later in zip(ages, ages[1:]))
     print(f'longest gap {gap * 1e3:.0f} ms, told of the loss after {lost * 1e3:.0f} ms, used again after '
           f'{back * 1e3:.0f} ms')
@@ -95,29 +95,29 @@ def test_one_is_pulled_and_plugged_in_again_while_the_program_drives(wires, wait
     assert first.loss == 0 and first.round_trip_us > 0 and first.board_id == 'sim-1' and first.as_dict()['busy'] is False
 
 
-def test_asyncio_has_them_too_and_a_text_joins_them(wires):
-    urls, cable = wires
+def test_asyncio_has_them_too_and_a_text_joins_them(paths):
+    urls, cable = paths
 
     async def main():
         async with aio.Board('+'.join(urls)) as board:
             lost = asyncio.Event()
             await board.wait_active()
-            board.on_wire(lambda wire: wire.state == 'down' and lost.set())
+            board.on_path(lambda path: path.state == 'down' and lost.set())
             await board.arm()
             cable.pull()
             await asyncio.wait_for(lost.wait(), 10)
             await board.servo(2).set(1500)
-            assert len(board.wires) == 2 and board.wires[0].state == 'carrying'
+            assert len(board.paths) == 2 and board.paths[0].state == 'carrying'
             cable.plug_in()
     asyncio.run(main())
 
 
-def test_a_fleet_has_boards_of_several(wires):
-    urls, _ = wires
+def test_a_fleet_has_boards_of_several(paths):
+    urls, _ = paths
     with r4link.Fleet('+'.join(urls)) as fleet:
         fleet.wait_active()
         [health] = fleet.health()
-        assert health.url == '+'.join(urls) and len(health.wires) == 2 and health.well
+        assert health.url == '+'.join(urls) and len(health.paths) == 2 and health.well
 
 
 def test_what_cannot_be_is_refused(sim):
@@ -125,7 +125,7 @@ def test_what_cannot_be_is_refused(sim):
         r4link.Board([sim.url, 'udp://127.0.0.1'])
     with pytest.raises(r4link.UsageError, match='one to 4 are possible'):
         r4link.Board([f'udp://127.0.0.{i}' for i in range(1, 6)])
-    with pytest.raises(r4link.UsageError, match='a board of one wire'):
+    with pytest.raises(r4link.UsageError, match='a board of one path'):
         r4link.Board([r4link.with_link('udp://127.0.0.1', 'loss=5%'), 'serial:auto'])
     with pytest.raises(r4link.UsageError):
         r4link.Board([])

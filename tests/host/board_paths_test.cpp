@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Board and r4::AsyncBoard over several wires, in real time: a board on UDP and a pty, and on carriers in memory
+// r4::Board and r4::AsyncBoard over several paths, in real time: a board on UDP and a pty, and on carriers in memory
 // that are cut.
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -40,28 +40,28 @@ bool comes_true(Board& board, Done done) {
   return true;
 }
 
-TEST(BoardWires, ABoardOnUdpAndAPtyIsOneBoard) {
+TEST(BoardPaths, ABoardOnUdpAndAPtyIsOneBoard) {
   BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
   Board board(simulated.urls(), at_will());
   board.wait_active();
   EXPECT_TRUE(comes_true(board, [&] { return board.link().carrying == 3; }));
   for (int i = 0; i < 20; ++i) board.osmc(1).set(100 + i, Direction::forward);
   EXPECT_EQ(simulated.executed().back(), "O:119,1,1");
-  const std::vector<Wire> wires = board.wires();
-  ASSERT_EQ(wires.size(), 2U);
-  EXPECT_EQ(wires[0].board_id, "test-board");
-  EXPECT_TRUE(contains(wires[0].name, "udp://127.0.0.1:"));
-  EXPECT_TRUE(contains(wires[1].name, "serial:///dev/pts/"));
-  EXPECT_EQ(wires[1].state, WireState::carrying);
-  EXPECT_GT(wires[1].round_trip_us, 0);
-  EXPECT_TRUE(contains(board.name(), wires[0].name + " " + wires[1].name));
+  const std::vector<PathStatus> paths = board.paths();
+  ASSERT_EQ(paths.size(), 2U);
+  EXPECT_EQ(paths[0].board_id, "test-board");
+  EXPECT_TRUE(contains(paths[0].name, "udp://127.0.0.1:"));
+  EXPECT_TRUE(contains(paths[1].name, "serial:///dev/pts/"));
+  EXPECT_EQ(paths[1].state, PathState::carrying);
+  EXPECT_GT(paths[1].round_trip_us, 0);
+  EXPECT_TRUE(contains(board.name(), paths[0].name + " " + paths[1].name));
   for (int i = 0; i < 30; ++i) board.next_state();
   EXPECT_GT(board.statistics().copies, 10U);
   board.stop();
   EXPECT_EQ(board.link().reason, SafeReason::stop);
 }
 
-TEST(BoardWires, ThatTheyLeadToTwoBoardsIsSaidWithBothNames) {
+TEST(BoardPaths, ThatTheyLeadToTwoBoardsIsSaidWithBothNames) {
   BoardInAThread left(std::vector<std::string>{"udp"}, "", "left-board");
   BoardInAThread right(std::vector<std::string>{"pty"}, "", "right-board");
   Board board({left.url(), right.url()}, at_will());
@@ -74,7 +74,7 @@ TEST(BoardWires, ThatTheyLeadToTwoBoardsIsSaidWithBothNames) {
   EXPECT_TRUE(right.executed().empty());
 }
 
-TEST(BoardWires, WhatCannotBeWiresIsRefused) {
+TEST(BoardPaths, WhatCannotBePathsIsRefused) {
   asio::io_context io;
   const auto refusal = [&](const std::vector<std::string>& urls) {
     const Problem problem = problem_of([&] { AsyncBoard board(io, urls); });
@@ -88,15 +88,15 @@ TEST(BoardWires, WhatCannotBeWiresIsRefused) {
   EXPECT_TRUE(contains(refusal({"sim:", "udp://r4.local"}), "of its own"));
   EXPECT_TRUE(contains(refusal({"serial:auto", "sim:"}), "of its own"));
   EXPECT_TRUE(contains(refusal({"udp://r4.local", "tcp://r4.local"}), "no transport"));
-  EXPECT_TRUE(contains(refusal({}), "0 wires"));
+  EXPECT_TRUE(contains(refusal({}), "0 paths"));
   EXPECT_TRUE(
-      contains(refusal({"udp://a", "udp://b", "udp://c", "udp://d", "udp://e"}), "5 wires"));
+      contains(refusal({"udp://a", "udp://b", "udp://c", "udp://d", "udp://e"}), "5 paths"));
   AsyncBoard(io, {"can://can0", "can://can1", "can://can1?node=2", "udp://10.0.0.1"});
 }
 
-TEST(BoardWires, OneThatCannotBeOpenedYetIsTriedAgain) {
+TEST(BoardPaths, OneThatCannotBeOpenedYetIsTriedAgain) {
   const std::string link =
-      (std::filesystem::temp_directory_path() / ("r4-wire-" + std::to_string(getpid()))).string();
+      (std::filesystem::temp_directory_path() / ("r4-path-" + std::to_string(getpid()))).string();
   BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
   EXPECT_EQ(problem_of([&] {
               Board({"serial://" + link, "serial://" + link + "2"});
@@ -109,7 +109,7 @@ TEST(BoardWires, OneThatCannotBeOpenedYetIsTriedAgain) {
   };
   Board board({simulated.urls()[0], "serial://" + link}, at_will(), callbacks);
   board.wait_active();
-  EXPECT_EQ(board.wires()[1].state, WireState::down);
+  EXPECT_EQ(board.paths()[1].state, PathState::down);
   EXPECT_TRUE(comes_true(board, [&] { return told == 1; }));
   std::filesystem::create_symlink(simulated.urls()[1].substr(9), link);
   EXPECT_TRUE(comes_true(board, [&] { return board.link().carrying == 3; }));
@@ -117,7 +117,7 @@ TEST(BoardWires, OneThatCannotBeOpenedYetIsTriedAgain) {
 }
 
 // As where a second device is plugged in that "serial:auto" cannot tell from the board: a fault in what is asked for.
-TEST(BoardWires, OneThatTurnsOutToBeNoSuchDeviceLeavesTheOthersAlone) {
+TEST(BoardPaths, OneThatTurnsOutToBeNoSuchDeviceLeavesTheOthersAlone) {
   const std::string link =
       (std::filesystem::temp_directory_path() / ("r4-odd-" + std::to_string(getpid()))).string();
   BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
@@ -170,16 +170,16 @@ class Cuttable final : public Carrier, private Carrier::Handler {
   Carrier::Handler* handler_ = nullptr;
 };
 
-struct BoardWiresInMemory : testing::Test {
+struct BoardPathsInMemory : testing::Test {
   void SetUp() override {
     sim::SimulatedBoard::Options options;
     options.board_id = "in-memory";
     simulated = std::make_unique<sim::SimulatedBoard>(io, std::move(options));
     std::vector<std::unique_ptr<Carrier>> ends;
-    for (Cuttable*& wire : wires) {
+    for (Cuttable*& path : paths) {
       auto [host_end, board_end] = make_memory_pair(io);
       auto cuttable = std::make_unique<Cuttable>(std::move(host_end));
-      wire = cuttable.get();
+      path = cuttable.get();
       ends.push_back(std::move(cuttable));
       simulated->add_carrier(std::move(board_end));
     }
@@ -205,30 +205,30 @@ struct BoardWiresInMemory : testing::Test {
   }
 
   asio::io_context io;
-  Cuttable* wires[2] = {};
+  Cuttable* paths[2] = {};
   std::unique_ptr<sim::SimulatedBoard> simulated;
   std::unique_ptr<AsyncBoard> board;
 };
 
-TEST_F(BoardWiresInMemory, TellWhatBeginsAndCeasesToCarry) {
-  std::vector<Wire> told;
-  const Subscription keep = board->on_wire([&](const Wire& wire) { told.push_back(wire); });
-  wires[0]->plug(false);
+TEST_F(BoardPathsInMemory, TellWhatBeginsAndCeasesToCarry) {
+  std::vector<PathStatus> told;
+  const Subscription keep = board->on_path([&](const PathStatus& path) { told.push_back(path); });
+  paths[0]->plug(false);
   ASSERT_EQ(told.size(), 1U) << "at once";
-  EXPECT_EQ(told[0].state, WireState::down);
+  EXPECT_EQ(told[0].state, PathState::down);
   EXPECT_EQ(board->link().state, HostLinkState::active);
-  wires[0]->plug(true);
+  paths[0]->plug(true);
   ASSERT_TRUE(run_until([&] { return told.size() == 2; }));
-  EXPECT_EQ(told[1].state, WireState::carrying);
+  EXPECT_EQ(told[1].state, PathState::carrying);
   const auto cut_at = std::chrono::steady_clock::now();
-  wires[1]->cut = true;
+  paths[1]->cut = true;
   ASSERT_TRUE(run_until([&] { return told.size() == 3; }));
-  EXPECT_EQ(told[2].state, WireState::silent);
+  EXPECT_EQ(told[2].state, PathState::silent);
   EXPECT_LT(std::chrono::steady_clock::now() - cut_at, 1500ms);
   EXPECT_TRUE(board->in_control());
 }
 
-TEST_F(BoardWiresInMemory, CostNoHeapPerDatagram) {
+TEST_F(BoardPathsInMemory, CostNoHeapPerDatagram) {
   run_for(300ms);
   const std::uint64_t before = bench::allocations();
   const std::uint64_t states = board->statistics().states;
@@ -237,9 +237,9 @@ TEST_F(BoardWiresInMemory, CostNoHeapPerDatagram) {
   EXPECT_LE(bench::allocations() - before, 10U) << "of the timer of this test";
 }
 
-TEST_F(BoardWiresInMemory, AreToldApartInARecording) {
+TEST_F(BoardPathsInMemory, AreToldApartInARecording) {
   const std::string path =
-      (std::filesystem::temp_directory_path() / ("r4-wires-" + std::to_string(getpid()) + ".r4"))
+      (std::filesystem::temp_directory_path() / ("r4-paths-" + std::to_string(getpid()) + ".r4"))
           .string();
   {
     Recording recording(path);
@@ -249,9 +249,9 @@ TEST_F(BoardWiresInMemory, AreToldApartInARecording) {
   std::ostringstream text;
   text << std::ifstream(path).rdbuf();
   std::filesystem::remove(path);
-  for (const std::string wire : {" 1", " 2"}) {
-    EXPECT_TRUE(contains(text.str(), wire + "< AIN24:")) << "brought";
-    EXPECT_TRUE(contains(text.str(), wire + "> H:ROS2-R4;")) << "carried";
+  for (const std::string path : {" 1", " 2"}) {
+    EXPECT_TRUE(contains(text.str(), path + "< AIN24:")) << "brought";
+    EXPECT_TRUE(contains(text.str(), path + "> H:ROS2-R4;")) << "carried";
   }
 }
 

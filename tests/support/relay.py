@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A wire between a host and a board, as a process: what is done to it is done to the wire.
+"""A path between a host and a board, as a process: what is done to it is done to the path.
 
-    wire_relay.py udp PORT         from 127.0.0.2, a port of its own, to the board's on 127.0.0.1
-    wire_relay.py pty LINK DEVICE  from a pty that LINK names to the board's
+    relay.py udp PORT         from 127.0.0.2, a port of its own, to the board's on 127.0.0.1
+    relay.py pty LINK DEVICE  from a pty that LINK names to the board's
 
-Killed: unplugged, as the system tells at once of a pty, and of UDP never. Stopped (SIGSTOP): a wire that brings nothing,
+Killed: unplugged, as the system tells at once of a pty, and of UDP never. Stopped (SIGSTOP): a path that brings nothing,
 and, when it goes on, what is old. Prints the URL for a host when it is there.
 """
 import os
@@ -50,4 +50,4 @@ if __name__ == '__main__':
     try:
         {'udp': udp, 'pty': pty}[sys.argv[1]](*sys.argv[2:])
     except OSError as error:
-        sys.exit(f'the wire has no other end any more: {error}')
+        sys.exit(f'the path has no other end any more: {error}')

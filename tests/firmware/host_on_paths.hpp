@@ -10,23 +10,23 @@
 
 namespace r4::test {
 
-class WiredHost {
+class HostOnPaths {
  public:
-  struct Wire {
+  struct Path {
     Source at;
     std::uint32_t lag_ms = 0;
     bool cut = false;
   };
 
-  WiredHost(TestBoard& to, std::vector<Wire> its_wires) : wires(std::move(its_wires)), board_(to) {}
+  HostOnPaths(TestBoard& to, std::vector<Path> its_paths) : paths(std::move(its_paths)), board_(to) {}
 
   // Sends on every path that is not cut; returns the number.
   std::uint32_t send(const std::string& field, std::uint64_t t) {
     const std::uint32_t number = pnum++;
-    for (const Wire& wire : wires) {
-      if (wire.cut) continue;
+    for (const Path& path : paths) {
+      if (path.cut) continue;
       last = with_crc(seal(field + ";" + stamp_of(our_session, number, t)));
-      under_way_.push_back({wire.at, last, board_.now_ms + wire.lag_ms});
+      under_way_.push_back({path.at, last, board_.now_ms + path.lag_ms});
     }
     deliver();
     return number;
@@ -55,13 +55,13 @@ class WiredHost {
   // The newest T that came on a path which is not cut.
   std::uint32_t echo() {
     std::uint32_t newest = 0;
-    for (const Wire& wire : wires) {
-      if (!wire.cut) newest = std::max(newest, board_.newest_t(wire.at.port));
+    for (const Path& path : paths) {
+      if (!path.cut) newest = std::max(newest, board_.newest_t(path.at.port));
     }
     return newest;
   }
 
-  std::vector<Wire> wires;
+  std::vector<Path> paths;
   std::uint32_t pnum = 12345;
   std::string last;  // that was sent
   // What is done to the fields before they are sent: nothing, or they are signed.

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host with several wires to its board that is at work, as a process: it commands all the time, each when the one
-// before it has ended, and tells of every state and of what becomes of its wires. For wired_host.py.
+// A host with several paths to its board that is at work, as a process: it commands all the time, each when the one
+// before it has ended, and tells of every state and of what becomes of its paths. For host_on_paths.py.
 //
-//     wired_host URL...                     ends when its input does
+//     host_on_paths URL...                     ends when its input does
 //
 //     {"type":"state","at":12.345678,"t":…}                       as it was received, by the monotonic clock
 //     {"type":"command","command":"S:1000,1","confirmed":true}
-//     {"type":"wire","at":…,"name":…,"carries":true}
+//     {"type":"path","at":…,"name":…,"carries":true}
 //     {"type":"link","at":…,"active":true}
 #include <poll.h>
 #include <unistd.h>
@@ -49,11 +49,11 @@ void work(const std::vector<std::string>& urls) {
   r4::BoardOptions options;
   options.session.arming = r4::Arming::off;
   r4::BoardCallbacks callbacks;
-  callbacks.on_wire = [](const r4::Wire& wire) {
-    const bool carries = wire.state == r4::WireState::carrying;
-    print({{"type", "wire"},
+  callbacks.on_path = [](const r4::PathStatus& path) {
+    const bool carries = path.state == r4::PathState::carrying;
+    print({{"type", "path"},
            {"at", seconds(Clock::now())},
-           {"name", wire.name},
+           {"name", path.name},
            {"carries", carries}});
   };
   callbacks.on_link = [](const r4::LinkStatus& link) {
@@ -91,7 +91,7 @@ int main(int count, char** arguments) {
   try {
     work({arguments + 1, arguments + count});
   } catch (const r4::Error& error) {
-    std::fprintf(stderr, "wired_host: %s\n", error.what());
+    std::fprintf(stderr, "host_on_paths: %s\n", error.what());
     return 1;
   }
 }

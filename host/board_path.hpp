@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One wire of a board: its transport, under the number by which the session knows it, and what of it goes into a
+// One path of a board: its transport, under the number by which the session knows it, and what of it goes into a
 // recording.
 #pragma once
 
@@ -15,20 +15,20 @@
 
 namespace r4 {
 
-class BoardWire final : public Carrier::Handler {
+class BoardPath final : public Carrier::Handler {
  public:
   class Owner {
    public:
-    virtual void on_datagram(BoardWire& wire, std::string_view bytes) = 0;
+    virtual void on_datagram(BoardPath& path, std::string_view bytes) = 0;
     virtual void on_drained() = 0;
-    virtual void on_carrier_event(BoardWire& wire, const CarrierEvent& event) = 0;
-    virtual void on_overheard(BoardWire& wire, std::string_view bytes) = 0;
+    virtual void on_carrier_event(BoardPath& path, const CarrierEvent& event) = 0;
+    virtual void on_overheard(BoardPath& path, std::string_view bytes) = 0;
 
    protected:
     ~Owner() = default;
   };
 
-  BoardWire(Owner& owner, std::size_t number, std::unique_ptr<Carrier> transport)
+  BoardPath(Owner& owner, std::size_t number, std::unique_ptr<Carrier> transport)
       : index(number), carrier(std::move(transport)), owner_(owner) {}
 
   void on_datagram(std::string_view bytes, Peer) override { owner_.on_datagram(*this, bytes); }

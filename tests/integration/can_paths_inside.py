@@ -12,7 +12,7 @@ import time
 from can_inside import PATIENTLY
 from r4_process import Board, Running, is_state, monitor, run, send
 from slcan_bus import SlcanBus
-from wired_host import WiredHost, Wire, has_joined, has_left
+from host_on_paths import HostOnPaths, Relay, has_joined, has_left
 
 BUSES = ('vcan8', 'vcan9')
 URLS = [f'can://{bus}?node=3' for bus in BUSES]
@@ -51,25 +51,25 @@ def two_buses():
         yield
 
 
-def of_wire(bus, carries):
-    return lambda each: (each['type'] == 'wire' and bus in each['fields']['name'] and
+def of_path(bus, carries):
+    return lambda each: (each['type'] == 'path' and bus in each['fields']['name'] and
                          (each['fields']['state'] == 'carrying') == carries)
 
 
 def test_either_of_two_buses_is_switched_off_and_nothing_is_missed():
     with two_buses(), Board(*URLS, options=PATIENTLY) as board, monitor('+'.join(URLS)) as host:
         for bus in BUSES:
-            if not any(of_wire(bus, True)(each) for each in host.log):
-                host.next(of_wire(bus, True))
+            if not any(of_path(bus, True)(each) for each in host.log):
+                host.next(of_path(bus, True))
         board.next(has_joined(2))
         began = host.next(is_state)['came']
         for bus in BUSES:
             down = time.monotonic()
             switch(bus, up=False)
-            lost = host.next(of_wire(bus, False))['came'] - down
+            lost = host.next(of_path(bus, False))['came'] - down
             up = time.monotonic()
             switch(bus, up=True)
-            back = host.next(of_wire(bus, True))['came'] - up
+            back = host.next(of_path(bus, True))['came'] - up
             board.next(has_joined(2))
             print(f'{bus}: told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
         for _ in range(20):
@@ -110,12 +110,12 @@ def test_a_stop_by_either_bus_is_enough():
 
 
 def test_a_cable_beside_a_bus(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('wires')
+    folder = tmp_path_factory.mktemp('paths')
     with one_bus('vcan8') as bus, \
             Board(f'pty:{folder}/board', f'can://{bus}?node=3', options=PATIENTLY) as board:
-        cable = Wire('pty', f'{folder}/host', f'{folder}/board')
+        cable = Relay('pty', f'{folder}/host', f'{folder}/board')
         try:
-            with WiredHost([cable.url, f'can://{bus}?node=3'], ['/host', bus]) as host:
+            with HostOnPaths([cable.url, f'can://{bus}?node=3'], ['/host', bus]) as host:
                 board.next(has_joined(2))
                 for place, away, back in (('/host', cable.pull, cable.plug_in),
                                           (bus, lambda: switch(bus, up=False), lambda: switch(bus, up=True))):
@@ -138,7 +138,7 @@ def test_two_buses_of_which_one_breaks_at_either_end():
     boards, hosts = (('can0', 'slcan0'), ('can1', 'slcan1'))
     with SlcanBus(2, 500000) as bus, \
             Board(*(f'can://{each}?node=3' for each in boards), options=PATIENTLY) as board, \
-            WiredHost([f'can://{each}?node=3' for each in hosts], [f'//{each}?' for each in hosts]) as host:
+            HostOnPaths([f'can://{each}?node=3' for each in hosts], [f'//{each}?' for each in hosts]) as host:
         board.next(has_joined(2))
 
         def spoil(node):

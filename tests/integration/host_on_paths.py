@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One session over several wires that drives all the time (wired_host.cpp): what it misses while they come and go."""
+"""One session over several paths that drives all the time (host_on_paths.cpp): what it misses while they come and go."""
 import pathlib
 import subprocess
 import sys
@@ -8,16 +8,16 @@ import time
 from machine import within
 from r4_process import R4, Running
 
-PROGRAM = pathlib.Path(R4).parent / 'tests' / 'wired_host'
-RELAY = pathlib.Path(__file__).resolve().parents[1] / 'support' / 'wire_relay.py'
+PROGRAM = pathlib.Path(R4).parent / 'tests' / 'host_on_paths'
+RELAY = pathlib.Path(__file__).resolve().parents[1] / 'support' / 'relay.py'
 REPORTED_WITHIN_S = 0.05  # where the system tells
 TIMEOUT_S = 1  # where it does not
 BACK_WITHIN_S = 1
 LONGEST_GAP_S = 0.1  # states come every 10 ms
 
 
-class Wire:
-    """A wire of its own to a board; `url` is its host's end."""
+class Relay:
+    """A path of its own to a board; `url` is its host's end."""
 
     def __init__(self, kind, *where):
         self.kind, self.where = kind, where
@@ -38,14 +38,14 @@ class Wire:
         self.process.send_signal(number)
 
 
-class WiredHost(Running):
-    """`places`: what the name of each wire has, in the order of the URLs."""
+class HostOnPaths(Running):
+    """`places`: what the name of each path has, in the order of the URLs."""
 
     def __init__(self, urls, places, **process):
         super().__init__(*urls, program=PROGRAM, stdin=subprocess.PIPE, **process)
         for place in places:
-            if not any(is_wire(place)(each) for each in self.log):
-                self.next(is_wire(place))
+            if not any(is_path(place)(each) for each in self.log):
+                self.next(is_path(place))
         self.next(is_command)
         self.began = time.monotonic()
         self.told = []
@@ -64,7 +64,7 @@ class WiredHost(Running):
     def _tells(self, place, carries, action, within_s):
         began = time.monotonic()
         at = action() or began
-        took = self.next(is_wire(place, carries))['at'] - at
+        took = self.next(is_path(place, carries))['at'] - at
         assert took <= within(within_s), f'{place}: told after {took:.3f} s'
         self.told.append(f'{place} {"used again" if carries else "told of"} after {took * 1e3:.0f} ms')
 
@@ -109,15 +109,15 @@ def is_command(each):
     return each['type'] == 'command'
 
 
-def is_wire(place, carries=True):
-    return lambda each: each['type'] == 'wire' and place in each['name'] and each['carries'] == carries
+def is_path(place, carries=True):
+    return lambda each: each['type'] == 'path' and place in each['name'] and each['carries'] == carries
 
 
-def has_joined(wires, event='joined'):
-    """Of a board: it has so many wires to its host, with one that it did not have."""
-    return lambda each: each.get('path', {}).get('event') == event and each['path']['paths'] == wires
+def has_joined(paths, event='joined'):
+    """Of a board: it has so many paths to its host, with one that it did not have."""
+    return lambda each: each.get('path', {}).get('event') == event and each['path']['paths'] == paths
 
 
-def has_left(wires):
+def has_left(paths):
     """It has so many, without one that it had."""
-    return has_joined(wires, 'left')
+    return has_joined(paths, 'left')

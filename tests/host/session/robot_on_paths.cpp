@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "wired_robot.hpp"
+#include "robot_on_paths.hpp"
 
 #include <algorithm>
 #include <iterator>
@@ -7,26 +7,26 @@
 
 namespace r4::test {
 
-struct WiredRobot::Board final : firmware::Hal, firmware::Observer {
+struct RobotOnPaths::Board final : firmware::Hal, firmware::Observer {
   struct End final : firmware::Port {
-    End(WiredRobot& r, std::size_t b, std::size_t w) : robot(r), board(b), wire(w) {}
+    End(RobotOnPaths& r, std::size_t b, std::size_t w) : robot(r), board(b), path(w) {}
     void send(Text bytes, Priority, Peer) override {
-      if (robot.cables[wire].board == board) robot.put(wire, false, {bytes.data(), bytes.size()});
+      if (robot.cables[path].board == board) robot.put(path, false, {bytes.data(), bytes.size()});
     }
     std::size_t max_size() const override { return max_datagram; }
     bool reaches(Peer) const override { return true; }
     bool may_configure() const override { return true; }
 
-    WiredRobot& robot;
+    RobotOnPaths& robot;
     const std::size_t board;
-    const std::size_t wire;
+    const std::size_t path;
     std::uint8_t number = 0;
   };
 
   // A cable may be plugged into another board: each has a port for each.
-  Board(WiredRobot& r, std::size_t i) : robot(r), name("board-" + std::to_string(i)) {
-    for (std::size_t wire = 0; wire < robot.cables.size(); ++wire) {
-      ends.push_back(std::make_unique<End>(robot, i, wire));
+  Board(RobotOnPaths& r, std::size_t i) : robot(r), name("board-" + std::to_string(i)) {
+    for (std::size_t path = 0; path < robot.cables.size(); ++path) {
+      ends.push_back(std::make_unique<End>(robot, i, path));
     }
   }
   void boot(std::uint32_t t_ms) {
@@ -58,7 +58,7 @@ struct WiredRobot::Board final : firmware::Hal, firmware::Observer {
   void on_refused(std::uint32_t, std::uint32_t, Refusal) override {}
   void on_rejected(std::uint32_t, Verdict) override {}
 
-  WiredRobot& robot;
+  RobotOnPaths& robot;
   const std::string name;
   std::vector<std::unique_ptr<End>> ends;
   std::unique_ptr<firmware::Application> application;
@@ -67,20 +67,20 @@ struct WiredRobot::Board final : firmware::Hal, firmware::Observer {
   std::map<std::uint32_t, int> executed;
 };
 
-std::vector<std::string> WiredRobot::Cable::all(char letter) const {
+std::vector<std::string> RobotOnPaths::Cable::all(char letter) const {
   std::vector<std::string> found;
   std::copy_if(sent.begin(), sent.end(), std::back_inserter(found),
                [letter](const std::string& each) { return each.front() == letter; });
   return found;
 }
 
-SessionOptions WiredRobot::at_will() {
+SessionOptions RobotOnPaths::at_will() {
   SessionOptions options;
   options.arming = Arming::off;
   return options;
 }
 
-WiredRobot::WiredRobot(Cables its_cables, SessionOptions options, BoardRole role, Settings settings)
+RobotOnPaths::RobotOnPaths(Cables its_cables, SessionOptions options, BoardRole role, Settings settings)
     : cables(std::move(its_cables)), settings_(std::move(settings)), up_(cables.size()) {
   std::size_t last = 0;
   for (const Cable& cable : cables) last = std::max(last, cable.board);
@@ -92,62 +92,62 @@ WiredRobot::WiredRobot(Cables its_cables, SessionOptions options, BoardRole role
   session = std::make_unique<Session>(handler, std::move(options), role, cables.size(),
                                       [n = 99ULL]() mutable { return ++n; });
 }
-WiredRobot::~WiredRobot() = default;
+RobotOnPaths::~RobotOnPaths() = default;
 
-firmware::Application& WiredRobot::board(std::size_t index) { return *boards_[index]->application; }
-const std::map<std::uint32_t, int>& WiredRobot::executed(std::size_t board) const {
+firmware::Application& RobotOnPaths::board(std::size_t index) { return *boards_[index]->application; }
+const std::map<std::uint32_t, int>& RobotOnPaths::executed(std::size_t board) const {
   return boards_[board]->executed;
 }
 
-void WiredRobot::connect() {
-  for (std::size_t wire = 0; wire < cables.size(); ++wire) plug(wire, true);
+void RobotOnPaths::connect() {
+  for (std::size_t path = 0; path < cables.size(); ++path) plug(path, true);
   run(500);
 }
 
-void WiredRobot::cut(std::size_t wire, bool is_cut) {
-  cables[wire].cut_to_board = cables[wire].cut_to_host = is_cut;
+void RobotOnPaths::cut(std::size_t path, bool is_cut) {
+  cables[path].cut_to_board = cables[path].cut_to_host = is_cut;
 }
 
-void WiredRobot::plug(std::size_t wire, bool in) {
-  up_[wire] = in;
-  if (!in) std::erase_if(packets_, [wire](const Packet& each) { return each.wire == wire; });
-  session->on_transport(wire, in, now(), !cables[wire].listens);
+void RobotOnPaths::plug(std::size_t path, bool in) {
+  up_[path] = in;
+  if (!in) std::erase_if(packets_, [path](const Packet& each) { return each.path == path; });
+  session->on_transport(path, in, now(), !cables[path].listens);
   session->poll(now());
-  Board& at = *boards_[cables[wire].board];
+  Board& at = *boards_[cables[path].board];
   for (const auto& end : at.ends) {
-    if (end->wire == wire && !in) at.application->port_down(end->number, at.now());
+    if (end->path == path && !in) at.application->port_down(end->number, at.now());
   }
 }
 
-void WiredRobot::reboot(std::size_t board, std::uint32_t t_ms) { boards_[board]->boot(t_ms); }
+void RobotOnPaths::reboot(std::size_t board, std::uint32_t t_ms) { boards_[board]->boot(t_ms); }
 
-void WiredRobot::bring(std::size_t wire, std::string_view bytes) {
-  session->receive(wire, bytes, now());
+void RobotOnPaths::bring(std::size_t path, std::string_view bytes) {
+  session->receive(path, bytes, now());
   session->poll(now());
 }
 
-std::uint32_t WiredRobot::board_ms(std::size_t board) const { return boards_[board]->now(); }
+std::uint32_t RobotOnPaths::board_ms(std::size_t board) const { return boards_[board]->now(); }
 
-CommandResult WiredRobot::finish(Ticket ticket, std::uint32_t most_ms) {
+CommandResult RobotOnPaths::finish(Ticket ticket, std::uint32_t most_ms) {
   for (; most_ms != 0 && results.find(ticket) == results.end(); --most_ms) run(1);
   const auto found = results.find(ticket);
   return found == results.end() ? CommandResult{Outcome::none} : found->second;
 }
 
-void WiredRobot::run(std::uint32_t ms) {
+void RobotOnPaths::run(std::uint32_t ms) {
   for (; ms != 0; --ms) pass(false);
 }
 
-void WiredRobot::sleep(std::uint32_t ms) {
+void RobotOnPaths::sleep(std::uint32_t ms) {
   pause(ms);
   session->on_sleep(now());
 }
 
-void WiredRobot::pause(std::uint32_t ms) {
+void RobotOnPaths::pause(std::uint32_t ms) {
   for (; ms != 0; --ms) pass(true);
 }
 
-void WiredRobot::pass(bool asleep) {
+void RobotOnPaths::pass(bool asleep) {
   ++now_ms_;
   if (asleep) ++slept_ms_;
   for (std::size_t n = packets_.size(); n != 0; --n) {
@@ -156,35 +156,35 @@ void WiredRobot::pass(bool asleep) {
     if (packet.at_ms > now_ms_) {
       packets_.push_back(std::move(packet));
     } else if (packet.to_board) {
-      Board& at = *boards_[cables[packet.wire].board];
+      Board& at = *boards_[cables[packet.path].board];
       for (const auto& end : at.ends) {
-        if (end->wire != packet.wire) continue;
+        if (end->path != packet.path) continue;
         at.application->receive(end->number, 1, Text(packet.bytes.data(), packet.bytes.size()),
                                 at.now());
       }
     } else if (!asleep) {
-      session->receive(packet.wire, packet.bytes, now());
+      session->receive(packet.path, packet.bytes, now());
     }
   }
   for (const auto& each : boards_) each->application->poll(each->now());
   if (!asleep) session->poll(now());
 }
 
-void WiredRobot::put(std::size_t wire, bool to_board, std::string_view bytes) {
-  const Cable& cable = cables[wire];
-  if (!up_[wire] || (to_board ? cable.cut_to_board : cable.cut_to_host)) return;
-  packets_.push_back({now_ms_ + cable.lag_ms, wire, to_board, std::string(bytes)});
+void RobotOnPaths::put(std::size_t path, bool to_board, std::string_view bytes) {
+  const Cable& cable = cables[path];
+  if (!up_[path] || (to_board ? cable.cut_to_board : cable.cut_to_host)) return;
+  packets_.push_back({now_ms_ + cable.lag_ms, path, to_board, std::string(bytes)});
 }
 
-SendResult WiredRobot::transmit(std::size_t wire, std::string_view bytes, Priority priority) {
-  if (!up_[wire]) return SendResult::down;
-  if (cables[wire].listens && priority != Priority::lease) return SendResult::down;
-  if (keeps_states) cables[wire].sent.emplace_back(bytes);
-  put(wire, true, bytes);
+SendResult RobotOnPaths::transmit(std::size_t path, std::string_view bytes, Priority priority) {
+  if (!up_[path]) return SendResult::down;
+  if (cables[path].listens && priority != Priority::lease) return SendResult::down;
+  if (keeps_states) cables[path].sent.emplace_back(bytes);
+  put(path, true, bytes);
   return SendResult::sent;
 }
 
-void WiredRobot::on_state(const ReceivedState& state, const Datagram&) {
+void RobotOnPaths::on_state(const ReceivedState& state, const Datagram&) {
   if (keeps_states) states.push_back(state);
   went_back = went_back || (told_states != 0 && newer(last_t_ms_, state.t_ms));
   if (told_states != 0) longest_gap_ms = std::max(longest_gap_ms, now_ms_ - last_state_ms_);

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What commands tell of boards to which several paths lead.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <utility>
+#include <vector>
+
+#include "json.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/error.hpp"
+#include "r4link/link.hpp"
+
+namespace r4::tool {
+
+// Do the URLs that were given as paths to one board lead to two, so that nothing began?
+inline bool leads_to_two_boards(const LinkStatus& link) {
+  return link.two_boards && !is_heard(link.state);
+}
+
+// Throws Error{refused} that names both.
+inline void require_one_board(const AsyncBoard& board) {
+  if (leads_to_two_boards(board.link())) throw Error(explain(board.paths()));
+}
+
+// {"name":…,"state":"carrying","busy":…,"board_id":…,"received":…,"lost":…,"loss":…,"copies":…,"round_trip_ms":…,
+//  "age_ms":…}; the last two null where nothing is known.
+inline Json path_json(const PathStatus& path) {
+  const auto milliseconds = [](double us) { return us > 0 ? Json(us / 1e3) : Json(); };
+  return {{"name", path.name},
+          {"state", to_text(path.state)},
+          {"busy", path.busy},
+          {"board_id", path.board_id},
+          {"received", path.packets.received},
+          {"lost", path.packets.lost},
+          {"loss", path.loss()},
+          {"copies", path.copies},
+          {"round_trip_ms", milliseconds(path.round_trip_us)},
+          {"age_ms", milliseconds(path.age_us)}};
+}
+
+// Calls `report` when a path begins to carry, or ceases to. The link reports as much of a board's only path.
+template <class Board, class Report>
+void on_paths(Board& board, Report report) {
+  if (board.paths().size() > 1) board.on_path(std::move(report));
+}
+
+// All paths. Null for the only path, of which the link reports as much.
+inline Json paths_json(const AsyncBoard& board) {
+  const std::vector<PathStatus> paths = board.paths();
+  if (paths.size() < 2) return nullptr;
+  Json all = Json::array();
+  for (const PathStatus& path : paths) all.push_back(path_json(path));
+  return all;
+}
+
+// Of several: those that are not there, of which a command that was carried by another one would say nothing.
+inline void tell_paths_down(const std::vector<PathStatus>& paths, bool json) {
+  for (const PathStatus& path : paths) {
+    if (paths.size() < 2 || path.state != PathState::down) continue;
+    if (json) {
+      Json line = path_json(path);
+      line["type"] = "path";
+      print_line(line);
+    } else {
+      print_trouble(fmt::format("r4: {} is down, so that nothing went by it", path.name));
+    }
+  }
+}
+
+}  // namespace r4::tool
