@@ -218,7 +218,7 @@ PostResult AsyncBoard::post(const Command& command) {
   impl.give_up_slot(command);
   PostResult result = PostResult::no_link;
   impl.enter(Completion::How::post, [&] {
-    if (impl.is_open()) result = impl.session.post(command, impl.now);
+    if (impl.is_open()) result = impl.post(command);
   });
   return result;
 }
@@ -227,7 +227,7 @@ PostResult AsyncBoard::post(const Setpoints& setpoints) {
   Impl& impl = *impl_;
   PostResult result = PostResult::no_link;
   impl.enter(Completion::How::post, [&] {
-    if (impl.is_open()) result = impl.session.post(setpoints, impl.now);
+    if (impl.is_open()) result = impl.post(setpoints);
   });
   return result;
 }

@@ -34,7 +34,7 @@ AsyncBoard::Impl::Impl(asio::io_context& context, std::vector<std::unique_ptr<Ca
     : io(context),
       heartbeat_ms(options.session.timing.heartbeat_ms),
       board_timeout(std::chrono::milliseconds(options.session.timing.timeout_ms)),
-      session(*this, with_clock(std::move(options.session), steady_now()), options.role,
+      session(with_clock(std::move(options.session), steady_now()), options.role,
               transports.size()),
       timer(context),
       reopening(context) {
@@ -52,6 +52,7 @@ Time AsyncBoard::Impl::time_of(Duration timeout) {
 // By how much what was due is late; 0 inside another entry.
 Time AsyncBoard::Impl::begin_entry(Completion::How way) {
   if (depth == 0) how = way;
+  session.on_trouble(trouble());
   const Time before = std::exchange(now, steady_now());
   if (now - before > held_up) in_backlog = true;
   return has_link() && depth == 0 ? now - due : Time{0};
@@ -90,6 +91,7 @@ void AsyncBoard::Impl::tell_that_it_was_held_up(Time late) {
 void AsyncBoard::Impl::settle() {
   const Inside inside(depth);
   for (;;) {
+    tell_news();
     // Handlers that are dispatched may start commands, whose ends are appended.
     while (!ended.empty()) {
       Ended first = std::move(ended.front());
@@ -98,8 +100,10 @@ void AsyncBoard::Impl::settle() {
     }
     if (poll_wanted && has_link()) {
       poll_wanted = false;
-      due = session.poll(now);
-    } else if (!end_waits()) {
+      session.poll(now);
+      send_all();
+      due = session.next_poll(now);
+    } else if (!end_waits() && !session.effects().any_news()) {
       break;
     }
   }
@@ -197,7 +201,7 @@ void AsyncBoard::Impl::open() {
   phase = Phase::open;
   sleep_watch = SleepWatch();
   due = steady_now();
-  enter(Completion::How::post, [this] { due = session.poll(now); });
+  enter(Completion::How::post, [this] { poll_wanted = true; });
   if (!all) open_again();
 }
 
@@ -273,7 +277,7 @@ void AsyncBoard::Impl::on_timer() {
   armed = false;
   if (waking != 0) --waking;
   enter(Completion::How::dispatch, [this] {
-    due = session.poll(now);
+    poll_wanted = true;
     tell_of_recordings();
   });
   // Twice without a word that the transport is drained: it may be one that never tells.
@@ -290,6 +294,8 @@ void AsyncBoard::Impl::on_datagram(BoardPath& path, std::string_view bytes) {
     session.receive(path.index, bytes, now);
     paths[0]->tap.on_packets(session.packets());
     poll_wanted = true;
+    send_all();
+    tell_news();  // which may be of these bytes
   });
 }
 
@@ -330,99 +336,6 @@ void AsyncBoard::Impl::on_overheard(BoardPath& path, std::string_view bytes) {
     const Text shown = without_secrets(Text(bytes.substr(0, max_datagram)), room.data());
     call(overheard_callbacks, std::string_view(shown.data(), shown.size()));
   });
-}
-
-// --- Session::Handler
-
-// Who only watches says nothing on a bus but stops and leases.
-bool AsyncBoard::Impl::only_listens(std::size_t path) const {
-  return session.board_role() == BoardRole::watch && carrier(path).is_shared();
-}
-
-SendResult AsyncBoard::Impl::transmit(std::size_t path, std::string_view datagram,
-                                      Priority priority) {
-  if (!has_link()) return SendResult::down;
-  const bool may_pass = priority == Priority::stop || priority == Priority::lease;
-  if (only_listens(path) && !may_pass) return SendResult::down;
-  const SendResult result = carrier(path).send(datagram, priority);
-  if (result == SendResult::sent) paths[path]->tap.on_sent(datagram);
-  return result;
-}
-
-// One path that is well is enough.
-TransportTrouble AsyncBoard::Impl::trouble() const {
-  TransportTrouble common = TransportTrouble::none;
-  for (const auto& path : paths) {
-    common = path->carrier->trouble();
-    if (common == TransportTrouble::none) break;
-  }
-  return common;
-}
-
-void AsyncBoard::Impl::on_state(const ReceivedState& state, const Datagram& datagram) {
-  if (!is_open()) return;
-  if (in_backlog) {
-    backlog_size = datagram.bytes().size();
-    std::copy_n(datagram.bytes().data(), backlog_size, backlog.data());
-  } else {
-    call(state_callbacks, state, datagram);
-  }
-}
-
-void AsyncBoard::Impl::on_board_heartbeat(const Datagram& datagram) {
-  if (is_open()) call(heartbeat_callbacks, datagram);
-}
-
-void AsyncBoard::Impl::on_identity(const Identity& fresh) {
-  identity.firmware.assign(fresh.firmware.data(), fresh.firmware.size());
-  identity.board_id.assign(fresh.board_id.data(), fresh.board_id.size());
-  identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
-  identity.name.assign(fresh.name.data(), fresh.name.size());
-  if (paths[0]->tap.attached()) name_in_recording();
-}
-
-void AsyncBoard::Impl::on_nack(const Nack& nack, const Datagram& datagram) {
-  if (is_open()) call(nack_callbacks, nack, datagram);
-}
-
-void AsyncBoard::Impl::on_bad_datagram(const ReadResult& result, std::string_view bytes) {
-  if (is_open()) call(bad_callbacks, result, bytes);
-}
-
-void AsyncBoard::Impl::on_link(const LinkStatus& status) {
-  paths[0]->tap.on_link(status);
-  tell_paths(status);
-  if (!is_open()) return;
-  // As it is by then: the one before may have changed it.
-  link_callbacks.each([&](auto& one) {
-    if (may_tell()) guarded([&] { one(session.link()); });
-  });
-}
-
-void AsyncBoard::Impl::on_restart() {
-  ++boots;
-  backlog_size = 0;  // of the boot before
-  if (is_open()) call(restart_callbacks);
-}
-
-void AsyncBoard::Impl::on_arming(DisarmCause) {
-  if (!is_open()) return;
-  arming_callbacks.each([&](auto& one) {
-    if (may_tell()) guarded([&] { one(session.disarmed_by()); });
-  });
-}
-
-void AsyncBoard::Impl::on_refused(const RefusedPost& refused) {
-  if (is_open()) call(refused_callbacks, refused);
-}
-
-void AsyncBoard::Impl::on_result(Ticket ticket, const CommandResult& result) {
-  const auto found = std::find_if(waiting.begin(), waiting.end(),
-                                  [ticket](const Waiting& w) { return w.ticket == ticket; });
-  if (found == waiting.end()) return;
-  ended.push_back({result, std::move(found->completion)});
-  if (found != waiting.end() - 1) *found = std::move(waiting.back());
-  waiting.pop_back();
 }
 
 }  // namespace r4

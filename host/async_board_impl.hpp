@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What is behind an AsyncBoard: a session, its paths and its timer, and who waits for what.
 //
-// Every call of the session is made inside enter(). The outermost one tells the results and sets the
-// timer afterwards; so no handler runs inside the session, or inside the call that started its command.
+// Every call of the session is made inside enter(), which then sends what the session wants to be sent. The
+// outermost one tells its news and results and sets the timer afterwards.
 #pragma once
 
 #include <array>
@@ -16,7 +16,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "board_path.hpp"
@@ -28,9 +30,7 @@
 namespace r4 {
 
 // Outlives the AsyncBoard where a callback or handler destroys that.
-struct AsyncBoard::Impl final : BoardPath::Owner,
-                                Session::Handler,
-                                std::enable_shared_from_this<AsyncBoard::Impl> {
+struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<AsyncBoard::Impl> {
   // A command under way, and one that has ended. By its id it is cancelled: the ticket of its first step.
   struct Waiting {
     Ticket ticket = 0;
@@ -106,6 +106,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner,
         session.feed(Time{fed.exchange(0, std::memory_order_relaxed)});
       }
       action();
+      send_all();
     }
     if (depth == 0) end_entry(late);
   }
@@ -120,6 +121,8 @@ struct AsyncBoard::Impl final : BoardPath::Owner,
   void end_entry(Time late);
   void on_sleep();
   void tell_that_it_was_held_up(Time late);
+  void send_all();
+  void tell_news();
   void settle();
   bool end_waits();
   void give_up(Waiter& waiter);
@@ -141,6 +144,22 @@ struct AsyncBoard::Impl final : BoardPath::Owner,
         completion.release()->complete({outcome, Refusal::none, Time{0}}, Completion::How::post);
       }
     });
+  }
+  // A command, or a group. One of a board that knows no groups goes as one command after the other, up to the first
+  // that is not sent.
+  template <class What>
+  PostResult post(const What& what) {
+    if constexpr (std::is_same_v<What, Setpoints>) {
+      if (session.posts_apart()) {
+        PostResult result = PostResult::sent;
+        for (std::size_t i = 0; i < what.size() && result; ++i) result = post(what[i]);
+        return result;
+      }
+    }
+    const PostResult result = session.post(what, now);
+    if (!result) return result;
+    send_all();
+    return session.posted();
   }
   void wait_active(Duration timeout, CompletionPtr completion);
   bool has_come(const Waiter& waiter) const;
@@ -178,20 +197,21 @@ struct AsyncBoard::Impl final : BoardPath::Owner,
   void on_carrier_event(BoardPath& path, const CarrierEvent& event) override;
   void on_overheard(BoardPath& path, std::string_view bytes) override;
 
-  // --- Session::Handler
+  // --- what the session wants done
 
-  SendResult transmit(std::size_t path, std::string_view datagram, Priority priority) override;
-  TransportTrouble trouble() const override;
-  void on_state(const ReceivedState& state, const Datagram& datagram) override;
-  void on_board_heartbeat(const Datagram& datagram) override;
-  void on_identity(const Identity& fresh) override;
-  void on_nack(const Nack& nack, const Datagram& datagram) override;
-  void on_bad_datagram(const ReadResult& result, std::string_view bytes) override;
-  void on_link(const LinkStatus&) override;
-  void on_restart() override;
-  void on_arming(DisarmCause) override;
-  void on_refused(const RefusedPost& refused) override;
-  void on_result(Ticket ticket, const CommandResult& result) override;
+  SendResult transmit(const Sending& sending);
+  TransportTrouble trouble() const;
+  void tell(const StateCame& news);
+  void tell(const HeartbeatCame& news);
+  void tell(const BoardIdentified& news);
+  void tell(const CommandRefused& news);
+  void tell(const BadDatagramCame& news);
+  void tell(const LinkChanged& news);
+  void tell(const CommandEnded& news);
+  void tell(const BoardRestarted&);
+  void tell(const ArmingChanged&);
+  void tell(const PostRefused& news);
+  void on_result(Ticket ticket, const CommandResult& result);
 
   // --- the paths
 

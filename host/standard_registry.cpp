@@ -8,8 +8,11 @@
 #include <system_error>
 
 #include "../firmware/ports/sim/sim_carrier.hpp"
+#include "../transports/impaired/impaired_carrier.hpp"
 #include "../transports/udp/udp_url.hpp"
 #include "../transports/url_pattern.hpp"
+#include "r4link/async_board.hpp"
+#include "r4link/simulation.hpp"
 #include "replay/replay_carrier.hpp"
 #include "session/session.hpp"
 
@@ -107,6 +110,13 @@ std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
 std::unique_ptr<Carrier> make_host_carrier(asio::io_context& io, std::string_view url,
                                            BoardRole role) {
   return standard_registry().make_shared(io, url, role);
+}
+
+CarrierMaker sim::with_link(std::string_view url, std::string_view link) {
+  return [url = std::string(url), impairment = Impairment::parse(link)](Loop& loop) {
+    asio::io_context& io = context_of(loop);
+    return make_impaired_carrier(io, make_host_carrier(io, url, BoardRole::control), impairment);
+  };
 }
 
 }  // namespace r4

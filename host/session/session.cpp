@@ -2,6 +2,7 @@
 #include "session.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <random>
 
 #include "../../protocol/messages/command_field.hpp"
@@ -36,10 +37,9 @@ SessionOptions checked(SessionOptions options) {
 
 }  // namespace
 
-Session::Session(Handler& handler, SessionOptions options, BoardRole role, std::size_t paths,
+Session::Session(SessionOptions options, BoardRole role, std::size_t paths,
                  std::function<std::uint64_t()> random)
-    : handler_(handler),
-      options_(checked(std::move(options))),
+    : options_(checked(std::move(options))),
       board_role_(role),
       random_(std::move(random)),
       link_(options_.timing, static_cast<std::uint32_t>(random_())),
@@ -86,7 +86,7 @@ Command Session::with_needed_fields(const Command& command) {
 
 // --- time
 
-Time Session::poll(Time now) {
+void Session::poll(Time now) {
   link_.poll(to_ms(now));
   if (link_.long_silent(to_ms(now))) forget_board(now);
   notice_restart(now);
@@ -110,7 +110,6 @@ Time Session::poll(Time now) {
     question_.ask(link_.last_pnum(), now);
     ++questions_of_clock_;
   }
-  return next_poll(now);
 }
 
 // Each path has a lease of its own, with its own T to echo.
@@ -128,13 +127,10 @@ void Session::send_lease(Time now) {
 
 void Session::send_heartbeat(Time now) {
   if (!link_.heartbeat_due(to_ms(now))) return;
-  if (transmit_now(Command::heartbeat(), link_.echo(), Priority::normal, now) == SendResult::sent) {
-    ++collector_.counts.heartbeats;
-    key_.on_heartbeat_sent();
-    link_.heartbeat_sent(to_ms(now));
-  } else {
-    link_.heartbeat_not_sent(to_ms(now));
-  }
+  link_.heartbeat_sent(to_ms(now));  // on_sent() tells if it could not be
+  const PathSet over = transmit_now(Command::heartbeat(), link_.echo(), Priority::normal, now);
+  heartbeat_ = {CommandKind::heartbeat, link_.last_pnum(), std::popcount(over), SendResult::down};
+  if (over == 0) link_.heartbeat_not_sent(to_ms(now));
 }
 
 Time Session::next_poll(Time now) {
@@ -209,7 +205,7 @@ void Session::refresh_status(Time now) {
       .state = link_.state(),
       .reason = link_.reason(),
       .busy = role_.refused(now),
-      .trouble = handler_.trouble(),
+      .trouble = trouble_,
       .gate = watches()                            ? Gate::open
               : link_.watchdog_expired(to_ms(now)) ? Gate::watchdog
               : link_.gated(to_ms(now))            ? Gate::callback
@@ -224,7 +220,7 @@ void Session::refresh_status(Time now) {
   };
   if (fresh == status_) return;
   status_ = fresh;
-  handler_.on_link(status_);
+  effects_.tell(LinkChanged{status_});
 }
 
 void Session::watchdog(std::chrono::milliseconds period, Time now) {

@@ -58,6 +58,7 @@
 #include "../measurement/time.hpp"
 #include "../paths/paths.hpp"
 #include "arming.hpp"
+#include "effects.hpp"
 #include "field_selection.hpp"
 #include "host_key.hpp"
 #include "host_role.hpp"
@@ -70,60 +71,39 @@
 
 namespace r4 {
 
-// Names a command that send() took; never 0.
-using Ticket = std::uint64_t;
-
 class Session {
  public:
-  // What the session does and tells. The calls come from receive(), poll(), send() and stop(); the
-  // views are valid in the call.
-  class Handler {
-   public:
-    virtual SendResult transmit(std::size_t path, std::string_view datagram, Priority priority) = 0;
-    // Of the transports: what all of them have.
-    virtual TransportTrouble trouble() const { return TransportTrouble::none; }
-    virtual void on_state(const ReceivedState& state, const Datagram& datagram) = 0;
-    virtual void on_board_heartbeat(const Datagram& datagram) = 0;
-    virtual void on_identity(const Identity& identity) = 0;
-    virtual void on_nack(const Nack& nack, const Datagram& datagram) = 0;
-    virtual void on_bad_datagram(const ReadResult& result, std::string_view bytes) = 0;
-    virtual void on_link(const LinkStatus& status) = 0;
-    virtual void on_result(Ticket ticket, const CommandResult& result) = 0;
-    // The board has begun again since it was heard: all that it was told is gone, but for settings
-    // that it stores. Called before its new state.
-    virtual void on_restart() {}
-    // The session is armed (none), or not any more.
-    virtual void on_arming(DisarmCause) {}
-    // The board refused a command that was posted.
-    virtual void on_refused(const RefusedPost&) {}
-
-   protected:
-    ~Handler() = default;
-  };
-
   // `random` gives 64 random bits at each call.
   // Throws Error{usage} if options.fields are no state fields.
-  Session(
-      Handler& handler, SessionOptions options, BoardRole role = BoardRole::control,
-      std::size_t paths = 1, std::function<std::uint64_t()> random = [] { return random_bits(); });
+  explicit Session(
+      SessionOptions options, BoardRole role = BoardRole::control, std::size_t paths = 1,
+      std::function<std::uint64_t()> random = [] { return random_bits(); });
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
   static constexpr std::size_t most_paths = 4;
 
+  // What is to be done after each call that takes a time. Each sending has to be told its result.
+  Effects& effects() { return effects_; }
+  void on_sent(const Sending& sending, SendResult result, Time now);
+
   // A datagram has come over that path. poll() is needed then.
   void receive(std::size_t path, std::string_view bytes, Time now);
-  // Does what is due. Returns when it is needed next, at the latest.
-  Time poll(Time now);
+  // Does what is due.
+  void poll(Time now);
+  // When poll() is needed next, at the latest.
+  Time next_poll(Time now);
+  // What all transports have.
+  void on_trouble(TransportTrouble trouble) { trouble_ = trouble; }
   // The transport of a path has come, or gone; poll() is needed now. Before it has come it is gone.
   // `can_ask`: false where who watches may send no question (a bus).
   void on_transport(std::size_t path, bool up, Time now, bool can_ask = true);
   // This computer slept for longer than the board waits for its host, while `now` stood still.
   // Another session begins: it is disarmed, and every command under way but a stop is cancelled.
-  // on_restart() is called. poll() is needed now.
+  // BoardRestarted tells so. poll() is needed now.
   void on_sleep(Time now);
 
-  // Sends a command and finds out what became of it, by on_result() at the latest at `timeout` from
+  // Sends a command and finds out what became of it: CommandEnded tells, at the latest at `timeout` from
   // now. Throws Error{usage} for a command outside its ranges; returns 0 when 64 are under way
   // already.
   Ticket send(const Command& command, Time timeout, Time now);
@@ -131,21 +111,24 @@ class Session {
   // sent one after the other, each when the one before is confirmed, and what is asked for later waits for
   // the last. Throws Error{usage} for none.
   Ticket send(const Setpoints& group, Time timeout, Time now);
-  // Sends a command once and does not wait for it: on_refused() tells if the board refuses it.
+  // Sends a command once and does not wait for it: PostRefused tells if the board refuses it. `sent`: it is among
+  // the effects, and posted() tells its result when they are done.
   PostResult post(const Command& command, Time now);
-  // A board that knows no groups is sent one after the other, up to the first that is not sent. no_link
-  // also as long as it is not known whether it does.
+  // no_link also as long as it is not known whether the board executes groups.
   PostResult post(const Setpoints& group, Time now);
+  // Does the board execute no groups? Then their commands are posted one after the other.
+  bool posts_apart() const { return groups_.state() == GroupSupport::State::apart; }
+  PostResult posted();
   // Clears what made the outputs safe, where that can be cleared, and closes relay 1, the motor supply:
   // confirmed when the board's state shows it. Output commands that are sent behind it wait for it.
   // Returns 0 when 64 commands are under way already.
   Ticket arm(Time timeout, Time now);
-  // E:STOP, sent before this returns. Confirmed when the board tells that it has obeyed this very
+  // E:STOP. Confirmed when the board tells that it has obeyed this very
   // stop. Returns 0, with the stop sent all the same, when 16 stops are under way already.
   Ticket stop(Time timeout, Time now);
-  // Asks who the board is; on_identity() follows. Confirmed by the answer.
+  // Asks who the board is; BoardIdentified follows. Confirmed by the answer.
   Ticket identify(Time timeout, Time now);
-  // Gives a command up, though it may have been executed: on_result() comes before this returns. A stop
+  // Gives a command up, though it may have been executed: CommandEnded tells so. A stop
   // goes on.
   void cancel(Ticket ticket, Time now);
   // Ends every command under way but stops, the heartbeats too, and says farewell: the board's outputs are
@@ -197,9 +180,10 @@ class Session {
   void send_queued(Time now);
   void retry_due(Time now);
   void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
-  SendResult transmit_now(const Command& command, std::uint32_t t_ms, Priority priority, Time now,
-                          PathSet paths = all_paths);
-  static PostResult post_result(SendResult result);
+  // To which paths it goes.
+  PathSet transmit_now(const Command& command, std::uint32_t t_ms, Priority priority, Time now,
+                       PathSet paths = all_paths);
+  PostResult note_post(CommandKind kind, PathSet over);
   // session_groups.cpp
   bool knows_groups(Time now);
   bool choose_form(Pending& pending, Time now);
@@ -213,8 +197,9 @@ class Session {
     PathSet paths;
   };
   static constexpr PathSet all_paths = 0xFF;
-  SendResult send_over(DatagramWriter& writer, Way way, Priority priority, Time now);
-  SendResult transmit_over(std::size_t path, DatagramWriter& writer, Priority priority, Time now);
+  PathSet send_over(DatagramWriter& writer, Way way, Priority priority, Time now);
+  void transmit_over(std::size_t path, DatagramWriter& writer, Way way, Priority priority,
+                     Time now);
   SessionId session_id() const { return watches() ? no_session : link_.session(); }
   void stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
              std::uint32_t t_ms) const;
@@ -262,12 +247,11 @@ class Session {
   void send_heartbeat(Time now);
   void send_lease(Time now);
   void on_lease_refused(std::size_t path, const Nack& nack, const Datagram& datagram, Time now);
-  Time next_poll(Time now);
   void select_fields(Time now);
   Command with_needed_fields(const Command& command);
   void refresh_status(Time now);
 
-  Handler& handler_;
+  Effects effects_;
   SessionOptions options_;
   const BoardRole board_role_;
   std::function<std::uint64_t()> random_;
@@ -280,6 +264,7 @@ class Session {
   Paths paths_;
   StopRepetition repetition_;
   LinkStatus status_;
+  TransportTrouble trouble_ = TransportTrouble::none;
   ReceivedState state_;
   std::uint32_t restarts_ = 0;       // of the board, those that were told
   std::optional<bool> knows_leave_;  // does the board?
@@ -294,6 +279,14 @@ class Session {
   PendingCommands pending_;
   PostedCommands posted_;
   GroupSupport groups_;
+  // A heartbeat, and a post: over how many paths they have yet to go, and what became of them so far.
+  struct Underway {
+    CommandKind kind = CommandKind::heartbeat;
+    std::uint32_t pnum = 0;
+    int open = 0;
+    SendResult best = SendResult::down;
+  };
+  Underway heartbeat_, post_;
   Ticket next_ticket_ = 1;
   // As the newest heartbeat told it; unnamed_cause: none was heard.
   std::int32_t cause_ = Command::unnamed_cause;

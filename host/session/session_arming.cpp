@@ -33,7 +33,7 @@ void Session::disarm(DisarmCause cause) {
 void Session::tell_arming() {
   if (told_cause_ == arming_.cause()) return;
   told_cause_ = arming_.cause();
-  handler_.on_arming(told_cause_);
+  effects_.tell(ArmingChanged{told_cause_});
 }
 
 // What the board's newest datagram says of it, and what the link does. What the board said before
@@ -164,7 +164,7 @@ void Session::on_post_refused(const Nack& nack) {
     if (nack.at <= group.size()) refused.at = nack.at;
     if (refused.at != 0) refused.command = group[refused.at - 1U];
   }
-  handler_.on_refused(refused);
+  effects_.tell(PostRefused{refused});
 }
 
 }  // namespace r4

@@ -34,21 +34,14 @@ PostResult Session::post(const Setpoints& group, Time now) {
   }
   if (group_is_ahead()) return PostResult::queue_full;
   if (!knows_groups(now)) return PostResult::no_link;
-  if (groups_.state() == GroupSupport::State::apart) {
-    for (std::size_t i = 0; i < group.size(); ++i) {
-      if (const PostResult result = post(group[i], now); !result) return result;
-    }
-    return PostResult::sent;
-  }
-  ++collector_.counts.commands;
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   for (std::size_t i = 0; i < group.size(); ++i) write_command(writer, group[i]);
   stamp(writer, group[0].kind, link_.take_pnum(), to_ms(now));
-  const SendResult result =
+  const PathSet over =
       send_over(writer, {group[0].kind, link_.last_pnum(), all_paths}, Priority::normal, now);
-  if (result == SendResult::sent) posted_.add(link_.last_pnum(), group);
-  return post_result(result);
+  posted_.add(link_.last_pnum(), group);
+  return note_post(group[0].kind, over);
 }
 
 // Is it known whether the board executes groups? If not, it is asked.

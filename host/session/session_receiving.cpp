@@ -12,7 +12,7 @@ void Session::receive(std::size_t path, std::string_view bytes, Time now) {
   const ReadResult result = read_datagram(bytes, datagram);
   if (!result) {
     ++collector_.counts.damaged;
-    handler_.on_bad_datagram(result, bytes);
+    effects_.tell(BadDatagramCame{result, bytes});
     return;
   }
   const MessageKind kind = kind_of(datagram);
@@ -73,7 +73,7 @@ void Session::on_heartbeat_datagram(std::size_t path, const Datagram& datagram, 
     if (key_.asked_for()) selection_.on_answer();
     key_.on_reason(connecting ? SafeReason::link : report.reason, now);
   }
-  handler_.on_board_heartbeat(datagram);
+  effects_.tell(HeartbeatCame{datagram});
   if (!current) return;
   refresh_status(now);
   confirm_stop(report, now);
@@ -94,8 +94,7 @@ void Session::on_state_datagram(std::size_t path, const Datagram& datagram, Time
     ++collector_.counts.damaged;
     ReadResult result;
     result.error = ReadError::syntax;
-    handler_.on_bad_datagram(result,
-                             std::string_view(datagram.bytes().data(), datagram.bytes().size()));
+    effects_.tell(BadDatagramCame{result, {datagram.bytes().data(), datagram.bytes().size()}});
     return;
   }
   if (!paths_.news().take_state(path, t_ms, fresh.present)) return;
@@ -121,7 +120,7 @@ void Session::on_state_datagram(std::size_t path, const Datagram& datagram, Time
   confirm_from_state(now);
   look_at_supply();
   select_fields(now);
-  handler_.on_state(state_, datagram);
+  effects_.tell(StateCame{datagram});
 }
 
 void Session::on_nack_datagram(std::size_t path, const Datagram& datagram, Time now) {
@@ -148,7 +147,7 @@ void Session::on_nack_datagram(std::size_t path, const Datagram& datagram, Time 
   const bool other_copy =
       nack.code == Refusal::auth && ((not_taken && key_.has_key()) || others_speak(path));
   const bool proof = !other_copy && is_proof(nack);
-  if (!paths_.news().is_copy(nack)) handler_.on_nack(nack, datagram);
+  if (!paths_.news().is_copy(nack)) effects_.tell(CommandRefused{nack, datagram});
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || pending.pnum != nack.pnum) continue;
     if (pending.kind == CommandKind::leave) {  // it was executed, or we have no session to leave
@@ -176,7 +175,7 @@ void Session::on_lease_refused(std::size_t path, const Nack& nack, const Datagra
   paths_.leases()[path].on_refusal(nack, now);
   const bool told =
       nack.code == Refusal::stale || nack.code == Refusal::busy || nack.code == Refusal::unknown;
-  if (!told) handler_.on_nack(nack, datagram);
+  if (!told) effects_.tell(CommandRefused{nack, datagram});
 }
 
 // Does the refusal prove that the command was not executed? Only while the board remembers what it
@@ -208,7 +207,7 @@ void Session::on_identity_datagram(std::size_t path, const Datagram& datagram, T
     clock_.heard(t_ms, now);
     if (identity.has_asked) clock_.answered(t_ms, *asked);
   }
-  handler_.on_identity(identity);
+  effects_.tell(BoardIdentified{identity});
   for (Pending& pending : pending_.under_way()) {
     // A second answer to an earlier question is none to this one.
     if (identity.has_asked && identity.asked != pending.pnum) continue;
@@ -254,7 +253,7 @@ bool Session::notice_restart(Time now) {
     give_up_commands(now);
   }
   tell_arming();  // what somebody asks for when he hears of it is wanted
-  handler_.on_restart();
+  effects_.tell(BoardRestarted{});
   return true;
 }
 

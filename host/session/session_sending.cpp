@@ -2,6 +2,7 @@
 // What the session sends, and how a command of it ends.
 #include <algorithm>
 #include <array>
+#include <bit>
 
 #include "../../protocol/messages/command_field.hpp"
 #include "../commands/command_help.hpp"
@@ -26,8 +27,8 @@ void Session::stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum
 }
 
 // A datagram of which no copy is kept.
-SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority priority,
-                                 Time now, PathSet paths) {
+PathSet Session::transmit_now(const Command& command, std::uint32_t t_ms, Priority priority,
+                              Time now, PathSet paths) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   write_command(writer, command);
@@ -36,41 +37,48 @@ SendResult Session::transmit_now(const Command& command, std::uint32_t t_ms, Pri
 }
 
 // A stop goes to every path. Anything else goes to the paths that lead to the session's board, if that
-// board has our key.
-SendResult Session::send_over(DatagramWriter& writer, Way way, Priority priority, Time now) {
+// board has our key. Each path has a signature of its own, which proves that path (docs/protocol.md, "Paths").
+PathSet Session::send_over(DatagramWriter& writer, Way way, Priority priority, Time now) {
   const bool stop = way.kind == CommandKind::stop;
-  if (key_.refuses_board() && !stop) return SendResult::down;
+  if (key_.refuses_board() && !stop) return 0;
   const PathSet to = stop ? way.paths : static_cast<PathSet>(way.paths & paths_.speaking());
-  SendResult best = SendResult::down;
-  bool busy = false;
+  PathSet over = 0;
   for (std::size_t i = 0; i < paths_.count(); ++i) {
     if ((to & path_bit(i)) == 0) continue;
-    const SendResult result = transmit_over(i, writer, priority, now);
-    if (result == SendResult::sent && way.kind == CommandKind::identify) {
-      paths_.asked(i, way.pnum, now);
-    }
-    if (result == SendResult::busy) {
-      paths_.on_busy(i, {}, now);
-      busy = true;
-    }
-    if (result == SendResult::sent || best == SendResult::down) best = result;
+    transmit_over(i, writer, way, priority, now);
+    over |= path_bit(i);
   }
-  if (busy && best != SendResult::sent && paths_.all_busy(now)) {
-    role_.on_busy_until(paths_.all_busy_until(now));
-  }
-  return best;
+  return over;
 }
 
-// Each path has a signature of its own, which proves that path (docs/protocol.md, "Paths").
-SendResult Session::transmit_over(std::size_t path, DatagramWriter& writer, Priority priority,
-                                  Time now) {
+void Session::transmit_over(std::size_t path, DatagramWriter& writer, Way way, Priority priority,
+                            Time now) {
   const std::size_t size = writer.size();
   if (!watches()) key_.sign(writer, now);  // a watcher's datagrams need no signature
   const Text bytes = writer.finish();
-  if (bytes.empty()) return SendResult::down;
-  const SendResult result = handler_.transmit(path, {bytes.data(), bytes.size()}, priority);
+  if (way.kind == CommandKind::identify) paths_.asked(path, way.pnum, now);
+  effects_.send(path, priority, way.kind, way.pnum, {bytes.data(), bytes.size()});
   writer.truncate(size);
-  return result;
+}
+
+// A heartbeat or a post has come somewhere if one of its paths has taken it.
+void Session::on_sent(const Sending& sending, SendResult result, Time now) {
+  for (Underway* const each : {&heartbeat_, &post_}) {
+    if (each->open == 0 || each->pnum != sending.pnum) continue;
+    --each->open;
+    const bool first = result == SendResult::sent && each->best != SendResult::sent;
+    if (first || each->best == SendResult::down) each->best = result;
+    if (each != &heartbeat_) continue;
+    if (first) {
+      ++collector_.counts.heartbeats;
+      key_.on_heartbeat_sent();
+    }
+    if (each->open == 0 && each->best != SendResult::sent) link_.heartbeat_not_sent(to_ms(now));
+  }
+  if (result != SendResult::busy) return;
+  paths_.on_busy(sending.path, {}, now);
+  if (paths_.all_busy(now)) role_.on_busy_until(paths_.all_busy_until(now));
+  refresh_status(now);
 }
 
 // One question to all that are to be asked who their board is.
@@ -82,8 +90,8 @@ void Session::ask_paths(Time now) {
     stamp(writer, CommandKind::identify, link_.take_pnum(), to_ms(now));
     for (std::size_t i = 0; i < paths_.count(); ++i) {
       if ((due & path_bit(i)) == 0) continue;
-      transmit_over(i, writer, Priority::normal, now);
-      paths_.asked(i, link_.last_pnum(), now);
+      transmit_over(i, writer, {CommandKind::identify, link_.last_pnum(), all_paths},
+                    Priority::normal, now);
     }
   }
   if (paths_.poll(now)) link_.on_transport(true);  // the first heartbeat goes out at once
@@ -143,29 +151,28 @@ PostResult Session::post(const Command& command, Time now) {
     return PostResult::not_armed;
   }
   if (group_is_ahead()) return PostResult::queue_full;
-  ++collector_.counts.commands;
   const bool unnamed =
       command.kind == CommandKind::clear && command.value == Command::unnamed_cause;
-  const SendResult result =
+  const PathSet over =
       transmit_now(unnamed ? Command::clear(cause_) : command, to_ms(now), Priority::normal, now);
-  if (result == SendResult::sent) {
-    if (command.kind == CommandKind::clear) repetition_.cancel();
-    posted_.add(link_.last_pnum(), command);
-  }
-  return post_result(result);
+  posted_.add(link_.last_pnum(), command);
+  return note_post(command.kind, over);
 }
 
-PostResult Session::post_result(SendResult result) {
-  switch (result) {
-    case SendResult::sent:
-      return PostResult::sent;
-    case SendResult::full:
-      return PostResult::queue_full;
-    case SendResult::down:
-    case SendResult::busy:
-      break;
+PostResult Session::note_post(CommandKind kind, PathSet over) {
+  post_ = {kind, link_.last_pnum(), std::popcount(over), SendResult::down};
+  return over != 0 ? PostResult::sent : posted();
+}
+
+PostResult Session::posted() {
+  if (post_.best != SendResult::sent) {
+    posted_.take(post_.pnum);
+    return post_.best == SendResult::full ? PostResult::queue_full : PostResult::no_link;
   }
-  return PostResult::no_link;
+  ++collector_.counts.commands;
+  if (post_.kind == CommandKind::clear)
+    repetition_.cancel();  // who clears a stop repeats it no more
+  return PostResult::sent;
 }
 
 Ticket Session::stop(Time timeout, Time now) {
@@ -290,8 +297,8 @@ void Session::finish(Pending& pending, Outcome outcome, Refusal code, Time now) 
     result.at = pending.step != 0 ? pending.step : pending.failed;
     if (pending.step != 0) result.executed = static_cast<std::uint8_t>(pending.step - 1);
   }
-  pending_.remove(pending);  // before the call: the handler may send again
-  handler_.on_result(ticket, result);
+  pending_.remove(pending);
+  effects_.tell(CommandEnded{ticket, result});
 }
 
 void Session::cancel(Ticket ticket, Time now) {

@@ -98,6 +98,7 @@ void HostLink::heartbeat_sent(std::uint32_t now_ms) {
   sent_ms_ = now_ms;
   any_sent_ = true;
   answer_now_ = false;
+  echoed_before_ = echoed_;
   if (echo_ != 0) echoed_ = true;
 }
 
@@ -105,6 +106,7 @@ void HostLink::heartbeat_not_sent(std::uint32_t now_ms) {
   sent_ms_ = now_ms - timing_.heartbeat_ms + retry_ms;
   any_sent_ = true;
   answer_now_ = false;
+  echoed_ = echoed_before_;
 }
 
 void HostLink::watchdog(std::uint32_t period_ms, std::uint32_t now_ms) {

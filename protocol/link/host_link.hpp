@@ -60,7 +60,7 @@ class HostLink {
   bool heartbeat_due(std::uint32_t now_ms) const;
   // A heartbeat was sent.
   void heartbeat_sent(std::uint32_t now_ms);
-  // It could not be: it is due again soon.
+  // It could not be, behind heartbeat_sent(): it is due again soon.
   void heartbeat_not_sent(std::uint32_t now_ms);
   // The T that it carries: the T of the board's newest heartbeat, 0 before the first.
   std::uint32_t echo() const { return echo_; }
@@ -118,6 +118,7 @@ class HostLink {
   bool any_sent_ = false;
   bool answer_now_ = true;  // the first heartbeat goes out at once
   bool echoed_ = false;
+  bool echoed_before_ = false;  // the heartbeat that was sent last
   std::uint32_t watchdog_ms_ = 0;
   std::uint32_t fed_ms_ = 0;
   bool hung_ = false;  // the watchdog had expired at a poll(): the clock's wrap does not undo it

@@ -8,18 +8,18 @@
 #include <string>
 
 #include "allocations.hpp"
-#include "host/session/session.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
+#include "tests/support/driven_session.hpp"
 
 namespace r4::bench {
 namespace {
 
-class Receiver final : Session::Handler {
+class Receiver final : test::DrivenSession::Handler {
  public:
   explicit Receiver(std::size_t paths) {
     SessionOptions options;
     options.arming = Arming::off;
-    Session::Handler& handler = *this;
+    test::DrivenSession::Handler& handler = *this;
     session_.emplace(handler, options, BoardRole::control, paths);
     for (std::size_t path = 0; path < paths; ++path) {
       session_->on_transport(path, true, Time{0});
@@ -62,7 +62,7 @@ class Receiver final : Session::Handler {
   void on_link(const LinkStatus&) override {}
   void on_result(Ticket, const CommandResult&) override {}
 
-  std::optional<Session> session_;
+  std::optional<test::DrivenSession> session_;
   std::uint32_t asked_ = 0;
   std::string sid_;
   std::array<char, max_datagram> bytes_;

@@ -15,11 +15,10 @@
 
 #include "environment.hpp"
 #include "firmware/application/application.hpp"
-#include "host/session/session.hpp"
-#include "incurious_host.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
 #include "random.hpp"
 #include "tests/support/datagrams.hpp"
+#include "tests/support/driven_session.hpp"
 #include "tests/support/signing.hpp"
 #include "transports/framing/peer_table.hpp"
 
@@ -49,7 +48,7 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
 
  private:
   using Peers = PeerTable<int, places>;
-  struct Host final : IncuriousHost {
+  struct Host final : test::DrivenSession::Handler {
     Host(Crowd& c, int at) : crowd(c), address(at) {}
     SendResult transmit(std::size_t, std::string_view bytes, Priority) override {
       crowd.to_board_.push_back(
@@ -60,7 +59,7 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
     Crowd& crowd;
     int address;
     std::uint32_t number = 0;  // as the port has it
-    std::unique_ptr<Session> session;
+    std::unique_ptr<test::DrivenSession> session;
   };
   struct Packet {
     std::uint64_t at_ms;
@@ -143,8 +142,8 @@ void Crowd::start(Host& host) {
     options.key = test::key_of(static_cast<std::uint8_t>(-host.address));
     options.clock_start = std::chrono::hours{24};
   }
-  host.session = std::make_unique<Session>(host, options, BoardRole::control, 1,
-                                           [this] { return random_.next(); });
+  host.session = std::make_unique<test::DrivenSession>(host, options, BoardRole::control, 1,
+                                                       [this] { return random_.next(); });
   host.session->on_transport(0, true, time());
 }
 

@@ -20,9 +20,8 @@
 
 #include "environment.hpp"
 #include "firmware/application/application.hpp"
-#include "host/session/session.hpp"
-#include "incurious_host.hpp"
 #include "random.hpp"
+#include "tests/support/driven_session.hpp"
 
 namespace r4::simulation {
 namespace {
@@ -79,13 +78,13 @@ class Path {
 };
 
 // One board and its host.
-class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
+class FleetLink final : firmware::Hal, firmware::Port, test::DrivenSession::Handler {
  public:
   explicit FleetLink(std::uint64_t seed) : random_(seed) {
     SessionOptions options;
     options.arming = Arming::off;
-    session_.emplace(static_cast<Session::Handler&>(*this), options, BoardRole::control, 1U,
-                     [this] { return random_.next(); });
+    session_.emplace(static_cast<test::DrivenSession::Handler&>(*this), options, BoardRole::control,
+                     1U, [this] { return random_.next(); });
     session_->on_transport(0, true, time());
     boot();
   }
@@ -222,7 +221,7 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
     transfer(false, {bytes.data(), bytes.size()});
   }
   std::size_t max_size() const override { return max_datagram; }
-  // IncuriousHost
+  // test::DrivenSession::Handler
   SendResult transmit(std::size_t, std::string_view bytes, Priority) override {
     transfer(true, bytes);
     return SendResult::sent;
@@ -239,7 +238,7 @@ class FleetLink final : firmware::Hal, firmware::Port, IncuriousHost {
   bool was_active_ = false;
   Path path_;
   std::optional<firmware::Application> application_;
-  std::optional<Session> session_;
+  std::optional<test::DrivenSession> session_;
 };
 
 double fleet_hours() {

@@ -12,9 +12,8 @@
 #include <string>
 
 #include "firmware/application/application.hpp"
-#include "host/session/session.hpp"
-#include "incurious_host.hpp"
 #include "random.hpp"
+#include "tests/support/driven_session.hpp"
 
 namespace r4::simulation {
 namespace {
@@ -63,7 +62,9 @@ struct AxisClock {
 };
 
 // A board, and its session.
-class AxisLink final : public firmware::Hal, public firmware::Port, public IncuriousHost {
+class AxisLink final : public firmware::Hal,
+                       public firmware::Port,
+                       public test::DrivenSession::Handler {
  public:
   AxisLink(SharedBus& bus, std::size_t number, Random& random)
       : clock{-90 + 25 * static_cast<std::int64_t>(number), random.below(1000),
@@ -78,8 +79,8 @@ class AxisLink final : public firmware::Hal, public firmware::Port, public Incur
     application_ = std::make_unique<firmware::Application>(*this, config);
     application_->add_port(*this);
     application_->start(clock.first_ms);
-    session_ = std::make_unique<Session>(*this, SessionOptions{}, BoardRole::control, 1,
-                                         [this] { return random_.next(); });
+    session_ = std::make_unique<test::DrivenSession>(*this, SessionOptions{}, BoardRole::control, 1,
+                                                     [this] { return random_.next(); });
     session_->on_transport(0, true, time());
     board_due_us = session_due_us = 1000;
   }
@@ -127,7 +128,7 @@ class AxisLink final : public firmware::Hal, public firmware::Port, public Incur
     bus_.put(now_us_, number_, false, {datagram.data(), datagram.size()});
   }
   std::size_t max_size() const override { return max_datagram; }
-  // IncuriousHost
+  // test::DrivenSession::Handler
   SendResult transmit(std::size_t, std::string_view bytes, Priority) override {
     bus_.put(now_us_, number_, true, bytes);
     return SendResult::sent;
@@ -147,7 +148,7 @@ class AxisLink final : public firmware::Hal, public firmware::Port, public Incur
   std::uint64_t now_us_;
   std::uint8_t chance_[Authentication::chance_size] = {7};
   std::unique_ptr<firmware::Application> application_;
-  std::unique_ptr<Session> session_;
+  std::unique_ptr<test::DrivenSession> session_;
 };
 
 TEST(TimeAxis, OfEightBoardsOnOneBusIsOneToAMillisecond) {

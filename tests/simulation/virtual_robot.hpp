@@ -10,13 +10,12 @@
 
 #include "firmware/application/application.hpp"
 #include "firmware/ports/sim/simulated_hardware.hpp"
-#include "host/session/session.hpp"
-#include "incurious_host.hpp"
 #include "random.hpp"
+#include "tests/support/driven_session.hpp"
 
 namespace r4::simulation {
 
-class VirtualRobot final : public firmware::Port, public IncuriousHost {
+class VirtualRobot final : public firmware::Port, public test::DrivenSession::Handler {
  public:
   using Clock = ReceivedState::Clock;
   struct Link {
@@ -43,7 +42,7 @@ class VirtualRobot final : public firmware::Port, public IncuriousHost {
   bool host_lives = true;    // a killed process says nothing any more
   bool states_stop = false;  // the board's states are lost, and nothing else
 
-  Session& session() { return session_; }
+  test::DrivenSession& session() { return session_; }
   Time now() const { return Time{static_cast<std::int64_t>(now_us_)}; }
   Clock::time_point clock() const { return Clock::time_point(now()); }
   double seconds() const { return static_cast<double>(now_us_) / 1e6; }
@@ -62,7 +61,7 @@ class VirtualRobot final : public firmware::Port, public IncuriousHost {
   // firmware::Port
   void send(Text datagram, Priority priority, std::uint32_t peer) override;
   std::size_t max_size() const override { return max_datagram; }
-  // IncuriousHost
+  // DrivenSession::Handler
   SendResult transmit(std::size_t, std::string_view bytes, Priority priority) override;
   void on_state(const ReceivedState& state, const Datagram& datagram) override;
 
@@ -75,7 +74,7 @@ class VirtualRobot final : public firmware::Port, public IncuriousHost {
   sim::BoardModel model_;
   sim::SimulatedHardware hardware_;
   std::unique_ptr<firmware::Application> application_;
-  Session session_;
+  test::DrivenSession session_;
 };
 
 }  // namespace r4::simulation

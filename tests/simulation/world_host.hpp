@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "script.hpp"
+#include "tests/support/driven_session.hpp"
 #include "tests/support/signing.hpp"
 #include "world.hpp"
 
@@ -18,7 +19,7 @@ namespace r4::simulation {
 
 inline Key key_of_host(int index) { return test::key_of(static_cast<std::uint8_t>(index + 1)); }
 
-struct World::Host final : Session::Handler {
+struct World::Host final : test::DrivenSession::Handler {
   Host(World& w, int i) : world(w), index(i) {}
 
   void begin() {
@@ -36,9 +37,9 @@ struct World::Host final : Session::Handler {
       options.key = key_of_host(index);
       options.clock_start = std::chrono::hours{24} - Time{clock_offset_us};
     }
-    session =
-        std::make_unique<Session>(*this, options, watcher ? BoardRole::watch : BoardRole::control,
-                                  places.size(), [this] { return world.random_.next(); });
+    session = std::make_unique<test::DrivenSession>(
+        *this, options, watcher ? BoardRole::watch : BoardRole::control, places.size(),
+        [this] { return world.random_.next(); });
     for (std::size_t i = 0; i < places.size(); ++i) {
       const Path& path = world.paths_[places[i].path];
       session->on_transport(i, world.now_us_ >= path.unplugged_until_us, time());
@@ -127,7 +128,7 @@ struct World::Host final : Session::Handler {
   std::uint64_t clock_offset_us = 0;
   std::uint64_t next_poll_us = 0;
   std::uint32_t poll_generation = 0;
-  std::unique_ptr<Session> session;
+  std::unique_ptr<test::DrivenSession> session;
   std::map<Ticket, int> tickets;
   struct Stop {
     std::uint32_t pnum = 0;

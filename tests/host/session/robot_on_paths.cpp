@@ -88,9 +88,9 @@ RobotOnPaths::RobotOnPaths(Cables its_cables, SessionOptions options, BoardRole 
     boards_.push_back(std::make_unique<Board>(*this, i));
     boards_[i]->boot(100'000 * static_cast<std::uint32_t>(i + 1));
   }
-  Session::Handler& handler = *this;
-  session = std::make_unique<Session>(handler, std::move(options), role, cables.size(),
-                                      [n = 99ULL]() mutable { return ++n; });
+  DrivenSession::Handler& handler = *this;
+  session = std::make_unique<DrivenSession>(handler, std::move(options), role, cables.size(),
+                                            [n = 99ULL]() mutable { return ++n; });
 }
 RobotOnPaths::~RobotOnPaths() = default;
 

@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "firmware/application/application.hpp"
-#include "host/session/session.hpp"
+#include "tests/support/driven_session.hpp"
 
 namespace r4::test {
 
-class RobotOnPaths final : private Session::Handler {
+class RobotOnPaths final : private DrivenSession::Handler {
  public:
   struct Cable {
     Cable(std::uint32_t its_lag_ms, std::size_t its_board = 0)
@@ -67,7 +67,7 @@ class RobotOnPaths final : private Session::Handler {
 
   static constexpr Time timeout = std::chrono::milliseconds{1000};
   Cables cables;
-  std::unique_ptr<Session> session;
+  std::unique_ptr<DrivenSession> session;
 
   std::vector<ReceivedState> states;
   bool keeps_states = true;

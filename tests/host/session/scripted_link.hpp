@@ -8,14 +8,14 @@
 #include <string_view>
 #include <vector>
 
-#include "host/session/session.hpp"
+#include "tests/support/driven_session.hpp"
 
 namespace r4::test {
 
 // What tests send that need any command.
 inline const Command turn_motor = Command::osmc(358, Direction::forward, 1);
 
-class ScriptedLink final : private Session::Handler {
+class ScriptedLink final : private DrivenSession::Handler {
  public:
   // A datagram of the host.
   struct Sent {
@@ -33,7 +33,7 @@ class ScriptedLink final : private Session::Handler {
   // and sends what it is given without being armed.
   static SessionOptions without_questions();
 
-  Session session;
+  DrivenSession session;
   Time now = std::chrono::seconds{5000};
 
   // What has come of it, in order.

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// An AsyncBoard does what its session wants done: it sends, then it tells.
+#include <algorithm>
+#include <utility>
+#include <variant>
+
+#include "async_board_impl.hpp"
+
+namespace r4 {
+
+void AsyncBoard::Impl::send_all() {
+  Effects& effects = session.effects();
+  while (effects.any_sendings()) {
+    std::unique_ptr<Sending> sending = effects.take_sending();
+    session.on_sent(*sending, transmit(*sending), now);
+    effects.give_back(std::move(sending));
+  }
+}
+
+void AsyncBoard::Impl::tell_news() {
+  Effects& effects = session.effects();
+  while (effects.any_news()) {
+    std::visit([this](const auto& news) { tell(news); }, effects.take_news());
+  }
+}
+
+// Who only watches says nothing on a bus but stops and leases.
+bool AsyncBoard::Impl::only_listens(std::size_t path) const {
+  return session.board_role() == BoardRole::watch && carrier(path).is_shared();
+}
+
+SendResult AsyncBoard::Impl::transmit(const Sending& sending) {
+  if (!has_link()) return SendResult::down;
+  const std::size_t path = sending.path;
+  const bool may_pass = sending.priority == Priority::stop || sending.priority == Priority::lease;
+  if (only_listens(path) && !may_pass) return SendResult::down;
+  const SendResult result = carrier(path).send(sending.datagram(), sending.priority);
+  if (result == SendResult::sent) paths[path]->tap.on_sent(sending.datagram());
+  return result;
+}
+
+// One path that is well is enough.
+TransportTrouble AsyncBoard::Impl::trouble() const {
+  TransportTrouble common = TransportTrouble::none;
+  for (const auto& path : paths) {
+    common = path->carrier->trouble();
+    if (common == TransportTrouble::none) break;
+  }
+  return common;
+}
+
+void AsyncBoard::Impl::tell(const StateCame& news) {
+  if (!is_open()) return;
+  if (in_backlog) {
+    const Text bytes = news.datagram.bytes();
+    backlog_size = bytes.size();
+    std::copy_n(bytes.data(), backlog_size, backlog.data());
+  } else {
+    call(state_callbacks, session.state(), news.datagram);
+  }
+}
+
+void AsyncBoard::Impl::tell(const HeartbeatCame& news) {
+  if (is_open()) call(heartbeat_callbacks, news.datagram);
+}
+
+void AsyncBoard::Impl::tell(const BoardIdentified& news) {
+  const Identity& fresh = news.identity;
+  identity.firmware.assign(fresh.firmware.data(), fresh.firmware.size());
+  identity.board_id.assign(fresh.board_id.data(), fresh.board_id.size());
+  identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
+  identity.name.assign(fresh.name.data(), fresh.name.size());
+  if (paths[0]->tap.attached()) name_in_recording();
+}
+
+void AsyncBoard::Impl::tell(const CommandRefused& news) {
+  if (is_open()) call(nack_callbacks, news.nack, news.datagram);
+}
+
+void AsyncBoard::Impl::tell(const BadDatagramCame& news) {
+  if (is_open()) call(bad_callbacks, news.result, news.bytes);
+}
+
+void AsyncBoard::Impl::tell(const LinkChanged& news) {
+  paths[0]->tap.on_link(news.status);
+  tell_paths(news.status);
+  if (!is_open()) return;
+  // As it is by then: the one before may have changed it.
+  link_callbacks.each([&](auto& one) {
+    if (may_tell()) guarded([&] { one(session.link()); });
+  });
+}
+
+void AsyncBoard::Impl::tell(const BoardRestarted&) {
+  ++boots;
+  backlog_size = 0;  // of the boot before
+  if (is_open()) call(restart_callbacks);
+}
+
+void AsyncBoard::Impl::tell(const ArmingChanged&) {
+  if (!is_open()) return;
+  arming_callbacks.each([&](auto& one) {
+    if (may_tell()) guarded([&] { one(session.disarmed_by()); });
+  });
+}
+
+void AsyncBoard::Impl::tell(const PostRefused& news) {
+  if (is_open()) call(refused_callbacks, news.refused);
+}
+
+void AsyncBoard::Impl::tell(const CommandEnded& news) { on_result(news.ticket, news.result); }
+
+void AsyncBoard::Impl::on_result(Ticket ticket, const CommandResult& result) {
+  const auto found = std::find_if(waiting.begin(), waiting.end(),
+                                  [ticket](const Waiting& w) { return w.ticket == ticket; });
+  if (found == waiting.end()) return;
+  ended.push_back({result, std::move(found->completion)});
+  if (found != waiting.end() - 1) *found = std::move(waiting.back());
+  waiting.pop_back();
+}
+
+}  // namespace r4

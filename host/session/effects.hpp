@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a session wants done, in its order: datagrams to be sent, and news to be told. The session itself calls nobody.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "../../protocol/messages/message.hpp"
+#include "r4link/carrier.hpp"
+#include "r4link/command.hpp"
+#include "r4link/link.hpp"
+
+namespace r4 {
+
+// Names a command that a session took; never 0.
+using Ticket = std::uint64_t;
+
+// A datagram for one path.
+struct Sending {
+  std::size_t path = 0;
+  Priority priority = Priority::normal;
+  CommandKind kind = CommandKind::heartbeat;
+  std::uint32_t pnum = 0;
+  std::size_t size = 0;
+  std::array<char, max_datagram> bytes;
+
+  std::string_view datagram() const { return {bytes.data(), size}; }
+};
+
+// The newest state of the board is another.
+struct StateCame {
+  Datagram datagram;
+};
+struct HeartbeatCame {
+  Datagram datagram;
+};
+struct BoardIdentified {
+  Identity identity;
+};
+struct CommandRefused {
+  Nack nack;
+  Datagram datagram;
+};
+struct BadDatagramCame {
+  ReadResult result;
+  std::string_view bytes;
+};
+struct LinkChanged {
+  LinkStatus status;
+};
+struct CommandEnded {
+  Ticket ticket = 0;
+  CommandResult result;
+};
+// The board has begun again since it was heard: all that it was told is gone, but for settings
+// that it stores. Told before its new state.
+struct BoardRestarted {};
+// The session is armed (none), or not any more.
+struct ArmingChanged {
+  DisarmCause cause = DisarmCause::none;
+};
+// The board refused a command that was posted.
+struct PostRefused {
+  RefusedPost refused;
+};
+// Views are of the datagram that was received last, and valid as long as its bytes.
+using News =
+    std::variant<StateCame, HeartbeatCame, BoardIdentified, CommandRefused, BadDatagramCame,
+                 LinkChanged, CommandEnded, BoardRestarted, ArmingChanged, PostRefused>;
+
+// Its memory is used again: in the steady state nothing is allocated.
+class Effects {
+ public:
+  void send(std::size_t path, Priority priority, CommandKind kind, std::uint32_t pnum,
+            std::string_view bytes) {
+    if (free_.empty()) free_.push_back(std::make_unique<Sending>());
+    Sending& sending = *free_.back();
+    sending.path = path;
+    sending.priority = priority;
+    sending.kind = kind;
+    sending.pnum = pnum;
+    sending.size = bytes.size();
+    std::copy(bytes.begin(), bytes.end(), sending.bytes.begin());
+    sendings_.push(std::move(free_.back()));
+    free_.pop_back();
+  }
+  void tell(News news) { news_.push(std::move(news)); }
+
+  bool any_sendings() const { return sendings_.any(); }
+  std::unique_ptr<Sending> take_sending() { return sendings_.take(); }
+  void give_back(std::unique_ptr<Sending> sending) { free_.push_back(std::move(sending)); }
+  bool any_news() const { return news_.any(); }
+  News take_news() { return news_.take(); }
+
+ private:
+  // First in, first out.
+  template <class Item>
+  class Queue {
+   public:
+    void push(Item item) { items_.push_back(std::move(item)); }
+    bool any() const { return taken_ != items_.size(); }
+    Item take() {
+      Item item = std::move(items_[taken_]);
+      if (++taken_ == items_.size()) {
+        items_.clear();
+        taken_ = 0;
+      }
+      return item;
+    }
+
+   private:
+    std::vector<Item> items_;
+    std::size_t taken_ = 0;
+  };
+
+  Queue<std::unique_ptr<Sending>> sendings_;
+  std::vector<std::unique_ptr<Sending>> free_;
+  Queue<News> news_;
+};
+
+}  // namespace r4

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A session whose effects are done at the end of each call, as an AsyncBoard does them: what it sends goes to
+// transmit(), then what it tells goes to the functions named after it.
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include "host/session/session.hpp"
+
+namespace r4::test {
+
+class DrivenSession : public Session {
+ public:
+  class Handler {
+   public:
+    virtual SendResult transmit(std::size_t path, std::string_view datagram, Priority priority) = 0;
+    virtual TransportTrouble trouble() const { return TransportTrouble::none; }
+    virtual void on_state(const ReceivedState&, const Datagram&) {}
+    virtual void on_board_heartbeat(const Datagram&) {}
+    virtual void on_identity(const Identity&) {}
+    virtual void on_nack(const Nack&, const Datagram&) {}
+    virtual void on_bad_datagram(const ReadResult&, std::string_view) {}
+    virtual void on_link(const LinkStatus&) {}
+    virtual void on_result(Ticket, const CommandResult&) {}
+    virtual void on_restart() {}
+    virtual void on_arming(DisarmCause) {}
+    virtual void on_refused(const RefusedPost&) {}
+
+   protected:
+    ~Handler() = default;
+  };
+
+  template <class... Arguments>
+  explicit DrivenSession(Handler& handler, Arguments&&... arguments)
+      : Session(std::forward<Arguments>(arguments)...), handler_(handler) {}
+
+  // When it is needed next.
+  Time poll(Time now) {
+    on_trouble(handler_.trouble());
+    Session::poll(now);
+    perform(now);
+    return next_poll(now);
+  }
+  void receive(std::size_t path, std::string_view bytes, Time now) {
+    on_trouble(handler_.trouble());
+    Session::receive(path, bytes, now);
+    perform(now);
+  }
+  void on_transport(std::size_t path, bool up, Time now, bool can_ask = true) {
+    Session::on_transport(path, up, now, can_ask);
+    perform(now);
+  }
+  void on_sleep(Time now) {
+    Session::on_sleep(now);
+    perform(now);
+  }
+  template <class What>
+  Ticket send(const What& what, Time timeout, Time now) {
+    return done(Session::send(what, timeout, now), now);
+  }
+  PostResult post(const Command& command, Time now) {
+    PostResult result = done(Session::post(command, now), now);
+    return result ? posted() : result;
+  }
+  PostResult post(const Setpoints& group, Time now) {
+    if (!posts_apart()) {
+      PostResult result = done(Session::post(group, now), now);
+      return result ? posted() : result;
+    }
+    PostResult result = PostResult::sent;
+    for (std::size_t i = 0; i < group.size() && result; ++i) result = post(group[i], now);
+    return result;
+  }
+  Ticket arm(Time timeout, Time now) { return done(Session::arm(timeout, now), now); }
+  Ticket stop(Time timeout, Time now) { return done(Session::stop(timeout, now), now); }
+  Ticket identify(Time timeout, Time now) { return done(Session::identify(timeout, now), now); }
+  Ticket leave(Time timeout, Time now) { return done(Session::leave(timeout, now), now); }
+  void cancel(Ticket ticket, Time now) {
+    Session::cancel(ticket, now);
+    perform(now);
+  }
+  void end_all(Time now) {
+    Session::end_all(now);
+    perform(now);
+  }
+  void watchdog(std::chrono::milliseconds period, Time now) {
+    Session::watchdog(period, now);
+    perform(now);
+  }
+  void feed(Time now) {
+    Session::feed(now);
+    perform(now);
+  }
+  void hold(bool held, Time now) {
+    Session::hold(held, now);
+    perform(now);
+  }
+
+ private:
+  template <class Result>
+  Result done(Result result, Time now) {
+    perform(now);
+    return result;
+  }
+  void perform(Time now) {
+    while (effects().any_sendings()) {
+      auto sending = effects().take_sending();
+      on_sent(*sending, handler_.transmit(sending->path, sending->datagram(), sending->priority),
+              now);
+      effects().give_back(std::move(sending));
+    }
+    while (effects().any_news()) {
+      std::visit([this](const auto& news) { tell(news); }, effects().take_news());
+    }
+  }
+  void tell(const StateCame& news) { handler_.on_state(state(), news.datagram); }
+  void tell(const HeartbeatCame& news) { handler_.on_board_heartbeat(news.datagram); }
+  void tell(const BoardIdentified& news) { handler_.on_identity(news.identity); }
+  void tell(const CommandRefused& news) { handler_.on_nack(news.nack, news.datagram); }
+  void tell(const BadDatagramCame& news) { handler_.on_bad_datagram(news.result, news.bytes); }
+  void tell(const LinkChanged& news) { handler_.on_link(news.status); }
+  void tell(const CommandEnded& news) { handler_.on_result(news.ticket, news.result); }
+  void tell(const BoardRestarted&) { handler_.on_restart(); }
+  void tell(const ArmingChanged& news) { handler_.on_arming(news.cause); }
+  void tell(const PostRefused& news) { handler_.on_refused(news.refused); }
+
+  Handler& handler_;
+};
+
+}  // namespace r4::test
