@@ -42,8 +42,8 @@ class CallbackThread {
   struct UartNews {
     int channel;
   };
-  using Notice = std::variant<Restart, ReceivedState, LinkStatus, CarrierEvent, PathStatus, DisarmCause,
-                              RefusedPost, UartNews>;
+  using Notice = std::variant<Restart, ReceivedState, LinkStatus, CarrierEvent, PathStatus,
+                              DisarmCause, RefusedPost, UartNews>;
   static constexpr std::size_t capacity = 64;
 
   // `on_end`: a callback has ended that ran for so long; called on this thread.

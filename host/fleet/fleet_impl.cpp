@@ -162,7 +162,8 @@ BoardHealth Fleet::Impl::health_of(std::size_t board) const {
   health.in_control = async.in_control();
   health.disarmed_by = async.disarmed_by();
   health.statistics = async.statistics();
-  if (std::vector<PathStatus> paths = async.paths(); paths.size() > 1) health.paths = std::move(paths);
+  if (std::vector<PathStatus> paths = async.paths(); paths.size() > 1)
+    health.paths = std::move(paths);
   return health;
 }
 

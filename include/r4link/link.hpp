@@ -62,9 +62,10 @@ R4LINK_API const char* to_text(PathState state);
 
 struct LinkStatus {
   HostLinkState state = HostLinkState::connecting;
-  SafeReason reason = SafeReason::none;     // why the board is safe
-  bool busy = false;                        // another host controls the board
-  TransportTrouble trouble = TransportTrouble::none;  // foreign_frames: what keeps us busy is no R4 host
+  SafeReason reason = SafeReason::none;  // why the board is safe
+  bool busy = false;                     // another host controls the board
+  TransportTrouble trouble =
+      TransportTrouble::none;  // foreign_frames: what keeps us busy is no R4 host
   Gate gate = Gate::open;
   KeyTrouble key = KeyTrouble::none;
   LeaseTrouble lease = LeaseTrouble::none;

@@ -18,7 +18,8 @@ class HostOnPaths {
     bool cut = false;
   };
 
-  HostOnPaths(TestBoard& to, std::vector<Path> its_paths) : paths(std::move(its_paths)), board_(to) {}
+  HostOnPaths(TestBoard& to, std::vector<Path> its_paths)
+      : paths(std::move(its_paths)), board_(to) {}
 
   // Sends on every path that is not cut; returns the number.
   std::uint32_t send(const std::string& field, std::uint64_t t) {

@@ -238,17 +238,17 @@ TEST_F(BoardPathsInMemory, CostNoHeapPerDatagram) {
 }
 
 TEST_F(BoardPathsInMemory, AreToldApartInARecording) {
-  const std::string path =
+  const std::string file =
       (std::filesystem::temp_directory_path() / ("r4-paths-" + std::to_string(getpid()) + ".r4"))
           .string();
   {
-    Recording recording(path);
+    Recording recording(file);
     board->record(recording);
     run_for(200ms);
   }
   std::ostringstream text;
-  text << std::ifstream(path).rdbuf();
-  std::filesystem::remove(path);
+  text << std::ifstream(file).rdbuf();
+  std::filesystem::remove(file);
   for (const std::string path : {" 1", " 2"}) {
     EXPECT_TRUE(contains(text.str(), path + "< AIN24:")) << "brought";
     EXPECT_TRUE(contains(text.str(), path + "> H:ROS2-R4;")) << "carried";

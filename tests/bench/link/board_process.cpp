@@ -83,8 +83,8 @@ void BoardProcess::serve(Transport path, bool unbound) {
     options.settings.state_rate_hz = 1000;
   }
   sim::SimulatedBoard board(io, std::move(options));
-  auto carrier =
-      Registry::standard().make(io, path == Transport::udp ? "udp://127.0.0.1:0" : "pty:", Role::board);
+  auto carrier = Registry::standard().make(
+      io, path == Transport::udp ? "udp://127.0.0.1:0" : "pty:", Role::board);
   const Carrier& end = *carrier;
   board.add_carrier(std::move(carrier));
   board.start();

@@ -9,11 +9,11 @@ namespace {
 using firmware::BoardState;
 using test::another_session;
 using test::Heard;
+using test::HostOnPaths;
 using test::our_session;
 using test::state_of;
 using test::TestBoard;
 using test::TestHost;
-using test::HostOnPaths;
 using Lines = std::vector<std::string>;
 using Numbers = std::vector<std::uint32_t>;
 

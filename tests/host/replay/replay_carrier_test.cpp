@@ -26,22 +26,22 @@ using namespace std::chrono_literals;
 
 struct Replay : testing::Test {
   Replay() { write_record_header(text); }
-  ~Replay() override { fs::remove(path); }
+  ~Replay() override { fs::remove(file); }
   void add(Time at, const std::string& bytes, RecordKind kind = RecordKind::from_board,
            std::uint16_t path = 1) {
     write_record(text, {Time{1795468293s} + at, path, kind, bytes});
   }
   // All of it, as fast as that.
   void play(const std::string& options) {
-    std::ofstream(path) << text;
-    const auto carrier = standard_registry().make(io, "replay:" + path + options, Role::host);
+    std::ofstream(file) << text;
+    const auto carrier = standard_registry().make(io, "replay:" + file + options, Role::host);
     carrier->open(heard);
     io.run_for(10s);
     EXPECT_FALSE(carrier->up());
     counters = carrier->counters();
   }
 
-  const std::string path = testing::TempDir() + "r4-replay-" + std::to_string(::getpid());
+  const std::string file = testing::TempDir() + "r4-replay-" + std::to_string(::getpid());
   std::string text;
   asio::io_context io;
   Recorder heard;
@@ -132,14 +132,14 @@ TEST_F(Replay, TellsOfDamageThatIsFarBehindWhatIsPlayed) {
 TEST_F(Replay, OfABoardIsThatBoardForAProgramThatWatches) {
   {
     Board board("sim:", at_will());
-    board.record(path);
+    board.record(file);
     board.wait_active();
     board.osmc(1).set(358, Direction::forward);
     for (int i = 0; i < 50; ++i) board.next_state();
   }
   BoardOptions options;
   options.role = BoardRole::watch;
-  Board again("replay:" + path, options);
+  Board again("replay:" + file, options);
   again.wait_active();
   while (again.next_state().osmc[0].pwm != 358) {
   }
@@ -156,7 +156,7 @@ TEST_F(Replay, RefusesWhatItCannotPlay) {
     EXPECT_EQ(problem_of([&] { Board board(none); }).reason, "No such file or directory");
   }
   EXPECT_EQ(problem_of([&] { Board("replay:" + testing::TempDir()); }).reason, "is a directory");
-  const std::string fifo = path + "-fifo";
+  const std::string fifo = file + "-fifo";
   ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
   EXPECT_EQ(problem_of([&] { Board("replay:" + fifo); }).reason, "is no regular file");
   fs::remove(fifo);

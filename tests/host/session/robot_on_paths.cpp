@@ -80,7 +80,8 @@ SessionOptions RobotOnPaths::at_will() {
   return options;
 }
 
-RobotOnPaths::RobotOnPaths(Cables its_cables, SessionOptions options, BoardRole role, Settings settings)
+RobotOnPaths::RobotOnPaths(Cables its_cables, SessionOptions options, BoardRole role,
+                           Settings settings)
     : cables(std::move(its_cables)), settings_(std::move(settings)), up_(cables.size()) {
   std::size_t last = 0;
   for (const Cable& cable : cables) last = std::max(last, cable.board);
@@ -94,7 +95,9 @@ RobotOnPaths::RobotOnPaths(Cables its_cables, SessionOptions options, BoardRole 
 }
 RobotOnPaths::~RobotOnPaths() = default;
 
-firmware::Application& RobotOnPaths::board(std::size_t index) { return *boards_[index]->application; }
+firmware::Application& RobotOnPaths::board(std::size_t index) {
+  return *boards_[index]->application;
+}
 const std::map<std::uint32_t, int>& RobotOnPaths::executed(std::size_t board) const {
   return boards_[board]->executed;
 }

@@ -33,7 +33,7 @@ class RobotOnPaths final : private DrivenSession::Handler {
   using Cables = std::vector<Cable>;
 
   explicit RobotOnPaths(Cables its_cables, SessionOptions options = at_will(),
-                      BoardRole role = BoardRole::control, Settings settings = {});
+                        BoardRole role = BoardRole::control, Settings settings = {});
   ~RobotOnPaths();
   static SessionOptions at_will();
 

@@ -2,9 +2,9 @@
 // One session over several paths, opposite a board that begins again, and what looks like it (docs/redundancy.md).
 #include <gtest/gtest.h>
 
+#include "robot_on_paths.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/signing.hpp"
-#include "robot_on_paths.hpp"
 
 namespace r4::test {
 namespace {

@@ -5,9 +5,9 @@
 #include <algorithm>
 
 #include "r4link/error.hpp"
+#include "robot_on_paths.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/signing.hpp"
-#include "robot_on_paths.hpp"
 
 namespace r4::test {
 namespace {

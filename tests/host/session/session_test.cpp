@@ -6,9 +6,9 @@
 
 #include "protocol/link/board_link.hpp"
 #include "r4link/error.hpp"
+#include "robot_on_paths.hpp"
 #include "scripted_link.hpp"
 #include "tests/support/datagrams.hpp"
-#include "robot_on_paths.hpp"
 
 namespace r4::test {
 namespace {

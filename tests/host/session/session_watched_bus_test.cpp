@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "tests/support/datagrams.hpp"
 #include "robot_on_paths.hpp"
+#include "tests/support/datagrams.hpp"
 
 namespace r4::test {
 namespace {

@@ -21,7 +21,8 @@ CanQuestion::CanQuestion(asio::io_context& io, const Url& url)
 }
 
 void CanQuestion::ask() {
-  if (const TransportTrouble now = carrier_->trouble(); now != TransportTrouble::none) trouble_ = now;
+  if (const TransportTrouble now = carrier_->trouble(); now != TransportTrouble::none)
+    trouble_ = now;
   if (answer_us_ > 0) return;
   const bool sent = carrier_->send(identity_question(), Priority::normal) == SendResult::sent;
   if (sent) {

@@ -13,8 +13,8 @@
 
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
-#include "../shell/subcommands.hpp"
 #include "../shell/paths.hpp"
+#include "../shell/subcommands.hpp"
 #include "host/standard_registry.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"

@@ -13,11 +13,11 @@
 
 #include "../shell/json.hpp"
 #include "conversion.hpp"
+#include "path_names.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/devices/device.hpp"
 #include "r4link/state.hpp"
 #include "recorded_devices.hpp"
-#include "path_names.hpp"
 
 namespace r4::tool {
 

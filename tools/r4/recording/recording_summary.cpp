@@ -54,7 +54,8 @@ void RecordingSummary::on_header() {
 // What the files of one program have in common is one path.
 void RecordingSummary::on_path(const RecordedPath& path) {
   const auto known = std::find_if(paths_.begin(), paths_.end(), [&path](const PathSummary& each) {
-    return each.recorded.number == path.number && (each.recorded.url == path.url || each.recorded.url.empty());
+    return each.recorded.number == path.number &&
+           (each.recorded.url == path.url || each.recorded.url.empty());
   });
   const auto index = static_cast<std::size_t>(known - paths_.begin());
   numbers_[path.number] = known == paths_.end() ? add(path.number) : index;

@@ -12,9 +12,9 @@
 #include <utility>
 
 #include "../shell/line_writer.hpp"
+#include "../shell/paths.hpp"
 #include "../shell/run_end.hpp"
 #include "../shell/screen.hpp"
-#include "../shell/paths.hpp"
 #include "monitor_view.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"

@@ -13,8 +13,8 @@
 
 #include "../conversion.hpp"
 #include "../json_lines.hpp"
-#include "../recorded_devices.hpp"
 #include "../path_names.hpp"
+#include "../recorded_devices.hpp"
 #include "host/recording/zstd_stream.hpp"
 #include "mcap.hpp"
 
