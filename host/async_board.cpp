@@ -10,7 +10,7 @@
 #include "board_loop.hpp"
 #include "commands/command_help.hpp"
 #include "commands/link_timing.hpp"
-#include "session/limits.hpp"
+#include "commands/limits.hpp"
 #include "standard_registry.hpp"
 
 namespace r4 {

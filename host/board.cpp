@@ -5,7 +5,7 @@
 
 #include "board_impl.hpp"
 #include "commands/command_help.hpp"
-#include "session/limits.hpp"
+#include "commands/limits.hpp"
 #include "standard_registry.hpp"
 
 namespace r4 {

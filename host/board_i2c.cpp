@@ -11,7 +11,7 @@
 #include "commands/command_help.hpp"
 #include "devices/device_steps.hpp"
 #include "r4link/board.hpp"
-#include "session/limits.hpp"
+#include "commands/limits.hpp"
 
 namespace r4 {
 

@@ -7,7 +7,7 @@
 
 #include "../transports/file_descriptor.hpp"
 #include "commands/command_help.hpp"
-#include "session/limits.hpp"
+#include "commands/limits.hpp"
 
 namespace r4 {
 

@@ -21,8 +21,8 @@ CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'trans
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/devices', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/devices', 'firmware/ports/sim/robot'}
-HOST = TRANSPORTS | {'host', 'host/blocking', 'host/commands', 'host/control', 'host/devices', 'host/measurement', 'host/paths',
-                     'host/recording', 'host/replay', 'host/session', 'host/uart'}
+HOST = TRANSPORTS | {'host', 'host/arming', 'host/blocking', 'host/commands', 'host/control', 'host/devices', 'host/link',
+                     'host/measurement', 'host/paths', 'host/recording', 'host/replay', 'host/session', 'host/uart'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = SIMULATED | {'tools/r4/shell'}
 FORMATS = {'tools/r4/formats', 'tools/r4/formats/mcap', 'tools/r4/formats/packets'}
@@ -63,17 +63,19 @@ ALLOWED = {
     'firmware/ports/giga/devices': FIRMWARE | {'firmware/ports', 'firmware/ports/giga/chip'},
     'firmware/ports/giga': FIRMWARE | {'firmware/ports/giga/chip', 'firmware/ports/giga/devices',
                                        'firmware/ports/giga/links'},
+    'host/arming': TRANSPORTS | {'host/link', 'host/measurement'},
     'host/blocking': TRANSPORTS | {'host/commands', 'host/measurement'},
     'host/bridge': HOST,
-    'host/commands': TRANSPORTS,
+    'host/commands': TRANSPORTS | {'host/arming', 'host/link', 'host/measurement', 'host/paths'},
     'host/control': PUBLIC,
     'host/devices': HOST,
     'host/fleet': HOST,
+    'host/link': TRANSPORTS | {'host/measurement', 'host/paths'},
     'host/measurement': TRANSPORTS,
     'host/recording': TRANSPORTS,
     'host/replay': TRANSPORTS | {'host/recording'},
     'host/paths': TRANSPORTS | {'host/measurement'},
-    'host/session': TRANSPORTS | {'host/commands', 'host/measurement', 'host/paths'},
+    'host/session': TRANSPORTS | {'host/arming', 'host/commands', 'host/link', 'host/measurement', 'host/paths'},
     'host/uart': HOST,
     'host/python/bindings': PUBLIC,
     'host': HOST,

@@ -35,13 +35,10 @@ struct PendingCommand {
     overtaken,  // CMD is past it: the answer to a retry decides
     executed,   // the board said DUPLICATE: it has executed this number
   };
-  // What it is for: a command of the program, an arm() of it (never sent), or a command that arm()
-  // sends.
-  enum class Role : std::uint8_t { command, arm, arm_step };
   Stage stage = Stage::free;
-  Role role = Role::command;
   CommandKind kind = CommandKind::heartbeat;
   bool cable_only = false;  // a setting that is refused elsewhere
+  bool is_step = false;     // sent by arm(), not by the program
   std::uint32_t pnum = 0;
   std::uint64_t ticket = 0;
   std::int32_t cause = Command::unnamed_cause;  // clear: the cause it names, once one is known
@@ -85,7 +82,7 @@ class PendingCommands {
     ++used_;
     PendingCommand& slot = *place;
     slot.stage = PendingCommand::Stage::queued;
-    slot.role = PendingCommand::Role::command;
+    slot.is_step = false;
     slot.kind = kind;
     slot.cable_only = false;
     slot.pnum = 0;

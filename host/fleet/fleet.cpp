@@ -5,7 +5,7 @@
 
 #include "../../transports/file_descriptor.hpp"
 #include "../commands/command_help.hpp"
-#include "../session/limits.hpp"
+#include "../commands/limits.hpp"
 #include "fleet_impl.hpp"
 
 namespace r4 {

@@ -74,14 +74,15 @@ PathSet Paths::to_ask(Time now) const {
   return due;
 }
 
-void Paths::asked(std::size_t index, std::uint32_t pnum, Time now) {
+void Paths::asked(std::size_t index, std::uint32_t pnum, bool sent, Time now) {
   Path& path = paths_[index];
   PathQuestions& questions = path.questions;
-  questions.open.asked(pnum, now);
-  questions.asked_at = now;
-  questions.unanswered += questions.unanswered < most_unanswered ? 1 : 0;
   const Time again = now + (path.other ? ask_other_interval : ask_interval);
-  questions.ask_at = path.known ? Time::max() : again;
+  questions.asked_at = now;
+  questions.ask_at = path.known && sent ? Time::max() : again;
+  if (!sent) return;
+  questions.open.asked(pnum, now);
+  questions.unanswered += questions.unanswered < most_unanswered ? 1 : 0;
 }
 
 // At once, but at most ten times a second.

@@ -71,7 +71,8 @@ class Paths {
   bool is_known(std::size_t index) const { return paths_[index].known; }
   // The paths that are to be sent Q:ID now.
   PathSet to_ask(Time now) const;
-  void asked(std::size_t index, std::uint32_t pnum, Time now);
+  // The path has taken Q:ID, or not.
+  void asked(std::size_t index, std::uint32_t pnum, bool sent, Time now);
   // Lets time pass. True if the session begins.
   bool poll(Time now);
   Time next(Time now) const;

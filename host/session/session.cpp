@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// What a session does when time passes, and what the program asks it for.
 #include "session.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <random>
+#include <utility>
 
-#include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/state_fields.hpp"
 #include "../commands/command_help.hpp"
-#include "limits.hpp"
+#include "../commands/limits.hpp"
 #include "r4link/error.hpp"
 
 namespace r4 {
@@ -20,18 +20,15 @@ std::uint64_t Session::random_bits() {
 
 namespace {
 
-// To know the board's clock, questions are asked more often than the program wants them: at first, until
-// the error is small, and later where it is not. The interval is no whole number of milliseconds: the board's
-// clock counts those, and so shows where they begin.
-constexpr Time soon_interval{102'300};
-constexpr Time first_goal{500}, later_goal{1'000};
-constexpr int first_questions = 100, questions_in_vain = 10;
 // The longest wait when nothing is due: Time::max() overflows when it is converted to nanoseconds.
 constexpr Time longest_wait = std::chrono::hours{1};
 
-// Before anything is made of them: their times may be too long to be reckoned with.
+// Before anything is made of the options: their times may be too long to be reckoned with.
 SessionOptions checked(SessionOptions options) {
   require_valid(options);
+  if (FieldSet set; !options.fields.empty() && parse_fields(options.fields, set) != Refusal::none) {
+    throw Error(bad_command("F:" + options.fields, Refusal::unknown));
+  }
   return options;
 }
 
@@ -40,48 +37,25 @@ SessionOptions checked(SessionOptions options) {
 Session::Session(SessionOptions options, BoardRole role, std::size_t paths,
                  std::function<std::uint64_t()> random)
     : options_(checked(std::move(options))),
-      board_role_(role),
       random_(std::move(random)),
       link_(options_.timing, static_cast<std::uint32_t>(random_())),
       key_(options_.key, options_.clock_start),
-      selection_(options_.fields),
-      question_(options_.identify_interval),
       paths_(paths, options_.timing, link_),
-      pending_(max_pending, max_stops) {
-  link_.hold(watches());
+      board_(options_.identify_interval),
+      outbox_(effects_, link_, key_, paths_, role),
+      keeper_(options_, link_, key_, paths_, outbox_, statistics_.counts),
+      ends_(effects_, statistics_.counts),
+      arming_(options_.arming, effects_, ends_),
+      commands_(options_, link_, keeper_, outbox_, board_, arming_, ends_, statistics_.counts),
+      posts_(effects_, outbox_, statistics_.counts) {
   begin_session();
-  if (!options_.fields.empty()) {
-    const std::string fields = options_.fields;
-    if (FieldSet set; parse_fields(fields, set) != Refusal::none) {
-      throw Error(bad_command("F:" + fields, Refusal::unknown));
-    }
-    require_valid(with_needed_fields(Command::fields(fields)));
-  }
+  if (options_.fields.empty()) return;
+  const std::string fields = options_.fields;
+  require_valid(keeper_.with_needed_fields(Command::fields(fields)));
 }
 
 void Session::begin_session() {
   while (link_.wants_session()) link_.begin_session(random_());
-}
-
-// Sees to it that the state has the fields we need, whoever chose others, and that we are in
-// control.
-void Session::select_fields(Time now) {
-  if (leaving_ || watches()) return;
-  if (!selection_.ask(role_.controlling(), link_up() && !role_.refused(now), now)) return;
-  transmit_now(Command::fields(selection_.fields()), to_ms(now), Priority::normal, now);
-}
-
-// A command that chooses fields, with those that we need; the choice is remembered.
-Command Session::with_needed_fields(const Command& command) {
-  if (command.kind != CommandKind::fields || selection_.fields().empty()) return command;
-  FieldSet set;
-  parse_fields(command.text, set);
-  std::string fields(command.text.data(), command.text.size());
-  if (!set.has(StateField::safe)) fields += ",SAFE";
-  if (!set.has(StateField::cmd)) fields += ",CMD";
-  if (!set.has(StateField::relays) && options_.arming == Arming::required) fields += ",RELAYS";
-  if (fields != selection_.fields()) selection_.choose(std::move(fields));
-  return Command::fields(selection_.fields());
 }
 
 // --- time
@@ -89,166 +63,223 @@ Command Session::with_needed_fields(const Command& command) {
 void Session::poll(Time now) {
   link_.poll(to_ms(now));
   if (link_.long_silent(to_ms(now))) forget_board(now);
-  notice_restart(now);
-  ask_paths(now);
-  refresh_status(now);
-  if (!leaving_ && paths_.begun()) watches() ? send_lease(now) : send_heartbeat(now);
-  for (Pending& pending : pending_.under_way()) {
-    if (now >= pending.deadline) {
-      finish(pending, Outcome::timed_out, Refusal::none, now);
-    }
-  }
-  if (!role_.controlling()) select_fields(now);  // the first thing when the link comes up
-  send_queued(now);
+  keeper_.ask_paths(now);
+  refresh(now);
+  keeper_.keep_alive(now);
+  commands_.expire(now);
+  arming_.expire(now);
+  if (!keeper_.controls()) keeper_.select_fields(now);  // the first thing when the link comes up
+  commands_.send_queued(now);
   advance_arming(now);
-  refuse_held_back(now);
-  send_queued(now);  // what has waited for arm()
-  retry_due(now);
-  repeat_stop(now);
-  if (!leaving_ && hears_board() && question_.due(question_interval(), now)) {
-    transmit_now(Command::identify(), to_ms(now), Priority::normal, now);
-    question_.ask(link_.last_pnum(), now);
-    ++questions_of_clock_;
+  commands_.refuse_held_back(now);
+  commands_.send_queued(now);  // commands that have waited for arm()
+  commands_.repeat(now);
+  if (!keeper_.is_leaving() && keeper_.hears_board() && board_.question_due(now)) {
+    board_.ask(outbox_.send(Command::identify(), {}, now).pnum, now);
   }
-}
-
-// Each path has a lease of its own, with its own T to echo.
-void Session::send_lease(Time now) {
-  const bool others = options_.fields != "DEFAULT";
-  const Text list = others ? Text(options_.fields.data(), options_.fields.size()) : Text();
-  for (std::size_t i = 0; i < paths_.count(); ++i) {
-    Lease& lease = paths_.leases()[i];
-    if ((paths_.speaking() & path_bit(i)) == 0 || !lease.due(now)) continue;
-    transmit_now(Command::watch(options_.watch_rate_hz, list), lease.echo(), Priority::lease, now,
-                 path_bit(i));
-    lease.sent(now);
-  }
-}
-
-void Session::send_heartbeat(Time now) {
-  if (!link_.heartbeat_due(to_ms(now))) return;
-  link_.heartbeat_sent(to_ms(now));  // on_sent() tells if it could not be
-  const PathSet over = transmit_now(Command::heartbeat(), link_.echo(), Priority::normal, now);
-  heartbeat_ = {CommandKind::heartbeat, link_.last_pnum(), std::popcount(over), SendResult::down};
-  if (over == 0) link_.heartbeat_not_sent(to_ms(now));
 }
 
 Time Session::next_poll(Time now) {
-  Time next = repetition_.next();
-  for (const Pending& pending : pending_.under_way()) {
-    next = std::min(next, pending.deadline);
-    if (pending.is_out()) next = std::min(next, pending.retry);
-  }
-  if (leaving_) return std::min(next, now + longest_wait);
-  Time link = now + std::chrono::milliseconds{link_.due_in(to_ms(now))};
-  // due_in() counts whole milliseconds; aim behind the edge, not before it.
-  link = std::chrono::duration_cast<std::chrono::milliseconds>(link) + Time{0};
-  if (link <= now) link = now + Time{1000};
-  if (paths_.begun()) next = std::min(next, link);
-  if (watches()) next = std::min(next, paths_.leases().next(paths_.speaking()));
-  next = std::min(next, paths_.next(now));
-  if (hears_board()) next = std::min(next, question_.next(question_interval()));
-  if (role_.refused(now)) next = std::min(next, role_.refused_until());
-  if (group_waits_) next = std::min(next, groups_.next());
-  return std::min(next, now + longest_wait);
+  Time next = std::min({commands_.next(), arming_.next_deadline(), now + longest_wait});
+  if (keeper_.is_leaving()) return next;
+  next = std::min(next, keeper_.next(now));
+  return keeper_.hears_board() ? std::min(next, board_.next_question()) : next;
 }
 
-void Session::on_transport(std::size_t path, bool up, Time now, bool can_ask) {
-  paths_.on_transport(path, up, can_ask, now);
-  transport_down_ = paths_.all_down();
-  if (up || transport_down_) link_.on_transport(up);
-  refresh_status(now);
-}
-
-bool Session::link_up() const {
-  if (!link_.echoed() || key_.refuses_board()) return false;
-  switch (link_.state()) {
-    case HostLinkState::active:
-      return true;
-    case HostLinkState::safe:
-      return link_.reason() != SafeReason::link;
-    case HostLinkState::connecting:
-    case HostLinkState::lost:
-      return false;
-  }
-  return false;
-}
-
-// Is the board there, whatever it thinks of us?
-bool Session::hears_board() const {
-  if (!watches()) return link_up();
-  return is_heard(link_.state());
-}
-
-Time Session::question_interval() const {
-  const bool first = questions_of_clock_ < first_questions;
-  const bool known = state_.sampled_error != ReceivedState::unknown;
-  const Time enough = first ? first_goal : later_goal;
-  const bool soon = known ? state_.sampled_error > enough : questions_of_clock_ < questions_in_vain;
-  return soon ? soon_interval : Time{options_.identify_interval};
-}
-
-// Commands wait for proof of control: the session's own F, executed. So none is ever sent into a
-// session that the board has not accepted, where a refusal would say nothing.
-bool Session::in_control(Time now) const {
-  const FieldSelection::Stage stage = selection_.stage();
-  const bool no_proof_to_come =
-      stage == FieldSelection::Stage::left || stage == FieldSelection::Stage::unheard;
-  return !leaving_ && link_up() && !role_.refused(now) &&
-         (role_.controlling() || no_proof_to_come) && !link_.gated(to_ms(now));
-}
-
-void Session::refresh_status(Time now) {
-  role_.on_link(link_up(), now);
-  look_at_arming(now);
-  const LinkStatus fresh{
-      .state = link_.state(),
-      .reason = link_.reason(),
-      .busy = role_.refused(now),
-      .trouble = trouble_,
-      .gate = watches()                            ? Gate::open
-              : link_.watchdog_expired(to_ms(now)) ? Gate::watchdog
-              : link_.gated(to_ms(now))            ? Gate::callback
-                                                   : Gate::open,
-      .key = watches() ? KeyTrouble::none : key_.trouble(now),
-      .lease = paths_.leases().trouble(now),
-      .in_control = in_control(now),
-      .transport_down = transport_down_,
-      .carrying = paths_.carrying(now),
-      .two_boards = paths_.two_boards(),
-      .chip = link_.reason() == SafeReason::fault ? state_.fault : ChipFault(),
-  };
+// Takes up what has changed: the role, what disarms, and the status that programs see.
+void Session::refresh(Time now) {
+  keeper_.update(now);
+  arming_.on_link(keeper_.is_up(), keeper_.in_control(now), link_.state() == HostLinkState::safe,
+                  link_.reason());
+  const LinkStatus fresh = keeper_.status(board_.state().fault, now);
   if (fresh == status_) return;
   status_ = fresh;
   effects_.tell(LinkChanged{status_});
 }
 
+void Session::on_sent(const Sending& sending, SendResult result, Time now) {
+  keeper_.on_sent(sending, result, now);
+  posts_.on_sent(sending, result);
+  if (result == SendResult::busy) refresh(now);
+}
+
+void Session::on_transport(std::size_t path, bool up, Time now, bool can_ask) {
+  keeper_.on_transport(path, up, can_ask, now);
+  refresh(now);
+}
+
+// A board whose timeout was raised may still be driving: its session ends at once.
+void Session::on_sleep(Time now) {
+  if (may_say_farewell()) {
+    Outbox::Way way;
+    way.echo = link_.echo();
+    outbox_.send(Command::leave(), way, now);
+  }
+  commands_.forget_stop();
+  arming_.on_sleep();
+  forget_board(now);
+  refresh(now);
+}
+
+// The board's T cannot be compared with what was heard before.
+void Session::forget_board(Time now) {
+  link_.begin_anew();
+  paths_.on_sleep(now);
+  on_new_boot(now);
+}
+
+// A path has proved that the board has restarted.
+void Session::on_restart(Time now) {
+  link_.on_restart();
+  link_.on_heard(to_ms(now));
+  on_new_boot(now);
+}
+
+// A board that has restarted has forgotten what it was told. If it did not say so itself, this host's
+// clock may have stood still instead, and the deadlines of commands with it: then a new session begins,
+// and the commands end.
+void Session::on_new_boot(Time now) {
+  board_.on_restart();
+  arming_.disarm(DisarmCause::restart);
+  if (link_.wants_session()) {
+    begin_session();
+    end_arming(Outcome::cancelled, now);
+    commands_.give_up(now);
+  }
+  effects_.tell(BoardRestarted{});
+}
+
+// --- arming
+
+// Goes on with arm() where it can.
+void Session::advance_arming(Time now) {
+  if (arming_.take_abandoned()) commands_.remove_step();
+  if (!arming_.any() || !keeper_.in_control(now) || commands_.delays_arming()) return;
+  const std::optional<Command> step = arming_.next_step(link_.reason(), now);
+  if (step && !commands_.send_step(*step, now)) end_arming(Outcome::full, now);
+}
+
+// Ends every arm() that waits.
+void Session::end_arming(Outcome outcome, Time now) {
+  arming_.end(outcome, Refusal::none, now);
+  commands_.remove_step();
+}
+
+Ticket Session::arm(Time timeout, Time now) {
+  require_control(board_role(), "arm()");
+  const Ticket ticket = commands_.take_ticket();
+  return arming_.add(ticket, commands_.cause(), now + timeout, now) ? ticket : 0;
+}
+
+// --- commands
+
+Ticket Session::send(const Command& command, Time timeout, Time now) {
+  require_valid(command);
+  require_control(board_role(), command);
+  return commands_.send(keeper_.with_needed_fields(command), timeout, now);
+}
+
+Ticket Session::send(const Setpoints& group, Time timeout, Time now) {
+  require_any(group);
+  require_control(board_role(), group);
+  return commands_.send(group, timeout, now);
+}
+
+PostResult Session::post(const Command& command, Time now) {
+  require_valid(command);
+  require_control(board_role(), command);
+  commands_.send_queued(now);  // commands that were asked for earlier go first
+  if (!in_control(now)) return PostResult::no_link;
+  if (commands_.is_held_back(command.kind)) {
+    ++statistics_.counts.refused;
+    return PostResult::not_armed;
+  }
+  if (commands_.is_group_ahead()) return PostResult::queue_full;
+  if (command.kind != CommandKind::clear) return posts_.send(command, now);
+  commands_.forget_stop();  // a program that clears a stop does not repeat it
+  const bool named = command.value != Command::unnamed_cause;
+  return posts_.send(named ? command : Command::clear(commands_.cause()), now);
+}
+
+PostResult Session::post(const Setpoints& group, Time now) {
+  require_any(group);
+  require_control(board_role(), group);
+  if (group.size() == 1) return post(group[0], now);
+  commands_.send_queued(now);  // commands that were asked for earlier go first
+  if (!in_control(now)) return PostResult::no_link;
+  if (!may_drive()) {
+    ++statistics_.counts.refused;
+    return PostResult::not_armed;
+  }
+  if (commands_.is_group_ahead()) return PostResult::queue_full;
+  if (!commands_.knows_groups(now)) return PostResult::no_link;
+  return posts_.send(group, now);
+}
+
+// Nothing that was asked for before a stop may follow it.
+Ticket Session::stop(Time timeout, Time now) {
+  end_arming(Outcome::cancelled, now);
+  arming_.disarm(DisarmCause::stop);
+  const Ticket ticket = commands_.stop(timeout, now);
+  commands_.end_all_but_stops(Outcome::cancelled, now);
+  return ticket;
+}
+
+Ticket Session::identify(Time timeout, Time now) { return commands_.identify(timeout, now); }
+
+void Session::cancel(Ticket ticket, Time now) {
+  if (!arming_.cancel(ticket, now)) commands_.cancel(ticket, now);
+  advance_arming(now);
+}
+
+// A board that confirms commands refuses a farewell that it does not know. So it is said as well where
+// the answer that would tell may have been lost.
+bool Session::may_say_farewell() const {
+  return keeper_.is_up() && !watches() && board_.may_know_leave();
+}
+
+Ticket Session::leave(Time timeout, Time now) {
+  end_arming(Outcome::closed, now);
+  commands_.end_all_but_stops(Outcome::closed, now);
+  keeper_.leave(now);
+  return may_say_farewell() ? commands_.leave(timeout, now) : 0;
+}
+
+void Session::end_all(Time now) {
+  end_arming(Outcome::closed, now);
+  commands_.end_all(now);
+}
+
+// --- gates
+
 void Session::watchdog(std::chrono::milliseconds period, Time now) {
   link_.watchdog(static_cast<std::uint32_t>(period.count()), to_ms(now));
-  refresh_status(now);
+  refresh(now);
 }
 
 void Session::hold(bool held, Time now) {
   if (watches()) return;
   link_.hold(held);
-  refresh_status(now);
+  refresh(now);
 }
 
 void Session::feed(Time now) {
   link_.feed(to_ms(now));
-  refresh_status(now);
+  refresh(now);
 }
 
+// --- reports
+
 Statistics Session::statistics(Time now) const {
-  Statistics report = collector_.report(now);
+  Statistics report = statistics_.report(now);
   report.packets = packets();
-  // Not those of the numbers, which a transport that comes up begins anew.
+  // Restarts of the board: those of the numbers count transports that came up, too.
   report.packets.restarts = link_.restarts();
   report.copies = packets().duplicate;
   report.received -= report.copies;
-  if (state_.sampled_error != ReceivedState::unknown) {
-    report.clock_drift_ppm = clock_.drift_ppm();
-    report.clock_drift_error_ppm = clock_.drift_error_ppm();
+  if (state().sampled_error != ReceivedState::unknown) {
+    report.clock_drift_ppm = board_.clock().drift_ppm();
+    report.clock_drift_error_ppm = board_.clock().drift_error_ppm();
   }
   return report;
 }

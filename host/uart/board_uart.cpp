@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "../board_impl.hpp"
-#include "../session/limits.hpp"
+#include "../commands/limits.hpp"
 #include "r4link/board.hpp"
 
 namespace r4 {

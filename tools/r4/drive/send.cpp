@@ -21,7 +21,7 @@
 #include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "host/commands/command_help.hpp"
-#include "host/session/limits.hpp"
+#include "host/commands/limits.hpp"
 #include "protocol/datagram/numbers.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Options and times that make no sense are refused before anything is sent.
-#include "host/session/limits.hpp"
+#include "host/commands/limits.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How commands begin, go out, and end by time or by the program. What the board's answers prove is in
+// commands_answered.cpp.
+#include "commands_under_way.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "../../protocol/messages/command_field.hpp"
+#include "command_help.hpp"
+
+namespace r4 {
+
+namespace {
+
+// Commands that end what the board does: repeated soon, also while the heartbeats are held.
+bool is_urgent(CommandKind kind) { return kind == CommandKind::stop || kind == CommandKind::leave; }
+
+constexpr Time no_deadline = std::chrono::hours{24};
+
+}  // namespace
+
+CommandsUnderWay::CommandsUnderWay(const SessionOptions& options, HostLink& link,
+                                   LinkKeeper& keeper, Outbox& outbox, HeardBoard& board,
+                                   const ArmRequests& arming, CommandEnds& ends, Statistics& counts)
+    : options_(options),
+      link_(link),
+      keeper_(keeper),
+      outbox_(outbox),
+      board_(board),
+      arming_(arming),
+      ends_(ends),
+      counts_(counts),
+      pending_(max_pending, max_stops) {}
+
+// --- begin
+
+CommandsUnderWay::Pending* CommandsUnderWay::allocate(const Command& command, Time timeout,
+                                                      Time now) {
+  Pending* const slot = pending_.add(command.kind);
+  if (slot == nullptr) return nullptr;
+  DatagramWriter writer(slot->bytes.data(), slot->bytes.size());
+  write_command(writer, command);
+  slot->size = writer.size();
+  slot->command = command;
+  slot->cable_only = command.kind == CommandKind::setting && is_site_setting(command.text);
+  slot->command.text = slot->command.text2 = Text();
+  slot->ticket = next_ticket_++;
+  slot->started = now;
+  slot->deadline = now + timeout;
+  if (command.kind == CommandKind::clear) {
+    slot->cause = command.value;
+    name_cause(*slot);
+    repetition_.cancel();  // a program that clears a stop does not repeat it
+  }
+  return slot;
+}
+
+// Gives an E:CLEAR the number of the cause that is known now, if it names none yet. False if nothing of
+// the board has been heard.
+bool CommandsUnderWay::name_cause(Pending& pending) const {
+  if (pending.cause == Command::unnamed_cause) pending.cause = cause_;
+  if (pending.cause == Command::unnamed_cause) return false;
+  if (pending.stage == Stage::queued) {
+    DatagramWriter writer(pending.bytes.data(), pending.bytes.size());
+    write_command(writer, Command::clear(pending.cause));
+    pending.size = writer.size();
+  }
+  return true;
+}
+
+Ticket CommandsUnderWay::send(const Command& command, Time timeout, Time now) {
+  Pending* const pending = allocate(command, timeout, now);
+  if (pending == nullptr) return 0;
+  ++counts_.commands;
+  const Ticket ticket = pending->ticket;
+  send_queued(now);
+  return ticket;
+}
+
+Ticket CommandsUnderWay::send(const Setpoints& group, Time timeout, Time now) {
+  if (group.size() == 1) return send(group[0], timeout, now);
+  Pending* const pending = allocate(group[0], timeout, now);
+  if (pending == nullptr) return 0;
+  pending->group = group;
+  ++counts_.commands;
+  const Ticket ticket = pending->ticket;
+  send_queued(now);
+  return ticket;
+}
+
+Ticket CommandsUnderWay::identify(Time timeout, Time now) {
+  Pending* const pending = allocate(Command::identify(), timeout, now);
+  if (pending == nullptr) return 0;
+  transmit(*pending, now);
+  return pending->ticket;
+}
+
+Ticket CommandsUnderWay::stop(Time timeout, Time now) {
+  repetition_.cancel();  // the new stop is repeated instead
+  ++counts_.commands;
+  if (Pending* const pending = allocate(Command::stop(), timeout, now)) {
+    transmit(*pending, now);
+    return pending->ticket;
+  }
+  outbox_.send(Command::stop(), {Priority::stop}, now);
+  return 0;
+}
+
+Ticket CommandsUnderWay::leave(Time timeout, Time now) {
+  farewell_ = {now, {}};
+  if (board_.state().any()) farewell_.state_ms = board_.state().t_ms;
+  Pending* const pending = allocate(Command::leave(), timeout, now);
+  if (pending == nullptr) return 0;
+  ++counts_.commands;
+  transmit(*pending, now);
+  return pending->ticket;
+}
+
+bool CommandsUnderWay::send_step(const Command& command, Time now) {
+  Pending* const pending = allocate(command, no_deadline, now);  // its arm() has a deadline
+  if (pending == nullptr) return false;
+  pending->is_step = true;
+  transmit(*pending, now);
+  return true;
+}
+
+// --- going out
+
+// Sends a pending command: the first time with a number of its own, then the same again.
+void CommandsUnderWay::transmit(Pending& pending, Time now) {
+  if (pending.stage == Stage::queued) {
+    if (pending.is_group()) write_group(pending);
+    pending.pnum = link_.take_pnum();
+    DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
+    outbox_.stamp(writer, pending.kind, pending.pnum, to_ms(now));
+    pending.size = writer.size();
+    pending.stage = Stage::sent;
+    if (pending.kind == CommandKind::identify) board_.asked(pending.pnum, now);
+  } else {
+    ++counts_.retries;
+  }
+  pending.retry =
+      now + (is_urgent(pending.kind) ? Time{options_.stop_retry} : Time{options_.command_retry});
+  DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
+  Outbox::Way way;
+  if (pending.kind == CommandKind::stop) way.priority = Priority::stop;
+  outbox_.send(writer, pending.kind, pending.pnum, way, now);
+}
+
+void CommandsUnderWay::send_queued(Time now) {
+  group_waits_ = false;
+  if (!keeper_.in_control(now)) return;
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.ticket > arming_.first()) return;
+    if (pending.stage == Stage::queued && !is_held_back(pending.kind) && now < pending.deadline) {
+      if (pending.is_group() && !choose_form(pending, now)) return;
+      transmit(pending, now);
+    }
+    if (pending.has_more()) return;
+  }
+}
+
+void CommandsUnderWay::repeat(Time now) {
+  const bool gated = link_.gated(to_ms(now));
+  for (Pending& pending : pending_.under_way()) {
+    if (!pending.is_out() || now < pending.retry) continue;
+    if (gated && !is_urgent(pending.kind)) {
+      pending.retry = now + options_.command_retry;
+    } else {
+      transmit(pending, now);
+    }
+  }
+  const std::string_view stop = repetition_.due(options_.stop_retry, now);
+  if (stop.empty()) return;
+  ++counts_.retries;
+  std::array<char, max_datagram> buffer;
+  std::copy(stop.begin(), stop.end(), buffer.begin());
+  DatagramWriter writer(buffer.data(), buffer.size(), stop.size());
+  outbox_.send(writer, CommandKind::stop, 0, {Priority::stop}, now);
+}
+
+Time CommandsUnderWay::next() {
+  Time next = repetition_.next();
+  for (const Pending& pending : pending_.under_way()) {
+    next = std::min(next, pending.deadline);
+    if (pending.is_out()) next = std::min(next, pending.retry);
+  }
+  if (group_waits_) next = std::min(next, board_.groups().next());
+  return next;
+}
+
+// --- groups
+
+bool CommandsUnderWay::knows_groups(Time now) {
+  if (board_.groups().ask(keeper_.fields().answers(), now)) {
+    board_.asked(outbox_.send(Command::identify(), {}, now).pnum, now);
+  }
+  return board_.groups().state() != GroupSupport::State::unknown;
+}
+
+// Chooses between one datagram and many. False if that is not known yet, and the group waits.
+bool CommandsUnderWay::choose_form(Pending& pending, Time now) {
+  if (pending.step != 0) return true;
+  if (!knows_groups(now)) {
+    group_waits_ = true;
+    return false;
+  }
+  if (board_.groups().state() == GroupSupport::State::apart) pending.step = 1;
+  return true;
+}
+
+// Writes the fields that are to be sent now.
+void CommandsUnderWay::write_group(Pending& pending) {
+  DatagramWriter writer(pending.bytes.data(), pending.bytes.size());
+  if (pending.step != 0) {
+    pending.command = pending.group[pending.step - 1U];
+    write_command(writer, pending.command);
+  } else {
+    for (std::size_t i = 0; i < pending.group.size(); ++i) write_command(writer, pending.group[i]);
+  }
+  pending.size = writer.size();
+}
+
+// A command of a group was executed. If more follow, the next one is queued, and gets a number of its
+// own.
+bool CommandsUnderWay::go_on(Pending& pending) {
+  if (!pending.has_more()) return false;
+  ++pending.step;
+  pending.stage = Stage::queued;
+  return true;
+}
+
+bool CommandsUnderWay::is_group_ahead() {
+  if (group_waits_) return true;
+  for (const Pending& pending : pending_.under_way()) {
+    if (pending.has_more()) return true;
+  }
+  return false;
+}
+
+// --- ends
+
+void CommandsUnderWay::finish(Pending& pending, Outcome outcome, Refusal code, Time now) {
+  CommandResult result{outcome, code, now - pending.started,
+                       outcome == Outcome::not_armed ? arming_.cause() : DisarmCause::none};
+  if (pending.is_step) {
+    step_end_ = {pending.kind, result};
+    pending_.remove(pending);
+    return;
+  }
+  if (outcome == Outcome::confirmed && go_on(pending)) return;
+  result.pnum = pending.pnum;
+  if (outcome != Outcome::confirmed) {
+    result.at = pending.step != 0 ? pending.step : pending.failed;
+    if (pending.step != 0) result.executed = static_cast<std::uint8_t>(pending.step - 1);
+  }
+  const Ticket ticket = pending.ticket;
+  pending_.remove(pending);
+  ends_.end(ticket, result);
+}
+
+void CommandsUnderWay::expire(Time now) {
+  for (Pending& pending : pending_.under_way()) {
+    if (now >= pending.deadline) finish(pending, Outcome::timed_out, Refusal::none, now);
+  }
+}
+
+void CommandsUnderWay::refuse_held_back(Time now) {
+  if (arming_.may_drive()) return;
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.ticket > arming_.first()) return;
+    if (pending.stage == Stage::queued && is_held_back(pending.kind)) {
+      finish(pending, Outcome::not_armed, Refusal::none, now);
+    }
+  }
+}
+
+void CommandsUnderWay::cancel(Ticket ticket, Time now) {
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.ticket != ticket || pending.kind == CommandKind::stop) continue;
+    finish(pending, Outcome::cancelled, Refusal::none, now);
+  }
+}
+
+void CommandsUnderWay::end_all_but_stops(Outcome outcome, Time now) {
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.kind != CommandKind::stop) finish(pending, outcome, Refusal::none, now);
+  }
+}
+
+void CommandsUnderWay::give_up(Time now) {
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.kind == CommandKind::stop || pending.kind == CommandKind::identify) continue;
+    finish(pending, Outcome::cancelled, Refusal::none, now);
+  }
+}
+
+void CommandsUnderWay::end_all(Time now) {
+  for (Pending& pending : pending_.under_way()) {
+    finish(pending, Outcome::closed, Refusal::none, now);
+  }
+}
+
+// --- steps of arm()
+
+void CommandsUnderWay::remove_step() {
+  step_end_.reset();
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.is_step) pending_.remove(pending);
+  }
+}
+
+bool CommandsUnderWay::delays_arming() {
+  for (const Pending& pending : pending_.under_way()) {
+    if (pending.is_step || pending.kind == CommandKind::stop || pending.kind == CommandKind::clear)
+      return true;
+  }
+  return false;
+}
+
+}  // namespace r4

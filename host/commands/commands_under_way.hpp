@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The commands of a session from the call to their end: sent when the session has control, repeated
+// until the board's answer or state proves what became of them. Without I/O.
+//
+//     queued --control--> sent --CMD == PNum in the board's state--> confirmed
+//                          |  ^                  N:…,<code>  ------> refused
+//                          +--+ the same bytes   deadline    ------> timed out
+//                         every 50 ms
+//
+// A retry has the bytes and the packet number of the original (signed anew, where there is a key),
+// so the board can execute it only once. When CMD has moved past a command, the retry's answer
+// (DUPLICATE: executed, STALE: not) decides. A refusal proves that the command was not executed only
+// if it names a session that began before the command was sent: over an outage the board forgets. A
+// board without CMD (the paper's release) confirms by the value that its state shows.
+//
+// With a key, AUTH says only that one copy was not taken: another may have been executed.
+//
+// A group of commands is one datagram and one pending command if the board executes groups
+// (../link/group_support.hpp). Otherwise its commands go one after the other, and later commands wait.
+//
+// E:STOP does not wait for the link, and is repeated every 20 ms until a heartbeat of the board
+// reports the reason `stop` and this stop's own number, and for a while longer, in case that an
+// E:CLEAR of another program was on its way. E:CLEAR names the cause that was known when it was asked
+// for; when the board tells of a newer one, it is given up.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "../../protocol/link/host_link.hpp"
+#include "../../protocol/messages/message.hpp"
+#include "../arming/arm_requests.hpp"
+#include "../link/command_ends.hpp"
+#include "../link/effects.hpp"
+#include "../link/heard_board.hpp"
+#include "../link/link_keeper.hpp"
+#include "../link/outbox.hpp"
+#include "../measurement/time.hpp"
+#include "pending_commands.hpp"
+#include "r4link/command.hpp"
+#include "r4link/options.hpp"
+#include "r4link/setpoints.hpp"
+#include "stop_repetition.hpp"
+
+namespace r4 {
+
+class CommandsUnderWay {
+ public:
+  static constexpr std::size_t max_pending = 64;
+  static constexpr std::size_t max_stops = 16;
+
+  // All references outlive this. `board`: asked whether it executes groups.
+  CommandsUnderWay(const SessionOptions& options, HostLink& link, LinkKeeper& keeper,
+                   Outbox& outbox, HeardBoard& board, const ArmRequests& arming, CommandEnds& ends,
+                   Statistics& counts);
+
+  // --- what the program asks for. Each returns 0 if there is no room.
+
+  Ticket send(const Command& command, Time timeout, Time now);
+  Ticket send(const Setpoints& group, Time timeout, Time now);
+  Ticket identify(Time timeout, Time now);
+  // Sent all the same if there is no room. Everything else under way is to be ended by the caller.
+  Ticket stop(Time timeout, Time now);
+  // The farewell.
+  Ticket leave(Time timeout, Time now);
+  // For a request that is no command of its own.
+  Ticket take_ticket() { return next_ticket_++; }
+  // Gives a command up, though it may have been executed. A stop goes on.
+  void cancel(Ticket ticket, Time now);
+  // Ends every command but stops, or every command but stops and questions.
+  void end_all_but_stops(Outcome outcome, Time now);
+  void give_up(Time now);
+  // Ends every command.
+  void end_all(Time now);
+  void forget_stop() { repetition_.cancel(); }
+
+  // --- a step of arm(). At most one is under way.
+
+  bool send_step(const Command& command, Time now);
+  void remove_step();
+  struct StepEnd {
+    CommandKind kind;
+    CommandResult result;
+  };
+  // The step that has ended since the last call.
+  std::optional<StepEnd> take_step_end() { return std::exchange(step_end_, {}); }
+  // True if a step, a stop or an E:CLEAR is under way: arm() waits for it.
+  bool delays_arming();
+
+  // --- what is due
+
+  void expire(Time now);
+  // Sends commands that have waited, in the order of the calls.
+  void send_queued(Time now);
+  // Ends commands that may not drive outputs and do not wait for an arm().
+  void refuse_held_back(Time now);
+  // Repeats what is not confirmed, and the stop that was confirmed last.
+  void repeat(Time now);
+  Time next();
+
+  // --- what the board says
+
+  void on_state(Time now);
+  void on_heartbeat(const SafeReport& report, std::optional<std::uint32_t> t_ms, Time now);
+  // The board reports the stop that it has obeyed.
+  void on_stop(const SafeReport& report, Time now);
+  void on_identity(const Identity& identity, Time now);
+  // `proof`: the refusal proves that the command was not executed. `others`: other paths carry copies.
+  void on_refusal(const Nack& nack, bool proof, bool others, Time now);
+  // True if that number is a setting that the board takes over a cable only.
+  bool is_cable_only(std::uint32_t pnum);
+
+  // --- for commands that are sent once
+
+  // True if a group waits, or commands of one are left: later commands must not overtake them.
+  bool is_group_ahead();
+  // True if it is known whether the board executes groups. If it is not, the board is asked.
+  bool knows_groups(Time now);
+  // The number of the newest cause that only E:CLEAR ends, 0 if there is none, or
+  // Command::unnamed_cause before the first heartbeat.
+  std::int32_t cause() const { return cause_; }
+  bool is_held_back(CommandKind kind) const {
+    return drives_output(kind) && !arming_.may_drive();
+  }
+
+ private:
+  using Pending = PendingCommand;
+  using Stage = PendingCommand::Stage;
+
+  Pending* allocate(const Command& command, Time timeout, Time now);
+  void transmit(Pending& pending, Time now);
+  void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
+  bool name_cause(Pending& pending) const;
+  bool choose_form(Pending& pending, Time now);
+  static void write_group(Pending& pending);
+  static bool go_on(Pending& pending);
+  bool is_behind_farewell(std::uint32_t t_ms) const;
+
+  const SessionOptions& options_;
+  HostLink& link_;
+  LinkKeeper& keeper_;
+  Outbox& outbox_;
+  HeardBoard& board_;
+  const ArmRequests& arming_;
+  CommandEnds& ends_;
+  Statistics& counts_;
+  PendingCommands pending_;
+  Ticket next_ticket_ = 1;
+  std::int32_t cause_ = Command::unnamed_cause;
+  bool group_waits_ = false;  // for the answer to Q:ID
+  std::optional<StepEnd> step_end_;
+  StopRepetition repetition_;
+  // The farewell: when it was sent, and the T of the newest state by then.
+  struct Farewell {
+    Time at{0};
+    std::optional<std::uint32_t> state_ms;
+  } farewell_;
+};
+
+}  // namespace r4

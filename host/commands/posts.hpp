@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Commands that are sent once and not waited for. A refusal of the board is reported. Without I/O.
+#pragma once
+
+#include "../link/effects.hpp"
+#include "../link/outbox.hpp"
+#include "../measurement/time.hpp"
+#include "posted_commands.hpp"
+#include "r4link/command.hpp"
+#include "r4link/link.hpp"
+#include "r4link/setpoints.hpp"
+
+namespace r4 {
+
+class Posts {
+ public:
+  Posts(Effects& effects, Outbox& outbox, Statistics& counts)
+      : effects_(effects), outbox_(outbox), counts_(counts) {}
+
+  // `sent`: the datagram is among the effects, and result() tells what became of it.
+  PostResult send(const Command& command, Time now);
+  PostResult send(const Setpoints& group, Time now);
+  void on_sent(const Sending& sending, SendResult result) { delivery_.on_sent(sending, result); }
+  // What became of the last one, when its effects are done.
+  PostResult result();
+  // The board has proved that it did not execute that command.
+  void on_refusal(const Nack& nack);
+
+ private:
+  PostResult begin(Outbox::Sent sent);
+
+  Effects& effects_;
+  Outbox& outbox_;
+  Statistics& counts_;
+  PostedCommands posted_;
+  Delivery delivery_;
+};
+
+}  // namespace r4

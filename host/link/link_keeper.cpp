@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "link_keeper.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "../../protocol/messages/command_field.hpp"
+#include "../../protocol/messages/state_fields.hpp"
+
+namespace r4 {
+
+LinkKeeper::LinkKeeper(const SessionOptions& options, HostLink& link, HostKey& key, Paths& paths,
+                       Outbox& outbox, Statistics& counts)
+    : options_(options),
+      link_(link),
+      key_(key),
+      paths_(paths),
+      outbox_(outbox),
+      counts_(counts),
+      fields_(options.fields) {
+  link_.hold(watches());
+}
+
+// --- events
+
+void LinkKeeper::on_transport(std::size_t path, bool up, bool can_ask, Time now) {
+  paths_.on_transport(path, up, can_ask, now);
+  transport_down_ = paths_.all_down();
+  if (up || transport_down_) link_.on_transport(up);
+}
+
+void LinkKeeper::on_sent(const Sending& sending, SendResult result, Time now) {
+  const bool sent_before = heartbeat_.result() == SendResult::sent;
+  if (heartbeat_.on_sent(sending, result)) {
+    if (!sent_before && heartbeat_.result() == SendResult::sent) {
+      ++counts_.heartbeats;
+      key_.on_heartbeat_sent();
+    }
+    if (heartbeat_.failed()) link_.heartbeat_not_sent(to_ms(now));
+  }
+  if (sending.kind == CommandKind::identify) {
+    paths_.asked(sending.path, sending.pnum, result == SendResult::sent, now);
+  }
+  if (result == SendResult::busy) on_busy(sending.path, {}, now);
+}
+
+void LinkKeeper::on_busy(std::size_t path, std::optional<std::uint32_t> t_ms, Time now) {
+  paths_.on_busy(path, t_ms, now);
+  if (paths_.all_busy(now)) role_.on_busy_until(paths_.all_busy_until(now));
+}
+
+void LinkKeeper::on_own_command(std::uint32_t t_ms, Time now) {
+  paths_.on_own_state(t_ms, now);
+  role_.on_own_command(!paths_.all_busy(now), now);
+}
+
+// --- what is due
+
+void LinkKeeper::ask_paths(Time now) {
+  if (const PathSet due = paths_.to_ask(now); due != 0) outbox_.ask(due, now);
+  if (paths_.poll(now)) link_.on_transport(true);  // the first heartbeat goes out at once
+}
+
+void LinkKeeper::keep_alive(Time now) {
+  if (leaving_ || !paths_.begun()) return;
+  watches() ? send_lease(now) : send_heartbeat(now);
+}
+
+// Each path has a lease of its own, with its own T to echo.
+void LinkKeeper::send_lease(Time now) {
+  const bool others = options_.fields != "DEFAULT";
+  const Text list = others ? Text(options_.fields.data(), options_.fields.size()) : Text();
+  for (std::size_t i = 0; i < paths_.count(); ++i) {
+    Lease& lease = paths_.leases()[i];
+    if ((paths_.speaking() & path_bit(i)) == 0 || !lease.due(now)) continue;
+    outbox_.send(Command::watch(options_.watch_rate_hz, list),
+                 {Priority::lease, path_bit(i), lease.echo()}, now);
+    lease.sent(now);
+  }
+}
+
+void LinkKeeper::send_heartbeat(Time now) {
+  if (!link_.heartbeat_due(to_ms(now))) return;
+  Outbox::Way way;
+  way.echo = link_.echo();
+  link_.heartbeat_sent(to_ms(now));  // on_sent() tells if it could not be
+  heartbeat_.begin(outbox_.send(Command::heartbeat(), way, now));
+  if (heartbeat_.failed()) link_.heartbeat_not_sent(to_ms(now));
+}
+
+void LinkKeeper::select_fields(Time now) {
+  if (leaving_ || watches()) return;
+  if (!fields_.ask(role_.controlling(), is_up() && !role_.refused(now), now)) return;
+  outbox_.send(Command::fields(fields_.fields()), {}, now);
+}
+
+Time LinkKeeper::next(Time now) const {
+  // due_in() counts whole milliseconds: wait for the end of the millisecond, not for its beginning.
+  Time link = now + std::chrono::milliseconds{link_.due_in(to_ms(now))};
+  link = std::chrono::floor<std::chrono::milliseconds>(link);
+  if (link <= now) link = now + Time{1000};
+  Time next = paths_.begun() ? link : Time::max();
+  if (watches()) next = std::min(next, paths_.leases().next(paths_.speaking()));
+  if (role_.refused(now)) next = std::min(next, role_.refused_until());
+  return std::min(next, paths_.next(now));
+}
+
+// A heartbeat after the farewell would take control again, so none is sent from now on.
+void LinkKeeper::leave(Time now) {
+  for (std::size_t i = 0; watches() && i < paths_.count(); ++i) {
+    outbox_.send(Command::watch(0), {Priority::normal, path_bit(i), paths_.leases()[i].echo()},
+                 now);
+  }
+  leaving_ = true;
+}
+
+// --- how the link is
+
+bool LinkKeeper::is_up() const {
+  if (!link_.echoed() || key_.refuses_board()) return false;
+  switch (link_.state()) {
+    case HostLinkState::active:
+      return true;
+    case HostLinkState::safe:
+      return link_.reason() != SafeReason::link;
+    case HostLinkState::connecting:
+    case HostLinkState::lost:
+      return false;
+  }
+  return false;
+}
+
+bool LinkKeeper::hears_board() const { return watches() ? is_heard(link_.state()) : is_up(); }
+
+// Commands wait for proof of control: the session's own F, executed. So no command is ever sent into
+// a session that the board has not accepted, where a refusal would prove nothing.
+bool LinkKeeper::in_control(Time now) const {
+  const FieldSelection::Stage stage = fields_.stage();
+  const bool no_proof_to_come =
+      stage == FieldSelection::Stage::left || stage == FieldSelection::Stage::unheard;
+  return !leaving_ && is_up() && !role_.refused(now) &&
+         (role_.controlling() || no_proof_to_come) && !link_.gated(to_ms(now));
+}
+
+LinkStatus LinkKeeper::status(ChipFault fault, Time now) const {
+  return {
+      .state = link_.state(),
+      .reason = link_.reason(),
+      .busy = role_.refused(now),
+      .trouble = trouble_,
+      .gate = watches()                            ? Gate::open
+              : link_.watchdog_expired(to_ms(now)) ? Gate::watchdog
+              : link_.gated(to_ms(now))            ? Gate::callback
+                                                   : Gate::open,
+      .key = watches() ? KeyTrouble::none : key_.trouble(now),
+      .lease = paths_.leases().trouble(now),
+      .in_control = in_control(now),
+      .transport_down = transport_down_,
+      .carrying = paths_.carrying(now),
+      .two_boards = paths_.two_boards(),
+      .chip = link_.reason() == SafeReason::fault ? fault : ChipFault(),
+  };
+}
+
+Command LinkKeeper::with_needed_fields(const Command& command) {
+  if (command.kind != CommandKind::fields || fields_.fields().empty()) return command;
+  FieldSet set;
+  parse_fields(command.text, set);
+  std::string fields(command.text.data(), command.text.size());
+  if (!set.has(StateField::safe)) fields += ",SAFE";
+  if (!set.has(StateField::cmd)) fields += ",CMD";
+  if (!set.has(StateField::relays) && options_.arming == Arming::required) fields += ",RELAYS";
+  if (fields != fields_.fields()) fields_.choose(std::move(fields));
+  return Command::fields(fields_.fields());
+}
+
+}  // namespace r4

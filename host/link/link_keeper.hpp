@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Keeps the link of a session alive and knows how it is. It sends heartbeats, or a watcher's leases,
+// asks the board for the state fields that the session needs, and tells whether commands may go out.
+//
+// It joins machines that have their own diagrams: the link (protocol/link/host_link.hpp), what this
+// host is to the board (host_role.hpp), the fields (field_selection.hpp), the key (host_key.hpp), and
+// a watcher's leases (../paths/lease.hpp).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "../../protocol/link/host_link.hpp"
+#include "../measurement/time.hpp"
+#include "../paths/paths.hpp"
+#include "field_selection.hpp"
+#include "host_key.hpp"
+#include "host_role.hpp"
+#include "outbox.hpp"
+#include "r4link/carrier.hpp"
+#include "r4link/command.hpp"
+#include "r4link/link.hpp"
+#include "r4link/options.hpp"
+
+namespace r4 {
+
+class LinkKeeper {
+ public:
+  // All references outlive the keeper.
+  LinkKeeper(const SessionOptions& options, HostLink& link, HostKey& key, Paths& paths,
+             Outbox& outbox, Statistics& counts);
+
+  // --- events
+
+  // The transport of a path has come or gone.
+  void on_transport(std::size_t path, bool up, bool can_ask, Time now);
+  void on_transport_trouble(TransportTrouble trouble) { trouble_ = trouble; }
+  // A path has taken a datagram, or not.
+  void on_sent(const Sending& sending, SendResult result, Time now);
+  // The board answered BUSY at its time `t_ms`. Without a time: a transport on CAN hears another
+  // host with this program's ids.
+  void on_busy(std::size_t path, std::optional<std::uint32_t> t_ms, Time now);
+  // A state of the board's time `t_ms` names a command of this session.
+  void on_own_command(std::uint32_t t_ms, Time now);
+  // The board has confirmed or answered something.
+  FieldSelection& fields() { return fields_; }
+  const FieldSelection& fields() const { return fields_; }
+
+  // --- what is due
+
+  // Asks paths who their board is, and lets the session begin when that is known.
+  void ask_paths(Time now);
+  // Sends the heartbeat, or the leases, that are due.
+  void keep_alive(Time now);
+  // Sends F if the states lack fields that the session needs, or if control is to be proved.
+  void select_fields(Time now);
+  // When one of these is due next; Time::max() for never.
+  Time next(Time now) const;
+  // Ends the link: nothing is sent from now on but what the caller sends itself.
+  void leave(Time now);
+
+  // --- how the link is
+
+  // Takes up what has changed. Call it before the questions below.
+  void update(Time now) { role_.on_link(is_up(), now); }
+  // True if the board hears this host.
+  bool is_up() const;
+  // True if the board is heard, whatever it thinks of this host.
+  bool hears_board() const;
+  // True if commands may go out at once: the link is up, the board has executed a command of this
+  // session, and nothing holds the session back.
+  bool in_control(Time now) const;
+  bool controls() const { return role_.controlling(); }
+  bool is_leaving() const { return leaving_; }
+  LinkStatus status(ChipFault fault, Time now) const;
+
+  // A command that chooses fields, with the fields that the session needs; the choice is remembered.
+  // Any other command as it is. The text is valid until the next call.
+  Command with_needed_fields(const Command& command);
+
+ private:
+  bool watches() const { return outbox_.watches(); }
+  void send_lease(Time now);
+  void send_heartbeat(Time now);
+
+  const SessionOptions& options_;
+  HostLink& link_;
+  HostKey& key_;
+  Paths& paths_;
+  Outbox& outbox_;
+  Statistics& counts_;
+  HostRoleMachine role_;
+  FieldSelection fields_;
+  Delivery heartbeat_;
+  TransportTrouble trouble_ = TransportTrouble::none;
+  bool transport_down_ = false;
+  bool leaving_ = false;
+};
+
+}  // namespace r4

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "outbox.hpp"
+
+#include <array>
+#include <bit>
+
+#include "../../protocol/messages/command_field.hpp"
+
+namespace r4 {
+
+// The board echoes nothing, so a command of the session needs no T.
+void Outbox::stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
+                   std::uint32_t t_ms) const {
+  const bool echoes = kind == CommandKind::heartbeat || kind == CommandKind::watch;
+  writer.session(session_id());
+  echoes || watches() ? writer.stamp(pnum, t_ms) : writer.packet(pnum);
+}
+
+Outbox::Sent Outbox::send(const Command& command, Way way, Time now) {
+  std::array<char, max_datagram> buffer;
+  DatagramWriter writer(buffer.data(), buffer.size());
+  write_command(writer, command);
+  const std::uint32_t pnum = link_.take_pnum();
+  stamp(writer, command.kind, pnum, way.echo.value_or(to_ms(now)));
+  return {pnum, send(writer, command.kind, pnum, way, now)};
+}
+
+Outbox::Sent Outbox::send(const Setpoints& group, Time now) {
+  std::array<char, max_datagram> buffer;
+  DatagramWriter writer(buffer.data(), buffer.size());
+  for (std::size_t i = 0; i < group.size(); ++i) write_command(writer, group[i]);
+  const std::uint32_t pnum = link_.take_pnum();
+  stamp(writer, group[0].kind, pnum, to_ms(now));
+  return {pnum, send(writer, group[0].kind, pnum, {}, now)};
+}
+
+PathSet Outbox::send(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum, Way way,
+                     Time now) {
+  const bool stop = kind == CommandKind::stop;
+  if (key_.refuses_board() && !stop) return 0;
+  const PathSet to = stop ? way.paths : static_cast<PathSet>(way.paths & paths_.speaking());
+  PathSet over = 0;
+  for (std::size_t i = 0; i < paths_.count(); ++i) {
+    if ((to & path_bit(i)) == 0) continue;
+    send_over(i, writer, kind, pnum, way.priority, now);
+    over |= path_bit(i);
+  }
+  return over;
+}
+
+void Outbox::ask(PathSet paths, Time now) {
+  std::array<char, max_datagram> buffer;
+  DatagramWriter writer(buffer.data(), buffer.size());
+  write_command(writer, Command::identify());
+  const std::uint32_t pnum = link_.take_pnum();
+  stamp(writer, CommandKind::identify, pnum, to_ms(now));
+  for (std::size_t i = 0; i < paths_.count(); ++i) {
+    if ((paths & path_bit(i)) == 0) continue;
+    send_over(i, writer, CommandKind::identify, pnum, Priority::normal, now);
+  }
+}
+
+// Each path has a signature of its own, which proves that path (docs/protocol.md, "Paths"). A
+// watcher's datagrams need no signature.
+void Outbox::send_over(std::size_t path, DatagramWriter& writer, CommandKind kind,
+                       std::uint32_t pnum, Priority priority, Time now) {
+  const std::size_t size = writer.size();
+  if (!watches()) key_.sign(writer, now);
+  const Text bytes = writer.finish();
+  effects_.send(path, priority, kind, pnum, {bytes.data(), bytes.size()});
+  writer.truncate(size);
+}
+
+void Delivery::begin(Outbox::Sent sent) {
+  pnum_ = sent.pnum;
+  open_ = std::popcount(sent.paths);
+  result_ = SendResult::down;
+}
+
+bool Delivery::on_sent(const Sending& sending, SendResult result) {
+  if (open_ == 0 || sending.pnum != pnum_) return false;
+  --open_;
+  if (result == SendResult::sent || result_ == SendResult::down) result_ = result;
+  return true;
+}
+
+}  // namespace r4

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Writes and signs the datagrams of a session, each once for every path that it takes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "../../protocol/link/host_link.hpp"
+#include "../measurement/time.hpp"
+#include "../paths/paths.hpp"
+#include "effects.hpp"
+#include "host_key.hpp"
+#include "r4link/command.hpp"
+#include "r4link/options.hpp"
+#include "r4link/setpoints.hpp"
+
+namespace r4 {
+
+class Outbox {
+ public:
+  static constexpr PathSet all_paths = 0xFF;
+
+  // How a datagram goes out.
+  struct Way {
+    Priority priority = Priority::normal;
+    PathSet paths = all_paths;
+    std::optional<std::uint32_t> echo{};  // the T that it carries, in ms; none: the host's time
+  };
+  // A datagram that went out: its number, and its paths.
+  struct Sent {
+    std::uint32_t pnum = 0;
+    PathSet paths = 0;
+  };
+
+  Outbox(Effects& effects, HostLink& link, HostKey& key, Paths& paths, BoardRole role)
+      : effects_(effects), link_(link), key_(key), paths_(paths), role_(role) {}
+
+  // A command, or a group, that is sent once.
+  Sent send(const Command& command, Way way, Time now);
+  Sent send(const Setpoints& group, Time now);
+  // A command that stands in the writer already, with its stamp. A stop goes to every path. Other
+  // commands go to the paths that lead to the session's board, if that board has this host's key.
+  PathSet send(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum, Way way, Time now);
+  // One question Q:ID to these paths, whether their board is known or not.
+  void ask(PathSet paths, Time now);
+
+  // Writes SID, PNum and, where a datagram echoes one, T.
+  void stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum, std::uint32_t t_ms) const;
+
+  BoardRole role() const { return role_; }
+  bool watches() const { return role_ == BoardRole::watch; }
+  // The id that this session's datagrams carry. A watcher has none.
+  SessionId session_id() const { return watches() ? no_session : link_.session(); }
+
+ private:
+  void send_over(std::size_t path, DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
+                 Priority priority, Time now);
+
+  Effects& effects_;
+  HostLink& link_;
+  HostKey& key_;
+  Paths& paths_;
+  const BoardRole role_;
+};
+
+// Whether a datagram was taken by one of the paths that it was sent over.
+class Delivery {
+ public:
+  void begin(Outbox::Sent sent);
+  // A path has taken the datagram or refused it. True if the datagram is this one.
+  bool on_sent(const Sending& sending, SendResult result);
+  // True if every path has answered, and none has taken it.
+  bool failed() const { return open_ == 0 && result_ != SendResult::sent; }
+  // `sent` as soon as one path has taken it; before that, what the first path answered.
+  SendResult result() const { return result_; }
+  std::uint32_t pnum() const { return pnum_; }
+
+ private:
+  std::uint32_t pnum_ = 0;
+  int open_ = 0;  // paths that have not answered yet
+  SendResult result_ = SendResult::down;
+};
+
+}  // namespace r4
