@@ -121,9 +121,7 @@ class CommandsUnderWay {
   // The number of the newest cause that only E:CLEAR ends, 0 if there is none, or
   // Command::unnamed_cause before the first heartbeat.
   std::int32_t cause() const { return cause_; }
-  bool is_held_back(CommandKind kind) const {
-    return drives_output(kind) && !arming_.may_drive();
-  }
+  bool is_held_back(CommandKind kind) const { return drives_output(kind) && !arming_.may_drive(); }
 
  private:
   using Pending = PendingCommand;

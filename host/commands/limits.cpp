@@ -9,7 +9,6 @@
 #include "../commands/command_help.hpp"
 #include "../commands/link_timing.hpp"
 #include "r4link/error.hpp"
-#include "session.hpp"
 
 namespace r4 {
 

@@ -139,8 +139,8 @@ bool LinkKeeper::in_control(Time now) const {
   const FieldSelection::Stage stage = fields_.stage();
   const bool no_proof_to_come =
       stage == FieldSelection::Stage::left || stage == FieldSelection::Stage::unheard;
-  return !leaving_ && is_up() && !role_.refused(now) &&
-         (role_.controlling() || no_proof_to_come) && !link_.gated(to_ms(now));
+  return !leaving_ && is_up() && !role_.refused(now) && (role_.controlling() || no_proof_to_come) &&
+         !link_.gated(to_ms(now));
 }
 
 LinkStatus LinkKeeper::status(ChipFault fault, Time now) const {

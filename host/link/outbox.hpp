@@ -46,7 +46,8 @@ class Outbox {
   void ask(PathSet paths, Time now);
 
   // Writes SID, PNum and, where a datagram echoes one, T.
-  void stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum, std::uint32_t t_ms) const;
+  void stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
+             std::uint32_t t_ms) const;
 
   BoardRole role() const { return role_; }
   bool watches() const { return role_ == BoardRole::watch; }

@@ -6,6 +6,7 @@
 #include <random>
 #include <utility>
 
+#include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/state_fields.hpp"
 #include "../commands/command_help.hpp"
 #include "../commands/limits.hpp"

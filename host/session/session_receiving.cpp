@@ -165,8 +165,7 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   if (!paths_.news().is_copy(nack)) effects_.tell(CommandRefused{nack, datagram});
   // AUTH refuses one copy. A repetition, or the copy on another path, may have been executed.
   const bool others = (paths_.speaking() & ~path_bit(path)) != 0;
-  const bool other_copy =
-      nack.code == Refusal::auth && ((not_taken && key_.has_key()) || others);
+  const bool other_copy = nack.code == Refusal::auth && ((not_taken && key_.has_key()) || others);
   const bool proof = !other_copy && is_proof(nack);
   commands_.on_refusal(nack, proof, others, now);
   take_step_end(now);

@@ -34,7 +34,7 @@ struct OnePath : testing::Test {
   bool booting() { return paths.admit_connecting(0, now); }
   void pass(int ms) { now += std::chrono::milliseconds{ms}; }
   // Sends a question.
-  void ask() { paths.asked(0, ++question, now); }
+  void ask() { paths.asked(0, ++question, true, now); }
   Admission answer() {
     Identity identity{Text("0.1.0"), Text("board"), Text("udp")};
     identity.has_asked = true;
