@@ -49,19 +49,20 @@ TransportTrouble AsyncBoard::Impl::trouble() const {
   return common;
 }
 
-void AsyncBoard::Impl::tell(const StateCame& news) {
+void AsyncBoard::Impl::tell(const StateCame&) {
   if (!is_open()) return;
+  const Datagram& datagram = session.effects().datagram();
   if (in_backlog) {
-    const Text bytes = news.datagram.bytes();
+    const Text bytes = datagram.bytes();
     backlog_size = bytes.size();
     std::copy_n(bytes.data(), backlog_size, backlog.data());
   } else {
-    call(state_callbacks, session.state(), news.datagram);
+    call(state_callbacks, session.state(), datagram);
   }
 }
 
-void AsyncBoard::Impl::tell(const HeartbeatCame& news) {
-  if (is_open()) call(heartbeat_callbacks, news.datagram);
+void AsyncBoard::Impl::tell(const HeartbeatCame&) {
+  if (is_open()) call(heartbeat_callbacks, session.effects().datagram());
 }
 
 void AsyncBoard::Impl::tell(const BoardIdentified& news) {
@@ -74,7 +75,7 @@ void AsyncBoard::Impl::tell(const BoardIdentified& news) {
 }
 
 void AsyncBoard::Impl::tell(const CommandRefused& news) {
-  if (is_open()) call(nack_callbacks, news.nack, news.datagram);
+  if (is_open()) call(nack_callbacks, news.nack, session.effects().datagram());
 }
 
 void AsyncBoard::Impl::tell(const BadDatagramCame& news) {

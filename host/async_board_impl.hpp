@@ -201,8 +201,8 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
 
   SendResult transmit(const Sending& sending);
   TransportTrouble trouble() const;
-  void tell(const StateCame& news);
-  void tell(const HeartbeatCame& news);
+  void tell(const StateCame&);
+  void tell(const HeartbeatCame&);
   void tell(const BoardIdentified& news);
   void tell(const CommandRefused& news);
   void tell(const BadDatagramCame& news);

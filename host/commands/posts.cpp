@@ -1,23 +1,43 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "posts.hpp"
 
+#include <cstddef>
+#include <utility>
+
+#include "../../protocol/link/board_link.hpp"
+
 namespace r4 {
 
+namespace {
+
+constexpr std::size_t remembered = BoardLink::memory;
+
+}  // namespace
+
 PostResult Posts::send(const Command& command, Time now) {
-  const Outbox::Sent sent = outbox_.send(command, {}, now);
-  posted_.add(sent.pnum, command);
-  return begin(sent);
+  return begin(outbox_.send(command, {}, now), command, false);
 }
 
 PostResult Posts::send(const Setpoints& group, Time now) {
   const Outbox::Sent sent = outbox_.send(group, now);
-  posted_.add(sent.pnum, group);
-  return begin(sent);
+  if (groups_.empty()) groups_.resize(remembered);
+  groups_[sent.pnum % remembered] = group;
+  return begin(sent, group[0], true);
 }
 
-PostResult Posts::begin(Outbox::Sent sent) {
+PostResult Posts::begin(Outbox::Sent sent, const Command& command, bool is_group) {
+  if (posted_.empty()) posted_.resize(remembered);
+  Posted& posted = posted_[sent.pnum % remembered];
+  posted = {true, is_group, sent.pnum, command};
+  posted.command.text = posted.command.text2 = Text();
   delivery_.begin(sent);
   return sent.paths != 0 ? PostResult::sent : result();
+}
+
+const Posts::Posted* Posts::take(std::uint32_t pnum) {
+  if (posted_.empty()) return nullptr;
+  Posted& posted = posted_[pnum % remembered];
+  return posted.pnum == pnum && std::exchange(posted.open, false) ? &posted : nullptr;
 }
 
 PostResult Posts::result() {
@@ -25,17 +45,17 @@ PostResult Posts::result() {
     ++counts_.commands;
     return PostResult::sent;
   }
-  posted_.take(delivery_.pnum());
+  take(delivery_.pnum());
   return delivery_.result() == SendResult::full ? PostResult::queue_full : PostResult::no_link;
 }
 
 void Posts::on_refusal(const Nack& nack) {
-  const PostedCommands::Entry* const posted = posted_.take(nack.pnum);
+  const Posted* const posted = take(nack.pnum);
   if (posted == nullptr || nack.code == Refusal::duplicate) return;
   ++counts_.refused;
   RefusedPost refused{posted->command, nack.code, PostResult::sent};
   if (posted->is_group) {
-    const Setpoints& group = posted_.group_of(*posted);
+    const Setpoints& group = groups_[nack.pnum % remembered];
     refused.group = static_cast<std::uint8_t>(group.size());
     if (nack.at <= group.size()) refused.at = nack.at;
     if (refused.at != 0) refused.command = group[refused.at - 1U];

@@ -2,10 +2,12 @@
 // Commands that are sent once and not waited for. A refusal of the board is reported. Without I/O.
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "../link/effects.hpp"
 #include "../link/outbox.hpp"
 #include "../measurement/time.hpp"
-#include "posted_commands.hpp"
 #include "r4link/command.hpp"
 #include "r4link/link.hpp"
 #include "r4link/setpoints.hpp"
@@ -27,13 +29,25 @@ class Posts {
   void on_refusal(const Nack& nack);
 
  private:
-  PostResult begin(Outbox::Sent sent);
+  // A command, or the first of a group, that the board may still refuse.
+  struct Posted {
+    bool open = false;
+    bool is_group = false;
+    std::uint32_t pnum = 0;
+    Command command;
+  };
+
+  PostResult begin(Outbox::Sent sent, const Command& command, bool is_group);
+  // Forgets it. Null if that number is not known.
+  const Posted* take(std::uint32_t pnum);
 
   Effects& effects_;
   Outbox& outbox_;
   Statistics& counts_;
-  PostedCommands posted_;
   Delivery delivery_;
+  // As many as the board remembers, by packet number. Empty until the first post, and the first group.
+  std::vector<Posted> posted_;
+  std::vector<Setpoints> groups_;
 };
 
 }  // namespace r4

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a session wants done, in its order: datagrams to be sent, and news to be told. The session itself calls nobody.
+// What a session wants done, in order: datagrams to be sent, and news to be reported. The session
+// itself calls nobody.
 #pragma once
 
 #include <algorithm>
@@ -34,19 +35,14 @@ struct Sending {
   std::string_view datagram() const { return {bytes.data(), size}; }
 };
 
-// The newest state of the board is another.
-struct StateCame {
-  Datagram datagram;
-};
-struct HeartbeatCame {
-  Datagram datagram;
-};
+// A newer state of the board has come, and a heartbeat.
+struct StateCame {};
+struct HeartbeatCame {};
 struct BoardIdentified {
   Identity identity;
 };
 struct CommandRefused {
   Nack nack;
-  Datagram datagram;
 };
 struct BadDatagramCame {
   ReadResult result;
@@ -59,10 +55,10 @@ struct CommandEnded {
   Ticket ticket = 0;
   CommandResult result;
 };
-// The board has begun again since it was heard: all that it was told is gone, but for settings
-// that it stores. Told before its new state.
+// The board has restarted since it was heard: it has forgotten what it was told, but for settings that
+// it stores. Reported before its new state.
 struct BoardRestarted {};
-// The session is armed (none), or not any more.
+// The session was armed (cause none) or disarmed.
 struct ArmingChanged {
   DisarmCause cause = DisarmCause::none;
 };
@@ -70,12 +66,12 @@ struct ArmingChanged {
 struct PostRefused {
   RefusedPost refused;
 };
-// Views are of the datagram that was received last, and valid as long as its bytes.
+// Views in news are of the datagram that was received last, and valid as long as its bytes.
 using News =
     std::variant<StateCame, HeartbeatCame, BoardIdentified, CommandRefused, BadDatagramCame,
                  LinkChanged, CommandEnded, BoardRestarted, ArmingChanged, PostRefused>;
 
-// Its memory is used again: in the steady state nothing is allocated.
+// Memory is used again: in the steady state nothing is allocated.
 class Effects {
  public:
   void send(std::size_t path, Priority priority, CommandKind kind, std::uint32_t pnum,
@@ -91,6 +87,8 @@ class Effects {
     sendings_.push(std::move(free_.back()));
     free_.pop_back();
   }
+  // The datagram that was received last, which the news are about.
+  Datagram& datagram() { return datagram_; }
   void tell(News news) { news_.push(std::move(news)); }
 
   bool any_sendings() const { return sendings_.any(); }
@@ -123,6 +121,7 @@ class Effects {
   Queue<std::unique_ptr<Sending>> sendings_;
   std::vector<std::unique_ptr<Sending>> free_;
   Queue<News> news_;
+  Datagram datagram_;
 };
 
 }  // namespace r4

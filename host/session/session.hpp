@@ -153,7 +153,7 @@ class Session {
   void on_heartbeat(std::size_t path, const Datagram& datagram, Time now);
   void on_identity(std::size_t path, const Datagram& datagram, Time now);
   void on_refusal(std::size_t path, const Datagram& datagram, Time now);
-  void on_lease_refused(std::size_t path, const Nack& nack, const Datagram& datagram, Time now);
+  void on_lease_refused(std::size_t path, const Nack& nack, Time now);
   bool counts(const Identity& identity) const;
   bool is_proof(const Nack& nack) const;
 

@@ -8,7 +8,7 @@
 namespace r4 {
 
 void Session::receive(std::size_t path, std::string_view bytes, Time now) {
-  Datagram datagram;
+  Datagram& datagram = effects_.datagram();
   const ReadResult result = read_datagram(bytes, datagram);
   if (!result) {
     ++statistics_.counts.damaged;
@@ -72,7 +72,7 @@ void Session::on_state(std::size_t path, const Datagram& datagram, Time now) {
   if (keeper_.is_up() && supply_closed) arming_.on_supply(*supply_closed);
   keeper_.select_fields(now);
   if (keeper_.in_control(now) != status_.in_control) refresh(now);
-  effects_.tell(StateCame{datagram});
+  effects_.tell(StateCame{});
 }
 
 void Session::on_heartbeat(std::size_t path, const Datagram& datagram, Time now) {
@@ -100,7 +100,7 @@ void Session::on_heartbeat(std::size_t path, const Datagram& datagram, Time now)
     link_.on_heartbeat(t_ms);
     newest ? link_.on_reason(report.reason, to_ms(now)) : link_.on_heard(to_ms(now));
   }
-  effects_.tell(HeartbeatCame{datagram});
+  effects_.tell(HeartbeatCame{});
   if (!newest) return refresh(now);
 
   const std::optional<std::uint32_t> board_ms = booting ? std::nullopt : std::optional(t_ms);
@@ -152,7 +152,7 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   }
   link_.on_heard(to_ms(now));
   if (watches()) {
-    on_lease_refused(path, nack, datagram, now);
+    on_lease_refused(path, nack, now);
     return refresh(now);
   }
   keeper_.fields().on_answer();
@@ -162,7 +162,7 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   }
   const bool not_taken = nack.code == Refusal::auth && !commands_.is_cable_only(nack.pnum);
   if (not_taken) key_.on_refusal(now);
-  if (!paths_.news().is_copy(nack)) effects_.tell(CommandRefused{nack, datagram});
+  if (!paths_.news().is_copy(nack)) effects_.tell(CommandRefused{nack});
   // AUTH refuses one copy. A repetition, or the copy on another path, may have been executed.
   const bool others = (paths_.speaking() & ~path_bit(path)) != 0;
   const bool other_copy = nack.code == Refusal::auth && ((not_taken && key_.has_key()) || others);
@@ -174,12 +174,11 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
 }
 
 // The board refuses nothing of a watcher but leases. The link's status reports what these codes mean.
-void Session::on_lease_refused(std::size_t path, const Nack& nack, const Datagram& datagram,
-                               Time now) {
+void Session::on_lease_refused(std::size_t path, const Nack& nack, Time now) {
   paths_.leases()[path].on_refusal(nack, now);
   const bool told =
       nack.code == Refusal::stale || nack.code == Refusal::busy || nack.code == Refusal::unknown;
-  if (!told) effects_.tell(CommandRefused{nack, datagram});
+  if (!told) effects_.tell(CommandRefused{nack});
 }
 
 // True if the refusal proves that the command was not executed. It does so only while the board remembers

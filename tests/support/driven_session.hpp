@@ -116,10 +116,10 @@ class DrivenSession : public Session {
       std::visit([this](const auto& news) { tell(news); }, effects().take_news());
     }
   }
-  void tell(const StateCame& news) { handler_.on_state(state(), news.datagram); }
-  void tell(const HeartbeatCame& news) { handler_.on_board_heartbeat(news.datagram); }
+  void tell(const StateCame&) { handler_.on_state(state(), effects().datagram()); }
+  void tell(const HeartbeatCame&) { handler_.on_board_heartbeat(effects().datagram()); }
   void tell(const BoardIdentified& news) { handler_.on_identity(news.identity); }
-  void tell(const CommandRefused& news) { handler_.on_nack(news.nack, news.datagram); }
+  void tell(const CommandRefused& news) { handler_.on_nack(news.nack, effects().datagram()); }
   void tell(const BadDatagramCame& news) { handler_.on_bad_datagram(news.result, news.bytes); }
   void tell(const LinkChanged& news) { handler_.on_link(news.status); }
   void tell(const CommandEnded& news) { handler_.on_result(news.ticket, news.result); }
