@@ -206,6 +206,19 @@ TEST_F(OnePath, ABoardThatStopsAnsweringIsBelievedAfterTenQuestions) {
   EXPECT_EQ(questions, 10) << "another firmware may run now";
 }
 
+TEST_F(OnePath, AQuestionThatTheTransportDidNotTakeIsRepeatedAndNotCounted) {
+  heartbeat();
+  ask();
+  ASSERT_EQ(answer(), Admission::yes);
+  reboot();
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(state(), Admission::no) << i;
+    pass(100);
+    ASSERT_EQ(paths.to_ask(now), 1) << i;
+    paths.asked(0, ++question, false, now);
+  }
+}
+
 TEST_F(OnePath, TheOnlyPathMayLeadToAnotherBoardLater) {
   state();
   ask();

@@ -192,6 +192,18 @@ TEST_F(SessionArming, DoesNotClearTheSameCauseTwice) {
   EXPECT_EQ(link.count('E'), 1U);
 }
 
+TEST_F(SessionArming, AnArmThatFollowsARefusedOneAtOnceClearsAnew) {
+  link.heartbeat(SafeReason::stop);
+  const Ticket first = arm();
+  link.nack(link.last('E').pnum, "CHANNEL");
+  ASSERT_EQ(outcome(first), Outcome::refused);
+  const Ticket second = arm();
+  EXPECT_EQ(link.count('E'), 2U);
+  execute('E');
+  execute('R', SafeReason::none, true);
+  EXPECT_EQ(outcome(second), Outcome::confirmed);
+}
+
 // --- what may have come before the session
 
 struct EarlierCause : testing::Test {
