@@ -229,8 +229,20 @@ void Session::watchdog(std::chrono::milliseconds period, Time now) {
 }
 
 void Session::hold(bool held, Time now) {
-  if (watches()) return;
-  link_.hold(held);
+  held_ = held;
+  link_.hold(held_ || watches());
+  refresh_status(now);
+}
+
+void Session::change_role(BoardRole role, Time now) {
+  end_all_but_stops(Outcome::cancelled, now);
+  disarm_anew();
+  board_role_ = role;
+  role_ = HostRoleMachine();
+  leaving_ = false;
+  link_.leave_session();
+  begin_session();
+  link_.hold(held_ || watches());
   refresh_status(now);
 }
 

@@ -136,6 +136,13 @@ class Session {
   // Returns 0 where there is nobody to tell, or the board knows no farewells. Nothing but stops is sent from
   // then on.
   Ticket leave(Time timeout, Time now);
+  bool leaving() const { return leaving_; }
+  // The same, but the commands end as cancelled: to watch from then on, change_role() when the
+  // farewell has ended.
+  Ticket release_control(Time timeout, Time now);
+  // From now on it controls, or only watches. Disarmed; with a new session id. Every command under
+  // way but stops is cancelled. on_transport() is needed then for each path that is up.
+  void change_role(BoardRole role, Time now);
   // Ends every command under way: the board is closed.
   void end_all(Time now);
 
@@ -218,11 +225,13 @@ class Session {
   bool notice_restart(Time now);
   void begin_session();
   void give_up_commands(Time now);
+  void end_all_but_stops(Outcome outcome, Time now);
   bool is_proof(const Nack& nack) const;
   bool is_cable_only(std::uint32_t pnum);
   void confirm_from_state(Time now);
   bool is_held_back(CommandKind kind) const;
   void disarm(DisarmCause cause);
+  void disarm_anew();
   void tell_arming();
   void look_at_arming(Time now);
   void look_at_supply();
@@ -253,7 +262,7 @@ class Session {
 
   Effects effects_;
   SessionOptions options_;
-  const BoardRole board_role_;
+  BoardRole board_role_;
   std::function<std::uint64_t()> random_;
   HostLink link_;
   HostKey key_;
@@ -268,6 +277,7 @@ class Session {
   ReceivedState state_;
   std::uint32_t restarts_ = 0;       // of the board, those that were told
   std::optional<bool> knows_leave_;  // does the board?
+  bool held_ = false;                // hold()
   bool leaving_ = false;
   Time left_at_{0};
   std::optional<std::uint32_t> left_ms_;  // the T of the newest state by then

@@ -30,6 +30,12 @@ void Session::disarm(DisarmCause cause) {
   tell_arming();
 }
 
+// As a session begins.
+void Session::disarm_anew() {
+  arming_ = ArmingMachine();
+  tell_arming();
+}
+
 void Session::tell_arming() {
   if (told_cause_ == arming_.cause()) return;
   told_cause_ = arming_.cause();

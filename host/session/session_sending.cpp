@@ -315,13 +315,17 @@ bool Session::may_say_farewell() const {
   return link_up() && !watches() && knows_leave_.value_or(state_.present.has(StateField::cmd));
 }
 
+Ticket Session::release_control(Time timeout, Time now) {
+  end_all_but_stops(Outcome::cancelled, now);
+  return leave(timeout, now);
+}
+
 Ticket Session::leave(Time timeout, Time now) {
-  for (Pending& pending : pending_.under_way()) {
-    if (pending.kind != CommandKind::stop) finish(pending, Outcome::closed, Refusal::none, now);
-  }
+  end_all_but_stops(Outcome::closed, now);
   for (std::size_t i = 0; watches() && i < paths_.count(); ++i) {
     transmit_now(Command::watch(0), paths_.leases()[i].echo(), Priority::normal, now, path_bit(i));
   }
+  disarm_anew();
   leaving_ = true;  // a heartbeat behind the farewell would take the board again
   left_at_ = now;
   if (state_.any()) left_ms_ = state_.t_ms;
@@ -331,6 +335,12 @@ Ticket Session::leave(Time timeout, Time now) {
   ++collector_.counts.commands;
   transmit(*pending, now);
   return pending->ticket;
+}
+
+void Session::end_all_but_stops(Outcome outcome, Time now) {
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.kind != CommandKind::stop) finish(pending, outcome, Refusal::none, now);
+  }
 }
 
 void Session::end_all(Time now) {
