@@ -32,7 +32,7 @@ BoardOptions watching() {
   return options;
 }
 
-struct BoardRoles : testing::TestWithParam<const char*> {
+struct BoardRoles : testing::TestWithParam<std::vector<std::string>> {
   // Runs the loop until `done()`; false after 5 s.
   template <class Done>
   bool run_until(Done done) {
@@ -74,13 +74,16 @@ struct BoardRoles : testing::TestWithParam<const char*> {
 
   BoardInAThread simulated{GetParam()};
   asio::io_context io;
-  AsyncBoard board{io, simulated.url(), watching()};
+  AsyncBoard board{io, simulated.urls(), watching()};
   int states = 0;
   Subscription counting = board.on_state([this](const auto&, const auto&) { ++states; });
 };
-// A path that is opened anew with the role, and one that serves both.
-INSTANTIATE_TEST_SUITE_P(Transports, BoardRoles, testing::Values("pty", "udp"),
-                         [](const auto& transport) { return std::string(transport.param); });
+// A path that is opened anew with the role, one that serves both, and the two together.
+const std::vector<std::string> kinds_of_paths[] = {{"pty"}, {"udp"}, {"pty", "udp"}};
+INSTANTIATE_TEST_SUITE_P(Transports, BoardRoles, testing::ValuesIn(kinds_of_paths),
+                         [](const auto& paths) {
+                           return paths.param.size() > 1 ? "both" : paths.param[0];
+                         });
 
 TEST_P(BoardRoles, AreTakenAndGivenBackAgainAndAgain) {
   board.open();
@@ -177,6 +180,45 @@ TEST_P(BoardRoles, EndWithTheBoard) {
       << "the first farewell may have been obeyed already";
   EXPECT_TRUE(is_safe());
   EXPECT_EQ(problem_of([&] { board.take_control(); }).kind, ErrorKind::usage);
+}
+
+// A path that another program may control.
+class Contested final : public Carrier {
+ public:
+  explicit Contested(bool taken) : taken_(taken) {}
+  void open(Handler&) override { up_ = true; }
+  void close() noexcept override { up_ = false; }
+  SendResult send(std::string_view, Priority, Peer) override { return SendResult::sent; }
+  void change_role(BoardRole role) override {
+    if (taken_) throw Error(ErrorKind::refused, name_, "taken");
+    roles.push_back(role);
+  }
+  bool up() const override { return up_; }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override { return counters_; }
+
+  std::vector<BoardRole> roles;
+
+ private:
+  bool taken_;
+  bool up_ = false;
+  const std::string name_ = "contested:";
+  CarrierCounters counters_;
+};
+
+TEST(BoardRole, IsRefusedAsAWholeWhereOneOfThePathsIsTaken) {
+  asio::io_context io;
+  std::vector<std::unique_ptr<Carrier>> paths;
+  auto free = std::make_unique<Contested>(false);
+  const Contested& first = *free;
+  paths.push_back(std::move(free));
+  paths.push_back(std::make_unique<Contested>(true));
+  AsyncBoard board(io, std::move(paths), watching());
+  EXPECT_EQ(problem_of([&] { board.take_control(); }).kind, ErrorKind::usage) << "not open yet";
+  board.open();
+  EXPECT_EQ(problem_of([&] { board.take_control(); }).reason, "taken");
+  EXPECT_EQ(first.roles, (std::vector<BoardRole>{BoardRole::control, BoardRole::watch}));
+  EXPECT_EQ(board.role(), BoardRole::watch);
 }
 
 TEST(BoardRole, IsRefusedByNameWhereAnotherProgramControlsAndTheBoardIsWatchedOn) {

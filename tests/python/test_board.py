@@ -263,6 +263,18 @@ def test_takes_control_and_releases_it(sim, wait):
         board.release_control()
 
 
+def test_over_udp_the_program_that_controls_has_the_port_of_hosts():
+    with r4link.SimBoard('udp://127.0.0.1:0') as sim, r4link.Board(sim.url.split('?')[0], role='watch') as board:
+        for _ in range(2):
+            board.wait_active()
+            assert '?listen=' in board.name, 'a port of its own'
+            board.take_control()
+            board.wait_active()
+            assert '?listen=' not in board.name
+            board.release_control()
+            board.next_state()
+
+
 def test_an_error_names_the_program_that_controls_the_board():
     with r4link.SimBoard('pty:') as sim, r4link.Board(sim.url) as driver:
         driver.wait_active()
