@@ -164,31 +164,70 @@ class AsyncBoard::TimingSteps final : public Completion {
   CompletionPtr completion_;
 };
 
-// Closes the board when the farewell has ended, and hands its result on.
+// Closes the board, or watches it, when the farewell has ended, and hands its result on.
 class AsyncBoard::Farewell final : public Completion {
  public:
-  Farewell(Impl& impl, CompletionPtr completion)
-      : impl_(impl), completion_(std::move(completion)) {}
+  using Then = void (*)(Impl& impl);
+  Farewell(Impl& impl, Then then, CompletionPtr completion)
+      : impl_(impl), then_(then), completion_(std::move(completion)) {}
 
   void listen(const Cancel& cancel) override { completion_->listen(cancel); }
   void complete(const CommandResult& result, How how) override {
     const CompletionPtr::pointer users = completion_.release();
     Impl& impl = impl_;
+    const Then then = then_;
     delete this;
-    impl.close();
+    then(impl);
     users->complete(result, how);
   }
   void destroy() noexcept override { delete this; }
 
  private:
   Impl& impl_;  // which owns this
+  Then then_;
   CompletionPtr completion_;
 };
 
 void AsyncBoard::start_close(Duration timeout, CompletionPtr completion) {
   Impl& impl = *impl_;
-  impl.begin(CompletionPtr(new Farewell(impl, std::move(completion))),
+  const auto then = [](Impl& each) { each.close(); };
+  impl.begin(CompletionPtr(new Farewell(impl, then, std::move(completion))),
              [&] { return impl.leave(Impl::time_of(timeout)); });
+}
+
+// --- the role
+
+BoardRole AsyncBoard::role() const { return impl_->session.board_role(); }
+
+// Not while the board is being left: it would end that before the board is known to be safe.
+void AsyncBoard::require_role_settled(std::string_view what) const {
+  if (!impl_->is_open() || !impl_->session.leaving()) return;
+  throw Error(ErrorKind::usage, std::string(what), "control is being released",
+              "wait until that has ended");
+}
+
+void AsyncBoard::take_control() {
+  if (!impl_->is_open()) {
+    throw Error(ErrorKind::usage, "take_control()", "the board is not open",
+                "call it between open() and close()");
+  }
+  require_role_settled("take_control()");
+  if (role() != BoardRole::control) impl_->become(BoardRole::control);
+}
+
+void AsyncBoard::start_release_control(Duration timeout, CompletionPtr completion) {
+  Impl& impl = *impl_;
+  if (impl.is_open() && role() == BoardRole::watch) {
+    completion.release()->complete({Outcome::confirmed}, Completion::How::post);
+    return;
+  }
+  const auto then = [](Impl& each) {
+    if (each.is_open()) each.become(BoardRole::watch);
+  };
+  impl.begin(
+      CompletionPtr(new Farewell(impl, then, std::move(completion))),
+      [&] { return impl.session.release_control(Impl::time_of(timeout), impl.now); }, 0,
+      Outcome::none);
 }
 
 void AsyncBoard::require_link_timing(Duration board_timeout, Duration heartbeat) const {
@@ -269,20 +308,6 @@ const CarrierCounters& AsyncBoard::Impl::counters() {
   counted = CarrierCounters();
   for (const auto& path : paths) counted += path->carrier->counters();
   return counted;
-}
-
-// Which have begun to carry, or ceased to; and that one leads to another board.
-void AsyncBoard::Impl::tell_paths(const LinkStatus& status) {
-  const LinkStatus before_that = std::exchange(told, status);
-  for (std::size_t i = 0; i < paths.size(); ++i) {
-    if (((before_that.carrying ^ status.carrying) & path_bit(i)) == 0) continue;
-    if (is_open()) call(path_callbacks, report(i));
-  }
-  if (status.two_boards && !before_that.two_boards && is_open()) {
-    std::vector<PathStatus> reports;
-    for (std::size_t i = 0; i < paths.size(); ++i) reports.push_back(report(i));
-    call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, explain(reports)});
-  }
 }
 
 void AsyncBoard::record(Recording& recording) { impl_->record(recording.recorder_); }

@@ -92,6 +92,20 @@ void AsyncBoard::Impl::tell(const LinkChanged& news) {
   });
 }
 
+// Which have begun to carry, or ceased to; and that one leads to another board.
+void AsyncBoard::Impl::tell_paths(const LinkStatus& status) {
+  const LinkStatus before_that = std::exchange(told, status);
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    if (((before_that.carrying ^ status.carrying) & path_bit(i)) == 0) continue;
+    if (is_open()) call(path_callbacks, report(i));
+  }
+  if (status.two_boards && !before_that.two_boards && is_open()) {
+    std::vector<PathStatus> reports;
+    for (std::size_t i = 0; i < paths.size(); ++i) reports.push_back(report(i));
+    call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, explain(reports)});
+  }
+}
+
 void AsyncBoard::Impl::tell(const BoardRestarted&) {
   ++boots;
   backlog_size = 0;  // of the boot before

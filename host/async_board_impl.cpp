@@ -257,6 +257,25 @@ void AsyncBoard::Impl::close() {
   enter(Completion::How::post, [this] { session.end_all(now); });
 }
 
+// All paths, or none. Each begins anew: its transport may be opened again, at another port.
+void AsyncBoard::Impl::become(BoardRole role) {
+  std::size_t changed = 0;
+  try {
+    for (; changed < paths.size(); ++changed) carrier(changed).change_role(role);
+  } catch (const Error&) {
+    for (std::size_t i = 0; i < changed; ++i) carrier(i).change_role(session.board_role());
+    throw;
+  }
+  enter(Completion::How::post, [&] {
+    session.change_role(role, now);
+    for (const auto& path : paths) {
+      if (!path->carrier->up()) continue;
+      session.on_transport(path->index, true, now, !only_listens(path->index));
+    }
+    poll_wanted = true;
+  });
+}
+
 // --- time
 
 // The timer is only set when it must ring earlier than it will; ringing early costs one poll.

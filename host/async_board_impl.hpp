@@ -129,10 +129,11 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
 
   // --- what the user starts
 
-  // `start` hands the command to the session; its ticket is 0 if there is no room. `id`: of the step
-  // before, if it is not the first.
+  // `start` hands the command to the session; its ticket is 0 if it is not taken, and ends so.
+  // `id`: of the step before, if it is not the first.
   template <class Start>
-  void begin(CompletionPtr completion, Start start, Ticket id = 0) {
+  void begin(CompletionPtr completion, Start start, Ticket id = 0,
+             Outcome not_taken = Outcome::full) {
     enter(Completion::How::post, [&] {
       const Ticket ticket = is_open() ? start() : 0;
       if (ticket != 0) {
@@ -140,7 +141,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
         waiting.push_back({ticket, id, std::move(completion)});
         poll_wanted = true;
       } else {
-        const Outcome outcome = is_open() ? Outcome::full : Outcome::closed;
+        const Outcome outcome = is_open() ? not_taken : Outcome::closed;
         completion.release()->complete({outcome, Refusal::none, Time{0}}, Completion::How::post);
       }
     });
@@ -173,6 +174,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   // Says farewell: its ticket, or 0 if there is nobody to say it to.
   Ticket leave(Time timeout);
   void close();
+  void become(BoardRole role);
 
   void record(const std::shared_ptr<Recorder>& recorder);
   void name_in_recording();

@@ -34,6 +34,33 @@ Board::~Board() { impl_->close(); }
 
 void Board::close() { impl_->close(); }
 
+BoardRole Board::role() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->role;
+}
+void Board::take_control() {
+  const auto impl = impl_;
+  const bool here = impl->run_on_loop("take_control()", [impl = impl.get()] {
+    impl->async.take_control();
+    const std::lock_guard lock(impl->mutex);
+    impl->role = impl->async.role();
+  });
+  if (!here) throw impl->closed_error("take_control()");
+}
+void Board::release_control(Duration timeout) {
+  require_timeout("release_control()", timeout);
+  const auto impl = impl_;
+  const auto call = impl->run(
+      "release_control()",
+      [&async = impl->async](Duration left, auto end) {
+        async.async_release_control(left, std::move(end));
+      },
+      timeout);
+  const Outcome outcome = call->result.outcome;
+  if (outcome == Outcome::none || outcome == Outcome::refused) return;  // not ours
+  Impl::require_confirmed(call);
+}
+
 // A call holds the Impl, so that the Board may be destroyed while it waits.
 
 void Board::wait_active(Duration timeout) {
@@ -71,7 +98,7 @@ void Board::apply(const Setpoints& setpoints, Duration timeout) {
   const std::string text = text_of(setpoints);
   require_timeout(text, timeout);
   const auto impl = impl_;
-  require_control(impl->role, text);
+  impl->require_control(text);
   impl->execute(
       text,
       [&async = impl->async, setpoints](Duration left, auto end) {
@@ -83,7 +110,7 @@ PostResult Board::post(const Setpoints& setpoints) { return impl_->post(setpoint
 void Board::arm(Duration timeout) {
   require_timeout("arm()", timeout);
   const auto impl = impl_;
-  require_control(impl->role, "arm()");
+  impl->require_control("arm()");
   impl->execute(
       "arm()",
       [&async = impl->async](Duration left, auto end) { async.async_arm(left, std::move(end)); },
@@ -150,7 +177,7 @@ void Board::link_timing(Duration board_timeout, Duration heartbeat, Duration tim
                            std::to_string(heartbeat.count());
   require_timeout(text, timeout);
   const auto impl = impl_;
-  require_control(impl->role, text);
+  impl->require_control(text);
   impl->async.require_link_timing(board_timeout, heartbeat);
   impl->execute(
       text,

@@ -34,13 +34,13 @@ struct KeptCommand {
 Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first)
     : BlockingLoop({"board", "a transport of your own must return at once"}, 1,
                    std::move(options.on_wait)),
-      role(options.role),
       arming(options.session.arming),
       callback_limit(options.callback_limit),
       async(io, make(loop), options),
       box(
           io, [this](const Command& c) { deliver(c); }, [this](const Setpoints& s) { deliver(s); }),
-      callbacks([this](Clock::duration busy) { on_callback_end(busy); }) {
+      callbacks([this](Clock::duration busy) { on_callback_end(busy); }),
+      role(options.role) {
   require_callback_limit(callback_limit);
   if (first.on_state) callbacks.on_state(std::move(first.on_state));
   if (first.on_link) callbacks.on_link(std::move(first.on_link));
@@ -184,7 +184,7 @@ void Board::Impl::on_callback_end(Clock::duration busy) {
 void Board::Impl::deliver(const Command& command) {
   if (command.kind == CommandKind::stop) {
     async.async_stop(default_timeout, [](const CommandResult&) {});
-  } else if (const PostResult result = async.post(command); !result) {
+  } else if (const PostResult result = post_now(command); !result) {
     RefusedPost refused{command, Refusal::none, result};
     refused.command.text = refused.command.text2 = Text();
     tell(refused);
@@ -192,7 +192,7 @@ void Board::Impl::deliver(const Command& command) {
 }
 
 void Board::Impl::deliver(const Setpoints& setpoints) {
-  if (const PostResult result = async.post(setpoints); !result) {
+  if (const PostResult result = post_now(setpoints); !result) {
     RefusedPost refused{setpoints[0], Refusal::none, result};
     refused.group = static_cast<std::uint8_t>(setpoints.size());
     tell(refused);
@@ -205,6 +205,7 @@ void Board::Impl::finish(Call& call, const CommandResult& result) {
     call.result.elapsed = std::chrono::duration_cast<Time>(Clock::now() - call.called);
     call.link = async.link();
     call.identity = async.identity();
+    role = async.role();
   });
 }
 
@@ -222,11 +223,16 @@ void Board::Impl::shut() {
 
 // --- on any thread
 
+void Board::Impl::require_control(std::string_view what) {
+  const std::lock_guard lock(mutex);
+  r4::require_control(role, what);
+}
+
 void Board::Impl::require_sendable(const Command& command) {
   require_valid(command);
-  require_control(role, command);
-  if (command.kind != CommandKind::setting) return;
   const std::lock_guard lock(mutex);
+  r4::require_control(role, command);
+  if (command.kind != CommandKind::setting) return;
   for (const std::string& path : path_names) require_cable(path, command);
 }
 
@@ -265,10 +271,16 @@ std::shared_ptr<const Board::Impl::Call> Board::Impl::run(std::string text, Star
   call->cancelled.resize(1);
   call->start = [this, start = std::move(start)](const CallPtr& base, Duration left) {
     const auto begun = std::static_pointer_cast<Call>(base);
-    start(left, End(begun->cancelled.front().slot(),
-                    [this, begun](const CommandResult& result) { finish(*begun, result); }));
+    try {
+      start(left, End(begun->cancelled.front().slot(),
+                      [this, begun](const CommandResult& result) { finish(*begun, result); }));
+    } catch (const Error& error) {
+      begun->trouble = error.problem();
+      finish(*begun, {});
+    }
   };
   BlockingLoop::run(call, timeout);
+  if (call->trouble) throw Error(*call->trouble);
   if (call->result.outcome == Outcome::closed) throw closed_error(call->text);
   return call;
 }
@@ -283,8 +295,8 @@ PostResult Board::Impl::post(const Command& command) {
 }
 PostResult Board::Impl::post(const Setpoints& setpoints) {
   require_any(setpoints);
-  require_control(role, setpoints);
   const std::lock_guard lock(mutex);
+  r4::require_control(role, setpoints);
   if (closed || !in_control) return PostResult::no_link;
   if (is_held_back()) return PostResult::not_armed;
   return box.put(setpoints) ? PostResult::sent : PostResult::queue_full;

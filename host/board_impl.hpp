@@ -15,7 +15,9 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "blocking/blocking_loop.hpp"
@@ -34,6 +36,7 @@ struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
     CommandResult result;
     LinkStatus link;
     BoardIdentity identity;
+    std::optional<Problem> trouble;  // it could not begin: the role has changed
   };
   using End = asio::cancellation_slot_binder<std::function<void(const CommandResult&)>,
                                              asio::cancellation_slot>;
@@ -51,6 +54,7 @@ struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
 
   // --- on any thread
 
+  void require_control(std::string_view what);
   void require_sendable(const Command& command);
   // Has the loop carry out a command. Throws if it is not confirmed.
   std::shared_ptr<const Call> execute(const Command& command, Duration timeout);
@@ -86,6 +90,11 @@ struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
 
   void listen();
   void take_name();
+  // Control may have been released since it was posted.
+  template <class What>
+  PostResult post_now(const What& what) {
+    return async.role() == BoardRole::control ? async.post(what) : PostResult::no_link;
+  }
   void deliver(const Command& command);
   void deliver(const Setpoints& setpoints);
   void take_uarts(const State& fresh);
@@ -95,7 +104,6 @@ struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
   void look_at_callbacks();
   void on_callback_end(Clock::duration busy);
 
-  const BoardRole role;
   const Arming arming;
   const Duration callback_limit;  // 0: none
   BoardLoop loop{io};
@@ -124,6 +132,7 @@ struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
   };
   UartInbox uarts[uart_channels];
   LinkStatus link;
+  BoardRole role;
   bool in_control = false;
   DisarmCause disarmed_by = DisarmCause::not_yet;
   std::uint64_t refused_here = 0;  // posts that did not get as far as the loop

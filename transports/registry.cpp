@@ -11,7 +11,6 @@
 #include "share/share_group.hpp"
 #include "share/shared_carrier.hpp"
 #include "udp/udp_carrier.hpp"
-#include "udp/udp_url.hpp"
 
 namespace r4 {
 
@@ -19,7 +18,7 @@ Registry Registry::standard() {
   Registry registry;
   registry.add({"udp", "udp://HOST[:2018][?listen=2390&local=ADDRESS], udp:auto, udp:?id=NAME",
                 "WiFi or Ethernet; for a board: udp://BIND[:2018][?peer=HOST[:2390]]",
-                make_udp_carrier, udp_share_name, udp_has_own_port});
+                make_udp_carrier, udp_share_name, udp_has_own_port, make_claimed_udp_carrier});
   registry.add({"serial", "serial:///dev/ttyACM0[?baud=1000000], serial:auto, serial:?sn=SERIAL",
                 "USB serial, or the pty of a simulated board", make_serial_carrier,
                 serial_share_name, nullptr, make_claimed_serial_carrier});
@@ -55,20 +54,17 @@ std::unique_ptr<Carrier> Registry::make_shared(asio::io_context& io, std::string
   Url parsed = Url::parse(url);
   const Entry& entry = entry_of(parsed);
   if (!entry.share_name) return entry.make(io, parsed, Role::host);
-  // Who watches has no need of the port of hosts.
-  Url alone = role == BoardRole::watch ? Url::parse(with_own_port(std::string(url))) : parsed;
-  alone.take("share");
   ShareGroup group = take_share_group(parsed);
   if (entry.own && entry.own(parsed)) return entry.make(io, parsed, Role::host);
+  auto claim = std::make_shared<DeviceClaim>();
+  auto carrier = entry.make_claimed ? entry.make_claimed(io, parsed, claim)
+                                    : entry.make(io, parsed, Role::host);
   FindShareName find = [name_of = entry.share_name, parsed = std::move(parsed),
                         group = std::move(group)] {
     ShareName found = name_of(parsed);
     found.group = group;
     return found;
   };
-  auto claim = std::make_shared<DeviceClaim>();
-  auto carrier =
-      entry.make_claimed ? entry.make_claimed(io, alone, claim) : entry.make(io, alone, Role::host);
   return make_shared_carrier(io, std::move(carrier), std::move(claim), std::move(find), role);
 }
 

@@ -32,7 +32,7 @@ class Registry {
     // True if the transport of this URL is its program's own, which is not shared. None: it never
     // is.
     std::function<bool(const Url& url)> own = nullptr;
-    // The host's carrier of a device that one program can have open at a time.
+    // The host's carrier of what one program can have at a time.
     std::function<std::unique_ptr<Carrier>(asio::io_context& io, const Url& url,
                                            std::shared_ptr<DeviceClaim> claim)>
         make_claimed = nullptr;

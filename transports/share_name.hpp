@@ -27,10 +27,11 @@ struct ShareName {
 // Throws Error if the transport cannot be found.
 using FindShareName = std::function<ShareName()>;
 
-// How a transport opens a device that one program can have open at a time (a serial port). The
-// carrier that shares the transport sets it before each open().
+// How a transport opens what one program can have at a time: a serial port, the UDP port of hosts.
+// The carrier that shares the transport sets it before each open().
 struct DeviceClaim {
-  // Another program may take the device, after which this program reads and sends nothing more.
+  // For a program that watches. Another program may take the device, after which this program reads
+  // and sends nothing more. The port of hosts is left to programs that control.
   bool yields = false;
   // Takes the device also from a program that yields: at the next opening only.
   bool takes = false;

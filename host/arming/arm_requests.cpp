@@ -111,6 +111,11 @@ void ArmRequests::on_link(bool up, bool in_control, bool safe, SafeReason reason
   tell();
 }
 
+void ArmRequests::begin_anew() {
+  machine_ = ArmingMachine();
+  tell();
+}
+
 void ArmRequests::tell() {
   if (told_ == machine_.cause()) return;
   told_ = machine_.cause();

@@ -73,6 +73,8 @@ class ArmRequests {
 
   void disarm(DisarmCause cause);
   void on_sleep() { machine_.on_sleep(); }
+  // A session begins: it is disarmed.
+  void begin_anew();
   // How the link is: whether it is up, whether the board obeys, whether it says that it is safe, and
   // why.
   void on_link(bool up, bool in_control, bool safe, SafeReason reason);

@@ -42,7 +42,7 @@ void require_valid(const SessionOptions& options) {
 void require_control(BoardRole role, std::string_view what) {
   if (role == BoardRole::control) return;
   throw Error(ErrorKind::usage, std::string(what), "this program only watches the board",
-              "open the board with BoardRole::control");
+              "take_control() first, or open the board with BoardRole::control");
 }
 
 void require_control(BoardRole role, const Command& command) {

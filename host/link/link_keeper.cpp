@@ -19,7 +19,7 @@ LinkKeeper::LinkKeeper(const SessionOptions& options, HostLink& link, HostKey& k
       outbox_(outbox),
       counts_(counts),
       fields_(options.fields) {
-  link_.hold(watches());
+  hold(false);
 }
 
 // --- events
@@ -113,6 +113,19 @@ void LinkKeeper::leave(Time now) {
                  now);
   }
   leaving_ = true;
+}
+
+void LinkKeeper::begin_anew() {
+  role_ = HostRoleMachine();
+  leaving_ = false;
+  link_.leave_session();
+  hold(held_);
+}
+
+// A watcher sends no heartbeats.
+void LinkKeeper::hold(bool held) {
+  held_ = held;
+  link_.hold(held_ || watches());
 }
 
 // --- how the link is

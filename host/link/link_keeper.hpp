@@ -60,6 +60,10 @@ class LinkKeeper {
   Time next(Time now) const;
   // Ends the link: nothing is sent from now on but what the caller sends itself.
   void leave(Time now);
+  // A new session is to begin, in the role that the outbox has.
+  void begin_anew();
+  // Holds heartbeats and commands back, until it is called with false.
+  void hold(bool held);
 
   // --- how the link is
 
@@ -96,6 +100,7 @@ class LinkKeeper {
   Delivery heartbeat_;
   TransportTrouble trouble_ = TransportTrouble::none;
   bool transport_down_ = false;
+  bool held_ = false;
   bool leaving_ = false;
 };
 

@@ -50,6 +50,7 @@ class Outbox {
              std::uint32_t t_ms) const;
 
   BoardRole role() const { return role_; }
+  void change_role(BoardRole role) { role_ = role; }
   bool watches() const { return role_ == BoardRole::watch; }
   // The id that this session's datagrams carry. A watcher has none.
   SessionId session_id() const { return watches() ? no_session : link_.session(); }
@@ -62,7 +63,7 @@ class Outbox {
   HostLink& link_;
   HostKey& key_;
   Paths& paths_;
-  const BoardRole role_;
+  BoardRole role_;
 };
 
 // Whether a datagram was taken by one of the paths that it was sent over.

@@ -219,11 +219,9 @@ PostResult Session::post(const Setpoints& group, Time now) {
 
 // Nothing that was asked for before a stop may follow it.
 Ticket Session::stop(Time timeout, Time now) {
-  end_arming(Outcome::cancelled, now);
+  end_all_but_stops(Outcome::cancelled, now);
   arming_.disarm(DisarmCause::stop);
-  const Ticket ticket = commands_.stop(timeout, now);
-  commands_.end_all_but_stops(Outcome::cancelled, now);
-  return ticket;
+  return commands_.stop(timeout, now);
 }
 
 Ticket Session::identify(Time timeout, Time now) { return commands_.identify(timeout, now); }
@@ -240,10 +238,29 @@ bool Session::may_say_farewell() const {
 }
 
 Ticket Session::leave(Time timeout, Time now) {
-  end_arming(Outcome::closed, now);
-  commands_.end_all_but_stops(Outcome::closed, now);
+  end_all_but_stops(Outcome::closed, now);
+  arming_.begin_anew();
   keeper_.leave(now);
   return may_say_farewell() ? commands_.leave(timeout, now) : 0;
+}
+
+Ticket Session::release_control(Time timeout, Time now) {
+  end_all_but_stops(Outcome::cancelled, now);
+  return leave(timeout, now);
+}
+
+void Session::change_role(BoardRole role, Time now) {
+  end_all_but_stops(Outcome::cancelled, now);
+  arming_.begin_anew();
+  outbox_.change_role(role);
+  keeper_.begin_anew();
+  begin_session();
+  refresh(now);
+}
+
+void Session::end_all_but_stops(Outcome outcome, Time now) {
+  end_arming(outcome, now);
+  commands_.end_all_but_stops(outcome, now);
 }
 
 void Session::end_all(Time now) {
@@ -259,8 +276,7 @@ void Session::watchdog(std::chrono::milliseconds period, Time now) {
 }
 
 void Session::hold(bool held, Time now) {
-  if (watches()) return;
-  link_.hold(held);
+  keeper_.hold(held);
   refresh(now);
 }
 

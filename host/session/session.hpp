@@ -102,6 +102,13 @@ class Session {
   // are safe at once, and another host need not wait for the timeout. Confirmed when the board reports
   // it. Returns 0 if no board hears it, or the board knows no farewells. Only stops are sent afterwards.
   Ticket leave(Time timeout, Time now);
+  bool leaving() const { return keeper_.is_leaving(); }
+  // The same, but the commands end as cancelled. When the farewell has ended, change_role() lets the
+  // session watch.
+  Ticket release_control(Time timeout, Time now);
+  // From now on the session controls, or only watches. It is disarmed, has a new id, and every command
+  // under way but stops is cancelled. on_transport() is needed then for each path that is up.
+  void change_role(BoardRole role, Time now);
   // Gives a command up, though it may have been executed. A stop goes on.
   void cancel(Ticket ticket, Time now);
   // Ends every command under way: the board is closed.
@@ -160,6 +167,7 @@ class Session {
   void refresh(Time now);
   void advance_arming(Time now);
   void end_arming(Outcome outcome, Time now);
+  void end_all_but_stops(Outcome outcome, Time now);
   void take_step_end(Time now);
   void on_restart(Time now);
   void on_new_boot(Time now);

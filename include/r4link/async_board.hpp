@@ -36,6 +36,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -101,9 +102,24 @@ class AsyncBoard {
   template <class Token>
   auto async_close(Duration timeout, Token&& token) {
     require_timeout("async_close()", timeout);
-    return asio::async_initiate<Token, void(CommandResult)>(
-        [this](auto handler, Duration t) { start_close(t, make_completion(std::move(handler))); },
-        token, timeout);
+    return initiate<&AsyncBoard::start_close, Token>(token, timeout);
+  }
+
+  BoardRole role() const;  // BoardOptions::role at first
+  // Controls the board from now on, disarmed, as if it had been opened so. Callbacks, recordings
+  // and what is known of the board stay. Throws Error{refused} if another program of this computer,
+  // its holder(), controls the board: then this one watches on. Throws Error{usage} while the board
+  // is not open, and, as async_release_control() does, while control is being released.
+  void take_control();
+  // void(CommandResult). Disarms, cancels all but stops, and says farewell as async_close() does.
+  // However that ends, the program watches then. Confirmed: the board is safe and nobody controls
+  // it, or the program watched already. Refused: another host had it. Timed out, and none (there
+  // was no link, or the board knows no farewells): it goes safe by its timeout.
+  template <class Token>
+  auto async_release_control(Duration timeout, Token&& token) {
+    require_timeout("async_release_control()", timeout);
+    require_role_settled("async_release_control()");
+    return initiate<&AsyncBoard::start_release_control, Token>(token, timeout);
   }
 
   // Throws Error{usage} for a command outside its ranges, and for a key or password where others
@@ -116,11 +132,7 @@ class AsyncBoard {
   auto async_send(const Command& command, Duration timeout, Token&& token) {
     require_sendable(command);
     require_timeout("async_send()", timeout);
-    return asio::async_initiate<Token, void(CommandResult)>(
-        [this](auto handler, const Command& c, Duration t) {
-          start_send(c, t, make_completion(std::move(handler)));
-        },
-        token, command, timeout);
+    return initiate<&AsyncBoard::start_send, Token>(token, command, timeout);
   }
   // void(CommandResult). Several output commands that the board executes together, in one pass over its chips,
   // or not at all; a board that knows no groups is sent one after the other, up to the first that fails:
@@ -129,19 +141,13 @@ class AsyncBoard {
   auto async_apply(const Setpoints& setpoints, Duration timeout, Token&& token) {
     require_sendable(setpoints);
     require_timeout("async_apply()", timeout);
-    return asio::async_initiate<Token, void(CommandResult)>(
-        [this](auto handler, const Setpoints& s, Duration t) {
-          start_apply(s, t, make_completion(std::move(handler)));
-        },
-        token, setpoints, timeout);
+    return initiate<&AsyncBoard::start_apply, Token>(token, setpoints, timeout);
   }
   // void(CommandResult). E:STOP: overtakes and cancels everything, also before the link is up. It is
   // sent whatever the timeout.
   template <class Token>
   auto async_stop(Duration timeout, Token&& token) {
-    return asio::async_initiate<Token, void(CommandResult)>(
-        [this](auto handler, Duration t) { start_stop(t, make_completion(std::move(handler))); },
-        token, timeout);
+    return initiate<&AsyncBoard::start_stop, Token>(token, timeout);
   }
   // void(CommandResult). Clears a stop, a watchdog or a fault that came while this program controlled
   // the board, and closes relay 1, the motor supply. Confirmed by the board's state: output commands
@@ -151,9 +157,7 @@ class AsyncBoard {
   auto async_arm(Duration timeout, Token&& token) {
     require_timeout("async_arm()", timeout);
     require_control("async_arm()");
-    return asio::async_initiate<Token, void(CommandResult)>(
-        [this](auto handler, Duration t) { start_arm(t, make_completion(std::move(handler))); },
-        token, timeout);
+    return initiate<&AsyncBoard::start_arm, Token>(token, timeout);
   }
   // void(CommandResult). Takes away the stop, watchdog or fault that the board reports.
   template <class Token>
@@ -164,11 +168,7 @@ class AsyncBoard {
   template <class Token>
   auto async_identify(Duration timeout, Token&& token) {
     require_timeout("async_identify()", timeout);
-    return asio::async_initiate<Token, void(CommandResult)>(
-        [this](auto handler, Duration t) {
-          start_identify(t, make_completion(std::move(handler)));
-        },
-        token, timeout);
+    return initiate<&AsyncBoard::start_identify, Token>(token, timeout);
   }
 
   // void(CommandResult). Confirmed as soon as the board is ACTIVE and takes our commands, so that the
@@ -177,11 +177,7 @@ class AsyncBoard {
   template <class Token>
   auto async_wait_active(Duration timeout, Token&& token) {
     require_wait("async_wait_active()", timeout);
-    return asio::async_initiate<Token, void(CommandResult)>(
-        [this](auto handler, Duration t) {
-          start_wait_active(t, make_completion(std::move(handler)));
-        },
-        token, timeout);
+    return initiate<&AsyncBoard::start_wait_active, Token>(token, timeout);
   }
   // void(CommandResult). Sets the board's timeout and heartbeat interval together, whatever they are
   // now; one of them alone may be refused, for the interval must stay below the timeout. Throws
@@ -193,11 +189,8 @@ class AsyncBoard {
     require_timeout("async_link_timing()", timeout);
     require_control("async_link_timing()");
     require_link_timing(board_timeout, heartbeat);
-    return asio::async_initiate<Token, void(CommandResult)>(
-        [this](auto handler, Duration b, Duration h, Duration t) {
-          start_link_timing(b, h, t, make_completion(std::move(handler)));
-        },
-        token, board_timeout, heartbeat, timeout);
+    return initiate<&AsyncBoard::start_link_timing, Token>(token, board_timeout, heartbeat,
+                                                           timeout);
   }
   // void(CommandResult). Sets a described device up (devices/device.hpp, docs/described-devices.md): is it the one?
   // Then what is to be written, which takes async_arm(), and the board's readings, until our session ends; their
@@ -211,11 +204,7 @@ class AsyncBoard {
     require_timeout("async_attach()", timeout);
     require_control("async_attach()");
     require_slots(device);
-    return asio::async_initiate<Token, void(CommandResult)>(
-        [this](auto handler, const Device& d, Duration t) {
-          start_attach(d, t, make_completion(std::move(handler)));
-        },
-        token, device, timeout);
+    return initiate<&AsyncBoard::start_attach, Token>(token, device, timeout);
   }
   // Throws Error{usage} for what async_link_timing() cannot set.
   void require_link_timing(Duration board_timeout, Duration heartbeat) const;
@@ -323,6 +312,15 @@ class AsyncBoard {
   template <class Handler>
   CompletionPtr make_completion(Handler handler);
 
+  // Starts what ends with a result for the token's handler.
+  template <auto Start, class Token, class... Arguments>
+  auto initiate(std::remove_reference_t<Token>& token, const Arguments&... arguments) {
+    auto start = [this](auto handler, const Arguments&... each) {
+      (this->*Start)(each..., make_completion(std::move(handler)));
+    };
+    return asio::async_initiate<Token, void(CommandResult)>(start, token, arguments...);
+  }
+
   // Throw Error{usage} for a time that none can be.
   static void require_timeout(std::string_view what, Duration timeout);
   static void require_wait(std::string_view what, Duration timeout);
@@ -339,6 +337,8 @@ class AsyncBoard {
   void require_slots(const Device& device) const;
   void start_attach(const Device& device, Duration timeout, CompletionPtr completion);
   void start_close(Duration timeout, CompletionPtr completion);
+  void require_role_settled(std::string_view what) const;
+  void start_release_control(Duration timeout, CompletionPtr completion);
 
   class TimingSteps;
   class AttachSteps;

@@ -130,6 +130,20 @@ class R4LINK_API Board {
   // too, and may run while other threads wait.
   void close();
 
+  // What this program is to its board: BoardOptions::role at first.
+  BoardRole role() const;
+  // Controls the board from now on, disarmed, as if it had been opened so: wait_active() waits
+  // until the board takes commands of this program. Callbacks, recordings and what is known of the
+  // board stay. Throws Error{refused} if another program of this computer, its holder(), controls
+  // the board: then this one watches on.
+  void take_control();
+  // Disarms, says farewell until the board has answered, so that it is safe and free, and watches
+  // from then on. Calls that wait in other threads throw Error{refused}; nothing of them is sent
+  // any more. Throws Error{refused} if the board does not answer in time. Then, as without a link,
+  // and where the board knows no farewells, it goes safe by its timeout; the program watches all
+  // the same.
+  void release_control(Duration timeout = default_timeout);
+
   // Waits until the board is ACTIVE under our control, or, where the program only watches, until it is heard;
   // throws Error{refused} saying what it is instead.
   void wait_active(Duration timeout = Duration{3000});

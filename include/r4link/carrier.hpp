@@ -21,6 +21,8 @@
 
 namespace r4 {
 
+enum class BoardRole : std::uint8_t;
+
 // Which end of the link a carrier serves: a host calls out to a board, a board listens for hosts.
 enum class Role : std::uint8_t { host, board };
 
@@ -175,6 +177,12 @@ class R4LINK_API Carrier {
   // one place, or through a program that shares its transport. A program that only watches sends
   // nothing there but stops and leases.
   virtual bool is_shared() const { return false; }
+  // The program controls its board from now on, or watches it. Where programs of this computer
+  // share the transport, only one of them can control: throws Error{refused} with its holder() if
+  // another program does, and changes nothing then. Else the transport may be closed and opened
+  // again, within the loop's next turns; trouble with that is an event. A transport of one program
+  // has nothing to do.
+  virtual void change_role(BoardRole role) { static_cast<void>(role); }
 
   virtual bool up() const = 0;
   // Why datagrams do not pass although the transport is up, as far as it can tell.

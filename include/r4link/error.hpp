@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -47,6 +48,12 @@ R4LINK_API const char* to_text(Outcome outcome);
 // nothing.
 R4LINK_API std::string printable(std::string_view text);
 
+// A program of this computer.
+struct Program {
+  int pid = 0;  // 0: not known
+  std::string name;
+};
+
 // A problem in words: "/dev/ttyACM0: permission denied; add yourself to the group dialout: …".
 struct Problem {
   ErrorKind kind = ErrorKind::open;
@@ -57,6 +64,8 @@ struct Problem {
   Outcome outcome = Outcome::none;
   Refusal refusal = Refusal::none;  // for Outcome::refused
   std::uint8_t at = 0;              // which command of a group, from 1; 0: none in particular
+  // The program that controls the transport already, where that is the reason.
+  std::optional<Program> holder{};
 
   // "thing: reason; fix", printable: one line, whatever the parts hold.
   R4LINK_API std::string text() const;
@@ -73,6 +82,7 @@ class R4LINK_API Error : public std::runtime_error {
   Outcome outcome() const { return problem_.outcome; }
   Refusal refusal() const { return problem_.refusal; }
   int at() const { return problem_.at; }
+  const std::optional<Program>& holder() const { return problem_.holder; }
 
  private:
   Problem problem_;

@@ -14,7 +14,7 @@
 
 namespace r4 {
 
-// What a program is to its board.
+// What a program is to its board. take_control() and release_control() change it at run time.
 enum class BoardRole : std::uint8_t {
   control,  // sends heartbeats, and commands the board as soon as no other host does
   watch,  // gets what the board says, and takes no control: it may stop the board, and nothing else

@@ -31,6 +31,12 @@ class HostLink {
   SessionId session() const { return session_; }
   bool wants_session() const { return session_ == no_session; }
   void begin_session(SessionId id) { session_ = id; }
+  // The host has left the board, or is to control it anew: a new session is wanted.
+  void leave_session() {
+    end_session();
+    forget_boot();
+    answer_now_ = true;
+  }
 
   // --- datagrams of the board. Duplicates and late ones are dropped before (host/paths/paths.hpp).
 

@@ -137,6 +137,25 @@ def test_records_watches_and_has_a_watchdog(sim, tmp_path):
     assert r4link.read(tmp_path / 'drive-00001.r4log').boards[0].states['osmc1_pwm'].max() == 100
 
 
+def test_takes_control_and_releases_it(sim):
+    async def main():
+        async with aio.Board(sim.url, role='watch') as board:
+            await board.wait_active()
+            await board.take_control()
+            await board.wait_active()
+            await board.arm()
+            await board.osmc(1).set(100)
+            assert board.role == 'control'
+            await board.release_control()
+            assert board.role == 'watch'
+            with pytest.raises(r4link.UsageError):
+                await board.arm()
+            async for state in board.states():
+                if state.safe == 'link' and state.osmc1.pwm == 0:
+                    break
+    asyncio.run(main())
+
+
 def test_with_a_key_it_drives_a_board_that_has_it_and_no_other(tmp_path):
     right, wrong = tmp_path / 'right', tmp_path / 'wrong'
     for path, digits in (right, '5a'), (wrong, '5b'):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """r4link.Board on a simulated board in the process."""
 import math
+import os
+import pickle
 import sys
 import threading
 import time
@@ -236,6 +238,59 @@ def test_who_watches_commands_nothing(sim):
         with pytest.raises(r4link.UsageError):
             board.arm()
         board.stop()
+
+
+def test_takes_control_and_releases_it(sim, wait):
+    with r4link.Board(sim.url, role='watch') as board:
+        states = []
+        board.on_state(states.append)
+        board.wait_active()
+        board.take_control()
+        board.take_control()  # that is no change
+        board.wait_active()
+        board.arm()
+        board.osmc(1).set(358)
+        assert board.role == 'control'
+        wait(lambda: sim.look().osmc[0].pwm == 358)
+        board.release_control()
+        assert (board.role, board.disarmed_by) == ('watch', 'not yet')
+        wait(lambda: sim.look().osmc[0].pwm == 0 and sim.look().is_safe)
+        before = len(states)
+        wait(lambda: len(states) > before)
+        assert board.next_state().safe == 'link'
+        with pytest.raises(r4link.UsageError):
+            board.arm()
+        board.release_control()
+
+
+def test_over_udp_the_program_that_controls_has_the_port_of_hosts():
+    with r4link.SimBoard('udp://127.0.0.1:0') as sim, r4link.Board(sim.url.split('?')[0], role='watch') as board:
+        for _ in range(2):
+            board.wait_active()
+            assert '?listen=' in board.name, 'a port of its own'
+            board.take_control()
+            board.wait_active()
+            assert '?listen=' not in board.name
+            board.release_control()
+            board.next_state()
+
+
+def test_an_error_names_the_program_that_controls_the_board():
+    with r4link.SimBoard('pty:') as sim, r4link.Board(sim.url) as driver:
+        driver.wait_active()
+        with r4link.Board(sim.url, role='watch') as watcher:
+            watcher.wait_active()
+            with pytest.raises(r4link.RefusedError) as refused:
+                watcher.take_control()
+            assert refused.value.holder.pid == os.getpid() and refused.value.holder.name
+            assert pickle.loads(pickle.dumps(refused.value)).holder == refused.value.holder
+            assert watcher.role == 'watch' and watcher.next_state()
+            driver.release_control()
+            watcher.take_control()
+            watcher.wait_active()
+        with pytest.raises(r4link.UsageError) as wrong:
+            driver.arm()
+        assert wrong.value.holder is None
 
 
 def test_records_and_plays_again(sim, tmp_path):

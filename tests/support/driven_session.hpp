@@ -78,6 +78,13 @@ class DrivenSession : public Session {
   Ticket stop(Time timeout, Time now) { return done(Session::stop(timeout, now), now); }
   Ticket identify(Time timeout, Time now) { return done(Session::identify(timeout, now), now); }
   Ticket leave(Time timeout, Time now) { return done(Session::leave(timeout, now), now); }
+  Ticket release_control(Time timeout, Time now) {
+    return done(Session::release_control(timeout, now), now);
+  }
+  void change_role(BoardRole role, Time now) {
+    Session::change_role(role, now);
+    perform(now);
+  }
   void cancel(Ticket ticket, Time now) {
     Session::cancel(ticket, now);
     perform(now);

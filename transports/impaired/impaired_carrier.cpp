@@ -54,6 +54,7 @@ class Impaired final : public ImpairedCarrier, public BoardEnd, private Carrier:
   void use_packed_form(bool wanted) override { end_.use_packed_form(wanted); }
   bool is_own_cable() const override { return end_.is_own_cable(); }
   bool is_shared() const override { return below_->is_shared(); }
+  void change_role(BoardRole role) override { below_->change_role(role); }
   bool up() const override { return below_->up(); }
   TransportTrouble trouble() const override { return below_->trouble(); }
   const std::string& name() const override { return below_->name(); }

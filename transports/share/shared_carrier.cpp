@@ -59,6 +59,7 @@ class SharedCarrier final : public Carrier,
   TransportTrouble trouble() const override { return own_->trouble(); }
   // The board would take what is sent to another program's transport for the holder's.
   bool is_shared() const override { return is_served() || own_->is_shared(); }
+  void change_role(BoardRole role) override;
   const std::string& name() const override { return name_; }
   const CarrierCounters& counters() const override {
     counted_ = own_->counters();
@@ -92,10 +93,12 @@ class SharedCarrier final : public Carrier,
 
   bool take_part();
   void require_control();
+  bool is_found();
   bool hold_to_watch();
   void open_own();
   void pass_over(const Problem& why);
   void lose();
+  void seek();
   void look();
   void look_later(milliseconds delay);
   bool late() const { return Clock::now() - search_.began >= take_over_within; }
@@ -108,7 +111,7 @@ class SharedCarrier final : public Carrier,
   const std::shared_ptr<DeviceClaim> claim_;  // how own_ opens its device
   const std::unique_ptr<Carrier> own_;
   const FindShareName find_;
-  const BoardRole role_;
+  BoardRole role_;
   std::string name_;
   ShareName share_;
   ShareHolder holder_;
@@ -185,16 +188,38 @@ void SharedCarrier::require_control() {
     if (const auto problem = out_of_resources(name_, errno)) throw Error(*problem);
     other = connect_to_holder(share_, BoardRole::control);
   }
-  if (other && !is_one_of_us(other.get(), share_)) return;  // a stranger keeps us from nothing
+  // A stranger keeps us from nothing.
+  if (other && !is_one_of_us(other.get(), share_)) return holder_.release();
   const pid_t process = other ? process_of(other.get()) : 0;
   const bool stopped = is_stopped(process);
-  throw Error(
+  const std::string program = program_of(process);
+  Problem problem{
       ErrorKind::refused, name_,
-      fmt::format("controlled by {}{}{}", program_of(process),
-                  other ? fmt::format(" (pid {})", process) : "",
+      fmt::format("controlled by {}{}{}", program, other ? fmt::format(" (pid {})", process) : "",
                   stopped ? ", which is stopped" : ""),
       stopped ? fmt::format("let it go on (kill -CONT {0}), or end it (kill -KILL {0})", process)
-              : "end that program, or watch beside it, as r4 monitor does");
+              : "end that program, or watch beside it, as r4 monitor does"};
+  problem.holder = Program{process, program};
+  throw Error(std::move(problem));
+}
+
+void SharedCarrier::change_role(BoardRole role) {
+  if (role == role_) return;
+  const bool controls = role == BoardRole::control;
+  const bool is_open = state_ != State::closed;
+  if (is_open && controls && is_found()) require_control();
+  role_ = role;
+  if (is_open) controls ? seek() : lose();
+}
+
+// The name of a transport that cannot be found is taken when it is there.
+bool SharedCarrier::is_found() {
+  try {
+    if (state_ == State::seeking) share_ = find_();
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
 }
 
 // Takes the name of the program that watches and holds the transport. False if another program was
@@ -238,9 +263,14 @@ void SharedCarrier::pass_over(const Problem& why) {
 
 // We have no part in the transport any more.
 void SharedCarrier::lose() {
+  seek();
+  holder_.release();  // the transport is free before others are told so
+}
+
+// The search for our part begins anew.
+void SharedCarrier::seek() {
   client_.leave();
   own_->close();
-  holder_.release();
   state_ = State::seeking;
   search_ = {};
   look_later(milliseconds(0));

@@ -6,13 +6,17 @@
 //      |   ^                                |                       |
 //      |   +---- the holder ends, or does not answer in time -------+
 //      |   |
-//      |   +---- a program that controls asks for the transport, or takes it
+//      |   +---- a program that controls asks for the transport, or takes it; the role is another
 //      |   |
 //      +-> holding, with the carrier open: no program holds it, or the holder was passed over
 //
 // The program that controls the board holds the transport itself: nothing of what it sends waits
 // for another program. It also holds a name of its own, so a second one is refused at once.
 // Programs that watch hear all that passes, and send stops.
+//
+// A program that takes control takes that name first: if it is refused, all stays as it is. Then,
+// as with any holder that ends, the transport is opened again, since a program that controls opens
+// it in another way (DeviceClaim), and the programs that it served look for the holder again.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -34,7 +34,13 @@ std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, 
 std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& url, Role role,
                                                HostLookup lookup, BoardSearch search) {
   if (role == Role::board) return std::make_unique<UdpBoard>(io, url, std::move(lookup));
-  return std::make_unique<UdpHost>(io, url, std::move(lookup), std::move(search));
+  return std::make_unique<UdpHost>(io, url, std::move(lookup), std::move(search),
+                                   std::make_shared<DeviceClaim>());
+}
+
+std::unique_ptr<Carrier> make_claimed_udp_carrier(asio::io_context& io, const Url& url,
+                                                  std::shared_ptr<DeviceClaim> claim) {
+  return std::make_unique<UdpHost>(io, url, HostLookup(), BoardSearch(), std::move(claim));
 }
 
 bool udp_has_own_port(const Url& text) { return UdpUrl(text, Role::host).listen == 0; }

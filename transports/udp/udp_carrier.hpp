@@ -40,7 +40,12 @@ namespace r4 {
 // Throws Error{usage} for a URL that UDP does not take.
 std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, Role role);
 
-// The same, with names looked up and boards searched for in that way.
+// A host's, opened as `claim` says each time: for a program that watches at any free port, unless
+// the URL names one.
+std::unique_ptr<Carrier> make_claimed_udp_carrier(asio::io_context& io, const Url& url,
+                                                  std::shared_ptr<DeviceClaim> claim);
+
+// With names looked up and boards searched for in that way.
 std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& url, Role role,
                                                HostLookup lookup, BoardSearch search = {});
 

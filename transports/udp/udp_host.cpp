@@ -8,10 +8,12 @@
 
 namespace r4 {
 
-UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search)
+UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search,
+                 std::shared_ptr<DeviceClaim> claim)
     : UdpEnd(io, UdpUrl(url, Role::host)),
       lookup_(std::move(lookup)),
       search_(std::move(search)),
+      claim_(std::move(claim)),
       watch_(io, lookup_),
       network_(NetworkWatch::of(io)) {
   search_.port = url_.port;
@@ -51,7 +53,8 @@ void UdpHost::close() noexcept {
 // The socket of a host whose board is there.
 void UdpHost::bind(const Endpoint& board) {
   board_ = board;
-  Endpoint local(board.protocol(), url_.listen);
+  const bool any_port = claim_->yields && !url_.names_listen;
+  Endpoint local(board.protocol(), any_port ? std::uint16_t{0} : url_.listen);
   if (!url_.local.is_unspecified()) {
     if (url_.local.is_v6() != board.address().is_v6()) {
       throw Error(ErrorKind::usage, url_.text,

@@ -4,7 +4,9 @@
 #pragma once
 
 #include <asio/io_context.hpp>
+#include <memory>
 
+#include "../share_name.hpp"
 #include "network/network_watch.hpp"
 #include "search/board_search.hpp"
 #include "search/host_lookup.hpp"
@@ -14,7 +16,8 @@ namespace r4 {
 
 class UdpHost final : public UdpEnd, private NetworkWatch::Member {
  public:
-  UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search);
+  UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search,
+          std::shared_ptr<DeviceClaim> claim);
   ~UdpHost() override { close(); }
 
   void open(Handler& handler) override;
@@ -35,6 +38,7 @@ class UdpHost final : public UdpEnd, private NetworkWatch::Member {
 
   const HostLookup lookup_;
   BoardSearch search_;
+  const std::shared_ptr<DeviceClaim> claim_;
   WantedBoard wanted_;  // where the URL leaves it to a search
   HostWatch watch_;
   UdpHostSocket host_socket_{socket_};

@@ -38,7 +38,8 @@ UdpUrl::UdpUrl(const Url& url, Role role)
       called(url.get("id").value_or("")),
       host(host_of(url, role)),
       port(port_of(url, role)),
-      listen(static_cast<std::uint16_t>(url.get_number("listen", 0, 65535, host_port))) {
+      listen(static_cast<std::uint16_t>(url.get_number("listen", 0, 65535, host_port))),
+      names_listen(url.get("listen").has_value()) {
   if (search) {
     const bool by_id = url.get("id").has_value();
     url.allow_only(by_id ? "id port listen" : "port listen");

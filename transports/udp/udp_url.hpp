@@ -24,6 +24,7 @@ struct UdpUrl {
   std::string host;      // the board's; at a board: where it listens
   std::uint16_t port;    // of the board
   std::uint16_t listen;  // of the host
+  bool names_listen;     // the URL says so
   asio::ip::address
       local;         // of this computer, by whose interface the host sends; unspecified: by any
   std::string peer;  // HOST or HOST:PORT; empty: none

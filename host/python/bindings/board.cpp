@@ -196,6 +196,12 @@ void bind_board(py::module_& module) {
            py::arg("stop_linger"), py::arg("identify_interval"), py::arg("callback_limit"))
       .def("close", &PyBoard::close, Released())
       .def("interrupt", &PyBoard::interrupt)
+      .def("watches", [](PyBoard& board) { return board->role() == BoardRole::watch; })
+      .def(
+          "take_control", [](PyBoard& board) { board->take_control(); }, Released())
+      .def(
+          "release_control", [](PyBoard& board, int ms) { board->release_control(Ms(ms)); },
+          Released())
       .def(
           "wait_active", [](PyBoard& board, int ms) { board->wait_active(Ms(ms)); }, Released())
       .def(

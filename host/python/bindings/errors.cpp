@@ -9,11 +9,14 @@ namespace {
 
 void raise(const Error& error) {
   const Problem& problem = error.problem();
+  py::object holder = py::none();
+  if (error.holder()) holder = py::make_tuple(error.holder()->pid, printable(error.holder()->name));
   const py::object made =
       py::module_::import("r4link.errors")
           .attr("error_of")(static_cast<int>(problem.kind), printable(problem.thing),
                             printable(problem.reason), printable(problem.fix),
-                            to_text(problem.outcome), to_str(name_of(problem.refusal)), problem.at);
+                            to_text(problem.outcome), to_str(name_of(problem.refusal)), problem.at,
+                            holder);
   PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(made.ptr())), made.ptr());
 }
 

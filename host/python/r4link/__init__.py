@@ -14,7 +14,7 @@ from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
 from .channels import (BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, Setpoints, StepperChannel, Uart)
 from .devices import Device, DeviceReading
 from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error, NotArmedError, NotConfirmedError,
-                     OpenError, RefusedError, UnsupportedError, UsageError)
+                     OpenError, Program, RefusedError, UnsupportedError, UsageError)
 from .fleet import Fleet, FleetEvent, FleetResults
 from .recording import Log, RecordedBoard, RecordedDatagram, RecordedEvent, read
 from .simulation import LinkedUrl, Look, SimBoard, with_link
@@ -28,8 +28,8 @@ __all__ = [
     'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'DataError', 'DeniedError', 'Device', 'DeviceReading', 'Direction', 'Drive',
     'DriveChannel', 'Error', 'Event', 'FIELDS', 'FORWARD', 'Fleet', 'FleetEvent', 'FleetResults', 'I2c', 'I2cAnswer',
     'I2cBusReport', 'I2cReading', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
-    'NotConfirmedError', 'OpenError', 'PostResult', 'REVERSE', 'RecordedBoard', 'RecordedDatagram', 'RecordedEvent',
-    'Recording', 'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State',
+    'NotConfirmedError', 'OpenError', 'PostResult', 'Program', 'REVERSE', 'RecordedBoard', 'RecordedDatagram',
+    'RecordedEvent', 'Recording', 'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State',
     'States', 'Statistics', 'StepperChannel', 'Subscription', 'Uart', 'UartBytes', 'UartData', 'UnsupportedError',
     'UsageError', 'PathStatus', 'aio', 'control', 'devices',
     'read', 'with_link', '__version__',

@@ -282,6 +282,18 @@ class Board:
                         trace: TracebackType | None) -> None:
         await asyncio.shield(self.close())
 
+    @property
+    def role(self) -> str:
+        return self._board.role
+
+    async def take_control(self) -> None:
+        """As r4link.Board.take_control()."""
+        await self._commands.call(self._board.take_control)
+
+    async def release_control(self, timeout: float = 1.0) -> None:
+        """As r4link.Board.release_control(), when the commands that were begun before have ended."""
+        await self._commands.call(lambda: self._board.release_control(timeout))
+
     async def wait_active(self, timeout: float = 3.0) -> None:
         await self._waits.call(lambda: self._board.wait_active(timeout))
 

@@ -77,7 +77,8 @@ class Board:
     """A board, opened by URL (docs/transports.md), or with_link(); see the options of include/r4link/options.hpp.
 
     Returns without waiting for the board: wait_active(). `role` is 'control', or 'watch' for a program that only
-    looks, and may stop the board. `key` is the path of a key file (`~` is yours). Raises UsageError, OpenError, DeniedError.
+    looks, and may stop the board, until take_control(). `key` is the path of a key file (`~` is yours). Raises
+    UsageError, OpenError, DeniedError.
 
         with r4link.Board('udp://192.168.0.125') as board:
             board.wait_active()
@@ -119,6 +120,23 @@ class Board:
 
     def __repr__(self) -> str:
         return f'<r4link.Board {self.name}: {self.link.state}>'
+
+    @property
+    def role(self) -> str:
+        """'control' or 'watch'."""
+        return 'watch' if self._core.watches() else 'control'
+
+    def take_control(self) -> None:
+        """From now on this program controls the board; callbacks and recordings stay. It begins disarmed: wait_active(),
+        arm(). Raises RefusedError if another program of this computer controls it, which `holder` names; then this one
+        watches on."""
+        self._core.take_control()
+
+    def release_control(self, timeout: float = 1.0) -> None:
+        """Disarms, says farewell until the board has answered, so that it is safe and free, and watches from then on.
+        Raises NotConfirmedError if it does not answer in time: it goes safe by its own timeout, and this program watches
+        all the same. Commands that other threads wait for raise CancelledError."""
+        self._core.release_control(_ms(timeout))
 
     def wait_active(self, timeout: float = 3.0) -> None:
         """Until the board is under our control or, where we only watch, is heard. Raises RefusedError that says what

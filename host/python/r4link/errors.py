@@ -13,7 +13,15 @@
       DeniedError          the system denies it (an OSError, too)
       UnsupportedError     kernel support or an interface is missing
 """
-from typing import Any
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+
+class Program(NamedTuple):
+    """A program of this computer."""
+    pid: int
+    name: str
 
 
 class Error(Exception):
@@ -21,11 +29,11 @@ class Error(Exception):
 
     `outcome` tells how a command ended ('timed out', 'cancelled' …; 'none': it is about no command), `refusal`
     why the board refused it ('NONE': it did not), and `at` which command of a group that was, from 1 (0: none in
-    particular).
+    particular). `holder` is the program that controls the board already, where that is the reason.
     """
 
     def __init__(self, thing: str, reason: str, fix: str = '', *, outcome: str = 'none', refusal: str = 'NONE',
-                 at: int = 0) -> None:
+                 at: int = 0, holder: Program | None = None) -> None:
         super().__init__(f'{thing}: {reason}' + (f'; {fix}' if fix else ''))
         self.thing = thing
         self.reason = reason
@@ -33,6 +41,7 @@ class Error(Exception):
         self.outcome = outcome
         self.refusal = refusal
         self.at = at
+        self.holder = holder
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -93,7 +102,9 @@ _OF_OUTCOME = {'timed out': NotConfirmedError, 'cancelled': CancelledError, 'clo
                'not armed': NotArmedError}
 
 
-def error_of(kind: int, thing: str, reason: str, fix: str, outcome: str, refusal: str, at: int) -> Error:
+def error_of(kind: int, thing: str, reason: str, fix: str, outcome: str, refusal: str, at: int,
+             holder: tuple[int, str] | None = None) -> Error:
     """The error of that ErrorKind and Outcome (include/r4link/error.hpp)."""
-    return _OF_OUTCOME.get(outcome, _OF_KIND.get(kind, Error))(thing, reason, fix, outcome=outcome, refusal=refusal,
-                                                               at=at)
+    made = _OF_OUTCOME.get(outcome, _OF_KIND.get(kind, Error))
+    return made(thing, reason, fix, outcome=outcome, refusal=refusal, at=at,
+                holder=None if holder is None else Program(*holder))

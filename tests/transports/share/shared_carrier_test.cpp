@@ -130,6 +130,9 @@ TEST_F(SharedCarrier, RefusesASecondProgramThatIsToControlAndNamesTheFirst) {
   EXPECT_EQ(error->kind(), ErrorKind::refused);
   EXPECT_EQ(error->problem().reason,
             fmt::format("controlled by {} (pid {})", program_of(::getpid()), ::getpid()));
+  ASSERT_TRUE(error->holder());
+  EXPECT_EQ(error->holder()->pid, ::getpid());
+  EXPECT_EQ(error->holder()->name, program_of(::getpid()));
   EXPECT_FALSE(second->carrier->up());
   EXPECT_EQ(device.opened, 1);
   driver.reset();
@@ -150,6 +153,67 @@ TEST_F(SharedCarrier, GivesTheTransportToAProgramThatControls) {
   EXPECT_TRUE(all_hear("nobody drives", one, two));
   EXPECT_EQ(device.opened, 3);
   for (const auto& each : {one.get(), two.get()}) EXPECT_EQ(each->heard.count(Kind::down), 0U);
+}
+
+TEST_F(SharedCarrier, GivesControlToAProgramThatWatchesAndTakesItBack) {
+  const auto one = opened(BoardRole::watch);
+  const auto two = opened(BoardRole::watch);
+  for (const auto* each : {two.get(), one.get()}) {  // beside the holder, and as the holder
+    each->carrier->change_role(BoardRole::control);
+    EXPECT_TRUE(error_of([&] { program(BoardRole::control, io)->open(); })) << "at once";
+    EXPECT_TRUE(all_hear("driven", one, two));
+    EXPECT_FALSE(each->carrier->is_shared());
+    EXPECT_EQ(each->carrier->send("hello", Priority::normal), SendResult::sent);
+    one->heard.datagrams.clear();
+    two->heard.datagrams.clear();
+    each->carrier->change_role(BoardRole::watch);
+    EXPECT_FALSE(connect_to_holder(share, BoardRole::control));
+    EXPECT_TRUE(all_hear("nobody drives", one, two));
+    EXPECT_EQ(each->heard.count(Kind::down), 0U);
+    each->carrier->change_role(BoardRole::watch);
+    EXPECT_TRUE(each->carrier->up()) << "that is no change";
+  }
+  EXPECT_EQ(device.sent.size(), 2U);
+}
+
+TEST_F(SharedCarrier, RefusesControlToAProgramThatWatchesAndLeavesItWatching) {
+  const auto driver = opened(BoardRole::control);
+  const auto watcher = opened(BoardRole::watch);
+  const auto error = error_of([&] { watcher->carrier->change_role(BoardRole::control); });
+  ASSERT_TRUE(error);
+  ASSERT_TRUE(error->holder());
+  EXPECT_EQ(error->holder()->pid, ::getpid());
+  EXPECT_TRUE(all_hear("watched", watcher));
+  EXPECT_EQ(device.opened, 1);
+  EXPECT_TRUE(watcher->carrier->is_shared());
+  driver->carrier->change_role(BoardRole::watch);
+  watcher->carrier->change_role(BoardRole::control);
+  EXPECT_TRUE(all_hear("driven", driver, watcher));
+  EXPECT_TRUE(driver->carrier->is_shared());
+}
+
+TEST_F(SharedCarrier, ChangesItsRoleInAnyCallback) {
+  const auto one = opened(BoardRole::watch);
+  const auto two = opened(BoardRole::watch);
+  for (Program* const each : {one.get(), two.get()}) {  // the holder, and one that it serves
+    bool changed = false;
+    const auto role = [&](BoardRole wanted) {
+      changed = false;
+      each->heard.then = [&, wanted](const auto&) {
+        if (!std::exchange(changed, true)) each->carrier->change_role(wanted);
+      };
+    };
+    role(BoardRole::control);
+    EXPECT_TRUE(all_hear("a", one, two));
+    EXPECT_TRUE(
+        in_time([&] { return each->carrier->send("b", Priority::normal) == SendResult::sent; }));
+    role(BoardRole::watch);
+    one->heard.datagrams.clear();
+    two->heard.datagrams.clear();
+    EXPECT_TRUE(all_hear("c", one, two));
+    EXPECT_FALSE(connect_to_holder(share, BoardRole::control));
+    each->heard.then = nullptr;
+  }
 }
 
 TEST_F(SharedCarrier, IsTakenOverByAnotherProgramWhenTheHolderEnds) {
@@ -370,6 +434,9 @@ TEST_F(SharedCarrier, IsOpenedThoughAStrangerHasTakenItsNames) {
   const auto watcher = opened(BoardRole::watch);
   EXPECT_EQ(device.opened, 2);
   EXPECT_FALSE(watcher->carrier->is_shared());
+  driver->carrier->close();
+  watcher->carrier->change_role(BoardRole::control);
+  EXPECT_TRUE(run_until(io, [&] { return device.opened == 3; })) << "nor from taking control";
 }
 
 }  // namespace

@@ -185,7 +185,7 @@ class SharedTransportTest : public testing::Test {
     FileDescriptor made(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
     EXPECT_EQ(has_name ? ::bind(made.get(), bytes, size) : ::connect(made.get(), bytes, size), 0);
     if (has_name) {
-      EXPECT_EQ(::listen(made.get(), 1), 0);
+      EXPECT_EQ(::listen(made.get(), 8), 0);
     }
     EXPECT_EQ(::seteuid(0), 0);
     return made;

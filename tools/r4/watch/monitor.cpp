@@ -37,8 +37,9 @@ namespace {
 constexpr Milliseconds tick{100};
 // With --count alone: how long a board may stay silent from the start.
 constexpr Milliseconds patience{5000};
-// With --device: for how long another host must control the board until it is left to that one.
-constexpr Milliseconds busy_patience{1500};
+// With --device: for how long another host must control the board until it is left to that one, and
+// how long the board has to confirm that.
+constexpr Milliseconds busy_patience{1500}, release_time{200};
 
 struct MonitorOptions {
   std::vector<std::string> urls;
@@ -53,7 +54,8 @@ struct MonitorOptions {
 
 BoardOptions board_options(const MonitorOptions& options, const std::vector<Device>& devices = {}) {
   BoardOptions board_options = with_key(options.key);
-  board_options.role = options.control ? BoardRole::control : BoardRole::watch;
+  const bool controls = options.control && devices.empty();
+  board_options.role = controls ? BoardRole::control : BoardRole::watch;
   board_options.session.arming = Arming::off;  // it drives nothing
   if (!options.fields.empty()) board_options.session.fields = options.fields;
   for (const Device& device : devices) board_options.session.fields += "," + device.fields();
@@ -74,21 +76,10 @@ class Monitor {
         tick_(io_),
         end_(io_) {}
 
-  // Another host controls the board, so that devices cannot be set up here.
-  bool gives_way() const { return gives_way_; }
-
   int run() {
     connect();
-    if (!devices_.empty()) {
-      setup_.emplace(io_, board_, devices_,
-                     [this](const Problem& problem) { view_->on_device_trouble(problem); });
-    }
-    try {
-      board_.open();
-    } catch (const Error& error) {
-      gives_way_ = error.problem().reason.starts_with("controlled by ");
-      throw;
-    }
+    board_.open();
+    if (!devices_.empty()) set_devices_up();
     run_end_.watch();
     end_after(options_.duration ? *options_.duration : patience);
     next_tick();
@@ -133,13 +124,23 @@ class Monitor {
     on_paths(board_, [this](const PathStatus& path) { view_->on_path(path); });
   }
 
+  // The program that controls the board sets devices up: this one, where no other does. Else what
+  // that program has set up is shown.
+  void set_devices_up() {
+    setup_.emplace(io_, board_, devices_,
+                   [this](const Problem& problem) { view_->on_device_trouble(problem); });
+    try {
+      board_.take_control();
+    } catch (const Error& error) {
+      if (!error.holder()) throw;
+    }
+  }
+
   // A host that was killed keeps its board until the board's timeout.
   void look_who_controls() {
-    const bool waits = options_.control && !devices_.empty() && board_.link().busy;
-    busy_ticks_ = waits ? busy_ticks_ + 1 : 0;
-    if (busy_ticks_ * tick < busy_patience) return;
-    gives_way_ = true;
-    io_.stop();
+    busy_ticks_ = setup_ && board_.link().busy ? busy_ticks_ + 1 : 0;
+    if (busy_ticks_ * tick != busy_patience) return;
+    board_.async_release_control(release_time, [](const CommandResult&) {});
   }
 
   // Each reading once, and again when the board has begun anew.
@@ -202,23 +203,7 @@ class Monitor {
   std::optional<DeviceSetup> setup_;
   std::array<std::optional<std::uint32_t>, i2c_slots> told_ms_;
   int busy_ticks_ = 0;
-  bool gives_way_ = false;
 };
-
-// Devices are set up by who controls the board: by us, where nobody does. Else what that program has set up is shown.
-int monitor_devices(MonitorOptions options, const std::string& url) {
-  options.control = true;
-  std::optional<Monitor> monitor(std::in_place, options, url);
-  try {
-    const int code = monitor->run();
-    if (!monitor->gives_way()) return code;
-  } catch (const Error&) {
-    if (!monitor->gives_way()) throw;
-  }
-  monitor.reset();
-  options.control = false;
-  return Monitor(options, url).run();
-}
 
 // can://can0 and nothing else: all boards.
 bool is_whole_bus(const std::string& text) {
@@ -248,7 +233,6 @@ int monitor(const MonitorOptions& options) {
     monitor_boards({urls, board_options(options), options.json, options.count, options.duration});
     return 0;
   }
-  if (!options.devices.empty()) return monitor_devices(options, urls.front());
   return Monitor(options, urls.front()).run();
 }
 

@@ -63,8 +63,8 @@ Hub::Hub(asio::io_context& io, const std::vector<std::string>& urls, const HubOp
       deadline_(io),
       recording_(
           io, options.record_folder,
-          [this](Recording* recording) {
-            for (const auto& board : boards_) board->record(recording);
+          [this](Recording& recording) {
+            for (const auto& board : boards_) board->board().record(recording);
           },
           [this](const WebRecording::Told&) { tell_recording(); }),
       foxglove_(
@@ -140,7 +140,7 @@ void Hub::on_metrics() {
   asio::post(io_, [this] {
     MetricFamilies families;
     for (const auto& each : boards_) {
-      if (each->board() != nullptr) describe({each->url(), each->board()}, families);
+      describe({each->url(), &each->board()}, families);
     }
     server_.set_metrics(families.text());
   });
@@ -203,9 +203,7 @@ void Hub::obey(ClientId client, const PageRequest& request) {
       return want_control(client, request.on);
     case PageRequest::Kind::alive:
       if (!control_.alive(client, Control::Time(request.now), now())) return;
-      for (const auto& board : boards_) {
-        if (board->board() != nullptr) board->board()->feed();
-      }
+      for (const auto& board : boards_) board->board().feed();
       return;
     case PageRequest::Kind::record:
       return record(client, request.on);
@@ -302,9 +300,7 @@ WebBoard::OnResult Hub::answering(ClientId client, const PageRequest& request, s
   return [this, client, request, board, what = std::move(what)](const CommandResult& result) {
     const bool ok = result.outcome == Outcome::confirmed;
     const double ms = std::chrono::duration<double, std::milli>(result.elapsed).count();
-    LinkStatus link;
-    if (boards_[board]->board() != nullptr) link = boards_[board]->board()->link();
-    Problem problem = explain(what, result, link);
+    Problem problem = explain(what, result, boards_[board]->board().link());
     if (is_earlier(result.disarmed)) problem.fix = "press Clear when the danger is over, then Arm";
     answer(client, request, board, ok, ms,
            ok ? "confirmed" : problem.reason + (problem.fix.empty() ? "" : "; " + problem.fix));
@@ -321,15 +317,15 @@ void Hub::command(ClientId client, const PageRequest& request) {
   const std::size_t number = request.board;
   if (number >= boards_.size())
     return answer(client, request, number, false, 0, "there is no such board");
-  AsyncBoard* const board = boards_[number]->board();
-  if (!control_.is_held_by(client) || board == nullptr) {
+  AsyncBoard& board = boards_[number]->board();
+  if (!control_.is_held_by(client)) {
     return answer(client, request, number, false, 0, "this browser has no control; take it first");
   }
   try {
     if (request.kind == PageRequest::Kind::arm) {
-      board->async_arm(arm_time, answering(client, request, number, "arm"));
+      board.async_arm(arm_time, answering(client, request, number, "arm"));
     } else {
-      send(client, request, *board,
+      send(client, request, board,
            request.kind == PageRequest::Kind::clear ? "E:CLEAR" : request.command);
     }
   } catch (const Error& error) {

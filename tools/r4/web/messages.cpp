@@ -81,27 +81,23 @@ std::string board_text(std::size_t number, WebBoard& slot) {
               {"name", who.name},
               {"firmware", who.firmware},
               {"id", who.board_id}};
-  const AsyncBoard* const board = slot.board();
-  if (board == nullptr) {
-    object.update({{"link", "down"}, {"why", slot.trouble()}, {"armed", false}, {"safe", ""}});
-    return text_of(object);
-  }
-  const LinkStatus& link = board->link();
-  const Statistics statistics = board->statistics();
+  const AsyncBoard& board = slot.board();
+  const LinkStatus& link = board.link();
+  const Statistics statistics = board.statistics();
   const bool heard = is_heard(link.state);
   const bool fine = link.state == HostLinkState::active && (!slot.controlling() || link.in_control);
   object["link"] = link.transport_down ? "down" : to_text(link.state);
   const bool free = !slot.controlling() && heard && link.reason == SafeReason::link;
   object["why"] = fine ? "" : free ? "nobody controls it" : explain(slot.url(), link).reason;
   object["controlled"] = link.in_control;
-  object["armed"] = slot.controlling() && board->disarmed_by() == DisarmCause::none;
-  object["disarmed"] = slot.controlling() ? to_text(board->disarmed_by()) : "";
+  object["armed"] = slot.controlling() && board.disarmed_by() == DisarmCause::none;
+  object["disarmed"] = slot.controlling() ? to_text(board.disarmed_by()) : "";
   object["safe"] = heard && link.reason != SafeReason::none ? to_text(link.reason) : "";
   object["rate_hz"] = std::round(statistics.state_rate_hz * 10) / 10;
   object["loss"] = statistics.loss();
   object["round_trip_ms"] = statistics.round_trip_us / 1e3;
   object["age_ms"] = statistics.state_age_us / 1e3;
-  if (Json paths = paths_json(*board); !paths.is_null()) object["paths"] = std::move(paths);
+  if (Json paths = paths_json(board); !paths.is_null()) object["paths"] = std::move(paths);
   return text_of(object);
 }
 

@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One board as r4 web has it: watched, and controlled while a browser wants to.
-//
-//      watching --take_control()--> controlling --leave_control()--> leaving --farewell answered, or 200 ms--> watching
-//
-// A board that cannot be opened again is tried once a second. A stop that comes while it is left goes out right behind;
-// one to a board that is not there is not confirmed.
 #pragma once
 
 #include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,29 +37,21 @@ class WebBoard {
            const std::vector<Device>& devices, Events& events);
 
   // To watch. Throws Error.
-  void open();
+  void open() { board_.open(); }
   // Throws Error where it cannot: then it is watched on.
   void take_control();
   // Its heartbeats end now. `done` when the board is free, or does not answer.
   void leave_control(Done done);
-  // The same at the end of the program: nothing is opened any more.
+  // The same at the end of the program.
   void close(Done done);
   void stop(OnResult done);
-  // nullptr: goes on recording nowhere.
-  void record(Recording* recording);
 
-  // Null while it cannot be opened.
-  AsyncBoard* board() { return leaving_ ? nullptr : board_.get(); }
-  bool controlling() const { return controlling_; }
+  AsyncBoard& board() { return board_; }
+  bool controlling() const { return board_.role() == BoardRole::control; }
   const std::string& url() const { return url_; }
   const BoardIdentity& identity() const { return identity_; }
-  // Why it is not there.
-  const std::string& trouble() const { return trouble_; }
 
  private:
-  void make(BoardRole role);
-  void watch();
-  void leave(Done done);
   void connect();
   void on_link(const LinkStatus& link);
   void say(Level level, const std::string& text) { events_.on_event(number_, level, text); }
@@ -74,20 +59,13 @@ class WebBoard {
   asio::io_context& io_;
   const std::size_t number_;
   const std::string url_;
-  const BoardOptions options_;
   const std::vector<Device>& devices_;
   Events& events_;
-  asio::steady_timer retry_;
-  std::unique_ptr<AsyncBoard> board_;
-  std::optional<DeviceSetup> setup_;  // of that one
-  Recording* recording_ = nullptr;
+  AsyncBoard board_;
+  std::optional<DeviceSetup> setup_;
   BoardIdentity identity_;
-  std::string trouble_;
-  std::vector<OnResult> stops_;  // that came while it was left
   LinkStatus link_;
   bool heard_ = false;
-  bool controlling_ = false;
-  bool leaving_ = false;
 };
 
 }  // namespace r4::tool::web

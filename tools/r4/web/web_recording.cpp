@@ -16,7 +16,7 @@
 namespace r4::tool::web {
 
 WebRecording::WebRecording(asio::io_context& io, std::string folder,
-                           std::function<void(Recording*)> use,
+                           std::function<void(Recording&)> use,
                            std::function<void(const Told&)> tell)
     : io_(io), folder_(std::move(folder)), use_(std::move(use)), tell_(std::move(tell)) {}
 
@@ -45,7 +45,7 @@ void WebRecording::opened(std::shared_ptr<Recording> recording, std::string path
   stage_ = Stage::on;
   recording_ = std::move(recording);
   told_ = {std::move(path), 0, ""};
-  use_(recording_.get());
+  use_(*recording_);
   tell_(told_);
   if (ends_at_once_) end();
 }
@@ -63,7 +63,6 @@ void WebRecording::end() {
 
 void WebRecording::close(const std::string& why) {
   stage_ = Stage::off;
-  use_(nullptr);
   asio::post(disk_, [recording = std::move(recording_)] { recording->close(); });
   recording_.reset();
   told_ = {"", told_.bytes, why};

@@ -26,9 +26,9 @@ class WebRecording {
     std::uint64_t bytes = 0;
     std::string why;  // it is not, or not any more
   };
-  // `use` hands the recording to the boards, or takes it from them (null); `tell` is told what has changed. Both are
-  // called on the loop.
-  WebRecording(asio::io_context& io, std::string folder, std::function<void(Recording*)> use,
+  // `use` hands the recording to the boards; `tell` is told what has changed. Both are called on
+  // the loop.
+  WebRecording(asio::io_context& io, std::string folder, std::function<void(Recording&)> use,
                std::function<void(const Told&)> tell);
   // Waits for the disk.
   ~WebRecording();
@@ -51,7 +51,7 @@ class WebRecording {
 
   asio::io_context& io_;
   const std::string folder_;
-  const std::function<void(Recording*)> use_;
+  const std::function<void(Recording&)> use_;
   const std::function<void(const Told&)> tell_;
   std::shared_ptr<Recording> recording_;
   Stage stage_ = Stage::off;

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A board that is watched, controlled and watched again, without being closed: AsyncBoard and Board.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <asio/io_context.hpp>
+#include <atomic>
+#include <filesystem>
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "r4link/async_board.hpp"
+#include "r4link/board.hpp"
+#include "r4link/recording.hpp"
+#include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+using firmware::BoardState;
+
+const Command turn_slowly = Command::osmc(358, Direction::forward, 1);
+
+BoardOptions watching() {
+  BoardOptions options;
+  options.role = BoardRole::watch;
+  return options;
+}
+
+struct BoardRoles : testing::TestWithParam<std::vector<std::string>> {
+  // Runs the loop until `done()`; false after 5 s.
+  template <class Done>
+  bool run_until(Done done) {
+    const auto deadline = std::chrono::steady_clock::now() + 5s;
+    io.restart();
+    while (!done() && std::chrono::steady_clock::now() < deadline) io.run_one_for(5s);
+    return done();
+  }
+  // How what `start(handler)` starts ends.
+  template <class Start>
+  Outcome end_of(Start start) {
+    std::optional<CommandResult> end;
+    start([&](const CommandResult& result) { end = result; });
+    EXPECT_TRUE(run_until([&] { return end.has_value(); }));
+    return end ? end->outcome : Outcome::none;
+  }
+  bool hears_more_states() {
+    const int before = states;
+    return run_until([&] { return states > before + 2; });
+  }
+  void drive() {
+    board.take_control();
+    EXPECT_EQ(end_of([&](auto end) { board.async_wait_active(5s, end); }), Outcome::confirmed);
+    EXPECT_EQ(end_of([&](auto end) { board.async_arm(3s, end); }), Outcome::confirmed);
+    EXPECT_EQ(end_of([&](auto end) { board.async_send(turn_slowly, 3s, end); }),
+              Outcome::confirmed);
+  }
+  Outcome release() {
+    return end_of([&](auto end) { board.async_release_control(2s, end); });
+  }
+  bool is_safe() {
+    bool safe = false;
+    simulated.run([&](sim::SimulatedBoard& each) {
+      safe = each.application().reason() == SafeReason::link &&
+             each.application().outputs().osmc[0].pwm == 0;
+    });
+    return safe;
+  }
+
+  BoardInAThread simulated{GetParam()};
+  asio::io_context io;
+  AsyncBoard board{io, simulated.urls(), watching()};
+  int states = 0;
+  Subscription counting = board.on_state([this](const auto&, const auto&) { ++states; });
+};
+// A path that is opened anew with the role, one that serves both, and the two together.
+const std::vector<std::string> kinds_of_paths[] = {{"pty"}, {"udp"}, {"pty", "udp"}};
+INSTANTIATE_TEST_SUITE_P(Transports, BoardRoles, testing::ValuesIn(kinds_of_paths),
+                         [](const auto& paths) {
+                           return paths.param.size() > 1 ? "both" : paths.param[0];
+                         });
+
+TEST_P(BoardRoles, AreTakenAndGivenBackAgainAndAgain) {
+  board.open();
+  ASSERT_TRUE(hears_more_states());
+  for (int i = 0; i < 3; ++i) {
+    drive();
+    EXPECT_EQ(board.role(), BoardRole::control);
+    EXPECT_EQ(board.state().osmc[0].pwm, 358);
+    ASSERT_TRUE(hears_more_states());
+    EXPECT_EQ(release(), Outcome::confirmed);
+    EXPECT_TRUE(is_safe());
+    EXPECT_EQ(board.role(), BoardRole::watch);
+    EXPECT_EQ(board.disarmed_by(), DisarmCause::not_yet);
+    ASSERT_TRUE(hears_more_states());
+    EXPECT_EQ(board.link().reason, SafeReason::link);
+    EXPECT_EQ(problem_of([&] { board.post(turn_slowly); }).kind, ErrorKind::usage);
+  }
+  EXPECT_EQ(release(), Outcome::confirmed) << "it watches already";
+}
+
+TEST_P(BoardRoles, KeepRecordingsStatisticsAndWhoItIs) {
+  const std::string path = testing::TempDir() + "board_roles.r4log";
+  Recording recording(path);
+  board.record(recording);
+  board.open();
+  ASSERT_TRUE(hears_more_states());
+  drive();
+  ASSERT_TRUE(run_until([&] { return !board.identity().board_id.empty(); }));
+  const std::uint64_t before = board.statistics().states;
+  const std::uint64_t carried = board.carrier_counters().rx_datagrams;
+  const std::uint64_t recorded = recording.records();
+  EXPECT_EQ(release(), Outcome::confirmed);
+  ASSERT_TRUE(hears_more_states());
+  EXPECT_GT(board.statistics().states, before);
+  EXPECT_GT(board.carrier_counters().rx_datagrams, carried);
+  EXPECT_GT(recording.records(), recorded);
+  EXPECT_EQ(board.identity().board_id, "test-board");
+  EXPECT_EQ(board.statistics().packets.restarts, 0U);
+  recording.close();
+  std::filesystem::remove(path);
+}
+
+TEST_P(BoardRoles, TakeNothingWhileControlIsBeingReleased) {
+  board.open();
+  drive();
+  std::optional<CommandResult> released;
+  board.async_release_control(2s, [&](const CommandResult& result) { released = result; });
+  EXPECT_EQ(board.post(Command::relay(2, true)), PostResult::no_link);
+  EXPECT_EQ(problem_of([&] { board.take_control(); }).kind, ErrorKind::usage);
+  EXPECT_EQ(problem_of([&] { board.async_release_control(1s, [](const auto&) {}); }).kind,
+            ErrorKind::usage);
+  EXPECT_EQ(end_of([&](auto end) { board.async_send(Command::fields("ENC1"), 3s, end); }),
+            Outcome::cancelled);
+  ASSERT_TRUE(run_until([&] { return released.has_value(); }));
+  EXPECT_EQ(released->outcome, Outcome::confirmed);
+  const std::vector<std::string> executed = simulated.executed();
+  EXPECT_EQ(std::count(executed.begin(), executed.end(), "R:2,On"), 0);
+}
+
+TEST_P(BoardRoles, MayChangeInACallback) {
+  board.open();
+  ASSERT_TRUE(hears_more_states());
+  std::optional<CommandResult> released;
+  const ScopedSubscription takes = board.on_state([&](const auto&, const auto&) {
+    if (board.role() == BoardRole::watch) board.take_control();
+  });
+  ASSERT_TRUE(run_until([&] { return board.in_control(); }));
+  const ScopedSubscription releases = board.on_board_heartbeat([&](const Datagram&) {
+    if (released || board.role() == BoardRole::watch) return;
+    released.emplace();
+    board.async_release_control(2s, [&](const CommandResult& result) { released = result; });
+  });
+  ASSERT_TRUE(run_until([&] { return released && released->outcome == Outcome::confirmed; }));
+  ASSERT_TRUE(run_until([&] { return board.in_control(); })) << "it takes control at each state";
+}
+
+TEST_P(BoardRoles, OfABoardThatIsSilentEndAtTheTimeout) {
+  board.open();
+  drive();
+  simulated.switch_off();
+  EXPECT_NE(end_of([&](auto end) { board.async_release_control(60ms, end); }), Outcome::confirmed);
+  EXPECT_EQ(board.role(), BoardRole::watch);
+}
+
+TEST_P(BoardRoles, EndWithTheBoard) {
+  board.open();
+  drive();
+  std::optional<CommandResult> released, closed;
+  board.async_release_control(2s, [&](const CommandResult& result) { released = result; });
+  board.async_close(2s, [&](const CommandResult& result) { closed = result; });
+  ASSERT_TRUE(run_until([&] { return released && closed; }));
+  EXPECT_EQ(released->outcome, Outcome::closed);
+  EXPECT_TRUE(closed->outcome == Outcome::confirmed || closed->outcome == Outcome::refused)
+      << "the first farewell may have been obeyed already";
+  EXPECT_TRUE(is_safe());
+  EXPECT_EQ(problem_of([&] { board.take_control(); }).kind, ErrorKind::usage);
+}
+
+// A path that another program may control.
+class Contested final : public Carrier {
+ public:
+  explicit Contested(bool taken) : taken_(taken) {}
+  void open(Handler&) override { up_ = true; }
+  void close() noexcept override { up_ = false; }
+  SendResult send(std::string_view, Priority, Peer) override { return SendResult::sent; }
+  void change_role(BoardRole role) override {
+    if (taken_) throw Error(ErrorKind::refused, name_, "taken");
+    roles.push_back(role);
+  }
+  bool up() const override { return up_; }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override { return counters_; }
+
+  std::vector<BoardRole> roles;
+
+ private:
+  bool taken_;
+  bool up_ = false;
+  const std::string name_ = "contested:";
+  CarrierCounters counters_;
+};
+
+TEST(BoardRole, IsRefusedAsAWholeWhereOneOfThePathsIsTaken) {
+  asio::io_context io;
+  std::vector<std::unique_ptr<Carrier>> paths;
+  auto free = std::make_unique<Contested>(false);
+  const Contested& first = *free;
+  paths.push_back(std::move(free));
+  paths.push_back(std::make_unique<Contested>(true));
+  AsyncBoard board(io, std::move(paths), watching());
+  EXPECT_EQ(problem_of([&] { board.take_control(); }).kind, ErrorKind::usage) << "not open yet";
+  board.open();
+  EXPECT_EQ(problem_of([&] { board.take_control(); }).reason, "taken");
+  EXPECT_EQ(first.roles, (std::vector<BoardRole>{BoardRole::control, BoardRole::watch}));
+  EXPECT_EQ(board.role(), BoardRole::watch);
+}
+
+TEST(BoardRole, IsRefusedByNameWhereAnotherProgramControlsAndTheBoardIsWatchedOn) {
+  BoardInAThread simulated("pty");
+  Board watcher(simulated.url(), watching());
+  watcher.wait_active();
+  EXPECT_EQ(watcher.role(), BoardRole::watch);
+  {
+    Board driver(simulated.url());
+    driver.wait_active();
+    try {
+      watcher.take_control();
+      FAIL() << "two programs control the board";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::refused);
+      ASSERT_TRUE(error.holder());
+      EXPECT_EQ(error.holder()->pid, ::getpid());
+    }
+    EXPECT_EQ(watcher.role(), BoardRole::watch);
+    EXPECT_GT(watcher.next_state().t_ms, 0U);
+    driver.release_control();
+    EXPECT_EQ(driver.role(), BoardRole::watch);
+    watcher.take_control();
+    watcher.wait_active();
+    EXPECT_GT(driver.next_state().t_ms, 0U) << "beside the program that controls now";
+  }
+  watcher.arm();
+  watcher.osmc(1).set(358, Direction::forward);
+  watcher.release_control();
+  EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link));
+  EXPECT_EQ(problem_of([&] { watcher.arm(); }).kind, ErrorKind::usage);
+  EXPECT_EQ(problem_of([&] { watcher.post(turn_slowly); }).kind, ErrorKind::usage);
+  watcher.close();
+  EXPECT_EQ(problem_of([&] { watcher.take_control(); }).outcome, Outcome::closed);
+  EXPECT_EQ(problem_of([&] { watcher.release_control(); }).outcome, Outcome::closed);
+}
+
+// However they meet, none of it drives and none ends the program.
+TEST(BoardRole, MayBeChangedWhileOtherThreadsCommand) {
+  BoardInAThread simulated("udp");
+  BoardOptions options = watching();
+  options.session.arming = Arming::off;
+  Board board(simulated.url(), options);
+  board.wait_active();
+  std::atomic<bool> done = false;
+  const auto commands = std::async(std::launch::async, [&] {
+    while (!done) {
+      try {
+        board.post(turn_slowly);
+        board.send(turn_slowly, 100ms);
+      } catch (const Error&) {
+      }
+    }
+  });
+  for (int i = 0; i < 10; ++i) {
+    board.take_control();
+    board.wait_active();
+    board.release_control();
+    EXPECT_EQ(board.role(), BoardRole::watch);
+  }
+  done = true;
+  commands.wait();
+  bool at_rest = false;
+  simulated.run(
+      [&](sim::SimulatedBoard& each) { at_rest = each.application().outputs().osmc[0].pwm == 0; });
+  EXPECT_TRUE(at_rest);
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A session that takes control, and releases it.
+#include <gtest/gtest.h>
+
+#include "host/session/session.hpp"
+#include "scripted_link.hpp"
+#include "tests/support/problems.hpp"
+
+namespace r4::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct SessionRole : testing::Test {
+  static SessionOptions must_arm() {
+    SessionOptions options = ScriptedLink::without_questions();
+    options.arming = Arming::required;
+    return options;
+  }
+  void change(BoardRole role) {
+    link.session.change_role(role, link.now);
+    link.session.on_transport(0, true, link.now);
+    link.pass(1ms);
+  }
+  // A host that is in control.
+  void take() {
+    change(BoardRole::control);
+    link.connect();
+  }
+  Outcome outcome(Ticket ticket) {
+    const auto found = link.results.find(ticket);
+    return found == link.results.end() ? Outcome::none : found->second.outcome;
+  }
+
+  ScriptedLink link{must_arm(), BoardRole::watch};
+};
+
+TEST_F(SessionRole, TakingControlBeginsAsAHostThatOpensTheBoard) {
+  link.state("AIN24:24.28;SAFE:1;");
+  link.heartbeat(SafeReason::link);
+  link.sent.clear();
+  change(BoardRole::control);
+  ASSERT_EQ(link.count('H'), 1U) << "at once";
+  EXPECT_EQ(link.last('H').t, 0U) << "the board has sent this session nothing that it could echo";
+  EXPECT_NE(link.host_session, no_session);
+  EXPECT_FALSE(link.session.in_control(link.now));
+  link.connect();
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::not_yet);
+  EXPECT_EQ(link.session.post(turn_motor, link.now), PostResult::not_armed);
+  link.pass(2s);
+  EXPECT_EQ(link.count('W'), 0U);
+  EXPECT_EQ(link.session.state().analog_cv[0], 2428) << "what is known stays";
+  EXPECT_EQ(link.restarts, 0);
+}
+
+TEST_F(SessionRole, ReleasingControlSaysFarewellUntilTheBoardAnswersAndThenWatches) {
+  take();
+  const Ticket ticket = link.session.release_control(100ms, link.now);
+  EXPECT_TRUE(link.session.leaving());
+  EXPECT_EQ(link.last('E').command, "E:LEAVE");
+  link.pass(50ms);
+  EXPECT_GT(link.count('E'), 1U);
+  EXPECT_EQ(link.count('H'), 0U);
+  link.heartbeat(SafeReason::link);
+  EXPECT_EQ(outcome(ticket), Outcome::confirmed);
+  link.sent.clear();
+  change(BoardRole::watch);
+  EXPECT_EQ(link.count('W'), 1U) << "at once";
+  EXPECT_EQ(link.host_session, no_session);
+  link.state("AIN24:24.28;SAFE:1;");
+  link.pass(2s);
+  EXPECT_EQ(link.count('H') + link.count('E') + link.count('F'), 0U);
+  EXPECT_EQ(problem_of([&] { link.session.send(turn_motor, 1s, link.now); }).kind,
+            ErrorKind::usage);
+}
+
+TEST_F(SessionRole, ArmingEndsAsSoonAsControlIsReleased) {
+  take();
+  const Ticket armed = link.session.arm(1s, link.now);
+  link.pass(1ms);
+  link.state("SAFE:0;RELAYS:1;CMD:" + std::to_string(link.last('R').pnum) + ";");
+  ASSERT_EQ(outcome(armed), Outcome::confirmed);
+  link.session.release_control(100ms, link.now);
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::not_yet);
+  EXPECT_EQ(link.arming, (std::vector<DisarmCause>{DisarmCause::none, DisarmCause::not_yet}));
+  link.heartbeat(SafeReason::link);
+  change(BoardRole::watch);
+  link.pass(200ms);  // the fields are asked for no more often
+  link.sent.clear();
+  take();
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::not_yet) << "relay 1 is closed, it says";
+  EXPECT_EQ(link.session.post(turn_motor, link.now), PostResult::not_armed);
+}
+
+// The motor must not run for a command that nobody waits for any more.
+TEST_F(SessionRole, NothingThatWasAskedForBeforeIsSentAfterAChange) {
+  change(BoardRole::control);
+  const Ticket early = link.session.send(Command::fields("ENC1"), 60s, link.now);
+  const Ticket arms = link.session.arm(60s, link.now);
+  const Ticket behind = link.session.send(turn_motor, 60s, link.now);
+  EXPECT_EQ(link.session.release_control(100ms, link.now), 0U) << "there is no link yet";
+  for (const Ticket each : {early, arms, behind}) EXPECT_EQ(outcome(each), Outcome::cancelled);
+  const Ticket late = link.session.send(Command::fields("ENC1"), 60s, link.now);
+  change(BoardRole::watch);
+  EXPECT_EQ(outcome(late), Outcome::cancelled) << "asked for while control was being released";
+  const SessionId earlier = link.host_session;
+  link.sent.clear();
+  take();
+  EXPECT_NE(link.host_session, earlier);
+  link.pass(1s);
+  EXPECT_EQ(link.count('O') + link.count('F') + link.count('R'), 0U);
+}
+
+TEST_F(SessionRole, EachControlIsASessionOfItsOwn) {
+  take();
+  const SessionId first = link.host_session;
+  const std::uint32_t of_first =
+      link.session.send(Command::fields("ENC1"), 1s, link.now) != 0 ? link.last('F').pnum : 0;
+  link.session.release_control(100ms, link.now);
+  link.heartbeat(SafeReason::link);
+  change(BoardRole::watch);
+  change(BoardRole::control);
+  EXPECT_NE(link.host_session, first);
+  link.heartbeat();
+  link.pass(10ms);
+  link.executed(of_first);
+  EXPECT_FALSE(link.session.in_control(link.now)) << "that number is of the session before";
+}
+
+TEST_F(SessionRole, AStopGoesOnOverEveryChange) {
+  link.state("SAFE:0;");
+  const Ticket ticket = link.session.stop(10s, link.now);
+  const std::uint32_t pnum = link.last('E').pnum;
+  for (const BoardRole role : {BoardRole::control, BoardRole::watch}) {
+    change(role);
+    link.sent.clear();
+    link.pass(100ms);
+    EXPECT_GE(link.count('E'), 4U);
+    EXPECT_EQ(link.last('E').pnum, pnum);
+    EXPECT_EQ(link.last('E').priority, Priority::stop);
+  }
+  link.stopped(pnum);
+  EXPECT_EQ(outcome(ticket), Outcome::confirmed);
+}
+
+TEST_F(SessionRole, HeartbeatsThatAreHeldStayHeld) {
+  link.session.hold(true, link.now);
+  change(BoardRole::control);
+  link.pass(500ms);
+  EXPECT_EQ(link.count('H'), 0U);
+  EXPECT_EQ(link.session.link().gate, Gate::callback);
+  link.session.hold(false, link.now);
+  link.pass(1ms);
+  EXPECT_EQ(link.count('H'), 1U);
+}
+
+TEST_F(SessionRole, AnExpiredWatchdogHoldsTheHeartbeatsUntilItIsFed) {
+  link.session.watchdog(50ms, link.now);
+  link.pass(200ms);
+  EXPECT_EQ(link.session.link().gate, Gate::open) << "it sends none anyway";
+  change(BoardRole::control);
+  link.pass(200ms);
+  EXPECT_EQ(link.count('H'), 0U);
+  link.session.feed(link.now);
+  link.pass(1ms);
+  EXPECT_EQ(link.count('H'), 1U);
+}
+
+}  // namespace
+}  // namespace r4::test
