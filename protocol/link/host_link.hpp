@@ -74,6 +74,7 @@ class HostLink {
   }
   // Stops the heartbeats for another reason, until it is called with false.
   void hold(bool held) { held_ = held; }
+  bool held() const { return held_; }
   bool gated(std::uint32_t now_ms) const { return held_ || watchdog_expired(now_ms); }
 
   // The number for the next datagram that the host sends.
