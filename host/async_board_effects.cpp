@@ -99,7 +99,8 @@ void AsyncBoard::Impl::tell_paths(const LinkStatus& status) {
     if (((before_that.carrying ^ status.carrying) & path_bit(i)) == 0) continue;
     if (is_open()) call(path_callbacks, report(i));
   }
-  if (status.two_boards && !before_that.two_boards && is_open()) {
+  constexpr LinkCauses elsewhere{LinkCause::two_boards, LinkCause::other_board};
+  if (status.causes.has_any(elsewhere) && !before_that.causes.has_any(elsewhere) && is_open()) {
     std::vector<PathStatus> reports;
     for (std::size_t i = 0; i < paths.size(); ++i) reports.push_back(report(i));
     call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, explain(reports)});

@@ -68,7 +68,7 @@ void Board::wait_active(Duration timeout) {
   const auto impl = impl_;
   // Its paths lead to two boards, and it never began.
   const auto refused = [](const LinkStatus& link) {
-    return link.two_boards && link.state == HostLinkState::connecting;
+    return link.causes.has(LinkCause::two_boards) && link.state == HostLinkState::connecting;
   };
   const bool active = impl->wait_for_news(timeout, [&] {
     const LinkStatus& link = impl->link;

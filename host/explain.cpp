@@ -50,32 +50,68 @@ Words safe_words(const LinkStatus& link) {
   return {"the board is safe", "E:CLEAR clears a stop, a fault and a watchdog"};
 }
 
-Words key_words(KeyTrouble trouble) {
-  switch (trouble) {
-    case KeyTrouble::board_has_none:
-      return {"the board has no key, so it obeys anyone: refused",
-              "give it ours over USB (r4 key give FILE URL), or open it without a key"};
-    case KeyTrouble::needed:
-      return {"the board obeys only who has its key",
-              "open it with the key: --key FILE or R4_KEY of r4, SessionOptions::key in a program"};
-    case KeyTrouble::not_taken:
-      return {
-          "the board takes nothing that is signed with our key, or does not hear it",
-          "see that both have the same key (r4 key give FILE URL, over USB); where a round trip "
-          "takes more than 250 ms, signatures come too late"};
-    case KeyTrouble::none:
-      break;
-  }
-  return {};
-}
+struct CauseWords {
+  const char* name;
+  const char* reason;
+  const char* fix;
+};
 
-Words lease_words(LeaseTrouble trouble) {
-  if (trouble == LeaseTrouble::full) {
-    return {"as many programs watch the board as it serves",
-            "end one of them; its place is free two seconds later"};
+CauseWords words_of(LinkCause cause) {
+  switch (cause) {
+    case LinkCause::transport_down:
+      return {"transport down",
+              "the transport is down: unplugged, or its interface is switched off",
+              "plug it in or switch it on; it is opened again by itself"};
+    case LinkCause::two_boards:
+      return {"two boards", "its paths lead to two boards", "give the URLs of one board"};
+    case LinkCause::watchdog:
+      return {"watchdog", "the application watchdog has stopped our heartbeats and commands",
+              "call feed() at least once in the watchdog's period; a call that waits does not "
+              "feed: give it a timeout below that period"};
+    case LinkCause::callback:
+      return {"callback", "a callback does not return, so our heartbeats and commands have stopped",
+              "do its work in another thread; BoardOptions::callback_limit is the time that it "
+              "has"};
+    case LinkCause::foreign_frames:
+      return {"foreign frames",
+              "frames that make no R4 datagram come on the board's command id (0x180 + node): "
+              "another protocol, such as CANopen, uses it",
+              "r4 bus can://INTERFACE names the ids that are in use; give the board a node of "
+              "which no id is in use, or the other device another id"};
+    case LinkCause::busy:
+      return {"busy", "another host controls the board",
+              "stop that host; control is free when its heartbeats have stayed away for the "
+              "board's timeout (1 s)"};
+    case LinkCause::board_has_no_key:
+      return {"board has no key", "the board has no key, so it obeys anyone: refused",
+              "give it ours over USB (r4 key give FILE URL), or open it without a key"};
+    case LinkCause::key_needed:
+      return {"key needed", "the board obeys only who has its key",
+              "open it with the key: --key FILE or R4_KEY of r4, SessionOptions::key in a "
+              "program"};
+    case LinkCause::key_not_taken:
+      return {"key not taken",
+              "the board takes nothing that is signed with our key, or does not hear it",
+              "see that both have the same key (r4 key give FILE URL, over USB); where a round "
+              "trip takes more than 250 ms, signatures come too late"};
+    case LinkCause::watchers_full:
+      return {"watchers full", "as many programs watch the board as it serves",
+              "end one of them; its place is free two seconds later"};
+    case LinkCause::not_watchable:
+      return {"not watchable",
+              "the board's firmware streams to the host that controls it, and to nobody else",
+              "bring it up to date, or take control: r4 monitor --control, BoardRole::control"};
+    case LinkCause::late_frames:
+      return {"late frames",
+              "flow control of the board does not come within 20 ms: the bus, or a tunnel or "
+              "adapter on it, holds frames back or loses them",
+              "ISO-TP needs each frame within 10 ms: use the bus without what is slow; "
+              "`r4 bench` measures the round trip"};
+    case LinkCause::other_board:
+      return {"other board", "a path leads to another board and is not used",
+              "give the URLs of one board"};
   }
-  return {"the board's firmware streams to the host that controls it, and to nobody else",
-          "bring it up to date, or take control: r4 monitor --control, BoardRole::control"};
+  return {"", "", ""};
 }
 
 constexpr const char* clear_on_purpose =
@@ -117,48 +153,15 @@ Words disarm_words(DisarmCause cause) {
   return {};
 }
 
+// A path that is not used disturbs no other path, so it is named only where all else is well.
+constexpr LinkCauses harmless{LinkCause::other_board};
+
 Words link_words(const LinkStatus& link) {
-  if (link.transport_down) {
-    return {"the transport is down: unplugged, or its interface is switched off",
-            "plug it in or switch it on; it is opened again by itself"};
-  }
-  if (link.two_boards && !is_heard(link.state)) {
-    return {"its paths lead to two boards", "give the URLs of one board"};
-  }
-  if (link.gate == Gate::watchdog) {
-    return {
-        "the application watchdog has stopped our heartbeats and commands",
-        "call feed() at least once in the watchdog's period; a call that waits does not feed: give "
-        "it a timeout below that period"};
-  }
-  if (link.gate == Gate::callback) {
-    return {"a callback does not return, so our heartbeats and commands have stopped",
-            "do its work in another thread; BoardOptions::callback_limit is the time that it has"};
-  }
-  if (link.trouble == TransportTrouble::foreign_frames) {
-    return {
-        "frames that make no R4 datagram come on the board's command id (0x180 + node): another "
-        "protocol, such as CANopen, uses it",
-        "r4 bus can://INTERFACE names the ids that are in use; give the board a node of which no "
-        "id is in use, or the other device another id"};
-  }
-  if (link.busy) {
-    return {"another host controls the board",
-            "stop that host; control is free when its heartbeats have stayed away for the board's "
-            "timeout (1 s)"};
-  }
-  if (link.key != KeyTrouble::none && link.state != HostLinkState::lost) {
-    return key_words(link.key);
-  }
-  if (link.lease != LeaseTrouble::none) return lease_words(link.lease);
-  const bool hears_us = link.state == HostLinkState::active ||
-                        (link.state == HostLinkState::safe && link.reason != SafeReason::link);
-  if (link.trouble == TransportTrouble::late_frames && is_heard(link.state)) {
-    return {fmt::format("{}flow control of the board does not come within 20 ms: the bus, or a "
-                        "tunnel or adapter on it, holds frames back or loses them",
-                        hears_us ? "" : "the board does not hear our heartbeats: "),
-            "ISO-TP needs each frame within 10 ms: use the bus without what is slow; `r4 bench` "
-            "measures the round trip"};
+  if (const auto cause = link.causes.without(harmless).first()) {
+    const CauseWords words = words_of(*cause);
+    const bool unheard = cause == LinkCause::late_frames && link.reason == SafeReason::link;
+    return {(unheard ? "the board does not hear our heartbeats: " : "") + std::string(words.reason),
+            words.fix};
   }
   switch (link.state) {
     case HostLinkState::connecting:
@@ -172,14 +175,16 @@ Words link_words(const LinkStatus& link) {
     case HostLinkState::active:
       break;
   }
-  if (link.in_control) return {"the board is active and takes our commands", ""};
-  return {"the board streams its state, but has confirmed no command of ours yet",
-          "allow more time; `r4 bench` shows how many datagrams are lost"};
+  if (!link.in_control) {
+    return {"the board streams its state, but has confirmed no command of ours yet",
+            "allow more time; `r4 bench` shows how many datagrams are lost"};
+  }
+  if (const auto cause = link.cause()) return {words_of(*cause).reason, words_of(*cause).fix};
+  return {"the board is active and takes our commands", ""};
 }
 
 bool link_is_well(const LinkStatus& link) {
-  return link.state == HostLinkState::active && !link.busy && !link.gated() &&
-         link.key == KeyTrouble::none && link.trouble == TransportTrouble::none;
+  return link.state == HostLinkState::active && link.causes.without(harmless).empty();
 }
 
 // Is it a setting that a board takes over its own cable only?
@@ -222,7 +227,7 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
       }
       break;
     case Refusal::busy:
-      words.fix = link_words(LinkStatus{.busy = true}).fix;
+      words.fix = words_of(LinkCause::busy).fix;
       break;
     case Refusal::stale:
       words.fix = command.substr(0, 7) == "E:CLEAR"
@@ -231,7 +236,7 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
       break;
     case Refusal::auth:
       words.fix = sets_the_site(command) ? "send it over USB: serial:auto"
-                                         : key_words(KeyTrouble::needed).fix;
+                                         : words_of(LinkCause::key_needed).fix;
       break;
     case Refusal::full:
       words.fix = "send it again when the transfer that is under way has ended";
@@ -243,14 +248,16 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
   return words;
 }
 
-// What keeps heartbeats and commands back (the watchdog, another host, a key) does not keep a stop.
+// These hold back heartbeats and commands, but not a stop.
+constexpr LinkCauses passed_by_a_stop{LinkCause::watchdog,         LinkCause::callback,
+                                      LinkCause::foreign_frames,   LinkCause::busy,
+                                      LinkCause::board_has_no_key, LinkCause::key_needed,
+                                      LinkCause::key_not_taken,    LinkCause::late_frames};
+
 Words unconfirmed_stop_words(const CommandResult& result, LinkStatus link) {
-  link.gate = Gate::open;
-  link.busy = false;
-  link.trouble = TransportTrouble::none;
-  link.key = KeyTrouble::none;
+  link.causes = link.causes.without(passed_by_a_stop);
   Words why = link_words(link);
-  if (link.state == HostLinkState::active && !link.transport_down) {
+  if (link.state == HostLinkState::active && !link.causes.has(LinkCause::transport_down)) {
     why = {"the board streams its state, and reports no stop", ""};
   }
   const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(result.elapsed).count();
@@ -335,10 +342,7 @@ std::string group_words(std::string_view group, const CommandResult& result) {
 
 }  // namespace
 
-Problem explain(KeyTrouble trouble) {
-  Words words = key_words(trouble);
-  return {ErrorKind::refused, "key", std::move(words.reason), std::move(words.fix)};
-}
+const char* to_text(LinkCause cause) { return words_of(cause).name; }
 
 const char* to_text(TransportTrouble trouble) {
   switch (trouble) {
@@ -352,21 +356,9 @@ const char* to_text(TransportTrouble trouble) {
   return "none";
 }
 
-const char* to_text(LeaseTrouble trouble) {
-  switch (trouble) {
-    case LeaseTrouble::none:
-      break;
-    case LeaseTrouble::full:
-      return "full";
-    case LeaseTrouble::unknown:
-      return "unknown";
-  }
-  return "none";
-}
-
-Problem explain(LeaseTrouble trouble) {
-  Words words = lease_words(trouble);
-  return {ErrorKind::refused, "watching", std::move(words.reason), std::move(words.fix)};
+Problem explain(LinkCause cause) {
+  const CauseWords words = words_of(cause);
+  return {ErrorKind::refused, words.name, words.reason, words.fix};
 }
 
 Problem explain(std::string_view command, DisarmCause cause) {

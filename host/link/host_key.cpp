@@ -5,20 +5,6 @@
 
 namespace r4 {
 
-const char* to_text(KeyTrouble trouble) {
-  switch (trouble) {
-    case KeyTrouble::none:
-      break;
-    case KeyTrouble::board_has_none:
-      return "board has none";
-    case KeyTrouble::needed:
-      return "needed";
-    case KeyTrouble::not_taken:
-      return "not taken";
-  }
-  return "none";
-}
-
 bool HostKey::on_heartbeat(const Datagram& heartbeat) {
   const Text nonce = heartbeat_nonce(heartbeat);
   heard_ = true;
@@ -36,10 +22,10 @@ void HostKey::sign(DatagramWriter& writer, Time now) {
   signer_->sign(writer, static_cast<std::uint64_t>((clock_start_ + now).count()), to_ms(now));
 }
 
-KeyTrouble HostKey::trouble(Time now) const {
-  if (refuses_board()) return KeyTrouble::board_has_none;
-  if (!asked_for_ || (in_vain_ < many && refused_until_ <= now)) return KeyTrouble::none;
-  return has_key() ? KeyTrouble::not_taken : KeyTrouble::needed;
+std::optional<LinkCause> HostKey::cause(Time now) const {
+  if (refuses_board()) return LinkCause::board_has_no_key;
+  if (!asked_for_ || (in_vain_ < many && refused_until_ <= now)) return std::nullopt;
+  return has_key() ? LinkCause::key_not_taken : LinkCause::key_needed;
 }
 
 }  // namespace r4

@@ -53,7 +53,8 @@ class HostKey {
   // Signs what is written, if there is a key and a nonce; finish() is to follow.
   void sign(DatagramWriter& writer, Time now);
 
-  KeyTrouble trouble(Time now) const;
+  // What is wrong with keys.
+  std::optional<LinkCause> cause(Time now) const;
 
  private:
   static constexpr int many = 10;  // heartbeats: a second of them

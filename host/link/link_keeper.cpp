@@ -157,21 +157,26 @@ bool LinkKeeper::in_control(Time now) const {
 }
 
 LinkStatus LinkKeeper::status(ChipFault fault, Time now) const {
+  const bool heard = is_heard(link_.state());
+  LinkCauses causes = watches() ? paths_.leases().causes(now) : LinkCauses();
+  causes.set(LinkCause::transport_down, transport_down_);
+  causes.set(heard ? LinkCause::other_board : LinkCause::two_boards, paths_.two_boards());
+  causes.set(LinkCause::foreign_frames, trouble_ == TransportTrouble::foreign_frames);
+  causes.set(LinkCause::late_frames, heard && trouble_ == TransportTrouble::late_frames);
+  causes.set(LinkCause::busy, role_.refused(now));
+  if (!watches()) {
+    causes.set(LinkCause::watchdog, link_.watchdog_expired(to_ms(now)));
+    causes.set(LinkCause::callback, held_);
+    // The silence of a board that is lost says nothing of keys.
+    const std::optional<LinkCause> key = key_.cause(now);
+    if (key && link_.state() != HostLinkState::lost) causes.set(*key);
+  }
   return {
       .state = link_.state(),
       .reason = link_.reason(),
-      .busy = role_.refused(now),
-      .trouble = trouble_,
-      .gate = watches()                            ? Gate::open
-              : link_.watchdog_expired(to_ms(now)) ? Gate::watchdog
-              : link_.gated(to_ms(now))            ? Gate::callback
-                                                   : Gate::open,
-      .key = watches() ? KeyTrouble::none : key_.trouble(now),
-      .lease = paths_.leases().trouble(now),
+      .causes = causes,
       .in_control = in_control(now),
-      .transport_down = transport_down_,
       .carrying = paths_.carrying(now),
-      .two_boards = paths_.two_boards(),
       .chip = link_.reason() == SafeReason::fault ? fault : ChipFault(),
   };
 }

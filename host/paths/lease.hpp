@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "../measurement/time.hpp"
@@ -46,7 +47,8 @@ class Lease {
   void on_refusal(const Nack& nack, Time now);
   // Do states come?
   bool streaming(Time now) const { return state_ == State::watching && now - heard_ < silence; }
-  LeaseTrouble trouble(Time now) const;
+  // Why the board does not stream to this watcher.
+  std::optional<LinkCause> cause(Time now) const;
 
  private:
   enum class State : std::uint8_t { asking, watching, full, unknown };
@@ -69,10 +71,10 @@ inline void Lease::on_refusal(const Nack& nack, Time now) {
   }
 }
 
-inline LeaseTrouble Lease::trouble(Time now) const {
-  if (streaming(now)) return LeaseTrouble::none;
-  if (state_ == State::full) return LeaseTrouble::full;
-  return state_ == State::unknown ? LeaseTrouble::unknown : LeaseTrouble::none;
+inline std::optional<LinkCause> Lease::cause(Time now) const {
+  if (streaming(now)) return std::nullopt;
+  if (state_ == State::full) return LinkCause::watchers_full;
+  return state_ == State::unknown ? std::optional(LinkCause::not_watchable) : std::nullopt;
 }
 
 // The leases of a session, one for each path.
@@ -87,12 +89,14 @@ class Leases {
     return std::any_of(leases_.begin(), leases_.end(),
                        [now](const Lease& lease) { return lease.streaming(now); });
   }
-  // The worst trouble of all leases; none if one of them brings states.
-  LeaseTrouble trouble(Time now) const {
-    LeaseTrouble worst = LeaseTrouble::none;
-    if (streaming(now)) return worst;
-    for (const Lease& lease : leases_) worst = std::max(worst, lease.trouble(now));
-    return worst;
+  // The causes of all leases; none if states come on any path.
+  LinkCauses causes(Time now) const {
+    LinkCauses all;
+    if (streaming(now)) return all;
+    for (const Lease& lease : leases_) {
+      if (const auto cause = lease.cause(now)) all.set(*cause);
+    }
+    return all;
   }
   // When the first lease of `paths` (bit i: path i) is due.
   Time next(std::uint8_t paths) const {

@@ -3,8 +3,11 @@
 // newest state.
 #pragma once
 
+#include <bit>
 #include <chrono>
 #include <cstdint>
+#include <initializer_list>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,31 +26,69 @@ using Time = std::chrono::microseconds;
 
 // --- how the link is
 
-// Do our heartbeats and commands go out?
-enum class Gate : std::uint8_t {
-  open,
-  watchdog,  // no: the application watchdog was not fed
-  callback,  // no: a callback of the program does not return
+// What is wrong with a link, in order of gravity: the first one that holds is the gravest.
+enum class LinkCause : std::uint8_t {
+  transport_down,    // its transport is down (of several: all are): unplugged, or switched off
+  two_boards,        // its paths lead to two boards, and no state is heard
+  watchdog,          // the application watchdog was not fed: no heartbeat or command is sent
+  callback,          // a callback of the program does not return: no heartbeat or command is sent
+  foreign_frames,    // another protocol uses the board's command id (CAN)
+  busy,              // another host controls the board
+  board_has_no_key,  // this program has a key, and the board asks for no signature
+  key_needed,        // the board asks for a signature, and this program has no key
+  key_not_taken,     // the board does not accept this program's signature, or does not hear it
+  watchers_full,     // the board already streams to as many watchers as it can
+  not_watchable,     // the board's firmware streams only to the controlling host
+  late_frames,       // the board's flow control comes too late (CAN)
+  other_board,       // a path leads to another board and is not used, but the link is up
 };
+// "transport down", "two boards", "watchdog", "callback", "foreign frames", "busy",
+// "board has no key", "key needed", "key not taken", "watchers full", "not watchable",
+// "late frames", "other board".
+R4LINK_API const char* to_text(LinkCause cause);
 
-// What is wrong with keys.
-enum class KeyTrouble : std::uint8_t {
-  none,
-  board_has_none,  // we have a key, and the board asks for no signature
-  needed,          // the board asks for a signature, and we have no key
-  not_taken,       // the board takes nothing that we sign, or does not hear it
-};
-// "none", "board has none", "needed", "not taken".
-R4LINK_API const char* to_text(KeyTrouble trouble);
+// A set of causes. A loop over it begins with the gravest.
+class LinkCauses {
+ public:
+  struct Iterator {
+    std::uint32_t left;
+    constexpr LinkCause operator*() const { return static_cast<LinkCause>(std::countr_zero(left)); }
+    constexpr Iterator& operator++() {
+      left &= left - 1;
+      return *this;
+    }
+    friend constexpr bool operator==(const Iterator&, const Iterator&) = default;
+  };
 
-// Why the board does not stream to a program that only watches.
-enum class LeaseTrouble : std::uint8_t {
-  none,
-  full,     // as many watch it already as it serves
-  unknown,  // its firmware serves nobody who does not control it
+  constexpr LinkCauses() = default;
+  constexpr LinkCauses(std::initializer_list<LinkCause> causes) {
+    for (const LinkCause cause : causes) set(cause);
+  }
+
+  constexpr void set(LinkCause cause, bool holds = true) {
+    bits_ = holds ? bits_ | bit(cause) : bits_ & ~bit(cause);
+  }
+  constexpr bool empty() const { return bits_ == 0; }
+  constexpr bool has(LinkCause cause) const { return (bits_ & bit(cause)) != 0; }
+  constexpr bool has_any(LinkCauses of) const { return (bits_ & of.bits_) != 0; }
+  constexpr LinkCauses without(LinkCauses others) const {
+    LinkCauses rest;
+    rest.bits_ = bits_ & ~others.bits_;
+    return rest;
+  }
+  // The gravest.
+  constexpr std::optional<LinkCause> first() const {
+    return empty() ? std::nullopt : std::optional(*begin());
+  }
+  constexpr Iterator begin() const { return {bits_}; }
+  constexpr Iterator end() const { return {0}; }
+  friend constexpr bool operator==(const LinkCauses&, const LinkCauses&) = default;
+
+ private:
+  static constexpr std::uint32_t bit(LinkCause cause) { return 1U << static_cast<unsigned>(cause); }
+
+  std::uint32_t bits_ = 0;
 };
-// "none", "full", "unknown".
-R4LINK_API const char* to_text(LeaseTrouble trouble);
 
 // How one of the paths to a board is (docs/redundancy.md). The only path of a board is never asking or other_board.
 enum class PathState : std::uint8_t {
@@ -63,19 +104,15 @@ R4LINK_API const char* to_text(PathState state);
 struct LinkStatus {
   HostLinkState state = HostLinkState::connecting;
   SafeReason reason = SafeReason::none;  // why the board is safe
-  bool busy = false;                     // another host controls the board
-  TransportTrouble trouble =
-      TransportTrouble::none;  // foreign_frames: what keeps us busy is no R4 host
-  Gate gate = Gate::open;
-  KeyTrouble key = KeyTrouble::none;
-  LeaseTrouble lease = LeaseTrouble::none;
-  bool in_control = false;  // the board takes our commands: they go out at once
-  bool transport_down =
-      false;  // it is gone: unplugged, its interface switched off. Of several: all are
-  std::uint8_t carrying = 0;  // the paths that carry: bit 0 is the first
-  bool two_boards = false;    // a path leads to another board than the rest
-  ChipFault chip{};           // of a fault: the chip that is the cause, if it is one
-  bool gated() const { return gate != Gate::open; }
+  LinkCauses causes{};                   // what is wrong with the link
+  bool in_control = false;               // the board takes our commands: they go out at once
+  std::uint8_t carrying = 0;             // the paths that carry: bit 0 is the first
+  ChipFault chip{};                      // of a fault: the chip that is the cause, if it is one
+
+  // The gravest.
+  std::optional<LinkCause> cause() const { return causes.first(); }
+  // True if heartbeats and commands are held back because the program seems to hang.
+  bool gated() const { return causes.has_any({LinkCause::watchdog, LinkCause::callback}); }
   friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
 };
 
@@ -273,12 +310,8 @@ R4LINK_API Problem explain(std::string_view name, const LinkStatus& link);
 // Which of the paths leads to another board, and what to do; of kind refused.
 R4LINK_API Problem explain(const std::vector<PathStatus>& paths);
 
-// What is wrong with keys, and what to do; of kind refused. Not for KeyTrouble::none.
-R4LINK_API Problem explain(KeyTrouble trouble);
-
-// Why the board does not stream to a program that only watches, and what to do; of kind refused. Not for
-// LeaseTrouble::none.
-R4LINK_API Problem explain(LeaseTrouble trouble);
+// What is wrong with a link, and what to do; of kind refused.
+R4LINK_API Problem explain(LinkCause cause);
 
 // Why the session is not armed, and what to do; of kind refused. Not for DisarmCause::none.
 R4LINK_API Problem explain(std::string_view command, DisarmCause cause);

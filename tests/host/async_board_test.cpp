@@ -154,7 +154,7 @@ TEST_F(AsyncBoardTest, WhoOnlyWatchesSendsNothingButLeasesAndStopsWhereAllHostsH
   watching.async_identify(600ms, [&](const CommandResult&) { asked = true; });
   ASSERT_TRUE(run_until(io, [&] { return asked; }));
   for (const std::string& each : sent) EXPECT_EQ(each.substr(0, 2), "W:") << each;
-  EXPECT_FALSE(watching.link().busy) << "nobody controls it";
+  EXPECT_FALSE(watching.link().causes.has(LinkCause::busy)) << "nobody controls it";
   sent.clear();
   watching.async_stop(50ms, [](const CommandResult&) {});
   ASSERT_TRUE(run_until(io, [&] { return !sent.empty(); }));

@@ -192,7 +192,7 @@ TEST(Board, SaysThatAnotherHostControlsTheBoard) {
   const Problem problem = problem_of([&] { other.osmc(1).set(1, Direction::forward, 300ms); });
   EXPECT_EQ(problem.kind, ErrorKind::refused);
   EXPECT_TRUE(contains(problem.reason, "another host controls the board"));
-  EXPECT_TRUE(other.link().busy);
+  EXPECT_TRUE(other.link().causes.has(LinkCause::busy));
 
   other.stop();  // which anyone may
   EXPECT_TRUE(hears_of(owner, SafeReason::stop));

@@ -355,7 +355,7 @@ TEST(BoardCallbacks, ThatDoNotReturnEndTheHeartbeatsUntilTheyDo) {
   });
   board.on_state([release = released.get_future().share()](const State&) { release.wait(); });
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link));
-  EXPECT_EQ(board.link().gate, Gate::callback);
+  EXPECT_EQ(board.link().cause(), LinkCause::callback);
   EXPECT_TRUE(contains(problem_of([&] { board.wait_active(1ms); }).reason, "a callback"));
   released.set_value();
   auto future = told.get_future();

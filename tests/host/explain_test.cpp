@@ -1,13 +1,28 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is said of a link on which datagrams do not pass.
+// The causes of a link's status: their set, their order, and their words.
 #include <gtest/gtest.h>
 
+#include <set>
 #include <string>
+#include <vector>
 
 #include "r4link/link.hpp"
 
 namespace r4 {
 namespace {
+
+// In the order of the enumeration. Beyond the last one to_text() has no text.
+std::vector<LinkCause> all_causes() {
+  std::vector<LinkCause> all;
+  for (unsigned i = 0; *to_text(static_cast<LinkCause>(i)) != '\0'; ++i) {
+    all.push_back(static_cast<LinkCause>(i));
+  }
+  return all;
+}
+
+LinkStatus well_but_for(LinkCauses causes) {
+  return {.state = HostLinkState::active, .causes = causes, .in_control = true};
+}
 
 std::string reason_of_link(const LinkStatus& link) { return explain("can://can0", link).reason; }
 
@@ -18,30 +33,94 @@ CommandResult timed_out_command() {
   return result;
 }
 
+TEST(LinkCauses, EndWithAPathToAnotherBoard) {
+  EXPECT_EQ(all_causes().size(), 13U);
+  EXPECT_EQ(all_causes().back(), LinkCause::other_board);
+}
+
+TEST(LinkCauses, AreASetThatIsReadFromTheGravestOn) {
+  constexpr LinkCauses some{LinkCause::busy, LinkCause::transport_down, LinkCause::other_board};
+  static_assert(some.first() == LinkCause::transport_down);
+  static_assert(some.has(LinkCause::busy) && !some.has(LinkCause::watchdog));
+  static_assert(some.without({LinkCause::busy, LinkCause::transport_down}).first() ==
+                LinkCause::other_board);
+  static_assert(some.without(some) == LinkCauses() && LinkCauses().empty());
+  static_assert(!LinkCauses().first() && !some.has_any({}));
+  std::vector<LinkCause> read;
+  for (const LinkCause cause : some) read.push_back(cause);
+  EXPECT_EQ(read, (std::vector<LinkCause>{LinkCause::transport_down, LinkCause::busy,
+                                          LinkCause::other_board}));
+}
+
+TEST(LinkCauses, ThatAreSetAndClearedAgainAreGone) {
+  LinkCauses causes;
+  for (const LinkCause cause : all_causes()) {
+    causes.set(cause);
+    EXPECT_TRUE(causes.has(cause)) << to_text(cause);
+    causes.set(cause, false);
+    EXPECT_TRUE(causes.empty()) << to_text(cause);
+  }
+}
+
+TEST(Explain, HasATextAndWordsForEachCauseThatNoOtherCauseHas) {
+  std::set<std::string> texts, reasons;
+  for (const LinkCause cause : all_causes()) {
+    const Problem problem = explain(cause);
+    EXPECT_EQ(problem.thing, to_text(cause));
+    EXPECT_FALSE(problem.fix.empty()) << problem.thing;
+    EXPECT_EQ(reason_of_link(well_but_for({cause})), problem.reason);
+    EXPECT_EQ(explain("board", well_but_for({cause})).fix, problem.fix);
+    texts.insert(problem.thing);
+    reasons.insert(problem.reason);
+  }
+  EXPECT_EQ(texts.size(), all_causes().size());
+  EXPECT_EQ(reasons.size(), all_causes().size());
+  EXPECT_EQ(reasons.count(reason_of_link(well_but_for({}))), 0U);
+}
+
+TEST(Explain, NamesTheGraverOneOfEachPairOfCauses) {
+  const std::vector<LinkCause> all = all_causes();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    for (std::size_t j = i + 1; j < all.size(); ++j) {
+      EXPECT_EQ(reason_of_link(well_but_for({all[j], all[i]})), explain(all[i]).reason)
+          << to_text(all[i]) << ", " << to_text(all[j]);
+    }
+  }
+}
+
+TEST(Explain, NamesAPathToAnotherBoardOnlyWhereAllElseIsWell) {
+  LinkStatus link{.state = HostLinkState::safe,
+                  .reason = SafeReason::stop,
+                  .causes = {LinkCause::other_board},
+                  .in_control = true};
+  EXPECT_EQ(reason_of_link(link), "the board is safe: an emergency stop is latched");
+  link = well_but_for({LinkCause::other_board});
+  link.in_control = false;
+  EXPECT_NE(reason_of_link(link).find("has confirmed no command"), std::string::npos);
+}
+
 TEST(Explain, NamesAnotherProtocolInsteadOfAnotherHost) {
-  const LinkStatus link{.busy = true, .trouble = TransportTrouble::foreign_frames};
+  const LinkStatus link{.causes = {LinkCause::busy, LinkCause::foreign_frames}};
   EXPECT_EQ(reason_of_link(link).substr(0, 36), "frames that make no R4 datagram come");
   const Problem problem = explain("R:1,On", timed_out_command(), link);
   EXPECT_NE(problem.reason.find("another protocol, such as CANopen"), std::string::npos);
   EXPECT_NE(problem.fix.find("r4 bus"), std::string::npos);
 }
 
-TEST(Explain, SaysThatFlowControlIsLateWhileTheBoardIsHeard) {
+TEST(Explain, SaysThatFlowControlIsLate) {
   for (const HostLinkState state : {HostLinkState::active, HostLinkState::safe}) {
     const LinkStatus link{
-        .state = state, .reason = SafeReason::link, .trouble = TransportTrouble::late_frames};
+        .state = state, .reason = SafeReason::link, .causes = {LinkCause::late_frames}};
     EXPECT_NE(reason_of_link(link).find("does not come within 20 ms"), std::string::npos);
     const Problem problem = explain("R:1,On", timed_out_command(), link);
     EXPECT_NE(problem.reason.find("does not come within 20 ms"), std::string::npos);
   }
-  const LinkStatus lost{.state = HostLinkState::lost, .trouble = TransportTrouble::late_frames};
-  EXPECT_EQ(reason_of_link(lost), "the board has fallen silent");
 }
 
 TEST(Explain, BlamesNoFramesForAStopWhichIsAFrameOfItsOwn) {
   const LinkStatus link{.state = HostLinkState::safe,
                         .reason = SafeReason::handle,
-                        .trouble = TransportTrouble::late_frames};
+                        .causes = {LinkCause::late_frames}};
   const Problem problem = explain("E:STOP", timed_out_command(), link);
   EXPECT_EQ(problem.reason.find("20 ms"), std::string::npos) << problem.reason;
 }

@@ -270,6 +270,6 @@ def is_state(each):
     return each['type'] == 'state'
 
 
-def is_link(state, reason='none', busy=False):
+def is_link(state, reason='none'):
     return lambda each: (each['type'] == 'link' and each['fields']['state'] == state and
-                         each['fields']['reason'] == reason and each['fields']['busy'] == busy)
+                         each['fields']['reason'] == reason and 'busy' not in each['fields']['causes'])

@@ -66,7 +66,7 @@ def stays_with_its_host_in(board, flooded):
             while host.next(is_state)['came'] < begun + 1.5:
                 pass
             during = host.log[before:]
-            assert all((each['fields']['state'], each['fields']['busy']) == ('active', False)
+            assert all((each['fields']['state'], each['fields']['causes']) == ('active', [])
                        for each in during if each['type'] == 'link')
             assert not any(each['fields'].get('SAFE') for each in during if is_state(each))
             assert not any(each['type'] == 'path' for each in host.log), 'the link reports as much of the only path'
@@ -192,7 +192,7 @@ def test_a_second_host_is_told_that_the_board_is_busy_and_may_still_stop_it(boar
         assert refused.returncode == 3 and 'another host controls the board' in refused.stderr
         with monitor(board.host_url) as second:
             second.next(lambda each: each['type'] == 'nack' and each['fields']['N'][1] == 'BUSY')
-            second.next(lambda each: each['type'] == 'link' and each['fields']['busy'])
+            second.next(lambda each: each['type'] == 'link' and each['fields']['causes'] == ['busy'])
         assert run('stop', board.host_url).returncode == 0
         first.next(is_link('safe', 'stop'))
     assert not any('executed' in each and each['executed']['command'].startswith('O:')

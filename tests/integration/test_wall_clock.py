@@ -35,7 +35,7 @@ def test_a_step_of_the_wall_clock_disturbs_nothing(tmp_path):
         after = [host.next(is_state) for _ in range(150)]
         assert host.end() == 0
         since = host.log[host.log.index(before):]
-    assert all(each['fields']['up'] and each['fields']['state'] == 'active' and not each['fields']['gated']
+    assert all(each['fields']['up'] and each['fields']['state'] == 'active' and not each['fields']['causes']
                for each in since if each['type'] == 'link'), 'the link is as it was'
     steps = [later['t'] - earlier['t'] for earlier, later in zip(after, after[1:])]
     assert max(steps) < within_ms(500), 'states go on'

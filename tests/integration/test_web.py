@@ -209,6 +209,7 @@ def test_a_program_that_drives_keeps_its_board():
             assert page.states(20)[-1]['RELAYS'] == 1
             page.control()
             status = page.next('board', lambda each: 'another host' in each['why'])
+            assert status['causes'] == ['busy']
             assert not status['controlled']
             assert not page.ask(type='command', board=0, command='O:358,1,1')['ok']
             assert host.process.poll() is None

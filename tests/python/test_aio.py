@@ -164,10 +164,10 @@ def test_with_a_key_it_drives_a_board_that_has_it_and_no_other(tmp_path):
 
     async def main():
         with r4link.SimBoard('udp://127.0.0.1:0', settings={'key': '1:' + '5a' * 32}) as sim:
-            for key, told in (None, 'needed'), (wrong, 'not taken'):
+            for key, told in (None, 'key needed'), (wrong, 'key not taken'):
                 async with aio.Board(sim.url, key=key) as stranger:
                     deadline = time.monotonic() + 10
-                    while stranger.link.key != told:
+                    while stranger.link.cause != told:
                         assert time.monotonic() < deadline, stranger.link
                         await asyncio.sleep(0.005)
                     with pytest.raises(r4link.RefusedError, match='key'):

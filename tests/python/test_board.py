@@ -326,18 +326,18 @@ def test_a_board_with_a_key_obeys_who_has_it(tmp_path, wait):
     path.chmod(0o600)
     with r4link.SimBoard('udp://127.0.0.1:0', settings={'key': KEY}) as sim:
         with r4link.Board(sim.url) as stranger:
-            wait(lambda: stranger.link.key == 'needed')
+            wait(lambda: stranger.link.cause == 'key needed')
             with pytest.raises(r4link.RefusedError, match='key'):
                 stranger.wait_active(0.01)
         with r4link.Board(sim.url, key=path) as board:
             board.wait_active()
             board.arm()
             board.osmc(1).set(358)
-            assert board.link.key == 'none'
+            assert board.link.causes == () and board.link.cause is None
             wait(lambda: sim.look().osmc[0].pwm == 358)
         path.write_text(KEY.replace('5a', '5b') + '\n')
         with r4link.Board(sim.url, key=path) as wrong:
-            wait(lambda: wrong.link.key == 'not taken')
+            wait(lambda: wrong.link.causes == ('key not taken',))
         assert sim.look().is_safe
 
 

@@ -97,7 +97,7 @@ struct World::Host final : test::DrivenSession::Handler {
   void on_bad_datagram(const ReadResult&, std::string_view) override {}
   void on_link(const LinkStatus& status) override {
     world.note(fmt::format("host {} link {} safe {} busy {}", index, r4::to_text(status.state),
-                           r4::to_text(status.reason), status.busy));
+                           r4::to_text(status.reason), status.causes.has(LinkCause::busy)));
   }
   void on_result(Ticket ticket, const CommandResult& result) override;
 

@@ -222,7 +222,8 @@ void World::check_paths() {
     if (settled && serves) check_age(w);
     const std::uint64_t quiet_since_us = std::max(path.serves_since_us, path.told_busy_us);
     const bool known = path.serves && now_us_ - quiet_since_us > busy_memory_us + most_delay_us;
-    if (known && host.session->link().busy) violate("paths: BUSY is told beside a good path");
+    if (known && host.session->link().causes.has(LinkCause::busy))
+      violate("paths: BUSY is told beside a good path");
     if (!serves && !alone && !crowded && now_us_ - path.fine_since_us >= used_again_us) {
       violate(fmt::format("paths: path {} is good and not used", w));
     }

@@ -126,13 +126,20 @@ void bind_values(py::module_& module) {
   Record<LinkStatus>(module, "LinkStatus")
       .has("state", [](const LinkStatus& link) { return to_text(link.state); })
       .has("reason", [](const LinkStatus& link) { return to_text(link.reason); })
-      .has("busy", &LinkStatus::busy)
-      .has("trouble", [](const LinkStatus& link) { return to_text(link.trouble); })
+      .has("causes",
+           [](const LinkStatus& link) {
+             py::list causes;
+             for (const LinkCause cause : link.causes) causes.append(to_text(cause));
+             return py::tuple(causes);
+           })
+      .has("cause",
+           [](const LinkStatus& link) {
+             const std::optional<LinkCause> cause = link.cause();
+             return cause ? py::object(py::str(to_text(*cause))) : py::none();
+           })
+      .has("busy", [](const LinkStatus& link) { return link.causes.has(LinkCause::busy); })
       .has("gated", [](const LinkStatus& link) { return link.gated(); })
-      .has("key", [](const LinkStatus& link) { return to_text(link.key); })
-      .has("lease", [](const LinkStatus& link) { return to_text(link.lease); })
       .has("in_control", &LinkStatus::in_control)
-      .has("transport_down", &LinkStatus::transport_down)
       .has("carrying",
            [](const LinkStatus& link) {
              py::list paths;
@@ -141,7 +148,6 @@ void bind_values(py::module_& module) {
              }
              return py::tuple(paths);
            })
-      .has("two_boards", &LinkStatus::two_boards)
       .has("chip", [](const LinkStatus& link) -> py::object {
         if (!link.chip.any()) return py::none();
         return py::str("{}: {}").format(chip_name(link.chip.address), to_text(link.chip.trouble));

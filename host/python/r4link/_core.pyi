@@ -23,32 +23,27 @@ class LinkStatus(_Record):
     def reason(self) -> str:
         """Why the board is safe: 'none', 'link', 'stop', 'handle', 'proximity', 'watchdog', 'fault'."""
     @property
+    def causes(self) -> tuple[str, ...]:
+        """What is wrong with the link, the gravest first. In order of gravity: 'transport down' (of several paths: all
+        are), 'two boards' (the paths lead to two, and no state is heard), 'watchdog' (it was not fed), 'callback' (one does
+        not return), 'foreign frames' (another protocol uses the board's command id), 'busy' (another host controls the
+        board), 'board has no key', 'key needed', 'key not taken', 'watchers full', 'not watchable' (the firmware streams
+        only to the controlling host), 'late frames' (flow control does not come in time), 'other board' (a path leads to
+        another one and is not used, but the link is up)."""
+    @property
+    def cause(self) -> str | None:
+        """The gravest."""
+    @property
     def busy(self) -> bool:
         """Another host controls the board."""
-    @property
-    def trouble(self) -> str:
-        """Of a CAN bus: 'none', 'foreign frames' (another protocol uses the board's command id, busy or not), 'late frames'
-        (flow control does not come in time)."""
     @property
     def gated(self) -> bool:
         """Our heartbeats and commands do not go out: the watchdog was not fed, or a callback does not return."""
     @property
-    def key(self) -> str:
-        """'none', 'board has none', 'needed', 'not taken'."""
-    @property
-    def lease(self) -> str:
-        """Why the board does not stream to who watches: 'none', 'full', 'unknown'."""
-    @property
     def in_control(self) -> bool: ...
-    @property
-    def transport_down(self) -> bool:
-        """Of several paths: all are."""
     @property
     def carrying(self) -> tuple[int, ...]:
         """The paths that carry, from 0."""
-    @property
-    def two_boards(self) -> bool:
-        """A path leads to another board than the rest."""
     @property
     def chip(self) -> str | None:
         """Of a fault: the chip and its trouble."""

@@ -185,7 +185,7 @@ TEST(Fleet, ItsWatchdogMakesAllBoardsSafe) {
   fleet.watchdog(50ms);
   EXPECT_TRUE(comes([&] {
     const std::vector<BoardHealth> all = fleet.health();
-    return all[0].link.gate == Gate::watchdog && all[1].link.gate == Gate::watchdog;
+    return all[0].link.cause() == LinkCause::watchdog && all[1].link.cause() == LinkCause::watchdog;
   }));
   fleet.watchdog(0ms);
   fleet.feed();

@@ -50,6 +50,7 @@ class ScriptedLink final : private DrivenSession::Handler {
 
   // Does another host send from our place, so that the carrier takes nothing but stops?
   bool place_taken = false;
+  TransportTrouble frames = TransportTrouble::none;  // what is wrong with those on the bus
 
   // Time passes; poll() is called exactly when the session asked for it.
   void pass(Time duration);
@@ -88,6 +89,7 @@ class ScriptedLink final : private DrivenSession::Handler {
   void finish(std::string_view fields);
 
   SendResult transmit(std::size_t, std::string_view datagram, Priority priority) override;
+  TransportTrouble trouble() const override { return frames; }
   void on_state(const ReceivedState& state, const Datagram&) override { states.push_back(state); }
   void on_restart() override { ++restarts; }
   void on_arming(DisarmCause cause) override { arming.push_back(cause); }

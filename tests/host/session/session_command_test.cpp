@@ -495,7 +495,7 @@ TEST(SessionBusy, AHostWhosePlaceOnTheBusIsTakenMayOnlyStopTheBoard) {
     link.pass(100ms);
     link.heartbeat();
     link.executed(0);
-    EXPECT_TRUE(link.session.link().busy);
+    EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
   }
   EXPECT_EQ(link.sent.size(), 0U);
   EXPECT_FALSE(link.session.in_control(link.now));
@@ -507,7 +507,7 @@ TEST(SessionBusy, AHostWhosePlaceOnTheBusIsTakenMayOnlyStopTheBoard) {
 
   link.place_taken = false;
   link.pass(400ms);
-  EXPECT_FALSE(link.session.link().busy);
+  EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy));
 }
 
 TEST(SessionBusy, CommandsWaitUntilTheOtherHostHasGone) {

@@ -15,6 +15,8 @@ using namespace std::chrono_literals;
 
 const Key key = key_of(2);
 constexpr const char* nonce = "0123456789abcdef";
+constexpr LinkCauses of_keys{LinkCause::board_has_no_key, LinkCause::key_needed,
+                             LinkCause::key_not_taken};
 
 SessionOptions keyed() {
   SessionOptions options = ScriptedLink::without_questions();
@@ -144,7 +146,7 @@ TEST(SessionKey, RefusesABoardThatHasNone) {
     link.heartbeat();
   }
   EXPECT_TRUE(link.sent.empty()) << link.sent.front().bytes;
-  EXPECT_EQ(link.session.link().key, KeyTrouble::board_has_none);
+  EXPECT_EQ(link.session.link().cause(), LinkCause::board_has_no_key);
   EXPECT_FALSE(link.session.in_control(link.now));
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::timed_out);
   EXPECT_NE(explain("board", link.session.link()).text().find("has no key"), std::string::npos);
@@ -164,10 +166,10 @@ TEST(SessionKey, SendsABoardThatHasNoneAStopAllTheSame) {
 TEST(SessionKey, TakesTheBoardAsSoonAsItHasAKey) {
   ScriptedLink link(keyed());
   link.heartbeat();
-  EXPECT_EQ(link.session.link().key, KeyTrouble::board_has_none);
+  EXPECT_EQ(link.session.link().cause(), LinkCause::board_has_no_key);
   link.pass(300ms);
   keyed_heartbeat(link);
-  EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+  EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
   EXPECT_EQ(verdict(link, link.last('H')), Verdict::authentic);
 }
 
@@ -186,7 +188,7 @@ TEST(SessionKey, AnAuthDoesNotProveThatTheCommandWasNotExecuted) {
   const std::uint32_t pnum = link.last('O').pnum;
   link.nack(pnum, "AUTH");
   EXPECT_TRUE(link.results.empty());
-  EXPECT_EQ(link.session.link().key, KeyTrouble::not_taken);
+  EXPECT_EQ(link.session.link().cause(), LinkCause::key_not_taken);
   link.executed(pnum);
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
 }
@@ -197,7 +199,7 @@ TEST(SessionKey, AnAuthForACablesSettingIsFinalAndSaysNothingOfKeys) {
   const Ticket ticket = link.session.send(Command::setting("node", "3"), 500ms, link.now);
   link.nack(link.last('C').pnum, "AUTH");
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::refused);
-  EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+  EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
 }
 
 TEST(SessionKey, FindsOutThatTheBoardTakesNoneOfItsHeartbeats) {
@@ -207,10 +209,22 @@ TEST(SessionKey, FindsOutThatTheBoardTakesNoneOfItsHeartbeats) {
         with_crc("H:R4-ROS2;PNum:0;T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
     link.pass(500ms);
   }
-  EXPECT_EQ(link.session.link().key, KeyTrouble::not_taken);
+  EXPECT_EQ(link.session.link().cause(), LinkCause::key_not_taken);
   keyed_heartbeat(link);
   link.pass(0ms);
-  EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+  EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
+}
+
+TEST(SessionKey, SaysNothingOfKeysWhenTheBoardIsLost) {
+  ScriptedLink link(keyed());
+  for (int i = 0; i < 12; ++i) {
+    keyed_heartbeat(link, nonce, ";SAFE:2");
+    link.pass(100ms);
+  }
+  ASSERT_EQ(link.session.link().cause(), LinkCause::key_not_taken);
+  link.pass(1100ms);
+  EXPECT_EQ(link.session.link().state, HostLinkState::lost);
+  EXPECT_TRUE(link.session.link().causes.empty());
 }
 
 // The host before ended with a stop: the board's reason hides whether it has a host.
@@ -220,7 +234,7 @@ TEST(SessionKey, FindsOutThatAStoppedBoardTakesNoneOfItsHeartbeats) {
     keyed_heartbeat(link, nonce, ";SAFE:2");
     link.pass(100ms);
   }
-  EXPECT_EQ(link.session.link().key, KeyTrouble::not_taken);
+  EXPECT_EQ(link.session.link().cause(), LinkCause::key_not_taken);
   EXPECT_NE(explain("board", link.session.link()).text().find("signed with our key"),
             std::string::npos);
   EXPECT_FALSE(link.session.in_control(link.now));
@@ -232,9 +246,9 @@ TEST(SessionKey, TakesAStoppedBoardThatAnswersBusyForOneWithAnotherHost) {
     keyed_heartbeat(link, nonce, ";SAFE:2");
     link.nack(link.last('H').pnum, "BUSY");
     link.pass(100ms);
-    EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+    EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
   }
-  EXPECT_TRUE(link.session.link().busy);
+  EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
 }
 
 // The lowest rate: heartbeats are sent in between, and none of them is in vain.
@@ -246,14 +260,14 @@ TEST(SessionKey, IsTakenByAStoppedBoardThatSendsAStateASecond) {
     for (int j = 0; j < 10; ++j) {
       keyed_heartbeat(link, nonce, ";SAFE:2");
       link.pass(100ms);
-      EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+      EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
     }
   }
   for (int j = 0; j < 20; ++j) {  // and then it sends none any more
     keyed_heartbeat(link, nonce, ";SAFE:2");
     link.pass(100ms);
   }
-  EXPECT_EQ(link.session.link().key, KeyTrouble::not_taken);
+  EXPECT_EQ(link.session.link().cause(), LinkCause::key_not_taken);
 }
 
 // The paper's release answers nothing, and is commanded all the same. It has no keys.
@@ -276,7 +290,7 @@ TEST(SessionWithoutKey, FindsOutThatOneIsNeeded) {
         with_crc("H:R4-ROS2;PNum:0;T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
     link.pass(500ms);
   }
-  EXPECT_EQ(link.session.link().key, KeyTrouble::needed);
+  EXPECT_EQ(link.session.link().cause(), LinkCause::key_needed);
   EXPECT_NE(explain("board", link.session.link()).text().find("--key"), std::string::npos);
   EXPECT_EQ(signature_of(link.last('H')), "");
 }
@@ -288,7 +302,7 @@ TEST(SessionWithoutKey, IsTakenOverACableOfTheBoardAllTheSame) {
     link.pass(100ms);
     keyed_heartbeat(link);
   }
-  EXPECT_EQ(link.session.link().key, KeyTrouble::none);
+  EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
 }
 
 TEST(Explain, TellsThatABoardHasAllTheKeysItCanHold) {

@@ -126,7 +126,7 @@ TEST(SessionPaths, TellAtOnceWhatTheTransportTells) {
   robot.plug(0, false);
   EXPECT_EQ(robot.links.back().carrying, 2);
   EXPECT_EQ(robot.session->path(0, robot.now()).state, PathState::down);
-  EXPECT_FALSE(robot.links.back().transport_down);
+  EXPECT_FALSE(robot.links.back().causes.has(LinkCause::transport_down));
   EXPECT_EQ(robot.links.back().state, HostLinkState::active);
   robot.plug(0, true);
   robot.run(200);
@@ -158,12 +158,12 @@ TEST(SessionPaths, AreLostTogetherAndComeBackOneByOne) {
   EXPECT_EQ(robot.session->link().carrying, 4);
   EXPECT_EQ(robot.drive(5).outcome, Outcome::confirmed);
   for (std::size_t path = 0; path < 3; ++path) robot.plug(path, false);
-  EXPECT_TRUE(robot.session->link().transport_down);
+  EXPECT_TRUE(robot.session->link().causes.has(LinkCause::transport_down));
   EXPECT_EQ(robot.session->link().state, HostLinkState::lost);
   robot.cut(0, false);
   robot.plug(0, true);
   robot.run(1000);
-  EXPECT_FALSE(robot.session->link().transport_down);
+  EXPECT_FALSE(robot.session->link().causes.has(LinkCause::transport_down));
   EXPECT_EQ(robot.drive(6).outcome, Outcome::confirmed);
   EXPECT_TRUE(executed_once(robot));
 }
@@ -219,10 +219,10 @@ TEST(SessionPaths, AreRefusedWhenAllOfThemAre) {
   RobotOnPaths robot(Cables{{1}, {1}});
   robot.connect();
   robot.bring(1, busy_for(robot));
-  EXPECT_FALSE(robot.session->link().busy);
+  EXPECT_FALSE(robot.session->link().causes.has(LinkCause::busy));
   EXPECT_TRUE(robot.session->path(1, robot.now()).busy);
   robot.bring(0, busy_for(robot));
-  EXPECT_TRUE(robot.session->link().busy);
+  EXPECT_TRUE(robot.session->link().causes.has(LinkCause::busy));
 }
 
 TEST(SessionPaths, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) {
@@ -232,7 +232,7 @@ TEST(SessionPaths, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) 
   robot.run(50);  // states with CMD
   robot.bring(0, busy);
   robot.bring(1, busy);
-  EXPECT_FALSE(robot.session->link().busy);
+  EXPECT_FALSE(robot.session->link().causes.has(LinkCause::busy));
   EXPECT_EQ(robot.drive(5).outcome, Outcome::confirmed);
 }
 
@@ -242,16 +242,16 @@ TEST(SessionPaths, AreBackInControlAsSoonAsAStateShowsIt) {
   const std::string busy = busy_for(robot);
   robot.bring(0, busy);
   robot.bring(1, busy);
-  EXPECT_TRUE(robot.session->link().busy);
+  EXPECT_TRUE(robot.session->link().causes.has(LinkCause::busy));
   robot.run(30);
-  EXPECT_FALSE(robot.session->link().busy);
+  EXPECT_FALSE(robot.session->link().causes.has(LinkCause::busy));
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
 TEST(SessionPaths, ToTwoBoardsAreRefused) {
   RobotOnPaths robot(Cables{{1}, {1, 1}});
   robot.connect();
-  EXPECT_TRUE(robot.session->link().two_boards);
+  EXPECT_EQ(robot.session->link().cause(), LinkCause::two_boards);
   EXPECT_EQ(robot.session->path(1, robot.now()).state, PathState::other_board);
   EXPECT_EQ(robot.session->path(0, robot.now()).board_id, "board-0");
   EXPECT_EQ(robot.session->path(1, robot.now()).board_id, "board-1");
@@ -263,7 +263,7 @@ TEST(SessionPaths, ToTwoBoardsAreRefused) {
   robot.plug(1, false);
   robot.cables[1].board = 0;  // the right one after all
   robot.run(500);
-  EXPECT_FALSE(robot.session->link().two_boards);
+  EXPECT_TRUE(robot.session->link().causes.empty());
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
@@ -275,7 +275,7 @@ TEST(SessionPaths, TakeTheBoardToWhichAllOfThemLeadWhicheverAnsweredFirst) {
   robot.cables[0].board = 1;  // that was the wrong one
   robot.plug(0, true);
   robot.run(1000);
-  EXPECT_FALSE(robot.session->link().two_boards);
+  EXPECT_TRUE(robot.session->link().causes.empty());
   EXPECT_TRUE(robot.session->in_control(robot.now()));
   EXPECT_EQ(robot.session->path(0, robot.now()).board_id, "board-1");
 }
@@ -288,7 +288,7 @@ TEST(SessionPaths, GoOnWhenOneIsPluggedIntoAnotherBoard) {
   ASSERT_TRUE(robot.session->in_control(robot.now()));
   robot.plug(2, true);
   robot.run(500);
-  EXPECT_TRUE(robot.session->link().two_boards);
+  EXPECT_EQ(robot.session->link().cause(), LinkCause::other_board);
   EXPECT_EQ(robot.drive(3).outcome, Outcome::confirmed);
   EXPECT_TRUE(robot.executed(1).empty());
   EXPECT_EQ(robot.cables[2].all('Q').size(), robot.cables[2].sent.size());

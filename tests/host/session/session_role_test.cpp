@@ -148,7 +148,7 @@ TEST_F(SessionRole, HeartbeatsThatAreHeldStayHeld) {
   change(BoardRole::control);
   link.pass(500ms);
   EXPECT_EQ(link.count('H'), 0U);
-  EXPECT_EQ(link.session.link().gate, Gate::callback);
+  EXPECT_TRUE(link.session.link().causes.has(LinkCause::callback));
   link.session.hold(false, link.now);
   link.pass(1ms);
   EXPECT_EQ(link.count('H'), 1U);
@@ -157,7 +157,7 @@ TEST_F(SessionRole, HeartbeatsThatAreHeldStayHeld) {
 TEST_F(SessionRole, AnExpiredWatchdogHoldsTheHeartbeatsUntilItIsFed) {
   link.session.watchdog(50ms, link.now);
   link.pass(200ms);
-  EXPECT_EQ(link.session.link().gate, Gate::open) << "it sends none anyway";
+  EXPECT_FALSE(link.session.link().gated()) << "it sends none anyway";
   change(BoardRole::control);
   link.pass(200ms);
   EXPECT_EQ(link.count('H'), 0U);

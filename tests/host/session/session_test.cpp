@@ -377,14 +377,14 @@ TEST(Session, IsBusyWhileTheBoardSaysThatAnotherHostControlsIt) {
   ScriptedLink link;
   const std::uint32_t ours = link.last('H').pnum;
   link.nack(ours, "BUSY");
-  EXPECT_TRUE(link.session.link().busy);
+  EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
   for (int i = 0; i < 10; ++i) {
     link.pass(100ms);
     link.nack(link.last('H').pnum, "BUSY");
   }
-  EXPECT_TRUE(link.session.link().busy);
+  EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
   link.pass(301ms);
-  EXPECT_FALSE(link.session.link().busy) << "the board refuses no more";
+  EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy)) << "the board refuses no more";
   link.connect();
 }
 
@@ -396,11 +396,11 @@ TEST(Session, AnswersToAnotherHostChangeNothing) {
   for (const std::uint32_t others : {ours + 1000, ours - 1000000, std::uint32_t{7}}) {
     link.nack(others, "BUSY");
   }
-  EXPECT_FALSE(link.session.link().busy);
+  EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy));
   EXPECT_TRUE(link.nacks.empty());
   EXPECT_TRUE(link.session.in_control(link.now));
   link.nack(ours, "BUSY");
-  EXPECT_TRUE(link.session.link().busy);
+  EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
 }
 
 // It answers each question after `delay`. How often it was asked in the last five seconds of twenty.

@@ -72,8 +72,8 @@ TEST_F(SessionWatch, HearsTheBoardAndIsNeverInControl) {
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
   EXPECT_EQ(link.session.state().analog_cv[0], 2428);
   EXPECT_FALSE(link.session.in_control(link.now));
-  EXPECT_FALSE(link.session.link().busy);
-  EXPECT_EQ(link.session.link().gate, Gate::open);
+  EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy));
+  EXPECT_FALSE(link.session.link().gated());
   link.pass(1100ms);
   EXPECT_EQ(link.session.link().state, HostLinkState::lost);
 }
@@ -88,8 +88,8 @@ TEST_F(SessionWatch, AHeartbeatForHostsDoesNotHideTheStates) {
 
 TEST_F(SessionWatch, ABoardWithoutRoomIsAskedLessOften) {
   link.nack(link.last('W').pnum, "BUSY");
-  EXPECT_FALSE(link.session.link().busy) << "nobody said who controls it";
-  EXPECT_EQ(link.session.link().lease, LeaseTrouble::full);
+  EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy)) << "nobody said who controls it";
+  EXPECT_EQ(link.session.link().cause(), LinkCause::watchers_full);
   link.sent.clear();
   link.pass(3050ms);
   EXPECT_LE(link.count('W'), 4U);
@@ -98,12 +98,12 @@ TEST_F(SessionWatch, ABoardWithoutRoomIsAskedLessOften) {
 
 TEST_F(SessionWatch, TellsThatTheFirmwareServesNobody) {
   link.nack(link.last('W').pnum, "UNKNOWN");
-  EXPECT_EQ(link.session.link().lease, LeaseTrouble::unknown);
+  EXPECT_EQ(link.session.link().cause(), LinkCause::not_watchable);
   link.nack(link.last('W').pnum, "STALE;LEASE:9");
   link.pass(1ms);
   EXPECT_EQ(link.last('W').t, 9U) << "another firmware has come";
   link.state("SAFE:1;");
-  EXPECT_EQ(link.session.link().lease, LeaseTrouble::none);
+  EXPECT_TRUE(link.session.link().causes.empty());
 }
 
 TEST_F(SessionWatch, StopsAndAsksWhoItIsAndCommandsNothing) {

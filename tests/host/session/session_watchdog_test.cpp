@@ -52,7 +52,7 @@ TEST(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
   ScriptedLink link;
   link.connect();
   link.session.hold(true, link.now);
-  EXPECT_EQ(link.links.back().gate, Gate::callback) << "on_link tells";
+  EXPECT_EQ(link.links.back().cause(), LinkCause::callback) << "on_link tells";
   EXPECT_FALSE(link.session.in_control(link.now));
   EXPECT_EQ(link.session.post(turn_motor, link.now), PostResult::no_link);
   const Ticket waits = link.session.send(turn_motor, 5s, link.now);
@@ -66,7 +66,7 @@ TEST(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
   EXPECT_EQ(link.results.at(late).outcome, Outcome::timed_out);
 
   link.session.hold(false, link.now);
-  EXPECT_EQ(link.session.link().gate, Gate::open);
+  EXPECT_FALSE(link.session.link().gated());
   link.pass(1ms);
   EXPECT_EQ(link.count('H'), 1U);
   EXPECT_EQ(link.count('O'), 1U) << "whose caller still waits";
@@ -85,12 +85,12 @@ TEST(SessionHold, AndWatchdogBothHaveToBeOver) {
   link.session.watchdog(100ms, link.now);
   link.session.hold(true, link.now);
   link.pass(200ms);
-  EXPECT_EQ(link.session.link().gate, Gate::watchdog);
+  EXPECT_EQ(link.session.link().causes, (LinkCauses{LinkCause::watchdog, LinkCause::callback}));
   link.session.hold(false, link.now);
   EXPECT_TRUE(link.session.link().gated());
   link.session.hold(true, link.now);
   link.session.feed(link.now);
-  EXPECT_EQ(link.session.link().gate, Gate::callback);
+  EXPECT_EQ(link.session.link().cause(), LinkCause::callback);
   link.session.hold(false, link.now);
   EXPECT_FALSE(link.session.link().gated());
 }
@@ -126,12 +126,32 @@ TEST(SessionLink, TellsThatTheTransportIsDown) {
   ScriptedLink link;
   link.connect();
   link.session.on_transport(0, false, link.now);
-  EXPECT_TRUE(link.session.link().transport_down);
+  EXPECT_TRUE(link.session.link().causes.has(LinkCause::transport_down));
   const Problem problem = explain("board", link.session.link());
   EXPECT_TRUE(contains(problem.reason, "transport is down"));
   EXPECT_FALSE(problem.fix.empty());
   link.session.on_transport(0, true, link.now);
-  EXPECT_FALSE(link.session.link().transport_down);
+  EXPECT_FALSE(link.session.link().causes.has(LinkCause::transport_down));
+}
+
+TEST(SessionLink, TellsOfLateFramesOnlyWhileTheBoardIsHeard) {
+  ScriptedLink link;
+  link.connect();
+  link.frames = TransportTrouble::late_frames;
+  link.pass(1ms);
+  EXPECT_EQ(link.session.link().causes, LinkCauses{LinkCause::late_frames});
+  link.pass(1100ms);
+  EXPECT_EQ(link.session.link().state, HostLinkState::lost);
+  EXPECT_TRUE(link.session.link().causes.empty());
+  EXPECT_EQ(explain("board", link.session.link()).reason, "the board has fallen silent");
+}
+
+TEST(SessionLink, TellsOfForeignFramesBeforeTheBoardIsHeard) {
+  ScriptedLink link;
+  link.frames = TransportTrouble::foreign_frames;
+  link.pass(1ms);
+  EXPECT_EQ(link.session.link().state, HostLinkState::connecting);
+  EXPECT_EQ(link.session.link().causes, LinkCauses{LinkCause::foreign_frames});
 }
 
 TEST(SessionLink, TellsWhichChipIsTheFault) {
@@ -148,9 +168,7 @@ TEST(SessionLink, TellsWhichChipIsTheFault) {
 
 TEST(Explain, OfAStopThatIsNotConfirmedSaysToCutThePower) {
   LinkStatus link;
-  link.gate = Gate::watchdog;
-  link.busy = true;
-  link.key = KeyTrouble::needed;
+  link.causes = {LinkCause::watchdog, LinkCause::busy, LinkCause::key_needed};
   const CommandResult unheard{Outcome::timed_out, Refusal::none, 1s};
   const Problem silent = explain("E:STOP", unheard, link);
   EXPECT_TRUE(contains(silent.reason, "not confirmed within 1000 ms: nothing was heard"));

@@ -33,7 +33,7 @@ TEST_F(WatchedBus, CarriesBesideAPathThatWasAsked) {
   robot().connect();
   robot().run(2000);
   EXPECT_EQ(robot().session->link().carrying, 3);
-  EXPECT_FALSE(robot().session->link().two_boards);
+  EXPECT_TRUE(robot().session->link().causes.empty());
   robot().cut(0);
   robot().told_states = 0;
   robot().run(1500);
@@ -53,7 +53,7 @@ TEST_F(WatchedBus, IsBelievedAgainAfterARestartOfTheBoard) {
     robot().run(3000);
     EXPECT_EQ(robot().restarts, restarts + 1);
     EXPECT_EQ(state(1), PathState::carrying) << alone;
-    EXPECT_FALSE(robot().session->link().two_boards);
+    EXPECT_TRUE(robot().session->link().causes.empty());
   }
 }
 
@@ -64,7 +64,7 @@ struct WatchedBusOfAnother : WatchedBus {
 TEST_F(WatchedBusOfAnother, IsNeverUsed) {
   robot().connect();
   robot().run(3000);
-  EXPECT_TRUE(robot().session->link().two_boards);
+  EXPECT_EQ(robot().session->link().cause(), LinkCause::other_board);
   EXPECT_EQ(state(1), PathState::other_board);
   robot().cut(0);
   robot().told_states = 0;
@@ -77,7 +77,7 @@ TEST_F(WatchedBusOfAnother, EndsTheSessionBeforeItBeginsIfItBringsAnythingByThen
   for (const std::size_t path : {0U, 1U}) robot().plug(path, true);
   robot().bring(1, with_crc("AIN24:24;PNum:5;T:" + std::to_string(robot().board_ms(1)) + ";"));
   robot().run(1000);
-  EXPECT_TRUE(robot().session->link().two_boards);
+  EXPECT_EQ(robot().session->link().cause(), LinkCause::two_boards);
   EXPECT_EQ(robot().session->link().state, HostLinkState::connecting);
   EXPECT_EQ(robot().told_states, 0U);
 }
@@ -95,7 +95,7 @@ TEST_F(TwoWatchedBuses, CarryBothAndAreBelievedAfterAPowerCycleOfTheirAdapters) 
   robot().connect();
   robot().run(2000);
   EXPECT_EQ(robot().session->link().carrying, 3);
-  EXPECT_FALSE(robot().session->link().two_boards);
+  EXPECT_TRUE(robot().session->link().causes.empty());
 }
 
 struct TwoWatchedBusesOfTwoBoards : WatchedBus {
@@ -105,7 +105,7 @@ struct TwoWatchedBusesOfTwoBoards : WatchedBus {
 TEST_F(TwoWatchedBusesOfTwoBoards, AreNotBothUsed) {
   robot().connect();
   robot().run(2000);
-  EXPECT_TRUE(robot().session->link().two_boards);
+  EXPECT_EQ(robot().session->link().cause(), LinkCause::other_board);
   EXPECT_NE(state(0) == PathState::other_board, state(1) == PathState::other_board);
 }
 

@@ -76,7 +76,7 @@ class Listening {
                      statistics.jitter_us,
                      answered(statistics, seconds),
                      question_ ? question_->answer_us() : statistics.round_trip_min_us,
-                     question_ ? question_->trouble() : board_->link().trouble,
+                     trouble_on_bus(),
                      explain(board_->name(), link())};
     if (statistics.received == 0 && statistics.damaged == 0) {
       const Problem problem = explain(board_->name(), board_->link());
@@ -102,8 +102,14 @@ class Listening {
   // As the question on the bus sees it, too, where this program only watches.
   LinkStatus link() const {
     LinkStatus link = board_->link();
-    if (question_) link.trouble = question_->trouble();
+    if (!question_) return link;
+    const TransportTrouble trouble = question_->trouble();
+    link.causes.set(LinkCause::foreign_frames, trouble == TransportTrouble::foreign_frames);
+    link.causes.set(LinkCause::late_frames, trouble == TransportTrouble::late_frames);
     return link;
+  }
+  TransportTrouble trouble_on_bus() const {
+    return question_ ? question_->trouble() : TransportTrouble::none;
   }
   Answered answered(const Statistics& statistics, double seconds) const {
     const bool by_anyone =
@@ -111,7 +117,7 @@ class Listening {
     if (statistics.round_trip_us > 0 || by_anyone) return Answered::yes;
     const bool asked = question_ ? question_->asked_since_s() >= asked_for_s
                                  : !is_recording_ && seconds >= asked_for_s;
-    return asked || link().trouble != TransportTrouble::none ? Answered::no : Answered::not_asked;
+    return asked || trouble_on_bus() != TransportTrouble::none ? Answered::no : Answered::not_asked;
   }
   void listen_to_bus(asio::io_context& io, const Url& url) {
     const std::string& name = can_interface_of(url);

@@ -142,7 +142,7 @@ class Sender {
       if (waiting_ && is_answered(*waiting_)) tell(*std::exchange(waiting_, std::nullopt));
     });
     const Subscription refused = board_.on_link([this](const LinkStatus& link) {
-      if (leads_to_two_boards(link)) io_.stop();
+      if (link.causes.has(LinkCause::two_boards)) io_.stop();
     });
     const Subscription events = board_.on_event([this](const CarrierEvent& event) {
       if (event.kind == CarrierEvent::Kind::down) down_ = event.problem;
@@ -232,7 +232,8 @@ class Sender {
       }
       failure_ = problem;
       failure_->thing = fmt::format("{} to {}", problem.thing, board_.name());
-      if (down_ && board_.link().transport_down) failure_->fix = down_->text();
+      if (down_ && board_.link().causes.has(LinkCause::transport_down))
+        failure_->fix = down_->text();
       io_.stop();
       return;
     }

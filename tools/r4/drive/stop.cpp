@@ -89,15 +89,14 @@ int stop(const StopOptions& options) {
   board->close();
   tell_paths_down(paths, options.json);
   if (!result || result->outcome != Outcome::confirmed) {
-    Problem problem = explain(fmt::format("E:STOP to {}", board->name()), link);
-    problem.reason = fmt::format("the board did not confirm the stop within {} ms: {}",
-                                 options.timeout.count(), problem.reason);
-    problem.fix = problem.fix.empty() ? stop_last_resort
-                                      : fmt::format("{}; {}", stop_last_resort, problem.fix);
+    Problem problem = explain("E:STOP", result.value_or(CommandResult()), link);
+    problem.thing = fmt::format("E:STOP to {}", board->name());
     throw Error(problem);
   }
   // The stop went to both, and one has confirmed it.
-  if (link.two_boards) throw Error(explain(paths));
+  if (link.causes.has_any({LinkCause::two_boards, LinkCause::other_board})) {
+    throw Error(explain(paths));
+  }
   return 0;
 }
 

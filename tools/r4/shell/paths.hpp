@@ -14,14 +14,16 @@
 
 namespace r4::tool {
 
-// Do the URLs that were given as paths to one board lead to two, so that nothing began?
-inline bool leads_to_two_boards(const LinkStatus& link) {
-  return link.two_boards && !is_heard(link.state);
+// ["busy","key needed"]: the gravest first.
+inline Json causes_json(LinkCauses causes) {
+  Json all = Json::array();
+  for (const LinkCause cause : causes) all.push_back(to_text(cause));
+  return all;
 }
 
-// Throws Error{refused} that names both.
+// Throws Error{refused} that names both if the URLs lead to two boards, so that nothing began.
 inline void require_one_board(const AsyncBoard& board) {
-  if (leads_to_two_boards(board.link())) throw Error(explain(board.paths()));
+  if (board.link().causes.has(LinkCause::two_boards)) throw Error(explain(board.paths()));
 }
 
 // {"name":…,"state":"carrying","busy":…,"board_id":…,"received":…,"lost":…,"loss":…,"copies":…,"round_trip_ms":…,

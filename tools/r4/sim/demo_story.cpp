@@ -103,7 +103,7 @@ void Story::require(bool is_so, const std::string& what) const {
 
 bool Story::active() const {
   const LinkStatus& link = board_.link();
-  return link.state == HostLinkState::active && !link.busy;
+  return link.state == HostLinkState::active && !link.causes.has(LinkCause::busy);
 }
 
 CommandResult Story::send(const Command& command) {

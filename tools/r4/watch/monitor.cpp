@@ -110,7 +110,8 @@ class Monitor {
     board_.on_nack([this](const Nack& nack, const Datagram& d) {
       // A path that is about to join is answered so, while another one carries.
       const LinkStatus link = board_.link();
-      if (nack.code == Refusal::busy && link.carrying != 0 && !link.busy) return;
+      const bool busy = link.causes.has(LinkCause::busy);
+      if (nack.code == Refusal::busy && link.carrying != 0 && !busy) return;
       view_->on_nack(nack, d);
     });
     board_.on_bad_datagram([this](const ReadResult& result, std::string_view bytes) {
@@ -118,7 +119,7 @@ class Monitor {
     });
     board_.on_link([this](const LinkStatus& status) {
       view_->on_link(status);
-      if (leads_to_two_boards(status)) io_.stop();
+      if (status.causes.has(LinkCause::two_boards)) io_.stop();
     });
     board_.on_event([this](const CarrierEvent& event) { view_->on_event(event); });
     on_paths(board_, [this](const PathStatus& path) { view_->on_path(path); });
@@ -138,7 +139,8 @@ class Monitor {
 
   // A host that was killed keeps its board until the board's timeout.
   void look_who_controls() {
-    busy_ticks_ = setup_ && board_.link().busy ? busy_ticks_ + 1 : 0;
+    const bool busy = board_.link().causes.has(LinkCause::busy);
+    busy_ticks_ = setup_ && busy ? busy_ticks_ + 1 : 0;
     if (busy_ticks_ * tick != busy_patience) return;
     board_.async_release_control(release_time, [](const CommandResult&) {});
   }
@@ -240,6 +242,9 @@ constexpr const char* monitor_footer =
     R"(On a terminal: a status, redrawn in place. Into a pipe: one line a state. With --json: one object a
 line, with type (state, heartbeat, link, nack, error), transport, pnum, t and fields (numbers as
 numbers, several values as an array); of one board on a CAN bus, at the end, one of type transfers.
+The causes of a link say what is wrong with it, the gravest first: transport down, two boards,
+watchdog, callback, foreign frames, busy (another host controls the board), board has no key,
+key needed, key not taken, watchers full, not watchable, late frames, other board.
 
 The monitor watches: it sends no heartbeats and takes no control, and a board that no host controls
 streams to it all the same. With --control it takes part in the link, as a host that commands nothing:

@@ -80,11 +80,7 @@ class JsonView final : public MonitorView {
     Json fields{{"up", up_},
                 {"state", to_text(status.state)},
                 {"reason", to_text(status.reason)},
-                {"busy", status.busy},
-                {"gated", status.gated()}};
-    if (status.trouble != TransportTrouble::none) fields["trouble"] = to_text(status.trouble);
-    if (status.key != KeyTrouble::none) fields["key"] = to_text(status.key);
-    if (status.lease != LeaseTrouble::none) fields["lease"] = to_text(status.lease);
+                {"causes", causes_json(status.causes)}};
     if (Json paths = paths_json(board_); !paths.is_null()) fields["paths"] = std::move(paths);
     lines_.write(line_of(object("link", std::move(fields))));
   }
@@ -211,15 +207,10 @@ std::string link_text(const LinkStatus& status) {
       text = "LOST: the board is silent";
       break;
   }
-  if (status.trouble != TransportTrouble::none) {
-    text += fmt::format(", {} on the bus", to_text(status.trouble));
-  } else if (status.busy) {
-    text += ", another host controls the board";
+  if (const std::optional<LinkCause> cause = status.cause()) {
+    const Problem problem = explain(*cause);
+    text += fmt::format(", {}; {}", problem.reason, problem.fix);
   }
-  if (status.two_boards) text += ", its paths lead to two boards";
-  if (status.gated()) text += ", our heartbeats are stopped";
-  if (status.key != KeyTrouble::none) text += ", " + explain(status.key).text();
-  if (status.lease != LeaseTrouble::none) text += ", " + explain(status.lease).text();
   return text;
 }
 

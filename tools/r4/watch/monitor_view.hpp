@@ -64,7 +64,7 @@ std::unique_ptr<MonitorView> make_plain_view();
 // A status of a few lines, redrawn in place.
 std::unique_ptr<MonitorView> make_live_view(const AsyncBoard& board);
 
-// "ACTIVE", "SAFE (stop)", "busy: another host controls the board": for people.
+// For people: "ACTIVE", "SAFE (stop)", "ACTIVE, another host controls the board; stop that host …".
 std::string link_text(const LinkStatus& status);
 // "accel_x 0.02 m/s2"; "-" for what is no measurement.
 std::string value_text(const DeviceNews::Value& value);

@@ -86,7 +86,8 @@ std::string board_text(std::size_t number, WebBoard& slot) {
   const Statistics statistics = board.statistics();
   const bool heard = is_heard(link.state);
   const bool fine = link.state == HostLinkState::active && (!slot.controlling() || link.in_control);
-  object["link"] = link.transport_down ? "down" : to_text(link.state);
+  object["link"] = link.causes.has(LinkCause::transport_down) ? "down" : to_text(link.state);
+  object["causes"] = causes_json(link.causes);
   const bool free = !slot.controlling() && heard && link.reason == SafeReason::link;
   object["why"] = fine ? "" : free ? "nobody controls it" : explain(slot.url(), link).reason;
   object["controlled"] = link.in_control;

@@ -68,11 +68,14 @@ std::string line_schema_text() {
 }
 
 std::string link_schema_text() {
+  Json causes = of_type("array", "what is wrong with the link, the gravest first");
+  causes["items"] = {{"type", "string"}};
   return text_of("r4.Link",
                  {{"name", of_type("string", "the board's")},
                   {"firmware", of_type("string", "its version")},
                   {"id", of_type("string", "of the hardware")},
                   {"link", of_type("string", "connecting, active, safe, lost or down")},
+                  {"causes", causes},
                   {"why", of_type("string", "what is wrong, in words")},
                   {"controlled", of_type("boolean", "it takes this program's commands")},
                   {"armed", of_type("boolean", "it takes those that drive")},
