@@ -39,6 +39,9 @@ class FieldSelection {
     if (stage_ == Stage::unheard) stage_ = Stage::asking;
   }
 
+  // A session begins, so the board is asked as soon as it may be.
+  void begin_anew() { next_ = Time{0}; }
+
   // A state with CMD.
   void on_cmd(Time now) {
     cmd_seen_ = now;

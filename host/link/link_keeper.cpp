@@ -117,6 +117,7 @@ void LinkKeeper::leave(Time now) {
 
 void LinkKeeper::begin_anew() {
   role_ = HostRoleMachine();
+  fields_.begin_anew();
   leaving_ = false;
   link_.leave_session();
   hold(held_);

@@ -85,7 +85,6 @@ TEST_F(SessionRole, ArmingEndsAsSoonAsControlIsReleased) {
   EXPECT_EQ(link.arming, (std::vector<DisarmCause>{DisarmCause::none, DisarmCause::not_yet}));
   link.heartbeat(SafeReason::link);
   change(BoardRole::watch);
-  link.pass(200ms);  // the fields are asked for no more often
   link.sent.clear();
   take();
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::not_yet) << "relay 1 is closed, it says";
