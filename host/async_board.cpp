@@ -9,8 +9,8 @@
 #include "async_board_impl.hpp"
 #include "board_loop.hpp"
 #include "commands/command_help.hpp"
-#include "commands/link_timing.hpp"
 #include "commands/limits.hpp"
+#include "commands/link_timing.hpp"
 #include "standard_registry.hpp"
 
 namespace r4 {
@@ -279,8 +279,8 @@ bool AsyncBoard::in_control() const {
 DisarmCause AsyncBoard::disarmed_by() const { return impl_->session.disarmed_by(); }
 const BoardIdentity& AsyncBoard::identity() const { return impl_->identity; }
 Statistics AsyncBoard::statistics() const { return impl_->session.statistics(Impl::steady_now()); }
-const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->counters(); }
-const std::string& AsyncBoard::name() const { return impl_->name(); }
+const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->paths.counters(); }
+const std::string& AsyncBoard::name() const { return impl_->paths.name(); }
 std::vector<PathStatus> AsyncBoard::paths() const {
   std::vector<PathStatus> reports;
   for (std::size_t i = 0; i < impl_->paths.size(); ++i) reports.push_back(impl_->report(i));
@@ -293,21 +293,6 @@ PathStatus AsyncBoard::Impl::report(std::size_t path) const {
   PathStatus made = session.path(path, steady_now());
   made.name = carrier(path).name();
   return made;
-}
-
-const std::string& AsyncBoard::Impl::name() {
-  names.clear();
-  for (const auto& path : paths) {  // without a temporary: programs ask for it with each state
-    if (!names.empty()) names += ' ';
-    names += path->carrier->name();
-  }
-  return names;
-}
-
-const CarrierCounters& AsyncBoard::Impl::counters() {
-  counted = CarrierCounters();
-  for (const auto& path : paths) counted += path->carrier->counters();
-  return counted;
 }
 
 void AsyncBoard::record(Recording& recording) { impl_->record(recording.recorder_); }
@@ -331,7 +316,7 @@ void AsyncBoard::Impl::record(const std::shared_ptr<Recorder>& recorder) {
     if (!transport.up()) continue;
     path->tap.on_carrier_event({CarrierEvent::Kind::up, {{}, transport.name(), {}, {}}});
   }
-  paths[0]->tap.on_link(session.link());
+  paths[0].tap.on_link(session.link());
   name_in_recording();
   for (const Device& device : devices) describe_in_recording(device);
 }
@@ -349,7 +334,7 @@ void AsyncBoard::Impl::tell_of_recordings() {
     std::optional<Problem> news = path->tap.take_news();
     if (news && !problem) problem = std::move(news);
   }
-  if (problem) call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, *problem});
+  if (problem) call(callbacks.event, CarrierEvent{CarrierEvent::Kind::warning, *problem});
 }
 
 void AsyncBoard::Impl::describe_in_recording(const Device& device) {
@@ -358,38 +343,38 @@ void AsyncBoard::Impl::describe_in_recording(const Device& device) {
 
 Subscription AsyncBoard::on_state(
     std::function<void(const ReceivedState&, const Datagram&)> callback) {
-  return impl_->state_callbacks.add(std::move(callback));
+  return impl_->callbacks.state.add(std::move(callback));
 }
 Subscription AsyncBoard::on_board_heartbeat(std::function<void(const Datagram&)> callback) {
-  return impl_->heartbeat_callbacks.add(std::move(callback));
+  return impl_->callbacks.heartbeat.add(std::move(callback));
 }
 Subscription AsyncBoard::on_nack(std::function<void(const Nack&, const Datagram&)> callback) {
-  return impl_->nack_callbacks.add(std::move(callback));
+  return impl_->callbacks.nack.add(std::move(callback));
 }
 Subscription AsyncBoard::on_bad_datagram(
     std::function<void(const ReadResult&, std::string_view)> callback) {
-  return impl_->bad_callbacks.add(std::move(callback));
+  return impl_->callbacks.bad.add(std::move(callback));
 }
 Subscription AsyncBoard::on_overheard(std::function<void(std::string_view)> callback) {
-  return impl_->overheard_callbacks.add(std::move(callback));
+  return impl_->callbacks.overheard.add(std::move(callback));
 }
 Subscription AsyncBoard::on_link(std::function<void(const LinkStatus&)> callback) {
-  return impl_->link_callbacks.add(std::move(callback));
+  return impl_->callbacks.link.add(std::move(callback));
 }
 Subscription AsyncBoard::on_path(std::function<void(const PathStatus&)> callback) {
-  return impl_->path_callbacks.add(std::move(callback));
+  return impl_->callbacks.path.add(std::move(callback));
 }
 Subscription AsyncBoard::on_event(std::function<void(const CarrierEvent&)> callback) {
-  return impl_->event_callbacks.add(std::move(callback));
+  return impl_->callbacks.event.add(std::move(callback));
 }
 Subscription AsyncBoard::on_restart(std::function<void()> callback) {
-  return impl_->restart_callbacks.add(std::move(callback));
+  return impl_->callbacks.restart.add(std::move(callback));
 }
 Subscription AsyncBoard::on_arming(std::function<void(DisarmCause)> callback) {
-  return impl_->arming_callbacks.add(std::move(callback));
+  return impl_->callbacks.arming.add(std::move(callback));
 }
 Subscription AsyncBoard::on_refused(std::function<void(const RefusedPost&)> callback) {
-  return impl_->refused_callbacks.add(std::move(callback));
+  return impl_->callbacks.refused.add(std::move(callback));
 }
 
 void AsyncBoard::watchdog(Duration period) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // An AsyncBoard does what its session wants done: it sends, then it tells.
-#include <algorithm>
 #include <utility>
 #include <variant>
 
@@ -35,34 +34,22 @@ SendResult AsyncBoard::Impl::transmit(const Sending& sending) {
   const bool may_pass = sending.priority == Priority::stop || sending.priority == Priority::lease;
   if (only_listens(path) && !may_pass) return SendResult::down;
   const SendResult result = carrier(path).send(sending.datagram(), sending.priority);
-  if (result == SendResult::sent) paths[path]->tap.on_sent(sending.datagram());
+  if (result == SendResult::sent) paths[path].tap.on_sent(sending.datagram());
   return result;
-}
-
-// One path that is well is enough.
-TransportTrouble AsyncBoard::Impl::trouble() const {
-  TransportTrouble common = TransportTrouble::none;
-  for (const auto& path : paths) {
-    common = path->carrier->trouble();
-    if (common == TransportTrouble::none) break;
-  }
-  return common;
 }
 
 void AsyncBoard::Impl::tell(const StateCame&) {
   if (!is_open()) return;
   const Datagram& datagram = session.effects().datagram();
-  if (in_backlog) {
-    const Text bytes = datagram.bytes();
-    backlog_size = bytes.size();
-    std::copy_n(bytes.data(), backlog_size, backlog.data());
+  if (backlog.keeps_states()) {
+    backlog.keep(datagram.bytes());
   } else {
-    call(state_callbacks, session.state(), datagram);
+    call(callbacks.state, session.state(), datagram);
   }
 }
 
 void AsyncBoard::Impl::tell(const HeartbeatCame&) {
-  if (is_open()) call(heartbeat_callbacks, session.effects().datagram());
+  if (is_open()) call(callbacks.heartbeat, session.effects().datagram());
 }
 
 void AsyncBoard::Impl::tell(const BoardIdentified& news) {
@@ -71,23 +58,23 @@ void AsyncBoard::Impl::tell(const BoardIdentified& news) {
   identity.board_id.assign(fresh.board_id.data(), fresh.board_id.size());
   identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
   identity.name.assign(fresh.name.data(), fresh.name.size());
-  if (paths[0]->tap.attached()) name_in_recording();
+  if (paths[0].tap.attached()) name_in_recording();
 }
 
 void AsyncBoard::Impl::tell(const CommandRefused& news) {
-  if (is_open()) call(nack_callbacks, news.nack, session.effects().datagram());
+  if (is_open()) call(callbacks.nack, news.nack, session.effects().datagram());
 }
 
 void AsyncBoard::Impl::tell(const BadDatagramCame& news) {
-  if (is_open()) call(bad_callbacks, news.result, news.bytes);
+  if (is_open()) call(callbacks.bad, news.result, news.bytes);
 }
 
 void AsyncBoard::Impl::tell(const LinkChanged& news) {
-  paths[0]->tap.on_link(news.status);
+  paths[0].tap.on_link(news.status);
   tell_paths(news.status);
   if (!is_open()) return;
   // As it is by then: the one before may have changed it.
-  link_callbacks.each([&](auto& one) {
+  callbacks.link.each([&](auto& one) {
     if (may_tell()) guarded([&] { one(session.link()); });
   });
 }
@@ -97,42 +84,33 @@ void AsyncBoard::Impl::tell_paths(const LinkStatus& status) {
   const LinkStatus before_that = std::exchange(told, status);
   for (std::size_t i = 0; i < paths.size(); ++i) {
     if (((before_that.carrying ^ status.carrying) & path_bit(i)) == 0) continue;
-    if (is_open()) call(path_callbacks, report(i));
+    if (is_open()) call(callbacks.path, report(i));
   }
   constexpr LinkCauses elsewhere{LinkCause::two_boards, LinkCause::other_board};
   if (status.causes.has_any(elsewhere) && !before_that.causes.has_any(elsewhere) && is_open()) {
     std::vector<PathStatus> reports;
     for (std::size_t i = 0; i < paths.size(); ++i) reports.push_back(report(i));
-    call(event_callbacks, CarrierEvent{CarrierEvent::Kind::warning, explain(reports)});
+    call(callbacks.event, CarrierEvent{CarrierEvent::Kind::warning, explain(reports)});
   }
 }
 
 void AsyncBoard::Impl::tell(const BoardRestarted&) {
   ++boots;
-  backlog_size = 0;  // of the boot before
-  if (is_open()) call(restart_callbacks);
+  backlog.forget();
+  if (is_open()) call(callbacks.restart);
 }
 
 void AsyncBoard::Impl::tell(const ArmingChanged&) {
   if (!is_open()) return;
-  arming_callbacks.each([&](auto& one) {
+  callbacks.arming.each([&](auto& one) {
     if (may_tell()) guarded([&] { one(session.disarmed_by()); });
   });
 }
 
 void AsyncBoard::Impl::tell(const PostRefused& news) {
-  if (is_open()) call(refused_callbacks, news.refused);
+  if (is_open()) call(callbacks.refused, news.refused);
 }
 
-void AsyncBoard::Impl::tell(const CommandEnded& news) { on_result(news.ticket, news.result); }
-
-void AsyncBoard::Impl::on_result(Ticket ticket, const CommandResult& result) {
-  const auto found = std::find_if(waiting.begin(), waiting.end(),
-                                  [ticket](const Waiting& w) { return w.ticket == ticket; });
-  if (found == waiting.end()) return;
-  ended.push_back({result, std::move(found->completion)});
-  if (found != waiting.end() - 1) *found = std::move(waiting.back());
-  waiting.pop_back();
-}
+void AsyncBoard::Impl::tell(const CommandEnded& news) { waits.end(news.ticket, news.result); }
 
 }  // namespace r4

@@ -32,16 +32,12 @@ constexpr std::chrono::seconds open_interval{1};
 AsyncBoard::Impl::Impl(asio::io_context& context, std::vector<std::unique_ptr<Carrier>> transports,
                        BoardOptions options)
     : io(context),
+      paths(*this, std::move(transports)),
       heartbeat_ms(options.session.timing.heartbeat_ms),
       board_timeout(std::chrono::milliseconds(options.session.timing.timeout_ms)),
-      session(with_clock(std::move(options.session), steady_now()), options.role,
-              transports.size()),
+      session(with_clock(std::move(options.session), steady_now()), options.role, paths.size()),
       timer(context),
-      reopening(context) {
-  for (std::unique_ptr<Carrier>& each : transports) {
-    paths.push_back(std::make_unique<BoardPath>(*this, paths.size(), std::move(each)));
-  }
-}
+      reopening(context) {}
 
 Time AsyncBoard::Impl::time_of(Duration timeout) {
   return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
@@ -52,9 +48,9 @@ Time AsyncBoard::Impl::time_of(Duration timeout) {
 // By how much what was due is late; 0 inside another entry.
 Time AsyncBoard::Impl::begin_entry(Completion::How way) {
   if (depth == 0) how = way;
-  session.on_trouble(trouble());
+  session.on_trouble(paths.trouble());
   const Time before = std::exchange(now, steady_now());
-  if (now - before > held_up) in_backlog = true;
+  if (now - before > held_up) backlog.on_held_up();
   return has_link() && depth == 0 ? now - due : Time{0};
 }
 
@@ -68,18 +64,17 @@ void AsyncBoard::Impl::end_entry(Time late) {
 
 // What has waited in sockets and buffers since before is passed over.
 void AsyncBoard::Impl::on_sleep() {
-  waking = 2;
-  backlog_size = 0;
+  backlog.on_sleep();
   session.on_sleep(now);
-  for (Waiter& waiter : waiters) give_up(waiter);
-  waiters.clear();
+  waits.end_conditions([](const Waits::Condition&) { return std::optional(Outcome::cancelled); },
+                       now);
   poll_wanted = true;
 }
 
 void AsyncBoard::Impl::tell_that_it_was_held_up(Time late) {
   const Inside inside(depth);
   const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(late).count();
-  call(event_callbacks,
+  call(callbacks.event,
        CarrierEvent{CarrierEvent::Kind::warning,
                     Problem{ErrorKind::refused, "the event loop",
                             "it was held up: what was due went out " + std::to_string(ms) +
@@ -93,10 +88,8 @@ void AsyncBoard::Impl::settle() {
   for (;;) {
     tell_news();
     // Handlers that are dispatched may start commands, whose ends are appended.
-    while (!ended.empty()) {
-      Ended first = std::move(ended.front());
-      ended.erase(ended.begin());
-      guarded([&] { first.completion.release()->complete(first.result, how); });
+    while (std::optional<Waits::Ended> ended = waits.take_ended()) {
+      guarded([&] { ended->completion.release()->complete(ended->result, how); });
     }
     if (poll_wanted && has_link()) {
       poll_wanted = false;
@@ -110,78 +103,55 @@ void AsyncBoard::Impl::settle() {
   if (has_link()) arm();
 }
 
-bool AsyncBoard::Impl::has_come(const Waiter& waiter) const {
+bool AsyncBoard::Impl::has_come(const Waits::Condition& condition) const {
   const LinkStatus& link = session.link();
-  switch (waiter.what) {
-    case Waiter::For::active:
+  switch (condition.what) {
+    case Waits::For::active:
       return session.board_role() == BoardRole::watch
                  ? is_heard(link.state)
                  : link.state == HostLinkState::active && link.in_control;
-    case Waiter::For::answer:
-      return session.state().i2c_answer.pnum == waiter.pnum;
-    case Waiter::For::time:
-      return now >= waiter.deadline;
+    case Waits::For::answer:
+      return session.state().i2c_answer.pnum == condition.pnum;
+    case Waits::For::time:
+      return now >= condition.deadline;
   }
   return false;
 }
 
 // Ends the waits that are over; false if none is.
 bool AsyncBoard::Impl::end_waits() {
-  bool any = false;
-  for (std::size_t i = 0; i < waiters.size();) {
-    Waiter& waiter = waiters[i];
-    const Outcome outcome = !is_open()         ? Outcome::closed
-                            : has_come(waiter) ? Outcome::confirmed
-                                               : Outcome::timed_out;
-    if (outcome == Outcome::timed_out && now < waiter.deadline) {
-      ++i;
-      continue;
-    }
-    any = true;
-    ended.push_back({{outcome, Refusal::none, now - waiter.started}, std::move(waiter.completion)});
-    waiters.erase(waiters.begin() + static_cast<std::ptrdiff_t>(i));
-  }
-  return any;
-}
-
-void AsyncBoard::Impl::give_up(Waiter& waiter) {
-  ended.push_back(
-      {{Outcome::cancelled, Refusal::none, now - waiter.started}, std::move(waiter.completion)});
+  return waits.end_conditions(
+      [this](const Waits::Condition& each) -> std::optional<Outcome> {
+        if (!is_open()) return Outcome::closed;
+        if (has_come(each)) return Outcome::confirmed;
+        return now >= each.deadline ? std::optional(Outcome::timed_out) : std::nullopt;
+      },
+      now);
 }
 
 // --- what the user starts
 
 void AsyncBoard::Impl::wait_active(Duration timeout, CompletionPtr completion) {
   enter(Completion::How::post, [&] {
-    const Ticket id = next_waiter++;
+    const Ticket id = waits.next_id();
     completion->listen(Cancel(weak_from_this(), id));
-    waiters.push_back(
-        {Waiter::For::active, id, 0, now, now + time_of(timeout), std::move(completion)});
+    waits.add({Waits::For::active, id, 0, now, now + time_of(timeout), std::move(completion)});
   });
 }
 
 void AsyncBoard::Impl::cancel(Ticket id) {
   enter(Completion::How::post, [&] {
-    const auto waiter =
-        std::find_if(waiters.begin(), waiters.end(), [id](const Waiter& w) { return w.id == id; });
-    if (waiter != waiters.end()) {
-      give_up(*waiter);
-      waiters.erase(waiter);
-      return;
-    }
-    const auto command =
-        std::find_if(waiting.begin(), waiting.end(), [id](const Waiting& w) { return w.id == id; });
-    if (command == waiting.end()) return;
-    const Ticket ticket = command->ticket;
+    const Ticket ticket = waits.cancel(id, now);
+    if (ticket == 0) return;
     session.cancel(ticket, now);
-    on_result(ticket, {Outcome::cancelled});  // of a stop, which goes on
+    waits.end(ticket, {Outcome::cancelled});  // of a stop, which goes on
     poll_wanted = true;
   });
 }
 
 void AsyncBoard::Impl::open() {
   if (phase != Phase::made) {
-    throw Error(ErrorKind::usage, name(), "a board is opened once",
+    throw Error(ErrorKind::usage, paths.name(), "a board is opened once",
                 "make another one for the same URL");
   }
   std::optional<Problem> problem;
@@ -215,7 +185,7 @@ bool AsyncBoard::Impl::open_path(BoardPath& path, std::optional<Problem>& proble
     return true;
   } catch (const Error& error) {
     if (phase == Phase::made && error.kind() == ErrorKind::usage) {
-      for (const auto& each : paths) each->carrier->close();
+      paths.close();
       throw;
     }
     if (!problem) problem = error.problem();
@@ -250,7 +220,7 @@ void AsyncBoard::Impl::close() {
   // Said once; nobody waits for an answer.
   if (is_open()) enter(Completion::How::post, [this] { leave(Time{0}); });
   phase = Phase::closed;
-  for (const auto& path : paths) path->carrier->close();
+  paths.close();
   timer.cancel();
   reopening.cancel();
   how = Completion::How::post;
@@ -280,8 +250,7 @@ void AsyncBoard::Impl::become(BoardRole role) {
 
 // The timer is only set when it must ring earlier than it will; ringing early costs one poll.
 void AsyncBoard::Impl::arm() {
-  Time next = due;
-  for (const Waiter& waiter : waiters) next = std::min(next, waiter.deadline);
+  const Time next = waits.next(due);
   if (armed && armed_for <= next) return;
   armed = true;
   armed_for = next;
@@ -294,14 +263,12 @@ void AsyncBoard::Impl::arm() {
 void AsyncBoard::Impl::on_timer() {
   if (!has_link()) return;
   armed = false;
-  if (waking != 0) --waking;
+  const bool tells_backlog = backlog.on_timer();
   enter(Completion::How::dispatch, [this] {
     poll_wanted = true;
     tell_of_recordings();
   });
-  // Twice without a word that the transport is drained: it may be one that never tells.
-  undrained = backlog_size == 0 ? 0 : undrained + 1;
-  if (undrained >= 2) tell_backlog();
+  if (tells_backlog) tell_backlog();
 }
 
 // --- BoardPath::Owner
@@ -309,9 +276,9 @@ void AsyncBoard::Impl::on_timer() {
 void AsyncBoard::Impl::on_datagram(BoardPath& path, std::string_view bytes) {
   enter(Completion::How::dispatch, [&] {
     path.tap.on_received(bytes, now);
-    if (waking != 0) return;
+    if (backlog.drops()) return;
     session.receive(path.index, bytes, now);
-    paths[0]->tap.on_packets(session.packets());
+    paths[0].tap.on_packets(session.packets());
     poll_wanted = true;
     send_all();
     tell_news();  // which may be of these bytes
@@ -319,19 +286,17 @@ void AsyncBoard::Impl::on_datagram(BoardPath& path, std::string_view bytes) {
 }
 
 void AsyncBoard::Impl::on_drained() {
-  in_backlog = false;
-  waking = 0;
-  undrained = 0;
+  backlog.on_drained();
   tell_backlog();
 }
 
 void AsyncBoard::Impl::tell_backlog() {
-  if (backlog_size == 0) return;
-  const std::size_t size = std::exchange(backlog_size, 0);
+  const Text state = backlog.take();
+  if (state.empty()) return;
   enter(Completion::How::dispatch, [&] {
     Datagram datagram;
-    if (is_open() && read_datagram(Text(backlog.data(), size), datagram)) {
-      call(state_callbacks, session.state(), datagram);
+    if (is_open() && read_datagram(state, datagram)) {
+      call(callbacks.state, session.state(), datagram);
     }
   });
 }
@@ -339,7 +304,7 @@ void AsyncBoard::Impl::tell_backlog() {
 void AsyncBoard::Impl::on_carrier_event(BoardPath& path, const CarrierEvent& event) {
   enter(Completion::How::dispatch, [&] {
     path.tap.on_carrier_event(event);
-    call(event_callbacks, event);
+    call(callbacks.event, event);
     if (event.kind != CarrierEvent::Kind::warning) {
       session.on_transport(path.index, event.kind == CarrierEvent::Kind::up, now,
                            !only_listens(path.index));
@@ -353,7 +318,7 @@ void AsyncBoard::Impl::on_overheard(BoardPath& path, std::string_view bytes) {
     path.tap.on_sent(bytes);
     std::array<char, max_datagram + masking_room> room;
     const Text shown = without_secrets(Text(bytes.substr(0, max_datagram)), room.data());
-    call(overheard_callbacks, std::string_view(shown.data(), shown.size()));
+    call(callbacks.overheard, std::string_view(shown.data(), shown.size()));
   });
 }
 

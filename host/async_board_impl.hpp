@@ -21,40 +21,31 @@
 #include <variant>
 #include <vector>
 
+#include "backlog.hpp"
 #include "board_path.hpp"
 #include "measurement/boot_clock.hpp"
 #include "r4link/async_board.hpp"
 #include "session/session.hpp"
 #include "subscribers.hpp"
+#include "waits.hpp"
 
 namespace r4 {
 
 // Outlives the AsyncBoard where a callback or handler destroys that.
 struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<AsyncBoard::Impl> {
-  // A command under way, and one that has ended. By its id it is cancelled: the ticket of its first step.
-  struct Waiting {
-    Ticket ticket = 0;
-    Ticket id = 0;
-    CompletionPtr completion;
-  };
-  // Who waits for something, and until when; its id is no ticket of the session's, but where it is a step behind
-  // one that was a command.
-  struct Waiter {
-    enum class For : std::uint8_t {
-      active,  // the board
-      answer,  // the end of the transfer of that number, as the state tells it
-      time,    // the deadline itself
-    };
-    For what = For::active;
-    Ticket id = 0;
-    std::uint32_t pnum = 0;
-    Time started{0};
-    Time deadline{0};
-    CompletionPtr completion;
-  };
-  struct Ended {
-    CommandResult result;
-    CompletionPtr completion;
+  using Waits = r4::Waits<CompletionPtr>;
+  struct Callbacks {
+    Subscribers<ReceivedState, Datagram> state;
+    Subscribers<Datagram> heartbeat;
+    Subscribers<Nack, Datagram> nack;
+    Subscribers<ReadResult, std::string_view> bad;
+    Subscribers<std::string_view> overheard;
+    Subscribers<LinkStatus> link;
+    Subscribers<PathStatus> path;
+    Subscribers<CarrierEvent> event;
+    Subscribers<> restart;
+    Subscribers<DisarmCause> arming;
+    Subscribers<RefusedPost> refused;
   };
 
   // The user is told nothing, and starts nothing, from `leaving` on.
@@ -89,8 +80,8 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
     }
   }
   template <class... Arguments>
-  void call(const Subscribers<Arguments...>& callbacks, const Arguments&... arguments) {
-    callbacks.each([&](auto& one) {
+  void call(const Subscribers<Arguments...>& those, const Arguments&... arguments) {
+    those.each([&](auto& one) {
       // The one before may have closed the board.
       if (may_tell()) guarded([&] { one(arguments...); });
     });
@@ -125,7 +116,6 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void tell_news();
   void settle();
   bool end_waits();
-  void give_up(Waiter& waiter);
 
   // --- what the user starts
 
@@ -138,7 +128,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
       const Ticket ticket = is_open() ? start() : 0;
       if (ticket != 0) {
         if (id == 0) completion->listen(Cancel(weak_from_this(), id = ticket));
-        waiting.push_back({ticket, id, std::move(completion)});
+        waits.add(ticket, id, std::move(completion));
         poll_wanted = true;
       } else {
         const Outcome outcome = is_open() ? not_taken : Outcome::closed;
@@ -163,7 +153,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
     return session.posted();
   }
   void wait_active(Duration timeout, CompletionPtr completion);
-  bool has_come(const Waiter& waiter) const;
+  bool has_come(const Waits::Condition& condition) const;
   void cancel(Ticket id);
   void open();
   bool open_path(BoardPath& path, std::optional<Problem>& problem);
@@ -202,7 +192,6 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   // --- what the session wants done
 
   SendResult transmit(const Sending& sending);
-  TransportTrouble trouble() const;
   void tell(const StateCame&);
   void tell(const HeartbeatCame&);
   void tell(const BoardIdentified& news);
@@ -213,19 +202,16 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void tell(const BoardRestarted&);
   void tell(const ArmingChanged&);
   void tell(const PostRefused& news);
-  void on_result(Ticket ticket, const CommandResult& result);
 
   // --- the paths
 
-  Carrier& carrier(std::size_t path) const { return *paths[path]->carrier; }
+  Carrier& carrier(std::size_t path) const { return *paths[path].carrier; }
   bool only_listens(std::size_t path) const;
   PathStatus report(std::size_t path) const;
-  const std::string& name();
-  const CarrierCounters& counters();
   void tell_paths(const LinkStatus& status);
 
   asio::io_context& io;
-  std::vector<std::unique_ptr<BoardPath>> paths;
+  BoardPaths paths;
   std::vector<Device> devices;  // that recordings tell of
   std::vector<const Device*> attaching;
   std::uint32_t boots = 0;           // of the board, while we have known it
@@ -234,29 +220,11 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   Session session;
   BoardIdentity identity;
 
-  Subscribers<ReceivedState, Datagram> state_callbacks;
-  Subscribers<Datagram> heartbeat_callbacks;
-  Subscribers<Nack, Datagram> nack_callbacks;
-  Subscribers<ReadResult, std::string_view> bad_callbacks;
-  Subscribers<std::string_view> overheard_callbacks;
-  Subscribers<LinkStatus> link_callbacks;
-  Subscribers<PathStatus> path_callbacks;
-  Subscribers<CarrierEvent> event_callbacks;
-  Subscribers<> restart_callbacks;
-  Subscribers<DisarmCause> arming_callbacks;
-  Subscribers<RefusedPost> refused_callbacks;
-
+  Callbacks callbacks;
+  Backlog backlog;
+  Waits waits;
   SleepWatch sleep_watch;
-  int waking = 0;  // times that the timer may ring until what came before a sleep has been read
-  bool in_backlog = false;
-  std::array<char, max_datagram> backlog;  // the newest state of it
-  std::size_t backlog_size = 0;
-  int undrained = 0;  // times that the timer rang while there was one
 
-  std::vector<Waiting> waiting;
-  std::vector<Ended> ended;
-  std::vector<Waiter> waiters;
-  Ticket next_waiter = Ticket{1} << 63;
   int depth = 0;  // calls of enter() and settle() under way
   bool poll_wanted = false;
   Completion::How how = Completion::How::post;
@@ -266,9 +234,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   Time due{0};
   asio::steady_timer timer;
   asio::steady_timer reopening;
-  std::string names;        // of the paths
-  CarrierCounters counted;  // of all of them together
-  LinkStatus told;          // of the paths
+  LinkStatus told;  // the status that paths were reported by last
   bool armed = false;
   Time armed_for{0};
   std::atomic<Time::rep> fed{0};  // when feed() was called last; 0: the session knows it

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One path of a board: its transport, under the number by which the session knows it, and what of it goes into a
-// recording.
+// The paths of a board: each has a transport, the number by which the session knows it, and what of it
+// goes into a recording.
 #pragma once
 
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "r4link/carrier.hpp"
 #include "r4link/error.hpp"
@@ -47,6 +49,54 @@ class BoardPath final : public Carrier::Handler {
 
  private:
   Owner& owner_;
+};
+
+class BoardPaths {
+ public:
+  using Iterator = std::vector<std::unique_ptr<BoardPath>>::const_iterator;
+
+  BoardPaths(BoardPath::Owner& owner, std::vector<std::unique_ptr<Carrier>> transports) {
+    for (std::unique_ptr<Carrier>& each : transports) {
+      paths_.push_back(std::make_unique<BoardPath>(owner, paths_.size(), std::move(each)));
+    }
+  }
+
+  std::size_t size() const { return paths_.size(); }
+  BoardPath& operator[](std::size_t path) const { return *paths_[path]; }
+  Iterator begin() const { return paths_.begin(); }
+  Iterator end() const { return paths_.end(); }
+
+  void close() {
+    for (const auto& path : paths_) path->carrier->close();
+  }
+  // The names of the transports. Programs ask for them with each state, so nothing is allocated.
+  const std::string& name() {
+    name_.clear();
+    for (const auto& path : paths_) {
+      if (!name_.empty()) name_ += ' ';
+      name_ += path->carrier->name();
+    }
+    return name_;
+  }
+  const CarrierCounters& counters() {
+    counters_ = CarrierCounters();
+    for (const auto& path : paths_) counters_ += path->carrier->counters();
+    return counters_;
+  }
+  // The trouble that all transports have: one path without trouble is enough.
+  TransportTrouble trouble() const {
+    TransportTrouble common = TransportTrouble::none;
+    for (const auto& path : paths_) {
+      common = path->carrier->trouble();
+      if (common == TransportTrouble::none) break;
+    }
+    return common;
+  }
+
+ private:
+  std::vector<std::unique_ptr<BoardPath>> paths_;
+  std::string name_;
+  CarrierCounters counters_;
 };
 
 }  // namespace r4

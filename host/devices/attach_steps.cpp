@@ -68,7 +68,7 @@ class AsyncBoard::AttachSteps final : public Completion {
         if (has_step() && step().is_answered()) {
           stage_ = Stage::answer;
           return wait(std::move(self),
-                      {Impl::Waiter::For::answer, id_, result.pnum, impl_.now, deadline_, nullptr});
+                      {Impl::Waits::For::answer, id_, result.pnum, impl_.now, deadline_, nullptr});
         }
         break;
       case Stage::answer: {
@@ -81,7 +81,7 @@ class AsyncBoard::AttachSteps final : public Completion {
         }
         stage_ = Stage::pause;
         return wait(std::move(self),
-                    {Impl::Waiter::For::time, id_, 0, impl_.now, impl_.now + step().wait, nullptr});
+                    {Impl::Waits::For::time, id_, 0, impl_.now, impl_.now + step().wait, nullptr});
       }
       case Stage::pause:
         break;
@@ -102,9 +102,9 @@ class AsyncBoard::AttachSteps final : public Completion {
   bool has_step() const { return done_ < steps_.size(); }
   const DeviceStep& step() const { return steps_[done_]; }
 
-  void wait(Ptr self, Impl::Waiter waiter) {
+  void wait(Ptr self, Impl::Waits::Condition waiter) {
     waiter.completion = std::move(self);
-    impl_.enter(How::post, [&] { impl_.waiters.push_back(std::move(waiter)); });
+    impl_.enter(How::post, [&] { impl_.waits.add(std::move(waiter)); });
   }
   void end(Ptr self, const CommandResult& result, How how) {
     CommandResult whole = result;

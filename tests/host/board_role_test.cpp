@@ -88,7 +88,7 @@ INSTANTIATE_TEST_SUITE_P(Transports, BoardRoles, testing::ValuesIn(kinds_of_path
 TEST_P(BoardRoles, AreTakenAndGivenBackAgainAndAgain) {
   const ScopedSubscription linked = board.on_link([](const LinkStatus& link) {
     EXPECT_NE(link.state, HostLinkState::lost);
-    EXPECT_FALSE(link.transport_down);
+    EXPECT_FALSE(link.causes.has(LinkCause::transport_down));
   });
   const ScopedSubscription up_only = board.on_event([](const CarrierEvent& event) {
     EXPECT_EQ(event.kind, CarrierEvent::Kind::up) << event.problem.text();

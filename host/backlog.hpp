@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a program that was held up does with the datagrams that have come meanwhile: of the states in a
+// backlog only the newest is reported, and what came before this computer slept is dropped.
+//
+//     live --held up--> in backlog --the transport is drained--> live
+//     any  --sleep----> waking     --drained, or the timer rang twice--> live
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <utility>
+
+#include "r4link/datagram.hpp"
+
+namespace r4 {
+
+class Backlog {
+ public:
+  void on_held_up() { behind_ = true; }
+  void on_sleep() {
+    waking_ = 2;
+    forget();
+  }
+  // The state that is kept is of an earlier boot of the board, or from before a sleep.
+  void forget() { size_ = 0; }
+
+  // True if datagrams are to be dropped, because they came before the sleep.
+  bool drops() const { return waking_ != 0; }
+  // True if states are to be kept, not reported.
+  bool keeps_states() const { return behind_; }
+  void keep(Text state) {
+    size_ = state.size();
+    std::copy_n(state.data(), size_, state_.data());
+  }
+
+  // Everything that had arrived was handed over.
+  void on_drained() {
+    behind_ = false;
+    waking_ = 0;
+    rings_ = 0;
+  }
+  // The timer rang. True if the kept state is to be reported: twice without on_drained(), so the transport
+  // may be one that never says that it is drained.
+  bool on_timer() {
+    if (waking_ != 0) --waking_;
+    rings_ = size_ == 0 ? 0 : rings_ + 1;
+    return rings_ >= 2;
+  }
+  // The newest state that was kept, which is forgotten; empty if there is none. Valid until the next
+  // keep().
+  Text take() { return {state_.data(), std::exchange(size_, 0)}; }
+
+ private:
+  bool behind_ = false;
+  int waking_ = 0;  // times that the timer may ring until nothing from before a sleep can come
+  int rings_ = 0;   // times that the timer has rung while a state was kept
+  std::array<char, max_datagram> state_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace r4

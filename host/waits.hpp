@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What handlers wait for at a board: the end of a command, or a condition. Each wait ends once: its result
+// stands among the ended waits until it is taken out and handed to its handler.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "link/effects.hpp"
+#include "r4link/link.hpp"
+
+namespace r4 {
+
+// `CompletionPtr` owns the handler.
+template <class CompletionPtr>
+class Waits {
+ public:
+  enum class For : std::uint8_t {
+    active,  // the board
+    answer,  // the end of the transfer of that number, as the state tells it
+    time,    // the deadline itself
+  };
+  // A wait for a condition. `id`: cancels it.
+  struct Condition {
+    For what = For::active;
+    Ticket id = 0;
+    std::uint32_t pnum = 0;
+    Time started{0};
+    Time deadline{0};
+    CompletionPtr completion;
+  };
+  struct Ended {
+    CommandResult result;
+    CompletionPtr completion;
+  };
+
+  // A command under way. `id`: cancels it; the ticket of its first step.
+  void add(Ticket ticket, Ticket id, CompletionPtr completion) {
+    commands_.push_back({ticket, id, std::move(completion)});
+  }
+  void add(Condition condition) { conditions_.push_back(std::move(condition)); }
+  // An id that is no ticket of a session.
+  Ticket next_id() { return next_id_++; }
+
+  // The command has ended. Ignored if nobody waits for it.
+  void end(Ticket ticket, const CommandResult& result) {
+    const auto found = std::find_if(commands_.begin(), commands_.end(),
+                                    [&](const Command& each) { return each.ticket == ticket; });
+    if (found == commands_.end()) return;
+    ended_.push_back({result, std::move(found->completion)});
+    if (found != commands_.end() - 1) *found = std::move(commands_.back());
+    commands_.pop_back();
+  }
+  // Ends the conditions that `outcome_of` says have ended: none for one that goes on. True if there
+  // were any.
+  template <class OutcomeOf>
+  bool end_conditions(OutcomeOf outcome_of, Time now) {
+    const std::size_t before = conditions_.size();
+    std::erase_if(conditions_, [&](Condition& each) {
+      const std::optional<Outcome> outcome = outcome_of(std::as_const(each));
+      if (outcome) give(each, *outcome, now);
+      return outcome.has_value();
+    });
+    return conditions_.size() != before;
+  }
+  // Ends that condition as cancelled. Otherwise, returns the ticket of the command with that id, which
+  // the session has to cancel; 0 if there is none.
+  Ticket cancel(Ticket id, Time now) {
+    end_conditions(
+        [id](const Condition& each) {
+          return each.id == id ? std::optional(Outcome::cancelled) : std::nullopt;
+        },
+        now);
+    const auto found = std::find_if(commands_.begin(), commands_.end(),
+                                    [&](const Command& each) { return each.id == id; });
+    return found == commands_.end() ? 0 : found->ticket;
+  }
+  // The oldest of the ended waits.
+  std::optional<Ended> take_ended() {
+    if (ended_.empty()) return std::nullopt;
+    std::optional<Ended> first(std::move(ended_.front()));
+    ended_.erase(ended_.begin());
+    return first;
+  }
+  // The first deadline of a condition; `latest` if there is no earlier one.
+  Time next(Time latest) const {
+    for (const Condition& each : conditions_) latest = std::min(latest, each.deadline);
+    return latest;
+  }
+
+ private:
+  struct Command {
+    Ticket ticket = 0;
+    Ticket id = 0;
+    CompletionPtr completion;
+  };
+
+  void give(Condition& condition, Outcome outcome, Time now) {
+    ended_.push_back(
+        {{outcome, Refusal::none, now - condition.started}, std::move(condition.completion)});
+  }
+
+  std::vector<Command> commands_;
+  std::vector<Condition> conditions_;
+  std::vector<Ended> ended_;
+  Ticket next_id_ = Ticket{1} << 63;
+};
+
+}  // namespace r4
