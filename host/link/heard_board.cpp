@@ -20,16 +20,17 @@ void HeardBoard::on_heartbeat(SafeReason reason, std::optional<std::uint32_t> t_
   if (reason == SafeReason::none) state_.fault = ChipFault();
 }
 
-void HeardBoard::on_state(const ReceivedState& state, SafeReason reason, Time now) {
+void HeardBoard::on_state(const ReceivedState& state, std::optional<SafeReason> reason, Time now) {
+  const SafeReason told = reason.value_or(state_.safe);
   state_ = state;
   clock_.heard(state_.t_ms, now);
   const BoardClock::Instant sampled = clock_.at(state_.t_ms);
   state_.sampled = ReceivedState::Clock::time_point(sampled.at);
   state_.sampled_error = sampled.error ? *sampled.error : ReceivedState::unknown;
   state_.received = ReceivedState::Clock::time_point(now);
-  state_.safe = reason;
+  state_.safe = told;
   // The field is in every state as long as there is a fault.
-  if (!state_.present.has(StateField::fault)) state_.fault = ChipFault();
+  if (reason && !state_.present.has(StateField::fault)) state_.fault = ChipFault();
 }
 
 std::optional<Time> HeardBoard::on_identity(const Identity& identity, std::uint32_t t_ms,

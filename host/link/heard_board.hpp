@@ -22,8 +22,8 @@ class HeardBoard {
 
   // The newest datagram is a heartbeat. `t_ms`: its T; none of a board that is booting.
   void on_heartbeat(SafeReason reason, std::optional<std::uint32_t> t_ms, Time now);
-  // The newest state; `reason`: what it says of the safe state.
-  void on_state(const ReceivedState& state, SafeReason reason, Time now);
+  // The newest state. `reason`: why the board is safe; none given if a heartbeat has told it later.
+  void on_state(const ReceivedState& state, std::optional<SafeReason> reason, Time now);
   // The answer to Q:ID. Returns when the question was sent; none if no question of this session is
   // answered.
   std::optional<Time> on_identity(const Identity& identity, std::uint32_t t_ms, Time now);

@@ -62,10 +62,14 @@ bool PathNews::take_state(std::size_t path, std::uint32_t t_ms, FieldSet present
   return fresh;
 }
 
-bool PathNews::is_newest(std::uint32_t t_ms) {
-  if (newest_.any && newer(newest_.t_ms, t_ms)) return false;
-  newest_.any = true;
-  newest_.t_ms = t_ms;
+// A heartbeat overtakes the states in a queue, also a state of the same millisecond.
+bool PathNews::is_newest(std::size_t path, std::uint32_t t_ms) {
+  const First& known = newest_.any;
+  const std::uint32_t pnum = paths_[path].pnum;
+  if (known.any && newer(known.t_ms, t_ms)) return false;
+  const bool same = known.any && known.t_ms == t_ms && known.path == path;
+  if (same && newer(known.pnum, pnum)) return false;
+  newest_.any = {true, t_ms, pnum, path};
   return true;
 }
 

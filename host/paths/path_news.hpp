@@ -36,15 +36,15 @@ class PathNews {
   // True if the state is not a duplicate. States of one T may each hold a part of the fields: then
   // a state is new if it brings a field that no state of this T has brought.
   bool take_state(std::size_t path, std::uint32_t t_ms, FieldSet present);
-  // True if no newer T is known. Then this is the newest.
-  bool is_newest(std::uint32_t t_ms);
+  // True if no newer datagram is known. Then this is the newest.
+  bool is_newest(std::size_t path, std::uint32_t t_ms);
   // Each path may bring an answer to its duplicate of a command. True if this answer adds nothing.
   bool is_copy(const Nack& nack);
 
   // The board has restarted: its T is unrelated to before.
   void forget() { newest_ = {}; }
   // The board says that it is booting: its next heartbeat is new.
-  void on_connecting() { newest_.any = newest_.heartbeat.any = false; }
+  void on_connecting() { newest_.any = newest_.heartbeat = First(); }
 
   // For the session: `lost` counts datagrams that no path has brought.
   const PacketCounters& counters() const { return counters_; }
@@ -77,9 +77,7 @@ class PathNews {
 
   std::vector<Numbers> paths_;
   struct Newest {
-    bool any = false;
-    std::uint32_t t_ms = 0;
-    First heartbeat, state;
+    First any, heartbeat, state;
     FieldSet fields;  // of all states with that T
   } newest_;
   PacketCounters counters_;

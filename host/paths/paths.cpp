@@ -296,8 +296,8 @@ bool Paths::admit_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_
   return begun_;
 }
 
-bool Paths::is_newest(std::uint32_t t_ms, Time now) {
-  if (!news_.is_newest(t_ms)) return false;
+bool Paths::is_newest(std::size_t index, std::uint32_t t_ms, Time now) {
+  if (!news_.is_newest(index, t_ms)) return false;
   clock_.set(t_ms, now);
   return true;
 }

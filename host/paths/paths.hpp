@@ -97,7 +97,7 @@ class Paths {
 
   PathNews& news() { return news_; }
   // True if no datagram with a newer T was admitted. Then this T sets the board's clock.
-  bool is_newest(std::uint32_t t_ms, Time now);
+  bool is_newest(std::size_t index, std::uint32_t t_ms, Time now);
 
   // --- BUSY: another host is in control
 

@@ -52,13 +52,15 @@ void Session::on_state(std::size_t path, const Datagram& datagram, Time now) {
 
   const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
   statistics_.on_state(fresh.t_ms, now);
-  // Heartbeats overtake states in a queue. An overtaken state is still the newest state.
-  if (paths_.is_newest(t_ms, now)) {
+  // Heartbeats overtake states in a queue. An overtaken state is still the newest state, but the
+  // heartbeat knows better whether the board is safe.
+  const bool newest = paths_.is_newest(path, t_ms, now);
+  if (newest) {
     link_.on_reason(reason, to_ms(now));
     key_.on_board_time(fresh.t_ms, now);
     key_.on_host_seen(now);
   }
-  board_.on_state(fresh, reason, now);
+  board_.on_state(fresh, newest ? std::optional(reason) : std::nullopt, now);
   refresh(now);
 
   if (board_.confirms()) {
@@ -93,7 +95,7 @@ void Session::on_heartbeat(std::size_t path, const Datagram& datagram, Time now)
     if (paths_.is_known(path)) commands_.on_stop(report, now);  // the stop's number proves it
     return refresh(now);
   }
-  const bool newest = booting || paths_.is_newest(t_ms, now);
+  const bool newest = booting || paths_.is_newest(path, t_ms, now);
   if (booting) {
     link_.on_booting(report.reason, to_ms(now));
   } else {

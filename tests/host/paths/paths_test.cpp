@@ -18,7 +18,7 @@ struct OnePath : testing::Test {
   std::uint32_t board_t() const { return to_ms(now) + board_offset; }
   Admission state() {
     const Admission admission = paths.admit(0, board_pnum++, board_t(), now);
-    if (admission != Admission::no) paths.is_newest(board_t(), now);
+    if (admission != Admission::no) paths.is_newest(0, board_t(), now);
     return admission;
   }
   // Handled as by a session. True if the heartbeat is new.
@@ -27,7 +27,7 @@ struct OnePath : testing::Test {
     if (admission == Admission::restarted) link.on_restart();
     if (admission == Admission::no || !paths.news().take_heartbeat(0, t_ms)) return false;
     link.on_heartbeat(t_ms);
-    if (paths.is_newest(t_ms, now)) link.on_reason(SafeReason::none, to_ms(now));
+    if (paths.is_newest(0, t_ms, now)) link.on_reason(SafeReason::none, to_ms(now));
     return true;
   }
   bool heartbeat() { return heartbeat(board_t(), board_pnum++); }
@@ -74,7 +74,7 @@ TEST_F(OnePath, OlderDatagramsAndDuplicatesAreDropped) {
   ASSERT_TRUE(heartbeat(board_t(), 10));
   EXPECT_FALSE(heartbeat(board_t() - 20, 5));
   EXPECT_FALSE(heartbeat(board_t(), 10));
-  EXPECT_FALSE(paths.is_newest(board_t() - 1, now));
+  EXPECT_FALSE(paths.is_newest(0, board_t() - 1, now));
   FieldSet fields;
   fields.add(StateField::safe);
   ASSERT_TRUE(paths.news().take_state(0, board_t(), fields));
@@ -154,7 +154,7 @@ TEST_F(OnePath, TheBoardsClockMayWrap) {
   heartbeat();
   pass(100);
   EXPECT_EQ(state(), Admission::yes);
-  EXPECT_TRUE(paths.is_newest(board_t(), now));
+  EXPECT_TRUE(paths.is_newest(0, board_t(), now));
 }
 
 TEST_F(OnePath, ADatagramOfAnEarlierBootIsDroppedAndTheBoardIsAsked) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "scripted_link.hpp"
+#include "tests/support/datagrams.hpp"
 
 namespace r4::test {
 namespace {
@@ -99,6 +100,21 @@ TEST(ReceivedState, AnOutageIsNoRestart) {
   link.executed(1);
   EXPECT_EQ(link.restarts, 0);
   EXPECT_EQ(link.session.state().encoder_counts[0], 7);
+}
+
+TEST(ReceivedState, AnOvertakenStateDoesNotTakeBackTheReasonThatAHeartbeatTold) {
+  for (const std::uint32_t earlier_ms : {0U, 5U}) {
+    ScriptedLink link;
+    link.connect();
+    link.pass(20ms);
+    const std::uint32_t number = link.board_pnum++;  // the state's, sent before the heartbeat
+    link.heartbeat(SafeReason::stop);
+    link.raw(with_crc("AIN24:24.28;SAFE:0;PNum:" + std::to_string(number) +
+                      ";T:" + std::to_string(link.board_ms() - earlier_ms) + ";"));
+    EXPECT_EQ(link.states.back().analog_cv[0], 2428) << "it is the newest state";
+    EXPECT_EQ(link.states.back().safe, SafeReason::stop) << earlier_ms;
+    EXPECT_EQ(link.session.link().reason, SafeReason::stop) << earlier_ms;
+  }
 }
 
 }  // namespace
