@@ -9,9 +9,9 @@
 
 #include "board_impl.hpp"
 #include "commands/command_help.hpp"
+#include "commands/limits.hpp"
 #include "devices/device_steps.hpp"
 #include "r4link/board.hpp"
-#include "commands/limits.hpp"
 
 namespace r4 {
 

@@ -21,7 +21,7 @@ CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'trans
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/devices', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/devices', 'firmware/ports/sim/robot'}
-HOST = TRANSPORTS | {'host', 'host/arming', 'host/blocking', 'host/commands', 'host/control', 'host/devices', 'host/link',
+HOST = TRANSPORTS | {'host', 'host/arming', 'host/async', 'host/blocking', 'host/commands', 'host/control', 'host/devices', 'host/link',
                      'host/measurement', 'host/paths', 'host/recording', 'host/replay', 'host/session', 'host/uart'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = SIMULATED | {'tools/r4/shell'}
@@ -64,6 +64,7 @@ ALLOWED = {
     'firmware/ports/giga': FIRMWARE | {'firmware/ports/giga/chip', 'firmware/ports/giga/devices',
                                        'firmware/ports/giga/links'},
     'host/arming': TRANSPORTS | {'host/link', 'host/measurement'},
+    'host/async': HOST,
     'host/blocking': TRANSPORTS | {'host/commands', 'host/measurement'},
     'host/bridge': HOST,
     'host/commands': TRANSPORTS | {'host/arming', 'host/link', 'host/measurement', 'host/paths'},

@@ -95,12 +95,12 @@ void ArmRequests::on_step(CommandKind kind, const CommandResult& result, SafeRea
   if (result.outcome != Outcome::confirmed || kind != CommandKind::relay) return;
   if (reason != SafeReason::none || supply_open) return;
   machine_.on_closed();
-  tell();
+  report();
 }
 
 void ArmRequests::disarm(DisarmCause cause) {
   machine_.disarm(cause);
-  tell();
+  report();
 }
 
 // What the board said before it obeyed this session may be older than the session.
@@ -108,18 +108,18 @@ void ArmRequests::on_link(bool up, bool in_control, bool safe, SafeReason reason
   if (!up) machine_.on_outage();
   if (in_control) machine_.on_heard(reason);
   if (safe) machine_.on_reason(reason);
-  tell();
+  report();
 }
 
 void ArmRequests::begin_anew() {
   machine_ = ArmingMachine();
-  tell();
+  report();
 }
 
-void ArmRequests::tell() {
+void ArmRequests::report() {
   if (told_ == machine_.cause()) return;
   told_ = machine_.cause();
-  effects_.tell(ArmingChanged{told_});
+  effects_.report(ArmingChanged{told_});
 }
 
 }  // namespace r4

@@ -81,7 +81,7 @@ class ArmRequests {
   // A state tells whether relay 1 is closed.
   void on_supply(bool closed) { machine_.on_supply(closed); }
   // Reports the cause if it has changed.
-  void tell();
+  void report();
 
  private:
   struct Request {

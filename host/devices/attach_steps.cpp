@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "../async_board_impl.hpp"
+#include "../async/async_board_impl.hpp"
 #include "device_steps.hpp"
 
 namespace r4 {

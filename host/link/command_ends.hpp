@@ -30,7 +30,7 @@ class CommandEnds {
       case Outcome::full:
         break;
     }
-    effects_.tell(CommandEnded{ticket, result});
+    effects_.report(CommandEnded{ticket, result});
   }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a session wants done, in order: datagrams to be sent, and news to be reported. The session
+// What a session wants done, in order: datagrams to be sent, and events to be reported. The session
 // itself calls nobody.
 #pragma once
 
@@ -66,8 +66,8 @@ struct ArmingChanged {
 struct PostRefused {
   RefusedPost refused;
 };
-// Views in news are of the datagram that was received last, and valid as long as its bytes.
-using News =
+// Views in events are of the datagram that was received last, and valid as long as its bytes.
+using SessionEvent =
     std::variant<StateCame, HeartbeatCame, BoardIdentified, CommandRefused, BadDatagramCame,
                  LinkChanged, CommandEnded, BoardRestarted, ArmingChanged, PostRefused>;
 
@@ -87,15 +87,15 @@ class Effects {
     sendings_.push(std::move(free_.back()));
     free_.pop_back();
   }
-  // The datagram that was received last, which the news are about.
+  // The datagram that was received last, which the events are about.
   Datagram& datagram() { return datagram_; }
-  void tell(News news) { news_.push(std::move(news)); }
+  void report(SessionEvent event) { events_.push(std::move(event)); }
 
   bool any_sendings() const { return sendings_.any(); }
   std::unique_ptr<Sending> take_sending() { return sendings_.take(); }
   void give_back(std::unique_ptr<Sending> sending) { free_.push_back(std::move(sending)); }
-  bool any_news() const { return news_.any(); }
-  News take_news() { return news_.take(); }
+  bool any_events() const { return events_.any(); }
+  SessionEvent take_event() { return events_.take(); }
 
  private:
   // First in, first out.
@@ -120,7 +120,7 @@ class Effects {
 
   Queue<std::unique_ptr<Sending>> sendings_;
   std::vector<std::unique_ptr<Sending>> free_;
-  Queue<News> news_;
+  Queue<SessionEvent> events_;
   Datagram datagram_;
 };
 

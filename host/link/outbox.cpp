@@ -42,8 +42,7 @@ PathSet Outbox::send(DatagramWriter& writer, CommandKind kind, std::uint32_t pnu
   PathSet over = 0;
   for (std::size_t i = 0; i < paths_.count(); ++i) {
     if ((to & path_bit(i)) == 0) continue;
-    send_over(i, writer, kind, pnum, way.priority, now);
-    over |= path_bit(i);
+    if (send_over(i, writer, kind, pnum, way.priority, now)) over |= path_bit(i);
   }
   return over;
 }
@@ -61,14 +60,15 @@ void Outbox::ask(PathSet paths, Time now) {
 }
 
 // Each path has a signature of its own, which proves that path (docs/protocol.md, "Paths"). A
-// watcher's datagrams need no signature.
-void Outbox::send_over(std::size_t path, DatagramWriter& writer, CommandKind kind,
+// watcher's datagrams need no signature. False if the datagram would be too long.
+bool Outbox::send_over(std::size_t path, DatagramWriter& writer, CommandKind kind,
                        std::uint32_t pnum, Priority priority, Time now) {
   const std::size_t size = writer.size();
   if (!watches()) key_.sign(writer, now);
   const Text bytes = writer.finish();
-  effects_.send(path, priority, kind, pnum, {bytes.data(), bytes.size()});
+  if (!bytes.empty()) effects_.send(path, priority, kind, pnum, {bytes.data(), bytes.size()});
   writer.truncate(size);
+  return !bytes.empty();
 }
 
 void Delivery::begin(Outbox::Sent sent) {

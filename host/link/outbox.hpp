@@ -56,7 +56,7 @@ class Outbox {
   SessionId session_id() const { return watches() ? no_session : link_.session(); }
 
  private:
-  void send_over(std::size_t path, DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
+  bool send_over(std::size_t path, DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
                  Priority priority, Time now);
 
   Effects& effects_;

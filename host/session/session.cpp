@@ -95,7 +95,7 @@ void Session::refresh(Time now) {
   const LinkStatus fresh = keeper_.status(board_.state().fault, now);
   if (fresh == status_) return;
   status_ = fresh;
-  effects_.tell(LinkChanged{status_});
+  effects_.report(LinkChanged{status_});
 }
 
 void Session::on_sent(const Sending& sending, SendResult result, Time now) {
@@ -147,7 +147,7 @@ void Session::on_new_boot(Time now) {
     end_arming(Outcome::cancelled, now);
     commands_.give_up(now);
   }
-  effects_.tell(BoardRestarted{});
+  effects_.report(BoardRestarted{});
 }
 
 // --- arming

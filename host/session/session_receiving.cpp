@@ -12,7 +12,7 @@ void Session::receive(std::size_t path, std::string_view bytes, Time now) {
   const ReadResult result = read_datagram(bytes, datagram);
   if (!result) {
     ++statistics_.counts.damaged;
-    effects_.tell(BadDatagramCame{result, bytes});
+    effects_.report(BadDatagramCame{result, bytes});
     return;
   }
   const MessageKind kind = kind_of(datagram);
@@ -45,7 +45,7 @@ void Session::on_state(std::size_t path, const Datagram& datagram, Time now) {
     ++statistics_.counts.damaged;
     ReadResult result;
     result.error = ReadError::syntax;
-    effects_.tell(BadDatagramCame{result, {datagram.bytes().data(), datagram.bytes().size()}});
+    effects_.report(BadDatagramCame{result, {datagram.bytes().data(), datagram.bytes().size()}});
     return refresh(now);
   }
   if (!paths_.news().take_state(path, t_ms, fresh.present)) return refresh(now);
@@ -74,7 +74,7 @@ void Session::on_state(std::size_t path, const Datagram& datagram, Time now) {
   if (keeper_.is_up() && supply_closed) arming_.on_supply(*supply_closed);
   keeper_.select_fields(now);
   if (keeper_.in_control(now) != status_.in_control) refresh(now);
-  effects_.tell(StateCame{});
+  effects_.report(StateCame{});
 }
 
 void Session::on_heartbeat(std::size_t path, const Datagram& datagram, Time now) {
@@ -102,7 +102,7 @@ void Session::on_heartbeat(std::size_t path, const Datagram& datagram, Time now)
     link_.on_heartbeat(t_ms);
     newest ? link_.on_reason(report.reason, to_ms(now)) : link_.on_heard(to_ms(now));
   }
-  effects_.tell(HeartbeatCame{});
+  effects_.report(HeartbeatCame{});
   if (!newest) return refresh(now);
 
   const std::optional<std::uint32_t> board_ms = booting ? std::nullopt : std::optional(t_ms);
@@ -130,7 +130,7 @@ void Session::on_identity(std::size_t path, const Datagram& datagram, Time now) 
   if (const auto asked = board_.on_identity(identity, t_ms, now)) {
     statistics_.on_round_trip(now - *asked);
   }
-  effects_.tell(BoardIdentified{identity});
+  effects_.report(BoardIdentified{identity});
   refresh(now);
   commands_.on_identity(identity, now);
 }
@@ -164,7 +164,7 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   }
   const bool not_taken = nack.code == Refusal::auth && !commands_.is_cable_only(nack.pnum);
   if (not_taken) key_.on_refusal(now);
-  if (!paths_.news().is_copy(nack)) effects_.tell(CommandRefused{nack});
+  if (!paths_.news().is_copy(nack)) effects_.report(CommandRefused{nack});
   // AUTH refuses one copy. A repetition, or the copy on another path, may have been executed.
   const bool others = (paths_.speaking() & ~path_bit(path)) != 0;
   const bool other_copy = nack.code == Refusal::auth && ((not_taken && key_.has_key()) || others);
@@ -180,7 +180,7 @@ void Session::on_lease_refused(std::size_t path, const Nack& nack, Time now) {
   paths_.leases()[path].on_refusal(nack, now);
   const bool told =
       nack.code == Refusal::stale || nack.code == Refusal::busy || nack.code == Refusal::unknown;
-  if (!told) effects_.tell(CommandRefused{nack});
+  if (!told) effects_.report(CommandRefused{nack});
 }
 
 // True if the refusal proves that the command was not executed. It does so only while the board remembers

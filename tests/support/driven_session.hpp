@@ -119,20 +119,20 @@ class DrivenSession : public Session {
               now);
       effects().give_back(std::move(sending));
     }
-    while (effects().any_news()) {
-      std::visit([this](const auto& news) { tell(news); }, effects().take_news());
+    while (effects().any_events()) {
+      std::visit([this](const auto& event) { notify(event); }, effects().take_event());
     }
   }
-  void tell(const StateCame&) { handler_.on_state(state(), effects().datagram()); }
-  void tell(const HeartbeatCame&) { handler_.on_board_heartbeat(effects().datagram()); }
-  void tell(const BoardIdentified& news) { handler_.on_identity(news.identity); }
-  void tell(const CommandRefused& news) { handler_.on_nack(news.nack, effects().datagram()); }
-  void tell(const BadDatagramCame& news) { handler_.on_bad_datagram(news.result, news.bytes); }
-  void tell(const LinkChanged& news) { handler_.on_link(news.status); }
-  void tell(const CommandEnded& news) { handler_.on_result(news.ticket, news.result); }
-  void tell(const BoardRestarted&) { handler_.on_restart(); }
-  void tell(const ArmingChanged& news) { handler_.on_arming(news.cause); }
-  void tell(const PostRefused& news) { handler_.on_refused(news.refused); }
+  void notify(const StateCame&) { handler_.on_state(state(), effects().datagram()); }
+  void notify(const HeartbeatCame&) { handler_.on_board_heartbeat(effects().datagram()); }
+  void notify(const BoardIdentified& event) { handler_.on_identity(event.identity); }
+  void notify(const CommandRefused& event) { handler_.on_nack(event.nack, effects().datagram()); }
+  void notify(const BadDatagramCame& event) { handler_.on_bad_datagram(event.result, event.bytes); }
+  void notify(const LinkChanged& event) { handler_.on_link(event.status); }
+  void notify(const CommandEnded& event) { handler_.on_result(event.ticket, event.result); }
+  void notify(const BoardRestarted&) { handler_.on_restart(); }
+  void notify(const ArmingChanged& event) { handler_.on_arming(event.cause); }
+  void notify(const PostRefused& event) { handler_.on_refused(event.refused); }
 
   Handler& handler_;
 };

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "link/effects.hpp"
+#include "../link/effects.hpp"
 #include "r4link/link.hpp"
 
 namespace r4 {

@@ -2,7 +2,7 @@
 // What is behind an AsyncBoard: a session, its paths and its timer, and who waits for what.
 //
 // Every call of the session is made inside enter(), which then sends what the session wants to be sent. The
-// outermost one tells its news and results and sets the timer afterwards.
+// outermost one then reports its events and results, and sets the timer.
 #pragma once
 
 #include <array>
@@ -21,12 +21,12 @@
 #include <variant>
 #include <vector>
 
+#include "../measurement/boot_clock.hpp"
+#include "../session/session.hpp"
+#include "../subscribers.hpp"
 #include "backlog.hpp"
 #include "board_path.hpp"
-#include "measurement/boot_clock.hpp"
 #include "r4link/async_board.hpp"
-#include "session/session.hpp"
-#include "subscribers.hpp"
 #include "waits.hpp"
 
 namespace r4 {
@@ -113,7 +113,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void on_sleep();
   void tell_that_it_was_held_up(Time late);
   void send_all();
-  void tell_news();
+  void notify_all();
   void settle();
   bool end_waits();
 
@@ -185,30 +185,30 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
 
   void on_datagram(BoardPath& path, std::string_view bytes) override;
   void on_drained() override;
-  void tell_backlog();
+  void notify_backlog();
   void on_carrier_event(BoardPath& path, const CarrierEvent& event) override;
   void on_overheard(BoardPath& path, std::string_view bytes) override;
 
   // --- what the session wants done
 
   SendResult transmit(const Sending& sending);
-  void tell(const StateCame&);
-  void tell(const HeartbeatCame&);
-  void tell(const BoardIdentified& news);
-  void tell(const CommandRefused& news);
-  void tell(const BadDatagramCame& news);
-  void tell(const LinkChanged& news);
-  void tell(const CommandEnded& news);
-  void tell(const BoardRestarted&);
-  void tell(const ArmingChanged&);
-  void tell(const PostRefused& news);
+  void notify(const StateCame&);
+  void notify(const HeartbeatCame&);
+  void notify(const BoardIdentified& event);
+  void notify(const CommandRefused& event);
+  void notify(const BadDatagramCame& event);
+  void notify(const LinkChanged& event);
+  void notify(const CommandEnded& event);
+  void notify(const BoardRestarted&);
+  void notify(const ArmingChanged&);
+  void notify(const PostRefused& event);
 
   // --- the paths
 
   Carrier& carrier(std::size_t path) const { return *paths[path].carrier; }
   bool only_listens(std::size_t path) const;
   PathStatus report(std::size_t path) const;
-  void tell_paths(const LinkStatus& status);
+  void notify_paths(const LinkStatus& status);
 
   asio::io_context& io;
   BoardPaths paths;

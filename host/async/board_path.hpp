@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
+#include "../recording/recording_tap.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/error.hpp"
-#include "recording/recording_tap.hpp"
 
 namespace r4 {
 

@@ -5,8 +5,8 @@
 #include <array>
 #include <string>
 
-#include "../protocol/messages/settings.hpp"
-#include "../transports/file_descriptor.hpp"
+#include "../../protocol/messages/settings.hpp"
+#include "../../transports/file_descriptor.hpp"
 
 namespace r4 {
 
@@ -86,7 +86,7 @@ void AsyncBoard::Impl::tell_that_it_was_held_up(Time late) {
 void AsyncBoard::Impl::settle() {
   const Inside inside(depth);
   for (;;) {
-    tell_news();
+    notify_all();
     // Handlers that are dispatched may start commands, whose ends are appended.
     while (std::optional<Waits::Ended> ended = waits.take_ended()) {
       guarded([&] { ended->completion.release()->complete(ended->result, how); });
@@ -96,7 +96,7 @@ void AsyncBoard::Impl::settle() {
       session.poll(now);
       send_all();
       due = session.next_poll(now);
-    } else if (!end_waits() && !session.effects().any_news()) {
+    } else if (!end_waits() && !session.effects().any_events()) {
       break;
     }
   }
@@ -263,12 +263,12 @@ void AsyncBoard::Impl::arm() {
 void AsyncBoard::Impl::on_timer() {
   if (!has_link()) return;
   armed = false;
-  const bool tells_backlog = backlog.on_timer();
+  const bool notifies_backlog = backlog.on_timer();
   enter(Completion::How::dispatch, [this] {
     poll_wanted = true;
     tell_of_recordings();
   });
-  if (tells_backlog) tell_backlog();
+  if (notifies_backlog) notify_backlog();
 }
 
 // --- BoardPath::Owner
@@ -281,16 +281,16 @@ void AsyncBoard::Impl::on_datagram(BoardPath& path, std::string_view bytes) {
     paths[0].tap.on_packets(session.packets());
     poll_wanted = true;
     send_all();
-    tell_news();  // which may be of these bytes
+    notify_all();  // which may be of these bytes
   });
 }
 
 void AsyncBoard::Impl::on_drained() {
   backlog.on_drained();
-  tell_backlog();
+  notify_backlog();
 }
 
-void AsyncBoard::Impl::tell_backlog() {
+void AsyncBoard::Impl::notify_backlog() {
   const Text state = backlog.take();
   if (state.empty()) return;
   enter(Completion::How::dispatch, [&] {

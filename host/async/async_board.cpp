@@ -5,13 +5,13 @@
 #include <string>
 #include <utility>
 
-#include "../transports/file_descriptor.hpp"
+#include "../../transports/file_descriptor.hpp"
+#include "../board_loop.hpp"
+#include "../commands/command_help.hpp"
+#include "../commands/limits.hpp"
+#include "../commands/link_timing.hpp"
+#include "../standard_registry.hpp"
 #include "async_board_impl.hpp"
-#include "board_loop.hpp"
-#include "commands/command_help.hpp"
-#include "commands/limits.hpp"
-#include "commands/link_timing.hpp"
-#include "standard_registry.hpp"
 
 namespace r4 {
 

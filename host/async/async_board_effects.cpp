@@ -16,10 +16,10 @@ void AsyncBoard::Impl::send_all() {
   }
 }
 
-void AsyncBoard::Impl::tell_news() {
+void AsyncBoard::Impl::notify_all() {
   Effects& effects = session.effects();
-  while (effects.any_news()) {
-    std::visit([this](const auto& news) { tell(news); }, effects.take_news());
+  while (effects.any_events()) {
+    std::visit([this](const auto& event) { notify(event); }, effects.take_event());
   }
 }
 
@@ -38,7 +38,7 @@ SendResult AsyncBoard::Impl::transmit(const Sending& sending) {
   return result;
 }
 
-void AsyncBoard::Impl::tell(const StateCame&) {
+void AsyncBoard::Impl::notify(const StateCame&) {
   if (!is_open()) return;
   const Datagram& datagram = session.effects().datagram();
   if (backlog.keeps_states()) {
@@ -48,12 +48,12 @@ void AsyncBoard::Impl::tell(const StateCame&) {
   }
 }
 
-void AsyncBoard::Impl::tell(const HeartbeatCame&) {
+void AsyncBoard::Impl::notify(const HeartbeatCame&) {
   if (is_open()) call(callbacks.heartbeat, session.effects().datagram());
 }
 
-void AsyncBoard::Impl::tell(const BoardIdentified& news) {
-  const Identity& fresh = news.identity;
+void AsyncBoard::Impl::notify(const BoardIdentified& event) {
+  const Identity& fresh = event.identity;
   identity.firmware.assign(fresh.firmware.data(), fresh.firmware.size());
   identity.board_id.assign(fresh.board_id.data(), fresh.board_id.size());
   identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
@@ -61,17 +61,17 @@ void AsyncBoard::Impl::tell(const BoardIdentified& news) {
   if (paths[0].tap.attached()) name_in_recording();
 }
 
-void AsyncBoard::Impl::tell(const CommandRefused& news) {
-  if (is_open()) call(callbacks.nack, news.nack, session.effects().datagram());
+void AsyncBoard::Impl::notify(const CommandRefused& event) {
+  if (is_open()) call(callbacks.nack, event.nack, session.effects().datagram());
 }
 
-void AsyncBoard::Impl::tell(const BadDatagramCame& news) {
-  if (is_open()) call(callbacks.bad, news.result, news.bytes);
+void AsyncBoard::Impl::notify(const BadDatagramCame& event) {
+  if (is_open()) call(callbacks.bad, event.result, event.bytes);
 }
 
-void AsyncBoard::Impl::tell(const LinkChanged& news) {
-  paths[0].tap.on_link(news.status);
-  tell_paths(news.status);
+void AsyncBoard::Impl::notify(const LinkChanged& event) {
+  paths[0].tap.on_link(event.status);
+  notify_paths(event.status);
   if (!is_open()) return;
   // As it is by then: the one before may have changed it.
   callbacks.link.each([&](auto& one) {
@@ -80,7 +80,7 @@ void AsyncBoard::Impl::tell(const LinkChanged& news) {
 }
 
 // Which have begun to carry, or ceased to; and that one leads to another board.
-void AsyncBoard::Impl::tell_paths(const LinkStatus& status) {
+void AsyncBoard::Impl::notify_paths(const LinkStatus& status) {
   const LinkStatus before_that = std::exchange(told, status);
   for (std::size_t i = 0; i < paths.size(); ++i) {
     if (((before_that.carrying ^ status.carrying) & path_bit(i)) == 0) continue;
@@ -94,23 +94,23 @@ void AsyncBoard::Impl::tell_paths(const LinkStatus& status) {
   }
 }
 
-void AsyncBoard::Impl::tell(const BoardRestarted&) {
+void AsyncBoard::Impl::notify(const BoardRestarted&) {
   ++boots;
   backlog.forget();
   if (is_open()) call(callbacks.restart);
 }
 
-void AsyncBoard::Impl::tell(const ArmingChanged&) {
+void AsyncBoard::Impl::notify(const ArmingChanged&) {
   if (!is_open()) return;
   callbacks.arming.each([&](auto& one) {
     if (may_tell()) guarded([&] { one(session.disarmed_by()); });
   });
 }
 
-void AsyncBoard::Impl::tell(const PostRefused& news) {
-  if (is_open()) call(callbacks.refused, news.refused);
+void AsyncBoard::Impl::notify(const PostRefused& event) {
+  if (is_open()) call(callbacks.refused, event.refused);
 }
 
-void AsyncBoard::Impl::tell(const CommandEnded& news) { waits.end(news.ticket, news.result); }
+void AsyncBoard::Impl::notify(const CommandEnded& event) { waits.end(event.ticket, event.result); }
 
 }  // namespace r4
