@@ -28,7 +28,7 @@ bool AsyncBoard::Impl::only_listens(std::size_t path) const {
   return session.board_role() == BoardRole::watch && carrier(path).is_shared();
 }
 
-SendResult AsyncBoard::Impl::transmit(const Sending& sending) {
+SendResult AsyncBoard::Impl::transmit(const Sending& sending) const {
   if (!has_link()) return SendResult::down;
   const std::size_t path = sending.path;
   const bool may_pass = sending.priority == Priority::stop || sending.priority == Priority::lease;

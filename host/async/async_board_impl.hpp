@@ -191,7 +191,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
 
   // --- what the session wants done
 
-  SendResult transmit(const Sending& sending);
+  SendResult transmit(const Sending& sending) const;
   void notify(const StateCame&);
   void notify(const HeartbeatCame&);
   void notify(const BoardIdentified& event);

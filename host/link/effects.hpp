@@ -89,7 +89,7 @@ class Effects {
   }
   // The datagram that was received last, which the events are about.
   Datagram& datagram() { return datagram_; }
-  void report(SessionEvent event) { events_.push(std::move(event)); }
+  void report(const SessionEvent& event) { events_.push(event); }
 
   bool any_sendings() const { return sendings_.any(); }
   std::unique_ptr<Sending> take_sending() { return sendings_.take(); }
