@@ -313,8 +313,8 @@ void CommandsUnderWay::remove_step() {
 
 bool CommandsUnderWay::delays_arming() {
   for (const Pending& pending : pending_.under_way()) {
-    if (pending.is_step || pending.kind == CommandKind::stop || pending.kind == CommandKind::clear)
-      return true;
+    const bool earlier = pending.kind == CommandKind::clear && pending.ticket < arming_.first();
+    if (pending.is_step || pending.kind == CommandKind::stop || earlier) return true;
   }
   return false;
 }

@@ -86,7 +86,7 @@ class CommandsUnderWay {
   };
   // The step that has ended since the last call.
   std::optional<StepEnd> take_step_end() { return std::exchange(step_end_, {}); }
-  // True if a step, a stop or an E:CLEAR is under way: arm() waits for it.
+  // True if arm() has to wait: for a step, for a stop, or for an E:CLEAR that was asked for before it.
   bool delays_arming();
 
   // --- what is due

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The paths over which a session has its board. This part of a session, without I/O, decides to
-// which paths the session speaks, and which datagrams it takes (docs/redundancy.md). No other code
-// knows how many paths there are.
+// which paths the session speaks, and which datagrams it takes (docs/redundancy.md). Of the other
+// parts only LinkKeeper asks how many paths there are, to send a lease over each.
 //
 //             up           its board answers Q:ID             a datagram comes
 //     down -------> asking -----------------------> silent <-------------------> carrying

@@ -192,6 +192,20 @@ TEST_F(SessionArming, DoesNotClearTheSameCauseTwice) {
   EXPECT_EQ(link.count('E'), 1U);
 }
 
+TEST_F(SessionArming, DoesNotWaitForAnEClearThatWasAskedForAfterIt) {
+  link.heartbeat(SafeReason::stop);
+  const Ticket ticket = link.session.arm(1s, link.now);
+  const Ticket clear = link.session.send(Command::clear(), 1s, link.now);
+  link.pass(1ms);
+  ASSERT_EQ(link.count('E'), 1U) << "the step of arm()";
+  execute('E');
+  execute('R', SafeReason::none, true);
+  EXPECT_EQ(outcome(ticket), Outcome::confirmed);
+  link.pass(1ms);
+  execute('E', SafeReason::none, true);
+  EXPECT_EQ(outcome(clear), Outcome::confirmed);
+}
+
 TEST_F(SessionArming, AnArmThatFollowsARefusedOneAtOnceClearsAnew) {
   link.heartbeat(SafeReason::stop);
   const Ticket first = arm();
