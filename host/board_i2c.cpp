@@ -88,7 +88,7 @@ void Board::attach(const Device& device, Duration timeout) {
   const std::string text = device.text();
   require_timeout(text, timeout);
   const auto impl = impl_;
-  require_control(impl->role, text);
+  impl->require_control(text);
   const Duration each = Impl::bounded(timeout);
   const auto obstacle = std::make_shared<std::optional<Problem>>();
   const auto attach = [&async = impl->async, device, each, obstacle](Duration, auto end) {

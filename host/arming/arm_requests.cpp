@@ -91,6 +91,7 @@ std::optional<Command> ArmRequests::next_step(SafeReason reason, Time now) {
 // cancelled with its requests.
 void ArmRequests::on_step(CommandKind kind, const CommandResult& result, SafeReason reason,
                           bool supply_open, Time now) {
+  if (requests_.empty()) return;
   if (result.outcome == Outcome::refused) end(result.outcome, result.code, now);
   if (result.outcome != Outcome::confirmed || kind != CommandKind::relay) return;
   if (reason != SafeReason::none || supply_open) return;

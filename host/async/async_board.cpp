@@ -226,8 +226,11 @@ void AsyncBoard::start_release_control(Duration timeout, CompletionPtr completio
   };
   impl.begin(
       CompletionPtr(new Farewell(impl, then, std::move(completion))),
-      [&] { return impl.session.release_control(Impl::time_of(timeout), impl.now); }, 0,
-      Outcome::none);
+      [&] {
+        impl.cancel_waits();
+        return impl.session.release_control(Impl::time_of(timeout), impl.now);
+      },
+      0, Outcome::none);
 }
 
 void AsyncBoard::require_link_timing(Duration board_timeout, Duration heartbeat) const {

@@ -66,8 +66,7 @@ void AsyncBoard::Impl::end_entry(Time late) {
 void AsyncBoard::Impl::on_sleep() {
   backlog.on_sleep();
   session.on_sleep(now);
-  waits.end_conditions([](const Waits::Condition&) { return std::optional(Outcome::cancelled); },
-                       now);
+  cancel_waits();
   poll_wanted = true;
 }
 
@@ -144,6 +143,7 @@ void AsyncBoard::Impl::cancel(Ticket id) {
     const Ticket ticket = waits.cancel(id, now);
     if (ticket == 0) return;
     session.cancel(ticket, now);
+    notify_all();                             // with what is known of the command
     waits.end(ticket, {Outcome::cancelled});  // of a stop, which goes on
     poll_wanted = true;
   });
@@ -227,17 +227,28 @@ void AsyncBoard::Impl::close() {
   enter(Completion::How::post, [this] { session.end_all(now); });
 }
 
-// All paths, or none. Each begins anew: its transport may be opened again, at another port.
+void AsyncBoard::Impl::cancel_waits() {
+  waits.end_conditions([](const Waits::Condition&) { return std::optional(Outcome::cancelled); },
+                       now);
+}
+
+// Control is taken on all paths, or on none; nothing keeps a board from being watched. Each path begins
+// anew: its transport may be opened again, at another port.
 void AsyncBoard::Impl::become(BoardRole role) {
   std::size_t changed = 0;
   try {
     for (; changed < paths.size(); ++changed) carrier(changed).change_role(role);
-  } catch (const Error&) {
-    for (std::size_t i = 0; i < changed; ++i) carrier(i).change_role(session.board_role());
-    throw;
+  } catch (...) {
+    if (role == BoardRole::control) {
+      for (std::size_t i = 0; i < changed; ++i) carrier(i).change_role(session.board_role());
+      throw;
+    }
+    guarded([] { throw; });
+    while (++changed < paths.size()) guarded([&] { carrier(changed).change_role(role); });
   }
   enter(Completion::How::post, [&] {
     session.change_role(role, now);
+    if (role == BoardRole::watch) cancel_waits();
     for (const auto& path : paths) {
       if (!path->carrier->up()) continue;
       session.on_transport(path->index, true, now, !only_listens(path->index));

@@ -2,7 +2,7 @@
 // What is behind an AsyncBoard: a session, its paths and its timer, and who waits for what.
 //
 // Every call of the session is made inside enter(), which then sends what the session wants to be sent. The
-// outermost one then reports its events and results, and sets the timer.
+// outermost enter() also reports events and results, and sets the timer. on_datagram() reports at once.
 #pragma once
 
 #include <array>
@@ -125,7 +125,13 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void begin(CompletionPtr completion, Start start, Ticket id = 0,
              Outcome not_taken = Outcome::full) {
     enter(Completion::How::post, [&] {
-      const Ticket ticket = is_open() ? start() : 0;
+      Ticket ticket = 0;
+      try {
+        if (is_open()) ticket = start();
+      } catch (const Error&) {
+        if (id == 0) throw;  // a later step: control may have been released since
+        not_taken = Outcome::cancelled;
+      }
       if (ticket != 0) {
         if (id == 0) completion->listen(Cancel(weak_from_this(), id = ticket));
         waits.add(ticket, id, std::move(completion));
@@ -165,6 +171,8 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   Ticket leave(Time timeout);
   void close();
   void become(BoardRole role);
+  // Conditions that a program waits for end, because control is released.
+  void cancel_waits();
 
   void record(const std::shared_ptr<Recorder>& recorder);
   void name_in_recording();

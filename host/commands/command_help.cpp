@@ -180,7 +180,7 @@ Problem failed_transfer(std::string_view command, I2cOutcome outcome) {
   Problem problem{ErrorKind::refused, std::string(command), to_text(outcome), ""};
   switch (outcome) {
     case I2cOutcome::no_acknowledge:
-      problem.fix = "X:SCAN shows which addresses answer; look at supply, paths and pull-ups";
+      problem.fix = "X:SCAN shows which addresses answer; look at supply, wires and pull-ups";
       break;
     case I2cOutcome::bus_stuck:
       problem.fix =

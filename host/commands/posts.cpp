@@ -31,6 +31,7 @@ PostResult Posts::begin(Outbox::Sent sent, const Command& command, bool is_group
   posted = {true, is_group, sent.pnum, command};
   posted.command.text = posted.command.text2 = Text();
   delivery_.begin(sent);
+  kind_ = command.kind;
   return sent.paths != 0 ? PostResult::sent : result();
 }
 

@@ -25,6 +25,8 @@ class Posts {
   void on_sent(const Sending& sending, SendResult result) { delivery_.on_sent(sending, result); }
   // What became of the last one, when its effects are done.
   PostResult result();
+  // True if the last one was an E:CLEAR.
+  bool is_clear() const { return kind_ == CommandKind::clear; }
   // The board has proved that it did not execute that command.
   void on_refusal(const Nack& nack);
 
@@ -45,6 +47,7 @@ class Posts {
   Outbox& outbox_;
   Statistics& counts_;
   Delivery delivery_;
+  CommandKind kind_ = CommandKind::heartbeat;
   // As many as the board remembers, by packet number. Empty until the first post, and the first group.
   std::vector<Posted> posted_;
   std::vector<Setpoints> groups_;

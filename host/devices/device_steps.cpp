@@ -79,7 +79,7 @@ std::optional<Problem> trouble_with(const Device& device, const DeviceStep& step
     problem.fix = "set it up again";
   } else if (answer.outcome != I2cOutcome::done) {
     problem.reason = fmt::format("it does not answer: {}", to_text(answer.outcome));
-    problem.fix = "X:SCAN shows which addresses answer; look at supply, paths and pull-ups";
+    problem.fix = "X:SCAN shows which addresses answer; look at supply, wires and pull-ups";
   } else if (!step.expected.empty() && !std::equal(answer.data.begin(), answer.data.end(),
                                                    step.expected.begin(), step.expected.end())) {
     problem.reason = fmt::format("it is another device: its register {} has {}, not {}", step.bytes,

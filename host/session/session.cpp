@@ -196,10 +196,15 @@ PostResult Session::post(const Command& command, Time now) {
     return PostResult::not_armed;
   }
   if (commands_.is_group_ahead()) return PostResult::queue_full;
-  if (command.kind != CommandKind::clear) return posts_.send(command, now);
-  commands_.forget_stop();  // a program that clears a stop does not repeat it
-  const bool named = command.value != Command::unnamed_cause;
-  return posts_.send(named ? command : Command::clear(commands_.cause()), now);
+  const bool unnamed =
+      command.kind == CommandKind::clear && command.value == Command::unnamed_cause;
+  return posts_.send(unnamed ? Command::clear(commands_.cause()) : command, now);
+}
+
+PostResult Session::posted() {
+  const PostResult result = posts_.result();
+  if (result && posts_.is_clear()) commands_.forget_stop();  // the program does not repeat it
+  return result;
 }
 
 PostResult Session::post(const Setpoints& group, Time now) {
@@ -213,7 +218,7 @@ PostResult Session::post(const Setpoints& group, Time now) {
     return PostResult::not_armed;
   }
   if (commands_.is_group_ahead()) return PostResult::queue_full;
-  if (!commands_.knows_groups(now)) return PostResult::no_link;
+  if (!commands_.knows_groups(now) || posts_apart()) return PostResult::no_link;
   return posts_.send(group, now);
 }
 

@@ -119,7 +119,7 @@ class Session {
   PostResult post(const Command& command, Time now);
   // no_link also as long as it is not known whether the board executes groups.
   PostResult post(const Setpoints& group, Time now);
-  PostResult posted() { return posts_.result(); }
+  PostResult posted();
   // True if the board executes no groups: then their commands are to be posted one after the other.
   bool posts_apart() const { return board_.groups().state() == GroupSupport::State::apart; }
 

@@ -71,7 +71,7 @@ void Session::on_state(std::size_t path, const Datagram& datagram, Time now) {
   commands_.on_state(now);
   take_step_end(now);
   const std::optional<bool> supply_closed = board_.supply();
-  if (keeper_.is_up() && supply_closed) arming_.on_supply(*supply_closed);
+  if (newest && keeper_.is_up() && supply_closed) arming_.on_supply(*supply_closed);
   keeper_.select_fields(now);
   if (keeper_.in_control(now) != status_.in_control) refresh(now);
   effects_.report(StateCame{});

@@ -120,5 +120,25 @@ TEST_F(AsyncBoardCancellation, IsWhatACoroutineDoesThatWaitsForTheFirstOfTwo) {
   EXPECT_EQ(first, 1U) << "the timer, and the command did not keep it waiting";
 }
 
+TEST(AsyncBoardCancel, TellsByWhichNumberTheCommandWasSent) {
+  asio::io_context io;
+  AsyncBoard board(io, "sim:", at_will());
+  asio::cancellation_signal signal;
+  std::optional<CommandResult> result;
+  board.open();
+  board.async_wait_active(5s, [&](const CommandResult&) {
+    board.async_send(run_motor, 5s,
+                     asio::bind_cancellation_slot(signal.slot(), [&](const CommandResult& r) {
+                       result = r;
+                       board.close();
+                     }));
+    signal.emit(asio::cancellation_type::terminal);  // it is on its way
+  });
+  io.run_for(10s);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->outcome, Outcome::cancelled);
+  EXPECT_NE(result->pnum, 0U);
+}
+
 }  // namespace
 }  // namespace r4::test

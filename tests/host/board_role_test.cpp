@@ -112,7 +112,7 @@ TEST_P(BoardRoles, AreTakenAndGivenBackAgainAndAgain) {
 }
 
 TEST_P(BoardRoles, KeepRecordingsStatisticsAndWhoItIs) {
-  const std::string path = testing::TempDir() + "board_roles.r4log";
+  const std::string path = testing::TempDir() + "board_roles-" + std::to_string(::getpid());
   Recording recording(path);
   board.record(recording);
   board.open();

@@ -56,6 +56,8 @@ def test_the_papers_udp_client_drives_a_board_on_a_serial_port(board):
     peer = f'127.0.0.1:{listening.getsockname()[1]}'
     with listening, sending, Bridge(f'udp://127.0.0.1:0?peer={peer}', f'serial://{board.tty}') as bridge:
         port = int(bridge.url.split('?')[0].rsplit(':', 1)[1])
+        # A machine that stands still for a moment makes some late. None vanishes.
+        fates = ('passed', 'late', 'undelivered', 'kept_out')
         client = PaperClient(lambda data: sending.sendto(data, ('127.0.0.1', port)))
         bridge.counters('board', lambda each: each['passed'] or each['undelivered'])  # the board has told that it has no key
         end = time.monotonic() + LASTS_S
@@ -65,15 +67,15 @@ def test_the_papers_udp_client_drives_a_board_on_a_serial_port(board):
             except TimeoutError:
                 pass
         log = board.rest()
+        if not SANITIZED:
+            bridge.counters('hosts', lambda each: sum(each[name] for name in fates) == client.pnum_sent)
         told = bridge.rest()
     assert not [each for each in log if each.get('state') == 'SAFE'], 'while the client was there'
     assert [each for each in log if each.get('state') == 'ACTIVE']
     assert len(client.states) >= 50 * LASTS_S or SANITIZED
     assert ';DHB1A:1000,1;' in client.states[-1] and ';SERVO1POS:300;' in client.states[-1]
     hosts = [each for each in told if each.get('side') == 'hosts' and each['type'] == 'counters'][-1]
-    # A machine that stands still for a moment makes some late; none vanishes. Before the client is served, 16 pass at once.
-    counted = sum(hosts[each] for each in ('passed', 'late', 'undelivered', 'kept_out'))
-    assert counted == client.pnum_sent or SANITIZED
+    # Before the client is served, 16 pass at once.
     assert hosts['kept_out'] <= 16 or SANITIZED
     assert hosts['passed'] > 0.95 * client.pnum_sent
     assert hosts['damaged'] == hosts['misdirected'] == hosts['refused'] == 0

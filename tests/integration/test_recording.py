@@ -65,11 +65,11 @@ def test_records_beside_a_program_that_drives(board, tmp_path, name):
     assert not [each for each in board.log if each.get('reason') == 'watchdog']
     (told,), code = info(path)
     assert code == 0 and told['ended'] and not told['damage'], told
-    path = told['paths'][0]
-    assert path['name'] == 'sim-1' and path['url'].startswith('udp://127.0.0.1:')
-    assert path['damaged'] == 0 and path['lost'] == 0 and path['states'] >= 10, path
-    assert path['safe']['link'] >= 1
-    assert path['heartbeats'] == 0, 'who watches sends none'
+    heard = told['paths'][0]
+    assert heard['name'] == 'sim-1' and heard['url'].startswith('udp://127.0.0.1:')
+    assert heard['damaged'] == 0 and heard['lost'] == 0 and heard['states'] >= 10, heard
+    assert heard['safe']['link'] >= 1
+    assert heard['heartbeats'] == 0, 'who watches sends none'
     lines = [line for line in text_of(path).splitlines() if ' 1< ' in line]
     assert run('decode', stdin='\n'.join(line.split('< ', 1)[1] for line in lines)).returncode == 0
     assert lines == sorted(lines, key=lambda line: float(line.split(' ')[0]))

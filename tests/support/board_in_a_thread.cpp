@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "board_in_a_thread.hpp"
 
+#include <fcntl.h>
+
 #include <asio/executor_work_guard.hpp>
 #include <asio/post.hpp>
 #include <future>
@@ -52,8 +54,16 @@ BoardInAThread::BoardInAThread(const std::vector<std::string>& transports,
 
 BoardInAThread::~BoardInAThread() { switch_off(); }
 
+// The system gives the number of a pty to the next one as soon as nobody has it open. A host that waits
+// for this board would find the board of another test there.
 void BoardInAThread::switch_off() {
   if (!thread_.joinable()) return;
+  for (const std::string& url : urls_) {
+    const std::string scheme = "serial://";
+    if (!url.starts_with(scheme)) continue;
+    ptys_.emplace_back(
+        ::open(url.c_str() + scheme.size(), O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  }
   run([](sim::SimulatedBoard& board) { board.stop(); });
   io_.stop();
   thread_.join();

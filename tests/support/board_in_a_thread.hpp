@@ -12,6 +12,7 @@
 
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "r4link/board.hpp"
+#include "transports/file_descriptor.hpp"
 
 namespace r4::test {
 
@@ -47,6 +48,7 @@ class BoardInAThread {
  private:
   asio::io_context io_;
   std::vector<std::string> urls_;
+  std::vector<FileDescriptor> ptys_;  // kept open
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::string> executed_;

@@ -220,5 +220,22 @@ TEST_F(AsyncAttachUnarmed, WhatIsToBeWrittenTakesArm) {
   EXPECT_EQ(attach(imu).outcome, Outcome::confirmed);
 }
 
+TEST_F(AsyncAttach, EndsAsCancelledWhenControlIsReleasedWhileTheDeviceIsGivenTime) {
+  std::optional<CommandResult> attached, released, waited;
+  board_.async_wait_active(5s, [](const CommandResult&) {});
+  run_until([&] { return board_.in_control(); });
+  const std::uint64_t before = commands();
+  board_.async_attach(slow(), 20s, [&](const CommandResult& r) { attached = r; });
+  run_until([&] { return commands() >= before + 2; });  // the check, then the write
+  run_until([&, end = std::chrono::steady_clock::now() + 100ms] {
+    return std::chrono::steady_clock::now() > end;
+  });
+  ASSERT_FALSE(attached);
+  board_.async_release_control(2s, [&](const CommandResult& r) { released = r; });
+  run_until([&] { return attached && released; });
+  EXPECT_EQ(attached->outcome, Outcome::cancelled);
+  EXPECT_EQ(released->outcome, Outcome::confirmed);
+}
+
 }  // namespace
 }  // namespace r4::test

@@ -5,6 +5,7 @@
 #include "host/commands/command_help.hpp"
 #include "r4link/link.hpp"
 #include "scripted_link.hpp"
+#include "tests/support/datagrams.hpp"
 
 namespace r4::test {
 namespace {
@@ -216,6 +217,19 @@ TEST_F(SessionArming, AnArmThatFollowsARefusedOneAtOnceClearsAnew) {
   execute('E');
   execute('R', SafeReason::none, true);
   EXPECT_EQ(outcome(second), Outcome::confirmed);
+}
+
+TEST_F(SessionArming, AStateThatAHeartbeatHasOvertakenTellsNothingOfTheMotorSupply) {
+  armed();
+  link.pass(20ms);
+  const std::uint32_t number =
+      link.board_pnum++;  // sent before the heartbeat, while relay 1 was open
+  const std::uint32_t t_ms = link.board_ms();
+  link.pass(5ms);
+  link.heartbeat();
+  link.raw(with_crc("RELAYS:0;SAFE:1;CMD:" + std::to_string(cmd) +
+                    ";PNum:" + std::to_string(number) + ";T:" + std::to_string(t_ms) + ";"));
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::none);
 }
 
 // --- what may have come before the session

@@ -249,5 +249,20 @@ TEST(SessionGroupArming, IsHeldBackUntilTheProgramIsArmed) {
   EXPECT_EQ(link.count('O'), 0U);
 }
 
+TEST_F(SessionGroup, IsNotPostedAsOneDatagramWhenTheBoardIsFoundToKnowNoGroups) {
+  link.heartbeat();  // of a board that answers nothing
+  PostResult last = PostResult::no_link;
+  for (int i = 0; i < 100; ++i) {
+    link.pass(100ms);
+    link.state("AIN24:24.28;");
+    last = post();
+    if (last == PostResult::sent) break;
+    EXPECT_EQ(link.count('O'), 0U);
+  }
+  EXPECT_EQ(last, PostResult::sent);
+  ASSERT_EQ(link.count('O'), 2U) << "one after the other";
+  EXPECT_EQ(fields(link.all('O')[0]), "O:358,1,1;");
+}
+
 }  // namespace
 }  // namespace r4::test

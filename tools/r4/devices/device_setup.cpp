@@ -61,7 +61,7 @@ void DeviceSetup::look_for_resets() {
       told_({ErrorKind::refused, devices_[i].text(),
              "it is not set up, as after a reset: its values are not measurements",
              in_control
-                 ? "it is set up again; look at its supply and paths if that repeats"
+                 ? "it is set up again; look at its supply and wires if that repeats"
                  : "the program that controls the board sets it up: give it this device, too",
              Outcome::refused});
     }
@@ -110,7 +110,7 @@ void DeviceSetup::on_result(const CommandResult& result) {
     progress.again = Clock::now() + retry_interval;
     tell(result);
   }
-  if (!begin_next(next_ + 1)) look_later();
+  if (!board_.in_control() || !begin_next(next_ + 1)) look_later();
 }
 
 void DeviceSetup::tell(const CommandResult& result) {

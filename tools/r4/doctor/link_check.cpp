@@ -188,7 +188,7 @@ Findings judge_link(const std::string& url, const LinkSample& sample) {
               known ? sample.link.reason
                     : "the board does not answer a question: it does not hear this computer",
               known ? sample.link.fix
-                    : "look at the way to the board (its RX path, firewall): r4 bench " + url,
+                    : "look at the way to the board (its RX wire, firewall): r4 bench " + url,
               ErrorKind::refused));
   } else if (sample.answer_us > slow_answer_us) {
     findings.push_back(found(url, Severity::warning, "link.answer",
