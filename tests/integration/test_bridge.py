@@ -66,9 +66,9 @@ def test_the_papers_udp_client_drives_a_board_on_a_serial_port(board):
                 client.take(listening.recv(1024))
             except TimeoutError:
                 pass
-        log = board.rest()
         if not SANITIZED:
             bridge.counters('hosts', lambda each: sum(each[name] for name in fates) == client.pnum_sent)
+        log = board.rest()
         told = bridge.rest()
     assert not [each for each in log if each.get('state') == 'SAFE'], 'while the client was there'
     assert [each for each in log if each.get('state') == 'ACTIVE']
