@@ -221,7 +221,7 @@ TEST_F(AsyncAttachUnarmed, WhatIsToBeWrittenTakesArm) {
 }
 
 TEST_F(AsyncAttach, EndsAsCancelledWhenControlIsReleasedWhileTheDeviceIsGivenTime) {
-  std::optional<CommandResult> attached, released, waited;
+  std::optional<CommandResult> attached, released;
   board_.async_wait_active(5s, [](const CommandResult&) {});
   run_until([&] { return board_.in_control(); });
   const std::uint64_t before = commands();
