@@ -148,7 +148,7 @@ class BoardsProcess : public ChildProcess {
 
 // Microseconds a datagram of one board as fast as it goes.
 double alone_us() {
-  BoardProcess process(PathStatus::udp, true);
+  BoardProcess process(Transport::udp, true);
   asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE};
   AsyncBoard board(io, process.url(), test::at_will());
   board.open();
