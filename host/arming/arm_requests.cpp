@@ -5,12 +5,6 @@
 
 namespace r4 {
 
-namespace {
-
-constexpr int supply_relay = 1;
-
-}  // namespace
-
 bool ArmRequests::add(Ticket ticket, std::int32_t cause, Time deadline, Time now) {
   if (requests_.size() == max_requests) return false;
   requests_.push_back({ticket, cause, now, deadline});
@@ -79,7 +73,7 @@ std::optional<Command> ArmRequests::next_step(SafeReason reason, Time now) {
     case ArmingMachine::Step::clear:
       return Command::clear();
     case ArmingMachine::Step::close:
-      return Command::relay(supply_relay, true);
+      return Command::relay(HeardBoard::supply_relay, true);
     case ArmingMachine::Step::fail:
       end(Outcome::not_armed, Refusal::none, now);
       break;

@@ -22,6 +22,7 @@
 
 #include "../link/command_ends.hpp"
 #include "../link/effects.hpp"
+#include "../link/heard_board.hpp"
 #include "../measurement/time.hpp"
 #include "arming.hpp"
 #include "r4link/command.hpp"

@@ -9,10 +9,10 @@ namespace r4 {
 
 void AsyncBoard::Impl::send_all() {
   Effects& effects = session.effects();
+  Effects::Room room;
   while (effects.any_sendings()) {
-    std::unique_ptr<Sending> sending = effects.take_sending();
-    session.on_sent(*sending, transmit(*sending), now);
-    effects.give_back(std::move(sending));
+    const Sending sending = effects.take_sending(room);
+    session.on_sent(sending, transmit(sending), now);
   }
 }
 
@@ -33,8 +33,8 @@ SendResult AsyncBoard::Impl::transmit(const Sending& sending) const {
   const std::size_t path = sending.path;
   const bool may_pass = sending.priority == Priority::stop || sending.priority == Priority::lease;
   if (only_listens(path) && !may_pass) return SendResult::down;
-  const SendResult result = carrier(path).send(sending.datagram(), sending.priority);
-  if (result == SendResult::sent) paths[path].tap.on_sent(sending.datagram());
+  const SendResult result = carrier(path).send(sending.datagram, sending.priority);
+  if (result == SendResult::sent) paths[path].tap.on_sent(sending.datagram);
   return result;
 }
 

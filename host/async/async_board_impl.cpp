@@ -161,7 +161,7 @@ void AsyncBoard::Impl::open() {
     const bool opened = open_path(*path, problem);
     any = any || opened;
     all = all && opened;
-    if (phase != Phase::made) return;  // closed by the callback that was told that it is open
+    if (phase != Phase::made) return;  // the callback for `up` has closed the board
   }
   if (!any) throw Error(*problem);
   for (const auto& path : paths) {

@@ -3,11 +3,10 @@
 // itself calls nobody.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <variant>
@@ -29,10 +28,7 @@ struct Sending {
   Priority priority = Priority::normal;
   CommandKind kind = CommandKind::heartbeat;
   std::uint32_t pnum = 0;
-  std::size_t size = 0;
-  std::array<char, max_datagram> bytes;
-
-  std::string_view datagram() const { return {bytes.data(), size}; }
+  std::string_view datagram;
 };
 
 // A newer state of the board has come, and a heartbeat.
@@ -74,26 +70,28 @@ using SessionEvent =
 // Memory is used again: in the steady state nothing is allocated.
 class Effects {
  public:
+  // Space for one datagram.
+  using Room = std::array<char, max_datagram>;
+
   void send(std::size_t path, Priority priority, CommandKind kind, std::uint32_t pnum,
-            std::string_view bytes) {
-    if (free_.empty()) free_.push_back(std::make_unique<Sending>());
-    Sending& sending = *free_.back();
-    sending.path = path;
-    sending.priority = priority;
-    sending.kind = kind;
-    sending.pnum = pnum;
-    sending.size = bytes.size();
-    std::copy(bytes.begin(), bytes.end(), sending.bytes.begin());
-    sendings_.push(std::move(free_.back()));
-    free_.pop_back();
+            std::string_view datagram) {
+    sendings_.push({{path, priority, kind, pnum, {}}, bytes_.size(), datagram.size()});
+    bytes_ += datagram;
   }
   // The datagram that was received last, which the events are about.
   Datagram& datagram() { return datagram_; }
   void report(const SessionEvent& event) { events_.push(event); }
 
   bool any_sendings() const { return sendings_.any(); }
-  std::unique_ptr<Sending> take_sending() { return sendings_.take(); }
-  void give_back(std::unique_ptr<Sending> sending) { free_.push_back(std::move(sending)); }
+  // The first. Its datagram is copied to `room`: while a transport sends it, the session may want more
+  // to be sent.
+  Sending take_sending(Room& room) {
+    Stored first = sendings_.take();
+    bytes_.copy(room.data(), first.size, first.begin);
+    if (!sendings_.any()) bytes_.clear();
+    first.sending.datagram = {room.data(), first.size};
+    return first.sending;
+  }
   bool any_events() const { return events_.any(); }
   SessionEvent take_event() { return events_.take(); }
 
@@ -118,8 +116,14 @@ class Effects {
     std::size_t taken_ = 0;
   };
 
-  Queue<std::unique_ptr<Sending>> sendings_;
-  std::vector<std::unique_ptr<Sending>> free_;
+  struct Stored {
+    Sending sending;
+    std::size_t begin = 0;  // of its datagram, in bytes_
+    std::size_t size = 0;
+  };
+
+  Queue<Stored> sendings_;
+  std::string bytes_;  // of the datagrams to be sent
   Queue<SessionEvent> events_;
   Datagram datagram_;
 };

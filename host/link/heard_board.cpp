@@ -6,7 +6,7 @@ namespace r4 {
 namespace {
 
 // The board's clock needs more questions than the program wants: at first until the error is small,
-// later where it is not. The interval is no whole number of milliseconds, because the board's clock
+// later where it is not. The interval is not a whole number of milliseconds, because the board's clock
 // counts these, and so shows where they begin.
 constexpr Time soon_interval{102'300};
 constexpr Time first_goal{500}, later_goal{1'000};

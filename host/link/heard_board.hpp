@@ -16,6 +16,9 @@ namespace r4 {
 
 class HeardBoard {
  public:
+  // The relay of the motor supply (paper section 2).
+  static constexpr int supply_relay = 1;
+
   // `identify_interval`: from one question Q:ID to the next; 0: none is sent.
   explicit HeardBoard(Time identify_interval)
       : identify_interval_(identify_interval), question_(identify_interval) {}
@@ -31,9 +34,10 @@ class HeardBoard {
 
   const ReceivedState& state() const { return state_; }
   const BoardClock& clock() const { return clock_; }
-  // True if the states tell how relay 1, the motor supply, is, and it is open.
+  // True if the states show that relay 1 is open.
   bool supply_is_open() const { return state_.present.has(StateField::relays) && !supply_closed(); }
-  // The newest state, while nothing kept the outputs off, told whether relay 1 is closed.
+  // Whether relay 1 is closed; none if the newest state does not tell it, or something keeps the
+  // outputs off.
   std::optional<bool> supply() const;
   // True if the board obeys a farewell (E:LEAVE), or may.
   bool may_know_leave() const { return knows_leave_.value_or(confirms()); }
@@ -52,7 +56,6 @@ class HeardBoard {
   void asked(std::uint32_t pnum, Time now) { question_.asked(pnum, now); }
 
  private:
-  static constexpr int supply_relay = 1;
   bool supply_closed() const { return (state_.relays & 1U << (supply_relay - 1)) != 0; }
   Time question_interval() const;
 

@@ -113,11 +113,10 @@ class DrivenSession : public Session {
     return result;
   }
   void perform(Time now) {
+    Effects::Room room;
     while (effects().any_sendings()) {
-      auto sending = effects().take_sending();
-      on_sent(*sending, handler_.transmit(sending->path, sending->datagram(), sending->priority),
-              now);
-      effects().give_back(std::move(sending));
+      const Sending sending = effects().take_sending(room);
+      on_sent(sending, handler_.transmit(sending.path, sending.datagram, sending.priority), now);
     }
     while (effects().any_events()) {
       std::visit([this](const auto& event) { notify(event); }, effects().take_event());
