@@ -31,6 +31,7 @@
 
 namespace r4 {
 
+// It has more than 15 members: they are grouped by the thread that may touch them.
 struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
   struct Call final : BlockingLoop::Call {
     CommandResult result;

@@ -34,6 +34,8 @@
 
 namespace r4 {
 
+// It has more than 15 members: a list of callbacks for each of eight kinds, and the others grouped by the
+// thread that may touch them.
 class CallbackThread {
  public:
   using Clock = std::chrono::steady_clock;

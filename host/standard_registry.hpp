@@ -20,9 +20,9 @@ const Registry& standard_registry();
 std::unique_ptr<Carrier> make_host_carrier(asio::io_context& io, std::string_view url,
                                            BoardRole role);
 
-// Those of several paths to one board; a text may join several (url_pattern.hpp). Throws Error{usage} for none, for more than a session has, for the same one
-// twice, and for several of which one is a board of its own (sim:, replay:). Of several udp: URLs only the first
-// has the port of hosts, unless they name one.
+// The carriers of all paths to one board. A text may join URLs (url_pattern.hpp). Throws Error{usage} for
+// no URL, for more than a session has paths, for the same one twice, and if one beside others is a board of
+// its own (sim:, replay:). Of the udp: URLs only the first has the port of hosts, unless they name one.
 std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
                                                          const std::vector<std::string>& urls,
                                                          BoardRole role);

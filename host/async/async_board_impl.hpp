@@ -32,6 +32,10 @@
 namespace r4 {
 
 // Outlives the AsyncBoard where a callback or handler destroys that.
+//
+// It has more than 15 members and 40 functions, because every function of AsyncBoard ends here and each
+// kind of event has a function of its own. A job of its own has a class: Session, BoardPaths, Waits,
+// Backlog.
 struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<AsyncBoard::Impl> {
   using Waits = r4::Waits<CompletionPtr>;
   struct Callbacks {

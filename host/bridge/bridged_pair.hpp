@@ -47,6 +47,8 @@
 
 namespace r4 {
 
+// It has more than 15 members: the two sides, a class for each rule that a datagram passes, and what the bridge
+// knows of the board for answers in its place.
 class BridgedPair {
  public:
   using Time = std::chrono::steady_clock::time_point;

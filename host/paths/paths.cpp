@@ -77,6 +77,7 @@ PathSet Paths::to_ask(Time now) const {
 void Paths::asked(std::size_t index, std::uint32_t pnum, bool sent, Time now) {
   Path& path = paths_[index];
   PathQuestions& questions = path.questions;
+  if (!sent && questions.ask_at > now) return;  // not a question of this part
   const Time again = now + (path.other ? ask_other_interval : ask_interval);
   questions.asked_at = now;
   questions.ask_at = path.known && sent ? Time::max() : again;

@@ -41,6 +41,7 @@
 
 namespace r4 {
 
+// It has more than 40 functions: what is true of one path has a private function with a name.
 class Paths {
  public:
   // `link`: what the session knows of the board.

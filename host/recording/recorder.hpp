@@ -26,6 +26,7 @@
 
 namespace r4 {
 
+// It has more than 15 members: they are grouped by the thread that may touch them.
 class Recorder {
  public:
   // Opens the file. Throws Error.

@@ -44,6 +44,7 @@
 
 namespace r4 {
 
+// It has more than 40 functions: most are its interface, and hand over to one part each.
 class Session {
  public:
   // `random` gives 64 random bits at each call.

@@ -41,14 +41,6 @@ struct AsyncBoardClose : testing::Test {
   auto told() {
     return [this](const CommandResult& result) { end = result; };
   }
-  bool is_safe() {
-    bool safe = false;
-    simulated.run([&](sim::SimulatedBoard& each) {
-      safe = each.application().reason() == SafeReason::link &&
-             each.application().outputs().osmc[0].pwm == 0;
-    });
-    return safe;
-  }
 
   BoardInAThread simulated{"udp"};
   asio::io_context io;
@@ -62,7 +54,7 @@ TEST_F(AsyncBoardClose, IsConfirmedWhenTheBoardIsSafe) {
   EXPECT_FALSE(end) << "not inside the call";
   ASSERT_TRUE(run_until([&] { return end.has_value(); }));
   EXPECT_EQ(end->outcome, Outcome::confirmed);
-  EXPECT_TRUE(is_safe());
+  EXPECT_TRUE(simulated.is_without_host());
 }
 
 TEST_F(AsyncBoardClose, TellsNothingFromTheCallOnAndTakesNothing) {
@@ -77,7 +69,7 @@ TEST_F(AsyncBoardClose, TellsNothingFromTheCallOnAndTakesNothing) {
   EXPECT_EQ(board->post(Command::osmc(5, Direction::forward, 1)), PostResult::no_link);
   ASSERT_TRUE(run_until([&] { return end && late; }));
   EXPECT_EQ(late->outcome, Outcome::closed);
-  EXPECT_TRUE(is_safe());
+  EXPECT_TRUE(simulated.is_without_host());
 }
 
 TEST_F(AsyncBoardClose, EndsWhatIsUnderWay) {

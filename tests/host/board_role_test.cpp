@@ -63,14 +63,6 @@ struct BoardRoles : testing::TestWithParam<std::vector<std::string>> {
   Outcome release() {
     return end_of([&](auto end) { board.async_release_control(2s, end); });
   }
-  bool is_safe() {
-    bool safe = false;
-    simulated.run([&](sim::SimulatedBoard& each) {
-      safe = each.application().reason() == SafeReason::link &&
-             each.application().outputs().osmc[0].pwm == 0;
-    });
-    return safe;
-  }
 
   BoardInAThread simulated{GetParam()};
   asio::io_context io;
@@ -101,7 +93,7 @@ TEST_P(BoardRoles, AreTakenAndGivenBackAgainAndAgain) {
     EXPECT_EQ(board.state().osmc[0].pwm, 358);
     ASSERT_TRUE(hears_more_states());
     EXPECT_EQ(release(), Outcome::confirmed);
-    EXPECT_TRUE(is_safe());
+    EXPECT_TRUE(simulated.is_without_host());
     EXPECT_EQ(board.role(), BoardRole::watch);
     EXPECT_EQ(board.disarmed_by(), DisarmCause::not_yet);
     ASSERT_TRUE(hears_more_states());
@@ -185,7 +177,7 @@ TEST_P(BoardRoles, EndWithTheBoard) {
   EXPECT_EQ(released->outcome, Outcome::closed);
   EXPECT_TRUE(closed->outcome == Outcome::confirmed || closed->outcome == Outcome::refused)
       << "the first farewell may have been obeyed already";
-  EXPECT_TRUE(is_safe());
+  EXPECT_TRUE(simulated.is_without_host());
   EXPECT_EQ(problem_of([&] { board.take_control(); }).kind, ErrorKind::usage);
 }
 

@@ -78,6 +78,15 @@ void BoardInAThread::run(const std::function<void(sim::SimulatedBoard&)>& action
   done.get_future().get();
 }
 
+bool BoardInAThread::is_without_host() {
+  bool safe = false;
+  run([&](sim::SimulatedBoard& each) {
+    safe = each.application().reason() == SafeReason::link &&
+           each.application().outputs().osmc[0].pwm == 0;
+  });
+  return safe;
+}
+
 std::vector<std::string> BoardInAThread::executed() {
   const std::lock_guard lock(mutex_);
   return executed_;

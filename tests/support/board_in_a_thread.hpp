@@ -40,6 +40,9 @@ class BoardInAThread {
   // Does `action` on the board's thread.
   void run(const std::function<void(sim::SimulatedBoard&)>& action);
 
+  // True if the board is safe because it has no host, and motor 1 is off.
+  bool is_without_host();
+
   // What the board has executed so far, "O:358,1,1".
   std::vector<std::string> executed();
   // Waits for the board to enter that state; false after 5 s.

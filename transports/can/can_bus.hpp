@@ -30,6 +30,8 @@
 
 namespace r4 {
 
+// It has more than 15 members and 40 functions: one socket with its timers and waits, the frames that wait
+// for it, the members, and the stops of the bus change together with every frame.
 class CanBus : public std::enable_shared_from_this<CanBus> {
  public:
   using Clock = CanSocket::Clock;

@@ -31,6 +31,7 @@ constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;  // newest wins
 constexpr std::uint32_t look_again_us = 20000;
 
+// It has more than 15 members: six are what its URL says, four the timer with what Asio wants kept for it.
 class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member {
  public:
   CanCarrier(asio::io_context& io, Url url, Role role);

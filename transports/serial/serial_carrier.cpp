@@ -50,6 +50,7 @@ std::string find_device(const Url& url) {
   return ports.front().path;
 }
 
+// It has more than 15 members: the device and how it is found again, and the timers and waits of Asio.
 class SerialCarrier final : public Carrier, private LineStream::Owner {
  public:
   SerialCarrier(asio::io_context& io, Url url, std::shared_ptr<DeviceClaim> claim);

@@ -32,7 +32,7 @@ constexpr milliseconds look_again{5}, look_again_slowly{100};
 // How long no program may hold the transport before that is told.
 constexpr milliseconds take_over_within{100};
 
-// Its 16 members belong to one state machine: the carrier, the search, and the two ends of sharing.
+// Its members, more than 15, belong to one state machine: the carrier, the search, and the two ends of sharing.
 class SharedCarrier final : public Carrier,
                             private Carrier::Handler,
                             private ShareHolder::Owner,

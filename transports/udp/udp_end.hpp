@@ -21,6 +21,7 @@
 
 namespace r4 {
 
+// It has more than 15 members: the socket with its timers and waits, the queue, and how the network is looked at.
 class UdpEnd : public Carrier {
  public:
   void close() noexcept override;

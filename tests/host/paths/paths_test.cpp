@@ -219,6 +219,15 @@ TEST_F(OnePath, AQuestionThatTheTransportDidNotTakeIsRepeatedAndNotCounted) {
   }
 }
 
+TEST_F(OnePath, AQuestionOfTheProgramThatTheTransportDidNotTakeIsNotRepeated) {
+  heartbeat();
+  ask();
+  ASSERT_EQ(answer(), Admission::yes);
+  paths.asked(0, ++question, false, now);
+  pass(1000);
+  EXPECT_EQ(paths.to_ask(now), 0);
+}
+
 TEST_F(OnePath, TheOnlyPathMayLeadToAnotherBoardLater) {
   state();
   ask();

@@ -37,6 +37,7 @@ struct CanNodeCounters {
 // How a third party hears a lane of `node` (command, reply or telemetry) without taking part.
 IsotpReceiverOptions listening_to(CanIdKind lane, std::uint8_t node);
 
+// It has more than 15 members: two machines for each direction, each with its buffer.
 class CanNode {
  public:
   // `node` is 0-31. With `fd`, frames of up to 64 bytes are sent; received are both.
