@@ -172,7 +172,7 @@ def test_a_host_alone_is_told_that_nobody_acknowledges(bus, board):
     with monitor(HOST) as host:
         in_control(host)
         bus.order('away', 0)
-        lonely = host.next(told('nobody acknowledges'))
+        lonely = host.next(told('no node acknowledges'))
         assert 'bit rate' in lonely['fields']['fix']
         bus.state(1, 'passive')  # and never bus-off: ISO 11898-1, 12.1.4.2
         board.state('SAFE', 'link')

@@ -10,7 +10,6 @@
 #include <asio/post.hpp>
 #include <cerrno>
 #include <map>
-#include <random>
 #include <utility>
 
 #include "../file_descriptor.hpp"
@@ -20,10 +19,7 @@
 namespace r4 {
 namespace {
 
-constexpr const char* not_acknowledged = "nobody acknowledges";
-constexpr const char* error_passive = "the controller is error-passive";
-constexpr const char* error_warning = "the controller warns of errors";
-constexpr const char* look_at_the_wire = "look at wiring, termination and bit rate";
+constexpr const char* check_the_wire = "check wiring, termination and bit rate";
 constexpr std::chrono::milliseconds look_interval{100};
 constexpr int most_looks = 8;  // others of the loop wait
 // What a program on an emulated processor takes to answer.
@@ -70,12 +66,12 @@ CanBus::CanBus(asio::io_context& io, std::string interface, bool fd)
     : io_(io),
       interface_(std::move(interface)),
       fd_(fd),
+      stops_(io, socket_),
       readable_(io),
       writable_(io),
       retry_timer_(io),
       look_timer_(io),
-      polling_(most_polling),
-      announced_stop_(std::random_device{}()) {
+      polling_(most_polling) {
   socket_.open(interface_, fd_);
   watch_socket();
   listen();
@@ -200,9 +196,9 @@ void CanBus::hand_over(std::size_t count) {
       continue;
     }
     if (!in_[i].local) {
-      // Whoever hears others is on the bus, whatever was told of before.
-      if (!up_ || (standing_ && standing_->problem.reason == not_acknowledged)) come_up();
-    } else if (!up_ && classify(in_[i].frame).kind != CanIdKind::emergency_stop) {
+      // A frame of another node proves that this node is on the bus.
+      if (!up() || trouble_ == Trouble::not_acknowledged) come_up();
+    } else if (!up() && classify(in_[i].frame).kind != CanIdKind::emergency_stop) {
       continue;  // it did not get to the bus
     }
     const std::uint32_t at_us = to_us(in_[i].at);
@@ -220,12 +216,12 @@ void CanBus::on_error_frame(const CanSocket::Received& received) {
     if ((controller & CAN_ERR_CRTL_ACTIVE) != 0) {
       come_up();
     } else if ((controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) {
-      set_trouble(error_passive, look_at_the_wire);
+      warn_of(Trouble::error_passive);
     } else if ((controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING)) != 0) {
-      set_trouble(error_warning, look_at_the_wire);
+      warn_of(Trouble::error_warning);
     }
-  } else if ((received.error & CAN_ERR_ACK) != 0 && !standing_) {  // the least of them
-    set_trouble(not_acknowledged, "see that another node is on the bus, at this bit rate");
+  } else if ((received.error & CAN_ERR_ACK) != 0 && trouble_ == Trouble::none) {
+    warn_of(Trouble::not_acknowledged);
   }
 }
 
@@ -233,24 +229,31 @@ void CanBus::on_error_frame(const CanSocket::Received& received) {
 void CanBus::look_at_controller() {
   const std::string state = can_interface(interface_).state;
   if (state == "bus-off") return go_bus_off();
-  if (!up_) come_up();
-  if (state == "error-passive") set_trouble(error_passive, look_at_the_wire);
-  if (state == "error-warning") set_trouble(error_warning, look_at_the_wire);
+  if (!up()) come_up();
+  if (state == "error-passive") warn_of(Trouble::error_passive);
+  if (state == "error-warning") warn_of(Trouble::error_warning);
 }
 
 void CanBus::go_bus_off() {
   go_down({ErrorKind::open, "can://" + interface_, "the controller is bus-off: too many errors",
            fmt::format("{}, then: ip link set {} type can restart (slcan: down, and up); with "
                        "restart-ms 100 it does so by itself",
-                       look_at_the_wire, interface_)},
+                       check_the_wire, interface_)},
           false);
 }
 
-// Told once until it changes.
-void CanBus::set_trouble(std::string reason, std::string fix) {
-  if (!up_ || (standing_ && standing_->problem.reason == reason)) return;
-  standing_ = {CarrierEvent::Kind::warning,
-               Problem{ErrorKind::open, "can://" + interface_, std::move(reason), std::move(fix)}};
+// Reports a trouble once until it changes.
+void CanBus::warn_of(Trouble trouble) {
+  if (!up() || trouble_ == trouble) return;
+  trouble_ = trouble;
+  Problem problem{ErrorKind::open, "can://" + interface_, "the controller warns of errors",
+                  check_the_wire};
+  if (trouble == Trouble::error_passive) problem.reason = "the controller is error-passive";
+  if (trouble == Trouble::not_acknowledged) {
+    problem.reason = "no node acknowledges the frames";
+    problem.fix = "check that another node is on the bus, at this bit rate";
+  }
+  standing_ = {CarrierEvent::Kind::warning, std::move(problem)};
   tell(*standing_);
 }
 
@@ -273,7 +276,7 @@ void CanBus::go_down(Problem problem, bool reopen) {
 
 // What keeps it down may change: it was bus-off or down, and now its adapter is gone.
 void CanBus::be_down(Problem problem) {
-  const bool was_up = std::exchange(up_, false);
+  const bool was_up = std::exchange(trouble_, Trouble::down) != Trouble::down;
   if (!was_up && standing_ && standing_->problem.reason == problem.reason) return;
   standing_ = {CarrierEvent::Kind::down, problem};
   tell({was_up ? CarrierEvent::Kind::down : CarrierEvent::Kind::warning, std::move(problem)});
@@ -281,11 +284,11 @@ void CanBus::be_down(Problem problem) {
 
 // Also when nothing was wrong but a warning.
 void CanBus::come_up() {
-  const bool troubled = standing_.has_value();
+  const Trouble before = std::exchange(trouble_, Trouble::none);
   standing_.reset();
   Problem problem{ErrorKind::open, "can://" + interface_, "", ""};
-  if (!std::exchange(up_, true)) return tell({CarrierEvent::Kind::up, std::move(problem)});
-  if (!troubled) return;
+  if (before == Trouble::down) return tell({CarrierEvent::Kind::up, std::move(problem)});
+  if (before == Trouble::none) return;
   problem.reason = "the trouble is over";
   tell({CarrierEvent::Kind::warning, std::move(problem)});
 }

@@ -24,14 +24,14 @@
 #include "../adaptive_polling.hpp"
 #include "../operation_slot.hpp"
 #include "../writable_wait.hpp"
+#include "bus_stops.hpp"
 #include "can_socket.hpp"
 #include "r4link/carrier.hpp"
-#include "stop_numbers.hpp"
 
 namespace r4 {
 
 // It has more than 15 members and 40 functions: one socket with its timers and waits, the frames that wait
-// for it, the members, and the stops of the bus change together with every frame.
+// for it, and the members change together with every frame.
 class CanBus : public std::enable_shared_from_this<CanBus> {
  public:
   using Clock = CanSocket::Clock;
@@ -91,24 +91,9 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   // Hands over the frames that have arrived. Before somebody gives up waiting for one: a loop that
   // was held up may find the time-out and the frame together. True if there were any.
   bool take();
-  // The emergency stop, which all boards of the bus hear, ahead of everything that waits in the interface's queue.
-  //
-  // The bare frame, which every board on any version of this plan obeys. To a board each is a new
-  // stop.
-  SendResult send_bare_stop();
-  // The same of a stop that is confirmed. `number` is set to the one that the bus gives it, by
-  // which repeat_stop() sends it. Members that announce a stop in one turn of the loop, within
-  // `together`, announce the same: they get one number, and one bare frame leaves. A member whose
-  // own earlier stop has that number gets another one.
-  SendResult announce_stop(const StopNumbers& own, std::uint32_t& number);
-  // The frame with that number. None is sent again within stop_spacing.
-  SendResult repeat_stop(std::uint32_t number);
-  static constexpr std::chrono::milliseconds stop_spacing{10};
-  // Shorter than a stop is repeated after its confirmation: whoever clears it meanwhile finds it
-  // pressed again.
-  static constexpr std::chrono::milliseconds together{100};
+  BusStops& stops() { return stops_; }
 
-  bool up() const { return up_; }
+  bool up() const { return trouble_ != Trouble::down; }
   // What was told of last, if that is still so: for who has joined since.
   const std::optional<CarrierEvent>& standing() const { return standing_; }
   // Frames wait for the interface. None is asked for until it has taken them.
@@ -125,6 +110,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   std::uint32_t overflows() const { return socket_.overflows() + controller_overflows_; }
 
  private:
+  enum class Trouble : std::uint8_t { none, not_acknowledged, error_warning, error_passive, down };
   struct Place {
     Member* member;  // null: has left
     std::vector<std::uint32_t> ids;
@@ -142,9 +128,8 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   void have_left(std::size_t count);
   void drop_queue();
   void send_later();
-  SendResult send_first(const CanFrame& frame);
   void go_bus_off();
-  void set_trouble(std::string reason, std::string fix);
+  void warn_of(Trouble trouble);
   void go_down(Problem problem, bool reopen);
   void be_down(Problem problem);
   void come_up();
@@ -162,6 +147,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   const std::string interface_;
   const bool fd_;
   CanSocket socket_;
+  BusStops stops_;
   LoopDescriptor readable_;
   OperationSlot reading_;
   WritableWait writable_;
@@ -184,16 +170,8 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   std::size_t out_count_ = 0;
   Clock::time_point progress_;
 
-  // The stop that was announced last, and the one that left with its number last.
-  std::uint32_t announced_stop_;
-  Clock::time_point announced_at_;
-  bool announcing_ = false;  // in this turn of the loop
-  OperationSlot announcement_;
-  std::optional<std::uint32_t> numbered_stop_;
-  Clock::time_point stop_left_;
-
-  bool up_ = true;
-  std::optional<CarrierEvent> standing_;  // down, or a warning
+  Trouble trouble_ = Trouble::none;
+  std::optional<CarrierEvent> standing_;  // what was reported of the trouble
   std::uint32_t controller_overflows_ = 0;
   std::array<CanSocket::Received, CanSocket::batch> in_;
 };

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How the members of a bus come to send, and the emergency stop ahead of them.
+// How the members of a bus send.
 #include <algorithm>
 #include <asio/post.hpp>
 #include <cerrno>
 
-#include "../framing/can/can_ids.hpp"
 #include "can_bus.hpp"
 #include "can_interface.hpp"
 
@@ -66,7 +65,7 @@ void CanBus::drop_queue() {
 }
 
 void CanBus::send() {
-  if (!up_ || sending_) return;
+  if (!up() || sending_) return;
   sending_ = true;
   CanSocket::Outcome outcome = CanSocket::Outcome::done;
   if (out_count_ == 0) progress_ = Clock::now();
@@ -101,54 +100,6 @@ void CanBus::send_later() {
   retry_timer_.expires_after(retry_interval);
   retry_timer_.async_wait(retrying_.handler([this] { send(); }));
   writable_.start(socket_.number(), [this] { send(); });
-}
-
-SendResult CanBus::send_bare_stop() {
-  CanFrame frame{};
-  frame.id = emergency_stop_id;
-  return send_first(frame);
-}
-
-SendResult CanBus::announce_stop(const StopNumbers& own, std::uint32_t& number) {
-  const Clock::time_point now = Clock::now();
-  if (!announcing_ || now - announced_at_ >= together || own.carries(announced_stop_)) {
-    const SendResult bare = send_bare_stop();
-    if (bare != SendResult::sent) return bare;
-    announced_stop_ = short_stop_number(announced_stop_ + 1);
-    announced_at_ = now;
-    announcing_ = true;
-    asio::post(io_, announcement_.handler([this] { announcing_ = false; }));
-  }
-  number = announced_stop_;
-  return SendResult::sent;
-}
-
-SendResult CanBus::repeat_stop(std::uint32_t number) {
-  const Clock::time_point now = Clock::now();
-  if (numbered_stop_ == number && now - stop_left_ < stop_spacing) return SendResult::sent;
-  CanFrame frame{};
-  frame.extended = true;
-  frame.id = numbered_stop_id(number);
-  const SendResult result = send_first(frame);
-  if (result == SendResult::sent) {
-    numbered_stop_ = number;
-    stop_left_ = now;
-  }
-  return result;
-}
-
-SendResult CanBus::send_first(const CanFrame& frame) {
-  if (socket_.number() < 0) return SendResult::down;
-  switch (socket_.send_first(frame)) {
-    case CanSocket::Outcome::done:
-      return SendResult::sent;
-    case CanSocket::Outcome::busy:
-    case CanSocket::Outcome::full:
-      return SendResult::full;
-    case CanSocket::Outcome::failed:
-      break;
-  }
-  return SendResult::down;
 }
 
 }  // namespace r4

@@ -202,15 +202,15 @@ SendResult CanCarrier::send_stop(std::string_view bytes) {
   Datagram stop;
   std::uint32_t pnum = 0;
   if (!read_datagram(Text(bytes.data(), bytes.size()), stop) || !stop_number(stop, pnum)) {
-    return bus_->send_bare_stop();
+    return bus_->stops().send_bare();
   }
   std::uint32_t number = 0;
   if (!stops_.find(pnum, number)) {
-    const SendResult announced = bus_->announce_stop(stops_, number);
+    const SendResult announced = bus_->stops().announce(stops_, number);
     if (announced != SendResult::sent) return announced;
     stops_.add(pnum, number);
   }
-  return bus_->repeat_stop(number);
+  return bus_->stops().repeat(number);
 }
 
 bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {

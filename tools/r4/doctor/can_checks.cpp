@@ -45,7 +45,8 @@ Finding down(const Machine& machine, const CanInterface& interface) {
 Finding bus_off(const Machine& machine, const CanInterface& interface) {
   Finding finding = about(interface, Severity::error, "can.busoff");
   finding.reason =
-      "bus-off: the controller has given up, for nobody acknowledges its frames or the bit rates "
+      "bus-off: the controller has given up, because no node acknowledges its frames or the bit "
+      "rates "
       "differ";
   finding.fix = machine.as_root(fmt::format("ip link set {} type can restart", interface.name));
   finding.mending = Mending::automatic;

@@ -16,8 +16,8 @@ constexpr const char* bus_off = "the controller is bus-off: too many errors";
 constexpr const char* warns = "the controller warns of errors";
 constexpr const char* passive = "the controller is error-passive";
 constexpr const char* over = "the trouble is over";
-constexpr const char* lonely = "nobody acknowledges";
-constexpr const char* look = "look at wiring, termination and bit rate";
+constexpr const char* lonely = "no node acknowledges the frames";
+constexpr const char* look = "check wiring, termination and bit rate";
 
 using Told = std::vector<std::pair<Kind, std::string>>;
 using Bytes = std::vector<std::uint8_t>;
@@ -88,7 +88,7 @@ TEST_F(CanBusTest, NoAcknowledgeIsAWarningUntilAnotherNodeIsHeard) {
   local.send(error(CAN_ERR_ACK));
   local.send(error(CAN_ERR_ACK));
   run_until([&] { return !member.events.empty(); });
-  EXPECT_EQ(member.fix, "see that another node is on the bus, at this bit rate");
+  EXPECT_EQ(member.fix, "check that another node is on the bus, at this bit rate");
   local.send(data(1));
   local.send(error(CAN_ERR_ACK));
   run_for(soon);

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bus_stops.hpp"
+
+#include <asio/post.hpp>
+#include <random>
+
+#include "../framing/can/can_ids.hpp"
+
+namespace r4 {
+
+BusStops::BusStops(asio::io_context& io, CanSocket& socket)
+    : io_(io), socket_(socket), announced_(std::random_device{}()) {}
+
+SendResult BusStops::send_bare() {
+  CanFrame frame{};
+  frame.id = emergency_stop_id;
+  return send_first(frame);
+}
+
+SendResult BusStops::announce(const StopNumbers& own, std::uint32_t& number) {
+  const Clock::time_point now = Clock::now();
+  if (!announcing_ || now - announced_at_ >= together || own.carries(announced_)) {
+    const SendResult bare = send_bare();
+    if (bare != SendResult::sent) return bare;
+    announced_ = short_stop_number(announced_ + 1);
+    announced_at_ = now;
+    announcing_ = true;
+    asio::post(io_, announcement_.handler([this] { announcing_ = false; }));
+  }
+  number = announced_;
+  return SendResult::sent;
+}
+
+SendResult BusStops::repeat(std::uint32_t number) {
+  const Clock::time_point now = Clock::now();
+  if (repeated_ == number && now - repeated_at_ < spacing) return SendResult::sent;
+  CanFrame frame{};
+  frame.extended = true;
+  frame.id = numbered_stop_id(number);
+  const SendResult result = send_first(frame);
+  if (result == SendResult::sent) {
+    repeated_ = number;
+    repeated_at_ = now;
+  }
+  return result;
+}
+
+SendResult BusStops::send_first(const CanFrame& frame) {
+  if (socket_.number() < 0) return SendResult::down;
+  switch (socket_.send_first(frame)) {
+    case CanSocket::Outcome::done:
+      return SendResult::sent;
+    case CanSocket::Outcome::busy:
+    case CanSocket::Outcome::full:
+      return SendResult::full;
+    case CanSocket::Outcome::failed:
+      break;
+  }
+  return SendResult::down;
+}
+
+}  // namespace r4
