@@ -16,7 +16,9 @@
 namespace r4 {
 namespace {
 
-constexpr int most_waiting = 128;
+// Connections that wait to be accepted, each for some 0.4 ms (ShareHolder::between_arrivals): the last has to wait for less
+// than a program waits for its answer.
+constexpr int most_waiting = 24;
 // About eighty states: a program that sleeps and wakes up hears nothing that is much older than a
 // second.
 constexpr int buffer_bytes = 32 * 1024;
@@ -73,8 +75,18 @@ FileDescriptor take_share_name(const ShareName& name, BoardRole role) {
   });
 }
 
+// Another user's programs may keep the holder's queue full. A place in it is free for some microseconds after each
+// accept(), so this tries for about as long as the holder waits between two of them.
 FileDescriptor connect_to_holder(const ShareName& name, BoardRole role) {
-  return local_socket(name, role, ::connect);
+  return local_socket(name, role, [](int local, const sockaddr* address, socklen_t size) {
+    constexpr int most_tries = 300;
+    int result = -1;
+    for (int i = 0; i < most_tries && result != 0; ++i) {
+      result = ::connect(local, address, size);
+      if (result != 0 && !would_block(errno)) break;
+    }
+    return result;
+  });
 }
 
 FileDescriptor accept_sharer(int holder) {
