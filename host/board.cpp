@@ -34,10 +34,7 @@ Board::~Board() { impl_->close(); }
 
 void Board::close() { impl_->close(); }
 
-BoardRole Board::role() const {
-  const std::lock_guard lock(impl_->mutex);
-  return impl_->role;
-}
+BoardRole Board::role() const { return impl_->read(impl_->role); }
 void Board::take_control() {
   const auto impl = impl_;
   const bool here = impl->run_on_loop("take_control()", [impl = impl.get()] {
@@ -50,23 +47,23 @@ void Board::take_control() {
 void Board::release_control(Duration timeout) {
   require_timeout("release_control()", timeout);
   const auto impl = impl_;
-  const auto call = impl->run(
-      "release_control()",
-      [&async = impl->async](Duration left, auto end) {
-        async.async_release_control(left, std::move(end));
-      },
-      timeout);
-  const Outcome outcome = call->result.outcome;
-  if (outcome == Outcome::none || outcome == Outcome::refused) return;  // not ours
-  Impl::require_confirmed(call);
+  const std::string text = "release_control()";
+  const auto release = [](AsyncBoard& board, std::size_t, Duration left, auto end) {
+    board.async_release_control(left, std::move(end));
+  };
+  const auto part = impl->run(text, release, timeout);
+  const Outcome outcome = part->result.outcome;
+  const bool was_ours = outcome != Outcome::none && outcome != Outcome::refused;
+  if (!was_ours || outcome == Outcome::confirmed) return;
+  throw Error(explain(text, part->result, part->link));
 }
 
-// A call holds the Impl, so that the Board may be destroyed while it waits.
+// A call owns the Impl, so that the Board may be destroyed while it waits.
 
 void Board::wait_active(Duration timeout) {
   require_wait("wait_active()", timeout);
   const auto impl = impl_;
-  // Its paths lead to two boards, and it never began.
+  // The paths lead to two boards, so the link never began.
   const auto refused = [](const LinkStatus& link) {
     return link.causes.has(LinkCause::two_boards) && link.state == HostLinkState::connecting;
   };
@@ -76,9 +73,9 @@ void Board::wait_active(Duration timeout) {
     if (impl->role == BoardRole::watch) return is_heard(link.state);
     return link.state == HostLinkState::active && impl->in_control && !link.gated();
   });
-  const LinkStatus link = impl->link_now();
+  const LinkStatus link = impl->read(impl->link);
   if (refused(link)) throw Error(explain(paths()));
-  if (!active) throw Error(explain(impl->name_now(), link));
+  if (!active) throw Error(explain(impl->read(impl->name), link));
 }
 
 void Board::send(const Command& command, Duration timeout) {
@@ -99,27 +96,22 @@ void Board::apply(const Setpoints& setpoints, Duration timeout) {
   require_timeout(text, timeout);
   const auto impl = impl_;
   impl->require_control(text);
-  impl->execute(
-      text,
-      [&async = impl->async, setpoints](Duration left, auto end) {
-        async.async_apply(setpoints, left, std::move(end));
-      },
-      timeout);
+  const auto apply = [setpoints](AsyncBoard& board, std::size_t, Duration left, auto end) {
+    board.async_apply(setpoints, left, std::move(end));
+  };
+  impl->execute(text, apply, timeout);
 }
 PostResult Board::post(const Setpoints& setpoints) { return impl_->post(setpoints); }
 void Board::arm(Duration timeout) {
   require_timeout("arm()", timeout);
   const auto impl = impl_;
   impl->require_control("arm()");
-  impl->execute(
-      "arm()",
-      [&async = impl->async](Duration left, auto end) { async.async_arm(left, std::move(end)); },
-      timeout);
+  const auto arm = [](AsyncBoard& board, std::size_t, Duration left, auto end) {
+    board.async_arm(left, std::move(end));
+  };
+  impl->execute("arm()", arm, timeout);
 }
-DisarmCause Board::disarmed_by() const {
-  const std::lock_guard lock(impl_->mutex);
-  return impl_->disarmed_by;
-}
+DisarmCause Board::disarmed_by() const { return impl_->read(impl_->disarmed_by); }
 
 void Board::stop(Duration timeout) { send(Command::stop(), timeout); }
 void Board::stop_async() { impl_->post(Command::stop()); }
@@ -179,35 +171,30 @@ void Board::link_timing(Duration board_timeout, Duration heartbeat, Duration tim
   const auto impl = impl_;
   impl->require_control(text);
   impl->async.require_link_timing(board_timeout, heartbeat);
-  impl->execute(
-      text,
-      [&async = impl->async, board_timeout, heartbeat](Duration left, auto end) {
-        async.async_link_timing(board_timeout, heartbeat, left, std::move(end));
-      },
-      timeout);
+  const auto set = [=](AsyncBoard& board, std::size_t, Duration left, auto end) {
+    board.async_link_timing(board_timeout, heartbeat, left, std::move(end));
+  };
+  impl->execute(text, set, timeout);
 }
 
 BoardIdentity Board::identify(Duration timeout) {
   require_timeout("identify()", timeout);
   const auto impl = impl_;
-  return impl->execute(Command::identify(), timeout)->identity;
+  impl->execute(Command::identify(), timeout);
+  return impl->read(impl->identity);
 }
 
-ReceivedState Board::state() const {
-  const std::lock_guard lock(impl_->mutex);
-  return impl_->state;
-}
+ReceivedState Board::state() const { return impl_->read(impl_->state); }
 ReceivedState Board::next_state(Duration timeout) {
   require_timeout("next_state()", timeout);
   const auto impl = impl_;
-  const std::uint64_t seen = impl->states_now();
+  const std::uint64_t seen = impl->read(impl->states);
   if (!impl->wait_for_news(timeout, [&] { return impl->states != seen; })) {
-    Problem problem = explain(impl->name_now(), impl->link_now());
+    Problem problem = explain(impl->read(impl->name), impl->read(impl->link));
     problem.reason = "no state came in time: " + problem.reason;
     throw Error(std::move(problem));
   }
-  const std::lock_guard lock(impl->mutex);
-  return impl->state;
+  return impl->read(impl->state);
 }
 States Board::states(StatesOptions options) {
   const auto queue = std::make_shared<States::Queue>(options, impl_->on_wait);
@@ -222,42 +209,24 @@ States Board::states(StatesOptions options) {
 std::optional<ReceivedState> States::take(Duration timeout) { return queue_->take(timeout); }
 bool States::ended() const { return queue_->ended(); }
 std::uint64_t States::missed() const { return queue_->missed(); }
-LinkStatus Board::link() const { return impl_->link_now(); }
-std::string Board::name() const { return impl_->name_now(); }
+LinkStatus Board::link() const { return impl_->read(impl_->link); }
+std::string Board::name() const { return impl_->read(impl_->name); }
 
 Statistics Board::statistics() const {
   const auto impl = impl_;
-  auto report = std::make_shared<Statistics>();
-  {
-    const std::lock_guard lock(impl->mutex);
-    *report = impl->last_statistics;
-  }
-  impl->run_on_loop("statistics()", [impl, report] { *report = impl->async.statistics(); });
-  const std::lock_guard lock(impl->mutex);
-  report->refused += impl->refused_here;
-  return *report;
+  Statistics report =
+      impl->report("statistics()", impl->last_statistics, [&] { return impl->async.statistics(); });
+  report.refused += impl->read(impl->refused_here);
+  return report;
 }
 CarrierCounters Board::carrier_counters() const {
   const auto impl = impl_;
-  auto report = std::make_shared<CarrierCounters>();
-  {
-    const std::lock_guard lock(impl->mutex);
-    *report = impl->last_counters;
-  }
-  impl->run_on_loop("carrier_counters()",
-                    [impl, report] { *report = impl->async.carrier_counters(); });
-  return *report;
+  return impl->report("carrier_counters()", impl->last_counters,
+                      [&] { return impl->async.carrier_counters(); });
 }
-
 std::vector<PathStatus> Board::paths() const {
   const auto impl = impl_;
-  auto report = std::make_shared<std::vector<PathStatus>>();
-  {
-    const std::lock_guard lock(impl->mutex);
-    *report = impl->last_paths;
-  }
-  impl->run_on_loop("paths()", [impl, report] { *report = impl->async.paths(); });
-  return *report;
+  return impl->report("paths()", impl->last_paths, [&] { return impl->async.paths(); });
 }
 
 void Board::record(const std::string& path, RecordingOptions options) {
@@ -273,25 +242,25 @@ void Board::record(Recording& recording) {
 }
 
 Subscription Board::on_state(std::function<void(const ReceivedState&)> callback) {
-  return impl_->callbacks.on_state(std::move(callback));
+  return impl_->callbacks.add<ReceivedState>(std::move(callback));
 }
 Subscription Board::on_link(std::function<void(const LinkStatus&)> callback) {
-  return impl_->callbacks.on_link(std::move(callback));
+  return impl_->callbacks.add<LinkStatus>(std::move(callback));
 }
 Subscription Board::on_event(std::function<void(const CarrierEvent&)> callback) {
-  return impl_->callbacks.on_event(std::move(callback));
+  return impl_->callbacks.add<CarrierEvent>(std::move(callback));
 }
 Subscription Board::on_path(std::function<void(const PathStatus&)> callback) {
-  return impl_->callbacks.on_path(std::move(callback));
+  return impl_->callbacks.add<PathStatus>(std::move(callback));
 }
 Subscription Board::on_restart(std::function<void()> callback) {
-  return impl_->callbacks.on_restart(std::move(callback));
+  return impl_->callbacks.add_restart(std::move(callback));
 }
 Subscription Board::on_arming(std::function<void(DisarmCause)> callback) {
-  return impl_->callbacks.on_arming(std::move(callback));
+  return impl_->callbacks.add<DisarmCause>(std::move(callback));
 }
 Subscription Board::on_refused(std::function<void(const RefusedPost&)> callback) {
-  return impl_->callbacks.on_refused(std::move(callback));
+  return impl_->callbacks.add<RefusedPost>(std::move(callback));
 }
 
 void Board::watchdog(Duration period) {

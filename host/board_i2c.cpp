@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The devices on the user's I2C bus: a command, and the answer that the state brings; a described one set up.
-#include <fmt/format.h>
-
+// The devices on the user's I2C bus: a command, and its answer, which comes with the state; the
+// set-up of a described device.
 #include <algorithm>
-#include <memory>
-#include <optional>
 #include <string>
 
 #include "board_impl.hpp"
@@ -17,11 +14,7 @@ namespace r4 {
 
 namespace {
 
-std::string text_of(const Board::I2c::Bytes& bytes) {
-  return fmt::format("x{:02x}", fmt::join(bytes, ""));
-}
-
-// What a C++ program counts in, as a command has it; what does not fit stays out of range.
+// A period that a command cannot hold stays out of range.
 int milliseconds(Board::Duration period) {
   return static_cast<int>(std::clamp<std::int64_t>(period.count(), 0, 1'000'000));
 }
@@ -30,13 +23,13 @@ int milliseconds(Board::Duration period) {
 
 Board::I2c::Bytes Board::I2c::read(int address, const Bytes& register_bytes, int count,
                                    Duration timeout) const {
-  const std::string text = text_of(register_bytes);
+  const std::string text = hex_of(register_bytes);
   return answer(Command::i2c_read(address, text, count), timeout);
 }
 
 Board::I2c::Bytes Board::I2c::write(int address, const Bytes& bytes, int count,
                                     Duration timeout) const {
-  const std::string text = text_of(bytes);
+  const std::string text = hex_of(bytes);
   return answer(Command::i2c_write(address, text, count), timeout);
 }
 
@@ -46,7 +39,7 @@ Board::I2c::Bytes Board::I2c::scan(Duration timeout) const {
 
 void Board::I2c::poll(int slot, int address, const Bytes& register_bytes, int count,
                       Duration period, Duration timeout) const {
-  const std::string text = text_of(register_bytes);
+  const std::string text = hex_of(register_bytes);
   board_.send(Command::i2c_poll(slot, address, text, count, milliseconds(period)), timeout);
 }
 
@@ -90,19 +83,12 @@ void Board::attach(const Device& device, Duration timeout) {
   const auto impl = impl_;
   impl->require_control(text);
   const Duration each = Impl::bounded(timeout);
-  const auto obstacle = std::make_shared<std::optional<Problem>>();
-  const auto attach = [&async = impl->async, device, each, obstacle](Duration, auto end) {
-    try {
-      async.async_attach(device, each, std::move(end));
-    } catch (const Error& error) {  // before it has taken `end`
-      *obstacle = error.problem();
-      end(CommandResult());
-    }
+  const auto attach = [device, each](AsyncBoard& board, std::size_t, Duration, auto end) {
+    board.async_attach(device, each, std::move(end));
   };
-  const auto call = impl->run(text, attach, longest(device, each));
-  if (*obstacle) throw Error(**obstacle);
-  if (call->result.outcome == Outcome::confirmed) return;
-  throw Error(explain(device, call->result, call->link));
+  const auto part = impl->run(text, attach, longest(device, each));
+  if (part->result.outcome == Outcome::confirmed) return;
+  throw Error(explain(device, part->result, part->link));
 }
 
 }  // namespace r4

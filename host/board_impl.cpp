@@ -11,47 +11,29 @@
 
 namespace r4 {
 
-namespace {
-
-// With texts of its own: its caller may be gone when it is sent.
-struct KeptCommand {
-  explicit KeptCommand(const Command& kept)
-      : command(kept),
-        text(kept.text.data(), kept.text.size()),
-        text2(kept.text2.data(), kept.text2.size()) {
-    command.text = text;
-    command.text2 = text2;
-  }
-  KeptCommand(const KeptCommand&) = delete;
-  KeptCommand& operator=(const KeptCommand&) = delete;
-
-  Command command;
-  std::string text, text2;
-};
-
-}  // namespace
-
 Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first)
     : BlockingLoop({"board", "a transport of your own must return at once"}, 1,
                    std::move(options.on_wait)),
       arming(options.session.arming),
       callback_limit(options.callback_limit),
       async(io, make(loop), options),
-      box(
-          io, [this](const Command& c) { deliver(c); }, [this](const Setpoints& s) { deliver(s); }),
+      box(io,
+          [this](const PostBox::Letter& letter) {
+            std::visit([this](const auto& what) { deliver(what); }, letter);
+          }),
       callbacks([this](Clock::duration busy) { on_callback_end(busy); }),
       role(options.role) {
   require_callback_limit(callback_limit);
-  if (first.on_state) callbacks.on_state(std::move(first.on_state));
-  if (first.on_link) callbacks.on_link(std::move(first.on_link));
-  if (first.on_event) callbacks.on_event(std::move(first.on_event));
-  if (first.on_path) callbacks.on_path(std::move(first.on_path));
-  if (first.on_restart) callbacks.on_restart(std::move(first.on_restart));
-  if (first.on_arming) callbacks.on_arming(std::move(first.on_arming));
-  if (first.on_refused) callbacks.on_refused(std::move(first.on_refused));
+  callbacks.add<ReceivedState>(std::move(first.on_state));
+  callbacks.add<LinkStatus>(std::move(first.on_link));
+  callbacks.add<CarrierEvent>(std::move(first.on_event));
+  callbacks.add<PathStatus>(std::move(first.on_path));
+  callbacks.add_restart(std::move(first.on_restart));
+  callbacks.add<DisarmCause>(std::move(first.on_arming));
+  callbacks.add<RefusedPost>(std::move(first.on_refused));
   callbacks.take_uart([this](int channel) {
     const std::lock_guard lock(mutex);
-    return std::exchange(uarts[channel - 1].to_tell, {});
+    return std::exchange(uarts[channel - 1].to_report, {});
   });
   listen();
   async.open();
@@ -79,10 +61,10 @@ void Board::Impl::start() {
   }
 }
 
-// The loop first: it waits for no callback, so that a callback may close the board.
+// Ends the loop first: it does not wait for callbacks, so a callback may close the board.
 void Board::Impl::close() {
   BlockingLoop::close([this] { shut(); });
-  keep(nullptr);  // with the farewell in it
+  keep(nullptr);  // the farewell is recorded
   callbacks.stop();
 }
 
@@ -103,7 +85,7 @@ void Board::Impl::listen() {
       for_each_queue([&](States::Queue& queue) { queue.put(fresh); });
     }
     news.notify_all();
-    tell(fresh);
+    callbacks.notify(fresh);
     take_uarts(fresh);
   });
   async.on_link([this](const LinkStatus& fresh) {
@@ -114,28 +96,28 @@ void Board::Impl::listen() {
       in_control = async.in_control();
     }
     news.notify_all();
-    tell(fresh);
+    callbacks.notify(fresh);
   });
   async.on_event([this](const CarrierEvent& event) {
     take_name();  // a board that was plugged in again may be at another port
-    tell(event);
+    callbacks.notify(event);
   });
-  async.on_path([this](const PathStatus& path) { tell(path); });
+  async.on_path([this](const PathStatus& path) { callbacks.notify(path); });
   async.on_arming([this](DisarmCause fresh) {
     {
       const std::lock_guard lock(mutex);
       disarmed_by = fresh;
     }
-    tell(fresh);
+    callbacks.notify(fresh);
   });
-  async.on_refused([this](const RefusedPost& refused) { tell(refused); });
+  async.on_refused([this](const RefusedPost& refused) { callbacks.notify(refused); });
   async.on_restart([this] {
     {
       const std::lock_guard lock(mutex);
       state = async.state();
       for (UartInbox& uart : uarts) uart.stream.restart();
     }
-    tell(CallbackThread::Restart{});
+    callbacks.notify(CallbackThread::Restart{});
   });
 }
 
@@ -147,10 +129,8 @@ void Board::Impl::take_name() {
   for (const PathStatus& path : paths) path_names.push_back(path.name);
 }
 
-void Board::Impl::tell(CallbackThread::Notice notice) { callbacks.tell(std::move(notice)); }
-
-// Heartbeats say that somebody looks after the robot. Looks again when the callback that runs now, or one
-// that begins at once, reaches the limit.
+// Heartbeats mean that the robot is looked after. The next look is when the callback that runs now,
+// or one that begins now, reaches the limit.
 void Board::Impl::look_at_callbacks() {
   const auto busy = callbacks.busy_for();
   const bool hangs = busy && *busy >= callback_limit;
@@ -169,10 +149,10 @@ void Board::Impl::on_callback_end(Clock::duration busy) {
   const auto ms = std::chrono::duration_cast<Duration>(busy).count();
   asio::post(io, [this, ms] {
     const auto next = callbacks.busy_for();
-    if (next && *next >= callback_limit) return;  // it hangs, too: its own end releases them
+    if (next && *next >= callback_limit) return;  // it hangs, too: its end releases the heartbeats
     if (!std::exchange(held_for_callback, false)) return;
     async.hold_heartbeats(false);
-    tell(CarrierEvent{
+    callbacks.notify(CarrierEvent{
         CarrierEvent::Kind::warning,
         Problem{ErrorKind::refused, "a callback",
                 "it ran for " + std::to_string(ms) + " ms, and after " +
@@ -181,13 +161,14 @@ void Board::Impl::on_callback_end(Clock::duration busy) {
   });
 }
 
-void Board::Impl::deliver(const Command& command) {
+void Board::Impl::deliver(const OwnCommand& own) {
+  const Command command = own.get();
   if (command.kind == CommandKind::stop) {
     async.async_stop(default_timeout, [](const CommandResult&) {});
   } else if (const PostResult result = post_now(command); !result) {
     RefusedPost refused{command, Refusal::none, result};
     refused.command.text = refused.command.text2 = Text();
-    tell(refused);
+    callbacks.notify(refused);
   }
 }
 
@@ -195,18 +176,13 @@ void Board::Impl::deliver(const Setpoints& setpoints) {
   if (const PostResult result = post_now(setpoints); !result) {
     RefusedPost refused{setpoints[0], Refusal::none, result};
     refused.group = static_cast<std::uint8_t>(setpoints.size());
-    tell(refused);
+    callbacks.notify(refused);
   }
 }
 
-void Board::Impl::finish(Call& call, const CommandResult& result) {
-  BlockingLoop::finish(call, [&] {
-    call.result = result;
-    call.result.elapsed = std::chrono::duration_cast<Time>(Clock::now() - call.called);
-    call.link = async.link();
-    call.identity = async.identity();
-    role = async.role();
-  });
+void Board::Impl::on_end() {
+  identity = async.identity();
+  role = async.role();
 }
 
 void Board::Impl::shut() {
@@ -236,53 +212,26 @@ void Board::Impl::require_sendable(const Command& command) {
   for (const std::string& path : path_names) require_cable(path, command);
 }
 
-std::shared_ptr<const Board::Impl::Call> Board::Impl::execute(const Command& command,
+std::shared_ptr<const Board::Impl::Part> Board::Impl::execute(const Command& command,
                                                               Duration timeout) {
-  const bool stop = command.kind == CommandKind::stop;
-  Start start;
-  if (stop) {
-    start = [this](Duration left, End end) { async.async_stop(left, std::move(end)); };
-  } else if (command.kind == CommandKind::identify) {
-    start = [this](Duration left, End end) { async.async_identify(left, std::move(end)); };
-  } else {
-    start = [this, kept = std::make_shared<const KeptCommand>(command)](Duration left, End end) {
-      async.async_send(kept->command, left, std::move(end));
-    };
-  }
-  return require_confirmed(run(shown(command), std::move(start), timeout, stop));
+  return execute(shown(command), start_of(command), timeout, command.kind == CommandKind::stop);
 }
 
-std::shared_ptr<const Board::Impl::Call> Board::Impl::execute(std::string text, Start start,
-                                                              Duration timeout) {
-  return require_confirmed(run(std::move(text), std::move(start), timeout));
+std::shared_ptr<const Board::Impl::Part> Board::Impl::execute(const std::string& text, Start start,
+                                                              Duration timeout, bool stop) {
+  auto part = run(text, std::move(start), timeout, stop);
+  if (part->result.outcome == Outcome::confirmed) return part;
+  throw Error(explain(text, part->result, part->link));
 }
 
-std::shared_ptr<const Board::Impl::Call> Board::Impl::require_confirmed(
-    std::shared_ptr<const Call> call) {
-  if (call->result.outcome == Outcome::confirmed) return call;
-  throw Error(explain(call->text, call->result, call->link));
-}
-
-std::shared_ptr<const Board::Impl::Call> Board::Impl::run(std::string text, Start start,
+std::shared_ptr<const Board::Impl::Part> Board::Impl::run(const std::string& text, Start start,
                                                           Duration timeout, bool stop) {
-  const auto call = std::make_shared<Call>();
-  call->text = std::move(text);
-  call->stop = stop;
-  call->cancelled.resize(1);
-  call->start = [this, start = std::move(start)](const CallPtr& base, Duration left) {
-    const auto begun = std::static_pointer_cast<Call>(base);
-    try {
-      start(left, End(begun->cancelled.front().slot(),
-                      [this, begun](const CommandResult& result) { finish(*begun, result); }));
-    } catch (const Error& error) {
-      begun->trouble = error.problem();
-      finish(*begun, {});
-    }
-  };
+  const auto call = std::make_shared<Call>(text, std::move(start), std::vector{&async}, stop);
   BlockingLoop::run(call, timeout);
-  if (call->trouble) throw Error(*call->trouble);
-  if (call->result.outcome == Outcome::closed) throw closed_error(call->text);
-  return call;
+  const Part& part = call->parts.front();
+  if (part.trouble) throw Error(*part.trouble);
+  if (part.result.outcome == Outcome::closed) throw closed_error(text);
+  return {call, &part};
 }
 
 PostResult Board::Impl::post(const Command& command) {
@@ -301,24 +250,11 @@ PostResult Board::Impl::post(const Setpoints& setpoints) {
   if (is_held_back()) return PostResult::not_armed;
   return box.put(setpoints) ? PostResult::sent : PostResult::queue_full;
 }
-// Are output commands refused here? Under the lock.
+// True if output commands are refused here, which it counts. Under the lock.
 bool Board::Impl::is_held_back() {
   if (arming != Arming::required || disarmed_by == DisarmCause::none) return false;
   ++refused_here;
   return true;
-}
-
-std::string Board::Impl::name_now() {
-  const std::lock_guard lock(mutex);
-  return name;
-}
-LinkStatus Board::Impl::link_now() {
-  const std::lock_guard lock(mutex);
-  return link;
-}
-std::uint64_t Board::Impl::states_now() {
-  const std::lock_guard lock(mutex);
-  return states;
 }
 
 }  // namespace r4

@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is behind a Board: the thread of its link, that of its callbacks, and the calls that wait.
+// The implementation of a Board: the thread of its link, the thread of its callbacks, and calls
+// that wait.
 //
 //     a thread of the program       the link's thread            the callbacks' thread
 //     send() -- Call, post() -->    AsyncBoard on its loop  -->  callback_thread.hpp
 //            <-- ended, news --
 //
-// The link's thread (blocking_loop.hpp) waits for nobody: nothing of the program runs there but a transport of its own.
+// The link's thread (blocking_loop.hpp) does not wait: no code of the program runs there but a
+// transport of its own.
 #pragma once
 
-#include <asio/bind_cancellation_slot.hpp>
 #include <asio/steady_timer.hpp>
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,21 +31,10 @@
 namespace r4 {
 
 // It has more than 15 members: they are grouped by the thread that may touch them.
-struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
-  struct Call final : BlockingLoop::Call {
-    CommandResult result;
-    LinkStatus link;
-    BoardIdentity identity;
-    std::optional<Problem> trouble;  // it could not begin: the role has changed
-  };
-  using End = asio::cancellation_slot_binder<std::function<void(const CommandResult&)>,
-                                             asio::cancellation_slot>;
-  // Begins what was asked for, on the loop.
-  using Start = std::function<void(Duration left, End end)>;
-
+struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
   using CarriersMaker = std::function<std::vector<std::unique_ptr<Carrier>>(Loop& loop)>;
   Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first);
-  // One whose threads run. Throws Error, also where the system has no thread or descriptor left.
+  // Its threads run. Throws Error, also where the system has no thread or descriptor left.
   static std::shared_ptr<Impl> started(const CarriersMaker& make, BoardOptions options,
                                        BoardCallbacks first);
   void start();
@@ -57,13 +45,14 @@ struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
 
   void require_control(std::string_view what);
   void require_sendable(const Command& command);
-  // Has the loop carry out a command. Throws if it is not confirmed.
-  std::shared_ptr<const Call> execute(const Command& command, Duration timeout);
-  std::shared_ptr<const Call> execute(std::string text, Start start, Duration timeout);
-  // The same, and leaves what became of it to the caller; throws if that is not known, or the board is closed.
-  std::shared_ptr<const Call> run(std::string text, Start start, Duration timeout,
+  // Has the board execute a command. Throws if it is not confirmed.
+  std::shared_ptr<const Part> execute(const Command& command, Duration timeout);
+  std::shared_ptr<const Part> execute(const std::string& text, Start start, Duration timeout,
+                                      bool stop = false);
+  // The same, but the caller judges the outcome. Throws if that is not known, or the board is
+  // closed.
+  std::shared_ptr<const Part> run(const std::string& text, Start start, Duration timeout,
                                   bool stop = false);
-  static std::shared_ptr<const Call> require_confirmed(std::shared_ptr<const Call> call);
   PostResult post(const Command& command);
   PostResult post(const Setpoints& setpoints);
   bool is_held_back();
@@ -80,11 +69,14 @@ struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
       return !queue;
     });
   }
-  std::string name_now();
-  LinkStatus link_now();
-  std::uint64_t states_now();
+  // What `ask` returns on the loop; `last` if the board is closed.
+  template <class Report, class Ask>
+  Report report(std::string_view what, const Report& last, Ask ask) {
+    Report now;
+    return run_on_loop(what, [&] { now = ask(); }) ? now : read(last);
+  }
 
-  // A recording of this board's own, until another one takes its place.
+  // Keeps a recording of this board's own until another one takes its place.
   void keep(std::unique_ptr<Recording> own);
 
   // --- on the loop
@@ -96,12 +88,11 @@ struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
   PostResult post_now(const What& what) {
     return async.role() == BoardRole::control ? async.post(what) : PostResult::no_link;
   }
-  void deliver(const Command& command);
+  void deliver(const OwnCommand& own);
   void deliver(const Setpoints& setpoints);
   void take_uarts(const State& fresh);
-  void finish(Call& call, const CommandResult& result);
+  void on_end() override;
   void shut();
-  void tell(CallbackThread::Notice notice);
   void look_at_callbacks();
   void on_callback_end(Clock::duration busy);
 
@@ -118,8 +109,8 @@ struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
   asio::steady_timer look_timer{io};
   bool held_for_callback = false;  // the heartbeats
 
-  // What both sides see. News are those of the state and the link.
-  std::string name;  // the transport's, as the loop knows it
+  // What both sides see. News are changes of the state and the link.
+  std::string name;  // of the transports
   std::vector<std::string> path_names;
   ReceivedState state;
   std::uint64_t states = 0;
@@ -128,15 +119,16 @@ struct Board::Impl : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
   struct UartInbox {
     UartStream stream;
     UartData to_read;
-    UartData to_tell;
-    bool told = false;  // there is a callback, or was one
+    UartData to_report;
+    bool reports = false;  // there is a callback, or was one
   };
   UartInbox uarts[uart_channels];
   LinkStatus link;
   BoardRole role;
+  BoardIdentity identity;
   bool in_control = false;
   DisarmCause disarmed_by = DisarmCause::not_yet;
-  std::uint64_t refused_here = 0;  // posts that did not get as far as the loop
+  std::uint64_t refused_here = 0;  // posts that did not reach the loop
   Statistics last_statistics;
   CarrierCounters last_counters;
   std::vector<PathStatus> last_paths;

@@ -1,20 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "callback_thread.hpp"
 
+#include <type_traits>
 #include <utility>
 
 namespace r4 {
-
-namespace {
-
-template <class... Calls>
-struct Overloaded : Calls... {
-  using Calls::operator()...;
-};
-template <class... Calls>
-Overloaded(Calls...) -> Overloaded<Calls...>;
-
-}  // namespace
 
 CallbackThread::CallbackThread(std::function<void(Clock::duration)> on_end)
     : on_end_(std::move(on_end)), ring_(capacity) {}
@@ -37,16 +27,16 @@ void CallbackThread::stop() {
     gone.swap(tasks_);
   }
   news_.notify_all();
-  if (on_it()) return;
+  if (std::this_thread::get_id() == id_.load()) return;
   const std::lock_guard lock(joining_);
   if (thread_.joinable()) thread_.join();
 }
 
-void CallbackThread::tell(Notice notice) {
+void CallbackThread::notify(Notice notice) {
   {
     const std::lock_guard lock(mutex_);
     if (ended_) return;
-    const bool waits = told_ > taken_ && (tasks_.empty() || tasks_.back().behind < told_);
+    const bool waits = told_ > taken_ && (tasks_.empty() || tasks_.back().after < told_);
     Notice& newest = ring_[(told_ + capacity - 1) % capacity];
     if (waits && std::holds_alternative<ReceivedState>(newest) &&
         std::holds_alternative<ReceivedState>(notice)) {
@@ -74,7 +64,7 @@ void CallbackThread::run() {
   Notice notice;
   std::function<void()> task;
   while (take(notice, task)) {
-    // An exception of the user's ends the program where it is thrown.
+    // An exception of a callback ends the program where it is thrown.
     [&]() noexcept {
       if (task) {
         task();
@@ -98,7 +88,7 @@ bool CallbackThread::take(Notice& notice, std::function<void()>& task) {
   std::unique_lock lock(mutex_);
   news_.wait(lock, [&] { return ended_ || told_ > taken_ || !tasks_.empty(); });
   if (ended_) return false;
-  if (!tasks_.empty() && tasks_.front().behind <= taken_) {
+  if (!tasks_.empty() && tasks_.front().after <= taken_) {
     task = std::move(tasks_.front().action);
     tasks_.pop_front();
   } else {
@@ -109,88 +99,31 @@ bool CallbackThread::take(Notice& notice, std::function<void()>& task) {
 }
 
 void CallbackThread::call(const Notice& notice) {
-  std::visit(Overloaded{
-                 [&](const Restart&) {
-                   state_ = ReceivedState();
-                   call_each(restart_callbacks_);
-                 },
-                 [&](const ReceivedState& state) {
-                   state_ = state;
-                   call_each(state_callbacks_, state);
-                 },
-                 [&](const LinkStatus& link) {
-                   link_ = link;
-                   call_each(link_callbacks_, link);
-                 },
-                 [&](const CarrierEvent& event) {
-                   if (event.kind == CarrierEvent::Kind::warning) {
-                     warning_ = event;
-                   } else {
-                     event_ = event;
-                     warning_.reset();
-                   }
-                   call_each(event_callbacks_, event);
-                 },
-                 [&](const PathStatus& path) { call_each(path_callbacks_, path); },
-                 [&](DisarmCause cause) {
-                   arming_ = cause;
-                   call_each(arming_callbacks_, cause);
-                 },
-                 [&](const RefusedPost& refused) { call_each(refused_callbacks_, refused); },
-                 [&](const UartNews& news) {
-                   const Board::UartData data = take_uart_(news.channel);
-                   if (data.bytes.empty() && data.lost == 0) return;
-                   call_each(uart_callbacks_[news.channel - 1], data);
-                 },
-             },
-             notice);
+  const auto report = [&](const auto& news) {
+    using Kind = std::decay_t<decltype(news)>;
+    if constexpr (std::is_same_v<Kind, UartNews>) {
+      const Board::UartData data = take_uart_(news.channel);
+      if (data.bytes.empty() && data.lost == 0) return;
+      call_each(uart_callbacks_[news.channel - 1], data);
+    } else {
+      keep(news);
+      call_each(std::get<Subscribers<Kind>>(callbacks_), news);
+    }
+  };
+  std::visit(report, notice);
 }
 
-// In its place among the notices, so that nothing is told twice and nothing left out.
-template <class Kind, class Function, class Tell>
-Subscription CallbackThread::add(Kind& kind, Function callback, Tell tell) {
-  if (!callback) return {};  // as Subscribers::add()
-  const auto one = std::make_shared<typename Kind::One>(std::move(callback));
-  {
-    const std::lock_guard lock(mutex_);
-    if (ended_) return {};
-    tasks_.push_back({told_, [&kind, one, tell] {
-                        kind.add(one);
-                        tell(*one);
-                      }});
-    news_.notify_one();  // with the lock: the callback may be called at once, and destroy this
-  }
-  return Subscription(one);
+void CallbackThread::call_first(Subscribers<ReceivedState>::One& one) {
+  if (state_.any()) one(state_);
 }
-
-Subscription CallbackThread::on_state(Subscribers<ReceivedState>::Function callback) {
-  return add(state_callbacks_, std::move(callback), [this](auto& one) {
-    if (state_.any()) one(state_);
-  });
+void CallbackThread::call_first(Subscribers<CarrierEvent>::One& one) {
+  if (event_) one(*event_);
+  if (warning_ && !ended_) one(*warning_);
 }
-Subscription CallbackThread::on_link(Subscribers<LinkStatus>::Function callback) {
-  return add(link_callbacks_, std::move(callback), [this](auto& one) { one(link_); });
-}
-Subscription CallbackThread::on_event(Subscribers<CarrierEvent>::Function callback) {
-  return add(event_callbacks_, std::move(callback), [this](auto& one) {
-    if (event_) one(*event_);
-    if (warning_ && !ended_) one(*warning_);
-  });
-}
-Subscription CallbackThread::on_path(Subscribers<PathStatus>::Function callback) {
-  return add(path_callbacks_, std::move(callback), [](auto&) {});
-}
-Subscription CallbackThread::on_restart(Subscribers<>::Function callback) {
-  return add(restart_callbacks_, std::move(callback), [](auto&) {});
-}
-Subscription CallbackThread::on_arming(Subscribers<DisarmCause>::Function callback) {
-  return add(arming_callbacks_, std::move(callback), [this](auto& one) { one(arming_); });
-}
-Subscription CallbackThread::on_refused(Subscribers<RefusedPost>::Function callback) {
-  return add(refused_callbacks_, std::move(callback), [](auto&) {});
-}
-Subscription CallbackThread::on_uart(int channel, Subscribers<Board::UartData>::Function callback) {
-  return add(uart_callbacks_[channel - 1], std::move(callback), [](auto&) {});
+void CallbackThread::keep(const CarrierEvent& event) {
+  const bool is_warning = event.kind == CarrierEvent::Kind::warning;
+  if (!is_warning) warning_.reset();
+  (is_warning ? warning_ : event_) = event;
 }
 
 }  // namespace r4

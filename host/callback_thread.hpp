@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The thread on which the callbacks of a Board run, beside the thread of its link.
 //
-//     the link's loop --tell()--> notices, 64 at most --> the callbacks, one at a time
+//     the link's loop --notify()--> notices, 64 at most --> the callbacks, one at a time
 //
-// So a callback may take its time, and may wait for the board: heartbeats and commands go on. It may
-// not take for ever: busy_for() tells the loop how long one has run, and after a limit the loop stops
-// the heartbeats, for nobody looks after the robot.
+// So a callback may take its time, and may wait for the board: heartbeats and commands go on. But a
+// callback that hangs must end in the safe state: busy_for() reports how long one has run, and
+// after a limit the loop stops the heartbeats, because nobody looks after the robot.
 //
-// Nothing here waits for a callback. A state that waits is replaced by the next one. Refusals and warnings
-// are left out where 32 notices wait; of the others, the oldest gives way where 64 do. tell() allocates
-// nothing.
+// The link does not wait for callbacks. A state that waits is replaced by the next one. Refusals
+// and warnings are left out where 32 notices wait; of the other notices, the oldest gives way where
+// 64 wait. notify() allocates nothing.
 #pragma once
 
 #include <atomic>
@@ -23,6 +23,7 @@
 #include <mutex>
 #include <optional>
 #include <thread>
+#include <tuple>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -34,8 +35,7 @@
 
 namespace r4 {
 
-// It has more than 15 members: a list of callbacks for each of eight kinds, and the others grouped by the
-// thread that may touch them.
+// It has more than 15 members, grouped by the thread that may touch them.
 class CallbackThread {
  public:
   using Clock = std::chrono::steady_clock;
@@ -48,7 +48,7 @@ class CallbackThread {
                               DisarmCause, RefusedPost, UartNews>;
   static constexpr std::size_t capacity = 64;
 
-  // `on_end`: a callback has ended that ran for so long; called on this thread.
+  // `on_end`: a callback that ran for this time has ended; called on this thread.
   explicit CallbackThread(std::function<void(Clock::duration)> on_end);
   ~CallbackThread();
   CallbackThread(const CallbackThread&) = delete;
@@ -58,44 +58,74 @@ class CallbackThread {
   void take_uart(std::function<Board::UartData(int channel)> take) { take_uart_ = std::move(take); }
   // `owner` is kept until the thread ends.
   void start(std::shared_ptr<void> owner);
-  // No callback runs any more when this returns, unless it is called in one; none is called again.
+  // When this returns, no callback runs, unless it is called in one, and none is called again.
   void stop();
-  // Is this the callbacks' thread?
-  bool on_it() const { return std::this_thread::get_id() == id_.load(); }
 
-  void tell(Notice notice);
+  void notify(Notice notice);
   // How long the callback that runs now has run; nothing if none does.
   std::optional<Clock::duration> busy_for() const;
 
-  // Adds a callback. It is told what there is already, then what comes next.
-  Subscription on_state(Subscribers<ReceivedState>::Function callback);
-  Subscription on_link(Subscribers<LinkStatus>::Function callback);
-  Subscription on_event(Subscribers<CarrierEvent>::Function callback);
-  Subscription on_path(Subscribers<PathStatus>::Function callback);
-  Subscription on_restart(Subscribers<>::Function callback);
-  Subscription on_arming(Subscribers<DisarmCause>::Function callback);
-  Subscription on_refused(Subscribers<RefusedPost>::Function callback);
-  Subscription on_uart(int channel, Subscribers<Board::UartData>::Function callback);
+  // Adds a callback for that kind of notice. It is called with what there is already, then with
+  // what comes next.
+  template <class Kind>
+  Subscription add(std::function<void(const Kind&)> callback) {
+    return add(std::get<Subscribers<Kind>>(callbacks_), std::move(callback));
+  }
+  Subscription add_restart(std::function<void()> callback) {
+    if (!callback) return {};
+    return add<Restart>([callback = std::move(callback)](const Restart&) { callback(); });
+  }
+  Subscription add_uart(int channel, std::function<void(const Board::UartData&)> callback) {
+    return add(uart_callbacks_[channel - 1], std::move(callback));
+  }
 
  private:
-  // Something to be done between two notices: behind the first `behind` of all.
+  // Something to be done between two notices: after the first `after` of all.
   struct Task {
-    std::uint64_t behind;
+    std::uint64_t after;
     std::function<void()> action;
   };
 
-  template <class Kind, class Function, class Tell>
-  Subscription add(Kind& kind, Function callback, Tell tell);
+  template <class Kind>
+  Subscription add(Subscribers<Kind>& callbacks, std::function<void(const Kind&)> callback) {
+    if (!callback) return {};  // as Subscribers::add()
+    const auto one = std::make_shared<typename Subscribers<Kind>::One>(std::move(callback));
+    {
+      const std::lock_guard lock(mutex_);
+      if (ended_) return {};
+      // In its place among the notices, so that none is reported twice or left out.
+      tasks_.push_back({told_, [this, &callbacks, one] {
+                          callbacks.add(one);
+                          call_first(*one);
+                        }});
+      news_.notify_one();  // with the lock: the callback may be called at once, and destroy this
+    }
+    return Subscription(one);
+  }
   void run();
   bool take(Notice& notice, std::function<void()>& task);
   void call(const Notice& notice);
-  // The one before may have closed the board.
-  template <class... Arguments>
-  void call_each(const Subscribers<Arguments...>& callbacks, const Arguments&... arguments) {
+  // Stops where a callback has closed the board.
+  template <class Kind>
+  void call_each(const Subscribers<Kind>& callbacks, const Kind& news) {
     callbacks.each([&](auto& one) {
-      if (!ended_) one(arguments...);
+      if (!ended_) one(news);
     });
   }
+  // Calls a new callback with what there is already.
+  void call_first(Subscribers<ReceivedState>::One& one);
+  void call_first(Subscribers<LinkStatus>::One& one) { one(link_); }
+  void call_first(Subscribers<CarrierEvent>::One& one);
+  void call_first(Subscribers<DisarmCause>::One& one) { one(arming_); }
+  void call_first(Subscriber&) {}
+  // Keeps what call_first() needs.
+  void keep(const Restart&) { state_ = ReceivedState(); }
+  void keep(const ReceivedState& state) { state_ = state; }
+  void keep(const LinkStatus& link) { link_ = link; }
+  void keep(const CarrierEvent& event);
+  void keep(DisarmCause cause) { arming_ = cause; }
+  template <class Kind>
+  void keep(const Kind&) {}
 
   const std::function<void(Clock::duration)> on_end_;
   std::function<Board::UartData(int)> take_uart_;
@@ -103,14 +133,11 @@ class CallbackThread {
   std::atomic<std::thread::id> id_{};
   std::mutex joining_;
 
-  // Of the thread: the callbacks, and what they were told last.
-  Subscribers<ReceivedState> state_callbacks_;
-  Subscribers<LinkStatus> link_callbacks_;
-  Subscribers<CarrierEvent> event_callbacks_;
-  Subscribers<PathStatus> path_callbacks_;
-  Subscribers<> restart_callbacks_;
-  Subscribers<DisarmCause> arming_callbacks_;
-  Subscribers<RefusedPost> refused_callbacks_;
+  // Of the thread: the callbacks, and the newest notices.
+  std::tuple<Subscribers<Restart>, Subscribers<ReceivedState>, Subscribers<LinkStatus>,
+             Subscribers<CarrierEvent>, Subscribers<PathStatus>, Subscribers<DisarmCause>,
+             Subscribers<RefusedPost>>
+      callbacks_;
   Subscribers<Board::UartData> uart_callbacks_[uart_channels];
   ReceivedState state_;
   LinkStatus link_;

@@ -153,7 +153,8 @@ Words disarm_words(DisarmCause cause) {
   return {};
 }
 
-// A path that is not used disturbs no other path, so it is named only where all else is well.
+// A path that is not used does not disturb the other paths, so it is named only if nothing else is
+// wrong.
 constexpr LinkCauses harmless{LinkCause::other_board};
 
 Words link_words(const LinkStatus& link) {
@@ -187,7 +188,7 @@ bool link_is_well(const LinkStatus& link) {
   return link.state == HostLinkState::active && link.causes.without(harmless).empty();
 }
 
-// Is it a setting that a board takes over its own cable only?
+// True for a setting that a board accepts over its own cable only.
 bool sets_the_site(std::string_view command) {
   constexpr std::string_view setting = "C:";
   return command.starts_with(setting) &&
@@ -205,7 +206,7 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
     case Refusal::range:
     case Refusal::channel:
       words.fix = bad_command(command, code).fix;
-      // What is no key is not sent.
+      // An invalid key is not sent, so the board has no room for it.
       if (code == Refusal::range && command.starts_with("C:key,")) {
         words.reason = fmt::format("refused by the board: RANGE (it holds {} keys)", max_keys);
         words.fix = "take one away: C:key,id:off";
@@ -248,7 +249,7 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
   return words;
 }
 
-// These hold back heartbeats and commands, but not a stop.
+// Causes that hold back heartbeats and commands, but not a stop.
 constexpr LinkCauses passed_by_a_stop{LinkCause::watchdog,         LinkCause::callback,
                                       LinkCause::foreign_frames,   LinkCause::busy,
                                       LinkCause::board_has_no_key, LinkCause::key_needed,
@@ -377,7 +378,8 @@ Problem explain(const std::vector<PathStatus>& paths) {
   std::string names;
   std::string boards;
   for (const PathStatus& path : paths) {
-    const bool unnamed = path.board_id.empty();  // on a bus nobody asks who watches
+    const bool unnamed =
+        path.board_id.empty();  // on a bus, a watcher does not ask the board for its id
     if (unnamed && path.state != PathState::other_board) continue;
     names += (names.empty() ? "" : ", ") + path.name;
     boards += (boards.empty() ? "" : ", ") + path.name + " to " +

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The one place where the host knows the simulated board, and recordings as boards.
+// The only file of the host that knows the simulated board, and recordings as boards.
 #include "standard_registry.hpp"
 
 #include <algorithm>
@@ -35,21 +35,12 @@ Registry with_all() {
   return registry;
 }
 
-}  // namespace
-
-const Registry& standard_registry() {
-  static const Registry registry = with_all();
-  return registry;
-}
-
-namespace {
-
 std::string lower(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return text;
 }
 
-// The same for URLs of the same path, as far as they tell.
+// Equal for URLs that name the same path, as far as their texts show.
 std::string path_of(const std::string& text) {
   Url url = Url::parse(text);
   url.take("share");
@@ -62,13 +53,18 @@ std::string path_of(const std::string& text) {
            std::to_string(udp.listen) + "|" + udp.local.to_string();
   }
   if (url.scheme() == "can") return "can|" + url.host() + value("node", "1");
-  std::error_code failed;  // then it stays as it is
+  std::error_code failed;  // then the path stays as it is written
   const std::filesystem::path device = std::filesystem::weakly_canonical(url.path(), failed);
   const std::string path = failed || !url.path().starts_with('/') ? url.path() : device.string();
   return url.scheme() + "|" + url.host() + "|" + path + value("sn", "");
 }
 
 }  // namespace
+
+const Registry& standard_registry() {
+  static const Registry registry = with_all();
+  return registry;
+}
 
 void require_paths(std::size_t count) {
   if (count >= 1 && count <= Session::most_paths) return;

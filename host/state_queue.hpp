@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is behind States: a bounded queue between the link's thread, which waits for nobody, and a thread of the
-// program's.
+// The implementation of States: a bounded queue between the link's thread, which does not wait, and
+// a thread of the program.
 #pragma once
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -16,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "blocking/blocking_loop.hpp"
 #include "r4link/board.hpp"
 #include "r4link/error.hpp"
 
@@ -36,7 +36,7 @@ class States::Queue {
     {
       const std::lock_guard lock(mutex_);
       if (ended_) return;
-      // Behind a gap none is put before it was told.
+      // No state is put after a gap until the gap has been reported.
       if (lossless_ && (gap_ != 0 || count_ == most_)) {
         ++gap_;
         ++missed_;
@@ -61,18 +61,10 @@ class States::Queue {
   }
 
   std::optional<ReceivedState> take(Duration timeout) {
-    const auto deadline =
-        Clock::now() + std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
+    const auto deadline = BlockingLoop::Clock::now() + BlockingLoop::bounded(timeout);
     std::unique_lock lock(mutex_);
-    const auto news = [&] { return ended_ || count_ != 0 || gap_ != 0; };
-    while (!news_.wait_until(
-        lock, on_wait_ ? std::min(deadline, Clock::now() + interval) : deadline, news)) {
-      if (Clock::now() >= deadline) return std::nullopt;
-      if (!on_wait_) continue;
-      lock.unlock();
-      on_wait_();
-      lock.lock();
-    }
+    BlockingLoop::wait_until(lock, news_, deadline, on_wait_,
+                             [&] { return ended_ || count_ != 0 || gap_ != 0; });
     if (count_ != 0) {
       const ReceivedState state = ring_[first_];
       drop_first();
@@ -94,15 +86,13 @@ class States::Queue {
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
   static constexpr std::size_t most_lossless = 65536;
-  static constexpr Duration interval{50};
 
   void drop_first() {
     first_ = (first_ + 1) % ring_.size();
     --count_;
   }
-  // A queue that is short stays small, and one that has grown allocates nothing any more.
+  // A short queue stays small, and a queue that has its size allocates nothing.
   void grow() {
     std::rotate(ring_.begin(), ring_.begin() + static_cast<std::ptrdiff_t>(first_), ring_.end());
     first_ = 0;
@@ -117,7 +107,7 @@ class States::Queue {
   std::vector<ReceivedState> ring_;
   std::size_t first_ = 0;
   std::size_t count_ = 0;
-  std::uint64_t gap_ = 0;  // so many are lost behind those that wait
+  std::uint64_t gap_ = 0;  // states that are lost after those that wait
   std::uint64_t missed_ = 0;
   bool ended_ = false;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Callbacks, several of a kind, each with a handle by which it is ended.
+// The callbacks of one kind, each with a handle by which it is ended.
 #pragma once
 
 #include <unistd.h>
@@ -15,62 +15,32 @@
 
 namespace r4 {
 
-// What stands behind a Subscription.
+// A callback, as its Subscription knows it.
 class Subscriber {
  public:
   virtual ~Subscriber() = default;
   void end() {
-    // In a fork nothing calls it, and a thread that was calling it then holds the lock for ever.
+    // In a fork no thread calls it, and a thread that called it then holds the lock for ever.
     if (::getpid() != process_) return;
     ended_ = true;
     std::shared_ptr<void> gone;            // destroyed without the lock
     const std::lock_guard lock(running_);  // waits for a call in another thread
-    if (!called_) gone = take();           // else when that call is over
+    gone = take();
   }
   bool ended() const { return ended_; }
 
  protected:
-  // Calls `function` unless this has ended.
-  template <class Function>
-  void call(Function function) {
-    std::shared_ptr<void> gone;
-    const std::lock_guard lock(running_);
-    if (ended_) return;
-    const Call under_way(*this, gone);
-    function();
-  }
-  // Takes the callback out, with what it has captured.
+  // Takes the callback out, with what it has captured. Under the lock.
   virtual std::shared_ptr<void> take() = 0;
 
- private:
-  // Also where the callback throws.
-  class Call {
-   public:
-    Call(Subscriber& subscriber, std::shared_ptr<void>& gone)
-        : subscriber_(subscriber),
-          gone_(gone),
-          outermost_(!std::exchange(subscriber.called_, true)) {}
-    Call(const Call&) = delete;
-    Call& operator=(const Call&) = delete;
-    ~Call() {
-      if (!outermost_) return;
-      subscriber_.called_ = false;
-      if (subscriber_.ended_) gone_ = subscriber_.take();
-    }
-
-   private:
-    Subscriber& subscriber_;
-    std::shared_ptr<void>& gone_;
-    const bool outermost_;
-  };
-
-  const pid_t process_ = ::getpid();
   std::recursive_mutex running_;
+
+ private:
+  const pid_t process_ = ::getpid();
   std::atomic<bool> ended_{false};
-  bool called_ = false;
 };
 
-// The callbacks of one kind. Added from any thread, called from one; a call allocates nothing.
+// Callbacks are added from any thread and called from one; a call allocates nothing.
 template <class... Arguments>
 class Subscribers {
  public:
@@ -80,7 +50,13 @@ class Subscribers {
    public:
     explicit One(Function function) : function_(std::make_shared<Function>(std::move(function))) {}
     void operator()(const Arguments&... arguments) {
-      call([&] { (*function_)(arguments...); });
+      // Keeps what it has captured until the call is over, though it may end itself; destroyed
+      // without the lock.
+      std::shared_ptr<Function> called;
+      const std::lock_guard lock(running_);
+      if (ended()) return;
+      called = function_;
+      (*called)(arguments...);
     }
 
    private:
@@ -88,7 +64,7 @@ class Subscribers {
     std::shared_ptr<Function> function_;
   };
 
-  // An empty function is no callback: its handle has ended.
+  // An empty function is not a callback: its handle has ended.
   Subscription add(Function function) {
     if (!function) return {};
     const auto one = std::make_shared<One>(std::move(function));
@@ -97,30 +73,23 @@ class Subscribers {
   }
   void add(const std::shared_ptr<One>& one) {
     const std::lock_guard lock(mutex_);
-    List fresh;
-    for (const auto& each : *list_) {
-      if (!each->ended()) fresh.push_back(each);
-    }
+    List fresh = *list_;
+    std::erase_if(fresh, [](const auto& each) { return each->ended(); });
     fresh.push_back(one);
     list_ = std::make_shared<const List>(std::move(fresh));
   }
 
-  // Those that are added meanwhile are not called.
-  void operator()(const Arguments&... arguments) const {
-    each([&](One& one) { one(arguments...); });
-  }
+  // Callbacks that are added meanwhile are left out.
   template <class Action>
   void each(Action action) const {
-    const std::shared_ptr<const List> now = list();
+    std::unique_lock lock(mutex_);
+    const std::shared_ptr<const List> now = list_;
+    lock.unlock();
     for (const auto& one : *now) action(*one);
   }
 
  private:
   using List = std::vector<std::shared_ptr<One>>;
-  std::shared_ptr<const List> list() const {
-    const std::lock_guard lock(mutex_);
-    return list_;
-  }
 
   mutable std::mutex mutex_;
   std::shared_ptr<const List> list_ = std::make_shared<const List>();

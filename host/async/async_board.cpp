@@ -50,7 +50,7 @@ AsyncBoard::AsyncBoard(const executor_type& executor,
 
 AsyncBoard::~AsyncBoard() {
   impl_->close();
-  // Inside a callback the transport is still running: it goes when that is over.
+  // Inside a callback the transport is still running: it is destroyed after the callback.
   if (impl_->depth > 0) asio::post(impl_->io, [keep = impl_] {});
 }
 
@@ -61,7 +61,7 @@ AsyncBoard::executor_type AsyncBoard::get_executor() const noexcept {
   return impl_->io.get_executor();
 }
 
-// In a handler of its own: a slot must not lose its handler while that runs.
+// In a handler of its own: a slot must not lose its handler while the handler runs.
 void AsyncBoard::Cancel::operator()(asio::cancellation_type) const {
   const std::shared_ptr<Impl> impl = impl_.lock();
   if (impl) asio::post(impl->io, [impl, command = command_] { impl->cancel(command); });
@@ -110,82 +110,56 @@ void AsyncBoard::start_identify(Duration timeout, CompletionPtr completion) {
 }
 
 void AsyncBoard::start_wait_active(Duration timeout, CompletionPtr completion) {
-  impl_->wait_active(timeout, std::move(completion));
+  Impl& impl = *impl_;
+  impl.enter(Completion::How::post, [&] {
+    const Ticket id = impl.waits.next_id();
+    completion->listen(Cancel(impl_, id));
+    impl.waits.add({Impl::Waits::For::active, id, 0, impl.now, impl.now + Impl::time_of(timeout),
+                    std::move(completion)});
+  });
 }
 
-// Sets one setting after the other; the user's completion is told how the last ended.
-class AsyncBoard::TimingSteps final : public Completion {
+// Sends one setting after the other. The user's handler gets the result of the last one.
+class AsyncBoard::TimingSteps final : public Impl::Sequence {
  public:
   TimingSteps(Impl& impl, LinkTimingSteps steps, Time timeout, CompletionPtr completion)
-      : impl_(impl),
+      : Sequence(impl, std::move(completion)),
         steps_(steps),
-        started_(Impl::steady_now()),
-        deadline_(started_ + timeout),
-        completion_(std::move(completion)) {}
+        deadline_(Impl::steady_now() + timeout) {}
 
-  static void begin(std::unique_ptr<TimingSteps, Destroy> self) {
-    TimingSteps& steps = *self;
-    steps.impl_.begin(
-        std::move(self),
-        [&steps] {
-          const LinkTimingStep& step = steps.steps_[steps.done_];
-          const std::string value = std::to_string(step.ms);
-          const Time left = std::max(Time{0}, steps.deadline_ - steps.impl_.now);
-          return steps.impl_.session.send(Command::setting(step.key, Text(value)), left,
-                                          steps.impl_.now);
-        },
-        steps.id_);
-  }
-
-  void listen(const Cancel& cancel) override {
-    id_ = cancel.command();
-    completion_->listen(cancel);
+  void begin() {
+    const auto send = [this] {
+      const LinkTimingStep& step = steps_[done_];
+      const std::string value = std::to_string(step.ms);
+      const Time left = std::max(Time{0}, deadline_ - impl_.now);
+      return impl_.session.send(Command::setting(step.key, Text(value)), left, impl_.now);
+    };
+    impl_.begin(CompletionPtr(this), send, id_);
   }
   void complete(const CommandResult& result, How how) override {
-    std::unique_ptr<TimingSteps, Destroy> self(this);
-    if (result.outcome == Outcome::confirmed && ++done_ < steps_.count) {
-      begin(std::move(self));
-      return;
-    }
-    CommandResult whole = result;
-    whole.elapsed = Impl::steady_now() - started_;
-    const CompletionPtr::pointer users = completion_.release();
-    self.reset();
-    users->complete(whole, how);
+    if (result.outcome != Outcome::confirmed || ++done_ == steps_.count) return end(result, how);
+    begin();
   }
-  void destroy() noexcept override { delete this; }
 
  private:
-  Impl& impl_;  // which owns this
-  LinkTimingSteps steps_;
+  const LinkTimingSteps steps_;
   std::size_t done_ = 0;
-  Ticket id_ = 0;
-  Time started_, deadline_;
-  CompletionPtr completion_;
+  const Time deadline_;
 };
 
-// Closes the board, or watches it, when the farewell has ended, and hands its result on.
-class AsyncBoard::Farewell final : public Completion {
+// Closes the board, or watches it, after the farewell, and hands the result on.
+class AsyncBoard::Farewell final : public Impl::Sequence {
  public:
   using Then = void (*)(Impl& impl);
   Farewell(Impl& impl, Then then, CompletionPtr completion)
-      : impl_(impl), then_(then), completion_(std::move(completion)) {}
-
-  void listen(const Cancel& cancel) override { completion_->listen(cancel); }
+      : Sequence(impl, std::move(completion)), then_(then) {}
   void complete(const CommandResult& result, How how) override {
-    const CompletionPtr::pointer users = completion_.release();
-    Impl& impl = impl_;
-    const Then then = then_;
-    delete this;
-    then(impl);
-    users->complete(result, how);
+    then_(impl_);
+    end(result, how);
   }
-  void destroy() noexcept override { delete this; }
 
  private:
-  Impl& impl_;  // which owns this
-  Then then_;
-  CompletionPtr completion_;
+  const Then then_;
 };
 
 void AsyncBoard::start_close(Duration timeout, CompletionPtr completion) {
@@ -199,7 +173,7 @@ void AsyncBoard::start_close(Duration timeout, CompletionPtr completion) {
 
 BoardRole AsyncBoard::role() const { return impl_->session.board_role(); }
 
-// Not while the board is being left: it would end that before the board is known to be safe.
+// The role must not change while control is being released: the board is not known to be safe yet.
 void AsyncBoard::require_role_settled(std::string_view what) const {
   if (!impl_->is_open() || !impl_->session.leaving()) return;
   throw Error(ErrorKind::usage, std::string(what), "control is being released",
@@ -239,9 +213,9 @@ void AsyncBoard::require_link_timing(Duration board_timeout, Duration heartbeat)
 
 void AsyncBoard::start_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
                                    CompletionPtr completion) {
-  TimingSteps::begin(std::unique_ptr<TimingSteps, Destroy>(
-      new TimingSteps(*impl_, link_timing_steps(board_timeout, heartbeat), Impl::time_of(timeout),
-                      std::move(completion))));
+  (new TimingSteps(*impl_, link_timing_steps(board_timeout, heartbeat), Impl::time_of(timeout),
+                   std::move(completion)))
+      ->begin();
 }
 
 void AsyncBoard::require_sendable(const Command& command) const {
@@ -256,22 +230,12 @@ void AsyncBoard::require_sendable(const Setpoints& setpoints) const {
 
 PostResult AsyncBoard::post(const Command& command) {
   require_sendable(command);
-  Impl& impl = *impl_;
-  impl.give_up_slot(command);
-  PostResult result = PostResult::no_link;
-  impl.enter(Completion::How::post, [&] {
-    if (impl.is_open()) result = impl.post(command);
-  });
-  return result;
+  impl_->give_up_slot(command);
+  return impl_->post(command);
 }
 PostResult AsyncBoard::post(const Setpoints& setpoints) {
   require_sendable(setpoints);
-  Impl& impl = *impl_;
-  PostResult result = PostResult::no_link;
-  impl.enter(Completion::How::post, [&] {
-    if (impl.is_open()) result = impl.post(setpoints);
-  });
-  return result;
+  return impl_->post(setpoints);
 }
 
 const ReceivedState& AsyncBoard::state() const { return impl_->session.state(); }
@@ -284,21 +248,21 @@ const BoardIdentity& AsyncBoard::identity() const { return impl_->identity; }
 Statistics AsyncBoard::statistics() const { return impl_->session.statistics(Impl::steady_now()); }
 const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->paths.counters(); }
 const std::string& AsyncBoard::name() const { return impl_->paths.name(); }
-std::vector<PathStatus> AsyncBoard::paths() const {
-  std::vector<PathStatus> reports;
-  for (std::size_t i = 0; i < impl_->paths.size(); ++i) reports.push_back(impl_->report(i));
-  return reports;
-}
+std::vector<PathStatus> AsyncBoard::paths() const { return impl_->statuses(); }
 
 // --- the paths
 
-PathStatus AsyncBoard::Impl::report(std::size_t path) const {
+PathStatus AsyncBoard::Impl::status_of(std::size_t path) const {
   PathStatus made = session.path(path, steady_now());
   made.name = carrier(path).name();
   return made;
 }
+std::vector<PathStatus> AsyncBoard::Impl::statuses() const {
+  std::vector<PathStatus> all;
+  for (std::size_t i = 0; i < paths.size(); ++i) all.push_back(status_of(i));
+  return all;
+}
 
-void AsyncBoard::record(Recording& recording) { impl_->record(recording.recorder_); }
 void AsyncBoard::describe(const Device& device) { impl_->describe(device); }
 
 void AsyncBoard::Impl::describe(const Device& device) {
@@ -311,17 +275,18 @@ void AsyncBoard::Impl::describe(const Device& device) {
   describe_in_recording(device);
 }
 
-// What is known already comes first.
-void AsyncBoard::Impl::record(const std::shared_ptr<Recorder>& recorder) {
-  for (const auto& path : paths) {
+// The recording begins with what is known already.
+void AsyncBoard::record(Recording& recording) {
+  Impl& impl = *impl_;
+  for (const auto& path : impl.paths) {
     const Carrier& transport = *path->carrier;
-    path->tap.attach(recorder, transport.name());
+    path->tap.attach(recording.recorder_, transport.name());
     if (!transport.up()) continue;
     path->tap.on_carrier_event({CarrierEvent::Kind::up, {{}, transport.name(), {}, {}}});
   }
-  paths[0].tap.on_link(session.link());
-  name_in_recording();
-  for (const Device& device : devices) describe_in_recording(device);
+  impl.paths[0].tap.on_link(impl.session.link());
+  impl.name_in_recording();
+  for (const Device& device : impl.devices) impl.describe_in_recording(device);
 }
 
 void AsyncBoard::Impl::name_in_recording() {
@@ -330,14 +295,14 @@ void AsyncBoard::Impl::name_in_recording() {
   for (const auto& path : paths) path->tap.on_name(board);
 }
 
-// The link goes on without it.
-void AsyncBoard::Impl::tell_of_recordings() {
+// A recording that ends by itself does not end the link.
+void AsyncBoard::Impl::warn_of_recordings() {
   std::optional<Problem> problem;
   for (const auto& path : paths) {
     std::optional<Problem> news = path->tap.take_news();
     if (news && !problem) problem = std::move(news);
   }
-  if (problem) call(callbacks.event, CarrierEvent{CarrierEvent::Kind::warning, *problem});
+  if (problem) warn(std::move(*problem));
 }
 
 void AsyncBoard::Impl::describe_in_recording(const Device& device) {

@@ -12,19 +12,19 @@ namespace r4 {
 
 namespace {
 
-// The session counts from the steady clock; since 1970 it is this much more.
+// The session counts by the steady clock. `clock_start` is the calendar's time at its zero.
 SessionOptions with_clock(SessionOptions options, Time now) {
   const auto epoch = std::chrono::system_clock::now().time_since_epoch();
   options.clock_start = std::chrono::duration_cast<Time>(epoch) - now;
   return options;
 }
 
-// Not in the event loop for this long: what has come meanwhile is a backlog, and of its states only
-// the newest is told.
+// After this time outside the event loop, waiting datagrams are a backlog: of its states only the
+// newest is reported.
 constexpr Time held_up{std::chrono::milliseconds{50}};
-// What was due so long ago is told of: two heartbeats were late.
+// From this delay on there is a warning, because two heartbeats were late.
 constexpr Time very_late{std::chrono::milliseconds{200}};
-// From one attempt to open a path to the next.
+// Between two attempts to open a path.
 constexpr std::chrono::seconds open_interval{1};
 
 }  // namespace
@@ -39,13 +39,9 @@ AsyncBoard::Impl::Impl(asio::io_context& context, std::vector<std::unique_ptr<Ca
       timer(context),
       reopening(context) {}
 
-Time AsyncBoard::Impl::time_of(Duration timeout) {
-  return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
-}
-
 // --- entering the session
 
-// By how much what was due is late; 0 inside another entry.
+// Returns the delay of what was due; 0 inside another entry.
 Time AsyncBoard::Impl::begin_entry(Completion::How way) {
   if (depth == 0) how = way;
   session.on_trouble(paths.trouble());
@@ -57,12 +53,12 @@ Time AsyncBoard::Impl::begin_entry(Completion::How way) {
 void AsyncBoard::Impl::end_entry(Time late) {
   if (is_open() && late > very_late) {
     poll_wanted = true;
-    tell_that_it_was_held_up(late);
+    warn_of_hold_up(late);
   }
   settle();
 }
 
-// What has waited in sockets and buffers since before is passed over.
+// Datagrams that have waited in sockets and buffers since before the sleep are dropped.
 void AsyncBoard::Impl::on_sleep() {
   backlog.on_sleep();
   session.on_sleep(now);
@@ -70,23 +66,20 @@ void AsyncBoard::Impl::on_sleep() {
   poll_wanted = true;
 }
 
-void AsyncBoard::Impl::tell_that_it_was_held_up(Time late) {
+void AsyncBoard::Impl::warn_of_hold_up(Time late) {
   const Inside inside(depth);
   const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(late).count();
-  call(callbacks.event,
-       CarrierEvent{CarrierEvent::Kind::warning,
-                    Problem{ErrorKind::refused, "the event loop",
-                            "it was held up: what was due went out " + std::to_string(ms) +
-                                " ms late, heartbeats too",
-                            "a handler on this loop must return at once; where none is slow, the "
-                            "computer had no time for this program"}});
+  warn({ErrorKind::refused, "the event loop",
+        "it was held up: what was due went out " + std::to_string(ms) + " ms late, heartbeats too",
+        "a handler on this loop must return at once; where none is slow, the "
+        "computer had no time for this program"});
 }
 
 void AsyncBoard::Impl::settle() {
   const Inside inside(depth);
   for (;;) {
     notify_all();
-    // Handlers that are dispatched may start commands, whose ends are appended.
+    // Handlers that are dispatched may start commands; their ends are appended.
     while (std::optional<Waits::Ended> ended = waits.take_ended()) {
       guarded([&] { ended->completion.release()->complete(ended->result, how); });
     }
@@ -117,7 +110,7 @@ bool AsyncBoard::Impl::has_come(const Waits::Condition& condition) const {
   return false;
 }
 
-// Ends the waits that are over; false if none is.
+// Ends the waits that are over. False if there are none.
 bool AsyncBoard::Impl::end_waits() {
   return waits.end_conditions(
       [this](const Waits::Condition& each) -> std::optional<Outcome> {
@@ -130,21 +123,13 @@ bool AsyncBoard::Impl::end_waits() {
 
 // --- what the user starts
 
-void AsyncBoard::Impl::wait_active(Duration timeout, CompletionPtr completion) {
-  enter(Completion::How::post, [&] {
-    const Ticket id = waits.next_id();
-    completion->listen(Cancel(weak_from_this(), id));
-    waits.add({Waits::For::active, id, 0, now, now + time_of(timeout), std::move(completion)});
-  });
-}
-
 void AsyncBoard::Impl::cancel(Ticket id) {
   enter(Completion::How::post, [&] {
     const Ticket ticket = waits.cancel(id, now);
     if (ticket == 0) return;
     session.cancel(ticket, now);
-    notify_all();                             // with what is known of the command
-    waits.end(ticket, {Outcome::cancelled});  // of a stop, which goes on
+    notify_all();                             // its end, with what is known of the command
+    waits.end(ticket, {Outcome::cancelled});  // a stop goes on: only the wait ends
     poll_wanted = true;
   });
 }
@@ -155,34 +140,30 @@ void AsyncBoard::Impl::open() {
                 "make another one for the same URL");
   }
   std::optional<Problem> problem;
-  bool any = false;
-  bool all = true;
   for (const auto& path : paths) {
-    const bool opened = open_path(*path, problem);
-    any = any || opened;
-    all = all && opened;
+    open_path(*path, problem);
     if (phase != Phase::made) return;  // the callback for `up` has closed the board
   }
-  if (!any) throw Error(*problem);
+  const auto is_opened = [](const auto& path) { return path->opened; };
+  if (std::none_of(paths.begin(), paths.end(), is_opened)) throw Error(*problem);
   for (const auto& path : paths) {
-    if (path->trouble) tell_trouble(*path);
+    if (path->trouble) report_trouble(*path);
     if (phase != Phase::made) return;
   }
   phase = Phase::open;
   sleep_watch = SleepWatch();
   due = steady_now();
   enter(Completion::How::post, [this] { poll_wanted = true; });
-  if (!all) open_again();
+  if (problem) open_again();
 }
 
-// If at least one path is open, the others are tried again later. From then on trouble with one path
-// does not touch the others. `problem`: set to the first error of all paths.
-bool AsyncBoard::Impl::open_path(BoardPath& path, std::optional<Problem>& problem) {
+// If at least one path is open, paths that failed are tried again later, and trouble with one path
+// does not touch the other paths. `problem`: set to the first error of all paths.
+void AsyncBoard::Impl::open_path(BoardPath& path, std::optional<Problem>& problem) {
   try {
     with_system_errors(path.carrier->name(), [&] { path.carrier->open(path); });
     path.opened = true;
     path.trouble.reset();
-    return true;
   } catch (const Error& error) {
     if (phase == Phase::made && error.kind() == ErrorKind::usage) {
       paths.close();
@@ -191,22 +172,20 @@ bool AsyncBoard::Impl::open_path(BoardPath& path, std::optional<Problem>& proble
     if (!problem) problem = error.problem();
     const bool news = !path.trouble || path.trouble->text() != error.problem().text();
     path.trouble = error.problem();
-    if (news && phase == Phase::open) tell_trouble(path);
+    if (news && phase == Phase::open) report_trouble(path);
   }
-  return false;
 }
 
 void AsyncBoard::Impl::open_again() {
   reopening.expires_after(open_interval);
   reopening.async_wait([self = shared_from_this()](const std::error_code& error) {
     if (error || !self->has_link()) return;
-    bool all = true;
     std::optional<Problem> problem;
     for (const auto& path : self->paths) {
       if (path->opened || !self->has_link()) continue;
-      self->guarded([&] { all = self->open_path(*path, problem) && all; });
+      self->guarded([&] { self->open_path(*path, problem); });
     }
-    if (!all && self->has_link()) self->open_again();
+    if (problem && self->has_link()) self->open_again();
   });
 }
 
@@ -217,7 +196,7 @@ Ticket AsyncBoard::Impl::leave(Time timeout) {
 
 void AsyncBoard::Impl::close() {
   if (phase == Phase::closed) return;
-  // Said once; nobody waits for an answer.
+  // The farewell is sent once; close() does not wait for an answer.
   if (is_open()) enter(Completion::How::post, [this] { leave(Time{0}); });
   phase = Phase::closed;
   paths.close();
@@ -232,8 +211,8 @@ void AsyncBoard::Impl::cancel_waits() {
                        now);
 }
 
-// Control is taken on all paths, or on none; nothing keeps a board from being watched. Each path begins
-// anew: its transport may be opened again, at another port.
+// Control is taken on all paths or on none, but watching cannot be refused. Each path restarts: its
+// transport may be opened again, at another port.
 void AsyncBoard::Impl::become(BoardRole role) {
   std::size_t changed = 0;
   try {
@@ -259,7 +238,7 @@ void AsyncBoard::Impl::become(BoardRole role) {
 
 // --- time
 
-// The timer is only set when it must ring earlier than it will; ringing early costs one poll.
+// The timer is set only if it must ring earlier; ringing early costs one poll.
 void AsyncBoard::Impl::arm() {
   const Time next = waits.next(due);
   if (armed && armed_for <= next) return;
@@ -277,7 +256,7 @@ void AsyncBoard::Impl::on_timer() {
   const bool notifies_backlog = backlog.on_timer();
   enter(Completion::How::dispatch, [this] {
     poll_wanted = true;
-    tell_of_recordings();
+    warn_of_recordings();
   });
   if (notifies_backlog) notify_backlog();
 }
@@ -292,7 +271,7 @@ void AsyncBoard::Impl::on_datagram(BoardPath& path, std::string_view bytes) {
     paths[0].tap.on_packets(session.packets());
     poll_wanted = true;
     send_all();
-    notify_all();  // which may be of these bytes
+    notify_all();  // events may have views of these bytes
   });
 }
 
@@ -315,7 +294,7 @@ void AsyncBoard::Impl::notify_backlog() {
 void AsyncBoard::Impl::on_carrier_event(BoardPath& path, const CarrierEvent& event) {
   enter(Completion::How::dispatch, [&] {
     path.tap.on_carrier_event(event);
-    call(callbacks.event, event);
+    report(event);
     if (event.kind != CarrierEvent::Kind::warning) {
       session.on_transport(path.index, event.kind == CarrierEvent::Kind::up, now,
                            !only_listens(path.index));

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is behind an AsyncBoard: a session, its paths and its timer, and who waits for what.
+// The implementation of an AsyncBoard: a session, its paths, its timer, and the waits of handlers.
 //
-// Every call of the session is made inside enter(), which then sends what the session wants to be sent. The
-// outermost enter() also reports events and results, and sets the timer. on_datagram() reports at once.
+// Every call of the session is made inside enter(), which then does the session's sendings. The
+// outermost enter() also reports events and results, and sets the timer. on_datagram() reports at
+// once.
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <asio/post.hpp>
 #include <asio/steady_timer.hpp>
 #include <atomic>
@@ -18,7 +19,6 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "../measurement/boot_clock.hpp"
@@ -31,13 +31,13 @@
 
 namespace r4 {
 
-// Outlives the AsyncBoard where a callback or handler destroys that.
+// Outlives the AsyncBoard if a callback or handler destroys the AsyncBoard.
 //
-// It has more than 15 members and 40 functions, because every function of AsyncBoard ends here and each
-// kind of event has a function of its own. A job of its own has a class: Session, BoardPaths, Waits,
-// Backlog.
+// It has more than 15 members and 40 functions, because every function of AsyncBoard ends here. A
+// job of its own has a class: Session, BoardPaths, Waits, Backlog.
 struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<AsyncBoard::Impl> {
   using Waits = r4::Waits<CompletionPtr>;
+  class Sequence;
   struct Callbacks {
     Subscribers<ReceivedState, Datagram> state;
     Subscribers<Datagram> heartbeat;
@@ -52,29 +52,30 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
     Subscribers<RefusedPost> refused;
   };
 
-  // The user is told nothing, and starts nothing, from `leaving` on.
+  // From `leaving` on, nothing is reported to the user and the user starts nothing.
   //
-  //     made --open()--> open --async_close()--> leaving --the board knows it, or time is up--> closed
-  //                        +-------------------- close() ----------------------------------------^
+  //     made --open()--> open --async_close()--> leaving --confirmed, or time is up--> closed
+  //                        +-------------------- close() -------------------------------^
   enum class Phase : std::uint8_t { made, open, leaving, closed };
   bool is_open() const { return phase == Phase::open; }
   bool has_link() const { return phase == Phase::open || phase == Phase::leaving; }
-  bool may_tell() const { return phase == Phase::made || phase == Phase::open; }
 
-  // Throws Error{usage} for none, and for more than a session has.
+  // Throws Error{usage} for no transport, and for more than a session has paths.
   Impl(asio::io_context& context, std::vector<std::unique_ptr<Carrier>> transports,
        BoardOptions options);
 
   static Time steady_now() {
     return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
   }
-  // A day is as good as for ever, and cannot overflow.
-  static Time time_of(Duration timeout);
+  // At most a day: that is as good as for ever, and cannot overflow.
+  static Time time_of(Duration timeout) {
+    return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
+  }
 
   // --- entering the session
 
-  // Runs the user's code. What it throws leaves io.run() in a handler of its own: through the
-  // transport, whose handler may be below us, it would end reception for ever.
+  // Runs the user's code. An exception leaves io.run() in a handler of its own: if it passed
+  // through the transport, whose handler may have called us, it would end reception for ever.
   template <class Code>
   void guarded(Code code) {
     try {
@@ -86,10 +87,17 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   template <class... Arguments>
   void call(const Subscribers<Arguments...>& those, const Arguments&... arguments) {
     those.each([&](auto& one) {
-      // The one before may have closed the board.
-      if (may_tell()) guarded([&] { one(arguments...); });
+      // An earlier callback may have closed the board.
+      if (is_open()) guarded([&] { one(arguments...); });
     });
   }
+  // Also while the board is being opened.
+  void report(const CarrierEvent& event) {
+    callbacks.event.each([&](auto& one) {
+      if (is_open() || phase == Phase::made) guarded([&] { one(event); });
+    });
+  }
+  void warn(Problem problem) { report({CarrierEvent::Kind::warning, std::move(problem)}); }
 
   template <class Action>
   void enter(Completion::How way, Action action) {
@@ -115,7 +123,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   Time begin_entry(Completion::How way);
   void end_entry(Time late);
   void on_sleep();
-  void tell_that_it_was_held_up(Time late);
+  void warn_of_hold_up(Time late);
   void send_all();
   void notify_all();
   void settle();
@@ -123,8 +131,8 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
 
   // --- what the user starts
 
-  // `start` hands the command to the session; its ticket is 0 if it is not taken, and ends so.
-  // `id`: of the step before, if it is not the first.
+  // `start` gives the command to the session and returns its ticket. If that is 0, the command ends
+  // as `not_taken`. `id`: of the first step, if this is a later step.
   template <class Start>
   void begin(CompletionPtr completion, Start start, Ticket id = 0,
              Outcome not_taken = Outcome::full) {
@@ -146,14 +154,23 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
       }
     });
   }
-  // A command, or a group. One of a board that knows no groups goes as one command after the other, up to the first
-  // that is not sent.
+  // A command, or a group.
   template <class What>
   PostResult post(const What& what) {
+    PostResult result = PostResult::no_link;
+    enter(Completion::How::post, [&] {
+      if (is_open()) result = post_now(what);
+    });
+    return result;
+  }
+  // If the board executes no groups, the commands of a group go one after the other, up to the
+  // first that is not sent.
+  template <class What>
+  PostResult post_now(const What& what) {
     if constexpr (std::is_same_v<What, Setpoints>) {
       if (session.posts_apart()) {
         PostResult result = PostResult::sent;
-        for (std::size_t i = 0; i < what.size() && result; ++i) result = post(what[i]);
+        for (std::size_t i = 0; i < what.size() && result; ++i) result = post_now(what[i]);
         return result;
       }
     }
@@ -162,31 +179,27 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
     send_all();
     return session.posted();
   }
-  void wait_active(Duration timeout, CompletionPtr completion);
   bool has_come(const Waits::Condition& condition) const;
   void cancel(Ticket id);
   void open();
-  bool open_path(BoardPath& path, std::optional<Problem>& problem);
-  void tell_trouble(BoardPath& path) {
+  void open_path(BoardPath& path, std::optional<Problem>& problem);
+  void report_trouble(BoardPath& path) {
     on_carrier_event(path, {CarrierEvent::Kind::down, *path.trouble});
   }
   void open_again();
-  // Says farewell: its ticket, or 0 if there is nobody to say it to.
+  // Sends a farewell. Returns its ticket, or 0 if no board hears it.
   Ticket leave(Time timeout);
   void close();
   void become(BoardRole role);
-  // Conditions that a program waits for end, because control is released.
+  // Ends the conditions that a program waits for.
   void cancel_waits();
 
-  void record(const std::shared_ptr<Recorder>& recorder);
   void name_in_recording();
   void describe(const Device& device);
   void describe_in_recording(const Device& device);
-  // Throws Error{usage} if another device has one of its slots.
-  void require_slots(const Device& device) const;
   // X:OFF gives up the device that has that slot.
   void give_up_slot(const Command& command);
-  void tell_of_recordings();
+  void warn_of_recordings();
 
   // --- time
 
@@ -201,34 +214,26 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void on_carrier_event(BoardPath& path, const CarrierEvent& event) override;
   void on_overheard(BoardPath& path, std::string_view bytes) override;
 
-  // --- what the session wants done
+  // --- the session's effects
 
   SendResult transmit(const Sending& sending) const;
-  void notify(const StateCame&);
-  void notify(const HeartbeatCame&);
-  void notify(const BoardIdentified& event);
-  void notify(const CommandRefused& event);
-  void notify(const BadDatagramCame& event);
-  void notify(const LinkChanged& event);
-  void notify(const CommandEnded& event);
-  void notify(const BoardRestarted&);
-  void notify(const ArmingChanged&);
-  void notify(const PostRefused& event);
+  void on_identity(const Identity& fresh);
 
   // --- the paths
 
   Carrier& carrier(std::size_t path) const { return *paths[path].carrier; }
   bool only_listens(std::size_t path) const;
-  PathStatus report(std::size_t path) const;
+  PathStatus status_of(std::size_t path) const;
+  std::vector<PathStatus> statuses() const;
   void notify_paths(const LinkStatus& status);
 
   asio::io_context& io;
   BoardPaths paths;
-  std::vector<Device> devices;  // that recordings tell of
+  std::vector<Device> devices;  // that recordings describe
   std::vector<const Device*> attaching;
-  std::uint32_t boots = 0;           // of the board, while we have known it
-  const std::uint32_t heartbeat_ms;  // between ours
-  const Time board_timeout;          // so long a board waits for its host
+  std::uint32_t boots = 0;           // times that the board has restarted
+  const std::uint32_t heartbeat_ms;  // interval of our heartbeats
+  const Time board_timeout;          // how long a board waits for its host
   Session session;
   BoardIdentity identity;
 
@@ -246,10 +251,41 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   Time due{0};
   asio::steady_timer timer;
   asio::steady_timer reopening;
-  LinkStatus told;  // the status that paths were reported by last
+  LinkStatus reported;  // by which paths were reported last
   bool armed = false;
   Time armed_for{0};
   std::atomic<Time::rep> fed{0};  // when feed() was called last; 0: the session knows it
+};
+
+// The completion of several steps, which stands before the user's.
+class AsyncBoard::Impl::Sequence : public Completion {
+ public:
+  Sequence(const Sequence&) = delete;
+  Sequence& operator=(const Sequence&) = delete;
+  void listen(const Cancel& cancel) final {
+    id_ = cancel.command();
+    completion_->listen(cancel);
+  }
+  void destroy() noexcept final { delete this; }
+
+ protected:
+  Sequence(Impl& impl, CompletionPtr completion)
+      : impl_(impl), completion_(std::move(completion)) {}
+  virtual ~Sequence() = default;
+  // Destroys this, then hands the result to the user's handler.
+  void end(CommandResult result, How how) {
+    result.elapsed = steady_now() - started_;
+    const CompletionPtr::pointer users = completion_.release();
+    delete this;
+    users->complete(result, how);
+  }
+
+  Impl& impl_;     // owns this
+  Ticket id_ = 0;  // of the first step, by which all are cancelled
+
+ private:
+  const Time started_ = steady_now();
+  CompletionPtr completion_;
 };
 
 }  // namespace r4

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a program that was held up does with the datagrams that have come meanwhile: of the states in a
-// backlog only the newest is reported, and what came before this computer slept is dropped.
+// The datagrams that came while a program was held up: of the states in a backlog only the newest
+// is reported. Datagrams from before a sleep of this computer are dropped.
 //
 //     live --held up--> in backlog --the transport is drained--> live
 //     any  --sleep----> waking     --drained, or the timer rang twice--> live
@@ -22,10 +22,10 @@ class Backlog {
     waking_ = 2;
     forget();
   }
-  // The state that is kept is of an earlier boot of the board, or from before a sleep.
+  // The kept state is of an earlier boot of the board, or from before a sleep.
   void forget() { size_ = 0; }
 
-  // True if datagrams are to be dropped, because they came before the sleep.
+  // True if datagrams are to be dropped, because they are from before a sleep.
   bool drops() const { return waking_ != 0; }
   // True if states are to be kept, not reported.
   bool keeps_states() const { return behind_; }
@@ -40,15 +40,15 @@ class Backlog {
     waking_ = 0;
     rings_ = 0;
   }
-  // The timer rang. True if the kept state is to be reported: twice without on_drained(), so the transport
-  // may be one that never says that it is drained.
+  // The timer rang. True if the kept state is to be reported: twice without on_drained(), so the
+  // transport may be one that never says that it is drained.
   bool on_timer() {
     if (waking_ != 0) --waking_;
     rings_ = size_ == 0 ? 0 : rings_ + 1;
     return rings_ >= 2;
   }
-  // The newest state that was kept, which is forgotten; empty if there is none. Valid until the next
-  // keep().
+  // The newest state that was kept, which is forgotten; empty if there is none. Valid until the
+  // next keep().
   Text take() { return {state_.data(), std::exchange(size_, 0)}; }
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The paths of a board: each has a transport, the number by which the session knows it, and what of it
-// goes into a recording.
+// The paths of a board: each has a transport, the number by which the session knows it, and a tap
+// for recordings.
 #pragma once
 
 #include <cstddef>
@@ -45,7 +45,7 @@ class BoardPath final : public Carrier::Handler {
   const std::unique_ptr<Carrier> carrier;
   RecordingTap tap;
   bool opened = false;
-  std::optional<Problem> trouble;  // why it could not be opened, as it was told last
+  std::optional<Problem> trouble;  // why it could not be opened, as reported last
 
  private:
   Owner& owner_;

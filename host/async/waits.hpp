@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What handlers wait for at a board: the end of a command, or a condition. Each wait ends once: its result
-// stands among the ended waits until it is taken out and handed to its handler.
+// The waits of handlers: for the end of a command, or for a condition. Each wait ends once: its
+// result is among the ended waits until it is taken out and given to its handler.
 #pragma once
 
 #include <algorithm>
@@ -20,9 +20,9 @@ template <class CompletionPtr>
 class Waits {
  public:
   enum class For : std::uint8_t {
-    active,  // the board
-    answer,  // the end of the transfer of that number, as the state tells it
-    time,    // the deadline itself
+    active,  // the board is active, or is heard by a watcher
+    answer,  // the state has the end of the I2C transfer `pnum`
+    time,    // the deadline
   };
   // A wait for a condition. `id`: cancels it.
   struct Condition {
@@ -46,7 +46,7 @@ class Waits {
   // An id that is not a ticket of a session.
   Ticket next_id() { return next_id_++; }
 
-  // The command has ended. Ignored if nobody waits for it.
+  // The command has ended. Ignored if no handler waits for it.
   void end(Ticket ticket, const CommandResult& result) {
     const auto found = std::find_if(commands_.begin(), commands_.end(),
                                     [&](const Command& each) { return each.ticket == ticket; });
@@ -55,8 +55,7 @@ class Waits {
     if (found != commands_.end() - 1) *found = std::move(commands_.back());
     commands_.pop_back();
   }
-  // Ends the conditions that `outcome_of` says have ended: none for one that goes on. True if there
-  // were any.
+  // Ends each condition for which `outcome_of` returns an outcome. True if there were any.
   template <class OutcomeOf>
   bool end_conditions(OutcomeOf outcome_of, Time now) {
     const std::size_t before = conditions_.size();
@@ -67,8 +66,8 @@ class Waits {
     });
     return conditions_.size() != before;
   }
-  // Ends that condition as cancelled. Otherwise, returns the ticket of the command with that id, which
-  // the session has to cancel; 0 if there is none.
+  // Ends the condition with that id as cancelled. Returns the ticket of the command with that id,
+  // which the session has to cancel; 0 if there is none.
   Ticket cancel(Ticket id, Time now) {
     end_conditions(
         [id](const Condition& each) {

@@ -6,21 +6,31 @@
 #include <utility>
 
 #include "../commands/command_help.hpp"
+#include "own_command.hpp"
 #include "r4link/board.hpp"
 
 namespace r4 {
 
 namespace {
 
-// The session ends every command at its deadline, which is that of the call. A call that has been begun and waits
-// longer than this beyond it is held up by a loop that does not turn.
+// The session ends every command at its deadline, which is that of the call. If a call that has
+// begun waits for this time beyond it, the loop is held up.
 constexpr BlockingLoop::Duration grace{500};
 
-// For what has no deadline of its own.
+// For what has no deadline.
 constexpr BlockingLoop::Duration patience{1000};
 static_assert(patience == Board::default_timeout);
 
 }  // namespace
+
+BlockingLoop::Start BlockingLoop::start_of(const Command& command) {
+  return [own = OwnCommand(command)](AsyncBoard& board, std::size_t, Duration left, BoundEnd end) {
+    const Command asked = own.get();
+    if (asked.kind == CommandKind::stop) return board.async_stop(left, std::move(end));
+    if (asked.kind == CommandKind::identify) return board.async_identify(left, std::move(end));
+    board.async_send(asked, left, std::move(end));
+  };
+}
 
 Error BlockingLoop::closed_error(std::string_view what) const {
   std::string type(name_.thing);
@@ -44,17 +54,18 @@ void BlockingLoop::run(const CallPtr& call, Duration timeout) {
   std::unique_lock lock(mutex);
   if (closed) throw closed_error(call->text);
   asio::post(io, [this, call, deadline] { begin(call, deadline); });
-  const auto is_done = [&] { return call->parts == 0; };
+  const auto is_done_by = [&](Clock::time_point time) {
+    return wait_until(lock, call->ended, time, on_wait, [&] { return call->left == 0; });
+  };
   bool done = false;
   try {
-    done = wait_until(lock, call->ended, deadline, is_done) ||
-           (call->begun && wait_until(lock, call->ended, deadline + grace, is_done));
+    done = is_done_by(deadline) || (call->begun && is_done_by(deadline + grace));
   } catch (...) {
     if (!lock.owns_lock()) lock.lock();
     call->abandoned = true;
     if (!closed) {
       asio::post(io, [call] {
-        for (auto& each : call->cancelled) each.emit(asio::cancellation_type::terminal);
+        for (Part& each : call->parts) each.cancelled.emit(asio::cancellation_type::terminal);
       });
     }
     throw;
@@ -76,33 +87,38 @@ void BlockingLoop::run_unawaited(const CallPtr& call) {
 }
 
 bool BlockingLoop::run_on_loop(std::string_view what, const std::function<void()>& action) {
-  struct Turn final : Call {
+  struct Turn {
+    bool begun = false;
+    bool abandoned = false;
+    bool over = false;
     std::exception_ptr trouble;
+    std::condition_variable ended;
   };
   const auto turn = std::make_shared<Turn>();
   std::unique_lock lock(mutex);
   if (closed) return false;
-  // `action` is the caller's, who is here as long as it runs.
+  // `action` is the caller's, who waits as long as it runs.
   asio::post(io, [this, turn, &action] {
-    {
-      const std::lock_guard begin_lock(mutex);
-      if (turn->abandoned) return;
-      turn->begun = true;
-    }
+    std::unique_lock loop_lock(mutex);
+    if (turn->abandoned) return;
+    turn->begun = true;
+    loop_lock.unlock();
     try {
       action();
     } catch (...) {
       turn->trouble = std::current_exception();
     }
-    finish(*turn, [] {});
+    loop_lock.lock();
+    turn->over = true;
+    turn->ended.notify_all();
   });
-  const auto is_done = [&] { return turn->parts == 0; };
-  if (!turn->ended.wait_for(lock, patience, is_done)) {
+  const auto is_over = [&] { return turn->over; };
+  if (!turn->ended.wait_for(lock, patience, is_over)) {
     if (!turn->begun) {
       turn->abandoned = true;
       throw blocked_error(what, "not done", name_.fix);
     }
-    turn->ended.wait(lock, is_done);
+    turn->ended.wait(lock, is_over);
   }
   if (turn->trouble) std::rethrow_exception(turn->trouble);
   return true;
@@ -115,7 +131,26 @@ void BlockingLoop::begin(const CallPtr& call, Clock::time_point deadline) {
     if (!call->stop && (call->abandoned || left <= Duration{0})) return;
     call->begun = true;
   }
-  call->start(call, left > Duration{0} ? left : patience);
+  if (left <= Duration{0}) left = patience;
+  for (std::size_t i = 0; i < call->parts.size(); ++i) {
+    Part& part = call->parts[i];
+    try {
+      call->start(*part.board, i, left, BoundEnd(part.cancelled.slot(), End{this, call, i}));
+    } catch (const Error& error) {
+      part.trouble = error.problem();
+      end(*call, i, {Outcome::refused});
+    }
+  }
+}
+
+void BlockingLoop::end(Call& call, std::size_t part, const CommandResult& result) {
+  const std::lock_guard lock(mutex);
+  Part& ended = call.parts[part];
+  ended.result = result;
+  ended.result.elapsed = std::chrono::duration_cast<Time>(Clock::now() - call.called);
+  ended.link = ended.board->link();
+  on_end();
+  if (--call.left == 0) call.ended.notify_all();
 }
 
 void BlockingLoop::close(std::function<void()> shut) {
@@ -129,7 +164,7 @@ void BlockingLoop::close(std::function<void()> shut) {
 
 void BlockingLoop::end_loop() {
   work_.reset();
-  // Twice around: the ends of commands that begin() finds closed come behind this one.
+  // Twice around: commands that begin() finds closed end after this.
   asio::post(io, [this] { asio::post(io, [this] { io.stop(); }); });
 }
 

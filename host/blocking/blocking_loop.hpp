@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The thread on which the links of a Board or a Fleet run, and the calls of other threads that wait for it.
+// The thread on which the links of a Board or a Fleet run, and the calls of other threads that wait
+// for it.
 //
 //     a thread of the program           the loop's thread
-//     run(call) ---- posted ---->       begin: the call's start(), with the time that is left
-//        waits  <--- finish() ---       each of its parts ends
+//     run(call) ---- posted ---->       begin(): each board starts its part, with the time left
+//        waits  <--- end() ------       each part ends
 //
-// A caller may give up: at its deadline, or when on_wait() throws. What the loop has not begun by then, it never
-// begins; what it has begun is cancelled. A stop goes out however late it is.
+// A caller may give up: at its deadline, or when on_wait() throws. What the loop has not begun by
+// then, it never begins; what it has begun is cancelled. A stop goes out however late it is.
 #pragma once
 
 #include <algorithm>
@@ -21,11 +22,14 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include "../measurement/boot_clock.hpp"
+#include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
 
 namespace r4 {
@@ -35,24 +39,48 @@ class BlockingLoop {
   using Clock = std::chrono::steady_clock;
   using Duration = std::chrono::milliseconds;
   static constexpr Duration wait_interval{50};
-  // So long does close() wait for the boards to say that they are free.
+  // How long close() waits for the boards to report that they are free.
   static constexpr Duration farewell_limit{100};
 
-  // Held by both sides, since the caller may give up.
   struct Call;
   using CallPtr = std::shared_ptr<Call>;
+  // Ends a part of a call, on the loop. Cancelled with the call.
+  struct End {
+    void operator()(const CommandResult& result) const { loop->end(*call, part, result); }
+    BlockingLoop* loop;
+    CallPtr call;
+    std::size_t part;
+  };
+  using BoundEnd = asio::cancellation_slot_binder<End, asio::cancellation_slot>;
+  // Has a board begin its part, on the loop, with the time that is left.
+  using Start =
+      std::function<void(AsyncBoard& board, std::size_t part, Duration left, BoundEnd end)>;
+  // What was asked of one board.
+  struct Part {
+    AsyncBoard* board = nullptr;
+    CommandResult result{};
+    LinkStatus link{};                 // at the end
+    std::optional<Problem> trouble{};  // it could not begin: the role has changed
+    asio::cancellation_signal cancelled{};
+  };
+  // Owned by both sides, because the caller may give up.
   struct Call {
-    std::string text;  // what was asked for, in errors
-    bool stop = false;
-    // On the loop. Each part ends by finish(), and is cancelled by a signal of its own.
-    std::function<void(const CallPtr& call, Duration left)> start;
-    std::deque<asio::cancellation_signal> cancelled;
-    std::size_t parts = 1;  // that have not ended
+    Call(std::string what, Start begin, const std::vector<AsyncBoard*>& boards, bool is_stop)
+        : text(std::move(what)), start(std::move(begin)), stop(is_stop), left(boards.size()) {
+      for (AsyncBoard* board : boards) parts.emplace_back().board = board;
+    }
+    const std::string text;  // what was asked for, in errors
+    const Start start;
+    const bool stop;
+    std::deque<Part> parts;
+    std::size_t left;  // parts that have not ended
     bool begun = false;
     bool abandoned = false;
     std::condition_variable ended;
     const Clock::time_point called = Clock::now();
   };
+  // Has a board stop, identify itself or send the command.
+  static Start start_of(const Command& command);
 
   // How errors name it: "board" or "fleet", and what to do if its thread does not answer.
   struct Name {
@@ -67,35 +95,38 @@ class BlockingLoop {
 
   // --- on any thread
 
-  // Waits until all parts of the call have ended. Throws if they do not in time, if it is closed, and what on_wait()
-  // throws.
+  // Waits until all parts of the call have ended. Throws if they do not in time, if the loop is
+  // closed, and what on_wait() throws.
   void run(const CallPtr& call, Duration timeout);
-  // Has the call begin, with Board::default_timeout, and does not wait. Does nothing if the loop is closed.
+  // Begins the call, with Board::default_timeout, and does not wait. Does nothing if the loop is
+  // closed.
   void run_unawaited(const CallPtr& call);
-  // Does `action` on the loop, between other things, and waits until it is done. False if it is closed. Throws if the
-  // loop does not begin it in time (then it never will), and what `action` throws.
+  // Runs `action` on the loop and waits until it has ended. False if the loop is closed. Throws if
+  // the loop does not begin it in time (then it never will), and what `action` throws.
   bool run_on_loop(std::string_view what, const std::function<void()>& action);
-  // Waits until `arrived` (asked under the lock) is true. False if it was not in time. A sleep of this computer is part
-  // of the time, though the deadline stands still meanwhile. Throws if it is closed, an error about what() returns; that is
-  // called under the lock.
+  // Waits until `arrived`, which is called under the lock, is true; false if it is not in time. A
+  // sleep of this computer is part of the time, though the deadline stands still meanwhile. Throws
+  // if the loop is closed, an error about what(), which is called under the lock.
   template <class What, class Predicate>
   bool wait_for_news(What what, Duration timeout, Predicate arrived) {
     const SleepWatch slept;
     std::unique_lock lock(mutex);
-    const bool woken = wait_until(lock, news, Clock::now() + bounded(timeout),
+    const bool woken = wait_until(lock, news, Clock::now() + bounded(timeout), on_wait,
                                   [&] { return closed || arrived(); });
     if (closed) throw closed_error(what());
     return woken && slept.time() <= bounded(timeout);
   }
-  // Waits for what `done` is asked under the lock; false at the deadline. Throws what on_wait() throws.
+  // Waits until `done`, which is called under the lock, is true; false at the deadline. Throws what
+  // while_waiting() throws; that is called every 50 ms without the lock.
   template <class Predicate>
-  bool wait_until(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,
-                  Clock::time_point deadline, Predicate done) {
-    if (!on_wait) return changed.wait_until(lock, deadline, done);
+  static bool wait_until(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,
+                         Clock::time_point deadline, const std::function<void()>& while_waiting,
+                         Predicate done) {
+    if (!while_waiting) return changed.wait_until(lock, deadline, done);
     while (!changed.wait_until(lock, std::min(deadline, Clock::now() + wait_interval), done)) {
       if (Clock::now() >= deadline) return false;
       lock.unlock();
-      on_wait();
+      while_waiting();
       lock.lock();
     }
     return true;
@@ -105,24 +136,23 @@ class BlockingLoop {
   static Duration bounded(Duration timeout) {
     return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
   }
+  // A copy of what both sides see.
+  template <class Value>
+  Value read(const Value& value) {
+    const std::lock_guard lock(mutex);
+    return value;
+  }
   Error closed_error(std::string_view what) const;
 
   // Throws std::system_error if the system has no thread left.
   void start(std::function<void()> loop) { thread_ = std::thread(std::move(loop)); }
-  // Has the loop begin to end, by `shut`, if it has not, and waits for its end. Idempotent.
+  // Runs `shut` on the loop unless it is closed, and waits for the end of the thread. Idempotent.
   void close(std::function<void()> shut);
 
   // --- on the loop
 
-  // `fill`: sets the results, under the lock.
-  template <class Fill>
-  void finish(Call& call, Fill fill) {
-    const std::lock_guard lock(mutex);
-    fill();
-    if (--call.parts == 0) call.ended.notify_all();
-  }
-  // For the beginning of `shut`: from now on nothing more is put on the loop. False if it was closed before. Calls `last`
-  // under the lock.
+  // For the beginning of `shut`: from now on nothing more is put on the loop. False if it was
+  // closed before. Calls `last` under the lock.
   template <class Last>
   bool mark_closed(Last last) {
     {
@@ -134,21 +164,24 @@ class BlockingLoop {
     news.notify_all();
     return true;
   }
-  // For the end of `shut`: carries out what is on the loop, then ends it.
+  // For the end of `shut`: runs what is on the loop, then ends the loop.
   void end_loop();
 
   const std::function<void()> on_wait;
   asio::io_context io;
   // What both sides see.
   std::mutex mutex;
-  std::condition_variable news;  // what wait_for_news() may be asked for, or `closed`, has changed
+  std::condition_variable news;  // `closed`, or what wait_for_news() waits for, has changed
   bool closed = false;
 
  protected:
   ~BlockingLoop() = default;
+  // A part has ended. Called under the lock.
+  virtual void on_end() {}
 
  private:
   void begin(const CallPtr& call, Clock::time_point deadline);
+  void end(Call& call, std::size_t part, const CommandResult& result);
   Error blocked_error(std::string_view what, std::string_view instead, std::string_view fix) const;
 
   const Name name_;

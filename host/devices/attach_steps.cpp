@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// AsyncBoard::async_attach(): what sets a device up, one step behind the other.
+// AsyncBoard::async_attach(): sets a device up, one step after the other.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,88 +13,68 @@
 
 namespace r4 {
 
-// The steps of a device, then its fields. The user's completion is told how the last ended. A failure ends it:
+// The steps of a device, then its fields. The user's handler gets the result of the last one. A
+// failure ends it:
 //
 //     command --confirmed--> answer --comes, as described--> pause --over--> the next command
 //        |                                                                       ^
 //        +---- confirmed, of one without an answer (X:POLL, F) ------------------+
-class AsyncBoard::AttachSteps final : public Completion {
+class AsyncBoard::AttachSteps final : public Impl::Sequence {
  public:
-  using Ptr = std::unique_ptr<AttachSteps, Destroy>;
-
   AttachSteps(Impl& impl, Device device, Time timeout, CompletionPtr completion)
-      : impl_(impl),
+      : Sequence(impl, std::move(completion)),
         device_(std::move(device)),
         steps_(steps_of(device_)),
-        timeout_(timeout),
-        started_(Impl::steady_now()),
-        completion_(std::move(completion)) {
+        timeout_(timeout) {
     impl_.attaching.push_back(&device_);
   }
-  ~AttachSteps() { std::erase(impl_.attaching, &device_); }
-  AttachSteps(const AttachSteps&) = delete;
-  AttachSteps& operator=(const AttachSteps&) = delete;
+  ~AttachSteps() override { std::erase(impl_.attaching, &device_); }
 
-  // The command of the step that is to be done now.
-  static void begin(Ptr self) {
-    AttachSteps& steps = *self;
-    steps.stage_ = Stage::command;
-    steps.impl_.begin(
-        std::move(self),
-        [&steps] {
-          Impl& impl = steps.impl_;
-          steps.deadline_ = impl.now + steps.timeout_;
-          const Command command =
-              steps.has_step() ? steps.step().command() : Command::fields(Text(steps.fields_));
-          return impl.session.send(command, steps.timeout_, impl.now);
-        },
-        steps.id_);
-  }
-
-  void listen(const Cancel& cancel) override {
-    id_ = cancel.command();
-    completion_->listen(cancel);
+  // Sends the command of the current step.
+  void begin() {
+    stage_ = Stage::command;
+    const auto send = [this] {
+      deadline_ = impl_.now + timeout_;
+      const Command command = has_step() ? step().command() : Command::fields(Text(fields_));
+      return impl_.session.send(command, timeout_, impl_.now);
+    };
+    impl_.begin(CompletionPtr(this), send, id_);
   }
   void complete(const CommandResult& result, How how) override {
-    Ptr self(this);
-    if (result.outcome != Outcome::confirmed) return end(std::move(self), result, how);
+    if (result.outcome != Outcome::confirmed) return fail(result, how);
+    CommandResult failure = result;
     if (impl_.boots != boots_) {  // it has forgotten the steps that were done
-      CommandResult cut = result;
-      cut.outcome = Outcome::cancelled;
-      return end(std::move(self), cut, how);
+      failure.outcome = Outcome::cancelled;
+      return fail(failure, how);
     }
     switch (stage_) {
       case Stage::command:
         if (has_step() && step().is_answered()) {
           stage_ = Stage::answer;
-          return wait(std::move(self),
-                      {Impl::Waits::For::answer, id_, result.pnum, impl_.now, deadline_, nullptr});
+          return wait({Impl::Waits::For::answer, id_, result.pnum, impl_.now, deadline_, nullptr});
         }
         break;
       case Stage::answer: {
         const I2cAnswer& answer = impl_.session.state().i2c_answer;
         if (trouble_with(device_, step(), answer)) {
-          CommandResult refused = result;
-          refused.outcome = Outcome::refused;
-          refused.transfer = answer;
-          return end(std::move(self), refused, how);
+          failure.outcome = Outcome::refused;
+          failure.transfer = answer;
+          return fail(failure, how);
         }
         stage_ = Stage::pause;
-        return wait(std::move(self),
-                    {Impl::Waits::For::time, id_, 0, impl_.now, impl_.now + step().wait, nullptr});
+        return wait({Impl::Waits::For::time, id_, 0, impl_.now, impl_.now + step().wait, nullptr});
       }
       case Stage::pause:
         break;
     }
-    if (!has_step()) return end(std::move(self), result, how);  // that were the fields
+    if (!has_step()) return end(result, how);  // the fields were the last
     if (++done_ == steps_.size()) {
       impl_.describe(device_);
       fields_ = fields_with(impl_.session.fields(), device_);
-      if (fields_.empty()) return end(std::move(self), result, how);
+      if (fields_.empty()) return end(result, how);
     }
-    begin(std::move(self));
+    begin();
   }
-  void destroy() noexcept override { delete this; }
 
  private:
   enum class Stage : std::uint8_t { command, answer, pause };
@@ -102,39 +82,28 @@ class AsyncBoard::AttachSteps final : public Completion {
   bool has_step() const { return done_ < steps_.size(); }
   const DeviceStep& step() const { return steps_[done_]; }
 
-  void wait(Ptr self, Impl::Waits::Condition waiter) {
-    waiter.completion = std::move(self);
-    impl_.enter(How::post, [&] { impl_.waits.add(std::move(waiter)); });
+  void wait(Impl::Waits::Condition condition) {
+    condition.completion.reset(this);
+    impl_.enter(How::post, [&] { impl_.waits.add(std::move(condition)); });
   }
-  void end(Ptr self, const CommandResult& result, How how) {
-    CommandResult whole = result;
-    whole.elapsed = Impl::steady_now() - started_;
-    if (stage_ == Stage::answer && whole.outcome == Outcome::timed_out) whole.executed = 1;
-    if (whole.outcome != Outcome::confirmed) whole.step = static_cast<std::uint16_t>(done_ + 1);
-    const CompletionPtr::pointer users = completion_.release();
-    self.reset();
-    users->complete(whole, how);
+  void fail(CommandResult result, How how) {
+    if (stage_ == Stage::answer && result.outcome == Outcome::timed_out) result.executed = 1;
+    result.step = static_cast<std::uint16_t>(done_ + 1);
+    end(result, how);
   }
 
-  Impl& impl_;  // which owns this
   const Device device_;
   const std::vector<DeviceStep> steps_;
   const Time timeout_;  // of each
-  const Time started_;
   const std::uint32_t boots_ = impl_.boots;
-  Time deadline_{0};  // of the step that is being done
+  Time deadline_{0};  // of the current step
   std::size_t done_ = 0;
   Stage stage_ = Stage::command;
   std::string fields_;
-  Ticket id_ = 0;
-  CompletionPtr completion_;
 };
 
-void AsyncBoard::require_slots(const Device& device) const { impl_->require_slots(device); }
-
 void AsyncBoard::start_attach(const Device& device, Duration timeout, CompletionPtr completion) {
-  AttachSteps::begin(AttachSteps::Ptr(
-      new AttachSteps(*impl_, device, Impl::time_of(timeout), std::move(completion))));
+  (new AttachSteps(*impl_, device, Impl::time_of(timeout), std::move(completion)))->begin();
 }
 
 // --- the slots
@@ -151,9 +120,9 @@ bool is_same_device(const Device& a, const Device& b) {
 
 }  // namespace
 
-void AsyncBoard::Impl::require_slots(const Device& device) const {
-  std::vector<const Device*> others = attaching;
-  for (const Device& each : devices) others.push_back(&each);
+void AsyncBoard::require_slots(const Device& device) const {
+  std::vector<const Device*> others = impl_->attaching;
+  for (const Device& each : impl_->devices) others.push_back(&each);
   std::erase_if(others, [&](const Device* each) { return is_same_device(*each, device); });
   const auto holder = [&](const Device& wanted) -> const Device* {
     const auto found = std::find_if(others.begin(), others.end(),

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where descriptions come from: the library itself, or a file of the user's.
+// The sources of descriptions: the library itself, and files of the user.
 #include <fmt/format.h>
 
 #include <cerrno>
 #include <fstream>
-#include <span>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -17,12 +16,8 @@ namespace r4 {
 
 namespace {
 
-std::span<const ShippedDescription> all_shipped() {
-  return {shipped_descriptions, shipped_description_count};
-}
-
 std::string read_description(const std::string& path) {
-  // One byte more than there may be: parse() says so then, whatever endless thing it is.
+  // One byte more than the limit, so that parse() refuses a longer or endless file.
   std::string text(DeviceDescription::max_text + 1, '\0');
   errno = 0;
   std::ifstream file(path, std::ios::binary);
@@ -40,12 +35,12 @@ std::string read_description(const std::string& path) {
 
 std::vector<std::string> DeviceDescription::shipped() {
   std::vector<std::string> names;
-  for (const ShippedDescription& each : all_shipped()) names.emplace_back(each.name);
+  for (const ShippedDescription& each : shipped_descriptions) names.emplace_back(each.name);
   return names;
 }
 
 std::string_view DeviceDescription::text_of(const std::string& name) {
-  for (const ShippedDescription& each : all_shipped()) {
+  for (const ShippedDescription& each : shipped_descriptions) {
     if (each.name == name) return each.text;
   }
   throw Error(ErrorKind::usage, name, "no such device is described here",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The text of a device description, line by line. One word begins each line and says what it is:
+// The text of a device description, line by line. The first word of a line is its kind:
 //
 //     device NAME                                             once, first
 //     title TEXT
@@ -13,7 +13,8 @@
 //           [only VALUE NUMBER]
 //     ready VALUE [NUMBER]
 //
-// '#' begins a comment. Bytes are x and two hexadecimal digits each; S and O are numbers and pi, joined by * and /.
+// '#' begins a comment. Bytes are x and two hexadecimal digits each; S and O are numbers and pi,
+// joined by * and /.
 #pragma once
 
 #include <cstddef>
@@ -60,7 +61,7 @@ class DescriptionParser {
   [[noreturn]] void fail(const std::string& reason, const std::string& fix) const;
 
   std::string source_;
-  int line_ = 0;  // 0: what is missing in all of them
+  int line_ = 0;  // 0: something is missing in all lines
   DeviceDescription result_;
 };
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "device_steps.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <string>
 
@@ -10,15 +8,6 @@
 #include "../commands/command_help.hpp"
 
 namespace r4 {
-
-namespace {
-
-template <class Bytes>
-std::string hex_of(const Bytes& bytes) {
-  return fmt::format("x{:02x}", fmt::join(bytes.begin(), bytes.end(), ""));
-}
-
-}  // namespace
 
 Command DeviceStep::command() const {
   if (kind == CommandKind::i2c_write) return Command::i2c_write(address, bytes);
@@ -42,15 +31,15 @@ std::vector<DeviceStep> steps_of(const Device& device) {
     step.count = static_cast<int>(check.expected.size());
     step.expected = check.expected;
   }
-  if (description.checks.empty()) {  // does anything answer?
+  if (description.checks.empty()) {  // a device must answer
     add(CommandKind::i2c_read, description.polls.front().register_bytes).count =
         description.polls.front().count;
   }
   for (const DeviceWrite& write : description.writes) {
     add(CommandKind::i2c_write, write.bytes).wait = write.wait;
     if (&write != &description.writes.front()) continue;
-    // What is read while it is being set up is no measurement: the slots stay empty meanwhile. They
-    // are emptied once the first write has shown that it may be set up.
+    // A reading during the set-up is not a measurement, so the slots are empty until its end. They
+    // are emptied after the first write, which shows that the device may be set up.
     for (int slot = device.first_slot(); slot <= device.last_slot(); ++slot) {
       add(CommandKind::i2c_poll, {}).slot = slot;
     }
@@ -66,7 +55,7 @@ std::vector<DeviceStep> steps_of(const Device& device) {
 }
 
 std::chrono::milliseconds longest(const Device& device, std::chrono::milliseconds timeout) {
-  std::chrono::milliseconds sum = timeout;  // that of the fields
+  std::chrono::milliseconds sum = timeout;  // of the command for the fields
   for (const DeviceStep& step : steps_of(device)) sum += timeout + step.wait;
   return sum;
 }
@@ -119,7 +108,7 @@ std::string fields_with(const std::string& chosen, const Device& device) {
 
 Problem explain(const Device& device, const CommandResult& result, const LinkStatus& link) {
   const std::vector<DeviceStep> steps = steps_of(device);
-  std::string command = "F:" + device.fields();  // behind them
+  std::string command = "F:" + device.fields();  // after the steps
   if (result.step >= 1 && result.step <= steps.size()) {
     const DeviceStep& step = steps[result.step - 1U];
     if (result.transfer.pnum != 0) {

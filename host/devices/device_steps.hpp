@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What sets a device up, one command after the other: is it the one that is described, what is written to it, and
-// what the board is to read of it again and again.
+// The commands that set a device up, in order: they check that it is the one that is described,
+// write to it, and have the board read it again and again.
 #pragma once
+
+#include <fmt/format.h>
 
 #include <chrono>
 #include <cstdint>
@@ -16,10 +18,16 @@
 
 namespace r4 {
 
+// Bytes as a command has them: "x3b00".
+template <class Bytes>
+std::string hex_of(const Bytes& bytes) {
+  return fmt::format("x{:02x}", fmt::join(bytes.begin(), bytes.end(), ""));
+}
+
 struct DeviceStep {
   CommandKind kind = CommandKind::i2c_read;  // or i2c_write, i2c_poll
   int address = 0;
-  std::string bytes;  // the register, or what is written: "x3b00"
+  std::string bytes;  // of the register, or to be written: "x3b00"
   int count = 0;
   std::vector<std::uint8_t> expected;        // i2c_read; empty: anything
   std::chrono::milliseconds wait{0};         // i2c_write, afterwards
@@ -32,15 +40,15 @@ struct DeviceStep {
 
 std::vector<DeviceStep> steps_of(const Device& device);
 
-// How long they take at most, where each has `timeout`.
+// The longest time that all steps take, if each has `timeout`.
 std::chrono::milliseconds longest(const Device& device, std::chrono::milliseconds timeout);
 
-// What is wrong with the device, if it does not answer, or is another one.
+// The problem if the device does not answer, or is another device.
 std::optional<Problem> trouble_with(const Device& device, const DeviceStep& step,
                                     const I2cAnswer& answer);
 
-// The fields that are sent (as in F), with those of the device; empty if they are among them, or the board's own choice
-// is left alone (`chosen` is empty).
+// The chosen fields (as in F) and those of the device. Empty if nothing has to be chosen: `chosen`
+// has the device's fields already, or is empty and leaves the choice to the board.
 std::string fields_with(const std::string& chosen, const Device& device);
 
 }  // namespace r4

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Devices as people write them: NAME@ADDRESS:SLOT.
+// Devices in text form: NAME@ADDRESS:SLOT.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace r4 {
 
 namespace {
 
-// Of "NAME[@ADDRESS[:SLOT]]".
+// The parts of "NAME[@ADDRESS[:SLOT]]".
 struct DevicePlace {
   std::string name;
   std::optional<int> address;
@@ -74,12 +74,10 @@ std::vector<Device> Device::from(const std::vector<std::string>& texts) {
     next = newest.last_slot() + 1;
     for (std::size_t i = 0; i + 1 < devices.size(); ++i) {
       const Device& other = devices[i];
+      if (!newest.takes_place_of(other)) continue;
       if (newest.address() == other.address()) {
         throw Error(ErrorKind::usage, newest.text(), other.text() + " has that address, too",
                     "give one of them another: NAME@ADDRESS; a bus has one device at an address");
-      }
-      if (newest.first_slot() > other.last_slot() || newest.last_slot() < other.first_slot()) {
-        continue;
       }
       throw Error(ErrorKind::usage, newest.text(),
                   fmt::format("{} has slot {}, too", other.text(),

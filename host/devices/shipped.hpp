@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The descriptions that are shipped: host/devices/*.device, as CMake has put them into the library.
+// The descriptions that are shipped: host/devices/*.device, which CMake puts into the library.
 #pragma once
 
-#include <cstddef>
+#include <span>
 #include <string_view>
 
 namespace r4 {
@@ -12,8 +12,7 @@ struct ShippedDescription {
   std::string_view text;
 };
 
-// By their names, in order.
-extern const ShippedDescription shipped_descriptions[];
-extern const std::size_t shipped_description_count;
+// In the order of their names.
+extern const std::span<const ShippedDescription> shipped_descriptions;
 
 }  // namespace r4

@@ -12,19 +12,6 @@ namespace r4 {
 
 namespace {
 
-// A command with its texts.
-struct OwnCommand {
-  explicit OwnCommand(const Command& c)
-      : text(c.text.data(), c.text.size()), text2(c.text2.data(), c.text2.size()), command(c) {
-    command.text = text;
-    command.text2 = text2;
-  }
-  OwnCommand(const OwnCommand&) = delete;
-  OwnCommand& operator=(const OwnCommand&) = delete;
-  std::string text, text2;
-  Command command;
-};
-
 std::vector<std::size_t> boards_of(const std::vector<BoardSetpoints>& setpoints) {
   std::vector<std::size_t> boards;
   boards.reserve(setpoints.size());
@@ -130,17 +117,7 @@ FleetResults Fleet::send(const Boards& boards, const Command& command, Duration 
   require_control(impl_->role, command);
   if (command.kind == CommandKind::stop) return impl_->stop(boards, timeout);
   require_timeout(shown(command), timeout);
-  const auto own = std::make_shared<OwnCommand>(command);
-  return impl_->execute(
-      shown(command), boards, timeout,
-      [impl = impl_.get(), own](std::size_t board, std::size_t, Duration left, Impl::BoundEnd end) {
-        AsyncBoard& async = *impl->boards[board];
-        if (own->command.kind == CommandKind::identify) {
-          async.async_identify(left, std::move(end));
-        } else {
-          async.async_send(own->command, left, std::move(end));
-        }
-      });
+  return impl_->execute(shown(command), boards, timeout, Impl::start_of(command));
 }
 FleetResults Fleet::send(const Command& command, Duration timeout) {
   return send(impl_->all_boards, command, timeout);
@@ -160,11 +137,10 @@ FleetResults Fleet::send(std::string_view command, Duration timeout) {
 FleetResults Fleet::arm(const Boards& boards, Duration timeout) {
   require_timeout("arm()", timeout);
   require_control(impl_->role, "arm()");
-  return impl_->execute(
-      "arm()", boards, timeout,
-      [impl = impl_.get()](std::size_t board, std::size_t, Duration left, Impl::BoundEnd end) {
-        impl->boards[board]->async_arm(left, std::move(end));
-      });
+  const auto arm = [](AsyncBoard& board, std::size_t, Duration left, auto end) {
+    board.async_arm(left, std::move(end));
+  };
+  return impl_->execute("arm()", boards, timeout, arm);
 }
 FleetResults Fleet::arm(Duration timeout) { return arm(impl_->all_boards, timeout); }
 FleetResults Fleet::clear(Duration timeout) { return send(Command::clear(), timeout); }
@@ -176,13 +152,10 @@ FleetResults Fleet::apply(const std::vector<BoardSetpoints>& setpoints, Duration
   for (const BoardSetpoints& each : setpoints) require_any(each.setpoints);
   require_timeout("apply()", timeout);
   require_control(impl_->role, "apply()");
-  const auto own = std::make_shared<const std::vector<BoardSetpoints>>(setpoints);
-  return impl_->execute("apply()", boards_of(setpoints), timeout,
-                        [impl = impl_.get(), own](std::size_t board, std::size_t at, Duration left,
-                                                  Impl::BoundEnd end) {
-                          impl->boards[board]->async_apply((*own)[at].setpoints, left,
-                                                           std::move(end));
-                        });
+  const auto apply = [setpoints](AsyncBoard& board, std::size_t part, Duration left, auto end) {
+    board.async_apply(setpoints[part].setpoints, left, std::move(end));
+  };
+  return impl_->execute("apply()", boards_of(setpoints), timeout, apply);
 }
 
 std::vector<PostResult> Fleet::post(const std::vector<BoardSetpoints>& setpoints) {

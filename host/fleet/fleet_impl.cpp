@@ -2,7 +2,7 @@
 #include "fleet_impl.hpp"
 
 #include <asio/post.hpp>
-#include <exception>
+#include <asio/use_future.hpp>
 #include <utility>
 
 #include "../../transports/url_pattern.hpp"
@@ -12,8 +12,8 @@ namespace r4 {
 
 namespace {
 
-// Where more than this happens in a window, each datagram of hundreds of boards would wake the thread: then it looks
-// again after a pause, and finds several.
+// Each datagram of hundreds of boards would wake the thread. So if more than this happens in a
+// window, the thread pauses before it looks again, and finds several.
 constexpr std::chrono::milliseconds window{10};
 constexpr std::size_t busy_window = 200;
 constexpr std::chrono::microseconds breather{200};
@@ -30,7 +30,7 @@ std::vector<std::string> urls_of(const std::vector<std::string>& patterns) {
 }  // namespace
 
 Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options)
-    // Other threads do nothing on it but post: what the reactor does needs no locks.
+    // Other threads only post to it, so its reactor needs no locks.
     : BlockingLoop({"fleet", "see that this computer has time for it"},
                    ASIO_CONCURRENCY_HINT_UNSAFE_IO, std::exchange(options.on_wait, nullptr)),
       role(options.role),
@@ -43,25 +43,16 @@ Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options
     listen(i);
   }
   start([this] { run(); });
-  // On the loop, where no name that is looked up holds the others up.
-  std::exception_ptr trouble;
-  asio::post(io, [&] {
-    try {
-      for (const auto& board : boards) board->open();
-    } catch (...) {
-      trouble = std::current_exception();
-    }
-    const std::lock_guard lock(mutex);
-    opened = true;
-    news.notify_all();
-  });
-  {
-    std::unique_lock lock(mutex);
-    news.wait(lock, [this] { return opened; });
+  try {
+    // On the loop, so that a name that is looked up does not delay boards that are open.
+    asio::post(io, asio::use_future([this] {
+                 for (const auto& board : boards) board->open();
+               }))
+        .get();
+  } catch (...) {
+    close();
+    throw;
   }
-  if (!trouble) return;
-  close();
-  std::rethrow_exception(trouble);
 }
 
 void Fleet::Impl::close() {
@@ -88,34 +79,28 @@ void Fleet::Impl::run() {
 
 void Fleet::Impl::listen(std::size_t board) {
   AsyncBoard& async = *boards[board];
-  async.on_link([this, board](const LinkStatus& fresh) {
+  const auto reports = [this, board](FleetEvent::Kind kind, auto FleetEvent::*part) {
+    return [this, board, kind, part](const auto& fresh) {
+      FleetEvent event{kind, board};
+      event.*part = fresh;
+      notify(std::move(event));
+    };
+  };
+  const auto report_link = reports(FleetEvent::Kind::link, &FleetEvent::link);
+  async.on_link([this, board, report_link](const LinkStatus& fresh) {
     {
       const std::lock_guard lock(mutex);
       links[board] = fresh;
     }
-    FleetEvent event{FleetEvent::Kind::link, board};
-    event.link = fresh;
-    tell(std::move(event));
+    report_link(fresh);
   });
-  async.on_event([this, board](const CarrierEvent& fresh) {
-    FleetEvent event{FleetEvent::Kind::transport, board};
-    event.transport = fresh;
-    tell(std::move(event));
-  });
-  async.on_arming([this, board](DisarmCause fresh) {
-    FleetEvent event{FleetEvent::Kind::arming, board};
-    event.disarmed_by = fresh;
-    tell(std::move(event));
-  });
-  async.on_restart([this, board] { tell({FleetEvent::Kind::restart, board}); });
-  async.on_refused([this, board](const RefusedPost& fresh) {
-    FleetEvent event{FleetEvent::Kind::refused, board};
-    event.refused = fresh;
-    tell(std::move(event));
-  });
+  async.on_event(reports(FleetEvent::Kind::transport, &FleetEvent::transport));
+  async.on_arming(reports(FleetEvent::Kind::arming, &FleetEvent::disarmed_by));
+  async.on_refused(reports(FleetEvent::Kind::refused, &FleetEvent::refused));
+  async.on_restart([this, board] { notify({FleetEvent::Kind::restart, board}); });
 }
 
-void Fleet::Impl::tell(FleetEvent event) {
+void Fleet::Impl::notify(FleetEvent event) {
   {
     const std::lock_guard lock(mutex);
     if (events.size() == most_events) {
@@ -125,21 +110,6 @@ void Fleet::Impl::tell(FleetEvent event) {
     events.push_back(std::move(event));
   }
   news.notify_all();
-}
-
-void Fleet::Impl::finish(Call& call, std::size_t at, const CommandResult& result) {
-  FleetResult& mine = call.results[at];
-  mine.result = result;
-  const std::string& url = urls[mine.board];
-  if (result.outcome == Outcome::confirmed) {
-    mine.problem = {};
-  } else if (result.outcome == Outcome::closed) {
-    mine.problem = closed_error(call.text).problem();
-  } else if (mine.problem.reason.empty()) {
-    mine.problem = explain(call.text, result, boards[mine.board]->link());
-  }
-  if (!mine.confirmed()) mine.problem.thing = url + ": " + mine.problem.thing;
-  BlockingLoop::finish(call, [] {});
 }
 
 void Fleet::Impl::shut() {
@@ -175,38 +145,33 @@ void Fleet::Impl::require_board(std::size_t board) const {
               "they are 0 to " + std::to_string(boards.size() - 1));
 }
 
-std::shared_ptr<Fleet::Impl::Call> Fleet::Impl::call_of(std::string text, const Boards& which,
-                                                        Start start, bool stop) {
-  auto call = std::make_shared<Call>();
-  call->text = std::move(text);
-  call->stop = stop;
-  call->boards = which;
-  call->cancelled.resize(which.size());
-  call->parts = which.size();
+Fleet::Impl::CallPtr Fleet::Impl::call_of(std::string text, const Boards& which, Start start,
+                                          bool stop) {
+  std::vector<AsyncBoard*> called;
   for (const std::size_t board : which) {
     require_board(board);
-    call->results.push_back({board, {}, {}});
+    called.push_back(boards[board].get());
   }
-  call->start = [this, start = std::move(start)](const CallPtr& base, Duration left) {
-    const auto begun = std::static_pointer_cast<Call>(base);
-    for (std::size_t at = 0; at < begun->boards.size(); ++at) {
-      BoundEnd end(begun->cancelled[at].slot(), End{this, begun, at});
-      try {
-        start(begun->boards[at], at, left, std::move(end));
-      } catch (const Error& error) {
-        begun->results[at].problem = error.problem();
-        finish(*begun, at, CommandResult{Outcome::refused});
-      }
-    }
-  };
-  return call;
+  return std::make_shared<Call>(std::move(text), std::move(start), called, stop);
 }
 
 FleetResults Fleet::Impl::execute(std::string text, const Boards& which, Duration timeout,
                                   Start start, bool stop) {
-  const auto call = call_of(std::move(text), which, std::move(start), stop);
+  const CallPtr call = call_of(std::move(text), which, std::move(start), stop);
   BlockingLoop::run(call, timeout);
-  return FleetResults(call->results);
+  std::vector<FleetResult> results;
+  for (const Part& part : call->parts) {
+    FleetResult& mine = results.emplace_back();
+    mine.board = which[results.size() - 1];
+    mine.result = part.result;
+    if (mine.confirmed()) continue;
+    mine.problem = part.trouble ? *part.trouble
+                   : part.result.outcome == Outcome::closed
+                       ? closed_error(call->text).problem()
+                       : explain(call->text, part.result, part.link);
+    mine.problem.thing = urls[mine.board] + ": " + mine.problem.thing;
+  }
+  return FleetResults(std::move(results));
 }
 
 void Fleet::Impl::run_on_loop(std::string_view what, const std::function<void()>& action) {
@@ -234,7 +199,7 @@ Fleet::Boards Fleet::Impl::wait_active(const Boards& which, Duration timeout) {
 
 std::optional<FleetEvent> Fleet::Impl::next_event(Duration timeout) {
   std::unique_lock lock(mutex);
-  wait_until(lock, news, Clock::now() + bounded(timeout),
+  wait_until(lock, news, Clock::now() + bounded(timeout), on_wait,
              [this] { return closed || !events.empty(); });
   if (missed_events != 0) {
     FleetEvent event{FleetEvent::Kind::missed};
@@ -250,22 +215,16 @@ std::optional<FleetEvent> Fleet::Impl::next_event(Duration timeout) {
   return event;
 }
 
-Fleet::Impl::Start Fleet::Impl::start_of_stop() {
-  return [this](std::size_t board, std::size_t, Duration left, BoundEnd end) {
-    boards[board]->async_stop(left, std::move(end));
-  };
-}
-
 FleetResults Fleet::Impl::stop(const Boards& which, Duration timeout) {
   FleetResults results =
-      execute("E:STOP", which, std::max(timeout, Duration{1}), start_of_stop(), true);
-  // Whoever does not wait for it any longer does not mean that it may be lost.
+      execute("E:STOP", which, std::max(timeout, Duration{1}), start_of(Command::stop()), true);
+  // The stop must not be lost when its caller does not wait any longer.
   if (!results.all_confirmed()) stop_async(results.failed());
   return results;
 }
 
 void Fleet::Impl::stop_async(const Boards& which) {
-  run_unawaited(call_of("E:STOP", which, start_of_stop(), true));
+  run_unawaited(call_of("E:STOP", which, start_of(Command::stop()), true));
 }
 
 }  // namespace r4

@@ -7,6 +7,7 @@
 
 #include "../board_impl.hpp"
 #include "../commands/limits.hpp"
+#include "../devices/device_steps.hpp"
 #include "r4link/board.hpp"
 
 namespace r4 {
@@ -20,7 +21,7 @@ Board::Uart Board::uart(int channel) {
 }
 
 void Board::Uart::write(const std::vector<std::uint8_t>& bytes, Duration timeout) const {
-  const std::string text = fmt::format("x{:02x}", fmt::join(bytes, ""));
+  const std::string text = hex_of(bytes);
   board_.send(Command::uart_write(channel_, text), timeout);
 }
 
@@ -41,9 +42,9 @@ Subscription Board::Uart::on_bytes(std::function<void(const UartData&)> callback
   const auto impl = board_.impl_;
   {
     const std::lock_guard lock(impl->mutex);
-    impl->uarts[channel_ - 1].told = true;
+    impl->uarts[channel_ - 1].reports = true;
   }
-  return impl->callbacks.on_uart(channel_, std::move(callback));
+  return impl->callbacks.add_uart(channel_, std::move(callback));
 }
 
 void Board::dac(int channel, int millivolts, Duration timeout) {
@@ -54,18 +55,15 @@ void Board::dac(int channel, int millivolts, Duration timeout) {
 void Board::Impl::take_uarts(const State& fresh) {
   for (int i = 0; i < uart_channels; ++i) {
     if (!fresh.present.has(i == 0 ? StateField::uart1 : StateField::uart2)) continue;
-    bool any = false;
-    bool told = false;
-    {
-      const std::lock_guard lock(mutex);
-      UartInbox& inbox = uarts[i];
-      told = inbox.told;
-      any = told ? inbox.stream.take(fresh.uart[i], inbox.to_read, inbox.to_tell)
-                 : inbox.stream.take(fresh.uart[i], inbox.to_read);
-    }
+    std::unique_lock lock(mutex);
+    UartInbox& inbox = uarts[i];
+    const bool reports = inbox.reports;
+    const bool any = reports ? inbox.stream.take(fresh.uart[i], inbox.to_read, inbox.to_report)
+                             : inbox.stream.take(fresh.uart[i], inbox.to_read);
+    lock.unlock();
     if (!any) continue;
     news.notify_all();
-    if (told) tell(CallbackThread::UartNews{i + 1});
+    if (reports) callbacks.notify(CallbackThread::UartNews{i + 1});
   }
 }
 

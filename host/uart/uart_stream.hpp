@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a UART of the user's has received, put together from states of which some may be missing, come twice or
-// come late (firmware/devices/user_uart.hpp).
+// The bytes that a UART of the user has received, put together from states. States may be missing,
+// late or duplicates (firmware/devices/user_uart.hpp).
 #pragma once
 
 #include <algorithm>
@@ -15,10 +15,10 @@ class UartStream {
  public:
   static constexpr std::size_t capacity = std::size_t{64} * 1024;
 
-  // The board has begun again, and counts from 0.
+  // The board has restarted, and counts from 0.
   void restart() { begun_ = false; }
 
-  // Appends what is new to each of `outs`. True if that is anything.
+  // Appends new bytes and losses to each of `outs`. True if there are any.
   template <class... Outs>
   bool take(const UartBytes& field, Outs&... outs) {
     if (!begun_) {
@@ -39,7 +39,7 @@ class UartStream {
   }
 
  private:
-  // Of more than capacity the oldest are lost.
+  // Beyond the capacity, the oldest bytes are lost.
   static void append(Board::UartData& out, const std::uint8_t* begin, const std::uint8_t* end,
                      std::uint64_t lost) {
     out.bytes.insert(out.bytes.end(), begin, end);

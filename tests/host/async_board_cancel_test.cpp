@@ -13,6 +13,7 @@
 
 #include "r4link/async_board.hpp"
 #include "tests/support/at_will.hpp"
+#include "tests/support/on_a_loop.hpp"
 
 namespace r4::test {
 namespace {
@@ -21,11 +22,11 @@ using namespace std::chrono_literals;
 
 const Command run_motor = Command::osmc(358, Direction::forward, 1);
 
-// A board that nobody answers, on a loop of its own.
-struct AsyncBoardUnanswered {
+// A session that no board answers.
+struct AsyncBoardUnanswered : OnALoop {
   AsyncBoardUnanswered() { board.open(); }
 
-  // How what `start` begins ends when its handler's slot is told to cancel it.
+  // The result of what `start` begins, when its handler's slot cancels it.
   template <class Start>
   std::optional<CommandResult> cancelled(Start start) {
     std::optional<CommandResult> result;
@@ -39,11 +40,10 @@ struct AsyncBoardUnanswered {
       EXPECT_FALSE(result) << "never inside the call that cancels it";
     });
     io.run_for(5s);
-    signal.emit(asio::cancellation_type::terminal);  // of what has ended: nothing
+    signal.emit(asio::cancellation_type::terminal);  // has no effect after the end
     return result;
   }
 
-  asio::io_context io;
   AsyncBoard board{io.get_executor(), "udp://127.0.0.1:9?listen=0", at_will()};
 };
 struct AsyncBoardCancellation : testing::Test, AsyncBoardUnanswered {};
@@ -63,23 +63,17 @@ TEST(AsyncBoardCancellations, EndACommandAnArmASettingAndAWait) {
 }
 
 TEST_F(AsyncBoardCancellation, EndsTheWaitForAStopThatGoesOn) {
-  std::optional<CommandResult> result;
   asio::cancellation_signal signal;
-  board.async_stop(
-      1h, asio::bind_cancellation_slot(signal.slot(), [&](const CommandResult& r) { result = r; }));
-  asio::post(io, [&] { signal.emit(asio::cancellation_type::terminal); });
-  const auto deadline = std::chrono::steady_clock::now() + 5s;
-  while (!result && std::chrono::steady_clock::now() < deadline) io.run_one_for(1s);
-  ASSERT_TRUE(result);
-  EXPECT_EQ(result->outcome, Outcome::cancelled);
+  const CommandResult result = result_of([&](auto note) {
+    board.async_stop(1h, asio::bind_cancellation_slot(signal.slot(), note));
+    asio::post(io, [&] { signal.emit(asio::cancellation_type::terminal); });
+  });
+  EXPECT_EQ(result.outcome, Outcome::cancelled);
   const std::uint64_t sent = board.statistics().retries;
-  while (board.statistics().retries < sent + 3 && std::chrono::steady_clock::now() < deadline) {
-    io.run_one_for(1s);
-  }
-  EXPECT_GE(board.statistics().retries, sent + 3) << "repeated all the same";
+  EXPECT_TRUE(run_until([&] { return board.statistics().retries >= sent + 3; })) << "repeated";
 }
 
-TEST(AsyncBoardCancel, OfALinkTimingIsNotLostBetweenItsSettings) {
+TEST(AsyncBoardCancel, IsNotLostBetweenTheSettingsOfALinkTiming) {
   asio::io_context io;
   AsyncBoard board(io, "sim:", at_will());
   asio::cancellation_signal signal;
@@ -105,7 +99,7 @@ TEST(AsyncBoardCancel, OfALinkTimingIsNotLostBetweenItsSettings) {
   EXPECT_EQ(result->outcome, Outcome::cancelled) << "after the first of three";
 }
 
-TEST_F(AsyncBoardCancellation, IsWhatACoroutineDoesThatWaitsForTheFirstOfTwo) {
+TEST_F(AsyncBoardCancellation, LetsACoroutineWaitForTheFirstOfTwo) {
   using namespace asio::experimental::awaitable_operators;
   std::optional<std::size_t> first;
   const auto race = [&]() -> asio::awaitable<void> {
@@ -120,7 +114,7 @@ TEST_F(AsyncBoardCancellation, IsWhatACoroutineDoesThatWaitsForTheFirstOfTwo) {
   EXPECT_EQ(first, 1U) << "the timer, and the command did not keep it waiting";
 }
 
-TEST(AsyncBoardCancel, TellsByWhichNumberTheCommandWasSent) {
+TEST(AsyncBoardCancel, ReportsTheNumberByWhichTheCommandWasSent) {
   asio::io_context io;
   AsyncBoard board(io, "sim:", at_will());
   asio::cancellation_signal signal;

@@ -2,7 +2,6 @@
 // How an AsyncBoard ends: with a farewell that the board answers, or without.
 #include <gtest/gtest.h>
 
-#include <asio/io_context.hpp>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -10,6 +9,7 @@
 #include "r4link/async_board.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/on_a_loop.hpp"
 
 namespace r4::test {
 namespace {
@@ -17,52 +17,41 @@ namespace {
 using namespace std::chrono_literals;
 using firmware::BoardState;
 
-struct AsyncBoardClose : testing::Test {
-  // Runs the loop until `done()`; false after 5 s.
-  template <class Done>
-  bool run_until(Done done) {
-    const auto deadline = std::chrono::steady_clock::now() + 5s;
-    io.restart();
-    while (!done() && std::chrono::steady_clock::now() < deadline) io.run_one_for(5s);
-    return done();
-  }
-  // A board that is driven, and would go on for ten seconds without a word.
+struct AsyncBoardClose : testing::Test, OnALoop {
+  // A board that is driven, and would go on for ten seconds without a heartbeat.
   void drive() {
     board->open();
-    std::optional<CommandResult> set, driven;
-    board->async_send(Command::setting("timeout", "10000"), 3s,
-                      [&](const CommandResult& result) { set = result; });
-    board->async_send(Command::osmc(358, Direction::forward, 1), 3s,
-                      [&](const CommandResult& result) { driven = result; });
-    ASSERT_TRUE(run_until([&] { return set && driven; }));
-    ASSERT_EQ(driven->outcome, Outcome::confirmed);
+    board->async_send(Command::setting("timeout", "10000"), 3s, [](const CommandResult&) {});
+    ASSERT_EQ(result_of([&](auto driven) {
+                board->async_send(Command::osmc(358, Direction::forward, 1), 3s, driven);
+              }).outcome,
+              Outcome::confirmed);
     ASSERT_TRUE(run_until([&] { return !board->identity().capabilities.empty(); }));
   }
-  auto told() {
+  Outcome close(std::chrono::milliseconds timeout) {
+    return result_of([&](auto closed) { board->async_close(timeout, closed); }).outcome;
+  }
+  auto note() {
     return [this](const CommandResult& result) { end = result; };
   }
 
   BoardInAThread simulated{"udp"};
-  asio::io_context io;
   std::unique_ptr<AsyncBoard> board = std::make_unique<AsyncBoard>(io, simulated.url(), at_will());
   std::optional<CommandResult> end;
 };
 
 TEST_F(AsyncBoardClose, IsConfirmedWhenTheBoardIsSafe) {
   drive();
-  board->async_close(1s, told());
-  EXPECT_FALSE(end) << "not inside the call";
-  ASSERT_TRUE(run_until([&] { return end.has_value(); }));
-  EXPECT_EQ(end->outcome, Outcome::confirmed);
+  EXPECT_EQ(close(1s), Outcome::confirmed);
   EXPECT_TRUE(simulated.is_without_host());
 }
 
-TEST_F(AsyncBoardClose, TellsNothingFromTheCallOnAndTakesNothing) {
+TEST_F(AsyncBoardClose, ReportsNothingFromTheCallOnAndTakesNothing) {
   drive();
   board->on_state([](const State&, const Datagram&) { ADD_FAILURE() << "a state"; });
   board->on_link([](const LinkStatus&) { ADD_FAILURE() << "the link"; });
   board->on_board_heartbeat([](const Datagram&) { ADD_FAILURE() << "a heartbeat"; });
-  board->async_close(1s, told());
+  board->async_close(1s, note());
   std::optional<CommandResult> late;
   board->async_send(Command::osmc(5, Direction::forward, 1), 1s,
                     [&](const CommandResult& result) { late = result; });
@@ -77,7 +66,7 @@ TEST_F(AsyncBoardClose, EndsWhatIsUnderWay) {
   std::optional<CommandResult> waits;
   board->async_send(Command::servo(1500, 1), 3s,
                     [&](const CommandResult& result) { waits = result; });
-  board->async_close(1s, told());
+  board->async_close(1s, note());
   ASSERT_TRUE(run_until([&] { return end && waits; }));
   EXPECT_EQ(waits->outcome, Outcome::closed);
   EXPECT_EQ(end->outcome, Outcome::confirmed);
@@ -86,30 +75,23 @@ TEST_F(AsyncBoardClose, EndsWhatIsUnderWay) {
 TEST_F(AsyncBoardClose, TimesOutWhereTheBoardIsSilent) {
   drive();
   simulated.switch_off();
-  board->async_close(60ms, told());
-  ASSERT_TRUE(run_until([&] { return end.has_value(); }));
-  EXPECT_NE(end->outcome, Outcome::confirmed);
+  EXPECT_NE(close(60ms), Outcome::confirmed);
 }
 
-TEST_F(AsyncBoardClose, OfABoardThatIsNotOpenHasNobodyToTell) {
-  board->async_close(1s, told());
-  ASSERT_TRUE(run_until([&] { return end.has_value(); }));
-  EXPECT_EQ(end->outcome, Outcome::closed);
-  end.reset();
-  board->async_close(1s, told());
-  ASSERT_TRUE(run_until([&] { return end.has_value(); }));
-  EXPECT_EQ(end->outcome, Outcome::closed) << "a second time, too";
+TEST_F(AsyncBoardClose, EndsAtOnceForABoardThatIsNotOpen) {
+  EXPECT_EQ(close(1s), Outcome::closed);
+  EXPECT_EQ(close(1s), Outcome::closed) << "a second time, too";
 }
 
-TEST_F(AsyncBoardClose, DestroyedMeanwhileItEnds) {
+TEST_F(AsyncBoardClose, EndsWhenTheBoardIsDestroyed) {
   drive();
-  board->async_close(1s, told());
+  board->async_close(1s, note());
   board.reset();
   ASSERT_TRUE(run_until([&] { return end.has_value(); }));
   EXPECT_EQ(end->outcome, Outcome::closed);
 }
 
-TEST_F(AsyncBoardClose, WithoutWaitingTheFarewellIsSaidAllTheSame) {
+TEST_F(AsyncBoardClose, SendsTheFarewellWithoutWaiting) {
   drive();
   board->close();
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link)) << "long before its timeout";

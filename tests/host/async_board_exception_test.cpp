@@ -65,7 +65,8 @@ TEST_P(ThrownIn, LeavesTheLoopAndTheBoardGoesOn) {
   const int states_then = states;
   const int heartbeats_then = heartbeats;
   bool asked = false;
-  // Nothing comes to a session without a timer: the next heartbeats of ours are what keeps it alive.
+  // Nothing comes to a session without a timer: the next heartbeats of ours are what keeps it
+  // alive.
   while (states < states_then + 20 || heartbeats < heartbeats_then + 3 || !asked) {
     ASSERT_NE(io.run_one_for(5s), 0U) << "reception or a timer is gone";
     if (states < states_then + 10 || asked) continue;

@@ -15,6 +15,7 @@
 #include "r4link/board.hpp"
 #include "r4link/error.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/on_a_loop.hpp"
 
 namespace {
 
@@ -38,13 +39,7 @@ Time steady_time() {
   return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
 }
 
-void run_io_until(asio::io_context& io, const std::function<bool()>& done) {
-  const auto deadline = std::chrono::steady_clock::now() + 10s;
-  while (!done() && std::chrono::steady_clock::now() < deadline) io.run_one_for(10ms);
-  ASSERT_TRUE(done());
-}
-
-TEST(SleepWatchTest, TellsASleepThatIsLongerThanTheLimitOnce) {
+TEST(SleepWatchTest, ReportsASleepThatIsLongerThanTheLimitOnce) {
   SleepWatch watch;
   EXPECT_FALSE(watch.slept(steady_time(), 1s));
   slept_seconds += 2;
@@ -62,34 +57,32 @@ TEST(SleepWatchTest, DoesNotTakeAThreadThatGetsNoProcessorForASleep) {
   EXPECT_TRUE(watch.slept(steady_time(), 1s));
 }
 
-TEST(AsyncBoardSleep, DisarmsAndSwitchesTheMotorsOff) {
+struct AsyncBoardSleep : testing::Test, OnALoop {};
+
+TEST_F(AsyncBoardSleep, DisarmsAndSwitchesTheMotorsOff) {
   BoardInAThread simulated("udp");
-  asio::io_context io;
   AsyncBoard board(io, simulated.url());
   int restarts = 0;
   board.on_restart([&] { ++restarts; });
   board.open();
-  bool armed = false;
-  board.async_arm(
-      10s, [&](const CommandResult& result) { armed = result.outcome == Outcome::confirmed; });
-  run_io_until(io, [&] { return armed; });
+  ASSERT_EQ(result_of([&](auto armed) { board.async_arm(10s, armed); }).outcome,
+            Outcome::confirmed);
   ASSERT_TRUE(board.post(Command::osmc(500, Direction::forward, 1)));
-  run_io_until(io, [&] { return board.state().osmc[0].pwm == 500; });
+  ASSERT_TRUE(run_until([&] { return board.state().osmc[0].pwm == 500; }));
 
   slept_seconds += 3;
-  run_io_until(io, [&] { return board.disarmed_by() != DisarmCause::none; });
+  ASSERT_TRUE(run_until([&] { return board.disarmed_by() != DisarmCause::none; }));
   EXPECT_EQ(board.disarmed_by(), DisarmCause::sleep);
   EXPECT_EQ(board.post(Command::osmc(500, Direction::forward, 1)), PostResult::no_link);
   EXPECT_EQ(restarts, 1);
-  run_io_until(io, [&] { return board.in_control() && board.state().any(); });
+  ASSERT_TRUE(run_until([&] { return board.in_control() && board.state().any(); }));
   EXPECT_EQ(board.state().osmc[0].pwm, 0) << "another session has begun";
   EXPECT_EQ(board.post(Command::osmc(500, Direction::forward, 1)), PostResult::not_armed);
   EXPECT_EQ(restarts, 1);
 }
 
-TEST(AsyncBoardSleep, CancelsWhatWaited) {
-  asio::io_context io;
-  AsyncBoard board(io, "udp://127.0.0.1:1?listen=0");  // nobody is there
+TEST_F(AsyncBoardSleep, CancelsCommandsAndWaits) {
+  AsyncBoard board(io, "udp://127.0.0.1:1?listen=0");  // there is no board
   board.open();
   std::vector<Outcome> ends;
   const auto note = [&](const CommandResult& result) { ends.push_back(result.outcome); };
@@ -99,7 +92,7 @@ TEST(AsyncBoardSleep, CancelsWhatWaited) {
   io.run_for(20ms);
   ASSERT_TRUE(ends.empty());
   slept_seconds += 3;
-  run_io_until(io, [&] { return ends.size() == 3; });
+  ASSERT_TRUE(run_until([&] { return ends.size() == 3; }));
   EXPECT_EQ(ends, std::vector<Outcome>(3, Outcome::cancelled));
 }
 

@@ -7,12 +7,12 @@
 #include <asio/bind_executor.hpp>
 #include <asio/co_spawn.hpp>
 #include <asio/detached.hpp>
-#include <asio/executor_work_guard.hpp>
 #include <asio/steady_timer.hpp>
 #include <asio/strand.hpp>
 #include <asio/thread_pool.hpp>
 #include <asio/use_awaitable.hpp>
 #include <asio/use_future.hpp>
+#include <future>
 #include <optional>
 #include <thread>
 
@@ -21,8 +21,10 @@
 #include "host/standard_registry.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/carriers.hpp"
 #include "tests/support/datagrams.hpp"
-#include "transports/memory_carrier.hpp"
+#include "tests/support/on_a_loop.hpp"
+#include "tests/support/problems.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::test {
@@ -32,58 +34,16 @@ using namespace std::chrono_literals;
 
 const Command start_motor = Command::osmc(358, Direction::forward, 1);
 
-// Runs the loop until `done()`; false after 5 s.
-template <class Done>
-bool run_until(asio::io_context& io, Done done) {
-  const auto deadline = std::chrono::steady_clock::now() + 5s;
-  io.restart();
-  while (!done()) {
-    if (std::chrono::steady_clock::now() > deadline) return false;
-    if (io.run_one_for(5s) == 0 && io.stopped()) return done();
-  }
-  return true;
-}
-
-struct AsyncBoardTest : testing::Test {
-  asio::io_context io;
+struct AsyncBoardTest : testing::Test, OnALoop {
   AsyncBoard board{io, "sim:?seed=1", at_will()};
 };
 
-TEST_F(AsyncBoardTest, SendsItsFirstHeartbeatWhenItOpens) {
-  auto [host_end, board_end] = make_memory_pair(io);
-  struct Listener final : Carrier::Handler {
-    void on_datagram(std::string_view bytes, Peer) override { heard.emplace_back(bytes); }
-    void on_carrier_event(const CarrierEvent&) override {}
-    std::vector<std::string> heard;
-  } listener;
-  board_end->open(listener);
-  BoardOptions options = at_will();
-  options.session.timing.heartbeat_ms = 60'000;  // the second one is far away
-  AsyncBoard over_memory(io, std::move(host_end), options);
-  over_memory.open();
-  ASSERT_TRUE(run_until(io, [&] { return !listener.heard.empty(); }));
-  EXPECT_EQ(listener.heard[0].substr(0, 9), "H:ROS2-R4");
-  board_end->close();
-}
-
 // A path on which another host is heard.
-class Overhearing final : public Carrier {
- public:
-  void open(Handler& handler) override { handler_ = &handler; }
-  void close() noexcept override { handler_ = nullptr; }
-  SendResult send(std::string_view, Priority, Peer) override { return SendResult::sent; }
-  bool up() const override { return handler_ != nullptr; }
-  const std::string& name() const override { return name_; }
-  const CarrierCounters& counters() const override { return counters_; }
+struct Overhearing final : IdleCarrier {
   void overhear(std::string_view bytes) { handler_->on_overheard(bytes); }
-
- private:
-  Handler* handler_ = nullptr;
-  const std::string name_ = "memory:";
-  CarrierCounters counters_;
 };
 
-TEST_F(AsyncBoardTest, TellsNoSecretOfAnotherHost) {
+TEST_F(AsyncBoardTest, ReportsNoSecretOfAnotherHost) {
   auto path = std::make_unique<Overhearing>();
   Overhearing& other = *path;
   AsyncBoard watching(io, std::move(path), at_will());
@@ -97,86 +57,63 @@ TEST_F(AsyncBoardTest, TellsNoSecretOfAnotherHost) {
                                              with_crc("O:358,1,1;PNum:2;T:3;")}));
 }
 
-// Hands over what another carrier receives, and never tells that it is drained.
-class Undrained final : public Carrier, private Carrier::Handler {
- public:
-  explicit Undrained(std::unique_ptr<Carrier> below) : below_(std::move(below)) {}
-  void open(Carrier::Handler& handler) override {
-    handler_ = &handler;
-    below_->open(*this);
-  }
-  void close() noexcept override { below_->close(); }
-  SendResult send(std::string_view bytes, Priority priority, Peer to) override {
-    return below_->send(bytes, priority, to);
-  }
-  bool up() const override { return below_->up(); }
-  const std::string& name() const override { return below_->name(); }
-  const CarrierCounters& counters() const override { return below_->counters(); }
-
- private:
-  void on_datagram(std::string_view bytes, Peer from) override {
-    handler_->on_datagram(bytes, from);
-  }
-  void on_carrier_event(const CarrierEvent& event) override { handler_->on_carrier_event(event); }
-
-  std::unique_ptr<Carrier> below_;
-  Carrier::Handler* handler_ = nullptr;
+struct Undrained final : WrappedCarrier {
+  using WrappedCarrier::WrappedCarrier;
+  void on_drained() override {}
 };
 
 // As a CAN bus: all hosts send from one place.
-class Bus final : public Carrier {
- public:
-  explicit Bus(std::vector<std::string>& sent) : sent_(sent) {}
-  void open(Handler&) override {}
-  void close() noexcept override {}
+struct Bus final : IdleCarrier {
+  explicit Bus(std::vector<std::string>& all) : sent(all) {}
   SendResult send(std::string_view bytes, Priority, Peer) override {
-    sent_.emplace_back(bytes);
+    sent.emplace_back(bytes);
     return SendResult::sent;
   }
   bool is_shared() const override { return true; }
-  bool up() const override { return true; }
-  const std::string& name() const override { return name_; }
-  const CarrierCounters& counters() const override { return counters_; }
-
- private:
-  std::vector<std::string>& sent_;
-  const std::string name_ = "bus";
-  CarrierCounters counters_;
+  std::vector<std::string>& sent;
 };
 
-TEST_F(AsyncBoardTest, WhoOnlyWatchesSendsNothingButLeasesAndStopsWhereAllHostsHaveOnePlace) {
+TEST_F(AsyncBoardTest, SendsItsFirstHeartbeatWhenItOpens) {
+  std::vector<std::string> sent;
+  AsyncBoard controlling(io, std::make_unique<Bus>(sent), at_will());
+  controlling.open();
+  ASSERT_FALSE(sent.empty());
+  EXPECT_EQ(sent[0].substr(0, 9), "H:ROS2-R4");
+}
+
+TEST_F(AsyncBoardTest, OnlyListensAsAWatcherOnABusButForLeasesAndStops) {
   std::vector<std::string> sent;
   BoardOptions options;
   options.role = BoardRole::watch;
   AsyncBoard watching(io, std::make_unique<Bus>(sent), options);
   watching.open();
-  bool asked = false;
-  watching.async_identify(600ms, [&](const CommandResult&) { asked = true; });
-  ASSERT_TRUE(run_until(io, [&] { return asked; }));
+  result_of([&](auto end) { watching.async_identify(600ms, end); });
   for (const std::string& each : sent) EXPECT_EQ(each.substr(0, 2), "W:") << each;
   EXPECT_FALSE(watching.link().causes.has(LinkCause::busy)) << "nobody controls it";
   sent.clear();
   watching.async_stop(50ms, [](const CommandResult&) {});
-  ASSERT_TRUE(run_until(io, [&] { return !sent.empty(); }));
+  ASSERT_TRUE(run_until([&] { return !sent.empty(); }));
   EXPECT_EQ(sent[0].substr(0, 7), "E:STOP;");
 }
 
-TEST_F(AsyncBoardTest, TellsStatesOfATransportThatIsNeverDrained) {
+TEST_F(AsyncBoardTest, ReportsStatesOfATransportThatIsNeverDrained) {
   AsyncBoard over(io,
                   std::make_unique<Undrained>(standard_registry().make(io, "sim:", Role::host)));
   int states = 0;
   over.on_state([&](const State&, const Datagram&) { ++states; });
   over.open();
-  EXPECT_TRUE(run_until(io, [&] { return states >= 3; }));
+  EXPECT_TRUE(run_until([&] { return states >= 3; }));
 }
 
-TEST_F(AsyncBoardTest, TellsOfAHoldUpOnceHoweverMuchFollowsIt) {
+TEST_F(AsyncBoardTest, WarnsOfAHoldUpOnceHoweverMuchFollowsIt) {
   int warnings = 0;
   board.on_event([&](const CarrierEvent& event) {
-    if (event.kind == CarrierEvent::Kind::warning) ++warnings;
+    if (event.kind != CarrierEvent::Kind::warning) return;
+    EXPECT_TRUE(contains(event.problem.reason, "held up"));
+    ++warnings;
   });
   board.open();
-  ASSERT_TRUE(run_until(io, [&] { return board.in_control(); }));
+  ASSERT_TRUE(run_until([&] { return board.in_control(); }));
   bool posted = false;
   asio::post(io, [&] {
     const auto end = std::chrono::steady_clock::now() + 350ms;
@@ -184,11 +121,11 @@ TEST_F(AsyncBoardTest, TellsOfAHoldUpOnceHoweverMuchFollowsIt) {
     for (int us = 1000; us < 1100; ++us) board.post(Command::servo(us, 1));
     posted = true;
   });
-  ASSERT_TRUE(run_until(io, [&] { return posted && board.state().servo_us[0] == 1099; }));
+  ASSERT_TRUE(run_until([&] { return posted && board.state().servo_us[0] == 1099; }));
   EXPECT_EQ(warnings, 1);
 }
 
-TEST_F(AsyncBoardTest, TellsEverySubscriberLastWhatIsSo) {
+TEST_F(AsyncBoardTest, GivesEverySubscriberTheNewestCause) {
   std::vector<DisarmCause> told;
   AsyncBoard armed(io, "sim:");
   armed.on_arming([&](DisarmCause cause) {
@@ -197,28 +134,16 @@ TEST_F(AsyncBoardTest, TellsEverySubscriberLastWhatIsSo) {
   armed.on_arming([&](DisarmCause cause) { told.push_back(cause); });
   armed.open();
   armed.async_arm(3s, [](const CommandResult&) {});
-  ASSERT_TRUE(run_until(io, [&] { return armed.link().reason == SafeReason::stop; }));
+  ASSERT_TRUE(run_until([&] { return armed.link().reason == SafeReason::stop; }));
   ASSERT_FALSE(told.empty());
   EXPECT_EQ(told.back(), DisarmCause::stop) << "the first one stopped the board meanwhile";
 }
 
 TEST_F(AsyncBoardTest, ConfirmsThroughAFuture) {
   board.open();
-  std::thread loop([&] {
-    const auto work = asio::make_work_guard(io);
-    io.run();
-  });
-  auto sent =
-      asio::post(
-          io, asio::use_future([&] { return board.async_send(start_motor, 1s, asio::use_future); }))
-          .get();
+  std::future<CommandResult> sent = board.async_send(start_motor, 1s, asio::use_future);
+  ASSERT_TRUE(run_until([&] { return sent.wait_for(0s) == std::future_status::ready; }));
   EXPECT_EQ(sent.get().outcome, Outcome::confirmed);
-  auto stopped =
-      asio::post(io, asio::use_future([&] { return board.async_stop(1s, asio::use_future); }))
-          .get();
-  EXPECT_EQ(stopped.get().outcome, Outcome::confirmed);
-  io.stop();
-  loop.join();
 }
 
 TEST_F(AsyncBoardTest, ConfirmsThroughACoroutine) {
@@ -256,7 +181,7 @@ TEST_F(AsyncBoardTest, RunsAHandlerOnItsExecutor) {
                      where = std::this_thread::get_id();
                      done = true;
                    }));
-  ASSERT_TRUE(run_until(io, [&] { return done.load(); }));
+  ASSERT_TRUE(run_until([&] { return done.load(); }));
   EXPECT_NE(where, std::this_thread::get_id());
   board.close();
   pool.join();
@@ -273,13 +198,11 @@ TEST_F(AsyncBoardTest, RunsAHandlerOnItsExecutor) {
 }
 
 TEST_F(AsyncBoardTest, TakesMoveOnlyHandlers) {
-  std::optional<Outcome> outcome;
+  int owned = 0;
   board.open();
-  board.async_send(start_motor, 1s, [&, owned = std::make_unique<int>(7)](const CommandResult& r) {
-    outcome = r.outcome;
-    EXPECT_EQ(*owned, 7);
-  });
-  ASSERT_TRUE(run_until(io, [&] { return outcome.has_value(); }));
+  board.async_send(start_motor, 1s,
+                   [&, seven = std::make_unique<int>(7)](const auto&) { owned = *seven; });
+  ASSERT_TRUE(run_until([&] { return owned == 7; }));
 }
 
 TEST_F(AsyncBoardTest, HandlersMaySendAgain) {
@@ -290,26 +213,26 @@ TEST_F(AsyncBoardTest, HandlersMaySendAgain) {
   };
   board.open();
   board.async_identify(1s, again);
-  ASSERT_TRUE(run_until(io, [&] { return confirmed == 1000; }));
+  ASSERT_TRUE(run_until([&] { return confirmed == 1000; }));
 }
 
-TEST_F(AsyncBoardTest, IsNotInTheWayWithSixtyFiveCommands) {
+TEST_F(AsyncBoardTest, RefusesTheSixtyFifthCommand) {
   std::vector<Outcome> outcomes;
   const auto note = [&](const CommandResult& result) { outcomes.push_back(result.outcome); };
   board.open();
   for (std::size_t i = 0; i < Session::max_pending + 1; ++i)
     board.async_send(start_motor, 1s, note);
-  ASSERT_TRUE(run_until(io, [&] { return outcomes.size() == Session::max_pending + 1; }));
+  ASSERT_TRUE(run_until([&] { return outcomes.size() == Session::max_pending + 1; }));
   EXPECT_EQ(outcomes[0], Outcome::full) << "said at once";
   EXPECT_EQ(std::count(outcomes.begin(), outcomes.end(), Outcome::confirmed),
             static_cast<long>(Session::max_pending));
 }
 
-TEST_F(AsyncBoardTest, CloseCancelsAndNoCallbackFollows) {
+TEST_F(AsyncBoardTest, CancelsWhenItClosesAndNoCallbackFollows) {
   std::vector<Outcome> outcomes;
   const auto note = [&](const CommandResult& result) { outcomes.push_back(result.outcome); };
   board.open();
-  ASSERT_TRUE(run_until(io, [&] { return board.in_control(); }));
+  ASSERT_TRUE(run_until([&] { return board.in_control(); }));
   board.async_send(start_motor, 10s, note);
   board.async_stop(10s, note);
   board.on_state([](const State&, const Datagram&) { ADD_FAILURE() << "called after close()"; });
@@ -327,15 +250,14 @@ TEST_F(AsyncBoardTest, CloseCancelsAndNoCallbackFollows) {
   EXPECT_THROW(board.open(), Error) << "once only";
 }
 
-// Everywhere where the user's code runs, the board may be destroyed.
-struct DestroyedIn : testing::TestWithParam<const char*> {};
+// The board may be destroyed wherever the user's code runs.
+struct DestroyedIn : testing::TestWithParam<const char*>, OnALoop {};
 INSTANTIATE_TEST_SUITE_P(AsyncBoard, DestroyedIn,
                          testing::Values("handler", "state", "heartbeat", "link", "nack"),
                          [](const auto& place) { return std::string(place.param); });
 
 TEST_P(DestroyedIn, SurvivesIt) {
   const std::string place = GetParam();
-  asio::io_context io;
   BoardInAThread over_udp("udp");
   for (const std::string& url : {std::string("sim:"), over_udp.url()}) {
     auto board = std::make_unique<AsyncBoard>(io, url, at_will());
@@ -363,7 +285,7 @@ TEST_P(DestroyedIn, SurvivesIt) {
   }
 }
 
-// The transport is up at once, and tells so inside of open().
+// The transport is up at once, and reports that inside of open().
 TEST(AsyncBoardEnd, MayComeWhileItOpens) {
   asio::io_context io;
   AsyncBoard closed(io, "sim:");
@@ -408,41 +330,15 @@ TEST(AsyncBoardEnd, ItsHandlersDieWithTheLoop) {
   EXPECT_EQ(payload.use_count(), 1);
 }
 
-TEST_F(AsyncBoardTest, TellsOfEverythingThatComes) {
-  int states = 0;
-  int heartbeats = 0;
-  int links = 0;
-  int nacks = 0;
-  board.on_state([&](const State&, const Datagram& datagram) {
-    EXPECT_TRUE(datagram.has_pnum());
-    ++states;
-  });
-  board.on_board_heartbeat([&](const Datagram&) { ++heartbeats; });
-  board.on_link([&](const LinkStatus&) { ++links; });
-  board.on_nack([&](const Nack& nack, const Datagram&) {
-    EXPECT_EQ(nack.code, Refusal::safe);
-    ++nacks;
-  });
-  board.open();
-  board.async_stop(1s, [&](const CommandResult&) {
-    board.async_send(start_motor, 1s, [](const CommandResult&) {});
-  });
-  ASSERT_TRUE(
-      run_until(io, [&] { return states > 3 && heartbeats > 1 && links > 1 && nacks > 0; }));
-  EXPECT_EQ(board.carrier_counters().rx_oversize, 0U);
-  EXPECT_GT(board.carrier_counters().rx_datagrams, 3U);
-  EXPECT_EQ(board.name(), "sim:?seed=1");
-}
-
 TEST_F(AsyncBoardTest, GatesItsHeartbeatsAndFeedsFromAnyThread) {
   board.watchdog(30ms);
   board.open();
-  ASSERT_TRUE(run_until(io, [&] { return board.link().gated(); }));
+  ASSERT_TRUE(run_until([&] { return board.link().gated(); }));
   std::atomic<bool> stop{false};
   std::thread feeder([&] {
     while (!stop) board.feed();
   });
-  EXPECT_TRUE(run_until(io, [&] { return !board.link().gated() && board.in_control(); }));
+  EXPECT_TRUE(run_until([&] { return !board.link().gated() && board.in_control(); }));
   stop = true;
   feeder.join();
 }

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Groups of commands from end to end: r4::Board and r4::AsyncBoard opposite simulated boards, and when the
-// registers of the chips change.
+// Groups of commands from end to end: r4::Board and r4::AsyncBoard opposite simulated boards, and
+// when the registers of the chips change.
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <asio/io_context.hpp>
-#include <asio/use_future.hpp>
 #include <cstdint>
-#include <future>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,11 +13,11 @@
 #include "r4link/async_board.hpp"
 #include "r4link/board.hpp"
 #include "r4link/error.hpp"
-#include "tests/bench/allocations.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/driven_board.hpp"
+#include "tests/support/on_a_loop.hpp"
 #include "tests/support/problems.hpp"
-#include "transports/memory_carrier.hpp"
 
 namespace r4::test {
 namespace {
@@ -28,13 +25,12 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr Direction forward = Direction::forward;
-using Lines = std::vector<std::string>;
 
-// When, on the bus, each wheel begins to do what it is to do: by the chips' outputs, which change at the end
-// of a transfer.
+// The time on the bus at which each wheel begins to turn as it should: the outputs of the chips
+// change at the end of a transfer.
 class Wheels final : public sim::I2cObserver {
  public:
-  // `osmc`: how many of the four are OSMC channels, the others DHB12.
+  // `osmc`: the number of OSMC channels among the four; the rest are DHB12 channels.
   Wheels(sim::BoardChips& chips, Drive wanted, int osmc)
       : chips_(chips), wanted_(wanted), osmc_(osmc) {
     chips_.bus.set_observer(this);
@@ -107,9 +103,9 @@ TEST(BoardGroup, FourWheelsOfOneChipChangeAtOnceAndOfTwoWithinAMillisecond) {
   }
 }
 
-TEST(BoardGroup, IsConfirmedAsOneAndRefusedAsOne) {
-  BoardInAThread simulated("udp");
-  Board board(simulated.url(), at_will());
+struct DrivenGroup : DrivenBoard {};
+
+TEST_F(DrivenGroup, IsConfirmedAsOneAndRefusedAsOne) {
   board.fields("DEFAULT,OSMC2,SERVO3POS,DAC2");
   board.apply(Setpoints{}.osmc(1, 358, forward).osmc(2, 359, forward).servo(3, 1500).dac(2, 1650));
   const State state = board.next_state();
@@ -130,68 +126,13 @@ TEST(BoardGroup, IsConfirmedAsOneAndRefusedAsOne) {
   EXPECT_EQ(problem_of([&] { board.apply(Setpoints{}.servo(1, 1), 0ms); }).kind, ErrorKind::usage);
 }
 
-TEST(BoardGroup, IsPostedWithoutAllocatingAnything) {
-  Board board("sim:", at_will());
-  board.wait_active();
-  board.identify();
-  int sent = 0;
-  const std::uint64_t before = bench::allocations_of_this_thread();
-  for (int i = 0; i < 20; ++i) {
-    if (board.post(Setpoints{}.osmc(1, 100 + i, forward).osmc(2, 100 + i, forward))) ++sent;
-    board.next_state();
-  }
-  EXPECT_EQ(bench::allocations_of_this_thread() - before, 0U);
-  EXPECT_EQ(sent, 20);
-}
-
-// A host and a board on one loop.
-struct OneLoop {
-  OneLoop() : ends(make_memory_pair(io)) {
-    sim::SimulatedBoard::Options options;
-    options.events.on_executed = [this](std::uint32_t, std::uint32_t pnum, const Command& command) {
-      if (drives_output(command.kind)) pnums.push_back(pnum);
-    };
-    simulated.emplace(io, std::move(options));
-    simulated->add_carrier(std::move(ends.second));
-    simulated->start();
-    host.emplace(io, std::move(ends.first), at_will());
-    host->open();
-  }
-  CommandResult apply(const Setpoints& setpoints) {
-    std::optional<CommandResult> result;
-    host->async_apply(setpoints, 5s, [&](const CommandResult& r) { result = r; });
-    const auto deadline = std::chrono::steady_clock::now() + 10s;
-    io.restart();
-    while (!result && std::chrono::steady_clock::now() < deadline) io.run_one_for(1s);
-    EXPECT_TRUE(result);
-    return result.value_or(CommandResult());
-  }
-
-  asio::io_context io;
-  std::pair<std::unique_ptr<Carrier>, std::unique_ptr<Carrier>> ends;
-  std::vector<std::uint32_t> pnums;  // under which the outputs were set
-  std::optional<sim::SimulatedBoard> simulated;
-  std::optional<AsyncBoard> host;
-};
-
-TEST(AsyncBoardGroup, IsOneDatagram) {
-  const Setpoints wheels = Setpoints{}.osmc(1, 358, forward).osmc(2, 358, forward).servo(3, 1500);
-  OneLoop loop;
-  EXPECT_EQ(loop.apply(wheels).outcome, Outcome::confirmed);
-  ASSERT_EQ(loop.pnums.size(), 3U);
-  EXPECT_EQ(loop.pnums[0], loop.pnums[2]);
-  EXPECT_TRUE(loop.host->post(wheels));
-}
-
-TEST(AsyncBoardGroup, OfNoneIsThrownBackAndOfAClosedBoardEnds) {
-  asio::io_context io;
-  AsyncBoard board(io, "sim:", at_will());
+TEST(AsyncBoardGroup, IsRefusedIfItIsEmptyAndEndsIfTheBoardIsClosed) {
+  OnALoop loop;
+  AsyncBoard board(loop.io, "sim:", at_will());
   EXPECT_THROW(board.async_apply(Setpoints{}, 1s, [](const CommandResult&) {}), Error);
   EXPECT_THROW(board.post(Setpoints{}), Error);
-  std::future<CommandResult> result =
-      board.async_apply(Setpoints{}.servo(1, 1), 1s, asio::use_future);
-  io.run();
-  EXPECT_EQ(result.get().outcome, Outcome::closed);
+  const auto apply = [&](auto end) { board.async_apply(Setpoints{}.servo(1, 1), 1s, end); };
+  EXPECT_EQ(loop.result_of(apply).outcome, Outcome::closed);
 }
 
 }  // namespace

@@ -4,8 +4,7 @@
 
 #include "r4link/board.hpp"
 #include "r4link/error.hpp"
-#include "tests/support/at_will.hpp"
-#include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/driven_board.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -14,39 +13,30 @@ namespace {
 using namespace std::chrono_literals;
 using Bytes = Board::I2c::Bytes;
 
-TEST(BoardI2c, ReadsWritesAndScans) {
-  BoardInAThread simulated("udp");
-  Board board(simulated.url(), at_will());
-  board.wait_active();
+struct BoardI2c : DrivenBoard {};
+
+TEST_F(BoardI2c, ReadsWritesAndScans) {
   EXPECT_EQ(board.i2c().scan(), (Bytes{0x40, 0x68}));
   EXPECT_EQ(board.i2c().read(0x68, {0x75}, 1), Bytes{0x68});
   EXPECT_EQ(board.i2c().write(0x68, {0x6B, 0x00}), Bytes{});
   EXPECT_EQ(board.i2c().read(0x68, {0x6B}, 1), Bytes{0x00});
   EXPECT_EQ(board.i2c().write(0x40, {0x00}, 2), (Bytes{0x39, 0x9F}));
-  const auto fails = [&](int address) {
-    try {
-      board.i2c().read(address, {0x00}, 1);
-    } catch (const Error& error) {
-      return error.kind() == ErrorKind::refused ? error.problem().reason : "usage";
-    }
-    return std::string("nothing");
+  const auto read = [&](int address) {
+    return problem_of([&] { board.i2c().read(address, {0x00}, 1); });
   };
-  EXPECT_EQ(fails(0x50), "no acknowledge");
-  EXPECT_EQ(fails(7), "usage");
-  EXPECT_EQ(fails(0x168), "usage");
+  EXPECT_EQ(read(0x50).reason, "no acknowledge");
+  EXPECT_EQ(read(7).kind, ErrorKind::usage);
+  EXPECT_EQ(read(0x168).kind, ErrorKind::usage);
 }
 
-TEST(BoardI2c, TheStateBringsWhatIsRepeated) {
-  BoardInAThread simulated("udp");
-  Board board(simulated.url(), at_will());
-  board.wait_active();
+TEST_F(BoardI2c, PutsRepeatedReadingsIntoTheState) {
   board.i2c().poll(1, 0x68, {0x75}, 1, 10ms);
   board.fields("I2C1");
   ReceivedState state = board.next_state();
   for (int i = 0; i < 100 && state.i2c[0].data.size == 0; ++i) state = board.next_state();
   ASSERT_EQ(state.i2c[0].data.size, 1);
   EXPECT_EQ(state.i2c[0].data.bytes[0], 0x68);
-  // A board that comes late samples behind the T of its state.
+  // A board that is late samples after the T of its state.
   EXPECT_LE(static_cast<std::int32_t>(state.t_ms - state.i2c[0].t_ms), 40);
   board.i2c().poll_off(1);
   for (int i = 0; i < 100 && state.i2c[0].data.size != 0; ++i) state = board.next_state();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Board and r4::AsyncBoard over several paths, in real time: a board on UDP and a pty, and on carriers in memory
-// that are cut.
+// r4::Board and r4::AsyncBoard over several paths, in real time: a board on UDP and a pty, and on
+// carriers in memory that are cut.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -21,6 +21,8 @@
 #include "tests/bench/allocations.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/carriers.hpp"
+#include "tests/support/on_a_loop.hpp"
 #include "tests/support/problems.hpp"
 #include "transports/memory_carrier.hpp"
 
@@ -28,6 +30,10 @@ namespace r4::test {
 namespace {
 
 using namespace std::chrono_literals;
+
+std::string temporary_path(const std::string& name) {
+  return testing::TempDir() + "r4-" + name + std::to_string(::getpid());
+}
 
 // True if `done` becomes true within 5 s. It is checked after each state of the board.
 template <class Done>
@@ -40,7 +46,7 @@ bool comes_true(Board& board, Done done) {
   return true;
 }
 
-TEST(BoardPaths, ABoardOnUdpAndAPtyIsOneBoard) {
+TEST(BoardPaths, LeadToOneBoardOverUdpAndAPty) {
   BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
   Board board(simulated.urls(), at_will());
   board.wait_active();
@@ -61,7 +67,7 @@ TEST(BoardPaths, ABoardOnUdpAndAPtyIsOneBoard) {
   EXPECT_EQ(board.link().reason, SafeReason::stop);
 }
 
-TEST(BoardPaths, ThatTheyLeadToTwoBoardsIsSaidWithBothNames) {
+TEST(BoardPaths, ThatLeadToTwoBoardsAreRefusedWithBothNames) {
   BoardInAThread left(std::vector<std::string>{"udp"}, "", "left-board");
   BoardInAThread right(std::vector<std::string>{"pty"}, "", "right-board");
   Board board({left.url(), right.url()}, at_will());
@@ -74,7 +80,7 @@ TEST(BoardPaths, ThatTheyLeadToTwoBoardsIsSaidWithBothNames) {
   EXPECT_TRUE(right.executed().empty());
 }
 
-TEST(BoardPaths, WhatCannotBePathsIsRefused) {
+TEST(BoardPaths, AreRefusedIfTheyCannotLeadToOneBoard) {
   asio::io_context io;
   const auto refusal = [&](const std::vector<std::string>& urls) {
     const Problem problem = problem_of([&] { AsyncBoard board(io, urls); });
@@ -94,63 +100,55 @@ TEST(BoardPaths, WhatCannotBePathsIsRefused) {
   AsyncBoard(io, {"can://can0", "can://can1", "can://can1?node=2", "udp://10.0.0.1"});
 }
 
-TEST(BoardPaths, OneThatCannotBeOpenedYetIsTriedAgain) {
-  const std::string link =
-      (std::filesystem::temp_directory_path() / ("r4-path-" + std::to_string(getpid()))).string();
+TEST(BoardPaths, AreOpenedLaterIfTheyCannotBeOpenedYet) {
+  const std::string link = temporary_path("path-");
   BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
   EXPECT_EQ(problem_of([&] {
               Board({"serial://" + link, "serial://" + link + "2"});
             }).kind,
             ErrorKind::open);
-  std::atomic<int> told{0};
+  std::atomic<int> downs{0};
   BoardCallbacks callbacks;
   callbacks.on_event = [&](const CarrierEvent& event) {
-    told += event.kind == CarrierEvent::Kind::down ? 1 : 0;
+    downs += event.kind == CarrierEvent::Kind::down ? 1 : 0;
   };
   Board board({simulated.urls()[0], "serial://" + link}, at_will(), callbacks);
   board.wait_active();
   EXPECT_EQ(board.paths()[1].state, PathState::down);
-  EXPECT_TRUE(comes_true(board, [&] { return told == 1; }));
+  EXPECT_TRUE(comes_true(board, [&] { return downs == 1; }));
   std::filesystem::create_symlink(simulated.urls()[1].substr(9), link);
   EXPECT_TRUE(comes_true(board, [&] { return board.link().carrying == 3; }));
   std::filesystem::remove(link);
 }
 
-// As where a second device is plugged in that "serial:auto" cannot tell from the board: a fault in what is asked for.
-TEST(BoardPaths, OneThatTurnsOutToBeNoSuchDeviceLeavesTheOthersAlone) {
-  const std::string link =
-      (std::filesystem::temp_directory_path() / ("r4-odd-" + std::to_string(getpid()))).string();
+// As if a second device is plugged in that "serial:auto" cannot tell from the board: an Error of
+// kind usage.
+TEST(BoardPaths, AreNotDisturbedByAPathThatHasAnotherDevice) {
+  const std::string link = temporary_path("odd-");
   BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
-  std::atomic<bool> told{false};
+  std::atomic<bool> wrong{false};
   BoardCallbacks callbacks;
   callbacks.on_event = [&](const CarrierEvent& event) {
-    if (event.problem.kind == ErrorKind::usage) told = true;
+    if (event.problem.kind == ErrorKind::usage) wrong = true;
   };
   Board board({simulated.urls()[0], "serial://" + link + "?baud=1234567"}, at_will(), callbacks);
   board.wait_active();
   std::filesystem::create_symlink(simulated.urls()[1].substr(9), link);
-  EXPECT_TRUE(comes_true(board, [&] { return told.load(); }));
+  EXPECT_TRUE(comes_true(board, [&] { return wrong.load(); }));
   std::filesystem::remove(link);
   board.osmc(1).set(100, Direction::forward);
   EXPECT_EQ(board.link().carrying, 1);
 }
 
-// One end of a carrier in memory that can be cut, told or untold.
-class Cuttable final : public Carrier, private Carrier::Handler {
+// One end of a carrier in memory that can be cut, with an event or without.
+class Cuttable final : public WrappedCarrier {
  public:
-  explicit Cuttable(std::unique_ptr<Carrier> below) : below_(std::move(below)) {}
-  void open(Carrier::Handler& handler) override {
-    handler_ = &handler;
-    below_->open(*this);
-  }
-  void close() noexcept override { below_->close(); }
+  using WrappedCarrier::WrappedCarrier;
   SendResult send(std::string_view bytes, Priority priority, Peer to) override {
     if (unplugged) return SendResult::down;
-    return cut ? SendResult::sent : below_->send(bytes, priority, to);
+    return cut ? SendResult::sent : WrappedCarrier::send(bytes, priority, to);
   }
-  bool up() const override { return !unplugged && below_->up(); }
-  const std::string& name() const override { return below_->name(); }
-  const CarrierCounters& counters() const override { return below_->counters(); }
+  bool up() const override { return !unplugged && WrappedCarrier::up(); }
   void plug(bool in) {
     unplugged = !in;
     on_carrier_event({in ? CarrierEvent::Kind::up : CarrierEvent::Kind::down, {}});
@@ -161,16 +159,11 @@ class Cuttable final : public Carrier, private Carrier::Handler {
 
  private:
   void on_datagram(std::string_view bytes, Peer from) override {
-    if (!cut && !unplugged) handler_->on_datagram(bytes, from);
+    if (!cut && !unplugged) WrappedCarrier::on_datagram(bytes, from);
   }
-  void on_carrier_event(const CarrierEvent& event) override { handler_->on_carrier_event(event); }
-  void on_drained() override { handler_->on_drained(); }
-
-  std::unique_ptr<Carrier> below_;
-  Carrier::Handler* handler_ = nullptr;
 };
 
-struct BoardPathsInMemory : testing::Test {
+struct BoardPathsInMemory : testing::Test, OnALoop {
   void SetUp() override {
     sim::SimulatedBoard::Options options;
     options.board_id = "in-memory";
@@ -188,15 +181,6 @@ struct BoardPathsInMemory : testing::Test {
     board->open();
     ASSERT_TRUE(run_until([&] { return board->in_control() && board->link().carrying == 3; }));
   }
-  template <class Done>
-  bool run_until(Done done) {
-    const auto deadline = std::chrono::steady_clock::now() + 5s;
-    while (!done()) {
-      if (std::chrono::steady_clock::now() > deadline) return false;
-      io.run_one_for(1s);
-    }
-    return true;
-  }
   void run_for(std::chrono::milliseconds duration) {
     asio::steady_timer timer(io, duration);
     bool over = false;
@@ -204,13 +188,12 @@ struct BoardPathsInMemory : testing::Test {
     run_until([&] { return over; });
   }
 
-  asio::io_context io;
   Cuttable* paths[2] = {};
   std::unique_ptr<sim::SimulatedBoard> simulated;
   std::unique_ptr<AsyncBoard> board;
 };
 
-TEST_F(BoardPathsInMemory, TellWhatBeginsAndCeasesToCarry) {
+TEST_F(BoardPathsInMemory, AreReportedWhenTheyBeginOrCeaseToCarry) {
   std::vector<PathStatus> told;
   const Subscription keep = board->on_path([&](const PathStatus& path) { told.push_back(path); });
   paths[0]->plug(false);
@@ -237,10 +220,8 @@ TEST_F(BoardPathsInMemory, CostNoHeapPerDatagram) {
   EXPECT_LE(bench::allocations() - before, 10U) << "of the timer of this test";
 }
 
-TEST_F(BoardPathsInMemory, AreToldApartInARecording) {
-  const std::string file =
-      (std::filesystem::temp_directory_path() / ("r4-paths-" + std::to_string(getpid()) + ".r4"))
-          .string();
+TEST_F(BoardPathsInMemory, HaveNumbersInARecording) {
+  const std::string file = temporary_path("paths-") + ".r4";
   {
     Recording recording(file);
     board->record(recording);

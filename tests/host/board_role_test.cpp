@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board that is watched, controlled and watched again, without being closed: AsyncBoard and Board.
+// A board that is watched, controlled and watched again, without being closed: AsyncBoard and
+// Board.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -16,6 +17,8 @@
 #include "r4link/board.hpp"
 #include "r4link/recording.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/carriers.hpp"
+#include "tests/support/on_a_loop.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -32,22 +35,11 @@ BoardOptions watching() {
   return options;
 }
 
-struct BoardRoles : testing::TestWithParam<std::vector<std::string>> {
-  // Runs the loop until `done()`; false after 5 s.
-  template <class Done>
-  bool run_until(Done done) {
-    const auto deadline = std::chrono::steady_clock::now() + 5s;
-    io.restart();
-    while (!done() && std::chrono::steady_clock::now() < deadline) io.run_one_for(5s);
-    return done();
-  }
-  // How what `start(handler)` starts ends.
+struct BoardRoles : testing::TestWithParam<std::vector<std::string>>, OnALoop {
+  // The outcome of what `start(handler)` starts.
   template <class Start>
   Outcome end_of(Start start) {
-    std::optional<CommandResult> end;
-    start([&](const CommandResult& result) { end = result; });
-    EXPECT_TRUE(run_until([&] { return end.has_value(); }));
-    return end ? end->outcome : Outcome::none;
+    return result_of(start).outcome;
   }
   bool hears_more_states() {
     const int before = states;
@@ -65,7 +57,6 @@ struct BoardRoles : testing::TestWithParam<std::vector<std::string>> {
   }
 
   BoardInAThread simulated{GetParam()};
-  asio::io_context io;
   AsyncBoard board{io, simulated.urls(), watching()};
   int states = 0;
   Subscription counting = board.on_state([this](const auto&, const auto&) { ++states; });
@@ -103,7 +94,7 @@ TEST_P(BoardRoles, AreTakenAndGivenBackAgainAndAgain) {
   EXPECT_EQ(release(), Outcome::confirmed) << "it watches already";
 }
 
-TEST_P(BoardRoles, KeepRecordingsStatisticsAndWhoItIs) {
+TEST_P(BoardRoles, KeepRecordingsStatisticsAndIdentity) {
   const std::string path = testing::TempDir() + "board_roles-" + std::to_string(::getpid());
   Recording recording(path);
   board.record(recording);
@@ -182,27 +173,14 @@ TEST_P(BoardRoles, EndWithTheBoard) {
 }
 
 // A path that another program may control.
-class Contested final : public Carrier {
- public:
-  explicit Contested(bool taken) : taken_(taken) {}
-  void open(Handler&) override { up_ = true; }
-  void close() noexcept override { up_ = false; }
-  SendResult send(std::string_view, Priority, Peer) override { return SendResult::sent; }
+struct Contested final : IdleCarrier {
+  explicit Contested(bool taken) : is_taken(taken) {}
   void change_role(BoardRole role) override {
-    if (taken_) throw Error(ErrorKind::refused, name_, "taken");
+    if (is_taken) throw Error(ErrorKind::refused, name(), "taken");
     roles.push_back(role);
   }
-  bool up() const override { return up_; }
-  const std::string& name() const override { return name_; }
-  const CarrierCounters& counters() const override { return counters_; }
-
+  const bool is_taken;
   std::vector<BoardRole> roles;
-
- private:
-  bool taken_;
-  bool up_ = false;
-  const std::string name_ = "contested:";
-  CarrierCounters counters_;
 };
 
 TEST(BoardRole, IsRefusedAsAWholeWhereOneOfThePathsIsTaken) {
@@ -228,14 +206,10 @@ TEST(BoardRole, IsRefusedByNameWhereAnotherProgramControlsAndTheBoardIsWatchedOn
   {
     Board driver(simulated.url());
     driver.wait_active();
-    try {
-      watcher.take_control();
-      FAIL() << "two programs control the board";
-    } catch (const Error& error) {
-      EXPECT_EQ(error.kind(), ErrorKind::refused);
-      ASSERT_TRUE(error.holder());
-      EXPECT_EQ(error.holder()->pid, ::getpid());
-    }
+    const Problem held = problem_of([&] { watcher.take_control(); });
+    EXPECT_EQ(held.kind, ErrorKind::refused);
+    ASSERT_TRUE(held.holder);
+    EXPECT_EQ(held.holder->pid, ::getpid());
     EXPECT_EQ(watcher.role(), BoardRole::watch);
     EXPECT_GT(watcher.next_state().t_ms, 0U);
     driver.release_control();
@@ -255,7 +229,8 @@ TEST(BoardRole, IsRefusedByNameWhereAnotherProgramControlsAndTheBoardIsWatchedOn
   EXPECT_EQ(problem_of([&] { watcher.release_control(); }).outcome, Outcome::closed);
 }
 
-// Whatever meets the change on its way to the loop, nothing drives, and nothing ends the program.
+// Commands may meet the change on their way to the loop: then no motor turns, and the program goes
+// on.
 TEST(BoardRole, MayBeChangedWhileOtherThreadsCommand) {
   BoardInAThread simulated("udp");
   BoardOptions options = watching();

@@ -16,7 +16,9 @@
 #include "tests/bench/allocations.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/driven_board.hpp"
 #include "tests/support/every_channel.hpp"
+#include "tests/support/first.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -64,10 +66,7 @@ TEST_P(BoardOver, ConfirmsEveryCommandOnceExecuted) {
   EXPECT_EQ(executed, after_settings) << "each once, in order";
 }
 
-TEST(Board, EveryChannelReachesItsPinAndComesBack) {
-  BoardInAThread simulated("udp");
-  Board board(simulated.url(), at_will());
-  board.wait_active();
+TEST_F(DrivenBoard, SetsThePinOfEveryChannelAndReadsItBack) {
   expect_every_channel(controlled(simulated, board));
 }
 
@@ -102,14 +101,11 @@ TEST_P(BoardOver, TheBoardGoesSafeWhenTheApplicationHangs) {
   board.setting("heartbeat", "50");
   board.setting("timeout", "150");
   board.watchdog(100ms);
-  std::promise<void> gated;
-  board.on_link([&, told = false](const LinkStatus& link) mutable {
-    if (link.gated() && !told) {
-      told = true;
-      gated.set_value();
-    }
+  const First<bool> gated;
+  board.on_link([gated](const LinkStatus& link) {
+    if (link.gated()) gated.set(true);
   });
-  ASSERT_EQ(gated.get_future().wait_for(5s), std::future_status::ready);
+  ASSERT_TRUE(gated.get());
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link));
   const Problem problem = problem_of([&] { board.wait_active(50ms); });
   EXPECT_TRUE(contains(problem.reason, "watchdog"));
@@ -134,28 +130,25 @@ TEST_P(BoardOver, TheBoardIsSafeAndFreeWhenTheHostHasEnded) {
   }
 }
 
-TEST(Board, TellsOfARestartBeforeTheNewState) {
+TEST(Board, ReportsARestartBeforeTheNewState) {
   BoardInAThread simulated("pty", "0.5 reboot\n");
-  std::vector<int> duties;  // of OSMC 1, as they are told; -1: the restart
-  std::promise<void> done;
+  std::vector<int> duties;  // of OSMC 1, in the order of the callbacks; -1: the restart
+  const First<std::vector<int>> four;
   Board board(simulated.url(), at_will());
   board.on_restart([&] { duties.push_back(-1); });
-  board.on_state([&](const State& state) {
+  board.on_state([&, four](const State& state) {
     if (!state.present.has(StateField::osmc1)) return;
     const int duty = state.osmc[0].pwm;
     if (!duties.empty() && duties.back() == duty) return;
     duties.push_back(duty);
-    if (duties.size() == 4) done.set_value();
+    if (duties.size() == 4) four.set(duties);
   });
   board.fields("OSMC1");
   board.osmc(1).set(358, Direction::forward);
-  ASSERT_EQ(done.get_future().wait_for(5s), std::future_status::ready);
-  board.close();
-  duties.resize(4);
-  EXPECT_EQ(duties, (std::vector<int>{0, 358, -1, 0}));
+  EXPECT_EQ(four.get(), (std::vector<int>{0, 358, -1, 0}));
 }
 
-TEST(Board, SaysWhatIsWrongWithAUrl) {
+TEST(Board, ReportsWhatIsWrongWithAUrl) {
   const Problem scheme = problem_of([] { Board("fax:123"); });
   EXPECT_EQ(scheme.kind, ErrorKind::usage);
   EXPECT_TRUE(contains(scheme.fix, "udp://HOST"));
@@ -166,7 +159,7 @@ TEST(Board, SaysWhatIsWrongWithAUrl) {
   EXPECT_EQ(problem_of([] { Board("sim:?node=99"); }).kind, ErrorKind::usage);
 }
 
-TEST(Board, SaysWhatTheLinkIsInsteadOfActive) {
+TEST(Board, ReportsTheLinkIfItIsNotActive) {
   Board board("udp://127.0.0.1:9?listen=0", at_will());
   const Problem nobody = problem_of([&] { board.wait_active(30ms); });
   EXPECT_EQ(nobody.kind, ErrorKind::refused);
@@ -182,7 +175,7 @@ TEST(Board, SaysWhatTheLinkIsInsteadOfActive) {
   EXPECT_FALSE(board.post(Command::osmc(1, Direction::forward, 1)));
 }
 
-TEST(Board, SaysThatAnotherHostControlsTheBoard) {
+TEST(Board, ReportsThatAnotherHostControlsTheBoard) {
   BoardInAThread simulated("udp");
   Board owner(simulated.url(), at_will());
   owner.wait_active();
@@ -201,27 +194,24 @@ TEST(Board, SaysThatAnotherHostControlsTheBoard) {
   ASSERT_NO_THROW(other.wait_active(5s)) << "control is free once the owner is silent";
 }
 
-TEST(Board, PostsAndWaitsForStatesWithoutTheHeap) {
-  BoardInAThread simulated("udp");
-  Board board(simulated.url(), at_will());
-  board.wait_active();
+TEST_F(DrivenBoard, PostsCommandsAndGroupsAndWaitsForStatesWithoutTheHeap) {
   board.osmc(1).set(1, Direction::forward);
+  board.identify();  // then it is known that the board executes groups
   int sent = 0;
   const std::uint64_t before = bench::allocations_of_this_thread();
   for (int i = 0; i < 20; ++i) {
     if (board.post(Command::osmc(100 + i, Direction::forward, 1))) ++sent;
+    const Direction forward = Direction::forward;
+    if (board.post(Setpoints{}.osmc(1, 100 + i, forward).osmc(2, 100 + i, forward))) ++sent;
     board.next_state();
   }
   EXPECT_EQ(bench::allocations_of_this_thread() - before, 0U);
-  EXPECT_EQ(sent, 20);
+  EXPECT_EQ(sent, 40);
 }
 
 // --- commands
 
-TEST(Board, SendsNoKeyAndNoPasswordWhereOthersSeeIt) {
-  BoardInAThread simulated("udp");
-  Board board(simulated.url(), at_will());
-  board.wait_active();
+TEST_F(DrivenBoard, SendsNoKeyAndNoPasswordWhereOthersSeeIt) {
   const std::string secret = "1:" + std::string(2 * key_size, 'e');
   for (const Problem& problem :
        {problem_of([&] { board.setting("key", secret); }),
@@ -233,7 +223,7 @@ TEST(Board, SendsNoKeyAndNoPasswordWhereOthersSeeIt) {
   }
 }
 
-TEST(Board, ThrowsForAValueOutsideItsRangeOfAnyOutput) {
+TEST(Board, ThrowsForAValueOutsideItsRangeAndNamesTheRange) {
   Board board("sim:", at_will());
   const auto is_usage = [](auto action) {
     const Problem problem = problem_of(action);
@@ -254,24 +244,17 @@ TEST(Board, ThrowsForAValueOutsideItsRangeOfAnyOutput) {
   is_usage([&] { board.send("O:1,1"); });
   is_usage([&] { board.send("osmc 1"); });
   is_usage([&] { board.post(Command::osmc(5000, Direction::forward, 1)); });
+  EXPECT_EQ(problem_of([&] { board.osmc(5).set(1, Direction::forward); }).text(),
+            "O:1,1,5: no such channel; use O:pwm,dir,ch with pwm 0-4095, dir 0 or 1, ch 1-4");
   EXPECT_EQ(board.statistics().refused, 0U) << "none of them was sent";
 }
 
-TEST(Board, SaysTheRangeInTheFix) {
-  Board board("sim:", at_will());
-  EXPECT_EQ(problem_of([&] { board.osmc(5).set(1, Direction::forward); }).text(),
-            "O:1,1,5: no such channel; use O:pwm,dir,ch with pwm 0-4095, dir 0 or 1, ch 1-4");
-}
-
-TEST(Board, StopsWithoutWaiting) {
-  BoardInAThread simulated("udp");
-  Board board(simulated.url(), at_will());
-  board.wait_active();
+TEST_F(DrivenBoard, StopsWithoutWaiting) {
   board.stop_async();
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
 }
 
-TEST(Board, TellsWhoItIs) {
+TEST(Board, IdentifiesTheBoard) {
   Board board("sim:?node=3", at_will());
   const BoardIdentity identity = board.identify();
   EXPECT_EQ(identity.board_id, "sim-3");
@@ -332,19 +315,16 @@ TEST(Board, LetsAStopCancelWhatOtherThreadsWaitFor) {
 
 // --- callbacks
 
-TEST(Board, CallsBackWithStatesAndLinkChanges) {
+TEST(Board, CallsBackInAnotherThreadUntilTheSubscriptionEnds) {
   Board board("sim:", at_will());
-  std::promise<std::thread::id> caller;
+  const First<std::thread::id> caller;
   std::atomic<int> states{0};
-  std::atomic<bool> active{false};
-  board.on_link([&](const LinkStatus& link) { active = link.state == HostLinkState::active; });
-  Subscription subscription = board.on_state([&](const State& state) {
+  Subscription subscription = board.on_state([&, caller](const State& state) {
     EXPECT_TRUE(state.present.has(StateField::ain24));
-    if (states++ == 0) caller.set_value(std::this_thread::get_id());
+    ++states;
+    caller.set(std::this_thread::get_id());
   });
-  auto future = caller.get_future();
-  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
-  EXPECT_NE(future.get(), std::this_thread::get_id());
+  EXPECT_NE(caller.get(), std::this_thread::get_id());
   subscription.cancel();
   const int seen = states;
   for (int i = 0; i < 3; ++i) board.next_state();
@@ -353,10 +333,9 @@ TEST(Board, CallsBackWithStatesAndLinkChanges) {
 
 TEST(Board, ObeysACallbackThatWaits) {
   Board board("sim:", at_will());
-  std::promise<std::string> told;
-  board.on_state([&, done = false](const State&) mutable {
-    if (done) return;
-    done = true;
+  const First<std::string> end;
+  board.on_state([&, end, done = false](const State&) mutable {
+    if (std::exchange(done, true)) return;
     const Problem problem = problem_of([&] {
       board.wait_active();
       board.osmc(1).set(1, Direction::forward);
@@ -369,29 +348,25 @@ TEST(Board, ObeysACallbackThatWaits) {
       board.stop();
       throw Error(ErrorKind::usage, "all", "is done");
     });
-    told.set_value(problem.text());
+    end.set(problem.text());
   });
-  auto future = told.get_future();
-  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
-  EXPECT_EQ(future.get(), "all: is done");
+  EXPECT_EQ(end.get(), "all: is done");
 }
 
 TEST(Board, LetsACallbackEndItself) {
   Board board("sim:", at_will());
-  std::promise<int> told;
+  const First<int> captured;
   const auto payload = std::make_shared<int>(42);
   Subscription subscription;
   std::promise<void> subscribed;
   subscription =
-      board.on_state([&, payload, ready = subscribed.get_future().share()](const State&) {
+      board.on_state([&, captured, payload, ready = subscribed.get_future().share()](const State&) {
         ready.wait();
         subscription.cancel();
-        told.set_value(*payload);  // of the function that was ended
+        captured.set(*payload);  // of the function that has ended
       });
   subscribed.set_value();
-  auto future = told.get_future();
-  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
-  EXPECT_EQ(future.get(), 42);
+  EXPECT_EQ(captured.get(), 42);
   board.next_state();
   board.close();
   EXPECT_EQ(payload.use_count(), 1);
@@ -416,66 +391,49 @@ TEST(Board, ClosesTwiceAndThenRefusesEverything) {
   EXPECT_NE(board.state().t_ms, 0U) << "the last state stays";
 }
 
-TEST(Board, CloseWakesAllWhoWait) {
-  Board board("udp://127.0.0.1:9?listen=0", at_will());
-  const auto reason_of = [](auto action) {
-    return std::async(std::launch::async, [action] { return problem_of(action).reason; });
-  };
-  std::vector<std::future<std::string>> waiting;
-  waiting.push_back(reason_of([&] { board.osmc(1).set(1, Direction::forward, 60s); }));
-  waiting.push_back(reason_of([&] { board.identify(60s); }));
-  waiting.push_back(reason_of([&] { board.wait_active(60s); }));
-  waiting.push_back(reason_of([&] { board.next_state(60s); }));
-  EXPECT_EQ(waiting[0].wait_for(20ms), std::future_status::timeout);
-  board.close();
-  for (auto& each : waiting) {
-    ASSERT_EQ(each.wait_for(5s), std::future_status::ready);
-    EXPECT_TRUE(contains(each.get(), "closed"));
-  }
-}
-
-TEST(Board, IsDestroyedWhileOthersWait) {
-  auto board = std::make_unique<Board>("udp://127.0.0.1:9?listen=0", at_will());
-  std::vector<std::future<std::string>> waiting;
-  std::atomic<int> begun{0};
-  for (int i = 0; i < 4; ++i) {
-    waiting.push_back(std::async(std::launch::async, [&, raw = board.get(), i] {
-      ++begun;
-      return problem_of([&] {
-               if (i % 2 == 0) {
-                 raw->osmc(1).set(1, Direction::forward, 60s);
-               } else {
-                 raw->next_state(60s);
-               }
-             })
-          .reason;
-    }));
-  }
-  while (begun < 4) std::this_thread::yield();
-  EXPECT_EQ(waiting[0].wait_for(50ms), std::future_status::timeout);
-  board.reset();
-  for (auto& each : waiting) {
-    ASSERT_EQ(each.wait_for(5s), std::future_status::ready);
-    EXPECT_TRUE(contains(each.get(), "closed"));
+// Closed or destroyed.
+TEST(Board, WakesAllCallsThatWaitWhenItEnds) {
+  for (const bool destroyed : {false, true}) {
+    auto board = std::make_unique<Board>("udp://127.0.0.1:9?listen=0", at_will());
+    std::atomic<int> begun{0};
+    std::vector<std::future<std::string>> waiting;
+    const auto wait = [&](auto call) {
+      waiting.push_back(std::async(std::launch::async, [&, call, raw = board.get()] {
+        ++begun;
+        return problem_of([&] { call(*raw); }).reason;
+      }));
+    };
+    wait([](Board& each) { each.osmc(1).set(1, Direction::forward, 60s); });
+    wait([](Board& each) { each.identify(60s); });
+    wait([](Board& each) { each.wait_active(60s); });
+    wait([](Board& each) { each.next_state(60s); });
+    while (begun < 4) std::this_thread::yield();
+    EXPECT_EQ(waiting[0].wait_for(50ms), std::future_status::timeout);
+    if (destroyed) {
+      board.reset();
+    } else {
+      board->close();
+    }
+    for (auto& each : waiting) {
+      ASSERT_EQ(each.wait_for(5s), std::future_status::ready);
+      EXPECT_TRUE(contains(each.get(), "closed"));
+    }
   }
 }
 
 TEST(Board, IsDestroyedInACallback) {
   auto board = std::make_unique<Board>("sim:", at_will());
-  std::promise<void> destroyed;
-  // Goes with the board's thread, which must end too.
+  const First<bool> destroyed;
+  // Destroyed with the thread of the board's callbacks, which must end too.
   struct AtThreadExit {
-    std::promise<void>* promise = nullptr;
-    ~AtThreadExit() {
-      if (promise != nullptr) promise->set_value();
-    }
+    First<bool> ended;
+    ~AtThreadExit() { ended.set(true); }
   };
   board->on_state([&](const State&) {
-    thread_local AtThreadExit end;
-    end.promise = &destroyed;
+    thread_local AtThreadExit end{destroyed};
     board.reset();
   });
-  ASSERT_EQ(destroyed.get_future().wait_for(5s), std::future_status::ready);
+  EXPECT_TRUE(destroyed.get());
 }
 
 TEST(Board, OpensAndClosesAtAnyMoment) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Board and its threads: what becomes of a call while a transport holds the link's, what a callback
-// is told, and what becomes of the board while one runs.
+// r4::Board and its threads: calls while a transport holds the link's thread up, the notices of a
+// callback, and the board while a callback runs.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -18,7 +18,10 @@
 #include "r4link/board.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/driven_board.hpp"
+#include "tests/support/first.hpp"
 #include "tests/support/held_carrier.hpp"
+#include "tests/support/on_a_loop.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -28,18 +31,29 @@ using namespace std::chrono_literals;
 using firmware::BoardState;
 
 struct BoardThread : testing::Test {
+  struct Enough {};
   BoardThread() { board.wait_active(); }
   void hold_up() {
     hold.begin();
     ASSERT_TRUE(hold.wait_until_held());
   }
+  BoardOptions options() {
+    BoardOptions result = at_will();
+    result.on_wait = [this] {
+      if (enough) throw Enough();
+    };
+    return result;
+  }
+  // After the next command.
   bool has_executed(const std::string& command) {
+    board.servo(1).set(1500);
     const std::vector<std::string> all = simulated.executed();
     return std::find(all.begin(), all.end(), command) != all.end();
   }
+  std::atomic<bool> enough{false};
   BoardInAThread simulated{"udp"};
   Hold hold;
-  Board board{hold.at(simulated.url()), at_will()};
+  Board board{hold.at(simulated.url()), options()};
 };
 
 TEST_F(BoardThread, NeverSendsACommandWhoseCallHasThrown) {
@@ -52,23 +66,11 @@ TEST_F(BoardThread, NeverSendsACommandWhoseCallHasThrown) {
   EXPECT_TRUE(contains(problem.reason, "not sent"));
   EXPECT_TRUE(contains(problem.fix, "transport"));
   hold.release();
-  board.servo(1).set(1500);  // behind it
   EXPECT_FALSE(has_executed("O:777,1,1"));
 }
 
-TEST(BoardWait, EndsWithWhatOnWaitThrowsAndNothingIsSentAfterwards) {
-  struct Enough {};
-  BoardInAThread simulated("udp");
-  std::atomic<bool> enough{false};
-  BoardOptions options = at_will();
-  options.on_wait = [&] {
-    if (enough) throw Enough();
-  };
-  Hold hold;
-  Board board(hold.at(simulated.url()), options);
-  board.wait_active();
-  hold.begin();
-  ASSERT_TRUE(hold.wait_until_held());
+TEST_F(BoardThread, EndsACallWithWhatOnWaitThrowsAndSendsNothingAfterwards) {
+  hold_up();
   enough = true;
   const auto begin = std::chrono::steady_clock::now();
   EXPECT_THROW(board.send("O:777,1,1", 5s), Enough);
@@ -76,9 +78,7 @@ TEST(BoardWait, EndsWithWhatOnWaitThrowsAndNothingIsSentAfterwards) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
   enough = false;
   hold.release();
-  board.servo(1).set(1500);  // behind it
-  const std::vector<std::string> all = simulated.executed();
-  EXPECT_EQ(std::find(all.begin(), all.end(), "O:777,1,1"), all.end());
+  EXPECT_FALSE(has_executed("O:777,1,1"));
 }
 
 TEST_F(BoardThread, SendsAStopHoweverLate) {
@@ -90,29 +90,12 @@ TEST_F(BoardThread, SendsAStopHoweverLate) {
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
 }
 
-TEST_F(BoardThread, TellsThatItWasHeldUp) {
-  std::promise<Problem> told;
-  board.on_event([&, done = false](const CarrierEvent& event) mutable {
-    if (done || event.kind != CarrierEvent::Kind::warning) return;
-    done = true;
-    told.set_value(event.problem);
-  });
-  hold_up();
-  // Until two heartbeats are late, and a little.
-  const auto end = std::chrono::steady_clock::now() + 350ms;
-  std::this_thread::sleep_until(end);
-  hold.release();
-  auto future = told.get_future();
-  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
-  EXPECT_TRUE(contains(future.get().reason, "held up"));
-}
-
-// The transport's name is written anew each time a USB board comes back.
+// The transport's name is written anew each time a USB board is plugged in.
 TEST(BoardName, IsWholeHoweverOftenTheBoardIsPluggedIn) {
   const std::string path = "/tmp/r4-board-name-" + std::to_string(::getpid());
   auto simulated = std::make_unique<BoardInAThread>("pty:" + path);
   Board board("serial://" + path);
-  board.watchdog(1ms);  // is never fed, so nobody's waiting ends
+  board.watchdog(1ms);  // is never fed, so no wait ends
   auto waiting =
       std::async(std::launch::async, [&] { return problem_of([&] { board.wait_active(60s); }); });
   ASSERT_EQ(waiting.wait_for(50ms), std::future_status::timeout);
@@ -142,24 +125,19 @@ TEST(BoardName, IsWholeHoweverOftenTheBoardIsPluggedIn) {
   EXPECT_EQ(waiting.get().thing, name);
 }
 
-// --- what a callback is told when it is set
+// --- callbacks
 
-TEST(BoardCallbacks, AreToldThatTheTransportIsUp) {
+TEST(BoardCallbacks, AreCalledFirstWithTheUpOfTheTransport) {
   for (int i = 0; i < 20; ++i) {
     Board board("sim:");
-    std::promise<CarrierEvent::Kind> told;
-    board.on_event([&, first = true](const CarrierEvent& event) mutable {
-      if (first) told.set_value(event.kind);
-      first = false;
-    });
-    auto future = told.get_future();
-    ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
-    EXPECT_EQ(future.get(), CarrierEvent::Kind::up);
+    const First<CarrierEvent::Kind> first;
+    board.on_event([first](const CarrierEvent& event) { first.set(event.kind); });
+    EXPECT_EQ(first.get(), CarrierEvent::Kind::up);
   }
 }
 
 // Each has a loop and a thread of its own; the port at which hosts listen is one.
-TEST(TwoBoards, OfOneProgramShareThePortAndGetWhatIsTheirs) {
+TEST(TwoBoards, OfOneProgramShareThePortAndGetTheirOwnDatagrams) {
   BoardInAThread left("udp");
   BoardInAThread right("udp");
   Board first(left.url());
@@ -177,42 +155,35 @@ TEST(TwoBoards, OfOneProgramShareThePortAndGetWhatIsTheirs) {
             "this program has that board open already");
 }
 
-TEST(BoardCallbacks, AreToldTheLinkAndTheNewestStateOfABoardThatIsSilentNow) {
+TEST(BoardCallbacks, AreCalledFirstWithTheLinkAndTheNewestStateOfASilentBoard) {
   BoardInAThread simulated("udp");
   BoardOptions options;
   options.session.timing.timeout_ms = 50;
   Board board(simulated.url(), options);
   board.wait_active();
-  std::promise<void> lost;
-  board.on_link([&, done = false](const LinkStatus& link) mutable {
-    if (done || link.state != HostLinkState::lost) return;
-    done = true;
-    lost.set_value();
+  const First<bool> lost;
+  board.on_link([lost](const LinkStatus& link) {
+    if (link.state == HostLinkState::lost) lost.set(true);
   });
   simulated.switch_off();
-  ASSERT_EQ(lost.get_future().wait_for(5s), std::future_status::ready);
-
-  std::promise<LinkStatus> link;
-  board.on_link([&](const LinkStatus& status) { link.set_value(status); });
-  auto told_link = link.get_future();
-  ASSERT_EQ(told_link.wait_for(5s), std::future_status::ready);
-  EXPECT_EQ(told_link.get(), board.link());
-  std::promise<std::uint32_t> state;
-  board.on_state([&](const State& newest) { state.set_value(newest.t_ms); });
-  auto told_state = state.get_future();
-  ASSERT_EQ(told_state.wait_for(5s), std::future_status::ready);
-  EXPECT_EQ(told_state.get(), board.state().t_ms);
+  ASSERT_TRUE(lost.get());
+  const First<LinkStatus> link;
+  board.on_link([link](const LinkStatus& status) { link.set(status); });
+  EXPECT_EQ(link.get(), board.link());
+  const First<std::uint32_t> state;
+  board.on_state([state](const State& newest) { state.set(newest.t_ms); });
+  EXPECT_EQ(state.get(), board.state().t_ms);
 }
 
-TEST(BoardCallbacks, AreToldNoStateThatNeverCame) {
+TEST(BoardCallbacks, AreNotCalledWithAStateThatNeverCame) {
   Board board("udp://127.0.0.1:9?listen=0");
   std::atomic<bool> called{false};
   board.on_state([&](const State&) { called = true; });
-  board.statistics();  // behind it
+  board.statistics();  // after it
   EXPECT_FALSE(called);
 }
 
-TEST(BoardCallbacks, AreToldEverythingIfTheyAreThereFirst) {
+TEST(BoardCallbacks, GetEveryNoticeIfTheyAreThereBeforeTheTransport) {
   std::mutex mutex;
   std::vector<std::string> told;
   const auto note = [&](const std::string& text) {
@@ -237,24 +208,28 @@ TEST(BoardCallbacks, ThatAreEmptyAreNone) {
   Board board("sim:");
   board.on_state(nullptr).cancel();
   board.on_link({}).cancel();
-  asio::io_context io;
-  AsyncBoard async(io, "sim:");
+  OnALoop loop;
+  AsyncBoard async(loop.io, "sim:");
   async.on_link({}).cancel();
   async.on_state(nullptr);
   async.open();
-  const auto deadline = std::chrono::steady_clock::now() + 5s;
-  while (!async.state().any() && std::chrono::steady_clock::now() < deadline) io.run_one_for(5s);
-  EXPECT_TRUE(async.state().any());
+  EXPECT_TRUE(loop.run_until([&] { return async.state().any(); }));
   board.next_state();
 }
 
-TEST(BoardCallbacks, ThatHangWhenTheyAreAddedEndTheHeartbeatsToo) {
-  BoardInAThread simulated("udp");
-  BoardOptions options;
-  options.callback_limit = 50ms;
+struct HangingCallbacks : testing::Test {
+  HangingCallbacks() { board.wait_active(); }
+  static BoardOptions options() {
+    BoardOptions result;
+    result.callback_limit = 50ms;
+    return result;
+  }
   std::promise<void> released;
-  Board board(simulated.url(), options);
-  board.wait_active();
+  BoardInAThread simulated{"udp"};
+  Board board{simulated.url(), options()};
+};
+
+TEST_F(HangingCallbacks, EndTheHeartbeatsWhenTheyAreAddedToo) {
   board.on_arming([release = released.get_future().share()](DisarmCause) { release.wait(); });
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link));
   released.set_value();
@@ -284,19 +259,17 @@ TEST(BoardCallbacks, NoneFollowsTheOneThatClosesTheBoard) {
   EXPECT_FALSE(called);
 }
 
-TEST(BoardCallbacks, SeveralOfAKindAreCalledInTheirOrderAndEndedOneByOne) {
-  std::promise<std::string> told;
+TEST(BoardCallbacks, OfOneKindAreCalledInTheirOrderAndEndedOneByOne) {
+  const First<std::string> calls;
   std::string order;
   Board board("sim:");
   ScopedSubscription first = board.on_state([&](const State&) { order += 'a'; });
-  board.on_state([&](const State&) {
+  board.on_state([&, calls](const State&) {
     order += 'b';
-    if (order.size() == 8) told.set_value(order);
+    if (order.size() == 8) calls.set(order);
     if (order.size() == 4) first = {};
   });
-  auto future = told.get_future();
-  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
-  EXPECT_EQ(future.get(), "ababbbbb");
+  EXPECT_EQ(calls.get(), "ababbbbb");
 }
 
 // Waits in another thread for a call that runs.
@@ -318,70 +291,54 @@ TEST(BoardCallbacks, AreNotRunningWhenTheirEndHasReturned) {
   subscription.cancel();
 }
 
-TEST(BoardCallbacks, CostNoHeartbeatWhileTheyRun) {
-  BoardInAThread simulated("udp");
-  Board board(simulated.url());
-  board.wait_active();
-  std::promise<std::uint64_t> sent;
-  board.on_state([&, done = false](const State&) mutable {
-    if (done) return;
-    done = true;
-    const std::uint64_t before = board.statistics().heartbeats;
-    const auto end = std::chrono::steady_clock::now() + 5s;
-    std::uint64_t now = before;
-    while (now < before + 3 && std::chrono::steady_clock::now() < end) {
-      now = board.statistics().heartbeats;
+struct DrivenCallbacks : DrivenBoard {};
+
+TEST_F(DrivenCallbacks, CostNoHeartbeatWhileTheyRun) {
+  const First<std::uint64_t> sent;
+  board.on_state([this, sent, done = false](const State&) mutable {
+    if (std::exchange(done, true)) return;
+    const auto heartbeats = [this] { return board.statistics().heartbeats; };
+    const std::uint64_t before = heartbeats();
+    const auto end = std::chrono::steady_clock::now() + 4s;
+    while (heartbeats() < before + 3 && std::chrono::steady_clock::now() < end) {
     }
-    sent.set_value(now - before);
+    sent.set(heartbeats() - before);
   });
-  auto future = sent.get_future();
-  ASSERT_EQ(future.wait_for(10s), std::future_status::ready);
-  EXPECT_GE(future.get(), 3U);
+  EXPECT_GE(sent.get(), 3U);
   EXPECT_EQ(board.link().state, HostLinkState::active);
 }
 
-TEST(BoardCallbacks, ThatDoNotReturnEndTheHeartbeatsUntilTheyDo) {
-  BoardInAThread simulated("udp");
-  BoardOptions options;
-  options.callback_limit = 50ms;
-  Board board(simulated.url(), options);
-  board.wait_active();
-  std::promise<void> released;
-  std::promise<Problem> told;
-  board.on_event([&, done = false](const CarrierEvent& event) mutable {
-    if (done || event.kind != CarrierEvent::Kind::warning) return;
-    done = true;
-    told.set_value(event.problem);
+TEST_F(HangingCallbacks, EndTheHeartbeatsUntilTheyReturn) {
+  const First<Problem> warning;
+  board.on_event([warning](const CarrierEvent& event) {
+    if (event.kind == CarrierEvent::Kind::warning) warning.set(event.problem);
   });
   board.on_state([release = released.get_future().share()](const State&) { release.wait(); });
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link));
   EXPECT_EQ(board.link().cause(), LinkCause::callback);
   EXPECT_TRUE(contains(problem_of([&] { board.wait_active(1ms); }).reason, "a callback"));
   released.set_value();
-  auto future = told.get_future();
-  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
-  EXPECT_TRUE(contains(future.get().reason, "heartbeats stopped"));
+  EXPECT_TRUE(contains(warning.get().reason, "heartbeats stopped"));
   board.wait_active();
 }
 
-TEST(BoardCallbacks, AreToldTheNewestOfTheStatesThatCameMeanwhile) {
+TEST(BoardCallbacks, GetTheNewestOfTheStatesThatCameMeanwhile) {
   Board board("sim:");
   board.send("F:DEFAULT");  // from now on there is no other news
   std::promise<void> late;
-  std::promise<std::uint32_t> next;
-  board.on_state([&, calls = 0](const State& state) mutable {
+  const First<std::uint32_t> next;
+  board.on_state([&, next, calls = 0](const State& state) mutable {
     ++calls;
     if (calls == 1) late.get_future().wait_for(5s);
-    if (calls == 2) next.set_value(state.t_ms);
+    if (calls == 2) next.set(state.t_ms);
   });
   std::uint32_t newest = 0;
   for (int i = 0; i < 5; ++i) newest = board.next_state().t_ms;
-  // A state is told to those who wait before it is told to callbacks: with the next one, this one was.
+  // Calls that wait get a state before callbacks do: when the next one has come, this one was
+  // reported.
   board.next_state();
   late.set_value();
-  auto future = next.get_future();
-  ASSERT_EQ(future.wait_for(5s), std::future_status::ready);
-  EXPECT_GE(future.get(), newest);
+  EXPECT_GE(next.get(), newest);
 }
 
 }  // namespace

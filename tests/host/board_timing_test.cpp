@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board's timeout and heartbeat interval are set together; waiting until it is active means control.
+// A board's timeout and heartbeat interval are set together; waiting until it is active means
+// control.
 #include <gtest/gtest.h>
 
-#include <asio/io_context.hpp>
 #include <optional>
 
 #include "r4link/async_board.hpp"
 #include "r4link/board.hpp"
 #include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/on_a_loop.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -58,41 +59,36 @@ TEST(BoardTiming, ThatCannotBeIsRefusedBeforeAnythingIsSent) {
   EXPECT_TRUE(contains(slow.fix, "heartbeat_ms"));
 }
 
-TEST(AsyncBoardActive, MeansThatTheFirstPostGoesOut) {
+struct AsyncBoardActive : testing::Test, OnALoop {};
+
+TEST_F(AsyncBoardActive, MeansThatTheFirstPostGoesOut) {
   BoardInAThread simulated("udp");
-  asio::io_context io;
   AsyncBoard board(io, simulated.url());
   board.open();
-  bool posted = false;
+  std::optional<PostResult> posted;
   board.async_wait_active(5s, [&](const CommandResult& result) {
     EXPECT_EQ(result.outcome, Outcome::confirmed);
-    posted = static_cast<bool>(board.post(Command::setting("rate", "50")));
-    io.stop();
+    posted = board.post(Command::setting("rate", "50"));
   });
-  io.run_for(10s);
-  EXPECT_TRUE(posted);
+  ASSERT_TRUE(run_until([&] { return posted.has_value(); }));
+  EXPECT_TRUE(*posted);
 }
 
-TEST(AsyncBoardActive, EndsAtItsDeadlineOrWithTheBoard) {
-  asio::io_context io;
+TEST_F(AsyncBoardActive, EndsAtItsDeadlineOrWithTheBoard) {
   AsyncBoard board(io, "udp://127.0.0.1:9?listen=0");
   board.open();
-  std::optional<CommandResult> timed_out;
-  std::optional<CommandResult> closed;
   const auto begin = std::chrono::steady_clock::now();
+  std::optional<CommandResult> closed;
   board.async_wait_active(5s, [&](const CommandResult& result) { closed = result; });
-  board.async_wait_active(20ms, [&](const CommandResult& result) {
-    timed_out = result;
-    board.close();
-  });
-  io.run();
+  const auto wait = [&](auto end) { board.async_wait_active(20ms, end); };
+  EXPECT_EQ(result_of(wait).outcome, Outcome::timed_out);
+  board.close();
+  ASSERT_TRUE(run_until([&] { return closed.has_value(); }));
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 4s);
-  ASSERT_TRUE(timed_out && closed);
-  EXPECT_EQ(timed_out->outcome, Outcome::timed_out);
   EXPECT_EQ(closed->outcome, Outcome::closed);
 }
 
-TEST(BoardStop, OfASilentBoardSaysToCutThePowerAndNothingOfTheWatchdog) {
+TEST(BoardStop, AdvisesToCutThePowerIfTheBoardIsSilentWhateverTheWatchdogSays) {
   Board board("udp://127.0.0.1:9?listen=0");
   board.watchdog(10ms);
   const Problem problem = problem_of([&] { board.stop(100ms); });

@@ -6,29 +6,25 @@
 #include <asio/executor_work_guard.hpp>
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
-#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <mutex>
 #include <sstream>
 #include <string>
 #include <thread>
-#include <vector>
 
 #include "docs/examples/own_transport/socket_carrier.hpp"
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "host/board_loop.hpp"
 #include "r4link/board.hpp"
 #include "tests/support/at_will.hpp"
+#include "tests/support/first.hpp"
 #include "transports/file_descriptor.hpp"
 
 namespace r4::test {
 namespace {
 
-using namespace std::chrono_literals;
-
-// A simulated board behind the other end of a socket.
+// A simulated board at the other end of a socket.
 class BoardBehindASocket {
  public:
   BoardBehindASocket() {
@@ -76,25 +72,17 @@ TEST(OwnTransport, CarriesABoardThatIsDrivenAndStopped) {
   EXPECT_NO_THROW(board.stop());
 }
 
-TEST(OwnTransport, SaysThatItIsDownWhenTheOtherEndIsClosed) {
+TEST(OwnTransport, ReportsThatItIsDownWhenTheOtherEndIsClosed) {
   BoardBehindASocket simulated;
-  std::mutex mutex;
-  std::vector<std::string> reasons;
+  const First<std::string> down;
   BoardCallbacks callbacks;
-  callbacks.on_event = [&](const CarrierEvent& event) {
-    const std::lock_guard lock(mutex);
-    if (event.kind == CarrierEvent::Kind::down) reasons.push_back(event.problem.reason);
+  callbacks.on_event = [down](const CarrierEvent& event) {
+    if (event.kind == CarrierEvent::Kind::down) down.set(event.problem.reason);
   };
   Board board(simulated.host_end(), at_will(), callbacks);
   board.wait_active();
   simulated.switch_off();
-  const auto end = std::chrono::steady_clock::now() + 5s;
-  const auto told = [&] {
-    const std::lock_guard lock(mutex);
-    return reasons == std::vector<std::string>{"the other end was closed"};
-  };
-  while (!told() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
-  EXPECT_TRUE(told());
+  EXPECT_EQ(down.get(), "the other end was closed");
 }
 
 TEST(OwnTransport, IsShownInTheDocumentationAsItIsTested) {

@@ -11,6 +11,7 @@
 #include "host/standard_registry.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/board.hpp"
+#include "tests/support/carriers.hpp"
 
 namespace r4::test {
 
@@ -53,25 +54,19 @@ class Hold {
     Stage stage_ = Stage::free;
   };
 
-  class Held final : public Carrier {
+  class Held final : public WrappedCarrier {
    public:
     Held(std::unique_ptr<Carrier> below, std::shared_ptr<Turn> turn)
-        : below_(std::move(below)), turn_(std::move(turn)) {}
-    void open(Handler& handler) override { below_->open(handler); }
-    void close() noexcept override { below_->close(); }
+        : WrappedCarrier(std::move(below)), turn_(std::move(turn)) {}
     SendResult send(std::string_view bytes, Priority priority, Peer to) override {
       if (turn_->is(Turn::Stage::wanted)) {
         turn_->reach(Turn::Stage::held);
         turn_->wait_for(Turn::Stage::released);
       }
-      return below_->send(bytes, priority, to);
+      return WrappedCarrier::send(bytes, priority, to);
     }
-    bool up() const override { return below_->up(); }
-    const std::string& name() const override { return below_->name(); }
-    const CarrierCounters& counters() const override { return below_->counters(); }
 
    private:
-    std::unique_ptr<Carrier> below_;
     std::shared_ptr<Turn> turn_;
   };
 

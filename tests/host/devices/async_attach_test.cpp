@@ -4,15 +4,13 @@
 
 #include <asio/bind_cancellation_slot.hpp>
 #include <asio/cancellation_signal.hpp>
-#include <asio/co_spawn.hpp>
-#include <asio/detached.hpp>
-#include <asio/use_awaitable.hpp>
 #include <optional>
 
 #include "host/devices/device_steps.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/devices/device.hpp"
 #include "tests/support/at_will.hpp"
+#include "tests/support/on_a_loop.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -20,43 +18,24 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Its set-up waits for 5 s behind what is written.
+// Its set-up waits for 5 s after a write.
 Device slow() {
   return Device::parse("slow@0x68",
                        "device slow\ntitle a test\naddress 0x68\ncheck x75 x68\n"
                        "write x6b00 wait 5000\npoll all x3b 2 10\nvalue a all 0 i16be\n");
 }
 
-// On a loop of its own, with a board that has an MPU-6050 at 0x68 and an INA219 at 0x40.
-class AsyncAttach : public testing::Test {
+// A board that has an MPU-6050 at 0x68 and an INA219 at 0x40.
+class AsyncAttach : public testing::Test, protected OnALoop {
  protected:
-  explicit AsyncAttach(const BoardOptions& options = at_will()) : board_(io_, "sim:", options) {
+  explicit AsyncAttach(const BoardOptions& options = at_will()) : board_(io, "sim:", options) {
     board_.open();
   }
-
-  // Runs the loop until `done()`; fails the test if that is not within 10 s.
-  template <class Done>
-  void run_until(Done done) {
-    const auto deadline = std::chrono::steady_clock::now() + 10s;
-    io_.restart();
-    while (!done()) {
-      if (std::chrono::steady_clock::now() > deadline) {
-        ADD_FAILURE() << "it has not come";
-        return;
-      }
-      io_.run_one_for(10s);
-    }
-  }
   CommandResult attach(const Device& device) {
-    std::optional<CommandResult> result;
-    board_.async_attach(device, 5s, [&](const CommandResult& r) { result = r; });
-    EXPECT_FALSE(result) << "never inside the call";
-    run_until([&] { return result.has_value(); });
-    return result.value_or(CommandResult{});
+    return result_of([&](auto end) { board_.async_attach(device, 5s, end); });
   }
   std::uint64_t commands() const { return board_.statistics().commands; }
 
-  asio::io_context io_;
   AsyncBoard board_;
 };
 
@@ -75,7 +54,7 @@ TEST_F(AsyncAttach, HasTheBoardReadItAndSendItsFieldsBesideThoseThatWereChosen) 
   EXPECT_EQ(commands() - before, 7U) << "its fields are sent already";
 }
 
-TEST_F(AsyncAttach, AnotherDeviceGetsNoSlotUntilItsHolderIsGivenUp) {
+TEST_F(AsyncAttach, GivesNoSlotAwayUntilItsHolderIsGivenUp) {
   const auto problem_with = [&](const char* device) {
     return problem_of([&] {
       board_.async_attach(Device::from(device), 5s,
@@ -95,13 +74,11 @@ TEST_F(AsyncAttach, AnotherDeviceGetsNoSlotUntilItsHolderIsGivenUp) {
   EXPECT_EQ(attach(Device::from("ina219@0x40")).outcome, Outcome::confirmed) << "the same again";
   EXPECT_EQ(attach(Device::from("ina219@0x40:7")).outcome, Outcome::confirmed) << "it moves";
   EXPECT_EQ(attach(Device::from("mpu6050@0x68:2")).outcome, Outcome::confirmed) << "it is free";
-  std::optional<CommandResult> off;
-  board_.async_send(Command::i2c_poll_off(2), 5s, [&](const CommandResult& r) { off = r; });
-  run_until([&] { return off.has_value(); });
+  result_of([&](auto off) { board_.async_send(Command::i2c_poll_off(2), 5s, off); });
   EXPECT_EQ(attach(Device::from("ina219@0x40:1")).outcome, Outcome::confirmed);
 }
 
-TEST_F(AsyncAttach, OneThatIsBeingSetUpHasItsSlotsAlready) {
+TEST_F(AsyncAttach, ReservesTheSlotsFromTheBeginningOfTheSetUp) {
   board_.async_attach(slow(), 5s, [](const CommandResult&) {});
   EXPECT_EQ(problem_of([&] {
               board_.async_attach(Device::from("ina219"), 5s, [](const CommandResult&) {});
@@ -116,7 +93,7 @@ TEST(DeviceSteps, LeaveTheBoardsChoiceOfFieldsAlone) {
   EXPECT_EQ(fields_with("I2C4,I2C3,AIN24", power), "");
 }
 
-TEST_F(AsyncAttach, TellsThatItIsAnotherDeviceAndWritesNothingToIt) {
+TEST_F(AsyncAttach, RefusesAnotherDeviceAndWritesNothingToIt) {
   const Device wrong = Device::from("icm20948@0x68");
   const CommandResult result = attach(wrong);
   EXPECT_EQ(result.outcome, Outcome::refused);
@@ -130,7 +107,7 @@ TEST_F(AsyncAttach, TellsThatItIsAnotherDeviceAndWritesNothingToIt) {
   EXPECT_FALSE(problem.fix.empty());
 }
 
-TEST_F(AsyncAttach, TellsThatNobodyAnswers) {
+TEST_F(AsyncAttach, RefusesADeviceThatDoesNotAnswer) {
   const Device missing = Device::from("ina219@0x41");
   const CommandResult result = attach(missing);
   EXPECT_EQ(result.outcome, Outcome::refused);
@@ -139,7 +116,6 @@ TEST_F(AsyncAttach, TellsThatNobodyAnswers) {
 }
 
 TEST_F(AsyncAttach, IsGivenUpByItsCancellationSlotWhileItWaitsForTheDevice) {
-  std::optional<CommandResult> result;
   asio::cancellation_signal signal;
   std::optional<std::uint32_t> first;  // the check's
   const ScopedSubscription states =
@@ -149,11 +125,11 @@ TEST_F(AsyncAttach, IsGivenUpByItsCancellationSlotWhileItWaitsForTheDevice) {
         if (!first) first = answered;
         if (answered != *first) signal.emit(asio::cancellation_type::terminal);
       });
-  board_.async_attach(slow(), 5s,
-                      asio::bind_cancellation_slot(signal.slot(), [&](auto r) { result = r; }));
-  run_until([&] { return result.has_value(); });
-  EXPECT_EQ(result->outcome, Outcome::cancelled);
-  EXPECT_EQ(result->step, 2);
+  const CommandResult result = result_of([&](auto end) {
+    board_.async_attach(slow(), 5s, asio::bind_cancellation_slot(signal.slot(), end));
+  });
+  EXPECT_EQ(result.outcome, Outcome::cancelled);
+  EXPECT_EQ(result.step, 2);
   EXPECT_EQ(commands(), 2U);
 }
 
@@ -166,38 +142,22 @@ TEST_F(AsyncAttach, EndsWithTheBoard) {
   EXPECT_EQ(result->outcome, Outcome::closed);
 }
 
-TEST_F(AsyncAttach, IsAwaited) {
-  std::optional<Outcome> outcome;
-  asio::co_spawn(
-      io_,
-      [&]() -> asio::awaitable<void> {
-        const auto result =
-            co_await board_.async_attach(Device::from("ina219"), 5s, asio::use_awaitable);
-        outcome = result.outcome;
-      },
-      asio::detached);
-  run_until([&] { return outcome.has_value(); });
-  EXPECT_EQ(*outcome, Outcome::confirmed);
-}
-
-TEST_F(AsyncAttach, WhatCannotBeIsSaidAtOnce) {
+TEST_F(AsyncAttach, RefusesATimeoutOfNothingAndAWatcherAtOnce) {
   const auto ignored = [](const CommandResult&) { ADD_FAILURE() << "it was begun"; };
   EXPECT_EQ(problem_of([&] { board_.async_attach(slow(), 0s, ignored); }).kind, ErrorKind::usage);
   BoardOptions options;
   options.role = BoardRole::watch;
-  AsyncBoard watcher(io_, "sim:", options);
+  AsyncBoard watcher(io, "sim:", options);
   EXPECT_EQ(problem_of([&] { watcher.async_attach(slow(), 1s, ignored); }).kind, ErrorKind::usage);
 }
 
-TEST_F(AsyncAttach, ASilentBoardIsNamedWithTheDevice) {
-  AsyncBoard board(io_, "udp://127.0.0.1:9?listen=0", at_will());
+TEST_F(AsyncAttach, NamesTheDeviceWhenTheBoardIsSilent) {
+  AsyncBoard board(io, "udp://127.0.0.1:9?listen=0", at_will());
   board.open();
-  std::optional<CommandResult> result;
   const Device device = Device::from("ina219");
-  board.async_attach(device, 50ms, [&](const CommandResult& r) { result = r; });
-  run_until([&] { return result.has_value(); });
-  EXPECT_EQ(result->outcome, Outcome::timed_out);
-  const Problem problem = explain(device, *result, board.link());
+  const CommandResult result = result_of([&](auto end) { board.async_attach(device, 50ms, end); });
+  EXPECT_EQ(result.outcome, Outcome::timed_out);
+  const Problem problem = explain(device, result, board.link());
   EXPECT_EQ(problem.thing, "ina219@0x40: X:READ,64,x01,2");
   EXPECT_TRUE(contains(problem.reason, "nothing was heard from the board yet"));
 }
@@ -206,7 +166,7 @@ struct AsyncAttachUnarmed : AsyncAttach {
   AsyncAttachUnarmed() : AsyncAttach(BoardOptions{}) {}
 };
 
-TEST_F(AsyncAttachUnarmed, WhatIsToBeWrittenTakesArm) {
+TEST_F(AsyncAttachUnarmed, WritesOnlyAfterArm) {
   const Device imu = Device::from("mpu6050");
   const CommandResult result = attach(imu);
   EXPECT_EQ(result.outcome, Outcome::not_armed);
@@ -214,16 +174,13 @@ TEST_F(AsyncAttachUnarmed, WhatIsToBeWrittenTakesArm) {
   EXPECT_TRUE(explain(imu, result, board_.link()).thing.starts_with("mpu6050@0x68: X:WRITE,104,"));
   EXPECT_EQ(attach(Device::from("ina219@0x40:3")).outcome, Outcome::confirmed)
       << "nothing is written";
-  std::optional<CommandResult> armed;
-  board_.async_arm(5s, [&](const CommandResult& r) { armed = r; });
-  run_until([&] { return armed.has_value(); });
+  result_of([&](auto armed) { board_.async_arm(5s, armed); });
   EXPECT_EQ(attach(imu).outcome, Outcome::confirmed);
 }
 
 TEST_F(AsyncAttach, EndsAsCancelledWhenControlIsReleasedWhileTheDeviceIsGivenTime) {
   std::optional<CommandResult> attached, released;
-  board_.async_wait_active(5s, [](const CommandResult&) {});
-  run_until([&] { return board_.in_control(); });
+  result_of([&](auto active) { board_.async_wait_active(5s, active); });
   const std::uint64_t before = commands();
   board_.async_attach(slow(), 20s, [&](const CommandResult& r) { attached = r; });
   run_until([&] { return commands() >= before + 2; });  // the check, then the write

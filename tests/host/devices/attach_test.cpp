@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Each description that is shipped, against the model of its device on a simulated board.
+// The descriptions that are shipped, against the models of their devices on a simulated board.
 #include <gtest/gtest.h>
 
 #include <numbers>
@@ -17,7 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// With the script everything is on the bus.
+// With this script all devices are on the bus.
 constexpr const char* all_connected =
     "0 device icm20948 on\n0 device bno055 on\n0 device vl53l0x on\n0 device as5600 on\n";
 
@@ -39,67 +39,53 @@ class DescribedDevice : public testing::Test {
   Board board_{simulated_.url(), at_will()};
 };
 
-TEST_F(DescribedDevice, AMpu6050FeelsGravity) {
-  const Device imu = Device::from("mpu6050@0x68");
-  board_.attach(imu);
-  EXPECT_NEAR(wait_for(imu, "accel_z"), 9.80665, 1e-9);
-  const ReceivedState state = board_.state();
-  EXPECT_EQ(imu.reading(state, "accel_x").number, 0.0);
-  EXPECT_EQ(imu.reading(state, "gyro_z").number, 0.0);
-  EXPECT_NEAR(imu.reading(state, "temperature").number.value(), 25.0, 0.01);
-  EXPECT_TRUE(state.present.has(StateField::ain24)) << "the fields of before are still sent";
-}
+struct Measured {
+  const char* device;
+  std::vector<std::pair<const char*, double>> values;
+};
+struct ShippedDevice : DescribedDevice, testing::WithParamInterface<Measured> {};
+const Measured all_measured[] = {
+    {"mpu6050@0x68", {{"accel_z", 9.80665}, {"accel_x", 0}, {"gyro_z", 0}, {"temperature", 25.0}}},
+    {"icm20948@0x69", {{"accel_z", 9.80665}, {"temperature", 21.0}}},
+    {"bno055",
+     {{"calibrated", 3},
+      {"accel_z", 9.81},
+      {"heading", 270},
+      {"quat_z", std::numbers::sqrt2 / 2},
+      {"mag_x", 22},
+      {"temperature", 25}}},
+    {"ina219", {{"voltage", 12.16}, {"current", 1.25}}},
+    {"vl53l0x", {{"distance", 0.5}, {"status", 11}, {"signal", 10}}},
+    {"as5600", {{"angle", std::numbers::pi / 2}, {"magnet", 1}}},
+};
+INSTANTIATE_TEST_SUITE_P(Attach, ShippedDevice, testing::ValuesIn(all_measured),
+                         [](const auto& each) {
+                           return Device::from(each.param.device).description().name;
+                         });
 
-TEST_F(DescribedDevice, AnIcm20948FeelsGravityWhateverItWasSetToBefore) {
+TEST_P(ShippedDevice, MeasuresWhateverItWasSetToBefore) {
   for (const auto& bytes : {Board::I2c::Bytes{0x7F, 0x20}, Board::I2c::Bytes{0x14, 0x07},
                             Board::I2c::Bytes{0x7F, 0x00}}) {
-    board_.i2c().write(0x69, bytes);  // 16 g
+    board_.i2c().write(0x69, bytes);  // the ICM-20948: 16 g
   }
-  const Device imu = Device::from("icm20948@0x69");
-  board_.attach(imu);
-  EXPECT_NEAR(wait_for(imu, "accel_z"), 9.80665, 1e-9);
-  EXPECT_NEAR(wait_for(imu, "temperature"), 21.0, 0.01);
+  const Device device = Device::from(GetParam().device);
+  board_.attach(device);
+  for (const auto& [value, number] : GetParam().values) {
+    const double tolerance = std::string_view(value) == "temperature" ? 0.01 : 1e-4;
+    EXPECT_NEAR(wait_for(device, value), number, tolerance) << value;
+    const ReceivedState state = board_.state();
+    EXPECT_LE(static_cast<std::int32_t>(state.t_ms - device.reading(state, value).t_ms), 1000);
+  }
 }
 
-TEST_F(DescribedDevice, ABno055SaysWhereItIsTurned) {
-  const Device imu = Device::from("bno055");
-  board_.attach(imu);
-  EXPECT_NEAR(wait_for(imu, "accel_z"), 9.81, 1e-9);
-  EXPECT_EQ(wait_for(imu, "calibrated"), 3.0);
-  const ReceivedState state = board_.state();
-  EXPECT_EQ(imu.reading(state, "heading").number, 270.0);
-  EXPECT_NEAR(imu.reading(state, "quat_z").number.value(), std::numbers::sqrt2 / 2, 1e-4);
-  EXPECT_EQ(imu.reading(state, "mag_x").number, 22.0);
-  EXPECT_EQ(imu.reading(state, "temperature").number, 25.0);
-  EXPECT_LE(static_cast<std::int32_t>(state.t_ms - imu.reading(state, "accel_z").t_ms), 1000);
-}
-
-TEST_F(DescribedDevice, AnIna219MeasuresAndNothingIsWrittenToIt) {
-  const Device power = Device::from("ina219");
-  board_.attach(power);
-  EXPECT_NEAR(wait_for(power, "voltage"), 12.16, 1e-9);
-  EXPECT_NEAR(wait_for(power, "current"), 1.25, 1e-9);
+TEST_F(DescribedDevice, IsNotWrittenToIfItMeasuresByItself) {
+  board_.attach(Device::from("ina219"));
   for (const std::string& command : simulated_.executed()) {
     EXPECT_FALSE(command.starts_with("X:WRITE")) << command;
   }
 }
 
-TEST_F(DescribedDevice, AVl53l0xRangesAndSaysNothingWhereThereIsNothing) {
-  const Device range = Device::from("vl53l0x");
-  board_.attach(range);
-  EXPECT_NEAR(wait_for(range, "distance"), 0.5, 1e-9);
-  EXPECT_EQ(wait_for(range, "status"), 11.0);
-  EXPECT_EQ(wait_for(range, "signal"), 10.0);
-}
-
-TEST_F(DescribedDevice, AnAs5600SaysItsAngle) {
-  const Device angle = Device::from("as5600");
-  board_.attach(angle);
-  EXPECT_NEAR(wait_for(angle, "angle"), std::numbers::pi / 2, 1e-9);
-  EXPECT_EQ(wait_for(angle, "magnet"), 1.0);
-}
-
-TEST_F(DescribedDevice, ThatWasResetMeasuresNothingUntilItIsSetUpAgain) {
+TEST_F(DescribedDevice, MeasuresNothingAfterAResetUntilItIsSetUpAgain) {
   for (const auto& [name, value] :
        {std::pair("mpu6050", "accel_z"), std::pair("icm20948@0x69", "accel_z"),
         std::pair("bno055", "accel_z"), std::pair("vl53l0x", "signal")}) {
@@ -126,7 +112,7 @@ TEST_F(DescribedDevice, ThatWasResetMeasuresNothingUntilItIsSetUpAgain) {
   }
 }
 
-TEST_F(DescribedDevice, SeveralAreReadSideBySide) {
+TEST_F(DescribedDevice, IsReadBesideOtherDevices) {
   const auto devices = Device::from({"bno055", "ina219", "as5600@0x36:7"});
   for (const Device& each : devices) board_.attach(each);
   EXPECT_NEAR(wait_for(devices[2], "angle"), std::numbers::pi / 2, 1e-9);

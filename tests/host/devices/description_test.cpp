@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The text of a device description: what it says, and what is said of one that is wrong.
+// The text of a device description, and the errors of a wrong one.
 #include "r4link/devices/description.hpp"
 
 #include <gtest/gtest.h>
@@ -12,6 +12,7 @@
 
 #include "r4link/devices/device.hpp"
 #include "r4link/error.hpp"
+#include "tests/support/problems.hpp"
 
 namespace r4 {
 namespace {
@@ -32,7 +33,7 @@ value pressure all 2 u24le scale 100*2/4 unit Pa
 value turn all 5 i8 scale pi/180
 )";
 
-TEST(DeviceDescription, SaysWhatItsLinesSay) {
+TEST(DeviceDescription, HasTheValuesOfItsLines) {
   const DeviceDescription device = DeviceDescription::parse(thermometer);
   EXPECT_EQ(device.name, "thermo9");
   EXPECT_EQ(device.title, "A thermometer, outdoors");
@@ -68,7 +69,7 @@ TEST(DeviceDescription, DecodesEachKindOfNumber) {
   EXPECT_FALSE(decode(2, {0, 0, 0, 0, 0}).has_value()) << "its byte is missing";
 }
 
-TEST(Device, AValueThatTheDeviceDoesNotCountIsNoMeasurement) {
+TEST(Device, HasNoMeasurementOfAValueThatDoesNotCount) {
   const Device lidar(DeviceDescription::load("vl53l0x"), 0x29);
   State state;
   I2cReading& read = state.i2c[0];
@@ -97,7 +98,7 @@ constexpr std::string_view gauge =
     "ready mode 1\n"
     "ready status\n";
 
-TEST(Device, OfOneThatIsNotSetUpNothingIsAMeasurement) {
+TEST(Device, HasNoMeasurementUntilItIsSetUp) {
   const Device device(DeviceDescription::parse(gauge), 0x48);
   State state;
   state.i2c[0].data.size = 1;
@@ -120,7 +121,7 @@ TEST(Device, OfOneThatIsNotSetUpNothingIsAMeasurement) {
   EXPECT_EQ(device.reading(state, "height").number, 0);
 }
 
-TEST(Device, EachThatIsShippedTellsWhetherItIsSetUpUnlessNothingIsWrittenToIt) {
+TEST(Device, ReportsWhetherItIsSetUpIfItIsShippedAndHasWrites) {
   for (const std::string& name : DeviceDescription::shipped()) {
     const DeviceDescription device = DeviceDescription::load(name);
     EXPECT_EQ(device.ready.empty(), device.writes.empty()) << name;
@@ -139,7 +140,7 @@ std::string what_is_there(const Device& device, std::vector<std::uint8_t> identi
   return problem.reason + "; " + problem.fix;
 }
 
-TEST(Device, AChipThatIsSoldInItsPlaceIsNamedWithWhatToDo) {
+TEST(Device, NamesAChipThatIsSoldInItsPlaceAndAdvises) {
   const std::string clone = what_is_there(Device::from("mpu6050@0x68"), {0x70});
   EXPECT_EQ(clone.substr(0, clone.find(';')),
             "it is an MPU-6500, which has another scale of its temperature: its register x75 has "
@@ -206,116 +207,110 @@ TEST(DeviceDescription, TakesNumbersOfEveryWidthAndOrder) {
   }
 }
 
-std::string problem_of(const std::string& text) {
-  try {
-    DeviceDescription::parse(text, "mine.device");
-  } catch (const Error& error) {
-    EXPECT_EQ(error.kind(), ErrorKind::data);
-    EXPECT_FALSE(error.problem().fix.empty());
-    return error.problem().thing + ": " + error.problem().reason;
-  }
-  return "nothing";
+struct WrongText {
+  int line;  // 0: none
+  std::string text;
+  const char* problem;
+};
+
+void expect_problem(const WrongText& wrong, const std::string& before = "") {
+  const Problem problem =
+      test::problem_of([&] { DeviceDescription::parse(before + wrong.text, "mine.device"); });
+  const std::string line = wrong.line == 0 ? "" : ", line " + std::to_string(wrong.line);
+  EXPECT_EQ(problem.kind, ErrorKind::data);
+  EXPECT_FALSE(problem.fix.empty());
+  EXPECT_EQ(problem.thing + ": " + problem.reason, "mine.device" + line + ": " + wrong.problem);
 }
 
-TEST(DeviceDescription, SaysWhatIsWrongAndInWhichLine) {
-  const std::string head = "device a\naddress 0x28\npoll p x08 6 20\n";
-  struct Case {
-    std::string text;
-    const char* problem;
-  };
-  std::string nine = head;
-  for (int i = 0; i < 8; ++i) nine += "poll p" + std::to_string(i) + " x00 1 20\n";
-  std::string many = head;
-  for (int i = 0; i < 257; ++i) many += "value v" + std::to_string(i) + " p 0 u8\n";
-  for (const Case& each : {
-           Case{"", "mine.device: it is empty"},
-           Case{"title x\n", "mine.device, line 1: it does not begin with its name"},
-           Case{"device A\n", "mine.device, line 1: that is no name"},
-           Case{head + "device b\n", "mine.device, line 4: it has a name already"},
-           Case{head + "\n\nregister x00\n",
-                "mine.device, line 6: \"register\" is none of its words"},
-           Case{"device a\naddress 7\n", "mine.device, line 2: an address is out of range"},
-           Case{"device a\naddress 0x78\n", "mine.device, line 2: an address is out of range"},
-           Case{"device a\naddress 9 9\n", "mine.device, line 2: an address is there twice"},
-           Case{"device a\naddress x28\n", "mine.device, line 2: an address is no number"},
-           Case{"device a\nrole car\n", "mine.device, line 2: there is no such role"},
-           Case{"device a\nrole imu\nrole imu\n", "mine.device, line 3: it has a role already"},
-           Case{"device a\ntitle b\ntitle c\n", "mine.device, line 3: it has a title already"},
-           Case{head + "check x000000 x00\n", "mine.device, line 4: a register has 3 bytes"},
-           Case{head + "check x00 x\n", "mine.device, line 4: what is expected has 0 bytes"},
-           Case{head + "check x00 x0\n",
-                "mine.device, line 4: what is expected is not written as bytes"},
-           Case{head + "write 3d00\n",
-                "mine.device, line 4: what is written is not written as bytes"},
-           Case{head + "write x" + std::string(66, '0') + "\n",
-                "mine.device, line 4: what is written has 33 bytes"},
-           Case{head + "write x3d00 wait 5001\n",
-                "mine.device, line 4: the wait in ms is out of range"},
-           Case{head + "write x3d00 then 5\n", "mine.device, line 4: it has not its form"},
-           Case{head + "poll q x00 33 20\n",
-                "mine.device, line 4: the count of bytes is out of range"},
-           Case{head + "poll q x00 3 4\n", "mine.device, line 4: the period in ms is out of range"},
-           Case{head + "poll p x00 3 5\n", "mine.device, line 4: there is a poll of that name"},
-           Case{nine, "mine.device, line 11: the board repeats 8 readings at most"},
-           Case{head + "value v q 0 u8\n", "mine.device, line 4: no poll above has that name"},
-           Case{head + "value v p 5 u16be\n",
-                "mine.device, line 4: it ends behind the 6 bytes of its poll"},
-           Case{head + "value v p 0 u16\n", "mine.device, line 4: there is no such type"},
-           Case{head + "value v p 0 u8be\n", "mine.device, line 4: there is no such type"},
-           Case{head + "value v p 0 u40be\n", "mine.device, line 4: there is no such type"},
-           Case{head + "value v p 0 u8 bits 0..8\n",
-                "mine.device, line 4: the highest bit is out of range"},
-           Case{head + "value v p 0 u8 bits 5..3\n",
-                "mine.device, line 4: the highest bit is out of range"},
-           Case{head + "value v p 0 u8 bits 5\n",
-                "mine.device, line 4: the highest bit is no number"},
-           Case{head + "value v p 0 u8 scale 0\n", "mine.device, line 4: the scale is 0"},
-           Case{head + "value v p 0 u8 scale 1/0\n", "mine.device, line 4: the scale is no number"},
-           Case{head + "value v p 0 u8 scale nan\n", "mine.device, line 4: the scale is no number"},
-           Case{head + "value v p 0 u8 offset 1/inf\n",
-                "mine.device, line 4: the offset is no number"},
-           Case{head + "value v p 0 u8 scale 1e-31\n",
-                "mine.device, line 4: the scale is out of range"},
-           Case{head + "value v p 0 u8 range 0 1e300\n",
-                "mine.device, line 4: the range is out of range"},
-           Case{head + "value v p 0 u8 only w 1\nvalue w p 0 u8\n",
-                "mine.device, line 4: no value above has that name"},
-           Case{head + "value w p 0 u8\nvalue v p 0 u8 only w\n",
-                "mine.device, line 5: something is missing at its end"},
-           Case{head + "value v p 0 u8 scale\n",
-                "mine.device, line 4: something is missing at its end"},
-           Case{head + "value v p 0 u8 unit a,b\n", "mine.device, line 4: that is no unit"},
-           Case{head + "value v p 0 u8 range 1 1\n", "mine.device, line 4: the range is empty"},
-           Case{head + "value v p 0 u8 unit V unit V\n",
-                "mine.device, line 4: a word is there twice"},
-           Case{head + "value v p 0 u8 gain 3\n",
-                "mine.device, line 4: a word of the value is not known"},
-           Case{head + "ready v 1\n", "mine.device, line 4: no value above has that name"},
-           Case{head + "value v p 0 u8\nready v 1 2\n", "mine.device, line 5: it has 4 words"},
-           Case{head + "value v p 0 u8\nready v x01\n",
-                "mine.device, line 5: what that value is while it is set up is no number"},
-           Case{head + "lookalike x00 x01\n", "mine.device, line 4: it has 3 words"},
-           Case{head + "lookalike x00 x01 a\x1b" + "b\n",
-                "mine.device, line 4: its title is too long, or not plain text"},
-           Case{head + "value v p 0 u8\nvalue v p 1 u8\n",
-                "mine.device, line 5: there is a value of that name"},
-           Case{many, "mine.device, line 260: it has more than 256 values"},
-           Case{head, "mine.device: it has no value"},
-           Case{"device a\npoll p x 1 5\nvalue v p 0 u8\n", "mine.device: it has no address"},
-           Case{"device a\naddress 8\n", "mine.device: nothing is read"},
-           Case{head + "role angle\nvalue angle p 0 u8 unit deg\n",
-                "mine.device: with the role angle it needs a value angle in rad"},
-           Case{head + "role range\nvalue distance p 0 u8 unit m\n",
-                "mine.device: its distance has no range"},
-           Case{std::string(500, 'a'),
-                "mine.device, line 1: the line has more than 400 characters"},
-           Case{std::string(70000, '\n'), "mine.device: it has more than 65536 bytes"},
+const std::string description_head = "device a\naddress 0x28\npoll p x08 6 20\n";
+
+TEST(DeviceDescription, ReportsWhatIsWrongInALine) {
+  for (const WrongText& each : {
+           WrongText{4, "device b\n", "it has a name already"},
+           WrongText{4, "check x000000 x00\n", "a register has 3 bytes"},
+           WrongText{4, "check x00 x\n", "what is expected has 0 bytes"},
+           WrongText{4, "check x00 x0\n", "what is expected is not written as bytes"},
+           WrongText{4, "write 3d00\n", "what is written is not written as bytes"},
+           WrongText{4, "write x" + std::string(66, '0') + "\n", "what is written has 33 bytes"},
+           WrongText{4, "write x3d00 wait 5001\n", "the wait in ms is out of range"},
+           WrongText{4, "write x3d00 then 5\n", "it has not its form"},
+           WrongText{4, "poll q x00 33 20\n", "the count of bytes is out of range"},
+           WrongText{4, "poll q x00 3 4\n", "the period in ms is out of range"},
+           WrongText{4, "poll p x00 3 5\n", "there is a poll of that name"},
+           WrongText{4, "value v q 0 u8\n", "no poll above has that name"},
+           WrongText{4, "value v p 5 u16be\n", "it ends behind the 6 bytes of its poll"},
+           WrongText{4, "value v p 0 u16\n", "there is no such type"},
+           WrongText{4, "value v p 0 u8be\n", "there is no such type"},
+           WrongText{4, "value v p 0 u40be\n", "there is no such type"},
+           WrongText{4, "value v p 0 u8 bits 0..8\n", "the highest bit is out of range"},
+           WrongText{4, "value v p 0 u8 bits 5..3\n", "the highest bit is out of range"},
+           WrongText{4, "value v p 0 u8 bits 5\n", "the highest bit is no number"},
+           WrongText{4, "value v p 0 u8 scale 0\n", "the scale is 0"},
+           WrongText{4, "value v p 0 u8 scale 1/0\n", "the scale is no number"},
+           WrongText{4, "value v p 0 u8 scale nan\n", "the scale is no number"},
+           WrongText{4, "value v p 0 u8 offset 1/inf\n", "the offset is no number"},
+           WrongText{4, "value v p 0 u8 scale 1e-31\n", "the scale is out of range"},
+           WrongText{4, "value v p 0 u8 range 0 1e300\n", "the range is out of range"},
+           WrongText{4, "value v p 0 u8 only w 1\nvalue w p 0 u8\n",
+                     "no value above has that name"},
+           WrongText{4, "value v p 0 u8 scale\n", "something is missing at its end"},
+           WrongText{4, "value v p 0 u8 unit a,b\n", "that is no unit"},
+           WrongText{4, "value v p 0 u8 range 1 1\n", "the range is empty"},
+           WrongText{4, "value v p 0 u8 unit V unit V\n", "a word is there twice"},
+           WrongText{4, "value v p 0 u8 gain 3\n", "a word of the value is not known"},
+           WrongText{4, "ready v 1\n", "no value above has that name"},
+           WrongText{4, "lookalike x00 x01\n", "it has 3 words"},
+           WrongText{4,
+                     "lookalike x00 x01 a\x1b"
+                     "b\n",
+                     "its title is too long, or not plain text"},
        }) {
-    EXPECT_EQ(problem_of(each.text), each.problem);
+    expect_problem(each, description_head);
   }
 }
 
-TEST(DeviceDescription, ThoseThatAreShippedAreNamedAsTheirFilesAndHaveARole) {
+TEST(DeviceDescription, ReportsWhatIsWrongAndInWhichLine) {
+  std::string nine = description_head;
+  for (int i = 0; i < 8; ++i) nine += "poll p" + std::to_string(i) + " x00 1 20\n";
+  std::string many = description_head;
+  for (int i = 0; i < 257; ++i) many += "value v" + std::to_string(i) + " p 0 u8\n";
+  for (const WrongText& each : {
+           WrongText{0, "", "it is empty"},
+           WrongText{1, "title x\n", "it does not begin with its name"},
+           WrongText{1, "device A\n", "that is no name"},
+           WrongText{6, description_head + "\n\nregister x00\n",
+                     "\"register\" is none of its words"},
+           WrongText{2, "device a\naddress 7\n", "an address is out of range"},
+           WrongText{2, "device a\naddress 0x78\n", "an address is out of range"},
+           WrongText{2, "device a\naddress 9 9\n", "an address is there twice"},
+           WrongText{2, "device a\naddress x28\n", "an address is no number"},
+           WrongText{2, "device a\nrole car\n", "there is no such role"},
+           WrongText{3, "device a\nrole imu\nrole imu\n", "it has a role already"},
+           WrongText{3, "device a\ntitle b\ntitle c\n", "it has a title already"},
+           WrongText{11, nine, "the board repeats 8 readings at most"},
+           WrongText{5, description_head + "value w p 0 u8\nvalue v p 0 u8 only w\n",
+                     "something is missing at its end"},
+           WrongText{5, description_head + "value v p 0 u8\nready v 1 2\n", "it has 4 words"},
+           WrongText{5, description_head + "value v p 0 u8\nready v x01\n",
+                     "what that value is while it is set up is no number"},
+           WrongText{5, description_head + "value v p 0 u8\nvalue v p 1 u8\n",
+                     "there is a value of that name"},
+           WrongText{260, many, "it has more than 256 values"},
+           WrongText{0, description_head, "it has no value"},
+           WrongText{0, "device a\npoll p x 1 5\nvalue v p 0 u8\n", "it has no address"},
+           WrongText{0, "device a\naddress 8\n", "nothing is read"},
+           WrongText{0, description_head + "role angle\nvalue angle p 0 u8 unit deg\n",
+                     "with the role angle it needs a value angle in rad"},
+           WrongText{0, description_head + "role range\nvalue distance p 0 u8 unit m\n",
+                     "its distance has no range"},
+           WrongText{1, std::string(500, 'a'), "the line has more than 400 characters"},
+           WrongText{0, std::string(70000, '\n'), "it has more than 65536 bytes"},
+       }) {
+    expect_problem(each);
+  }
+}
+
+TEST(DeviceDescription, IsNamedAsItsFileAndHasARoleIfItIsShipped) {
   const std::vector<std::string> names = DeviceDescription::shipped();
   EXPECT_EQ(names, (std::vector<std::string>{"as5600", "bno055", "icm20948", "ina219", "mpu6050",
                                              "vl53l0x"}));
@@ -327,32 +322,21 @@ TEST(DeviceDescription, ThoseThatAreShippedAreNamedAsTheirFilesAndHaveARole) {
   }
 }
 
-TEST(DeviceDescription, OneThatIsNotThereIsNamedWithThoseThatAre) {
-  try {
-    DeviceDescription::load("bno056");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.kind(), ErrorKind::usage);
-    EXPECT_NE(error.problem().fix.find("bno055"), std::string::npos);
-  }
-  try {
-    DeviceDescription::load("/nonexistent/mine.device");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.kind(), ErrorKind::open);
-  }
-  EXPECT_THROW(DeviceDescription::load("/dev/zero"), Error) << "endless";
-  EXPECT_THROW(DeviceDescription::load("/tmp/"), Error);
+TEST(DeviceDescription, NamesThoseThatAreShippedIfThereIsNoSuchName) {
+  const auto problem = [](const char* name) {
+    return test::problem_of([&] { DeviceDescription::load(name); });
+  };
+  EXPECT_EQ(problem("bno056").kind, ErrorKind::usage);
+  EXPECT_TRUE(test::contains(problem("bno056").fix, "bno055"));
+  EXPECT_EQ(problem("/nonexistent/mine.device").kind, ErrorKind::open);
+  problem("/dev/zero");  // endless
+  problem("/tmp/");
 }
 
 std::string usage_of(const std::vector<std::string>& texts) {
-  try {
-    Device::from(texts);
-  } catch (const Error& error) {
-    EXPECT_EQ(error.kind(), ErrorKind::usage);
-    return error.problem().thing + ": " + error.problem().reason;
-  }
-  return "nothing";
+  const Problem problem = test::problem_of([&] { Device::from(texts); });
+  EXPECT_EQ(problem.kind, ErrorKind::usage);
+  return problem.thing + ": " + problem.reason;
 }
 
 TEST(Device, IsNamedWithItsAddressAndSlot) {

@@ -9,8 +9,7 @@
 #include "host/uart/uart_stream.hpp"
 #include "r4link/board.hpp"
 #include "r4link/error.hpp"
-#include "tests/support/at_will.hpp"
-#include "tests/support/board_in_a_thread.hpp"
+#include "tests/support/driven_board.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -60,7 +59,7 @@ TEST(UartStream, PositionsWrapAndARestartBeginsAnew) {
   EXPECT_EQ(data.lost, 1U);
 }
 
-TEST(UartStream, HoldsSoMuchAndNoMore) {
+TEST(UartStream, HoldsItsCapacityAndCountsOlderBytesAsLost) {
   UartStream stream;
   Board::UartData data;
   for (std::uint32_t i = 0; i < 2000; ++i)
@@ -69,8 +68,8 @@ TEST(UartStream, HoldsSoMuchAndNoMore) {
   EXPECT_EQ(data.bytes.size() + data.lost, 2000U * 64);
 }
 
-// The board's side and this one, with states lost between: every byte is delivered, or counted.
-TEST(UartStream, OverALinkThatLosesStates) {
+// With the board's side of the stream.
+TEST(UartStream, DeliversOrCountsEachByteOverALinkThatLosesStates) {
   struct Line final : firmware::UserUartPort {
     void set_up(const UartMode&) override {}
     std::size_t receive(std::uint8_t* out, std::size_t size) override {
@@ -120,17 +119,16 @@ TEST(UartStream, OverALinkThatLosesStates) {
   }
 }
 
-TEST(BoardUart, ReadsWhatAReceiverSaysAndCallsBack) {
-  BoardInAThread simulated("udp");
-  std::mutex mutex;  // of what the callback writes, until the board is gone
-  std::string told;
-  std::uint64_t told_lost = 0;
-  Board board(simulated.url(), at_will());
-  board.wait_active();
-  board.uart(1).on_bytes([&](const Board::UartData& data) {
+struct DrivenUart : DrivenBoard {
+  std::mutex mutex;
+  Board::UartData reported;  // under the mutex
+};
+
+TEST_F(DrivenUart, ReadsWhatAReceiverSendsAndCallsBack) {
+  const ScopedSubscription reports = board.uart(1).on_bytes([&](const Board::UartData& data) {
     const std::lock_guard lock(mutex);
-    told += text(data);
-    told_lost += data.lost;
+    reported.bytes.insert(reported.bytes.end(), data.bytes.begin(), data.bytes.end());
+    reported.lost += data.lost;
   });
   board.fields("DEFAULT,UART1");
   board.setting("uart1", "115200:8N1");
@@ -141,21 +139,21 @@ TEST(BoardUart, ReadsWhatAReceiverSaysAndCallsBack) {
     lost += data.lost;
     read += text(data);
   }
-  EXPECT_NE(read.find("$GPRMC,"), std::string::npos);
+  EXPECT_TRUE(contains(read, "$GPRMC,"));
   board.next_state();
   board.next_state();
   {
     const std::lock_guard lock(mutex);
-    EXPECT_NE(told.find("$GPRMC,"), std::string::npos);
-    if (lost + told_lost == 0) {
-      EXPECT_EQ(told.compare(0, 200, read, 0, 200), 0);
+    EXPECT_TRUE(contains(text(reported), "$GPRMC,"));
+    if (lost + reported.lost == 0) {
+      EXPECT_EQ(text(reported).compare(0, 200, read, 0, 200), 0);
     }
   }
   EXPECT_THROW(board.uart(3), Error);
   EXPECT_TRUE(board.uart(2).read().bytes.empty());
 }
 
-TEST(BoardUart, AWriteIsAnOutputAndSoIsAVoltage) {
+TEST(BoardUart, WritesBytesAndVoltagesOnlyAfterArm) {
   BoardInAThread simulated("udp");
   Board board(simulated.url());
   board.wait_active();

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A simulated board on UDP that a Board controls.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include "r4link/board.hpp"
+#include "tests/support/at_will.hpp"
+#include "tests/support/board_in_a_thread.hpp"
+
+namespace r4::test {
+
+struct DrivenBoard : testing::Test {
+  DrivenBoard() { board.wait_active(); }
+  BoardInAThread simulated{"udp"};
+  Board board{simulated.url(), at_will()};
+};
+
+}  // namespace r4::test
