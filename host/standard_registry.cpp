@@ -23,7 +23,7 @@ namespace {
 Registry with_all() {
   Registry registry = Registry::standard();
   registry.add({"sim", "sim:[?node=1]", "a simulated board in this process",
-                [](asio::io_context& io, const Url& url, Role role) {
+                [](asio::io_context& io, const Url& url, Role role, const Claim&) {
                   if (role == Role::board) {
                     throw Error(ErrorKind::usage, url.text(), "sim: is a board, it cannot listen",
                                 "give the board a transport to listen on, such as udp://:2018");
@@ -31,7 +31,9 @@ Registry with_all() {
                   return sim::make_sim_carrier(io, url);
                 }});
   registry.add({"replay", "replay:FILE[?speed=1&path=1&from=0]", "what a board said in a recording",
-                make_replay_carrier});
+                [](asio::io_context& io, const Url& url, Role role, const Claim&) {
+                  return make_replay_carrier(io, url, role);
+                }});
   return registry;
 }
 

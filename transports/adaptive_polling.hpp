@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether to ask again and again for what comes next, or to sleep until it wakes us.
+// Decides whether to poll for the next arrival, or to sleep until the system wakes the process.
 //
-// Between programs of one machine the next thing often comes sooner than a process goes to sleep and
-// is woken up. It is asked for while the last silence of its kind was short, as Linux's haltpoll
-// governor does: who is answered at once stays awake, who waits for the next period sleeps. For a
-// processor of one's own or one whose other users get it in between. Sans-I/O.
+// Between programs of one computer the next frame often comes sooner than a process goes to sleep
+// and wakes up. So the program polls while the last silence of the same kind was short, as Linux's
+// haltpoll governor does: a program that is answered at once stays awake, a program that waits for
+// the next period sleeps. The caller must yield the processor between two polls. Without I/O.
 #pragma once
 
 #include <array>
@@ -18,17 +18,17 @@ class AdaptivePolling {
  public:
   using Time = std::chrono::steady_clock::time_point;
   using Duration = std::chrono::steady_clock::duration;
-  // A silence is over soon in the middle of a transfer, whatever it is between transfers.
+  // Silences in the middle of a transfer are short, however long those between transfers are.
   enum class Silence : std::uint8_t { within, between };
 
-  // Nothing is asked for longer than `most`.
+  // A silence is polled through for `most` at most.
   explicit AdaptivePolling(Duration most) : most_(most), last_{forever, forever} {}
 
   void on_arrival(Time now) {
     if (silent_) last_[index()] = now - since_;
     silent_ = false;
   }
-  // All that had arrived has been taken.
+  // Everything that had arrived has been taken.
   void on_silence(Silence kind, Time now) {
     if (silent_ && kind == kind_) return;
     silent_ = true;

@@ -2,9 +2,9 @@
 // Functions of a transport that only boards use. A carrier with such a function is also a BoardEnd.
 // For any other carrier board_end_of() returns an end whose functions do nothing.
 //
-//     UDP     hosts send from many peers: which of them are in control
+//     UDP     hosts send from many peers: which peers are in control
 //     CAN     datagrams have a packed form
-//     pty     stands for the board's own cable
+//     pty     is the board's own cable
 #pragma once
 
 #include "r4link/carrier.hpp"
@@ -14,8 +14,7 @@ namespace r4 {
 class BoardEnd {
  public:
   // That peer is in control: it keeps its number, however many other peers send, until another peer
-  // is held. On UDP, datagrams for `everyone` go to it. `everyone`: no peer of this transport is in
-  // control.
+  // is held. On UDP, datagrams for `everyone` go to it. `everyone`: no peer is in control.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
   // The host in control is also heard from that peer, which is held besides the first until hold()
   // is called.

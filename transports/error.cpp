@@ -13,9 +13,9 @@ struct CodePoints {
   std::uint32_t first, last;
 };
 
-// What shows nothing, or changes how the text beside it is shown: the control and format characters
-// of Unicode 15 (categories Cc, Cf, Zl, Zp), its fillers and variation selectors, and what is no
-// character at all.
+// Code points that show nothing, or change how the text beside them is shown: the control and
+// format characters of Unicode 15 (categories Cc, Cf, Zl, Zp), fillers and variation selectors, and
+// code points that are not characters.
 constexpr std::array<CodePoints, 29> unprintable{{
     {0x0000, 0x001F},   {0x007F, 0x009F},   {0x00AD, 0x00AD},   {0x034F, 0x034F},
     {0x0600, 0x0605},   {0x061C, 0x061C},   {0x06DD, 0x06DD},   {0x070F, 0x070F},
@@ -34,7 +34,7 @@ bool is_printable(std::uint32_t code) {
   return at == unprintable.end() || code < at->first;
 }
 
-// How many bytes at the front of `text` are a printable character in UTF-8 (RFC 3629); 0: none.
+// The size of the printable character in UTF-8 (RFC 3629) at the front of `text`; 0: there is none.
 std::size_t printable_size(std::string_view text) {
   const auto byte = [text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   if (byte(0) < 0x80) return is_printable(byte(0)) ? 1 : 0;
@@ -76,27 +76,11 @@ std::string Problem::text() const {
 }
 
 const char* to_text(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::none:
-      return "none";
-    case Outcome::confirmed:
-      return "confirmed";
-    case Outcome::refused:
-      return "refused";
-    case Outcome::timed_out:
-      return "timed out";
-    case Outcome::cancelled:
-      return "cancelled";
-    case Outcome::closed:
-      return "closed";
-    case Outcome::blocked:
-      return "blocked";
-    case Outcome::full:
-      return "full";
-    case Outcome::not_armed:
-      return "not armed";
-  }
-  return "unknown";
+  constexpr std::array names{"none",   "confirmed", "refused", "timed out", "cancelled",
+                             "closed", "blocked",   "full",    "not armed"};
+  static_assert(names.size() == static_cast<std::size_t>(Outcome::not_armed) + 1);
+  const auto at = static_cast<std::size_t>(outcome);
+  return at < names.size() ? names[at] : "unknown";
 }
 
 }  // namespace r4

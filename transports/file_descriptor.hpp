@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A file descriptor with an owner; what to do where the system has none left, or no memory or thread;
-// and sockets of Asio's that a program which this one starts does not inherit: it would keep the port
-// for as long as it runs.
+// A file descriptor with an owner; what to do if the system has no descriptor, memory or thread
+// left; and sockets of Asio that child processes do not inherit: a child would keep the port while
+// it runs.
 #pragma once
 
 #include <fcntl.h>
@@ -44,8 +44,8 @@ class FileDescriptor {
   int number_ = -1;
 };
 
-// Why `thing` cannot be opened, if `error` (errno) says that the program, the user or the computer has used up what it
-// needs: files, memory, or what epoll may wait for.
+// Why `thing` cannot be opened, if `error` (errno) says that the program, the user or the computer
+// has used up its files, its memory, or what epoll may wait for.
 inline std::optional<Problem> out_of_resources(const std::string& thing, int error) {
   if (error == ENFILE) {
     return Problem{ErrorKind::open, thing, "this computer has no file left", "end some programs"};
@@ -70,7 +70,8 @@ inline std::optional<Problem> out_of_resources(const std::string& thing, int err
           std::to_string(4 * limit.rlim_cur)};
 }
 
-// What Asio and the standard library throw where the system refuses something: a thread, a descriptor, a watch.
+// The problem behind an error of Asio or the standard library: the system refuses a thread, a
+// descriptor, a watch.
 inline Problem problem_of(const std::string& thing, const std::system_error& error) {
   if (auto problem = out_of_resources(thing, error.code().value())) return *std::move(problem);
   if (error.code().value() == EAGAIN) {
@@ -81,8 +82,9 @@ inline Problem problem_of(const std::string& thing, const std::system_error& err
           "end some programs, and try again"};
 }
 
-// Throws std::system_error if an event loop that is made now could not be woken. Asio does not look whether the system
-// lets a loop wait for what wakes it and for its timers: such a loop would sleep for ever.
+// Throws std::system_error if an event loop that is made now could not be woken. Asio does not
+// check that the system lets a loop wait for its timers and for calls: such a loop would sleep for
+// ever.
 inline void require_watches() {
   const FileDescriptor epoll(::epoll_create1(EPOLL_CLOEXEC));
   const FileDescriptor events[] = {FileDescriptor(::eventfd(0, EFD_CLOEXEC)),
@@ -96,7 +98,7 @@ inline void require_watches() {
   }
 }
 
-// The result of `action`; what the system refuses it is an Error about `thing`.
+// The result of `action`. A std::system_error becomes an Error about `thing`.
 template <class Action>
 auto with_system_errors(const std::string& thing, Action action) {
   try {
@@ -106,7 +108,7 @@ auto with_system_errors(const std::string& thing, Action action) {
   }
 }
 
-// As socket.open(protocol, error), also of an acceptor.
+// As socket.open(protocol, error), also for an acceptor.
 template <class Socket, class ErrorCode>
 void open_close_on_exec(Socket& socket, const typename Socket::protocol_type& protocol,
                         ErrorCode& error) {
@@ -120,7 +122,7 @@ void open_close_on_exec(Socket& socket, const typename Socket::protocol_type& pr
   if (error) ::close(descriptor);
 }
 
-// For one that Asio has opened itself.
+// For a descriptor that Asio has opened itself.
 inline void close_on_exec(int descriptor) { ::fcntl(descriptor, F_SETFD, FD_CLOEXEC); }
 
 }  // namespace r4

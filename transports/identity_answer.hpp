@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who a board is, as it tells anyone who asks `Q:ID`, whoever controls it.
+// The answer of a board to `Q:ID`, which it gives to every host.
 #pragma once
 
 #include <optional>
@@ -11,13 +11,13 @@
 namespace r4 {
 
 struct IdentityAnswer : BoardIdentity {
-  std::optional<bool>
-      busy;  // another host than the one that asked controls it; none: it does not tell
+  // True if another host than the one that asked controls it; none: the board does not report it.
+  std::optional<bool> busy;
 };
 
-// The question, without a number: nobody's session goes on by it.
+// The question, without a packet number: it is not part of a session.
 std::string identity_question();
-// A board's answer. None if it is something else.
+// None if the datagram is not a board's answer.
 std::optional<IdentityAnswer> read_identity_answer(Text bytes);
 
 }  // namespace r4

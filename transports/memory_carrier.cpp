@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t normal_entries = 128;
 constexpr std::size_t state_entries = 32;
-constexpr int datagrams_in_a_turn = 64;  // then others on the event loop have theirs
+constexpr int datagrams_in_a_turn = 64;  // then the other work of the loop has its turn
 
 class MemoryCarrier final : public Carrier {
  public:
@@ -85,7 +85,7 @@ class MemoryCarrier final : public Carrier {
     for (int i = 0; i < datagrams_in_a_turn; ++i) {
       const SendQueue::Entry* const entry = inbox_.front(std::chrono::steady_clock::now());
       if (entry == nullptr) break;
-      // The handler may send, and the entry's place be taken.
+      // A copy: the handler may send, and a new entry may take this place.
       const std::size_t size = entry->size;
       std::memcpy(datagram_.data(), entry->bytes, size);
       inbox_.pop();
@@ -106,12 +106,9 @@ class MemoryCarrier final : public Carrier {
     if (up() == reported_up_) return;
     reported_up_ = up();
     ++(reported_up_ ? counters_.ups : counters_.downs);
-    if (reported_up_) {
-      handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
-    } else {
-      handler_->on_carrier_event({CarrierEvent::Kind::down,
-                                  Problem{ErrorKind::open, name_, "the other end was closed", ""}});
-    }
+    handler_->on_carrier_event(
+        {reported_up_ ? CarrierEvent::Kind::up : CarrierEvent::Kind::down,
+         Problem{ErrorKind::open, name_, reported_up_ ? "" : "the other end was closed", ""}});
   }
 
   asio::io_context& io_;

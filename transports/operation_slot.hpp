@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Memory and cancellation for one asynchronous operation that is started again and again.
+// Memory and cancellation for one asynchronous operation that is started repeatedly.
 //
 // A carrier has a slot for each thing it waits for (readable, writable, a time). The operation
-// lives in the slot's memory, so that waiting costs no heap, and after cancel(), or when the slot
-// is gone, the handler is not called any more, whatever the event loop still holds. For one thread,
-// like all of a carrier.
+// lives in the slot's memory, so that waiting costs no heap. After cancel(), or when the slot is
+// gone, the handler is never called, whatever the event loop still holds. For one thread, like a
+// carrier.
 #pragma once
 
 #include <asio/basic_waitable_timer.hpp>
@@ -20,8 +20,8 @@
 
 namespace r4 {
 
-// Asio's objects take the event loop's executor as it is: their default, any_io_executor, costs 0.1 us
-// an operation.
+// Asio's objects with the event loop's own executor: the default, any_io_executor, costs 0.1 us an
+// operation.
 using LoopExecutor = asio::io_context::executor_type;
 using LoopDescriptor = asio::posix::basic_stream_descriptor<LoopExecutor>;
 using LoopTimer =
@@ -32,7 +32,7 @@ class OperationSlot {
   struct Memory {
     alignas(std::max_align_t) std::byte bytes[256];
     bool taken = false;
-    std::uint32_t started = 0;  // counts operations: only the newest is alive
+    std::uint32_t started = 0;  // counts operations: only the newest one is called
   };
 
   template <class T>
@@ -41,7 +41,7 @@ class OperationSlot {
     using value_type = T;
     explicit Allocator(Memory& memory) : memory_(&memory) {}
     template <class U>
-    // NOLINTNEXTLINE(google-explicit-constructor): as the standard has it
+    // NOLINTNEXTLINE(google-explicit-constructor): as the standard requires
     Allocator(const Allocator<U>& other) : memory_(other.memory_) {}
 
     T* allocate(std::size_t count) {
@@ -49,7 +49,8 @@ class OperationSlot {
         memory_->taken = true;
         return reinterpret_cast<T*>(memory_->bytes);
       }
-      return static_cast<T*>(::operator new(count * sizeof(T)));  // a cancelled one is still there
+      return static_cast<T*>(
+          ::operator new(count * sizeof(T)));  // a cancelled operation is still there
     }
     void deallocate(T* at, std::size_t) {
       if (reinterpret_cast<std::byte*>(at) == memory_->bytes) {
@@ -66,7 +67,7 @@ class OperationSlot {
    private:
     template <class>
     friend class Allocator;
-    Memory* memory_;  // kept alive by the Operation that gave it
+    Memory* memory_;  // its Operation keeps it alive
   };
 
   template <class Function>
@@ -81,11 +82,11 @@ class OperationSlot {
     void operator()() {
       if (memory_->started == number_) function_();
     }
-    // A wait that failed (its descriptor was closed) is over without a call.
+    // A wait that failed (its descriptor was closed) ends without a call.
     void operator()(const asio::error_code& error) {
       if (!error) (*this)();
     }
-    // A transfer tells how it ended.
+    // A transfer reports how it ended.
     void operator()(const asio::error_code& error, std::size_t size) {
       if (memory_->started == number_) function_(error, size);
     }
@@ -102,8 +103,8 @@ class OperationSlot {
   OperationSlot& operator=(const OperationSlot&) = delete;
   ~OperationSlot() { cancel(); }
 
-  // A completion handler for Asio that calls `function()`, or `function(error, size)` for a transfer.
-  // Cancels the operation before it.
+  // A completion handler for Asio that calls `function()`, or `function(error, size)` for a
+  // transfer. Cancels the previous operation.
   template <class Function>
   Operation<Function> handler(Function function) {
     ++memory_->started;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From a URL to a carrier: one table of schemes serves the library, the simulated board and `r4`.
+// Makes the carrier of a URL: one table of schemes serves the library, the simulated board and
+// `r4`.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -16,8 +17,9 @@
 
 namespace r4 {
 
-using CarrierFactory =
-    std::function<std::unique_ptr<Carrier>(asio::io_context& io, const Url& url, Role role)>;
+// `claim`: how a transport opens what one program can have at a time, each time.
+using CarrierFactory = std::function<std::unique_ptr<Carrier>(asio::io_context& io, const Url& url,
+                                                              Role role, Claim claim)>;
 
 class Registry {
  public:
@@ -26,16 +28,11 @@ class Registry {
     std::string usage;    // "udp://HOST[:2018][?listen=2390&local=ADDRESS]"
     std::string meaning;  // one line for --help
     CarrierFactory make;
-    // What the transport of a URL is called among the programs that share it (share_name.hpp).
-    // None: programs do not share it. Throws Error if the transport cannot be found.
+    // The name under which programs share the transport of a URL. Null: programs do not share it.
+    // Throws Error if the transport cannot be found.
     std::function<ShareName(const Url& url)> share_name = nullptr;
-    // True if the transport of this URL is its program's own, which is not shared. None: it never
-    // is.
+    // True if the transport of this URL belongs to its program alone. Null: never.
     std::function<bool(const Url& url)> own = nullptr;
-    // The host's carrier of what one program can have at a time.
-    std::function<std::unique_ptr<Carrier>(asio::io_context& io, const Url& url,
-                                           std::shared_ptr<DeviceClaim> claim)>
-        make_claimed = nullptr;
   };
 
   // A registry with the transports of this folder: udp, serial, pty, can.
@@ -45,9 +42,10 @@ class Registry {
   const std::vector<Entry>& entries() const { return entries_; }
 
   // The carrier for a URL, not yet opened. Throws Error{usage} for an unknown scheme, naming those
-  // that exist, and for a URL that its scheme does not take. A host's is of its own: `share` is passed over.
+  // that exist, and for a URL that its scheme does not take. A host does not share it: `share` is
+  // ignored.
   std::unique_ptr<Carrier> make(asio::io_context& io, std::string_view url, Role role) const;
-  // The same for a host's program, which shares the transport with others of this computer.
+  // The carrier of a host that shares the transport with other programs of this computer.
   std::unique_ptr<Carrier> make_shared(asio::io_context& io, std::string_view url,
                                        BoardRole role) const;
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams that the system does not take at the moment, in the order in which they should go.
+// Datagrams that the system does not take at the moment, in the order in which to send them.
 //
-//     stop    first of all; never expires; of more than 8 the oldest makes room
+//     stop    first; never expires; when 8 wait, the oldest makes room
 //     normal  in order; refused when the lane is full
 //     state   last; newest wins: when the lane is full, the oldest makes room
 //
-// Each entry but a stop expires 100 ms after it came. Bounded. Hardly ever does anything wait, and of many
-// boards each has a queue: a lane takes all its memory when something waits in it for the first time.
+// Each entry but a stop expires 100 ms after it came. Bounded. Most queues stay empty, and each
+// board has one, so a lane allocates its memory when its first entry comes.
 #pragma once
 
 #include <chrono>
@@ -41,9 +41,9 @@ class SendQueue {
   // `sent` if it waits now, else `full`. `bytes` must be at most max_datagram long.
   SendResult push(std::string_view bytes, Priority priority, Peer to, Time now);
 
-  // The one to send next, or null. Drops what has expired.
+  // The entry to send next, or null. Drops expired entries.
   const Entry* front(Time now);
-  // Removes the one that front() gave.
+  // Removes the entry that front() returned.
   void pop();
 
   bool empty() const;
@@ -55,7 +55,7 @@ class SendQueue {
   struct Lane {
     explicit Lane(std::size_t most) : capacity(most) {}
     std::size_t capacity;
-    std::vector<Entry> entries;  // none yet, or `capacity`
+    std::vector<Entry> entries;  // none at first, else `capacity`
     std::size_t first = 0;
     std::size_t count = 0;
     void pop();

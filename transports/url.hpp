@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a board is: the URL grammar of every transport (docs/transports.md has the table).
+// The place of a board: the URL grammar of every transport (docs/transports.md has the table).
 //
 //     url    = scheme ":" ["//" authority] [path] ["?" key "=" value *("&" key "=" value)]
 //     scheme = udp | serial | pty | sim | …        authority = HOST[:PORT] | [IPv6][:PORT]
@@ -28,11 +28,11 @@ class Url {
   std::optional<std::uint16_t> port() const { return port_; }
   const std::string& path() const { return path_; }  // "/dev/ttyACM0", "auto", "can0"
 
-  // The value of a key, if it is there.
+  // The value of a key, if the URL has it.
   std::optional<std::string> get(std::string_view key) const;
-  // The same, and it is no longer there.
+  // The same; removes the key.
   std::optional<std::string> take(std::string_view key);
-  // As a whole number within [min, max], or `fallback`; throws Error{usage} otherwise.
+  // The value as a whole number, or `fallback`. Throws Error{usage} unless it is within [min, max].
   long get_number(std::string_view key, long min, long max, long fallback) const;
   // Throws Error{usage} naming the first key that is not in the space-separated `allowed`.
   void allow_only(std::string_view allowed) const;
@@ -42,5 +42,8 @@ class Url {
   std::optional<std::uint16_t> port_;
   std::map<std::string, std::string, std::less<>> query_;
 };
+
+// The text as a value in a URL: what a URL, a shell or a terminal may interpret becomes %NN.
+std::string percent_encoded(std::string_view text);
 
 }  // namespace r4

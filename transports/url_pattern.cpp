@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "url_pattern.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <set>
@@ -27,7 +29,7 @@ namespace {
 bool is_decimal(char c) { return c >= '0' && c <= '9'; }
 bool begins_scheme(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 
-// The end of "0-7" at the beginning of the text; 0 if that is no range.
+// The size of a range such as "0-7" at the beginning of the text; 0 if there is none.
 std::size_t range_size(std::string_view text) {
   const auto digits = [&text](std::size_t from) {
     while (from < text.size() && is_decimal(text[from])) ++from;
@@ -39,7 +41,7 @@ std::size_t range_size(std::string_view text) {
   return end == dash + 1 ? 0 : end;
 }
 
-// Braces about the range at that place, if there is one that ends there.
+// Puts braces around the range at that place, if the value there is a range.
 void brace(std::string& text, std::size_t at) {
   const std::size_t size = range_size(std::string_view(text).substr(at));
   const std::size_t end = at + size;
@@ -48,7 +50,7 @@ void brace(std::string& text, std::size_t at) {
   text.insert(at, "{");
 }
 
-// With braces where they may be left out.
+// Adds the braces that may be left out.
 std::string with_braces(std::string_view pattern) {
   std::string text(pattern);
   for (const char* key : {"?node=", "&node="}) {
@@ -63,7 +65,7 @@ std::string with_braces(std::string_view pattern) {
   return text;
 }
 
-// The numbers of "1,3,07-12", as they are written.
+// The numbers of "1,3,07-12", as text.
 std::vector<std::string> numbers_of(std::string_view pattern, std::string_view list) {
   std::vector<std::string> numbers;
   for (bool more = true; more;) {
@@ -76,26 +78,20 @@ std::vector<std::string> numbers_of(std::string_view pattern, std::string_view l
     const std::string_view upper = dash == part.size() ? lower : part.substr(dash + 1);
     std::uint32_t first = 0;
     std::uint32_t last = 0;
-    const auto is_number = [](std::string_view text) {
-      return !text.empty() && std::all_of(text.begin(), text.end(), is_decimal);
-    };
-    if (!is_number(lower) || !is_number(upper) || !parse_number(lower, first) ||
-        !parse_number(upper, last) || first > last) {
+    if (!parse_number(lower, first) || !parse_number(upper, last) || first > last) {
       refuse_pattern(pattern, "'" + std::string(part) + "' is no number and no range");
     }
     if (last - first >= most_pattern_urls) refuse_as_too_many(pattern);
     const std::size_t width = lower.front() == '0' ? lower.size() : 0;
     for (std::uint32_t number = first; number <= last; ++number) {
-      std::string digits = std::to_string(number);
-      if (digits.size() < width) digits.insert(0, width - digits.size(), '0');
-      numbers.push_back(std::move(digits));
+      numbers.push_back(fmt::format("{:0{}}", number, width));
       if (numbers.size() > most_pattern_urls) refuse_as_too_many(pattern);
     }
   }
   return numbers;
 }
 
-// Of one path.
+// The same as expand_urls() for one path.
 std::vector<PatternUrl> expand_path(std::string_view pattern) {
   std::vector<PatternUrl> all{{"", ""}};
   std::string text = with_braces(pattern);

@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One text for the URLs of many boards:
 //
-//     can://can0?node=0-7        udp://127.0.0.1:20000-20999        udp://10.0.0.{1-250}, udp://arm-{1,3,07-12}
+//     can://can0?node=0-7                      udp://127.0.0.1:20000-20999
+//     udp://10.0.0.{1-250}                     udp://arm-{1,3,07-12}
 //
-// A range of nodes or of ports needs no braces. Of several braces the last counts fastest. A number that begins with 0
-// keeps its width: {07-12} is 07, 08 …
+// A range of nodes or of ports needs no braces. If there are several braces, the last one counts
+// fastest. A number that begins with 0 keeps its width: {07-12} is 07, 08 …
 //
-// And for those of several paths to one board (docs/redundancy.md):
+// One text also joins several paths to one board (docs/redundancy.md):
 //
 //     serial:auto+udp://192.168.0.125          can://can0?node=0-7+can://can1?node=0-7
 //
-// A '+' joins only where the scheme of a URL and its colon follow; elsewhere it is a character as any other, and %2B is
-// one everywhere. Of patterns each part stands for as many: the first board has the first of each, and so on. A part that
-// is no pattern cannot lead to several boards.
+// A '+' joins only if the scheme of a URL and its colon follow. Elsewhere it is an ordinary
+// character, and %2B is one everywhere. All patterns of a text stand for equally many URLs: the
+// first board has the first URL of each, and so on. A part without a pattern cannot lead to several
+// boards.
 #pragma once
 
 #include <cstddef>
@@ -23,23 +25,23 @@
 namespace r4 {
 
 struct PatternUrl {
-  std::string url;     // of several paths: joined
-  std::string number;  // what the pattern has become, "7" or "3-7"; empty where the text is a URL
+  std::string url;     // with several paths: joined
+  std::string number;  // the numbers in place of the pattern, "7" or "3-7"; empty without a pattern
 };
 
-// More are a mistake in typing.
+// More would be a typing mistake.
 constexpr std::size_t most_pattern_urls = 10'000;
 
-// What it stands for, in order; a URL stands for itself. Throws Error{usage} for braces and ranges that are none,
-// for more than most_pattern_urls, and for what is then no URL.
+// The URLs that a pattern stands for, in order; a URL stands for itself. Throws Error{usage} for
+// invalid braces and ranges, for more than most_pattern_urls, and if a result is not a valid URL.
 std::vector<PatternUrl> expand_urls(std::string_view pattern);
-// Of several texts, each of other boards: throws Error{usage} for a URL that is there twice, too.
+// The same for several texts. Throws Error{usage}, too, if two of them name the same URL.
 std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns);
 
-// The URLs of the paths that a text joins; of one URL that alone. They are not looked at.
+// The URLs that a text joins. They are not checked.
 std::vector<std::string> split_paths(std::string_view text);
 std::string join_paths(const std::vector<std::string>& urls);
-// Has one of them that scheme?
+// True if one of the joined URLs has that scheme.
 bool has_path(std::string_view text, std::string_view scheme);
 
 }  // namespace r4

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Waits until a descriptor takes bytes again.
 //
-// It waits on a duplicate that lives only as long as there is something to wait for: asked once,
-// Asio's reactor reports "writable" for a descriptor for good, which would cost a wake-up with each
-// datagram that is received. A process that has no descriptor left for that looks again and again.
+// It waits on a duplicate that is open only during the wait. Once asked, Asio's reactor reports
+// "writable" for a descriptor for ever, which would cost a wake-up with each datagram that is
+// received. A process without a free descriptor polls instead.
 #pragma once
 
 #include <fcntl.h>
@@ -21,8 +21,8 @@ class WritableWait {
  public:
   explicit WritableWait(asio::io_context& io) : duplicate_(io), timer_(io) {}
 
-  // Calls `function()` once, when `descriptor` is writable, or may be. Does nothing if a call is due
-  // already.
+  // Calls `function()` once, when `descriptor` is or may be writable. Does nothing if a call is
+  // due.
   template <class Function>
   void start(int descriptor, Function function) {
     if (waiting_) return;
@@ -39,7 +39,7 @@ class WritableWait {
     }
   }
 
-  // Nothing waits any more.
+  // Cancels the call.
   void stop() {
     waiting_ = false;
     slot_.cancel();

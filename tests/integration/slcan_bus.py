@@ -25,10 +25,9 @@ def ip(*arguments):
 class SlcanBus:
     """One bus; `interfaces` are its nodes in order."""
 
-    def __init__(self, nodes=2, bitrate=125000, txqueuelen=1000, **options):
+    def __init__(self, nodes=2, bitrate=125000, txqueuelen=1000):
         self.process = subprocess.Popen(
-            [PROGRAM, '--nodes', str(nodes), '--bitrate', str(bitrate),
-             *(word for name, value in options.items() for word in (f'--{name}', str(value)))],
+            [PROGRAM, '--nodes', str(nodes), '--bitrate', str(bitrate)],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.bitrate = bitrate
         self.answers = queue.Queue()

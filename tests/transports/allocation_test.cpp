@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// No heap for a datagram: each carrier exchanges datagrams while every `new` is counted.
+// A datagram costs no heap: each carrier exchanges datagrams while every `new` is counted.
 #include <gtest/gtest.h>
 
 #include "recorder.hpp"
@@ -10,7 +10,7 @@
 namespace r4::test {
 namespace {
 
-// Answers each datagram with another, so that one keeps going to and fro.
+// Answers each datagram with another one.
 class Player final : public Carrier::Handler {
  public:
   void on_datagram(std::string_view, Peer from) override {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program that this one starts inherits no descriptor of a transport: it would keep a port for as
-// long as it runs.
+// A child process inherits no descriptor of a transport: it would keep a port while it runs.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -17,7 +16,7 @@
 namespace r4::test {
 namespace {
 
-// The open descriptors that a program inherits, and what each is.
+// The number and the file of each open descriptor that a child process inherits.
 std::set<std::string> inherited() {
   std::set<std::string> all;
   for (const auto& each : std::filesystem::directory_iterator("/proc/self/fd")) {
@@ -42,7 +41,7 @@ TEST(Descriptors, OfNoTransportAreInherited) {
   open.push_back(open_carrier(io, "pty:", Role::board, events));
   open.push_back(open_carrier(io, "serial://" + open.back()->name().substr(4), Role::host, events));
   const std::string board = open.front()->name();
-  for (int i = 0; i < 12; ++i) {  // more than those that do without a reader of many sockets
+  for (int i = 0; i < 12; ++i) {  // enough that a loop reads many sockets together
     open.push_back(open_carrier(io, board + "?listen=0", Role::host, events));
   }
   io.poll();

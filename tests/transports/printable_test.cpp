@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Text of others in one line that a terminal and a log may show.
+// Foreign text in one line that a terminal and a log may show.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -23,7 +23,7 @@ TEST(Printable, WritesControlCharactersAsBytes) {
   EXPECT_EQ(printable("\u009b2J"), "\\xc2\\x9b2J");  // ESC [ in one character
 }
 
-TEST(Printable, WritesWhatReordersOrHidesTextAsBytes) {
+TEST(Printable, WritesCharactersThatReorderOrHideTextAsBytes) {
   EXPECT_EQ(printable("exe.\u202Egnp"), "exe.\\xe2\\x80\\xaegnp");
   EXPECT_EQ(printable("a\u200Bb"), "a\\xe2\\x80\\x8bb");
   EXPECT_EQ(printable("\uFEFFa"), "\\xef\\xbb\\xbfa");
@@ -32,7 +32,7 @@ TEST(Printable, WritesWhatReordersOrHidesTextAsBytes) {
   EXPECT_EQ(printable("\U000E0041"), "\\xf3\\xa0\\x81\\x81");
 }
 
-TEST(Printable, WritesWhatIsNotUtf8AsBytes) {
+TEST(Printable, WritesInvalidUtf8AsBytes) {
   EXPECT_EQ(printable("\xff\xfe"), "\\xff\\xfe");
   EXPECT_EQ(printable("a\xc3"), "a\\xc3");         // cut
   EXPECT_EQ(printable("\x80"), "\\x80");           // without its first byte

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the tests of carriers share: a handler that remembers, and waiting for something to happen.
+// For tests of carriers: a handler that records its calls, and functions that wait for events.
 #pragma once
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <asio/io_context.hpp>
 #include <asio/steady_timer.hpp>
 #include <chrono>
@@ -54,15 +55,12 @@ class Recorder final : public Carrier::Handler {
   void on_oversize(std::string_view beginning) override { oversize.emplace_back(beginning); }
 
   bool has(std::string_view text) const {
-    for (const Datagram& datagram : datagrams) {
-      if (datagram.text == text) return true;
-    }
-    return false;
+    return std::any_of(datagrams.begin(), datagrams.end(),
+                       [text](const Datagram& each) { return each.text == text; });
   }
   std::size_t count(Kind kind) const {
-    std::size_t n = 0;
-    for (const Event& event : events) n += event.kind == kind ? 1 : 0;
-    return n;
+    return static_cast<std::size_t>(std::count_if(
+        events.begin(), events.end(), [kind](const Event& each) { return each.kind == kind; }));
   }
   const Event* last(Kind kind) const {
     const Event* found = nullptr;
@@ -90,13 +88,13 @@ bool run_until(asio::io_context& io, Done done, Clock::duration limit = patience
   while (!done()) {
     const auto now = Clock::now();
     if (now >= deadline) return false;
-    // With nothing to wait for there is nothing that could change.
+    // If the loop has nothing to wait for, nothing can change.
     if (io.run_one_for(deadline - now) == 0 && io.stopped()) return done();
   }
   return true;
 }
 
-// Runs the loop for a while: to see that something does not happen, or to keep a rate.
+// Runs the loop for a while: to check that something does not happen, or to keep a rate.
 inline void run_for(asio::io_context& io, Clock::duration time) {
   const auto never = [] { return false; };
   run_until(io, never, time);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "recorder.hpp"
+#include "tests/support/problems.hpp"
 #include "transports/memory_carrier.hpp"
 
 namespace r4::test {
@@ -29,27 +30,27 @@ TEST(Registry, MakesACarrierForEachTransport) {
 
 TEST(Registry, NamesTheTransportsThatItHas) {
   asio::io_context io;
-  const auto error =
-      error_of([&] { Registry::standard().make(io, "tcp://127.0.0.1", Role::host); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->kind(), ErrorKind::usage);
-  EXPECT_EQ(error->problem().thing, "tcp://127.0.0.1");
-  EXPECT_EQ(error->problem().reason, "there is no transport 'tcp'");
+  const Problem problem =
+      problem_of([&] { Registry::standard().make(io, "tcp://127.0.0.1", Role::host); });
+  EXPECT_EQ(problem.kind, ErrorKind::usage);
+  EXPECT_EQ(problem.thing, "tcp://127.0.0.1");
+  EXPECT_EQ(problem.reason, "there is no transport 'tcp'");
   for (const char* usage : {"udp://HOST", "serial:auto", "pty:[PATH]"}) {
-    EXPECT_NE(error->problem().fix.find(usage), std::string::npos) << error->what();
+    EXPECT_TRUE(contains(problem.fix, usage));
   }
 }
 
 TEST(Registry, TakesFurtherTransports) {
   asio::io_context io;
   Registry registry = Registry::standard();
-  registry.add({"memory", "memory:", "for this test", [](asio::io_context& loop, const Url&, Role) {
+  registry.add({"memory", "memory:", "for this test",
+                [](asio::io_context& loop, const Url&, Role, const Claim&) {
                   return make_memory_pair(loop).first;
                 }});
   EXPECT_EQ(registry.make(io, "memory:", Role::host)->name(), "memory:");
 }
 
-TEST(Registry, ACarrierOfOnesOwnIsSharedWithNobodyWhateverTheUrlSays) {
+TEST(Registry, ACarrierThatIsNotSharedIgnoresTheGroupOfItsUrl) {
   asio::io_context io;
   const Registry registry = Registry::standard();
   for (const char* url :
@@ -64,11 +65,10 @@ TEST(Registry, SharesAPathWithAGroupThatIsThere) {
   asio::io_context io;
   const Registry registry = Registry::standard();
   EXPECT_NE(registry.make_shared(io, "can://can0?node=2&share=root", BoardRole::watch), nullptr);
-  const auto error =
-      error_of([&] { registry.make_shared(io, "serial:auto?share=nobodys", BoardRole::control); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->kind(), ErrorKind::usage);
-  EXPECT_EQ(error->problem().reason, "there is no group 'nobodys' on this machine");
+  const Problem problem = problem_of(
+      [&] { registry.make_shared(io, "serial:auto?share=nobodys", BoardRole::control); });
+  EXPECT_EQ(problem.kind, ErrorKind::usage);
+  EXPECT_EQ(problem.reason, "there is no group 'nobodys' on this machine");
   EXPECT_EQ(run_unprivileged([&] {
               const auto refused = error_of([&] {
                 registry.make_shared(io, "udp://127.0.0.1?share=daemon", BoardRole::control);
@@ -124,11 +124,10 @@ TEST(Registry, RefusesAUrlThatItsTransportDoesNotTake) {
   asio::io_context io;
   for (const Refusal& row : table) {
     SCOPED_TRACE(row.url);
-    const auto error = error_of([&] { Registry::standard().make(io, row.url, row.role); });
-    ASSERT_TRUE(error) << "taken";
-    EXPECT_EQ(error->kind(), ErrorKind::usage);
-    EXPECT_NE(error->problem().reason.find(row.reason), std::string::npos) << error->what();
-    EXPECT_FALSE(error->problem().fix.empty()) << error->what();
+    const Problem problem = problem_of([&] { Registry::standard().make(io, row.url, row.role); });
+    EXPECT_EQ(problem.kind, ErrorKind::usage);
+    EXPECT_TRUE(contains(problem.reason, row.reason));
+    EXPECT_FALSE(problem.fix.empty());
   }
 }
 

@@ -69,7 +69,7 @@ TEST_F(SendQueueTest, NeverRefusesAStop) {
   EXPECT_EQ(left.back(), "stop 99");
 }
 
-TEST_F(SendQueueTest, DropsWhatIsOlderThan100MsButNoStop) {
+TEST_F(SendQueueTest, DropsEntriesAfter100MsExceptStops) {
   push("stop", Priority::stop);
   push("old", Priority::normal);
   push("old state", Priority::state);
@@ -81,7 +81,7 @@ TEST_F(SendQueueTest, DropsWhatIsOlderThan100MsButNoStop) {
   EXPECT_EQ(dropped, 2U);
 }
 
-TEST_F(SendQueueTest, MakesRoomByWhatHasExpired) {
+TEST_F(SendQueueTest, MakesRoomByDroppingExpiredEntries) {
   for (const char* text : {"1", "2", "3", "4"}) push(text, Priority::normal);
   now += milliseconds(100);
   EXPECT_EQ(push("5", Priority::normal), SendResult::sent);
@@ -89,7 +89,7 @@ TEST_F(SendQueueTest, MakesRoomByWhatHasExpired) {
   EXPECT_EQ(dropped, 4U);
 }
 
-TEST_F(SendQueueTest, CountsWhatIsCleared) {
+TEST_F(SendQueueTest, CountsClearedEntries) {
   push("stop", Priority::stop);
   push("normal", Priority::normal);
   push("state", Priority::state);

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "r4link/error.hpp"
+#include "tests/support/problems.hpp"
 
-namespace r4 {
+namespace r4::test {
 namespace {
 
 using Texts = std::vector<std::string>;
@@ -85,12 +85,12 @@ TEST(UrlPattern, PathsOfOneBoardAreJoinedAndEachBoardHasTheNextOfEach) {
   EXPECT_EQ(expand_urls("can://can0?node=5-7+udp://arm-{1-3}")[2].number, "7");
 }
 
-TEST(UrlPattern, WhatIsNoneIsRefusedWithTheReason) {
+TEST(UrlPattern, RefusesAnInvalidPatternWithTheReason) {
   struct Refused {
     const char* pattern;
     const char* reason;
   };
-  for (const auto& [pattern, reason] : {
+  for (const Refused& each : {
            Refused{"can://can0?node=7-0", "'7-0' is no number and no range"},
            Refused{"udp://arm-{}", "'' is no number and no range"},
            Refused{"udp://arm-{1-}", "'1-' is no number and no range"},
@@ -107,15 +107,11 @@ TEST(UrlPattern, WhatIsNoneIsRefusedWithTheReason) {
            Refused{"can://can0?node=0-7+serial:auto", "its paths lead to 8 and to 1 boards"},
            Refused{"serial:auto+udp://arm-{1-3}", "its paths lead to 1 and to 3 boards"},
        }) {
-    try {
-      expand_urls(pattern);
-      ADD_FAILURE() << pattern;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.kind(), ErrorKind::usage) << pattern;
-      EXPECT_EQ(error.problem().reason, reason) << pattern;
-    }
+    const Problem problem = problem_of([&] { expand_urls(each.pattern); });
+    EXPECT_EQ(problem.kind, ErrorKind::usage) << each.pattern;
+    EXPECT_EQ(problem.reason, each.reason) << each.pattern;
   }
 }
 
 }  // namespace
-}  // namespace r4
+}  // namespace r4::test

@@ -49,7 +49,7 @@ TEST_F(WritableWaitTest, CallsOnceWhenThereIsRoom) {
   EXPECT_EQ(calls, 1);
 }
 
-TEST_F(WritableWaitTest, CallsNobodyAfterStop) {
+TEST_F(WritableWaitTest, DoesNotCallAfterStop) {
   WritableWait wait(io);
   wait.start(writer.get(), [this] { ++calls; });
   wait.stop();
@@ -57,7 +57,6 @@ TEST_F(WritableWaitTest, CallsNobodyAfterStop) {
   EXPECT_EQ(calls, 0);
 }
 
-// Who waits must not wait for ever because the process has no descriptor left to wait on.
 TEST_F(WritableWaitTest, CallsAlsoWhenThereIsNoDescriptorLeftToWaitOn) {
   WritableWait wait(io);
   rlimit before{};

@@ -47,16 +47,9 @@ SendResult BusStops::repeat(std::uint32_t number) {
 
 SendResult BusStops::send_first(const CanFrame& frame) {
   if (socket_.number() < 0) return SendResult::down;
-  switch (socket_.send_first(frame)) {
-    case CanSocket::Outcome::done:
-      return SendResult::sent;
-    case CanSocket::Outcome::busy:
-    case CanSocket::Outcome::full:
-      return SendResult::full;
-    case CanSocket::Outcome::failed:
-      break;
-  }
-  return SendResult::down;
+  const CanSocket::Outcome outcome = socket_.send_first(frame);
+  if (outcome == CanSocket::Outcome::done) return SendResult::sent;
+  return outcome == CanSocket::Outcome::failed ? SendResult::down : SendResult::full;
 }
 
 }  // namespace r4

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The emergency stop of a CAN bus, which every board of the bus obeys. Its frames overtake all frames that wait in the
-// queue of the interface. CanBus owns one object, so that several members press one stop.
+// The emergency stop of a CAN bus, which every board of the bus obeys. Its frames overtake all
+// frames that wait in the queue of the interface. CanBus owns one object, so that several members
+// press one stop.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -19,8 +20,8 @@ class BusStops {
  public:
   // The shortest time between two frames with the same number.
   static constexpr std::chrono::milliseconds spacing{10};
-  // Announcements within this time share a number. It is shorter than the time for which a host repeats a
-  // confirmed stop, so a host that clears the stop meanwhile finds it pressed again.
+  // Announcements within this time share a number. It is shorter than the time for which a host
+  // repeats a confirmed stop, so a host that clears the stop meanwhile finds it pressed again.
   static constexpr std::chrono::milliseconds together{100};
 
   BusStops(asio::io_context& io, CanSocket& socket);
@@ -29,8 +30,8 @@ class BusStops {
   // takes each such frame for a new stop.
   SendResult send_bare();
   // Sends the bare frame of a stop that is to be confirmed, and sets `number` for repeat(). Members
-  // that announce a stop in one turn of the loop, within `together`, get one number, and one bare frame
-  // is sent. A member whose own earlier stop (`own`) has that number gets a new number.
+  // that announce a stop in one turn of the loop, within `together`, get one number, and one bare
+  // frame is sent. A member whose own earlier stop (`own`) has that number gets a new number.
   SendResult announce(const StopNumbers& own, std::uint32_t& number);
   // Sends the frame with that number, if it was not sent within `spacing`.
   SendResult repeat(std::uint32_t number);

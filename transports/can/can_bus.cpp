@@ -5,7 +5,6 @@
 #include <linux/can/error.h>
 #include <sched.h>
 
-#include <algorithm>
 #include <asio/defer.hpp>
 #include <asio/post.hpp>
 #include <cerrno>
@@ -21,10 +20,10 @@ namespace {
 
 constexpr const char* check_the_wire = "check wiring, termination and bit rate";
 constexpr std::chrono::milliseconds look_interval{100};
-constexpr int most_looks = 8;  // others of the loop wait
-// What a program on an emulated processor takes to answer.
+constexpr int most_looks = 8;  // then the other work of the loop has its turn
+// The time that a program on an emulated processor takes to answer.
 constexpr std::chrono::microseconds most_polling{400};
-// Then the loop sleeps if nothing is there: who calls its poll() gets back.
+// After that the loop may sleep, so that a caller of its poll() gets control back.
 constexpr std::chrono::milliseconds most_awake{10};
 
 Problem filter_problem(const std::string& interface, int error) {
@@ -105,22 +104,22 @@ bool CanBus::has(const Member* member) const {
                      [member](const Place& place) { return place.member == member; });
 }
 
-// Not while somebody goes through them.
+// Not while a loop over them runs.
 void CanBus::clear_places() {
   if (calling_ != 0 || sending_) return;
   if (std::erase_if(members_, [](const Place& place) { return place.member == nullptr; }) != 0)
     hear();
 }
 
-// A bus that hears less than its members think is down. They are told from the loop, for one of them
-// may just be joining or leaving.
+// A bus that hears less than its members asked for is down. The loop reports that later, because a
+// member may just be joining or leaving.
 void CanBus::hear() {
   if (socket_.number() < 0 || set_filters()) return;
   asio::post(io_, deafness_.handler(
                       [this, error = errno] { go_down(filter_problem(interface_, error), true); }));
 }
 
-// False: the kernel does not take them; errno tells why.
+// False, with errno, if the kernel does not take them.
 bool CanBus::set_filters() {
   std::vector<std::uint32_t> ids;
   for (const Place& place : members_) {
@@ -199,7 +198,7 @@ void CanBus::hand_over(std::size_t count) {
       // A frame of another node proves that this node is on the bus.
       if (!up() || trouble_ == Trouble::not_acknowledged) come_up();
     } else if (!up() && classify(in_[i].frame).kind != CanIdKind::emergency_stop) {
-      continue;  // it did not get to the bus
+      continue;  // it did not reach the bus
     }
     const std::uint32_t at_us = to_us(in_[i].at);
     for_each_member([&](Member& member) { member.on_frame(in_[i].frame, at_us); });
@@ -225,7 +224,7 @@ void CanBus::on_error_frame(const CanSocket::Received& received) {
   }
 }
 
-// An error frame comes when the state changes; who opens the socket later asks.
+// Error frames report changes of the state only, so a new socket asks for it.
 void CanBus::look_at_controller() {
   const std::string state = can_interface(interface_).state;
   if (state == "bus-off") return go_bus_off();
@@ -274,7 +273,7 @@ void CanBus::go_down(Problem problem, bool reopen) {
   be_down(std::move(problem));
 }
 
-// What keeps it down may change: it was bus-off or down, and now its adapter is gone.
+// The reason may change while the bus is down: it was bus-off, and now its adapter is gone.
 void CanBus::be_down(Problem problem) {
   const bool was_up = std::exchange(trouble_, Trouble::down) != Trouble::down;
   if (!was_up && standing_ && standing_->problem.reason == problem.reason) return;
@@ -282,7 +281,7 @@ void CanBus::be_down(Problem problem) {
   tell({was_up ? CarrierEvent::Kind::down : CarrierEvent::Kind::warning, std::move(problem)});
 }
 
-// Also when nothing was wrong but a warning.
+// Also ends a warning of a bus that is up.
 void CanBus::come_up() {
   const Trouble before = std::exchange(trouble_, Trouble::none);
   standing_.reset();
@@ -298,7 +297,7 @@ void CanBus::look_later() {
   look_timer_.async_wait(looking_.handler([this] { look(); }));
 }
 
-// Opened anew: the interface may be another one of the same name.
+// Opens a new socket: the interface may be another one of the same name.
 void CanBus::look() {
   const std::shared_ptr<CanBus> alive = shared_from_this();
   try {
@@ -314,7 +313,7 @@ void CanBus::look() {
   look_at_controller();
 }
 
-void CanBus::tell(CarrierEvent event) {  // a copy: it may be over before all know
+void CanBus::tell(CarrierEvent event) {  // a copy: standing_ may change in a call
   for_each_member([&](Member& member) { member.on_bus(event); });
 }
 

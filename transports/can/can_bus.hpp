@@ -2,12 +2,12 @@
 // One CAN interface, shared by everything in an event loop that uses it: one socket with kernel
 // filters for the ids in use, frames read and written in batches, and its state as events.
 //
-// Each member hears all frames that any of them asked for, but none that a member sent. Frames
-// leave in the order in which members offer them; a member's transfer is not interrupted by
-// another's. At most `ahead` frames are taken from members at a time, the next when the interface has
-// them; after 100 ms without progress they are dropped.
+// Each member hears every frame that any member asked for, except the frames that members send.
+// Frames leave in the order in which members offer them; a member's transfer is not interrupted by
+// the transfer of another member. At most `ahead` frames are taken from members at a time, and the
+// next ones when the interface has taken these. After 100 ms without progress they are dropped.
 //
-// On a bus without a wire (vcan, vxcan) it stays awake for what is about to come.
+// On a bus without a wire (vcan, vxcan) it polls for a short time instead of sleeping.
 #pragma once
 
 #include <algorithm>
@@ -30,8 +30,8 @@
 
 namespace r4 {
 
-// It has more than 15 members and 40 functions: one socket with its timers and waits, the frames that wait
-// for it, and the members change together with every frame.
+// It has more than 15 members and 40 functions: one socket with its timers and waits, the frames
+// that wait for it, and the members change together with every frame.
 class CanBus : public std::enable_shared_from_this<CanBus> {
  public:
   using Clock = CanSocket::Clock;
@@ -41,37 +41,34 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   class Member {
    public:
     virtual void on_frame(const CanFrame& frame, std::uint32_t at_us) = 0;
-    virtual void on_drained() = 0;  // all frames that had arrived were handed over
-    // Is in the middle of a transfer whose next frame is another's, and may come at once.
+    virtual void on_drained() {}  // all frames that had arrived were handed over
+    // True in the middle of a transfer whose next frame comes from the other end, perhaps at once.
     virtual bool awaits_frame() const { return false; }
-    // The frame to send now, accepted with frame_sent().
-    virtual bool offer(std::uint32_t now_us, CanFrame& frame) = 0;
-    // The same, of those that may overtake what was accepted before.
-    virtual bool offer_urgent(std::uint32_t now_us, CanFrame& frame) = 0;
-    virtual void frame_sent(std::uint32_t now_us) = 0;
-    // That frame of its waited for the interface, and has got there.
-    virtual void on_late_frame(const CanFrame& frame, std::uint32_t now_us) {
-      static_cast<void>(frame);
-      static_cast<void>(now_us);
-    }
-    virtual void on_sent() = 0;  // all was asked for what they offer: time to set a timer
+    // True if there is a frame to send now. The bus accepts it with frame_sent().
+    virtual bool offer(std::uint32_t, CanFrame&) { return false; }
+    // The same for a frame that may overtake the frames that were accepted before.
+    virtual bool offer_urgent(std::uint32_t, CanFrame&) { return false; }
+    virtual void frame_sent(std::uint32_t) {}
+    // A frame of this member had to wait, and the interface has taken it now.
+    virtual void on_late_frame(const CanFrame&, std::uint32_t) {}
+    virtual void on_sent() {}  // all members were asked for frames: time to set a timer
     // The bus came up or went down (transfers are over), or the controller is in trouble.
     virtual void on_bus(const CarrierEvent& event) = 0;
-    // The bus took nothing for too long: what was under way is lost.
-    virtual void on_stuck() = 0;
+    // The bus took nothing for too long: the frames that waited are lost.
+    virtual void on_stuck() {}
 
    protected:
     ~Member() = default;
   };
 
-  // Microseconds of the clock that members are driven by; wraps.
+  // Microseconds of the clock of members; wraps.
   static std::uint32_t to_us(Clock::time_point at) {
     return static_cast<std::uint32_t>(
         std::chrono::duration_cast<std::chrono::microseconds>(at.time_since_epoch()).count());
   }
   static std::uint32_t now_us() { return to_us(Clock::now()); }
 
-  // The bus of that interface in this event loop, opened if nobody has yet. Throws Error.
+  // The bus of that interface in this event loop; opens it if it is not open. Throws Error.
   static std::shared_ptr<CanBus> of(asio::io_context& io, const std::string& interface, bool fd);
 
   CanBus(asio::io_context& io, std::string interface, bool fd);
@@ -88,25 +85,25 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
 
   // Members have something to offer.
   void send();
-  // Hands over the frames that have arrived. Before somebody gives up waiting for one: a loop that
-  // was held up may find the time-out and the frame together. True if there were any.
+  // Hands over the frames that have arrived. To be called before a time-out has an effect: a loop
+  // that was held up may find the time-out and the frame together. True if there were any.
   bool take();
   BusStops& stops() { return stops_; }
 
   bool up() const { return trouble_ != Trouble::down; }
-  // What was told of last, if that is still so: for who has joined since.
+  // The newest event while it is still true: for a member that has joined since.
   const std::optional<CarrierEvent>& standing() const { return standing_; }
-  // Frames wait for the interface. None is asked for until it has taken them.
+  // True if frames wait for the interface. Members are asked again when it has taken all of them.
   bool full() const { return out_count_ != 0; }
-  // Does one of them fulfil it?
+  // True if one of these frames fulfils it.
   template <class Predicate>
   bool holds(Predicate predicate) const {
     const auto end = out_.begin() + static_cast<std::ptrdiff_t>(out_count_);
     return std::any_of(out_.begin(), end, predicate);
   }
   bool heard_rate_switch() const { return socket_.heard_rate_switch(); }
-  // Frames that were dropped, for nobody took them in time: by the kernel, and times that the
-  // controller told of some.
+  // Frames that the kernel dropped because this program did not take them in time, plus the number
+  // of overflows that the controller reported.
   std::uint32_t overflows() const { return socket_.overflows() + controller_overflows_; }
 
  private:
@@ -155,18 +152,18 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   OperationSlot retrying_;
   LoopTimer look_timer_;
   OperationSlot looking_;
-  OperationSlot deafness_;  // the kernel has refused our filters: it will be told
+  OperationSlot deafness_;  // the report that the kernel has refused the filters
 
   std::vector<Place> members_;
-  std::size_t next_ = 0;  // whose turn it is
+  std::size_t next_ = 0;  // the place of the member whose turn it is
   int calling_ = 0;       // members are being called: their places stay
   bool sending_ = false;
   bool receiving_ = false;
   AdaptivePolling polling_;
-  Clock::time_point woken_;  // when it slept last, and was
+  Clock::time_point woken_;  // when the loop last woke it
   std::array<CanFrame, ahead> out_;
-  std::array<Member*, ahead> out_of_{};  // whose frame it is; null: has left
-  bool late_ = false;                    // they have been refused once
+  std::array<Member*, ahead> out_of_{};  // the member that offered the frame; null: has left
+  bool late_ = false;                    // the interface has refused them once
   std::size_t out_count_ = 0;
   Clock::time_point progress_;
 
@@ -176,7 +173,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   std::array<CanSocket::Received, CanSocket::batch> in_;
 };
 
-// Members may leave, and others join, in any call of theirs: those come later than what is told.
+// Members may leave and join in any call. A member that joins is not called with this event.
 template <class Action>
 void CanBus::for_each_member(Action action) {
   ++calling_;

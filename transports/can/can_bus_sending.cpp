@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How the members of a bus send.
+// The sending part of CanBus.
 #include <algorithm>
 #include <asio/post.hpp>
 #include <cerrno>
@@ -14,8 +14,8 @@ constexpr std::chrono::milliseconds retry_interval{1};
 
 }  // namespace
 
-// Flow control behind a whole datagram of telemetry would come too late on a slow bus. What finds no
-// room is offered again with the rest.
+// On a slow bus, flow control that waits for a whole datagram of telemetry would come too late. A
+// frame that finds no room is offered again by offer().
 void CanBus::send_urgent(std::uint32_t now_us) {
   CanFrame frame;
   for (const Place& place : members_) {
@@ -26,8 +26,9 @@ void CanBus::send_urgent(std::uint32_t now_us) {
   }
 }
 
-// Takes what members offer, a transfer of one after the other. True if there is any. Not while some
-// are left: of what waits longer, members choose the newest.
+// Takes frames from members, one member's transfer after the other. True if there are any. Not
+// called while frames are left: the longer a member keeps its datagrams, the newer is the one that
+// it sends.
 bool CanBus::refill(std::uint32_t now_us) {
   std::size_t quiet = 0;
   while (out_count_ < ahead && quiet < members_.size()) {
@@ -45,7 +46,7 @@ bool CanBus::refill(std::uint32_t now_us) {
   return out_count_ != 0;
 }
 
-// The first ones of the queue have got to the interface.
+// The interface has taken the first `count` frames of the queue.
 void CanBus::have_left(std::size_t count) {
   if (count != 0) progress_ = Clock::now();
   for (std::size_t i = 0; late_ && i < count; ++i) {
@@ -90,7 +91,8 @@ void CanBus::send() {
   for_each_member([](Member& member) { member.on_sent(); });
 }
 
-// A socket that is writable tells so; a full interface queue does not.
+// The system reports a writable socket, but not room in the queue of the interface: hence the
+// timer.
 void CanBus::send_later() {
   if (Clock::now() - progress_ > patience) {
     drop_queue();

@@ -21,7 +21,7 @@
 #include "can_interface.hpp"
 #include "can_trouble.hpp"
 #include "can_turn.hpp"
-#include "overheard_commands.hpp"
+#include "overheard_lane.hpp"
 #include "r4link/command.hpp"
 
 namespace r4 {
@@ -31,7 +31,7 @@ constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;  // newest wins
 constexpr std::uint32_t look_again_us = 20000;
 
-// It has more than 15 members: six are what its URL says, four the timer with what Asio wants kept for it.
+// It has more than 15 members: six are from its URL, and four are its timer.
 class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member {
  public:
   CanCarrier(asio::io_context& io, Url url, Role role);
@@ -55,7 +55,7 @@ class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member
   };
 
   void on_frame(const CanFrame& frame, std::uint32_t at_us) override;
-  void on_drained() override;
+  void on_drained() override { handler_->on_drained(); }
   bool awaits_frame() const override { return node_.awaits_frame(); }
   void on_sent() override { arm(); }
   bool offer(std::uint32_t now_us, CanFrame& frame) override;
@@ -84,12 +84,12 @@ class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member
   const Role role_;
   const std::uint8_t number_;
   const bool fd_;
-  const bool packs_;  // a host; a board is told by its setting
+  const bool packs_;  // of a host; a board follows its setting
   const std::string name_;
   CanNode node_;
   CanTurn turn_{std::random_device{}()};  // of a host
-  OverheardCommands others_;              // to the same board
-  mutable CarrierCounters counters_;      // what others count is put in when it is asked for
+  OverheardLane others_;                  // commands of other hosts to the same board
+  mutable CarrierCounters counters_;      // counters() adds the counts of node_ and bus_
   std::array<Lane, 2> lanes_;
   std::shared_ptr<CanBus> bus_;
   StopNumbers stops_;   // of a host
@@ -101,7 +101,7 @@ class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member
   std::uint32_t armed_for_us_ = 0;
 };
 
-// Whether a board packs is its setting, not its URL's.
+// A board's setting says whether it packs, not its URL.
 std::uint8_t node_of(const Url& url, Role role) {
   url.allow_only(role == Role::host ? "node fd pack" : "node fd");
   can_interface_of(url);
@@ -118,7 +118,7 @@ CanCarrier::CanCarrier(asio::io_context& io, Url url, Role role)
       name_(fmt::format("can://{}?node={}{}{}", url_.host(), number_, fd_ ? "&fd=1" : "",
                         role == Role::board || packs_ ? "" : "&pack=0")),
       node_(role == Role::board ? CanEnd::board : CanEnd::host, number_, fd_),
-      others_(number_),
+      others_(CanIdKind::command, number_),
       lanes_{
           Lane{CanLane::dialogue, SendQueue(normal_entries, state_entries, counters_.tx_dropped)},
           Lane{CanLane::telemetry, SendQueue(normal_entries, state_entries, counters_.tx_dropped)}},
@@ -196,8 +196,8 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
   return result;
 }
 
-// Only the frame with its number is repeated: to a board a bare frame is a new stop each time, and
-// who has seen the one would have to look again before they clear it.
+// Only the frame with its number is repeated. To a board each bare frame is a new stop, so a host
+// could not clear the stop that it has seen.
 SendResult CanCarrier::send_stop(std::string_view bytes) {
   Datagram stop;
   std::uint32_t pnum = 0;
@@ -221,8 +221,8 @@ bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
   return true;
 }
 
-// By a frame that is the same whoever sends it, so that it collides with nobody's; where the board is, and no
-// host for whom it streams anyway.
+// All watchers send the same frame, so that it does not collide. Without a board a lease has no
+// effect, and for a host the board streams anyway.
 SendResult CanCarrier::send_lease() {
   const Clock::time_point now = Clock::now();
   if (!trouble_.hears_board(now) || trouble_.hears_host(now)) return SendResult::down;
@@ -231,31 +231,25 @@ SendResult CanCarrier::send_lease() {
   return SendResult::sent;
 }
 
-// Our board, and what another host sends to it: commands; its flow control is the same as ours. Frames of other boards
-// come, too, where their hosts have this bus.
+// Notes frames of this board, and commands of other hosts to it. The flow control of another host
+// is the same as that of this host, so it tells nothing. Frames of other boards come because the
+// hosts of a program share the bus.
 void CanCarrier::listen_for_others(const CanFrame& frame) {
   const CanIdMeaning meaning = classify(frame);
   if (role_ != Role::host || meaning.node != number_) return;
   const Clock::time_point now = Clock::now();
-  switch (meaning.kind) {
-    case CanIdKind::went_safe:
-    case CanIdKind::reply:
-    case CanIdKind::telemetry:
-      trouble_.on_board(now);
-      return;
-    case CanIdKind::command:
-      break;
-    default:
-      return;
+  if (meaning.kind == CanIdKind::went_safe || meaning.kind == CanIdKind::reply ||
+      meaning.kind == CanIdKind::telemetry) {
+    return trouble_.on_board(now);
   }
-  if (isotp_frame::is_flow_control(frame)) return;
+  if (meaning.kind != CanIdKind::command || isotp_frame::is_flow_control(frame)) return;
   trouble_.on_host_frame(now);
   if (!turn_.on_other(now)) return;
   node_.stop_commanding();
   lane(CanLane::dialogue).queue.clear();
 }
 
-// Both directions of the dialogue take flow control.
+// In both directions of the dialogue there is flow control.
 void CanCarrier::count_late_transfers() {
   const std::uint64_t count = std::uint64_t{node_.sent(CanLane::dialogue).flow_control_timeout} +
                               node_.received(CanLane::dialogue).consecutive_timeout;
@@ -286,14 +280,11 @@ bool CanCarrier::offer(std::uint32_t now_us, CanFrame& frame) {
 void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
   listen_for_others(frame);
   if (role_ == Role::host && classify(frame).kind == CanIdKind::command) {
-    const std::string_view command = others_.on_frame(frame, at_us);
-    if (command.empty()) return;
+    const std::optional<Text> command = others_.on_frame(frame, at_us);
+    if (!command || command->empty()) return;
     Datagram whole;
-    if (read_datagram(Text(command.data(), command.size()), whole)) {
-      trouble_.on_host_datagram(Clock::now());
-    }
-    handler_->on_overheard(command);
-    return;
+    if (read_datagram(*command, whole)) trouble_.on_host_datagram(Clock::now());
+    return handler_->on_overheard({command->data(), command->size()});
   }
   char room[max_datagram];
   const Text datagram = stops_.in_full(node_.on_frame(frame, at_us), room);
@@ -310,13 +301,12 @@ const CarrierCounters& CanCarrier::counters() const {
   return counters_;
 }
 
-void CanCarrier::on_drained() { handler_->on_drained(); }
-
 void CanCarrier::arm() {
   IsotpDeadline deadline = node_.deadline();
   if (handler_ == nullptr || !deadline.armed) return;
   const std::uint32_t now_us = CanBus::now_us();
-  // What is due to be sent waits for the bus, which asks for it; behind it something may time out.
+  // A frame that is due waits for the bus, which will ask for it. A later deadline may be a
+  // time-out.
   if (bus_->full() && reached(now_us, deadline.at_us)) deadline.at_us = now_us + look_again_us;
   if (armed_ && reached(deadline.at_us, armed_for_us_)) return;
   armed_ = true;
@@ -331,13 +321,13 @@ void CanCarrier::on_deadline() {
   const std::shared_ptr<CanBus> bus = bus_;
   const CanBus::Member* const self = this;
   bus->take();
-  if (!bus->has(self)) return;  // somebody who was told of a frame closed or destroyed this one
+  if (!bus->has(self)) return;  // a handler of a frame has closed or destroyed this carrier
   const std::uint32_t now_us = CanBus::now_us();
   const auto answerable = [this](const CanFrame& frame) { return node_.may_be_answered(frame); };
   if (bus->holds(answerable)) node_.wait_anew(now_us);
   node_.poll(now_us);
   count_late_transfers();
-  bus->send();  // also what others owe by now
+  bus->send();  // also frames of other members that are due by now
 }
 
 void CanCarrier::on_bus(const CarrierEvent& event) {
@@ -361,7 +351,8 @@ void CanCarrier::on_stuck() {
 
 }  // namespace
 
-std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role) {
+std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role,
+                                          const Claim&) {
   return std::make_unique<CanCarrier>(io, url, role);
 }
 

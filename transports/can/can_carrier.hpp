@@ -3,13 +3,13 @@
 // ISO-TP on SocketCAN, at either end. Many may share an interface.
 //
 //     node=N   the board's number on the bus, 0-31 (default 1)
-//     fd=1     sends CAN FD frames; received are both
-//     pack=0   a host sends text, and is answered so; else the packed form. Received are both. A board
-//              goes by its setting: C:pack,0
+//     fd=1     sends CAN FD frames; receives classic and FD frames
+//     pack=0   a host sends text, and gets text; else the packed form. Both forms are received. A
+//              board follows its setting: C:pack,0
 //
 // A stop (Priority::stop) of the host's end is the emergency frame, which stops every board on the
-// bus, ahead of all that waits. A lease (W) of who watches is a frame of its own, and only where the board is
-// heard and no host.
+// bus and overtakes all frames that wait. The lease (W) of a watcher is a frame of its own. It is
+// sent only while the board is heard and no host is.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -21,9 +21,10 @@
 
 namespace r4 {
 
-std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role);
+std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role,
+                                          const Claim& = {});
 
-// What programs that share the path call it: the interface and the board's number.
+// The name by which programs share the path: the interface and the board's number.
 ShareName can_share_name(const Url& url);
 
 }  // namespace r4

@@ -24,14 +24,13 @@
 #include "../file_descriptor.hpp"
 
 namespace r4 {
-
 namespace {
 
 using Netlink = std::unique_ptr<nl_sock, decltype(&nl_socket_free)>;
 using Link = std::unique_ptr<rtnl_link, decltype(&rtnl_link_put)>;
 using Links = std::unique_ptr<nl_cache, decltype(&nl_cache_free)>;
 
-// 0, or libnl's negative error: this system may not let us.
+// 0, or libnl's negative error.
 int connect(const Netlink& netlink) {
   return netlink ? nl_connect(netlink.get(), NETLINK_ROUTE) : -NLE_NOMEM;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the system knows of a CAN interface, and how it is brought up.
+// What the system knows of a CAN interface, and how to bring it up.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace r4 {
 
 struct CanInterface {
   std::string name;
-  std::string unknown;  // why the system tells nothing about it; empty: it does
+  std::string unknown;  // why the system reports nothing about it; empty: it reports the rest
   bool exists = false;
   bool is_can = false;
   bool up = false;
@@ -21,12 +21,12 @@ struct CanInterface {
   bool has_controller = false;  // with a bit rate and an error state; not vcan, vxcan
   int index = 0;
   std::uint32_t tx_queue = 0;  // frames that the kernel keeps for it
-  // What its controller says, as far as the driver tells.
+  // The state of its controller, as far as the driver reports it.
   std::string state;           // "error-active", "error-warning", … "stopped"; empty: not known
   std::uint32_t bit_rate = 0;  // bit/s, of FD the nominal one; 0: not known
   std::uint32_t data_bit_rate = 0;  // bit/s of FD's data phase; 0: not known
-  std::uint32_t restart_ms = 0;     // after a bus-off it begins again; 0: never
-  std::uint16_t tx_errors = 0;      // its error counters, 0 where it has none
+  std::uint32_t restart_ms = 0;     // how long after a bus-off it restarts; 0: never
+  std::uint16_t tx_errors = 0;      // its error counters, 0 without a controller
   std::uint16_t rx_errors = 0;
 };
 
@@ -35,7 +35,7 @@ CanInterface can_interface(const std::string& name);
 // The interface that can://INTERFACE names. Throws Error{usage} if the URL is of another form.
 const std::string& can_interface_of(const Url& url);
 
-// All of this machine, by name; none if the system does not tell.
+// All CAN interfaces of this computer, by name; none if the system does not report them.
 std::vector<CanInterface> list_can_interfaces();
 
 // What an errno of a socket on that interface means, with the fix where there is one.

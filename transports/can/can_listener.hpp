@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Listens to a CAN interface: every frame goes to a CanSurvey, and nothing is ever sent. What
-// becomes of the interface is told as it is to a carrier.
+// Listens to a CAN interface: every frame goes to a CanSurvey, and nothing is ever sent. It reports
+// the events of the interface as a carrier does.
 #pragma once
 
 #include <asio/io_context.hpp>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "can_bus.hpp"
+#include "can_interface.hpp"
 #include "can_survey.hpp"
 #include "r4link/carrier.hpp"
 
@@ -16,32 +19,34 @@ namespace r4 {
 
 class CanListener final : private CanBus::Member {
  public:
-  // `rate` is for the survey's sums. Throws Error, as a carrier does that is opened.
-  CanListener(asio::io_context& io, const std::string& interface, CanBitRate rate);
-  ~CanListener();
+  // `rate` is for the survey's sums. Throws Error, as a carrier's open() does.
+  CanListener(asio::io_context& io, const std::string& interface, CanBitRate rate)
+      : survey_(rate), bus_(CanBus::of(io, interface, can_interface(interface).fd)) {
+    bus_->join_all(*this);
+  }
+  ~CanListener() { bus_->leave(*this); }
   CanListener(const CanListener&) = delete;
   CanListener& operator=(const CanListener&) = delete;
 
   CanSurvey& survey() { return survey_; }
   const CanSurvey& survey() const { return survey_; }
-  // CAN FD frames came that switch their bit rate: the survey's sums need rate.data.
+  // True if CAN FD frames came that switch their bit rate: the survey's sums need rate.data.
   bool heard_rate_switch() const { return bus_->heard_rate_switch(); }
-  // Down, or warned of.
+  // True while the interface is down, or a warning stands.
   bool in_trouble() const { return bus_->standing().has_value(); }
-  // Also of what is the matter already.
-  void on_event(std::function<void(const CarrierEvent&)> callback);
+  // An event that is true already is reported at once.
+  void on_event(std::function<void(const CarrierEvent&)> callback) {
+    event_callback_ = std::move(callback);
+    if (const std::optional<CarrierEvent> standing = bus_->standing()) on_bus(*standing);
+  }
 
  private:
   void on_frame(const CanFrame& frame, std::uint32_t at_us) override {
     survey_.on_frame(frame, at_us);
   }
-  void on_drained() override {}
-  bool offer(std::uint32_t, CanFrame&) override { return false; }
-  bool offer_urgent(std::uint32_t, CanFrame&) override { return false; }
-  void frame_sent(std::uint32_t) override {}
-  void on_sent() override {}
-  void on_bus(const CarrierEvent& event) override;
-  void on_stuck() override {}
+  void on_bus(const CarrierEvent& event) override {
+    if (event_callback_) event_callback_(event);
+  }
 
   CanSurvey survey_;
   std::function<void(const CarrierEvent&)> event_callback_;

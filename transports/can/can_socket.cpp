@@ -23,13 +23,12 @@
 namespace r4 {
 namespace {
 
-// The kernel's queue takes an interface's frames in the order of their coming; what waits there can
-// be neither replaced nor overtaken. So a socket has few frames in it at a time: the kernel's least
-// buffer, about six.
+// Frames in the kernel's queue of an interface can be neither replaced nor overtaken. So a socket
+// keeps few frames there: the kernel's least buffer, about six.
 constexpr int least_send_buffer = 1;
 constexpr int receive_buffer = 1 << 20;
-constexpr int highest_priority =
-    6;  // of those that need no privilege; the first band of pfifo_fast
+// The highest priority without a privilege: the first band of pfifo_fast.
+constexpr int highest_priority = 6;
 
 template <class Value>
 bool set_option(int socket, int level, int name, const Value& value) {
@@ -43,7 +42,6 @@ bool set_option(int socket, int level, int name, const Value& value) {
 FileDescriptor open_socket(const std::string& interface, int index) {
   FileDescriptor socket(::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW));
   if (!socket) fail(interface, errno);
-  // Nothing is heard until somebody says what.
   if (::setsockopt(socket.get(), SOL_CAN_RAW, CAN_RAW_FILTER, nullptr, 0) != 0) {
     fail(interface, errno);
   }
@@ -88,7 +86,7 @@ constexpr std::size_t control_size =
 
 }  // namespace
 
-// Where recvmmsg() puts frames. The headers are made once: most calls take few frames.
+// The buffers of recvmmsg(). The headers are made once, because most calls take few frames.
 struct CanSocket::Inbox {
   struct Control {
     alignas(cmsghdr) char bytes[control_size];
@@ -113,7 +111,7 @@ CanSocket::~CanSocket() = default;
 
 void CanSocket::open(const std::string& interface, bool fd) {
   close();
-  // Which of the two is missing: CAN as such, or this interface.
+  // Tells a kernel without CAN from a missing interface.
   FileDescriptor probe(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW));
   if (!probe) fail(interface, errno);
   const CanInterface state = can_interface(interface);
@@ -154,9 +152,8 @@ void CanSocket::open(const std::string& interface, bool fd) {
              set_option(number, SOL_SOCKET, SO_SNDBUF, least_send_buffer) &&
              set_option(first.get(), SOL_SOCKET, SO_PRIORITY, highest_priority);
   if (!set) fail(interface, errno);
-  index_ = state.index;
   simulated_ = !state.has_controller;
-  overflows_before_ += std::exchange(overflows_, 0);  // the kernel counts anew
+  overflows_before_ += std::exchange(overflows_, 0);  // the kernel counts from 0 for each socket
   descriptor_ = std::move(socket);
   first_ = std::move(first);
 }
@@ -164,7 +161,6 @@ void CanSocket::open(const std::string& interface, bool fd) {
 void CanSocket::close() noexcept {
   descriptor_.reset();
   first_.reset();
-  index_ = 0;
 }
 
 bool CanSocket::hear(const std::vector<std::uint32_t>& ids) {
@@ -191,8 +187,8 @@ int CanSocket::receive(std::array<Received, batch>& frames) {
   const int count = ::recvmmsg(descriptor_.get(), messages.data(), batch, MSG_DONTWAIT, nullptr);
   if (count < 0) return -errno;
 
-  // The steady clock is read first. If this thread is held up between the two readings, frames are taken for
-  // older than they are, never for younger.
+  // The steady clock is read first. If this thread is held up between the two readings, frames
+  // appear older than they are, never younger.
   const Clock::time_point now = Clock::now();
   timespec real{};
   ::clock_gettime(CLOCK_REALTIME, &real);
@@ -243,7 +239,7 @@ CanSocket::Outcome CanSocket::send(const CanFrame* frames, std::size_t count, st
         ::sendmmsg(descriptor_.get(), messages.data(), static_cast<unsigned>(now), MSG_DONTWAIT);
     if (taken < 0) return outcome_of(errno);
     sent += static_cast<std::size_t>(taken);
-    // It tells why it stopped when it is asked for the next.
+    // If it took only a part, the next call reports why.
   }
   return Outcome::done;
 }

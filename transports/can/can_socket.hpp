@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A raw SocketCAN socket on one interface: frames in batches with the time at which they came, the
-// controller's error frames apart, and sends that never wait. What it hears is filtered in the
-// kernel.
+// controller's error frames apart, and sends that never wait. The kernel filters what it hears.
 #pragma once
 
 #include <array>
@@ -30,54 +29,52 @@ class CanSocket {
   struct Received {
     CanFrame frame;           // of an error frame, the data hold its details
     std::uint32_t error = 0;  // the error classes of <linux/can/error.h>; 0 in a data frame
-    bool local = false;       // sent on this machine: it tells nothing of the wire
+    bool local = false;       // sent on this computer: it proves nothing about the wire
     Clock::time_point at;     // when the kernel got it
   };
 
   enum class Outcome : std::uint8_t {
     done,    // everything was taken
     busy,    // the socket's share of the queue is used up: wait until it is writable
-    full,    // the interface's queue is full: nothing tells when it is not
-    failed,  // errno tells why
+    full,    // the interface's queue is full: the system does not report when it has room
+    failed,  // with errno
   };
 
-  // Opens it on `interface` with no id to hear. With `fd`, CAN FD frames can be sent. Throws Error:
-  // unsupported if this kernel has no CAN or there is no such interface, open if the interface is
-  // down, is not CAN or does not do CAN FD, permission.
+  // Opens it on `interface`; it hears nothing yet. With `fd`, CAN FD frames can be sent. Throws
+  // Error: unsupported if this kernel has no CAN or there is no such interface, open if the
+  // interface is down, is not CAN or does not do CAN FD, permission.
   void open(const std::string& interface, bool fd);
   void close() noexcept;
   int number() const { return descriptor_.get(); }
-  int interface_index() const { return index_; }
-  // No controller and no wire: frames come as fast as programs make them.
+  // True without a controller and a wire: frames come as fast as programs make them.
   bool simulated() const { return simulated_; }
-  // A CAN FD frame came whose data travelled at a bit rate of their own (BRS).
+  // True if a CAN FD frame came whose data have a bit rate of their own (BRS).
   bool heard_rate_switch() const { return heard_rate_switch_; }
 
-  // Hears the frames with exactly these 11-bit ids (and with the emergency stop's, those stops that have
-  // a number), or everything, extended and remote ones too.
-  // False, and it hears what it heard before: the kernel does not take that; errno tells why.
+  // Hears the frames with exactly these 11-bit ids (the id of the emergency stop includes the stops
+  // with a number), or everything, extended and remote frames too. False, with errno, if the kernel
+  // does not take that; then it hears what it heard before.
   [[nodiscard]] bool hear(const std::vector<std::uint32_t>& ids);
   [[nodiscard]] bool hear_everything();
 
   // Takes up to `batch` frames; returns how many, or -errno (EAGAIN: none is there).
   int receive(std::array<Received, batch>& frames);
-  // Hands frames over in order. `sent` tells how many were taken.
+  // Hands frames over in order. Sets `sent` to the number of frames that were taken.
   Outcome send(const CanFrame* frames, std::size_t count, std::size_t& sent);
   // Hands one frame over ahead of everything that waits in the interface's queue.
   Outcome send_first(const CanFrame& frame);
 
-  // Frames that came while the socket's buffer was full, since it was opened first.
+  // Frames that were lost because the socket's buffer was full, over all openings.
   std::uint32_t overflows() const { return overflows_before_ + overflows_; }
 
  private:
   struct Inbox;
   FileDescriptor descriptor_;
   FileDescriptor first_;  // with a priority and a queue of its own
-  int index_ = 0;
   bool simulated_ = false;
   bool heard_rate_switch_ = false;
   std::uint32_t overflows_ = 0;         // of this opening
-  std::uint32_t overflows_before_ = 0;  // of those before
+  std::uint32_t overflows_before_ = 0;  // of earlier openings
   const std::unique_ptr<Inbox> inbox_;
 };
 

@@ -4,23 +4,17 @@
 #include <utility>
 
 #include "../../protocol/messages/message.hpp"
-#include "../framing/can/can_node.hpp"
-#include "../framing/can/isotp_receiver.hpp"
-#include "../framing/can/packed_form.hpp"
-#include "overheard_commands.hpp"
+#include "overheard_lane.hpp"
 
 namespace r4 {
 
-// What a board sends, heard by receivers that never answer.
 struct CanSurvey::Lanes {
   explicit Lanes(std::uint8_t node)
-      : telemetry(listening_to(CanIdKind::telemetry, node), telemetry_bytes.data(), max_datagram),
-        replies(listening_to(CanIdKind::reply, node), reply_bytes.data(), max_datagram),
-        commands(node) {}
+      : telemetry(CanIdKind::telemetry, node),
+        replies(CanIdKind::reply, node),
+        commands(CanIdKind::command, node) {}
 
-  std::array<std::uint8_t, max_datagram> telemetry_bytes, reply_bytes;
-  IsotpReceiver telemetry, replies;
-  OverheardCommands commands;
+  OverheardLane telemetry, replies, commands;
   PacketTracker packets;
 };
 
@@ -47,6 +41,7 @@ void CanSurvey::on_frame(const CanFrame& frame, std::uint32_t at_us) {
   switch (meaning.kind) {
     case CanIdKind::telemetry:
     case CanIdKind::reply:
+    case CanIdKind::command:
       return receive(meaning.node, frame, meaning.kind, at_us);
     case CanIdKind::went_safe:
       if (frame.size != 0) boards_[meaning.node].reason = to_safe_reason(frame.data[0]);
@@ -54,8 +49,6 @@ void CanSurvey::on_frame(const CanFrame& frame, std::uint32_t at_us) {
     case CanIdKind::emergency_stop:
       if (stop_callback_) stop_callback_();
       return;
-    case CanIdKind::command:
-      return receive_command(meaning.node, frame, at_us);
     case CanIdKind::watch:
     case CanIdKind::other:
       return;
@@ -64,32 +57,9 @@ void CanSurvey::on_frame(const CanFrame& frame, std::uint32_t at_us) {
 
 bool CanSurvey::is_r4(std::uint32_t id) const {
   const CanIdMeaning meaning = classify(id);
-  switch (meaning.kind) {
-    case CanIdKind::emergency_stop:
-      return true;
-    case CanIdKind::command:
-      return board(meaning.node).commands != 0;
-    case CanIdKind::went_safe:
-    case CanIdKind::reply:
-    case CanIdKind::telemetry:
-    case CanIdKind::watch:
-      return board(meaning.node).sends_datagrams();
-    case CanIdKind::other:
-      break;
-  }
-  return false;
-}
-
-CanSurvey::Lanes& CanSurvey::lanes(std::uint8_t node) {
-  std::unique_ptr<Lanes>& lanes = lanes_[node];
-  if (!lanes) lanes = std::make_unique<Lanes>(node);
-  return *lanes;
-}
-
-void CanSurvey::receive_command(std::uint8_t node, const CanFrame& frame, std::uint32_t at_us) {
-  const std::string_view bytes = lanes(node).commands.on_frame(frame, at_us);
-  Datagram datagram;
-  if (read_datagram(Text(bytes.data(), bytes.size()), datagram)) ++boards_[node].commands;
+  if (meaning.kind == CanIdKind::command) return board(meaning.node).commands != 0;
+  return meaning.kind == CanIdKind::emergency_stop ||
+         (meaning.kind != CanIdKind::other && board(meaning.node).sends_datagrams());
 }
 
 void CanSurvey::count(const CanFrame& frame) {
@@ -104,17 +74,20 @@ void CanSurvey::count(const CanFrame& frame) {
 
 void CanSurvey::receive(std::uint8_t node, const CanFrame& frame, CanIdKind kind,
                         std::uint32_t at_us) {
-  Lanes& own = lanes(node);
-  IsotpReceiver& receiver = kind == CanIdKind::reply ? own.replies : own.telemetry;
-  const std::uint64_t before = errors(receiver.counters());
-  const bool complete = receiver.on_frame(frame, at_us).datagram;
-  boards_[node].damaged += errors(receiver.counters()) - before;
-  if (!complete) return;
-  const std::uint8_t* const bytes = receiver.data();
-  if (!is_packed(bytes[0])) return take(node, receiver.text(), at_us);
-  std::array<char, max_datagram> plain;
-  const UnpackResult result = unpack(bytes, receiver.size(), plain.data(), plain.size());
-  take(node, result ? Text(plain.data(), result.size) : Text(), at_us);
+  if (!lanes_[node]) lanes_[node] = std::make_unique<Lanes>(node);
+  Lanes& own = *lanes_[node];
+  OverheardLane& lane = kind == CanIdKind::command ? own.commands
+                        : kind == CanIdKind::reply ? own.replies
+                                                   : own.telemetry;
+  const std::uint64_t before = errors(lane.counters());
+  const std::optional<Text> bytes = lane.on_frame(frame, at_us);
+  if (kind == CanIdKind::command) {
+    Datagram datagram;
+    if (bytes && read_datagram(*bytes, datagram)) ++boards_[node].commands;
+    return;
+  }
+  boards_[node].damaged += errors(lane.counters()) - before;
+  if (bytes) take(node, *bytes, at_us);
 }
 
 void CanSurvey::take(std::uint8_t node, Text bytes, std::uint32_t at_us) {
@@ -130,13 +103,14 @@ void CanSurvey::take(std::uint8_t node, Text bytes, std::uint32_t at_us) {
   switch (kind_of(datagram)) {
     case MessageKind::state:
       ++board.states;
-      // Who watches has a board stream that has no host: its heartbeats tell.
+      // A watcher lets a board without a host stream states, too. Then its heartbeats are not
+      // numbered.
       if (board.heartbeats == 0) board.connected = true;
       break;
     case MessageKind::board_heartbeat:
       ++board.heartbeats;
       board.reason = heartbeat_reason(datagram);
-      // Without a host they are all the same (docs/protocol.md).
+      // Without a host all heartbeats are the same (docs/protocol.md).
       board.connected = datagram.pnum() != 0 || datagram.time_ms() != 0;
       break;
     case MessageKind::nack:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which boards are on a CAN bus, what they say, and how full it is: from its frames alone. Nothing
+// The boards on a CAN bus, their datagrams, and the load of the bus: from its frames alone. Nothing
 // is ever sent, so it may be used beside hosts that drive.
 //
 //     CanSurvey survey({1000000, 0});
@@ -7,7 +7,8 @@
 //     survey.on_frame(frame, at_us);         // every frame of the bus, see CanListener
 //     survey.board(3).states; survey.traffic(); survey.busy_ns();
 //
-// No I/O, no clock. Memory is bounded: 32 nodes, at most 2048 ids of 11 bits and all others as one.
+// No I/O, no clock. Memory is bounded: 32 nodes, at most 2048 ids of 11 bits, and all longer ids as
+// one.
 #pragma once
 
 #include <array>
@@ -25,17 +26,17 @@
 
 namespace r4 {
 
-// What was heard of a node, since it was heard first.
+// Counts of a node, and its newest values.
 struct HeardBoard {
   std::uint64_t states = 0;
   std::uint64_t heartbeats = 0;
   std::uint64_t answers = 0;             // N and I
-  std::uint64_t commands = 0;            // of its hosts, heartbeats too; the rest is the board's
-  std::uint64_t damaged = 0;             // transfers that failed, and datagrams that are none
-  std::uint32_t lost = 0;                // numbers that never came
+  std::uint64_t commands = 0;            // of its hosts, heartbeats too
+  std::uint64_t damaged = 0;             // failed transfers, and invalid datagrams
+  std::uint32_t lost = 0;                // packet numbers that never came
   std::uint64_t t_ms = 0;                // T of the newest datagram, by the board's clock
-  std::uint32_t pnum = 0;                // its number
-  std::uint32_t heard_us = 0;            // when, by ours
+  std::uint32_t pnum = 0;                // packet number of the newest datagram
+  std::uint32_t heard_us = 0;            // when it came, by the clock of on_frame()
   SafeReason reason = SafeReason::none;  // of the newest heartbeat or went-safe frame
   bool connected = false;                // it has a host: it sends states, or numbered heartbeats
 
@@ -47,12 +48,12 @@ struct HeardBoard {
 struct CanTraffic {
   std::uint64_t frames = 0;
   std::uint64_t bits = 0;     // stuff bits and intermission included
-  std::uint64_t busy_ns = 0;  // that the bus was taken
+  std::uint64_t busy_ns = 0;  // for which they occupied the bus
 };
 
 class CanSurvey {
  public:
-  // All ids that are none of 11 bits count as this one.
+  // All ids of 29 bits count as this one.
   static constexpr std::uint32_t extended_ids = max_can_id + 1;
 
   // With rate.data 0, FD frames count as not switching their rate.
@@ -61,7 +62,7 @@ class CanSurvey {
   CanSurvey(const CanSurvey&) = delete;
   CanSurvey& operator=(const CanSurvey&) = delete;
 
-  // A board's datagram (plain form, its CRC good), or an emergency stop of a host.
+  // A board's datagram (plain form, its CRC is right), or an emergency stop of a host.
   void on_datagram(std::function<void(std::uint8_t node, const Datagram&)> callback);
   void on_stop(std::function<void()> callback);
 
@@ -79,8 +80,6 @@ class CanSurvey {
 
   void count(const CanFrame& frame);
   void receive(std::uint8_t node, const CanFrame& frame, CanIdKind kind, std::uint32_t at_us);
-  void receive_command(std::uint8_t node, const CanFrame& frame, std::uint32_t at_us);
-  Lanes& lanes(std::uint8_t node);
   void take(std::uint8_t node, Text bytes, std::uint32_t at_us);
 
   const CanBitRate rate_;

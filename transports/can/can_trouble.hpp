@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a host hears on a CAN bus beside its own transfers: its board, other hosts, and why
+// What a host hears on a CAN bus besides its own transfers: its board, other hosts, and why
 // datagrams do not pass although the bus is up. Without I/O.
 //
-//     foreign frames   frames come on the board's command id for host_completes, and none of them
-//                      has ended a datagram of a host, which sends ten heartbeats a second: another
+//     foreign frames   frames have come on the board's command id for host_completes, and none of
+//                      them has ended a datagram. A host sends ten heartbeats a second, so another
 //                      protocol uses the id. A host that pauses or ends sends no frames meanwhile
 //     late frames      late_transfers transfers within late_within were not answered in time (N_Bs,
 //                      N_Cr), while the board is heard: frames are held back, or lost
@@ -25,19 +25,19 @@ class CanTrouble {
   static constexpr Duration board_silence{3000};  // six heartbeats of a board
   static constexpr Duration host_silence{300};    // three of a host
   static constexpr Duration host_completes{500};  // five heartbeats of a host
-  static constexpr Duration frames_over{1000};    // after that, frames begin anew
+  static constexpr Duration frames_over{1000};    // the pause after which frames are new ones
   static constexpr std::size_t late_transfers = 3;
   static constexpr Duration late_within{2000};
 
   void on_board(Time now) { board_heard_ = now; }
-  // A frame on the board's command id that is not ours.
+  // A frame on the board's command id that this host did not send.
   void on_host_frame(Time now) {
     if (now - host_heard_ > frames_over || !incomplete()) frames_since_ = now;
     host_heard_ = now;
   }
   // Such frames have made a datagram.
   void on_host_datagram(Time now) { host_completed_ = now; }
-  // How many transfers were not answered in time, since the beginning.
+  // `count`: all transfers that were not answered in time.
   void on_late(std::uint64_t count, Time now) {
     for (; late_count_ < count; ++late_count_) late_[place(late_count_)] = now;
   }
@@ -66,7 +66,7 @@ class CanTrouble {
            host_heard_ - frames_since_ >= host_completes;
   }
 
-  // When they were heard last; long ago.
+  // The newest times; at first long ago.
   Time board_heard_;
   Time host_heard_;
   Time host_completed_;

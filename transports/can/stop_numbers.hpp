@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The numbers by which a bus carries the stops of one host. A stop is confirmed by its packet
-// number, which has 32 bits; the frame on the bus carries a number of 18 bits, which a board tells
-// in the field STOP of its heartbeats. Here a heartbeat that was heard gets back the number that
-// the host knows.
+// number, which has 32 bits. The frame on the bus carries a number of 18 bits, which a board
+// reports in the field STOP of its heartbeats. in_full() puts the packet number back into such a
+// heartbeat.
 //
 // The newest 16 stops are known, as many as a session repeats at a time.
 #pragma once
@@ -19,15 +19,16 @@ class StopNumbers {
  public:
   static constexpr std::size_t most = 16;
 
-  // The bus carries the stop `pnum` by the number `carried`.
+  // The bus carries the stop `pnum` under the number `carried`.
   void add(std::uint32_t pnum, std::uint32_t carried);
-  // The number by which the bus carries that stop. False: it is new, or forgotten.
+  // Sets `carried` to the number under which the bus carries that stop. False if the stop is not
+  // known.
   bool find(std::uint32_t pnum, std::uint32_t& carried) const;
-  // True if it carries a stop of this host by that number.
+  // True if the bus carries a stop of this host under that number.
   bool carries(std::uint32_t carried) const { return stop_of(carried) != nullptr; }
 
-  // A heartbeat that tells of one of these stops, with the number that the host knows, written to
-  // `room` of max_datagram bytes. Any other datagram as it is.
+  // A heartbeat that reports one of these stops, with its packet number, written to `room` of
+  // max_datagram bytes. Any other datagram is returned as it is.
   Text in_full(Text datagram, char* room) const;
 
  private:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A transport with a bad link before it: datagrams of both directions are lost, delayed, doubled, damaged and cut
-// off, as Impairment says. At either end, and for any transport; of a transfer in frames (CAN) it is the datagram
-// that suffers.
+// A transport with a bad link: datagrams of both directions are lost, delayed, duplicated, damaged
+// and cut off, as Impairment says. For either end of any transport. On CAN it affects whole
+// datagrams, not frames.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -14,7 +14,7 @@ namespace r4 {
 
 class ImpairedCarrier : public Carrier {
  public:
-  // What came in, and what went out, since it was opened last.
+  // Counts of each direction since the last open().
   virtual const ImpairmentCounters& received() const = 0;
   virtual const ImpairmentCounters& sent() const = 0;
 };

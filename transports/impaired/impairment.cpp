@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <utility>
 
 #include "r4link/error.hpp"
 
@@ -15,7 +16,7 @@ namespace {
       "write a link as in loss=5%,delay=20ms±10,duplicate=1%,corrupt=0.1%,cut=10s+2s,seed=7");
 }
 
-// The number at the beginning of `text`, which is taken off it.
+// Takes a number off the beginning of `text`.
 double number(std::string_view part, std::string_view& text, double most) {
   double value = 0;
   const auto [end, error] =
@@ -39,7 +40,7 @@ double share(std::string_view part, std::string_view text) {
   return percent / 100;
 }
 
-// An hour at most. A unit that is left out is `unit`.
+// An hour at most. `unit`: the unit if the text has none.
 Time duration(std::string_view part, std::string_view& text, std::string_view unit) {
   const double value = number(part, text, 3'600'000);
   const bool ms = take(text, "ms");
@@ -94,7 +95,7 @@ ImpairedDirection::ImpairedDirection(const Impairment& impairment, std::uint64_t
       opened_(opened),
       random_(impairment.seed * 0x9E3779B97F4A7C15U + stream) {}
 
-// Always draws, so that one impairment more leaves the others as they are.
+// Always draws a number, so that another impairment does not change the effects of the rest.
 bool ImpairedDirection::happens(double chance) {
   return static_cast<double>(random_() >> 11) * 0x1p-53 < chance;
 }

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is wrong with a link that is bad on purpose, and what becomes of the datagrams of one direction of it. No
-// I/O, no clock; the same seed does the same to the same datagrams at the same times.
+// A link that is bad on purpose, and what happens to the datagrams of one of its directions. No
+// I/O, no clock. The same seed does the same to the same datagrams at the same times.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -11,36 +10,37 @@
 #include <random>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include "r4link/link.hpp"
 
 namespace r4 {
 
 struct Impairment {
-  // Of the datagrams of each direction, 0-1.
+  // Shares of the datagrams of each direction, 0-1.
   double loss = 0;
   double duplicate = 0;
   double corrupt = 0;  // a bit is flipped
-  // Each takes so long, give or take up to `jitter`, evenly distributed: they overtake each other.
+  // Each datagram takes `delay`, plus or minus up to `jitter`, evenly distributed: they overtake
+  // each other.
   Time delay{0};
   Time jitter{0};
-  // Nothing passes from then on, so long; from the time at which the link was opened.
+  // Nothing passes for `cut_for`, from `cut_at` after the link was opened.
   Time cut_at{0};
   Time cut_for{0};
   std::uint64_t seed = 1;
 
-  // "loss=5%,delay=20ms±10,duplicate=1%,corrupt=0.1%,cut=10s+2s,seed=7"; +- is as good as ±. Throws Error{usage}.
+  // "loss=5%,delay=20ms±10,duplicate=1%,corrupt=0.1%,cut=10s+2s,seed=7"; +- means ±, too. Throws
+  // Error{usage}.
   static Impairment parse(std::string_view text);
 };
 
 struct ImpairmentCounters {
-  std::uint64_t passed = 0;  // copies too
+  std::uint64_t passed = 0;  // with duplicates
   std::uint64_t lost = 0;
   std::uint64_t duplicated = 0;
   std::uint64_t corrupted = 0;
   std::uint64_t cut = 0;
-  std::uint64_t overflow = 0;  // thrown away, for too many were on their way
+  std::uint64_t overflow = 0;  // dropped because too many were on their way
 };
 
 // One direction.
@@ -53,13 +53,13 @@ class ImpairedDirection {
     std::uint8_t priority = 0;
   };
 
-  // `stream` tells directions apart. `opened`: when the link was.
+  // `stream`: another number for each direction. `opened`: when the link was opened.
   ImpairedDirection(const Impairment& impairment, std::uint64_t stream, Time opened);
 
   void put(Time now, Item item);
-  // When the next one is there.
+  // When the next datagram arrives.
   std::optional<Time> due() const;
-  // It, if it is there by now.
+  // The next datagram, if it has arrived.
   std::optional<Item> take(Time now);
   const ImpairmentCounters& counters() const { return counters_; }
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "port_list.hpp"
 
-#include <fmt/format.h>
 #include <libserialport.h>
 
 #include <algorithm>
+
+#include "../url.hpp"
 
 namespace r4 {
 
@@ -26,7 +27,7 @@ std::vector<SerialPort> list_serial_ports() {
         port.pid = static_cast<std::uint16_t>(pid);
       }
     }
-    port.is_r4 = port.vid == board_vid && port.pid == board_pid;
+    port.is_r4 = port.vid == 0x2341 && port.pid == 0x0266;
     ports.push_back(std::move(port));
   }
   sp_free_port_list(found);
@@ -37,15 +38,7 @@ std::vector<SerialPort> list_serial_ports() {
 
 std::string url_of(const SerialPort& port) {
   if (port.serial_number.empty()) return "serial://" + port.path;
-  // Any text may be a serial number: what a URL, a shell or a terminal would take for its own is
-  // percent-encoded.
-  std::string url = "serial:?sn=";
-  for (const char c : port.serial_number) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                       c == '_' || c == '-' || c == '.' || c == ':';
-    url += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
-  }
-  return url;
+  return "serial:?sn=" + percent_encoded(port.serial_number);
 }
 
 }  // namespace r4

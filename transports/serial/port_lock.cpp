@@ -14,11 +14,11 @@ struct flock bytes_from(off_t first, off_t count) {
   bytes.l_type = F_WRLCK;
   bytes.l_whence = SEEK_SET;
   bytes.l_start = first;
-  bytes.l_len = count;  // 0: all that follow
+  bytes.l_len = count;  // 0: all following bytes
   return bytes;
 }
 
-// A lock of another opening from that byte on. Its type is F_UNLCK if there is none.
+// A lock of another opening at or after that byte. Its type is F_UNLCK if there is none.
 struct flock other_from(int device, off_t first) {
   struct flock bytes = bytes_from(first, 0);
   if (::fcntl(device, F_OFD_GETLK, &bytes) != 0) bytes.l_type = F_UNLCK;
@@ -28,14 +28,14 @@ struct flock other_from(int device, off_t first) {
 }  // namespace
 
 bool PortLock::lock(int device, const DeviceClaim& claim) {
-  // For programs that are not ours, and lock it as a whole.
+  // For foreign programs, which lock the whole device.
   if (::flock(device, LOCK_SH | LOCK_NB) != 0) return false;
   off_t place = 0;
   while (true) {
     const struct flock other = other_from(device, place);
     if (other.l_type == F_UNLCK) break;
-    // A program that yields takes it from one program at most: two of them would take it from each
-    // other again and again.
+    // A program that yields takes the port from one program at most. Two such programs would take
+    // it from each other for ever.
     if (!claim.takes || other.l_len == 0 || (claim.yields && place != 0)) {
       errno = EWOULDBLOCK;
       return false;

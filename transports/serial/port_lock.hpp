@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who has a serial port: locks on the bytes of its device, which has none to read at these places, so that a program
-// may take it from one that hangs. They go with the last descriptor of the opening.
+// The lock of a serial port: file locks on the bytes of its device, so that a program can take the
+// port from a program that hangs. They end with the last descriptor of the opening.
 //
 //     bytes   0    1    2    3 …
 //     A       A                   yields: it has one byte
-//     B            B              has taken it from A, and yields, but not to one that yields
-//     C                 C C C …   has taken it from B: with all that follow it yields to nobody
+//     B            B              has taken the port from A; yields, but not to one that yields
+//     C                 C C C …   has taken the port from B; does not yield, so it has the rest
 //
-// Whoever finds a byte behind its own locked has lost the port: A and B here.
+// A program has lost the port if a byte after its own is locked: A and B here.
 #pragma once
 
 #include <sys/types.h>
@@ -18,11 +18,11 @@ namespace r4 {
 
 class PortLock {
  public:
-  // False, with errno, if other programs have it and do not let it go.
+  // False, with errno, if another program has the port and does not yield.
   bool lock(int device, const DeviceClaim& claim);
-  // Another program has taken it from this one.
+  // True if another program has taken the port from this one.
   bool is_taken() const;
-  // Nobody has had it before.
+  // True if the port was free, not taken from another program.
   bool is_first() const { return place_ == 0; }
 
  private:

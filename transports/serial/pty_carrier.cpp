@@ -18,8 +18,7 @@
 
 #include "../board_end.hpp"
 #include "../file_descriptor.hpp"
-#include "../operation_slot.hpp"
-#include "line_stream.hpp"
+#include "line_carrier.hpp"
 #include "unread_marks.hpp"
 
 namespace r4 {
@@ -27,64 +26,48 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+// The system reports that a host closes its end, and not that one opens it.
 constexpr std::chrono::milliseconds look_for_host{20};
 constexpr std::chrono::milliseconds stale{30};
-// Up to 4095 unread bytes lie where they can be counted, the others before that.
+// The kernel counts up to 4095 unread bytes of a pty; further bytes wait in an earlier buffer.
 constexpr int countable_bytes = 3500;
 constexpr std::size_t all_bytes = 4096 + 20480;
 
-// A link that a board left behind, or that of another board: into /dev/pts, or to nowhere.
+// True for a link of a board: it leads into /dev/pts, or to nothing.
 bool is_our_kind(const std::filesystem::path& link) {
   std::error_code error;
   const std::filesystem::path target = std::filesystem::read_symlink(link, error);
   return !error && (target.parent_path() == "/dev/pts" || !std::filesystem::exists(link, error));
 }
 
-class PtyCarrier final : public Carrier, public BoardEnd, private LineStream::Owner {
+class PtyCarrier final : public LineCarrier, public BoardEnd {
  public:
   PtyCarrier(asio::io_context& io, Url url);
   ~PtyCarrier() override { close(); }
 
   void open(Handler& handler) override;
   void close() noexcept override;
-  SendResult send(std::string_view bytes, Priority priority, Peer) override {
-    return stream_.send(bytes, priority);
-  }
   bool is_own_cable() const override { return true; }
-  bool up() const override { return up_; }
-  const std::string& name() const override { return name_; }
-  const CarrierCounters& counters() const override { return counters_; }
 
  private:
-  void on_line(std::string_view line) override { handler_->on_datagram(line, everyone); }
-  void on_oversize(std::string_view beginning) override { handler_->on_oversize(beginning); }
-  void on_drained() override { handler_->on_drained(); }
-  void on_lost(int error) override;
+  void look() override;
+  Problem on_lost(int error) override;
   void before_state() override;
   void on_written(std::size_t bytes) override { unread_.wrote(bytes, Clock::now()); }
 
   void make_link();
   FileDescriptor open_other_end() const;
-  void look_later();
-  void look();
 
   const Url url_;
-  std::string name_;
   std::string device_;  // "/dev/pts/5"
   bool linked_ = false;
-  std::string obstacle_;  // why a host that is there cannot be heard
-  LoopTimer timer_;
-  OperationSlot looking_;
+  std::string obstacle_;  // why a host that has it open cannot be heard
   FileDescriptor master_;
   UnreadMarks unread_;
-  Handler* handler_ = nullptr;
-  bool up_ = false;
-  CarrierCounters counters_;
-  LineStream stream_;
 };
 
 PtyCarrier::PtyCarrier(asio::io_context& io, Url url)
-    : url_(std::move(url)), name_(url_.text()), timer_(io), stream_(io, *this, counters_) {
+    : LineCarrier(io, url.text(), look_for_host), url_(std::move(url)) {
   url_.allow_only("");
   if (!url_.host().empty()) {
     throw Error(ErrorKind::usage, url_.text(), "it is not pty: or pty:PATH",
@@ -107,7 +90,7 @@ void PtyCarrier::open(Handler& handler) {
   if (!made) {
     const int error = errno;
     master_.reset();
-    // ENOSPC: there are as many pseudo-terminals as there may be (kernel.pty.max).
+    // ENOSPC: the limit of pseudo-terminals is reached (kernel.pty.max).
     const auto problem = out_of_resources(url_.text(), error == ENOSPC ? 0 : error);
     if (problem) throw Error(*problem);
     throw Error(ErrorKind::open, url_.text(),
@@ -123,7 +106,7 @@ void PtyCarrier::open(Handler& handler) {
   }
   name_ = "pty:" + (url_.path().empty() ? device_ : url_.path());
   handler_ = &handler;
-  open_other_end().reset();  // until it has been open once, nothing tells that it is closed
+  open_other_end().reset();  // the system reports a closed end only after it was open once
   look_later();
 }
 
@@ -137,7 +120,7 @@ void PtyCarrier::make_link() {
     throw Error(ErrorKind::open, url_.text(), link.string() + " is there and leads to no pty",
                 "give another path, or remove it");
   }
-  // Made aside and moved there: at no moment is the path without a link.
+  // The new link replaces an old one in one step, so the path always has a link.
   const fs::path fresh = fmt::format("{}.{}", link.string(), ::getpid());
   fs::create_symlink(device_, fresh, error);
   if (!error) {
@@ -154,14 +137,11 @@ void PtyCarrier::make_link() {
 }
 
 void PtyCarrier::close() noexcept {
-  handler_ = nullptr;
-  up_ = false;
-  looking_.cancel();
-  stream_.stop();
+  LineCarrier::close();
   master_.reset();
   unread_.clear();
   if (std::exchange(linked_, false)) {
-    // Another board may have taken the link over.
+    // The link may belong to another board by now.
     std::error_code error;
     if (std::filesystem::read_symlink(url_.path(), error) == device_ && !error) {
       std::filesystem::remove(url_.path(), error);
@@ -174,12 +154,6 @@ FileDescriptor PtyCarrier::open_other_end() const {
       ::ioctl(master_.get(), TIOCGPTPEER, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
 }
 
-// The system tells when a host closes its end, not when one opens it.
-void PtyCarrier::look_later() {
-  timer_.expires_after(look_for_host);
-  timer_.async_wait(looking_.handler([this] { look(); }));
-}
-
 void PtyCarrier::look() {
   pollfd state{master_.get(), POLLIN, 0};
   ::poll(&state, 1, 0);
@@ -188,11 +162,11 @@ void PtyCarrier::look() {
     stream.reset(::fcntl(master_.get(), F_DUPFD_CLOEXEC, 0));
   }
   if (!stream) return look_later();
-  // A line may have been under way when the last host went.
+  // The last host may have left the rest of a line unread.
   if (const FileDescriptor other = open_other_end()) ::tcflush(other.get(), TCIFLUSH);
   unread_.clear();
   try {
-    stream_.start(std::move(stream), name_);
+    start(std::move(stream), name_);
   } catch (const Error& error) {
     look_later();
     if (std::exchange(obstacle_, error.what()) != error.what()) {
@@ -201,18 +175,12 @@ void PtyCarrier::look() {
     return;
   }
   obstacle_.clear();
-  up_ = true;
-  ++counters_.ups;
-  handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+  report_up();
 }
 
-void PtyCarrier::on_lost(int) {
-  up_ = false;
-  ++counters_.downs;
-  look_later();
-  handler_->on_carrier_event(
-      {CarrierEvent::Kind::down, Problem{ErrorKind::open, name_, "no host has it open",
-                                         "open it at the host: serial://" + device_}});
+Problem PtyCarrier::on_lost(int) {
+  return {ErrorKind::open, name_, "no host has it open",
+          "open it at the host: serial://" + device_};
 }
 
 void PtyCarrier::before_state() {
@@ -227,12 +195,13 @@ void PtyCarrier::before_state() {
   ::tcflush(other.get(), TCIFLUSH);
   unread_.clear();
   ++counters_.tx_dropped;
-  stream_.restart_line();
+  restart_line();
 }
 
 }  // namespace
 
-std::unique_ptr<Carrier> make_pty_carrier(asio::io_context& io, const Url& url, Role role) {
+std::unique_ptr<Carrier> make_pty_carrier(asio::io_context& io, const Url& url, Role role,
+                                          const Claim&) {
   if (role == Role::host) {
     throw Error(ErrorKind::usage, url.text(), "pty is the board's end",
                 "a host opens the other end: serial:///dev/pts/N");

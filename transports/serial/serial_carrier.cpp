@@ -4,15 +4,13 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <asio/post.hpp>
 #include <chrono>
 #include <cstring>
 #include <utility>
 #include <vector>
 
-#include "../operation_slot.hpp"
-#include "line_stream.hpp"
+#include "line_carrier.hpp"
 #include "port_list.hpp"
 #include "serial_device.hpp"
 
@@ -50,61 +48,40 @@ std::string find_device(const Url& url) {
   return ports.front().path;
 }
 
-// It has more than 15 members: the device and how it is found again, and the timers and waits of Asio.
-class SerialCarrier final : public Carrier, private LineStream::Owner {
+class SerialCarrier final : public LineCarrier {
  public:
-  SerialCarrier(asio::io_context& io, Url url, std::shared_ptr<DeviceClaim> claim);
+  SerialCarrier(asio::io_context& io, Url url, Claim claim);
   ~SerialCarrier() override { close(); }
 
   void open(Handler& handler) override;
   void close() noexcept override;
-  SendResult send(std::string_view bytes, Priority priority, Peer) override;
-  bool up() const override { return up_; }
-  const std::string& name() const override { return name_; }
-  const CarrierCounters& counters() const override { return counters_; }
+  SendResult send(std::string_view bytes, Priority priority, Peer to) override;
 
  private:
-  void on_line(std::string_view line) override { handler_->on_datagram(line, everyone); }
-  void on_oversize(std::string_view beginning) override { handler_->on_oversize(beginning); }
-  void on_drained() override { handler_->on_drained(); }
-  void on_lost(int error) override;
+  void look() override;
+  Problem on_lost(int error) override;
   bool may_read() override;
 
   std::string find_again() const;
   void open_device(const std::string& path);
-  void look_later();
-  void look();
 
-  asio::io_context& io_;
   const Url url_;
   const unsigned baud_;
-  const std::string serial_number_;  // that the URL asks for
-  SerialPort device_;                // that has been open
-  std::string name_;
-  LoopTimer timer_;
-  OperationSlot looking_;
+  SerialPort device_;     // the device that has been open
   std::string obstacle_;  // why it cannot be opened again though it is there
-  int obstructed_ = 0;    // looks at which it was so
-  Handler* handler_ = nullptr;
-  bool up_ = false;
-  const std::shared_ptr<DeviceClaim> claim_;
+  int obstructed_ = 0;    // consecutive looks with that obstacle
+  const Claim claim_;
   PortLock lock_;
   OperationSlot yielding_;
-  CarrierCounters counters_;
-  LineStream stream_;
 };
 
-SerialCarrier::SerialCarrier(asio::io_context& io, Url url, std::shared_ptr<DeviceClaim> claim)
-    : io_(io),
+SerialCarrier::SerialCarrier(asio::io_context& io, Url url, Claim claim)
+    : LineCarrier(io, url.text(), look_again),
       url_(std::move(url)),
       baud_(static_cast<unsigned>(url_.get_number("baud", min_baud, max_baud, default_baud))),
-      serial_number_(url_.get("sn").value_or("")),
-      name_(url_.text()),
-      timer_(io),
-      claim_(std::move(claim)),
-      stream_(io, *this, counters_) {
+      claim_(std::move(claim)) {
   url_.allow_only("baud sn");
-  const bool by_number = !serial_number_.empty();
+  const bool by_number = !url_.get("sn").value_or("").empty();
   const bool by_path = url_.path() == "auto" || url_.path().find('/') != std::string::npos;
   if (!url_.host().empty() || by_number == by_path || (by_number && !url_.path().empty())) {
     throw Error(ErrorKind::usage, url_.text(), "it names no serial port",
@@ -116,30 +93,25 @@ SerialCarrier::SerialCarrier(asio::io_context& io, Url url, std::shared_ptr<Devi
 void SerialCarrier::open(Handler& handler) {
   close();
   open_device(find_device(url_));
-  claim_->takes = false;  // once: another may have it in the right way when it is opened again
+  claim_->takes = false;  // once: at the next opening another program may rightly have it
   handler_ = &handler;
-  up_ = true;
-  ++counters_.ups;
-  handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+  report_up();
 }
 
 void SerialCarrier::close() noexcept {
-  handler_ = nullptr;
-  up_ = false;
-  looking_.cancel();
   yielding_.cancel();
-  stream_.stop();
+  LineCarrier::close();
 }
 
-SendResult SerialCarrier::send(std::string_view bytes, Priority priority, Peer) {
-  if (claim_->yields && up_ && lock_.is_taken()) {
+SendResult SerialCarrier::send(std::string_view bytes, Priority priority, Peer to) {
+  if (claim_->yields && up() && lock_.is_taken()) {
     asio::post(io_, yielding_.handler([this] { may_read(); }));
     return SendResult::down;
   }
-  return stream_.send(bytes, priority);
+  return LineCarrier::send(bytes, priority, to);
 }
 
-// Asked before each reading where the port may be taken from us: we may have been stopped for long.
+// Another program may have taken the port while this program was stopped.
 bool SerialCarrier::may_read() {
   if (!lock_.is_taken()) return true;
   close();
@@ -163,7 +135,7 @@ std::string SerialCarrier::find_again() const {
 }
 
 void SerialCarrier::open_device(const std::string& path) {
-  stream_.start(open_serial_device(io_, path, baud_, *claim_, lock_), path, claim_->yields);
+  start(open_serial_device(io_, path, baud_, *claim_, lock_), path, claim_->yields);
   name_ = "serial://" + path;
   if (baud_ != default_baud) name_ += fmt::format("?baud={}", baud_);
   const std::string real_path = resolve_links(path);
@@ -172,24 +144,14 @@ void SerialCarrier::open_device(const std::string& path) {
   }
 }
 
-void SerialCarrier::on_lost(int error) {
-  up_ = false;
+Problem SerialCarrier::on_lost(int error) {
   yielding_.cancel();
-  ++counters_.downs;
   obstructed_ = 0;
-  look_later();
-  handler_->on_carrier_event(
-      {CarrierEvent::Kind::down,
-       Problem{ErrorKind::open, name_,
-               error == 0 ? "unplugged, or closed at the other end"
-                          : fmt::format("unplugged, or closed at the other end ({})",
-                                        std::strerror(error)),
-               "plug it in again; it is opened by itself"}});
-}
-
-void SerialCarrier::look_later() {
-  timer_.expires_after(look_again);
-  timer_.async_wait(looking_.handler([this] { look(); }));
+  return {ErrorKind::open, name_,
+          error == 0
+              ? "unplugged, or closed at the other end"
+              : fmt::format("unplugged, or closed at the other end ({})", std::strerror(error)),
+          "plug it in again; it is opened by itself"};
 }
 
 void SerialCarrier::look() {
@@ -199,7 +161,7 @@ void SerialCarrier::look() {
     open_device(path);
   } catch (const Error& error) {
     look_later();
-    // Absence is no news; what keeps us from a device that is there needs a hand.
+    // A missing device was reported. A device that is there and cannot be opened needs help.
     const bool there = !path.empty() && ::access(path.c_str(), F_OK) == 0;
     if (!there || error.what() != obstacle_) obstructed_ = 0;
     obstacle_ = error.what();
@@ -208,19 +170,13 @@ void SerialCarrier::look() {
     }
     return;
   }
-  up_ = true;
-  ++counters_.ups;
-  handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+  report_up();
 }
 
 }  // namespace
 
-std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& url, Role) {
-  return make_claimed_serial_carrier(io, url, std::make_shared<DeviceClaim>());
-}
-
-std::unique_ptr<Carrier> make_claimed_serial_carrier(asio::io_context& io, const Url& url,
-                                                     std::shared_ptr<DeviceClaim> claim) {
+std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& url, Role,
+                                             Claim claim) {
   return std::make_unique<SerialCarrier>(io, url, std::move(claim));
 }
 

@@ -6,8 +6,8 @@
 //     serial:?sn=SERIAL                      the USB device with that serial number
 //
 // 8N1, raw, no flow control, locked. Rates below 9600 are refused: an Arduino takes 1200 baud as
-// the order to erase its program. An unplugged or hung-up port is `down` at once; it is looked for
-// until it is back, by serial number where it has one, else by its path.
+// the order to erase its program. An unplugged or hung-up port is `down` at once. The carrier looks
+// for it until it is back, by serial number where it has one, else by its path.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -20,14 +20,12 @@
 namespace r4 {
 
 // Throws Error{usage} for a URL that serial does not take.
-std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& url, Role role);
+std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& url, Role role,
+                                             Claim claim);
 
-// The same, opened as `claim` says each time.
-std::unique_ptr<Carrier> make_claimed_serial_carrier(asio::io_context& io, const Url& url,
-                                                     std::shared_ptr<DeviceClaim> claim);
-
-// What programs that share the port call it: a board by its serial number, so that it may be plugged into
-// another socket, anything else by its device. Throws Error where there is none, or more than one.
+// The name by which programs share the port: that of a board is its serial number, so that it may
+// be plugged into another socket; that of any other device is its path. Throws Error where there is
+// no device, or more than one.
 ShareName serial_share_name(const Url& url);
 
 }  // namespace r4

@@ -14,7 +14,6 @@
 #include <filesystem>
 #include <memory>
 
-#include "../file_descriptor.hpp"
 #include "port_list.hpp"
 #include "r4link/error.hpp"
 

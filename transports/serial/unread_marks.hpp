@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// When the oldest bytes were written that the reader of a byte stream has not read yet.
-//
-// Fed with what is written and, now and then, with how much is unread. Times are exact to `grain`,
-// never too late. No heap.
+// Knows when the oldest unread bytes of a byte stream were written, from the numbers of written and
+// unread bytes. Times are exact to `grain`, and never too late. No heap.
 #pragma once
 
 #include <array>
@@ -18,17 +16,17 @@ class UnreadMarks {
   static constexpr std::chrono::milliseconds grain{2};
 
   void wrote(std::size_t bytes, Time now);
-  // At most that many of the bytes written are unread.
+  // At most that many written bytes are unread.
   void unread_at_most(std::size_t bytes);
   void clear() { count_ = 0; }
 
-  // Something may be unread.
+  // True if bytes may be unread.
   bool any() const { return count_ != 0; }
-  // When the oldest of it was written; only if there is any.
+  // When the oldest unread byte was written. Only if any().
   Time oldest() const { return marks_[first_].time; }
 
  private:
-  // Bytes up to `end`, counted from the first ever, written at `time` or a grain later.
+  // Bytes up to the number `end`, written at `time` or up to a grain later.
   struct Mark {
     std::uint64_t end = 0;
     Time time{};

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <cerrno>
-#include <optional>
 #include <utility>
 
 namespace r4 {
@@ -45,7 +44,7 @@ void ShareClient::receive() {
       owner_.on_all_heard();
       break;
     }
-    // The holder has not read everything: what it sent can still be read.
+    // The holder has not read everything; its own messages can still be read.
     if (size < 0 && errno == ECONNRESET) continue;
     if (size <= 0) {
       leave();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The connection of a program to the one that holds the transport. A holder that is silent for
-// answer_within is asked whether it is alive, and has as long again to answer: a silent board is
-// not a holder that hangs.
+// The connection of a program to the program that holds the transport. If the holder is silent for
+// answer_within, it is asked whether it is alive, and has the same time to answer: the board may be
+// silent, and the holder well.
 #pragma once
 
 #include <array>
@@ -26,8 +26,8 @@ class ShareClient {
   class Owner {
    public:
     virtual void on_message(const ShareMessage& message) = 0;
-    virtual void on_all_heard() = 0;  // what had arrived was handed over
-    // The holder does not answer, or is of another version of R4 link. Called again until it
+    virtual void on_all_heard() = 0;  // all messages that had arrived were handed over
+    // The holder does not answer, or is of another version of R4 link. Called repeatedly until it
     // answers.
     virtual void on_no_help(const Problem& why) = 0;
     // The connection has ended.
@@ -43,17 +43,17 @@ class ShareClient {
   ShareClient& operator=(const ShareClient&) = delete;
 
   enum class Joined { holder, nobody, stranger, crowd };
-  // Connects to the holder with that role, and sends `greeting`. A stranger has taken the name; a
-  // crowd waits for the holder, so that there is no room for another program. Throws
-  // std::system_error if the system does not let the loop wait for the connection. `thing`: the
-  // transport, for problems.
+  // Connects to the holder with that role, and sends `greeting`. `stranger`: a program of another
+  // user has taken the name. `crowd`: so many programs wait for the holder that no other one can.
+  // Throws std::system_error if the system does not let the loop wait for the connection. `thing`:
+  // the transport, for problems.
   Joined join(const ShareName& name, BoardRole role, ShareMessage::Kind greeting,
               const std::string& thing);
   // An E:STOP for the board.
   SendResult send_stop(std::string_view datagram);
   void leave() noexcept;
 
-  // The process that holds the transport.
+  // The process that holds the transport; 0: not known.
   pid_t process() const { return process_; }
   Problem silence() const;
 
@@ -70,8 +70,8 @@ class ShareClient {
   OperationSlot answering_;
   std::string thing_;
   pid_t process_ = 0;
-  bool heard_ = false;  // since the last look
-  bool asked_ = false;  // and no answer yet
+  bool heard_ = false;  // since look_for_answer()
+  bool asked_ = false;  // and the holder has not answered
   std::array<char, ShareMessage::max_size + 1> packet_;
 };
 

@@ -30,7 +30,7 @@ bool is_stop(std::string_view bytes) {
 
 }  // namespace
 
-// A program that has come.
+// A program that has connected.
 class ShareHolder::Sharer : public std::enable_shared_from_this<Sharer> {
  public:
   Sharer(ShareHolder& holder, LoopDescriptor connection)
@@ -40,8 +40,8 @@ class ShareHolder::Sharer : public std::enable_shared_from_this<Sharer> {
   bool is_served() const { return is_here() && served_; }
   void set_served() { served_ = true; }
 
-  // A copy may be lost, as on any transport. A program that would miss anything else has to come
-  // again.
+  // A copy may be lost, as on any transport. A program that would miss another message is
+  // disconnected and has to reconnect.
   void tell(Kind kind, std::string_view text) {
     if (!is_here()) return;
     const int error = send_message(connection_.native_handle(), kind, text);
@@ -55,7 +55,7 @@ class ShareHolder::Sharer : public std::enable_shared_from_this<Sharer> {
       const ssize_t size =
           receive_packet(connection_.native_handle(), packet.data(), packet.size());
       if (size < 0 && would_block(errno)) break;
-      // The program has not read everything: what it sent can still be read.
+      // The program has not read everything; its own messages can still be read.
       if (size < 0 && errno == ECONNRESET) continue;
       if (size <= 0) return end();
       holder_.on_message(*this,
@@ -90,8 +90,8 @@ bool ShareHolder::hold(const ShareName& name, BoardRole role) {
   return true;
 }
 
-// Closed, with errno, if the loop cannot wait for it: an error here must not end the program, which
-// may be driving.
+// The result is closed, with errno, if the loop cannot wait for it. An exception could end the
+// program, which may be driving.
 LoopDescriptor ShareHolder::on_loop(FileDescriptor descriptor) {
   LoopDescriptor waited_for(io_);
   if (!descriptor) return waited_for;
@@ -138,10 +138,10 @@ void ShareHolder::accept() {
   accept_timer_.async_wait(accepting_.handler([this] { listen(); }));
   if (!connection || !is_one_of_us(connection.get(), name_)) return;
   LoopDescriptor waited_for = on_loop(std::move(connection));
-  if (!waited_for.is_open()) return;  // it may come again
+  if (!waited_for.is_open()) return;  // the program may reconnect
   const auto sharer = std::make_shared<Sharer>(*this, std::move(waited_for));
   sharers_.push_back(sharer);
-  sharer->receive();  // mostly its hello is there already
+  sharer->receive();  // its hello has usually arrived
 }
 
 void ShareHolder::on_message(Sharer& from, const std::optional<ShareMessage>& message) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The end of a shared transport at the program that holds it: sends the other programs a copy of
-// all that passes, and takes stops from them. The stop of any of them is obeyed. Of those that say
-// hello, the first most_served are served; a program that has stopped the board is served beyond
-// that, to hear whether it obeys. A copy that a slow program does not take is lost to that program;
-// nothing waits for it here.
+// The end of a shared transport at the program that holds it. It sends the other programs a copy of
+// every datagram, and takes stops from them. It obeys the stop of any program. The first
+// most_served programs that say hello are served. A program that has stopped the board is served
+// beyond that, so that it hears whether the board obeys. A copy that a slow program does not take
+// is lost to that program.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -27,16 +27,15 @@ class ShareHolder {
  public:
   static constexpr std::size_t most_served = 16;
   static constexpr std::size_t most_served_after_a_stop = 20;
-  // So programs that connect again and again, of whichever user, take a few percent of the loop's
-  // time at most.
+  // Programs of any user that connect repeatedly take a few percent of the loop's time at most.
   static constexpr std::chrono::microseconds between_arrivals{300};
 
   // Called on the loop's thread. Any of these may release the holder.
   class Owner {
    public:
-    // The events that a new program has to know: whether the transport is up, and its trouble.
+    // The events that a new program must know: whether the transport is up, and its trouble.
     virtual std::vector<CarrierEvent> standing() const = 0;
-    // Another program's E:STOP, which is one.
+    // The E:STOP of another program. `datagram` is a valid one.
     virtual void on_stop_of_another(std::string_view datagram) = 0;
     // A program that controls the board asks for the transport.
     virtual void on_asked() = 0;
@@ -58,7 +57,7 @@ class ShareHolder {
 
   bool holds() const { return listener_.is_open(); }
   std::size_t served() const;
-  // To all that are served. Secrets in a copy are masked.
+  // Sends to all served programs. Masks secrets in a copy.
   void tell(ShareMessage::Kind kind, std::string_view text);
 
  private:
@@ -67,7 +66,6 @@ class ShareHolder {
   LoopDescriptor on_loop(FileDescriptor descriptor);
   void listen();
   void accept();
-  void take_in(FileDescriptor connection);
   void on_message(Sharer& from, const std::optional<ShareMessage>& message);
   void on_hello(Sharer& from);
   void serve(Sharer& sharer);

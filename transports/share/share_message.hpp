@@ -2,10 +2,10 @@
 // The messages between programs that share a transport (docs/sharing.md). Each is one packet of a
 // local socket: a letter, then its content. Without I/O.
 //
-//     hello     h VERSION     to the holder: let me hear what passes; or: do you answer?
-//     ask       c VERSION     to the holder: I control the board, let go of the transport. The
+//     hello     h VERSION     to the holder: asks for copies of all datagrams, or if it is alive
+//     ask       c VERSION     to the holder: a program that controls wants the transport. The
 //                             answer is the end of the connection
-//     welcome   w VERSION     the answer to hello, and to what is no message of this version
+//     welcome   w VERSION     the answer to hello, and to an invalid message
 //     event     e u|d|! KIND THING 0 REASON 0 FIX
 //                             the transport is up, is down, has a warning
 //     received  r DATAGRAM    from the board
@@ -44,7 +44,7 @@ struct ShareMessage {
   CarrierEvent event;     // event
 };
 
-// True for a copy of what passes on the transport.
+// True for a copy of a datagram on the transport.
 constexpr bool is_copy(ShareMessage::Kind kind) {
   using Kind = ShareMessage::Kind;
   return kind == Kind::received || kind == Kind::sent || kind == Kind::oversize;
@@ -53,7 +53,7 @@ constexpr bool is_copy(ShareMessage::Kind kind) {
 // None if the packet is not a message of this version.
 std::optional<ShareMessage> read_share_message(std::string_view packet);
 
-// The content of an event. Texts that are too long are cut.
+// The content of an event. Cuts texts that are too long.
 std::string text_of(const CarrierEvent& event);
 
 }  // namespace r4

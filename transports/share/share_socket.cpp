@@ -16,11 +16,10 @@
 namespace r4 {
 namespace {
 
-// Connections that wait to be accepted, each for some 0.4 ms (ShareHolder::between_arrivals): the last has to wait for less
-// than a program waits for its answer.
+// Connections that wait to be accepted, each for some 0.4 ms (ShareHolder::between_arrivals): the last
+// has to wait for less than a program waits for its answer.
 constexpr int most_waiting = 24;
-// About eighty states: a program that sleeps and wakes up hears nothing that is much older than a
-// second.
+// About eighty states: a program that wakes up hears nothing that is much older than a second.
 constexpr int buffer_bytes = 32 * 1024;
 
 struct Address {
@@ -47,7 +46,7 @@ Address address_of(const ShareName& share, BoardRole role) {
   return address;
 }
 
-// A socket with which `use(socket, address, size)` was done; none, with errno, if that failed.
+// A socket for which `use(socket, address, size)` has succeeded; none, with errno, if it failed.
 template <class Use>
 FileDescriptor local_socket(const ShareName& name, BoardRole role, Use use) {
   FileDescriptor local(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
@@ -102,7 +101,7 @@ bool is_one_of_us(int connection, const ShareName& name) {
   if (peer.uid == ::geteuid()) return true;
   if (name.group.name.empty()) return false;
   if (peer.uid == 0 || peer.gid == name.group.id) return true;
-  // Asked for nothing, the kernel says how much there is.
+  // With size 0 the kernel reports the size that it needs.
   socklen_t size = 0;
   if (::getsockopt(connection, SOL_SOCKET, SO_PEERGROUPS, nullptr, &size) == 0) return false;
   std::vector<gid_t> groups(size / sizeof(gid_t));

@@ -3,10 +3,10 @@
 // (abstract, unix(7)): a name is free as soon as its program has ended. Like UDP ports and CAN
 // interfaces, the names belong to a network namespace.
 //
-// A transport has two names: the program that controls the board holds one, and while none does, a
-// program that watches holds the other. A name contains the user's number, or the name of the group
-// that shares the transport. Any user can take a name, so both ends look who the other one is, as
-// the kernel knows it. No call here blocks.
+// A transport has two names. The program that controls the board holds one. While no program
+// controls it, a program that watches holds the other. A name contains the user's number, or the
+// name of the group that shares the transport. Any user can take a name, so both ends ask the
+// kernel who the other end is. No call here blocks.
 #pragma once
 
 #include <sys/types.h>

@@ -29,17 +29,18 @@ using std::chrono::milliseconds;
 // The names by which the holder is sought, in this order.
 constexpr std::array holders{BoardRole::control, BoardRole::watch};
 constexpr milliseconds look_again{5}, look_again_slowly{100};
-// How long no program may hold the transport before that is told.
+// If no program holds the transport for longer, that is reported.
 constexpr milliseconds take_over_within{100};
 
-// Its members, more than 15, belong to one state machine: the carrier, the search, and the two ends of sharing.
+// It has more than 15 members, which belong to one state machine: the carrier, the search, and the
+// two ends of sharing.
 class SharedCarrier final : public Carrier,
                             private Carrier::Handler,
                             private ShareHolder::Owner,
                             private ShareClient::Owner {
  public:
-  SharedCarrier(asio::io_context& io, std::unique_ptr<Carrier> own,
-                std::shared_ptr<DeviceClaim> claim, FindShareName find, BoardRole role)
+  SharedCarrier(asio::io_context& io, std::unique_ptr<Carrier> own, Claim claim, FindShareName find,
+                BoardRole role)
       : claim_(std::move(claim)),
         own_(std::move(own)),
         find_(std::move(find)),
@@ -57,7 +58,7 @@ class SharedCarrier final : public Carrier,
   SendResult send(std::string_view bytes, Priority priority, Peer to) override;
   bool up() const override { return up_; }
   TransportTrouble trouble() const override { return own_->trouble(); }
-  // The board would take what is sent to another program's transport for the holder's.
+  // The board cannot tell this program's datagrams from those of the holder.
   bool is_shared() const override { return is_served() || own_->is_shared(); }
   void change_role(BoardRole role) override;
   const std::string& name() const override { return name_; }
@@ -68,12 +69,12 @@ class SharedCarrier final : public Carrier,
 
  private:
   enum class State { closed, seeking, asking, joined, holding };
-  // For a part in the transport, since we had none.
+  // The search for a holder, or for the transport itself.
   struct Search {
     Clock::time_point began = Clock::now();
-    std::size_t asked = 0;           // the holder that we have asked
-    std::size_t passed = 0;          // holders that are no help
-    std::optional<Problem> no_help;  // why not the first of them
+    std::size_t asked = 0;           // the place in `holders` of the holder that was asked
+    std::size_t passed = 0;          // how many of `holders` were passed over
+    std::optional<Problem> no_help;  // why the first of them was passed over
   };
 
   void on_datagram(std::string_view bytes, Peer from) override;
@@ -81,11 +82,11 @@ class SharedCarrier final : public Carrier,
   void on_drained() override { handler_->on_drained(); }
   void on_overheard(std::string_view bytes) override;
   void on_oversize(std::string_view beginning) override;
-  // Programs to which we are the holder.
+  // For the programs that this one serves as holder.
   std::vector<CarrierEvent> standing() const override;
   void on_stop_of_another(std::string_view datagram) override;
   void on_asked() override;
-  // The holder that serves us.
+  // From the holder that serves this program.
   void on_message(const ShareMessage& message) override;
   void on_all_heard() override { handler_->on_drained(); }
   void on_no_help(const Problem& why) override;
@@ -102,13 +103,13 @@ class SharedCarrier final : public Carrier,
   void look();
   void look_later(milliseconds delay);
   bool late() const { return Clock::now() - search_.began >= take_over_within; }
-  // Another program holds the transport, and takes our stops.
+  // Another program holds the transport, and takes stops from this one.
   bool is_served() const {
     return state_ == State::joined || (state_ == State::asking && role_ == BoardRole::watch);
   }
   void tell(const CarrierEvent& event);
 
-  const std::shared_ptr<DeviceClaim> claim_;  // how own_ opens its device
+  const Claim claim_;  // how own_ opens its device
   const std::unique_ptr<Carrier> own_;
   const FindShareName find_;
   BoardRole role_;
@@ -123,8 +124,8 @@ class SharedCarrier final : public Carrier,
   bool up_ = false;
   std::optional<Problem> trouble_;  // why it is down, or the warning that stands
   Carrier::Handler* handler_ = nullptr;
-  CarrierCounters shared_counters_;  // of what other programs carried for us
-  mutable CarrierCounters counted_;  // of it and our own
+  CarrierCounters shared_counters_;  // of datagrams by way of another holder
+  mutable CarrierCounters counted_;  // the sum of these and of own_
 };
 
 void SharedCarrier::open(Carrier::Handler& handler) {
@@ -147,12 +148,12 @@ void SharedCarrier::close() noexcept {
   trouble_.reset();
   looking_.cancel();
   client_.leave();
-  own_->close();  // the transport is free before others are told so
+  own_->close();  // the transport is free before other programs look for a holder
   holder_.release();
 }
 
 // Joins the holder, or becomes it. False: look again soon. Throws Error if the transport cannot be
-// had.
+// opened.
 bool SharedCarrier::take_part() {
   if (!holder_.holds()) share_ = find_();
   const bool controls = role_ == BoardRole::control;
@@ -183,12 +184,12 @@ bool SharedCarrier::take_part() {
 // Takes the name of the program that controls. Throws Error{refused} if another program has it.
 void SharedCarrier::require_control() {
   FileDescriptor other;
-  for (int i = 0; !other && i < 2; ++i) {  // the other one may have ended in between
+  for (int i = 0; !other && i < 2; ++i) {  // the other program may have ended in between
     if (holder_.hold(share_, BoardRole::control)) return;
     if (const auto problem = out_of_resources(name_, errno)) throw Error(*problem);
     other = connect_to_holder(share_, BoardRole::control);
   }
-  // A stranger keeps us from nothing.
+  // A stranger that has taken the name prevents nothing.
   if (other && !is_one_of_us(other.get(), share_)) return holder_.release();
   const pid_t process = other ? process_of(other.get()) : 0;
   const bool stopped = is_stopped(process);
@@ -212,7 +213,7 @@ void SharedCarrier::change_role(BoardRole role) {
   if (is_open) controls ? seek() : lose();
 }
 
-// The name of a transport that cannot be found is taken when it is there.
+// The name of a transport that is not found yet is taken when it is found.
 bool SharedCarrier::is_found() {
   try {
     if (state_ == State::seeking) share_ = find_();
@@ -223,8 +224,8 @@ bool SharedCarrier::is_found() {
 }
 
 // Takes the name of the program that watches and holds the transport. False if another program was
-// faster. A program that is to control takes its own name before it looks for this one, so one of
-// the two sees the other.
+// faster. A program that wants control takes the other name before it looks for this name, so one
+// of the two programs sees the other.
 bool SharedCarrier::hold_to_watch() {
   if (!holder_.hold(share_, BoardRole::watch)) {
     if (const auto problem = out_of_resources(name_, errno)) throw Error(*problem);
@@ -237,8 +238,8 @@ bool SharedCarrier::hold_to_watch() {
   return false;
 }
 
-// If a holder was passed over that only watches, a device that one program can have open is taken
-// from that program.
+// If a holder that only watches was passed over, a device that one program can have open is taken
+// from that holder.
 void SharedCarrier::open_own() {
   state_ = State::holding;
   try {
@@ -254,20 +255,20 @@ void SharedCarrier::open_own() {
   if (state_ == State::holding && !holder_.holds()) look_later(look_again_slowly);
 }
 
-// The holder that was asked is no help.
+// The holder that was asked does not answer.
 void SharedCarrier::pass_over(const Problem& why) {
   client_.leave();
   search_.passed = search_.asked + 1;
   if (!search_.no_help) search_.no_help = why;
 }
 
-// We have no part in the transport any more.
+// This program neither holds nor shares the transport any more.
 void SharedCarrier::lose() {
   seek();
-  holder_.release();  // the transport is free before others are told so
+  holder_.release();  // after seek(): the transport is free before other programs look for a holder
 }
 
-// The search for our part begins anew.
+// Restarts the search.
 void SharedCarrier::seek() {
   client_.leave();
   own_->close();
@@ -305,18 +306,17 @@ SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer t
     if (result == SendResult::sent) holder_.tell(Kind::sent, bytes);
     return result;
   }
-  // Another holder sends nothing for us but a stop: the board would take anything else for the
-  // holder's.
+  // The holder passes on stops only: the board would take any other datagram for one of the holder.
   if (!is_served() || priority != Priority::stop) return SendResult::down;
   ++shared_counters_.tx_datagrams;
   shared_counters_.tx_bytes += bytes.size();
   return client_.send_stop(bytes);
 }
 
-// --- we hold the transport
+// --- this program holds the transport
 
 void SharedCarrier::on_datagram(std::string_view bytes, Peer from) {
-  // Our own program first: it may be driving.
+  // This program first: it may be driving.
   handler_->on_datagram(bytes, from);
   if (state_ == State::holding) holder_.tell(Kind::received, bytes);
 }
@@ -334,12 +334,12 @@ void SharedCarrier::on_oversize(std::string_view beginning) {
 void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
   name_ = own_->name();
   tell(event);
-  // Another device may be given that path at once.
+  // Another device may get that path at once.
   const bool is_gone = event.kind == CarrierEvent::Kind::down && share_.is_path;
   if (is_gone && state_ == State::holding) lose();
 }
 
-// To the programs that we serve, and to our own program unless it knows that already.
+// Reports to the served programs, and to this program unless it knows the event already.
 void SharedCarrier::tell(const CarrierEvent& event) {
   const bool up = event.kind == CarrierEvent::Kind::up;
   const bool down = event.kind == CarrierEvent::Kind::down;
@@ -363,7 +363,7 @@ std::vector<CarrierEvent> SharedCarrier::standing() const {
 }
 
 void SharedCarrier::on_stop_of_another(std::string_view datagram) {
-  if (state_ != State::holding) return;  // it is repeated until the board obeys
+  if (state_ != State::holding) return;  // the other program repeats it until the board obeys
   if (own_->send(datagram, Priority::stop, everyone) != SendResult::sent) return;
   holder_.tell(Kind::sent, datagram);
   handler_->on_overheard(datagram);
@@ -421,8 +421,7 @@ void SharedCarrier::on_closed() {
 }  // namespace
 
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
-                                             std::shared_ptr<DeviceClaim> claim, FindShareName find,
-                                             BoardRole role) {
+                                             Claim claim, FindShareName find, BoardRole role) {
   return std::make_unique<SharedCarrier>(io, std::move(own), std::move(claim), std::move(find),
                                          role);
 }

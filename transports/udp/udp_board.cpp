@@ -10,8 +10,7 @@
 namespace r4 {
 namespace {
 
-// Others of the loop wait.
-constexpr int most_packets = 32;
+constexpr int most_packets = 32;  // then the other work of the loop has its turn
 
 asio::ip::address mapped_to_v6(const asio::ip::address& address) {
   return asio::ip::make_address_v6(asio::ip::v4_mapped, address.to_v4());
@@ -39,8 +38,7 @@ void UdpBoard::open(Handler& handler) {
 }
 
 void UdpBoard::find_peer(const Endpoint& local) {
-  audience_ = {Endpoint(lookup_.find(url_.peer_host, url_.text), url_.peer_port), {}};
-  Endpoint& host = audience_.host;
+  Endpoint host(lookup_.find(url_.peer_host, url_.text), url_.peer_port);
   const bool v6_socket = local.protocol() == asio::ip::udp::v6();
   if (v6_socket && host.protocol() == asio::ip::udp::v4()) {
     host.address(mapped_to_v6(host.address()));
@@ -48,17 +46,12 @@ void UdpBoard::find_peer(const Endpoint& local) {
     throw Error(ErrorKind::usage, url_.text, "an IPv4 socket cannot send to an IPv6 peer",
                 "listen on [::]");
   }
-  audience_known_ = true;
+  audience_ = Place{host, {}};
 }
 
 void UdpBoard::close() noexcept {
-  audience_known_ = false;
+  audience_.reset();
   UdpEnd::close();
-}
-
-void UdpBoard::close_socket() noexcept {
-  asio::error_code ignored;
-  socket_.close(ignored);
 }
 
 void UdpBoard::listen() {
@@ -96,19 +89,17 @@ void UdpBoard::hold(Peer peer) {
 
 bool UdpBoard::reaches(Peer peer) const {
   const Place* const at = peers_.find(peer);
-  return peer == everyone || (at != nullptr && audience_known_ && *at == audience_);
+  return peer == everyone || (at != nullptr && audience_ && *at == *audience_);
 }
 
 void UdpBoard::follow_audience() {
   const Place* const audience = peers_.find(peers_.audience());
-  if (audience == nullptr || !url_.peer_host.empty()) return;
-  audience_ = *audience;
-  audience_known_ = true;
+  if (audience != nullptr && url_.peer_host.empty()) audience_ = *audience;
 }
 
 UdpEnd::Outcome UdpBoard::transmit(std::string_view bytes, Peer to) {
   if (to == everyone) {
-    if (audience_known_) return transmit_to(bytes, audience_.host, true, audience_.at);
+    if (audience_) return transmit_to(bytes, audience_->host, true, audience_->at);
     ++counters_.tx_dropped;
     return Outcome::failed;
   }
@@ -119,17 +110,17 @@ UdpEnd::Outcome UdpBoard::transmit(std::string_view bytes, Peer to) {
   }
   const Outcome outcome = transmit_to(bytes, asker->host, false, asker->at);
   if (outcome == Outcome::busy) return outcome;
-  const bool same_machine = !url_.peer_host.empty() &&
-                            asker->host.address() == audience_.host.address() &&
-                            !peers_.watches(to);
-  if (same_machine && asker->host.port() != audience_.host.port()) {
-    return transmit_to(bytes, audience_.host, true, asker->at);
+  // The paper's client listens at another port of its address.
+  if (audience_ && !url_.peer_host.empty() && !peers_.watches(to) &&
+      asker->host.address() == audience_->host.address() &&
+      asker->host.port() != audience_->host.port()) {
+    return transmit_to(bytes, audience_->host, true, asker->at);
   }
   return outcome;
 }
 
 int UdpBoard::probe(const std::vector<OwnAddress>& own) {
-  return probe_route(audience_.host, {}, own);
+  return probe_route(audience_ ? audience_->host : Endpoint(), {}, own);
 }
 
 }  // namespace r4

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's end of UDP: hosts come and go, and one of them is in control. At 0.0.0.0 or [::] each
-// host is answered from the address that it has asked.
+// The board's end of UDP: it has several hosts, and one of them is in control. At 0.0.0.0 or [::]
+// an answer leaves from the address that the host has asked.
 #pragma once
 
 #include <asio/io_context.hpp>
+#include <optional>
 
 #include "../board_end.hpp"
 #include "../framing/peer_table.hpp"
@@ -24,8 +25,8 @@ class UdpBoard final : public UdpEnd, public BoardEnd {
   bool reaches(Peer peer) const override;
 
  private:
-  // A host, and the address of this computer that it sends to: its answers leave from there.
-  // Unspecified where the socket has one address only.
+  // A host, and the address of this computer to which it sends and from which its answers leave.
+  // Unspecified if the socket has one address only.
   struct Place {
     Endpoint host;
     asio::ip::address at;
@@ -39,7 +40,6 @@ class UdpBoard final : public UdpEnd, public BoardEnd {
   void received(std::string_view bytes) override;
   Outcome transmit(std::string_view bytes, Peer to) override;
   int probe(const std::vector<OwnAddress>& own) override;
-  void close_socket() noexcept override;
 
   void find_peer(const Endpoint& local);
   void follow_audience();
@@ -49,9 +49,8 @@ class UdpBoard final : public UdpEnd, public BoardEnd {
   const HostLookup lookup_;
   PeerTable<Place, peer_places> peers_;
   bool at_all_addresses_ = false;
-  asio::ip::address sent_to_;  // of the packet that is being read
-  bool audience_known_ = false;
-  Place audience_;  // where what is for everyone goes
+  asio::ip::address sent_to_;      // of the packet that is being read
+  std::optional<Place> audience_;  // the destination of datagrams for everyone
 };
 
 }  // namespace r4

@@ -4,28 +4,81 @@
 #include <fmt/format.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <asio/ip/v6_only.hpp>
 #include <asio/post.hpp>
+#include <cctype>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
 #include <utility>
+#include <vector>
 
 #include "../file_descriptor.hpp"
 #include "network/packet_address.hpp"
-#include "udp_port_user.hpp"
 
 namespace r4 {
 namespace {
 
 constexpr std::size_t normal_entries = 64;
-constexpr std::size_t state_entries = 20;  // four for the host, and for each that watches
+constexpr std::size_t state_entries = 20;  // four for the host and for each watcher
 constexpr std::chrono::milliseconds probe_interval{200};
 
-// The network is not there at the moment, as against one packet that failed.
+// True if the network is not there at the moment; false if only one packet failed.
 bool is_network_loss(int error) {
   return error == ENETUNREACH || error == ENETDOWN || error == EHOSTUNREACH ||
          error == EADDRNOTAVAIL || error == ENODEV;
+}
+
+namespace fs = std::filesystem;
+
+// "socket:[1234]", as /proc shows the descriptors of the sockets at that port.
+std::vector<std::string> sockets_of(std::uint16_t port) {
+  std::vector<std::string> sockets;
+  const std::string end = fmt::format(":{:04X}", port);
+  for (const char* const table : {"/proc/self/net/udp", "/proc/self/net/udp6"}) {
+    std::ifstream lines(table);
+    for (std::string line; std::getline(lines, line);) {
+      std::istringstream words(line);
+      std::string number, local, word, inode;
+      words >> number >> local;
+      for (int i = 0; i < 7; ++i) words >> word;  // remote … timeout
+      words >> inode;
+      if (words && local.ends_with(end)) sockets.push_back("socket:[" + inode + "]");
+    }
+  }
+  return sockets;
+}
+
+bool has_one_of(const fs::path& process, const std::vector<std::string>& sockets) {
+  std::error_code error;
+  for (fs::directory_iterator each(process / "fd", error), end; !error && each != end;
+       each.increment(error)) {
+    std::error_code gone;
+    const std::string target = fs::read_symlink(each->path(), gone).string();
+    if (std::find(sockets.begin(), sockets.end(), target) != sockets.end()) return true;
+  }
+  return false;
+}
+
+// The program that has a UDP port of this computer, as far as this user may see it (proc(5)):
+// "r4 (pid 123)", or "another program".
+std::string user_of_udp_port(std::uint16_t port) {
+  const std::vector<std::string> sockets = sockets_of(port);
+  std::error_code error;
+  for (fs::directory_iterator each("/proc", error), end; !error && each != end;
+       each.increment(error)) {
+    const std::string pid = each->path().filename().string();
+    if (std::isdigit(static_cast<unsigned char>(pid[0])) == 0) continue;
+    if (!has_one_of(each->path(), sockets)) continue;
+    std::string name;
+    std::ifstream comm(each->path() / "comm");
+    if (std::getline(comm, name)) return fmt::format("{} (pid {})", name, pid);
+  }
+  return "another program";
 }
 
 }  // namespace
@@ -71,6 +124,11 @@ void UdpEnd::refuse(const asio::error_code& error, const Endpoint& local, const 
               "use an address of this machine, or 0.0.0.0 for all of them");
 }
 
+void UdpEnd::close_socket() noexcept {
+  asio::error_code ignored;
+  socket_.close(ignored);
+}
+
 void UdpEnd::begin(Handler& handler) {
   handler_ = &handler;
   listen();
@@ -91,8 +149,8 @@ void UdpEnd::close() noexcept {
   close_socket();
 }
 
-// The attempt to receive at once with which Asio begins tells whether more is there, at no cost: it
-// fills in the sender.
+// Asio first tries to receive at once. It fills in the sender then, which shows at no cost that
+// there is another packet.
 bool UdpEnd::begin_to_receive() {
   sender_.port(0);
   socket_.async_receive_from(asio::buffer(received_), sender_, MSG_TRUNC,
@@ -119,13 +177,9 @@ SendResult UdpEnd::send(std::string_view bytes, Priority priority, Peer to) {
   }
   if (!socket_.is_open()) return SendResult::down;
   if (queue_.empty()) {
-    switch (transmit(bytes, to)) {
-      case Outcome::sent:
-        return SendResult::sent;
-      case Outcome::failed:
-        return SendResult::down;
-      case Outcome::busy:
-        break;
+    const Outcome outcome = transmit(bytes, to);
+    if (outcome != Outcome::busy) {
+      return outcome == Outcome::sent ? SendResult::sent : SendResult::down;
     }
   }
   const SendResult result = queue_.push(bytes, priority, to, std::chrono::steady_clock::now());
@@ -147,7 +201,7 @@ void UdpEnd::send_waiting() {
 UdpEnd::Outcome UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, bool standing,
                                     const asio::ip::address& from) {
   int error = send_packet(socket_.native_handle(), bytes, to, from);
-  // That is about an earlier packet, no program listens there yet; this one was not sent for it.
+  // ECONNREFUSED is about an earlier packet: no program listened there. This packet was not sent.
   if (error == ECONNREFUSED) error = send_packet(socket_.native_handle(), bytes, to, from);
   if (error == 0 || error == ECONNREFUSED) {
     ++counters_.tx_datagrams;
@@ -160,7 +214,8 @@ UdpEnd::Outcome UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, 
     return Outcome::sent;
   }
   if (error == EAGAIN || error == EWOULDBLOCK) return Outcome::busy;
-  if (error == ENOBUFS) {  // the interface's queue is full; there is nothing to wait for
+  if (error ==
+      ENOBUFS) {  // the interface's queue is full: the system does not report when it has room
     ++counters_.tx_dropped;
     return Outcome::sent;
   }
@@ -189,7 +244,7 @@ void UdpEnd::lose_network(int error) {
 }
 
 void UdpEnd::judge_route(int error) {
-  if (error != 0 && !is_network_loss(error)) return;  // it was not found out
+  if (error != 0 && !is_network_loss(error)) return;
   cut_ = error != 0;
   if (cut_ && up_) {
     lose_network(error);
@@ -226,11 +281,9 @@ void UdpEnd::report() {
   }
   if (handler_ == nullptr || up_ == reported_up_) return;
   reported_up_ = up_;
-  if (up_) {
-    handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
-  } else {
-    handler_->on_carrier_event({CarrierEvent::Kind::down, no_route(name_, down_error_)});
-  }
+  handler_->on_carrier_event(
+      up_ ? CarrierEvent{CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}}
+          : CarrierEvent{CarrierEvent::Kind::down, no_route(name_, down_error_)});
 }
 
 Problem UdpEnd::no_route(const std::string& subject, int error) const {
@@ -244,7 +297,7 @@ Problem UdpEnd::no_route(const std::string& subject, int error) const {
           "check the WiFi or cable and the address"};
 }
 
-// The interface may come back while nobody sends.
+// The interface may come back while nothing is sent.
 void UdpEnd::probe_later() {
   probe_timer_.expires_after(probe_interval);
   probe_timer_.async_wait(probe_.handler([this] {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What both ends of UDP have in common: a socket, what waits to be sent, and whether the network is
-// there. udp_host.hpp and udp_board.hpp are the ends.
+// What both ends of UDP have in common: a socket, the datagrams that wait, and whether the network
+// is there. udp_host.hpp and udp_board.hpp are the ends.
 #pragma once
 
 #include <array>
@@ -21,7 +21,8 @@
 
 namespace r4 {
 
-// It has more than 15 members: the socket with its timers and waits, the queue, and how the network is looked at.
+// It has more than 15 members: the socket with its timers and waits, the queue, and the state of
+// the network.
 class UdpEnd : public Carrier {
  public:
   void close() noexcept override;
@@ -41,9 +42,9 @@ class UdpEnd : public Carrier {
   // A packet from sender_.
   virtual void received(std::string_view bytes) = 0;
   virtual Outcome transmit(std::string_view bytes, Peer to) = 0;
-  // Is the network there? 0, or errno.
+  // 0 if the network is there, else errno.
   virtual int probe(const std::vector<OwnAddress>& own) = 0;
-  virtual void close_socket() noexcept = 0;
+  virtual void close_socket() noexcept;
   // The socket is bound: begins to receive.
   virtual void listen() { begin_to_receive(); }
 
@@ -51,25 +52,27 @@ class UdpEnd : public Carrier {
 
   // The socket, not bound. Throws Error.
   void open_socket(const Endpoint& local, bool v6_only);
-  // Closes the socket; why it cannot be bound, and `fix` for a port that another program has.
+  // Closes the socket and throws why it cannot be bound. `fix`: for a port that another program
+  // has.
   [[noreturn]] void refuse(const asio::error_code& error, const Endpoint& local,
                            const std::string& fix);
   // The socket is bound: receives, and is up.
   void begin(Handler& handler);
   void hand_over(std::string_view bytes, Peer from);
-  // `standing`: to where what is for everyone goes. It tells whether the network is there. `from`:
-  // an address of this computer; unspecified: any.
+  // `standing`: to the destination of datagrams for everyone, which shows whether the network is
+  // there. `from`: an address of this computer; unspecified: any.
   Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing,
                       const asio::ip::address& from = {});
   void set_up(bool up);
-  // What the system says of the way, 0 or errno: is it up? Any other error says nothing of it.
+  // `error`: of probe(). Goes up or down by it. Errors that are not about the network have no
+  // effect.
   void judge_route(int error);
   void report();
   void warn(const std::string& reason, const std::string& fix);
-  // It is tried again and again, and told once.
+  // Reports why the host is down, once for each reason.
   void tell_why_down(const Problem& problem);
 
-  // Why there is no way, by what the system says: errno.
+  // Why there is no route; `error` is errno.
   Problem no_route(const std::string& subject, int error) const;
 
   asio::io_context& io_;
@@ -81,11 +84,11 @@ class UdpEnd : public Carrier {
   WritableWait writable_;
   CarrierCounters counters_;
   Endpoint sender_;
-  std::string down_reason_;  // why it cannot be opened, as told last
+  std::string down_reason_;  // why it cannot be opened, as reported last
   std::array<char, max_datagram> received_;
 
  private:
-  // Is there more at once?
+  // True if another packet is there already.
   bool begin_to_receive();
   void send_waiting();
   void lose_network(int error);
@@ -95,7 +98,7 @@ class UdpEnd : public Carrier {
   LoopTimer probe_timer_;
   OperationSlot probe_;
   bool up_ = false;
-  bool cut_ = false;  // its interface does not work, though the system may take what is sent
+  bool cut_ = false;  // its interface does not work, though the system may take packets
   bool reported_up_ = false;
   int down_error_ = 0;
   int refused_error_ = 0;  // why the system refused the last packet; 0 once one has passed

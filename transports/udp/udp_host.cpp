@@ -9,7 +9,7 @@
 namespace r4 {
 
 UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search,
-                 std::shared_ptr<DeviceClaim> claim)
+                 Claim claim)
     : UdpEnd(io, UdpUrl(url, Role::host)),
       lookup_(std::move(lookup)),
       search_(std::move(search)),
@@ -19,7 +19,7 @@ UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardS
   search_.port = url_.port;
 }
 
-// Whoever opens it in a handler of the loop has others on that loop, whom a name must not hold up.
+// In a handler of the loop the lookup of a name must not block the other work of the loop.
 void UdpHost::open(Handler& handler) {
   close();
   wanted_ = {url_.called, ""};
@@ -27,7 +27,7 @@ void UdpHost::open(Handler& handler) {
   if (named_ && io_.get_executor().running_in_this_thread()) {
     handler_ = &handler;
     network_.enter(*this);
-    return watch();  // its address is asked for
+    return watch();  // asks for the address
   }
   if (url_.search) {
     const FoundHost board = find_board(search_, wanted_);
@@ -50,7 +50,7 @@ void UdpHost::close() noexcept {
   UdpEnd::close();
 }
 
-// The socket of a host whose board is there.
+// Opens and binds the socket that hears the board at that address.
 void UdpHost::bind(const Endpoint& board) {
   board_ = board;
   const bool any_port = claim_->yields && !url_.names_listen;
@@ -89,15 +89,13 @@ void UdpHost::bind(const Endpoint& board) {
 }
 
 void UdpHost::watch() {
-  if (named_) {
-    watch_.start(question(), socket_.is_open(), [this](const FoundHost& answer) { found(answer); });
-  } else if (host_socket_.connected()) {
-    // The address of this computer may be another now.
-    watch_.start([this] { judge_route(probe(own_addresses())); });
-  }
+  // Without a name, the address of this computer may have changed.
+  if (!named_ && !host_socket_.connected()) return;
+  watch_.start(named_ ? question() : nullptr, socket_.is_open(),
+               [this](const FoundHost& answer) { found(answer); });
 }
 
-// What is asked to know where the board is. It must not need this object: nobody waits for the answer.
+// Asks where the board is. It does not use this object, which may be gone before the answer comes.
 HostWatch::Question UdpHost::question() const {
   if (url_.search) {
     return [search = search_, wanted = wanted_] { return find_board(search, wanted); };
@@ -105,21 +103,21 @@ HostWatch::Question UdpHost::question() const {
   return [resolve = lookup_.resolve, host = url_.host] { return resolve(host); };
 }
 
-// Which board it is. The next search is for that one, whatever else is there by then.
+// The next search is for the same board, whatever other boards are there by then.
 void UdpHost::remember(const FoundHost& answer) {
   if (!url_.search) return;
   wanted_.board_id = answer.board_id;
   watch_.ask_for(question());
 }
 
-// Where the board of that name is, now.
+// The answer of a lookup or a search.
 void UdpHost::found(const FoundHost& answer) {
   const auto& addresses = answer.addresses;
   const bool is_open = socket_.is_open();
   if (is_open) {
     const bool same =
         std::find(addresses.begin(), addresses.end(), board_.address()) != addresses.end();
-    // Or it is this computer that has moved.
+    // The board has not moved. This computer may have moved.
     if (same || addresses.empty()) return judge_route(probe(own_addresses()));
   }
   const std::string before = is_open ? board_.address().to_string() : "";
@@ -171,7 +169,7 @@ UdpEnd::Outcome UdpHost::transmit(std::string_view bytes, Peer to) {
 
 int UdpHost::probe(const std::vector<OwnAddress>& own) {
   if (const int error = probe_route(board_, url_.local, own); error != 0) return error;
-  // The interface may be another of the same address.
+  // Another interface may have that address now.
   send_by_interface_of(url_.local, socket_.native_handle(), board_, own);
   return host_socket_.reconnect();
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The host's end of UDP: one board, which may be known by the name of its address, or by its own
-// (board_search.hpp), and may move.
+// The host's end of UDP: one board, given by its address, by a host name, or by its own name
+// (board_search.hpp). It may move.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -16,8 +16,7 @@ namespace r4 {
 
 class UdpHost final : public UdpEnd, private NetworkWatch::Member {
  public:
-  UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search,
-          std::shared_ptr<DeviceClaim> claim);
+  UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardSearch search, Claim claim);
   ~UdpHost() override { close(); }
 
   void open(Handler& handler) override;
@@ -38,12 +37,12 @@ class UdpHost final : public UdpEnd, private NetworkWatch::Member {
 
   const HostLookup lookup_;
   BoardSearch search_;
-  const std::shared_ptr<DeviceClaim> claim_;
-  WantedBoard wanted_;  // where the URL leaves it to a search
+  const Claim claim_;
+  WantedBoard wanted_;  // of a search
   HostWatch watch_;
   UdpHostSocket host_socket_{socket_};
   NetworkWatch& network_;
-  bool named_ = false;  // the URL has a name or leaves it to a search: where the board is, is asked
+  bool named_ = false;  // the address of the board comes from a lookup or a search
   Endpoint board_;
 };
 

@@ -11,8 +11,8 @@
 namespace r4 {
 namespace {
 
-// What the process has bound. Ports belong to the process, and its boards may have a thread each;
-// entered at open and close only. Never destroyed: a board may be static.
+// The bound sockets of the process, whose boards may have a thread each. Used at open and close
+// only. Never destroyed: a board may be static.
 struct Bound {
   std::mutex mutex;
   std::vector<UdpHostSocket*> sockets;
@@ -45,7 +45,7 @@ asio::error_code UdpHostSocket::bind(const Endpoint& local, const Endpoint& boar
   if (others.empty()) {
     socket_.bind(local_, error);
   } else {
-    // Only for this moment: a program that would share the port is to be noticed.
+    // Only for this moment: another program must not share the port.
     for (const UdpHostSocket* const each : others) set_reuse(each->descriptor_, true);
     set_reuse(socket_.native_handle(), true);
     for (UdpHostSocket* const each : others) {
@@ -70,7 +70,7 @@ void UdpHostSocket::close() noexcept {
     socket_.close(ignored);
     return;
   }
-  // Whoever binds next finds the port free or shares it, never in between.
+  // Under the lock, the next bind() finds the port either free or shared.
   Bound& all = bound();
   const std::lock_guard lock(all.mutex);
   all.sockets.erase(std::remove(all.sockets.begin(), all.sockets.end(), this), all.sockets.end());

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The socket at which a host hears one board, and what the boards of a program have to do with each
-// other there: they share the port of hosts.
+// The socket at which a host hears one board. The boards of a program share the port of hosts.
 //
-// The first at a port has it alone, so that another program at that port is noticed, and is not
-// connected: it hears its board from any of the board's ports. A further one is bound beside it and
-// connected to its board, so the kernel hands it what comes from there, and from that port only.
-// What is under way in the microseconds between the two may be lost.
+// The first socket at a port has it alone, so that another program at that port is noticed. It is
+// not connected, so it hears its board from any of the board's ports. A further socket is bound
+// beside it and connected to its board, so the kernel gives it the packets from the board's port
+// only. A packet that comes in the microseconds between bind and connect may be lost.
 #pragma once
 
 #include <asio/error_code.hpp>
@@ -29,18 +28,18 @@ class UdpHostSocket {
   UdpHostSocket& operator=(const UdpHostSocket&) = delete;
   ~UdpHostSocket() { close(); }
 
-  // Binds the socket, which is open, to `local` (port 0: any free one), to hear `board`. Fails with
+  // Binds the open socket to `local` (port 0: any free port), to hear `board`. Fails with
   // asio::error::already_open if this program hears that board there already.
   asio::error_code bind(const Endpoint& local, const Endpoint& board);
   // Closes the socket. Can be called twice.
   void close() noexcept;
 
-  // Connected: the kernel has chosen the address that it sends from, which may be gone.
+  // True if the kernel has chosen the address from which it sends. That address may go.
   bool connected() const { return connected_; }
-  // Has it chosen again, if it has. 0, or errno.
+  // Lets the kernel choose again, if it is connected. 0, or errno.
   int reconnect();
 
-  // Does the board send from there?
+  // True if `sender` is the board.
   bool hears(const Endpoint& sender) const {
     return sender.address() == board_.address() &&
            (!neighbours_.load(std::memory_order_relaxed) || sender.port() == board_.port());
@@ -52,7 +51,7 @@ class UdpHostSocket {
   Endpoint local_;
   Endpoint board_;
   bool connected_ = false;
-  // Another board of this program is, or was, at this one's address: they differ by their port.
+  // Another board of this program is, or was, at the same address: the port tells them apart.
   std::atomic<bool> neighbours_{false};
 };
 

@@ -11,7 +11,7 @@ bool is_search(const Url& url, Role role) {
   return role == Role::host && url.host().empty() && (url.path() == "auto" || url.get("id"));
 }
 
-// A board that is to listen, and no more is said, listens to programs of this machine.
+// A board whose URL names no address listens to programs of this computer only.
 std::string host_of(const Url& url, Role role) {
   const bool listens = role == Role::board && url.path().empty() && url.text().find("//") == 4;
   return url.host().empty() && listens ? "127.0.0.1" : url.host();

@@ -19,23 +19,22 @@ struct UdpUrl {
   UdpUrl(const Url& url, Role role);
 
   std::string text;
-  bool search = false;   // udp:auto, udp:?id=NAME: the board is to be found
-  std::string called;    // its name or board id; empty: the only one
-  std::string host;      // the board's; at a board: where it listens
+  bool search = false;   // udp:auto, udp:?id=NAME: a search finds the board
+  std::string called;    // its name or board id; empty: the only board
+  std::string host;      // of the board; at a board: where it listens
   std::uint16_t port;    // of the board
   std::uint16_t listen;  // of the host
-  bool names_listen;     // the URL says so
-  asio::ip::address
-      local;         // of this computer, by whose interface the host sends; unspecified: by any
+  bool names_listen;     // the URL has the option `listen`
+  // The host sends by the interface with that address; unspecified: by any interface.
+  asio::ip::address local;
   std::string peer;  // HOST or HOST:PORT; empty: none
   std::string peer_host;
   std::uint16_t peer_port = host_port;
 };
 
-// The URL by which a host opens a board. If it is one of UDP and names no port to listen at, any
-// free one is added; others come back as they are.
+// The URL of a host, with `listen=0` (any free port) if it is one of UDP and has no `listen`.
 std::string with_own_port(std::string url);
-// The same, and a port that it names is replaced, too.
+// The same; also replaces the port of `listen`.
 std::string with_any_port(std::string url);
 
 }  // namespace r4

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The bus that capacity tests run on, against what ISO 11898-1 says of a bus.
+// Compares the bus model of capacity tests with ISO 11898-1.
 #include "tests/support/can_bus_model.hpp"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ constexpr std::uint64_t second_ns = 1000000000;
 CanFrame frame(std::uint32_t id, const std::string& hex = "55 55") { return frame_of(id, hex); }
 std::uint64_t bits(const CanFrame& frame) { return total(can_bits(frame)); }
 
-// A bus whose last node listens and notes what comes.
+// A bus with a node that listens and records the frames.
 struct Bench {
   explicit Bench(const CanBusOptions& options = {}) : bus(options) {
     CanNodeOptions listener;
@@ -77,7 +77,7 @@ TEST(CanBusModel, TheLowestIdWinsAmongNodesAndWithinMailboxes) {
   EXPECT_EQ(bench.ids(), (Ids{0x010, 0x180, 0x200, 0x280, 0x300}));
 }
 
-TEST(CanBusModel, AFifoHoldsUpWhatIsUrgentBehindIt) {
+TEST(CanBusModel, AnUrgentFrameWaitsInAFifo) {
   Bench bench;
   const int fifo = bench.sender(1000, CanQueue::fifo);
   const int other = bench.sender();
@@ -166,7 +166,8 @@ TEST(CanBusModel, AFrameInBetweenEndsARunOfRecessiveBits) {
   bench.bus.send(node, frame(0x100));
   bench.bus.corrupt_next(32);
   const std::uint64_t until_off = (32 * (bits(frame(0x100)) + 7) + 16 * 8) * bit_ns;
-  // Ten bits after the bus is free: a run of 21 bits counts once. The end of this frame begins anew.
+  // Ten bits after the bus is free: a run of 21 bits counts once. The end of this frame begins
+  // anew.
   bench.bus.at(until_off + 10 * bit_ns, [&] { bench.bus.send(other, frame(0x200)); });
   bench.bus.run_until(second_ns);
   ASSERT_EQ(bench.heard.size(), 2U);
@@ -226,7 +227,7 @@ TEST(CanBusModel, TwoNodesWithOneIdGoBusOffUnlessTheySayTheSame) {
   EXPECT_EQ(bench.bus.state(two), CanNodeState::bus_off);
 }
 
-TEST(CanBusModel, ABabblingNodeStarvesWhatIsBelowItAndNothingElse) {
+TEST(CanBusModel, ABabblingNodeStarvesOnlyLowerPriorities) {
   Bench bench;
   CanNodeOptions options;
   int babbler = 0;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr CanBitRate one_mbit{1000000, 0};
 
-// A board's end of a bus on which somebody surveys.
+// A board's end of a bus with a survey.
 struct Bus {
   explicit Bus(std::uint8_t node = 3) : board(CanEnd::board, node, false) {
     survey.on_datagram([this](std::uint8_t from, const Datagram& datagram) {
@@ -54,7 +54,7 @@ struct Bus {
   std::uint32_t now_us = 0xFFFF0000;  // wraps under way
 };
 
-TEST(CanSurvey, TellsIdsOfR4FromThoseThatAnotherProtocolUses) {
+TEST(CanSurvey, TellsIdsOfR4FromIdsOfAnotherProtocol) {
   Bus bus;
   CanFrame frame{};
   frame.size = 8;
@@ -95,7 +95,7 @@ TEST(CanSurvey, HearsThePackedForm) {
   EXPECT_EQ(bus.heard.at(0).substr(0, 8), "3 AIN24:");
 }
 
-TEST(CanSurvey, CountsWhatWasLost) {
+TEST(CanSurvey, CountsLostDatagrams) {
   Bus bus;
   bus.state(10);
   bus.state(11, 2);  // a frame of it is lost
@@ -118,7 +118,7 @@ TEST(CanSurvey, ABoardWithoutAHostIsNotConnected) {
   EXPECT_EQ(bus.survey.board(3).lost, 0U);
 }
 
-TEST(CanSurvey, StatesForWhoWatchesAreNoHost) {
+TEST(CanSurvey, StatesForAWatcherDoNotProveAHost) {
   Bus bus;
   bus.heartbeat(0, 0, SafeReason::none);
   bus.state(7);

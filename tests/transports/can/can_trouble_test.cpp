@@ -10,7 +10,7 @@ using namespace std::chrono_literals;
 
 const CanTrouble::Time trouble_start{std::chrono::hours{1}};
 
-TEST(CanTrouble, TakesFramesThatMakeNoDatagramForThoseOfAnotherProtocol) {
+TEST(CanTrouble, TakesFramesWithoutADatagramForAnotherProtocol) {
   CanTrouble trouble;
   for (auto after = 0ms; after < 500ms; after += 10ms) {
     trouble.on_host_frame(trouble_start + after);

@@ -28,7 +28,7 @@ TEST(CanTurn, IsOursWhenNobodyElseIsHeard) {
   EXPECT_TRUE(turn.ours(start + 1h));
 }
 
-TEST(CanTurn, WhoComesLaterIsSilentUntilTheOtherHasGone) {
+TEST(CanTurn, AHostThatComesLaterIsSilentUntilTheOtherHasGone) {
   CanTurn turn(1);
   turn.listen(start);
   auto heard = start + 99ms;
@@ -42,14 +42,14 @@ TEST(CanTurn, WhoComesLaterIsSilentUntilTheOtherHasGone) {
   EXPECT_TRUE(turn.ours(heard + CanTurn::silence + CanTurn::most_chance));
 }
 
-TEST(CanTurn, WhoIsThereGoesOn) {
+TEST(CanTurn, AHostThatHasTheTurnGoesOn) {
   CanTurn turn(1);
   talk(turn, start, 0ms);
   EXPECT_FALSE(turn.on_other(start + 50ms));
   EXPECT_TRUE(turn.ours(start + 50ms));
 }
 
-TEST(CanTurn, WhoHasJustBegunMakesRoom) {
+TEST(CanTurn, AHostThatHasJustBegunGivesWay) {
   CanTurn turn(1);
   turn.on_own(start);
   EXPECT_TRUE(turn.on_other(start + 49ms));
@@ -57,7 +57,7 @@ TEST(CanTurn, WhoHasJustBegunMakesRoom) {
   EXPECT_FALSE(turn.on_other(start + 51ms)) << "it is silent already";
 }
 
-TEST(CanTurn, WhoWasSilentForASecondIsANewcomer) {
+TEST(CanTurn, AHostThatWasSilentForASecondIsANewcomer) {
   CanTurn turn(1);
   talk(turn, start, 10s);
   EXPECT_TRUE(turn.on_other(start + 11s)) << "held up, and another has taken over";
@@ -77,7 +77,8 @@ TEST(CanTurn, ListensAgainWhenTheBusComesBack) {
   EXPECT_TRUE(turn.others());
 }
 
-// Two that begin in the same millisecond fall silent both; one of them is back first, and stays.
+// Two hosts that begin in the same millisecond both fall silent. One of them is back first, and
+// stays.
 TEST(CanTurn, OfTwoThatBeginTogetherOneGetsIt) {
   for (std::uint32_t seed = 1; seed <= 100; ++seed) {
     CanTurn turns[] = {CanTurn(seed), CanTurn(seed + 1000)};

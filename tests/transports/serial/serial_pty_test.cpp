@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// serial and pty joined by a real pseudo-terminal, and each against a terminal in the test's hands.
+// serial and pty joined by a real pseudo-terminal, and each against a terminal of the test.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -14,8 +14,10 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "../recorder.hpp"
+#include "tests/support/problems.hpp"
 #include "tests/support/refused_calls.hpp"
 #include "transports/file_descriptor.hpp"
 #include "transports/serial/pty_carrier.hpp"
@@ -30,7 +32,7 @@ using std::chrono::milliseconds;
 // "serial:///dev/pts/5" of "pty:/dev/pts/5".
 std::string url_for_host(const Carrier& board) { return "serial://" + board.name().substr(4); }
 
-// A pseudo-terminal in the test's hands: the far end of a serial carrier.
+// A pseudo-terminal of the test: the far end of a serial carrier.
 struct Terminal {
   Terminal() : master(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
     std::array<char, 64> name{};
@@ -52,7 +54,7 @@ FileDescriptor open_raw(const std::string& device) {
   return terminal;
 }
 
-// What can be read at once.
+// Everything that can be read at once.
 std::string read_all(const FileDescriptor& terminal) {
   std::string all;
   std::array<char, 4096> buffer{};
@@ -99,9 +101,14 @@ class SerialPtyTest : public testing::Test {
   bool wait_for(const Recorder& recorder, std::string_view text) {
     return run_until(io, [&] { return recorder.has(text); });
   }
-  std::optional<Error> host_error(const std::string& url) {
+  Problem host_problem(const std::string& url) {
     Recorder recorder;
-    return error_of([&] { open_carrier(io, url, Role::host, recorder); });
+    return problem_of([&] { open_carrier(io, url, Role::host, recorder); });
+  }
+  std::unique_ptr<Carrier> claimed(const Url& url, const DeviceClaim& claim, Recorder& recorder) {
+    auto carrier = make_serial_carrier(io, url, Role::host, std::make_shared<DeviceClaim>(claim));
+    carrier->open(recorder);
+    return carrier;
   }
 
   asio::io_context io;
@@ -126,10 +133,6 @@ TEST_F(SerialPtyTest, CarriesBothWays) {
   EXPECT_EQ(at_host.datagrams[0].from, everyone);
   EXPECT_EQ(board->counters().rx_bytes, host->counters().tx_bytes);
   EXPECT_GE(at_host.drained, 1);
-}
-
-TEST_F(SerialPtyTest, CarriesTheLongestDatagramAndNoLonger) {
-  connect();
   const std::string longest(1024, 'x');
   EXPECT_EQ(host->send(longest + "x", Priority::normal), SendResult::full);
   EXPECT_EQ(host->send(longest, Priority::normal), SendResult::sent);
@@ -153,10 +156,9 @@ TEST_F(SerialPtyTest, SetsOneMegabaudRawEightBits) {
 
 TEST_F(SerialPtyTest, NamesTheRateThatIsRefused) {
   open_board();
-  const auto error = host_error(url_for_host(*board) + "?baud=12345");
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->kind(), ErrorKind::usage);
-  EXPECT_NE(error->problem().reason.find("12345 baud"), std::string::npos) << error->what();
+  const Problem problem = host_problem(url_for_host(*board) + "?baud=12345");
+  EXPECT_EQ(problem.kind, ErrorKind::usage);
+  EXPECT_TRUE(contains(problem.reason, "12345 baud"));
   open_host(url_for_host(*board) + "?baud=115200");
   EXPECT_EQ(host->name(), url_for_host(*board) + "?baud=115200");
 }
@@ -219,7 +221,7 @@ TEST_F(SerialPtyTest, SeesTheBoardGoAndComeBackByItsPath) {
   EXPECT_TRUE(wait_for(at_board, "works again"));
 }
 
-TEST_F(SerialPtyTest, ReportsOnceWhatKeepsItFromADeviceThatIsBack) {
+TEST_F(SerialPtyTest, ReportsOnceWhyADeviceThatIsBackCannotBeOpened) {
   const std::string link = folder / "board";
   open_board("pty:" + link);
   open_host("serial://" + link);
@@ -351,7 +353,7 @@ class StalledBoardTest : public SerialPtyTest {
     while (host->send(line(sent), Priority::normal) == SendResult::sent) ++sent;
   }
   static std::string line(int i) { return "line " + std::to_string(i) + std::string(150, '.'); }
-  // All that the far end reads until the last of it is `last`.
+  // The lines that the far end reads, up to `last`.
   std::vector<std::string> read_until(const std::string& last) {
     std::string text;
     const auto deadline = Clock::now() + patience;
@@ -367,7 +369,7 @@ class StalledBoardTest : public SerialPtyTest {
   int sent = 0;
 };
 
-TEST_F(StalledBoardTest, LetsStopOvertakeWhatWaits) {
+TEST_F(StalledBoardTest, LetsAStopOvertakeWaitingLines) {
   EXPECT_EQ(host->send("one too many", Priority::normal), SendResult::full);
   EXPECT_EQ(host->send("state 1", Priority::state), SendResult::sent);
   EXPECT_EQ(host->send("state 2", Priority::state), SendResult::sent);
@@ -385,7 +387,7 @@ TEST_F(StalledBoardTest, LetsStopOvertakeWhatWaits) {
   }
 }
 
-TEST_F(StalledBoardTest, DropsWhatHasWaited100MsButCompletesTheLineBegun) {
+TEST_F(StalledBoardTest, DropsLinesAfter100MsButCompletesTheLineInProgress) {
   host->send("state", Priority::state);
   host->send("stop", Priority::stop);
   run_for(io, milliseconds(110));
@@ -402,38 +404,33 @@ TEST_F(StalledBoardTest, DropsWhatHasWaited100MsButCompletesTheLineBegun) {
 
 TEST_F(SerialPtyTest, SaysThatADeviceIsInUse) {
   connect();
-  const auto error = host_error(url_for_host(*board));
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->kind(), ErrorKind::open);
-  EXPECT_EQ(error->problem().reason, "it is in use by another program");
-  EXPECT_FALSE(error->problem().fix.empty());
+  const Problem problem = host_problem(url_for_host(*board));
+  EXPECT_EQ(problem.kind, ErrorKind::open);
+  EXPECT_EQ(problem.reason, "it is in use by another program");
+  EXPECT_FALSE(problem.fix.empty());
   host->close();
-  EXPECT_FALSE(host_error(url_for_host(*board)));
+  host->open(at_host);
 }
 
-TEST_F(SerialPtyTest, MayBeTakenFromOneThatYieldsWhichReadsAndSendsNothingMore) {
+TEST_F(SerialPtyTest, CanBeTakenFromAProgramThatYieldsWhichThenReadsAndSendsNothing) {
   const Terminal terminal;
   const Url url = Url::parse("serial://" + terminal.device);
   int lost_first = 0;
   int lost_second = 0;
-  const auto opened = [&](const DeviceClaim& claim, Carrier::Handler& handler) {
-    auto carrier = make_claimed_serial_carrier(io, url, std::make_shared<DeviceClaim>(claim));
-    carrier->open(handler);
-    return carrier;
-  };
   const DeviceClaim controls{false, false}, takes{false, true},
       yields{true, false, [&] { ++lost_first; }},
       takes_and_yields{true, true, [&] { ++lost_second; }};
   Recorder first, second, third;
-  const auto one = opened(yields, first);
+  const auto one = claimed(url, yields, first);
   write_text(terminal.master, "for the first\r\n");
   ASSERT_TRUE(wait_for(first, "for the first"));
   for (const auto& claim : {controls, yields})
-    EXPECT_TRUE(error_of([&] { opened(claim, second); })) << "asked to take it, it is not";
+    EXPECT_TRUE(error_of([&] { claimed(url, claim, second); })) << "asked to take it, it is not";
 
-  const auto two = opened(takes_and_yields, second);
-  EXPECT_TRUE(error_of([&] { opened(takes_and_yields, third); })) << "those two would take turns";
-  const auto three = opened(takes, third);
+  const auto two = claimed(url, takes_and_yields, second);
+  EXPECT_TRUE(error_of([&] { claimed(url, takes_and_yields, third); }))
+      << "those two would take turns";
+  const auto three = claimed(url, takes, third);
   for (int i = 0; i < 20; ++i) {
     write_text(terminal.master, fmt::format("for the third {}\r\n", i));
     ASSERT_TRUE(wait_for(third, fmt::format("for the third {}", i)));
@@ -445,69 +442,54 @@ TEST_F(SerialPtyTest, MayBeTakenFromOneThatYieldsWhichReadsAndSendsNothingMore) 
   EXPECT_FALSE(one->up());
   EXPECT_EQ(two->send("late", Priority::normal), SendResult::down);
   for (const auto& claim : {takes, takes_and_yields, yields, controls})
-    EXPECT_TRUE(error_of([&] { opened(claim, second); })) << "it yields to nobody";
+    EXPECT_TRUE(error_of([&] { claimed(url, claim, second); })) << "it yields to nobody";
   EXPECT_EQ(read_all(terminal.master), "");
 }
 
-TEST_F(SerialPtyTest, IsTakenAlsoFromOneThatWantsToSend) {
+TEST_F(SerialPtyTest, CanBeTakenFromAProgramThatWantsToSend) {
   const Terminal terminal;
   const Url url = Url::parse("serial://" + terminal.device);
-  const auto yields = std::make_shared<DeviceClaim>(DeviceClaim{true, false});
-  const auto one = make_claimed_serial_carrier(io, url, yields);
-  one->open(at_host);
+  const auto one = claimed(url, {true, false}, at_host);
   EXPECT_EQ(one->send("mine", Priority::normal), SendResult::sent);
   Recorder other;
-  const auto takes = std::make_shared<DeviceClaim>(DeviceClaim{false, true});
-  const auto two = make_claimed_serial_carrier(io, url, takes);
-  two->open(other);
+  const auto two = claimed(url, {false, true}, other);
   EXPECT_EQ(one->send("late", Priority::normal), SendResult::down);
   EXPECT_EQ(lines_of(read_all(terminal.master)), std::vector<std::string>{"mine"});
   EXPECT_TRUE(run_until(io, [&] { return !one->up(); }));
 }
 
-TEST_F(SerialPtyTest, SaysWhichDeviceIsMissing) {
-  for (const char* device : {"/dev/ttyACM99", "/dev/pts/99999", "/no/such/folder/tty"}) {
-    const auto error = host_error(std::string("serial://") + device);
-    ASSERT_TRUE(error) << device;
-    EXPECT_EQ(error->kind(), ErrorKind::open);
-    EXPECT_EQ(error->problem().thing, device);
-    EXPECT_EQ(error->problem().reason, "there is no such device");
-    EXPECT_NE(error->problem().fix.find("ports"), std::string::npos) << error->what();
-  }
-  const auto by_number = host_error("serial:?sn=no-such-number");
-  ASSERT_TRUE(by_number);
-  EXPECT_EQ(by_number->kind(), ErrorKind::open);
-  EXPECT_NE(by_number->problem().reason.find("'no-such-number'"), std::string::npos);
-}
-
-TEST_F(SerialPtyTest, SaysWhatIsNoSerialPort) {
+TEST_F(SerialPtyTest, SaysWhichDeviceIsMissingOrNotASerialPort) {
   std::ofstream(folder / "file") << "text";
-  for (const std::string& path :
-       {std::string("/dev/null"), folder.string(), (folder / "file").string()}) {
-    const auto error = host_error("serial://" + path);
-    ASSERT_TRUE(error) << path;
-    EXPECT_EQ(error->kind(), ErrorKind::open);
-    EXPECT_EQ(error->problem().reason, "it is not a serial port") << error->what();
+  const std::string missing = "there is no such device";
+  const std::string other = "it is not a serial port";
+  for (const auto& [path, reason] : std::map<std::string, std::string>{
+           {"/dev/ttyACM99", missing},
+           {"/dev/pts/99999", missing},
+           {"/no/such/folder/tty", missing},
+           {"/dev/null", other},
+           {folder, other},
+           {folder / "file", other},
+       }) {
+    const Problem problem = host_problem("serial://" + path);
+    EXPECT_EQ(problem.kind, ErrorKind::open);
+    EXPECT_EQ(problem.thing, path);
+    EXPECT_EQ(problem.reason, reason) << path;
+    EXPECT_TRUE(contains(problem.fix, "ports"));
   }
+  const Problem by_number = host_problem("serial:?sn=no-such-number");
+  EXPECT_EQ(by_number.kind, ErrorKind::open);
+  EXPECT_TRUE(contains(by_number.reason, "'no-such-number'"));
 }
 
 TEST_F(SerialPtyTest, SaysHowToGetPermission) {
   const Terminal far;
   ASSERT_EQ(::chmod(far.device.c_str(), 0), 0);
   const int status = run_unprivileged([&] {
-    const auto error = host_error("serial://" + far.device);
-    if (!error || error->kind() != ErrorKind::permission) return 1;
-    return error->problem().fix.find("usermod -aG dialout") != std::string::npos ? 0 : 2;
+    const Problem problem = host_problem("serial://" + far.device);
+    if (problem.kind != ErrorKind::permission) return 1;
+    return contains(problem.fix, "usermod -aG dialout") ? 0 : 2;
   });
   EXPECT_EQ(status, 0);
-}
-
-TEST_F(SerialPtyTest, OpensADeviceThroughALink) {
-  const Terminal far;
-  fs::create_symlink(far.device, folder / "by-id");
-  open_host("serial://" + (folder / "by-id").string());
-  write_text(far.master, "through the link\r\n");
-  EXPECT_TRUE(wait_for(at_host, "through the link"));
 }
 
 TEST_F(SerialPtyTest, ReplacesALinkAndNothingElse) {
@@ -568,16 +550,14 @@ TEST_F(SerialPtyTest, LeaksNoDescriptorsOver30Reopenings) {
   EXPECT_LE(open_descriptors(), before);
 }
 
-// The program may be driving: it goes on, and tries again.
-TEST_F(SerialPtyTest, WhatTheLoopMayNotWaitForIsAnErrorOfTheHostAndAWarningOfTheBoard) {
+// The program may be driving, so it must go on and try again.
+TEST_F(SerialPtyTest, ARefusedWaitIsAnErrorOfTheHostAndAWarningOfTheBoard) {
   in_a_thread_of_its_own([&] {
     open_board();
     refuse(no_watches);
     const std::string reason =
         "the programs of this user wait for as many files and sockets as they may";
-    const auto error = host_error(url_for_host(*board));
-    ASSERT_TRUE(error);
-    EXPECT_EQ(error->problem().reason, reason);
+    EXPECT_EQ(host_problem(url_for_host(*board)).reason, reason);
     const FileDescriptor terminal = open_raw(board->name().substr(4));
     ASSERT_TRUE(run_until(io, [&] { return at_board.count(Kind::warning) != 0; }));
     EXPECT_EQ(at_board.last(Kind::warning)->problem.reason, reason);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a program that holds a transport lets other programs do.
+// A program that holds a transport, and what other programs can do with it.
 #include "transports/share/share_holder.hpp"
 
 #include <fmt/format.h>
@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "shared_transport.hpp"
+#include "tests/support/problems.hpp"
 #include "tests/support/refused_calls.hpp"
 #include "transports/share/share_message.hpp"
 #include "transports/share/share_socket.hpp"
@@ -35,7 +36,7 @@ class ShareHolderTest : public SharedTransportTest {
     EXPECT_TRUE(connection);
     return connection;
   }
-  // One that is served.
+  // A connection that is served.
   FileDescriptor raw_watcher() {
     FileDescriptor connection = raw();
     EXPECT_EQ(send_message(connection.get(), Letter::hello, ShareMessage::version), 0);
@@ -95,7 +96,7 @@ TEST_F(ShareHolderTest, LosesCopiesToAProgramThatSleepsAndTellsItTheNewestAfterw
   EXPECT_LT(sleeper->heard.datagrams.size(), 300U);
 }
 
-TEST_F(ShareHolderTest, LetsAProgramComeAgainThatMissedWhatHappenedToTheTransport) {
+TEST_F(ShareHolderTest, DisconnectsAProgramThatMissesAnEventOfTheTransport) {
   const auto holder = opened(BoardRole::control);
   const FileDescriptor sleeper = raw_watcher();
   const auto awake = opened(BoardRole::watch);
@@ -201,7 +202,7 @@ TEST_F(ShareHolderTest, TurnsStrangersAwayOneAtATimeWithAPauseAfterEach) {
   EXPECT_GE(Clock::now() - began, 19 * ShareHolder::between_arrivals);
 }
 
-// What the system refuses ends nothing: the program may be driving.
+// A refusal of the system must not end the program, which may be driving.
 TEST_F(ShareHolderTest, GoesOnWhereTheLoopCannotWaitForAProgramThatComes) {
   in_a_thread_of_its_own([&] {
     const auto holder = opened(BoardRole::control);
@@ -211,9 +212,8 @@ TEST_F(ShareHolderTest, GoesOnWhereTheLoopCannotWaitForAProgramThatComes) {
     EXPECT_TRUE(in_time([&] { return is_ended(late); }));
     EXPECT_TRUE(all_hear("state", watcher, holder));
     const auto told = program(BoardRole::watch, io);
-    const auto error = error_of([&] { told->open(); });
-    ASSERT_TRUE(error) << "it cannot wait for the holder";
-    EXPECT_NE(error->problem().reason.find("wait for as many files"), std::string::npos);
+    EXPECT_TRUE(contains(problem_of([&] { told->open(); }).reason, "wait for as many files"))
+        << "it cannot wait for the holder";
   });
 }
 

@@ -40,7 +40,7 @@ TEST(ShareMessage, BringsADatagramOfAnyBytes) {
   EXPECT_EQ(message->text, std::string("\0\xff;", 3));
 }
 
-TEST(ShareMessage, IsRefusedIfItIsNoneOfThisVersion) {
+TEST(ShareMessage, IsRefusedIfItIsInvalidOrOfAnotherVersion) {
   const std::string longest(max_datagram, 'x');
   for (const std::string& good : {"s" + longest, std::string("h3"), std::string("c3"),
                                   std::string("w3"), std::string("ed4a\0b\0", 7)}) {

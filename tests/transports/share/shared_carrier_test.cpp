@@ -9,6 +9,7 @@
 
 #include "shared_transport.hpp"
 #include "tests/support/datagrams.hpp"
+#include "tests/support/problems.hpp"
 #include "transports/share/share_message.hpp"
 #include "transports/share/share_socket.hpp"
 
@@ -94,7 +95,7 @@ TEST_F(SharedCarrier, ServesItsOwnProgramBeforeOthers) {
   EXPECT_TRUE(hear());
 }
 
-TEST_F(SharedCarrier, LetsAllHearWhatAnotherHostSaysAndWhatIsTooLong) {
+TEST_F(SharedCarrier, LetsAllHearAnotherHostAndDatagramsThatAreTooLong) {
   const auto driver = opened(BoardRole::control);
   const auto watcher = opened(BoardRole::watch);
   device.overhear("O:358,1,1;");
@@ -125,14 +126,13 @@ TEST_F(SharedCarrier, LetsAProgramThatWatchesStopTheBoardAtOnceAndSayNothingElse
 TEST_F(SharedCarrier, RefusesASecondProgramThatIsToControlAndNamesTheFirst) {
   auto driver = opened(BoardRole::control);
   const auto second = program(BoardRole::control, io);
-  const auto error = error_of([&] { second->open(); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->kind(), ErrorKind::refused);
-  EXPECT_EQ(error->problem().reason,
+  const Problem problem = problem_of([&] { second->open(); });
+  EXPECT_EQ(problem.kind, ErrorKind::refused);
+  EXPECT_EQ(problem.reason,
             fmt::format("controlled by {} (pid {})", program_of(::getpid()), ::getpid()));
-  ASSERT_TRUE(error->holder());
-  EXPECT_EQ(error->holder()->pid, ::getpid());
-  EXPECT_EQ(error->holder()->name, program_of(::getpid()));
+  ASSERT_TRUE(problem.holder);
+  EXPECT_EQ(problem.holder->pid, ::getpid());
+  EXPECT_EQ(problem.holder->name, program_of(::getpid()));
   EXPECT_FALSE(second->carrier->up());
   EXPECT_EQ(device.opened, 1);
   driver.reset();
@@ -179,10 +179,9 @@ TEST_F(SharedCarrier, GivesControlToAProgramThatWatchesAndTakesItBack) {
 TEST_F(SharedCarrier, RefusesControlToAProgramThatWatchesAndLeavesItWatching) {
   const auto driver = opened(BoardRole::control);
   const auto watcher = opened(BoardRole::watch);
-  const auto error = error_of([&] { watcher->carrier->change_role(BoardRole::control); });
-  ASSERT_TRUE(error);
-  ASSERT_TRUE(error->holder());
-  EXPECT_EQ(error->holder()->pid, ::getpid());
+  const Problem problem = problem_of([&] { watcher->carrier->change_role(BoardRole::control); });
+  ASSERT_TRUE(problem.holder);
+  EXPECT_EQ(problem.holder->pid, ::getpid());
   EXPECT_TRUE(all_hear("watched", watcher));
   EXPECT_EQ(device.opened, 1);
   EXPECT_TRUE(watcher->carrier->is_shared());
@@ -229,7 +228,7 @@ TEST_F(SharedCarrier, IsTakenOverByAnotherProgramWhenTheHolderEnds) {
   EXPECT_GE(programs.front()->carrier->counters().rx_datagrams, 2U) << "also what others held";
 }
 
-TEST_F(SharedCarrier, TellsAllWhatHappensToTheTransport) {
+TEST_F(SharedCarrier, ReportsEventsOfTheTransportToAllPrograms) {
   const auto holder = opened(BoardRole::watch);
   const auto early = opened(BoardRole::watch);
   device.report({Kind::down, unplugged});
@@ -254,8 +253,8 @@ TEST_F(SharedCarrier, MayBeClosedByAProgramThatHearsAStopOfAnother) {
   EXPECT_EQ(device.sent, std::vector<std::string>{stop});
 }
 
-// As the board behind a link to a pty is, when it ends and begins again.
-TEST_F(SharedCarrier, BeginsAnewWhenADeviceGoesThatIsKnownByItsPath) {
+// A board behind a link to a pty is such a device when it restarts.
+TEST_F(SharedCarrier, RestartsWhenADeviceThatIsKnownByItsPathIsGone) {
   share.is_path = true;
   const auto one = opened(BoardRole::watch);
   const auto two = opened(BoardRole::watch);
@@ -345,9 +344,7 @@ TEST_F(SharedCarrier, StaysWithAHolderThatDoesNotAnswerButControls) {
   asio::io_context hanging;
   const auto holder = opened_in(hanging, BoardRole::control);
   const auto second = program(BoardRole::control, io);
-  const auto error = error_of([&] { second->open(); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->kind(), ErrorKind::refused);
+  EXPECT_EQ(problem_of([&] { second->open(); }).kind, ErrorKind::refused);
   const auto watcher = opened_in(io, BoardRole::watch);
   ASSERT_TRUE(run_until(io, [&] { return watcher->heard.count(Kind::down) == 1; }));
   EXPECT_EQ(watcher->heard.last(Kind::down)->problem.reason, silent);
@@ -401,7 +398,7 @@ TEST_F(SharedCarrier, IsNotForOtherUsers) {
 }
 
 TEST_F(SharedCarrier, IsForTheMembersOfTheGroupThatTheHolderNames) {
-  // A user in the group nobody has (65534), and in no other.
+  // A user whose only group is that of nobody (65534).
   const auto stop_it = [&](const ShareGroup& of) {
     return run_unprivileged([&] {
       const ShareName shared{share.text, of};

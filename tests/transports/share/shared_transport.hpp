@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the tests of a shared transport have in common: a device, and programs that share it.
+// For tests of a shared transport: a device, and programs that share it.
 #pragma once
 
 #include <fmt/format.h>
@@ -24,12 +24,12 @@
 
 namespace r4::test {
 
-// A device that one can have open at a time, as a serial port is, or several.
+// A device that one program can have open at a time, such as a serial port, or several programs.
 struct Device {
   class Port;
   bool exclusive = true;
-  bool may_be_taken = false;  // from one that yields
-  Port* open = nullptr;       // the newest, if it is for several
+  bool may_be_taken = false;  // from a program that yields
+  Port* open = nullptr;       // the newest one, if several programs have it open
   int opened = 0;
   std::vector<std::string> sent;
   std::function<void()> then_sent;  // also called
@@ -41,7 +41,7 @@ struct Device {
 
 class Device::Port final : public Carrier {
  public:
-  Port(asio::io_context& io, Device& device, std::shared_ptr<DeviceClaim> claim)
+  Port(asio::io_context& io, Device& device, Claim claim)
       : io_(io), device_(device), claim_(std::move(claim)) {}
   ~Port() override { close(); }
 
@@ -87,7 +87,7 @@ class Device::Port final : public Carrier {
   const std::string name_ = "device:";
   Handler* handler_ = nullptr;
   bool up_ = false;
-  const std::shared_ptr<DeviceClaim> claim_;
+  const Claim claim_;
   CarrierCounters counters_;
 };
 
@@ -141,7 +141,7 @@ class SharedTransportTest : public testing::Test {
         role);
     return made;
   }
-  // A program whose open() has returned, in this loop or in one that nobody may run.
+  // A program whose open() has returned, in this loop or in a loop that may not run.
   std::unique_ptr<Program> opened_in(asio::io_context& loop, BoardRole role) {
     auto made = program(role, loop);
     made->open();
@@ -162,7 +162,7 @@ class SharedTransportTest : public testing::Test {
     }
     return true;
   }
-  // The device says it again and again until all of them have heard it.
+  // The device repeats `text` until all programs have heard it.
   template <class... Programs>
   bool all_hear(const std::string& text, const Programs&... programs) {
     return in_time([&] {

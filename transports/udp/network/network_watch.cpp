@@ -33,7 +33,7 @@ void NetworkWatch::leave(Member& member) {
   std::replace(members_.begin(), members_.end(), &member, static_cast<Member*>(nullptr));
   if (std::any_of(members_.begin(), members_.end(), [](const Member* each) { return each; }))
     return;
-  // Nothing that the loop would have to wait for.
+  // Without members the loop must not wait for anything.
   members_.clear();
   waiting_.cancel();
   if (waits_.is_open()) waits_.release();
@@ -56,8 +56,8 @@ void NetworkWatch::wait() {
   waits_.async_wait(asio::posix::descriptor_base::wait_read, waiting_.handler([this] { tell(); }));
 }
 
-// What has changed is looked up anew: reports may have been lost, and many may have come for one cause. Those that come
-// faster than they are read are the next turn's.
+// Looks up all addresses: reports may have been lost, and one cause may bring many reports. Reports
+// that come faster than they are read are left for the next turn.
 void NetworkWatch::tell() {
   std::array<char, 4096> report;
   for (int i = 0; i < most_in_a_turn; ++i) {

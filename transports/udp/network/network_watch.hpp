@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tells the hosts of a loop that an interface of this computer, its carrier or an address of it has changed: a cable
-// that is pulled is known at once, though nothing is sent. One of each loop. Where the system does not tell
-// (rtnetlink(7) is not to be had), nobody is called, and what is sent shows it later.
+// Notifies the hosts of a loop when an interface of this computer, its carrier or an address has
+// changed. So a pulled cable is known at once, though nothing is sent. One object a loop. If
+// rtnetlink(7) is not available, members are not called, and a failing datagram shows the change
+// later.
 #pragma once
 
 #include <asio/execution_context.hpp>
@@ -44,7 +45,7 @@ class NetworkWatch final : public asio::execution_context::service {
   FileDescriptor changes_;  // a socket of rtnetlink
   LoopDescriptor waits_;
   OperationSlot waiting_;
-  std::vector<Member*> members_;  // nullptr: has left while all are told
+  std::vector<Member*> members_;  // nullptr: has left during a notification
 };
 
 }  // namespace r4

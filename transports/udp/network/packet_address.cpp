@@ -13,7 +13,7 @@ namespace {
 using asio::ip::address;
 using Endpoint = asio::ip::udp::endpoint;
 
-// An error is of a packet that was sent before, and is told once.
+// The system reports an error of an earlier packet once.
 constexpr int most_errors = 4;
 constexpr std::size_t control_size = CMSG_SPACE(sizeof(in6_pktinfo));
 
@@ -21,7 +21,7 @@ address address_of(const cmsghdr& item) {
   if (item.cmsg_level == IPPROTO_IP && item.cmsg_type == IP_PKTINFO) {
     in_pktinfo info{};
     std::memcpy(&info, CMSG_DATA(&item), sizeof info);
-    // Of a broadcast, too, it is an address of this computer.
+    // An address of this computer, also for a broadcast.
     return asio::ip::address_v4(ntohl(info.ipi_spec_dst.s_addr));
   }
   if (item.cmsg_level == IPPROTO_IPV6 && item.cmsg_type == IPV6_PKTINFO) {
@@ -97,7 +97,7 @@ int send_packet(int socket, std::string_view bytes, const Endpoint& to, const ad
   };
   if (from.is_unspecified()) return result_of(send_by_any);
   alignas(cmsghdr) char control[control_size] = {};
-  // The kernel only reads them.
+  // The kernel only reads the buffers.
   iovec part{const_cast<char*>(bytes.data()), bytes.size()};  // NOLINT
   msghdr message{};
   message.msg_name = const_cast<void*>(static_cast<const void*>(to.data()));  // NOLINT
@@ -116,7 +116,7 @@ int send_packet(int socket, std::string_view bytes, const Endpoint& to, const ad
     put(message, IPPROTO_IPV6, IPV6_PKTINFO, info);
   }
   const int error = result_of([&] { return ::sendmsg(socket, &message, flags); });
-  // This computer may have that address no longer.
+  // This computer may have lost that address.
   return error == EINVAL || error == EADDRNOTAVAIL ? result_of(send_by_any) : error;
 }
 

@@ -62,7 +62,7 @@ int probe_route(const Endpoint& to, const address& from, const std::vector<OwnAd
   auto size = static_cast<socklen_t>(local.capacity());
   if (::getsockname(probe.get(), local.data(), &size) != 0) return errno;
   const OwnAddress* const source = find(own, local.address());
-  const bool here = local.address() == to.address();  // whatever its interface is like
+  const bool here = local.address() == to.address();  // the state of its interface does not matter
   return here || source == nullptr || source->works ? 0 : ENETDOWN;
 }
 

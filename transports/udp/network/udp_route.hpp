@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The way to a board: does the system know one, and does the interface that it leads out by work? Nothing is sent to
-// find out.
+// The route to a board: whether the system has one, and whether its interface works. Sends nothing.
 #pragma once
 
 #include <asio/ip/address.hpp>
@@ -9,22 +8,22 @@
 
 namespace r4 {
 
-// An address of this computer, and whether its interface is up and has a carrier (a cable that is plugged in, a WiFi
-// that is joined).
+// An address of this computer.
 struct OwnAddress {
   asio::ip::address address;
-  unsigned interface = 0;  // its index
-  bool works = false;
+  unsigned interface = 0;  // index of its interface
+  bool works = false;      // the interface is up and has a carrier (a plugged cable, a joined WiFi)
 };
-// Empty where the system does not tell.
+// Empty if the system does not report them.
 std::vector<OwnAddress> own_addresses();
 
-// 0 if there is a way to that board, else errno. `from`: by the interface of that address; unspecified: by any.
+// 0 if there is a route to that board, else errno. `from`: by the interface of that address;
+// unspecified: by any interface.
 int probe_route(const asio::ip::udp::endpoint& to, const asio::ip::address& from,
                 const std::vector<OwnAddress>& own);
 
-// Has the socket send to that board by the interface of that address, also where another leads there, too. What comes
-// is taken from any. A board of this computer is reached anyway.
+// Lets the socket send to that board by the interface of that address, also if another interface
+// leads there, too. It receives by any interface. Has no effect for a board on this computer.
 void send_by_interface_of(const asio::ip::address& from, int socket,
                           const asio::ip::udp::endpoint& to, const std::vector<OwnAddress>& own);
 

@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "../../file_descriptor.hpp"
+#include "../../url.hpp"
 #include "r4link/datagram.hpp"
 
 namespace r4 {
@@ -28,10 +29,9 @@ using Network = BoardSearch::Network;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t most_networks = 64;
-// Read from one socket before the others, and the clock, have their turn.
+// Datagrams read from one socket before the next socket, and the clock, have their turn.
 constexpr int most_at_once = 64;
-// In an error; `r4 list` has them all.
-constexpr std::size_t most_listed = 8;
+constexpr std::size_t most_listed = 8;  // boards in an error; `r4 list` shows all of them
 
 sockaddr_in system_address(const address_v4& address, std::uint16_t port) {
   sockaddr_in system{};
@@ -47,13 +47,15 @@ address_v4 address_of(const sockaddr* system) {
   return address_v4(ntohl(in.sin_addr.s_addr));
 }
 
-// A socket of this computer's address in a network. Not open: `network.trouble` says why.
+// A socket at this computer's address in a network, which sends by the network's own interface,
+// also where two interfaces are in one network. Not open: `network.trouble` says why.
 FileDescriptor open_in(Network& network) {
   FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int on = 1;
+  const std::uint32_t index = htonl(network.index);
   const sockaddr_in from = system_address(network.from, 0);
-  if (socket.get() < 0 ||
-      ::setsockopt(socket.get(), SOL_SOCKET, SO_BROADCAST, &on, sizeof on) != 0 ||
+  if (!socket || ::setsockopt(socket.get(), SOL_SOCKET, SO_BROADCAST, &on, sizeof on) != 0 ||
+      ::setsockopt(socket.get(), IPPROTO_IP, IP_UNICAST_IF, &index, sizeof index) != 0 ||
       ::bind(socket.get(), reinterpret_cast<const sockaddr*>(&from), sizeof from) != 0) {
     network.trouble = std::strerror(errno);
     return FileDescriptor();
@@ -61,31 +63,14 @@ FileDescriptor open_in(Network& network) {
   return socket;
 }
 
-// Out of the network's own interface, also where two of them are in one network.
-void ask(int socket, Network& network, std::uint16_t port, std::string text) {
-  sockaddr_in to = system_address(network.to, port);
-  iovec part{text.data(), text.size()};
-  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(in_pktinfo))> control{};
-  msghdr message{};
-  message.msg_name = &to;
-  message.msg_namelen = sizeof to;
-  message.msg_iov = &part;
-  message.msg_iovlen = 1;
-  message.msg_control = control.data();
-  message.msg_controllen = control.size();
-  cmsghdr* const header = CMSG_FIRSTHDR(&message);
-  header->cmsg_level = IPPROTO_IP;
-  header->cmsg_type = IP_PKTINFO;
-  header->cmsg_len = CMSG_LEN(sizeof(in_pktinfo));
-  in_pktinfo way{};
-  way.ipi_ifindex = static_cast<int>(network.index);
-  way.ipi_spec_dst.s_addr = htonl(network.from.to_uint());
-  std::memcpy(CMSG_DATA(header), &way, sizeof way);
-  const bool sent = ::sendmsg(socket, &message, MSG_DONTWAIT | MSG_NOSIGNAL) >= 0;
+void ask(int socket, Network& network, std::uint16_t port, const std::string& text) {
+  const sockaddr_in to = system_address(network.to, port);
+  const bool sent = ::sendto(socket, text.data(), text.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
+                             reinterpret_cast<const sockaddr*>(&to), sizeof to) >= 0;
   network.trouble = sent ? "" : std::strerror(errno);
 }
 
-// One search: its sockets and what they have heard.
+// One search: its sockets and the answers.
 class Round {
  public:
   Round(const BoardSearch& search, std::string_view called) : search_(search), called_(called) {
@@ -101,9 +86,8 @@ class Round {
     const auto begun = Clock::now();
     const auto end = begun + search_.patience;
     auto next_question = begun;
-    for (int asked = 0;;) {
-      const auto now = Clock::now();
-      if (now >= end) break;
+    int asked = 0;
+    for (auto now = begun; now < end; now = Clock::now()) {
       if (asked < search_.questions && now >= next_question) {
         ask_all(text);
         ++asked;
@@ -126,9 +110,7 @@ class Round {
  private:
   void ask_all(const std::string& text) {
     for (std::size_t i = 0; i < sockets_.size(); ++i) {
-      if (sockets_[i].get() >= 0) {
-        ask(sockets_[i].get(), result_.networks[i], search_.port, text);
-      }
+      if (sockets_[i]) ask(sockets_[i].get(), result_.networks[i], search_.port, text);
     }
   }
 
@@ -176,7 +158,7 @@ class Round {
                        [&](const Network& network) { return network.from == address; });
   }
 
-  // A simulated board that listens on all addresses of this computer answers from each.
+  // A simulated board that listens on all addresses of this computer answers from each address.
   void merge_own() {
     std::vector<FoundBoard>& boards = result_.boards;
     for (std::size_t i = 0; i < boards.size(); ++i) {
@@ -184,36 +166,22 @@ class Round {
       const auto same = [&](const FoundBoard& other) {
         return other.board_id == boards[i].board_id && is_own(other.address);
       };
-      const auto behind = boards.begin() + static_cast<std::ptrdiff_t>(i) + 1;
-      boards.erase(std::remove_if(behind, boards.end(), same), boards.end());
+      const auto after = boards.begin() + static_cast<std::ptrdiff_t>(i) + 1;
+      boards.erase(std::remove_if(after, boards.end(), same), boards.end());
     }
   }
 
   const BoardSearch& search_;
   const std::string_view called_;
-  std::set<std::string> others_;  // by their ids: one may answer from several addresses
+  std::set<std::string> others_;  // ids: one board may answer from several addresses
   BoardSearch::Result result_;
   std::vector<FileDescriptor> sockets_;
   std::vector<pollfd> polled_;
   std::array<char, max_datagram + 1> buffer_;
 };
 
-std::string percent_encoded(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                       c == '-' || c == '_' || c == '.';
-    if (plain) {
-      out += c;
-    } else {
-      out += fmt::format("%{:02X}", static_cast<unsigned char>(c));
-    }
-  }
-  return out;
-}
-
 Problem nothing_found(const BoardSearch::Result& result, const WantedBoard& wanted) {
-  std::vector<std::string> interfaces;  // each once: it may have several addresses
+  std::vector<std::string> interfaces;  // each once, though it may have several addresses
   std::string trouble;
   for (const Network& network : result.networks) {
     if (!network.trouble.empty()) {
@@ -224,22 +192,20 @@ Problem nothing_found(const BoardSearch::Result& result, const WantedBoard& want
     }
   }
   const std::string asked = fmt::format("{}", fmt::join(interfaces, ", "));
-  Problem problem;
   if (asked.empty()) {
-    problem.reason = trouble.empty() ? "this computer is in no network"
-                                     : fmt::format("nothing can be sent ({})", trouble);
-    problem.fix = "join the network of the board";
-    return problem;
+    return {ErrorKind::open, "",
+            trouble.empty() ? "this computer is in no network"
+                            : fmt::format("nothing can be sent ({})", trouble),
+            "join the network of the board"};
   }
-  problem.reason =
+  return {
+      ErrorKind::open, "",
       wanted.called.empty()
           ? fmt::format("no R4 board answered (asked on {})", asked)
           : fmt::format("no board called '{}' answered, {} other{} did (asked on {})",
-                        wanted.called, result.others, result.others == 1 ? "" : "s", asked);
-  problem.fix =
+                        wanted.called, result.others, result.others == 1 ? "" : "s", asked),
       "switch it on and join its network; where broadcast does not pass, give its address as in "
-      "udp://192.168.1.77";
-  return problem;
+      "udp://192.168.1.77"};
 }
 
 Problem several_found(const std::vector<FoundBoard>& boards, const WantedBoard& wanted,
@@ -250,13 +216,10 @@ Problem several_found(const std::vector<FoundBoard>& boards, const WantedBoard& 
                         boards[i].address.to_string());
   }
   if (boards.size() > most_listed || result.more) list += ", …; r4 list shows more";
-  Problem problem;
-  problem.kind = ErrorKind::usage;
-  problem.reason = wanted.called.empty()
-                       ? "several boards answered"
-                       : fmt::format("several boards are called '{}'", wanted.called);
-  problem.fix = "use one of " + list;
-  return problem;
+  return {ErrorKind::usage, "",
+          wanted.called.empty() ? "several boards answered"
+                                : fmt::format("several boards are called '{}'", wanted.called),
+          "use one of " + list};
 }
 
 }  // namespace
@@ -321,7 +284,8 @@ FoundHost find_board(const BoardSearch& search, const WantedBoard& wanted) {
   std::vector<FoundBoard> meant = result.boards;
   if (!wanted.called.empty()) meant = called(result.boards, wanted.called);
   if (!wanted.board_id.empty()) {
-    // Of several that are called so it is the one that it has been. The only one is not another.
+    // Of several boards of that name, take the one that was found before. If the URL wants the only
+    // board there is, another board does not replace it.
     std::vector<FoundBoard> same;
     for (const FoundBoard& board : meant) {
       if (board.board_id == wanted.board_id) same.push_back(board);

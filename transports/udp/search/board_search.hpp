@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which boards are on the networks of this computer: `Q:ID` by IPv4 broadcast, which a board answers
-// whoever controls it.
+// Finds the boards on the networks of this computer: sends `Q:ID` by IPv4 broadcast. A board
+// answers every host.
 //
 //     on each network:  socket at our address, any free port --- Q:ID, 3 times ---> broadcast:2018
 //                                             <--- I:R4,…;NAME:…;BUSY:… --- each board, from its :2018
 //
-// One search takes half a second and sends three packets a network; nothing is sent but that. However
-// much comes back, at most `most_boards` are kept. The answers are not signed: who is on the network can
-// answer as any board. What may be commanded, the link and its keys decide, and not the search.
+// One search takes half a second and sends three packets a network, and nothing else. At most
+// `most_boards` answers are kept. The answers are not signed: any program on the network can answer
+// as any board. The link and its keys decide what may be commanded, not the search.
 //
-// Broadcast passes no router, and often no VPN, container network or WiFi with client isolation: there a
-// board is reached by its address. On the loopback, which has no broadcast, each address is asked itself.
+// Broadcast passes no router, and often no VPN, container network or WiFi with client isolation. A
+// board behind one of these is reached by its address. The loopback has no broadcast: the question
+// goes to each of its addresses.
 #pragma once
 
 #include <asio/ip/address_v4.hpp>
@@ -30,7 +31,7 @@ namespace r4 {
 // A board that has answered.
 struct FoundBoard : IdentityAnswer {
   asio::ip::address_v4 address;
-  asio::ip::address_v4 heard_at;  // ours, in its network
+  asio::ip::address_v4 heard_at;  // the address of this computer in its network
 };
 
 struct BoardSearch {
@@ -38,21 +39,21 @@ struct BoardSearch {
   struct Network {
     std::string interface;
     unsigned index = 0;         // of the interface; 0: as the system routes it
-    asio::ip::address_v4 from;  // ours
-    asio::ip::address_v4 to;    // everyone's there
-    std::string trouble = {};   // why nothing could be asked
+    asio::ip::address_v4 from;  // the address of this computer
+    asio::ip::address_v4 to;    // the broadcast address
+    std::string trouble = {};   // why the question could not be sent
   };
-  // Those that are up, 64 at most.
+  // The networks whose interface is up, 64 at most.
   static std::vector<Network> networks_of_this_computer();
 
   struct Result {
-    std::vector<Network> networks;  // that were asked
+    std::vector<Network> networks;  // where the question was sent
     std::vector<FoundBoard> boards;
-    std::size_t others = 0;  // that are not called so
-    bool more = false;       // more than are kept have answered
+    std::size_t others = 0;  // boards of another id and name
+    bool more = false;       // more boards have answered than are kept
   };
-  // Blocks for `patience`. Throws nothing but for memory. `called`: keeps those of that board id or name
-  // alone, however many others answer; empty: all.
+  // Blocks for `patience`. Throws nothing but for memory. `called`: keeps only the boards of that
+  // board id or name, however many others answer; empty: all boards.
   Result run(std::string_view called = {}) const;
 
   static constexpr std::size_t most_boards = 64;
@@ -64,21 +65,20 @@ struct BoardSearch {
   std::chrono::milliseconds patience{500};
 };
 
-// Which of them is meant.
 struct WantedBoard {
-  std::string called;    // its board id, or its name; empty: the only one there is
-  std::string board_id;  // of the one that it has been; empty: none yet
+  std::string called;    // its board id, or its name; empty: the only board there is
+  std::string board_id;  // of the board that was found before; empty: none yet
 };
 
-// Which of `boards` is meant: those of that id, else those of that name.
+// The boards with that id; if there is none, the boards with that name.
 std::vector<FoundBoard> called(const std::vector<FoundBoard>& boards, std::string_view id_or_name);
 
-// The URL that finds one of `boards` wherever its address is: by name, by id, or by address if neither is
-// its own. `port`: of the search.
+// The URL that finds one of `boards` again: by name, by id, or by address if another board has the
+// same name and id. `port`: of the search.
 std::string url_of(const FoundBoard& board, const std::vector<FoundBoard>& boards,
                    std::uint16_t port);
 
-// Searches. Where the board is, or why none of those that have answered can be taken for it.
+// Searches. Returns where the board is, or why no board that has answered can be taken for it.
 FoundHost find_board(const BoardSearch& search, const WantedBoard& wanted);
 
 }  // namespace r4

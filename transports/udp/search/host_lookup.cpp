@@ -6,23 +6,20 @@
 #include <algorithm>
 #include <asio/ip/udp.hpp>
 #include <asio/post.hpp>
-#include <condition_variable>
 #include <exception>
+#include <future>
 #include <mutex>
-#include <optional>
 #include <system_error>
 #include <thread>
 #include <utility>
 
-#include "r4link/error.hpp"
-
 namespace r4 {
 namespace {
 
-// Calls `done(answer)` in a thread of its own. It may outlive everything that it was not given.
+// Calls `done(answer)` in a thread of its own, which may outlive everything but the arguments.
 template <class Question, class Done>
 void ask_in_a_thread(Question question, Done done) {
-  // Out of that thread an exception would end the program, which may be driving.
+  // An exception that leaves the thread would end the program, which may be driving.
   const auto ask = [question] {
     try {
       return question();
@@ -51,25 +48,14 @@ FoundHost HostLookup::ask_system(const std::string& host) {
 
 asio::ip::address HostLookup::find(const std::string& host, const std::string& thing) const {
   if (is_address(host)) return address_of({{asio::ip::make_address(host)}, ""}, host, thing);
-  struct Answer {
-    std::mutex mutex;
-    std::condition_variable came;
-    std::optional<FoundHost> found;
-  };
-  const auto answer = std::make_shared<Answer>();
+  const auto answer = std::make_shared<std::promise<FoundHost>>();
+  std::future<FoundHost> found = answer->get_future();
   const auto question = [ask = resolve, host] { return ask(host); };
-  ask_in_a_thread(question, [answer](FoundHost found) {
-    {
-      const std::lock_guard lock(answer->mutex);
-      answer->found = std::move(found);
-    }
-    answer->came.notify_all();
-  });
-  std::unique_lock lock(answer->mutex);
-  if (!answer->came.wait_for(lock, patience, [&] { return answer->found.has_value(); })) {
+  ask_in_a_thread(question, [answer](FoundHost each) { answer->set_value(std::move(each)); });
+  if (found.wait_for(patience) != std::future_status::ready) {
     return address_of({{}, "no name server answers"}, host, thing);
   }
-  return address_of(*answer->found, host, thing);
+  return address_of(found.get(), host, thing);
 }
 
 asio::ip::address address_of(const FoundHost& found, const std::string& host,
@@ -98,7 +84,7 @@ bool is_address(const std::string& host) {
   return !error;
 }
 
-// Whoever asked may be gone before the answer comes, and the loop as well.
+// The asker and its loop may be gone before the answer comes.
 struct HostWatch::Asked {
   std::mutex mutex;
   HostWatch* asker = nullptr;
@@ -116,19 +102,11 @@ void HostWatch::start(Question question, bool known, OnFound on_found) {
   wait();
 }
 
-void HostWatch::start(std::function<void()> on_silence) {
-  stop();
-  known_ = true;
-  on_silence_ = std::move(on_silence);
-  wait();
-}
-
 void HostWatch::stop() {
   waiting_.cancel();
   timer_.cancel();
   heard_ = true;
   on_found_ = nullptr;
-  on_silence_ = nullptr;
   if (!asked_) return;
   {
     const std::lock_guard lock(asked_->mutex);
@@ -145,7 +123,7 @@ void HostWatch::ask() {
     const std::lock_guard lock(asked->mutex);
     if (asked->asker == nullptr) return;
     asio::post(asked->asker->io_, [asked, found] {
-      HostWatch* const asker = asked->asker;  // its thread alone writes it
+      HostWatch* const asker = asked->asker;  // only the thread of the loop writes it
       if (asker == nullptr) return;
       asker->asked_.reset();
       const OnFound on_found = asker->on_found_;  // it may stop the watch
@@ -162,12 +140,9 @@ void HostWatch::wait() {
     heard_ = !known_;
     wait();
     if (!silent) return;
-    if (on_silence_) {
-      const auto on_silence = on_silence_;
-      on_silence();
-    } else {
-      ask();
-    }
+    if (what_to_ask_) return ask();
+    const OnFound on_found = on_found_;  // it may stop the watch
+    on_found({});
   }));
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where the host of a name is, without holding up the event loop.
+// Looks up the address of a host name without blocking the event loop.
 //
-// The system's resolver blocks, for 10 s where no name server answers. So it is asked in a thread for
-// each question, which nobody waits for: Asio's resolver joins its thread when the loop goes, and the
-// program would not end before the system gives up.
+// The system's resolver blocks, for 10 s if no name server answers. So each question has a detached
+// thread. Asio's resolver would join its thread when the loop is destroyed, and the program could
+// not end before the system gives up.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -21,38 +21,39 @@
 namespace r4 {
 
 struct FoundHost {
-  std::vector<asio::ip::address> addresses;  // empty: there is none
-  std::string reason;                        // why there is none
+  std::vector<asio::ip::address> addresses;
+  std::string reason;  // why there are no addresses
   // Of a search for boards (board_search.hpp):
   std::string board_id = {};            // of the board that was found
-  std::optional<Problem> problem = {};  // why it cannot be told which one it is; its thing is empty
+  std::optional<Problem> problem = {};  // why no board can be chosen; its thing is empty
 };
 
-// Who knows where hosts are, and how long things take.
+// How to look up a host, and the times of that.
 struct HostLookup {
   // Blocks; called in threads of their own.
   using Resolve = std::function<FoundHost(const std::string& host)>;
   static FoundHost ask_system(const std::string& host);
 
   Resolve resolve = ask_system;
-  std::chrono::milliseconds patience{5000};  // find() waits for an answer
-  std::chrono::milliseconds retry{1000};     // ask again where there is none
-  std::chrono::milliseconds silence{3000};   // look again when nothing was heard for so long
+  std::chrono::milliseconds patience{5000};  // find() waits that long for an answer
+  std::chrono::milliseconds retry{1000};     // from a failed question to the next
+  std::chrono::milliseconds silence{
+      3000};  // a board that is not heard for so long is looked up again
 
-  // The address of `host`, which may be one. Blocks until the answer is there. Throws Error about
-  // `thing` if there is none in time.
+  // The address of `host`, a name or an address. Blocks until the answer comes. Throws Error about
+  // `thing` if none comes in time.
   asio::ip::address find(const std::string& host, const std::string& thing) const;
 };
 
-// The one to use of those found, IPv4 first, as the board's WiFi has it. Throws Error about `thing`
-// if there is none.
+// The address to use, IPv4 first, because the board's WiFi uses it. Throws Error about `thing` if
+// there is none.
 asio::ip::address address_of(const FoundHost& found, const std::string& host,
                              const std::string& thing);
 
-// Is it an address, not a name?
+// True if `host` is an address, not a name.
 bool is_address(const std::string& host);
 
-// Keeps asking where a board is: until it is known, and again when it is silent.
+// Asks where a board is until that is known, and again when the board is silent.
 class HostWatch {
  public:
   HostWatch(asio::io_context& io, HostLookup lookup);
@@ -62,18 +63,16 @@ class HostWatch {
 
   using Question = std::function<FoundHost()>;  // blocks; asked in threads of their own
   using OnFound = std::function<void(const FoundHost&)>;
-  // Calls `on_found`, on the loop, with each answer. It begins by asking, unless it is known where the
-  // board is.
+  // Calls `on_found`, on the loop, with each answer. Asks at once unless the address is `known`.
+  // Without a question, `on_found` gets an empty answer when the board is silent.
   void start(Question question, bool known, OnFound on_found);
-  // The same without a question: calls `on_silence` each time.
-  void start(std::function<void()> on_silence);
-  // From now on that is asked.
+  // Replaces the question.
   void ask_for(Question question) { what_to_ask_ = std::move(question); }
-  // No call follows. What was asked is left to itself.
+  // No call follows. An open question goes on in its thread, and its answer is dropped.
   void stop();
 
   void set_known(bool known) { known_ = known; }
-  // Does it matter whether something is heard now? Then tell.
+  // True if heard() has an effect.
   bool listens() const { return !heard_; }
   void heard() { heard_ = true; }
 
@@ -86,12 +85,11 @@ class HostWatch {
   const HostLookup lookup_;
   Question what_to_ask_;
   OnFound on_found_;
-  std::function<void()> on_silence_;
   bool known_ = false;
   bool heard_ = true;
   LoopTimer timer_;
   OperationSlot waiting_;
-  std::shared_ptr<Asked> asked_;  // null: none is under way
+  std::shared_ptr<Asked> asked_;  // the open question, or null
 };
 
 }  // namespace r4

@@ -13,7 +13,8 @@
 namespace r4::test {
 namespace {
 
-// In the packed form. In plain text every channel goes over UDP and a pty (tests/host/board_test.cpp).
+// In the packed form. In plain text every channel goes over UDP and a pty
+// (tests/host/board_test.cpp).
 TEST(CanBoard, EveryChannelReachesItsPinAndComesBack) {
   BoardInAThread simulated("can://vcan0?node=9");
   Board board(simulated.url(), at_will());
@@ -23,7 +24,7 @@ TEST(CanBoard, EveryChannelReachesItsPinAndComesBack) {
   EXPECT_NE(board.carrier_counters().transfers->packed, 0U);
 }
 
-// An emulated machine takes longer for a datagram than a real one, and tells so.
+// An emulated computer takes longer for a datagram than a real one, and reports so.
 TEST(CanSampledTime, IsWithinItsErrorAlways) {
   using namespace std::chrono_literals;
   BoardInAThread simulated("can://vcan0?node=9");

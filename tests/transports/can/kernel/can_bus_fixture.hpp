@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CanBus on a vxcan pair of its own: what comes from the far end is from another machine to it, what
-// is sent on the near one is local. For tools/with-can.
+// A CanBus on a vxcan pair of its own: to it, frames from the far end come from another computer,
+// and frames that are sent at the near end are local. For tools/with-can.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ inline constexpr std::uint32_t heard_frame_id = 0x183;
 inline constexpr std::uint32_t other_id = 0x555;
 inline constexpr std::chrono::milliseconds soon{200};
 
-// The two interfaces are there as long as the tests of a suite run.
+// The two interfaces exist while the tests of a suite run.
 class CanBusTest : public testing::Test {
  public:
   static void SetUpTestSuite() {
@@ -89,7 +89,7 @@ class CanBusTest : public testing::Test {
   }
 };
 
-// Writes down what it is told.
+// Notes the calls of its bus.
 class Witness final : public CanBus::Member {
  public:
   explicit Witness(std::shared_ptr<CanBus> bus, std::uint32_t id = heard_frame_id)
@@ -126,12 +126,6 @@ class Witness final : public CanBus::Member {
     EXPECT_EQ(event.problem.thing, std::string("can://") + near_end);
     in_event();
   }
-  void on_drained() override {}
-  bool offer(std::uint32_t, CanFrame&) override { return false; }
-  bool offer_urgent(std::uint32_t, CanFrame&) override { return false; }
-  void frame_sent(std::uint32_t) override {}
-  void on_sent() override {}
-  void on_stuck() override {}
 
   std::shared_ptr<CanBus> bus_;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CanBus that takes frames slowly, and one whose reader is held up: what waits, what is late, what
-// is lost.
+// A CanBus that takes frames slowly, and a CanBus whose reader is held up: frames that wait, that
+// are late, and that are lost.
 #include <algorithm>
 #include <fstream>
 #include <thread>
@@ -12,7 +12,7 @@
 namespace r4::test {
 namespace {
 
-// Offers a number of frames, and writes down what becomes of them.
+// Offers a number of frames, and notes what happens to them.
 class Talker final : public CanBus::Member {
  public:
   Talker(std::shared_ptr<CanBus> bus, int frames) : left_(frames), bus_(std::move(bus)) {
@@ -35,7 +35,6 @@ class Talker final : public CanBus::Member {
     frame.data[0] = static_cast<std::uint8_t>(accepted);
     return true;
   }
-  bool offer_urgent(std::uint32_t, CanFrame&) override { return false; }
   void frame_sent(std::uint32_t) override {
     --left_;
     ++accepted;
@@ -46,15 +45,13 @@ class Talker final : public CanBus::Member {
     ++stuck;
   }
   void on_frame(const CanFrame&, std::uint32_t) override {}
-  void on_drained() override {}
-  void on_sent() override {}
   void on_bus(const CarrierEvent&) override {}
 
   int left_;
   std::shared_ptr<CanBus> bus_;
 };
 
-// A bus of so many bits a second, 128 a frame.
+// `rate`: bits a second, 128 a frame.
 class SlowBus {
  public:
   explicit SlowBus(int rate) {
@@ -86,11 +83,11 @@ struct Link {
   std::unique_ptr<Carrier> host, board;
 };
 
-constexpr int most_runs = 20;  // until this machine does not stand still meanwhile
+constexpr int most_runs = 20;  // tries, because this computer may stand still during a run
 
 class CanBusLoad : public CanBusTest {};
 
-TEST_F(CanBusLoad, TellsOfFramesThatWaitedAndSendsThemAllInOrder) {
+TEST_F(CanBusLoad, ReportsFramesThatWaitedAndSendsThemAllInOrder) {
   const SlowBus slow(16000);
   Talker talker(bus, CanBus::ahead);
   bus->send();
@@ -110,7 +107,7 @@ TEST_F(CanBusLoad, TellsOfFramesThatWaitedAndSendsThemAllInOrder) {
 
 const std::string in_two_frames = "0123456789";
 
-// The first frames of all hosts together take the bus longer than each may be unanswered.
+// All first frames together occupy the bus longer than each may stay unanswered.
 TEST_F(CanBusLoad, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
   constexpr std::size_t hosts = 16;
   const SlowBus slow(64000);
@@ -150,8 +147,8 @@ TEST_F(CanBusLoad, AFirstFrameThatNobodyAnswersTimesOutThoughOthersKeepTheBusFul
   EXPECT_LT(talker.accepted, 200);
 }
 
-// A board that always has a state to send sets no timer for that, but for the answer that it waits for.
-TEST_F(CanBusLoad, WhatNobodyAnswersTimesOutAlsoBehindAStateThatTakesTheBusLong) {
+// A board that always has a state to send needs a timer for the answer that it waits for.
+TEST_F(CanBusLoad, AnUnansweredDatagramTimesOutAfterAStateThatOccupiesTheBusLong) {
   Recorder told;
   const auto board = make_can_carrier(io, Link::url(near_end, node), Role::board);
   board->open(told);
@@ -162,7 +159,7 @@ TEST_F(CanBusLoad, WhatNobodyAnswersTimesOutAlsoBehindAStateThatTakesTheBusLong)
   EXPECT_TRUE(bus->full()) << "the state was over before";
 }
 
-// The frame came in time, by its stamp: what this process did meanwhile does not make it late.
+// The frame came in time, by its time stamp: it does not matter when this process reads it.
 TEST_F(CanBusLoad, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
   bool in_time = false;
   for (int run = 0; run < most_runs && !in_time; ++run) {
@@ -192,7 +189,7 @@ TEST_F(CanBusLoad, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
   EXPECT_TRUE(in_time) << "this machine stands still again and again";
 }
 
-TEST_F(CanBusLoad, DropsWhatABusDoesNotTakeForLong) {
+TEST_F(CanBusLoad, DropsFramesThatTheBusDoesNotTakeForLong) {
   Talker talker(bus, CanBus::ahead);
   const auto start = CanBus::Clock::now();
   {
@@ -203,7 +200,7 @@ TEST_F(CanBusLoad, DropsWhatABusDoesNotTakeForLong) {
     EXPECT_FALSE(bus->full());
     EXPECT_EQ(talker.late, 0);
   }
-  // What the kernel had is gone with its queue, or comes; nothing else does.
+  // Frames in the kernel's queue are gone, or they arrive. No other frame does.
   Talker next(bus, 1);
   run_until([&] {
     bus->send();
@@ -213,7 +210,7 @@ TEST_F(CanBusLoad, DropsWhatABusDoesNotTakeForLong) {
 
 // --- when frames came
 
-// A board's datagram in seven frames, on its way while the reader of this thread is held up.
+// A board's datagram in seven frames, which come while the reader in this thread is held up.
 class CanBusTimes : public CanBusTest {
  protected:
   static constexpr std::chrono::milliseconds n_cr{100};  // docs/can.md
@@ -230,7 +227,7 @@ class CanBusTimes : public CanBusTest {
     for (CanFrame frame; board.offer(0, frame); board.frame_sent(0)) frames.push_back(frame);
   }
 
-  // Sends the next frames, each that long after the one before.
+  // Sends the next frames, with `gap` before each.
   void send(std::size_t count, std::chrono::milliseconds gap) {
     for (; count != 0; --count) {
       std::this_thread::sleep_for(gap);  // nothing is waited for: it is what is sent
@@ -239,7 +236,7 @@ class CanBusTimes : public CanBusTest {
       sendings.push_back({before_us, CanBus::now_us()});
     }
   }
-  // Of frames n-1 and n: the time between them was that at least, and at most.
+  // The least and the longest possible time between frames n-1 and n.
   std::uint32_t least_gap_us(std::size_t n) const {
     return sendings[n].before_us - sendings[n - 1].after_us;
   }
@@ -258,7 +255,7 @@ class CanBusTimes : public CanBusTest {
   std::vector<Sending> sendings;
 };
 
-TEST_F(CanBusTimes, AreThoseOfTheirComingHoweverLateTheyAreRead) {
+TEST_F(CanBusTimes, AreWhenFramesCameHoweverLateTheyAreRead) {
   constexpr std::chrono::milliseconds gap{25};  // six of them are more than N_Cr
   ASSERT_EQ(frames.size(), 7U);
   bool in_time = false;
@@ -271,13 +268,13 @@ TEST_F(CanBusTimes, AreThoseOfTheirComingHoweverLateTheyAreRead) {
     read_all();
     send(frames.size() - 1, gap);
     read_all();
-    in_time = true;  // but where this machine stood still meanwhile
+    in_time = true;  // unless this computer stood still
     for (std::size_t n = 1; n < frames.size(); ++n) {
       if (most_gap_us(n) > n_cr / std::chrono::microseconds(1)) in_time = false;
     }
   }
   ASSERT_TRUE(in_time) << "this machine stands still again and again";
-  for (std::size_t n = 2; n < frames.size(); ++n) {  // those that were read together
+  for (std::size_t n = 2; n < frames.size(); ++n) {  // the frames that were read together
     const std::uint32_t gap_us = member.came_us[n] - member.came_us[n - 1];
     EXPECT_GE(gap_us + 1, least_gap_us(n)) << n;
     EXPECT_LE(gap_us, most_gap_us(n) + 1) << n;
@@ -294,9 +291,9 @@ TEST_F(CanBusTimes, ShowAPauseOfTheSenderThoughAllIsReadTogether) {
   EXPECT_EQ(timed_out(), 1U);
 }
 
-// --- frames that are lost because nobody reads
+// --- frames that are lost because no program reads
 
-// More frames than a socket holds. How many came to the interface, by its own count.
+// More frames than a socket holds. The interface counts the frames that came.
 class CanBusOverflow : public CanBusTest {
  protected:
   static std::uint64_t came() {
@@ -304,7 +301,7 @@ class CanBusOverflow : public CanBusTest {
     std::ifstream("/sys/class/net/vxcan7/statistics/rx_packets") >> count;
     return count;
   }
-  // Afterwards all that the socket has taken is read. A frame tells of those lost before it.
+  // Returns when all frames in the socket were read. A frame reports how many were lost before it.
   void flood() {
     const std::size_t before = member.frames.size();
     for (int i = 0; i < 3000; ++i) remote.send(data(1));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What CanBus tells its members, and what they may do meanwhile.
+// What CanBus reports to its members, and what they may do during a call.
 #include "transports/can/can_bus.hpp"
 
 #include <sys/resource.h>
@@ -113,9 +113,9 @@ TEST_F(CanBusTest, NoAcknowledgeIsNotToldOfAControllerInTroubleNorEndsIt) {
   EXPECT_EQ(member.events.back().second, over);
 }
 
-// --- who comes later
+// --- a host that comes later
 
-TEST_F(CanBusTest, OneWhoOpensABusThatIsDownIsToldThatAndThenThatItIsUp) {
+TEST_F(CanBusTest, AHostThatOpensABusThatIsDownIsToldSoAndThenThatItIsUp) {
   Witness first(bus);
   local.send(error(CAN_ERR_BUSOFF));
   run_until([&] { return !bus->up(); });
@@ -132,7 +132,7 @@ TEST_F(CanBusTest, OneWhoOpensABusThatIsDownIsToldThatAndThenThatItIsUp) {
   EXPECT_TRUE(carrier->up());
 }
 
-TEST_F(CanBusTest, OneWhoOpensABusInTroubleIsToldOfIt) {
+TEST_F(CanBusTest, AHostThatOpensABusInTroubleIsToldOfIt) {
   become_passive();
   Recorder told;
   const auto carrier = host();
@@ -143,7 +143,7 @@ TEST_F(CanBusTest, OneWhoOpensABusInTroubleIsToldOfIt) {
   EXPECT_EQ(told.events[1].problem.reason, passive);
 }
 
-TEST_F(CanBusTest, OneWhoClosesWhenItIsToldThatItIsUpIsToldNoMore) {
+TEST_F(CanBusTest, AHostThatClosesInTheUpEventGetsNoOtherEvent) {
   become_passive();
   Recorder told;
   const auto carrier = host();
@@ -153,7 +153,7 @@ TEST_F(CanBusTest, OneWhoClosesWhenItIsToldThatItIsUpIsToldNoMore) {
   EXPECT_FALSE(carrier->up());
 }
 
-TEST_F(CanBusTest, OneWhoOpensInsideAnEventIsToldOfItOnce) {
+TEST_F(CanBusTest, AHostThatOpensInsideAnEventIsToldOfItOnce) {
   Witness first(bus);
   Recorder told;
   const auto carrier = host();
@@ -164,7 +164,7 @@ TEST_F(CanBusTest, OneWhoOpensInsideAnEventIsToldOfItOnce) {
   EXPECT_EQ(told.events[0].kind, Kind::down);
 }
 
-// Descriptors are as good as any reason for which netlink is not to be had.
+// Netlink fails here because the process has no free descriptor.
 TEST_F(CanBusTest, AnInterfaceOfWhichTheSystemTellsNothingIsNotSaidToBeMissing) {
   r4::CanSocket socket;
   rlimit before{};
@@ -183,7 +183,7 @@ TEST_F(CanBusTest, AnInterfaceOfWhichTheSystemTellsNothingIsNotSaidToBeMissing) 
   EXPECT_NO_THROW(socket.open(near_end, false));
 }
 
-// More ids than the kernel has filters for, as an example of what it may refuse.
+// The kernel refuses more ids than it has filters for.
 TEST_F(CanBusTest, ABusWhoseFiltersTheKernelRefusesIsDownUntilItTakesThem) {
   Witness member(bus);
   Witness greedy(bus);
@@ -220,7 +220,7 @@ TEST_F(CanBusTest, AnInterfaceThatGoesDownAndThenAwayIsToldOfTwiceAndItsReturnOn
   EXPECT_EQ(member.events.back().first, Kind::up);
 }
 
-TEST_F(CanBusTest, CountsWhatTheControllerLost) {
+TEST_F(CanBusTest, CountsFramesThatTheControllerLost) {
   Witness member(bus);
   EXPECT_EQ(bus->overflows(), 0U);
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_OVERFLOW));
@@ -285,7 +285,7 @@ TEST_F(CanBusTest, TheLastMemberMayLeaveInsideACall) {
   EXPECT_EQ(member->events.size(), 1U);
 }
 
-TEST_F(CanBusTest, OneWhoJoinsInsideACallIsCalledFromThenOn) {
+TEST_F(CanBusTest, AMemberThatJoinsInsideACallIsCalledFromThenOn) {
   Witness first(bus);
   std::unique_ptr<Witness> second;
   first.in_frame = [&] {

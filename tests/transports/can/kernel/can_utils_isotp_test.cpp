@@ -56,7 +56,7 @@ std::string link_options(const Form& form) {
          " " + can_interface;
 }
 
-// With padding; CanUtilsLengths is without.
+// With padding. kernel_isotp_test.cpp has the forms without padding, too.
 class CanUtils : public testing::TestWithParam<Form> {};
 INSTANTIATE_TEST_SUITE_P(, CanUtils, testing::Values(forms[1], forms[3]),
                          [](const auto& form) { return form.param.name; });

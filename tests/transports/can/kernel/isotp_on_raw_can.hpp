@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drives our engine frame by frame over a raw socket, as a carrier does, to the end of one transfer.
+// Drives our engine frame by frame over a raw socket, as a carrier does, to the end of one
+// transfer.
 #pragma once
 
 #include <algorithm>
@@ -21,12 +22,14 @@ constexpr std::uint32_t flow_control_id = 0x200;
 constexpr std::uint32_t patience_us = 2000000;
 constexpr std::uint32_t start_limit_us = 10000000;  // of a transfer; a program may send it
 
-// The lengths to try: each one in which single frames end or sequence numbers begin again, then every 17th, so that last
-// frames of all sizes come up. Isotp.EveryLengthInEveryFrameLengthArrives tries all lengths, without a bus.
-constexpr std::uint32_t longest_datagram = 1024;
+// The lengths to try: each one at which single frames end or sequence numbers restart, then every
+// 17th, so that last frames of all sizes come up, and lengths that need a 32-bit first frame.
+// Isotp.EveryLengthInEveryFrameLengthArrives tries all lengths, without a bus.
 constexpr std::uint32_t next_length(std::uint32_t size) {
-  return size < 136 || size >= longest_datagram ? size + 1 : std::min(size + 17, longest_datagram);
+  if (size < 136 || size == 4095 || size == 4096) return size + 1;
+  return size < 1024 ? std::min(size + 17, 1024U) : size == 1024 ? 4095 : 8200;
 }
+constexpr std::uint32_t longest_length = 8200;
 
 // How both ends make their frames.
 struct Form {
@@ -62,7 +65,7 @@ inline IsotpReceiverOptions receiver_of(const Form& form) {
   return options;
 }
 
-// The kernel is told to check every frame of ours: padded to the byte, or as short as can be.
+// The kernel checks every frame of our engine: padded to the byte, or as short as possible.
 inline KernelIsotpOptions kernel_of(const Form& form) {
   KernelIsotpOptions options;
   options.tx_dl = form.tx_dl;

@@ -74,7 +74,7 @@ class KernelIsotp : CanSocket {
     return static_cast<std::size_t>(got);
   }
 
-  // What went wrong since the last call, an errno; waits for it if told to. 0: nothing.
+  // The error since the last call, an errno; 0: none. Waits for it up to `limit_us`.
   int error(std::uint32_t limit_us = 0) {
     int error = std::exchange(error_, 0);
     if (error == 0 && limit_us != 0) await(fd(), 0, clock_us() + limit_us);

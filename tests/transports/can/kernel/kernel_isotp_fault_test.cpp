@@ -27,6 +27,12 @@ constexpr std::uint32_t capacity = 1024;
 constexpr std::uint32_t time_out_us = 200000;
 constexpr std::uint32_t lateness_us = 1000000;
 
+IsotpSenderOptions hasty_sender() {
+  IsotpSenderOptions options = sender_of(classic);
+  options.n_bs_us = time_out_us;
+  return options;
+}
+
 struct EngineReceiver {
   explicit EngineReceiver(const IsotpReceiverOptions& options)
       : receiver(options, buffer.data(), capacity) {}
@@ -74,7 +80,7 @@ class Peer {
   pid_t process_ = -1;
 };
 
-TEST(KernelIsotpFaults, KernelTellsWhatTheEngineDidNotPad) {
+TEST(KernelIsotpFaults, KernelReportsMissingPadding) {
   KernelIsotp kernel(data_id, flow_control_id, kernel_of(forms[1]));
   RawCan bus(flow_control_id);
   IsotpSender sender(sender_of(classic));
@@ -83,7 +89,7 @@ TEST(KernelIsotpFaults, KernelTellsWhatTheEngineDidNotPad) {
   EXPECT_EQ(kernel.error(), EBADMSG);
 }
 
-// Whichever frame is lost: nobody delivers what was not sent, and the next transfer is sound. The
+// Whichever frame is lost, no damaged datagram is delivered, and the next transfer is sound. The
 // last frame of the damaged one is full: a short one out of its place is ignored, by both engines.
 constexpr std::uint32_t damaged_size = 174;
 constexpr unsigned last_frame = 24;
@@ -91,9 +97,7 @@ constexpr unsigned last_frame = 24;
 TEST(KernelIsotpFaults, LostFrameFromTheEngineCostsItsDatagramOnly) {
   KernelIsotp kernel(data_id, flow_control_id, kernel_of(classic));
   RawCan bus(flow_control_id);
-  IsotpSenderOptions options = sender_of(classic);
-  options.n_bs_us = time_out_us;
-  IsotpSender sender(options);
+  IsotpSender sender(hasty_sender());
   const std::string datagram = content_of(170);
   for (unsigned lost = 0; lost < last_frame; ++lost) {
     const Course course =
@@ -153,9 +157,7 @@ TEST(KernelIsotpFaults, KernelTellsThatTheEngineHasNoRoom) {
 
 TEST(KernelIsotpFaults, EngineEndsWithN_BsWhenNobodyAnswers) {
   RawCan bus(flow_control_id);
-  IsotpSenderOptions options = sender_of(classic);
-  options.n_bs_us = time_out_us;
-  IsotpSender sender(options);
+  IsotpSender sender(hasty_sender());
   const Course course = drive(bus, sender, content_of(100));
   EXPECT_EQ(course.error, IsotpError::flow_control_timeout);
   EXPECT_EQ(course.frames, 1U);
@@ -172,9 +174,7 @@ TEST(KernelIsotpFaults, EngineEndsWithN_BsWhenTheKernelsProcessIsKilledInTheMidd
     for (;;) pause();
   });
   RawCan bus(flow_control_id);
-  IsotpSenderOptions options = sender_of(classic);
-  options.n_bs_us = time_out_us;
-  IsotpSender sender(options);
+  IsotpSender sender(hasty_sender());
   const Course course = drive(bus, sender, content_of(1024), [&](unsigned frame) {
     if (frame == 20) peer.kill_now();  // in the third block
     return false;
@@ -190,7 +190,8 @@ TEST(KernelIsotpFaults, EngineEndsWithN_BsWhenTheKernelsProcessIsKilledInTheMidd
   EXPECT_TRUE(restarted.receive() == content_of(1000));
 }
 
-// The kernel finishes what a killed process has begun to send, so that this process runs our sender.
+// The kernel finishes what a killed process has begun to send, so that this process runs our
+// sender.
 TEST(KernelIsotpFaults, EngineEndsWithN_CrWhenTheSendersProcessIsKilledInTheMiddle) {
   RawCan bus(data_id);
   Peer peer([](const std::function<void()>& ready) {

@@ -1,42 +1,40 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // slcan_bus: a CAN bus as a process, exact to the bit, whose nodes are Linux network interfaces.
 //
-//     slcan_bus [--nodes 2] [--bitrate 125000] [--room 3] [--seed 1]
+//     slcan_bus [--nodes 2] [--bitrate 125000]
 //
-// It opens a pty a node and prints one line: {"type":"ready","bitrate":125000,"ptys":["/dev/pts/3",…]}.
-// Each pty speaks the slcan protocol, as adapters do that Linux knows by its line discipline 17:
+// It opens a pty a node and prints one line:
+// {"type":"ready","bitrate":125000,"ptys":["/dev/pts/3",…]}. Each pty speaks the slcan protocol, as
+// adapters of Linux' line discipline 17 do:
 //
 //     fd = os.open(pty, os.O_RDWR | os.O_NOCTTY); fcntl.ioctl(fd, termios.TIOCSETD, 17 as an int)
 //     ip link set slcan0 type can bitrate 125000 && ip link set slcan0 up
 //
 // (or slcan_attach). The process keeps the ptys open: the interfaces stay until it ends. The kernel
-// sends C, S and O when an interface of known bit rate comes up; another rate than the bus's is
-// refused, and that node stays off the bus. O resets the controller: no errors, nothing queued, and
-// out of bus-off by 128 times 11 recessive bits. The controller has `room` mailboxes, lowest id
-// first; when they are taken nothing is read from the pty, and frames wait in the kernel.
+// sends C, S and O when an interface of known bit rate comes up. A wrong bit rate is refused, and
+// that node stays off the bus. O resets the controller: no errors, nothing queued, and out of
+// bus-off by 128 times 11 recessive bits. The controller has three mailboxes, lowest id first;
+// while they are full, nothing is read from the pty, and frames wait in the kernel.
 //
-// The bus (support/can_bus_model.hpp) runs along the clock. A process that was held up catches up:
-// what is queued on the bus goes on at its own times, whatever the time at which it is told.
+// The bus (support/can_bus_model.hpp) follows the clock. A process that was held up catches up:
+// frames on the bus keep their own times, whenever the process computes them.
 //
-// What the controllers of hardware tell their driver, this tells the kernel: s[awpb]RRRTTT when the
-// state of a node changes (active, warning from 96 errors, passive, bus-off; the counters), e3aaa
-// when a frame was not acknowledged, e3ccc when one was damaged (each at most every 10 ms, and of
-// three letters because slcan passes over what is shorter than five). The kernel makes its error
-// frames of them. Linux 6.1 turns the carrier off at bus-off, and its slcan has nothing to turn it
-// on again but `ip link set slcan0 down` and `up` (no restart-ms, no CAN_ERR_RESTARTED).
+// The process reports the same to the kernel as a hardware controller to its driver: s[awpb]RRRTTT
+// when the state of a node changes (active, warning from 96 errors, passive, bus-off; the
+// counters), e3aaa when a frame was not acknowledged, e3ccc when a frame was damaged (each at most
+// every 10 ms; three letters because slcan ignores lines of less than five characters). The kernel
+// makes error frames of these. Linux 6.1 turns the carrier off at bus-off, and slcan turns it on
+// again only by `ip link set slcan0 down` and `up` (no restart-ms, no CAN_ERR_RESTARTED).
 //
 // Orders, a line each on stdin; each is answered by a line, {"type":"done"} or
-// {"type":"error","reason":…}. The end of stdin is the end of the bus.
+// {"type":"error","reason":…}. The process ends at the end of stdin.
 //
-//     corrupt N          the next N frames are damaged: error frame, and sent again
-//     noise P            each frame is, with that probability (0: none any more)
-//     spoil K | heal K   what node K sends is damaged: it becomes passive, then bus-off | no more
+//     noise P            each frame is damaged with that probability: error frame, and sent again
+//     spoil K | heal K   node K's frames are damaged: it becomes passive, then bus-off | ends
 //     errors K TEC REC   sets the counters of node K, and its state by them
-//     return K           lets node K come back from bus-off without O
 //     away K | back K    node K is off the bus: it acknowledges nothing | on it again
-//     babble ID [BYTES]  one more node sends that id (hex) without a pause: 8 bytes if not said
-//     quiet              it stops
-//     stall K | go K     nothing is read from node K's pty, as if its controller took nothing | again
+//     babble ID | quiet  another node sends that id (hex) without a pause, 8 bytes | stops
+//     stall K | go K     node K's pty is not read, as if its controller took nothing | ends
 //     status             answered by the counters of each node
 //
 // Changes of state are printed as they come: {"type":"state","node":0,"state":"passive",…}.
@@ -68,6 +66,7 @@ namespace r4::test {
 namespace {
 
 constexpr unsigned warning_errors = 96;
+constexpr std::size_t mailboxes = 3;
 constexpr std::uint64_t look_every_ns = 5000000;
 constexpr std::uint64_t between_error_messages_ns = 10000000;
 constexpr std::array<std::uint32_t, 9> slcan_rates{10000,  20000,  50000,  100000, 125000,
@@ -76,8 +75,6 @@ constexpr std::array<std::uint32_t, 9> slcan_rates{10000,  20000,  50000,  10000
 struct Options {
   int nodes = 2;
   std::uint32_t bitrate = 125000;
-  std::size_t room = 3;
-  std::uint64_t seed = 1;
 };
 
 [[noreturn]] void fail(const std::string& what) {
@@ -145,7 +142,7 @@ class Bus {
   struct Adapter {
     int node = 0;
     int pty = -1;
-    int kept = -1;  // the far end, so that the pty has one whoever leaves
+    int kept = -1;  // the far end, so that the pty always has one
     std::string name;
     std::string input;
     bool open = false;
@@ -159,7 +156,7 @@ class Bus {
 
   void add_adapter(std::size_t number);
   bool has_room(const Adapter& adapter) const {
-    return !adapter.stalled && bus_.waiting(adapter.node) < options_.room;
+    return !adapter.stalled && bus_.waiting(adapter.node) < mailboxes;
   }
   void read(Adapter& adapter);
   void read_if_closed(Adapter& adapter);
@@ -184,8 +181,7 @@ class Bus {
   const std::uint64_t begun_ns_ = clock_ns();
 };
 
-Bus::Bus(const Options& options)
-    : options_(options), bus_({.rate = {options.bitrate, 0}, .seed = options.seed}) {
+Bus::Bus(const Options& options) : options_(options), bus_({.rate = {options.bitrate, 0}}) {
   for (int i = 0; i < options_.nodes; ++i) add_adapter(static_cast<std::size_t>(i));
   CanNodeOptions babbler;
   babbler.sent = [this](const CanFrame&) {
@@ -211,7 +207,7 @@ void Bus::add_adapter(std::size_t number) {
   if (::tcsetattr(adapter.kept, TCSANOW, &raw) != 0) fail(adapter.name);
 
   CanNodeOptions node;
-  node.room = options_.room;
+  node.room = mailboxes;
   node.comes_back = false;
   node.sent = [this, number](const CanFrame&) { tell_state(number); };
   node.received = [this, number](const CanFrame& frame) {
@@ -223,7 +219,7 @@ void Bus::add_adapter(std::size_t number) {
     tell_state(number);
   };
   node.changed = [this, number](CanNodeState state) {
-    // What has come back would go bus-off again for good.
+    // After O it came back once. The next bus-off lasts until the next O.
     if (state == CanNodeState::active) bus_.let_come_back(adapters_[number].node, false);
     tell_state(number);
   };
@@ -273,8 +269,8 @@ void Bus::read(Adapter& adapter) {
   if (count > 0) adapter.input.append(bytes.data(), static_cast<std::size_t>(count));
 }
 
-// The kernel writes one frame and waits until it is read. What comes behind it is an order: the
-// frames before a C are not sent any more.
+// The kernel writes one frame and waits until it is read. Text after it is a command: the frames
+// before a C are not sent.
 void Bus::read_if_closed(Adapter& adapter) {
   int unread = 0;
   if (::ioctl(adapter.pty, FIONREAD, &unread) != 0) return;
@@ -323,20 +319,12 @@ void Bus::take(Adapter& adapter, std::string_view line) {
       bus_.clear(adapter.node);
       bus_.set_present(adapter.node, false);
       return write(adapter, ok);
-    case 'F': {  // bit 2: warning, 5: passive, 7: bus error
-      const unsigned flags = adapter.told == 'a' ? 0 : adapter.told == 'w' ? 0x04 : 0x24;
-      return write(adapter, fmt::format("F{:02X}\r", adapter.told == 'b' ? flags | 0x80 : flags));
-    }
-    case 'V':
-      return write(adapter, "V1013\r");
-    case 'N':
-      return write(adapter, fmt::format("NR4{:02d}\r", adapter.node));
     default:
       return write(adapter, error);
   }
 }
 
-// The kernel takes an interface that comes up for error-active.
+// The kernel treats an interface that comes up as error-active.
 void Bus::reset(Adapter& adapter) {
   adapter.open = true;
   adapter.told = 'a';
@@ -407,12 +395,6 @@ std::string Bus::obey(const std::string& order) {
     return fmt::format(R"({{"type":"error","order":"{}","reason":"{}"}})", verb, reason);
   };
   const std::string done = R"({"type":"done"})";
-  if (verb == "corrupt") {
-    unsigned count = 0;
-    if (!(words >> count)) return error("how many?");
-    bus_.corrupt_next(count);
-    return done;
-  }
   if (verb == "noise") {
     double probability = 0;
     if (!(words >> probability)) return error("how probable?");
@@ -421,10 +403,8 @@ std::string Bus::obey(const std::string& order) {
   }
   if (verb == "babble") {
     std::string id;
-    unsigned size = 8;
     if (!(words >> id) || !parse(std::string_view(id), babble_.id, 16)) return error("which id?");
-    if (words >> size && size > max_classic_size) return error("8 bytes at most");
-    babble_.size = static_cast<std::uint8_t>(size);
+    babble_.size = 8;
     babbling_ = true;
     bus_.set_present(babbler_, true);
     babble();
@@ -465,8 +445,6 @@ std::string Bus::obey(const std::string& order) {
     if (!(words >> sent >> received)) return error("how many?");
     bus_.set_errors(adapter.node, sent, received);
     tell_state(number);
-  } else if (verb == "return") {
-    bus_.let_come_back(adapter.node, true);
   } else if (verb == "away" || verb == "back") {
     bus_.set_present(adapter.node, verb == "back" && adapter.open);
   } else if (verb == "stall" || verb == "go") {
@@ -486,9 +464,7 @@ int main(int argc, char** argv) {
     const std::string_view name = argv[i];
     const std::string_view value = argv[i + 1];
     const bool good = (name == "--nodes" && r4::test::parse(value, options.nodes, 10)) ||
-                      (name == "--bitrate" && r4::test::parse(value, options.bitrate, 10)) ||
-                      (name == "--room" && r4::test::parse(value, options.room, 10)) ||
-                      (name == "--seed" && r4::test::parse(value, options.seed, 10));
+                      (name == "--bitrate" && r4::test::parse(value, options.bitrate, 10));
     if (good) continue;
     std::fprintf(stderr, "slcan_bus: %s %s is no option of it\n", argv[i], argv[i + 1]);
     return 2;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Boards on the loopback, each at an address of its own and all at one port, that answer whatever they
-// are asked: on a thread of their own, for a search blocks.
+// Boards on the loopback that answer every datagram, each at an address of its own and all at one
+// port. They have a thread, because a search blocks.
 #pragma once
 
 #include <asio/executor_work_guard.hpp>
@@ -22,7 +22,7 @@
 
 namespace r4::test {
 
-// What a board says of itself. `more` such as "NAME:left;BUSY:0;".
+// The answer of a board. `more` is for example "NAME:left;BUSY:0;".
 inline std::string identity(const std::string& id, const std::string& more = "") {
   return with_crc("I:R4,0.1.0," + id + ",udp;" + more + "PNum:1;T:2;");
 }
@@ -39,8 +39,8 @@ class AnsweringBoards {
   AnsweringBoards(const AnsweringBoards&) = delete;
   AnsweringBoards& operator=(const AnsweringBoards&) = delete;
 
-  // A board at 127.0.<address>, such as "0.2", which answers all that, from the question `first` on. One
-  // that is there already goes.
+  // Adds a board at 127.0.<address>, such as "0.2". It sends all `answers` to each question from
+  // number `first` on. Replaces a board at that address.
   void add(const std::string& address, Answers answers, int first = 1) {
     on_thread([&] {
       boards_.erase(address);
@@ -53,7 +53,7 @@ class AnsweringBoards {
       boards_[address] = std::move(board);
     });
   }
-  // What is asked there is answered from another port, too, before the board does.
+  // Another port of that address answers before the board does.
   void add_elsewhere(const std::string& address, const std::string& answer) {
     on_thread([&] {
       boards_.at(address)->elsewhere = answer;
@@ -69,7 +69,7 @@ class AnsweringBoards {
 
   std::uint16_t port() const { return port_; }
 
-  // A search that is over soon, of those that there are now and of `others`.
+  // A short search at the addresses of these boards and at `others`.
   BoardSearch search(const std::vector<std::string>& others = {}) {
     BoardSearch search;
     search.port = port_;
@@ -107,7 +107,7 @@ class AnsweringBoards {
     board.socket.async_receive_from(
         asio::buffer(board.buffer), board.asker,
         [this, &board](const asio::error_code& error, std::size_t) {
-          if (error) return;  // it may be gone
+          if (error) return;  // `board` may be gone
           if (++board.asked >= board.first) {
             asio::error_code ignored;
             if (!board.elsewhere.empty()) {

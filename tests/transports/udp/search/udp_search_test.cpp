@@ -6,6 +6,7 @@
 
 #include "../../recorder.hpp"
 #include "answering_boards.hpp"
+#include "tests/support/problems.hpp"
 #include "transports/udp/udp_carrier.hpp"
 
 namespace r4::test {
@@ -36,7 +37,7 @@ class UdpSearchTest : public testing::Test {
   void open_in_loop() {
     asio::post(io, [this] { host->open(at_host); });
   }
-  // Does that board hear us, and we it?
+  // True if that board answers this host.
   bool has_link(const std::string& id) {
     const std::size_t before = at_host.datagrams.size();
     host->send(with_crc("Q:ID;"), Priority::normal);
@@ -66,33 +67,19 @@ TEST_F(UdpSearchTest, TheOnlyBoardIsFoundWhenOpenReturns) {
   EXPECT_TRUE(has_link("one"));
 }
 
-TEST_F(UdpSearchTest, ABoardIsFoundByItsName) {
-  boards.add("0.2", {identity("one", "NAME:left;")});
-  boards.add("0.3", {identity("two", "NAME:right;")});
-  make("udp:?id=right");
-  host->open(at_host);
-  EXPECT_TRUE(has_link("two"));
-}
-
-TEST_F(UdpSearchTest, SaysThatThereIsNone) {
+TEST_F(UdpSearchTest, SaysThatThereIsNoBoardOrMoreThanOne) {
   boards.add("0.9", {identity("elsewhere")});
   make("udp:auto");
-  const auto error = error_of([&] { host->open(at_host); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->kind(), ErrorKind::open);
-  EXPECT_EQ(error->problem().thing.find("udp:auto"), 0U);
-  EXPECT_EQ(error->problem().reason, "no R4 board answered (asked on lo)");
-  EXPECT_NE(error->problem().fix.find("udp://"), std::string::npos);
-}
-
-TEST_F(UdpSearchTest, SaysThatThereAreSeveral) {
+  const Problem none = problem_of([&] { host->open(at_host); });
+  EXPECT_EQ(none.kind, ErrorKind::open);
+  EXPECT_EQ(none.thing.find("udp:auto"), 0U);
+  EXPECT_EQ(none.reason, "no R4 board answered (asked on lo)");
+  EXPECT_TRUE(contains(none.fix, "udp://"));
   boards.add("0.2", {identity("one")});
   boards.add("0.3", {identity("two")});
-  make("udp:auto");
-  const auto error = error_of([&] { host->open(at_host); });
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->kind(), ErrorKind::usage);
-  EXPECT_NE(error->problem().fix.find("udp:?id=one"), std::string::npos) << error->what();
+  const Problem several = problem_of([&] { host->open(at_host); });
+  EXPECT_EQ(several.kind, ErrorKind::usage);
+  EXPECT_TRUE(contains(several.fix, "udp:?id=one"));
 }
 
 TEST_F(UdpSearchTest, InAHandlerOfTheLoopItIsDownUntilTheBoardIsThere) {
@@ -145,7 +132,7 @@ TEST_F(UdpSearchTest, AnotherBoardThatComesIsNotTakenForIt) {
   EXPECT_TRUE(has_link("one"));
 }
 
-TEST_F(UdpSearchTest, SendsNothingButWhatItIsToldWhileTheBoardIsHeard) {
+TEST_F(UdpSearchTest, DoesNotSearchWhileTheBoardIsHeard) {
   boards.add("0.2", {identity("one")});
   lookup.silence = milliseconds(100);
   make("udp:auto");
@@ -158,16 +145,6 @@ TEST_F(UdpSearchTest, SendsNothingButWhatItIsToldWhileTheBoardIsHeard) {
   }
   run_until(io, [&] { return boards.asked("0.2") >= before + sent; });
   EXPECT_EQ(boards.asked("0.2"), before + sent);
-}
-
-TEST_F(UdpSearchTest, IsForgottenWithTheCarrier) {
-  boards.add("0.9", {identity("elsewhere")});
-  make("udp:auto");
-  open_in_loop();
-  run_for(io, milliseconds(10));
-  host.reset();
-  run_for(io, milliseconds(100));
-  EXPECT_TRUE(at_host.events.empty());
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "line_stream.hpp"
+#include "line_carrier.hpp"
 
 #include <unistd.h>
 
@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <utility>
 
 namespace r4 {
 namespace {
@@ -20,15 +21,17 @@ bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK || 
 
 }  // namespace
 
-LineStream::LineStream(asio::io_context& io, Owner& owner, CarrierCounters& counters)
+LineCarrier::LineCarrier(asio::io_context& io, std::string name,
+                         std::chrono::milliseconds look_interval)
     : io_(io),
-      owner_(owner),
-      counters_(counters),
+      name_(std::move(name)),
+      look_interval_(look_interval),
+      timer_(io),
       stream_(io),
       writable_(io),
-      queue_(normal_entries, state_entries, counters.tx_dropped) {}
+      queue_(normal_entries, state_entries, counters_.tx_dropped) {}
 
-void LineStream::start(FileDescriptor descriptor, const std::string& thing, bool asks) {
+void LineCarrier::start(FileDescriptor descriptor, const std::string& thing, bool asks) {
   stop();
   asks_ = asks;
   with_system_errors(thing, [&] { stream_.assign(descriptor.get()); });
@@ -39,7 +42,23 @@ void LineStream::start(FileDescriptor descriptor, const std::string& thing, bool
   begin_to_receive();
 }
 
-void LineStream::stop() noexcept {
+void LineCarrier::report_up() {
+  ++counters_.ups;
+  handler_->on_carrier_event({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+}
+
+void LineCarrier::look_later() {
+  timer_.expires_after(look_interval_);
+  timer_.async_wait(looking_.handler([this] { look(); }));
+}
+
+void LineCarrier::close() noexcept {
+  handler_ = nullptr;
+  looking_.cancel();
+  stop();
+}
+
+void LineCarrier::stop() noexcept {
   readable_.cancel();
   failure_.cancel();
   writable_.stop();
@@ -48,9 +67,10 @@ void LineStream::stop() noexcept {
   stream_.close(ignored);
 }
 
-// Asio tries to read at once before it waits: on a tty that costs half as much as a wait, which has
-// to be armed anew each time. It would do so, too, when a program that was stopped goes on.
-void LineStream::begin_to_receive() {
+// Asio tries to read at once before it waits: on a tty that costs half as much as a wait, which
+// must be armed each time. A stream that asks must not be read at once when a stopped program goes
+// on.
+void LineCarrier::begin_to_receive() {
   if (asks_) {
     stream_.async_wait(asio::posix::descriptor_base::wait_read,
                        readable_.handler([this] { ask_and_read(); }));
@@ -61,51 +81,50 @@ void LineStream::begin_to_receive() {
                                                    std::size_t size) { receive(error, size); }));
 }
 
-void LineStream::ask_and_read() {
-  if (!owner_.may_read()) return;
+void LineCarrier::ask_and_read() {
+  if (!may_read()) return;
   const ssize_t size = ::read(stream_.native_handle(), received_.data(), received_.size());
   if (size < 0 && would_block(errno)) return begin_to_receive();
   if (size <= 0) return lost(size == 0 ? 0 : errno);
   receive({}, static_cast<std::size_t>(size));
 }
 
-void LineStream::receive(const asio::error_code& error, std::size_t size) {
+void LineCarrier::receive(const asio::error_code& error, std::size_t size) {
   if (error) return lost(error == asio::error::eof ? 0 : error.value());
   const auto take = [this](Text line) {
-    if (!stream_.is_open()) return;  // closed by the handler of a line before
+    if (!stream_.is_open()) return;  // the handler of an earlier line closed it
     ++counters_.rx_datagrams;
     counters_.rx_bytes += line.size();
-    owner_.on_line({line.data(), line.size()});
+    handler_->on_datagram({line.data(), line.size()}, everyone);
   };
   framing_.push(received_.data(), size, take, [this](Text beginning) {
-    if (stream_.is_open()) owner_.on_oversize({beginning.data(), beginning.size()});
+    if (stream_.is_open()) handler_->on_oversize({beginning.data(), beginning.size()});
   });
   counters_.rx_oversize = framing_.oversize();
   // The system hands a backlog over in pieces of up to 4095 bytes.
-  if (stream_.is_open() && size < received_.size() / 2) owner_.on_drained();
+  if (stream_.is_open() && size < received_.size() / 2) handler_->on_drained();
   if (stream_.is_open()) begin_to_receive();
 }
 
-void LineStream::lost(int error) {
+void LineCarrier::lost(int error) {
   stop();
-  owner_.on_lost(error);
+  ++counters_.downs;
+  const Problem problem = on_lost(error);
+  look_later();
+  handler_->on_carrier_event({CarrierEvent::Kind::down, problem});
 }
 
-SendResult LineStream::send(std::string_view bytes, Priority priority) {
+SendResult LineCarrier::send(std::string_view bytes, Priority priority, Peer) {
   if (!stream_.is_open()) return SendResult::down;
   if (bytes.size() > max_datagram) {
     ++counters_.tx_errors;
     return SendResult::full;
   }
-  if (priority == Priority::state) owner_.before_state();
+  if (priority == Priority::state) before_state();
   if (line_written_ == line_size_ && queue_.empty()) {
-    switch (write_line(bytes)) {
-      case Outcome::written:
-        return SendResult::sent;
-      case Outcome::failed:
-        return SendResult::down;
-      case Outcome::busy:
-        break;
+    const Outcome outcome = write_line(bytes);
+    if (outcome != Outcome::busy) {
+      return outcome == Outcome::written ? SendResult::sent : SendResult::down;
     }
   }
   const SendResult result =
@@ -114,14 +133,14 @@ SendResult LineStream::send(std::string_view bytes, Priority priority) {
   return result;
 }
 
-void LineStream::restart_line() {
+void LineCarrier::restart_line() {
   line_size_ = line_written_ = 0;
   terminator_first_ = true;
   if (!queue_.empty()) send_waiting();
 }
 
-// Begins a line; written also if only a part of it has been.
-LineStream::Outcome LineStream::write_line(std::string_view bytes) {
+// Begins a line. `written` also if the system took a part of it.
+LineCarrier::Outcome LineCarrier::write_line(std::string_view bytes) {
   std::size_t size = 0;
   const auto append = [&](const char* data, std::size_t count) {
     std::memcpy(line_.data() + size, data, count);
@@ -146,7 +165,7 @@ LineStream::Outcome LineStream::write_line(std::string_view bytes) {
   return Outcome::written;
 }
 
-LineStream::Outcome LineStream::continue_line() {
+LineCarrier::Outcome LineCarrier::continue_line() {
   while (line_written_ != line_size_) {
     const ssize_t count =
         ::write(stream_.native_handle(), line_.data() + line_written_, line_size_ - line_written_);
@@ -158,13 +177,13 @@ LineStream::Outcome LineStream::continue_line() {
       return Outcome::failed;
     }
     line_written_ += static_cast<std::size_t>(count);
-    owner_.on_written(static_cast<std::size_t>(count));
+    on_written(static_cast<std::size_t>(count));
     if (line_written_ != line_size_) return Outcome::busy;
   }
   return Outcome::written;
 }
 
-void LineStream::send_waiting() {
+void LineCarrier::send_waiting() {
   Outcome outcome = continue_line();
   while (outcome == Outcome::written && line_written_ == line_size_) {
     const SendQueue::Entry* const entry = queue_.front(std::chrono::steady_clock::now());

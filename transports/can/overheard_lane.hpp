@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The datagrams of one CAN id, joined from its frames by a receiver that never answers.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "../framing/can/can_node.hpp"
+#include "../framing/can/isotp_receiver.hpp"
+#include "../framing/can/packed_form.hpp"
+
+namespace r4 {
+
+class OverheardLane {
+ public:
+  OverheardLane(CanIdKind kind, std::uint8_t node)
+      : receiver_(listening_to(kind, node), bytes_.data(), max_datagram) {}
+
+  // The datagram that the frame completes, if any, in plain form and valid up to the next call; empty
+  // if it cannot be unpacked.
+  std::optional<Text> on_frame(const CanFrame& frame, std::uint32_t at_us) {
+    if (!receiver_.on_frame(frame, at_us).datagram) return std::nullopt;
+    if (!is_packed(receiver_.data()[0])) return receiver_.text();
+    const UnpackResult result =
+        unpack(receiver_.data(), receiver_.size(), plain_.data(), plain_.size());
+    return result ? Text(plain_.data(), result.size) : Text();
+  }
+  const IsotpReceiverCounters& counters() const { return receiver_.counters(); }
+
+ private:
+  std::array<std::uint8_t, max_datagram> bytes_;
+  std::array<char, max_datagram> plain_;
+  IsotpReceiver receiver_;
+};
+
+}  // namespace r4

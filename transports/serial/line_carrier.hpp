@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Datagrams as lines on an open byte stream (a tty): what both ends of a serial line have in
+// common. serial_carrier.cpp and pty_carrier.cpp are the ends.
+//
+// One write a line; a line that the system takes in part is continued and never interleaved. Lines
+// that must wait keep the order of SendQueue: stop after the line in progress, then normal, then
+// the newest state. Reads at most 4096 bytes a turn. It is up while the stream is open.
+#pragma once
+
+#include <array>
+#include <asio/error_code.hpp>
+#include <asio/io_context.hpp>
+#include <chrono>
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include "../file_descriptor.hpp"
+#include "../framing/line_framing.hpp"
+#include "../operation_slot.hpp"
+#include "../send_queue.hpp"
+#include "../writable_wait.hpp"
+#include "r4link/carrier.hpp"
+
+namespace r4 {
+
+// It has more than 15 members: the stream with its waits, the line in progress, and the timer that
+// looks for the device.
+class LineCarrier : public Carrier {
+ public:
+  void close() noexcept override;
+  SendResult send(std::string_view bytes, Priority priority, Peer) override;
+  bool up() const override { return stream_.is_open(); }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override { return counters_; }
+
+ protected:
+  // Without a stream, look() is called each `look_interval` after look_later().
+  LineCarrier(asio::io_context& io, std::string name, std::chrono::milliseconds look_interval);
+
+  // --- what the ends do
+
+  // Looks for the device, and starts the stream if it is there.
+  virtual void look() = 0;
+  // The stream has ended and is closed: errno, or 0 for an end of file. Returns the problem to
+  // report.
+  virtual Problem on_lost(int error) = 0;
+  // Of a stream that asks: true if this program may read what has come. If not, the end closes the
+  // carrier.
+  virtual bool may_read() { return true; }
+  // A state is about to be sent. Called within send().
+  virtual void before_state() {}
+  // The system has taken that many bytes. Called within send().
+  virtual void on_written(std::size_t) {}
+
+  // --- what they do it with
+
+  // Begins to receive. The descriptor must not block. `asks`: may_read() is called before each
+  // reading. Throws Error about `thing` if the system does not let the loop wait for the stream.
+  void start(FileDescriptor descriptor, const std::string& thing, bool asks = false);
+  // Tells the handler that the stream is open.
+  void report_up();
+  void look_later();
+  // What was written has been thrown away on its way: the next line begins with a terminator.
+  void restart_line();
+
+  asio::io_context& io_;
+  std::string name_;
+  Handler* handler_ = nullptr;
+  CarrierCounters counters_;
+
+ private:
+  enum class Outcome { written, busy, failed };
+
+  void stop() noexcept;
+  void begin_to_receive();
+  void ask_and_read();
+  void receive(const asio::error_code& error, std::size_t size);
+  void lost(int error);
+  Outcome write_line(std::string_view bytes);
+  Outcome continue_line();
+  void send_waiting();
+
+  const std::chrono::milliseconds look_interval_;
+  LoopTimer timer_;
+  OperationSlot looking_;
+  LoopDescriptor stream_;
+  OperationSlot readable_;
+  OperationSlot failure_;
+  WritableWait writable_;
+  bool asks_ = false;
+  LineFraming framing_;
+  SendQueue queue_;
+  std::array<char, 4096> received_;
+
+  // The line in progress: line_[line_written_, line_size_) is still to be written.
+  std::array<char, 2 * line_end.size() + max_datagram> line_;
+  std::size_t line_size_ = 0;
+  std::size_t line_written_ = 0;
+  bool terminator_first_ = false;
+};
+
+}  // namespace r4
