@@ -116,9 +116,9 @@ void AsyncBoard::start_wait_active(Duration timeout, CompletionPtr completion) {
 // Sets one setting after the other; the user's completion is told how the last ended.
 class AsyncBoard::TimingSteps final : public Completion {
  public:
-  TimingSteps(Impl& impl, LinkTimingSteps steps, Time timeout, CompletionPtr completion)
+  TimingSteps(Impl& impl, std::vector<LinkTimingStep> steps, Time timeout, CompletionPtr completion)
       : impl_(impl),
-        steps_(steps),
+        steps_(std::move(steps)),
         started_(Impl::steady_now()),
         deadline_(started_ + timeout),
         completion_(std::move(completion)) {}
@@ -143,7 +143,7 @@ class AsyncBoard::TimingSteps final : public Completion {
   }
   void complete(const CommandResult& result, How how) override {
     std::unique_ptr<TimingSteps, Destroy> self(this);
-    if (result.outcome == Outcome::confirmed && ++done_ < steps_.count) {
+    if (result.outcome == Outcome::confirmed && ++done_ < steps_.size()) {
       begin(std::move(self));
       return;
     }
@@ -157,7 +157,7 @@ class AsyncBoard::TimingSteps final : public Completion {
 
  private:
   Impl& impl_;  // which owns this
-  LinkTimingSteps steps_;
+  std::vector<LinkTimingStep> steps_;
   std::size_t done_ = 0;
   Ticket id_ = 0;
   Time started_, deadline_;
