@@ -14,19 +14,17 @@ bool ArmRequests::add(Ticket ticket, std::int32_t cause, Time deadline, Time now
 
 template <class Predicate>
 bool ArmRequests::end_those(Predicate which, Outcome outcome, Refusal code, Time now) {
-  const auto end = std::stable_partition(requests_.begin(), requests_.end(),
-                                         [&](const Request& each) { return !which(each); });
-  const bool any = end != requests_.end();
-  std::for_each(end, requests_.end(), [&](const Request& each) {
+  const std::size_t ended = std::erase_if(requests_, [&](const Request& each) {
+    if (!which(each)) return false;
     ends_.end(each.ticket, {outcome, code, now - each.started,
                             outcome == Outcome::not_armed ? cause() : DisarmCause::none});
+    return true;
   });
-  requests_.erase(end, requests_.end());
   if (requests_.empty() && machine_.under_way()) {
     machine_.give_up();
     abandoned_ = true;
   }
-  return any;
+  return ended != 0;
 }
 
 void ArmRequests::end(Outcome outcome, Refusal code, Time now) {
@@ -49,8 +47,7 @@ Time ArmRequests::next_deadline() const {
   return next;
 }
 
-// A cause that is newer than the one which arm() was asked about came after the call: the program
-// does not know it.
+// A newer cause than the one at the call of arm() is unknown to the program, so it ends the call.
 void ArmRequests::on_cause(std::int32_t newest, Time now) {
   for (Request& each : requests_) {
     if (each.cause == Command::unnamed_cause) each.cause = newest;
@@ -81,8 +78,8 @@ std::optional<Command> ArmRequests::next_step(SafeReason reason, Time now) {
   return {};
 }
 
-// After E:CLEAR the next step is chosen by what the board says then. A step that was cancelled was
-// cancelled with its requests.
+// After E:CLEAR the board's next reason decides the next step. A cancelled step was cancelled
+// together with its requests.
 void ArmRequests::on_step(CommandKind kind, const CommandResult& result, SafeReason reason,
                           bool supply_open, Time now) {
   if (requests_.empty()) return;
@@ -98,7 +95,7 @@ void ArmRequests::disarm(DisarmCause cause) {
   report();
 }
 
-// What the board said before it obeyed this session may be older than the session.
+// A reason that the board reported before it obeyed this session may be older than the session.
 void ArmRequests::on_link(bool up, bool in_control, bool safe, SafeReason reason) {
   if (!up) machine_.on_outage();
   if (in_control) machine_.on_heard(reason);

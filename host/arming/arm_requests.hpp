@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The calls of arm() that have not ended, and whether the program may drive. Without I/O.
+// The calls of arm() that have not ended, and whether the program may drive outputs. Without I/O.
 //
 //     add() --> waiting --in control, and no stop, E:CLEAR or step is under way--> next_step()
 //                  ^                                                                  |
 //                  +---- the board has executed the step (E:CLEAR or R:1,On) ---------+
 //
 //     It ends confirmed when the program is armed; refused when the board refuses a step; not_armed
-//     when it cannot be armed, or a newer cause than the one it was asked about has come; timed_out,
+//     when arming is impossible, or a cause has come that is newer than the call; timed_out,
 //     cancelled and closed like a command.
 //
-// Several calls have their steps in common, and end together. Commands for outputs that were asked
-// for after an arm() wait for it.
+// Several calls share their steps, and end together. Output commands that follow an arm() wait for
+// it.
 #pragma once
 
 #include <cstddef>
@@ -34,7 +34,7 @@ class ArmRequests {
  public:
   static constexpr std::size_t max_requests = 64;
 
-  // `mode`: whether a program has to be armed.
+  // `mode`: whether a program must be armed.
   ArmRequests(Arming mode, Effects& effects, CommandEnds& ends)
       : mode_(mode), effects_(effects), ends_(ends) {}
 
@@ -44,42 +44,42 @@ class ArmRequests {
 
   // --- requests
 
-  // One call of arm(). `cause`: the number of the newest cause that is known, or unnamed_cause. False
-  // if as many wait already as there may be.
+  // One call of arm(). `cause`: the number of the newest known cause, or unnamed_cause. False if
+  // max_requests wait already.
   bool add(Ticket ticket, std::int32_t cause, Time deadline, Time now);
   bool any() const { return !requests_.empty(); }
-  // The ticket of the oldest; greater than any ticket if there is none.
+  // The ticket of the oldest call; greater than any ticket if there is none.
   Ticket first() const { return requests_.empty() ? no_ticket : requests_.front().ticket; }
-  // Ends all, or the one with that ticket (false if there is none), or those whose deadline has come.
+  // Ends all calls, or the call with that ticket (false if there is none), or those past their
+  // deadline.
   void end(Outcome outcome, Refusal code, Time now);
   bool cancel(Ticket ticket, Time now);
   void expire(Time now);
   Time next_deadline() const;
-  // The number of the newest cause that only E:CLEAR ends; 0: there is none.
+  // The number of the newest cause that only E:CLEAR ends; 0 if there is none.
   void on_cause(std::int32_t newest, Time now);
 
   // --- steps
 
-  // True, once, if requests have ended whose step may still be under way. That step is then to be
-  // dropped, not repeated.
+  // True, once, if all requests have ended while their step may be under way. The caller then drops
+  // the step.
   bool take_abandoned() { return std::exchange(abandoned_, false); }
-  // Goes on, while the board obeys and no step is under way. `reason`: what keeps its outputs off.
-  // Returns the step to be sent, if there is one.
+  // The next step to be sent, if there is one. To be called while the board obeys and no step is
+  // under way. `reason`: why the outputs are off.
   std::optional<Command> next_step(SafeReason reason, Time now);
-  // The step has ended. `supply_open`: the board says that relay 1 is open.
+  // The step has ended. `supply_open`: the board's states show that relay 1 is open.
   void on_step(CommandKind kind, const CommandResult& result, SafeReason reason, bool supply_open,
                Time now);
 
-  // --- what disarms
+  // --- events that disarm
 
   void disarm(DisarmCause cause);
   void on_sleep() { machine_.on_sleep(); }
-  // A session begins: it is disarmed.
+  // A session begins disarmed.
   void begin_anew();
-  // How the link is: whether it is up, whether the board obeys, whether it says that it is safe, and
-  // why.
+  // The state of the link: whether it is up, whether the board obeys, whether it is safe, and why.
   void on_link(bool up, bool in_control, bool safe, SafeReason reason);
-  // A state tells whether relay 1 is closed.
+  // A state shows whether relay 1 is closed.
   void on_supply(bool closed) { machine_.on_supply(closed); }
   // Reports the cause if it has changed.
   void report();

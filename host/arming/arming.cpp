@@ -37,6 +37,9 @@ const char* to_text(DisarmCause cause) {
   return "unknown";
 }
 
+namespace {
+
+// The cause for a reason of the board; none for `none` and `link`.
 DisarmCause cause_of(SafeReason reason) {
   switch (reason) {
     case SafeReason::stop:
@@ -56,6 +59,7 @@ DisarmCause cause_of(SafeReason reason) {
   return DisarmCause::none;
 }
 
+// The same for a stop, a watchdog or a fault that may be older than the session.
 DisarmCause earlier_cause_of(SafeReason reason) {
   switch (reason) {
     case SafeReason::stop:
@@ -67,7 +71,9 @@ DisarmCause earlier_cause_of(SafeReason reason) {
   }
 }
 
-// The first cause is told until the next arm(): what follows from it is no news.
+}  // namespace
+
+// The first cause is kept until the next arm(): later causes only follow from it.
 void ArmingMachine::disarm(DisarmCause cause) {
   if (armed() || cause_ == DisarmCause::not_yet) cause_ = cause;
 }
@@ -77,8 +83,8 @@ void ArmingMachine::on_reason(SafeReason reason) {
   if (cause != DisarmCause::none && armed()) cause_ = cause;
 }
 
-// The board tells the gravest of its reasons: those that are graver are not there. Of one that only
-// E:CLEAR ends it cannot be told whether it hides others.
+// The board reports the gravest of its reasons, so it has no graver reason. A reason that only
+// E:CLEAR ends may hide less grave ones.
 void ArmingMachine::on_heard(SafeReason reason) {
   switch (reason) {
     case SafeReason::stop:

@@ -122,9 +122,9 @@ void AsyncBoard::start_wait_active(Duration timeout, CompletionPtr completion) {
 // Sends one setting after the other. The user's handler gets the result of the last one.
 class AsyncBoard::TimingSteps final : public Impl::Sequence {
  public:
-  TimingSteps(Impl& impl, LinkTimingSteps steps, Time timeout, CompletionPtr completion)
+  TimingSteps(Impl& impl, std::vector<LinkTimingStep> steps, Time timeout, CompletionPtr completion)
       : Sequence(impl, std::move(completion)),
-        steps_(steps),
+        steps_(std::move(steps)),
         deadline_(Impl::steady_now() + timeout) {}
 
   void begin() {
@@ -137,12 +137,17 @@ class AsyncBoard::TimingSteps final : public Impl::Sequence {
     impl_.begin(CompletionPtr(this), send, id_);
   }
   void complete(const CommandResult& result, How how) override {
-    if (result.outcome != Outcome::confirmed || ++done_ == steps_.count) return end(result, how);
-    begin();
+  TimingSteps(Impl& impl, std::vector<LinkTimingStep> steps, Time timeout, CompletionPtr completion)
+      : Sequence(impl, std::move(completion)),
+        steps_(std::move(steps)),
+        deadline_(Impl::steady_now() + timeout) {}
   }
 
  private:
-  const LinkTimingSteps steps_;
+  TimingSteps(Impl& impl, std::vector<LinkTimingStep> steps, Time timeout, CompletionPtr completion)
+      : Sequence(impl, std::move(completion)),
+        steps_(std::move(steps)),
+        deadline_(Impl::steady_now() + timeout) {}
   std::size_t done_ = 0;
   const Time deadline_;
 };

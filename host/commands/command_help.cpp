@@ -13,7 +13,7 @@ namespace r4 {
 
 namespace {
 
-constexpr std::array<CommandHelp, 15> table{{
+constexpr std::array<CommandHelp, 14> table{{
     {'O', "O:pwm,dir,ch", "OSMC motor driver", "pwm 0-4095, dir 0 or 1, ch 1-4"},
     {'D', "D:pwm,dir,ch", "DHB12 motor driver", "pwm 0-4095, dir 0 or 1, ch 1-4"},
     {'S', "S:us,ch", "servo pulse width", "us 0 (off) to 2500, ch 1-16"},
@@ -35,7 +35,6 @@ constexpr std::array<CommandHelp, 15> table{{
      "1-48 bytes, channel 1-2, 0-3300 mV"},
     {'Q', "Q:ID", "asks who the board is", "ID"},
     {'H', "H:ROS2-R4", "host heartbeat", "ROS2-R4"},
-    {0, "", "", ""},
 }};
 
 struct SettingHelp {
@@ -62,25 +61,21 @@ constexpr std::array<SettingHelp, 16> settings_table{{
     {"AIN24", "0.01-650 volts; AIN12, AIN5 and the others likewise"},
 }};
 
-// A text "C:key,value" in its parts. The key ends where it can, if there is no comma.
+// The parts of a text "C:key,value". Without a comma the key ends at a space, colon or equals sign.
 struct SettingText {
   explicit SettingText(std::string_view text) : name(text.substr(2)) {
     const std::size_t end = std::min(name.find_first_of(", :="), name.size());
     value = name.substr(std::min(end + 1, name.size()));
     name = name.substr(0, end);
   }
-  static bool is_one(std::string_view text) { return text.starts_with("C:"); }
-  bool is_known() const {
-    Settings settings;
-    return set(settings, Text(name), Text(value)) != Refusal::unknown;
-  }
-
   std::string_view name;
   std::string_view value;
 };
 
 std::string setting_fix(const SettingText& setting) {
-  const bool analog = setting.is_known() && setting.name.starts_with("AIN");
+  Settings settings;
+  const bool known = set(settings, Text(setting.name), Text(setting.value)) != Refusal::unknown;
+  const bool analog = known && setting.name.starts_with("AIN");
   const bool slot = poll_slot_of(Text(setting.name)) != 0;
   const bool uart = uart_of(Text(setting.name)) != 0;
   for (const SettingHelp& each : settings_table) {
@@ -96,12 +91,12 @@ std::string setting_fix(const SettingText& setting) {
 
 }  // namespace
 
-const CommandHelp* all_command_help() { return table.data(); }
+std::span<const CommandHelp> all_command_help() { return table; }
 
 const CommandHelp* command_help(char letter) {
   const auto found = std::find_if(table.begin(), table.end(),
                                   [letter](const CommandHelp& h) { return h.letter == letter; });
-  return letter == 0 || found == table.end() ? nullptr : &*found;
+  return found == table.end() ? nullptr : &*found;
 }
 
 std::string text_of(const Command& command) {
@@ -162,16 +157,14 @@ Problem bad_command(std::string_view text, Refusal refusal) {
   Problem problem{ErrorKind::usage, shown(text), std::string(meaning_of(refusal)), ""};
   const CommandHelp* help = text.empty() ? nullptr : command_help(text.front());
   const bool is_letter = text.size() == 1 || (text.size() > 1 && text[1] == ':');
-  if (SettingText::is_one(text)) {
+  if (text.starts_with("C:")) {
     problem.fix = setting_fix(SettingText(text));
   } else if (help != nullptr && is_letter) {
     problem.fix = "use " + std::string(help->form) + " with " + std::string(help->ranges);
   } else {
     problem.reason = "no such command";
     problem.fix = "the commands are";
-    for (const CommandHelp& each : table) {
-      if (each.letter != 0) problem.fix += " " + std::string(each.form);
-    }
+    for (const CommandHelp& each : table) problem.fix += " " + std::string(each.form);
   }
   return problem;
 }
@@ -247,13 +240,13 @@ Command parse_command_text(std::string_view text) {
     refusal = parse_fields(command.text, set);
   }
   if (refusal == Refusal::none && command.kind == CommandKind::setting) {
-    Settings settings;  // the board's are not known here: those that leave each key its whole range
+    Settings settings;  // the board's settings are unknown, so these leave each key its whole range
     settings.heartbeat_ms = 50;
     settings.timeout_ms = 10000;
     refusal = set(settings, command.text, command.text2);
   }
   if (refusal != Refusal::none) throw Error(bad_command(trimmed, refusal));
-  // Nothing that the grammar forbids may hide in a text: what cannot be written is not a command.
+  // A text may hold bytes that the grammar forbids. Such a command cannot be written.
   if (text_of(command).empty()) throw Error(bad_command(trimmed, Refusal::format));
   return command;
 }

@@ -1,9 +1,53 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the board's datagrams prove of the commands under way.
-#include "command_evidence.hpp"
+// How the board's datagrams end the commands under way.
 #include "commands_under_way.hpp"
 
 namespace r4 {
+
+namespace {
+
+// The field of a channel. `second`: the field of channel 2, which the fields of later channels
+// follow.
+StateField field_of(StateField first, StateField second, int channel) {
+  if (channel == 1) return first;
+  return static_cast<StateField>(static_cast<int>(second) + channel - 2);
+}
+
+// For boards that do not report CMD: true if `state`, as one datagram carried it, shows the value
+// that `command` sets. Commands without a state field (threshold, fields, settings) are never
+// shown.
+bool state_shows(const State& state, const Command& command) {
+  const int channel = command.channel;
+  const auto i = static_cast<std::size_t>(channel - 1);
+  switch (command.kind) {
+    case CommandKind::osmc:
+      return state.present.has(field_of(StateField::osmc1, StateField::osmc2, channel)) &&
+             state.osmc[i].pwm == command.value && state.osmc[i].direction == command.direction;
+    case CommandKind::dhb12:
+      return state.present.has(field_of(StateField::dhb1a, StateField::dhb1b, channel)) &&
+             state.dhb12[i].pwm == command.value && state.dhb12[i].direction == command.direction;
+    case CommandKind::servo:
+      return state.present.has(field_of(StateField::servo1pos, StateField::servo2pos, channel)) &&
+             state.servo_us[i] == command.value;
+    case CommandKind::relay:
+      return state.present.has(StateField::relays) &&
+             (((state.relays >> i) & 1) != 0) == command.on;
+    case CommandKind::stepper:
+      return state.present.has(field_of(StateField::step1pos, StateField::step2pos, channel)) &&
+             state.stepper_steps[i] == command.value;
+    case CommandKind::bldc:
+      return state.present.has(field_of(StateField::bldc1, StateField::bldc2, channel)) &&
+             state.bldc[i].speed == command.value && state.bldc[i].direction == command.direction &&
+             state.bldc[i].brake == command.on;
+    case CommandKind::dac:
+      return state.present.has(field_of(StateField::dac1, StateField::dac2, channel)) &&
+             state.dac_mv[i] == command.value;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
 
 void CommandsUnderWay::on_state(Time now) {
   const ReceivedState& state = board_.state();
@@ -20,7 +64,7 @@ void CommandsUnderWay::on_state(Time now) {
         finish(pending, Outcome::confirmed, Refusal::none, now);
       } else if (past && pending.stage == Stage::sent) {
         pending.stage = Stage::overtaken;
-        pending.retry = now;  // ask at once what became of it
+        pending.retry = now;  // the answer to a retry decides: ask at once
       }
     } else if (!fields.answers() && fields.stage() != FieldSelection::Stage::asking &&
                state_shows(state, pending.command)) {
@@ -33,37 +77,36 @@ void CommandsUnderWay::on_stop(const SafeReport& report, Time now) {
   if (report.reason != SafeReason::stop || !report.has_stop) return;
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || pending.kind != CommandKind::stop) continue;
-    if (report.stop != pending.pnum) continue;
-    repetition_.begin({pending.bytes.data(), pending.size}, pending.retry,
-                      now + options_.stop_linger);
-    finish(pending, Outcome::confirmed, Refusal::none, now);
+    if (report.stop == pending.pnum) finish(pending, Outcome::confirmed, Refusal::none, now);
   }
 }
 
-// A board whose host has left is safe for the reason `link`, unless there is a graver one. A heartbeat
-// from before the farewell proves nothing; then the answer to a repetition does.
+// A board whose host has left is safe for the reason `link`, unless there is a graver reason. A
+// heartbeat from before the farewell proves nothing. Then the answer to a repetition ends the
+// farewell.
 void CommandsUnderWay::on_heartbeat(const SafeReport& report, std::optional<std::uint32_t> t_ms,
                                     Time now) {
   on_stop(report, now);
   cause_ = report.cause;
-  const bool left = report.reason == SafeReason::link && (!t_ms || is_behind_farewell(*t_ms));
+  const bool left = report.reason == SafeReason::link && (!t_ms || is_after_farewell(*t_ms));
   for (Pending& pending : pending_.under_way()) {
     if (pending.kind == CommandKind::leave && left) {
       finish(pending, Outcome::confirmed, Refusal::none, now);
     }
     if (pending.kind != CommandKind::clear || !name_cause(pending)) continue;
-    // A newer cause came after this E:CLEAR was asked for.
+    // The program did not know the newer cause when it called for this E:CLEAR.
     if (cause_ != 0 && cause_ != pending.cause) {
       finish(pending, Outcome::cancelled, Refusal::none, now);
     }
   }
 }
 
-// True if a heartbeat with that T was sent after the farewell. It may be of the same millisecond as a
-// state that told otherwise. On a slow network the clocks tell little, and only what is certain counts.
-bool CommandsUnderWay::is_behind_farewell(std::uint32_t t_ms) const {
+// True if a heartbeat with that T was sent after the farewell. A state of the same millisecond may
+// have come before the farewell. On a slow network the board's clock is known badly, and only a T
+// that is certainly later counts.
+bool CommandsUnderWay::is_after_farewell(std::uint32_t t_ms) const {
   constexpr Time fast{5000};
-  constexpr Time tick{1000};  // for this long the board shows one T
+  constexpr Time tick{1000};  // the board shows one T for this long
   if (farewell_.state_ms && !newer(t_ms, *farewell_.state_ms)) return false;
   const BoardClock::Instant shown = board_.clock().at(t_ms);
   if (!shown.error) return true;
@@ -84,9 +127,9 @@ void CommandsUnderWay::on_identity(const Identity& identity, Time now) {
 void CommandsUnderWay::on_refusal(const Nack& nack, bool proof, bool others, Time now) {
   for (Pending& pending : pending_.under_way()) {
     if (!pending.is_out() || pending.pnum != nack.pnum) continue;
-    if (pending.kind == CommandKind::leave) {  // executed, or the board has no session to leave
+    if (pending.kind == CommandKind::leave) {  // executed, or the board has no session of this host
       const bool left = nack.code == Refusal::duplicate;
-      if (!left && others) continue;  // one copy was refused: the board's heartbeats tell
+      if (!left && others) continue;  // another copy may be executed: a heartbeat will show it
       finish(pending, left ? Outcome::confirmed : Outcome::refused, nack.code, now);
       continue;
     }

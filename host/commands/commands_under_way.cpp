@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How commands begin, go out, and end by time or by the program. What the board's answers prove is in
-// commands_answered.cpp.
+// How commands begin, go out, and end by time or by the program. commands_answered.cpp ends
+// commands by the board's answers.
 #include "commands_under_way.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include "../../protocol/messages/command_field.hpp"
 #include "command_help.hpp"
@@ -13,7 +12,8 @@ namespace r4 {
 
 namespace {
 
-// Commands that end what the board does: repeated soon, also while the heartbeats are held.
+// True for commands that switch the outputs off. They are repeated soon, even while the heartbeats
+// are held.
 bool is_urgent(CommandKind kind) { return kind == CommandKind::stop || kind == CommandKind::leave; }
 
 constexpr Time no_deadline = std::chrono::hours{24};
@@ -51,13 +51,13 @@ CommandsUnderWay::Pending* CommandsUnderWay::allocate(const Command& command, Ti
   if (command.kind == CommandKind::clear) {
     slot->cause = command.value;
     name_cause(*slot);
-    repetition_.cancel();  // a program that clears a stop does not repeat it
+    forget_stop();  // the E:CLEAR clears it
   }
   return slot;
 }
 
-// Gives an E:CLEAR the number of the cause that is known now, if it names none yet. False if nothing of
-// the board has been heard.
+// Gives an E:CLEAR the number of the cause that is known now, if it names none yet. False before
+// the first heartbeat of the board.
 bool CommandsUnderWay::name_cause(Pending& pending) const {
   if (pending.cause == Command::unnamed_cause) pending.cause = cause_;
   if (pending.cause == Command::unnamed_cause) return false;
@@ -70,51 +70,45 @@ bool CommandsUnderWay::name_cause(Pending& pending) const {
 }
 
 Ticket CommandsUnderWay::send(const Command& command, Time timeout, Time now) {
-  Pending* const pending = allocate(command, timeout, now);
-  if (pending == nullptr) return 0;
-  ++counts_.commands;
-  const Ticket ticket = pending->ticket;
-  send_queued(now);
-  return ticket;
+  return queue(allocate(command, timeout, now), now);
 }
 
 Ticket CommandsUnderWay::send(const Setpoints& group, Time timeout, Time now) {
   if (group.size() == 1) return send(group[0], timeout, now);
   Pending* const pending = allocate(group[0], timeout, now);
+  if (pending != nullptr) pending->group = group;
+  return queue(pending, now);
+}
+
+Ticket CommandsUnderWay::queue(Pending* pending, Time now) {
   if (pending == nullptr) return 0;
-  pending->group = group;
   ++counts_.commands;
   const Ticket ticket = pending->ticket;
   send_queued(now);
   return ticket;
 }
 
-Ticket CommandsUnderWay::identify(Time timeout, Time now) {
-  Pending* const pending = allocate(Command::identify(), timeout, now);
+Ticket CommandsUnderWay::send_at_once(const Command& command, Time timeout, Time now) {
+  Pending* const pending = allocate(command, timeout, now);
   if (pending == nullptr) return 0;
   transmit(*pending, now);
   return pending->ticket;
 }
 
 Ticket CommandsUnderWay::stop(Time timeout, Time now) {
-  repetition_.cancel();  // the new stop is repeated instead
+  forget_stop();  // the new stop is repeated instead
   ++counts_.commands;
-  if (Pending* const pending = allocate(Command::stop(), timeout, now)) {
-    transmit(*pending, now);
-    return pending->ticket;
-  }
-  outbox_.send(Command::stop(), {Priority::stop}, now);
-  return 0;
+  const Ticket ticket = send_at_once(Command::stop(), timeout, now);
+  if (ticket == 0) outbox_.send(Command::stop(), {}, now);
+  return ticket;
 }
 
 Ticket CommandsUnderWay::leave(Time timeout, Time now) {
   farewell_ = {now, {}};
   if (board_.state().any()) farewell_.state_ms = board_.state().t_ms;
-  Pending* const pending = allocate(Command::leave(), timeout, now);
-  if (pending == nullptr) return 0;
-  ++counts_.commands;
-  transmit(*pending, now);
-  return pending->ticket;
+  const Ticket ticket = send_at_once(Command::leave(), timeout, now);
+  if (ticket != 0) ++counts_.commands;
+  return ticket;
 }
 
 bool CommandsUnderWay::send_step(const Command& command, Time now) {
@@ -127,7 +121,7 @@ bool CommandsUnderWay::send_step(const Command& command, Time now) {
 
 // --- going out
 
-// Sends a pending command: the first time with a number of its own, then the same again.
+// Sends a pending command: the first time with a new number, then again with the same bytes.
 void CommandsUnderWay::transmit(Pending& pending, Time now) {
   if (pending.stage == Stage::queued) {
     if (pending.is_group()) write_group(pending);
@@ -143,9 +137,7 @@ void CommandsUnderWay::transmit(Pending& pending, Time now) {
   pending.retry =
       now + (is_urgent(pending.kind) ? Time{options_.stop_retry} : Time{options_.command_retry});
   DatagramWriter writer(pending.bytes.data(), pending.bytes.size(), pending.size);
-  Outbox::Way way;
-  if (pending.kind == CommandKind::stop) way.priority = Priority::stop;
-  outbox_.send(writer, pending.kind, pending.pnum, way, now);
+  outbox_.send(writer, pending.kind, pending.pnum, {}, now);
 }
 
 void CommandsUnderWay::send_queued(Time now) {
@@ -164,27 +156,20 @@ void CommandsUnderWay::send_queued(Time now) {
 void CommandsUnderWay::repeat(Time now) {
   const bool gated = link_.gated(to_ms(now));
   for (Pending& pending : pending_.under_way()) {
-    if (!pending.is_out() || now < pending.retry) continue;
+    if (pending.stage == Stage::queued || now < pending.retry) continue;
     if (gated && !is_urgent(pending.kind)) {
       pending.retry = now + options_.command_retry;
     } else {
       transmit(pending, now);
     }
   }
-  const std::string_view stop = repetition_.due(options_.stop_retry, now);
-  if (stop.empty()) return;
-  ++counts_.retries;
-  std::array<char, max_datagram> buffer;
-  std::copy(stop.begin(), stop.end(), buffer.begin());
-  DatagramWriter writer(buffer.data(), buffer.size(), stop.size());
-  outbox_.send(writer, CommandKind::stop, 0, {Priority::stop}, now);
 }
 
 Time CommandsUnderWay::next() {
-  Time next = repetition_.next();
+  Time next = Time::max();
   for (const Pending& pending : pending_.under_way()) {
     next = std::min(next, pending.deadline);
-    if (pending.is_out()) next = std::min(next, pending.retry);
+    if (pending.stage != Stage::queued) next = std::min(next, pending.retry);
   }
   if (group_waits_) next = std::min(next, board_.groups().next());
   return next;
@@ -199,7 +184,8 @@ bool CommandsUnderWay::knows_groups(Time now) {
   return board_.groups().state() != GroupSupport::State::unknown;
 }
 
-// Chooses between one datagram and many. False if that is not known yet, and the group waits.
+// Chooses between one datagram and many. False if the choice is not known yet: then the group
+// waits.
 bool CommandsUnderWay::choose_form(Pending& pending, Time now) {
   if (pending.step != 0) return true;
   if (!knows_groups(now)) {
@@ -210,7 +196,7 @@ bool CommandsUnderWay::choose_form(Pending& pending, Time now) {
   return true;
 }
 
-// Writes the fields that are to be sent now.
+// Writes the fields that are sent next.
 void CommandsUnderWay::write_group(Pending& pending) {
   DatagramWriter writer(pending.bytes.data(), pending.bytes.size());
   if (pending.step != 0) {
@@ -220,15 +206,6 @@ void CommandsUnderWay::write_group(Pending& pending) {
     for (std::size_t i = 0; i < pending.group.size(); ++i) write_command(writer, pending.group[i]);
   }
   pending.size = writer.size();
-}
-
-// A command of a group was executed. If more follow, the next one is queued, and gets a number of its
-// own.
-bool CommandsUnderWay::go_on(Pending& pending) {
-  if (!pending.has_more()) return false;
-  ++pending.step;
-  pending.stage = Stage::queued;
-  return true;
 }
 
 bool CommandsUnderWay::is_group_ahead() {
@@ -242,6 +219,7 @@ bool CommandsUnderWay::is_group_ahead() {
 // --- ends
 
 void CommandsUnderWay::finish(Pending& pending, Outcome outcome, Refusal code, Time now) {
+  if (pending.stage == Stage::lingering) return pending_.remove(pending);  // its end was reported
   CommandResult result{outcome, code, now - pending.started,
                        outcome == Outcome::not_armed ? arming_.cause() : DisarmCause::none};
   if (pending.is_step) {
@@ -249,15 +227,24 @@ void CommandsUnderWay::finish(Pending& pending, Outcome outcome, Refusal code, T
     pending_.remove(pending);
     return;
   }
-  if (outcome == Outcome::confirmed && go_on(pending)) return;
+  if (outcome == Outcome::confirmed && pending.has_more()) {
+    ++pending.step;
+    pending.stage = Stage::queued;  // it gets a number of its own
+    return;
+  }
   result.pnum = pending.pnum;
   if (outcome != Outcome::confirmed) {
     result.at = pending.step != 0 ? pending.step : pending.failed;
     if (pending.step != 0) result.executed = static_cast<std::uint8_t>(pending.step - 1);
   }
-  const Ticket ticket = pending.ticket;
-  pending_.remove(pending);
-  ends_.end(ticket, result);
+  ends_.end(pending.ticket, result);
+  if (pending.kind == CommandKind::stop && outcome == Outcome::confirmed) {
+    forget_stop();  // at most one lingers
+    pending.stage = Stage::lingering;
+    pending.deadline = now + options_.stop_linger;
+  } else {
+    pending_.remove(pending);
+  }
 }
 
 void CommandsUnderWay::expire(Time now) {
@@ -296,6 +283,12 @@ void CommandsUnderWay::give_up(Time now) {
   }
 }
 
+void CommandsUnderWay::forget_stop() {
+  for (Pending& pending : pending_.under_way()) {
+    if (pending.stage == Stage::lingering) pending_.remove(pending);
+  }
+}
+
 void CommandsUnderWay::end_all(Time now) {
   for (Pending& pending : pending_.under_way()) {
     finish(pending, Outcome::closed, Refusal::none, now);
@@ -314,7 +307,8 @@ void CommandsUnderWay::remove_step() {
 bool CommandsUnderWay::delays_arming() {
   for (const Pending& pending : pending_.under_way()) {
     const bool earlier = pending.kind == CommandKind::clear && pending.ticket < arming_.first();
-    if (pending.is_step || pending.kind == CommandKind::stop || earlier) return true;
+    const bool stops = pending.kind == CommandKind::stop && pending.is_out();
+    if (pending.is_step || stops || earlier) return true;
   }
   return false;
 }

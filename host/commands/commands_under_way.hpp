@@ -1,27 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands of a session from the call to their end: sent when the session has control, repeated
-// until the board's answer or state proves what became of them. Without I/O.
+// The commands of a session from the call to their end: sent when the session has control, and
+// repeated until the board's answer or state proves how they ended. Without I/O.
 //
 //     queued --control--> sent --CMD == PNum in the board's state--> confirmed
 //                          |  ^                  N:…,<code>  ------> refused
 //                          +--+ the same bytes   deadline    ------> timed out
 //                         every 50 ms
 //
-// A retry has the bytes and the packet number of the original (signed anew, where there is a key),
-// so the board can execute it only once. When CMD has moved past a command, the retry's answer
-// (DUPLICATE: executed, STALE: not) decides. A refusal proves that the command was not executed only
-// if it names a session that began before the command was sent: over an outage the board forgets. A
-// board without CMD (the paper's release) confirms by the value that its state shows.
+// A retry has the bytes and the packet number of the original (signed anew, if there is a key), so
+// the board can execute it only once. When CMD has moved past a command, the retry's answer
+// (DUPLICATE: executed, STALE: not) decides. A refusal proves that the command was not executed
+// only if it names a session that began before the command was sent, because the board forgets over
+// an outage. A board without CMD (the paper's release) confirms a command by the value that its
+// state shows.
 //
-// With a key, AUTH says only that one copy was not taken: another may have been executed.
+// With a key, AUTH proves only that one copy was not taken: another copy may have been executed.
 //
 // A group of commands is one datagram and one pending command if the board executes groups
-// (../link/group_support.hpp). Otherwise its commands go one after the other, and later commands wait.
+// (../link/group_support.hpp). Otherwise its commands go one after the other, and later commands
+// wait.
 //
-// E:STOP does not wait for the link, and is repeated every 20 ms until a heartbeat of the board
-// reports the reason `stop` and this stop's own number, and for a while longer, in case that an
-// E:CLEAR of another program was on its way. E:CLEAR names the cause that was known when it was asked
-// for; when the board tells of a newer one, it is given up.
+// E:STOP does not wait for the link. It is repeated every 20 ms until a heartbeat of the board
+// reports the reason `stop` and this stop's own number, and then for a while longer, because an
+// E:CLEAR of another program may be on its way. E:CLEAR names the cause that was known at the call.
+// When the board reports a newer cause, the E:CLEAR is given up.
 #pragma once
 
 #include <cstddef>
@@ -42,7 +44,6 @@
 #include "r4link/command.hpp"
 #include "r4link/options.hpp"
 #include "r4link/setpoints.hpp"
-#include "stop_repetition.hpp"
 
 namespace r4 {
 
@@ -51,30 +52,33 @@ class CommandsUnderWay {
   static constexpr std::size_t max_pending = 64;
   static constexpr std::size_t max_stops = 16;
 
-  // All references outlive this. `board`: asked whether it executes groups.
+  // All references outlive this.
   CommandsUnderWay(const SessionOptions& options, HostLink& link, LinkKeeper& keeper,
                    Outbox& outbox, HeardBoard& board, const ArmRequests& arming, CommandEnds& ends,
                    Statistics& counts);
 
-  // --- what the program asks for. Each returns 0 if there is no room.
+  // --- calls of the program. Each returns 0 if there is no room.
 
   Ticket send(const Command& command, Time timeout, Time now);
   Ticket send(const Setpoints& group, Time timeout, Time now);
-  Ticket identify(Time timeout, Time now);
-  // Sent all the same if there is no room. Everything else under way is to be ended by the caller.
+  Ticket identify(Time timeout, Time now) {
+    return send_at_once(Command::identify(), timeout, now);
+  }
+  // Sent even if there is no room. The caller ends all other commands under way.
   Ticket stop(Time timeout, Time now);
   // The farewell.
   Ticket leave(Time timeout, Time now);
-  // For a request that is no command of its own.
+  // For a request that is not a command itself.
   Ticket take_ticket() { return next_ticket_++; }
-  // Gives a command up, though it may have been executed. A stop goes on.
+  // Gives up a command, which the board may have executed. A stop goes on.
   void cancel(Ticket ticket, Time now);
   // Ends every command but stops, or every command but stops and questions.
   void end_all_but_stops(Outcome outcome, Time now);
   void give_up(Time now);
   // Ends every command.
   void end_all(Time now);
-  void forget_stop() { repetition_.cancel(); }
+  // A confirmed stop is repeated no longer.
+  void forget_stop();
 
   // --- a step of arm(). At most one is under way.
 
@@ -84,41 +88,42 @@ class CommandsUnderWay {
     CommandKind kind;
     CommandResult result;
   };
-  // The step that has ended since the last call.
+  // The step that has ended since the last call, if one has.
   std::optional<StepEnd> take_step_end() { return std::exchange(step_end_, {}); }
-  // True if arm() has to wait: for a step, for a stop, or for an E:CLEAR that was asked for before it.
+  // True if arm() has to wait: for a step, for a stop, or for an earlier E:CLEAR.
   bool delays_arming();
 
-  // --- what is due
+  // --- actions that are due
 
   void expire(Time now);
-  // Sends commands that have waited, in the order of the calls.
+  // Sends waiting commands, in the order of the calls.
   void send_queued(Time now);
-  // Ends commands that may not drive outputs and do not wait for an arm().
+  // Ends output commands that are held back and do not wait for an arm().
   void refuse_held_back(Time now);
-  // Repeats what is not confirmed, and the stop that was confirmed last.
+  // Repeats commands that are not confirmed, and the stop that was confirmed last.
   void repeat(Time now);
   Time next();
 
-  // --- what the board says
+  // --- datagrams of the board
 
   void on_state(Time now);
   void on_heartbeat(const SafeReport& report, std::optional<std::uint32_t> t_ms, Time now);
   // The board reports the stop that it has obeyed.
   void on_stop(const SafeReport& report, Time now);
   void on_identity(const Identity& identity, Time now);
-  // `proof`: the refusal proves that the command was not executed. `others`: other paths carry copies.
+  // `proof`: the refusal proves that the command was not executed. `others`: other paths carry
+  // copies of the command.
   void on_refusal(const Nack& nack, bool proof, bool others, Time now);
-  // True if that number is a setting that the board takes over a cable only.
+  // True if the command with that number is a setting that the board takes over a cable only.
   bool is_cable_only(std::uint32_t pnum);
 
   // --- for commands that are sent once
 
-  // True if a group waits, or commands of one are left: later commands must not overtake them.
+  // True if a group waits, or commands of a group are left: later commands must not overtake them.
   bool is_group_ahead();
-  // True if it is known whether the board executes groups. If it is not, the board is asked.
+  // True if it is known whether the board executes groups. Otherwise the board is asked.
   bool knows_groups(Time now);
-  // The number of the newest cause that only E:CLEAR ends, 0 if there is none, or
+  // The number of the newest cause that only E:CLEAR ends; 0 if there is none;
   // Command::unnamed_cause before the first heartbeat.
   std::int32_t cause() const { return cause_; }
   bool is_held_back(CommandKind kind) const { return drives_output(kind) && !arming_.may_drive(); }
@@ -128,13 +133,14 @@ class CommandsUnderWay {
   using Stage = PendingCommand::Stage;
 
   Pending* allocate(const Command& command, Time timeout, Time now);
+  Ticket queue(Pending* pending, Time now);
+  Ticket send_at_once(const Command& command, Time timeout, Time now);
   void transmit(Pending& pending, Time now);
   void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
   bool name_cause(Pending& pending) const;
   bool choose_form(Pending& pending, Time now);
   static void write_group(Pending& pending);
-  static bool go_on(Pending& pending);
-  bool is_behind_farewell(std::uint32_t t_ms) const;
+  bool is_after_farewell(std::uint32_t t_ms) const;
 
   const SessionOptions& options_;
   HostLink& link_;
@@ -149,8 +155,7 @@ class CommandsUnderWay {
   std::int32_t cause_ = Command::unnamed_cause;
   bool group_waits_ = false;  // for the answer to Q:ID
   std::optional<StepEnd> step_end_;
-  StopRepetition repetition_;
-  // The farewell: when it was sent, and the T of the newest state by then.
+  // The time of the farewell, and the T of the newest state by then.
   struct Farewell {
     Time at{0};
     std::optional<std::uint32_t> state_ms;

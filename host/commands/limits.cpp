@@ -60,14 +60,14 @@ void require_control(BoardRole role, const Setpoints& group) {
 void require_timeout(std::string_view what, std::chrono::milliseconds timeout) {
   if (timeout.count() > 0) return;
   throw Error(ErrorKind::usage, fmt::format("{} within {} ms", what, timeout.count()),
-              "is no time in which anything can be confirmed or come",
+              "the timeout must be longer than 0 ms",
               "give a timeout of at least 1 ms; post() sends without waiting");
 }
 
 void require_wait(std::string_view what, std::chrono::milliseconds timeout) {
   if (timeout.count() >= 0) return;
   throw Error(ErrorKind::usage, fmt::format("{} within {} ms", what, timeout.count()),
-              "is a time in the past", "give a timeout; 0 only looks how it is");
+              "the timeout must not be negative", "give a timeout; 0 looks without waiting");
 }
 
 void require_link_timing(std::chrono::milliseconds timeout, std::chrono::milliseconds heartbeat,

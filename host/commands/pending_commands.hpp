@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands of a session that are under way: a fixed number of slots, walked in the order in
-// which the commands were given. Few are ever under way at once, and a fleet has many sessions: a slot
-// takes its memory when it is used for the first time, and keeps it. One is there from the beginning.
+// The commands of a session that are under way: a fixed number of slots, walked in the order of the
+// calls. Few commands are under way at once, and a fleet has many sessions. So a slot gets its
+// memory at its first use, and keeps it.
 #pragma once
 
 #include <algorithm>
@@ -23,39 +23,45 @@ namespace r4 {
 //                          |                           |
 //                          +-------DUPLICATE-----------+--> executed
 //
-// It ends out of any of them: confirmed when CMD names it, or is past it and it was executed.
+// It may end in any of these states. It is confirmed when CMD names it, or CMD is past it and it
+// was executed. A stop that is confirmed has ended for the program, but stays for a while:
 //
-// A group is one command as long as the board takes it as one datagram. Where it does not, each of its
-// commands goes this way in turn: it is queued again when the one before is confirmed.
+//     sent --the board reports it--> lingering --the time is over, another stop, an E:CLEAR--> free
+//
+// A group is one command if the board takes it as one datagram. Otherwise each of its commands goes
+// through these states in turn: it is queued when its predecessor is confirmed.
 struct PendingCommand {
   enum class Stage : std::uint8_t {
     free,       // a slot without a command
     queued,     // not sent yet
     sent,       // and repeated
     overtaken,  // CMD is past it: the answer to a retry decides
-    executed,   // the board said DUPLICATE: it has executed this number
+    executed,   // the board answered DUPLICATE: it has executed this number
+    lingering,  // a confirmed stop, which is repeated
   };
   Stage stage = Stage::free;
   CommandKind kind = CommandKind::heartbeat;
-  bool cable_only = false;  // a setting that is refused elsewhere
+  bool cable_only = false;  // a setting that the board takes over a cable only
   bool is_step = false;     // sent by arm(), not by the program
   std::uint32_t pnum = 0;
   std::uint64_t ticket = 0;
   std::int32_t cause = Command::unnamed_cause;  // clear: the cause it names, once one is known
   std::chrono::microseconds started{0}, deadline{0}, retry{0};
-  std::size_t size = 0;  // of what is in `bytes`: the command's field; once sent, PNum and T too
+  std::size_t size = 0;  // of the fields in `bytes`: the command; once sent, also PNum and T
   Command command;       // without its texts; of a group the first, or the one under way
-  Setpoints group;       // empty: it is none
-  // Of a group whose commands go one after the other, which of them, from 1; else 0.
+  Setpoints group;       // empty for a single command
+  // If the commands of a group go one after the other: the current one, from 1; else 0.
   std::uint8_t step = 0;
-  // Of a group that is one datagram, which of its commands the board has refused, from 1.
+  // If a group is one datagram: the command that the board has refused, from 1.
   std::uint8_t failed = 0;
   std::array<char, max_datagram> bytes;
 
-  // Has a copy of it gone out?
-  bool is_out() const { return stage != Stage::free && stage != Stage::queued; }
+  // True if it was sent and has not ended.
+  bool is_out() const {
+    return stage != Stage::free && stage != Stage::queued && stage != Stage::lingering;
+  }
   bool is_group() const { return !group.empty(); }
-  // Do more commands follow this one, one after the other?
+  // True if more commands of a group follow this one, one after the other.
   bool has_more() const { return step != 0 && step < group.size(); }
 };
 
@@ -63,88 +69,77 @@ class PendingCommands {
  public:
   static constexpr std::size_t max_slots = 128;
 
-  // At most max_slots together: `commands` and, in slots of their own, `stops`, so that no number
-  // of commands can keep a stop out.
+  // At most max_slots together. The stops have slots of their own, so that no number of commands
+  // can keep a stop out.
   PendingCommands(std::size_t commands, std::size_t stops)
-      : slots_(commands + stops), order_(commands + stops), commands_(commands), stops_(stops) {
-    for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = static_cast<std::uint8_t>(i);
+      : slots_(commands + stops), commands_(commands), stops_(stops) {
     slots_[0] = std::make_unique<PendingCommand>();
   }
 
-  // A slot for a command, the last in the order, with everything reset but `bytes`; nullptr if all
-  // are taken.
+  // A fresh slot for a command, the last in the order; nullptr if all are taken.
   PendingCommand* add(CommandKind kind) {
     std::size_t& room = room_for(kind);
     if (room == 0) return nullptr;
     --room;
-    std::unique_ptr<PendingCommand>& place = slots_[order_[used_]];
-    if (!place) place = std::make_unique<PendingCommand>();
-    ++used_;
-    PendingCommand& slot = *place;
-    slot.stage = PendingCommand::Stage::queued;
-    slot.is_step = false;
-    slot.kind = kind;
-    slot.cable_only = false;
-    slot.pnum = 0;
-    slot.cause = Command::unnamed_cause;
-    slot.size = 0;
-    slot.group = Setpoints();
-    slot.step = slot.failed = 0;
-    return &slot;
+    std::unique_ptr<PendingCommand>& slot = slots_[used_++];
+    if (!slot) slot = std::make_unique<PendingCommand>();
+    *slot = PendingCommand();
+    slot->stage = PendingCommand::Stage::queued;
+    slot->kind = kind;
+    return slot.get();
   }
 
   void remove(PendingCommand& command) {
-    const auto end = order_.begin() + static_cast<std::ptrdiff_t>(used_);
-    const auto at = std::find_if(
-        order_.begin(), end, [&](std::uint8_t index) { return slots_[index].get() == &command; });
+    const auto end = slots_.begin() + static_cast<std::ptrdiff_t>(used_);
+    const auto at =
+        std::find_if(slots_.begin(), end, [&](const auto& slot) { return slot.get() == &command; });
     std::rotate(at, at + 1, end);
     --used_;
     ++room_for(command.kind);
     command.stage = PendingCommand::Stage::free;
   }
 
-  // Those under way now, oldest first. While they are walked, commands may be added, which are not
-  // visited, and removed, which are passed over.
+  // The commands under way now, oldest first. During a walk commands may be added, which are not
+  // visited, and removed, which are skipped.
   class Walk {
    public:
     class Iterator {
      public:
-      Iterator(const Walk& walk, std::size_t at) : walk_(walk), at_(at) { skip(); }
-      PendingCommand& operator*() const { return walk_.command(at_); }
+      Iterator(PendingCommand* const* at, PendingCommand* const* end) : at_(at), end_(end) {
+        skip();
+      }
+      PendingCommand& operator*() const { return **at_; }
       Iterator& operator++() {
         ++at_;
         skip();
         return *this;
       }
-      friend bool operator!=(const Iterator& a, const Iterator& b) { return a.at_ != b.at_; }
+      bool operator==(const Iterator& other) const { return at_ == other.at_; }
 
      private:
       void skip() {
-        while (at_ < walk_.count_ && (**this).stage == PendingCommand::Stage::free) ++at_;
+        while (at_ != end_ && (*at_)->stage == PendingCommand::Stage::free) ++at_;
       }
-      const Walk& walk_;
-      std::size_t at_;
+      PendingCommand* const* at_;
+      PendingCommand* const* end_;
     };
-    explicit Walk(PendingCommands& commands)
-        : slots_(commands.slots_.data()), count_(commands.used_) {
-      std::copy_n(commands.order_.begin(), count_, order_.begin());
+    explicit Walk(const PendingCommands& commands) : count_(commands.used_) {
+      for (std::size_t i = 0; i < count_; ++i) commands_[i] = commands.slots_[i].get();
     }
-    Iterator begin() const { return {*this, 0}; }
-    Iterator end() const { return {*this, count_}; }
+    Iterator begin() const { return {commands_.data(), commands_.data() + count_}; }
+    Iterator end() const { return {commands_.data() + count_, commands_.data() + count_}; }
 
    private:
-    PendingCommand& command(std::size_t at) const { return *slots_[order_[at]]; }
-    const std::unique_ptr<PendingCommand>* slots_;
     std::size_t count_;
-    std::array<std::uint8_t, max_slots> order_;
+    std::array<PendingCommand*, max_slots> commands_;
   };
-  Walk under_way() { return Walk(*this); }
+  Walk under_way() const { return Walk(*this); }
 
  private:
   std::size_t& room_for(CommandKind kind) { return kind == CommandKind::stop ? stops_ : commands_; }
 
-  std::vector<std::unique_ptr<PendingCommand>> slots_;  // null: not used yet
-  std::vector<std::uint8_t> order_;  // of slots: those under way, oldest first, then the free ones
+  // First those under way, oldest first, then the free ones. Null: not used yet.
+  std::vector<std::unique_ptr<PendingCommand>> slots_;
   std::size_t used_ = 0;
   std::size_t commands_, stops_;  // how many more
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Commands that are sent once and not waited for. A refusal of the board is reported. Without I/O.
+// Commands that are sent once, without waiting for their end. A refusal is reported. Without I/O.
 #pragma once
 
 #include <cstdint>
@@ -19,13 +19,13 @@ class Posts {
   Posts(Effects& effects, Outbox& outbox, Statistics& counts)
       : effects_(effects), outbox_(outbox), counts_(counts) {}
 
-  // `sent`: the datagram is among the effects, and result() tells what became of it.
+  // `sent`: the datagram is among the effects, and result() returns the final result.
   PostResult send(const Command& command, Time now);
   PostResult send(const Setpoints& group, Time now);
   void on_sent(const Sending& sending, SendResult result) { delivery_.on_sent(sending, result); }
-  // What became of the last one, when its effects are done.
+  // The result of the last post, when its effects have been performed.
   PostResult result();
-  // True if the last one was an E:CLEAR.
+  // True if the last post was an E:CLEAR.
   bool is_clear() const { return kind_ == CommandKind::clear; }
   // The board has proved that it did not execute that command.
   void on_refusal(const Nack& nack);
@@ -40,7 +40,7 @@ class Posts {
   };
 
   PostResult begin(Outbox::Sent sent, const Command& command, bool is_group);
-  // Forgets it. Null if that number is not known.
+  // Takes the post with that number out of the memory. Null if there is none.
   const Posted* take(std::uint32_t pnum);
 
   Effects& effects_;
@@ -48,7 +48,7 @@ class Posts {
   Statistics& counts_;
   Delivery delivery_;
   CommandKind kind_ = CommandKind::heartbeat;
-  // As many as the board remembers, by packet number. Empty until the first post, and the first group.
+  // As many as the board remembers, by packet number. Empty until the first post or group.
   std::vector<Posted> posted_;
   std::vector<Setpoints> groups_;
 };

@@ -10,7 +10,7 @@ namespace r4 {
 
 namespace {
 
-// Why it may not come behind that many others.
+// Why the command may not follow that many others in a group.
 Problem bad_group_member(const Command& command, std::size_t others) {
   Problem problem{ErrorKind::usage, shown(command), "", ""};
   if (!joins_groups(command.kind)) {

@@ -30,24 +30,20 @@ FieldSet fields_of(std::string_view names) {
   return fields;
 }
 
-int channels_of(CommandKind drive) {
-  switch (drive) {
-    case CommandKind::osmc:
-      return osmc_channels;
-    case CommandKind::dhb12:
-      return dhb12_channels;
-    case CommandKind::bldc:
-      return bldc_channels;
-    default:
-      return 0;
-  }
-}
+struct DriveKind {
+  CommandKind kind;
+  const char* name;
+  int channels;
+};
 
-std::string name_of_drive(const Standstill& motor) {
-  const char* name = motor.drive == CommandKind::osmc    ? "OSMC "
-                     : motor.drive == CommandKind::dhb12 ? "DHB12 "
-                                                         : "BLDC ";
-  return name + std::to_string(motor.channel);
+// The drive of that kind; one without channels if there is none.
+DriveKind drive_of(CommandKind kind) {
+  for (const DriveKind& each : {DriveKind{CommandKind::osmc, "OSMC ", osmc_channels},
+                                DriveKind{CommandKind::dhb12, "DHB12 ", dhb12_channels},
+                                DriveKind{CommandKind::bldc, "BLDC ", bldc_channels}}) {
+    if (each.kind == kind) return each;
+  }
+  return {kind, "", 0};
 }
 
 std::string ms_text(std::chrono::milliseconds time) { return std::to_string(time.count()) + " ms"; }
@@ -68,7 +64,7 @@ LoopGuard::LoopGuard(LoopOptions options)
     if (each.encoder < 1 || each.encoder > encoder_channels) {
       throw wrong("there is no encoder " + std::to_string(each.encoder), "give 1 to 4");
     }
-    if (each.channel < 1 || each.channel > channels_of(each.drive)) {
+    if (each.channel < 1 || each.channel > drive_of(each.drive).channels) {
       throw wrong("a standstill is watched of a motor that is not there",
                   "give a channel 1 to 4 of osmc, dhb12 or bldc");
     }
@@ -95,7 +91,7 @@ void LoopGuard::end(LoopEnd cause, std::string why) {
   why_ = std::move(why);
 }
 
-// A state may come in several datagrams of one T.
+// A state may come in several datagrams with the same T.
 bool LoopGuard::is_ready(const ReceivedState& state) {
   if (got_ms_ != state.t_ms) got_ = FieldSet();
   got_ms_ = state.t_ms;
@@ -107,8 +103,7 @@ bool LoopGuard::is_ready(const ReceivedState& state) {
 
 std::optional<double> LoopGuard::on_state(const ReceivedState& state, DisarmCause disarmed,
                                           Clock::time_point now) {
-  if (end_ != LoopEnd::none || !is_ready(state)) return std::nullopt;
-  if (last_ms_ == state.t_ms) return std::nullopt;
+  if (end_ != LoopEnd::none || !is_ready(state) || last_ms_ == state.t_ms) return std::nullopt;
   if (state.safe != SafeReason::none) {
     end(LoopEnd::not_active, std::string("the board is safe: ") + to_text(state.safe));
     return std::nullopt;
@@ -117,7 +112,7 @@ std::optional<double> LoopGuard::on_state(const ReceivedState& state, DisarmCaus
   if (check(HostLinkState::active, disarmed, now) != LoopEnd::none) return std::nullopt;
   const std::int32_t passed_ms = last_ms_ ? static_cast<std::int32_t>(state.t_ms - *last_ms_) : 0;
   if (passed_ms < 0 || std::chrono::milliseconds(passed_ms) > options_.late + options_.first) {
-    end(LoopEnd::not_active, "the board has begun again");
+    end(LoopEnd::not_active, "the board has restarted");
     return std::nullopt;
   }
   last_ms_ = state.t_ms;
@@ -152,8 +147,9 @@ void LoopGuard::look_at_motors(const ReceivedState& state) {
     }
     if (std::chrono::milliseconds(state.t_ms - motor.since_ms) < limits.time) continue;
     end(LoopEnd::standstill, "ENC" + std::to_string(limits.encoder) + " stands still, although " +
-                                 name_of_drive(limits) + " has been driven with " +
-                                 std::to_string(motor.pwm) + " for " + ms_text(limits.time) +
+                                 drive_of(limits.drive).name + std::to_string(limits.channel) +
+                                 " has been driven with " + std::to_string(motor.pwm) + " for " +
+                                 ms_text(limits.time) +
                                  "; look at the wheel, and at the encoder's cable");
     return;
   }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <exception>
-#include <utility>
 
 #include "r4link/control/loop.hpp"
 #include "r4link/error.hpp"
@@ -13,9 +12,9 @@ using Clock = LoopGuard::Clock;
 using Milliseconds = std::chrono::milliseconds;
 
 constexpr std::size_t waiting_states = 8;  // a state may come in several datagrams
-constexpr Milliseconds look_interval{20};  // at link and arming, while no state comes
+constexpr Milliseconds look_interval{20};  // between checks of link and arming without a state
 
-// The loop's own watch over its steps, as long as it runs.
+// The board's watchdog, on while the loop runs.
 class StepWatchdog {
  public:
   StepWatchdog(Board& board, Milliseconds period) : board_(board), on_(period.count() > 0) {
@@ -35,16 +34,16 @@ class StepWatchdog {
   bool on_;
 };
 
-// Why output commands are refused here.
+// Why this loop may not send output commands.
 DisarmCause cause_of(const Board& board, const LoopOptions& options) {
   return options.arming == Arming::off ? DisarmCause::none : board.disarmed_by();
 }
 
-// Whatever there is left to say of how the outputs were left.
+// Leaves the outputs as `rest` has them, or safe. Returns the end of the report's `why`.
 std::string come_to_rest(Board& board, const LoopOptions& options, bool& at_rest) {
   at_rest = true;
   const auto is_safe = [&] { return cause_of(board, options) != DisarmCause::none; };
-  // They are safe already, and nothing would be sent; but for a board that nobody need arm.
+  // The outputs are safe already, and nothing would be sent, unless the board needs no arming.
   if (is_safe() && board.disarmed_by() != DisarmCause::not_yet) return {};
   try {
     board.apply(options.rest, options.rest_timeout);
@@ -100,7 +99,7 @@ LoopReport run_loop(Board& board, const LoopOptions& options,
         }
         ++report.steps;
         guard.on_commanded(*wanted);
-        // What is not sent is not missed: the next is newer. The guard sees why.
+        // A refused post needs no repeat: the next one is newer, and the guard sees the reason.
         if (!wanted->empty()) static_cast<void>(board.post(*wanted));
       } catch (...) {
         thrown = std::current_exception();

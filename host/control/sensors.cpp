@@ -34,14 +34,16 @@ void Wheel::reset() {
 double Wheel::advance(const State& state) {
   const Sample now{state.t_ms, state.encoder(geometry_.encoder)};
   if (count_ != 0 && samples_[newest_].t_ms == now.t_ms) return 0;
+  const auto metres_since = [&](const Sample& then) {  // the counts wrap
+    return static_cast<std::int32_t>(static_cast<std::uint32_t>(now.counts) -
+                                     static_cast<std::uint32_t>(then.counts)) *
+           metres_a_count_;
+  };
   double rolled_m = 0;
   if (count_ != 0) {
-    const Sample& before = samples_[newest_];
-    const auto counts = static_cast<std::int32_t>(static_cast<std::uint32_t>(now.counts) -
-                                                  static_cast<std::uint32_t>(before.counts));
-    const auto elapsed_ms =
-        static_cast<std::int32_t>(now.t_ms - before.t_ms);  // < 0: it began again
-    rolled_m = counts * metres_a_count_;
+    // Below 0 if the board has restarted.
+    const auto elapsed_ms = static_cast<std::int32_t>(now.t_ms - samples_[newest_].t_ms);
+    rolled_m = metres_since(samples_[newest_]);
     if (elapsed_ms < 0 || std::abs(rolled_m) > max_speed_m_s_ * elapsed_ms / 1000.0) {
       reset();
       rolled_m = 0;
@@ -50,14 +52,12 @@ double Wheel::advance(const State& state) {
   newest_ = (newest_ + 1) % most_samples;
   samples_[newest_] = now;
   count_ = std::min(count_ + 1, most_samples);
-  // The nearest of those that are a window old, and of what there is the oldest.
+  // The newest sample that is a window old, or else the oldest.
   for (std::size_t back = 1; back < count_; ++back) {
     const Sample& then = samples_[(newest_ + most_samples - back) % most_samples];
     const std::uint32_t age_ms = now.t_ms - then.t_ms;
     if (age_ms < window_ms_ && back + 1 < count_) continue;
-    const auto counts = static_cast<std::int32_t>(static_cast<std::uint32_t>(now.counts) -
-                                                  static_cast<std::uint32_t>(then.counts));
-    speed_m_s_ = counts * metres_a_count_ * 1000.0 / age_ms;
+    speed_m_s_ = metres_since(then) * 1000.0 / age_ms;
     break;
   }
   return rolled_m;

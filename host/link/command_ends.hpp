@@ -12,24 +12,10 @@ class CommandEnds {
   CommandEnds(Effects& effects, Statistics& counts) : effects_(effects), counts_(counts) {}
 
   void end(Ticket ticket, const CommandResult& result) {
-    switch (result.outcome) {
-      case Outcome::confirmed:
-        ++counts_.confirmed;
-        break;
-      case Outcome::refused:
-      case Outcome::not_armed:
-        ++counts_.refused;
-        break;
-      case Outcome::timed_out:
-        ++counts_.timed_out;
-        break;
-      case Outcome::none:
-      case Outcome::cancelled:
-      case Outcome::closed:
-      case Outcome::blocked:
-      case Outcome::full:
-        break;
-    }
+    const Outcome outcome = result.outcome;
+    if (outcome == Outcome::confirmed) ++counts_.confirmed;
+    if (outcome == Outcome::timed_out) ++counts_.timed_out;
+    if (outcome == Outcome::refused || outcome == Outcome::not_armed) ++counts_.refused;
     effects_.report(CommandEnded{ticket, result});
   }
 

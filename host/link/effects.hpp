@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a session wants done, in order: datagrams to be sent, and events to be reported. The session
-// itself calls nobody.
+// The effects of a call to a session, in order: datagrams to send, then events to report. The
+// session itself calls nothing outside.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ struct Sending {
   std::string_view datagram;
 };
 
-// A newer state of the board has come, and a heartbeat.
+// A newer state of the board has come, or a heartbeat.
 struct StateCame {};
 struct HeartbeatCame {};
 struct BoardIdentified {
@@ -51,8 +51,8 @@ struct CommandEnded {
   Ticket ticket = 0;
   CommandResult result;
 };
-// The board has restarted since it was heard: it has forgotten what it was told, but for settings that
-// it stores. Reported before its new state.
+// The board has restarted since its last datagram, and kept nothing but its stored settings.
+// Reported before its new state.
 struct BoardRestarted {};
 // The session was armed (cause none) or disarmed.
 struct ArmingChanged {
@@ -62,12 +62,12 @@ struct ArmingChanged {
 struct PostRefused {
   RefusedPost refused;
 };
-// Views in events are of the datagram that was received last, and valid as long as its bytes.
+// Views in an event point into the datagram received last, and are valid as long as its bytes.
 using SessionEvent =
     std::variant<StateCame, HeartbeatCame, BoardIdentified, CommandRefused, BadDatagramCame,
                  LinkChanged, CommandEnded, BoardRestarted, ArmingChanged, PostRefused>;
 
-// Memory is used again: in the steady state nothing is allocated.
+// Memory is reused: in the steady state nothing is allocated.
 class Effects {
  public:
   // Space for one datagram.
@@ -78,13 +78,13 @@ class Effects {
     sendings_.push({{path, priority, kind, pnum, {}}, bytes_.size(), datagram.size()});
     bytes_ += datagram;
   }
-  // The datagram that was received last, which the events are about.
+  // The datagram received last. The events are about it.
   Datagram& datagram() { return datagram_; }
   void report(const SessionEvent& event) { events_.push(event); }
 
   bool any_sendings() const { return sendings_.any(); }
-  // The first. Its datagram is copied to `room`: while a transport sends it, the session may want more
-  // to be sent.
+  // The oldest. Its datagram is copied to `room`, because the session may add more while a
+  // transport sends it.
   Sending take_sending(Room& room) {
     Stored first = sendings_.take();
     bytes_.copy(room.data(), first.size, first.begin);

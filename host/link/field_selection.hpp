@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state fields that a session asks its board for, and whether the board listens: without I/O.
+// The state fields that a session asks its board for, and whether the board answers. Without I/O.
 //
 //                  CMD comes, in control                five F without any answer
 //     satisfied <------------------------- asking ----------------------------------> unheard
@@ -7,11 +7,11 @@
 //         +--------------------------------+    +----------------------------------------+
 //          no CMD for 200 ms, or no control      the board answers something after all
 //
-//     left       the board's own choice is left alone: nothing is ever asked for
-//     satisfied  the states bring CMD, and we are in control
-//     asking     F is sent every 200 ms. Executed, it is also the proof that the board obeys us
-//     unheard    the board is taken for one of the paper's release, which does not know F. It is asked
-//                once a second all the same: on a bad line all five may have been lost
+//     left       the board keeps its own choice of fields, and F is never sent
+//     satisfied  the states bring CMD, and this host is in control
+//     asking     F is sent every 200 ms. Once executed, F proves that the board obeys this host
+//     unheard    the board counts as one of the paper's release, which does not know F. F is still
+//                sent once a second, because a bad line may have lost all five
 #pragma once
 
 #include <cstdint>
@@ -26,13 +26,13 @@ class FieldSelection {
  public:
   enum class Stage : std::uint8_t { left, satisfied, asking, unheard };
 
-  // `fields` as in F; empty: the board's own choice is left alone.
+  // `fields` as in F; empty: the board keeps its own choice.
   explicit FieldSelection(std::string fields) : fields_(std::move(fields)) {
     if (fields_.empty()) stage_ = Stage::left;
   }
 
   const std::string& fields() const { return fields_; }
-  // The program has chosen others.
+  // The program has chosen other fields.
   void choose(std::string fields) {
     fields_ = std::move(fields);
     unanswered_ = 0;
@@ -47,13 +47,13 @@ class FieldSelection {
     cmd_seen_ = now;
     on_answer();
   }
-  // The board has answered something: the paper's release never does.
+  // The board has answered something. A board of the paper's release never answers.
   void on_answer() {
     answers_ = true;
     if (stage_ == Stage::unheard) stage_ = Stage::asking;
   }
 
-  // Is F to be sent now? `may_ask`: the link is up, and no other host controls the board.
+  // True if F is to be sent now. `may_ask`: the link is up, and no other host controls the board.
   bool ask(bool controlling, bool may_ask, Time now) {
     if (stage_ == Stage::left) return false;
     if (controlling && now - cmd_seen_ < retry) {
@@ -69,7 +69,7 @@ class FieldSelection {
   }
 
   Stage stage() const { return stage_; }
-  // The board speaks this protocol, and not the paper's release of it alone.
+  // True if the board's firmware is newer than the paper's release.
   bool answers() const { return answers_; }
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Does the board execute a group of commands together (capability `group` of its answer to Q:ID)? Without
-// I/O, part of a session.
+// Whether the board executes a group of commands together: the capability `group` in its answer to
+// Q:ID. Without I/O, part of a session.
 //
 //               I:… with the word
 //     unknown ----------------------> together
@@ -8,13 +8,13 @@
 //      |   |  I:… without it, or a board that answers nothing at all
 //      |   +---------------------------> apart
 //      |                                 |
-//      +---- the board has begun again --+
+//      +---- the board has restarted ----+
 //
-//     unknown   a group waits, and Q:ID is sent every 100 ms. On a bad line many may be lost: a board that
-//               has ever answered anything is asked until it does, or what is to be done together would be
-//               done one by one
+//     unknown   while a group waits, Q:ID is sent every 100 ms. A bad line may lose many of them. A
+//               board that has ever answered anything is asked until it answers, because otherwise
+//               commands that belong together would be executed one by one
 //     together  a group is one datagram
-//     apart     its commands are sent one after the other. An answer that comes late counts all the same
+//     apart     the commands of a group are sent one after the other. A late answer still counts
 #pragma once
 
 #include <cstdint>
@@ -38,8 +38,8 @@ class GroupSupport {
     state_ = State::unknown;
     unanswered_ = 0;
   }
-  // A group waits: is Q:ID to be sent now? `answers`: the board has ever answered anything. One that does
-  // not (the paper's release) will not answer this either.
+  // True if Q:ID is to be sent now; to be called while a group waits. `answers`: the board has ever
+  // answered anything. A board that has not (the paper's release) will not answer Q:ID either.
   bool ask(bool answers, Time now) {
     if (state_ != State::unknown || now < next_) return false;
     next_ = now + retry;
@@ -48,7 +48,7 @@ class GroupSupport {
     state_ = State::apart;
     return false;
   }
-  // When ask() may be true next, while a group waits and it is unknown.
+  // When ask() may be true next, in the state `unknown`.
   Time next() const { return next_; }
 
  private:

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "heard_board.hpp"
 
+#include <algorithm>
+
 namespace r4 {
 
 namespace {
 
-// The board's clock needs more questions than the program wants: at first until the error is small,
-// later where it is not. The interval is not a whole number of milliseconds, because the board's clock
-// counts these, and so shows where they begin.
+// The board's clock needs more questions than the program asks for: at first until the error is
+// small, later whenever the error has grown. The interval is not a whole number of milliseconds. So
+// the answers also show where a millisecond of the board's clock begins.
 constexpr Time soon_interval{102'300};
 constexpr Time first_goal{500}, later_goal{1'000};
 constexpr int first_questions = 100, questions_in_vain = 10;
@@ -29,7 +31,7 @@ void HeardBoard::on_state(const ReceivedState& state, std::optional<SafeReason> 
   state_.sampled_error = sampled.error ? *sampled.error : ReceivedState::unknown;
   state_.received = ReceivedState::Clock::time_point(now);
   state_.safe = told;
-  // The field is in every state as long as there is a fault.
+  // While there is a fault, the field is in every state.
   if (reason && !state_.present.has(StateField::fault)) state_.fault = ChipFault();
 }
 
@@ -59,16 +61,23 @@ std::optional<bool> HeardBoard::supply() const {
 }
 
 void HeardBoard::ask(std::uint32_t pnum, Time now) {
-  question_.ask(pnum, now);
+  next_question_ = now + identify_interval_;
+  asked(pnum, now);
   ++questions_of_clock_;
 }
 
-Time HeardBoard::question_interval() const {
+void HeardBoard::asked(std::uint32_t pnum, Time now) {
+  newest_question_ = now;
+  question_.asked(pnum, now);
+}
+
+Time HeardBoard::next_question() const {
+  if (identify_interval_.count() == 0) return Time::max();
   const bool first = questions_of_clock_ < first_questions;
   const bool known = state_.sampled_error != ReceivedState::unknown;
   const Time enough = first ? first_goal : later_goal;
   const bool soon = known ? state_.sampled_error > enough : questions_of_clock_ < questions_in_vain;
-  return soon ? soon_interval : identify_interval_;
+  return std::min(next_question_, newest_question_ + (soon ? soon_interval : identify_interval_));
 }
 
 }  // namespace r4

@@ -5,12 +5,12 @@
 
 namespace r4 {
 
-bool HostKey::on_heartbeat(const Datagram& heartbeat) {
+void HostKey::on_heartbeat(const Datagram& heartbeat) {
   const Text nonce = heartbeat_nonce(heartbeat);
   heard_ = true;
   asked_for_ = !nonce.empty();
   if (!asked_for_) in_vain_ = 0;
-  return signer_ && signer_->on_nonce(nonce);
+  if (signer_) signer_->on_nonce(nonce);
 }
 
 void HostKey::on_board_time(std::uint32_t t_ms, Time now) {

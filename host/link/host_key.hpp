@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The host's key, and what its board makes of it.
+// The host's key, and whether the board accepts it.
 //
-// With a key everything is signed as soon as the board's nonce is known, and a board that tells
-// none is refused: it has no key and obeys anyone. That a board takes nothing of ours, for we have
-// no key or another one, is found out by what it does not do: it takes no heartbeat, or answers AUTH.
+// With a key, every datagram is signed as soon as the board's nonce is known. A board without a
+// nonce is refused: it has no key, and obeys anyone. A board that accepts no datagram of this host,
+// because the host has no key or another key, does not say so: it takes no heartbeat, or answers
+// AUTH.
 #pragma once
 
 #include <chrono>
@@ -23,18 +24,17 @@ class HostKey {
     if (key) signer_.emplace(*key);
   }
 
-  // The board's newest heartbeat. True if we sign and its nonce is another: the board has been safe
-  // since, and our session may have ended.
-  bool on_heartbeat(const Datagram& heartbeat);
-  // The T of its newest datagram.
+  // The board's newest heartbeat.
+  void on_heartbeat(const Datagram& heartbeat);
+  // The T of the board's newest datagram.
   void on_board_time(std::uint32_t t_ms, Time now);
-  // The board has a host, whoever that is.
+  // The board has a host: this one or another.
   void on_host_seen(Time now) {
     in_vain_ = 0;
     host_seen_ = now;
   }
-  // What the board's newest heartbeat says of it: none, and it has a host; link, and it has none. Any
-  // other reason hides whether it still has the one that was seen last.
+  // The reason in the board's newest heartbeat. `none`: the board has a host. `link`: it has none.
+  // Any other reason hides whether the board still has the host that was seen last.
   void on_reason(SafeReason reason, Time now) {
     if (reason == SafeReason::none) on_host_seen(now);
     if (reason == SafeReason::link) host_seen_.reset();
@@ -42,30 +42,30 @@ class HostKey {
   }
   // A heartbeat was sent.
   void on_heartbeat_sent() { in_vain_ += asked_for_ && in_vain_ < many ? 1 : 0; }
-  // It has answered AUTH to something that a key would have made good.
+  // The board has answered AUTH to a datagram that the right key would have made acceptable.
   void on_refusal(Time now) { refused_until_ = now + refusal_memory; }
 
   bool has_key() const { return signer_.has_value(); }
-  // The board asks for a signature: it is none of the paper's release.
+  // True if the board asks for signatures. A board of the paper's release never does.
   bool asked_for() const { return asked_for_; }
-  // To that board nothing may be sent but stops.
+  // True if only stops may be sent to the board.
   bool refuses_board() const { return has_key() && heard_ && !asked_for_; }
-  // Signs what is written, if there is a key and a nonce; finish() is to follow.
+  // Signs the fields written so far, if there is a key and a nonce. finish() must follow.
   void sign(DatagramWriter& writer, Time now);
 
-  // What is wrong with keys.
+  // The problem with keys, if there is one.
   std::optional<LinkCause> cause(Time now) const;
 
  private:
-  static constexpr int many = 10;  // heartbeats: a second of them
+  static constexpr int many = 10;  // heartbeats: one second of them
   static constexpr Time refusal_memory = std::chrono::seconds{1};
-  // More than a second: from a state to the next at the lowest rate.
+  // Longer than one second, the time between two states at the lowest rate.
   static constexpr Time host_memory = std::chrono::milliseconds{1500};
 
   std::optional<Signer> signer_;
   Time clock_start_;
-  bool heard_ = false;      // a heartbeat
-  bool asked_for_ = false;  // a signature, by that heartbeat
+  bool heard_ = false;      // a heartbeat has come
+  bool asked_for_ = false;  // the newest heartbeat asks for signatures
   int in_vain_ = 0;         // heartbeats sent since the board was known to have a host
   std::optional<Time> host_seen_;
   Time refused_until_{0};

@@ -55,10 +55,12 @@ void LinkKeeper::on_own_command(std::uint32_t t_ms, Time now) {
   role_.on_own_command(!paths_.all_busy(now), now);
 }
 
-// --- what is due
+// --- actions that are due
 
 void LinkKeeper::ask_paths(Time now) {
-  if (const PathSet due = paths_.to_ask(now); due != 0) outbox_.ask(due, now);
+  if (const PathSet due = paths_.to_ask(now); due != 0) {
+    outbox_.send(Command::identify(), {.paths = due, .unknown_too = true}, now);
+  }
   if (paths_.poll(now)) link_.on_transport(true);  // the first heartbeat goes out at once
 }
 
@@ -75,17 +77,15 @@ void LinkKeeper::send_lease(Time now) {
     Lease& lease = paths_.leases()[i];
     if ((paths_.speaking() & path_bit(i)) == 0 || !lease.due(now)) continue;
     outbox_.send(Command::watch(options_.watch_rate_hz, list),
-                 {Priority::lease, path_bit(i), lease.echo()}, now);
+                 {.priority = Priority::lease, .paths = path_bit(i), .echo = lease.echo()}, now);
     lease.sent(now);
   }
 }
 
 void LinkKeeper::send_heartbeat(Time now) {
   if (!link_.heartbeat_due(to_ms(now))) return;
-  Outbox::Way way;
-  way.echo = link_.echo();
-  link_.heartbeat_sent(to_ms(now));  // on_sent() tells if it could not be
-  heartbeat_.begin(outbox_.send(Command::heartbeat(), way, now));
+  link_.heartbeat_sent(to_ms(now));  // on_sent() takes it back if no path takes the heartbeat
+  heartbeat_.begin(outbox_.send(Command::heartbeat(), {.echo = link_.echo()}, now));
   if (heartbeat_.failed()) link_.heartbeat_not_sent(to_ms(now));
 }
 
@@ -96,7 +96,8 @@ void LinkKeeper::select_fields(Time now) {
 }
 
 Time LinkKeeper::next(Time now) const {
-  // due_in() counts whole milliseconds: wait for the end of the millisecond, not for its beginning.
+  // due_in() counts whole milliseconds, so wait for the end of the millisecond, not for its
+  // beginning.
   Time link = now + std::chrono::milliseconds{link_.due_in(to_ms(now))};
   link = std::chrono::floor<std::chrono::milliseconds>(link);
   if (link <= now) link = now + Time{1000};
@@ -106,11 +107,10 @@ Time LinkKeeper::next(Time now) const {
   return std::min(next, paths_.next(now));
 }
 
-// A heartbeat after the farewell would take control again, so none is sent from now on.
+// A heartbeat after the farewell would take control again, so no more heartbeats are sent.
 void LinkKeeper::leave(Time now) {
   for (std::size_t i = 0; watches() && i < paths_.count(); ++i) {
-    outbox_.send(Command::watch(0), {Priority::normal, path_bit(i), paths_.leases()[i].echo()},
-                 now);
+    outbox_.send(Command::watch(0), {.paths = path_bit(i), .echo = paths_.leases()[i].echo()}, now);
   }
   leaving_ = true;
 }
@@ -129,26 +129,19 @@ void LinkKeeper::hold(bool held) {
   link_.hold(held_ || watches());
 }
 
-// --- how the link is
+// --- the state of the link
 
 bool LinkKeeper::is_up() const {
-  if (!link_.echoed() || key_.refuses_board()) return false;
-  switch (link_.state()) {
-    case HostLinkState::active:
-      return true;
-    case HostLinkState::safe:
-      return link_.reason() != SafeReason::link;
-    case HostLinkState::connecting:
-    case HostLinkState::lost:
-      return false;
-  }
-  return false;
+  const HostLinkState state = link_.state();
+  return link_.echoed() && !key_.refuses_board() &&
+         (state == HostLinkState::active ||
+          (state == HostLinkState::safe && link_.reason() != SafeReason::link));
 }
 
 bool LinkKeeper::hears_board() const { return watches() ? is_heard(link_.state()) : is_up(); }
 
-// Commands wait for proof of control: the session's own F, executed. So no command is ever sent into
-// a session that the board has not accepted, where a refusal would prove nothing.
+// Commands wait for proof of control: the board has executed this session's F. Before that, the
+// board may not have accepted the session, and a refusal would prove nothing.
 bool LinkKeeper::in_control(Time now) const {
   const FieldSelection::Stage stage = fields_.stage();
   const bool no_proof_to_come =
@@ -168,7 +161,7 @@ LinkStatus LinkKeeper::status(ChipFault fault, Time now) const {
   if (!watches()) {
     causes.set(LinkCause::watchdog, link_.watchdog_expired(to_ms(now)));
     causes.set(LinkCause::callback, held_);
-    // The silence of a board that is lost says nothing of keys.
+    // The silence of a lost board is no sign of a wrong key.
     const std::optional<LinkCause> key = key_.cause(now);
     if (key && link_.state() != HostLinkState::lost) causes.set(*key);
   }

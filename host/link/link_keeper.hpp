@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Keeps the link of a session alive and knows how it is. It sends heartbeats, or a watcher's leases,
-// asks the board for the state fields that the session needs, and tells whether commands may go out.
+// Keeps the link of a session alive and reports its status. It sends heartbeats, or a watcher's
+// leases, asks the board for the state fields that the session needs, and decides whether commands
+// may go out.
 //
-// It joins machines that have their own diagrams: the link (protocol/link/host_link.hpp), what this
-// host is to the board (host_role.hpp), the fields (field_selection.hpp), the key (host_key.hpp), and
-// a watcher's leases (../paths/lease.hpp).
+// It joins machines that have their own diagrams: the link (protocol/link/host_link.hpp), the role
+// of this host (host_role.hpp), the fields (field_selection.hpp), the key (host_key.hpp), and a
+// watcher's leases (../paths/lease.hpp).
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <string>
 
 #include "../../protocol/link/host_link.hpp"
 #include "../measurement/time.hpp"
@@ -34,10 +34,10 @@ class LinkKeeper {
 
   // --- events
 
-  // The transport of a path has come or gone.
+  // The transport of a path is up or down.
   void on_transport(std::size_t path, bool up, bool can_ask, Time now);
   void on_transport_trouble(TransportTrouble trouble) { trouble_ = trouble; }
-  // A path has taken a datagram, or not.
+  // A path has taken a datagram or refused it.
   void on_sent(const Sending& sending, SendResult result, Time now);
   // The board answered BUSY at its time `t_ms`. Without a time: a transport on CAN hears another
   // host with this program's ids.
@@ -46,42 +46,41 @@ class LinkKeeper {
   void on_own_command(std::uint32_t t_ms, Time now);
   // The board has confirmed or answered something.
   FieldSelection& fields() { return fields_; }
-  const FieldSelection& fields() const { return fields_; }
 
-  // --- what is due
+  // --- actions that are due
 
-  // Asks paths who their board is, and lets the session begin when that is known.
+  // Asks each path's board for its identity. The session begins when the boards are known.
   void ask_paths(Time now);
-  // Sends the heartbeat, or the leases, that are due.
+  // Sends the heartbeat, or the leases, if they are due.
   void keep_alive(Time now);
-  // Sends F if the states lack fields that the session needs, or if control is to be proved.
+  // Sends F if the states lack fields that the session needs, or control has to be proved.
   void select_fields(Time now);
-  // When one of these is due next; Time::max() for never.
+  // When one of these three is due next; Time::max() for never.
   Time next(Time now) const;
-  // Ends the link: nothing is sent from now on but what the caller sends itself.
+  // Ends the link: from now on the keeper sends nothing.
   void leave(Time now);
-  // A new session is to begin, in the role that the outbox has.
+  // A new session begins, in the outbox's role.
   void begin_anew();
-  // Holds heartbeats and commands back, until it is called with false.
+  // Holds heartbeats and commands back until it is called with false.
   void hold(bool held);
 
-  // --- how the link is
+  // --- the state of the link
 
-  // Takes up what has changed. Call it before the questions below.
-  void update(Time now) { role_.on_link(is_up(), now); }
+  // Applies changes of the link to the role. Call it before the functions below.
+  void update() { role_.on_link(is_up()); }
   // True if the board hears this host.
   bool is_up() const;
-  // True if the board is heard, whatever it thinks of this host.
+  // True if the board is heard, even if it does not hear this host.
   bool hears_board() const;
   // True if commands may go out at once: the link is up, the board has executed a command of this
-  // session, and nothing holds the session back.
+  // session, and neither a callback nor the watchdog holds the session back.
   bool in_control(Time now) const;
   bool controls() const { return role_.controlling(); }
   bool is_leaving() const { return leaving_; }
   LinkStatus status(ChipFault fault, Time now) const;
 
-  // A command that chooses fields, with the fields that the session needs; the choice is remembered.
-  // Any other command as it is. The text is valid until the next call.
+  // Adds the fields that the session needs to a command that chooses fields, and remembers the
+  // choice. Returns any other command unchanged. The text is valid until the next call.
   Command with_needed_fields(const Command& command);
 
  private:

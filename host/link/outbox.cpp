@@ -8,7 +8,7 @@
 
 namespace r4 {
 
-// The board echoes nothing, so a command of the session needs no T.
+// The board never echoes a host's T, so a command of a session carries none.
 void Outbox::stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
                    std::uint32_t t_ms) const {
   const bool echoes = kind == CommandKind::heartbeat || kind == CommandKind::watch;
@@ -36,27 +36,16 @@ Outbox::Sent Outbox::send(const Setpoints& group, Time now) {
 
 PathSet Outbox::send(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum, Way way,
                      Time now) {
-  const bool stop = kind == CommandKind::stop;
-  if (key_.refuses_board() && !stop) return 0;
-  const PathSet to = stop ? way.paths : static_cast<PathSet>(way.paths & paths_.speaking());
+  if (kind == CommandKind::stop) way.priority = Priority::stop;
+  const bool to_any = way.unknown_too || kind == CommandKind::stop;
+  if (key_.refuses_board() && !to_any) return 0;
+  const PathSet to = to_any ? way.paths : static_cast<PathSet>(way.paths & paths_.speaking());
   PathSet over = 0;
   for (std::size_t i = 0; i < paths_.count(); ++i) {
     if ((to & path_bit(i)) == 0) continue;
     if (send_over(i, writer, kind, pnum, way.priority, now)) over |= path_bit(i);
   }
   return over;
-}
-
-void Outbox::ask(PathSet paths, Time now) {
-  std::array<char, max_datagram> buffer;
-  DatagramWriter writer(buffer.data(), buffer.size());
-  write_command(writer, Command::identify());
-  const std::uint32_t pnum = link_.take_pnum();
-  stamp(writer, CommandKind::identify, pnum, to_ms(now));
-  for (std::size_t i = 0; i < paths_.count(); ++i) {
-    if ((paths & path_bit(i)) == 0) continue;
-    send_over(i, writer, CommandKind::identify, pnum, Priority::normal, now);
-  }
 }
 
 // Each path has a signature of its own, which proves that path (docs/protocol.md, "Paths"). A

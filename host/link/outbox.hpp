@@ -21,11 +21,13 @@ class Outbox {
  public:
   static constexpr PathSet all_paths = 0xFF;
 
-  // How a datagram goes out.
+  // How a datagram goes out. A stop always has the priority of stops.
   struct Way {
     Priority priority = Priority::normal;
     PathSet paths = all_paths;
     std::optional<std::uint32_t> echo{};  // the T that it carries, in ms; none: the host's time
+    // Also to paths whose board is not known, and to a board without a key.
+    bool unknown_too = false;
   };
   // A datagram that went out: its number, and its paths.
   struct Sent {
@@ -39,11 +41,9 @@ class Outbox {
   // A command, or a group, that is sent once.
   Sent send(const Command& command, Way way, Time now);
   Sent send(const Setpoints& group, Time now);
-  // A command that stands in the writer already, with its stamp. A stop goes to every path. Other
+  // A command that is in the writer already, with its stamp. A stop goes to every path. Other
   // commands go to the paths that lead to the session's board, if that board has this host's key.
   PathSet send(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum, Way way, Time now);
-  // One question Q:ID to these paths, whether their board is known or not.
-  void ask(PathSet paths, Time now);
 
   // Writes SID, PNum and, where a datagram echoes one, T.
   void stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
@@ -66,7 +66,7 @@ class Outbox {
   BoardRole role_;
 };
 
-// Whether a datagram was taken by one of the paths that it was sent over.
+// Whether one of the paths has taken a datagram.
 class Delivery {
  public:
   void begin(Outbox::Sent sent);

@@ -3,24 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace r4 {
 
-namespace {
-
-constexpr double infinite = std::numeric_limits<double>::infinity();
-
-}  // namespace
-
-// Microseconds of the board's clock. An older T, too: datagrams overtake each other.
+// Microseconds of the board's clock. Also for an older T, because datagrams overtake each other.
 double BoardClock::since_first(std::uint32_t t_ms) const {
   const auto later = static_cast<std::int32_t>(t_ms - newest_t_ms_);
   return static_cast<double>(newest_board_ms_ + later) * 1000;
 }
 
-void BoardClock::limit(Limits& limits, std::uint32_t t_ms, Time host, Time margin) {
+void BoardClock::limit(Side& side, std::uint32_t t_ms, Time host, Time margin) {
   if (!any_) {
     any_ = true;
     newest_t_ms_ = t_ms;
@@ -31,49 +24,43 @@ void BoardClock::limit(Limits& limits, std::uint32_t t_ms, Time host, Time margi
     newest_board_ms_ += later;
     newest_t_ms_ = t_ms;
   }
-  if (place(limits, t_ms, host, margin)) return;
-  // No clock that drifts by 100 ppm has shown all of that: one of the two has been set, or stood still
-  // while the computer slept. What is new is true.
+  if (place(side, t_ms, host, margin)) return;
+  // No clock that drifts by 100 ppm satisfies all limits: one of the two clocks was set, or stood
+  // still while the computer slept. The newest limit is true.
   restart();
-  limit(limits, t_ms, host, margin);
+  limit(side, t_ms, host, margin);
 }
 
-// False: it contradicts what is known.
-bool BoardClock::place(Limits& limits, std::uint32_t t_ms, Time host, Time margin) {
+// False if the limit contradicts the limits so far.
+bool BoardClock::place(Side& side, std::uint32_t t_ms, Time host, Time margin) {
   Limit fresh;
   fresh.at = since_first(t_ms);
   fresh.second = static_cast<std::int64_t>(std::floor(fresh.at / 1e6));
   fresh.offset = static_cast<double>((host - first_ + margin).count()) - fresh.at;
+  if (!is_upper(side)) fresh.offset = -fresh.offset;
   if (is_old(fresh.second)) return false;  // no datagram is under way for so long
-  const bool is_upper = &limits == &upper_;
-  if (is_upper ? fresh.offset < lowest(fresh.at) : fresh.offset > highest(fresh.at)) return false;
+  if (fresh.offset < -highest(is_upper(side) ? lower_ : upper_, fresh.at)) return false;
   if (fresh.second > newest_second_) next_second(fresh.second);
-  Limit& kept = limits[slot_of(fresh.second)];
-  const double later = fresh.at - kept.at;
-  const double moved = kept.offset + later * (is_upper == (later > 0) ? fastest_ : slowest_);
-  const bool tighter = is_upper ? fresh.offset < moved : fresh.offset > moved;
+  Limit& kept = side.limits[slot_of(fresh.second)];
+  const bool tighter = fresh.offset < moved(side, kept, fresh.at - kept.at);
   if (kept.second != fresh.second || tighter) kept = fresh;
-  if (is_upper && fresh.at >= high_.at && fresh.offset < highest(fresh.at)) {
-    high_ = {fresh.at, fresh.offset};
-  }
-  if (!is_upper && fresh.at >= low_.at && fresh.offset > lowest(fresh.at)) {
-    low_ = {fresh.at, fresh.offset};
-  }
+  if (fresh.at >= side.front.at && fresh.offset < highest(side, fresh.at)) side.front = fresh;
   return true;
 }
 
-// What has been learned in the last one tells more of the drift, and the oldest is forgotten.
+// The second that has ended narrows the drift, and the oldest second is forgotten.
 void BoardClock::next_second(std::int64_t second) {
   narrow_drift(std::exchange(newest_second_, second));
   const double at = static_cast<double>(second) * 1e6;
-  high_ = {at, highest_of_all(at)};
-  low_ = {at, lowest_of_all(at)};
+  for (Side* const side : {&upper_, &lower_}) {
+    side->front = {second, at, highest_of_all(*side, at)};
+  }
 }
 
-// A line through the gap between an upper and a lower limit cannot be steeper than from the one to the other.
+// A line between an upper and a lower limit cannot be steeper than the line through both.
 void BoardClock::Slopes::narrow(const Limit& upper, const Limit& lower) {
   if (lower.at == upper.at) return;
-  const double slope = (lower.offset - upper.offset) / (lower.at - upper.at);
+  const double slope = (-lower.offset - upper.offset) / (lower.at - upper.at);
   if (lower.at > upper.at) {
     slowest = std::max(slowest, slope);
   } else {
@@ -81,23 +68,23 @@ void BoardClock::Slopes::narrow(const Limit& upper, const Limit& lower) {
   }
 }
 
-// The limits of that second beside those before it, and its own.
+// Compares the limits of that second with its own and with those of earlier seconds.
 void BoardClock::take_slopes(std::int64_t second) {
-  const Limit& upper = upper_[slot_of(second)];
-  const Limit& lower = lower_[slot_of(second)];
+  const Limit& upper = upper_.limits[slot_of(second)];
+  const Limit& lower = lower_.limits[slot_of(second)];
   for (std::int64_t before = second - seconds + 1; before <= second; ++before) {
     const std::size_t slot = slot_of(before);
     if (slopes_[slot].second != before) slopes_[slot] = {before};
-    if (upper_[slot].second == before && lower.second == second) {
-      slopes_[slot].narrow(upper_[slot], lower);
+    if (upper_.limits[slot].second == before && lower.second == second) {
+      slopes_[slot].narrow(upper_.limits[slot], lower);
     }
-    if (lower_[slot].second == before && upper.second == second) {
-      slopes_[slot].narrow(upper, lower_[slot]);
+    if (lower_.limits[slot].second == before && upper.second == second) {
+      slopes_[slot].narrow(upper, lower_.limits[slot]);
     }
   }
 }
 
-// That second is over. An answer from its end may still come.
+// That second has ended. The second before it is taken again, for an answer that came late.
 void BoardClock::narrow_drift(std::int64_t second) {
   take_slopes(second - 1);
   take_slopes(second);
@@ -108,41 +95,33 @@ void BoardClock::narrow_drift(std::int64_t second) {
     slowest_ = std::max(slowest_, each.slowest);
     fastest_ = std::min(fastest_, each.fastest);
   }
-  if (slowest_ > fastest_) slowest_ = fastest_ = (slowest_ + fastest_) / 2;  // of rounding
+  if (slowest_ > fastest_) slowest_ = fastest_ = (slowest_ + fastest_) / 2;  // by rounding
 }
 
-double BoardClock::highest(double at) const {
-  return at < high_.at ? highest_of_all(at) : high_.offset + (at - high_.at) * fastest_;
+double BoardClock::moved(const Side& side, const Limit& limit, double later) const {
+  const bool fastest = is_upper(side) == (later > 0);
+  const double change = later * (fastest ? fastest_ : slowest_);
+  return limit.offset + (is_upper(side) ? change : -change);
 }
 
-double BoardClock::lowest(double at) const {
-  return at < low_.at ? lowest_of_all(at) : low_.offset + (at - low_.at) * slowest_;
+double BoardClock::highest(const Side& side, double at) const {
+  const double later = at - side.front.at;
+  return later < 0 ? highest_of_all(side, at) : moved(side, side.front, later);
 }
 
-double BoardClock::highest_of_all(double at) const {
-  double offset = infinite;
-  for (const Limit& each : upper_) {
+double BoardClock::highest_of_all(const Side& side, double at) const {
+  double offset = std::numeric_limits<double>::infinity();
+  for (const Limit& each : side.limits) {
     if (each.second == none || is_old(each.second)) continue;
-    const double later = at - each.at;
-    offset = std::min(offset, each.offset + later * (later > 0 ? fastest_ : slowest_));
-  }
-  return offset;
-}
-
-double BoardClock::lowest_of_all(double at) const {
-  double offset = -infinite;
-  for (const Limit& each : lower_) {
-    if (each.second == none || is_old(each.second)) continue;
-    const double later = at - each.at;
-    offset = std::max(offset, each.offset + later * (later > 0 ? slowest_ : fastest_));
+    offset = std::min(offset, moved(side, each, at - each.at));
   }
   return offset;
 }
 
 BoardClock::Instant BoardClock::at(std::uint32_t t_ms) const {
   const double board = since_first(t_ms);
-  const double high = highest(board);
-  const double low = lowest(board);
+  const double high = highest(upper_, board);
+  const double low = -highest(lower_, board);
   const bool bounded = std::isfinite(high) && std::isfinite(low);
   const double offset = bounded ? (high + low) / 2 : std::isfinite(high) ? high : low;
   Instant instant;

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's clock on the host's, without I/O. Two facts bound it, and neither supposes anything of
-// the link:
+// The board's clock in terms of the host's clock, without I/O. Two facts bound it, whatever the
+// link does:
 //
 //     a datagram with T came at r:                  the board's clock showed T before r
 //     a question asked at a was answered with T:    it showed T + 1 ms after a
 //
-// Each is a limit of the offset, the host's time less the board's, at one T. An offset runs as the clocks
-// drift apart: by a straight line, of at most 100 ppm. What lines the limits leave is what is known. The
-// tightest of each second are kept, for the last minute: constant memory, and a clock whose drift
-// follows the temperature is followed.
+// Each fact limits the offset (the host's time less the board's) at one T, from above or from
+// below. The clocks drift apart along a straight line of at most 100 ppm. Every line between the
+// limits is possible. The tightest limits of each second are kept for the last minute: the
+// memory is constant, and the estimate follows a drift that changes with the temperature.
 //
-// The estimate is the middle of what is left, which is right where the fastest datagrams of both ways take
-// as long. Where nothing has been answered (who only listens asks nothing) it is the upper limit, and
-// the error is not known.
+// The estimate is the middle of the remaining range. It is right if the fastest datagrams of both
+// directions take equally long. Without answers (a watcher may not be able to ask) the estimate is
+// the upper limit, and its error is unknown.
 #pragma once
 
 #include <array>
@@ -29,21 +29,21 @@ class BoardClock {
  public:
   // A datagram of the board with that T has come.
   void heard(std::uint32_t t_ms, Time now) { limit(upper_, t_ms, now, Time{0}); }
-  // The answer to what was asked at that time has T = t_ms.
+  // The answer to a question that was asked at that time has T = t_ms.
   void answered(std::uint32_t t_ms, Time asked) {
     limit(lower_, t_ms, asked, std::chrono::milliseconds{-1});
   }
-  // The board has begun again, with another clock.
+  // The board has restarted, with another clock.
   void restart() { *this = BoardClock(); }
 
   struct Instant {
     Time at;
-    std::optional<Time> error;  // the truth is no farther from it; none: not known
+    std::optional<Time> error;  // the truth is at most this far away; no value: unknown
   };
   // When the board's clock began to show t_ms. Only once a datagram has come.
   Instant at(std::uint32_t t_ms) const;
 
-  // How much slower than the host's the board's clock runs, and by how much that may be wrong; ppm.
+  // How much slower than the host's the board's clock runs, and the error of that; ppm.
   double drift_ppm() const { return (slowest_ + fastest_) / 2 * 1e6; }
   double drift_error_ppm() const { return (fastest_ - slowest_) / 2 * 1e6; }
 
@@ -58,9 +58,17 @@ class BoardClock {
   };
   static constexpr std::int64_t none = INT64_MIN;
   static constexpr int seconds = 64;
-  using Limits = std::array<Limit, seconds>;
 
-  // Of the lines that pass between the limits of a second and those of later ones, or of itself.
+  // The limits from one side. The lower side holds each offset negated. So both are upper limits,
+  // and one algorithm serves both.
+  struct Side {
+    std::array<Limit, seconds> limits;
+    // The tightest limit as it is now. At later times it is looser by the drift.
+    Limit front{none, 0, std::numeric_limits<double>::infinity()};
+  };
+
+  // The slopes of the lines that pass between the limits of one second and those of that or later
+  // seconds.
   struct Slopes {
     std::int64_t second = none;
     double slowest = -most_drift;
@@ -69,14 +77,8 @@ class BoardClock {
     void narrow(const Limit& upper, const Limit& lower);
   };
 
-  // The tightest limit as it is now: at later times it is that much looser.
-  struct Front {
-    double at = 0;
-    double offset = 0;
-  };
-
-  void limit(Limits& limits, std::uint32_t t_ms, Time host, Time margin);
-  bool place(Limits& limits, std::uint32_t t_ms, Time host, Time margin);
+  void limit(Side& side, std::uint32_t t_ms, Time host, Time margin);
+  bool place(Side& side, std::uint32_t t_ms, Time host, Time margin);
   void next_second(std::int64_t second);
   void take_slopes(std::int64_t second);
   void narrow_drift(std::int64_t second);
@@ -85,22 +87,21 @@ class BoardClock {
     return static_cast<std::size_t>((second % seconds + seconds) % seconds);
   }
   bool is_old(std::int64_t second) const { return second + seconds <= newest_second_; }
-  // The limits of the offset at that time of the board.
-  double highest(double at) const;
-  double lowest(double at) const;
-  double highest_of_all(double at) const;
-  double lowest_of_all(double at) const;
+  bool is_upper(const Side& side) const { return &side == &upper_; }
+  // A side's limit at that time of the board: by the front, and by all its limits.
+  double highest(const Side& side, double at) const;
+  double highest_of_all(const Side& side, double at) const;
+  // The limit of one side at `later` microseconds after `limit`.
+  double moved(const Side& side, const Limit& limit, double later) const;
 
   bool any_ = false;
   std::uint32_t newest_t_ms_ = 0;
-  std::int64_t newest_board_ms_ = 0;  // the same since the first, which does not wrap
+  std::int64_t newest_board_ms_ = 0;  // the same since the first datagram, without the wrap
   std::int64_t newest_second_ = 0;
   Time first_{0};
-  Limits upper_, lower_;
+  Side upper_, lower_;
   std::array<Slopes, seconds> slopes_;
-  Front high_{0, std::numeric_limits<double>::infinity()};
-  Front low_{0, -std::numeric_limits<double>::infinity()};
-  // What the offset may change by in one unit of time.
+  // The range of the offset's slope.
   double slowest_ = -most_drift;
   double fastest_ = most_drift;
 };

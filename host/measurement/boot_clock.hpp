@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Time that goes on while this computer sleeps, and a watch that notices that it slept.
+// A clock that goes on while this computer sleeps, and a watch that notices a sleep.
 //
-// The steady clock (CLOCK_MONOTONIC) stands still in a suspended computer, and every timer and
-// deadline with it. The boot clock (CLOCK_BOOTTIME) goes on. What has to end in a human's time is
-// measured by it.
+// In a suspended computer the steady clock (CLOCK_MONOTONIC) stands still, and every timer and
+// deadline with it. The boot clock (CLOCK_BOOTTIME) goes on. It measures periods that must end in a
+// human's time.
 #pragma once
 
 #include <algorithm>
@@ -28,8 +28,8 @@ struct BootClock {
   }
 };
 
-// How long this computer has slept since it was switched on: by so much the boot clock is ahead of
-// the steady one. The two are read one after the other, and a thread may lose its processor in
+// How long this computer has slept since it was switched on: the boot clock is ahead of the steady
+// clock by that. The two are read one after the other, and a thread may lose its processor in
 // between.
 inline Time slept_at_most(Time steady) {
   return std::chrono::duration_cast<Time>(BootClock::now().time_since_epoch()) - steady;
@@ -40,7 +40,7 @@ inline Time slept_at_least() {
                                           std::chrono::steady_clock::now().time_since_epoch());
 }
 
-// Neither a thread that gets no processor nor a process that is stopped is mistaken for a sleep.
+// A thread without a processor and a stopped process are not mistaken for a sleep.
 class SleepWatch {
  public:
   // `steady` is the steady clock now. True if the computer slept for longer than `limit` since this
@@ -55,7 +55,7 @@ class SleepWatch {
     before_ = most;
     return true;
   }
-  // For how long it slept since then, at least.
+  // How long it has slept since then, at least.
   Time time() const { return std::max(slept_at_least() - before_, Time{0}); }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The host's time (r4::Time) for the machines of protocol/, whose milliseconds wrap.
+// Converts the host's time (r4::Time) to the wrapping milliseconds of the machines in protocol/.
 #pragma once
 
 #include <chrono>

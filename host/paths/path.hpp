@@ -55,7 +55,7 @@ class PathClock {
 
 // The questions Q:ID on a path.
 struct PathQuestions {
-  IdentityQuestion open{Time{0}};
+  IdentityQuestion open;
   bool answered = false;  // at least one, since the transport came up
   int unanswered = 0;     // since the last answer
   Time asked_at{0};

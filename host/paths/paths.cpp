@@ -52,7 +52,7 @@ void Paths::on_sleep(Time now) {
     path.clock.forget();
     path.connecting = false;
     path.heard = path.heard_until = path.busy.until = Time{0};
-    path.questions.open = IdentityQuestion{Time{0}};
+    path.questions.open = IdentityQuestion();
     if (path.up && path.can_ask && (path.questions.answered || !path.known))
       path.questions.ask_at = now;
     news_.restart(i);

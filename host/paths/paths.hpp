@@ -130,7 +130,7 @@ class Paths {
   static constexpr Time patience = std::chrono::milliseconds{300};
   // After this many unanswered questions the board is believed without an answer.
   static constexpr int most_unanswered = 10;
-  // As in host_role.hpp.
+  // A heartbeat goes out every 100 ms at least, and each is answered.
   static constexpr Time busy_memory = std::chrono::milliseconds{300};
   // T wraps, so BUSY is not compared with an older state.
   static constexpr Time own_state_memory = std::chrono::hours{1};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a session does when time passes, and what the program asks it for.
+// How a session reacts to time and to calls of the program.
 #include "session.hpp"
 
 #include <algorithm>
@@ -14,17 +14,17 @@
 
 namespace r4 {
 
-std::uint64_t Session::random_bits() {
+namespace {
+
+std::uint64_t random_bits() {
   std::random_device random;
   return std::uint64_t{random()} << 32 | random();
 }
 
-namespace {
-
 // The longest wait when nothing is due: Time::max() overflows when it is converted to nanoseconds.
 constexpr Time longest_wait = std::chrono::hours{1};
 
-// Before anything is made of the options: their times may be too long to be reckoned with.
+// The options are checked before their first use: arithmetic with their times could overflow.
 SessionOptions checked(SessionOptions options) {
   require_valid(options);
   if (FieldSet set; !options.fields.empty() && parse_fields(options.fields, set) != Refusal::none) {
@@ -38,7 +38,7 @@ SessionOptions checked(SessionOptions options) {
 Session::Session(SessionOptions options, BoardRole role, std::size_t paths,
                  std::function<std::uint64_t()> random)
     : options_(checked(std::move(options))),
-      random_(std::move(random)),
+      random_(random ? std::move(random) : random_bits),
       link_(options_.timing, static_cast<std::uint32_t>(random_())),
       key_(options_.key, options_.clock_start),
       paths_(paths, options_.timing, link_),
@@ -51,8 +51,7 @@ Session::Session(SessionOptions options, BoardRole role, std::size_t paths,
       posts_(effects_, outbox_, statistics_.counts) {
   begin_session();
   if (options_.fields.empty()) return;
-  const std::string fields = options_.fields;
-  require_valid(keeper_.with_needed_fields(Command::fields(fields)));
+  require_valid(keeper_.with_needed_fields(Command::fields(options_.fields)));
 }
 
 void Session::begin_session() {
@@ -69,13 +68,13 @@ void Session::poll(Time now) {
   keeper_.keep_alive(now);
   commands_.expire(now);
   arming_.expire(now);
-  if (!keeper_.controls()) keeper_.select_fields(now);  // the first thing when the link comes up
+  if (!keeper_.controls()) keeper_.select_fields(now);  // first, when the link comes up
   commands_.send_queued(now);
   advance_arming(now);
   commands_.refuse_held_back(now);
   commands_.send_queued(now);  // commands that have waited for arm()
   commands_.repeat(now);
-  if (!keeper_.is_leaving() && keeper_.hears_board() && board_.question_due(now)) {
+  if (!keeper_.is_leaving() && keeper_.hears_board() && now >= board_.next_question()) {
     board_.ask(outbox_.send(Command::identify(), {}, now).pnum, now);
   }
 }
@@ -87,9 +86,9 @@ Time Session::next_poll(Time now) {
   return keeper_.hears_board() ? std::min(next, board_.next_question()) : next;
 }
 
-// Takes up what has changed: the role, what disarms, and the status that programs see.
+// Updates the role, the arming, and the status that programs see.
 void Session::refresh(Time now) {
-  keeper_.update(now);
+  keeper_.update();
   arming_.on_link(keeper_.is_up(), keeper_.in_control(now), link_.state() == HostLinkState::safe,
                   link_.reason());
   const LinkStatus fresh = keeper_.status(board_.state().fault, now);
@@ -111,18 +110,14 @@ void Session::on_transport(std::size_t path, bool up, Time now, bool can_ask) {
 
 // A board whose timeout was raised may still be driving: its session ends at once.
 void Session::on_sleep(Time now) {
-  if (may_say_farewell()) {
-    Outbox::Way way;
-    way.echo = link_.echo();
-    outbox_.send(Command::leave(), way, now);
-  }
+  if (may_say_farewell()) outbox_.send(Command::leave(), {.echo = link_.echo()}, now);
   commands_.forget_stop();
   arming_.on_sleep();
   forget_board(now);
   refresh(now);
 }
 
-// The board's T cannot be compared with what was heard before.
+// The board's next T cannot be compared with earlier ones.
 void Session::forget_board(Time now) {
   link_.begin_anew();
   paths_.on_sleep(now);
@@ -136,9 +131,9 @@ void Session::on_restart(Time now) {
   on_new_boot(now);
 }
 
-// A board that has restarted has forgotten what it was told. If it did not say so itself, this host's
-// clock may have stood still instead, and the deadlines of commands with it: then a new session begins,
-// and the commands end.
+// A board that has restarted has forgotten its session. If the board did not report the restart
+// itself, this host's clock, and with it the deadlines of commands, may have stood still instead.
+// Then a new session begins, and the commands end.
 void Session::on_new_boot(Time now) {
   board_.on_restart();
   arming_.disarm(DisarmCause::restart);
@@ -152,7 +147,7 @@ void Session::on_new_boot(Time now) {
 
 // --- arming
 
-// Goes on with arm() where it can.
+// Takes the next step of arm(), if there is one.
 void Session::advance_arming(Time now) {
   if (arming_.take_abandoned()) commands_.remove_step();
   if (!arming_.any() || !keeper_.in_control(now) || commands_.delays_arming()) return;
@@ -160,7 +155,7 @@ void Session::advance_arming(Time now) {
   if (step && !commands_.send_step(*step, now)) end_arming(Outcome::full, now);
 }
 
-// Ends every arm() that waits.
+// Ends every waiting arm().
 void Session::end_arming(Outcome outcome, Time now) {
   arming_.end(outcome, Refusal::none, now);
   commands_.remove_step();
@@ -186,16 +181,22 @@ Ticket Session::send(const Setpoints& group, Time timeout, Time now) {
   return commands_.send(group, timeout, now);
 }
 
-PostResult Session::post(const Command& command, Time now) {
-  require_valid(command);
-  require_control(board_role(), command);
-  commands_.send_queued(now);  // commands that were asked for earlier go first
+// `sent` if a command may be posted now.
+PostResult Session::gate_of_posts(CommandKind kind, Time now) {
+  commands_.send_queued(now);  // earlier commands go first
   if (!in_control(now)) return PostResult::no_link;
-  if (commands_.is_held_back(command.kind)) {
+  if (commands_.is_held_back(kind)) {
     ++statistics_.counts.refused;
     return PostResult::not_armed;
   }
-  if (commands_.is_group_ahead()) return PostResult::queue_full;
+  return commands_.is_group_ahead() ? PostResult::queue_full : PostResult::sent;
+}
+
+PostResult Session::post(const Command& command, Time now) {
+  require_valid(command);
+  require_control(board_role(), command);
+  const PostResult gate = gate_of_posts(command.kind, now);
+  if (!gate) return gate;
   const bool unnamed =
       command.kind == CommandKind::clear && command.value == Command::unnamed_cause;
   return posts_.send(unnamed ? Command::clear(commands_.cause()) : command, now);
@@ -211,18 +212,13 @@ PostResult Session::post(const Setpoints& group, Time now) {
   require_any(group);
   require_control(board_role(), group);
   if (group.size() == 1) return post(group[0], now);
-  commands_.send_queued(now);  // commands that were asked for earlier go first
-  if (!in_control(now)) return PostResult::no_link;
-  if (!may_drive()) {
-    ++statistics_.counts.refused;
-    return PostResult::not_armed;
-  }
-  if (commands_.is_group_ahead()) return PostResult::queue_full;
+  const PostResult gate = gate_of_posts(group[0].kind, now);
+  if (!gate) return gate;
   if (!commands_.knows_groups(now) || posts_apart()) return PostResult::no_link;
   return posts_.send(group, now);
 }
 
-// Nothing that was asked for before a stop may follow it.
+// No command from before a stop may follow it.
 Ticket Session::stop(Time timeout, Time now) {
   end_all_but_stops(Outcome::cancelled, now);
   arming_.disarm(DisarmCause::stop);
@@ -236,8 +232,8 @@ void Session::cancel(Ticket ticket, Time now) {
   advance_arming(now);
 }
 
-// A board that confirms commands refuses a farewell that it does not know. So it is said as well where
-// the answer that would tell may have been lost.
+// A board that confirms commands refuses a farewell that it does not know. So the farewell is also
+// sent while the board's answer, which would show whether it knows farewells, may be lost.
 bool Session::may_say_farewell() const {
   return keeper_.is_up() && !watches() && board_.may_know_leave();
 }
@@ -295,7 +291,7 @@ void Session::feed(Time now) {
 Statistics Session::statistics(Time now) const {
   Statistics report = statistics_.report(now);
   report.packets = packets();
-  // Restarts of the board: those of the numbers count transports that came up, too.
+  // Restarts of the board only: packet numbers also restart when a transport comes up.
   report.packets.restarts = link_.restarts();
   report.copies = packets().duplicate;
   report.received -= report.copies;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The way of a datagram of the board through a session. Each function goes from top to bottom: which
-// datagrams count, what they say of the board and the link, what that proves, and what is reported.
+// How a session handles a datagram of the board. Each function first decides whether the datagram
+// counts, then updates the board and the link, then the commands, and reports last.
 #include "../../protocol/link/board_link.hpp"
 #include "../../protocol/messages/state_fields.hpp"
 #include "session.hpp"
@@ -43,9 +43,8 @@ void Session::on_state(std::size_t path, const Datagram& datagram, Time now) {
   ReceivedState fresh = state();
   if (!read_state(datagram, fresh)) {
     ++statistics_.counts.damaged;
-    ReadResult result;
-    result.error = ReadError::syntax;
-    effects_.report(BadDatagramCame{result, {datagram.bytes().data(), datagram.bytes().size()}});
+    effects_.report(BadDatagramCame{{.error = ReadError::syntax},
+                                    {datagram.bytes().data(), datagram.bytes().size()}});
     return refresh(now);
   }
   if (!paths_.news().take_state(path, t_ms, fresh.present)) return refresh(now);
@@ -53,7 +52,7 @@ void Session::on_state(std::size_t path, const Datagram& datagram, Time now) {
   const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
   statistics_.on_state(fresh.t_ms, now);
   // Heartbeats overtake states in a queue. An overtaken state is still the newest state, but the
-  // heartbeat knows better whether the board is safe.
+  // heartbeat's reason is newer.
   const bool newest = paths_.is_newest(path, t_ms, now);
   if (newest) {
     link_.on_reason(reason, to_ms(now));
@@ -83,7 +82,8 @@ void Session::on_heartbeat(std::size_t path, const Datagram& datagram, Time now)
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   bool taken = false;
   if (booting) {
-    // On a bus a watcher hears this heartbeat, which is meant for hosts. States tell watchers more.
+    // On a bus a watcher also hears this heartbeat, which is meant for hosts. It goes by states
+    // instead.
     const bool for_hosts = watches() && paths_.leases().streaming(now);
     taken = !for_hosts && paths_.admit_connecting(path, now);
   } else {
@@ -92,7 +92,7 @@ void Session::on_heartbeat(std::size_t path, const Datagram& datagram, Time now)
     taken = admission != Paths::Admission::no && paths_.news().take_heartbeat(path, t_ms);
   }
   if (!taken) {
-    if (paths_.is_known(path)) commands_.on_stop(report, now);  // the stop's number proves it
+    if (paths_.is_known(path)) commands_.on_stop(report, now);  // the stop's number is proof enough
     return refresh(now);
   }
   const bool newest = booting || paths_.is_newest(path, t_ms, now);
@@ -135,8 +135,8 @@ void Session::on_identity(std::size_t path, const Datagram& datagram, Time now) 
   commands_.on_identity(identity, now);
 }
 
-// True if the answer's number is one of those that the states have. Answers to hosts without control are
-// numbered apart.
+// True if the answer is numbered together with the states. Answers to hosts without control have
+// numbers of their own.
 bool Session::counts(const Identity& identity) const {
   const bool to_watcher = watches() && identity.sid == no_session;
   return to_watcher || !(identity.has_busy && identity.busy);
@@ -148,7 +148,8 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   if (!paths_.admit_answer(path, datagram.pnum(), t_ms, nack.has_session, now)) return;
   if (nack.sid != outbox_.session_id() || !link_.is_taken(nack.pnum)) {
-    // Answers to other hosts are heard on a CAN bus, on a shared transport and in a recording.
+    // A watcher hears answers to other hosts on a CAN bus, on a shared transport and in a
+    // recording.
     if (watches() && nack.has_session) link_.on_heard(to_ms(now));
     return refresh(now);
   }
@@ -175,26 +176,28 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   refresh(now);
 }
 
-// The board refuses nothing of a watcher but leases. The link's status reports what these codes mean.
+// The board refuses only leases of a watcher. The link's status reports the codes of a refused
+// lease.
 void Session::on_lease_refused(std::size_t path, const Nack& nack, Time now) {
   paths_.leases()[path].on_refusal(nack, now);
-  const bool told =
+  const bool in_status =
       nack.code == Refusal::stale || nack.code == Refusal::busy || nack.code == Refusal::unknown;
-  if (!told) effects_.report(CommandRefused{nack});
+  if (!in_status) effects_.report(CommandRefused{nack});
 }
 
-// True if the refusal proves that the command was not executed. It does so only while the board remembers
-// what it executed: in the session in which the command was sent, and not after too many numbers. Without
-// proof the deadline ends the command, as unknown.
+// True if the refusal proves that the command was not executed. It proves this only while the board
+// remembers its executed commands: in the session in which the command was sent, and for a limited
+// count of numbers. Without proof the command ends at its deadline.
 bool Session::is_proof(const Nack& nack) const {
-  // Numbers are compared by how long ago they were taken: a session may be older than half of all numbers.
+  // Numbers are compared by their distance to the newest, because a session may be older than half
+  // of all numbers.
   const std::uint32_t since_command = link_.last_pnum() - nack.pnum;
   const std::uint32_t since_session = link_.last_pnum() - nack.session;
   return nack.has_session && link_.is_taken(nack.session) && since_session > since_command &&
          since_command < BoardLink::memory;
 }
 
-// A step of arm() may have ended by what the board said.
+// The board's datagram may have ended a step of arm().
 void Session::take_step_end(Time now) {
   const std::optional<CommandsUnderWay::StepEnd> step = commands_.take_step_end();
   if (!step) return;

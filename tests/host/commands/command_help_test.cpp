@@ -3,24 +3,13 @@
 
 #include <gtest/gtest.h>
 
-#include <functional>
 #include <string>
 
 #include "r4link/key.hpp"
+#include "tests/support/problems.hpp"
 
 namespace r4::test {
 namespace {
-
-// What people would see of an Error; fails if there is none.
-std::string error_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  ADD_FAILURE() << "no error";
-  return "";
-}
 
 TEST(CommandHelp, ShowsNoKeyAndNoPassword) {
   const std::string digits(2 * key_size, 'e');
@@ -50,15 +39,16 @@ TEST(CommandHelp, ShowsNoKeyAndNoPassword) {
   EXPECT_EQ(shown(Command::setting("key", Text("3:" + digits))), "C:key,3:...");
 }
 
-TEST(CommandHelp, SaysWhatIsWrongWithAKeyOrAPasswordWithoutShowingIt) {
+TEST(CommandHelp, ReportsAWrongKeyOrPasswordWithoutShowingIt) {
   const std::string secret(2 * key_size - 1, 'e');
   for (const std::string& text : {"C:key,3:" + secret, "C:key," + secret, "C:kee,3:" + secret,
                                   "C:password," + secret + "e", "C:pass," + secret}) {
-    const std::string said = error_of([&] { parse_command_text(text); });
+    const std::string said = problem_of([&] { parse_command_text(text); }).text();
     EXPECT_EQ(said.find("eeee"), std::string::npos) << said;
     EXPECT_EQ(said.substr(0, 3), "C:" + text.substr(2, 1)) << said;
   }
-  const std::string said = error_of([&] { require_valid(Command::setting("", Text(secret))); });
+  const std::string said =
+      problem_of([&] { require_valid(Command::setting("", Text(secret))); }).text();
   EXPECT_EQ(said.find("eeee"), std::string::npos) << said;
   const Problem problem = bad_command("C:key,3:" + secret, Refusal::format);
   EXPECT_EQ(problem.thing, "C:key,3:...");
@@ -72,13 +62,13 @@ TEST(CommandHelp, SendsASecretOnlyOverABoardsOwnCable) {
   }
   for (const char* url :
        {"udp://192.168.4.1", "can://can0?node=3", "UDP://192.168.4.1", "both:", ""}) {
-    EXPECT_NE(error_of([&] { require_cable(url, secret); }).find("over USB only"),
+    EXPECT_NE(problem_of([&] { require_cable(url, secret); }).text().find("over USB only"),
               std::string::npos);
     EXPECT_NO_THROW(require_cable(url, Command::setting("rate", "100"))) << url;
   }
 }
 
-TEST(CommandHelp, TellsWhatASettingTakes) {
+TEST(CommandHelp, ShowsTheValuesThatASettingTakes) {
   EXPECT_NE(bad_command("C:rate,0", Refusal::range).fix.find("1-1000"), std::string::npos);
   EXPECT_NE(bad_command("C:AINSTEER,x", Refusal::range).fix.find("volts"), std::string::npos);
   const std::string all = bad_command("C:colour,1", Refusal::unknown).fix;

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <string>
-
 #include "host/commands/command_help.hpp"
 #include "tests/support/problems.hpp"
 

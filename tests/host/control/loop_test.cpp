@@ -69,7 +69,7 @@ TEST(LoopGuard, EndsWhenTheWholeStateIsLateAndStaysEnded) {
   EXPECT_TRUE(contains(nothing.why(), "no state came within 300 ms")) << nothing.why();
 }
 
-TEST(LoopGuard, EndsWhenTheBoardDoesNotDriveOrHasBegunAgain) {
+TEST(LoopGuard, EndsWhenTheBoardDoesNotDriveOrHasRestarted) {
   LoopGuard safe = begun({});
   ReceivedState state = part(1010, {});
   state.safe = SafeReason::proximity;
@@ -128,16 +128,15 @@ TEST(LoopGuard, RefusesOptionsThatCannotBe) {
 
 class RunLoop : public ::testing::Test {
  protected:
-  RunLoop() : board(robot.url(), options()) {
-    rest.osmc(1, 0, Direction::forward);
+  explicit RunLoop(BoardOptions options = BoardOptions())
+      : board(robot.url(), with_fields(options)) {
     loop.fields = "ENC1";
-    loop.rest = rest;
+    loop.rest.osmc(1, 0, Direction::forward);
     loop.late = 500ms;  // this machine may be busy
     board.wait_active();
-    board.arm();
+    if (options.session.arming == Arming::required) board.arm();
   }
-  static BoardOptions options() {
-    BoardOptions options;
+  static BoardOptions with_fields(BoardOptions options) {
     options.session.fields = "OSMC1,ENC1";
     return options;
   }
@@ -148,7 +147,6 @@ class RunLoop : public ::testing::Test {
 
   sim::SimulatedRobot robot;
   Board board;
-  Setpoints rest;
   LoopOptions loop;
 };
 
@@ -196,32 +194,27 @@ TEST_F(RunLoop, StopsTheHeartbeatsWhenAStepHangs) {
   EXPECT_TRUE(robot.look().pins.is_safe());
 }
 
-TEST(RunLoopWithoutArming, DrivesAndComesToRest) {
-  sim::SimulatedRobot robot;
-  BoardOptions options = test::at_will();
-  options.session.fields = "OSMC1,ENC1";
-  Board board(robot.url(), options);
-  board.wait_active();
+struct RunLoopWithoutArming : RunLoop {
+  RunLoopWithoutArming() : RunLoop(test::at_will()) {}
+};
+
+TEST_F(RunLoopWithoutArming, DrivesAndComesToRest) {
   board.osmc(1).set(1000, Direction::forward);
-  LoopOptions loop;
-  loop.late = 500ms;
-  loop.rest.osmc(1, 0, Direction::forward);
   int steps = 0;
-  const auto drive = [&](const LoopStep&) {
-    return ++steps < 5 ? std::optional(Setpoints{}.osmc(1, 2000, Direction::forward))
-                       : std::nullopt;
+  const auto drive_four_times = [&](const LoopStep& step) {
+    return ++steps < 5 ? drive(step) : std::nullopt;
   };
-  // It was not told so: it does not run, and yet leaves nothing driven.
-  const LoopReport untold = run_loop(board, loop, drive);
+  // Its options say that the board must be armed: it does not run, and yet leaves nothing driven.
+  const LoopReport untold = run_loop(board, loop, drive_four_times);
   EXPECT_EQ(untold.end, LoopEnd::disarmed);
   EXPECT_TRUE(contains(untold.why, "not yet; call arm() first")) << untold.why;
   EXPECT_TRUE(untold.at_rest);
-  EXPECT_EQ(robot.look().pins.osmc[0].pwm, 0);
+  expect_rest();
   loop.arming = Arming::off;
-  const LoopReport report = run_loop(board, loop, drive);
+  const LoopReport report = run_loop(board, loop, drive_four_times);
   EXPECT_EQ(report.end, LoopEnd::asked) << report.why;
   EXPECT_EQ(report.steps, 4U);
-  EXPECT_EQ(robot.look().pins.osmc[0].pwm, 0);
+  expect_rest();
 }
 
 TEST(RunLoopOnALinkThatIsCut, SaysThatTheMotorsMayGoOn) {
@@ -244,7 +237,7 @@ TEST(RunLoopOnALinkThatIsCut, SaysThatTheMotorsMayGoOn) {
   EXPECT_TRUE(contains(report.why, std::string(stop_last_resort))) << report.why;
 }
 
-TEST_F(RunLoop, HasToBeToldWhatRestIs) {
+TEST_F(RunLoop, NeedsSetpointsForRest) {
   loop.rest = Setpoints();
   EXPECT_TRUE(contains(problem_of([&] { run_loop(board, loop, drive); }).thing, "rest"));
 }

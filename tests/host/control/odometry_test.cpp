@@ -12,7 +12,7 @@
 namespace r4::control {
 namespace {
 
-TEST(Odometry, FollowsArcsExactlyWhateverTheSteps) {
+TEST(Odometry, FollowsArcsExactlyWithAnySteps) {
   for (const int steps : {1, 3, 1000}) {
     Odometry odometry;
     for (int i = 0; i < steps; ++i) {
@@ -26,7 +26,7 @@ TEST(Odometry, FollowsArcsExactlyWhateverTheSteps) {
   }
 }
 
-TEST(Odometry, GoesBackwardsAndBeginsWhereItIsTold) {
+TEST(Odometry, GoesBackwardsAndStartsAtAGivenPose) {
   Odometry odometry;
   odometry.advance(1, 0);
   odometry.reset({.x_m = 1, .y_m = 2, .yaw_rad = 5 * std::numbers::pi / 2});
@@ -37,7 +37,7 @@ TEST(Odometry, GoesBackwardsAndBeginsWhereItIsTold) {
   EXPECT_NEAR(odometry.pose().yaw_rad, std::numbers::pi / 2, 1e-12);
 }
 
-// Robots whose wheels err as it says: where they get to is spread as the covariance tells.
+// The wheels of many robots err as the noise says. The spread of their poses is the covariance.
 TEST(Odometry, KnowsHowFarItMayBeWrong) {
   constexpr OdometryNoise noise{
       .length_per_m = 0.0003, .turn_per_m = 0.0003, .turn_per_rad = 0.001};
@@ -65,7 +65,7 @@ TEST(Odometry, KnowsHowFarItMayBeWrong) {
   }
 }
 
-TEST(Odometry, TellsRosWhatItDoesNotKnow) {
+TEST(Odometry, MarksTheAxesThatItDoesNotKnowForRos) {
   Odometry odometry;
   odometry.advance(3, 0.5);
   const auto ros = odometry.ros_covariance(9);

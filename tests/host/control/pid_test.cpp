@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <limits>
 
 #include "r4link/error.hpp"
@@ -36,7 +35,7 @@ TEST(Pid, ChangesItsOutputNoFasterThanItsRate) {
   EXPECT_DOUBLE_EQ(pid.step(-1, 0, 0.05), 0.3);
 }
 
-TEST(Pid, TakesTheDerivativeOfWhatIsMeasuredAndSmoothsIt) {
+TEST(Pid, TakesTheDerivativeOfTheMeasuredValueAndSmoothsIt) {
   Pid pid({.kd = 0.1, .minimum = -10, .maximum = 10});
   EXPECT_EQ(pid.step(0, 1, 0.1), 0) << "there is no slope of one value";
   EXPECT_EQ(pid.step(100, 1, 0.1), 0) << "a new setpoint gives no kick";
@@ -56,7 +55,7 @@ TEST(Pid, TakesOverWithoutAJump) {
   EXPECT_EQ(pid.integral(), 0);
 }
 
-TEST(Pid, RefusesWhatIsNoNumber) {
+TEST(Pid, RefusesValuesThatAreNotFinite) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   Pid pid({.kp = 1});
   pid.step(0.3, 0, 0.1);

@@ -24,7 +24,7 @@ State seen(std::uint32_t t_ms, std::int32_t counts) {
   return state;
 }
 
-TEST(Wheel, SumsUpWhatItHasRolled) {
+TEST(Wheel, SumsUpTheRolledDistance) {
   Wheel wheel(metre_wheel);
   EXPECT_EQ(wheel.advance(seen(1000, 500)), 0) << "that was before";
   EXPECT_NEAR(wheel.advance(seen(1010, 510)), 0.010, 1e-12);
@@ -44,7 +44,7 @@ TEST(Wheel, DoesNotMindThatCountsAndTimeWrap) {
   EXPECT_NEAR(wheel.speed_m_s(), 1.0, 1e-9);
 }
 
-TEST(Wheel, TakesABoardThatBeganAgainForOne) {
+TEST(Wheel, StartsAgainAfterARestartOfTheBoard) {
   Wheel wheel(metre_wheel);
   wheel.advance(seen(600'000, 90'000));
   EXPECT_EQ(wheel.advance(seen(3'000, 0)), 0);
@@ -91,7 +91,7 @@ TEST(SteeringSensor, KnowsTheAngleBetweenItsEndsAndNoneBeyond) {
   EXPECT_NEAR(sensor.volts(0.05), 2.5, 1e-9);
 }
 
-TEST(ControlSensors, RefuseWhatCannotBe) {
+TEST(ControlSensors, RefuseImpossibleGeometry) {
   EXPECT_THROW(Wheel({.encoder = 5, .counts_a_turn = 1, .radius_m = 1}), Error);
   EXPECT_THROW(Wheel({.encoder = 1, .counts_a_turn = 0, .radius_m = 1}), Error);
   EXPECT_THROW(SteeringSensor({.left_volts = 1, .left_rad = 1, .right_volts = 1}), Error);

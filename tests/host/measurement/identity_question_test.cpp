@@ -18,8 +18,8 @@ Identity answer_to(std::uint32_t pnum) {
   return identity;
 }
 
-TEST(IdentityQuestion, IsAnsweredByWhoNamesIt) {
-  IdentityQuestion question(Time{0});
+TEST(IdentityQuestion, IsAnsweredByTheAnswerThatNamesIt) {
+  IdentityQuestion question;
   question.asked(7, 100ms);
   question.asked(8, 200ms);
   EXPECT_FALSE(question.answered(answer_to(9)));
@@ -28,23 +28,23 @@ TEST(IdentityQuestion, IsAnsweredByWhoNamesIt) {
   EXPECT_EQ(question.answered(answer_to(8)), 200ms);
 }
 
-TEST(IdentityQuestion, ThatIsSentAgainWasAskedWhenItWasSentFirst) {
-  IdentityQuestion question(Time{0});
+TEST(IdentityQuestion, CountsFromItsFirstSendingIfItIsRepeated) {
+  IdentityQuestion question;
   question.asked(7, 100ms);
   question.asked(7, 200ms);
   EXPECT_EQ(question.answered(answer_to(7)), 100ms) << "it may have been on its way for so long";
   EXPECT_FALSE(question.answered(answer_to(7)));
 }
 
-TEST(IdentityQuestion, IsForgottenBehindEightNewerOnes) {
-  IdentityQuestion question(Time{0});
+TEST(IdentityQuestion, IsForgottenAfterEightNewerOnes) {
+  IdentityQuestion question;
   for (std::uint32_t pnum = 0; pnum <= 8; ++pnum) question.asked(pnum, 100ms);
   EXPECT_FALSE(question.answered(answer_to(0)));
   EXPECT_EQ(question.answered(answer_to(1)), 100ms);
 }
 
-TEST(IdentityQuestion, IsTheNewestWhereTheAnswerNamesNone) {
-  IdentityQuestion question(Time{0});
+TEST(IdentityQuestion, IsTheNewestIfTheAnswerNamesNone) {
+  IdentityQuestion question;
   question.asked(7, 100ms);
   question.asked(8, 200ms);
   EXPECT_EQ(question.answered(Identity{}), 200ms);

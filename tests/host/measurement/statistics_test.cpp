@@ -85,8 +85,7 @@ TEST(Statistics, RoundTripHasNewestLeastAndMean) {
 }
 
 TEST(Statistics, LossIsTheShareOfTheBoardsDatagrams) {
-  ScriptedLink link;
-  link.connect();
+  ConnectedLink link;
   for (int i = 0; i < 100; ++i) {
     link.pass(10ms);
     if (i % 4 == 3) ++link.board_pnum;  // one in five is lost

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host session over several paths opposite real boards in virtual time, in steps of a millisecond: each path has its
-// own delay, and can be cut, told or untold, in one direction or both.
+// A host session over several paths to real boards in virtual time, in steps of a millisecond. Each
+// path has its own delay, and can be cut in one direction or both, with or without notice.
 #pragma once
+
+#include <gtest/gtest.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -24,10 +26,10 @@ class RobotOnPaths final : private DrivenSession::Handler {
         : lag_ms(its_lag_ms), board(its_board) {}
     std::uint32_t lag_ms;
     std::size_t board;
-    bool listens = false;  // a bus, for who watches: nobody is asked there who is there
+    bool listens = false;  // a bus, on which a watcher sends no questions
     bool cut_to_board = false, cut_to_host = false;
     std::vector<std::string> sent;                    // by the host
-    std::vector<std::string> all(char letter) const;  // of those, that begin with it
+    std::vector<std::string> all(char letter) const;  // those that begin with it
   };
 
   using Cables = std::vector<Cable>;
@@ -37,23 +39,23 @@ class RobotOnPaths final : private DrivenSession::Handler {
   ~RobotOnPaths();
   static SessionOptions at_will();
 
-  // The transports of all paths come up, and the link has half a second.
+  // The transports of all paths come up, and half a second passes.
   void connect();
   void run(std::uint32_t ms);
-  // The host's computer sleeps: its clock stands still, and what comes meanwhile is lost. When it
-  // wakes, its other clock tells.
+  // The host's computer sleeps: its clock stands still, and datagrams that come meanwhile are lost.
+  // When it wakes, its other clock shows the sleep.
   void sleep(std::uint32_t ms);
-  // The same of a virtual machine that is paused: no clock tells.
+  // The same for a paused virtual machine: no clock shows the pause.
   void pause(std::uint32_t ms);
-  // Untold: as a cable that is cut somewhere in a network.
+  // Without notice: as a cable that is cut somewhere in a network.
   void cut(std::size_t path, bool is_cut = true);
-  // The transport tells: unplugged.
+  // With notice of the transport.
   void plug(std::size_t path, bool in);
-  // It begins again, with another clock.
+  // The board restarts, with another clock.
   void reboot(std::size_t board, std::uint32_t t_ms = 50);
-  // Hands a datagram to the host, as if that path had brought it.
+  // Gives a datagram to the host, as if that path had brought it.
   void bring(std::size_t path, std::string_view bytes);
-  // Waits for the end of what was asked for.
+  // Waits for the end of a command.
   CommandResult finish(Ticket ticket, std::uint32_t most_ms = 2000);
   CommandResult drive(int pwm) {
     return finish(session->send(Command::osmc(pwm, Direction::forward, 1), timeout, now()));
@@ -71,16 +73,15 @@ class RobotOnPaths final : private DrivenSession::Handler {
 
   std::vector<ReceivedState> states;
   bool keeps_states = true;
-  std::uint32_t oldest_age_ms = 0;  // of the states when they were told
+  std::uint32_t oldest_age_ms = 0;  // of the states when they were reported
   std::int64_t longest_gap_ms = 0;  // between two states
   std::uint64_t told_states = 0;
-  bool went_back = false;  // a state was told that is older than the one before
+  bool went_back = false;  // a state was reported that is older than its predecessor
   std::vector<LinkStatus> links;
   std::vector<Nack> nacks;
   std::map<Ticket, CommandResult> results;
   int restarts = 0;
-  int heartbeats = 0;  // of the board, told
-  int trips = 0;       // a board was safe that had been active
+  int trips = 0;  // a board was safe that had been active
 
  private:
   struct Board;
@@ -94,10 +95,7 @@ class RobotOnPaths final : private DrivenSession::Handler {
 
   SendResult transmit(std::size_t path, std::string_view bytes, Priority priority) override;
   void on_state(const ReceivedState& state, const Datagram&) override;
-  void on_board_heartbeat(const Datagram&) override { ++heartbeats; }
-  void on_identity(const Identity&) override {}
   void on_nack(const Nack& nack, const Datagram&) override { nacks.push_back(nack); }
-  void on_bad_datagram(const ReadResult&, std::string_view) override {}
   void on_link(const LinkStatus& status) override { links.push_back(status); }
   void on_restart() override { ++restarts; }
   void on_result(Ticket ticket, const CommandResult& result) override {
@@ -114,6 +112,12 @@ class RobotOnPaths final : private DrivenSession::Handler {
   std::vector<std::unique_ptr<Board>> boards_;
   std::vector<bool> up_;
   std::deque<Packet> packets_;
+};
+
+// Two equal paths to one board, connected.
+struct TwoPaths : testing::Test {
+  TwoPaths() { robot.connect(); }
+  RobotOnPaths robot{RobotOnPaths::Cables{{1}, {1}}};
 };
 
 }  // namespace r4::test

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "scripted_link.hpp"
 
-#include <gtest/gtest.h>
-
 #include "protocol/datagram/numbers.hpp"
 #include "tests/support/datagrams.hpp"
 
@@ -18,6 +16,12 @@ SessionOptions ScriptedLink::without_questions() {
   SessionOptions options;
   options.identify_interval = std::chrono::milliseconds{0};
   options.arming = Arming::off;
+  return options;
+}
+
+SessionOptions ScriptedLink::must_arm() {
+  SessionOptions options = without_questions();
+  options.arming = Arming::required;
   return options;
 }
 

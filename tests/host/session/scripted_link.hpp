@@ -2,10 +2,12 @@
 // A host session in virtual time, opposite a board whose every datagram the test writes.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <map>
-#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tests/support/driven_session.hpp"
@@ -15,7 +17,7 @@ namespace r4::test {
 // What tests send that need any command.
 inline const Command turn_motor = Command::osmc(358, Direction::forward, 1);
 
-class ScriptedLink final : private DrivenSession::Handler {
+class ScriptedLink : private DrivenSession::Handler {
  public:
   // A datagram of the host.
   struct Sent {
@@ -29,14 +31,16 @@ class ScriptedLink final : private DrivenSession::Handler {
 
   explicit ScriptedLink(SessionOptions options = without_questions(),
                         BoardRole role = BoardRole::control);
-  // Options with which the session sends nothing by itself but heartbeats and its choice of fields,
-  // and sends what it is given without being armed.
+  // Options with which the session sends only heartbeats and its choice of fields by itself, and
+  // sends commands without being armed.
   static SessionOptions without_questions();
+  // The same, but the session must be armed.
+  static SessionOptions must_arm();
 
   DrivenSession session;
   Time now = std::chrono::seconds{5000};
 
-  // What has come of it, in order.
+  // What the session has sent and reported, in order.
   std::vector<Sent> sent;
   std::map<Ticket, CommandResult> results;
   std::vector<LinkStatus> links;
@@ -48,9 +52,9 @@ class ScriptedLink final : private DrivenSession::Handler {
   std::vector<Nack> nacks;
   std::string board_id;
 
-  // Does another host send from our place, so that the carrier takes nothing but stops?
+  // True if another host sends from our place, so that the carrier takes only stops.
   bool place_taken = false;
-  TransportTrouble frames = TransportTrouble::none;  // what is wrong with those on the bus
+  TransportTrouble frames = TransportTrouble::none;  // the trouble with frames on the bus
 
   // Time passes; poll() is called exactly when the session asked for it.
   void pass(Time duration);
@@ -66,12 +70,12 @@ class ScriptedLink final : private DrivenSession::Handler {
   void nack(std::uint32_t pnum, std::string_view code);
   std::uint32_t session_pnum = 0;       // connect() begins one
   SessionId host_session = no_session;  // of the host's newest datagram; answers name it
-  // As the answer to our newest question, or of a board that does not tell which it answers.
+  // The answer to our newest question, or of a board that does not name the question.
   void identity(std::string_view capabilities = "udp", bool names_question = true);
   void answer(std::uint32_t question, std::string_view capabilities = "udp");
   std::string asker() const;  // "SID:…;"
   void raw(std::string_view bytes);
-  // It begins again, with another clock and new numbers; nothing is sent.
+  // It restarts, with another clock and new numbers; nothing is sent.
   void reboot();
   std::uint32_t board_ms() const { return board_clock(); }
   std::uint32_t board_pnum = 5000;
@@ -94,7 +98,6 @@ class ScriptedLink final : private DrivenSession::Handler {
   void on_restart() override { ++restarts; }
   void on_arming(DisarmCause cause) override { arming.push_back(cause); }
   void on_refused(const RefusedPost& post) override { refused.push_back(post); }
-  void on_board_heartbeat(const Datagram&) override {}
   void on_identity(const Identity& identity) override;
   void on_nack(const Nack& nack, const Datagram&) override { nacks.push_back(nack); }
   void on_bad_datagram(const ReadResult& result, std::string_view) override {
@@ -107,6 +110,37 @@ class ScriptedLink final : private DrivenSession::Handler {
 
   Time due_{0};
   std::uint32_t clock_offset_ = 77'000;
+};
+
+// A link whose session is in control of its board.
+struct ConnectedLink : ScriptedLink {
+  explicit ConnectedLink(SessionOptions options = without_questions())
+      : ScriptedLink(std::move(options)) {
+    connect();
+  }
+};
+
+// A session whose board has not been heard yet.
+struct NewSession : testing::Test {
+  explicit NewSession(SessionOptions options = ScriptedLink::without_questions(),
+                      BoardRole role = BoardRole::control)
+      : link(std::move(options), role) {}
+  bool under_way(Ticket ticket) const { return !link.results.contains(ticket); }
+  CommandResult result(Ticket ticket) const {
+    EXPECT_FALSE(under_way(ticket)) << "command " << ticket << " has not ended";
+    return under_way(ticket) ? CommandResult{Outcome::none} : link.results.at(ticket);
+  }
+  Outcome outcome(Ticket ticket) const { return result(ticket).outcome; }
+
+  ScriptedLink link;
+};
+
+// A session that is in control of its board.
+struct ConnectedSession : NewSession {
+  explicit ConnectedSession(SessionOptions options = ScriptedLink::without_questions())
+      : NewSession(std::move(options)) {
+    link.connect();
+  }
 };
 
 }  // namespace r4::test

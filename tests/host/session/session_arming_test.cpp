@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session that must be armed: what it holds back, what disarms it, and what arm() does.
+// A session that must be armed: the commands that it holds back, the causes that disarm it, and
+// arm().
 #include <gtest/gtest.h>
 
 #include "host/commands/command_help.hpp"
@@ -12,14 +13,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-SessionOptions arming_required() {
-  SessionOptions options = ScriptedLink::without_questions();
-  options.arming = Arming::required;
-  return options;
-}
-
-struct SessionArming : testing::Test {
-  SessionArming() { link.connect(); }
+struct SessionArming : ConnectedSession {
+  SessionArming() : ConnectedSession(ScriptedLink::must_arm()) {}
 
   void state(SafeReason reason, std::uint32_t executed, bool relay) {
     link.state("RELAYS:" + std::to_string(static_cast<int>(relay)) + ";SAFE:" +
@@ -39,16 +34,22 @@ struct SessionArming : testing::Test {
     const Ticket ticket = arm();
     execute('R', SafeReason::none, true);
     ASSERT_EQ(outcome(ticket), Outcome::confirmed);
-    ASSERT_TRUE(link.session.may_drive());
+    ASSERT_EQ(link.session.disarmed_by(), DisarmCause::none);
     link.sent.clear();
   }
-  Outcome outcome(Ticket ticket) {
-    EXPECT_EQ(link.results.count(ticket), 1U) << "it has not ended";
-    return link.results[ticket].outcome;
-  }
   PostResult post() { return link.session.post(turn_motor, link.now); }
+  // The link is lost, and the board is heard again. Its relay 1 shows whether it brought its
+  // outputs back.
+  void outage(bool relay) {
+    link.pass(1500ms);
+    EXPECT_EQ(post(), PostResult::no_link);
+    link.heartbeat(SafeReason::link);
+    link.pass(10ms);
+    link.heartbeat();
+    link.pass(10ms);
+    state(SafeReason::none, link.last('F').pnum, relay);
+  }
 
-  ScriptedLink link{arming_required()};
   std::uint32_t cmd = 0;
 };
 
@@ -65,7 +66,7 @@ TEST_F(SessionArming, BeginsDisarmedAndSaysWhyNothingIsSent) {
   EXPECT_EQ(link.session.statistics(link.now).refused, 2U);
 }
 
-TEST_F(SessionArming, HoldsBackWhatDrivesAnOutputAndNothingElse) {
+TEST_F(SessionArming, HoldsBackOutputCommandsOnly) {
   for (const char* text : {"D:1,1,1", "S:1500,1", "R:1,1", "P:5,1", "Z:1", "B:1,1,0,1"}) {
     EXPECT_EQ(link.session.post(parse_command_text(text), link.now), PostResult::not_armed) << text;
   }
@@ -104,7 +105,7 @@ TEST_F(SessionArming, EveryCauseButTheLinkDisarms) {
     link.heartbeat(reason);
     EXPECT_EQ(link.session.disarmed_by(), cause);
     EXPECT_EQ(post(), PostResult::not_armed);
-    // It is over by itself, or by somebody else's E:CLEAR.
+    // It ends by itself, or by another program's E:CLEAR.
     state(SafeReason::none, cmd, false);
     EXPECT_EQ(post(), PostResult::not_armed) << "and nothing drives off";
     EXPECT_EQ(link.session.disarmed_by(), cause) << "the first cause is told, not what followed";
@@ -113,24 +114,13 @@ TEST_F(SessionArming, EveryCauseButTheLinkDisarms) {
 
 TEST_F(SessionArming, StaysArmedOverAnOutageAfterWhichTheBoardBringsItsOutputsBack) {
   armed();
-  link.pass(1500ms);
-  EXPECT_EQ(post(), PostResult::no_link);
-  link.heartbeat(SafeReason::link);
-  link.pass(10ms);
-  link.heartbeat();
-  link.pass(10ms);
-  state(SafeReason::none, link.last('F').pnum, true);
+  outage(true);
   EXPECT_EQ(post(), PostResult::sent);
 }
 
 TEST_F(SessionArming, AnOutageAfterWhichTheOutputsStayOffDisarms) {
   armed();
-  link.pass(1500ms);
-  link.heartbeat(SafeReason::link);
-  link.pass(10ms);
-  link.heartbeat();
-  link.pass(10ms);
-  state(SafeReason::none, link.last('F').pnum, false);  // recovery=rearm, or another host was there
+  outage(false);  // recovery=rearm, or another host was there
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::link);
   EXPECT_EQ(post(), PostResult::not_armed);
 }
@@ -158,7 +148,7 @@ TEST_F(SessionArming, AStopOfItsOwnDisarmsAtOnce) {
   EXPECT_EQ(post(), PostResult::not_armed);
 }
 
-TEST_F(SessionArming, ClearsAStopAndWhatItHidEachOnce) {
+TEST_F(SessionArming, ClearsAStopAndEachHiddenCauseOnce) {
   link.heartbeat(SafeReason::stop);
   const Ticket ticket = arm();
   EXPECT_EQ(link.count('E'), 1U);
@@ -172,25 +162,20 @@ TEST_F(SessionArming, ClearsAStopAndWhatItHidEachOnce) {
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
 }
 
-TEST_F(SessionArming, DoesNotClearAStopThatIsPressedMeanwhile) {
-  link.heartbeat(SafeReason::fault);
+struct ArmingMeanwhile : SessionArming, testing::WithParamInterface<SafeReason> {};
+INSTANTIATE_TEST_SUITE_P(Causes, ArmingMeanwhile,
+                         testing::Values(SafeReason::fault, SafeReason::stop));
+
+TEST_P(ArmingMeanwhile, DoesNotClearAStopThatIsPressed) {
+  link.heartbeat(GetParam());
   const Ticket ticket = arm();
   EXPECT_EQ(link.count('E'), 1U);
   execute('E', SafeReason::stop);
-  EXPECT_EQ(link.count('E'), 1U);
   EXPECT_EQ(outcome(ticket), Outcome::not_armed);
-  EXPECT_EQ(link.results[ticket].disarmed, DisarmCause::stop);
+  EXPECT_EQ(result(ticket).disarmed, DisarmCause::stop);
   link.pass(2s);
   EXPECT_EQ(link.count('E'), 1U);
   EXPECT_EQ(link.count('R'), 0U);
-}
-
-TEST_F(SessionArming, DoesNotClearTheSameCauseTwice) {
-  link.heartbeat(SafeReason::stop);
-  const Ticket ticket = arm();
-  execute('E', SafeReason::stop);  // pressed again
-  EXPECT_EQ(outcome(ticket), Outcome::not_armed);
-  EXPECT_EQ(link.count('E'), 1U);
 }
 
 TEST_F(SessionArming, DoesNotWaitForAnEClearThatWasAskedForAfterIt) {
@@ -219,7 +204,7 @@ TEST_F(SessionArming, AnArmThatFollowsARefusedOneAtOnceClearsAnew) {
   EXPECT_EQ(outcome(second), Outcome::confirmed);
 }
 
-TEST_F(SessionArming, AStateThatAHeartbeatHasOvertakenTellsNothingOfTheMotorSupply) {
+TEST_F(SessionArming, AnOvertakenStateIsNoProofOfAnOpenMotorSupply) {
   armed();
   link.pass(20ms);
   const std::uint32_t number =
@@ -232,9 +217,10 @@ TEST_F(SessionArming, AStateThatAHeartbeatHasOvertakenTellsNothingOfTheMotorSupp
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::none);
 }
 
-// --- what may have come before the session
+// --- causes that may be older than the session
 
-struct EarlierCause : testing::Test {
+struct EarlierCause : NewSession {
+  EarlierCause() : NewSession(ScriptedLink::must_arm()) {}
   // A program begins, and its board, which obeys it, is safe for that reason.
   void begin(SafeReason reason) {
     link.heartbeat();  // held back by the network since before the cause: it proves nothing
@@ -255,7 +241,6 @@ struct EarlierCause : testing::Test {
     return link.results[ticket];
   }
 
-  ScriptedLink link{arming_required()};
   std::uint32_t cmd = 0;
 };
 
@@ -273,14 +258,10 @@ TEST_F(EarlierCause, IsNotClearedByArming) {
   EXPECT_EQ(link.count('E') + link.count('R'), 0U);
 }
 
-TEST_F(EarlierCause, IsAlsoAFault) {
+TEST_F(EarlierCause, IsAlsoAWatchdogOrAFault) {
   begin(SafeReason::fault);
   EXPECT_EQ(arm().disarmed, DisarmCause::earlier_fault);
-  EXPECT_EQ(link.count('E') + link.count('R'), 0U);
-}
-
-TEST_F(EarlierCause, IsAlsoAWatchdog) {
-  begin(SafeReason::watchdog);
+  says(SafeReason::watchdog);
   EXPECT_EQ(arm().disarmed, DisarmCause::earlier_watchdog);
   EXPECT_EQ(link.count('E') + link.count('R'), 0U);
 }
@@ -342,18 +323,18 @@ TEST_F(EarlierCause, IsAnyOneAfterASleep) {
   EXPECT_EQ(arm().disarmed, DisarmCause::earlier_stop);
 }
 
-TEST_F(SessionArming, FailsAtOnceForWhatCannotBeCleared) {
-  for (const SafeReason reason : {SafeReason::handle, SafeReason::proximity}) {
+TEST_F(SessionArming, FailsAtOnceForACauseThatCannotBeCleared) {
+  Ticket ticket = 0;
+  for (const auto& [reason, cause] : {std::pair(SafeReason::proximity, DisarmCause::proximity),
+                                      std::pair(SafeReason::handle, DisarmCause::handle)}) {
     link.heartbeat(reason);
-    const Ticket ticket = arm();
+    ticket = arm();
     EXPECT_EQ(outcome(ticket), Outcome::not_armed);
-    EXPECT_EQ(link.results[ticket].disarmed, cause_of(reason));
-    EXPECT_LT(link.results[ticket].elapsed, 2ms);
+    EXPECT_EQ(result(ticket).disarmed, cause);
+    EXPECT_LT(result(ticket).elapsed, 2ms);
   }
   EXPECT_EQ(link.count('R'), 0U);
-  link.heartbeat(SafeReason::handle);
-  const Ticket ticket = arm();
-  const Problem problem = explain("arm()", link.results[ticket], link.session.link());
+  const Problem problem = explain("arm()", result(ticket), link.session.link());
   EXPECT_EQ(problem.reason, "not armed: the dead-man's handle was released");
   EXPECT_EQ(problem.fix, "hold the handle, then call arm()");
 }
@@ -366,31 +347,27 @@ TEST_F(SessionArming, IsNotArmedWhenTheBoardRefusesTheRelay) {
   EXPECT_EQ(post(), PostResult::not_armed);
 }
 
-TEST_F(SessionArming, GivesUpAtItsDeadlineAndSendsNothingAfterIt) {
-  const Ticket ticket = arm();
-  link.pass(1s);
-  EXPECT_EQ(outcome(ticket), Outcome::timed_out);
-  link.sent.clear();
+TEST_F(SessionArming, SendsNothingAfterItsDeadlineItsCancellationOrAStop) {
+  const auto ends_as = [&](Ticket ticket, Outcome wanted) {
+    EXPECT_EQ(outcome(ticket), wanted);
+    EXPECT_GE(link.count('R'), 1U);
+    link.sent.clear();
+    link.heartbeat();
+    link.pass(500ms);
+    link.heartbeat();
+    EXPECT_EQ(link.count('R'), 0U) << "an abandoned call is not repeated";
+  };
+  const Ticket late = arm();
   link.pass(500ms);
-  EXPECT_EQ(link.count('R'), 0U) << "an abandoned call is not repeated";
-}
-
-TEST_F(SessionArming, CancelledSendsNothingMore) {
-  const Ticket ticket = arm();
-  link.session.cancel(ticket, link.now);
-  EXPECT_EQ(outcome(ticket), Outcome::cancelled);
-  link.sent.clear();
+  link.heartbeat();
   link.pass(500ms);
-  EXPECT_EQ(link.count('R'), 0U);
-}
-
-TEST_F(SessionArming, AStopCancelsIt) {
-  const Ticket ticket = arm();
+  ends_as(late, Outcome::timed_out);
+  const Ticket cancelled = arm();
+  link.session.cancel(cancelled, link.now);
+  ends_as(cancelled, Outcome::cancelled);
+  const Ticket stopped = arm();
   link.session.stop(1s, link.now);
-  EXPECT_EQ(outcome(ticket), Outcome::cancelled);
-  link.sent.clear();
-  link.pass(500ms);
-  EXPECT_EQ(link.count('R'), 0U);
+  ends_as(stopped, Outcome::cancelled);
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::stop);
 }
 
@@ -420,7 +397,7 @@ TEST_F(SessionArming, AStopOfSomebodyElseThatComesMeanwhileEndsIt) {
   EXPECT_EQ(link.count('E') + link.count('R'), 0U);
 }
 
-TEST_F(SessionArming, OutputCommandsBehindItWaitForIt) {
+TEST_F(SessionArming, OutputCommandsAfterItWaitForIt) {
   const Ticket ticket = link.session.arm(1s, link.now);
   const Ticket behind = link.session.send(turn_motor, 1s, link.now);
   link.pass(1ms);
@@ -432,7 +409,7 @@ TEST_F(SessionArming, OutputCommandsBehindItWaitForIt) {
   EXPECT_EQ(outcome(behind), Outcome::confirmed);
 }
 
-TEST_F(SessionArming, OutputCommandsBehindOneThatFailsAreRefused) {
+TEST_F(SessionArming, OutputCommandsAfterAFailedArmAreRefused) {
   link.heartbeat(SafeReason::handle);
   link.session.arm(1s, link.now);
   const Ticket behind = link.session.send(turn_motor, 1s, link.now);
@@ -449,7 +426,7 @@ TEST_F(SessionArming, IsConfirmedAtOnceWhenItIsArmedAlready) {
 }
 
 TEST_F(SessionArming, WaitsForTheLink) {
-  ScriptedLink fresh(arming_required());
+  ScriptedLink fresh(ScriptedLink::must_arm());
   const Ticket ticket = fresh.session.arm(1s, fresh.now);
   fresh.pass(10ms);
   EXPECT_EQ(fresh.count('R'), 0U);
@@ -462,8 +439,7 @@ TEST_F(SessionArming, WaitsForTheLink) {
 }
 
 TEST_F(SessionArming, CanBeTurnedOff) {
-  ScriptedLink free;
-  free.connect();
+  ConnectedLink free;
   EXPECT_EQ(free.session.post(turn_motor, free.now), PostResult::sent);
   free.heartbeat(SafeReason::stop);
   free.heartbeat();
@@ -477,7 +453,7 @@ TEST_F(SessionArming, CanBeTurnedOff) {
 
 // --- posts that the board refuses
 
-TEST_F(SessionArming, TellsOfAPostThatTheBoardRefusesOnce) {
+TEST_F(SessionArming, ReportsAPostThatTheBoardRefusesOnce) {
   armed();
   ASSERT_EQ(post(), PostResult::sent);
   const std::uint32_t pnum = link.last('O').pnum;
@@ -502,12 +478,7 @@ TEST_F(SessionArming, ARefusalOverAnOutageProvesNothingOfAPost) {
   armed();
   post();
   const std::uint32_t pnum = link.last('O').pnum;
-  link.pass(1500ms);
-  link.heartbeat(SafeReason::link);
-  link.pass(10ms);
-  link.heartbeat();
-  link.pass(10ms);
-  state(SafeReason::none, link.last('F').pnum, true);
+  outage(true);
   link.session_pnum = link.last('H').pnum;  // the board has begun another
   link.nack(pnum, "STALE");
   EXPECT_TRUE(link.refused.empty());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Groups of commands: one datagram where the board executes groups, one after the other where not.
+// Groups of commands: one datagram if the board executes groups, otherwise one after the other.
 #include <gtest/gtest.h>
 
 #include "host/commands/command_help.hpp"
@@ -16,19 +16,14 @@ using namespace std::chrono_literals;
 const Setpoints two_motors =
     Setpoints{}.osmc(1, 358, Direction::forward).osmc(2, 359, Direction::forward).servo(3, 1500);
 
-struct SessionGroup : testing::Test {
-  // A link to a board of which is known whether it executes groups.
+struct SessionGroup : NewSession {
+  // Connects to a board that has reported whether it executes groups.
   void connect(std::string_view capabilities) {
     link.connect();
     link.identity(capabilities);
   }
   Ticket send(Time timeout = 1s) { return link.session.send(two_motors, timeout, link.now); }
   PostResult post() { return link.session.post(two_motors, link.now); }
-  bool under_way(Ticket ticket) const { return link.results.find(ticket) == link.results.end(); }
-  CommandResult result(Ticket ticket) {
-    EXPECT_FALSE(under_way(ticket)) << "it has not ended";
-    return link.results[ticket];
-  }
   // The command fields of a datagram.
   static std::string fields(const ScriptedLink::Sent& sent) {
     return sent.bytes.substr(0, sent.bytes.find("SID:"));
@@ -40,8 +35,6 @@ struct SessionGroup : testing::Test {
                       "PNum:" + std::to_string(link.board_pnum++) +
                       ";T:" + std::to_string(link.board_ms()) + ";"));
   }
-
-  ScriptedLink link;
 };
 
 TEST_F(SessionGroup, IsOneDatagramAndOneCommand) {
@@ -174,7 +167,7 @@ TEST_F(SessionGroup, OfABoardThatAnswersNothingGoesOneAfterTheOther) {
   EXPECT_EQ(fields(link.last('O')), "O:359,1,2;") << "confirmed by its value";
 }
 
-TEST_F(SessionGroup, IsAskedForAnewWhenTheBoardHasBegunAgain) {
+TEST_F(SessionGroup, WaitsForAnotherAnswerAfterARestartOfTheBoard) {
   connect("group");
   link.reboot();
   link.boot_heartbeat();
@@ -186,7 +179,7 @@ TEST_F(SessionGroup, IsAskedForAnewWhenTheBoardHasBegunAgain) {
   EXPECT_EQ(link.count('Q'), 1U);
 }
 
-TEST_F(SessionGroup, AStopEndsItWhereverItIs) {
+TEST_F(SessionGroup, AStopEndsItAtAnyStep) {
   connect("udp");
   const Ticket ticket = send();
   link.executed(link.last('O').pnum);
@@ -197,7 +190,7 @@ TEST_F(SessionGroup, AStopEndsItWhereverItIs) {
   EXPECT_EQ(link.count('O'), sent);
 }
 
-TEST_F(SessionGroup, IsPostedOnceAndItsRefusalIsTold) {
+TEST_F(SessionGroup, IsPostedOnceAndItsRefusalIsReported) {
   connect("group");
   ASSERT_TRUE(post());
   EXPECT_EQ(fields(link.sent.back()), "O:358,1,1;O:359,1,2;S:1500,3;");
@@ -236,10 +229,7 @@ TEST_F(SessionGroup, OfOneCommandIsThatCommandAndOfNoneIsThrownBack) {
 }
 
 TEST(SessionGroupArming, IsHeldBackUntilTheProgramIsArmed) {
-  SessionOptions options = ScriptedLink::without_questions();
-  options.arming = Arming::required;
-  ScriptedLink link(options);
-  link.connect();
+  ConnectedLink link(ScriptedLink::must_arm());
   link.identity("group");
   EXPECT_EQ(link.session.post(two_motors, link.now), PostResult::not_armed);
   const Ticket ticket = link.session.send(two_motors, 1s, link.now);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session with a key, and one without opposite a board that asks for one.
+// A session with a key, and a session without a key whose board asks for one.
 #include <gtest/gtest.h>
 
 #include "host/session/session.hpp"
@@ -32,7 +32,7 @@ void keyed_heartbeat(ScriptedLink& link, const std::string& its_nonce = nonce,
                     ";T:" + std::to_string(link.board_ms()) + reason + ";AN:" + its_nonce + ";"));
 }
 
-void connect(ScriptedLink& link) {
+void connect_keyed(ScriptedLink& link) {
   keyed_heartbeat(link);
   link.pass(10ms);
   ASSERT_EQ(link.count('F'), 1U);
@@ -41,6 +41,23 @@ void connect(ScriptedLink& link) {
   link.session_pnum = link.last('H').pnum;
   link.sent.clear();
 }
+
+// The board reports for two seconds that it is booting, with its nonce.
+void boot_with_a_key(ScriptedLink& link) {
+  for (int i = 0; i < 4; ++i) {
+    link.raw(
+        with_crc("H:R4-ROS2;PNum:0;T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
+    link.pass(500ms);
+  }
+}
+
+struct SessionKey : NewSession {
+  SessionKey() : NewSession(keyed()) {}
+};
+
+struct SessionWithKey : SessionKey {
+  SessionWithKey() { connect_keyed(link); }
+};
 
 // The field A of a datagram; empty if it has none.
 std::string signature_of(const ScriptedLink::Sent& sent) {
@@ -66,8 +83,7 @@ Verdict verdict(const ScriptedLink& link, const ScriptedLink::Sent& sent,
   return age <= 250 ? Verdict::authentic : Verdict::old;
 }
 
-TEST(SessionKey, AsksForTheNonceWithAnUnsignedHeartbeatAndSignsAllBehindIt) {
-  ScriptedLink link(keyed());
+TEST_F(SessionKey, AsksForTheNonceWithAnUnsignedHeartbeatAndThenSignsAll) {
   ASSERT_EQ(link.count('H'), 1U);
   EXPECT_EQ(signature_of(link.last('H')), "");
   keyed_heartbeat(link);
@@ -76,8 +92,7 @@ TEST(SessionKey, AsksForTheNonceWithAnUnsignedHeartbeatAndSignsAllBehindIt) {
   EXPECT_EQ(verdict(link, link.last('F')), Verdict::authentic);
 }
 
-TEST(SessionKey, SignsWhatABoardThatIsConnectingSays) {
-  ScriptedLink link(keyed());
+TEST_F(SessionKey, SignsTheAnswerToAConnectingBoard) {
   link.raw(
       with_crc("H:R4-ROS2;PNum:0;T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
   EXPECT_EQ(link.session.link().state, HostLinkState::connecting);
@@ -86,9 +101,7 @@ TEST(SessionKey, SignsWhatABoardThatIsConnectingSays) {
   EXPECT_EQ(verdict(link, heartbeat), Verdict::authentic);
 }
 
-TEST(SessionKey, ARetryHasTheSameNumberAndASignatureOfItsOwn) {
-  ScriptedLink link(keyed());
-  connect(link);
+TEST_F(SessionWithKey, ARetryHasTheSameNumberAndASignatureOfItsOwn) {
   link.session.send(turn_motor, 1s, link.now);
   link.pass(60ms);
   const auto sent = link.all('O');
@@ -101,22 +114,17 @@ TEST(SessionKey, ARetryHasTheSameNumberAndASignatureOfItsOwn) {
   EXPECT_EQ(link.results.begin()->second.outcome, Outcome::confirmed);
 }
 
-TEST(SessionKey, CountsFromTheTimeSince1970) {
-  ScriptedLink link(keyed());
+TEST_F(SessionKey, CountsFromTheTimeSince1970) {
   keyed_heartbeat(link);
   EXPECT_EQ(signature_of(link.last('H')).find("2,1700005000"), 0U) << signature_of(link.last('H'));
 }
 
-TEST(SessionKey, FollowsTheBoardToAnotherNonce) {
-  ScriptedLink link(keyed());
-  connect(link);
+TEST_F(SessionWithKey, FollowsTheBoardToAnotherNonce) {
   keyed_heartbeat(link, "fedcba9876543210");
   EXPECT_EQ(verdict(link, link.last('H'), "fedcba9876543210"), Verdict::authentic);
 }
 
-TEST(SessionKey, ALateHeartbeatDoesNotBringTheOldNonceBack) {
-  ScriptedLink link(keyed());
-  connect(link);
+TEST_F(SessionWithKey, ALateHeartbeatDoesNotBringTheOldNonceBack) {
   const std::uint32_t late = link.board_pnum++;
   keyed_heartbeat(link, "fedcba9876543210");
   link.raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(late) +
@@ -125,16 +133,13 @@ TEST(SessionKey, ALateHeartbeatDoesNotBringTheOldNonceBack) {
   EXPECT_EQ(verdict(link, link.last('O'), "fedcba9876543210"), Verdict::authentic);
 }
 
-TEST(SessionKey, SignsInTimeAlsoWhileTheBoardSaysLittle) {
-  ScriptedLink link(keyed());
-  connect(link);
+TEST_F(SessionWithKey, SignsInTimeAlsoWhileTheBoardSaysLittle) {
   link.pass(700ms);
   link.session.send(turn_motor, 1s, link.now);
   EXPECT_EQ(verdict(link, link.last('O')), Verdict::authentic);
 }
 
-TEST(SessionKey, RefusesABoardThatHasNone) {
-  ScriptedLink link(keyed());
+TEST_F(SessionKey, RefusesABoardThatHasNone) {
   link.heartbeat();
   link.sent.clear();
   const Ticket ticket = link.session.send(turn_motor, 500ms, link.now);
@@ -152,8 +157,9 @@ TEST(SessionKey, RefusesABoardThatHasNone) {
   EXPECT_NE(explain("board", link.session.link()).text().find("has no key"), std::string::npos);
 }
 
-TEST(SessionKey, SendsABoardThatHasNoneAStopAllTheSame) {
-  ScriptedLink link(keyed());
+TEST_F(SessionKey, SendsAnUnsignedStopBeforeItKnowsANonceAndToABoardWithoutAKey) {
+  link.session.stop(1s, link.now);
+  EXPECT_EQ(signature_of(link.last('E')), "");
   link.heartbeat();
   link.sent.clear();
   const Ticket ticket = link.session.stop(500ms, link.now);
@@ -163,8 +169,7 @@ TEST(SessionKey, SendsABoardThatHasNoneAStopAllTheSame) {
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
 }
 
-TEST(SessionKey, TakesTheBoardAsSoonAsItHasAKey) {
-  ScriptedLink link(keyed());
+TEST_F(SessionKey, TakesTheBoardAsSoonAsItHasAKey) {
   link.heartbeat();
   EXPECT_EQ(link.session.link().cause(), LinkCause::board_has_no_key);
   link.pass(300ms);
@@ -173,17 +178,8 @@ TEST(SessionKey, TakesTheBoardAsSoonAsItHasAKey) {
   EXPECT_EQ(verdict(link, link.last('H')), Verdict::authentic);
 }
 
-TEST(SessionKey, SendsAStopBeforeItKnowsAnything) {
-  ScriptedLink link(keyed());
-  link.sent.clear();
-  link.session.stop(1s, link.now);
-  EXPECT_EQ(signature_of(link.last('E')), "");
-}
-
-// Of two copies, signed each, the board may have executed the first and refused the second.
-TEST(SessionKey, AnAuthDoesNotProveThatTheCommandWasNotExecuted) {
-  ScriptedLink link(keyed());
-  connect(link);
+// The board may have executed the first of two signed copies, and refused the second.
+TEST_F(SessionWithKey, AnAuthDoesNotProveThatTheCommandWasNotExecuted) {
   const Ticket ticket = link.session.send(turn_motor, 500ms, link.now);
   const std::uint32_t pnum = link.last('O').pnum;
   link.nack(pnum, "AUTH");
@@ -193,43 +189,23 @@ TEST(SessionKey, AnAuthDoesNotProveThatTheCommandWasNotExecuted) {
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
 }
 
-TEST(SessionKey, AnAuthForACablesSettingIsFinalAndSaysNothingOfKeys) {
-  ScriptedLink link(keyed());
-  connect(link);
+TEST_F(SessionWithKey, AnAuthForACablesSettingIsFinalAndSaysNothingOfKeys) {
   const Ticket ticket = link.session.send(Command::setting("node", "3"), 500ms, link.now);
   link.nack(link.last('C').pnum, "AUTH");
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::refused);
   EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
 }
 
-TEST(SessionKey, FindsOutThatTheBoardTakesNoneOfItsHeartbeats) {
-  ScriptedLink link(keyed());
-  for (int i = 0; i < 4; ++i) {
-    link.raw(
-        with_crc("H:R4-ROS2;PNum:0;T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
-    link.pass(500ms);
-  }
+TEST_F(SessionKey, FindsOutThatTheBoardTakesNoneOfItsHeartbeats) {
+  boot_with_a_key(link);
   EXPECT_EQ(link.session.link().cause(), LinkCause::key_not_taken);
   keyed_heartbeat(link);
   link.pass(0ms);
   EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
 }
 
-TEST(SessionKey, SaysNothingOfKeysWhenTheBoardIsLost) {
-  ScriptedLink link(keyed());
-  for (int i = 0; i < 12; ++i) {
-    keyed_heartbeat(link, nonce, ";SAFE:2");
-    link.pass(100ms);
-  }
-  ASSERT_EQ(link.session.link().cause(), LinkCause::key_not_taken);
-  link.pass(1100ms);
-  EXPECT_EQ(link.session.link().state, HostLinkState::lost);
-  EXPECT_TRUE(link.session.link().causes.empty());
-}
-
-// The host before ended with a stop: the board's reason hides whether it has a host.
-TEST(SessionKey, FindsOutThatAStoppedBoardTakesNoneOfItsHeartbeats) {
-  ScriptedLink link(keyed());
+// The earlier host ended with a stop: the board's reason hides whether it has a host.
+TEST_F(SessionKey, FindsOutThatAStoppedBoardTakesNoneOfItsHeartbeatsWhileItIsHeard) {
   for (int i = 0; i < 12; ++i) {
     keyed_heartbeat(link, nonce, ";SAFE:2");
     link.pass(100ms);
@@ -238,10 +214,12 @@ TEST(SessionKey, FindsOutThatAStoppedBoardTakesNoneOfItsHeartbeats) {
   EXPECT_NE(explain("board", link.session.link()).text().find("signed with our key"),
             std::string::npos);
   EXPECT_FALSE(link.session.in_control(link.now));
+  link.pass(1100ms);
+  EXPECT_EQ(link.session.link().state, HostLinkState::lost);
+  EXPECT_TRUE(link.session.link().causes.empty()) << "its silence is no sign of a wrong key";
 }
 
-TEST(SessionKey, TakesAStoppedBoardThatAnswersBusyForOneWithAnotherHost) {
-  ScriptedLink link(keyed());
+TEST_F(SessionKey, TakesAStoppedBoardThatAnswersBusyForOneWithAnotherHost) {
   for (int i = 0; i < 30; ++i) {
     keyed_heartbeat(link, nonce, ";SAFE:2");
     link.nack(link.last('H').pnum, "BUSY");
@@ -251,10 +229,8 @@ TEST(SessionKey, TakesAStoppedBoardThatAnswersBusyForOneWithAnotherHost) {
   EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
 }
 
-// The lowest rate: heartbeats are sent in between, and none of them is in vain.
-TEST(SessionKey, IsTakenByAStoppedBoardThatSendsAStateASecond) {
-  ScriptedLink link(keyed());
-  connect(link);
+// At the lowest rate heartbeats are sent between two states, and none of them is in vain.
+TEST_F(SessionWithKey, IsTakenByAStoppedBoardThatSendsAStateASecond) {
   for (int i = 0; i < 10; ++i) {
     link.state("SAFE:2;CMD:0;");
     for (int j = 0; j < 10; ++j) {
@@ -271,10 +247,7 @@ TEST(SessionKey, IsTakenByAStoppedBoardThatSendsAStateASecond) {
 }
 
 // The paper's release answers nothing, and is commanded all the same. It has no keys.
-TEST(SessionKey, DoesNotTakeABoardWithAKeyForThePapersRelease) {
-  SessionOptions options = keyed();
-  ASSERT_FALSE(options.fields.empty());
-  ScriptedLink link(options);
+TEST_F(SessionKey, DoesNotTakeABoardWithAKeyForThePapersRelease) {
   for (int i = 0; i < 30; ++i) {
     keyed_heartbeat(link);
     link.pass(100ms);
@@ -283,21 +256,15 @@ TEST(SessionKey, DoesNotTakeABoardWithAKeyForThePapersRelease) {
   EXPECT_GT(link.count('F'), 5U);
 }
 
-TEST(SessionWithoutKey, FindsOutThatOneIsNeeded) {
-  ScriptedLink link;
-  for (int i = 0; i < 4; ++i) {
-    link.raw(
-        with_crc("H:R4-ROS2;PNum:0;T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
-    link.pass(500ms);
-  }
+TEST_F(NewSession, FindsOutThatAKeyIsNeeded) {
+  boot_with_a_key(link);
   EXPECT_EQ(link.session.link().cause(), LinkCause::key_needed);
   EXPECT_NE(explain("board", link.session.link()).text().find("--key"), std::string::npos);
   EXPECT_EQ(signature_of(link.last('H')), "");
 }
 
-TEST(SessionWithoutKey, IsTakenOverACableOfTheBoardAllTheSame) {
-  ScriptedLink link;
-  connect(link);
+TEST_F(NewSession, NeedsNoKeyOverACableOfTheBoard) {
+  connect_keyed(link);
   for (int i = 0; i < 30; ++i) {
     link.pass(100ms);
     keyed_heartbeat(link);
@@ -305,13 +272,13 @@ TEST(SessionWithoutKey, IsTakenOverACableOfTheBoardAllTheSame) {
   EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
 }
 
-TEST(Explain, TellsThatABoardHasAllTheKeysItCanHold) {
+TEST(Explain, SaysThatABoardHoldsAsManyKeysAsItCan) {
   const CommandResult refused{Outcome::refused, Refusal::range, Time{0}};
   EXPECT_NE(explain("C:key,5:...", refused, {}).reason.find("it holds 4 keys"), std::string::npos);
   EXPECT_NE(explain("C:rate,50", refused, {}).fix.find("1-1000"), std::string::npos);
 }
 
-TEST(Explain, TellsASettingForTheCableFromOneThatWantsAKey) {
+TEST(Explain, DistinguishesASettingForTheCableFromOneThatNeedsAKey) {
   const CommandResult refused{Outcome::refused, Refusal::auth, Time{0}};
   EXPECT_EQ(explain("C:key,1:...", refused, {}).fix, "send it over USB: serial:auto");
   EXPECT_EQ(explain("C:node,5", refused, {}).fix, "send it over USB: serial:auto");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One session over several paths, opposite a board that begins again, and what looks like it (docs/redundancy.md).
+// One session over several paths to a board that restarts, or seems to (docs/redundancy.md).
 #include <gtest/gtest.h>
 
 #include "robot_on_paths.hpp"
@@ -30,9 +30,7 @@ TEST(SessionPaths, ShowOneRestartOfTheBoardAndAreBack) {
   }
 }
 
-TEST(SessionPaths, PassOverWhatIsAnHourOld) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, DropDatagramsThatAreAnHourOld) {
   const auto old = [&](std::uint32_t back_ms) {
     return with_crc("AIN24:1.00;SAFE:0;PNum:17;T:" + std::to_string(robot.board_ms(0) - back_ms) +
                     ";");
@@ -50,7 +48,7 @@ TEST(SessionPaths, PassOverWhatIsAnHourOld) {
   EXPECT_EQ(robot.trips, 0);
 }
 
-TEST(SessionPaths, BringWhatTheBoardSaidWhileItBootedTooLate) {
+TEST(SessionPaths, SurviveALateHeartbeatOfABootingBoard) {
   SessionOptions options = RobotOnPaths::at_will();
   options.key = key_of(1);
   options.clock_start = std::chrono::hours{1};
@@ -68,7 +66,7 @@ TEST(SessionPaths, BringWhatTheBoardSaidWhileItBootedTooLate) {
   EXPECT_EQ(robot.drive(10).outcome, Outcome::confirmed);
 }
 
-// Whether the other path is heard or not.
+// With and without the other path.
 TEST(SessionPaths, AreNotEndedByALateWordThatTheBoardIsBooting) {
   for (const bool alone : {false, true}) {
     RobotOnPaths robot(Cables{{1}, {1}});
@@ -88,9 +86,7 @@ TEST(SessionPaths, AreNotEndedByALateWordThatTheBoardIsBooting) {
   }
 }
 
-TEST(SessionPaths, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
   robot.run(500);
   for (Cable& cable : robot.cables) cable.sent.clear();
   robot.bring(0, with_crc("H:R4-ROS2;PNum:0;T:0;"));
@@ -104,35 +100,26 @@ TEST(SessionPaths, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
-TEST(SessionPaths, BeginAnewWhereNothingElseComes) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
-  for (const std::size_t path : {0U, 1U}) robot.cut(path);
-  // No answer tells of another clock: it began again with nearly the same one.
-  for (int i = 0; i < 15; ++i) {
-    robot.bring(1, with_crc("H:R4-ROS2;PNum:0;T:0;"));
-    robot.run(100);
+// No answer shows another clock: there is none, or the board restarted with nearly the same clock.
+TEST(SessionPaths, BeginAnewIfTheBoardOnlySaysThatItBoots) {
+  for (const bool answers : {false, true}) {
+    RobotOnPaths robot(Cables{{1}, {1}});
+    robot.connect();
+    for (const std::size_t path : {0U, 1U}) robot.cut(path);
+    const std::string id = robot.session->path(1, robot.now()).board_id;
+    const std::string question = robot.cables[1].all('Q').back();
+    const std::string sid = question.substr(question.find("SID:"), 21);
+    for (int i = 0; i < 15; ++i) {
+      robot.bring(1, with_crc("H:R4-ROS2;PNum:0;T:0;"));
+      const std::string answer =
+          with_crc("I:R4,0," + id + ",sim;BUSY:0;" + sid + "PNum:" + std::to_string(i) +
+                   ";T:" + std::to_string(robot.board_ms(0)) + ";");
+      if (answers) robot.bring(1, answer);
+      robot.run(100);
+    }
+    EXPECT_EQ(robot.session->link().state, HostLinkState::connecting) << answers;
+    EXPECT_NE(robot.cables[1].all('H').back().find(";T:0;"), std::string::npos) << answers;
   }
-  EXPECT_EQ(robot.session->link().state, HostLinkState::connecting);
-  EXPECT_NE(robot.cables[1].all('H').back().find(";T:0;"), std::string::npos);
-}
-
-// The board answers who it is, and its clock is nearly that of the boot before.
-TEST(SessionPaths, BeginAnewWhereTheBoardOnlySaysThatItBoots) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
-  for (const std::size_t path : {0U, 1U}) robot.cut(path);
-  const std::string id = robot.session->path(1, robot.now()).board_id;
-  const std::string question = robot.cables[1].all('Q').back();
-  const std::string sid = question.substr(question.find("SID:"), 21);
-  for (int i = 0; i < 15; ++i) {
-    robot.bring(1, with_crc("H:R4-ROS2;PNum:0;T:0;"));
-    robot.bring(1, with_crc("I:R4,0," + id + ",sim;BUSY:0;" + sid + "PNum:" + std::to_string(i) +
-                            ";T:" + std::to_string(robot.board_ms(0)) + ";"));
-    robot.run(100);
-  }
-  EXPECT_EQ(robot.session->link().state, HostLinkState::connecting);
-  EXPECT_NE(robot.cables[1].all('H').back().find(";T:0;"), std::string::npos);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ std::string busy_for(const RobotOnPaths& robot) {
                   ",BUSY;SID:0000000000000065;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
 }
 
-TEST(SessionPaths, AskWhoIsThereBeforeAnythingElseIsSaid) {
+TEST(SessionPaths, AskForTheBoardsIdentityFirst) {
   RobotOnPaths robot(Cables{{5}, {5}});
   robot.plug(0, true);
   robot.plug(1, true);
@@ -46,9 +46,7 @@ TEST(SessionPaths, AskWhoIsThereBeforeAnythingElseIsSaid) {
   EXPECT_EQ(robot.session->link().carrying, 3);
 }
 
-TEST(SessionPaths, CarryTheSameBytes) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, CarryTheSameBytes) {
   robot.drive(100);
   EXPECT_EQ(robot.cables[0].all('H'), robot.cables[1].all('H'));
   EXPECT_EQ(robot.cables[0].all('O'), robot.cables[1].all('O'));
@@ -56,9 +54,7 @@ TEST(SessionPaths, CarryTheSameBytes) {
   EXPECT_TRUE(executed_once(robot));
 }
 
-TEST(SessionPaths, BringEachStateOnce) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, BringEachStateOnce) {
   robot.told_states = 0;
   robot.run(1000);
   EXPECT_NEAR(static_cast<double>(robot.told_states), 100, 2);
@@ -120,9 +116,7 @@ TEST(SessionPaths, OneIsCutAThousandTimesAndNothingIsMissed) {
   EXPECT_EQ(robot.session->statistics(robot.now()).timed_out, 0U);
 }
 
-TEST(SessionPaths, TellAtOnceWhatTheTransportTells) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, ReportAtOnceThatATransportIsDown) {
   robot.plug(0, false);
   EXPECT_EQ(robot.links.back().carrying, 2);
   EXPECT_EQ(robot.session->path(0, robot.now()).state, PathState::down);
@@ -134,9 +128,7 @@ TEST(SessionPaths, TellAtOnceWhatTheTransportTells) {
   EXPECT_EQ(robot.trips, 0);
 }
 
-TEST(SessionPaths, TellWithinTheTimeoutWhatNobodyTells) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, ReportASilentPathWithinTheTimeout) {
   robot.cut(1);
   robot.run(990);
   EXPECT_EQ(robot.session->link().carrying, 3);
@@ -168,18 +160,14 @@ TEST(SessionPaths, AreLostTogetherAndComeBackOneByOne) {
   EXPECT_TRUE(executed_once(robot));
 }
 
-TEST(SessionPaths, ConfirmACommandThatOneCarriesAndAnotherAnswers) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, ConfirmACommandThatOneCarriesAndAnotherAnswers) {
   robot.cables[0].cut_to_host = true;
   robot.cables[1].cut_to_board = true;
   for (int i = 0; i < 10; ++i) EXPECT_EQ(robot.drive(i).outcome, Outcome::confirmed);
   EXPECT_TRUE(executed_once(robot));
 }
 
-TEST(SessionPaths, TellARefusalOnce) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, ReportARefusalOnce) {
   robot.nacks.clear();
   robot.drive(1);
   EXPECT_TRUE(robot.nacks.empty()) << "that a copy was executed before is nothing to tell";
@@ -193,9 +181,7 @@ TEST(SessionPaths, TellARefusalOnce) {
 }
 
 // AUTH refuses one copy of a command. While another path speaks, its copy may be executed.
-TEST(SessionPaths, EndACommandByAuthOnlyWhenNoOtherPathSpeaks) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, EndACommandByAuthOnlyWhenNoOtherPathSpeaks) {
   for (const std::size_t path : {0U, 1U}) robot.cut(path);
   const Ticket ticket =
       robot.session->send(Command::setting("node", "3"), RobotOnPaths::timeout, robot.now());
@@ -215,9 +201,7 @@ TEST(SessionPaths, EndACommandByAuthOnlyWhenNoOtherPathSpeaks) {
   EXPECT_EQ(robot.results[ticket].code, Refusal::auth);
 }
 
-TEST(SessionPaths, AreRefusedWhenAllOfThemAre) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, AreRefusedWhenAllOfThemAre) {
   robot.bring(1, busy_for(robot));
   EXPECT_FALSE(robot.session->link().causes.has(LinkCause::busy));
   EXPECT_TRUE(robot.session->path(1, robot.now()).busy);
@@ -225,9 +209,7 @@ TEST(SessionPaths, AreRefusedWhenAllOfThemAre) {
   EXPECT_TRUE(robot.session->link().causes.has(LinkCause::busy));
 }
 
-TEST(SessionPaths, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, AreNotRefusedByABusyThatIsOlderThanTheProofOfControl) {
   const std::string busy = busy_for(robot);
   robot.run(50);  // states with CMD
   robot.bring(0, busy);
@@ -236,9 +218,7 @@ TEST(SessionPaths, AreNotRefusedByWhatTheBoardSaidBeforeItShowedThatItIsTheirs) 
   EXPECT_EQ(robot.drive(5).outcome, Outcome::confirmed);
 }
 
-TEST(SessionPaths, AreBackInControlAsSoonAsAStateShowsIt) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, AreBackInControlAsSoonAsAStateShowsIt) {
   const std::string busy = busy_for(robot);
   robot.bring(0, busy);
   robot.bring(1, busy);
@@ -294,7 +274,7 @@ TEST(SessionPaths, GoOnWhenOneIsPluggedIntoAnotherBoard) {
   EXPECT_EQ(robot.cables[2].all('Q').size(), robot.cables[2].sent.size());
 }
 
-TEST(SessionPaths, BeginWithoutOneWhoseBoardDoesNotAnswer) {
+TEST(SessionPaths, BeginWithoutAPathThatDoesNotAnswer) {
   RobotOnPaths robot(Cables{{1}, {1}});
   robot.cut(1);
   robot.connect();
@@ -306,9 +286,7 @@ TEST(SessionPaths, BeginWithoutOneWhoseBoardDoesNotAnswer) {
   EXPECT_EQ(robot.session->link().carrying, 3);
 }
 
-TEST(SessionPaths, TakeAStateInPartsFromWhicheverBringsThem) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, TakeAStateInPartsFromWhicheverBringsThem) {
   robot.run(3);
   const std::string t = std::to_string(robot.board_ms(0) + 1);
   robot.states.clear();
@@ -321,9 +299,7 @@ TEST(SessionPaths, TakeAStateInPartsFromWhicheverBringsThem) {
   EXPECT_EQ(robot.states[1].analog_cv[static_cast<int>(StateField::ain24)], 100);
 }
 
-TEST(SessionPaths, TellOfAStateOnlyWhatItHasBrought) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, ReportOnlyTheFieldsOfTheNewestState) {
   robot.run(3);
   const std::uint32_t t_ms = robot.board_ms(0) + 1;
   robot.bring(0, with_crc("SAFE:2;CMD:5;PNum:90001;T:" + std::to_string(t_ms) + ";"));
@@ -334,9 +310,7 @@ TEST(SessionPaths, TellOfAStateOnlyWhatItHasBrought) {
   EXPECT_FALSE(robot.session->state().present.has(StateField::cmd));
 }
 
-TEST(SessionPaths, CountAsLostWhatNoneBrings) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, CountADatagramAsLostOnlyIfNoPathBringsIt) {
   robot.run(100);
   robot.cut(0);
   robot.run(100);
@@ -353,7 +327,7 @@ TEST(SessionPaths, CountAsLostWhatNoneBrings) {
   EXPECT_NEAR(robot.session->packets().lost, 10, 2);
 }
 
-TEST(SessionPaths, AllCarryAStopWhoeverIsThere) {
+TEST(SessionPaths, AllCarryAStopEvenToAnUnknownBoard) {
   RobotOnPaths robot(Cables{{1}, {1}, {1}});
   robot.plug(0, true);
   robot.plug(1, true);
@@ -378,9 +352,7 @@ TEST(SessionPaths, AreLeftTogether) {
   EXPECT_FALSE(robot.board(0).link().has_owner());
 }
 
-TEST(SessionPaths, AreNotLeftByWhatTheBoardSaidBefore) {
-  RobotOnPaths robot(Cables{{1}, {1}});
-  robot.connect();
+TEST_F(TwoPaths, AreNotLeftByAHeartbeatFromBeforeTheFarewell) {
   for (const std::size_t path : {0U, 1U}) robot.cut(path);
   const Ticket ticket = robot.session->leave(RobotOnPaths::timeout, robot.now());
   const std::uint32_t newest_ms = robot.session->state().t_ms;
@@ -396,10 +368,10 @@ TEST(SessionPaths, AreNotLeftByWhatTheBoardSaidBefore) {
 
 TEST(SessionPaths, AreLeftBeforeAStateHasCome) {
   RobotOnPaths robot(Cables{{1}, {1}});
-  robot.reboot(0, 0xC0000000U);  // whatever T: this one is not newer than 0
+  robot.reboot(0, 0xC0000000U);  // a T that is not newer than 0
   robot.plug(0, true);
   robot.plug(1, true);
-  robot.run(2);  // each path's board has said who it is
+  robot.run(2);  // each path's board has sent its identity
   for (const std::size_t path : {0U, 1U}) robot.cut(path);
   const auto at = [&](std::uint32_t later_ms) {
     return ";PNum:9;T:" + std::to_string(robot.board_ms(0) + later_ms) + ";";
@@ -450,7 +422,7 @@ TEST(SessionPaths, AreArmedTogether) {
   EXPECT_EQ(robot.drive(4).outcome, Outcome::confirmed);
 }
 
-TEST(SessionPaths, HaveALeaseEachForWhoWatches) {
+TEST(SessionPaths, HaveALeaseEachForAWatcher) {
   RobotOnPaths robot(Cables{{1}, {1}}, SessionOptions{}, BoardRole::watch);
   robot.connect();
   robot.run(2000);

@@ -11,12 +11,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-struct SessionRole : testing::Test {
-  static SessionOptions must_arm() {
-    SessionOptions options = ScriptedLink::without_questions();
-    options.arming = Arming::required;
-    return options;
-  }
+struct SessionRole : NewSession {
+  SessionRole() : NewSession(ScriptedLink::must_arm(), BoardRole::watch) {}
   void change(BoardRole role) {
     link.session.change_role(role, link.now);
     link.session.on_transport(0, true, link.now);
@@ -27,12 +23,6 @@ struct SessionRole : testing::Test {
     change(BoardRole::control);
     link.connect();
   }
-  Outcome outcome(Ticket ticket) {
-    const auto found = link.results.find(ticket);
-    return found == link.results.end() ? Outcome::none : found->second.outcome;
-  }
-
-  ScriptedLink link{must_arm(), BoardRole::watch};
 };
 
 TEST_F(SessionRole, TakingControlBeginsAsAHostThatOpensTheBoard) {
@@ -91,7 +81,7 @@ TEST_F(SessionRole, ArmingEndsAsSoonAsControlIsReleased) {
   EXPECT_EQ(link.session.post(turn_motor, link.now), PostResult::not_armed);
 }
 
-// The motor must not run for a command that nobody waits for any more.
+// The motor must not run for a command whose caller has given it up.
 TEST_F(SessionRole, NothingThatWasAskedForBeforeIsSentAfterAChange) {
   change(BoardRole::control);
   const Ticket early = link.session.send(Command::fields("ENC1"), 60s, link.now);

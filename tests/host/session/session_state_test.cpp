@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the session keeps of the board's state, how old it is, and what a restart of the board forgets.
+// The state that a session keeps of its board, its age, and how a restart of the board clears it.
 #include <gtest/gtest.h>
 
 #include "scripted_link.hpp"
@@ -10,14 +10,14 @@ namespace {
 
 using namespace std::chrono_literals;
 using Clock = ReceivedState::Clock;
+using SessionState = ConnectedSession;
 
 // How old the session's state is now.
 Clock::duration age(const ScriptedLink& link) {
   return link.session.state().age(Clock::time_point(link.now));
 }
 
-TEST(ReceivedState, TellsHowOldItIsAlsoWhileTheLinkIsLost) {
-  ScriptedLink link;
+TEST_F(NewSession, ReportsTheAgeOfItsStateAlsoWhileTheLinkIsLost) {
   EXPECT_FALSE(link.session.state().any());
   EXPECT_EQ(age(link), Clock::duration::max());
   link.connect();
@@ -30,9 +30,7 @@ TEST(ReceivedState, TellsHowOldItIsAlsoWhileTheLinkIsLost) {
   EXPECT_EQ(age(link), 5s);
 }
 
-TEST(ReceivedState, FollowsTheReasonOfHeartbeatsWhileNoStatesCome) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionState, FollowsTheReasonOfHeartbeatsWhileNoStatesCome) {
   link.state("ENC1:7;SAFE:0;CMD:1;");
   const auto received = link.session.state().received;
   link.pass(1500ms);
@@ -44,9 +42,7 @@ TEST(ReceivedState, FollowsTheReasonOfHeartbeatsWhileNoStatesCome) {
   EXPECT_EQ(link.session.state().safe, SafeReason::none);
 }
 
-TEST(ReceivedState, ForgetsAChipFaultThatTheBoardReportsNoMore) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionState, ForgetsAChipFaultThatTheBoardReportsNoMore) {
   link.state("SAFE:6;FAULT:97,1;CMD:1;");
   EXPECT_EQ(link.session.state().fault.address, 97);
   link.state("SAFE:2;FAULT:97,1;CMD:1;");
@@ -57,9 +53,7 @@ TEST(ReceivedState, ForgetsAChipFaultThatTheBoardReportsNoMore) {
   EXPECT_FALSE(link.session.state().fault.any()) << "a watchdog reset is no chip's";
 }
 
-TEST(ReceivedState, MixesNothingOfTwoBoots) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionState, IsOfOneBootOnly) {
   link.state("OSMC1:358,1;ENC1:7;SAFE:6;FAULT:97,1;CMD:1;");
   link.pass(300ms);
   link.reboot();
@@ -76,12 +70,10 @@ TEST(ReceivedState, MixesNothingOfTwoBoots) {
   EXPECT_EQ(link.restarts, 1);
 }
 
-TEST(ReceivedState, BeginsWithTheStateThatTellsOfTheRestart) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionState, BeginsWithTheStateThatShowsTheRestart) {
   link.state("OSMC1:358,1;ENC1:7;SAFE:0;CMD:1;");
   link.reboot();
-  link.state("ENC2:5;SAFE:3;");  // what came before it was lost
+  link.state("ENC2:5;SAFE:3;");  // the datagrams before it were lost
   EXPECT_EQ(link.restarts, 1);
   const ReceivedState& state = link.states.back();
   EXPECT_EQ(state.encoder_counts[1], 5);
@@ -90,9 +82,7 @@ TEST(ReceivedState, BeginsWithTheStateThatTellsOfTheRestart) {
   EXPECT_EQ(state.encoder_counts[0], 0);
 }
 
-TEST(ReceivedState, AnOutageIsNoRestart) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionState, StaysOverAnOutage) {
   link.state("ENC1:7;SAFE:0;CMD:1;");
   link.pass(60s);
   link.heartbeat(SafeReason::link);
@@ -102,18 +92,17 @@ TEST(ReceivedState, AnOutageIsNoRestart) {
   EXPECT_EQ(link.session.state().encoder_counts[0], 7);
 }
 
-TEST(ReceivedState, AnOvertakenStateDoesNotTakeBackTheReasonThatAHeartbeatTold) {
+TEST_F(SessionState, IsTheNewestButKeepsTheReasonOfAHeartbeatThatOvertookIt) {
   for (const std::uint32_t earlier_ms : {0U, 5U}) {
-    ScriptedLink link;
-    link.connect();
-    link.pass(20ms);
-    const std::uint32_t number = link.board_pnum++;  // the state's, sent before the heartbeat
-    link.heartbeat(SafeReason::stop);
-    link.raw(with_crc("AIN24:24.28;SAFE:0;PNum:" + std::to_string(number) +
-                      ";T:" + std::to_string(link.board_ms() - earlier_ms) + ";"));
-    EXPECT_EQ(link.states.back().analog_cv[0], 2428) << "it is the newest state";
-    EXPECT_EQ(link.states.back().safe, SafeReason::stop) << earlier_ms;
-    EXPECT_EQ(link.session.link().reason, SafeReason::stop) << earlier_ms;
+    ConnectedLink each;
+    each.pass(20ms);
+    const std::uint32_t number = each.board_pnum++;  // the state's, sent before the heartbeat
+    each.heartbeat(SafeReason::stop);
+    each.raw(with_crc("AIN24:24.28;SAFE:0;PNum:" + std::to_string(number) +
+                      ";T:" + std::to_string(each.board_ms() - earlier_ms) + ";"));
+    EXPECT_EQ(each.states.back().analog_cv[0], 2428) << "it is the newest state";
+    EXPECT_EQ(each.states.back().safe, SafeReason::stop) << earlier_ms;
+    EXPECT_EQ(each.session.link().reason, SafeReason::stop) << earlier_ms;
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The link: how it comes up, stays alive and ends, and what the session tells of it.
+// The link: how it comes up, stays alive and ends, and how the session reports it.
 #include "host/session/session.hpp"
 
 #include <gtest/gtest.h>
@@ -15,8 +15,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(Session, SendsAHeartbeatAtOnceAndThenTenASecond) {
-  ScriptedLink link;
+using SessionLink = ConnectedSession;
+using SessionFarewell = ConnectedSession;
+
+TEST_F(NewSession, SendsAHeartbeatAtOnceAndThenTenASecond) {
   ASSERT_EQ(link.count('H'), 1U);
   EXPECT_EQ(link.sent[0].command, "H:ROS2-R4");
   EXPECT_EQ(link.sent[0].t, 0U) << "nothing heard, nothing to echo";
@@ -30,8 +32,7 @@ TEST(Session, SendsAHeartbeatAtOnceAndThenTenASecond) {
   }
 }
 
-TEST(Session, IsConnectingWhileTheBoardBoots) {
-  ScriptedLink link;
+TEST_F(NewSession, IsConnectingWhileTheBoardBoots) {
   link.boot_heartbeat();
   EXPECT_EQ(link.session.link().state, HostLinkState::connecting);
   EXPECT_EQ(link.count('H'), 2U) << "it answers";
@@ -39,9 +40,7 @@ TEST(Session, IsConnectingWhileTheBoardBoots) {
   EXPECT_EQ(link.count('F'), 0U) << "no command before the board knows us";
 }
 
-TEST(Session, BecomesActiveWithTheBoardsStateAndSaysSoOnce) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, BecomesActiveWithTheBoardsStateAndSaysSoOnce) {
   ASSERT_EQ(link.links.size(), 2U);
   EXPECT_EQ(link.links[0].state, HostLinkState::active);
   EXPECT_FALSE(link.links[0].in_control);
@@ -51,9 +50,7 @@ TEST(Session, BecomesActiveWithTheBoardsStateAndSaysSoOnce) {
   EXPECT_EQ(link.links.size(), 2U);
 }
 
-TEST(Session, PassesOverWhatTheBoardAnswersToAnotherSession) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, IgnoresAnswersToAnotherSession) {
   const Ticket question = link.session.identify(1s, link.now);
   const Ticket command = link.session.send(Command::servo(1500, 1), 1s, link.now);
   const SessionId ours = std::exchange(link.host_session, 0x1234);
@@ -68,9 +65,7 @@ TEST(Session, PassesOverWhatTheBoardAnswersToAnotherSession) {
   EXPECT_EQ(link.results.at(command).outcome, Outcome::refused);
 }
 
-TEST(SessionFarewell, EndsHeartbeatsAndIsRepeatedUntilTheBoardTellsThatItIsFree) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionFarewell, EndsHeartbeatsAndIsRepeatedUntilTheBoardReportsThatItIsFree) {
   link.identity("udp+leave");
   const Ticket command = link.session.send(Command::servo(1500, 1), 1s, link.now);
   link.pass(5ms);
@@ -89,9 +84,7 @@ TEST(SessionFarewell, EndsHeartbeatsAndIsRepeatedUntilTheBoardTellsThatItIsFree)
   EXPECT_EQ(link.sent.size(), 3U) << "a heartbeat would take the board again";
 }
 
-TEST(SessionFarewell, IsConfirmedByTheAnswerToARepetitionToo) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionFarewell, IsConfirmedByTheAnswerToARepetitionToo) {
   link.identity("leave");
   const Ticket ticket = link.session.leave(100ms, link.now);
   link.heartbeat(SafeReason::stop);  // graver than the lost link
@@ -101,20 +94,19 @@ TEST(SessionFarewell, IsConfirmedByTheAnswerToARepetitionToo) {
 }
 
 // T is a whole millisecond, and a farewell is said somewhere in it.
-TEST(SessionFarewell, IsConfirmedByAHeartbeatOfTheSameMillisecond) {
+TEST_F(SessionFarewell, IsConfirmedByAHeartbeatOfTheSameMillisecond) {
   for (const int us : {0, 200, 400, 600, 800, 999}) {
-    ScriptedLink link;
-    link.connect();
-    link.identity("leave");
-    link.pass(std::chrono::microseconds(5000 + us));
-    const Ticket ticket = link.session.leave(100ms, link.now);
-    link.heartbeat(SafeReason::link);
-    EXPECT_EQ(link.results.count(ticket), 1U) << us;
+    ConnectedLink each;
+    each.identity("leave");
+    each.pass(std::chrono::microseconds(5000 + us));
+    const Ticket ticket = each.session.leave(100ms, each.now);
+    each.heartbeat(SafeReason::link);
+    EXPECT_EQ(each.results.count(ticket), 1U) << us;
   }
 }
 
-// Of a board that had lost its host and had it again.
-TEST(SessionFarewell, IsNotConfirmedByAHeartbeatThatMayBeOfBefore) {
+// The heartbeat is of a board that had lost its host for a while.
+TEST_F(SessionFarewell, IsNotConfirmedByAHeartbeatThatMayBeOfBefore) {
   RobotOnPaths robot(RobotOnPaths::Cables{{40}});
   robot.connect();
   robot.run(1500);
@@ -127,43 +119,37 @@ TEST(SessionFarewell, IsNotConfirmedByAHeartbeatThatMayBeOfBefore) {
   EXPECT_FALSE(robot.board(0).link().has_owner());
 }
 
-TEST(SessionFarewell, TellsThatItWasRefusedOrNotAnswered) {
+TEST_F(SessionFarewell, ReportsThatItWasRefusedOrNotAnswered) {
   for (const bool answered : {false, true}) {
-    ScriptedLink link;
-    link.connect();
-    link.identity("leave");
-    const Ticket ticket = link.session.leave(100ms, link.now);
-    if (answered) link.nack(link.last('E').pnum, "BUSY");
-    link.pass(100ms);
-    EXPECT_EQ(link.results.at(ticket).outcome, answered ? Outcome::refused : Outcome::timed_out);
+    ConnectedLink each;
+    each.identity("leave");
+    const Ticket ticket = each.session.leave(100ms, each.now);
+    if (answered) each.nack(each.last('E').pnum, "BUSY");
+    each.pass(100ms);
+    EXPECT_EQ(each.results.at(ticket).outcome, answered ? Outcome::refused : Outcome::timed_out);
   }
 }
 
-TEST(SessionFarewell, IsNotSaidToABoardThatDoesNotKnowItOrIsNotThere) {
-  ScriptedLink older;
-  older.connect();
+TEST_F(SessionFarewell, IsNotSaidToABoardThatDoesNotKnowItOrIsNotThere) {
+  ConnectedLink older;
   older.identity("udp+leaves");
   EXPECT_EQ(older.session.leave(100ms, older.now), 0U);
   older.pass(1s);
   EXPECT_EQ(older.count('E'), 0U);
 
-  ScriptedLink silent;
-  silent.connect();
+  ConnectedLink silent;
   silent.identity("leave");
   silent.pass(1500ms);
   EXPECT_EQ(silent.session.leave(100ms, silent.now), 0U);
 
-  ScriptedLink rebooted;
-  rebooted.connect();
+  ConnectedLink rebooted;
   rebooted.identity("leave");
   rebooted.reboot();
   rebooted.heartbeat();
   EXPECT_EQ(rebooted.session.leave(100ms, rebooted.now), 0U) << "it may have other firmware now";
 }
 
-TEST(SessionFarewell, IsSaidToABoardWhoseIdentityWasLostIfItConfirmsCommands) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionFarewell, IsSentToABoardOfUnknownIdentityIfItConfirmsCommands) {
   EXPECT_NE(link.session.leave(100ms, link.now), 0U);
   EXPECT_EQ(link.last('E').command, "E:LEAVE");
 
@@ -174,9 +160,7 @@ TEST(SessionFarewell, IsSaidToABoardWhoseIdentityWasLostIfItConfirmsCommands) {
   EXPECT_EQ(of_the_paper.session.leave(100ms, of_the_paper.now), 0U);
 }
 
-TEST(SessionFarewell, AStopUnderWayGoesOn) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionFarewell, AStopUnderWayGoesOn) {
   link.identity("leave");
   const Ticket stop = link.session.stop(1s, link.now);
   link.session.leave(100ms, link.now);
@@ -188,27 +172,22 @@ TEST(SessionFarewell, AStopUnderWayGoesOn) {
   EXPECT_EQ(link.results.count(stop), 0U);
 }
 
-TEST(Session, SaysWhyTheBoardIsSafe) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, SaysWhyTheBoardIsSafe) {
   link.heartbeat(SafeReason::handle);
-  EXPECT_EQ(link.session.link(), (LinkStatus{.state = HostLinkState::safe,
-                                             .reason = SafeReason::handle,
-                                             .in_control = true,
-                                             .carrying = 1}));
+  LinkStatus safe{.state = HostLinkState::safe,
+                  .reason = SafeReason::handle,
+                  .in_control = true,
+                  .carrying = 1};
+  EXPECT_EQ(link.session.link(), safe);
   link.state("SAFE:4;CMD:1;");
-  EXPECT_EQ(link.session.link(), (LinkStatus{.state = HostLinkState::safe,
-                                             .reason = SafeReason::proximity,
-                                             .in_control = true,
-                                             .carrying = 1}));
+  safe.reason = SafeReason::proximity;
+  EXPECT_EQ(link.session.link(), safe);
   EXPECT_EQ(link.session.state().safe, SafeReason::proximity);
   link.state("SAFE:0;CMD:1;");
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
 }
 
-TEST(Session, IsLostWhenTheBoardFallsSilentAndComesBackByItself) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, IsLostWhenTheBoardFallsSilentAndComesBackByItself) {
   const Time heard = link.now;
   link.pass(999ms);
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
@@ -226,9 +205,7 @@ TEST(Session, IsLostWhenTheBoardFallsSilentAndComesBackByItself) {
 }
 
 // T wraps after 49 days: after half of that it cannot be compared.
-TEST(Session, HearsABoardAgainAfterAMonthOfSilence) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, HearsABoardAgainAfterAMonthOfSilence) {
   for (int day = 0; day < 30; ++day) {
     link.now += 24h;
     link.session.poll(link.now);
@@ -241,8 +218,7 @@ TEST(Session, HearsABoardAgainAfterAMonthOfSilence) {
   EXPECT_EQ(link.restarts, 1) << "T is new, and not a second restart";
 }
 
-TEST(Session, AsksForItsFieldsWhenTheLinkComesUpAndAgainWhenTheyAreMissing) {
-  ScriptedLink link;
+TEST_F(NewSession, AsksForItsFieldsWhenTheLinkComesUpAndAgainWhenTheyAreMissing) {
   link.heartbeat();
   link.pass(1ms);
   ASSERT_EQ(link.count('F'), 1U);
@@ -264,19 +240,7 @@ TEST(Session, AsksForItsFieldsWhenTheLinkComesUpAndAgainWhenTheyAreMissing) {
   EXPECT_EQ(link.count('F'), 4U) << "every 200 ms";
 }
 
-TEST(Session, SeldomAsksABoardThatKnowsNoFields) {
-  ScriptedLink link;
-  link.heartbeat();
-  for (int i = 0; i < 500; ++i) {
-    link.pass(10ms);
-    link.state("AIN24:24.28;OSMC1:0,0;");
-  }
-  EXPECT_EQ(link.count('F'), 5U + 4U) << "five in the first second, then one a second";
-}
-
-TEST(Session, AddsWhatItNeedsToTheFieldsOfTheUserAndKeepsThem) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, AddsItsOwnFieldsToTheUsersAndKeepsThem) {
   link.session.send(Command::fields("ENC1,ENC2"), 1s, link.now);
   EXPECT_EQ(link.last('F').command, "F:ENC1,ENC2,SAFE,CMD");
   link.executed(link.last('F').pnum);
@@ -290,7 +254,7 @@ TEST(Session, AddsWhatItNeedsToTheFieldsOfTheUserAndKeepsThem) {
   EXPECT_EQ(link.last('F').command, "F:CMD,ENC1,SAFE");
 }
 
-TEST(Session, LeavesTheFieldsAloneWhenToldTo) {
+TEST(SessionFields, AreLeftAloneOnRequest) {
   SessionOptions options = ScriptedLink::without_questions();
   options.fields = "";
   ScriptedLink link(options);
@@ -304,15 +268,13 @@ TEST(Session, LeavesTheFieldsAloneWhenToldTo) {
   EXPECT_EQ(link.last('F').command, "F:ENC1");
 }
 
-TEST(Session, RefusesOptionsWithFieldsThatDoNotExist) {
+TEST(SessionFields, MustExist) {
   SessionOptions options;
   options.fields = "AIN24,AIN25";
   EXPECT_THROW(ScriptedLink{options}, Error);
 }
 
-TEST(Session, KeepsTheFieldsOfEarlierDatagrams) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, KeepsTheFieldsOfEarlierDatagrams) {
   link.state("AIN24:24.28;ENC1:7;SAFE:0;CMD:1;");
   link.state("AIN12:12.01;SAFE:0;CMD:1;");
   const State& state = link.session.state();
@@ -322,9 +284,7 @@ TEST(Session, KeepsTheFieldsOfEarlierDatagrams) {
   EXPECT_FALSE(state.present.has(StateField::ain24)) << "present is of the newest datagram";
 }
 
-TEST(Session, LetsNoOlderStateReplaceANewerOne) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, LetsNoOlderStateReplaceANewerOne) {
   link.board_pnum += 2;
   link.state("ENC1:2;SAFE:0;CMD:1;");
   const std::size_t known = link.states.size();
@@ -335,22 +295,7 @@ TEST(Session, LetsNoOlderStateReplaceANewerOne) {
   EXPECT_EQ(link.session.statistics(link.now).packets.late, 1U);
 }
 
-TEST(Session, TakesTheNewestStateThatAHeartbeatHasOvertaken) {
-  ScriptedLink link;
-  link.connect();
-  link.state("ENC1:1;SAFE:0;CMD:1;");
-  ++link.board_pnum;
-  link.heartbeat();
-  const std::size_t known = link.states.size();
-  link.board_pnum -= 2;
-  link.state("ENC1:2;SAFE:0;CMD:1;");
-  EXPECT_EQ(link.states.size(), known + 1);
-  EXPECT_EQ(link.session.state().encoder_counts[0], 2);
-}
-
-TEST(Session, CountsDamagedDatagramsAndGoesOn) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, CountsDamagedDatagramsAndGoesOn) {
   std::string damaged = captured_state();
   damaged[6] ^= 1;
   link.raw(damaged);
@@ -363,8 +308,7 @@ TEST(Session, CountsDamagedDatagramsAndGoesOn) {
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
 }
 
-TEST(Session, PassesOverDatagramsThatAreNotOfABoard) {
-  ScriptedLink link;
+TEST_F(NewSession, PassesOverDatagramsThatAreNotOfABoard) {
   const auto before = link.sent.size();
   link.raw(with_crc("H:ROS2-R4;PNum:66;T:5;"));
   link.raw(with_crc("O:358,1,1;PNum:67;T:5;"));
@@ -373,24 +317,7 @@ TEST(Session, PassesOverDatagramsThatAreNotOfABoard) {
   EXPECT_EQ(link.session.statistics(link.now).received, 0U);
 }
 
-TEST(Session, IsBusyWhileTheBoardSaysThatAnotherHostControlsIt) {
-  ScriptedLink link;
-  const std::uint32_t ours = link.last('H').pnum;
-  link.nack(ours, "BUSY");
-  EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
-  for (int i = 0; i < 10; ++i) {
-    link.pass(100ms);
-    link.nack(link.last('H').pnum, "BUSY");
-  }
-  EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
-  link.pass(301ms);
-  EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy)) << "the board refuses no more";
-  link.connect();
-}
-
-TEST(Session, AnswersToAnotherHostChangeNothing) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, AnswersToAnotherHostChangeNothing) {
   link.pass(100ms);
   const std::uint32_t ours = link.last('H').pnum;
   for (const std::uint32_t others : {ours + 1000, ours - 1000000, std::uint32_t{7}}) {
@@ -403,7 +330,8 @@ TEST(Session, AnswersToAnotherHostChangeNothing) {
   EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
 }
 
-// It answers each question after `delay`. How often it was asked in the last five seconds of twenty.
+// It answers each question after `delay`. How often it was asked in the last five seconds of
+// twenty.
 std::size_t questions_of(ScriptedLink& link, Time delay, bool answers, bool names_question) {
   if (!link.session.in_control(link.now)) link.connect();
   std::size_t asked = 0, before = 0;
@@ -419,14 +347,14 @@ std::size_t questions_of(ScriptedLink& link, Time delay, bool answers, bool name
   return link.count('Q') - before;
 }
 
-TEST(Session, AsksTheBoardWhoItIsOnceASecondAndMeasuresTheRoundTrip) {
+TEST(SessionQuestions, AskForTheIdentityOnceASecondAndMeasureTheRoundTrip) {
   ScriptedLink link{SessionOptions{}};
   EXPECT_NEAR(static_cast<double>(questions_of(link, 0ms, true, true)), 5, 1);
   EXPECT_EQ(link.board_id, "board-7");
   EXPECT_NEAR(link.session.statistics(link.now).round_trip_us, 1000, 1000);
 }
 
-TEST(Session, AsksMoreOftenWhereTheBoardsClockIsHardToTell) {
+TEST(SessionQuestions, ComeMoreOftenIfTheBoardsClockIsHardToKnow) {
   ScriptedLink slow{SessionOptions{}}, silent{SessionOptions{}}, old{SessionOptions{}};
   EXPECT_NEAR(static_cast<double>(questions_of(slow, 8ms, true, true)), 49, 2);
   EXPECT_NEAR(static_cast<double>(questions_of(silent, 0ms, false, false)), 5, 1);
@@ -437,7 +365,7 @@ TEST(Session, AsksMoreOftenWhereTheBoardsClockIsHardToTell) {
   EXPECT_GT(old.session.statistics(old.now).round_trip_us, 2000);
 }
 
-TEST(Session, AStateTellsWhenItWasSampled) {
+TEST(SessionQuestions, ShowWhenAStateWasSampled) {
   ScriptedLink link{SessionOptions{}};
   link.connect();
   EXPECT_LE(link.session.state().sampled, link.session.state().received);

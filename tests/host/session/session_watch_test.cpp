@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session that only watches: how it keeps its lease, what it hears, and that it commands nothing.
+// A session that only watches: it keeps its lease, hears the board, and commands nothing.
 #include <gtest/gtest.h>
 
 #include "host/session/session.hpp"
@@ -30,7 +30,7 @@ TEST_F(SessionWatch, AsksForALeaseTwiceASecondAndSendsNothingElse) {
   EXPECT_EQ(link.last('W').t, 0U) << "it has heard nothing";
 }
 
-TEST_F(SessionWatch, EchoesAtOnceWhatItIsSent) {
+TEST_F(SessionWatch, EchoesALeaseAtOnce) {
   link.pass(10ms);
   tell(3912005417);
   link.pass(1ms);
@@ -96,7 +96,7 @@ TEST_F(SessionWatch, ABoardWithoutRoomIsAskedLessOften) {
   EXPECT_GE(link.count('W'), 3U);
 }
 
-TEST_F(SessionWatch, TellsThatTheFirmwareServesNobody) {
+TEST_F(SessionWatch, ReportsThatTheFirmwareServesNoWatchers) {
   link.nack(link.last('W').pnum, "UNKNOWN");
   EXPECT_EQ(link.session.link().cause(), LinkCause::not_watchable);
   link.nack(link.last('W').pnum, "STALE;LEASE:9");
@@ -106,7 +106,7 @@ TEST_F(SessionWatch, TellsThatTheFirmwareServesNobody) {
   EXPECT_TRUE(link.session.link().causes.empty());
 }
 
-TEST_F(SessionWatch, StopsAndAsksWhoItIsAndCommandsNothing) {
+TEST_F(SessionWatch, MayStopAndIdentifyTheBoardAndCommandsNothing) {
   link.state("SAFE:0;");
   EXPECT_NE(link.session.stop(1s, link.now), 0U);
   EXPECT_EQ(link.count('E'), 1U);

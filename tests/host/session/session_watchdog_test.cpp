@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The application watchdog, and what the link's status tells in words.
+// The application watchdog, and the words of the link's status.
 #include <gtest/gtest.h>
 
 #include "r4link/link.hpp"
@@ -11,9 +11,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(SessionWatchdog, HoldsCommandsBackOfAProgramThatDoesNotFeed) {
-  ScriptedLink link;
-  link.connect();
+using SessionLink = ConnectedSession;
+using SessionWatchdog = ConnectedSession;
+using SessionHold = ConnectedSession;
+
+TEST_F(SessionWatchdog, HoldsCommandsBackOfAProgramThatDoesNotFeed) {
   link.session.watchdog(300ms, link.now);
   const Time begin = link.now;
   const Ticket lost =
@@ -35,9 +37,7 @@ TEST(SessionWatchdog, HoldsCommandsBackOfAProgramThatDoesNotFeed) {
   EXPECT_EQ(link.results.at(late).outcome, Outcome::cancelled);
 }
 
-TEST(SessionWatchdog, FedAgainGivesControlBack) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionWatchdog, FedAgainGivesControlBack) {
   link.session.watchdog(100ms, link.now);
   link.pass(200ms);
   link.heartbeat();
@@ -48,9 +48,7 @@ TEST(SessionWatchdog, FedAgainGivesControlBack) {
   EXPECT_EQ(link.count('O'), 1U);
 }
 
-TEST(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
   link.session.hold(true, link.now);
   EXPECT_EQ(link.links.back().cause(), LinkCause::callback) << "on_link tells";
   EXPECT_FALSE(link.session.in_control(link.now));
@@ -79,9 +77,7 @@ TEST(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
   EXPECT_GE(link.count('E'), 4U) << "a stop is never held back";
 }
 
-TEST(SessionHold, AndWatchdogBothHaveToBeOver) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionHold, AndWatchdogBothHaveToBeOver) {
   link.session.watchdog(100ms, link.now);
   link.session.hold(true, link.now);
   link.pass(200ms);
@@ -95,9 +91,7 @@ TEST(SessionHold, AndWatchdogBothHaveToBeOver) {
   EXPECT_FALSE(link.session.link().gated());
 }
 
-TEST(Session, SendsNothingWhoseDeadlineIsOver) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, SendsNoCommandAfterItsDeadline) {
   link.place_taken = true;
   link.session.post(Command::servo(1500, 1), link.now);  // finds the place taken
   link.session.send(turn_motor, 100ms, link.now);        // waits for it
@@ -108,8 +102,7 @@ TEST(Session, SendsNothingWhoseDeadlineIsOver) {
   EXPECT_EQ(link.count('O'), 0U);
 }
 
-TEST(SessionLink, TellsWhenTheBoardTakesCommands) {
-  ScriptedLink link;
+TEST_F(NewSession, ReportsWhenTheBoardTakesCommands) {
   link.heartbeat();
   link.pass(10ms);
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
@@ -122,9 +115,7 @@ TEST(SessionLink, TellsWhenTheBoardTakesCommands) {
             "the board is active and takes our commands");
 }
 
-TEST(SessionLink, TellsThatTheTransportIsDown) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, ReportsThatTheTransportIsDown) {
   link.session.on_transport(0, false, link.now);
   EXPECT_TRUE(link.session.link().causes.has(LinkCause::transport_down));
   const Problem problem = explain("board", link.session.link());
@@ -134,9 +125,7 @@ TEST(SessionLink, TellsThatTheTransportIsDown) {
   EXPECT_FALSE(link.session.link().causes.has(LinkCause::transport_down));
 }
 
-TEST(SessionLink, TellsOfLateFramesOnlyWhileTheBoardIsHeard) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, ReportsLateFramesOnlyWhileTheBoardIsHeard) {
   link.frames = TransportTrouble::late_frames;
   link.pass(1ms);
   EXPECT_EQ(link.session.link().causes, LinkCauses{LinkCause::late_frames});
@@ -146,17 +135,14 @@ TEST(SessionLink, TellsOfLateFramesOnlyWhileTheBoardIsHeard) {
   EXPECT_EQ(explain("board", link.session.link()).reason, "the board has fallen silent");
 }
 
-TEST(SessionLink, TellsOfForeignFramesBeforeTheBoardIsHeard) {
-  ScriptedLink link;
+TEST_F(NewSession, ReportsForeignFramesBeforeTheBoardIsHeard) {
   link.frames = TransportTrouble::foreign_frames;
   link.pass(1ms);
   EXPECT_EQ(link.session.link().state, HostLinkState::connecting);
   EXPECT_EQ(link.session.link().causes, LinkCauses{LinkCause::foreign_frames});
 }
 
-TEST(SessionLink, TellsWhichChipIsTheFault) {
-  ScriptedLink link;
-  link.connect();
+TEST_F(SessionLink, ReportsTheChipThatFailed) {
   link.state("AIN24:24.28;SAFE:6;FAULT:97,1;");
   EXPECT_EQ(link.session.link().chip, (ChipFault{97, ChipTrouble::no_acknowledge}));
   const Problem problem = explain("board", link.session.link());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who watches a board over a bus beside another path: on a bus nobody may be asked who is there.
+// A watcher of a board over a bus beside another path. On a bus it may not send questions.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -47,7 +47,7 @@ TEST_F(WatchedBus, IsBelievedAgainAfterARestartOfTheBoard) {
   robot().run(2000);
   for (const bool alone : {false, true}) {
     robot().cut(0, alone);
-    robot().run(12'000);  // or its clock would be near that of before
+    robot().run(12'000);  // or its clock would be near the clock before the restart
     const int restarts = robot().restarts;
     robot().reboot(0);
     robot().run(3000);

@@ -64,12 +64,12 @@ std::string url_table() {
 std::string command_table() {
   constexpr std::size_t widest = 100;
   std::string table;
-  for (const CommandHelp* each = all_command_help(); each->letter != 0; ++each) {
-    if (each->letter == 'H') continue;  // those are sent by themselves
-    const std::string first = fmt::format("  {:<21} {}:", each->form, each->meaning);
-    const bool fits = first.size() + each->ranges.size() < widest;
+  for (const CommandHelp& each : all_command_help()) {
+    if (each.letter == 'H') continue;  // those are sent by themselves
+    const std::string first = fmt::format("  {:<21} {}:", each.form, each.meaning);
+    const bool fits = first.size() + each.ranges.size() < widest;
     table += first + (fits ? " " : "\n      ");
-    std::string_view ranges = each->ranges;
+    std::string_view ranges = each.ranges;
     while (6 + ranges.size() > widest) {
       const std::size_t end = ranges.rfind(' ', widest - 6);
       table += fmt::format("{}\n      ", ranges.substr(0, end));
