@@ -137,17 +137,12 @@ class AsyncBoard::TimingSteps final : public Impl::Sequence {
     impl_.begin(CompletionPtr(this), send, id_);
   }
   void complete(const CommandResult& result, How how) override {
-  TimingSteps(Impl& impl, std::vector<LinkTimingStep> steps, Time timeout, CompletionPtr completion)
-      : Sequence(impl, std::move(completion)),
-        steps_(std::move(steps)),
-        deadline_(Impl::steady_now() + timeout) {}
+    if (result.outcome != Outcome::confirmed || ++done_ == steps_.size()) return end(result, how);
+    begin();
   }
 
  private:
-  TimingSteps(Impl& impl, std::vector<LinkTimingStep> steps, Time timeout, CompletionPtr completion)
-      : Sequence(impl, std::move(completion)),
-        steps_(std::move(steps)),
-        deadline_(Impl::steady_now() + timeout) {}
+  const std::vector<LinkTimingStep> steps_;
   std::size_t done_ = 0;
   const Time deadline_;
 };
