@@ -187,19 +187,14 @@ TEST_F(NewSession, TakesAtMostSixtyFourCommands) {
   EXPECT_EQ(link.results.size(), Session::max_pending);
 }
 
-TEST_F(SessionCommand, SentOnceIsNotRepeated) {
-  EXPECT_TRUE(link.session.post(turn_motor, link.now));
-  link.pass(1s);
-  EXPECT_EQ(link.count('O'), 1U);
-  EXPECT_TRUE(link.results.empty());
-}
-
-TEST_F(SessionCommand, SentOnceDoesNotOvertakeThoseThatWait) {
+TEST_F(SessionCommand, SentOnceIsNotRepeatedAndDoesNotOvertakeEarlierCommands) {
   link.session.send(turn_motor, 1s, link.now);
-  link.session.post(Command::osmc(0, Direction::forward, 1), link.now);
-  ASSERT_EQ(link.count('O'), 2U);
-  EXPECT_EQ(link.all('O')[0].command, "O:358,1,1");
-  EXPECT_LT(link.all('O')[0].pnum, link.all('O')[1].pnum);
+  EXPECT_TRUE(link.session.post(Command::servo(0, 1), link.now));
+  ASSERT_EQ(link.count('O'), 1U);
+  EXPECT_LT(link.last('O').pnum, link.last('S').pnum);
+  link.pass(1s);
+  EXPECT_EQ(link.count('S'), 1U);
+  EXPECT_EQ(link.results.size(), 1U) << "only the sent command has an end";
 }
 
 TEST_F(NewSession, ConfirmsIdentifyByTheAnswerInAnyState) {
@@ -279,6 +274,8 @@ TEST_F(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
   link.stopped(link.last('E').pnum);
   link.pass(1s);
   EXPECT_EQ(link.count('E'), 10U) << "every 20 ms for 200 ms";
+  EXPECT_EQ(link.session.statistics(link.now).confirmed, 1U);
+  EXPECT_EQ(link.session.statistics(link.now).timed_out, 0U) << "it ends only once";
   EXPECT_EQ(link.last('E').bytes, link.all('E').front().bytes);
 
   for (const bool posts : {false, true}) {

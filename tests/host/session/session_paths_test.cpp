@@ -201,12 +201,16 @@ TEST_F(TwoPaths, EndACommandByAuthOnlyWhenNoOtherPathSpeaks) {
   EXPECT_EQ(robot.results[ticket].code, Refusal::auth);
 }
 
-TEST_F(TwoPaths, AreRefusedWhenAllOfThemAre) {
-  robot.bring(1, busy_for(robot));
+TEST_F(TwoPaths, AreRefusedWhenAllOfThemAreUntilAStateShowsControl) {
+  const std::string busy = busy_for(robot);
+  robot.bring(1, busy);
   EXPECT_FALSE(robot.session->link().causes.has(LinkCause::busy));
   EXPECT_TRUE(robot.session->path(1, robot.now()).busy);
-  robot.bring(0, busy_for(robot));
+  robot.bring(0, busy);
   EXPECT_TRUE(robot.session->link().causes.has(LinkCause::busy));
+  robot.run(30);
+  EXPECT_FALSE(robot.session->link().causes.has(LinkCause::busy));
+  EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
 TEST_F(TwoPaths, AreNotRefusedByABusyThatIsOlderThanTheProofOfControl) {
@@ -216,16 +220,6 @@ TEST_F(TwoPaths, AreNotRefusedByABusyThatIsOlderThanTheProofOfControl) {
   robot.bring(1, busy);
   EXPECT_FALSE(robot.session->link().causes.has(LinkCause::busy));
   EXPECT_EQ(robot.drive(5).outcome, Outcome::confirmed);
-}
-
-TEST_F(TwoPaths, AreBackInControlAsSoonAsAStateShowsIt) {
-  const std::string busy = busy_for(robot);
-  robot.bring(0, busy);
-  robot.bring(1, busy);
-  EXPECT_TRUE(robot.session->link().causes.has(LinkCause::busy));
-  robot.run(30);
-  EXPECT_FALSE(robot.session->link().causes.has(LinkCause::busy));
-  EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
 TEST(SessionPaths, ToTwoBoardsAreRefused) {
