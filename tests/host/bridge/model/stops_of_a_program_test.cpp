@@ -129,7 +129,7 @@ TEST_F(ProgramOnABus, ARepetitionHasNoBareFrameAndTheSameNumber) {
   stop(0, 1);
   EXPECT_EQ(stops(), (Texts{"bare", "numbered"}));
   const std::uint32_t first = number_;
-  pass(CanBus::stop_spacing);
+  pass(BusStops::spacing);
   stop(0, 1);
   EXPECT_EQ(stops(), Texts{"numbered"});
   EXPECT_EQ(number_, first);
