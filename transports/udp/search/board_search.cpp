@@ -286,10 +286,8 @@ FoundHost find_board(const BoardSearch& search, const WantedBoard& wanted) {
   if (!wanted.board_id.empty()) {
     // Of several boards of that name, take the one that was found before. If the URL wants the only
     // board there is, another board does not replace it.
-    std::vector<FoundBoard> same;
-    for (const FoundBoard& board : meant) {
-      if (board.board_id == wanted.board_id) same.push_back(board);
-    }
+    std::vector<FoundBoard> same = meant;
+    std::erase_if(same, [&](const FoundBoard& each) { return each.board_id != wanted.board_id; });
     if (!same.empty() || wanted.called.empty()) meant = std::move(same);
   }
   FoundHost found;

@@ -44,16 +44,9 @@ class CanBusTest : public testing::Test {
 
  protected:
   void run_until(const std::function<bool()>& is_so) {
-    const auto end = std::chrono::steady_clock::now() + patience;
-    while (!is_so()) {
-      io.restart();
-      ASSERT_NE(0U, io.run_one_until(end)) << "it did not come";
-    }
+    ASSERT_TRUE(test::run_until(io, is_so)) << "it did not come";
   }
-  void run_for(std::chrono::milliseconds time) {
-    io.restart();
-    io.run_for(time);
-  }
+  void run_for(std::chrono::milliseconds time) { test::run_for(io, time); }
 
   static CanFrame data(std::uint8_t byte) {
     CanFrame frame{};
