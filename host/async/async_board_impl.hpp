@@ -16,7 +16,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -146,21 +145,10 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
       }
     });
   }
-  // A command, or a group. One of a board that knows no groups goes as one command after the other, up to the first
-  // that is not sent.
+  // A command, or a group.
   template <class What>
   PostResult post(const What& what) {
-    if constexpr (std::is_same_v<What, Setpoints>) {
-      if (session.posts_apart()) {
-        PostResult result = PostResult::sent;
-        for (std::size_t i = 0; i < what.size() && result; ++i) result = post(what[i]);
-        return result;
-      }
-    }
-    const PostResult result = session.post(what, now);
-    if (!result) return result;
-    send_all();
-    return session.posted();
+    return post_by(session, what, now, [this] { send_all(); });
   }
   void wait_active(Duration timeout, CompletionPtr completion);
   bool has_come(const Waits::Condition& condition) const;
