@@ -17,7 +17,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -159,25 +158,9 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   PostResult post(const What& what) {
     PostResult result = PostResult::no_link;
     enter(Completion::How::post, [&] {
-      if (is_open()) result = post_now(what);
+      if (is_open()) result = post_by(session, what, now, [this] { send_all(); });
     });
     return result;
-  }
-  // If the board executes no groups, the commands of a group go one after the other, up to the
-  // first that is not sent.
-  template <class What>
-  PostResult post_now(const What& what) {
-    if constexpr (std::is_same_v<What, Setpoints>) {
-      if (session.posts_apart()) {
-        PostResult result = PostResult::sent;
-        for (std::size_t i = 0; i < what.size() && result; ++i) result = post_now(what[i]);
-        return result;
-      }
-    }
-    const PostResult result = session.post(what, now);
-    if (!result) return result;
-    send_all();
-    return session.posted();
   }
   bool has_come(const Waits::Condition& condition) const;
   void cancel(Ticket id);

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Bridge: its pairs on one loop, and the thread of that.
+// r4::Bridge: its pairs on one loop, and the loop's thread.
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
-#include <future>
+#include <asio/use_future.hpp>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <type_traits>
 #include <utility>
 
 #include "../../transports/file_descriptor.hpp"
@@ -19,14 +20,13 @@
 namespace r4 {
 namespace {
 
-// A device may be plugged in later; where a program listens is there, or it is a mistake.
-BridgedPair::Absence absence_of(const std::string& url) {
+// True for a device that may be plugged in later. A port to listen at is there, or it is a mistake.
+bool is_device(const std::string& url) {
   const std::string scheme = Url::parse(url).scheme();
-  return scheme == "serial" || scheme == "can" ? BridgedPair::Absence::awaited
-                                               : BridgedPair::Absence::refused;
+  return scheme == "serial" || scheme == "can";
 }
 
-// True if a board obeys whatever comes by that transport, without a signature.
+// True if a board obeys every datagram of that transport, without a signature.
 bool is_cable(const std::string& board) { return Url::parse(board).scheme() == "serial"; }
 
 }  // namespace
@@ -56,7 +56,7 @@ struct Bridge::Impl {
       setup.trusted = cable && !options.open;
       setup.hosts = standard_registry().make(io, urls.hosts, Role::board);
       setup.board = make_host_carrier(io, urls.board, BoardRole::control);
-      setup.hosts_absence = absence_of(urls.hosts);
+      setup.hosts_may_be_away = is_device(urls.hosts);
       setup.timeout = options.timeout;
       setup.on_event = [this, pair = pairs.size()](BridgeSide side, const CarrierEvent& event) {
         if (on_event) on_event({pair, side, event});
@@ -83,7 +83,7 @@ struct Bridge::Impl {
     on_event({pairs.size(), BridgeSide::hosts, {CarrierEvent::Kind::warning, warning}});
   }
 
-  // On the loop, where no name that is looked up holds the others up.
+  // On the loop, where looking up one name does not delay the other pairs.
   void open() {
     tick_later();
     thread = std::thread([this] { io.run(); });
@@ -112,9 +112,7 @@ struct Bridge::Impl {
   std::vector<BridgeStatus> status() {
     const std::lock_guard lock(mutex);
     if (!thread.joinable()) return last;
-    std::vector<BridgeStatus> now;
-    on_loop([&] { now = collect(); });
-    return now;
+    return on_loop([this] { return collect(); });
   }
 
   std::vector<BridgeStatus> collect() const {
@@ -124,19 +122,10 @@ struct Bridge::Impl {
     return all;
   }
 
-  // Waits until it is done there, which takes no longer than a turn of the loop.
+  // Waits until `action` is done on the loop: no longer than one turn of it.
   template <class Action>
-  void on_loop(Action action) {
-    std::promise<void> done;
-    asio::post(io, [&] {
-      try {
-        action();
-        done.set_value();
-      } catch (...) {
-        done.set_exception(std::current_exception());
-      }
-    });
-    done.get_future().get();
+  std::invoke_result_t<Action> on_loop(Action action) {
+    return asio::post(io, asio::use_future(std::move(action))).get();
   }
 
   void tick_later() {
@@ -148,12 +137,12 @@ struct Bridge::Impl {
   }
 
   const std::function<void(const BridgeEvent&)> on_event;
-  // Other threads do nothing on it but post: what the reactor does needs no locks.
+  // Other threads do nothing on it but post, so the reactor needs no locks.
   asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE_IO};
   LoopTimer timer{io};
   OperationSlot ticking;
   std::vector<std::unique_ptr<BridgedPair>> pairs;
-  std::mutex mutex;  // of who calls from outside
+  std::mutex mutex;  // of callers of other threads
   std::vector<BridgeStatus> last;
   std::thread thread;
 };

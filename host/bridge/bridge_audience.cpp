@@ -5,11 +5,9 @@ namespace r4 {
 
 BridgeAudience::Effect BridgeAudience::on_lease(Peer from, bool ends, std::uint64_t echo,
                                                 Time now) {
-  int watchers = 0;
-  for (const Place& each : places_) {
-    if (each.used && each.peer != from && now < each.watches_until) ++watchers;
-  }
-  if (watchers >= most_watchers) return Effect::full;
+  int others = 0;
+  for_each_watcher(now, [&](Peer peer) { others += peer != from ? 1 : 0; });
+  if (others >= most_watchers) return Effect::full;
   Place& place = place_of(from, now);
   const bool known = now < place.watches_until || now - place.told < lease;
   if (place.token == 0 || echo != place.token || !known) return Effect::unproven;
@@ -18,12 +16,11 @@ BridgeAudience::Effect BridgeAudience::on_lease(Peer from, bool ends, std::uint6
 }
 
 std::uint32_t BridgeAudience::new_token(Peer to, Time now) {
-  std::uint32_t token = 0;
-  while (token == 0) token = random_();
   Place& place = place_of(to, now);
-  place.token = token;
+  do place.token = random_();
+  while (place.token == 0);
   place.told = now;
-  return token;
+  return place.token;
 }
 
 void BridgeAudience::on_question(Peer from, std::optional<std::uint32_t> pnum, SessionId sid,
@@ -33,35 +30,30 @@ void BridgeAudience::on_question(Peer from, std::optional<std::uint32_t> pnum, S
 
 std::optional<Peer> BridgeAudience::asker_of(std::optional<std::uint32_t> pnum, SessionId sid,
                                              Time now) const {
-  std::optional<Peer> asker;
-  Time newest;
+  const Question* newest = nullptr;
   for (const Question& each : questions_) {
     if (each.at == Time() || now - each.at > curiosity) continue;
     if (each.pnum != pnum || each.sid != sid) continue;
-    if (asker && each.at < newest) continue;
-    asker = each.from;
-    newest = each.at;
+    if (newest == nullptr || each.at >= newest->at) newest = &each;
   }
-  return asker;
+  if (newest == nullptr) return std::nullopt;
+  return newest->from;
 }
 
-// The place of one that is new is that of who was silent longest, but of nobody who watches.
+// A new peer takes a free place, or the place of the peer that was silent longest, but never the
+// place of a watcher.
 BridgeAudience::Place& BridgeAudience::place_of(Peer peer, Time now) {
-  any_ = true;
   Place* best = nullptr;
   for (Place& place : places_) {
-    if (place.used && place.peer == peer) {
+    if (place.peer == peer && place.heard != Time()) {
       place.heard = now;
       return place;
     }
-    if (place.used && now < place.watches_until) continue;
-    const bool better =
-        best == nullptr || (best->used && (!place.used || place.heard < best->heard));
-    if (better) best = &place;
+    if (now < place.watches_until) continue;
+    if (best == nullptr || place.heard < best->heard) best = &place;
   }
   if (best == nullptr) best = places_.data();  // there are more places than may watch
   *best = Place();
-  best->used = true;
   best->peer = peer;
   best->heard = now;
   return *best;

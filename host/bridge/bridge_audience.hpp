@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The peers that hear a board through a bridge besides the served hosts: watchers (docs/protocol.md,
-// 4.8), and for a second each peer that stopped the board, that asks for control of it, or that
-// needs its nonce to sign what it sends.
+// The peers that hear a board through a bridge besides the served hosts: watchers
+// (docs/protocol.md, 4.8), and for a second each peer that stopped the board, asks for control of
+// it, or needs its nonce to sign what it sends.
 //
-//     W:rate --> is told a LEASE --W:rate that echoes it--> hears everything for two seconds, again by the next W
+//     W:rate --> is sent a LEASE --W:rate that echoes it--> hears everything for two seconds
+//                                                           after each W
 //
-// As at the board, nothing is streamed before the echo of a random number that was sent to that very
-// peer. So nobody can have a bridge flood a third party by forging where a W comes from. For the
-// same reason the answers to peers that have echoed nothing are few.
+// As at the board, nothing is streamed to a peer before it echoes a random number that was sent to
+// it. So a forged sender address of a W cannot make a bridge flood a third party. For the same
+// reason the answers to peers that have echoed nothing are few.
 #pragma once
 
 #include <array>
@@ -30,52 +31,49 @@ class BridgeAudience {
   static constexpr int most_watchers = 4;
 
   enum class Effect : std::uint8_t { watching, unproven, full };
-  // `W` of a host, with its T; `rate` 0 ends its lease.
+  // A `W` of a peer, with its T. `ends`: its rate is 0, which ends the lease.
   Effect on_lease(Peer from, bool ends, std::uint64_t echo, Time now);
-  // A new LEASE, which that host is told.
+  // A new LEASE for that peer.
   std::uint32_t new_token(Peer to, Time now);
 
-  // That peer is to hear the board's heartbeats for a while.
+  // That peer hears the board's heartbeats for a while.
   void listen(Peer from, Time now) { place_of(from, now).listens_until = now + curiosity; }
 
-  // It has sent the board a datagram of that number and session; none: of no number.
+  // The peer sent the board a datagram with that number, if any, and that session.
   void on_question(Peer from, std::optional<std::uint32_t> pnum, SessionId sid, Time now);
   // The peer that sent such a datagram last. An answer to a session goes to no peer that did not
   // name its id.
   std::optional<Peer> asker_of(std::optional<std::uint32_t> pnum, SessionId sid, Time now) const;
 
-  // Calls `call(peer)` for each that hears states.
+  // Calls `call(peer)` for each peer that hears states.
   template <class Call>
   void for_each_watcher(Time now, Call call) const {
     for (const Place& place : places_) {
-      if (place.used && now < place.watches_until) call(place.peer);
+      if (now < place.watches_until) call(place.peer);
     }
   }
-  // Calls `call(peer)` for each that hears heartbeats and is no watcher. Each time it begins with
-  // another one: where a budget does not suffice for all, each has its turn.
+  // Calls `call(peer)` for each peer that hears heartbeats and is no watcher. Each call begins with
+  // another peer, so that each has its turn when a budget does not suffice for all.
   template <class Call>
   void for_each_listener(Time now, Call call) {
     ++turn_;
     for (std::size_t i = 0; i < places; ++i) {
       const Place& place = places_[(turn_ + i) % places];
-      if (place.used && now >= place.watches_until && now < place.listens_until) call(place.peer);
+      if (now >= place.watches_until && now < place.listens_until) call(place.peer);
     }
   }
   bool has_watchers(Time now) const {
     bool any = false;
-    if (any_) for_each_watcher(now, [&any](Peer) { any = true; });
+    for_each_watcher(now, [&any](Peer) { any = true; });
     return any;
   }
-  // True if nobody need be looked for.
-  bool empty() const { return !any_; }
 
  private:
   struct Place {
-    bool used = false;
     Peer peer = everyone;
-    Time heard;
+    Time heard;               // Time(): the place is free
     std::uint32_t token = 0;  // 0: none
-    Time told;
+    Time told;                // when the token was sent
     Time watches_until;
     Time listens_until;
   };
@@ -92,7 +90,6 @@ class BridgeAudience {
   std::array<Question, 64> questions_;
   std::size_t next_question_ = 0;
   std::size_t turn_ = 0;
-  bool any_ = false;
   std::random_device random_;
 };
 

@@ -12,7 +12,7 @@
 //     none    at a cable, not heard yet    never
 //
 // The rule is that of the board (protocol/keys/authentication.hpp), with the nonce and the clock
-// that the board tells. E:STOP, Q:ID and W need no signature, neither here nor at the board.
+// that the board reports. E:STOP, Q:ID and W need no signature, neither here nor at the board.
 #pragma once
 
 #include <chrono>
@@ -28,24 +28,24 @@ class BridgeGuard {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  // Why nothing passes that needs a signature.
+  // Why no datagram passes that needs a signature.
   enum class Trouble : std::uint8_t {
     none,
     board_has_no_key,  // and the bridge has one
     key_needed,        // the board has a key, and the bridge has none
   };
 
-  // `keys`: those of the board that its hosts sign with; at most max_keys. `trusted`: the board
-  // obeys whatever comes by this transport (its cable), and the bridge is not open to everyone.
+  // `keys`: the board's keys that its hosts sign with; at most max_keys. `trusted`: the board obeys
+  // every datagram of this transport (its cable), and the bridge is not open to everyone.
   BridgeGuard(const std::vector<Key>& keys, bool trusted);
 
   void on_board_datagram(const Datagram& datagram, MessageKind kind, Time now);
-  // The board's transport is down. Another board may be there when it comes back.
+  // The board's transport is down. It may lead to another board when it comes back.
   void on_board_gone() { heard_ = false; }
 
   // Judges a heartbeat or a command.
   Verdict judge(const Datagram& datagram, Time now);
-  // That verdict was not good. True if it may be answered.
+  // Counts a verdict other than authentic. True if it may be answered.
   bool may_answer(Verdict verdict);
 
   Trouble trouble() const;
@@ -55,8 +55,8 @@ class BridgeGuard {
 
   Authentication authentication_;
   const bool trusted_;
-  bool heard_ = false;  // a heartbeat of the board
-  bool asks_ = false;   // for signatures, by its newest heartbeat
+  bool heard_ = false;  // a heartbeat of the board has come
+  bool asks_ = false;   // its newest heartbeat asks for signatures
   bool has_clock_ = false;
   std::uint32_t t_ms_ = 0;  // the board's clock at told_
   Time told_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hosts behind a bridge, by their session ids, and which of them the bridge serves.
+// The hosts of a bridge, by their session ids, and which of them the bridge serves.
 //
 //                 heartbeat             no BUSY of the board for `patience` after a
 //                                       heartbeat that the board judges
@@ -11,10 +11,10 @@
 //
 // The board decides which host controls it, and answers BUSY to every other one. So the host that
 // the board obeys is the one that it does not refuse. States are sent to served hosts alone, and
-// what they send passes at once. Other hosts share a budget (bridged_pair.hpp).
+// their datagrams pass at once. Other hosts share a budget (bridged_pair.hpp).
 //
-// A served host keeps its place for as long as it is heard. After a silence it is served again at
-// once, unless another served host needed the place.
+// A served host keeps its place while it is heard. After a silence it is served again at once,
+// unless another served host needed the place.
 //
 // A paper host has no session id, so the board cannot distinguish two of them behind one bridge.
 // Only one passes at a time.
@@ -44,22 +44,22 @@ class BridgeHosts {
   // `timeout`: the board's.
   explicit BridgeHosts(std::chrono::milliseconds timeout);
 
-  // `judged`: the board begins or feeds a session by that heartbeat, or answers it BUSY.
+  // `judged`: the board begins or feeds a session by that heartbeat, or answers BUSY.
   // False if it must not pass: there is another paper host, or `most` other hosts are served.
   bool on_heartbeat(Peer from, const Datagram& heartbeat, bool judged, Time now);
   // The board has refused that session.
   void on_busy(SessionId sid, Time now);
-  // The board reports that it has no host, so it refuses nobody.
+  // The board reports that it has no host, so it refuses none.
   void on_board_free();
   // Lets time pass. True if served() has changed.
   bool poll(Time now);
 
-  // Where the served hosts are as of the last poll(), each peer once.
+  // The peers of the served hosts as of the last poll(), each peer once.
   const std::vector<Peer>& served() const { return served_; }
   bool is_served_at(Peer peer) const;
   // True if a heartbeat of this host passed, at most a timeout ago.
   bool knows(Peer from, SessionId sid, Time now) const;
-  // True if what this host sends passes at once: it is served, or was before a silence. That holds
+  // True if datagrams of this host pass at once: it is served, or was before a silence. That holds
   // for every path of its session.
   bool trusts(Peer from, SessionId sid, Time now) const;
   bool serves(SessionId sid, Time now) const;

@@ -3,7 +3,6 @@
 
 #include <asio/io_context.hpp>
 #include <asio/ip/udp.hpp>
-#include <set>
 #include <utility>
 
 #include "../../transports/file_descriptor.hpp"
@@ -18,7 +17,7 @@ namespace {
 
 constexpr const char* other_side = "name the board's own transport as the second one";
 
-// Is it an address of this machine? Only those can be bound.
+// True if that is an address of this machine: only those can be bound.
 bool is_ours(const std::string& host) {
   asio::error_code error;
   const auto address = asio::ip::make_address(host == "localhost" ? "127.0.0.1" : host, error);
@@ -83,11 +82,6 @@ void require_one_path(std::string_view side) {
               "udp://ROBOT:2018+udp://ROBOT:2019");
 }
 
-void require_once(std::set<std::string>& seen, const std::string& url) {
-  if (seen.insert(url).second) return;
-  throw Error(ErrorKind::usage, url, "it is in the bridge twice", "name it once");
-}
-
 }  // namespace
 
 bool is_of_this_computer(const std::string& hosts) {
@@ -101,8 +95,8 @@ bool is_of_this_computer(const std::string& hosts) {
 std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board) {
   require_one_path(hosts);
   require_one_path(board);
-  std::vector<PatternUrl> a = expand_urls(hosts);
-  std::vector<PatternUrl> b = expand_urls(board);
+  std::vector<PatternUrl> a = expand_urls(std::vector{std::string(hosts)});
+  std::vector<PatternUrl> b = expand_urls(std::vector{std::string(board)});
   if (a.size() != b.size()) {
     throw Error(ErrorKind::usage, std::string(hosts) + " " + std::string(board),
                 "they stand for " + std::to_string(a.size()) + " and " + std::to_string(b.size()) +
@@ -111,10 +105,7 @@ std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view boar
                 "'can://can0?node=0-7'");
   }
   std::vector<BridgedUrls> pairs;
-  std::set<std::string> seen_hosts, seen_boards;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    require_once(seen_hosts, a[i].url);
-    require_once(seen_boards, b[i].url);
     const Url at_board = Url::parse(b[i].url);
     require_board(at_board);
     require_two_sides(Url::parse(a[i].url), at_board);

@@ -13,12 +13,12 @@ struct BridgedUrls {
   std::string board;
 };
 
-// Throws Error{usage} for patterns of different lengths, for a side of several paths, for a side that would be
-// joined to itself, and for what cannot be a side.
+// Throws Error{usage} for patterns of different lengths, for a side of several paths, for a side
+// that would be joined to itself, and for a transport that cannot be that side.
 std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board);
 
-// True if only programs of this computer, or what is plugged into it, reach a side where hosts are
-// heard.
+// True if the side of hosts is reached only by programs of this computer, or by devices that are
+// plugged into it.
 bool is_of_this_computer(const std::string& hosts);
 
 }  // namespace r4

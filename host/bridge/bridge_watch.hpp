@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A bridge watches its board while it serves no host (docs/protocol.md, 4.8): the states that
-// come by it are for the watchers at the hosts' side, and for those that share the board's
-// transport with the bridge.
+// A bridge watches its board while it serves no host (docs/protocol.md, 4.8), for the watchers at
+// the hosts' side, and for programs that share the board's transport with the bridge.
 //
-// It asks for what the newest watcher at the hosts' side has asked for; where there is none, for a
-// few states a second, which are no load for a bus of many boards.
+// It asks for the rate and fields of the newest watcher at the hosts' side; without a watcher, for
+// a few states a second, which are a small load for a bus of many boards.
 #pragma once
 
 #include <chrono>
@@ -44,7 +43,7 @@ class BridgeWatch {
     return write_lease(writer, "0");
   }
 
-  // True if that answers a W of ours, which names no session.
+  // True if that answers a W of this bridge, which names no session.
   bool on_refusal(const Nack& nack, SteadyTime now) {
     if (nack.sid != no_session || next_pnum_ - 1 - nack.pnum >= remembered) return false;
     if (nack.lease == 0) wish_nothing();  // the board does not take it
@@ -60,14 +59,7 @@ class BridgeWatch {
     return std::chrono::duration_cast<Time>(now.time_since_epoch());
   }
   Text write_lease(DatagramWriter& writer, std::string_view values) {
-    writer.field("W");
-    for (std::size_t end = values.find(','); end != std::string_view::npos;
-         end = values.find(',')) {
-      writer.value(Text(values.substr(0, end)));
-      values.remove_prefix(end + 1);
-    }
-    writer.value(Text(values));
-    return writer.finish(next_pnum_++, lease_.echo());
+    return writer.field("W").values(values).finish(next_pnum_++, lease_.echo());
   }
 
   Lease lease_;

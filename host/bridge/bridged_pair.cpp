@@ -15,12 +15,12 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// A board that was silent for so long may have begun again, with another clock.
+// A board that was silent for so long may have restarted, with another clock.
 constexpr milliseconds clock_lifetime{1500};
 
 std::string_view view(Text text) { return {text.data(), text.size()}; }
 
-// As in firmware: a single command of another letter is no stop.
+// As in firmware: a single command of another letter is not a stop.
 bool is_stop(const Datagram& datagram) {
   const bool may_be = datagram.command_count() != 1 || datagram.command().name() == "E";
   return may_be && asks_to_stop(datagram);
@@ -47,7 +47,7 @@ bool is_absence(ErrorKind kind) {
 }  // namespace
 
 BridgedPair::BridgedPair(Setup setup)
-    : hosts_absence_(setup.hosts_absence),
+    : hosts_may_be_away_(setup.hosts_may_be_away),
       now_(std::move(setup.now)),
       on_event_(std::move(setup.on_event)),
       hosts_(*this, BridgeSide::hosts, std::move(setup.hosts)),
@@ -60,8 +60,8 @@ BridgedPair::BridgedPair(Setup setup)
 
 void BridgedPair::open() {
   const Time now = now_();
-  try_to_open(hosts_, hosts_absence_, now);
-  try_to_open(board_, Absence::awaited, now);
+  try_to_open(hosts_, hosts_may_be_away_ ? Failure::throws_unless_absent : Failure::throws, now);
+  try_to_open(board_, Failure::throws_unless_absent, now);
 }
 
 void BridgedPair::close() noexcept {
@@ -71,7 +71,7 @@ void BridgedPair::close() noexcept {
   }
 }
 
-void BridgedPair::try_to_open(Side& side, Absence absence, Time now) {
+void BridgedPair::try_to_open(Side& side, Failure failure, Time now) {
   side.tried = now;
   side.waiting.begin(now);
   try {
@@ -79,9 +79,10 @@ void BridgedPair::try_to_open(Side& side, Absence absence, Time now) {
     with_system_errors(side.carrier->name(), [&] { side.carrier->open(side); });
   } catch (const Error& error) {
     side.opened = false;
-    if (absence == Absence::refused || !is_absence(error.kind())) throw;
-    if (side.obstacle == error.what()) return;
-    side.obstacle = error.what();
+    const bool reported = failure == Failure::is_reported ||
+                          (failure == Failure::throws_unless_absent && is_absence(error.kind()));
+    if (!reported) throw;
+    if (std::exchange(side.obstacle, error.what()) == error.what()) return;
     side.on_carrier_event({CarrierEvent::Kind::down, error.problem()});
   }
 }
@@ -92,13 +93,7 @@ void BridgedPair::tick() {
     if (side->opened) {
       side->waiting.on_tick(now);
     } else if (now - side->tried >= try_again) {
-      try {
-        try_to_open(*side, Absence::awaited, now);
-      } catch (const Error& error) {  // it is there, and cannot be had
-        if (std::exchange(side->obstacle, error.what()) != error.what()) {
-          side->on_carrier_event({CarrierEvent::Kind::down, error.problem()});
-        }
-      }
+      try_to_open(*side, Failure::is_reported, now);
     }
   }
   follow_hosts(now);
@@ -130,7 +125,7 @@ BridgeStatus BridgedPair::status() const {
 
 void BridgedPair::Side::on_datagram(std::string_view bytes, Peer from) {
   Datagram datagram;
-  if (!read_datagram(Text(bytes.data(), bytes.size()), datagram)) {
+  if (!read_datagram(bytes, datagram)) {
     ++counters.damaged;
     return;
   }
@@ -185,11 +180,12 @@ void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
     return;
   }
   if (!trusted && !may_ask(now)) return;
-  if (has_site_setting(datagram)) {  // no copy of it has passed: that is proof for its host
+  // The answer names the session: no copy of this command has passed, so its host may believe it.
+  if (has_site_setting(datagram)) {
     ++hosts_.counters.refused;
     return answer(datagram, Refusal::auth, 0, from, now, known_.first_heartbeat(from, sid));
   }
-  // A paper host and a program that only asks cannot be distinguished by the answer.
+  // The answer does not distinguish a paper host from a program that only asks.
   pass_on(datagram, from, trusted && !(asks_who && sid == no_session), now);
 }
 
@@ -212,18 +208,19 @@ bool BridgedPair::is_judged(const Datagram& heartbeat) const {
          milliseconds(std::abs(std::int64_t{ago})) <= timeout_;
 }
 
-// Whenever other hosts are served than before. Their peers keep their numbers at the carrier,
-// whatever others send.
+// When the set of served hosts changes: the carrier keeps the numbers of their peers, whatever
+// other peers send.
 void BridgedPair::follow_hosts(Time now) {
   if (!known_.poll(now)) return;
   const std::vector<Peer>& served = known_.served();
   hosts_.end.hold(served.empty() ? everyone : served.front());
   for (const Peer peer : served) hosts_.end.also_hold(peer);
   if (served.empty() || !watch_.asked()) return;
-  std::array<char, max_datagram> buffer;  // the board's states are for that host now
+  std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   const Text farewell = watch_.write_end(writer);
-  // On a bus others may watch, too. There the lease runs out.
+  // The board's states are for that host from now on. On a bus other programs may watch, too, so
+  // there the lease runs out.
   if (!board_.carrier->is_shared()) send(board_, view(farewell), Priority::normal, everyone);
 }
 
@@ -231,18 +228,17 @@ void BridgedPair::follow_hosts(Time now) {
 bool BridgedPair::is_allowed(const Datagram& datagram, MessageKind kind, Peer from, Time now) {
   const Verdict verdict = guard_.judge(datagram, now);
   if (verdict == Verdict::authentic) return true;
-  const bool is_command = kind == MessageKind::command;
   ++hosts_.counters.refused;
   if (!guard_.may_answer(verdict)) return false;
-  if (is_command) {
+  if (kind == MessageKind::command) {
     answer(datagram, Refusal::auth, 0, from, now);
   } else {
-    audience_.listen(from, now);  // a heartbeat of the board tells the nonce
+    audience_.listen(from, now);  // the board's heartbeat has the nonce
   }
   return false;
 }
 
-// The board has one lease for all that comes from the bridge. So each watcher has its lease here.
+// To the board the bridge is one watcher, so each watcher has its lease here.
 void BridgedPair::on_lease(const Datagram& datagram, Peer from, Time now) {
   Command command;
   FieldSet fields;
@@ -298,8 +294,8 @@ void BridgedPair::on_board_datagram(const Datagram& datagram, Time now) {
   }
 }
 
-// To served hosts and watchers; a heartbeat also to listeners, and while no host is served to
-// everyone whom the carrier reaches at once.
+// To served hosts and watchers; a heartbeat also to listeners, and while no host is served to every
+// peer that the carrier reaches with one datagram.
 void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time now) {
   const Priority priority = is_state ? Priority::state : Priority::normal;
   const std::vector<Peer>& served = known_.served();
@@ -308,7 +304,6 @@ void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time
   if (!served.empty()) deliver(board_, hosts_, datagram, priority, served.front());
   const auto copy = [&](Peer peer) { send(hosts_, view(datagram.bytes()), priority, peer); };
   for (std::size_t i = 1; i < served.size(); ++i) copy(served[i]);
-  if (audience_.empty()) return;
   const auto has_it = [&](Peer peer) {
     return known_.is_served_at(peer) || (to_everyone && hosts_.end.reaches(peer));
   };
@@ -354,7 +349,7 @@ void BridgedPair::watch_board(Time now) {
 
 void BridgedPair::report_trouble() {
   const BridgeGuard::Trouble trouble = guard_.trouble();
-  if (std::exchange(told_trouble_, trouble) == trouble || !on_event_) return;
+  if (std::exchange(reported_, trouble) == trouble || !on_event_) return;
   Problem problem{ErrorKind::refused, board_.carrier->name(), "", ""};
   switch (trouble) {
     case BridgeGuard::Trouble::none:
@@ -375,7 +370,7 @@ void BridgedPair::report_trouble() {
   on_event_(BridgeSide::board, {CarrierEvent::Kind::warning, problem});
 }
 
-// In the board's place, as if it had said so together with what it said last. `session`: as a
+// In the board's place, with the number of its newest datagram and its time. `session`: as a
 // refusal of the board names it.
 void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to,
                          Time now, std::optional<std::uint32_t> session) {
@@ -395,7 +390,7 @@ void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t leas
   send(hosts_, view(text), Priority::normal, to);
 }
 
-// To the board. The answer to a host that is not trusted goes to where it asked from.
+// To the board. The answer to a host that is not trusted goes to the peer that it asked from.
 void BridgedPair::pass_on(const Datagram& datagram, Peer from, bool trusted, Time now) {
   if (!trusted) {
     std::optional<std::uint32_t> pnum;

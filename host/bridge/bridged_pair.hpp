@@ -1,25 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Two carriers of one loop joined: on one hosts are heard, at the other is their board.
+// Joins two carriers of one loop: one hears hosts, the other leads to their board.
 //
-//     hosts --> E:STOP                 first of all, of anyone, however old
-//               heartbeats, commands   if they prove what they must (bridge_guard.hpp): of served
-//                                      hosts (bridge_hosts.hpp) at once, of others within a budget
-//               Q:ID                   of anyone, likewise
-//     board --> heartbeats             to served hosts and watchers (bridge_audience.hpp), and for a
-//                                      second to each other host
+//     hosts --> E:STOP                 first of all, of any peer, however old
+//               heartbeats, commands   if they are signed as they must be (bridge_guard.hpp): of
+//                                      served hosts (bridge_hosts.hpp) at once, of other hosts
+//                                      within a budget
+//               Q:ID                   of any peer, likewise
+//     board --> heartbeats             to served hosts and watchers (bridge_audience.hpp), and for
+//                                      a second to each other host
 //               states                 to served hosts and watchers
 //               N, I                   to the session that they name if it is served, else to the
 //                                      peer that asked
 //
-// The bytes stay as they are. What may have waited for longer than `oldest` before it was read is dropped, but a stop:
-// so nothing that a bridge held back is executed, or keeps a board alive. What waits to be sent is bounded likewise,
-// by the carriers' queues. Settings that a board takes only from its own cable (site_settings.hpp)
-// never pass: a bridge would turn everyone who reaches it into that cable, and would carry keys and
-// passwords over a network.
+// The bytes stay as they are. A datagram that may have waited for longer than `oldest` before it
+// was read is dropped, unless it is a stop. So nothing that a bridge held back is executed, or
+// keeps a board alive. The carriers' queues bound the time before sending likewise. Settings that a
+// board takes only from its own cable (site_settings.hpp) never pass: a bridge would turn everyone
+// who reaches it into that cable, and would carry keys and passwords over a network.
 //
-// No heartbeat is made here. Answers are: BUSY for a host that is kept out, AUTH for what must not
-// pass, and a LEASE for a watcher, since all of a bridge's watchers are one peer to the board. While
-// no host is served, the bridge itself watches the board (bridge_watch.hpp).
+// A bridge makes no heartbeat. It makes answers: BUSY for a host that is kept out, AUTH for a
+// datagram that must not pass, and a LEASE for a watcher, since all of a bridge's watchers are one
+// peer to the board. While no host is served, the bridge itself watches the board
+// (bridge_watch.hpp).
 #pragma once
 
 #include <array>
@@ -53,19 +55,19 @@ class BridgedPair {
  public:
   using Time = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::milliseconds oldest{100};
-  // A side that was not there when it was opened is tried again so often.
+  // The time from one attempt to open a side to the next.
   static constexpr std::chrono::milliseconds try_again{500};
 
-  enum class Absence : std::uint8_t { awaited, refused };
   struct Setup {
     std::unique_ptr<Carrier> hosts;
     std::unique_ptr<Carrier> board;
-    // May the side of hosts be away at the beginning, too? A device may; a port to listen at is an error.
-    Absence hosts_absence = Absence::refused;
+    // True if the side of hosts may be away at the beginning, too, as a device may. A port to
+    // listen at may not.
+    bool hosts_may_be_away = false;
     std::chrono::milliseconds timeout{1000};  // the board's
     std::vector<Key> keys;                    // the board's
     bool trusted = false;                     // as BridgeGuard takes it
-    // Goes on while this computer sleeps, so that what has waited since before is old.
+    // Goes on while this computer sleeps, so that datagrams from before the sleep are old.
     std::function<Time()> now = [] { return Time(BootClock::now().time_since_epoch()); };
     std::function<void(BridgeSide, const CarrierEvent&)> on_event;
   };
@@ -75,7 +77,7 @@ class BridgedPair {
   BridgedPair(const BridgedPair&) = delete;
   BridgedPair& operator=(const BridgedPair&) = delete;
 
-  // Throws Error for what will not come by itself.
+  // Throws Error for a fault that does not end by itself.
   void open();
   void close() noexcept;
   // To be called every WaitingTime::tick_interval.
@@ -96,11 +98,11 @@ class BridgedPair {
     const std::unique_ptr<Carrier> carrier;
     BoardEnd& end;  // of the carrier
     bool opened = false;
-    std::string obstacle;  // why it could not be opened, as told last
+    std::string obstacle;  // why it could not be opened, as reported last
     Time tried;
     WaitingTime waiting;
     BridgeCounters counters;
-    std::uint64_t refused = 0;  // of what its carrier dropped: what it did not take
+    std::uint64_t refused = 0;  // datagrams that its carrier dropped because it did not take them
   };
 
   void on_host_datagram(const Datagram& datagram, Peer from, Time now);
@@ -122,9 +124,12 @@ class BridgedPair {
   void pass_on(const Datagram& datagram, Peer from, bool trusted, Time now);
   bool send(Side& to, std::string_view bytes, Priority priority, Peer peer);
   bool is_old(Side& side, Time now);
-  void try_to_open(Side& side, Absence absence, Time now);
+  // What to do with the error of a side that cannot be opened. Waiting ends an absence, such as of
+  // a device that is not plugged in; other faults it does not.
+  enum class Failure : std::uint8_t { throws, throws_unless_absent, is_reported };
+  void try_to_open(Side& side, Failure failure, Time now);
 
-  const Absence hosts_absence_;
+  const bool hosts_may_be_away_;
   const std::function<Time()> now_;
   const std::function<void(BridgeSide, const CarrierEvent&)> on_event_;
   Side hosts_;
@@ -134,9 +139,9 @@ class BridgedPair {
   BridgeGuard guard_;
   BridgeAudience audience_;
   BridgeWatch watch_;
-  // For peers that have proved nothing: what they send to the board, answers to W, and heartbeats.
+  // For peers that have proved nothing: datagrams to the board, answers to W, and heartbeats.
   AnswerBudget asking_, leases_, copies_;
-  BridgeGuard::Trouble told_trouble_ = BridgeGuard::Trouble::none;
+  BridgeGuard::Trouble reported_ = BridgeGuard::Trouble::none;
   // The board's newest number and clock, for answers in its place.
   bool board_known_ = false;
   std::uint32_t board_pnum_ = 0;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// For how long a datagram may have waited to be read, at most.
+// How long a datagram may have waited to be read, at most.
 //
-// Carriers do not tell when a datagram came. But what is read now came after the input was empty last. It was empty
-// when the carrier said so, and whatever was there at one tick of the loop has been read by the next. A process that was
-// stopped (Ctrl-Z), or got no processor, finds no tick where there should be one.
+// Carriers do not report when a datagram came. But a datagram that is read now came after the input
+// was empty last. It was empty when the carrier said so; and everything that waited at one tick of
+// the loop is read before the next tick. A process that was stopped (Ctrl-Z), or got no processor,
+// misses ticks.
 #pragma once
 
 #include <algorithm>
@@ -32,11 +33,11 @@ class WaitingTime {
     empty_ = std::max(empty_, tick_);
     tick_ = now;
   }
-  // Of what is read now.
+  // For a datagram that is read now.
   std::chrono::steady_clock::duration at_most(Time now) const { return now - empty_; }
 
  private:
-  Time empty_;  // the input, last
+  Time empty_;  // when the input was empty last
   Time tick_;
 };
 

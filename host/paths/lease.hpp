@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a program that watches a board keeps its lease there: without I/O, part of a session.
+// How a program that watches a board keeps its lease there. A part of a session, without I/O.
 //
 //         +--+ STALE: its LEASE is echoed
 //         v  |          states come
@@ -7,13 +7,13 @@
 //         |                                                              ^
 //         +----------- BUSY: full; refused otherwise: unknown -----------+
 //
-// `watching` is worth nothing when no state has come for 1 s: then a refusal counts, as in
-// `asking`.
+// After 1 s without a state `watching` is treated as `asking`: a refusal counts.
 //
 //     asking    W is sent every 500 ms; at once with a LEASE to echo, and when a transport comes up
 //     watching  likewise: a lease lasts 2 s
 //     full      the board has no room for another watcher; it is asked once a second
-//     unknown   the board does not know of watchers; likewise, for another may come to its place
+//     unknown   the board does not know watchers; it is asked once a second, because another board
+//               may replace it
 #pragma once
 
 #include <algorithm>
@@ -36,19 +36,30 @@ class Lease {
     next_ = now + (hopeless ? reminder : renewal);
   }
   void renew(Time now) { next_ = now; }
-  // The T to put into the next one.
+  // The T to put into the next W.
   std::uint32_t echo() const { return echo_; }
 
   void on_state(Time now) {
     state_ = State::watching;
     heard_ = now;
   }
-  // Our W was answered so.
-  void on_refusal(const Nack& nack, Time now);
-  // Do states come?
+  // The answer to a W of this program.
+  void on_refusal(const Nack& nack, Time now) {
+    if (nack.lease != 0) {
+      echo_ = nack.lease;
+      renew(now);
+    } else if (!streaming(now)) {  // else the states come because a host is in control
+      state_ = nack.code == Refusal::busy ? State::full : State::unknown;
+    }
+  }
+  // True if states come.
   bool streaming(Time now) const { return state_ == State::watching && now - heard_ < silence; }
   // Why the board does not stream to this watcher.
-  std::optional<LinkCause> cause(Time now) const;
+  std::optional<LinkCause> cause(Time now) const {
+    if (streaming(now)) return std::nullopt;
+    if (state_ == State::full) return LinkCause::watchers_full;
+    return state_ == State::unknown ? std::optional(LinkCause::not_watchable) : std::nullopt;
+  }
 
  private:
   enum class State : std::uint8_t { asking, watching, full, unknown };
@@ -62,28 +73,12 @@ class Lease {
   std::uint32_t echo_ = 0;
 };
 
-inline void Lease::on_refusal(const Nack& nack, Time now) {
-  if (nack.lease != 0) {
-    echo_ = nack.lease;
-    renew(now);
-  } else if (!streaming(now)) {  // else a host's control brings us the states
-    state_ = nack.code == Refusal::busy ? State::full : State::unknown;
-  }
-}
-
-inline std::optional<LinkCause> Lease::cause(Time now) const {
-  if (streaming(now)) return std::nullopt;
-  if (state_ == State::full) return LinkCause::watchers_full;
-  return state_ == State::unknown ? std::optional(LinkCause::not_watchable) : std::nullopt;
-}
-
 // The leases of a session, one for each path.
 class Leases {
  public:
   explicit Leases(std::size_t paths) : leases_(paths) {}
 
   Lease& operator[](std::size_t path) { return leases_[path]; }
-  void renew(std::size_t path, Time now) { leases_[path].renew(now); }
   // True if states come on any path.
   bool streaming(Time now) const {
     return std::any_of(leases_.begin(), leases_.end(),

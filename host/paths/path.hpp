@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "../measurement/identity_question.hpp"
@@ -30,13 +31,8 @@ class PathClock {
   std::int32_t ahead(std::uint32_t t_ms, Time at) const {
     return static_cast<std::int32_t>(t_ms - (board_ms_ + (to_ms(at) - at_ms_)));
   }
-  // True if a T that arrives now may be of this boot: at most `late_ms` late, and not from the
-  // future.
-  bool fits(std::uint32_t t_ms, Time now, std::int32_t late_ms) const {
-    const std::int32_t off = ahead(t_ms, now);
-    return off >= -late_ms && off <= tolerance_ms;
-  }
-  // The same for a T that was sent after `since`.
+  // True if a T that arrives now, and was sent after `since`, may be of this boot: at most
+  // `late_ms` late, and not from the future.
   bool fits(std::uint32_t t_ms, Time since, Time now, std::int32_t late_ms) const {
     return ahead(t_ms, since) >= -late_ms && ahead(t_ms, now) <= tolerance_ms;
   }
@@ -66,8 +62,8 @@ struct PathQuestions {
 // BUSY on a path.
 struct PathBusy {
   Time until{0};
-  bool here = false;           // heard by this program's transport, not answered by the board
-  std::uint32_t board_ms = 0;  // the board's T of its newest BUSY
+  // The board's T of its newest BUSY; none if this program's transport heard another host.
+  std::optional<std::uint32_t> board_ms;
 };
 
 struct Path {

@@ -29,12 +29,12 @@ void PathNews::restart(std::size_t index) {
 }
 
 // True if T is newer, or equal with a newer number on the same path. Then it becomes the newest.
-bool PathNews::is_new(First& newest, std::size_t path, std::uint32_t t_ms) const {
+bool PathNews::is_new(std::optional<First>& newest, std::size_t path, std::uint32_t t_ms) const {
   const std::uint32_t pnum = paths_[path].pnum;
-  const bool behind = newest.t_ms == t_ms && newest.path == path && newer(pnum, newest.pnum);
-  if (newest.any && !newer(t_ms, newest.t_ms) && !behind) return false;
-  newest = {true, t_ms, pnum, path};
-  return true;
+  const bool fresh = !newest || newer(t_ms, newest->t_ms) ||
+                     (t_ms == newest->t_ms && path == newest->path && newer(pnum, newest->pnum));
+  if (fresh) newest = {t_ms, pnum, path};
+  return fresh;
 }
 
 bool PathNews::take_heartbeat(std::size_t path, std::uint32_t t_ms) {
@@ -44,19 +44,19 @@ bool PathNews::take_heartbeat(std::size_t path, std::uint32_t t_ms) {
 }
 
 bool PathNews::is_newest_state(std::size_t path, std::uint32_t t_ms) {
-  if (!newest_.state.any || !newer(newest_.state.t_ms, t_ms)) return true;
+  if (!newest_.state || !newer(newest_.state->t_ms, t_ms)) return true;
   count_copy(paths_[path]);
   return false;
 }
 
 bool PathNews::take_state(std::size_t path, std::uint32_t t_ms, FieldSet present) {
-  if (!newest_.state.any || t_ms != newest_.state.t_ms) newest_.fields = FieldSet();
+  if (!newest_.state || t_ms != newest_.state->t_ms) newest_.fields = FieldSet();
   const FieldSet known = newest_.fields;
   newest_.fields.add(present);
   bool fresh = is_new(newest_.state, path, t_ms);
   if (!fresh && !(newest_.fields == known)) {
     fresh = true;
-    newest_.state = {true, t_ms, paths_[path].pnum, path};
+    newest_.state = {t_ms, paths_[path].pnum, path};
   }
   fresh ? count_new(paths_[path]) : count_copy(paths_[path]);
   return fresh;
@@ -64,12 +64,12 @@ bool PathNews::take_state(std::size_t path, std::uint32_t t_ms, FieldSet present
 
 // A heartbeat overtakes the states in a queue, also a state of the same millisecond.
 bool PathNews::is_newest(std::size_t path, std::uint32_t t_ms) {
-  const First& known = newest_.any;
+  const std::optional<First>& known = newest_.any;
   const std::uint32_t pnum = paths_[path].pnum;
-  if (known.any && newer(known.t_ms, t_ms)) return false;
-  const bool same = known.any && known.t_ms == t_ms && known.path == path;
-  if (same && newer(known.pnum, pnum)) return false;
-  newest_.any = {true, t_ms, pnum, path};
+  if (known && newer(known->t_ms, t_ms)) return false;
+  const bool same = known && known->t_ms == t_ms && known->path == path;
+  if (same && newer(known->pnum, pnum)) return false;
+  newest_.any = {t_ms, pnum, path};
   return true;
 }
 

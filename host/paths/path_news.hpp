@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Separates the new datagrams of a session from duplicates, and counts lost ones (paths.hpp). Packet
-// numbers differ between paths, so T orders the datagrams of different paths. Numbers order those of
-// one path within a millisecond.
+// Separates the new datagrams of a session from duplicates, and counts lost ones (paths.hpp).
+// Packet numbers differ between paths, so T orders the datagrams of different paths. Numbers order
+// the datagrams of one path within a millisecond.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "../../protocol/link/packet_tracker.hpp"
@@ -19,7 +20,7 @@ class PathNews {
  public:
   explicit PathNews(std::size_t paths) : paths_(paths) {}
 
-  // --- the packet number of each admitted datagram, before the question whether it is new
+  // --- the packet number of each admitted datagram, before the functions below
 
   void on_number(std::size_t index, std::uint32_t pnum);
   // An answer is always new. It counts once a state or a heartbeat has come.
@@ -27,7 +28,7 @@ class PathNews {
   // The next number is unrelated to the last one.
   void restart(std::size_t index);
 
-  // --- whether it is new: each of these also counts it
+  // --- whether it is new: each of these functions also counts it
 
   // True if the heartbeat is not a duplicate from another path, and not older.
   bool take_heartbeat(std::size_t path, std::uint32_t t_ms);
@@ -44,7 +45,7 @@ class PathNews {
   // The board has restarted: its T is unrelated to before.
   void forget() { newest_ = {}; }
   // The board says that it is booting: its next heartbeat is new.
-  void on_connecting() { newest_.any = newest_.heartbeat = First(); }
+  void on_connecting() { newest_.any = newest_.heartbeat = std::nullopt; }
 
   // For the session: `lost` counts datagrams that no path has brought.
   const PacketCounters& counters() const { return counters_; }
@@ -64,12 +65,11 @@ class PathNews {
   };
   // The newest datagram of a kind, and the path that brought it first.
   struct First {
-    bool any = false;
     std::uint32_t t_ms = 0;
     std::uint32_t pnum = 0;
     std::size_t path = 0;
   };
-  bool is_new(First& newest, std::size_t path, std::uint32_t t_ms) const;
+  bool is_new(std::optional<First>& newest, std::size_t path, std::uint32_t t_ms) const;
   void count_new(Numbers& path);
   void count_copy(Numbers& path);
   void count_gap(Numbers& path);
@@ -77,8 +77,8 @@ class PathNews {
 
   std::vector<Numbers> paths_;
   struct Newest {
-    First any, heartbeat, state;
-    FieldSet fields;  // of all states with that T
+    std::optional<First> any, heartbeat, state;
+    FieldSet fields;  // of all states with the T of `state`
   } newest_;
   PacketCounters counters_;
   struct Told {

@@ -39,11 +39,7 @@ void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
   if (!up) return;
   // The numbers may begin anew, and a lease may have ended.
   news_.restart(index);
-  leases_.renew(index, now);
-}
-
-bool Paths::all_down() const {
-  return std::none_of(paths_.begin(), paths_.end(), [](const Path& path) { return path.up; });
+  leases_[index].renew(now);
 }
 
 void Paths::on_sleep(Time now) {
@@ -56,7 +52,7 @@ void Paths::on_sleep(Time now) {
     if (path.up && path.can_ask && (path.questions.answered || !path.known))
       path.questions.ask_at = now;
     news_.restart(i);
-    leases_.renew(i, now);
+    leases_[i].renew(now);
   }
   clock_.forget();
   news_.forget();
@@ -64,14 +60,11 @@ void Paths::on_sleep(Time now) {
   anew_ = true;
 }
 
-// --- who is there
+// --- which board is at the other end
 
 PathSet Paths::to_ask(Time now) const {
-  PathSet due = 0;
-  for (std::size_t i = 0; i < paths_.size(); ++i) {
-    if (paths_[i].up && paths_[i].can_ask && now >= paths_[i].questions.ask_at) due |= path_bit(i);
-  }
-  return due;
+  return those(
+      [now](const Path& path) { return path.up && path.can_ask && now >= path.questions.ask_at; });
 }
 
 void Paths::asked(std::size_t index, std::uint32_t pnum, bool sent, Time now) {
@@ -134,18 +127,6 @@ Paths::Admission Paths::admit_identity(std::size_t index, const Identity& identi
   return same ? Admission::yes : Admission::restarted;
 }
 
-bool Paths::two_boards() const {
-  return std::any_of(paths_.begin(), paths_.end(), [](const Path& path) { return path.other; });
-}
-
-PathSet Paths::known() const {
-  PathSet set = 0;
-  for (std::size_t i = 0; i < paths_.size(); ++i) {
-    if (paths_[i].known) set |= path_bit(i);
-  }
-  return set;
-}
-
 bool Paths::poll(Time now) {
   if (begun_ || known() == 0 || two_boards()) return false;
   const bool asking = std::any_of(paths_.begin(), paths_.end(), [this](const Path& path) {
@@ -169,10 +150,10 @@ Time Paths::next(Time now) const {
   return next;
 }
 
-// --- what they bring
+// --- received datagrams
 
 bool Paths::in_clock(const Path& path, std::uint32_t t_ms, Time now) {
-  return path.clock.known() && path.clock.fits(t_ms, now, late_of(path));
+  return path.clock.known() && path.clock.fits(t_ms, now, now, late_of(path));
 }
 
 // True unless another path of this boot contradicts that T.
@@ -187,7 +168,7 @@ bool Paths::fits_others(const Path& path, std::uint32_t t_ms, Time now) const {
 // decide.
 bool Paths::fits(const Path& path, std::uint32_t t_ms, Time now) const {
   if (!begun_) return fits_others(path, t_ms, now);
-  return !clock_.known() || clock_.fits(t_ms, now, late_of(path));
+  return !clock_.known() || clock_.fits(t_ms, now, now, late_of(path));
 }
 
 void Paths::set_clock(std::size_t index, std::uint32_t t_ms, Time now) {
@@ -313,17 +294,17 @@ bool Paths::others_carry(const Path& path, Time now) const {
                      [&](const Path& each) { return &each != &path && is_heard(each, now); });
 }
 
-// --- who has the board
+// --- BUSY
 
 void Paths::on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now) {
   Path& path = paths_[index];
-  path.busy = {now + busy_memory, !t_ms, t_ms.value_or(0)};
+  path.busy = {now + busy_memory, t_ms};
 }
 
 bool Paths::refuses(const Path& path, Time now) const {
   if (now >= path.busy.until) return false;
-  const bool comparable = !path.busy.here && own_.any && now - own_.at < own_state_memory;
-  return !comparable || newer(path.busy.board_ms, own_.t_ms);
+  const bool comparable = path.busy.board_ms && own_ && now - own_->at < own_state_memory;
+  return !comparable || newer(*path.busy.board_ms, own_->t_ms);
 }
 
 bool Paths::all_busy(Time now) const {
@@ -339,15 +320,7 @@ Time Paths::all_busy_until(Time now) const {
   return until;
 }
 
-// --- in numbers
-
-PathSet Paths::carrying(Time now) const {
-  PathSet set = 0;
-  for (std::size_t i = 0; i < paths_.size(); ++i) {
-    if (is_heard(paths_[i], now)) set |= path_bit(i);
-  }
-  return set;
-}
+// --- reports
 
 PathState Paths::state(const Path& path, Time now) const {
   if (!path.up) return PathState::down;

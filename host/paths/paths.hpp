@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The paths over which a session has its board. This part of a session, without I/O, decides to
+// The paths over which a session reaches its board. This part of a session, without I/O, decides to
 // which paths the session speaks, and which datagrams it takes (docs/redundancy.md). Of the other
 // parts only LinkKeeper asks how many paths there are, to send a lease over each.
 //
@@ -57,9 +57,11 @@ class Paths {
   // --- the transports
 
   // `can_ask`: false on a bus for a watcher, which may not send questions. The only path is then
-  // believed. Beside other paths its T must fit the board's clock, which starts at random.
+  // believed. With other paths its T must fit the board's clock, which starts at random.
   void on_transport(std::size_t index, bool up, bool can_ask, Time now);
-  bool all_down() const;
+  bool all_down() const {
+    return those([](const Path& path) { return path.up; }) == 0;
+  }
   // This computer slept, or the board was silent for days: its clock is unknown on every path. The
   // boards' ids stay known.
   void on_sleep(Time now);
@@ -106,7 +108,7 @@ class Paths {
   // host with this program's ids.
   void on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now);
   // A state of the board's time `t_ms` names a command of this session, so an older BUSY is void.
-  void on_own_state(std::uint32_t t_ms, Time now) { own_ = {true, now, t_ms}; }
+  void on_own_state(std::uint32_t t_ms, Time now) { own_ = {now, t_ms}; }
   // True if BUSY holds on all paths that carry.
   bool all_busy(Time now) const;
   // When that ends, unless another BUSY comes.
@@ -118,8 +120,12 @@ class Paths {
 
   // --- reports
 
-  PathSet carrying(Time now) const;
-  bool two_boards() const;
+  PathSet carrying(Time now) const {
+    return those([now](const Path& path) { return is_heard(path, now); });
+  }
+  bool two_boards() const {
+    return those([](const Path& path) { return path.other; }) != 0;
+  }
   // Everything but the name.
   PathStatus report(std::size_t index, Time now) const;
   const PacketCounters& counters() const { return news_.counters(); }
@@ -135,12 +141,22 @@ class Paths {
   // T wraps, so BUSY is not compared with an older state.
   static constexpr Time own_state_memory = std::chrono::hours{1};
 
+  template <class Predicate>
+  PathSet those(Predicate is_one) const {
+    PathSet set = 0;
+    for (std::size_t i = 0; i < paths_.size(); ++i) {
+      if (is_one(paths_[i])) set |= path_bit(i);
+    }
+    return set;
+  }
   bool is_only() const { return paths_.size() == 1; }
   // How late a T may be on a path.
   static std::int32_t late_of(const Path& path) {
     return path.connecting ? PathClock::restart_tolerance_ms : PathClock::tolerance_ms;
   }
-  PathSet known() const;
+  PathSet known() const {
+    return those([](const Path& path) { return path.known; });
+  }
   static bool is_heard(const Path& path, Time now) { return path.known && now < path.heard_until; }
   void hear(Path& path, Time now) const;
   static bool is_believed(const Path& path) {
@@ -174,10 +190,10 @@ class Paths {
   Time proven_{0};   // when the boot was proved last
   PathClock clock_;  // by the newest T of all paths
   struct OwnState {
-    bool any = false;
     Time at{0};
     std::uint32_t t_ms = 0;
-  } own_;
+  };
+  std::optional<OwnState> own_;
   PathNews news_;
   Leases leases_;
 };

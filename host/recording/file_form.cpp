@@ -20,7 +20,7 @@ constexpr std::array marks{
     Mark{"\xD4\xC3\xB2\xA1"sv, FileForm::pcap},
     Mark{"\xA1\xB2\x3C\x4D"sv, FileForm::pcap},
     Mark{"\x4D\x3C\xB2\xA1"sv, FileForm::pcap},
-    Mark{"\x0A\x0D\x0D\x0A"sv, FileForm::pcapng},
+    Mark{"\x0A\x0D\x0D\x0A"sv, FileForm::pcap},
     Mark{"\x89MCAP0\r\n"sv, FileForm::mcap},
     Mark{"\x1F\x8B"sv, FileForm::gzip},
     Mark{"\xFD\x37zXZ"sv, FileForm::xz},
@@ -35,40 +35,6 @@ constexpr std::array marks{
     Mark{"\0("sv, FileForm::utf16},
 };
 
-struct Words {
-  const char* reason;
-  const char* fix;
-};
-
-Words words_of(FileForm form) {
-  switch (form) {
-    case FileForm::pcap:
-    case FileForm::pcapng:
-      return {"is a capture of packets, not a recording",
-              "make a recording of it: r4 convert CAPTURE -o FILE.r4log"};
-    case FileForm::mcap:
-      return {"is an MCAP file, not a recording in the native format",
-              "make one of it: r4 convert FILE.mcap -o FILE.r4log"};
-    case FileForm::gzip:
-      return {"is compressed by gzip", "unpack it first: gzip -dk FILE.gz"};
-    case FileForm::xz:
-      return {"is compressed by xz", "unpack it first: xz -dk FILE.xz"};
-    case FileForm::bzip2:
-      return {"is compressed by bzip2", "unpack it first: bzip2 -dk FILE.bz2"};
-    case FileForm::lz4:
-      return {"is compressed by lz4", "unpack it first: lz4 -d FILE.lz4"};
-    case FileForm::zip:
-      return {"is a zip archive", "unpack it first: unzip FILE.zip"};
-    case FileForm::utf16:
-      return {"is text in UTF-16", "make it UTF-8: iconv -f UTF-16 -t UTF-8 FILE -o NEW"};
-    case FileForm::zstd:
-    case FileForm::text:
-      break;
-  }
-  return {"no recording",
-          "r4 record URL -o FILE makes one, and r4 convert makes one of a log of candump"};
-}
-
 }  // namespace
 
 FileForm form_of(std::string_view beginning) {
@@ -80,8 +46,34 @@ FileForm form_of(std::string_view beginning) {
 }
 
 Error not_a_recording(const std::string& name, FileForm form) {
-  const Words words = words_of(form);
-  return {ErrorKind::data, name, words.reason, words.fix};
+  const auto error = [&name](const char* reason, const char* fix) {
+    return Error(ErrorKind::data, name, reason, fix);
+  };
+  switch (form) {
+    case FileForm::pcap:
+      return error("is a capture of packets, not a recording",
+                   "make a recording of it: r4 convert CAPTURE -o FILE.r4log");
+    case FileForm::mcap:
+      return error("is an MCAP file, not a recording in the native format",
+                   "make one of it: r4 convert FILE.mcap -o FILE.r4log");
+    case FileForm::gzip:
+      return error("is compressed by gzip", "unpack it first: gzip -dk FILE.gz");
+    case FileForm::xz:
+      return error("is compressed by xz", "unpack it first: xz -dk FILE.xz");
+    case FileForm::bzip2:
+      return error("is compressed by bzip2", "unpack it first: bzip2 -dk FILE.bz2");
+    case FileForm::lz4:
+      return error("is compressed by lz4", "unpack it first: lz4 -d FILE.lz4");
+    case FileForm::zip:
+      return error("is a zip archive", "unpack it first: unzip FILE.zip");
+    case FileForm::utf16:
+      return error("is text in UTF-16", "make it UTF-8: iconv -f UTF-16 -t UTF-8 FILE -o NEW");
+    case FileForm::zstd:
+    case FileForm::text:
+      break;
+  }
+  return error("no recording",
+               "r4 record URL -o FILE makes one, and r4 convert makes one of a log of candump");
 }
 
 }  // namespace r4

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a file holds, by its first bytes and not by its name.
+// The form of a file, by its first bytes and not by its name.
 #pragma once
 
 #include <cstddef>
@@ -12,10 +12,9 @@
 namespace r4 {
 
 enum class FileForm : std::uint8_t {
-  text,  // and whatever else begins as no other form does
+  text,  // and every file that begins as no other form does
   zstd,  // also with skippable frames at the front
-  pcap,
-  pcapng,
+  pcap,  // or pcapng
   mcap,
   gzip,
   xz,
@@ -25,7 +24,7 @@ enum class FileForm : std::uint8_t {
   utf16,
 };
 
-// So many bytes tell every form.
+// This many bytes distinguish all forms.
 constexpr std::size_t form_bytes = 8;
 
 FileForm form_of(std::string_view beginning);
@@ -33,7 +32,7 @@ FileForm form_of(std::string_view beginning);
 // The mark that some editors write in front of UTF-8.
 constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
 
-// Why a file of that form is not a recording, and what makes one of it.
+// Says why a file of that form is not a recording, and how to make one of it.
 Error not_a_recording(const std::string& name, FileForm form);
 
 }  // namespace r4

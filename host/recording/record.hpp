@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a recording is made of (docs/recordings.md): records, each at its time and of one path.
+// The parts of a recording (docs/recordings.md). Each record has a time and a path.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,12 @@
 namespace r4 {
 
 enum class RecordKind : std::uint8_t {
-  from_board,  // a datagram, damaged ones too
-  to_board,    // a datagram of whichever host
-  event,       // what happened, in words
+  from_board,  // a datagram, also a damaged one
+  to_board,    // a datagram of any host
+  event,       // an event, in words
 };
 
-// The recording itself, of which some events are.
+// The path of events of the recording itself.
 constexpr std::uint16_t no_path = 0;
 
 struct Record {
@@ -26,14 +26,15 @@ struct Record {
   std::string_view bytes;  // the datagram without its terminator, or the event's words
 };
 
-// How one board is reached.
+// How a board is reached.
 struct RecordedPath {
   std::uint16_t number = 1;
   std::string url;
-  std::string name;  // the board's, or its id; empty while it has not told
+  std::string name;  // the board's name, or its id; empty until the board has reported it
 };
 
-// A described device of the board at a path, and the text of its description (docs/described-devices.md).
+// A described device of the board of a path, and the text of its description
+// (docs/described-devices.md).
 struct RecordedDevice {
   std::uint16_t path = 1;
   std::string place;  // "bno055@0x28:1"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "record_line.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -22,75 +24,42 @@ constexpr std::string_view header_words = "# r4log ";
 constexpr std::string_view path_words = "# path ";
 constexpr std::string_view device_words = "# device ";
 constexpr std::string_view hex_digits = "0123456789abcdef";
+constexpr std::string_view kind_marks = "<>!";  // of each RecordKind
 
 constexpr Time end_of_time =
     sys_days{year_month_day{std::chrono::year{9999}, std::chrono::month{12}, std::chrono::day{31}}}
         .time_since_epoch() +
     days{1} - Time{1};
 
-char mark_of(RecordKind kind) {
-  switch (kind) {
-    case RecordKind::from_board:
-      return '<';
-    case RecordKind::to_board:
-      return '>';
-    case RecordKind::event:
-      break;
-  }
-  return '!';
-}
-
-bool kind_of(char mark, RecordKind& out) {
-  if (mark == '<') {
-    out = RecordKind::from_board;
-  } else if (mark == '>') {
-    out = RecordKind::to_board;
-  } else if (mark == '!') {
-    out = RecordKind::event;
-  } else {
-    return false;
-  }
-  return true;
-}
-
 bool is_plain(char c) { return c >= ' ' && c <= '~' && c != '\\'; }
 
-void append_number(std::string& out, std::uint32_t number) {
-  std::array<char, max_number_text> text;
-  out.append(text.data(), write_number(text.data(), number));
-}
-
-void append_byte(std::string& out, char c) {
-  const auto byte = static_cast<unsigned char>(c);
-  out += {'\\', 'x', hex_digits[byte >> 4], hex_digits[byte & 15]};
-}
-
-// A blank separates words, so it is escaped, too.
-void append_word(std::string& out, std::string_view word) {
-  for (const char c : word) {
-    if (is_plain(c) && c != ' ') {
+void append(std::string& out, std::string_view bytes, bool escapes_blanks) {
+  for (const char c : bytes) {
+    if (is_plain(c) && !(escapes_blanks && c == ' ')) {
       out += c;
     } else {
-      append_byte(out, c);
+      const auto byte = static_cast<unsigned char>(c);
+      out += {'\\', 'x', hex_digits[byte >> 4], hex_digits[byte & 15]};
     }
   }
 }
 
-int hex_value(char c) {
-  const std::size_t at = hex_digits.find(c);
-  return at == std::string_view::npos ? -1 : static_cast<int>(at);
+// "# path 1 WORD". A blank separates words, so a blank in a word is escaped.
+void append_of_path(std::string& out, std::string_view words, std::uint16_t path,
+                    std::string_view word) {
+  out.append(words).append(std::to_string(path)) += ' ';
+  append(out, word, true);
 }
 
-void put_digits(char* at, std::size_t count, std::int64_t value) {
-  for (; count > 0; --count, value /= 10) at[count - 1] = static_cast<char>('0' + value % 10);
-}
-
-// "1795468293.404765" at `out`; what is behind its end.
+// Writes "1795468293.404765" at `out`, and returns its end.
 char* write_time(char* out, Time time) {
   time = std::clamp(time, Time{0}, end_of_time);
   out = write_number(out, static_cast<std::uint64_t>(time / second));
   *out = '.';
-  put_digits(out + 1, decimals, (time % second).count());
+  std::int64_t micros = (time % second).count();
+  for (std::size_t i = decimals; i > 0; --i, micros /= 10) {
+    out[i] = static_cast<char>('0' + micros % 10);
+  }
   return out + 1 + decimals;
 }
 
@@ -108,7 +77,7 @@ bool read_time(std::string_view text, Time& out) {
   return true;
 }
 
-// Takes the number at the front of `text`, as far as `end`.
+// Takes the number at the front of `text`, and `end` after it.
 bool take_number(std::string_view& text, char end, std::uint32_t limit, std::uint32_t& out) {
   const std::size_t size = text.find(end);
   const std::string_view digits = text.substr(0, size);
@@ -149,15 +118,15 @@ LineKind read_comment(std::string_view line, RecordLine& out) {
     if (!read_of_path(line, out.path.number, out.path.url, out.path.name)) {
       return damaged(out, "no path is written so");
     }
-    // Elsewhere it becomes a cell, a topic or a label: what no board is called is no name.
+    // A name becomes a cell, a topic or a label elsewhere, so only a valid board name is kept.
     if (!is_board_id(Text(out.path.name))) out.path.name.clear();
     return LineKind::path;
   }
   if (line.starts_with(device_words)) {
     line.remove_prefix(device_words.size());
-    if (line.empty() || line[0] < '0' || line[0] > '9') return LineKind::comment;  // a person's
+    if (line.empty() || line[0] < '0' || line[0] > '9') return LineKind::comment;  // of a person
     RecordedDevice& device = out.device;
-    // It is shown as it is.
+    // The place is shown as it is.
     return read_of_path(line, device.path, device.place, device.description) &&
                    std::all_of(device.place.begin(), device.place.end(), is_plain)
                ? LineKind::device
@@ -174,13 +143,14 @@ LineKind read_record(std::string_view line, RecordLine& out) {
   }
   line.remove_prefix(time_size + 1);
   const std::size_t blank = line.find(' ');
-  if (blank == std::string_view::npos || blank < 2 || !kind_of(line[blank - 1], out.record.kind)) {
-    return damaged(out, "no path and direction behind the time");
-  }
+  const bool has_mark = blank != std::string_view::npos && blank >= 2;
+  const std::size_t kind = has_mark ? kind_marks.find(line[blank - 1]) : std::string_view::npos;
   std::uint32_t path = 0;
-  if (!parse_number(Text(line.substr(0, blank - 1)), path) || path > max_path) {
+  if (kind == std::string_view::npos || !parse_number(Text(line.substr(0, blank - 1)), path) ||
+      path > max_path) {
     return damaged(out, "no path and direction behind the time");
   }
+  out.record.kind = static_cast<RecordKind>(kind);
   out.record.path = static_cast<std::uint16_t>(path);
   out.text.clear();
   if (!append_unescaped(out.text, line.substr(blank + 1))) {
@@ -193,15 +163,7 @@ LineKind read_record(std::string_view line, RecordLine& out) {
 
 }  // namespace
 
-void append_escaped(std::string& out, std::string_view bytes) {
-  for (const char c : bytes) {
-    if (is_plain(c)) {
-      out += c;
-    } else {
-      append_byte(out, c);
-    }
-  }
-}
+void append_escaped(std::string& out, std::string_view bytes) { append(out, bytes, false); }
 
 bool append_unescaped(std::string& out, std::string_view text) {
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -210,9 +172,9 @@ bool append_unescaped(std::string& out, std::string_view text) {
       continue;
     }
     if (text[i] != '\\' || text.size() - i < 4 || text[i + 1] != 'x') return false;
-    const int high = hex_value(text[i + 2]);
-    const int low = hex_value(text[i + 3]);
-    if (high < 0 || low < 0) return false;
+    const std::size_t high = hex_digits.find(text[i + 2]);
+    const std::size_t low = hex_digits.find(text[i + 3]);
+    if (high == std::string_view::npos || low == std::string_view::npos) return false;
     out += static_cast<char>(high << 4 | low);
     i += 3;
   }
@@ -221,7 +183,7 @@ bool append_unescaped(std::string& out, std::string_view text) {
 
 Record without_secrets(Record record, RecordRoom& room) {
   record.bytes = record.bytes.substr(0, max_record_bytes);
-  // Of events only this one has bytes of a path.
+  // The only event that holds bytes of a path.
   constexpr std::string_view oversize = "oversize ";
   std::size_t before = 0;
   if (record.kind == RecordKind::event) {
@@ -236,32 +198,21 @@ Record without_secrets(Record record, RecordRoom& room) {
 }
 
 void write_record_header(std::string& out) {
-  out += header_words;
-  append_number(out, record_version);
+  out.append(header_words) += std::to_string(record_version);
   out += " by r4 " R4LINK_VERSION
          "\n# seconds since 1970 (UTC), the number of the path, < from the board > to the board ! "
          "event; \\xNN is a byte\n";
 }
 
 void write_path(std::string& out, const RecordedPath& path) {
-  out += path_words;
-  append_number(out, path.number);
-  out += ' ';
-  append_word(out, path.url);
-  if (!path.name.empty()) {
-    out += ' ';
-    append_word(out, path.name);
-  }
+  append_of_path(out, path_words, path.number, path.url);
+  if (!path.name.empty()) append(out += ' ', path.name, true);
   out += '\n';
 }
 
 void write_device(std::string& out, const RecordedDevice& device) {
-  out += device_words;
-  append_number(out, device.path);
-  out += ' ';
-  append_word(out, device.place);
-  out += ' ';
-  append_escaped(out, std::string_view(device.description).substr(0, max_record_bytes));
+  append_of_path(out, device_words, device.path, device.place);
+  append_escaped(out += ' ', std::string_view(device.description).substr(0, max_record_bytes));
   out += '\n';
 }
 
@@ -270,7 +221,7 @@ void write_record(std::string& out, const Record& record) {
   char* end = write_time(head.data(), record.time);
   *end++ = ' ';
   end = write_number(end, std::uint32_t{record.path});
-  *end++ = mark_of(record.kind);
+  *end++ = kind_marks[static_cast<std::size_t>(record.kind)];
   *end++ = ' ';
   out.append(head.data(), static_cast<std::size_t>(end - head.data()));
   append_escaped(out, record.bytes.substr(0, max_record_bytes));
@@ -278,9 +229,7 @@ void write_record(std::string& out, const Record& record) {
 }
 
 void write_beginning(std::string& out, Time time) {
-  out += "# from ";
-  out += record_time_text(time);
-  out += '\n';
+  out += "# from " + record_time_text(time) + '\n';
 }
 
 bool read_record_line(std::string_view line, RecordLine& out) {
@@ -293,18 +242,13 @@ std::string record_time_text(Time time) {
   const auto day = std::chrono::floor<days>(time);
   const year_month_day date{sys_days{day}};
   const std::chrono::hh_mm_ss clock{time - day};
-  std::string text = "0000-00-00T00:00:00.000000Z";
-  put_digits(text.data(), 4, int{date.year()});
-  put_digits(&text[5], 2, unsigned{date.month()});
-  put_digits(&text[8], 2, unsigned{date.day()});
-  put_digits(&text[11], 2, clock.hours().count());
-  put_digits(&text[14], 2, clock.minutes().count());
-  put_digits(&text[17], 2, clock.seconds().count());
-  put_digits(&text[20], decimals, clock.subseconds().count());
-  return text;
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:06}Z", int{date.year()},
+                     unsigned{date.month()}, unsigned{date.day()}, clock.hours().count(),
+                     clock.minutes().count(), clock.seconds().count(), clock.subseconds().count());
 }
 
-// What is not right in it is not so in the text of the time that comes of it.
+// The time that is read is written again, and must give the same text: so every wrong character and
+// every number out of range is found.
 std::optional<Time> read_record_time(std::string_view text) {
   constexpr std::string_view form = "0000-00-00T00:00:00.000000Z";
   constexpr std::size_t whole_seconds = 19;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The lines of a recording: written, and read back.
+// Writes and reads the lines of a recording.
 //
 //     # r4log 1 by r4 0.1.0
 //     # path 1 serial:///dev/ttyACM0 left-arm
@@ -7,7 +7,8 @@
 //     # from 2026-11-23T21:11:33.404765Z
 //     1795468293.404765 1< AIN24:24.28;PNum:7434;T:79090;^0xf07cfd9a^
 //
-// Any bytes come back as they were: what is not printable ASCII, and a backslash, stands as \xNN.
+// Any bytes come back as they were: a backslash, and a byte that is not printable ASCII, is written
+// as \xNN.
 #pragma once
 
 #include <array>
@@ -23,40 +24,40 @@
 namespace r4 {
 
 constexpr std::uint32_t record_version = 1;
-// What a record may hold; a datagram is shorter, what a damaged stream gives may not be.
+// The most bytes that a record holds. A datagram is shorter; bytes of a damaged stream may be more.
 constexpr std::size_t max_record_bytes = 4096;
-// The longest line there is, without its end: all of it escaped, and its time and path before it.
+// The longest line without its end: every byte escaped, after a time and a path.
 constexpr std::size_t max_record_line = 4 * max_record_bytes + 64;
 
-// A record as it may be kept: its datagram, or what begins one in an event `oversize`, is
-// without_secrets(). It has at most max_record_bytes, which may be in `room`.
+// A record as it may be stored: without the secrets of its datagram, or of the beginning of one in
+// an event `oversize`. It has at most max_record_bytes, which may be in `room`.
 using RecordRoom = std::array<char, max_record_bytes + masking_room>;
 Record without_secrets(Record record, RecordRoom& room);
 
 // --- writing; each appends one line with its end
 
 void write_record_header(std::string& out);
-// For people: when the first record is from.
+// For people: the time of the first record.
 void write_beginning(std::string& out, Time time);
 void write_path(std::string& out, const RecordedPath& path);
 // At most max_record_bytes of description.
 void write_device(std::string& out, const RecordedDevice& device);
-// Bytes beyond max_record_bytes are left out. A time outside of the years 1970 to 9999 is written as the next
-// that is inside.
+// Bytes beyond max_record_bytes are left out. A time outside of the years 1970 to 9999 is written
+// as the nearest time inside.
 void write_record(std::string& out, const Record& record);
 
 // --- reading
 
 enum class LineKind : std::uint8_t {
-  damaged,  // none of these: `problem` says why
+  damaged,  // not a line of a recording: `problem` says why
   record,
   header,
   path,
   device,
-  comment,  // another line that begins with #; of a later version, or a person's
+  comment,  // another line that begins with #: of a later version, or of a person
 };
 
-// One line as it was read; used again for the next one, so that reading allocates nothing.
+// One line. The same object is used for every line, so that reading allocates nothing.
 struct RecordLine {
   LineKind kind = LineKind::damaged;
   const char* problem = "";
@@ -72,14 +73,15 @@ bool read_record_line(std::string_view line, RecordLine& out);
 
 // --- bytes as a record has them
 
-// What is no printable ASCII, and a backslash, as \xNN.
+// Appends bytes; a backslash, and a byte that is not printable ASCII, as \xNN.
 void append_escaped(std::string& out, std::string_view bytes);
-// Appends the bytes that are written so; false for what is not.
+// The reverse. False if the text is not written so.
 bool append_unescaped(std::string& out, std::string_view text);
 
 // "2026-11-23T21:11:33.404765Z"
 std::string record_time_text(Time time);
-// That again, also with fewer decimals or none, and without the Z; none for what is no such time.
+// The reverse, also with fewer decimals or none, and without the Z. Empty if the text is not a
+// time.
 std::optional<Time> read_record_time(std::string_view text);
 
 }  // namespace r4

@@ -16,13 +16,13 @@
 namespace r4 {
 namespace {
 
-// What a crash may cost, with the time that the disk takes, is less than a second.
+// A crash loses less than a second: the records of this time, and of the time that the disk takes.
 constexpr std::chrono::milliseconds interval{250};
-// A wall clock that was set by less is only told of when more has come together.
+// The smallest change of the wall clock that is recorded; smaller ones are added up.
 constexpr Time clock_step{std::chrono::milliseconds{100}};
 
-// A signal is for the program's own threads. SIGXFSZ, of a file that reaches the limit of its size, comes to the
-// thread that writes, and would end the program.
+// Blocks all signals in this thread: they are for the program's own threads. SIGXFSZ, of a file
+// that reaches the limit of its size, comes to the thread that writes, and would end the program.
 class NoSignals {
  public:
   NoSignals() {
@@ -71,7 +71,7 @@ std::uint16_t Recorder::add_path(std::string url) {
   const std::lock_guard lock(mutex_);
   const auto number = static_cast<std::uint16_t>(paths_.size() + 1);
   paths_.push_back({number, std::move(url), {}});
-  undeclared_.push_back(number);
+  undeclared_.push_back(paths_.back());
   return number;
 }
 
@@ -80,7 +80,7 @@ void Recorder::name_path(std::uint16_t path, std::string name) {
   RecordedPath& known = paths_[path - 1U];
   if (known.name == name) return;
   known.name = std::move(name);
-  undeclared_.push_back(path);
+  undeclared_.push_back(known);
 }
 
 void Recorder::add_device(RecordedDevice device) {
@@ -127,14 +127,6 @@ std::optional<Problem> Recorder::news(unsigned& known) const {
   known = news_count_;
   return news_;
 }
-std::uint64_t Recorder::records() const {
-  const std::lock_guard lock(mutex_);
-  return records_;
-}
-std::uint64_t Recorder::dropped() const {
-  const std::lock_guard lock(mutex_);
-  return dropped_;
-}
 
 // --- the writer's thread
 
@@ -150,38 +142,38 @@ void Recorder::run() {
                          [this] { return closing_ || waiting_.size() > capacity / 2; });
         last = closing_;
         batch_.swap(waiting_);
-        for (const std::uint16_t number : undeclared_) fresh.push_back(paths_[number - 1U]);
-        undeclared_.clear();
+        fresh.swap(undeclared_);
         devices.swap(undeclared_devices_);
       }
       for (const RecordedPath& path : fresh) writer_.declare(path);
       for (const RecordedDevice& device : devices) writer_.declare(device);
       written_until_ = last ? now() : now() - settled;
       write();
-      tell_of_what_was_dropped();
-      tell_of_the_clock();
+      record_dropped();
+      record_set_clock();
       writer_.flush();
-      tell_of_the_file();
+      record_new_file();
     }
     write_event("end");
     writer_.close();
-    tell_of_the_file();
+    record_new_file();
   } catch (const Error& error) {
-    tell_of_trouble(error.problem(), true);
+    report(error.problem(), true);
   } catch (const std::exception& error) {
-    tell_of_trouble({ErrorKind::open, writer_.path(), error.what(), "record again"}, true);
+    report({ErrorKind::open, writer_.path(), error.what(), "record again"}, true);
   }
   ended_ = true;
 }
 
-void Recorder::tell_of_trouble(const Problem& trouble, bool is_problem) {
+void Recorder::report(const Problem& trouble, bool is_problem) {
   const std::lock_guard lock(mutex_);
   if (is_problem) problem_ = trouble;
   news_ = trouble;
   ++news_count_;
 }
 
-// Writes what is of times up to written_until_; the rest waits for what may be told of earlier times.
+// Writes the records of times up to written_until_. The others wait, because records of earlier
+// times may still come.
 void Recorder::write() {
   order_.clear();
   put_in_order(unsettled_);
@@ -213,26 +205,26 @@ void Recorder::write_event(const std::string& text) {
   writer_.append({written_until_, no_path, RecordKind::event, text});
 }
 
-void Recorder::tell_of_what_was_dropped() {
+void Recorder::record_dropped() {
   const std::uint64_t all = dropped();
-  if (all == dropped_told_) return;
-  write_event(fmt::format("dropped {}", all - dropped_told_));
-  dropped_told_ = all;
+  if (all == recorded_dropped_) return;
+  write_event(fmt::format("dropped {}", all - recorded_dropped_));
+  recorded_dropped_ = all;
 }
 
-// A file that was only moved is no problem: nothing of it is lost.
-void Recorder::tell_of_the_file() {
+// A moved file is no problem(): nothing of it is lost.
+void Recorder::record_new_file() {
   const std::optional<Problem> trouble = writer_.take_trouble();
   if (!trouble) return;
   write_event("warning " + trouble->text());
-  tell_of_trouble(*trouble, trouble->kind == ErrorKind::data);
+  report(*trouble, trouble->kind == ErrorKind::data);
 }
 
-void Recorder::tell_of_the_clock() {
+void Recorder::record_set_clock() {
   const Time set = wall_clock() - now();
-  if (std::chrono::abs(set - clock_told_) < clock_step) return;
+  if (std::chrono::abs(set - recorded_clock_) < clock_step) return;
   write_event(fmt::format("clock {:+} us", set.count()));
-  clock_told_ = set;
+  recorded_clock_ = set;
 }
 
 }  // namespace r4

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is behind a Recording: boards put records in, from any thread and without waiting; a thread of its own writes
-// them.
+// The implementation of a Recording. Boards add records from any thread and without waiting; a
+// thread of the recorder writes them.
 //
 //     record() -- 4 MiB at most --> the writer's thread --> RecordingWriter --> the disk
 //
-// The two meet for as long as it takes to copy a datagram. Times are those of the steady clock, from the wall clock
-// at the beginning: whoever sets the wall clock moves no record, and is told of in the recording.
+// The threads share a lock for as long as it takes to copy a datagram. Times are those of the
+// steady clock, which starts at the wall clock's time. So no record moves when the wall clock is
+// set; the recording has an event about that.
 #pragma once
 
 #include <atomic>
@@ -35,36 +36,38 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  // The number of a new path.
+  // Returns the number of the new path.
   std::uint16_t add_path(std::string url);
-  // What the board there calls itself.
+  // The name of the board of that path.
   void name_path(std::uint16_t path, std::string name);
-  // What the bytes of one of its devices mean.
+  // A described device of the board of a path.
   void add_device(RecordedDevice device);
-  // Copies it. Allocates nothing; beyond max_record_bytes it is cut. `at`: when it was, by the steady clock; records
-  // are written in the order of their times if none is told of more than `settled` later.
+  // Copies `bytes`, at most max_record_bytes. Allocates nothing. `at`: the record's time by the
+  // steady clock. Records are written in the order of their times if each comes at most `settled`
+  // after its time.
   void record(std::uint16_t path, RecordKind kind, std::string_view bytes, Time at);
   void record(std::uint16_t path, RecordKind kind, std::string_view bytes) {
     record(path, kind, bytes, steady_now());
   }
 
-  // Writes what waits and ends the file.
+  // Writes all waiting records and ends the file.
   void close();
 
-  // It records nothing any more. No lock: for every datagram.
+  // True if it records no longer. Takes no lock, because it is asked for every datagram.
   bool ended() const { return ended_.load(std::memory_order_acquire); }
   std::optional<Problem> problem() const;
-  // What has happened to it: it was begun anew, or has ended by itself. `known`: how much of that is known already.
+  // Reports that the file was begun anew, or that the recording has ended by itself. `known`: the
+  // count of news that the caller knows already; it is updated.
   std::optional<Problem> news(unsigned& known) const;
   unsigned news_count() const { return news_count_.load(std::memory_order_acquire); }
-  std::uint64_t records() const;
-  std::uint64_t dropped() const;
+  std::uint64_t records() const { return records_; }
+  std::uint64_t dropped() const { return dropped_; }
 
   static constexpr std::size_t capacity = 4 << 20;
   static constexpr std::chrono::milliseconds settled{50};
 
  private:
-  // Before each record's bytes in the buffer.
+  // Stands before each record's bytes in the buffer.
   struct Head {
     Time time;
     std::uint32_t size;
@@ -84,32 +87,31 @@ class Recorder {
   void write();
   void put_in_order(const std::vector<char>& records);
   void write_event(const std::string& text);
-  void tell_of_the_clock();
-  void tell_of_what_was_dropped();
-  void tell_of_the_file();
-  void tell_of_trouble(const Problem& trouble, bool is_problem);
+  void record_set_clock();
+  void record_dropped();
+  void record_new_file();
+  void report(const Problem& trouble, bool is_problem);
 
   // Of the writer's thread.
   RecordingWriter writer_;
   std::vector<char> batch_;
-  std::vector<char> unsettled_;  // records that came so late that earlier ones may follow
+  std::vector<char> unsettled_;  // records so new that earlier ones may follow
   std::vector<Place> order_;
   Time written_until_{0};
-  Time clock_told_{0};  // by how much the wall clock was set, as the recording has it
-  std::uint64_t dropped_told_ = 0;
+  Time recorded_clock_{0};  // by how much the wall clock was set, as the recording has it
+  std::uint64_t recorded_dropped_ = 0;
   const Time began_;  // by the wall clock
   const Time began_steady_ = steady_now();
 
   std::atomic<bool> ended_{false};
   std::atomic<unsigned> news_count_{0};
-  mutable std::mutex mutex_;  // of what follows
+  std::atomic<std::uint64_t> records_{0}, dropped_{0};
+  mutable std::mutex mutex_;  // of the members below, to joining_
   std::condition_variable wanted_;
   std::vector<char> waiting_;
   std::vector<RecordedPath> paths_;
-  std::vector<std::uint16_t> undeclared_;
+  std::vector<RecordedPath> undeclared_;
   std::vector<RecordedDevice> undeclared_devices_;
-  std::uint64_t records_ = 0;
-  std::uint64_t dropped_ = 0;
   bool closing_ = false;
   std::optional<Problem> problem_;
   std::optional<Problem> news_;  // the newest

@@ -24,7 +24,7 @@ std::uint64_t Recording::dropped() const { return recorder_->dropped(); }
 
 namespace {
 
-// Hands a recording to its visitor.
+// Gives a recording to a visitor.
 class Tour final : public RecordingReader::Handler {
  public:
   explicit Tour(RecordingVisitor& visitor) : visitor_(visitor) {}

@@ -18,14 +18,12 @@
 namespace r4 {
 namespace {
 
-bool is_full(int error) { return error == ENOSPC || error == EDQUOT || error == EFBIG; }
-
 Error cannot_be_written(const std::string& path, int error) {
   if (error == EACCES || error == EPERM || error == EROFS) {
     return {ErrorKind::permission, path, std::strerror(error),
             "record into a directory that you may write to"};
   }
-  if (is_full(error)) {
+  if (error == ENOSPC || error == EDQUOT || error == EFBIG) {
     return {ErrorKind::open, path, std::string("the recording has ended: ") + std::strerror(error),
             "make room there, and bound what is kept: r4 record --keep 10G"};
   }
@@ -38,7 +36,8 @@ Error cannot_be_read(const std::string& path, int error) {
           denied ? "allow reading it: chmod +r" : "name a recording, or - for standard input"};
 }
 
-// False if another program has the file. A file system that has no locks, such as some of networks, grants any.
+// False if another program has locked the file. A file system without locks, such as some network
+// file systems, always grants the lock.
 bool lock_alone(int file) {
   while (::flock(file, LOCK_EX | LOCK_NB) != 0) {
     if (errno != EINTR) return errno != EWOULDBLOCK;
@@ -50,7 +49,7 @@ bool lock_alone(int file) {
 
 RecordingFile::RecordingFile(std::string path) : path_(std::move(path)) {
   struct stat status {};
-  // A device is not even opened: behind a terminal there may be a board.
+  // A device is not even opened: a terminal may lead to a board.
   if (::stat(path_.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
     throw Error(ErrorKind::open, path_, S_ISDIR(status.st_mode) ? "is a directory" : "is no file",
                 "name a file that can be written");
@@ -89,7 +88,7 @@ void RecordingFile::append(std::string_view bytes) {
       bytes.remove_prefix(static_cast<std::size_t>(n));
     } else if (errno != EINTR) {
       const int error = errno;
-      // Half a line is of no use. If it cannot be removed, a reader skips it.
+      // Half a line is useless. If it cannot be removed, a reader skips it.
       [[maybe_unused]] const int removed = ::ftruncate(file_.get(), static_cast<off_t>(size_));
       throw cannot_be_written(path_, error);
     }
@@ -101,7 +100,7 @@ void RecordingFile::append(std::string_view bytes) {
 RecordingFile::Fate RecordingFile::fate() const {
   struct stat mine {};
   struct stat there {};
-  if (::fstat(file_.get(), &mine) != 0) return Fate::here;  // append() reports what is wrong
+  if (::fstat(file_.get(), &mine) != 0) return Fate::here;  // append() reports the error
   if (mine.st_nlink == 0) return Fate::removed;
   if (static_cast<std::uint64_t>(mine.st_size) < size_) return Fate::truncated;
   const bool same = ::stat(path_.c_str(), &there) == 0 && there.st_dev == mine.st_dev &&

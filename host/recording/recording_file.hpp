@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The files of recordings, written and read. They block while the disk is slow.
+// Writes and reads the files of recordings. The calls block while the disk is slow.
 #pragma once
 
 #include <array>
@@ -11,24 +11,25 @@
 
 namespace r4 {
 
-// A file that a recording goes into.
+// The file that a recording is written to.
 class RecordingFile {
  public:
-  // What others have done to the file since it was opened.
+  // What another program has done to the file since it was opened.
   enum class Fate : std::uint8_t { here, moved, removed, truncated };
 
-  // Opens it, or makes it; a recording that is there goes on at its end. Nobody else records into it meanwhile.
-  // Throws Error for what cannot be written, and for a file that holds something else.
+  // Opens or creates the file; an existing recording is continued at its end. No other program can
+  // record into it until this object is destroyed. Throws Error for a file that cannot be written,
+  // or that holds something else.
   explicit RecordingFile(std::string path);
 
-  // Writes all of it and hands it to the disk. Throws Error; then the file is as it was before.
+  // Writes all bytes to the disk. If it throws Error, the file is as it was before.
   void append(std::string_view bytes);
 
-  // moved: another file, or none, has its path.
+  // moved: its path leads to another file, or to none.
   Fate fate() const;
 
   std::uint64_t size() const { return size_; }
-  // Its last line has no end.
+  // True if its last line had no end when it was opened.
   bool torn() const { return torn_; }
 
  private:
@@ -40,12 +41,12 @@ class RecordingFile {
   bool torn_ = false;
 };
 
-// A file that a recording is read from.
+// The file that a recording is read from.
 class RecordingInput {
  public:
   // "-" is the standard input. Throws Error.
   explicit RecordingInput(const std::string& path);
-  // What comes next; empty at the end. Valid until the next call. Throws Error.
+  // The next bytes; empty at the end. Valid until the next call. Throws Error.
   std::string_view read();
   const std::string& name() const { return name_; }
 

@@ -16,9 +16,9 @@ namespace r4 {
 namespace {
 
 constexpr std::uint64_t least_kept = 1 << 20;
-constexpr std::uint64_t least_parts = 4;  // of what is kept
+constexpr std::uint64_t least_parts = 4;  // files within keep_bytes
 
-// Where the number goes in: before the endings that say what the file is.
+// Where the number is inserted: before the endings that name the form of the file.
 std::size_t ending_of(std::string_view path) {
   for (const std::string_view ending : {".r4log.zst", ".r4log", ".zst"}) {
     if (path.ends_with(ending)) return path.size() - ending.size();
@@ -51,7 +51,6 @@ void require_limits(const RecordingOptions& options) {
 
 }  // namespace
 
-// The path is made absolute: it leads to the same file if the program changes its working directory.
 RecordingParts::RecordingParts(const std::string& path, RecordingOptions options)
     : stem_(std::filesystem::absolute(path.substr(0, ending_of(path)))),
       ending_(path.substr(ending_of(path))),
@@ -61,34 +60,29 @@ RecordingParts::RecordingParts(const std::string& path, RecordingOptions options
   require_limits(options);
 }
 
-std::string RecordingParts::path_of(std::uint64_t number) const {
-  return fmt::format("{}-{:05}{}", stem_, number, ending_);
-}
-
 std::string RecordingParts::next() {
   if (!has_limits(options_)) return stem_ + ending_;
   if (number_ == 0) {
     const std::vector<Part> parts = found();
     if (!parts.empty()) number_ = parts.back().number;
   }
-  return path_of(++number_);
+  return fmt::format("{}-{:05}{}", stem_, ++number_, ending_);
 }
 
 std::vector<RecordingParts::Part> RecordingParts::found() const {
   namespace fs = std::filesystem;
   std::vector<Part> parts;
-  std::error_code error;  // what cannot be listed holds none; opening a file there tells why
+  // A folder that cannot be listed has no files. Opening a file there reports why.
+  std::error_code error;
   const fs::path stem(stem_);
   const std::string prefix = stem.filename().string() + "-";
-  const fs::path folder = stem.has_parent_path() ? stem.parent_path() : fs::path(".");
-  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+  const std::size_t around = prefix.size() + ending_.size();
+  for (fs::directory_iterator at(stem.parent_path(), error), end; !error && at != end;
+       at.increment(error)) {
     const std::string name = at->path().filename().string();
-    if (!name.starts_with(prefix) || !name.ends_with(ending_)) continue;
-    if (name.size() <= prefix.size() + ending_.size()) continue;
-    const std::string digits =
-        name.substr(prefix.size(), name.size() - prefix.size() - ending_.size());
+    if (!name.starts_with(prefix) || !name.ends_with(ending_) || name.size() < around + 5) continue;
     std::uint64_t number = 0;
-    if (digits.size() < 5 || !parse_number(Text(digits), number)) continue;
+    if (!parse_number(Text(name).substr(prefix.size(), name.size() - around), number)) continue;
     std::error_code gone;
     const std::uintmax_t size =
         fs::is_regular_file(at->path(), gone) ? fs::file_size(at->path(), gone) : 0;
@@ -102,7 +96,7 @@ std::vector<RecordingParts::Part> RecordingParts::found() const {
 void RecordingParts::make_room() {
   if (options_.keep_bytes == 0) return;
   const std::vector<Part> parts = found();
-  std::uint64_t sum = most_bytes_;  // of the one that comes
+  std::uint64_t sum = most_bytes_;  // the next file's
   for (const Part& part : parts) sum += part.size;
   for (const Part& part : parts) {
     if (sum <= options_.keep_bytes) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The files of a recording that has limits: drive-00001.r4log, drive-00002.r4log …
+// The files of a recording with limits: drive-00001.r4log, drive-00002.r4log …
 #pragma once
 
 #include <cstdint>
@@ -12,15 +12,16 @@ namespace r4 {
 
 class RecordingParts {
  public:
-  // Throws Error{usage} for limits that cannot be kept.
+  // Throws Error{usage} for limits that cannot be kept. The path is made absolute, so that it leads
+  // to the same file when the program changes its working directory.
   RecordingParts(const std::string& path, RecordingOptions options);
 
-  // The path of the next file: `path` itself, where there are no limits.
+  // The path of the next file: `path` itself if there are no limits.
   std::string next();
-  // Removes the oldest until there is room for another one. Throws Error.
+  // Removes the oldest files until there is room for another one. Throws Error.
   void make_room();
 
-  // As asked for, or, where only keep_bytes was, chosen; 0: none.
+  // The limit of one file: as given, or chosen if only keep_bytes is given; 0: none.
   std::uint64_t most_bytes() const { return most_bytes_; }
 
  private:
@@ -30,7 +31,6 @@ class RecordingParts {
     std::string path;
   };
   std::vector<Part> found() const;  // oldest first
-  std::string path_of(std::uint64_t number) const;
 
   std::string stem_, ending_;  // of the path
   RecordingOptions options_;

@@ -11,7 +11,8 @@ namespace {
 
 constexpr std::size_t magic_size = 4;  // of zstd
 
-// Appends the front of `bytes` to what is known of a beginning, until that is `wanted` bytes long. True if it is.
+// Moves bytes from the front of `bytes` to `beginning`, until that is `wanted` bytes long. True if
+// it is.
 bool complete(std::string& beginning, std::string_view& bytes, std::size_t wanted) {
   const std::size_t taken = std::min(bytes.size(), wanted - beginning.size());
   beginning += bytes.substr(0, taken);
@@ -24,7 +25,7 @@ bool complete(std::string& beginning, std::string_view& bytes, std::size_t wante
 // --- lines
 
 const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream) {
-  // What is not printable is written as \xNN, so this is a part of the line's end.
+  // In a record CR is written as \xNN, so this CR belongs to the line's end.
   while (line.ends_with('\r')) line.remove_suffix(1);
   if (line.empty()) return nullptr;
   // Another format may carry any bytes as a line.
@@ -33,7 +34,7 @@ const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream)
     on_damage();
     return one ? read_.problem : "it has the end of a line in it";
   }
-  if (line == damage_line) damage_ = Damage::told;
+  if (line == damage_line) damage_ = Damage::reported;
   const bool header = read_.kind == LineKind::header;
   if (header ? after_header_ : stream_.value_or(stream) != stream) on_sign_of_mixture();
   after_header_ = header;
@@ -43,7 +44,7 @@ const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream)
       break;
     case LineKind::record:
       recognised_ = true;
-      tell(read_.record);
+      give(read_.record);
       return nullptr;
     case LineKind::header:
       if (read_.version != record_version) {
@@ -79,10 +80,10 @@ void RecordingLines::on_record(const Record& record, std::uint32_t stream, std::
   if (path.stream.value_or(stream) != stream) on_sign_of_mixture();
   if (!path.url.empty() && !url.empty() && path.url != url) on_sign_of_mixture();
   path.stream = stream;
-  tell(record);
+  give(record);
 }
 
-void RecordingLines::tell(const Record& record) {
+void RecordingLines::give(const Record& record) {
   if (ended_) on_sign_of_mixture();
   after_header_ = false;
   ended_ = record.path == no_path && record.kind == RecordKind::event && record.bytes == "end";
@@ -96,7 +97,7 @@ void RecordingLines::on_sign_of_mixture() {
                 "read each recording alone, or join them one after the other: cat A.r4log B.r4log");
   }
   if (damage_ == Damage::here) handler_.on_comment(damage_line);
-  damage_ = Damage::told;
+  damage_ = Damage::reported;
 }
 
 // --- a file
@@ -107,9 +108,8 @@ RecordingReader::RecordingReader(Handler& handler, std::string name)
 }
 
 void RecordingReader::feed(std::string_view bytes) {
-  if (!begun_) {
+  if (beginning_.size() < magic_size) {
     if (!complete(beginning_, bytes, magic_size)) return;
-    begun_ = true;
     if (is_zstd(beginning_)) zstd_ = std::make_unique<ZstdReader>();
     feed(beginning_);
   }
@@ -121,7 +121,7 @@ void RecordingReader::on_compressed(std::string_view bytes) {
     const std::size_t before = bytes.size();
     const ZstdReader::Step step = zstd_->step(bytes);
     if (step == ZstdReader::Step::damaged) {
-      // What comes next is not the rest of the line that was begun.
+      // The next text is not the rest of this line.
       if (part_size_ != 0) end_line({});
       if (zstd_->window_too_large() && !lines_.recognised()) {
         throw Error(ErrorKind::data, name_, ZstdReader::window_problem,
@@ -137,11 +137,10 @@ void RecordingReader::on_compressed(std::string_view bytes) {
   if (!lines_.recognised() && taken_ > patience) fail_as_none();
 }
 
-// The text from its beginning, which may be something else.
+// The text from its beginning, which shows whether it may be a recording.
 void RecordingReader::on_text(std::string_view text) {
-  if (!text_begun_) {
+  if (text_beginning_.size() < form_bytes) {
     if (!complete(text_beginning_, text, form_bytes)) return;
-    text_begun_ = true;
     if (form_of(text_beginning_) != FileForm::text) fail_as_none();
     std::string_view beginning = text_beginning_;
     if (beginning.starts_with(utf8_mark)) {
@@ -169,7 +168,7 @@ void RecordingReader::on_lines(std::string_view text) {
   }
 }
 
-// Ends the line whose last bytes these are.
+// Ends a line with its last bytes.
 void RecordingReader::end_line(std::string_view rest) {
   const std::uint64_t size = part_size_ + rest.size();
   const bool cr = rest.empty() ? part_.ends_with('\r') : rest.ends_with('\r');
@@ -187,14 +186,8 @@ void RecordingReader::end_line(std::string_view rest) {
 }
 
 void RecordingReader::finish() {
-  if (!begun_) {
-    begun_ = true;
-    on_text(beginning_);
-  }
-  if (!text_begun_) {
-    text_begun_ = true;
-    on_lines(text_beginning_);
-  }
+  if (beginning_.size() < magic_size) on_text(beginning_);
+  if (text_beginning_.size() < form_bytes) on_lines(text_beginning_);
   const bool recognised = lines_.recognised();
   if (part_size_ != 0) {
     damage(RecordingDamage::Kind::torn, "the last line is not whole");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a board's link is tapped for a recording: between the transport and the session, so that what comes is
-// recorded before anybody judges it.
+// Taps a board's link for a recording: between the transport and the session, so that every
+// datagram is recorded before it is judged.
 #pragma once
 
 #include <memory>
@@ -16,18 +16,19 @@ namespace r4 {
 
 class RecordingTap {
  public:
-  // From now on into that recording, instead of another one. `url`: how the board is reached.
+  // Records into that recording from now on, and no longer into another. `url`: how the board is
+  // reached.
   void attach(std::shared_ptr<Recorder> recorder, const std::string& url);
   void detach() { recorder_.reset(); }
   bool attached() const { return recorder_ != nullptr; }
-  // Why the recording has ended, or was begun anew; each is told once. A recording that has ended is let go.
+  // Why the recording has ended, or was begun anew; once for each. Detaches an ended recording.
   std::optional<Problem> take_news();
 
-  // `at`: when it came, by the steady clock.
+  // `at`: when the datagram came, by the steady clock.
   void on_received(std::string_view bytes, Time at) {
     if (recorder_) recorder_->record(path_, RecordKind::from_board, bytes, at);
   }
-  // By whoever: this program, or another one on the same path.
+  // Sent by this program, or by another one on the same path.
   void on_sent(std::string_view bytes) { record(RecordKind::to_board, bytes); }
   void on_oversize(std::string_view beginning);
   void on_carrier_event(const CarrierEvent& event);

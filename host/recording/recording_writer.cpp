@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "recording_writer.hpp"
 
-#include <algorithm>
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "record_line.hpp"
@@ -9,9 +10,9 @@
 namespace r4 {
 namespace {
 
-// So much text waits at most.
+// The most text that waits to be written.
 constexpr std::size_t most_text = 65536;
-// A frame is lost as a whole where its beginning is damaged.
+// The text of one frame, all of which is lost if the beginning of the frame is damaged.
 constexpr std::size_t frame_text = 1 << 20;
 
 }  // namespace
@@ -30,22 +31,15 @@ void RecordingWriter::begin_file() {
   if (path_.ends_with(".zst")) zstd_.emplace();
   frame_ = 0;
   begun_.reset();
-  // Whoever wrote the last line was ended in the midst of it; it stays a line of its own.
+  // The program that wrote the last line was ended meanwhile; the line stays a line of its own.
   if (file_->torn()) text_ += '\n';
   write_record_header(text_);
-  for (const RecordedPath& path : paths_) write_path(text_, path);
+  for (const auto& [number, path] : paths_) write_path(text_, path);
   for (const RecordedDevice& device : devices_) write_device(text_, device);
 }
 
 void RecordingWriter::declare(const RecordedPath& path) {
-  const auto known = std::find_if(paths_.begin(), paths_.end(), [&](const RecordedPath& each) {
-    return each.number == path.number;
-  });
-  if (known == paths_.end()) {
-    paths_.push_back(path);
-  } else {
-    *known = path;
-  }
+  paths_[path.number] = path;
   write_path(text_, path);
 }
 
@@ -87,19 +81,17 @@ void RecordingWriter::close() {
   write_out(true);
 }
 
-// Who moves it (logrotate) has all of it; what was removed or truncated is lost.
+// A file that was moved (logrotate) is completed; a file that was removed or truncated is lost.
 void RecordingWriter::look_after_file() {
   using Fate = RecordingFile::Fate;
   const Fate fate = file_->fate();
   if (fate == Fate::here) return;
   const bool moved = fate == Fate::moved;
   if (moved) write_out(true);
+  const char* const what = moved ? "moved" : fate == Fate::removed ? "removed" : "truncated";
   trouble_ = {moved ? ErrorKind::open : ErrorKind::data, path_,
-              std::string(moved                   ? "was moved"
-                          : fate == Fate::removed ? "was removed"
-                                                  : "was truncated") +
-                  " while it was recorded, and is begun anew" +
-                  (moved ? "" : "; what was recorded before is lost"),
+              fmt::format("was {} while it was recorded, and is begun anew{}", what,
+                          moved ? "" : "; what was recorded before is lost"),
               "let r4 record begin new files and remove old ones: --rotate, --keep"};
   const std::string waiting = std::exchange(text_, {});
   begin_file();

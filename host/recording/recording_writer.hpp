@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Turns records into files: compressed where their name says so, one after the other where there are limits. Blocks
-// while the disk is slow. Knows no clock: time is that of the records.
+// Writes records to files: compressed if their name ends in .zst, and one after the other if there
+// are limits. Blocks while the disk is slow. Has no clock: time is that of the records.
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -24,20 +25,20 @@ class RecordingWriter {
   // Opens the file. Throws Error.
   RecordingWriter(const std::string& path, const RecordingOptions& options);
 
-  // A path, before its first record, or with more that is known of it. Throws as append() does.
+  // A path, before its first record, and again when its name is known.
   void declare(const RecordedPath& path);
-  // A device: in this file, and in those that follow; instead of another at that place of that path.
+  // A device: in this file and in later ones. It replaces the device at that place of that path.
   void declare(const RecordedDevice& device);
-  // Without the secrets in it. Each may write, and throws Error when that cannot be done.
+  // Appends a record without the secrets in it. Throws Error if the file cannot be written.
   void append(const Record& record);
-  // What was appended is on the disk when this returns. Throws Error. If others have moved, removed or truncated the
-  // file, it is begun anew first.
+  // Writes everything that was appended to the disk. Throws Error. If another program has moved,
+  // removed or truncated the file, it is begun anew first.
   void flush();
-  // The same, and ends what is compressed.
+  // The same, and ends the compressed frame.
   void close();
 
   const std::string& path() const { return path_; }
-  // That the file was begun anew since the last call, and why. Kind `data`: what was in it is lost.
+  // Why the file was begun anew since the last call, if it was. Kind `data`: its content is lost.
   std::optional<Problem> take_trouble() { return std::exchange(trouble_, std::nullopt); }
 
  private:
@@ -52,13 +53,13 @@ class RecordingWriter {
   std::optional<RecordingFile> file_;
   std::optional<Problem> trouble_;
   std::optional<ZstdWriter> zstd_;
-  std::vector<RecordedPath> paths_;
+  std::map<std::uint16_t, RecordedPath> paths_;
   std::vector<RecordedDevice> devices_;
-  RecordRoom room_;            // used again and again
+  RecordRoom room_;            // a member to save allocations
   std::string text_;           // not written yet
-  std::string compressed_;     // used again and again
+  std::string compressed_;     // a member to save allocations
   std::size_t frame_ = 0;      // text in the frame so far
-  std::optional<Time> begun_;  // the first record of this file
+  std::optional<Time> begun_;  // the time of the first record of this file
 };
 
 }  // namespace r4

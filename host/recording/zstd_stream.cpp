@@ -11,19 +11,19 @@ namespace {
 
 // The first bytes of a frame (RFC 8878, 3.1.1).
 constexpr std::string_view magic = "\x28\xb5\x2f\xfd";
-// The last three bytes of the magic number of a skippable frame, whose first byte is 0x50 to 0x5F (RFC 8878, 3.1.2).
-// pzstd and seekable archives begin with one.
+// The last three bytes of the magic number of a skippable frame, whose first byte is 0x50 to 0x5F
+// (RFC 8878, 3.1.2). Files of pzstd and seekable archives begin with one.
 constexpr std::string_view skippable = "\x2a\x4d\x18";
-// The largest window that is read: 128 MiB, as `zstd -d` reads without an option. zstd --long and --ultra ask for it.
-// Memory is taken only for what the frame holds.
+// The largest window that is read: 128 MiB, as `zstd -d` reads without an option. zstd --long and
+// --ultra ask for it. A small frame takes less memory.
 constexpr int window_log = 27;
 constexpr int level = 3;
-// The frames that are written here; a longer window gains nothing.
+// The window of the frames that are written here; a longer window gains nothing.
 constexpr int frame_window_log = 20;
-// So much is read at once: what it holds before damage may be lost with it.
+// The bytes that are read at once: undamaged bytes of a slice may be lost with damaged ones.
 constexpr std::size_t slice = 512;
 
-// Up to where another frame may begin: where the one before has no end, all of that is read. At least a byte.
+// The bytes before a possible next frame, at least one: if a frame has no end, all of it is read.
 std::string_view until_a_frame(std::string_view bytes) {
   std::size_t size = std::min(bytes.size(), bytes.find(magic, 1));
   for (std::size_t left = 1; left < magic.size() && size == bytes.size() && left < size; ++left) {
@@ -51,7 +51,7 @@ void ZstdWriter::write(std::string_view bytes, bool end_frame, std::string& out)
     ZSTD_outBuffer output{out.data() + before, out.size() - before, 0};
     left = ZSTD_compressStream2(context_.get(), &output, &input, how);
     out.resize(before + output.pos);
-    // Of these calls none can fail but for want of memory.
+    // These calls fail only if there is no memory.
     if (ZSTD_isError(left) != 0) throw std::bad_alloc();
   } while (left != 0);
 }
@@ -89,32 +89,24 @@ ZstdReader::Step ZstdReader::step(std::string_view& bytes) {
   return Step::text;
 }
 
-// The next frame may begin in what was taken already, where the one before it has no end.
+// If the frame has no end, the next one may begin in bytes that were taken already.
 void ZstdReader::search(std::string_view& bytes, bool from_found) {
   ZSTD_DCtx_reset(context_.get(), ZSTD_reset_session_only);
   searching_ = true;
-  tail_.clear();
-  if (from_found) {
-    found_.clear();
-  } else if (in_frame_) {
-    tail_ = last_;
-    while (!magic.starts_with(tail_)) tail_.erase(0, 1);
-  } else {
-    bytes.remove_prefix(1);  // not the beginning again that is damaged
-  }
+  found_ = !from_found && in_frame_ ? last_ : "";
+  while (!magic.starts_with(found_)) found_.erase(0, 1);
+  if (!from_found && !in_frame_) bytes.remove_prefix(1);  // not the same damaged beginning again
   in_frame_ = false;
   last_.clear();
 }
 
-// Takes what is before the next frame, and its first bytes.
+// Takes the bytes before the next frame, and its first bytes. False if there is no frame yet.
 bool ZstdReader::find_frame(std::string_view& bytes) {
   while (!bytes.empty()) {
-    tail_ += bytes.front();
+    found_ += bytes.front();
     bytes.remove_prefix(1);
-    while (!magic.starts_with(tail_)) tail_.erase(0, 1);
-    if (tail_.size() == magic.size()) {
-      found_.swap(tail_);
-      tail_.clear();
+    while (!magic.starts_with(found_)) found_.erase(0, 1);
+    if (found_.size() == magic.size()) {
       searching_ = false;
       return true;
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The two directions of zstd, in pieces and in bounded memory.
+// Compresses and decompresses zstd, in pieces and in bounded memory.
 #pragma once
 
 #include <zstd.h>
@@ -14,8 +14,8 @@ namespace r4 {
 class ZstdWriter {
  public:
   ZstdWriter();
-  // Appends to `out` what a reader needs to have all of `bytes`; ends the frame where that is wanted, so
-  // that what comes next can be read without what was before.
+  // Appends to `out` everything that a reader needs to read all of `bytes`. `end_frame` ends the
+  // frame, so that later bytes can be read without the earlier ones.
   void write(std::string_view bytes, bool end_frame, std::string& out);
 
  private:
@@ -25,7 +25,7 @@ class ZstdWriter {
   std::unique_ptr<ZSTD_CCtx, Free> context_;
 };
 
-// Frames one after the other. Behind damage it goes on with the next frame that there is.
+// Reads frames one after the other. After damage it goes on with the next frame.
 class ZstdReader {
  public:
   static constexpr const char* window_problem =
@@ -34,17 +34,18 @@ class ZstdReader {
   ZstdReader();
   enum class Step : unsigned char {
     more,     // all of the input is taken
-    text,     // some of it, and text() is there; call again
-    damaged,  // what was read here is damaged: it looks for the next frame; call again
+    text,     // some of the input is taken, and there is text(); call again
+    damaged,  // the input is damaged here; the next frame is searched for; call again
   };
   // Takes from the front of `bytes`.
   Step step(std::string_view& bytes);
   std::string_view text() const { return {output_.data(), size_}; }
   // Why step() returned damaged.
   const char* problem() const;
-  // True if that was a frame which needs more memory than is read: it is whole, and zstd --long=31 unpacks it.
+  // True if the frame is not damaged, but needs more memory than this reader takes. zstd --long=31
+  // unpacks it.
   bool window_too_large() const { return window_too_large_; }
-  // Between two frames: nothing of the last one is missing.
+  // True between two frames: the last one is complete.
   bool between_frames() const { return !in_frame_; }
 
  private:
@@ -60,12 +61,11 @@ class ZstdReader {
   bool in_frame_ = false;
   bool window_too_large_ = false;
   bool searching_ = false;
-  std::string tail_;   // while it searches: the beginning of a frame, perhaps
   std::string last_;   // the last bytes that were taken
-  std::string found_;  // the beginning of the frame that was found
+  std::string found_;  // the beginning of the next frame, as far as it was found
 };
 
-// True if a file that begins so holds frames of zstd; four bytes tell.
+// True if a file with that beginning holds frames of zstd; four bytes suffice.
 bool is_zstd(std::string_view beginning);
 
 }  // namespace r4

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "replay_carrier.hpp"
 
-#include <asio/steady_timer.hpp>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -11,6 +10,7 @@
 #include <utility>
 
 #include "../../protocol/datagram/numbers.hpp"
+#include "../../transports/operation_slot.hpp"
 #include "r4link/datagram.hpp"
 #include "replay_records.hpp"
 
@@ -19,7 +19,7 @@ namespace {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 
-// Others use the loop, too: after so many records, or pieces of the file, it is their turn.
+// After so many records, or pieces of the file, other users of the loop have their turn.
 constexpr int steps_in_a_turn = 32;
 
 double speed_of(const Url& url) {
@@ -60,7 +60,7 @@ class ReplayCarrier final : public Carrier {
 
   void close() noexcept override {
     handler_ = nullptr;
-    alive_.reset();
+    playing_.cancel();
     timer_.cancel();
     up_ = false;
   }
@@ -86,12 +86,10 @@ class ReplayCarrier final : public Carrier {
 
   void wait() {
     timer_.expires_at(due());
-    timer_.async_wait([this, alive = std::weak_ptr<int>(alive_)](const std::error_code& error) {
-      if (!error && !alive.expired()) play();
-    });
+    timer_.async_wait(playing_.handler([this] { play(); }));
   }
 
-  // What is due, a turn's worth.
+  // Plays records that are due, for one turn of the loop.
   void play() {
     const SteadyTime now = std::chrono::steady_clock::now();
     for (int i = 0; i < steps_in_a_turn && handler_ != nullptr; ++i) {
@@ -108,7 +106,7 @@ class ReplayCarrier final : public Carrier {
     if (handler_ != nullptr) wait();
   }
 
-  // False at the end, which is told.
+  // False at the end, which it reports.
   bool continue_reading() {
     Problem end{ErrorKind::open, name_, "the recording has ended", "open it again"};
     try {
@@ -149,14 +147,14 @@ class ReplayCarrier final : public Carrier {
   const std::uint16_t path_;
   const double speed_;
   const ReplayStart start_;
-  asio::steady_timer timer_;
-  std::shared_ptr<int> alive_ = std::make_shared<int>(0);
+  LoopTimer timer_;
+  OperationSlot playing_;
   Carrier::Handler* handler_ = nullptr;
   bool up_ = false;
   CarrierCounters counters_;
 
   std::optional<ReplayRecords> records_;
-  Time first_{0};  // of what is played
+  Time first_{0};  // of the records that are played
   SteadyTime began_;
 };
 

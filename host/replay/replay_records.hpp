@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What one board of a recording said, and what happened to its transport: one after the other, as it is asked for.
+// The datagrams of one board of a recording, and the events of its transport, in their order.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,8 @@ struct ReplayStart {
   Time time{0};           // after its first record, or
   bool absolute = false;  // by the clock of the recording
 
-  // Seconds such as "12.5", or a time in UTC such as "2026-11-23T21:20:00". Throws Error{usage} about `thing`.
+  // Seconds such as "12.5", or a time in UTC such as "2026-11-23T21:20:00". Throws Error{usage}
+  // about `thing`.
   static ReplayStart of(const std::string& thing, const std::string& text);
 };
 
@@ -26,16 +27,17 @@ class ReplayRecords final : private RecordingReader::Handler {
   struct Item {
     Time time;  // as recorded
     RecordKind kind = RecordKind::event;
-    // A datagram of the board, or an event: "up …", "down …", "warning …", damage of the file among those.
+    // A datagram of the board, or an event: "up …", "down …", "warning …", also for damage of the
+    // file.
     std::string bytes;
   };
 
-  // What is read must not wait for anybody: only files are. Reads as far as the first of that path from `start` on.
-  // Throws Error, about `thing`.
+  // Takes only regular files, because reading must not wait. Reads to the first record of that path
+  // from `start` on. Throws Error about `thing`.
   ReplayRecords(const std::string& thing, const std::string& file, std::uint16_t path,
                 const ReplayStart& start);
 
-  // The next one, if the file has been read so far: then take() it.
+  // The next item, if the file has been read so far: then take() it.
   const Item* next() const { return waiting_.empty() ? nullptr : &waiting_.front(); }
   Item take();
   // Reads on, 16 KiB at most; false at the end of the file. Throws Error.
@@ -47,12 +49,12 @@ class ReplayRecords final : private RecordingReader::Handler {
   void on_damage(const RecordingDamage& damage) override;
 
   const std::uint16_t path_;
-  ReplayStart start_;  // absolute, once a record was read
+  ReplayStart start_;  // absolute after the first record
   RecordingInput input_;
   RecordingReader reader_;
   bool ended_ = false;
   std::optional<Time> passed_over_;  // the latest record of that path before the start
-  std::optional<Time> latest_;       // of what is there, as far as it was read
+  std::optional<Time> latest_;       // of the items so far
   std::deque<Item> waiting_;
 };
 

@@ -24,6 +24,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "../../protocol/link/host_link.hpp"
 #include "../../protocol/messages/message.hpp"
@@ -196,5 +197,24 @@ class Session {
   Posts posts_;
   LinkStatus status_;
 };
+
+// Posts a command, or a group. `send_all()` sends the effects' datagrams. To a board that knows no
+// groups the commands of a group go one after the other, up to the first that is not sent.
+template <class What, class SendAll>
+PostResult post_by(Session& session, const What& what, Time now, SendAll send_all) {
+  if constexpr (std::is_same_v<What, Setpoints>) {
+    if (session.posts_apart()) {
+      PostResult result = PostResult::sent;
+      for (std::size_t i = 0; i < what.size() && result; ++i) {
+        result = post_by(session, what[i], now, send_all);
+      }
+      return result;
+    }
+  }
+  const PostResult result = session.post(what, now);
+  if (!result) return result;
+  send_all();
+  return session.posted();
+}
 
 }  // namespace r4

@@ -184,13 +184,9 @@ def test_no_key_goes_through_a_bridge(tty, tmp_path):
 
 @pytest.mark.parametrize('hosts, to, code', [
     ('udp://127.0.0.1:2018', 'udp://127.0.0.1', 2),
-    ('udp://127.0.0.1:2100-2107', 'can://can0?node=0-6', 2),
-    ('udp://127.0.0.1:0', 'pty:', 2),
-    ('sim:', 'serial:auto', 2),
     ('udp://192.0.2.1:2018', 'udp://127.0.0.1:2019', 4),
-    ('udp://127.0.0.1:0', 'nothing', 2),
 ])
-def test_what_cannot_be_joined_is_one_clear_line(hosts, to, code):
+def test_two_sides_that_cannot_be_joined_are_one_clear_line(hosts, to, code):
     ended = run('bridge', hosts, to)
     assert ended.returncode == code and ended.stdout == ''
     assert ERROR.fullmatch(ended.stderr.rstrip('\n')), ended.stderr

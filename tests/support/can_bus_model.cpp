@@ -191,7 +191,6 @@ void CanBusModel::succeed() {
       ++traffic.frames;
       traffic.busy_ns += free_at_ns_ - begun_ns_;
       busy_ns_ += free_at_ns_ - begun_ns_;
-      traffic.latency_ns += latency_ns;
     }
     traffic.max_latency_ns = std::max(traffic.max_latency_ns, latency_ns);
     node.queue.erase(sent);

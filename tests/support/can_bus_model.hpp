@@ -60,8 +60,7 @@ struct CanIdTraffic {
   std::uint64_t frames = 0;          // that arrived
   std::uint64_t failed = 0;          // attempts that ended in an error frame
   std::uint64_t busy_ns = 0;         // of both
-  std::uint64_t latency_ns = 0;      // sum over the frames, from send() to the end of the frame
-  std::uint64_t max_latency_ns = 0;  //
+  std::uint64_t max_latency_ns = 0;  // from send() to the end of the frame
 };
 
 class CanBusModel {

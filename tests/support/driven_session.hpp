@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session whose effects are done at the end of each call, as an AsyncBoard does them: what it sends goes to
-// transmit(), then what it tells goes to the functions named after it.
+// A session whose effects are done at the end of each call, as an AsyncBoard does them: its
+// datagrams go to transmit(), then its events go to the functions named after them.
 #pragma once
 
 #include <optional>
@@ -37,7 +37,7 @@ class DrivenSession : public Session {
   explicit DrivenSession(Handler& handler, Arguments&&... arguments)
       : Session(std::forward<Arguments>(arguments)...), handler_(handler) {}
 
-  // When it is needed next.
+  // Returns when poll() is needed next.
   Time poll(Time now) {
     on_trouble(handler_.trouble());
     Session::poll(now);
@@ -61,18 +61,9 @@ class DrivenSession : public Session {
   Ticket send(const What& what, Time timeout, Time now) {
     return done(Session::send(what, timeout, now), now);
   }
-  PostResult post(const Command& command, Time now) {
-    PostResult result = done(Session::post(command, now), now);
-    return result ? posted() : result;
-  }
-  PostResult post(const Setpoints& group, Time now) {
-    if (!posts_apart()) {
-      PostResult result = done(Session::post(group, now), now);
-      return result ? posted() : result;
-    }
-    PostResult result = PostResult::sent;
-    for (std::size_t i = 0; i < group.size() && result; ++i) result = post(group[i], now);
-    return result;
+  template <class What>
+  PostResult post(const What& what, Time now) {
+    return done(post_by(*this, what, now, [&] { send_all(now); }), now);
   }
   Ticket arm(Time timeout, Time now) { return done(Session::arm(timeout, now), now); }
   Ticket stop(Time timeout, Time now) { return done(Session::stop(timeout, now), now); }
@@ -112,12 +103,15 @@ class DrivenSession : public Session {
     perform(now);
     return result;
   }
-  void perform(Time now) {
+  void send_all(Time now) {
     Effects::Room room;
     while (effects().any_sendings()) {
       const Sending sending = effects().take_sending(room);
       on_sent(sending, handler_.transmit(sending.path, sending.datagram, sending.priority), now);
     }
+  }
+  void perform(Time now) {
+    send_all(now);
     while (effects().any_events()) {
       std::visit([this](const auto& event) { notify(event); }, effects().take_event());
     }

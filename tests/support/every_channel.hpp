@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every channel of the board from end to end: a command at the host, the register and the pin in the
-// model, the state back at the host; and every input from its pin to the host. Whatever the transport.
+// Tests every channel of a board from end to end, over any transport: from a command at the host,
+// over the register and the pin in the model, to the state at the host; and every input from its
+// pin to the host.
 #pragma once
 
 #include <functional>
@@ -20,7 +21,7 @@ struct ControlledBoard {
   std::function<void(const std::function<void(sim::SimulatedBoard&)>&)> at_board;
 };
 
-// A board of a thread, and the host that has opened it.
+// For a board in a thread, and the host that has opened it.
 ControlledBoard controlled(BoardInAThread& simulated, Board& host);
 
 void expect_every_channel(const ControlledBoard& board);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A transport that holds the loop up when it is told to, as none of ours does.
+// A transport that blocks the loop on request, which no real transport does.
 #pragma once
 
 #include <condition_variable>
@@ -17,20 +17,20 @@ namespace r4::test {
 
 class Hold {
  public:
-  // A transport by that URL.
+  // A transport for that URL.
   CarrierMaker at(const std::string& url) {
     return [turn = turn_, url](Loop& loop) {
       return std::make_unique<Held>(standard_registry().make(context_of(loop), url, Role::host),
                                     turn);
     };
   }
-  // Holds the loop up when it sends next.
+  // Blocks the loop at its next send().
   void begin() { turn_->reach(Turn::Stage::wanted); }
   bool wait_until_held() { return turn_->wait_for(Turn::Stage::held); }
   void release() { turn_->reach(Turn::Stage::released); }
 
  private:
-  // It outlives both threads' use of it.
+  // Shared, so that it outlives its use by both threads.
   class Turn {
    public:
     enum class Stage : std::uint8_t { free, wanted, held, released };

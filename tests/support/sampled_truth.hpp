@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether states tell truly when they were sampled, over a real transport: the simulated board's clock is this
-// machine's, so that the truth is known to some microseconds.
+// Compares the reported sampling times of states with the true ones, over a real transport: the
+// simulated board's clock is this computer's, so the true time is known to some microseconds.
 #pragma once
 
 #include <cstddef>
@@ -11,15 +11,15 @@
 namespace r4::test {
 
 struct SampledTruth {
-  std::size_t states = 0;     // whose error was told
-  std::size_t dishonest = 0;  // of them those that were farther from the truth
-  ReceivedState::Clock::duration bound = ReceivedState::unknown;  // the last one told
-  // Of the last states, from which the bound was good enough.
+  std::size_t states = 0;     // with a reported error
+  std::size_t dishonest = 0;  // of these, states whose error was larger than reported
+  ReceivedState::Clock::duration bound = ReceivedState::unknown;  // the last reported error
+  // Of the last states, since the reported error was small enough.
   ReceivedState::Clock::duration median_error{}, worst_error{};
 };
 
-// Listens until the error that is told is `enough`, 10 s at most, and then to a hundred states more. No host has the
-// board yet.
+// Waits until the reported error is at most `enough`, 10 s at most, and then measures a hundred
+// states. No other host may control the board.
 SampledTruth look_at_sampled(BoardInAThread& simulated, const std::string& host_url,
                              ReceivedState::Clock::duration enough);
 

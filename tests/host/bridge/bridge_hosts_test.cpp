@@ -84,7 +84,7 @@ TEST_F(BridgeHostsTest, AHostIsServedWhenTheBoardHasHadTheTimeToRefuseIt) {
   EXPECT_EQ(hosts->held, owner);
 }
 
-TEST_F(BridgeHostsTest, ARefusedHostIsNotServedWhileItKeepsTrying) {
+TEST_F(BridgeHostsTest, ARefusedHostIsNotServedUntilATimeoutWithoutAnotherRefusal) {
   begin();
   heartbeat(other_sid, waiting);
   busy(other_sid);
@@ -93,16 +93,10 @@ TEST_F(BridgeHostsTest, ARefusedHostIsNotServedWhileItKeepsTrying) {
     heartbeat(owner_sid, owner);
     heartbeat(other_sid, waiting);
     EXPECT_FALSE(hears_states(waiting));
-    if (i % 5 == 0) busy(other_sid);  // the board answers not every one
+    if (i % 5 == 0) busy(other_sid);  // the board does not answer every heartbeat
   }
   EXPECT_EQ(hosts->held, owner);
   EXPECT_TRUE(hosts->also_held.empty());
-}
-
-TEST_F(BridgeHostsTest, ARefusalEndsWithATimeoutWithoutAnother) {
-  begin();
-  heartbeat(other_sid, waiting);
-  busy(other_sid);
   pass(1s);
   heartbeat(other_sid, waiting);
   pass(BridgeHosts::patience);

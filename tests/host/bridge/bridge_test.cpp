@@ -15,11 +15,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-std::string host_url(const Bridge& bridge) {
-  return bridge.status().at(0).hosts.name + "?listen=0";
+std::string host_url(const Bridge& bridge, std::size_t pair = 0) {
+  return bridge.status().at(pair).hosts.name + "?listen=0";
 }
 
-TEST(Bridge, AHostDrivesTheBoardBehindIt) {
+TEST(Bridge, AHostDrivesTheBoardThroughIt) {
   Bridge bridge("udp://127.0.0.1:0", "sim:");
   Board board(host_url(bridge));
   board.wait_active();
@@ -38,12 +38,12 @@ TEST(Bridge, JoinsAWholeFleetInOrder) {
   Bridge bridge("udp://127.0.0.{1-3}:0", "sim:?node=7-9");
   ASSERT_EQ(bridge.size(), 3U);
   for (std::size_t i = 0; i < 3; ++i) {
-    Board board(bridge.status().at(i).hosts.name + "?listen=0");
+    Board board(host_url(bridge, i));
     EXPECT_EQ(board.identify().board_id, "sim-" + std::to_string(7 + i));
   }
 }
 
-TEST(Bridge, CanBeClosedTwiceAndTellsHowItWas) {
+TEST(Bridge, CanBeClosedTwiceAndKeepsItsStatus) {
   Bridge bridge("udp://127.0.0.1:0", "sim:");
   const std::string name = bridge.status().at(0).hosts.name;
   bridge.close();
@@ -55,48 +55,38 @@ TEST(Bridge, RefusesWhatCannotBeJoined) {
   struct Case {
     const char* hosts;
     const char* board;
-    ErrorKind kind;
     const char* reason;
   };
+  const char* const same = "both sides of the bridge are the same";
+  const char* const several = "a side of a bridge is one path, and these are several";
+  const char* const no_key = "which asks for no key at its cable";
   for (const Case& each : {
-           Case{"udp://127.0.0.1:2018", "udp://127.0.0.1:2018", ErrorKind::usage,
-                "both sides of the bridge are the same"},
-           Case{"udp://0.0.0.0:2018", "udp://localhost", ErrorKind::usage,
+           Case{"udp://127.0.0.1:2018", "udp://127.0.0.1:2018", same},
+           Case{"can://can0?node=1", "can://can0", same},
+           Case{"pty:/tmp/r4", "serial:///tmp/r4", same},
+           Case{"udp://0.0.0.0:2018", "udp://localhost",
                 "that is where the bridge itself listens for hosts"},
-           Case{"udp://0.0.0.0:2390", "udp://192.0.2.1", ErrorKind::usage,
+           Case{"udp://0.0.0.0:2390", "udp://192.0.2.1",
                 "it hears the board at the port where the other side listens for hosts"},
-           Case{"can://can0?node=1", "can://can0", ErrorKind::usage,
-                "both sides of the bridge are the same"},
-           Case{"pty:/tmp/r4", "serial:///tmp/r4", ErrorKind::usage,
-                "both sides of the bridge are the same"},
-           Case{"udp://127.0.0.1:2100-2107", "can://can0?node=0-6", ErrorKind::usage,
+           Case{"udp://127.0.0.1:2100-2107", "can://can0?node=0-6",
                 "they stand for 8 and 7 transports"},
-           Case{"sim:", "udp://192.0.2.1", ErrorKind::usage, "sim: is a board, it cannot listen"},
-           Case{"udp://127.0.0.1:0", "replay:/tmp/x", ErrorKind::usage,
+           Case{"udp://127.0.0.1:0", "can://can0?node=1-2", "they stand for 1 and 2 transports"},
+           Case{"udp://127.0.0.{1-2}:0", "can://can0?node={1,1}", "it is named twice"},
+           Case{"udp://127.0.0.{1,1}:0", "can://can0?node=0-1", "it is named twice"},
+           Case{"sim:", "udp://192.0.2.1", "sim: is a board, it cannot listen"},
+           Case{"udp://127.0.0.1:0", "replay:/tmp/x",
                 "a recording is no board: nobody can drive it"},
-           Case{"udp://127.0.0.1:0", "pty:", ErrorKind::usage,
-                "pty: is for the side of hosts, which open its other end"},
-           Case{"udp://127.0.0.1:0", "serial:auto+udp://192.0.2.1", ErrorKind::usage,
-                "a side of a bridge is one path, and these are several"},
-           Case{"udp://127.0.0.1:0+pty:", "serial:auto", ErrorKind::usage,
-                "a side of a bridge is one path, and these are several"},
-           Case{"udp://127.0.0.1:0", "can://can0?node={1,1}", ErrorKind::usage,
-                "they stand for 1 and 2 transports"},
-           Case{"udp://127.0.0.{1,1}:0", "can://can0?node=0-1", ErrorKind::usage,
-                "it is in the bridge twice"},
-           Case{"udp://0.0.0.0:0", "serial:auto", ErrorKind::usage,
-                "everyone who reaches it may drive the board at serial:auto, which asks for no key "
-                "at its cable"},
-           Case{"udp://[::]:0", "serial:///dev/r4", ErrorKind::usage,
-                "everyone who reaches it may drive the board at serial:///dev/r4, which asks for "
-                "no key at its cable"},
-           Case{"can://can0?node=3", "serial:auto", ErrorKind::usage,
-                "everyone who reaches it may drive the board at serial:auto, which asks for no key "
-                "at its cable"},
+           Case{"udp://127.0.0.1:0",
+                "pty:", "pty: is for the side of hosts, which open its other end"},
+           Case{"udp://127.0.0.1:0", "serial:auto+udp://192.0.2.1", several},
+           Case{"udp://127.0.0.1:0+pty:", "serial:auto", several},
+           Case{"udp://0.0.0.0:0", "serial:auto", no_key},
+           Case{"udp://[::]:0", "serial:///dev/r4", no_key},
+           Case{"can://can0?node=3", "serial:auto", no_key},
        }) {
     const Problem problem = problem_of([&] { Bridge(each.hosts, each.board); });
-    EXPECT_EQ(problem.kind, each.kind) << each.hosts << ' ' << each.board;
-    EXPECT_EQ(problem.reason, each.reason) << each.hosts << ' ' << each.board;
+    EXPECT_EQ(problem.kind, ErrorKind::usage) << each.hosts << ' ' << each.board;
+    EXPECT_TRUE(contains(problem.reason, each.reason)) << each.hosts << ' ' << each.board;
     EXPECT_FALSE(problem.fix.empty()) << each.hosts << ' ' << each.board;
   }
 }
@@ -123,7 +113,7 @@ TEST(Bridge, ListensToANetworkForABoardAtACableWithItsKeyOrOnPurpose) {
   EXPECT_EQ(problem_of([&] { Bridge("udp://0.0.0.0:0", away, open); }).kind, ErrorKind::usage);
 }
 
-TEST(Bridge, SaysWhoHasThePort) {
+TEST(Bridge, NamesTheProgramThatHasThePort) {
   Bridge bridge("udp://127.0.0.1:0", "sim:");
   const Problem problem = problem_of([&] { Bridge(bridge.status().at(0).hosts.name, "sim:"); });
   EXPECT_EQ(problem.kind, ErrorKind::open);

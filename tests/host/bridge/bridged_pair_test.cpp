@@ -117,7 +117,7 @@ TEST_F(BridgedPairTest, AStopOfAnyonePassesBeforeEverything) {
   board->say("H:R4-ROS2;PNum:8;T:101;SAFE:2;STOP:70;");
   EXPECT_EQ(hosts->take(), (Texts{"H:R4-ROS2;PNum:8;T:101;SAFE:2;STOP:70;@1",
                                   "H:R4-ROS2;PNum:8;T:101;SAFE:2;STOP:70;@3"}))
-      << "who has stopped it hears so";
+      << "the peer that stopped it hears that";
   pass(1s);
   board->say("H:R4-ROS2;PNum:9;T:601;SAFE:2;STOP:70;");
   EXPECT_EQ(hosts->take(), Texts{"H:R4-ROS2;PNum:9;T:601;SAFE:2;STOP:70;"});
@@ -133,17 +133,13 @@ TEST_F(BridgedPairTest, AStopWaitsForNothingWhereStatesDoNotGetThrough) {
   EXPECT_EQ(from_board().undelivered, 1000U);
 }
 
-TEST_F(BridgedPairTest, AStopBesideOtherCommandsIsOne) {
-  begin();
-  hosts->say("O:1,1,1;E:STOP;PNum:70;T:0;", third);
-  ASSERT_EQ(board->sent.size(), 1U);
-  EXPECT_EQ(board->sent.front().priority, Priority::stop);
-}
-
 TEST_F(BridgedPairTest, PrioritiesAreThoseOfTheEnds) {
   begin();
   hosts->say("O:1,1,1;SID:00000000000000aa;PNum:2;T:0;", first);
+  hosts->say("O:1,1,1;E:STOP;PNum:70;T:0;", third);
+  ASSERT_EQ(board->sent.size(), 2U);
   EXPECT_EQ(board->sent.front().priority, Priority::normal);
+  EXPECT_EQ(board->sent.back().priority, Priority::stop) << "a stop with other commands is a stop";
   board->say(board_state);
   board->say("H:R4-ROS2;PNum:8;T:101;");
   EXPECT_EQ(hosts->sent.front().priority, Priority::state);
@@ -166,19 +162,15 @@ TEST_F(BridgedPairTest, WhatCameWhileTheBridgeWasStoppedIsDroppedButAStop) {
   EXPECT_EQ(from_hosts().late, 2U);
   EXPECT_EQ(from_board().late, 1U);
   hosts->say(heartbeat, first);
-  EXPECT_EQ(passed(), Texts{heartbeat}) << "that was read after all that waited";
+  EXPECT_EQ(passed(), Texts{heartbeat}) << "it was read after everything that had waited";
 }
 
-TEST_F(BridgedPairTest, WhereNothingWaitedTheFirstDatagramAfterAStandstillPasses) {
+TEST_F(BridgedPairTest, TheFirstDatagramAfterAStandstillOrAnIdleHourPasses) {
   begin();
   sleep(500ms);
   pass(50ms);
   hosts->say("O:1,1,1;SID:00000000000000aa;PNum:5;T:0;", first);
   EXPECT_EQ(passed(), Texts{"O:1,1,1;SID:00000000000000aa;PNum:5;T:0;"});
-}
-
-TEST_F(BridgedPairTest, AnIdleBridgeIsNoLateOne) {
-  begin();
   pass(1h);
   hosts->say(heartbeat, first);
   EXPECT_EQ(passed(), Texts{heartbeat});
@@ -220,9 +212,9 @@ TEST_F(BridgedPairTest, CountsWhatDidNotGetThrough) {
   EXPECT_EQ(from_board().outdated, 5U);
 }
 
-// --- who asks
+// --- answers
 
-TEST_F(BridgedPairTest, AnAnswerGoesToWhoHasAsked) {
+TEST_F(BridgedPairTest, AnAnswerGoesToThePeerThatAsked) {
   begin();
   hosts->say("Q:ID;PNum:500;T:0;", second);
   hosts->say("Q:ID;PNum:600;T:0;", third);
@@ -236,6 +228,9 @@ TEST_F(BridgedPairTest, AnAnswerGoesToWhoHasAsked) {
                                   "I:R4,1,id,udp;ASKED:500;PNum:9;T:101;@2",
                                   "I:R4,1,id,udp;ASKED:3;SID:00000000000000aa;PNum:10;T:101;@1",
                                   "N:2,RANGE;SID:00000000000000aa;PNum:11;T:101;@1"}));
+  hosts->say("Q:ID;", second);
+  board->say("I:R4,1,id,udp;PNum:12;T:101;");
+  EXPECT_EQ(hosts->take(), Texts{"I:R4,1,id,udp;PNum:12;T:101;@2"}) << "also without a number";
 }
 
 TEST_F(BridgedPairTest, AnAnswerToAHostsCommandGoesToThatHostThoughAnotherAsksWithItsNumber) {
@@ -245,13 +240,6 @@ TEST_F(BridgedPairTest, AnAnswerToAHostsCommandGoesToThatHostThoughAnotherAsksWi
   hosts->say("Q:ID;PNum:2;T:0;", third);
   board->say("N:2,RANGE;SID:00000000000000aa;PNum:8;T:101;");
   EXPECT_EQ(hosts->take(), Texts{"N:2,RANGE;SID:00000000000000aa;PNum:8;T:101;@1"});
-}
-
-TEST_F(BridgedPairTest, ANumberlessQuestionIsAnsweredToTheHostThatAsked) {
-  begin();
-  hosts->say("Q:ID;", second);
-  board->say("I:R4,1,id,udp;PNum:8;T:101;");
-  EXPECT_EQ(hosts->take(), Texts{"I:R4,1,id,udp;PNum:8;T:101;@2"});
 }
 
 TEST_F(BridgedPairTest, AnotherHostCannotHaveACommandRefusedByAskingBadly) {
@@ -291,16 +279,20 @@ TEST_F(BridgedPairTest, WhatHostsThatHaveProvedNothingAreSentIsLimited) {
   EXPECT_EQ(passed(), Texts{"Q:ID;SID:00000000000000aa;PNum:3;T:0;"});
 }
 
-// --- who watches
+// --- watchers
 
-TEST_F(BridgedPairTest, WhoWatchesBesideAHostHearsAllAfterAnEchoAndForTwoSeconds) {
+// The LEASE of the only answer that was sent.
+std::string lease_in(const Texts& answers) {
+  const std::string& answer = answers.at(0);
+  const std::size_t at = answer.find(",STALE;LEASE:");
+  EXPECT_NE(at, std::string::npos) << answer;
+  return answer.substr(at + 13, answer.find(";PNum") - at - 13);
+}
+
+TEST_F(BridgedPairTest, AWatcherBesideAHostHearsEverythingAfterAnEchoAndForTwoSeconds) {
   begin();
   hosts->say("W:50;PNum:900;T:0;", second);
-  const Texts told = hosts->take();
-  ASSERT_EQ(told.size(), 1U);
-  const std::string prefix = "N:900,STALE;LEASE:";
-  ASSERT_EQ(told[0].substr(0, prefix.size()), prefix);
-  const std::string token = told[0].substr(prefix.size(), told[0].find(";PNum") - prefix.size());
+  const std::string token = lease_in(hosts->take());
   board->say(board_state);
   EXPECT_EQ(hosts->take(), Texts{std::string(board_state) + "@1"}) << "not yet";
   hosts->say("W:50;PNum:901;T:" + token + ";", third);
@@ -317,8 +309,8 @@ TEST_F(BridgedPairTest, WhoWatchesBesideAHostHearsAllAfterAnEchoAndForTwoSeconds
   EXPECT_EQ(hosts->take(), Texts{std::string(board_state) + "@1"});
 }
 
-// The number of the newest W that the bridge has sent since this was asked last, and its text
-// before that.
+// The newest W that the bridge has sent since the last call: its text before the number, and its
+// number.
 struct OwnLease {
   std::string text;
   std::string pnum;
@@ -377,15 +369,13 @@ TEST_F(BridgedPairTest, ARefusalThatNamesASessionIsNoAnswerToTheBridgesOwnW) {
   EXPECT_EQ(hosts->take(), Texts{refusal + "@1"});
 }
 
-TEST_F(BridgedPairTest, WithoutAHostThoseThatWatchHearWhatTheNewestOfThemAskedFor) {
+TEST_F(BridgedPairTest, WithoutAHostWatchersHearWhatTheNewestWatcherAskedFor) {
   board->say("H:R4-ROS2;PNum:3;T:90;SAFE:1;");
   hosts->take();
   hosts->say("W:50,AIN24,SAFE;PNum:900;T:0;", second);
-  const std::string told = hosts->take().at(0);
-  const std::size_t at = told.find("LEASE:") + 6;
+  const std::string token = lease_in(hosts->take());
   EXPECT_EQ(passed(), Texts{}) << "the board would take it for the bridge's";
-  hosts->say("W:50,AIN24,SAFE;PNum:901;T:" + told.substr(at, told.find(';', at) - at) + ";",
-             second);
+  hosts->say("W:50,AIN24,SAFE;PNum:901;T:" + token + ";", second);
   pass(25ms);
   EXPECT_EQ(own_lease(*board).text, "W:50,AIN24,SAFE");
   board->say("AIN24:24.28;SAFE:1;PNum:7;T:100;");
@@ -399,13 +389,11 @@ TEST_F(BridgedPairTest, FourMayWatch) {
   for (Peer peer = 11; peer <= 15; ++peer) {
     const std::string number = std::to_string(900 + peer);
     hosts->say("W:50;PNum:" + number + ";T:0;", peer);
-    const std::string told = hosts->take().at(0);
     if (peer == 15) {
-      EXPECT_EQ(told, "N:915,BUSY;PNum:7;T:150;@15");
+      EXPECT_EQ(hosts->take(), Texts{"N:915,BUSY;PNum:7;T:150;@15"});
       break;
     }
-    const std::size_t at = told.find("LEASE:") + 6;
-    hosts->say("W:50;PNum:1000;T:" + told.substr(at, told.find(';', at) - at) + ";", peer);
+    hosts->say("W:50;PNum:1000;T:" + lease_in(hosts->take()) + ";", peer);
   }
   for (Peer stranger = 100; stranger < 140; ++stranger) hosts->say("E:STOP;", stranger);
   hosts->take();

@@ -57,7 +57,7 @@ class ScriptedCarrier final : public Carrier, public BoardEnd {
   void report(CarrierEvent::Kind kind) {
     handler_->on_carrier_event({kind, Problem{ErrorKind::open, name_, "gone", ""}});
   }
-  // What was sent since this was asked last, without checksums; with "@peer" where it was to one.
+  // The datagrams sent since the last call, without checksums; with "@peer" if sent to one peer.
   std::vector<std::string> take() {
     std::vector<std::string> texts;
     for (const Sent& each : std::exchange(sent, {})) {
@@ -71,7 +71,7 @@ class ScriptedCarrier final : public Carrier, public BoardEnd {
   SendResult result = SendResult::sent;
   CarrierCounters counted;
   bool shared = false;
-  bool keeps = true;  // what was sent, which takes memory
+  bool keeps = true;  // keeps sent datagrams, which takes memory
   std::vector<Sent> sent;
   Peer held = everyone;
   std::vector<Peer> also_held;
@@ -113,8 +113,7 @@ class ScriptedBridge {
   }
   // Time passes in which the process is stopped.
   void sleep(std::chrono::milliseconds time) { now += time; }
-  // What has passed to the board since this was asked last: without what the bridge itself asks the
-  // board for.
+  // The datagrams that have passed to the board since the last call, without the bridge's own W.
   Texts passed() {
     Texts texts = board->take();
     std::erase_if(texts, [](const std::string& text) { return text.starts_with("W:"); });

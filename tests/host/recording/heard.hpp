@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a reader of recordings has told.
+// What tests of recordings share: what a reader has read, and a full disk.
 #pragma once
+
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -40,7 +42,7 @@ struct Heard final : RecordingReader::Handler {
   std::vector<Damage> damage;
 };
 
-// All that can be read of it, fed in pieces of that size.
+// Everything that can be read, fed in pieces of that size.
 inline Heard heard_in(std::string_view bytes, std::size_t piece = 1000) {
   Heard heard;
   RecordingReader reader(heard, "test");
@@ -50,5 +52,19 @@ inline Heard heard_in(std::string_view bytes, std::size_t piece = 1000) {
   reader.finish();
   return heard;
 }
+
+// The process may write no more than so many bytes into a file.
+struct FileLimit {
+  explicit FileLimit(rlim_t bytes) {
+    ::getrlimit(RLIMIT_FSIZE, &before);
+    rlimit limit = before;
+    limit.rlim_cur = bytes;
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileLimit() { ::setrlimit(RLIMIT_FSIZE, &before); }
+  FileLimit(const FileLimit&) = delete;
+  FileLimit& operator=(const FileLimit&) = delete;
+  rlimit before{};
+};
 
 }  // namespace r4::test

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whatever has become of a recording: what can be read is read, and the rest has a place.
+// Reads recordings in every state: damage has a place, and the rest is read.
 #include "host/recording/recording_reader.hpp"
 
 #include <gtest/gtest.h>
@@ -19,12 +19,15 @@ namespace {
 
 using DamageKind = RecordingDamage::Kind;
 
-std::string head() {
+std::string head(const std::string& url = "udp://robot") {
   std::string text;
   write_record_header(text);
-  write_path(text, {1, "udp://robot", "left"});
+  write_path(text, {1, url, "left"});
   return text;
 }
+
+const std::string other_head = head("udp://another-robot");
+const std::string end_of_it = "1795468299.000000 0! end\n";
 
 // Records that differ, as lines.
 std::string lines(int from, int count) {
@@ -57,7 +60,7 @@ TEST(RecordingReader, GivesEveryRecordHoweverTheBytesCome) {
   }
 }
 
-TEST(RecordingReader, TellsThePlaceOfADamagedLineAndGoesOn) {
+TEST(RecordingReader, ReportsThePlaceOfADamagedLineAndGoesOn) {
   const std::string before = head() + lines(0, 3);
   const Heard heard = heard_in(before + "nonsense\n" + lines(3, 3), 10);
   EXPECT_EQ(heard.records, lines(0, 6));
@@ -66,7 +69,7 @@ TEST(RecordingReader, TellsThePlaceOfADamagedLineAndGoesOn) {
   EXPECT_EQ(heard.damage[0], expected);
 }
 
-TEST(RecordingReader, TellsOfALastLineWithoutAnEnd) {
+TEST(RecordingReader, ReportsALastLineWithoutAnEnd) {
   const std::string whole = head() + lines(0, 3);
   const std::string next = lines(3, 1);
   for (std::size_t cut = 1; cut < next.size(); ++cut) {
@@ -77,7 +80,7 @@ TEST(RecordingReader, TellsOfALastLineWithoutAnEnd) {
   }
 }
 
-TEST(RecordingReader, PassesOverALineThatIsLongerThanAnyInLittleMemory) {
+TEST(RecordingReader, SkipsATooLongLineInLittleMemory) {
   const std::string before = head() + lines(0, 1);
   const std::string longest(max_record_line + 1, 'x');
   for (const std::string& junk : {longest, std::string(3'000'000, 'x')}) {
@@ -88,14 +91,14 @@ TEST(RecordingReader, PassesOverALineThatIsLongerThanAnyInLittleMemory) {
   }
 }
 
-TEST(RecordingReader, ReadsAFileThatHoldsSeveralRecordings) {
-  const Heard text = heard_in(head() + lines(0, 2) + head() + lines(2, 2));
-  EXPECT_EQ(text.records, lines(0, 4));
-  EXPECT_EQ(text.headers, 2);
-  const Heard frames =
-      heard_in(compressed(head() + lines(0, 2)) + compressed(head() + lines(2, 2)), 5);
-  EXPECT_EQ(frames.records, lines(0, 4));
-  EXPECT_TRUE(frames.damage.empty());
+TEST(RecordingReader, ReadsSeveralRecordingsOneAfterTheOtherAlsoWithOtherPaths) {
+  const std::string a = head() + lines(0, 2), b = other_head + lines(2, 2) + end_of_it;
+  for (const std::string& file : {a + b + a, compressed(a) + compressed(b) + compressed(a)}) {
+    const Heard heard = heard_in(file, 5);
+    EXPECT_EQ(heard.records, lines(0, 4) + end_of_it + lines(0, 2));
+    EXPECT_EQ(heard.headers, 3);
+    EXPECT_TRUE(heard.damage.empty());
+  }
 }
 
 TEST(RecordingReader, ReadsAllThatWasFlushedOfAFrameWithoutAnEnd) {
@@ -116,7 +119,7 @@ TEST(RecordingReader, GoesOnWithTheNextFrameWhereOneHasNoEnd) {
   }
 }
 
-TEST(RecordingReader, GoesOnWithTheNextFrameBehindADamagedByte) {
+TEST(RecordingReader, GoesOnWithTheNextFrameAfterADamagedByte) {
   const std::string first = compressed(head() + lines(0, 20));
   const std::string second = compressed(lines(20, 20));
   const std::string third = compressed(lines(40, 20));
@@ -130,7 +133,7 @@ TEST(RecordingReader, GoesOnWithTheNextFrameBehindADamagedByte) {
   }
 }
 
-TEST(RecordingReader, RefusesWhatIsNoRecording) {
+TEST(RecordingReader, RefusesAFileThatIsNotARecording) {
   for (const std::string& file :
        {std::string(), std::string("x"), std::string("not one\n"), std::string(200'000, 'x'),
         std::string(200'000, '\n'), compressed(std::string(200'000, 'x')),
@@ -148,16 +151,7 @@ TEST(RecordingReader, RefusesALaterVersion) {
   EXPECT_TRUE(contains(problem.reason, "a later version: # r4log 2 by r4 9.0"));
 }
 
-TEST(RecordingReader, RefusesAFrameThatWantsMuchMemory) {
-  // A window of 2 GiB.
-  std::string file = compressed(head() + lines(0, 3));
-  file += std::string("\x28\xb5\x2f\xfd\x00\xa8", 6) + std::string(100, '\0');
-  const Heard heard = heard_in(file);
-  EXPECT_EQ(heard.records, lines(0, 3));
-  EXPECT_FALSE(heard.damage.empty());
-}
-
-TEST(RecordingReader, ReadsLinesThatEndInCrLfBehindAMarkOfUtf8) {
+TEST(RecordingReader, ReadsLinesThatEndInCrLfAfterTheMarkOfUtf8) {
   const std::string text = head() + lines(0, 20);
   std::string edited = "\xEF\xBB\xBF";
   for (const char c : text) edited += c == '\n' ? std::string("\r\n") : std::string(1, c);
@@ -170,7 +164,7 @@ TEST(RecordingReader, ReadsLinesThatEndInCrLfBehindAMarkOfUtf8) {
   }
 }
 
-TEST(RecordingReader, SaysWhatAFileOfAnotherFormIsAndWhatReadsIt) {
+TEST(RecordingReader, NamesTheFormOfAnotherFileAndTheProgramThatReadsIt) {
   struct Other {
     std::string beginning, reason, fix;
   };
@@ -214,9 +208,13 @@ TEST(RecordingReader, ReadsTheArchivesOfZstdsOwnPrograms) {
   }
 }
 
-TEST(RecordingReader, SaysThatAWindowIsTooLargeAndWhatUnpacksIt) {
-  const std::string file = std::string("\x28\xb5\x2f\xfd\x00\xa8", 6) + std::string(100, '\0');
-  const Problem problem = problem_of([&] { heard_in(file); });
+TEST(RecordingReader, RefusesAFrameThatNeedsMuchMemoryAndNamesTheProgramThatUnpacksIt) {
+  // A window of 2 GiB.
+  const std::string frame = std::string("\x28\xb5\x2f\xfd\x00\xa8", 6) + std::string(100, '\0');
+  const Heard heard = heard_in(compressed(head() + lines(0, 3)) + frame);
+  EXPECT_EQ(heard.records, lines(0, 3));
+  EXPECT_FALSE(heard.damage.empty());
+  const Problem problem = problem_of([&] { heard_in(frame); });
   EXPECT_EQ(problem.kind, ErrorKind::data);
   EXPECT_TRUE(contains(problem.reason, "window of more than 128 MiB"));
   EXPECT_TRUE(contains(problem.fix, "zstd -d --long=31"));
@@ -238,19 +236,15 @@ std::string merged_by_sort(const std::string& a, const std::string& b) {
 }
 
 TEST(RecordingReader, RefusesRecordingsThatAreMixed) {
-  const std::string end = "1795468299.000000 0! end\n";
-  std::string other;
-  write_record_header(other);
-  write_path(other, {1, "udp://another-robot", "right"});
-  const std::string left = head() + lines(0, 5) + end;
-  const std::string right = other + lines(3, 5) + end;
+  const std::string left = head() + lines(0, 5) + end_of_it;
+  const std::string right = other_head + lines(3, 5) + end_of_it;
   const std::string no_header = right.substr(right.find("# path"));
   for (const std::string& file : {
            merged_by_sort(left, right),
            merged_by_sort(left, left),
-           head() + lines(0, 2) + no_header,                  // the path is another
-           head() + other + lines(0, 9) + end + lines(9, 1),  // behind the end
-           head() + other + lines(0, 9) + end + end,
+           head() + lines(0, 2) + no_header,                             // another path
+           head() + other_head + lines(0, 9) + end_of_it + lines(9, 1),  // records after the end
+           head() + other_head + lines(0, 9) + end_of_it + end_of_it,
        }) {
     const Problem problem = problem_of([&] { heard_in(file); });
     EXPECT_EQ(problem.kind, ErrorKind::data);
@@ -259,24 +253,11 @@ TEST(RecordingReader, RefusesRecordingsThatAreMixed) {
 }
 
 TEST(RecordingReader, ReadsRecordingsOneAfterTheOtherThoughTheHeaderBetweenThemIsDamaged) {
-  std::string other;
-  write_record_header(other);
-  write_path(other, {1, "udp://another-robot", "right"});
-  other[0] = '$';
-  const std::string end = "1795468299.000000 0! end\n";
-  const Heard heard = heard_in(head() + lines(0, 2) + end + other + lines(2, 2) + end);
-  EXPECT_EQ(heard.records, lines(0, 2) + end + lines(2, 2) + end);
+  std::string damaged = other_head + lines(2, 2) + end_of_it;
+  damaged[0] = '$';
+  const Heard heard = heard_in(head() + lines(0, 2) + end_of_it + damaged);
+  EXPECT_EQ(heard.records, lines(0, 2) + end_of_it + lines(2, 2) + end_of_it);
   EXPECT_EQ(heard.damage.size(), 1);
-}
-
-TEST(RecordingReader, ReadsRecordingsWithOtherPathsOneAfterTheOther) {
-  std::string other;
-  write_record_header(other);
-  write_path(other, {1, "udp://another-robot", "right"});
-  const std::string end = "1795468299.000000 0! end\n";
-  const Heard heard = heard_in(head() + lines(0, 2) + end + other + lines(2, 2) + head() + end);
-  EXPECT_EQ(heard.records, lines(0, 2) + end + lines(2, 2) + end);
-  EXPECT_EQ(heard.headers, 3);
 }
 
 }  // namespace

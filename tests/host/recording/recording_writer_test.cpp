@@ -1,27 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Records become files, within the limits that were asked for. Time is that of the records.
+// Records become files, within given limits. Time is that of the records.
 #include "host/recording/recording_writer.hpp"
 
 #include <gtest/gtest.h>
-#include <linux/filter.h>
-#include <linux/seccomp.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
-#include <sys/syscall.h>
 
 #include <cerrno>
 #include <csignal>
-#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
-#include <thread>
 
 #include "heard.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/problems.hpp"
+#include "tests/support/refused_calls.hpp"
 
 namespace r4::test {
 namespace {
@@ -97,7 +91,7 @@ TEST_F(RecordingWriterTest, WhatWasFlushedIsInTheFile) {
   }
 }
 
-TEST_F(RecordingWriterTest, GoesOnWhereARecordingIs) {
+TEST_F(RecordingWriterTest, ContinuesAnExistingRecording) {
   for (const char* const name : {"a.r4log", "a.r4log.zst"}) {
     all.clear();
     for (int run = 0; run < 3; ++run) {
@@ -112,7 +106,7 @@ TEST_F(RecordingWriterTest, GoesOnWhereARecordingIs) {
   }
 }
 
-TEST_F(RecordingWriterTest, GoesOnBehindATornLine) {
+TEST_F(RecordingWriterTest, GoesOnAfterATornLine) {
   {
     RecordingWriter writer(path("a.r4log"), {});
     append(writer);
@@ -145,55 +139,38 @@ TEST_F(RecordingWriterTest, WritesOverNothingElse) {
   EXPECT_EQ(problem_of([&] { RecordingWriter(path("no/where.r4log"), {}); }).kind, ErrorKind::open);
 }
 
-TEST_F(RecordingWriterTest, AFileThatWasMovedIsLeftWholeAndBegunAnew) {
+TEST_F(RecordingWriterTest, BeginsAFileAnewThatWasMovedRemovedOrTruncatedAndReportsALoss) {
   for (const std::string ending : {".r4log", ".r4log.zst"}) {
-    all.clear();
-    RecordingWriter writer(path("a" + ending), {});
-    writer.declare(RecordedPath{1, "udp://robot", "left"});
-    for (int i = 0; i < 10; ++i) append(writer);
-    writer.flush();
-    fs::rename(path("a" + ending), path("moved" + ending));
-    append(writer);
-    writer.flush();
-    const std::optional<Problem> trouble = writer.take_trouble();
-    ASSERT_TRUE(trouble);
-    EXPECT_EQ(trouble->kind, ErrorKind::open) << "nothing is lost";
-    EXPECT_EQ(trouble->thing, path("a" + ending));
-    EXPECT_TRUE(contains(trouble->reason, "was moved"));
-    EXPECT_FALSE(writer.take_trouble()) << "it is told once";
-    append(writer);
-    writer.close();
-    const Heard moved = heard_in(content("moved" + ending));
-    const Heard anew = heard_in(content("a" + ending));
-    EXPECT_EQ(moved.records + anew.records, all);
-    EXPECT_TRUE(moved.damage.empty() && anew.damage.empty());
-    EXPECT_EQ(anew.paths.back().name, "left") << "each is whole in itself";
-  }
-}
-
-TEST_F(RecordingWriterTest, AFileThatWasRemovedOrTruncatedIsBegunAnewAndTheLossIsTold) {
-  for (const std::string ending : {".r4log", ".r4log.zst"}) {
-    for (const bool removed : {true, false}) {
-      RecordingWriter writer(path("a" + ending), {});
+    for (const std::string what : {"moved", "removed", "truncated"}) {
+      const std::string file = path("a" + ending), moved = path("moved" + ending);
+      all.clear();
+      RecordingWriter writer(file, {});
       writer.declare(RecordedPath{1, "udp://robot", "left"});
       for (int i = 0; i < 10; ++i) append(writer);
       writer.flush();
-      removed ? static_cast<void>(fs::remove(path("a" + ending)))
-              : fs::resize_file(path("a" + ending), 0);
-      all.clear();
+      fs::copy_file(file, moved);
+      if (what == "truncated") {
+        fs::resize_file(file, 0);
+      } else {
+        what == "moved" ? fs::rename(file, moved) : static_cast<void>(fs::remove(file));
+      }
       append(writer);
       writer.flush();
       const std::optional<Problem> trouble = writer.take_trouble();
       ASSERT_TRUE(trouble);
-      EXPECT_EQ(trouble->kind, ErrorKind::data);
-      EXPECT_TRUE(contains(trouble->reason, removed ? "was removed" : "was truncated"));
+      EXPECT_EQ(trouble->kind, what == "moved" ? ErrorKind::open : ErrorKind::data);
+      EXPECT_EQ(trouble->thing, file);
+      EXPECT_TRUE(contains(trouble->reason, "was " + what));
+      EXPECT_FALSE(writer.take_trouble()) << "it is reported once";
       append(writer);
       writer.close();
+      const Heard before = heard_in(content("moved" + ending));
       const Heard anew = heard_in(content("a" + ending));
-      EXPECT_EQ(anew.records, all);
-      EXPECT_TRUE(anew.damage.empty());
-      EXPECT_EQ(anew.paths.back().name, "left");
-      fs::remove(path("a" + ending));
+      EXPECT_EQ(before.records + anew.records, all);
+      EXPECT_TRUE((what != "moved" || before.damage.empty()) && anew.damage.empty());
+      EXPECT_EQ(anew.paths.back().name, "left") << "each file is whole in itself";
+      fs::remove(file);
+      fs::remove(moved);
     }
   }
 }
@@ -224,31 +201,18 @@ TEST_F(RecordingWriterTest, StaysInItsFolderWhenTheProgramChangesItsWorkingDirec
   EXPECT_EQ(names(), (std::vector<std::string>{"drive-00001.r4log", "drive-00002.r4log"}));
 }
 
-// From now on flock() fails with that error in this thread.
-void let_flock_fail(int error) {
-  sock_filter program[] = {
-      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_flock, 0, 1),
-      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | static_cast<std::uint32_t>(error)),
-      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
-  };
-  const sock_fprog filter{static_cast<unsigned short>(std::size(program)), program};
-  ASSERT_EQ(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0), 0);
-  ASSERT_EQ(::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter), 0);
-}
-
 TEST_F(RecordingWriterTest, RecordsOnAFileSystemThatHasNoLocks) {
   for (const int error : {ENOLCK, ENOSYS, EOPNOTSUPP, EINVAL}) {
-    std::thread([&] {
-      let_flock_fail(error);
+    in_a_thread_of_its_own([&] {
+      refuse({SYS_flock, error, std::nullopt});
       EXPECT_NO_THROW(RecordingWriter(path(std::to_string(error)), {})) << error;
-    }).join();
+    });
   }
-  std::thread([&] {
-    let_flock_fail(EWOULDBLOCK);
+  in_a_thread_of_its_own([&] {
+    refuse({SYS_flock, EWOULDBLOCK, std::nullopt});
     EXPECT_EQ(problem_of([&] { RecordingWriter(path("taken"), {}); }).reason,
               "another program records into it");
-  }).join();
+  });
 }
 
 TEST_F(RecordingWriterTest, BeginsANewFileAfterASize) {
@@ -286,7 +250,7 @@ TEST_F(RecordingWriterTest, BeginsANewFileAfterATime) {
   for (const std::string& name : names()) EXPECT_EQ(heard_in(content(name)).count, 200) << name;
 }
 
-TEST_F(RecordingWriterTest, TellsOfItsDevicesInEachFile) {
+TEST_F(RecordingWriterTest, DeclaresItsDevicesInEachFile) {
   RecordingOptions options;
   options.rotate_after = 2s;
   RecordingWriter writer(path("drive.r4log"), options);
@@ -341,26 +305,10 @@ TEST_F(RecordingWriterTest, RefusesLimitsThatCannotBeKept) {
   EXPECT_TRUE(names().empty());
 }
 
-// The process may write no more than so many bytes into a file.
-struct FileLimit {
-  explicit FileLimit(rlim_t bytes) {
-    ::getrlimit(RLIMIT_FSIZE, &before);
-    rlimit limit = before;
-    limit.rlim_cur = bytes;
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-    handler = std::signal(SIGXFSZ, SIG_IGN);
-  }
-  ~FileLimit() {
-    ::setrlimit(RLIMIT_FSIZE, &before);
-    std::signal(SIGXFSZ, handler);
-  }
-  rlimit before{};
-  void (*handler)(int);
-};
-
 TEST_F(RecordingWriterTest, AFullDiskIsAnErrorAndWhatIsWrittenStaysWhole) {
   RecordingWriter writer(path("a.r4log"), {});
   std::string flushed;
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
   const Problem problem = problem_of([&] {
     const FileLimit limit(10'000);
     for (int i = 0; i < 1000; ++i) {
@@ -369,6 +317,7 @@ TEST_F(RecordingWriterTest, AFullDiskIsAnErrorAndWhatIsWrittenStaysWhole) {
       flushed = all;
     }
   });
+  std::signal(SIGXFSZ, handler);
   EXPECT_EQ(problem.kind, ErrorKind::open);
   EXPECT_EQ(problem.thing, path("a.r4log"));
   EXPECT_TRUE(contains(problem.reason, "the recording has ended"));

@@ -13,7 +13,6 @@
 #include "host/recording/record_line.hpp"
 #include "host/standard_registry.hpp"
 #include "r4link/board.hpp"
-#include "tests/support/at_will.hpp"
 #include "tests/support/problems.hpp"
 #include "tests/transports/recorder.hpp"
 #include "transports/registry.hpp"
@@ -31,7 +30,7 @@ struct Replay : testing::Test {
            std::uint16_t path = 1) {
     write_record(text, {Time{1795468293s} + at, path, kind, bytes});
   }
-  // All of it, as fast as that.
+  // Plays the whole recording.
   void play(const std::string& options) {
     std::ofstream(file) << text;
     const auto carrier = standard_registry().make(io, "replay:" + file + options, Role::host);
@@ -48,7 +47,7 @@ struct Replay : testing::Test {
   CarrierCounters counters;
 };
 
-TEST_F(Replay, GivesWhatTheBoardSaidAndWhatHappenedToTheTransport) {
+TEST_F(Replay, GivesTheBoardsDatagramsAndTheEventsOfItsTransport) {
   const std::string damaged("\x00\xff x", 4);
   add(0ms, "up udp://x", RecordKind::event);
   add(1ms, "one");
@@ -104,7 +103,7 @@ TEST_F(Replay, BeginsAtATimeOfTheRecordingsClock) {
   }
 }
 
-TEST_F(Replay, LeavesTheLoopToOthersHoweverMuchIsDue) {
+TEST_F(Replay, LeavesTurnsOfTheLoopToOthersHoweverMuchIsDue) {
   constexpr std::size_t all = 1000;
   for (std::size_t i = 0; i < all; ++i) add(0ms, "at once");
   std::size_t at_the_turn_of_others = 0;
@@ -118,7 +117,7 @@ TEST_F(Replay, LeavesTheLoopToOthersHoweverMuchIsDue) {
   EXPECT_EQ(heard.drained, 1) << "before the end";
 }
 
-TEST_F(Replay, TellsOfDamageThatIsFarBehindWhatIsPlayed) {
+TEST_F(Replay, ReportsDamageFarBehindTheRecordThatIsPlayed) {
   add(0ms, "one");
   for (int i = 0; i < 2000; ++i) add(0ms, std::string(200, 'x'), RecordKind::from_board, 2);
   text += "no record\n";
@@ -129,24 +128,7 @@ TEST_F(Replay, TellsOfDamageThatIsFarBehindWhatIsPlayed) {
   EXPECT_EQ(heard.datagrams.size(), 2U);
 }
 
-TEST_F(Replay, OfABoardIsThatBoardForAProgramThatWatches) {
-  {
-    Board board("sim:", at_will());
-    board.record(file);
-    board.wait_active();
-    board.osmc(1).set(358, Direction::forward);
-    for (int i = 0; i < 50; ++i) board.next_state();
-  }
-  BoardOptions options;
-  options.role = BoardRole::watch;
-  Board again("replay:" + file, options);
-  again.wait_active();
-  while (again.next_state().osmc[0].pwm != 358) {
-  }
-  EXPECT_EQ(again.statistics().packets.lost, 0);
-}
-
-TEST_F(Replay, RefusesWhatItCannotPlay) {
+TEST_F(Replay, RefusesAFileThatItCannotPlay) {
   add(0ms, "one");
   EXPECT_EQ(problem_of([&] { play("?path=3"); }).reason, "nothing of that path is there");
   EXPECT_EQ(problem_of([&] { play("?speed=0"); }).kind, ErrorKind::usage);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a program is told by a recording is what it was told when that was made.
+// A program gets from a recording the same as it got when the recording was made.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -18,6 +18,7 @@
 #include "r4link/async_board.hpp"
 #include "r4link/recording.hpp"
 #include "tests/support/at_will.hpp"
+#include "transports/impaired/impaired_carrier.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::test {
@@ -25,42 +26,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Damages, loses and doubles what the board says.
-class TroubledCarrier final : public Carrier, private Carrier::Handler {
- public:
-  explicit TroubledCarrier(std::unique_ptr<Carrier> below) : below_(std::move(below)) {}
-  ~TroubledCarrier() override { below_->close(); }
-
-  void open(Carrier::Handler& handler) override {
-    handler_ = &handler;
-    below_->open(*this);
-  }
-  void close() noexcept override { below_->close(); }
-  SendResult send(std::string_view bytes, Priority priority, Peer to) override {
-    return below_->send(bytes, priority, to);
-  }
-  bool up() const override { return below_->up(); }
-  const std::string& name() const override { return below_->name(); }
-  const CarrierCounters& counters() const override { return below_->counters(); }
-
- private:
-  void on_datagram(std::string_view bytes, Peer from) override {
-    ++count_;
-    if (count_ % 23 == 0) return;
-    std::string text(bytes);
-    if (count_ % 17 == 0) text[text.size() / 2] ^= 4;
-    handler_->on_datagram(text, from);
-    if (count_ % 29 == 0) handler_->on_datagram(text, from);
-  }
-  void on_carrier_event(const CarrierEvent& event) override { handler_->on_carrier_event(event); }
-  void on_drained() override { handler_->on_drained(); }
-
-  const std::unique_ptr<Carrier> below_;
-  Carrier::Handler* handler_ = nullptr;
-  int count_ = 0;
-};
-
-// All that a program is told of the board.
+// Everything that a program gets from the board.
 struct ToldOfABoard {
   explicit ToldOfABoard(AsyncBoard& board) {
     board.on_state(
@@ -85,7 +51,7 @@ struct ToldOfABoard {
     return {datagram.bytes().data(), datagram.bytes().size()};
   }
 
-  // Every field, those too that this datagram has not brought.
+  // Every field, also those that this datagram does not have.
   static std::string text_of(const State& state) {
     char buffer[4 * max_datagram];
     DatagramWriter writer(buffer, sizeof buffer);
@@ -106,9 +72,9 @@ struct ToldOfABoard {
 TEST(ReplayFidelity, TheSameStatesEventsAndStatisticsAsLive) {
   const std::string path = testing::TempDir() + "r4-fidelity-" + std::to_string(::getpid());
   asio::io_context io;
+  const Impairment bad = Impairment::parse("loss=4%,duplicate=4%,corrupt=6%,seed=7");
   AsyncBoard board(
-      io,
-      std::make_unique<TroubledCarrier>(standard_registry().make(io, "sim:?seed=7", Role::host)),
+      io, make_impaired_carrier(io, standard_registry().make(io, "sim:?seed=7", Role::host), bad),
       at_will());
   ToldOfABoard live(board);
   Recording recording(path);

@@ -80,7 +80,6 @@ std::optional<DetectedSource::Format> DetectedSource::detect(bool at_end) {
   const FileForm form = form_of(text_);
   switch (form) {
     case FileForm::pcap:
-    case FileForm::pcapng:
       return Format::packets;
     case FileForm::mcap:
       return Format::mcap;
