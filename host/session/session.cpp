@@ -38,7 +38,7 @@ SessionOptions checked(SessionOptions options) {
 Session::Session(SessionOptions options, BoardRole role, std::size_t paths,
                  std::function<std::uint64_t()> random)
     : options_(checked(std::move(options))),
-      random_(random ? std::move(random) : random_bits),
+      random_(random ? std::move(random) : [] { return random_bits(); }),
       link_(options_.timing, static_cast<std::uint32_t>(random_())),
       key_(options_.key, options_.clock_start),
       paths_(paths, options_.timing, link_),
