@@ -258,9 +258,9 @@ class AsyncBoard::Impl::Sequence : public Completion {
   // Destroys this, then hands the result to the user's handler.
   void end(CommandResult result, How how) {
     result.elapsed = steady_now() - started_;
-    const CompletionPtr::pointer users = completion_.release();
+    const CompletionPtr::pointer handler = completion_.release();
     delete this;
-    users->complete(result, how);
+    handler->complete(result, how);
   }
 
   Impl& impl_;     // owns this

@@ -9,6 +9,7 @@
 #include "../commands/command_help.hpp"
 #include "../commands/link_timing.hpp"
 #include "r4link/error.hpp"
+#include "r4link/options.hpp"
 
 namespace r4 {
 
