@@ -256,11 +256,11 @@ class AsyncBoard::Impl::Sequence : public Completion {
       : impl_(impl), completion_(std::move(completion)) {}
   virtual ~Sequence() = default;
   // Destroys this, then hands the result to the user's handler.
-  void end(CommandResult result, How how) {
+  void end(CommandResult result, How called) {
     result.elapsed = steady_now() - started_;
     const CompletionPtr::pointer handler = completion_.release();
     delete this;
-    handler->complete(result, how);
+    handler->complete(result, called);
   }
 
   Impl& impl_;     // owns this
