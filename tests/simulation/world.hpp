@@ -403,7 +403,6 @@ class World : public firmware::Hal, public firmware::Observer {
   };
   bool recording_ = false;
   std::vector<Recorded> recorded_;
-  std::map<std::uint32_t, int> whose_;  // a place: a host's
 };
 
 }  // namespace r4::simulation

@@ -67,7 +67,7 @@ void World::happen(const Happening& happening, bool over) {
         if ((happening.paths >> place.path & 1U) == 0) continue;
         disturb(place.path, happening.kind, now_us_);
         std::swap(place.peer, place.other_peer);
-        if (place.peer == 0) whose_[place.peer = next_peer_++] = host.index;
+        if (place.peer == 0) place.peer = next_peer_++;
       }
       break;
     case Happening::Kind::leave:

@@ -38,14 +38,12 @@ void World::place(Host& host) {
     const bool shared =
         w == 0 && (bus_stopper || (host.watcher && script_ == nullptr && random_.chance(0.1)));
     place.peer = shared ? hosts_.front()->places.front().peer : next_peer_++;
-    whose_.emplace(place.peer, host.index);
     host.places.push_back(place);
   }
   if (!host.places.empty()) return;
   Host::Place place;
   place.path = schedule_.paths() - 1;
   place.peer = next_peer_++;
-  whose_.emplace(place.peer, host.index);
   host.places.push_back(place);
 }
 
@@ -168,8 +166,7 @@ void World::on_path(std::uint32_t, Source path, bool joined) {
   ++report_.joins;
   if (!fed_.empty() && fed_.back().from.host < 0)
     return;  // a stranger's session, with what paths it likes
-  const auto its = whose_.find(path.peer);
-  const bool of_host = its != whose_.end() && !fed_.empty() && its->second == fed_.back().from.host;
+  const bool of_host = !fed_.empty() && delivering_ == fed_.back().from;
   if (!of_host) violate(fmt::format("joined: peer {} is not of the session's host", path.peer));
 }
 

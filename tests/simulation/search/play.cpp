@@ -243,10 +243,14 @@ std::string Play::name_of(Process process) const {
 }
 
 void Play::before_board(const Packet& packet) {
+  const auto copied = copied_.find(packet.bytes);
+  if (copied != copied_.end() && !std::exchange(copied->second.has_arrived, true)) {
+    world_.delivering_ = copied->second.signer;
+  }
   had_owner_ = world_.board_->link().has_owner();
   fed_before_ = world_.board_->link().fed_ms();
   if (!packet.intact || !packet.heartbeat) return;
-  const Process from{packet.host, packet.incarnation};
+  const Process from = world_.delivering_;
   heard_us_[from] = world_.now_us_;
   const auto newest = newest_.find(from);
   if (newest != newest_.end() && !newer(packet.pnum, newest->second)) return;
@@ -264,7 +268,7 @@ void Play::before_board(const Packet& packet) {
 
 void Play::after_board(const Packet& packet) {
   const BoardLink& link = world_.board_->link();
-  const Process from{packet.host, packet.incarnation};
+  const Process from = world_.delivering_;
   const bool begins = link.has_owner() && !had_owner_;
   const bool feeds = link.has_owner() && had_owner_ && link.fed_ms() != fed_before_;
   if (!packet.heartbeat || !(begins || feeds) || (has_controller_ && from == controller_)) return;

@@ -14,6 +14,9 @@
 //             fresh echo
 //   served    while a host is in control, strangers do not prevent the confirmation of its commands
 //   returns   at the end of a run without strangers, a host that runs is in control
+//
+// With a key, the first copy of a signed datagram that reaches the board counts as its host's,
+// whatever its peer is (docs/safety.md, limits). Any further copy counts as the stranger's.
 #pragma once
 
 #include <cstdint>
@@ -102,7 +105,7 @@ class Play final : World::Script {
   void say_bytes(std::string bytes, std::uint8_t port, std::uint32_t peer);
   bool is_taken(std::uint32_t peer);
   void say_once(Fault::Kind kind);
-  void repeat(const std::string& bytes);
+  void repeat(const std::string& bytes, Process signer);
   std::uint32_t next_number() const;
   void carry_on(Fault::Kind kind, std::uint8_t port, std::uint32_t peer);
 
@@ -150,6 +153,11 @@ class Play final : World::Script {
   std::uint64_t good_us_ = 0;  // when the newest heartbeat came that has to feed
   std::map<Process, std::uint64_t> heard_us_;
   std::map<Process, std::uint32_t> newest_;  // number of a heartbeat
+  struct Signed {
+    Process signer;
+    bool has_arrived = false;
+  };
+  std::map<std::string, Signed> copied_;  // the datagrams that a stranger has copied
 
   Stranger stranger_;
   std::uint32_t stranger_pnum_ = 0;                     // of its own datagrams

@@ -99,7 +99,7 @@ void Play::begin_fault(Fault::Kind kind, int index, int path, const std::string&
         if (place.path != path) continue;
         world_.disturb(path, Happening::Kind::address, world_.now_us_);
         std::swap(place.peer, place.other_peer);
-        if (place.peer == 0) world_.whose_[place.peer = world_.next_peer_++] = index;
+        if (place.peer == 0) place.peer = world_.next_peer_++;
       }
       return;
     case Fault::Kind::stops:
@@ -134,7 +134,7 @@ void Play::begin_fault(Fault::Kind kind, int index, int path, const std::string&
     case Fault::Kind::stranger_inherits:
       return carry_on(kind, world_.port_of(host(0).places.front().path), first_peer_);
     case Fault::Kind::stranger_copies:
-      return repeat(bytes);
+      return repeat(bytes, {index, host(index).incarnation});
     default:
       return;
   }

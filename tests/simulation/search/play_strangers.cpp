@@ -71,7 +71,8 @@ void Play::say_once(Fault::Kind kind) {
 }
 
 // Sends a copy of a host's datagram from the stranger's address.
-void Play::repeat(const std::string& bytes) {
+void Play::repeat(const std::string& bytes, Process signer) {
+  copied_.try_emplace(bytes, Signed{signer});
   say_bytes(bytes, world_.port_of(story_.paths - 1), Stranger::address);
 }
 
