@@ -117,21 +117,29 @@ void Board::stop(Duration timeout) { send(Command::stop(), timeout); }
 void Board::stop_async() { impl_->post(Command::stop()); }
 void Board::clear(Duration timeout) { send(Command::clear(), timeout); }
 
-Command Board::DriveChannel::command(int pwm, Direction direction) const {
-  return kind_ == CommandKind::osmc ? Command::osmc(pwm, direction, channel_)
-                                    : Command::dhb12(pwm, direction, channel_);
+Command Board::DriveChannel::command(Pwm pwm, Direction direction) const {
+  return kind_ == CommandKind::osmc ? Command::osmc(channel_, pwm, direction)
+                                    : Command::dhb12(channel_, pwm, direction);
 }
-void Board::DriveChannel::set(int pwm, Direction direction, Duration timeout) const {
-  board_.send(command(pwm, direction), timeout);
+Command Board::DriveChannel::command(double duty) const {
+  const Duty checked = checked_duty(duty);
+  return command(checked.pwm(), checked.direction());
 }
-PostResult Board::DriveChannel::post(int pwm, Direction direction) const {
-  return board_.post(command(pwm, direction));
+void Board::DriveChannel::set(double duty, Duration timeout) const {
+  board_.send(command(duty), timeout);
+}
+PostResult Board::DriveChannel::post(double duty) const { return board_.post(command(duty)); }
+void Board::DriveChannel::set_pwm(int pwm, Direction direction, Duration timeout) const {
+  board_.send(command(Pwm(pwm), direction), timeout);
+}
+PostResult Board::DriveChannel::post_pwm(int pwm, Direction direction) const {
+  return board_.post(command(Pwm(pwm), direction));
 }
 void Board::ServoChannel::set(int pulse_us, Duration timeout) const {
-  board_.send(Command::servo(pulse_us, channel_), timeout);
+  board_.send(Command::servo(channel_, Microseconds(pulse_us)), timeout);
 }
 PostResult Board::ServoChannel::post(int pulse_us) const {
-  return board_.post(Command::servo(pulse_us, channel_));
+  return board_.post(Command::servo(channel_, Microseconds(pulse_us)));
 }
 void Board::RelayChannel::set(bool on, Duration timeout) const {
   board_.send(Command::relay(channel_, on), timeout);
@@ -139,23 +147,30 @@ void Board::RelayChannel::set(bool on, Duration timeout) const {
 PostResult Board::RelayChannel::post(bool on) const {
   return board_.post(Command::relay(channel_, on));
 }
-void Board::StepperChannel::move_to(std::int32_t position, int speed, Duration timeout) const {
-  board_.send(Command::stepper(position, speed, channel_), timeout);
+void Board::StepperChannel::move_to(Steps position, StepsPerSecond speed, Duration timeout) const {
+  board_.send(Command::stepper(channel_, position, speed), timeout);
 }
-PostResult Board::StepperChannel::post(std::int32_t position, int speed) const {
-  return board_.post(Command::stepper(position, speed, channel_));
+PostResult Board::StepperChannel::post(Steps position, StepsPerSecond speed) const {
+  return board_.post(Command::stepper(channel_, position, speed));
 }
 void Board::StepperChannel::zero(Duration timeout) const {
   board_.send(Command::zero(channel_), timeout);
 }
-void Board::BldcChannel::set(int speed, Direction direction, bool brake, Duration timeout) const {
-  board_.send(Command::bldc(speed, direction, brake, channel_), timeout);
+void Board::BldcChannel::set(double duty, bool brake, Duration timeout) const {
+  board_.send(Command::bldc(channel_, checked_duty(duty), brake), timeout);
 }
-PostResult Board::BldcChannel::post(int speed, Direction direction, bool brake) const {
-  return board_.post(Command::bldc(speed, direction, brake, channel_));
+PostResult Board::BldcChannel::post(double duty, bool brake) const {
+  return board_.post(Command::bldc(channel_, checked_duty(duty), brake));
 }
-void Board::proximity(int channel, int threshold_cm, Duration timeout) {
-  send(Command::proximity(threshold_cm, channel), timeout);
+void Board::BldcChannel::set_pwm(int speed, Direction direction, bool brake,
+                                 Duration timeout) const {
+  board_.send(Command::bldc(channel_, Pwm(speed), direction, brake), timeout);
+}
+PostResult Board::BldcChannel::post_pwm(int speed, Direction direction, bool brake) const {
+  return board_.post(Command::bldc(channel_, Pwm(speed), direction, brake));
+}
+void Board::proximity(Channel channel, Centimetres threshold, Duration timeout) {
+  send(Command::proximity(channel, threshold), timeout);
 }
 void Board::fields(std::string_view names, Duration timeout) {
   send("F:" + std::string(names), timeout);

@@ -208,7 +208,7 @@ void require_valid(const Command& command) {
 
 void require_any(const Setpoints& group) {
   if (!group.empty()) return;
-  throw Error(ErrorKind::usage, "the group", "has no command", "add one: Setpoints{}.osmc(…)");
+  throw Error(ErrorKind::usage, "the group", "has no command", "add one: Setpoints::add()");
 }
 
 void require_cable(std::string_view url, std::string_view secret) {

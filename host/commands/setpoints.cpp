@@ -30,27 +30,6 @@ Problem bad_group_member(const Command& command, std::size_t others) {
 
 }  // namespace
 
-Setpoints& Setpoints::osmc(int channel, int pwm, Direction direction) {
-  return add(Command::osmc(pwm, direction, channel));
-}
-Setpoints& Setpoints::dhb12(int channel, int pwm, Direction direction) {
-  return add(Command::dhb12(pwm, direction, channel));
-}
-Setpoints& Setpoints::servo(int channel, int pulse_us) {
-  return add(Command::servo(pulse_us, channel));
-}
-Setpoints& Setpoints::relay(int channel, bool on) { return add(Command::relay(channel, on)); }
-Setpoints& Setpoints::stepper(int channel, std::int32_t position, int speed) {
-  return add(Command::stepper(position, speed, channel));
-}
-Setpoints& Setpoints::zero(int channel) { return add(Command::zero(channel)); }
-Setpoints& Setpoints::bldc(int channel, int speed, Direction direction, bool brake) {
-  return add(Command::bldc(speed, direction, brake, channel));
-}
-Setpoints& Setpoints::dac(int channel, int millivolts) {
-  return add(Command::dac(channel, millivolts));
-}
-
 Setpoints& Setpoints::add(const Command& command) {
   require_valid(command);
   GroupRules rules;

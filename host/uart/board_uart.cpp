@@ -47,8 +47,8 @@ Subscription Board::Uart::on_bytes(std::function<void(const UartData&)> callback
   return impl->callbacks.add_uart(channel_, std::move(callback));
 }
 
-void Board::dac(int channel, int millivolts, Duration timeout) {
-  send(Command::dac(channel, millivolts), timeout);
+void Board::dac(Channel channel, Millivolts voltage, Duration timeout) {
+  send(Command::dac(channel, voltage), timeout);
 }
 
 // On the loop.

@@ -4,7 +4,7 @@
 //     asio::io_context io;
 //     r4::AsyncBoard board(io, "serial:auto");       // or io.get_executor()
 //     board.open();
-//     board.async_send(r4::Command::osmc(358, r4::Direction::forward, 1), 500ms,
+//     board.async_send(r4::Command::osmc(1, r4::Pwm(358), r4::Direction::forward), 500ms,
 //                      [](const r4::CommandResult& result) { … });
 //     io.run();
 //

@@ -4,7 +4,7 @@
 //     r4::Board board("udp://192.168.0.125");
 //     board.wait_active();
 //     board.arm();                                     // closes relay 1, the motor supply
-//     board.osmc(1).set(358, r4::Direction::forward);  // the board's state has confirmed it
+//     board.osmc(1).set(0.1);                          // the board's state has confirmed it
 //     board.on_state([](const r4::State& s) { … });
 //     board.stop();                                    // every output safe, at once
 //
@@ -189,12 +189,18 @@ class R4LINK_API Board {
   // Each channel: set() is send(), confirmed; post() sends once and does not wait.
   class DriveChannel {
    public:
-    void set(int pwm, Direction direction, Duration timeout = default_timeout) const;  // pwm 0-4095
-    PostResult post(int pwm, Direction direction) const;
+    // `duty`: from -1 (full reverse) to 1 (full forward); set() throws Error{usage} for others, and
+    // post() as well.
+    void set(double duty, Duration timeout = default_timeout) const;
+    PostResult post(double duty) const;
+    // The board's own value: `pwm` 0-4095.
+    void set_pwm(int pwm, Direction direction, Duration timeout = default_timeout) const;
+    PostResult post_pwm(int pwm, Direction direction) const;
 
    private:
     friend class Board;
-    Command command(int pwm, Direction direction) const;
+    Command command(Pwm pwm, Direction direction) const;
+    Command command(double duty) const;
     DriveChannel(Board& board, CommandKind kind, int channel)
         : board_(board), kind_(kind), channel_(channel) {}
     Board& board_;
@@ -225,24 +231,27 @@ class R4LINK_API Board {
   };
   class StepperChannel {
    public:
-    // Position in steps, speed in steps per second (1-20000).
-    void move_to(std::int32_t position, int speed = stepper_speed_default,
+    void move_to(Steps position, StepsPerSecond speed = default_speed,
                  Duration timeout = default_timeout) const;
-    PostResult post(std::int32_t position, int speed = stepper_speed_default) const;
+    PostResult post(Steps position, StepsPerSecond speed = default_speed) const;
     void zero(Duration timeout = default_timeout) const;
 
    private:
     friend class Board;
+    static constexpr StepsPerSecond default_speed{stepper_speed_default};
     StepperChannel(Board& board, int channel) : board_(board), channel_(channel) {}
     Board& board_;
     int channel_;
   };
   class BldcChannel {
    public:
-    // Speed 0-4095.
-    void set(int speed, Direction direction, bool brake = false,
-             Duration timeout = default_timeout) const;
-    PostResult post(int speed, Direction direction, bool brake = false) const;
+    // `duty` as of DriveChannel.
+    void set(double duty, bool brake = false, Duration timeout = default_timeout) const;
+    PostResult post(double duty, bool brake = false) const;
+    // The board's own value: `speed` 0-4095.
+    void set_pwm(int speed, Direction direction, bool brake = false,
+                 Duration timeout = default_timeout) const;
+    PostResult post_pwm(int speed, Direction direction, bool brake = false) const;
 
    private:
     friend class Board;
@@ -312,7 +321,7 @@ class R4LINK_API Board {
   // Throws Error{usage} where there is none.
   Uart uart(int channel);
   // A voltage of the board's, channel 1 or 2, 0-3300 mV; 0 in the safe state.
-  void dac(int channel, int millivolts, Duration timeout = default_timeout);
+  void dac(Channel channel, Millivolts voltage, Duration timeout = default_timeout);
 
   // Channels count from 1, as on the board. A channel that does not exist throws at set().
   DriveChannel osmc(int channel) { return {*this, CommandKind::osmc, channel}; }
@@ -321,7 +330,8 @@ class R4LINK_API Board {
   RelayChannel relay(int channel) { return {*this, channel}; }
   StepperChannel stepper(int channel) { return {*this, channel}; }
   BldcChannel bldc(int channel) { return {*this, channel}; }
-  void proximity(int channel, int threshold_cm, Duration timeout = default_timeout);  // 0: off
+  // The board goes safe when the sensor sees something nearer; 0: off.
+  void proximity(Channel channel, Centimetres threshold, Duration timeout = default_timeout);
   void fields(std::string_view names, Duration timeout = default_timeout);  // "DEFAULT,ENC1"
   void setting(std::string_view key, std::string_view value, Duration timeout = default_timeout);
   // The board's timeout and heartbeat interval together, whatever they are now: one of them alone may

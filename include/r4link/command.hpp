@@ -12,6 +12,45 @@ namespace r4 {
 // The value of a host's heartbeat.
 constexpr Text host_heartbeat_word("ROS2-R4");
 
+// --- channels and values. Each has a type of its own, so that swapped arguments do not compile.
+
+// The number of a channel on the board, from 1. A command of a channel that the board lacks is
+// refused.
+struct Channel {
+  constexpr Channel(int channel) : number(channel) {}  // NOLINT(google-explicit-constructor)
+  Channel(bool) = delete;
+  int number;
+};
+
+// A number of one unit. A command with a value outside its range is refused.
+template <class Unit>
+struct Quantity {
+  constexpr explicit Quantity(std::int32_t number) : value(number) {}
+  std::int32_t value;
+};
+using Pwm = Quantity<struct PwmUnit>;                        // 0-4095 (pwm_max), the full drive
+using Microseconds = Quantity<struct MicrosecondsUnit>;      // a servo's pulse, 0 (off) to 2500
+using Steps = Quantity<struct StepsUnit>;                    // a stepper's position, of 32 bits
+using StepsPerSecond = Quantity<struct StepsPerSecondUnit>;  // 1-20000
+using Millivolts = Quantity<struct MillivoltsUnit>;          // 0-3300
+using Centimetres = Quantity<struct CentimetresUnit>;        // 0 (off) to 400
+
+// How hard a motor is driven: from -1 (full reverse) to 1 (full forward).
+struct Duty {
+  constexpr explicit Duty(double duty) : value(duty) {}
+  constexpr bool is_in_range() const { return value >= -1 && value <= 1; }
+  // Rounded to the nearest; outside its range if the duty is.
+  constexpr Pwm pwm() const {
+    return Pwm(is_in_range()
+                   ? static_cast<std::int32_t>((value < 0 ? -value : value) * pwm_max + 0.5)
+                   : pwm_max + 1);
+  }
+  constexpr Direction direction() const {
+    return value < 0 ? Direction::reverse : Direction::forward;
+  }
+  double value;
+};
+
 enum class CommandKind : std::uint8_t {
   heartbeat,   // H:ROS2-R4
   osmc,        // O:pwm,dir,ch
@@ -55,10 +94,16 @@ struct R4LINK_API Command {
   Text text2;  // setting: the value
 
   static Command heartbeat();
-  static Command osmc(std::int32_t pwm, Direction direction, int channel);
-  static Command dhb12(std::int32_t pwm, Direction direction, int channel);
-  static Command servo(std::int32_t us, int channel);
-  static Command relay(int channel, bool on);
+  static Command osmc(Channel channel, Pwm pwm, Direction direction);
+  static Command osmc(Channel channel, Duty duty) {
+    return osmc(channel, duty.pwm(), duty.direction());
+  }
+  static Command dhb12(Channel channel, Pwm pwm, Direction direction);
+  static Command dhb12(Channel channel, Duty duty) {
+    return dhb12(channel, duty.pwm(), duty.direction());
+  }
+  static Command servo(Channel channel, Microseconds pulse);
+  static Command relay(Channel channel, bool on);
   static Command stop();
   // `cause`: the number of the cause to be cleared, as the board's heartbeats tell it (CAUSE); 0 if
   // they tell none. unnamed_cause: a host that does not know of such numbers, or Session, which puts
@@ -67,10 +112,16 @@ struct R4LINK_API Command {
   static Command clear(std::int32_t cause = unnamed_cause);
   // The controlling host ends: the board is safe at once, and whoever comes next may control it.
   static Command leave();
-  static Command stepper(std::int32_t target_steps, std::int32_t steps_per_s, int channel);
-  static Command zero(int channel);
-  static Command bldc(std::int32_t speed, Direction direction, bool brake, int channel);
-  static Command proximity(std::int32_t cm, int channel);
+  static Command stepper(Channel channel, Steps position,
+                         StepsPerSecond speed = StepsPerSecond(stepper_speed_default));
+  // The stepper's position and the encoder's count become 0.
+  static Command zero(Channel channel);
+  static Command bldc(Channel channel, Pwm speed, Direction direction, bool brake = false);
+  static Command bldc(Channel channel, Duty duty, bool brake = false) {
+    return bldc(channel, duty.pwm(), duty.direction(), brake);
+  }
+  // The board goes safe when the sensor sees something nearer.
+  static Command proximity(Channel channel, Centimetres threshold);
   static Command fields(Text list);
   static Command setting(Text key, Text value);
   static Command identify();
@@ -86,9 +137,9 @@ struct R4LINK_API Command {
   static Command i2c_poll(int slot, int address, Text register_bytes, int count, int period_ms);
   static Command i2c_poll_off(int slot);
   // On a UART of the user's: at most uart_max_write bytes.
-  static Command uart_write(int channel, Text bytes);
+  static Command uart_write(Channel channel, Text bytes);
   // A voltage of the microcontroller's; 0 in the safe state.
-  static Command dac(int channel, std::int32_t millivolts);
+  static Command dac(Channel channel, Millivolts voltage);
 };
 
 // May it move something? Those are refused in the safe state: O D S R P B Z, X:DAC, and X:WRITE and

@@ -2,17 +2,20 @@
 // r4::Setpoints: output commands that a board executes together, in one pass over its chips, or none of
 // them.
 //
-//     board.apply(r4::Setpoints{}.osmc(1, 358, forward).osmc(2, 358, forward).servo(3, 1500));
+//     board.apply({r4::Command::osmc(1, r4::Duty(0.1)), r4::Command::osmc(2, r4::Duty(0.1)),
+//                  r4::Command::servo(3, r4::Microseconds(1500))});
 //
-// Its effect is that of its commands one after the other, in the order in which they were added, with
-// nothing in between: relay 1, closed behind a motor's command, takes that back (docs/safety.md). What is in
-// it can be sent: a value outside its range, a second command for the same channel, and more than
-// max_group of them throw Error{usage} as they are added.
+// Their effect is that of the commands one after the other, in the order in which they were added,
+// with nothing in between: relay 1, closed after a motor's command, takes that back
+// (docs/safety.md). All of them can be sent: a command that drives no output, a value outside its
+// range, a second command for the same channel, and more than max_group of them throw Error{usage}
+// as they are added.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 
 #include "command.hpp"
 #include "config.hpp"
@@ -21,17 +24,11 @@ namespace r4 {
 
 class R4LINK_API Setpoints {
  public:
-  // Channels count from 1; ranges as of the channels of Board.
-  Setpoints& osmc(int channel, int pwm, Direction direction);
-  Setpoints& dhb12(int channel, int pwm, Direction direction);
-  Setpoints& servo(int channel, int pulse_us);
-  Setpoints& relay(int channel, bool on);
-  Setpoints& stepper(int channel, std::int32_t position, int speed = stepper_speed_default);
-  Setpoints& zero(int channel);
-  Setpoints& bldc(int channel, int speed, Direction direction, bool brake = false);
-  // A voltage, 0-3300 mV.
-  Setpoints& dac(int channel, int millivolts);
-  // Any output command (O D S R P B Z, X:DAC).
+  Setpoints() = default;
+  Setpoints(std::initializer_list<Command> commands) {
+    for (const Command& command : commands) add(command);
+  }
+  // An output command: O D S R P B Z, X:DAC.
   Setpoints& add(const Command& command);
 
   std::size_t size() const { return size_; }

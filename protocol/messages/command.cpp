@@ -151,9 +151,10 @@ Command read_clear(Values& v) {
 }
 
 Command read_stepper(Values& v) {
-  if (v.count() == 2) return Command::stepper(v.number(0), stepper_speed_default, v.number(1));
+  if (v.count() == 2)
+    return Command::stepper(v.number(1), Steps(v.number(0)), StepsPerSecond(stepper_speed_default));
   if (!v.count_is(3)) return Command();
-  return Command::stepper(v.number(0), v.number(1), v.number(2));
+  return Command::stepper(v.number(2), Steps(v.number(0)), StepsPerSecond(v.number(1)));
 }
 
 // The rate, and behind it a list.
@@ -247,13 +248,13 @@ Refusal parse_command(const Field& field, Command& out) {
       }
       break;
     case 'O':
-      if (v.count_is(3)) command = Command::osmc(v.number(0), v.direction(1), v.number(2));
+      if (v.count_is(3)) command = Command::osmc(v.number(2), Pwm(v.number(0)), v.direction(1));
       break;
     case 'D':
-      if (v.count_is(3)) command = Command::dhb12(v.number(0), v.direction(1), v.number(2));
+      if (v.count_is(3)) command = Command::dhb12(v.number(2), Pwm(v.number(0)), v.direction(1));
       break;
     case 'S':
-      if (v.count_is(2)) command = Command::servo(v.number(0), v.number(1));
+      if (v.count_is(2)) command = Command::servo(v.number(1), Microseconds(v.number(0)));
       break;
     case 'R':
       if (v.count_is(2)) command = Command::relay(v.number(0), v.on_or_off(1));
@@ -266,11 +267,11 @@ Refusal parse_command(const Field& field, Command& out) {
       break;
     case 'B':
       if (v.count_is(4)) {
-        command = Command::bldc(v.number(0), v.direction(1), v.flag(2), v.number(3));
+        command = Command::bldc(v.number(3), Pwm(v.number(0)), v.direction(1), v.flag(2));
       }
       break;
     case 'U':
-      if (v.count_is(2)) command = Command::proximity(v.number(0), v.number(1));
+      if (v.count_is(2)) command = Command::proximity(v.number(1), Centimetres(v.number(0)));
       break;
     case 'W':
       command = read_watch(v, field.values());

@@ -17,10 +17,16 @@ Number number_of(int value) {
   return value > 0 && value <= static_cast<Number>(-1) ? static_cast<Number>(value) : Number{0};
 }
 
-Command of_channel(CommandKind kind, std::int32_t value, int channel) {
+Command of_channel(CommandKind kind, Channel channel, std::int32_t value) {
   Command command = of_kind(kind);
   command.value = value;
-  command.channel = number_of<std::uint8_t>(channel);
+  command.channel = number_of<std::uint8_t>(channel.number);
+  return command;
+}
+
+Command of_motor(CommandKind kind, Channel channel, Pwm pwm, Direction direction) {
+  Command command = of_channel(kind, channel, pwm.value);
+  command.direction = direction;
   return command;
 }
 
@@ -39,21 +45,17 @@ Command of_device(CommandKind kind, int address, Text bytes, int count) {
 }  // namespace
 
 Command Command::heartbeat() { return of_kind(CommandKind::heartbeat); }
-Command Command::osmc(std::int32_t pwm, Direction direction, int channel) {
-  Command command = of_channel(CommandKind::osmc, pwm, channel);
-  command.direction = direction;
-  return command;
+Command Command::osmc(Channel channel, Pwm pwm, Direction direction) {
+  return of_motor(CommandKind::osmc, channel, pwm, direction);
 }
-Command Command::dhb12(std::int32_t pwm, Direction direction, int channel) {
-  Command command = of_channel(CommandKind::dhb12, pwm, channel);
-  command.direction = direction;
-  return command;
+Command Command::dhb12(Channel channel, Pwm pwm, Direction direction) {
+  return of_motor(CommandKind::dhb12, channel, pwm, direction);
 }
-Command Command::servo(std::int32_t us, int channel) {
-  return of_channel(CommandKind::servo, us, channel);
+Command Command::servo(Channel channel, Microseconds pulse) {
+  return of_channel(CommandKind::servo, channel, pulse.value);
 }
-Command Command::relay(int channel, bool on) {
-  Command command = of_channel(CommandKind::relay, 0, channel);
+Command Command::relay(Channel channel, bool on) {
+  Command command = of_channel(CommandKind::relay, channel, 0);
   command.on = on;
   return command;
 }
@@ -64,20 +66,19 @@ Command Command::clear(std::int32_t cause) {
   return command;
 }
 Command Command::leave() { return of_kind(CommandKind::leave); }
-Command Command::stepper(std::int32_t target_steps, std::int32_t steps_per_s, int channel) {
-  Command command = of_channel(CommandKind::stepper, target_steps, channel);
-  command.speed = steps_per_s;
+Command Command::stepper(Channel channel, Steps position, StepsPerSecond speed) {
+  Command command = of_channel(CommandKind::stepper, channel, position.value);
+  command.speed = speed.value;
   return command;
 }
-Command Command::zero(int channel) { return of_channel(CommandKind::zero, 0, channel); }
-Command Command::bldc(std::int32_t speed, Direction direction, bool brake, int channel) {
-  Command command = of_channel(CommandKind::bldc, speed, channel);
-  command.direction = direction;
+Command Command::zero(Channel channel) { return of_channel(CommandKind::zero, channel, 0); }
+Command Command::bldc(Channel channel, Pwm speed, Direction direction, bool brake) {
+  Command command = of_motor(CommandKind::bldc, channel, speed, direction);
   command.on = brake;
   return command;
 }
-Command Command::proximity(std::int32_t cm, int channel) {
-  return of_channel(CommandKind::proximity, cm, channel);
+Command Command::proximity(Channel channel, Centimetres threshold) {
+  return of_channel(CommandKind::proximity, channel, threshold.value);
 }
 Command Command::fields(Text list) {
   Command command = of_kind(CommandKind::fields);
@@ -116,13 +117,13 @@ Command Command::i2c_poll_off(int slot) {
   command.channel = number_of<std::uint8_t>(slot);
   return command;
 }
-Command Command::uart_write(int channel, Text bytes) {
-  Command command = of_channel(CommandKind::uart_write, 0, channel);
+Command Command::uart_write(Channel channel, Text bytes) {
+  Command command = of_channel(CommandKind::uart_write, channel, 0);
   command.text = bytes;
   return command;
 }
-Command Command::dac(int channel, std::int32_t millivolts) {
-  return of_channel(CommandKind::dac, millivolts, channel);
+Command Command::dac(Channel channel, Millivolts voltage) {
+  return of_channel(CommandKind::dac, channel, voltage.value);
 }
 Command Command::identify() { return of_kind(CommandKind::identify); }
 

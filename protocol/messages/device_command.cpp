@@ -120,7 +120,7 @@ Refusal parse_device_command(const Field& field, Command& out) {
       command = Command::uart_write(numbers.number(values[1]), values[2]);
       break;
     case CommandKind::dac:
-      command = Command::dac(numbers.number(values[1]), numbers.number(values[2]));
+      command = Command::dac(numbers.number(values[1]), Millivolts(numbers.number(values[2])));
       break;
     default:
       command = Command::i2c_scan();

@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
     std::vector<double> us(std::max<std::size_t>(1, std::strtoul(argv[2], nullptr, 10)));
     for (std::size_t i = 0; i < us.size(); ++i) {
       const auto start = Clock::now();
-      board.send(r4::Command::proximity(static_cast<int>(i % 2), 1));
+      board.send(r4::Command::proximity(1, r4::Centimetres(static_cast<int>(i % 2))));
       us[i] = std::chrono::duration<double, std::micro>(Clock::now() - start).count();
     }
     std::sort(us.begin(), us.end());

@@ -26,11 +26,11 @@ TEST(Executor, ChangesWhatTheCommandNamesAndNothingElse) {
   expected.outputs.relays = 0x01;
   expect(Command::relay(1, true));
   expected.outputs.osmc[0] = {4095, Direction::forward};
-  expect(Command::osmc(4095, Direction::forward, 1));
+  expect(Command::osmc(1, Pwm(4095), Direction::forward));
   expected.outputs.dhb12[3] = {1, Direction::forward};
-  expect(Command::dhb12(1, Direction::forward, 4));
+  expect(Command::dhb12(4, Pwm(1), Direction::forward));
   expected.outputs.servo_us[15] = 2500;
-  expect(Command::servo(2500, 16));
+  expect(Command::servo(16, Microseconds(2500)));
   expected.outputs.relays = 0x81;
   expect(Command::relay(8, true));
   expect(Command::relay(1, true));
@@ -39,11 +39,11 @@ TEST(Executor, ChangesWhatTheCommandNamesAndNothingElse) {
   expected.outputs.stepper[1].position = -5;
   expected.outputs.stepper[1].speed = 20;
   expected.outputs.stepper[1].enabled = true;
-  expect(Command::stepper(-5, 20, 2));
+  expect(Command::stepper(2, Steps(-5), StepsPerSecond(20)));
   expected.outputs.bldc[2] = {9, Direction::reverse, true};
-  expect(Command::bldc(9, Direction::reverse, true, 3));
+  expect(Command::bldc(3, Pwm(9), Direction::reverse, true));
   expected.proximity_cm[3] = 400;
-  expect(Command::proximity(400, 4));
+  expect(Command::proximity(4, Centimetres(400)));
   expected.fields = FieldSet();
   expected.fields.add(StateField::ain5);
   expect(Command::fields("AIN5"));
@@ -59,12 +59,12 @@ TEST(Executor, ChangesWhatTheCommandNamesAndNothingElse) {
 
 TEST(Executor, ClosingTheMotorSupplyMovesNothing) {
   Setpoints setpoints;
-  carry_out(Command::osmc(500, Direction::forward, 4), setpoints);
-  carry_out(Command::dhb12(500, Direction::forward, 2), setpoints);
-  carry_out(Command::bldc(500, Direction::forward, false, 3), setpoints);
-  carry_out(Command::stepper(500, 20, 1), setpoints);
-  carry_out(Command::dac(3000, 1), setpoints);
-  carry_out(Command::servo(1500, 1), setpoints);
+  carry_out(Command::osmc(4, Pwm(500), Direction::forward), setpoints);
+  carry_out(Command::dhb12(2, Pwm(500), Direction::forward), setpoints);
+  carry_out(Command::bldc(3, Pwm(500), Direction::forward, false), setpoints);
+  carry_out(Command::stepper(1, Steps(500), StepsPerSecond(20)), setpoints);
+  carry_out(Command::dac(1, Millivolts(3000)), setpoints);
+  carry_out(Command::servo(1, Microseconds(1500)), setpoints);
   carry_out(Command::relay(2, true), setpoints);
   carry_out(Command::relay(1, true), setpoints);
   const Outputs& outputs = setpoints.outputs;
@@ -77,32 +77,32 @@ TEST(Executor, ClosingTheMotorSupplyMovesNothing) {
   EXPECT_EQ(outputs.servo_us[0], 1500) << "servos are not on that supply";
   EXPECT_EQ(outputs.relays, 0b11);
 
-  carry_out(Command::osmc(500, Direction::forward, 4), setpoints);
+  carry_out(Command::osmc(4, Pwm(500), Direction::forward), setpoints);
   carry_out(Command::relay(1, true), setpoints);
   EXPECT_EQ(outputs.osmc[3].pwm, 500) << "it is closed already";
 }
 
 TEST(Executor, ChangesNothingWhenItRefuses) {
   Setpoints setpoints;
-  carry_out(Command::osmc(1, Direction::forward, 1), setpoints);
+  carry_out(Command::osmc(1, Pwm(1), Direction::forward), setpoints);
   const Setpoints before = setpoints;
   const std::pair<Command, Refusal> cases[] = {
-      {Command::osmc(4096, Direction::forward, 1), Refusal::range},
-      {Command::osmc(-1, Direction::forward, 1), Refusal::range},
-      {Command::osmc(1, Direction::forward, 5), Refusal::channel},
-      {Command::osmc(1, Direction::forward, 0), Refusal::channel},
-      {Command::osmc(1, static_cast<Direction>(2), 1), Refusal::range},
-      {Command::dhb12(1, Direction::forward, 257), Refusal::channel},
-      {Command::servo(2501, 1), Refusal::range},
-      {Command::servo(1, 17), Refusal::channel},
+      {Command::osmc(1, Pwm(4096), Direction::forward), Refusal::range},
+      {Command::osmc(1, Pwm(-1), Direction::forward), Refusal::range},
+      {Command::osmc(5, Pwm(1), Direction::forward), Refusal::channel},
+      {Command::osmc(0, Pwm(1), Direction::forward), Refusal::channel},
+      {Command::osmc(1, Pwm(1), static_cast<Direction>(2)), Refusal::range},
+      {Command::dhb12(257, Pwm(1), Direction::forward), Refusal::channel},
+      {Command::servo(1, Microseconds(2501)), Refusal::range},
+      {Command::servo(17, Microseconds(1)), Refusal::channel},
       {Command::relay(9, true), Refusal::channel},
-      {Command::stepper(1, 0, 1), Refusal::range},
-      {Command::stepper(1, 20001, 1), Refusal::range},
-      {Command::stepper(1, 1, -1), Refusal::channel},
+      {Command::stepper(1, Steps(1), StepsPerSecond(0)), Refusal::range},
+      {Command::stepper(1, Steps(1), StepsPerSecond(20001)), Refusal::range},
+      {Command::stepper(-1, Steps(1), StepsPerSecond(1)), Refusal::channel},
       {Command::zero(5), Refusal::channel},
-      {Command::bldc(4096, Direction::forward, false, 1), Refusal::range},
-      {Command::proximity(401, 1), Refusal::range},
-      {Command::proximity(1, 5), Refusal::channel},
+      {Command::bldc(1, Pwm(4096), Direction::forward, false), Refusal::range},
+      {Command::proximity(1, Centimetres(401)), Refusal::range},
+      {Command::proximity(5, Centimetres(1)), Refusal::channel},
       {Command::fields("AIN24,NONSENSE"), Refusal::unknown},
       {Command::fields(""), Refusal::format},
       {Command::setting("rate", "1001"), Refusal::range},

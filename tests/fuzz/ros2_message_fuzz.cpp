@@ -51,15 +51,13 @@ void read_string(std::string_view bytes) {
 }
 
 void read_numbers(double first, double second) {
-  const auto duty = from_duty(first);
-  require(duty.has_value() == (first >= -1 && first <= 1));
-  if (duty) require(duty->pwm >= 0 && duty->pwm <= 4095);
   const MotorChannel left{CommandKind::osmc, 1, false}, right{CommandKind::dhb12, 4, true};
   if (const auto command = left.command(first)) is_sendable(*command);
   ServoCalibration servo;
   for (const bool microseconds : {false, true}) {
     servo.microseconds = microseconds;
-    if (const auto pulse = to_pulse(servo, first)) is_sendable(Command::servo(*pulse, 16));
+    if (const auto pulse = to_pulse(servo, first))
+      is_sendable(Command::servo(16, Microseconds(*pulse)));
   }
   const auto wheels = DifferentialDrive{left, right, 0.4, 1.5}.setpoints(first, second);
   if (std::isnan(first) || std::isnan(second)) require(!wheels);

@@ -20,7 +20,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-const Command run_motor = Command::osmc(358, Direction::forward, 1);
+const Command run_motor = Command::osmc(1, Pwm(358), Direction::forward);
 
 // A session that no board answers.
 struct AsyncBoardUnanswered : OnALoop {

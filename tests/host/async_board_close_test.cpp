@@ -23,7 +23,7 @@ struct AsyncBoardClose : testing::Test, OnALoop {
     board->open();
     board->async_send(Command::setting("timeout", "10000"), 3s, [](const CommandResult&) {});
     ASSERT_EQ(result_of([&](auto driven) {
-                board->async_send(Command::osmc(358, Direction::forward, 1), 3s, driven);
+                board->async_send(Command::osmc(1, Pwm(358), Direction::forward), 3s, driven);
               }).outcome,
               Outcome::confirmed);
     ASSERT_TRUE(run_until([&] { return !board->identity().capabilities.empty(); }));
@@ -53,9 +53,9 @@ TEST_F(AsyncBoardClose, ReportsNothingFromTheCallOnAndTakesNothing) {
   board->on_board_heartbeat([](const Datagram&) { ADD_FAILURE() << "a heartbeat"; });
   board->async_close(1s, note());
   std::optional<CommandResult> late;
-  board->async_send(Command::osmc(5, Direction::forward, 1), 1s,
+  board->async_send(Command::osmc(1, Pwm(5), Direction::forward), 1s,
                     [&](const CommandResult& result) { late = result; });
-  EXPECT_EQ(board->post(Command::osmc(5, Direction::forward, 1)), PostResult::no_link);
+  EXPECT_EQ(board->post(Command::osmc(1, Pwm(5), Direction::forward)), PostResult::no_link);
   ASSERT_TRUE(run_until([&] { return end && late; }));
   EXPECT_EQ(late->outcome, Outcome::closed);
   EXPECT_TRUE(simulated.is_without_host());
@@ -64,7 +64,7 @@ TEST_F(AsyncBoardClose, ReportsNothingFromTheCallOnAndTakesNothing) {
 TEST_F(AsyncBoardClose, EndsWhatIsUnderWay) {
   drive();
   std::optional<CommandResult> waits;
-  board->async_send(Command::servo(1500, 1), 3s,
+  board->async_send(Command::servo(1, Microseconds(1500)), 3s,
                     [&](const CommandResult& result) { waits = result; });
   board->async_close(1s, note());
   ASSERT_TRUE(run_until([&] { return end && waits; }));

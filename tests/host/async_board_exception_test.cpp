@@ -56,7 +56,7 @@ TEST_P(ThrownIn, LeavesTheLoopAndTheBoardGoesOn) {
   if (place == "event") board.on_event(throw_once);
   if (place == "restart") board.on_restart(throw_once);
   board.open();
-  const Command drive = Command::osmc(1, Direction::forward, 1);
+  const Command drive = Command::osmc(1, Pwm(1), Direction::forward);
   if (place == "handler") board.async_identify(5s, throw_once);
   if (place == "nack") {
     board.async_stop(5s, [&](const auto&) { board.async_send(drive, 5s, [](const auto&) {}); });

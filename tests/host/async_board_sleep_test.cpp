@@ -67,17 +67,17 @@ TEST_F(AsyncBoardSleep, DisarmsAndSwitchesTheMotorsOff) {
   board.open();
   ASSERT_EQ(result_of([&](auto armed) { board.async_arm(10s, armed); }).outcome,
             Outcome::confirmed);
-  ASSERT_TRUE(board.post(Command::osmc(500, Direction::forward, 1)));
+  ASSERT_TRUE(board.post(Command::osmc(1, Pwm(500), Direction::forward)));
   ASSERT_TRUE(run_until([&] { return board.state().osmc[0].pwm == 500; }));
 
   slept_seconds += 3;
   ASSERT_TRUE(run_until([&] { return board.disarmed_by() != DisarmCause::none; }));
   EXPECT_EQ(board.disarmed_by(), DisarmCause::sleep);
-  EXPECT_EQ(board.post(Command::osmc(500, Direction::forward, 1)), PostResult::no_link);
+  EXPECT_EQ(board.post(Command::osmc(1, Pwm(500), Direction::forward)), PostResult::no_link);
   EXPECT_EQ(restarts, 1);
   ASSERT_TRUE(run_until([&] { return board.in_control() && board.state().any(); }));
   EXPECT_EQ(board.state().osmc[0].pwm, 0) << "another session has begun";
-  EXPECT_EQ(board.post(Command::osmc(500, Direction::forward, 1)), PostResult::not_armed);
+  EXPECT_EQ(board.post(Command::osmc(1, Pwm(500), Direction::forward)), PostResult::not_armed);
   EXPECT_EQ(restarts, 1);
 }
 
@@ -88,7 +88,7 @@ TEST_F(AsyncBoardSleep, CancelsCommandsAndWaits) {
   const auto note = [&](const CommandResult& result) { ends.push_back(result.outcome); };
   board.async_wait_active(30s, note);
   board.async_arm(30s, note);
-  board.async_send(Command::osmc(500, Direction::forward, 1), 30s, note);
+  board.async_send(Command::osmc(1, Pwm(500), Direction::forward), 30s, note);
   io.run_for(20ms);
   ASSERT_TRUE(ends.empty());
   slept_seconds += 3;

@@ -32,7 +32,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-const Command start_motor = Command::osmc(358, Direction::forward, 1);
+const Command start_motor = Command::osmc(1, Pwm(358), Direction::forward);
 
 struct AsyncBoardTest : testing::Test, OnALoop {
   AsyncBoard board{io, "sim:?seed=1", at_will()};
@@ -118,7 +118,7 @@ TEST_F(AsyncBoardTest, WarnsOfAHoldUpOnceHoweverMuchFollowsIt) {
   asio::post(io, [&] {
     const auto end = std::chrono::steady_clock::now() + 350ms;
     while (std::chrono::steady_clock::now() < end) std::this_thread::yield();
-    for (int us = 1000; us < 1100; ++us) board.post(Command::servo(us, 1));
+    for (int us = 1000; us < 1100; ++us) board.post(Command::servo(1, Microseconds(us)));
     posted = true;
   });
   ASSERT_TRUE(run_until([&] { return posted && board.state().servo_us[0] == 1099; }));
@@ -154,7 +154,8 @@ TEST_F(AsyncBoardTest, ConfirmsThroughACoroutine) {
     outcomes.push_back(result.outcome);
     EXPECT_EQ(board.identity().board_id, "sim-1");
     for (int i = 0; i < 3; ++i) {
-      result = co_await board.async_send(Command::servo(1500 + i, 1), 1s, asio::use_awaitable);
+      result = co_await board.async_send(Command::servo(1, Microseconds(1500 + i)), 1s,
+                                         asio::use_awaitable);
       outcomes.push_back(result.outcome);
     }
     result = co_await board.async_stop(1s, asio::use_awaitable);

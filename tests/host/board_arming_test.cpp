@@ -24,7 +24,7 @@ class Stream {
   explicit Stream(Board& board)
       : thread_([this, &board] {
           while (!ended_) {
-            last_ = board.post(Command::osmc(500, Direction::forward, 1)).value();
+            last_ = board.post(Command::osmc(1, Pwm(500), Direction::forward)).value();
             ++turns_;
             turns_.notify_one();
             std::this_thread::sleep_for(2ms);
@@ -80,7 +80,8 @@ TEST(BoardArming, ReportsWhatPreventsIt) {
   EXPECT_EQ(
       arming.text(),
       "arm(): not armed: the dead-man's handle was released; hold the handle, then call arm()");
-  EXPECT_EQ(problem_of([&] { board.osmc(1).set(1, Direction::forward); }).reason, arming.reason);
+  EXPECT_EQ(problem_of([&] { board.osmc(1).set_pwm(1, Direction::forward); }).reason,
+            arming.reason);
 }
 
 TEST(BoardArming, ArmsABoardThatIsStopped) {
@@ -89,13 +90,13 @@ TEST(BoardArming, ArmsABoardThatIsStopped) {
   board.stop();
   board.arm();
   EXPECT_EQ(board.next_state().relays & 1, 1);
-  board.osmc(1).set(358, Direction::forward);
+  board.osmc(1).set_pwm(358, Direction::forward);
 }
 
 TEST(BoardArming, ClosingTheSupplyStartsNothingThatWasCommandedBefore) {
   Board board("sim:", at_will());
   board.wait_active();
-  board.osmc(1).set(500, Direction::forward);  // as a network delivers it that held it back
+  board.osmc(1).set_pwm(500, Direction::forward);  // as a network delivers it that held it back
   EXPECT_EQ(driven(board), 500);
   board.arm();
   EXPECT_EQ(driven(board), 0);
@@ -108,7 +109,7 @@ TEST(BoardArming, CountsThePostsThatAreRefusedAndReportsThoseThatTheBoardRefuses
   guarded.on_refused([refused](const RefusedPost& post) { refused.set(post); });
   guarded.wait_active();
   guarded.stop();
-  ASSERT_TRUE(guarded.post(Command::osmc(5, Direction::forward, 1)));
+  ASSERT_TRUE(guarded.post(Command::osmc(1, Pwm(5), Direction::forward)));
   const RefusedPost post = refused.get();
   EXPECT_EQ(post.command.value, 5);
   EXPECT_EQ(post.code, Refusal::safe);
@@ -116,7 +117,7 @@ TEST(BoardArming, CountsThePostsThatAreRefusedAndReportsThoseThatTheBoardRefuses
 
   Board board("sim:");
   board.wait_active();
-  EXPECT_EQ(board.post(Command::osmc(5, Direction::forward, 1)), PostResult::not_armed);
+  EXPECT_EQ(board.post(Command::osmc(1, Pwm(5), Direction::forward)), PostResult::not_armed);
   EXPECT_EQ(board.statistics().refused, 1U);
 }
 

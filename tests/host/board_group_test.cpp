@@ -70,8 +70,9 @@ double skew_of(const std::string& transport, int osmc, Drive before, Drive wante
   board.wait_active();
   const auto all = [&](Drive drive) {
     Setpoints wheels;
-    for (int i = 1; i <= osmc; ++i) wheels.osmc(i, drive.pwm, drive.direction);
-    for (int i = 1; i <= 4 - osmc; ++i) wheels.dhb12(i, drive.pwm, drive.direction);
+    for (int i = 1; i <= osmc; ++i) wheels.add(Command::osmc(i, Pwm(drive.pwm), drive.direction));
+    for (int i = 1; i <= 4 - osmc; ++i)
+      wheels.add(Command::dhb12(i, Pwm(drive.pwm), drive.direction));
     return wheels;
   };
   board.apply(all(before));
@@ -107,7 +108,8 @@ struct DrivenGroup : DrivenBoard {};
 
 TEST_F(DrivenGroup, IsConfirmedAsOneAndRefusedAsOne) {
   board.fields("DEFAULT,OSMC2,SERVO3POS,DAC2");
-  board.apply(Setpoints{}.osmc(1, 358, forward).osmc(2, 359, forward).servo(3, 1500).dac(2, 1650));
+  board.apply(Setpoints{Command::osmc(1, Pwm(358), forward), Command::osmc(2, Pwm(359), forward),
+                        Command::servo(3, Microseconds(1500)), Command::dac(2, Millivolts(1650))});
   const State state = board.next_state();
   EXPECT_EQ(state.osmc[0], (Drive{358, forward}));
   EXPECT_EQ(state.osmc[1], (Drive{359, forward}));
@@ -123,7 +125,9 @@ TEST_F(DrivenGroup, IsConfirmedAsOneAndRefusedAsOne) {
   EXPECT_TRUE(contains(refused.reason, "none of the 2 commands was executed"));
   EXPECT_EQ(problem_of([&] { board.apply(Setpoints{}); }).kind, ErrorKind::usage);
   EXPECT_EQ(problem_of([&] { board.send("O:5,1,1;E:CLEAR"); }).kind, ErrorKind::usage);
-  EXPECT_EQ(problem_of([&] { board.apply(Setpoints{}.servo(1, 1), 0ms); }).kind, ErrorKind::usage);
+  EXPECT_EQ(
+      problem_of([&] { board.apply(Setpoints{Command::servo(1, Microseconds(1))}, 0ms); }).kind,
+      ErrorKind::usage);
 }
 
 TEST(AsyncBoardGroup, IsRefusedIfItIsEmptyAndEndsIfTheBoardIsClosed) {
@@ -131,7 +135,9 @@ TEST(AsyncBoardGroup, IsRefusedIfItIsEmptyAndEndsIfTheBoardIsClosed) {
   AsyncBoard board(loop.io, "sim:", at_will());
   EXPECT_THROW(board.async_apply(Setpoints{}, 1s, [](const CommandResult&) {}), Error);
   EXPECT_THROW(board.post(Setpoints{}), Error);
-  const auto apply = [&](auto end) { board.async_apply(Setpoints{}.servo(1, 1), 1s, end); };
+  const auto apply = [&](auto end) {
+    board.async_apply(Setpoints{Command::servo(1, Microseconds(1))}, 1s, end);
+  };
   EXPECT_EQ(loop.result_of(apply).outcome, Outcome::closed);
 }
 

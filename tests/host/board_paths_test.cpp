@@ -51,7 +51,7 @@ TEST(BoardPaths, LeadToOneBoardOverUdpAndAPty) {
   Board board(simulated.urls(), at_will());
   board.wait_active();
   EXPECT_TRUE(comes_true(board, [&] { return board.link().carrying == 3; }));
-  for (int i = 0; i < 20; ++i) board.osmc(1).set(100 + i, Direction::forward);
+  for (int i = 0; i < 20; ++i) board.osmc(1).set_pwm(100 + i, Direction::forward);
   EXPECT_EQ(simulated.executed().back(), "O:119,1,1");
   const std::vector<PathStatus> paths = board.paths();
   ASSERT_EQ(paths.size(), 2U);
@@ -136,7 +136,7 @@ TEST(BoardPaths, AreNotDisturbedByAPathThatHasAnotherDevice) {
   std::filesystem::create_symlink(simulated.urls()[1].substr(9), link);
   EXPECT_TRUE(comes_true(board, [&] { return wrong.load(); }));
   std::filesystem::remove(link);
-  board.osmc(1).set(100, Direction::forward);
+  board.osmc(1).set_pwm(100, Direction::forward);
   EXPECT_EQ(board.link().carrying, 1);
 }
 

@@ -27,7 +27,7 @@ namespace {
 using namespace std::chrono_literals;
 using firmware::BoardState;
 
-const Command turn_slowly = Command::osmc(358, Direction::forward, 1);
+const Command turn_slowly = Command::osmc(1, Pwm(358), Direction::forward);
 
 BoardOptions watching() {
   BoardOptions options;
@@ -219,7 +219,7 @@ TEST(BoardRole, IsRefusedByNameWhereAnotherProgramControlsAndTheBoardIsWatchedOn
     EXPECT_GT(driver.next_state().t_ms, 0U) << "beside the program that controls now";
   }
   watcher.arm();
-  watcher.osmc(1).set(358, Direction::forward);
+  watcher.osmc(1).set_pwm(358, Direction::forward);
   watcher.release_control();
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link));
   EXPECT_EQ(problem_of([&] { watcher.arm(); }).kind, ErrorKind::usage);

@@ -39,14 +39,14 @@ TEST_P(BoardOver, ConfirmsEveryCommandOnceExecuted) {
   board.wait_active();
   board.setting("rate", "1000");
   board.fields("ALL");
-  board.osmc(1).set(358, Direction::forward);
-  board.osmc(4).set(4095, Direction::reverse);
-  board.dhb12(2).set(100, Direction::forward);
+  board.osmc(1).set_pwm(358, Direction::forward);
+  board.osmc(4).set(-1);
+  board.dhb12(2).set_pwm(100, Direction::forward);
   board.servo(16).set(1500);
   board.relay(3).set(true);
-  board.stepper(2).move_to(-5, 20000);
-  board.bldc(4).set(2000, Direction::forward, true);
-  board.proximity(1, 15);
+  board.stepper(2).move_to(Steps(-5), StepsPerSecond(20000));
+  board.bldc(4).set_pwm(2000, Direction::forward, true);
+  board.proximity(1, Centimetres(15));
   board.stepper(1).zero();
   board.setting("recovery", "rearm");
   board.send("S:0,16");
@@ -74,7 +74,7 @@ TEST_P(BoardOver, StopsUntilCleared) {
   BoardInAThread simulated(GetParam());
   Board board(simulated.url(), at_will());
   board.wait_active();
-  board.osmc(1).set(1000, Direction::forward);
+  board.osmc(1).set_pwm(1000, Direction::forward);
   board.stop();
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
   EXPECT_EQ(board.link(), (LinkStatus{.state = HostLinkState::safe,
@@ -82,7 +82,7 @@ TEST_P(BoardOver, StopsUntilCleared) {
                                       .in_control = true,
                                       .carrying = 1}));
 
-  const Problem refused = problem_of([&] { board.osmc(1).set(5, Direction::forward); });
+  const Problem refused = problem_of([&] { board.osmc(1).set_pwm(5, Direction::forward); });
   EXPECT_EQ(refused.kind, ErrorKind::refused);
   EXPECT_EQ(refused.thing, "O:5,1,1");
   EXPECT_TRUE(contains(refused.reason, "SAFE"));
@@ -92,7 +92,7 @@ TEST_P(BoardOver, StopsUntilCleared) {
   board.clear();
   board.wait_active();
   EXPECT_EQ(board.next_state().osmc[0].pwm, 0) << "nothing comes back after a stop";
-  board.osmc(1).set(5, Direction::forward);
+  board.osmc(1).set_pwm(5, Direction::forward);
 }
 
 TEST_P(BoardOver, TheBoardGoesSafeWhenTheApplicationHangs) {
@@ -119,7 +119,7 @@ TEST_P(BoardOver, TheBoardIsSafeAndFreeWhenTheHostHasEnded) {
   for (int i = 0; i < 3; ++i) {
     Board board(simulated.url(), at_will());
     board.setting("timeout", "10000");  // far longer than any wait below
-    board.osmc(1).set(100, Direction::forward);
+    board.osmc(1).set_pwm(100, Direction::forward);
     board.close();
     bool safe = false;
     simulated.run([&](sim::SimulatedBoard& each) {
@@ -144,7 +144,7 @@ TEST(Board, ReportsARestartBeforeTheNewState) {
     if (duties.size() == 4) four.set(duties);
   });
   board.fields("OSMC1");
-  board.osmc(1).set(358, Direction::forward);
+  board.osmc(1).set_pwm(358, Direction::forward);
   EXPECT_EQ(four.get(), (std::vector<int>{0, 358, -1, 0}));
 }
 
@@ -165,14 +165,14 @@ TEST(Board, ReportsTheLinkIfItIsNotActive) {
   EXPECT_EQ(nobody.kind, ErrorKind::refused);
   EXPECT_EQ(nobody.thing, board.name());
   EXPECT_TRUE(contains(nobody.reason, "nothing was heard"));
-  const Problem command = problem_of([&] { board.osmc(1).set(1, Direction::forward, 30ms); });
+  const Problem command = problem_of([&] { board.osmc(1).set_pwm(1, Direction::forward, 30ms); });
   EXPECT_EQ(command.thing, "O:1,1,1");
   EXPECT_TRUE(contains(command.reason, "not confirmed within "));
   EXPECT_TRUE(contains(command.reason, "nothing was heard"));
   EXPECT_TRUE(contains(problem_of([&] { board.next_state(30ms); }).reason, "nothing was heard"));
   EXPECT_TRUE(contains(problem_of([&] { board.identify(30ms); }).reason, "not confirmed"));
   EXPECT_TRUE(contains(problem_of([&] { board.stop(30ms); }).reason, "not confirmed"));
-  EXPECT_FALSE(board.post(Command::osmc(1, Direction::forward, 1)));
+  EXPECT_FALSE(board.post(Command::osmc(1, Pwm(1), Direction::forward)));
 }
 
 TEST(Board, ReportsThatAnotherHostControlsTheBoard) {
@@ -182,7 +182,7 @@ TEST(Board, ReportsThatAnotherHostControlsTheBoard) {
   BoardOptions options = at_will();
   options.session.stop_linger = 0ms;  // the owner clears it at once
   Board other(simulated.url(), options);
-  const Problem problem = problem_of([&] { other.osmc(1).set(1, Direction::forward, 300ms); });
+  const Problem problem = problem_of([&] { other.osmc(1).set_pwm(1, Direction::forward, 300ms); });
   EXPECT_EQ(problem.kind, ErrorKind::refused);
   EXPECT_TRUE(contains(problem.reason, "another host controls the board"));
   EXPECT_TRUE(other.link().causes.has(LinkCause::busy));
@@ -195,14 +195,16 @@ TEST(Board, ReportsThatAnotherHostControlsTheBoard) {
 }
 
 TEST_F(DrivenBoard, PostsCommandsAndGroupsAndWaitsForStatesWithoutTheHeap) {
-  board.osmc(1).set(1, Direction::forward);
+  board.osmc(1).set_pwm(1, Direction::forward);
   board.identify();  // then it is known that the board executes groups
   int sent = 0;
   const std::uint64_t before = bench::allocations_of_this_thread();
   for (int i = 0; i < 20; ++i) {
-    if (board.post(Command::osmc(100 + i, Direction::forward, 1))) ++sent;
+    if (board.post(Command::osmc(1, Pwm(100 + i), Direction::forward))) ++sent;
     const Direction forward = Direction::forward;
-    if (board.post(Setpoints{}.osmc(1, 100 + i, forward).osmc(2, 100 + i, forward))) ++sent;
+    if (board.post(Setpoints{Command::osmc(1, Pwm(100 + i), forward),
+                             Command::osmc(2, Pwm(100 + i), forward)}))
+      ++sent;
     board.next_state();
   }
   EXPECT_EQ(bench::allocations_of_this_thread() - before, 0U);
@@ -231,20 +233,22 @@ TEST(Board, ThrowsForAValueOutsideItsRangeAndNamesTheRange) {
     EXPECT_FALSE(problem.fix.empty()) << problem.text();
     EXPECT_FALSE(problem.thing.empty()) << problem.text();
   };
-  is_usage([&] { board.osmc(5).set(1, Direction::forward); });
-  is_usage([&] { board.osmc(-1).set(1, Direction::forward); });
-  is_usage([&] { board.osmc(257).set(1, Direction::forward); });
-  is_usage([&] { board.dhb12(5).set(1, Direction::forward); });
+  is_usage([&] { board.osmc(5).set(0.1); });
+  is_usage([&] { board.osmc(1).set(1.01); });
+  is_usage([&] { board.bldc(1).post(-1.01); });
+  is_usage([&] { board.osmc(-1).set_pwm(1, Direction::forward); });
+  is_usage([&] { board.osmc(257).set_pwm(1, Direction::forward); });
+  is_usage([&] { board.dhb12(5).set_pwm(1, Direction::forward); });
   is_usage([&] { board.relay(9).set(true); });
   is_usage([&] { board.stepper(0).zero(); });
-  is_usage([&] { board.bldc(5).set(1, Direction::forward); });
-  is_usage([&] { board.proximity(5, 1); });
+  is_usage([&] { board.bldc(5).set_pwm(1, Direction::forward); });
+  is_usage([&] { board.proximity(5, Centimetres(1)); });
   is_usage([&] { board.fields("AIN24,AIN99"); });
   is_usage([&] { board.setting("colour", "red"); });
   is_usage([&] { board.send("O:1,1"); });
   is_usage([&] { board.send("osmc 1"); });
-  is_usage([&] { board.post(Command::osmc(5000, Direction::forward, 1)); });
-  EXPECT_EQ(problem_of([&] { board.osmc(5).set(1, Direction::forward); }).text(),
+  is_usage([&] { board.post(Command::osmc(1, Pwm(5000), Direction::forward)); });
+  EXPECT_EQ(problem_of([&] { board.osmc(5).set_pwm(1, Direction::forward); }).text(),
             "O:1,1,5: no such channel; use O:pwm,dir,ch with pwm 0-4095, dir 0 or 1, ch 1-4");
   EXPECT_EQ(board.statistics().refused, 0U) << "none of them was sent";
 }
@@ -288,8 +292,8 @@ TEST(Board, TakesCommandsFromSeveralThreadsAtOnce) {
   for (int channel = 1; channel <= 4; ++channel) {
     threads.emplace_back([&, channel] {
       for (int i = 0; i < 50; ++i) {
-        board.osmc(channel).set(i, Direction::forward, 5s);
-        board.post(Command::servo(i, channel));
+        board.osmc(channel).set_pwm(i, Direction::forward, 5s);
+        board.post(Command::servo(channel, Microseconds(i)));
         static_cast<void>(board.state());
         static_cast<void>(board.link());
         static_cast<void>(board.statistics());
@@ -307,7 +311,7 @@ TEST(Board, TakesCommandsFromSeveralThreadsAtOnce) {
 TEST(Board, LetsAStopCancelWhatOtherThreadsWaitFor) {
   Board board("udp://127.0.0.1:9?listen=0", at_will());
   auto waiting = std::async(std::launch::async, [&] {
-    return problem_of([&] { board.osmc(1).set(1, Direction::forward, 20s); });
+    return problem_of([&] { board.osmc(1).set_pwm(1, Direction::forward, 20s); });
   });
   while (waiting.wait_for(1ms) != std::future_status::ready) board.stop_async();
   EXPECT_TRUE(contains(waiting.get().reason, "cancelled"));
@@ -338,13 +342,13 @@ TEST(Board, ObeysACallbackThatWaits) {
     if (std::exchange(done, true)) return;
     const Problem problem = problem_of([&] {
       board.wait_active();
-      board.osmc(1).set(1, Direction::forward);
+      board.osmc(1).set_pwm(1, Direction::forward);
       board.next_state();
       board.identify();
       static_cast<void>(board.state());
       static_cast<void>(board.statistics());
       board.watchdog(0ms);
-      board.post(Command::servo(1, 1));
+      board.post(Command::servo(1, Microseconds(1)));
       board.stop();
       throw Error(ErrorKind::usage, "all", "is done");
     });
@@ -380,10 +384,10 @@ TEST(Board, ClosesTwiceAndThenRefusesEverything) {
   board.close();
   board.close();
   EXPECT_TRUE(
-      contains(problem_of([&] { board.osmc(1).set(1, Direction::forward); }).reason, "closed"));
+      contains(problem_of([&] { board.osmc(1).set_pwm(1, Direction::forward); }).reason, "closed"));
   EXPECT_TRUE(contains(problem_of([&] { board.wait_active(); }).reason, "closed"));
   EXPECT_TRUE(contains(problem_of([&] { board.next_state(); }).reason, "closed"));
-  EXPECT_FALSE(board.post(Command::servo(1, 1)));
+  EXPECT_FALSE(board.post(Command::servo(1, Microseconds(1))));
   board.on_state([](const State&) {});
   board.watchdog(10ms);
   board.feed();
@@ -403,7 +407,7 @@ TEST(Board, WakesAllCallsThatWaitWhenItEnds) {
         return problem_of([&] { call(*raw); }).reason;
       }));
     };
-    wait([](Board& each) { each.osmc(1).set(1, Direction::forward, 60s); });
+    wait([](Board& each) { each.osmc(1).set_pwm(1, Direction::forward, 60s); });
     wait([](Board& each) { each.identify(60s); });
     wait([](Board& each) { each.wait_active(60s); });
     wait([](Board& each) { each.next_state(60s); });

@@ -40,7 +40,7 @@ SimulatedRobot::Look await(Board& board, const SimulatedRobot& robot,
 void drive(Board& board) {
   board.wait_active();
   board.arm();
-  board.osmc(1).set(4095, Direction::forward);
+  board.osmc(1).set_pwm(4095, Direction::forward);
 }
 
 TEST(SimulatedRobot, LetsTheHandleGoAndShowsThatTheMotorStops) {
@@ -84,8 +84,8 @@ TEST(SimulatedRobot, IsARobotOfTheProgramsOwn) {
   board.fields("ENC1,ENC4,AINSTEER,US3");
   EXPECT_EQ(board.next_state().encoder(4), 0);
   board.arm();
-  board.osmc(1).set(4095, Direction::forward);
-  board.osmc(2).set(4000, Direction::forward);
+  board.osmc(1).set_pwm(4095, Direction::forward);
+  board.osmc(2).set_pwm(4000, Direction::forward);
   const State state = await(
       board, [](const State& now) { return now.distance_cm(3) == 77 && now.encoder(4) < -10; });
   EXPECT_EQ(state.encoder(1), 0) << "the motor of the bench is not there";
@@ -159,8 +159,8 @@ TEST(BadLink, LosesDoublesAndDamagesDatagramsOfAnyBoard) {
   EXPECT_GT(statistics.packets.lost, 3U);
   EXPECT_GT(statistics.packets.duplicate, 3U);
   EXPECT_GT(statistics.damaged, 1U);
-  board.osmc(1).set(358, Direction::forward,
-                    std::chrono::seconds{10});  // it is repeated until it is confirmed
+  board.osmc(1).set_pwm(358, Direction::forward,
+                        std::chrono::seconds{10});  // it is repeated until it is confirmed
   EXPECT_EQ(robot.look().pins.osmc[0].pwm, 358);
 }
 

@@ -31,7 +31,7 @@ check() {
     echo "install: $name failed"
     exit 1
   }
-  for words in 'board sim-1' 'OSMC 1 at 1000 forward' 'motor 1 has turned by [1-9]' \
+  for words in 'board sim-1' 'OSMC 1 at  819 forward' 'motor 1 has turned by [1-9]' \
     'link: safe, reason stop' ' us round trip'; do
     grep -q "$words" "$work/out" || {
       cat "$work/out"

@@ -154,12 +154,13 @@ class Bench final : public sim::I2cObserver {
     run_ms(2);
     for (int i = 1; i <= relay_channels; ++i) execute(Command::relay(i, true));
     for (int i = 1; i <= 4; ++i) {
-      execute(Command::osmc(1000 + i, Direction::forward, i));
-      execute(Command::dhb12(2000 + i, Direction::forward, i));
-      execute(Command::bldc(3000 + i, Direction::forward, false, i));
-      execute(Command::stepper(1000000, 1000 * i, i));
+      execute(Command::osmc(i, Pwm(1000 + i), Direction::forward));
+      execute(Command::dhb12(i, Pwm(2000 + i), Direction::forward));
+      execute(Command::bldc(i, Pwm(3000 + i), Direction::forward, false));
+      execute(Command::stepper(i, Steps(1000000), StepsPerSecond(1000 * i)));
     }
-    for (int i = 1; i <= servo_channels; ++i) execute(Command::servo(600 + 100 * i, i));
+    for (int i = 1; i <= servo_channels; ++i)
+      execute(Command::servo(i, Microseconds(600 + 100 * i)));
     heartbeat();
     run_ms(5);
   }

@@ -113,7 +113,7 @@ TEST(Devices, AReceiverIsHeardAndAVoltageIsZeroBehindAStop) {
   Listener& listener = host.listen();
   host.execute(Command::fields("UART1,DAC1,GPIO"));
   host.execute(Command::setting("uart1", "115200:8N1"));
-  host.execute(Command::dac(1, 1650));
+  host.execute(Command::dac(1, Millivolts(1650)));
   host.run_alive_ms(300);
   const State& state = listener.state();
   EXPECT(state.uart[0].position > 300 && state.uart[0].lost == 0);

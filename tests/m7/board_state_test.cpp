@@ -39,7 +39,7 @@ TEST(BoardState, BringsEveryInputExactly) {
     board.host.model().turn_encoder(channel, turns_of(channel) + part_of(channel));
     board.host.model().set_ultrasonic(channel, static_cast<std::uint16_t>(50 * channel));
   }
-  board.host.execute(Command::stepper(50, 5000, 3));
+  board.host.execute(Command::stepper(3, Steps(50), StepsPerSecond(5000)));
   board.host.run_alive_ms(700);  // every sensor has its turn
   const State& state = board.state();
   EXPECT(state.handle_held && state.stepper_steps[2] == 50);
@@ -60,7 +60,7 @@ TEST(BoardState, BringsEveryInputExactly) {
   }
   board.host.execute(Command::relay(1, true));  // closes the motors' supply
   for (int channel = 1; channel <= 4; ++channel) {
-    board.host.execute(Command::osmc(1000 * channel, Direction::forward, channel));
+    board.host.execute(Command::osmc(channel, Pwm(1000 * channel), Direction::forward));
   }
   board.host.run_alive_ms(2000);
   for (int channel = 1; channel <= 4; ++channel) {
@@ -93,7 +93,7 @@ TEST(BoardState, AReleasedHandleSwitchesEverythingOff) {
 TEST(BoardState, AnObstacleBeforeEachSensorSwitchesEverythingOff) {
   Heard board;
   for (int channel = 1; channel <= ultrasonic_channels; ++channel) {
-    board.host.execute(Command::proximity(60, channel));
+    board.host.execute(Command::proximity(channel, Centimetres(60)));
     board.host.run_alive_ms(300);
     board.host.drive_everything();
     EXPECT(!board.host.safe());
@@ -105,7 +105,7 @@ TEST(BoardState, AnObstacleBeforeEachSensorSwitchesEverythingOff) {
     board.host.model().set_ultrasonic(channel, 0);
     board.host.run_alive_ms(900);
     EXPECT(board.host.reason() == SafeReason::none && board.host.chips_are_safe());
-    board.host.execute(Command::proximity(0, channel));
+    board.host.execute(Command::proximity(channel, Centimetres(0)));
   }
 }
 
@@ -114,7 +114,7 @@ TEST(BoardState, AnObstacleBeforeEachSensorSwitchesEverythingOff) {
 TEST(BoardState, StreamsAt1000HzOverUdpWithNothingLostOrLeftOut) {
   Heard board;
   board.host.execute(Command::fields("DEFAULT,LATE"));
-  board.host.execute(Command::osmc(1000, Direction::forward, 1));
+  board.host.execute(Command::osmc(1, Pwm(1000), Direction::forward));
   board.host.execute(Command::setting("rate", "1000"));
   board.host.run_alive_ms(100);
   constexpr std::uint32_t streamed_ms = 5000;

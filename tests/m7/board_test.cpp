@@ -72,7 +72,7 @@ TEST(Board, AGroupMovesFourWheelsAtOnce) {
   char buffer[max_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
   for (int i = 1; i <= osmc_channels; ++i) {
-    write_command(writer, Command::osmc(358, Direction::forward, i));
+    write_command(writer, Command::osmc(i, Pwm(358), Direction::forward));
   }
   host.send(writer);
   host.run_ms(5);

@@ -182,7 +182,8 @@ void Crowd::pass_millisecond() {
   application_->poll(board_ms());
   for (Host* const host : {&first_, &second_}) {
     if (host->session == nullptr) continue;
-    if (now_ms_ % 20 == 0) host->session->post(Command::stepper(-host->address, 1000, 1), time());
+    if (now_ms_ % 20 == 0)
+      host->session->post(Command::stepper(1, Steps(-host->address), StepsPerSecond(1000)), time());
     host->session->poll(time());
   }
   due(to_host_, [this](const Packet& packet) {

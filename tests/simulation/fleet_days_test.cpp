@@ -120,8 +120,9 @@ class FleetLink final : firmware::Hal, firmware::Port, test::DrivenSession::Hand
   bool well() const { return now_us_ > fault_ends_us() + comes_back_within_us; }
   void command() {
     ++asked;
-    session_->send(Command::stepper(static_cast<std::int32_t>(asked), 1000, 1),
-                   std::chrono::seconds(10), time());
+    session_->send(
+        Command::stepper(1, Steps(static_cast<std::int32_t>(asked)), StepsPerSecond(1000)),
+        std::chrono::seconds(10), time());
     host_due_us_ = now_us_;
   }
   bool back() const {

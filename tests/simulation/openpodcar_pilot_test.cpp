@@ -117,7 +117,8 @@ class PilotRun {
         return;
       case Phase::arming:
         if (session.disarmed_by() == DisarmCause::none) {
-          session.send(Command::proximity(podcar_clearance_cm, 1), patience, robot.now());
+          session.send(Command::proximity(1, Centimetres(podcar_clearance_cm)), patience,
+                       robot.now());
           phase_ = Phase::guarding;
           phase_ms_ = ms_;
         } else if (ms_ - phase_ms_ > 1000) {

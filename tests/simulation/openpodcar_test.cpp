@@ -36,7 +36,7 @@ class PodcarRun {
     robot.state_came = [this](const ReceivedState& state) { on_state(state); };
     EXPECT_TRUE(robot.arm());
     send(Command::setting("recovery", "rearm"));
-    send(Command::proximity(podcar_clearance_cm, 1));
+    send(Command::proximity(1, Centimetres(podcar_clearance_cm)));
     robot.pass(200);
     PodcarPlace start;
     start.yaw_rad = course.heading_rad();

@@ -85,9 +85,7 @@ class SpeedLoop {
     wheel.advance(state);
     const double is = by_ == By::counts ? wheel.speed_m_s() : wheel.measured_m_s(state);
     const double duty = pid.step(wanted, is, *dt_s);
-    const auto setpoint =
-        Setpoints{}.osmc(1, static_cast<int>(std::lround(std::abs(duty) * pwm_max)),
-                         duty < 0 ? Direction::reverse : Direction::forward);
+    const auto setpoint = Setpoints{Command::osmc(1, Duty(duty))};
     guard.on_commanded(setpoint);
     robot.session().post(setpoint[0], robot.now());
   }

@@ -58,7 +58,8 @@ void World::happen(const Happening& happening, bool over) {
       break;
     case Happening::Kind::obstacle:
       // The threshold is set by command, so that it goes the way of all commands.
-      if (!over && host.alive) host.session->post(Command::proximity(50, 1), host.time());
+      if (!over && host.alive)
+        host.session->post(Command::proximity(1, Centimetres(50)), host.time());
       distance_cm_ = over ? 200 : 10;
       break;
     case Happening::Kind::address:

@@ -102,7 +102,8 @@ void World::issue_command(int index) {
   sent.group = random_.chance(schedule_.group_share);
   commands_.push_back(sent);
   Setpoints setpoints;
-  for (int i = 1; i <= (sent.group ? stepper_channels : 1); ++i) setpoints.stepper(i, id, 1000);
+  for (int i = 1; i <= (sent.group ? stepper_channels : 1); ++i)
+    setpoints.add(Command::stepper(i, Steps(id), StepsPerSecond(1000)));
   if (random_.chance(schedule_.post_share)) {
     host.session->post(setpoints, host.time());
   } else {

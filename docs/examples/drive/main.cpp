@@ -53,8 +53,8 @@ void drive(r4::Board& board) {
   // safe, it is open, and commands that drive an output are refused.
   board.arm(250ms);
   board.feed();
-  for (const int pwm : {0, 500, 1000, 1500, 1000, 500, 0}) {
-    board.osmc(1).set(pwm, r4::Direction::forward, 250ms);  // the board's state has confirmed it
+  for (const double duty : {0.0, 0.1, 0.2, 0.3, 0.2, 0.1, 0.0}) {
+    board.osmc(1).set(duty, 250ms);  // the board's state has confirmed it
     board.feed();
     std::this_thread::sleep_for(50ms);
   }

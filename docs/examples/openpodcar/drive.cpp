@@ -4,7 +4,7 @@
 #include <cmath>
 #include <r4link/error.hpp>
 
-void guard_podcar(r4::Board& board) { board.proximity(1, podcar_clearance_cm); }
+void guard_podcar(r4::Board& board) { board.proximity(1, r4::Centimetres(podcar_clearance_cm)); }
 
 void arm_podcar(r4::Board& board) {
   board.arm();

@@ -13,11 +13,6 @@ constexpr double moved_rad = 0.02;
 constexpr double most_stuck_s = 0.5;
 constexpr double runaway = 1.5;  // times the greatest speed
 
-int pwm_of(double duty) { return static_cast<int>(std::lround(std::abs(duty) * r4::pwm_max)); }
-r4::Direction direction_of(double duty) {
-  return duty < 0 ? r4::Direction::reverse : r4::Direction::forward;
-}
-
 }  // namespace
 
 r4::control::LoopOptions podcar_loop() {
@@ -26,7 +21,7 @@ r4::control::LoopOptions podcar_loop() {
   options.fields = "ENC1,AINSTEER";
   options.late = 150ms;
   options.standstill = {{.encoder = 1, .channel = 1, .pwm = 1500, .counts = 5, .time = 1000ms}};
-  options.rest.osmc(1, 0, r4::Direction::forward).dhb12(1, 0, r4::Direction::forward);
+  options.rest = {r4::Command::osmc(1, r4::Duty(0)), r4::Command::dhb12(1, r4::Duty(0))};
   return options;
 }
 
@@ -71,7 +66,6 @@ r4::Setpoints Podcar::drive(const r4::control::Twist& wish, double dt_s) {
     stuck_at_rad_ = steering_rad_;
     stuck_s_ = 0;
   }
-  return r4::Setpoints{}
-      .osmc(1, pwm_of(drive), direction_of(drive))
-      .dhb12(1, steered ? 0 : pwm_of(turn), direction_of(turn));
+  return {r4::Command::osmc(1, r4::Duty(drive)),
+          r4::Command::dhb12(1, r4::Duty(steered ? 0 : turn))};
 }

@@ -27,7 +27,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int speed = 600;  // of 4095
+constexpr double speed = 0.15;  // of full speed
 constexpr auto period = 20ms;
 // A key that is held is repeated by the terminal, the first time after about half a second.
 constexpr auto hold = 700ms;
@@ -38,8 +38,8 @@ constexpr auto patience = 300ms;  // with the board, within the watchdog's time
 volatile std::sig_atomic_t ended = 0;
 
 struct Setpoint {
-  int left = 0;
-  int right = 0;
+  double left = 0;
+  double right = 0;
 };
 
 // What the hand on the keys asks for; nothing once it has let go of them.
@@ -72,16 +72,11 @@ class Hand {
   Clock::time_point until_;
 };
 
-r4::Command motor(int channel, int pwm) {
-  const auto direction = pwm < 0 ? r4::Direction::reverse : r4::Direction::forward;
-  return r4::Command::osmc(std::abs(pwm), direction, channel);
-}
-
-// Sends the newest setpoint once. One that cannot be sent is dropped, not kept: the next, 20 ms later,
-// is newer.
+// Sends the newest setpoints once, both motors together. What cannot be sent is dropped, not kept:
+// the next ones, 20 ms later, are newer.
 r4::PostResult post(r4::Board& board, const Setpoint& setpoint) {
-  const r4::PostResult left = board.post(motor(1, setpoint.left));
-  return left ? board.post(motor(2, setpoint.right)) : left;
+  return board.post(r4::Setpoints{r4::Command::osmc(1, r4::Duty(setpoint.left)),
+                                  r4::Command::osmc(2, r4::Duty(setpoint.right))});
 }
 
 void say_why(r4::Board& board, r4::PostResult result) {

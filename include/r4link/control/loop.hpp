@@ -3,11 +3,11 @@
 //
 //     r4::control::LoopOptions options;
 //     options.fields = "ENC1";
-//     options.rest.osmc(1, 0, r4::Direction::forward);
+//     options.rest.add(r4::Command::osmc(1, r4::Duty(0)));
 //     options.standstill = {{.encoder = 1, .channel = 1}};
 //     const auto end = r4::control::run_loop(board, options, [&](const r4::control::LoopStep& step) {
 //       const double duty = pid.step(1.2, wheel.speed_m_s(), step.dt_s);
-//       return std::optional(r4::Setpoints{}.osmc(1, …));
+//       return std::optional(r4::Setpoints{r4::Command::osmc(1, r4::Duty(duty))});
 //     });
 //     std::puts(end.why.c_str());
 //

@@ -147,7 +147,8 @@ class Host {
   };
   void ask() {
     start_ = Clock::now();
-    board_.async_send(Command::osmc(100 + left_, Direction::forward, 1), 200ms, Confirmed{*this});
+    board_.async_send(Command::osmc(1, Pwm(100 + left_), Direction::forward), 200ms,
+                      Confirmed{*this});
   }
 
   asio::io_context io_{ASIO_CONCURRENCY_HINT_UNSAFE};

@@ -223,7 +223,7 @@ void measure(std::size_t count, std::chrono::seconds seconds, double reference_u
   const auto posting = Clock::now();
   std::vector<BoardSetpoints> setpoints;
   for (std::size_t i = 0; i < count; ++i) {
-    setpoints.push_back({i, Setpoints().osmc(1, 500, Direction::forward)});
+    setpoints.push_back({i, Setpoints{Command::osmc(1, Pwm(500), Direction::forward)}});
   }
   fleet.post(setpoints);
   const double post_ms = std::chrono::duration<double, std::milli>(Clock::now() - posting).count();

@@ -199,7 +199,7 @@ void count_allocations(Transport path) {
       Count& count;
       void operator()() const {
         if (count.left-- == 0) return count.end();
-        count.host.board.post(Command::osmc(count.left, Direction::forward, 1));
+        count.host.board.post(Command::osmc(1, Pwm(count.left), Direction::forward));
         asio::post(count.host.io, *this);
       }
     };
@@ -216,7 +216,8 @@ void count_allocations(Transport path) {
       void operator()(const CommandResult&) const { send(); }
       void send() const {
         if (count.left-- == 0) return count.end();
-        count.host.board.async_send(Command::osmc(count.left, Direction::forward, 1), 1s, *this);
+        count.host.board.async_send(Command::osmc(1, Pwm(count.left), Direction::forward), 1s,
+                                    *this);
       }
     };
     asio::steady_timer timer(host.io);
@@ -242,13 +243,13 @@ void count_allocations(Transport path) {
   Board board(other.url(), test::at_will());
   board.wait_active();
   for (int i = 0; i < 300; ++i) {  // also the deques of the loop have their size now
-    board.post(Command::osmc(i, Direction::forward, 1));
+    board.post(Command::osmc(1, Pwm(i), Direction::forward));
     if (i % 10 == 0) board.next_state();
   }
   const Usage board_before = other.usage();
   const std::uint64_t before = allocations();
   for (int i = 0; i < 1000; ++i) {
-    board.post(Command::osmc(i, Direction::forward, 1));
+    board.post(Command::osmc(1, Pwm(i), Direction::forward));
     if (i % 10 == 0) board.next_state();
   }
   const std::uint64_t made = allocations() - before;

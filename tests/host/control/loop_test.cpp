@@ -105,9 +105,10 @@ TEST(LoopGuard, EndsWhereADrivenMotorStands) {
     return guard.ended();
   };
   EXPECT_EQ(pass(50, 0), LoopEnd::none) << "nothing is driven";
-  guard.on_commanded(Setpoints{}.dhb12(2, 399, Direction::forward));
+  guard.on_commanded(Setpoints{Command::dhb12(2, Pwm(399), Direction::forward)});
   EXPECT_EQ(pass(50, 0), LoopEnd::none) << "too little to turn it";
-  guard.on_commanded(Setpoints{}.dhb12(2, 400, Direction::forward).dhb12(1, 0, Direction::forward));
+  guard.on_commanded(Setpoints{Command::dhb12(2, Pwm(400), Direction::forward),
+                               Command::dhb12(1, Pwm(0), Direction::forward)});
   EXPECT_EQ(pass(50, -1), LoopEnd::none) << "it turns";
   EXPECT_EQ(pass(6, 0), LoopEnd::none);
   EXPECT_EQ(pass(50, 0), LoopEnd::standstill);
@@ -131,7 +132,7 @@ class RunLoop : public ::testing::Test {
   explicit RunLoop(BoardOptions options = BoardOptions())
       : board(robot.url(), with_fields(options)) {
     loop.fields = "ENC1";
-    loop.rest.osmc(1, 0, Direction::forward);
+    loop.rest.add(Command::osmc(1, Pwm(0), Direction::forward));
     loop.late = 500ms;  // this machine may be busy
     board.wait_active();
     if (options.session.arming == Arming::required) board.arm();
@@ -141,7 +142,7 @@ class RunLoop : public ::testing::Test {
     return options;
   }
   static std::optional<Setpoints> drive(const LoopStep&) {
-    return Setpoints{}.osmc(1, 2000, Direction::forward);
+    return Setpoints{Command::osmc(1, Pwm(2000), Direction::forward)};
   }
   void expect_rest() const { EXPECT_EQ(robot.look().pins.osmc[0].pwm, 0); }
 
@@ -199,7 +200,7 @@ struct RunLoopWithoutArming : RunLoop {
 };
 
 TEST_F(RunLoopWithoutArming, DrivesAndComesToRest) {
-  board.osmc(1).set(1000, Direction::forward);
+  board.osmc(1).set_pwm(1000, Direction::forward);
   int steps = 0;
   const auto drive_four_times = [&](const LoopStep& step) {
     return ++steps < 5 ? drive(step) : std::nullopt;
@@ -228,9 +229,9 @@ TEST(RunLoopOnALinkThatIsCut, SaysThatTheMotorsMayGoOn) {
   loop.fields = "ENC1";
   loop.late = 300ms;
   loop.rest_timeout = 50ms;
-  loop.rest.osmc(1, 0, Direction::forward);
+  loop.rest.add(Command::osmc(1, Pwm(0), Direction::forward));
   const LoopReport report = run_loop(board, loop, [](const LoopStep&) {
-    return std::optional(Setpoints{}.osmc(1, 2000, Direction::forward));
+    return std::optional(Setpoints{Command::osmc(1, Pwm(2000), Direction::forward)});
   });
   EXPECT_EQ(report.end, LoopEnd::late) << report.why;
   EXPECT_FALSE(report.at_rest);

@@ -43,7 +43,7 @@ bool comes(Done done) {
   return true;
 }
 
-Setpoints motor(int pwm) { return Setpoints().osmc(1, pwm, Direction::forward); }
+Setpoints motor(int pwm) { return Setpoints{Command::osmc(1, Pwm(pwm), Direction::forward)}; }
 
 TEST(Fleet, FindsTheBoardsOfAPatternByIndexUrlAndId) {
   ActiveFleet fleet({"sim:?node=0-7", "sim:?node=20"});
@@ -85,7 +85,7 @@ TEST(Fleet, ReportsAResultOfEachBoardAndCountsFailures) {
 
 TEST(Fleet, StopsAllBoardsUntilTheyAreCleared) {
   ActiveFleet fleet({"sim:?node=0-7"}, at_will());
-  fleet.send(Command::osmc(500, Direction::forward, 1)).require();
+  fleet.send(Command::osmc(1, Pwm(500), Direction::forward)).require();
   EXPECT_TRUE(fleet.stop().all_confirmed());
   EXPECT_TRUE(comes([&] {
     for (const ReceivedState& state : fleet.states()) {

@@ -45,9 +45,9 @@ TEST(ReadRecording, VisitsAllThatWasRecorded) {
     Board board("sim:", at_will());
     board.record(path);
     board.wait_active();
-    board.osmc(1).set(358, Direction::forward);
+    board.osmc(1).set_pwm(358, Direction::forward);
     board.next_state();
-    board.osmc(1).set(10, Direction::forward);
+    board.osmc(1).set_pwm(10, Direction::forward);
     live = board.statistics();
   }
   VisitorOfAll visitor;

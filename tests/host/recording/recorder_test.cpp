@@ -48,7 +48,7 @@ TEST_F(RecordingOfABoard, HasBothDirectionsAndWhatHappened) {
     Board board("sim:", at_will());
     board.record(path());
     board.wait_active();
-    board.osmc(1).set(358, Direction::forward);
+    board.osmc(1).set_pwm(358, Direction::forward);
     board.stop();
     board.identify();
     board.close();
@@ -88,7 +88,7 @@ TEST_F(RecordingOfABoard, ReportsAFullDiskAndTheLinkGoesOn) {
   EXPECT_EQ(problem->kind, ErrorKind::open);
   EXPECT_EQ(problem->thing, path());
   EXPECT_TRUE(contains(problem->fix, "--keep"));
-  board.osmc(1).set(358, Direction::forward);
+  board.osmc(1).set_pwm(358, Direction::forward);
   EXPECT_TRUE(heard().damage.empty());
   board.record(path("next.r4log"));
   board.next_state();

@@ -83,7 +83,7 @@ TEST(ReplayFidelity, TheSameStatesEventsAndStatisticsAsLive) {
   const auto ignore = [](const CommandResult&) {};
   board.async_send(Command::fields("DEFAULT,ENC1,SAFE,RXOK"), 1s, ignore);
   board.async_send(Command::relay(1, true), 1s, ignore);
-  board.async_send(Command::osmc(358, Direction::forward, 1), 1s, ignore);
+  board.async_send(Command::osmc(1, Pwm(358), Direction::forward), 1s, ignore);
   io.run_for(1s);
   board.async_stop(1s, ignore);
   io.run_for(300ms);

@@ -58,7 +58,7 @@ class RobotOnPaths final : private DrivenSession::Handler {
   // Waits for the end of a command.
   CommandResult finish(Ticket ticket, std::uint32_t most_ms = 2000);
   CommandResult drive(int pwm) {
-    return finish(session->send(Command::osmc(pwm, Direction::forward, 1), timeout, now()));
+    return finish(session->send(Command::osmc(1, Pwm(pwm), Direction::forward), timeout, now()));
   }
 
   Time now() const { return Time{(now_ms_ - slept_ms_) * 1000}; }

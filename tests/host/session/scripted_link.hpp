@@ -15,7 +15,7 @@
 namespace r4::test {
 
 // What tests send that need any command.
-inline const Command turn_motor = Command::osmc(358, Direction::forward, 1);
+inline const Command turn_motor = Command::osmc(1, Pwm(358), Direction::forward);
 
 class ScriptedLink : private DrivenSession::Handler {
  public:

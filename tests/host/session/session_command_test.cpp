@@ -39,7 +39,7 @@ TEST_F(SessionCommand, GoesOutAtOnceAndIsConfirmedByItsNumberInTheState) {
 
 TEST_F(NewSession, HoldsCommandsUntilTheLinkIsUpAndKeepsTheirOrder) {
   const Ticket first = link.session.send(turn_motor, 5s, link.now);
-  const Ticket second = link.session.send(Command::servo(1500, 2), 5s, link.now);
+  const Ticket second = link.session.send(Command::servo(2, Microseconds(1500)), 5s, link.now);
   EXPECT_FALSE(link.session.post(turn_motor, link.now)) << "what is sent once does not wait";
   link.pass(200ms);
   EXPECT_EQ(link.count('O') + link.count('S'), 0U);
@@ -88,7 +88,7 @@ TEST_F(SessionCommand, EndsAtItsDeadline) {
 
 TEST_F(SessionCommand, IsRefusedWithTheBoardsCode) {
   const Ticket other = link.session.send(turn_motor, 1s, link.now);
-  const Ticket ticket = link.session.send(Command::servo(1500, 2), 1s, link.now);
+  const Ticket ticket = link.session.send(Command::servo(2, Microseconds(1500)), 1s, link.now);
   link.pass(3ms);
   link.nack(link.last('S').pnum, "SAFE");
   EXPECT_EQ(outcome(ticket), Outcome::refused);
@@ -102,7 +102,7 @@ TEST_F(SessionCommand, ThatWasOvertakenAsksAtOnceAndEndsByTheAnswer) {
   for (const char* answer : {"DUPLICATE", "STALE"}) {
     link.sent.clear();
     const Ticket first = link.session.send(turn_motor, 1s, link.now);
-    link.session.send(Command::servo(1500, 2), 1s, link.now);
+    link.session.send(Command::servo(2, Microseconds(1500)), 1s, link.now);
     link.pass(10ms);
     link.executed(link.last('S').pnum);  // the state between them was lost
     EXPECT_TRUE(under_way(first)) << "CMD past it proves nothing";
@@ -159,10 +159,11 @@ TEST_F(NewSession, AsksForFieldsUntilTheBoardKnowsHoweverManyAreLost) {
 
 TEST_F(SessionCommand, OutsideItsRangesIsThrownBack) {
   for (const Command& wrong :
-       {Command::osmc(4096, Direction::forward, 1), Command::osmc(-1, Direction::forward, 1),
-        Command::dhb12(1, Direction::forward, 0), Command::servo(1, 17), Command::proximity(401, 1),
-        Command::fields(""), Command::setting("", "1"), Command::fields("A;B"),
-        Command::setting("rate", "1^2")}) {
+       {Command::osmc(1, Pwm(4096), Direction::forward),
+        Command::osmc(1, Pwm(-1), Direction::forward),
+        Command::dhb12(0, Pwm(1), Direction::forward), Command::servo(17, Microseconds(1)),
+        Command::proximity(1, Centimetres(401)), Command::fields(""), Command::setting("", "1"),
+        Command::fields("A;B"), Command::setting("rate", "1^2")}) {
     try {
       link.session.send(wrong, 1s, link.now);
       ADD_FAILURE() << text_of(wrong) << " was taken";
@@ -189,7 +190,7 @@ TEST_F(NewSession, TakesAtMostSixtyFourCommands) {
 
 TEST_F(SessionCommand, SentOnceIsNotRepeatedAndDoesNotOvertakeEarlierCommands) {
   link.session.send(turn_motor, 1s, link.now);
-  EXPECT_TRUE(link.session.post(Command::servo(0, 1), link.now));
+  EXPECT_TRUE(link.session.post(Command::servo(1, Microseconds(0)), link.now));
   ASSERT_EQ(link.count('O'), 1U);
   EXPECT_LT(link.last('O').pnum, link.last('S').pnum);
   link.pass(1s);
@@ -386,7 +387,7 @@ TEST_F(SessionRefusal, ProvesNothingOfASessionThatBeganAfterTheCommand) {
 TEST_F(NewSession, CancelsEveryCommandByAStopAndSendsNoneAfterIt) {
   const Ticket queued = link.session.send(turn_motor, 5s, link.now);
   link.connect();
-  const Ticket sent = link.session.send(Command::servo(1500, 2), 5s, link.now);
+  const Ticket sent = link.session.send(Command::servo(2, Microseconds(1500)), 5s, link.now);
   link.session.stop(1s, link.now);
   EXPECT_EQ(outcome(queued), Outcome::cancelled);
   EXPECT_EQ(outcome(sent), Outcome::cancelled);

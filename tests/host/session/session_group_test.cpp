@@ -13,8 +13,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
-const Setpoints two_motors =
-    Setpoints{}.osmc(1, 358, Direction::forward).osmc(2, 359, Direction::forward).servo(3, 1500);
+const Setpoints two_motors = Setpoints{Command::osmc(1, Pwm(358), Direction::forward),
+                                       Command::osmc(2, Pwm(359), Direction::forward),
+                                       Command::servo(3, Microseconds(1500))};
 
 struct SessionGroup : NewSession {
   // Connects to a board that has reported whether it executes groups.
@@ -82,8 +83,8 @@ TEST_F(SessionGroup, AsksFirstWhetherTheBoardExecutesGroups) {
   const Ticket ticket = send();
   EXPECT_EQ(link.count('O'), 0U);
   EXPECT_EQ(link.count('Q'), 1U);
-  const Ticket behind = link.session.send(Command::servo(1, 1), 1s, link.now);
-  EXPECT_EQ(link.session.post(Command::servo(0, 1), link.now), PostResult::queue_full)
+  const Ticket behind = link.session.send(Command::servo(1, Microseconds(1)), 1s, link.now);
+  EXPECT_EQ(link.session.post(Command::servo(1, Microseconds(0)), link.now), PostResult::queue_full)
       << "it would overtake them";
   EXPECT_EQ(post(), PostResult::queue_full);
   link.pass(250ms);
@@ -105,13 +106,13 @@ TEST_F(SessionGroup, OfABoardWithoutGroupsGoesOneAfterTheOther) {
   connect("udp");
   const Ticket ticket = send();
   EXPECT_EQ(fields(link.sent.back()), "O:358,1,1;");
-  const Ticket behind = link.session.send(Command::servo(7, 7), 1s, link.now);
+  const Ticket behind = link.session.send(Command::servo(7, Microseconds(7)), 1s, link.now);
   link.pass(60ms);
   EXPECT_EQ(link.sent.size(), 2U) << "the first, twice";
   link.executed(link.last('O').pnum);
   EXPECT_EQ(fields(link.sent.back()), "O:359,1,2;");
   EXPECT_TRUE(under_way(ticket));
-  EXPECT_EQ(link.session.post(Command::osmc(0, Direction::forward, 1), link.now),
+  EXPECT_EQ(link.session.post(Command::osmc(1, Pwm(0), Direction::forward), link.now),
             PostResult::queue_full)
       << "the commands that are left would come after it";
   link.executed(link.last('O').pnum);
@@ -221,9 +222,9 @@ TEST_F(SessionGroup, IsPostedOneByOneToABoardWithoutGroups) {
 
 TEST_F(SessionGroup, OfOneCommandIsThatCommandAndOfNoneIsThrownBack) {
   link.connect();
-  link.session.send(Setpoints{}.osmc(1, 358, Direction::forward), 1s, link.now);
+  link.session.send(Setpoints{Command::osmc(1, Pwm(358), Direction::forward)}, 1s, link.now);
   EXPECT_EQ(fields(link.sent.back()), "O:358,1,1;") << "whatever the board knows";
-  EXPECT_TRUE(link.session.post(Setpoints{}.servo(1, 5), link.now));
+  EXPECT_TRUE(link.session.post(Setpoints{Command::servo(1, Microseconds(5))}, link.now));
   EXPECT_THROW(link.session.send(Setpoints{}, 1s, link.now), Error);
   EXPECT_THROW(link.session.post(Setpoints{}, link.now), Error);
 }

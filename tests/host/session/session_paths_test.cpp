@@ -229,7 +229,8 @@ TEST(SessionPaths, ToTwoBoardsAreRefused) {
   EXPECT_EQ(robot.session->path(1, robot.now()).state, PathState::other_board);
   EXPECT_EQ(robot.session->path(0, robot.now()).board_id, "board-0");
   EXPECT_EQ(robot.session->path(1, robot.now()).board_id, "board-1");
-  robot.session->send(Command::osmc(1, Direction::forward, 1), RobotOnPaths::timeout, robot.now());
+  robot.session->send(Command::osmc(1, Pwm(1), Direction::forward), RobotOnPaths::timeout,
+                      robot.now());
   robot.run(1000);
   for (const Cable& cable : robot.cables) {
     EXPECT_EQ(cable.all('Q').size(), cable.sent.size()) << "nothing but questions";

@@ -66,7 +66,7 @@ TEST_P(SleepingHost, CancelsACommandAndAnArmThatItAskedForBefore) {
     if (link != Link::never_heard) cut_all(armed);
     armed.run(1500);
     const Ticket arm = armed.session->arm(std::chrono::seconds{30}, armed.now());
-    const auto command = Command::osmc(100, Direction::forward, 1);
+    const auto command = Command::osmc(1, Pwm(100), Direction::forward);
     const Ticket drive = armed.session->send(command, std::chrono::seconds{30}, armed.now());
     if (link == Link::restarted) armed.reboot(0);
     armed.sleep(9000);
@@ -105,7 +105,7 @@ TEST_P(SleepingHost, RepeatsNothingThatItHadSent) {
     RobotOnPaths sender(GetParam());
     sender.connect();
     cut_all(sender);
-    const auto command = Command::osmc(100, Direction::forward, 1);
+    const auto command = Command::osmc(1, Pwm(100), Direction::forward);
     const Ticket ticket = sender.session->send(command, std::chrono::seconds{30}, sender.now());
     sender.run(later_ms);
     sender.sleep(60'000);

@@ -52,7 +52,7 @@ TEST_F(SessionLink, BecomesActiveWithTheBoardsStateAndSaysSoOnce) {
 
 TEST_F(SessionLink, IgnoresAnswersToAnotherSession) {
   const Ticket question = link.session.identify(1s, link.now);
-  const Ticket command = link.session.send(Command::servo(1500, 1), 1s, link.now);
+  const Ticket command = link.session.send(Command::servo(1, Microseconds(1500)), 1s, link.now);
   const SessionId ours = std::exchange(link.host_session, 0x1234);
   link.answer(link.last('Q').pnum, "udp");
   link.nack(link.last('S').pnum, "RANGE");
@@ -67,7 +67,7 @@ TEST_F(SessionLink, IgnoresAnswersToAnotherSession) {
 
 TEST_F(SessionFarewell, EndsHeartbeatsAndIsRepeatedUntilTheBoardReportsThatItIsFree) {
   link.identity("udp+leave");
-  const Ticket command = link.session.send(Command::servo(1500, 1), 1s, link.now);
+  const Ticket command = link.session.send(Command::servo(1, Microseconds(1500)), 1s, link.now);
   link.pass(5ms);
   link.sent.clear();
   const Ticket ticket = link.session.leave(100ms, link.now);

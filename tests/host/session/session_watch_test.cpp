@@ -117,11 +117,11 @@ TEST_F(SessionWatch, MayStopAndIdentifyTheBoardAndCommandsNothing) {
     EXPECT_EQ(problem.kind, ErrorKind::usage);
     EXPECT_TRUE(contains(problem.reason, "only watches")) << problem.reason;
   };
-  refused([&] { link.session.send(Command::servo(1500, 1), 1s, link.now); });
+  refused([&] { link.session.send(Command::servo(1, Microseconds(1500)), 1s, link.now); });
   refused([&] { link.session.post(Command::clear(), link.now); });
   refused([&] { link.session.arm(1s, link.now); });
-  const Setpoints wheels =
-      Setpoints{}.osmc(1, 358, Direction::forward).osmc(2, 358, Direction::forward);
+  const Setpoints wheels = Setpoints{Command::osmc(1, Pwm(358), Direction::forward),
+                                     Command::osmc(2, Pwm(358), Direction::forward)};
   refused([&] { link.session.send(wheels, 1s, link.now); });
   refused([&] { link.session.post(wheels, link.now); });
   EXPECT_EQ(link.count('S'), 0U);

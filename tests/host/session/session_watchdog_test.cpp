@@ -54,7 +54,7 @@ TEST_F(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
   EXPECT_FALSE(link.session.in_control(link.now));
   EXPECT_EQ(link.session.post(turn_motor, link.now), PostResult::no_link);
   const Ticket waits = link.session.send(turn_motor, 5s, link.now);
-  const Ticket late = link.session.send(Command::servo(1500, 1), 300ms, link.now);
+  const Ticket late = link.session.send(Command::servo(1, Microseconds(1500)), 300ms, link.now);
   for (int i = 0; i < 4; ++i) {
     link.heartbeat();
     link.pass(100ms);
@@ -93,8 +93,8 @@ TEST_F(SessionHold, AndWatchdogBothHaveToBeOver) {
 
 TEST_F(SessionLink, SendsNoCommandAfterItsDeadline) {
   link.place_taken = true;
-  link.session.post(Command::servo(1500, 1), link.now);  // finds the place taken
-  link.session.send(turn_motor, 100ms, link.now);        // waits for it
+  link.session.post(Command::servo(1, Microseconds(1500)), link.now);  // finds the place taken
+  link.session.send(turn_motor, 100ms, link.now);                      // waits for it
   link.place_taken = false;
   link.now += 750ms;                     // the loop was held up
   link.executed(link.session_pnum + 1);  // its choice of fields

@@ -159,19 +159,19 @@ TEST(BoardUart, WritesBytesAndVoltagesOnlyAfterArm) {
   board.wait_active();
   board.setting("uart2", "115200:8N1");
   EXPECT_THROW(board.uart(2).write({'a'}), Error);
-  EXPECT_THROW(board.dac(1, 1000), Error);
+  EXPECT_THROW(board.dac(1, Millivolts(1000)), Error);
   board.arm();
   board.uart(2).write({'a', 'b'});
   EXPECT_THROW(board.uart(2).write({}), Error);
   EXPECT_THROW(board.uart(2).write(std::vector<std::uint8_t>(49)), Error);
   EXPECT_THROW(board.uart(1).write({'a'}), Error) << "it is off";
   board.fields("DAC1,GPIO");
-  board.dac(1, 1650);
+  board.dac(1, Millivolts(1650));
   ReceivedState state = board.next_state();
   for (int i = 0; i < 100 && state.dac_mv[0] != 1650; ++i) state = board.next_state();
   EXPECT_EQ(state.dac_mv[0], 1650);
   EXPECT_TRUE(state.input(1));
-  EXPECT_THROW(board.dac(1, 3301), Error);
+  EXPECT_THROW(board.dac(1, Millivolts(3301)), Error);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ int main() {
   });
   io.run();
   try {
-    board.osmc(1).set(1, r4::Direction::forward);
+    board.osmc(1).set_pwm(1, r4::Direction::forward);
   } catch (const r4::Error& error) {
     return error.outcome() == r4::Outcome::not_armed ? 0 : 1;
   }

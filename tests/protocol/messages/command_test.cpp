@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -70,9 +71,9 @@ TEST(Command, AlternativeFormsAreTheSameCommand) {
 
 TEST(Command, TheFactoriesMakeWhatIsWritten) {
   EXPECT_EQ(written(Command::heartbeat()), "H:ROS2-R4");
-  EXPECT_EQ(written(Command::osmc(358, Direction::forward, 1)), "O:358,1,1");
-  EXPECT_EQ(written(Command::dhb12(4095, Direction::reverse, 4)), "D:4095,0,4");
-  EXPECT_EQ(written(Command::servo(2500, 16)), "S:2500,16");
+  EXPECT_EQ(written(Command::osmc(1, Pwm(358), Direction::forward)), "O:358,1,1");
+  EXPECT_EQ(written(Command::dhb12(4, Pwm(4095), Direction::reverse)), "D:4095,0,4");
+  EXPECT_EQ(written(Command::servo(16, Microseconds(2500))), "S:2500,16");
   EXPECT_EQ(written(Command::relay(8, true)), "R:8,On");
   EXPECT_EQ(written(Command::relay(1, false)), "R:1,Off");
   EXPECT_EQ(written(Command::stop()), "E:STOP");
@@ -80,10 +81,11 @@ TEST(Command, TheFactoriesMakeWhatIsWritten) {
   EXPECT_EQ(written(Command::clear(7)), "E:CLEAR,7");
   EXPECT_EQ(command_judged("E:CLEAR,-1"), Refusal::range);
   EXPECT_EQ(command_judged("E:CLEAR,2147483648"), Refusal::range);
-  EXPECT_EQ(written(Command::stepper(-2147483647 - 1, 20000, 4)), "P:-2147483648,20000,4");
+  EXPECT_EQ(written(Command::stepper(4, Steps(-2147483647 - 1), StepsPerSecond(20000))),
+            "P:-2147483648,20000,4");
   EXPECT_EQ(written(Command::zero(1)), "Z:1");
-  EXPECT_EQ(written(Command::bldc(1, Direction::forward, true, 2)), "B:1,1,1,2");
-  EXPECT_EQ(written(Command::proximity(0, 1)), "U:0,1");
+  EXPECT_EQ(written(Command::bldc(2, Pwm(1), Direction::forward, true)), "B:1,1,1,2");
+  EXPECT_EQ(written(Command::proximity(1, Centimetres(0))), "U:0,1");
   EXPECT_EQ(written(Command::fields("DEFAULT,SAFE,CMD")), "F:DEFAULT,SAFE,CMD");
   EXPECT_EQ(written(Command::setting("rate", "50")), "C:rate,50");
   EXPECT_EQ(written(Command::identify()), "Q:ID");
@@ -201,28 +203,31 @@ TEST(Command, TheFormComesBeforeTheChannelAndTheChannelBeforeTheRange) {
 }
 
 TEST(Command, CommandsOfTheFactoriesAreCheckedTheSame) {
-  EXPECT_EQ(check_command(Command::osmc(4095, Direction::forward, 4)), Refusal::none);
-  EXPECT_EQ(check_command(Command::osmc(4096, Direction::forward, 4)), Refusal::range);
-  EXPECT_EQ(check_command(Command::osmc(-1, Direction::forward, 4)), Refusal::range);
-  EXPECT_EQ(check_command(Command::osmc(1, static_cast<Direction>(2), 4)), Refusal::range);
+  EXPECT_EQ(check_command(Command::osmc(4, Pwm(4095), Direction::forward)), Refusal::none);
+  EXPECT_EQ(check_command(Command::osmc(4, Pwm(4096), Direction::forward)), Refusal::range);
+  EXPECT_EQ(check_command(Command::osmc(4, Pwm(-1), Direction::forward)), Refusal::range);
+  EXPECT_EQ(check_command(Command::osmc(4, Pwm(1), static_cast<Direction>(2))), Refusal::range);
   for (const int channel : {-1, 0, 5, 256, 257, 65537}) {
-    EXPECT_EQ(check_command(Command::osmc(1, Direction::forward, channel)), Refusal::channel)
+    EXPECT_EQ(check_command(Command::osmc(channel, Pwm(1), Direction::forward)), Refusal::channel)
         << channel;
-    EXPECT_EQ(check_command(Command::dhb12(1, Direction::forward, channel)), Refusal::channel)
+    EXPECT_EQ(check_command(Command::dhb12(channel, Pwm(1), Direction::forward)), Refusal::channel)
         << channel;
-    EXPECT_EQ(check_command(Command::stepper(1, 1, channel)), Refusal::channel) << channel;
+    EXPECT_EQ(check_command(Command::stepper(channel, Steps(1), StepsPerSecond(1))),
+              Refusal::channel)
+        << channel;
     EXPECT_EQ(check_command(Command::zero(channel)), Refusal::channel) << channel;
-    EXPECT_EQ(check_command(Command::bldc(1, Direction::forward, false, channel)),
+    EXPECT_EQ(check_command(Command::bldc(channel, Pwm(1), Direction::forward, false)),
               Refusal::channel);
-    EXPECT_EQ(check_command(Command::proximity(1, channel)), Refusal::channel) << channel;
+    EXPECT_EQ(check_command(Command::proximity(channel, Centimetres(1))), Refusal::channel)
+        << channel;
   }
-  EXPECT_EQ(check_command(Command::servo(2500, 16)), Refusal::none);
-  EXPECT_EQ(check_command(Command::servo(2501, 16)), Refusal::range);
-  EXPECT_EQ(check_command(Command::servo(2500, 17)), Refusal::channel);
+  EXPECT_EQ(check_command(Command::servo(16, Microseconds(2500))), Refusal::none);
+  EXPECT_EQ(check_command(Command::servo(16, Microseconds(2501))), Refusal::range);
+  EXPECT_EQ(check_command(Command::servo(17, Microseconds(2500))), Refusal::channel);
   EXPECT_EQ(check_command(Command::relay(9, true)), Refusal::channel);
-  EXPECT_EQ(check_command(Command::stepper(1, 0, 1)), Refusal::range);
-  EXPECT_EQ(check_command(Command::stepper(1, 20001, 1)), Refusal::range);
-  EXPECT_EQ(check_command(Command::proximity(401, 1)), Refusal::range);
+  EXPECT_EQ(check_command(Command::stepper(1, Steps(1), StepsPerSecond(0))), Refusal::range);
+  EXPECT_EQ(check_command(Command::stepper(1, Steps(1), StepsPerSecond(20001))), Refusal::range);
+  EXPECT_EQ(check_command(Command::proximity(1, Centimetres(401))), Refusal::range);
   EXPECT_EQ(check_command(Command::fields("")), Refusal::format);
   EXPECT_EQ(check_command(Command::setting("", "1")), Refusal::format);
   EXPECT_EQ(check_command(Command::setting("rate", "")), Refusal::format);
@@ -231,6 +236,35 @@ TEST(Command, CommandsOfTheFactoriesAreCheckedTheSame) {
     EXPECT_EQ(check_command(command), Refusal::none);
   }
 }
+
+TEST(Command, ADutyIsRoundedToTheNearestPwmAndItsSignIsTheDirection) {
+  EXPECT_EQ(written(Command::osmc(1, Duty(1))), "O:4095,1,1");
+  EXPECT_EQ(written(Command::osmc(1, Duty(0))), "O:0,1,1");
+  EXPECT_EQ(written(Command::dhb12(2, Duty(-0.25))), "D:1024,0,2");
+  EXPECT_EQ(written(Command::bldc(3, Duty(0.1), true)), "B:410,1,1,3");
+  for (const double wrong : {1.0001, -1.0001, std::numeric_limits<double>::quiet_NaN(),
+                             std::numeric_limits<double>::infinity()}) {
+    EXPECT_EQ(check_command(Command::osmc(1, Duty(wrong))), Refusal::range) << wrong;
+  }
+}
+
+template <class... Arguments>
+concept MakesServo = requires(Arguments... arguments) {
+  Command::servo(arguments...);
+};
+template <class... Arguments>
+concept MakesRelay = requires(Arguments... arguments) {
+  Command::relay(arguments...);
+};
+template <class... Arguments>
+concept MakesStepper = requires(Arguments... arguments) {
+  Command::stepper(arguments...);
+};
+static_assert(MakesServo<int, Microseconds>);
+static_assert(!MakesServo<Microseconds, int> && !MakesServo<int, int>);
+static_assert(MakesRelay<int, bool> && !MakesRelay<bool, int>);
+static_assert(MakesStepper<int, Steps, StepsPerSecond>);
+static_assert(!MakesStepper<int, StepsPerSecond, Steps>);
 
 TEST(Command, TextsCannotForgeAField) {
   EXPECT_EQ(written(Command::fields("AIN24;E:CLEAR")), "refused");

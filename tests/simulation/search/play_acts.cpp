@@ -150,7 +150,8 @@ void Play::command(int index, bool group) {
   sent.group = group;
   world_.commands_.push_back(sent);
   Setpoints setpoints;
-  for (int i = 1; i <= (group ? stepper_channels : 1); ++i) setpoints.stepper(i, id, 1000);
+  for (int i = 1; i <= (group ? stepper_channels : 1); ++i)
+    setpoints.add(Command::stepper(i, Steps(id), StepsPerSecond(1000)));
   const Time timeout{world_.schedule_.command_timeout_us};
   const Ticket ticket = at.session->send(setpoints, timeout, at.time());
   if (ticket != 0) at.tickets[ticket] = id;

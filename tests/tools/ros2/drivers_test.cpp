@@ -37,7 +37,7 @@ using Texts = std::vector<std::string>;
 
 TEST(Ros2Drivers, StopWhatASilentPublisherDrove) {
   Driven driven;
-  driven.sent(Command::osmc(358, Direction::forward, 2));
+  driven.sent(Command::osmc(2, Pwm(358), Direction::forward));
   driven.now += 999ms;
   EXPECT_EQ(driven.to_stop(), Texts{});
   driven.now += 1ms;
@@ -50,8 +50,8 @@ TEST(Ros2Drivers, StopWhatASilentPublisherDrove) {
 
 TEST(Ros2Drivers, StopAtOnceWhatSomebodyDroveWhoHasGone) {
   Driven driven;
-  driven.sent(Command::osmc(1, Direction::forward, 1), 7);
-  driven.sent(Command::dhb12(1, Direction::reverse, 3), 8);
+  driven.sent(Command::osmc(1, Pwm(1), Direction::forward), 7);
+  driven.sent(Command::dhb12(3, Pwm(1), Direction::reverse), 8);
   driven.drivers.on_publishers(&driven.other_topic, {});
   EXPECT_EQ(driven.to_stop(), Texts{}) << "of another topic";
   driven.drivers.on_publishers(&driven.topic, {8});
@@ -60,17 +60,17 @@ TEST(Ros2Drivers, StopAtOnceWhatSomebodyDroveWhoHasGone) {
 
 TEST(Ros2Drivers, PutEachOutputWhereTheSafeStateHasIt) {
   Driven driven;
-  driven.sent(Command::dhb12(9, Direction::reverse, 4));
-  driven.sent(Command::servo(1500, 16));
+  driven.sent(Command::dhb12(4, Pwm(9), Direction::reverse));
+  driven.sent(Command::servo(16, Microseconds(1500)));
   driven.sent(Command::relay(8, true));
-  driven.sent(Command::bldc(10, Direction::forward, false, 1));
+  driven.sent(Command::bldc(1, Pwm(10), Direction::forward, false));
   driven.now += 2s;
   EXPECT_EQ(driven.to_stop(), (Texts{"D:0,1,4", "S:0,16", "R:8,Off", "B:0,1,1,1"}));
 }
 
 TEST(Ros2Drivers, AStepperIsStoppedWhereItIsOnceThatIsKnown) {
   Driven driven;
-  driven.sent(Command::stepper(100000, 1000, 2));
+  driven.sent(Command::stepper(2, Steps(100000), StepsPerSecond(1000)));
   driven.now += 2s;
   EXPECT_EQ(driven.to_stop(), Texts{});
   driven.told(2, 1234);
@@ -79,7 +79,7 @@ TEST(Ros2Drivers, AStepperIsStoppedWhereItIsOnceThatIsKnown) {
 
 TEST(Ros2Drivers, AStepperIsStoppedThoughTheNewestDatagramIsAnotherPartOfTheState) {
   Driven driven;
-  driven.sent(Command::stepper(100000, 1000, 2));
+  driven.sent(Command::stepper(2, Steps(100000), StepsPerSecond(1000)));
   driven.told(2, 1234);
   State rest;
   rest.present.add(StateField::relays);
@@ -90,7 +90,7 @@ TEST(Ros2Drivers, AStepperIsStoppedThoughTheNewestDatagramIsAnotherPartOfTheStat
 
 TEST(Ros2Drivers, NoStepperGoesBackToWhereItWasLongAgo) {
   Driven driven;
-  driven.sent(Command::stepper(100000, 1000, 2));
+  driven.sent(Command::stepper(2, Steps(100000), StepsPerSecond(1000)));
   driven.told(2, 1234);
   driven.drivers.on_publishers(&driven.topic, {});
   driven.now += 251ms;
@@ -103,7 +103,7 @@ TEST(Ros2Drivers, NoStepperGoesBackToWhereItWasLongAgo) {
 
 TEST(Ros2Drivers, APositionOfBeforeItWasSetToZeroIsNone) {
   Driven driven;
-  driven.sent(Command::stepper(100000, 1000, 2));
+  driven.sent(Command::stepper(2, Steps(100000), StepsPerSecond(1000)));
   driven.told(2, 50000);
   driven.sent(Command::zero(2));
   driven.drivers.on_publishers(&driven.topic, {});
@@ -118,11 +118,11 @@ TEST(Ros2Drivers, APositionOfBeforeItWasSetToZeroIsNone) {
 
 TEST(Ros2Drivers, LeaveAloneWhatRestsAndTheMotorsSupply) {
   Driven driven;
-  driven.sent(Command::osmc(0, Direction::forward, 1));
-  driven.sent(Command::servo(0, 1));
+  driven.sent(Command::osmc(1, Pwm(0), Direction::forward));
+  driven.sent(Command::servo(1, Microseconds(0)));
   driven.sent(Command::relay(2, false));
   driven.sent(Command::relay(1, true));
-  driven.sent(Command::bldc(0, Direction::forward, true, 1));
+  driven.sent(Command::bldc(1, Pwm(0), Direction::forward, true));
   driven.now += 1h;
   EXPECT_FALSE(driven.drivers.any());
   EXPECT_EQ(driven.to_stop(), Texts{});
@@ -130,13 +130,13 @@ TEST(Ros2Drivers, LeaveAloneWhatRestsAndTheMotorsSupply) {
 
 TEST(Ros2Drivers, ACommandThatStopsIsRepeatedUntilTheBoardHasConfirmedIt) {
   Driven driven;
-  driven.sent(Command::osmc(358, Direction::forward, 1));
-  driven.sent(Command::osmc(0, Direction::forward, 1));
+  driven.sent(Command::osmc(1, Pwm(358), Direction::forward));
+  driven.sent(Command::osmc(1, Pwm(0), Direction::forward));
   const Drivers::Stop stop = driven.drivers.to_stop(driven.now);
   ASSERT_EQ(stop.commands.size(), 1U) << "it may have been lost on its way";
   EXPECT_EQ(text_of(stop.commands[0]), "O:0,1,1");
   EXPECT_FALSE(stop.missed) << "nobody has gone";
-  driven.sent(Command::osmc(0, Direction::forward, 1));  // as who drives by 0 repeats it
+  driven.sent(Command::osmc(1, Pwm(0), Direction::forward));  // as who drives by 0 repeats it
   driven.drivers.stopped(stop);
   EXPECT_EQ(driven.to_stop(), Texts{});
   EXPECT_FALSE(driven.drivers.any());
@@ -144,31 +144,31 @@ TEST(Ros2Drivers, ACommandThatStopsIsRepeatedUntilTheBoardHasConfirmedIt) {
 
 TEST(Ros2Drivers, SayWhetherSomebodyIsMissed) {
   Driven driven;
-  driven.sent(Command::osmc(358, Direction::forward, 1));
+  driven.sent(Command::osmc(1, Pwm(358), Direction::forward));
   driven.now += 2s;
   EXPECT_TRUE(driven.drivers.to_stop(driven.now).missed);
 }
 
 TEST(Ros2Drivers, AVoltageGoesToZeroBehindTheOthersWhichABoardWithoutOneWouldRefuse) {
   Driven driven;
-  driven.sent(Command::dac(2, 3300));
-  driven.sent(Command::osmc(358, Direction::forward, 1));
+  driven.sent(Command::dac(2, Millivolts(3300)));
+  driven.sent(Command::osmc(1, Pwm(358), Direction::forward));
   driven.now += 2s;
   const Drivers::Stop others = driven.drivers.to_stop(driven.now);
   ASSERT_EQ(others.commands.size(), 1U);
   EXPECT_EQ(text_of(others.commands[0]), "O:0,1,1");
   driven.drivers.stopped(others);
   EXPECT_EQ(driven.to_stop(), Texts{"X:DAC,2,0"});
-  driven.drivers.forget(Command::dac(2, 3300));
+  driven.drivers.forget(Command::dac(2, Millivolts(3300)));
   EXPECT_FALSE(driven.drivers.any()) << "the board has none";
 }
 
 TEST(Ros2Drivers, AnotherCommandEndsTheStopping) {
   Driven driven;
-  driven.sent(Command::osmc(358, Direction::forward, 1), 7);
+  driven.sent(Command::osmc(1, Pwm(358), Direction::forward), 7);
   driven.now += 2s;
   const Drivers::Stop stop = driven.drivers.to_stop(driven.now);
-  driven.sent(Command::osmc(100, Direction::forward, 1), 8);
+  driven.sent(Command::osmc(1, Pwm(100), Direction::forward), 8);
   EXPECT_EQ(driven.to_stop(), Texts{});
   driven.drivers.on_publishers(&driven.topic, {});
   driven.drivers.stopped(stop);
@@ -179,7 +179,7 @@ TEST(Ros2Drivers, AnotherCommandEndsTheStopping) {
 
 TEST(Ros2Drivers, WithoutADeadlineOnlyWhoHasGoneIsMissed) {
   Driven driven(0ms);
-  driven.sent(Command::osmc(358, Direction::forward, 1), 7);
+  driven.sent(Command::osmc(1, Pwm(358), Direction::forward), 7);
   driven.now += 24h;
   EXPECT_EQ(driven.to_stop(), Texts{});
   driven.drivers.on_publishers(&driven.topic, {});
@@ -188,8 +188,9 @@ TEST(Ros2Drivers, WithoutADeadlineOnlyWhoHasGoneIsMissed) {
 
 TEST(Ros2Drivers, AGroupAtATime) {
   Driven driven;
-  for (int n = 1; n <= servo_channels; ++n) driven.sent(Command::servo(1500, n));
-  for (int n = 1; n <= osmc_channels; ++n) driven.sent(Command::osmc(1, Direction::forward, n));
+  for (int n = 1; n <= servo_channels; ++n) driven.sent(Command::servo(n, Microseconds(1500)));
+  for (int n = 1; n <= osmc_channels; ++n)
+    driven.sent(Command::osmc(n, Pwm(1), Direction::forward));
   driven.now += 2s;
   const auto first = driven.drivers.to_stop(driven.now);
   EXPECT_EQ(first.commands.size(), static_cast<std::size_t>(max_group));
@@ -198,7 +199,7 @@ TEST(Ros2Drivers, AGroupAtATime) {
 }
 
 TEST(Ros2Drivers, ToSetAStepperToZeroIsNoRest) {
-  EXPECT_TRUE(Drivers::rests(Command::osmc(0, Direction::forward, 1)));
+  EXPECT_TRUE(Drivers::rests(Command::osmc(1, Pwm(0), Direction::forward)));
   EXPECT_FALSE(Drivers::rests(Command::zero(1)));
 }
 

@@ -16,17 +16,18 @@ namespace {
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-TEST(Ros2Units, ADutyIsSignedAndNeverRounded) {
-  EXPECT_EQ(from_duty(1)->pwm, 4095);
-  EXPECT_EQ(from_duty(-1)->pwm, 4095);
-  EXPECT_EQ(from_duty(-1)->direction, Direction::reverse);
-  EXPECT_EQ(from_duty(0)->pwm, 0);
-  for (const double wrong : {1.0001, -1.0001, not_a_number, infinite, -infinite}) {
-    EXPECT_FALSE(from_duty(wrong)) << wrong;
+TEST(Ros2Units, ADutyOfAStateCommandsTheSamePwm) {
+  for (int pwm = 0; pwm <= 4095; ++pwm) {
+    EXPECT_EQ(Duty(to_duty(pwm, Direction::forward)).pwm().value, pwm);
+    EXPECT_EQ(Duty(to_duty(pwm, Direction::reverse)).pwm().value, pwm);
   }
-  for (const int pwm : {0, 1, 358, 4095}) {
-    EXPECT_EQ(from_duty(to_duty(pwm, Direction::forward))->pwm, pwm);
-    EXPECT_EQ(from_duty(to_duty(pwm, Direction::reverse))->pwm, pwm);
+}
+
+TEST(Ros2Units, AMotorOutsideItsDutyIsNotCommanded) {
+  const MotorChannel motor{CommandKind::osmc, 1, false};
+  EXPECT_TRUE(motor.command(-1));
+  for (const double wrong : {1.0001, -1.0001, not_a_number, infinite, -infinite}) {
+    EXPECT_FALSE(motor.command(wrong)) << wrong;
   }
 }
 

@@ -172,13 +172,12 @@ void BoardCommands::subscribe_outputs(Graph& graph, std::size_t node, Inbox& inb
     motor(CommandKind::dhb12, fmt::format("dhb12_{}/command", n));
     subscribe(Float32Message(), fmt::format("bldc{}/command", n),
               [n](double duty) -> std::optional<Command> {
-                const auto speed = from_duty(duty);
-                if (!speed) return std::nullopt;
-                return Command::bldc(speed->pwm, speed->direction, speed->pwm == 0, n);
+                const Duty speed(duty);
+                if (!speed.is_in_range()) return std::nullopt;
+                return Command::bldc(n, speed, speed.pwm().value == 0);
               });
     subscribe(Int32Message(), fmt::format("stepper{}/command", n), [n](double steps) {
-      return std::optional(
-          Command::stepper(static_cast<std::int32_t>(steps), stepper_speed_default, n));
+      return std::optional(Command::stepper(n, Steps(static_cast<std::int32_t>(steps))));
     });
   }
   for (int n = 1; n <= servo_channels; ++n) {
@@ -186,7 +185,7 @@ void BoardCommands::subscribe_outputs(Graph& graph, std::size_t node, Inbox& inb
               [n, servo = options_.servo](double value) -> std::optional<Command> {
                 const auto pulse = to_pulse(servo, value);
                 if (!pulse) return std::nullopt;
-                return Command::servo(*pulse, n);
+                return Command::servo(n, Microseconds(*pulse));
               });
   }
   for (int n = 2; n <= relay_channels; ++n) {  // relay 1 is arming's

@@ -64,22 +64,22 @@ std::optional<Command> Drivers::stop_of(std::size_t index, Time now) const {
     const int channel = static_cast<int>(index - first) + 1;
     switch (each.kind) {
       case CommandKind::osmc:
-        return Command::osmc(0, Direction::forward, channel);
+        return Command::osmc(channel, Pwm(0), Direction::forward);
       case CommandKind::dhb12:
-        return Command::dhb12(0, Direction::forward, channel);
+        return Command::dhb12(channel, Pwm(0), Direction::forward);
       case CommandKind::servo:
-        return Command::servo(0, channel);
+        return Command::servo(channel, Microseconds(0));
       case CommandKind::relay:
         return Command::relay(channel, false);
       case CommandKind::stepper: {
         const Position& position = positions_[index - first];
         if (!position.sampled || now - *position.sampled > oldest_position) return std::nullopt;
-        return Command::stepper(position.steps, stepper_speed_default, channel);
+        return Command::stepper(channel, Steps(position.steps));
       }
       case CommandKind::dac:
-        return Command::dac(channel, 0);
+        return Command::dac(channel, Millivolts(0));
       default:
-        return Command::bldc(0, Direction::forward, true, channel);
+        return Command::bldc(channel, Pwm(0), Direction::forward, true);
     }
   }
   return std::nullopt;

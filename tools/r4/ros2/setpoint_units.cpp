@@ -49,12 +49,6 @@ std::optional<MotorChannel> motor_channel(std::string_view text) {
 
 }  // namespace
 
-std::optional<SignedDuty> from_duty(double duty) {
-  if (!(std::abs(duty) <= 1.0)) return std::nullopt;  // NaN, too
-  return SignedDuty{static_cast<int>(std::lround(std::abs(duty) * pwm_max)),
-                    duty < 0 ? Direction::reverse : Direction::forward};
-}
-
 double to_duty(int pwm, Direction direction) {
   const double duty = static_cast<double>(pwm) / pwm_max;
   return direction == Direction::forward || pwm == 0 ? duty : -duty;
@@ -101,11 +95,10 @@ double from_pulse(const ServoCalibration& servo, int pulse_us) {
 }
 
 std::optional<Command> MotorChannel::command(double duty) const {
-  const auto signed_duty = from_duty(reversed ? -duty : duty);
-  if (!signed_duty) return std::nullopt;
-  return kind == CommandKind::osmc
-             ? Command::osmc(signed_duty->pwm, signed_duty->direction, channel)
-             : Command::dhb12(signed_duty->pwm, signed_duty->direction, channel);
+  const Duty wanted(reversed ? -duty : duty);
+  if (!wanted.is_in_range()) return std::nullopt;
+  return kind == CommandKind::osmc ? Command::osmc(channel, wanted)
+                                   : Command::dhb12(channel, wanted);
 }
 
 std::optional<Setpoints> DifferentialDrive::setpoints(double linear, double angular) const {
@@ -118,7 +111,7 @@ std::optional<Setpoints> DifferentialDrive::setpoints(double linear, double angu
   const auto one = left.command(left_duty);
   const auto other = right.command(right_duty);
   if (!one || !other) return std::nullopt;
-  return Setpoints{}.add(*one).add(*other);
+  return Setpoints{*one, *other};
 }
 
 DifferentialDrive differential_drive(std::string_view channels, double separation_m,

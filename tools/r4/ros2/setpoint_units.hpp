@@ -16,12 +16,7 @@
 
 namespace r4::tool::ros2 {
 
-// A duty from -1, full speed backwards, to 1.
-struct SignedDuty {
-  int pwm = 0;
-  Direction direction = Direction::forward;
-};
-std::optional<SignedDuty> from_duty(double duty);
+// From -1 (full reverse) to 1.
 double to_duty(int pwm, Direction direction);
 
 // Radians of a servo: from min_us to max_us it turns by `angle`; 0 is in the middle.

@@ -173,7 +173,7 @@ void Story::command() {
   teller_.say(
       "supply    R:1,On closes relay 1: it is in the motors' supply, and opens in every safe "
       "state.");
-  result_.confirmed_ms = milliseconds_of(send(Command::osmc(358, Direction::forward, 1)));
+  result_.confirmed_ms = milliseconds_of(send(Command::osmc(1, Pwm(358), Direction::forward)));
   require(state_.osmc[0] == commanded, "the state does not show the command");
   teller_.say(
       "command   O:358,1,1 sets motor 1 (OSMC1) to 358 of 4095, forward. The state shows it:");
