@@ -278,6 +278,7 @@ TEST_F(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
   EXPECT_EQ(link.session.statistics(link.now).timed_out, 0U) << "it ends only once";
   EXPECT_EQ(link.last('E').bytes, link.all('E').front().bytes);
 
+  link.executed(link.last('E').pnum);  // in control again after a second of silence
   for (const bool posts : {false, true}) {
     link.session.stop(1s, link.now);
     link.stopped(link.last('E').pnum);
@@ -287,6 +288,7 @@ TEST_F(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
     } else {
       link.session.send(Command::clear(), 1s, link.now);
     }
+    ASSERT_EQ(link.last('E').command.substr(0, 7), "E:CLEAR");
     const std::size_t stops = link.count('E');
     link.pass(40ms);
     EXPECT_EQ(link.count('E'), stops) << "not past an E:CLEAR of its own";

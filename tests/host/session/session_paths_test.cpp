@@ -232,6 +232,7 @@ TEST(SessionPaths, ToTwoBoardsAreRefused) {
   robot.session->send(Command::osmc(1, Direction::forward, 1), RobotOnPaths::timeout, robot.now());
   robot.run(1000);
   for (const Cable& cable : robot.cables) {
+    ASSERT_FALSE(cable.sent.empty());
     EXPECT_EQ(cable.all('Q').size(), cable.sent.size()) << "nothing but questions";
   }
   robot.plug(1, false);
