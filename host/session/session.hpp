@@ -63,8 +63,8 @@ class Session {
 
   // --- effects
 
-  // To be performed after each call that takes a time. on_sent() reports the result of each
-  // sending.
+  // Perform them after each call that takes a time: first the sendings, then the reports. Give the
+  // result of each sending to on_sent().
   Effects& effects() { return effects_; }
   void on_sent(const Sending& sending, SendResult result, Time now);
 
