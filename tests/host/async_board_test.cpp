@@ -280,7 +280,7 @@ INSTANTIATE_TEST_SUITE_P(AsyncBoard, DestroyedIn,
                          testing::Values("handler", "state", "heartbeat", "link", "nack"),
                          [](const auto& place) { return std::string(place.param); });
 
-TEST_P(DestroyedIn, SurvivesIt) {
+TEST_P(DestroyedIn, TheBoardMayBeDestroyedInAnyCallback) {
   const std::string place = GetParam();
   BoardInAThread over_udp("udp");
   for (const std::string& url : {std::string("sim:"), over_udp.url()}) {
@@ -310,7 +310,7 @@ TEST_P(DestroyedIn, SurvivesIt) {
 }
 
 // The transport is up at once, and reports that inside of open().
-TEST(AsyncBoardEnd, MayComeWhileItOpens) {
+TEST(AsyncBoardEnd, MayComeInsideAnEventOfOpening) {
   asio::io_context io;
   AsyncBoard closed(io, "sim:");
   closed.on_event([&](const CarrierEvent&) { closed.close(); });
@@ -342,7 +342,7 @@ TEST(AsyncBoardEnd, IsDestroyedBeforeOrWithoutItsLoop) {
   EXPECT_EQ(outcome, Outcome::closed);
 }
 
-TEST(AsyncBoardEnd, ItsHandlersDieWithTheLoop) {
+TEST(AsyncBoardEnd, DestroysTheHandlersWithTheLoop) {
   const auto payload = std::make_shared<int>(1);
   {
     asio::io_context io;

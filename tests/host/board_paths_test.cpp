@@ -67,7 +67,7 @@ TEST(BoardPaths, LeadToOneBoardOverUdpAndAPty) {
   EXPECT_EQ(board.link().reason, SafeReason::stop);
 }
 
-TEST(BoardPaths, ThatLeadToTwoBoardsAreRefusedWithBothNames) {
+TEST(BoardPaths, AreRefusedWithBothNamesIfTheyLeadToTwoBoards) {
   BoardInAThread left(std::vector<std::string>{"udp"}, "", "left-board");
   BoardInAThread right(std::vector<std::string>{"pty"}, "", "right-board");
   Board board({left.url(), right.url()}, at_will());
