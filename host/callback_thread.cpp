@@ -83,7 +83,7 @@ void CallbackThread::run() {
   }
 }
 
-// Waits for the next thing to do; false at the end.
+// Waits for the next notice or task; false at the end.
 bool CallbackThread::take(Notice& notice, std::function<void()>& task) {
   std::unique_lock lock(mutex_);
   news_.wait(lock, [&] { return ended_ || told_ > taken_ || !tasks_.empty(); });

@@ -4,12 +4,12 @@
 //     the link's loop --notify()--> notices, 64 at most --> the callbacks, one at a time
 //
 // So a callback may take its time, and may wait for the board: heartbeats and commands go on. But a
-// callback that hangs must end in the safe state: busy_for() reports how long one has run, and
-// after a limit the loop stops the heartbeats, because nobody looks after the robot.
+// callback that hangs must end in the safe state, because nobody looks after the robot. busy_for()
+// reports how long a callback has run, and after a limit the loop stops the heartbeats.
 //
-// The link does not wait for callbacks. A state that waits is replaced by the next one. Refusals
-// and warnings are left out where 32 notices wait; of the other notices, the oldest gives way where
-// 64 wait. notify() allocates nothing.
+// The link does not wait for callbacks. A state that waits is replaced by the next state. While 32
+// notices wait, refusals and warnings are dropped. While 64 wait, each new notice replaces the
+// oldest. notify() allocates nothing.
 #pragma once
 
 #include <atomic>
@@ -58,15 +58,15 @@ class CallbackThread {
   void take_uart(std::function<Board::UartData(int channel)> take) { take_uart_ = std::move(take); }
   // `owner` is kept until the thread ends.
   void start(std::shared_ptr<void> owner);
-  // When this returns, no callback runs, unless it is called in one, and none is called again.
+  // When this returns, no callback runs, except one that called this, and none is called again.
   void stop();
 
   void notify(Notice notice);
-  // How long the callback that runs now has run; nothing if none does.
+  // The time for which the present callback has run; nothing if no callback runs.
   std::optional<Clock::duration> busy_for() const;
 
-  // Adds a callback for that kind of notice. It is called with what there is already, then with
-  // what comes next.
+  // Adds a callback for that kind of notice. It is called with the newest notice, if there is one,
+  // then with each new notice.
   template <class Kind>
   Subscription add(std::function<void(const Kind&)> callback) {
     return add(std::get<Subscribers<Kind>>(callbacks_), std::move(callback));
@@ -80,7 +80,7 @@ class CallbackThread {
   }
 
  private:
-  // Something to be done between two notices: after the first `after` of all.
+  // An action between two notices: after the first `after` notices of all.
   struct Task {
     std::uint64_t after;
     std::function<void()> action;
@@ -93,7 +93,7 @@ class CallbackThread {
     {
       const std::lock_guard lock(mutex_);
       if (ended_) return {};
-      // In its place among the notices, so that none is reported twice or left out.
+      // Queued among the notices, so that no notice is reported twice or left out.
       tasks_.push_back({told_, [this, &callbacks, one] {
                           callbacks.add(one);
                           call_first(*one);
@@ -105,14 +105,14 @@ class CallbackThread {
   void run();
   bool take(Notice& notice, std::function<void()>& task);
   void call(const Notice& notice);
-  // Stops where a callback has closed the board.
+  // Stops if a callback has closed the board.
   template <class Kind>
   void call_each(const Subscribers<Kind>& callbacks, const Kind& news) {
     callbacks.each([&](auto& one) {
       if (!ended_) one(news);
     });
   }
-  // Calls a new callback with what there is already.
+  // Calls a new callback with the newest notice, if there is one.
   void call_first(Subscribers<ReceivedState>::One& one);
   void call_first(Subscribers<LinkStatus>::One& one) { one(link_); }
   void call_first(Subscribers<CarrierEvent>::One& one);
@@ -133,7 +133,7 @@ class CallbackThread {
   std::atomic<std::thread::id> id_{};
   std::mutex joining_;
 
-  // Of the thread: the callbacks, and the newest notices.
+  // For this thread only: the callbacks, and the newest notices.
   std::tuple<Subscribers<Restart>, Subscribers<ReceivedState>, Subscribers<LinkStatus>,
              Subscribers<CarrierEvent>, Subscribers<PathStatus>, Subscribers<DisarmCause>,
              Subscribers<RefusedPost>>

@@ -17,7 +17,8 @@
 
 namespace r4 {
 
-// `claim`: how a transport opens what one program can have at a time, each time.
+// `claim`: how a transport opens a device that one program can have at a time. It is read at each
+// opening.
 using CarrierFactory = std::function<std::unique_ptr<Carrier>(asio::io_context& io, const Url& url,
                                                               Role role, Claim claim)>;
 
@@ -41,9 +42,9 @@ class Registry {
   void add(Entry entry);
   const std::vector<Entry>& entries() const { return entries_; }
 
-  // The carrier for a URL, not yet opened. Throws Error{usage} for an unknown scheme, naming those
-  // that exist, and for a URL that its scheme does not take. A host does not share it: `share` is
-  // ignored.
+  // The carrier for a URL, not yet opened. Throws Error{usage} for an unknown scheme, with the
+  // schemes that exist, and for a URL that its scheme does not take. A host does not share the
+  // transport: `share` is ignored.
   std::unique_ptr<Carrier> make(asio::io_context& io, std::string_view url, Role role) const;
   // The carrier of a host that shares the transport with other programs of this computer.
   std::unique_ptr<Carrier> make_shared(asio::io_context& io, std::string_view url,

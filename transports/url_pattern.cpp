@@ -152,7 +152,7 @@ std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns) {
   for (const std::string& pattern : patterns) {
     for (PatternUrl& each : expand_urls(pattern)) {
       if (!seen.insert(each.url).second) {
-        throw Error(ErrorKind::usage, each.url, "it is named twice", "name a board once");
+        throw Error(ErrorKind::usage, each.url, "it is named twice", "name it once");
       }
       boards.push_back(std::move(each));
     }

@@ -160,6 +160,7 @@ void AsyncBoard::Impl::open() {
 // If at least one path is open, paths that failed are tried again later, and trouble with one path
 // does not touch the other paths. `problem`: set to the first error of all paths.
 void AsyncBoard::Impl::open_path(BoardPath& path, std::optional<Problem>& problem) {
+  path.opened = false;
   try {
     with_system_errors(path.carrier->name(), [&] { path.carrier->open(path); });
     path.opened = true;

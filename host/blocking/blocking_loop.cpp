@@ -13,11 +13,11 @@ namespace r4 {
 
 namespace {
 
-// The session ends every command at its deadline, which is that of the call. If a call that has
-// begun waits for this time beyond it, the loop is held up.
+// The session ends every command at the deadline of the call. If a call that has begun has not
+// ended by this time after its deadline, the loop is held up.
 constexpr BlockingLoop::Duration grace{500};
 
-// For what has no deadline.
+// For calls without a deadline.
 constexpr BlockingLoop::Duration patience{1000};
 static_assert(patience == Board::default_timeout);
 
@@ -40,7 +40,7 @@ Error BlockingLoop::closed_error(std::string_view what) const {
                        "open it again with another " + type, Outcome::closed});
 }
 
-// `instead`: what that means for what was asked.
+// `instead`: the effect on the call, such as "not sent".
 Error BlockingLoop::blocked_error(std::string_view what, std::string_view instead,
                                   std::string_view fix) const {
   return Error(Problem{
@@ -97,7 +97,7 @@ bool BlockingLoop::run_on_loop(std::string_view what, const std::function<void()
   const auto turn = std::make_shared<Turn>();
   std::unique_lock lock(mutex);
   if (closed) return false;
-  // `action` is the caller's, who waits as long as it runs.
+  // The reference to `action` stays valid, because the caller waits while it runs.
   asio::post(io, [this, turn, &action] {
     std::unique_lock loop_lock(mutex);
     if (turn->abandoned) return;
@@ -164,7 +164,7 @@ void BlockingLoop::close(std::function<void()> shut) {
 
 void BlockingLoop::end_loop() {
   work_.reset();
-  // Twice around: commands that begin() finds closed end after this.
+  // Posted twice: commands that begin() finds closed end after the first turn.
   asio::post(io, [this] { asio::post(io, [this] { io.stop(); }); });
 }
 

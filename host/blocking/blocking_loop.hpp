@@ -6,8 +6,8 @@
 //     run(call) ---- posted ---->       begin(): each board starts its part, with the time left
 //        waits  <--- end() ------       each part ends
 //
-// A caller may give up: at its deadline, or when on_wait() throws. What the loop has not begun by
-// then, it never begins; what it has begun is cancelled. A stop goes out however late it is.
+// A caller gives up at its deadline, or when on_wait() throws. A call that has not begun by then
+// never begins. A call that has begun is cancelled. A stop is sent however late it is.
 #pragma once
 
 #include <algorithm>
@@ -52,24 +52,24 @@ class BlockingLoop {
     std::size_t part;
   };
   using BoundEnd = asio::cancellation_slot_binder<End, asio::cancellation_slot>;
-  // Has a board begin its part, on the loop, with the time that is left.
+  // Begins a board's part, on the loop, with the time that is left.
   using Start =
       std::function<void(AsyncBoard& board, std::size_t part, Duration left, BoundEnd end)>;
-  // What was asked of one board.
+  // The part of one board.
   struct Part {
     AsyncBoard* board = nullptr;
     CommandResult result{};
     LinkStatus link{};                 // at the end
-    std::optional<Problem> trouble{};  // it could not begin: the role has changed
+    std::optional<Problem> trouble{};  // why it could not begin: the role has changed
     asio::cancellation_signal cancelled{};
   };
-  // Owned by both sides, because the caller may give up.
+  // Owned by both threads, because the caller may give up.
   struct Call {
     Call(std::string what, Start begin, const std::vector<AsyncBoard*>& boards, bool is_stop)
         : text(std::move(what)), start(std::move(begin)), stop(is_stop), left(boards.size()) {
       for (AsyncBoard* board : boards) parts.emplace_back().board = board;
     }
-    const std::string text;  // what was asked for, in errors
+    const std::string text;  // names the call in errors
     const Start start;
     const bool stop;
     std::deque<Part> parts;
@@ -79,10 +79,10 @@ class BlockingLoop {
     std::condition_variable ended;
     const Clock::time_point called = Clock::now();
   };
-  // Has a board stop, identify itself or send the command.
+  // Stops a board, asks for its identity, or sends the command.
   static Start start_of(const Command& command);
 
-  // How errors name it: "board" or "fleet", and what to do if its thread does not answer.
+  // How errors name it, "board" or "fleet", and their fix if its thread does not answer.
   struct Name {
     std::string_view thing;
     std::string_view fix;
@@ -95,18 +95,18 @@ class BlockingLoop {
 
   // --- on any thread
 
-  // Waits until all parts of the call have ended. Throws if they do not in time, if the loop is
-  // closed, and what on_wait() throws.
+  // Waits until all parts of the call have ended. Throws if they do not end in time, or if the loop
+  // is closed. Passes on what on_wait() throws.
   void run(const CallPtr& call, Duration timeout);
   // Begins the call, with Board::default_timeout, and does not wait. Does nothing if the loop is
   // closed.
   void run_unawaited(const CallPtr& call);
   // Runs `action` on the loop and waits until it has ended. False if the loop is closed. Throws if
-  // the loop does not begin it in time (then it never will), and what `action` throws.
+  // the loop does not begin it in time: then it never runs. Passes on what `action` throws.
   bool run_on_loop(std::string_view what, const std::function<void()>& action);
-  // Waits until `arrived`, which is called under the lock, is true; false if it is not in time. A
-  // sleep of this computer is part of the time, though the deadline stands still meanwhile. Throws
-  // if the loop is closed, an error about what(), which is called under the lock.
+  // Waits until `arrived()` is true; false if it is not true in time. A sleep of this computer is
+  // part of the time, though the deadline stands still meanwhile. If the loop is closed, throws an
+  // error about `what()`. Both are called under the lock.
   template <class What, class Predicate>
   bool wait_for_news(What what, Duration timeout, Predicate arrived) {
     const SleepWatch slept;
@@ -116,8 +116,8 @@ class BlockingLoop {
     if (closed) throw closed_error(what());
     return woken && slept.time() <= bounded(timeout);
   }
-  // Waits until `done`, which is called under the lock, is true; false at the deadline. Throws what
-  // while_waiting() throws; that is called every 50 ms without the lock.
+  // Waits until `done()`, which is called under the lock, is true; false at the deadline. Calls
+  // while_waiting() every 50 ms without the lock, and passes on what it throws.
   template <class Predicate>
   static bool wait_until(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,
                          Clock::time_point deadline, const std::function<void()>& while_waiting,
@@ -136,7 +136,7 @@ class BlockingLoop {
   static Duration bounded(Duration timeout) {
     return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
   }
-  // A copy of what both sides see.
+  // A copy of a value that both threads use.
   template <class Value>
   Value read(const Value& value) {
     const std::lock_guard lock(mutex);
@@ -151,8 +151,8 @@ class BlockingLoop {
 
   // --- on the loop
 
-  // For the beginning of `shut`: from now on nothing more is put on the loop. False if it was
-  // closed before. Calls `last` under the lock.
+  // `shut` begins with this: nothing is put on the loop afterwards. False if it was closed before.
+  // Calls `last` under the lock.
   template <class Last>
   bool mark_closed(Last last) {
     {
@@ -164,12 +164,12 @@ class BlockingLoop {
     news.notify_all();
     return true;
   }
-  // For the end of `shut`: runs what is on the loop, then ends the loop.
+  // `shut` ends with this: everything on the loop is run, then the loop ends.
   void end_loop();
 
   const std::function<void()> on_wait;
   asio::io_context io;
-  // What both sides see.
+  // Both threads use these.
   std::mutex mutex;
   std::condition_variable news;  // `closed`, or what wait_for_news() waits for, has changed
   bool closed = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A command with texts of its own: the texts of its caller may be gone when it is sent.
+// A command with texts of its own, because its caller's texts may not live until it is sent.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ class OwnCommand {
         text_(command.text.data(), command.text.size()),
         text2_(command.text2.data(), command.text2.size()) {}
 
-  // Its texts are views of this.
+  // The command's texts are views of this object.
   Command get() const {
     Command command = command_;
     command.text = text_;

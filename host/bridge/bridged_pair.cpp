@@ -75,7 +75,7 @@ void BridgedPair::try_to_open(Side& side, Failure failure, Time now) {
   side.tried = now;
   side.waiting.begin(now);
   try {
-    side.opened = true;  // it may be up before it returns
+    side.opened = true;  // open() may report `up` before it returns
     with_system_errors(side.carrier->name(), [&] { side.carrier->open(side); });
   } catch (const Error& error) {
     side.opened = false;
@@ -180,7 +180,7 @@ void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
     return;
   }
   if (!trusted && !may_ask(now)) return;
-  // The answer names the session: no copy of this command has passed, so its host may believe it.
+  // The answer names the session, so its host may believe it: no duplicate has passed.
   if (has_site_setting(datagram)) {
     ++hosts_.counters.refused;
     return answer(datagram, Refusal::auth, 0, from, now, known_.first_heartbeat(from, sid));
@@ -208,8 +208,8 @@ bool BridgedPair::is_judged(const Datagram& heartbeat) const {
          milliseconds(std::abs(std::int64_t{ago})) <= timeout_;
 }
 
-// When the set of served hosts changes: the carrier keeps the numbers of their peers, whatever
-// other peers send.
+// When the set of served hosts changes, the carrier gets the new set: it keeps the numbers of their
+// peers, whatever other peers send.
 void BridgedPair::follow_hosts(Time now) {
   if (!known_.poll(now)) return;
   const std::vector<Peer>& served = known_.served();
@@ -219,8 +219,8 @@ void BridgedPair::follow_hosts(Time now) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   const Text farewell = watch_.write_end(writer);
-  // The board's states are for that host from now on. On a bus other programs may watch, too, so
-  // there the lease runs out.
+  // The board streams to the served host without a lease. On a bus other programs may watch, too,
+  // so there the lease runs out.
   if (!board_.carrier->is_shared()) send(board_, view(farewell), Priority::normal, everyone);
 }
 
@@ -294,8 +294,8 @@ void BridgedPair::on_board_datagram(const Datagram& datagram, Time now) {
   }
 }
 
-// To served hosts and watchers; a heartbeat also to listeners, and while no host is served to every
-// peer that the carrier reaches with one datagram.
+// Delivers to served hosts and watchers. A heartbeat also goes to listeners and, while no host is
+// served, to every peer that the carrier reaches with one datagram.
 void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time now) {
   const Priority priority = is_state ? Priority::state : Priority::normal;
   const std::vector<Peer>& served = known_.served();
@@ -316,7 +316,8 @@ void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time
   });
 }
 
-// To each path of the session that the answer names if it is served, else to the peer that asked.
+// Delivers to each path of the session that the answer names if it is served, else to the peer that
+// asked.
 void BridgedPair::on_answer(const Datagram& answer, MessageKind kind, Time now) {
   const SessionId sid = answer.session_id();
   std::optional<Peer> asker;
@@ -370,8 +371,8 @@ void BridgedPair::report_trouble() {
   on_event_(BridgeSide::board, {CarrierEvent::Kind::warning, problem});
 }
 
-// In the board's place, with the number of its newest datagram and its time. `session`: as a
-// refusal of the board names it.
+// Answers in the board's place, with the number of its newest datagram and its time. `session`: as
+// a refusal of the board names it.
 void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to,
                          Time now, std::optional<std::uint32_t> session) {
   if (!asked.has_pnum() || !board_known_ || now - board_heard_ > clock_lifetime) return;
@@ -390,7 +391,8 @@ void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t leas
   send(hosts_, view(text), Priority::normal, to);
 }
 
-// To the board. The answer to a host that is not trusted goes to the peer that it asked from.
+// Delivers to the board. The answer to a host that is not trusted goes to the peer that it asked
+// from.
 void BridgedPair::pass_on(const Datagram& datagram, Peer from, bool trusted, Time now) {
   if (!trusted) {
     std::optional<std::uint32_t> pnum;

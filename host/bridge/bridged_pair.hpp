@@ -49,8 +49,8 @@
 
 namespace r4 {
 
-// It has more than 15 members: the two sides, a class for each rule that a datagram passes, and what the bridge
-// knows of the board for answers in its place.
+// It has more than 15 members: the two sides, a class for each rule that a datagram passes, and the
+// board's newest number and clock.
 class BridgedPair {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -80,7 +80,7 @@ class BridgedPair {
   // Throws Error for a fault that does not end by itself.
   void open();
   void close() noexcept;
-  // To be called every WaitingTime::tick_interval.
+  // Call it every WaitingTime::tick_interval.
   void tick();
   BridgeStatus status() const;
 
@@ -124,8 +124,8 @@ class BridgedPair {
   void pass_on(const Datagram& datagram, Peer from, bool trusted, Time now);
   bool send(Side& to, std::string_view bytes, Priority priority, Peer peer);
   bool is_old(Side& side, Time now);
-  // What to do with the error of a side that cannot be opened. Waiting ends an absence, such as of
-  // a device that is not plugged in; other faults it does not.
+  // The treatment of a side that cannot be opened. An absence, such as of a device that is not
+  // plugged in, may end by itself. Other faults do not.
   enum class Failure : std::uint8_t { throws, throws_unless_absent, is_reported };
   void try_to_open(Side& side, Failure failure, Time now);
 

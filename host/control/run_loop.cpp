@@ -34,7 +34,7 @@ class StepWatchdog {
   bool on_;
 };
 
-// Why this loop may not send output commands.
+// The cause for which this loop may not send output commands; none if it may.
 DisarmCause cause_of(const Board& board, const LoopOptions& options) {
   return options.arming == Arming::off ? DisarmCause::none : board.disarmed_by();
 }
@@ -43,7 +43,7 @@ DisarmCause cause_of(const Board& board, const LoopOptions& options) {
 std::string come_to_rest(Board& board, const LoopOptions& options, bool& at_rest) {
   at_rest = true;
   const auto is_safe = [&] { return cause_of(board, options) != DisarmCause::none; };
-  // The outputs are safe already, and nothing would be sent, unless the board needs no arming.
+  // A disarmed board's outputs are safe already, and nothing would be sent to it.
   if (is_safe() && board.disarmed_by() != DisarmCause::not_yet) return {};
   try {
     board.apply(options.rest, options.rest_timeout);

@@ -136,7 +136,7 @@ void DescriptionParser::take_addresses(const Words& words) {
   for (std::size_t i = 1; i < words.size(); ++i) {
     const int address = number(words[i], i2c_first_address, i2c_last_address, "an address");
     if (std::count(result_.addresses.begin(), result_.addresses.end(), address) != 0) {
-      fail("an address is there twice", "name each once");
+      fail("an address is named twice", "name it once");
     }
     require_room(result_.addresses.size(), most_addresses, "addresses");
     result_.addresses.push_back(address);
@@ -236,7 +236,9 @@ void DescriptionParser::take_options(const Words& words, std::size_t first, Devi
   Words seen;
   for (std::size_t i = first; i < words.size();) {
     const std::string_view what = words[i];
-    if (std::count(seen.begin(), seen.end(), what) != 0) fail("a word is there twice", "once does");
+    if (std::count(seen.begin(), seen.end(), what) != 0) {
+      fail("a word is named twice", "name it once");
+    }
     seen.push_back(what);
     const std::size_t needs = what == "range" || what == "only" ? 2 : 1;
     if (i + needs >= words.size()) fail("something is missing at its end", "say how much it is");
@@ -255,7 +257,7 @@ void DescriptionParser::take_options(const Words& words, std::size_t first, Devi
     } else if (what == "unit") {
       if (word.size() > longest_unit || !is_printable(word) ||
           word.find_first_of(",\"[]\\") != std::string_view::npos) {
-        fail("that is no unit", "write it in plain characters: m/s2, rad/s, degC");
+        fail("that is not a valid unit", "write it in plain characters: m/s2, rad/s, degC");
       }
       value.unit = word;
     } else if (what == "range") {
@@ -330,7 +332,7 @@ std::string DescriptionParser::name_of(std::string_view word) {
                        return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
                      });
   if (!right) {
-    fail("that is no name",
+    fail("that is not a valid name",
          fmt::format("take up to {} of a-z, 0-9 and _, a letter first", longest_name));
   }
   return std::string(word);
@@ -341,7 +343,7 @@ int DescriptionParser::number(std::string_view word, int least, int most, const 
   const bool read = word.starts_with("0x") ? parse_hex(Text(word.substr(2)), value)
                                            : parse_number(Text(word), value);
   if (!read) {
-    fail(fmt::format("{} is no number", what),
+    fail(fmt::format("{} is not a number", what),
          fmt::format("write {} to {}, or in hexadecimal 0x{:x}", least, most, most));
   }
   if (value < static_cast<std::uint32_t>(least) || value > static_cast<std::uint32_t>(most)) {
@@ -363,7 +365,7 @@ double DescriptionParser::factor(std::string_view word, const char* what) {
     if (is_pi) value = std::numbers::pi;
     const bool right = is_pi || (read.ec == std::errc() && read.ptr == each.data() + each.size());
     if (!right || !std::isfinite(value) || (joined == '/' && value == 0)) {
-      fail(fmt::format("{} is no number", what), "write it as 0.01, 9.80665/16384 or pi/180");
+      fail(fmt::format("{} is not a number", what), "write it as 0.01, 9.80665/16384 or pi/180");
     }
     result = joined == '*' ? result * value : result / value;
     const double size = std::abs(result);

@@ -43,7 +43,7 @@ DevicePlace read_place(std::string_view text) {
   place.address = small_number(where.substr(0, colon));
   if (colon != where.size()) place.slot = small_number(where.substr(colon + 1));
   if (!place.address || (colon != where.size() && !place.slot)) {
-    throw Error(ErrorKind::usage, std::string(text), "its address or slot is no number",
+    throw Error(ErrorKind::usage, std::string(text), "its address or slot is not a number",
                 "write NAME@ADDRESS or NAME@ADDRESS:SLOT, such as bno055@0x28:1");
   }
   return place;

@@ -63,8 +63,8 @@ class Session {
 
   // --- effects
 
-  // To be performed after each call that takes a time. on_sent() reports the result of each
-  // sending.
+  // Perform them after each call that takes a time: first the sendings, then the reports. Give the
+  // result of each sending to on_sent().
   Effects& effects() { return effects_; }
   void on_sent(const Sending& sending, SendResult result, Time now);
 
@@ -199,9 +199,10 @@ class Session {
 };
 
 // Posts a command, or a group. `send_all()` sends the effects' datagrams. To a board that knows no
-// groups the commands of a group go one after the other, up to the first that is not sent.
+// groups the commands of a group go one after the other, up to the first that is not sent. `now` is
+// read anew for each command: send_all() may advance it.
 template <class What, class SendAll>
-PostResult post_by(Session& session, const What& what, Time now, SendAll send_all) {
+PostResult post_by(Session& session, const What& what, const Time& now, SendAll send_all) {
   if constexpr (std::is_same_v<What, Setpoints>) {
     if (session.posts_apart()) {
       PostResult result = PostResult::sent;

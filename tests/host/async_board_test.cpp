@@ -88,6 +88,7 @@ TEST_F(AsyncBoardTest, OnlyListensAsAWatcherOnABusButForLeasesAndStops) {
   AsyncBoard watching(io, std::make_unique<Bus>(sent), options);
   watching.open();
   result_of([&](auto end) { watching.async_identify(600ms, end); });
+  ASSERT_FALSE(sent.empty());
   for (const std::string& each : sent) EXPECT_EQ(each.substr(0, 2), "W:") << each;
   EXPECT_FALSE(watching.link().causes.has(LinkCause::busy)) << "nobody controls it";
   sent.clear();
@@ -251,13 +252,36 @@ TEST_F(AsyncBoardTest, CancelsWhenItClosesAndNoCallbackFollows) {
   EXPECT_THROW(board.open(), Error) << "once only";
 }
 
+// A path that cannot be opened while it has trouble.
+struct Obstructed final : IdleCarrier {
+  void open(Handler& handler) override {
+    if (trouble) throw Error(*trouble);
+    IdleCarrier::open(handler);
+  }
+  std::optional<Problem> trouble;
+};
+
+TEST_F(AsyncBoardTest, IsNotOpenIfNoPathOpensThoughOneOpenedInAnEarlierAttempt) {
+  auto first = std::make_unique<Obstructed>();
+  auto second = std::make_unique<Obstructed>();
+  Obstructed* const ends[] = {first.get(), second.get()};
+  std::vector<std::unique_ptr<Carrier>> paths;
+  paths.push_back(std::move(first));
+  paths.push_back(std::move(second));
+  AsyncBoard other(io, std::move(paths), at_will());
+  ends[1]->trouble = Problem{ErrorKind::usage, "idle:", "", ""};
+  EXPECT_EQ(problem_of([&] { other.open(); }).kind, ErrorKind::usage);
+  for (Obstructed* const end : ends) end->trouble = Problem{ErrorKind::open, "idle:", "", ""};
+  EXPECT_EQ(problem_of([&] { other.open(); }).kind, ErrorKind::open);
+}
+
 // The board may be destroyed wherever the user's code runs.
 struct DestroyedIn : testing::TestWithParam<const char*>, OnALoop {};
 INSTANTIATE_TEST_SUITE_P(AsyncBoard, DestroyedIn,
                          testing::Values("handler", "state", "heartbeat", "link", "nack"),
                          [](const auto& place) { return std::string(place.param); });
 
-TEST_P(DestroyedIn, SurvivesIt) {
+TEST_P(DestroyedIn, TheBoardMayBeDestroyedInAnyCallback) {
   const std::string place = GetParam();
   BoardInAThread over_udp("udp");
   for (const std::string& url : {std::string("sim:"), over_udp.url()}) {
@@ -287,7 +311,7 @@ TEST_P(DestroyedIn, SurvivesIt) {
 }
 
 // The transport is up at once, and reports that inside of open().
-TEST(AsyncBoardEnd, MayComeWhileItOpens) {
+TEST(AsyncBoardEnd, MayComeInsideAnEventOfOpening) {
   asio::io_context io;
   AsyncBoard closed(io, "sim:");
   closed.on_event([&](const CarrierEvent&) { closed.close(); });
@@ -319,7 +343,7 @@ TEST(AsyncBoardEnd, IsDestroyedBeforeOrWithoutItsLoop) {
   EXPECT_EQ(outcome, Outcome::closed);
 }
 
-TEST(AsyncBoardEnd, ItsHandlersDieWithTheLoop) {
+TEST(AsyncBoardEnd, DestroysTheHandlersWithTheLoop) {
   const auto payload = std::make_shared<int>(1);
   {
     asio::io_context io;

@@ -37,7 +37,7 @@ std::string temporary_path(const std::string& name) {
 
 // True if `done` becomes true within 5 s. It is checked after each state of the board.
 template <class Done>
-bool comes_true(Board& board, Done done) {
+[[nodiscard]] bool comes_true(Board& board, Done done) {
   const auto end = std::chrono::steady_clock::now() + 5s;
   while (!done()) {
     if (std::chrono::steady_clock::now() > end) return false;
@@ -67,7 +67,7 @@ TEST(BoardPaths, LeadToOneBoardOverUdpAndAPty) {
   EXPECT_EQ(board.link().reason, SafeReason::stop);
 }
 
-TEST(BoardPaths, ThatLeadToTwoBoardsAreRefusedWithBothNames) {
+TEST(BoardPaths, AreRefusedWithBothNamesIfTheyLeadToTwoBoards) {
   BoardInAThread left(std::vector<std::string>{"udp"}, "", "left-board");
   BoardInAThread right(std::vector<std::string>{"pty"}, "", "right-board");
   Board board({left.url(), right.url()}, at_will());
@@ -185,7 +185,7 @@ struct BoardPathsInMemory : testing::Test, OnALoop {
     asio::steady_timer timer(io, duration);
     bool over = false;
     timer.async_wait([&](const std::error_code&) { over = true; });
-    run_until([&] { return over; });
+    ASSERT_TRUE(run_until([&] { return over; }));
   }
 
   Cuttable* paths[2] = {};

@@ -15,7 +15,7 @@ namespace r4::test {
 struct OnALoop {
   // False if `done()` is not true within 10 s.
   template <class Done>
-  bool run_until(Done done) {
+  [[nodiscard]] bool run_until(Done done) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds{10};
     io.restart();
     while (!done()) {

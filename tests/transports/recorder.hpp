@@ -82,7 +82,7 @@ class Recorder final : public Carrier::Handler {
 
 // Runs the loop until `done()`; false if it is not within `limit`.
 template <class Done>
-bool run_until(asio::io_context& io, Done done, Clock::duration limit = patience) {
+[[nodiscard]] bool run_until(asio::io_context& io, Done done, Clock::duration limit = patience) {
   const auto deadline = Clock::now() + limit;
   io.restart();
   while (!done()) {
@@ -97,7 +97,7 @@ bool run_until(asio::io_context& io, Done done, Clock::duration limit = patience
 // Runs the loop for a while: to check that something does not happen, or to keep a rate.
 inline void run_for(asio::io_context& io, Clock::duration time) {
   const auto never = [] { return false; };
-  run_until(io, never, time);
+  static_cast<void>(run_until(io, never, time));
 }
 inline void run_to(asio::io_context& io, Clock::time_point time) {
   run_for(io, time - Clock::now());

@@ -101,7 +101,7 @@ class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member
   std::uint32_t armed_for_us_ = 0;
 };
 
-// A board's setting says whether it packs, not its URL.
+// A board packs by its setting, not by its URL.
 std::uint8_t node_of(const Url& url, Role role) {
   url.allow_only(role == Role::host ? "node fd pack" : "node fd");
   can_interface_of(url);
@@ -232,7 +232,7 @@ SendResult CanCarrier::send_lease() {
 }
 
 // Notes frames of this board, and commands of other hosts to it. The flow control of another host
-// is the same as that of this host, so it tells nothing. Frames of other boards come because the
+// looks the same as that of this host, so it is ignored. Frames of other boards come because the
 // hosts of a program share the bus.
 void CanCarrier::listen_for_others(const CanFrame& frame) {
   const CanIdMeaning meaning = classify(frame);
@@ -249,7 +249,7 @@ void CanCarrier::listen_for_others(const CanFrame& frame) {
   lane(CanLane::dialogue).queue.clear();
 }
 
-// In both directions of the dialogue there is flow control.
+// The dialogue has flow control in both directions.
 void CanCarrier::count_late_transfers() {
   const std::uint64_t count = std::uint64_t{node_.sent(CanLane::dialogue).flow_control_timeout} +
                               node_.received(CanLane::dialogue).consecutive_timeout;

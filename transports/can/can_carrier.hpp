@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // can://INTERFACE[?node=1&fd=0&pack=1]: datagrams of one board on a CAN bus (docs/can.md), by
-// ISO-TP on SocketCAN, at either end. Many may share an interface.
+// ISO-TP on SocketCAN, at either end. Several carriers may share an interface.
 //
 //     node=N   the board's number on the bus, 0-31 (default 1)
 //     fd=1     sends CAN FD frames; receives classic and FD frames
-//     pack=0   a host sends text, and gets text; else the packed form. Both forms are received. A
+//     pack=0   a host sends and gets text; without it, the packed form. Both forms are received. A
 //              board follows its setting: C:pack,0
 //
 // A stop (Priority::stop) of the host's end is the emergency frame, which stops every board on the

@@ -67,9 +67,9 @@ void LineCarrier::stop() noexcept {
   stream_.close(ignored);
 }
 
-// Asio tries to read at once before it waits: on a tty that costs half as much as a wait, which
-// must be armed each time. A stream that asks must not be read at once when a stopped program goes
-// on.
+// Asio tries to read at once before it waits. On a tty this attempt costs half as much as a wait,
+// which must be armed each time. A stream that asks must not be read at once when a stopped program
+// continues.
 void LineCarrier::begin_to_receive() {
   if (asks_) {
     stream_.async_wait(asio::posix::descriptor_base::wait_read,
@@ -139,7 +139,7 @@ void LineCarrier::restart_line() {
   if (!queue_.empty()) send_waiting();
 }
 
-// Begins a line. `written` also if the system took a part of it.
+// Begins a line. Returns `written` also if the system took only a part of it.
 LineCarrier::Outcome LineCarrier::write_line(std::string_view bytes) {
   std::size_t size = 0;
   const auto append = [&](const char* data, std::size_t count) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams as lines on an open byte stream (a tty): what both ends of a serial line have in
-// common. serial_carrier.cpp and pty_carrier.cpp are the ends.
+// Datagrams as lines on an open byte stream (a tty): the common part of both ends of a serial line.
+// serial_carrier.cpp and pty_carrier.cpp are the ends.
 //
-// One write a line; a line that the system takes in part is continued and never interleaved. Lines
-// that must wait keep the order of SendQueue: stop after the line in progress, then normal, then
-// the newest state. Reads at most 4096 bytes a turn. It is up while the stream is open.
+// Each line is one write. A line that the system takes in part is continued and never interleaved.
+// Lines that must wait keep the order of SendQueue: stop after the line in progress, then normal,
+// then the newest state. Reads at most 4096 bytes a turn. It is up while the stream is open.
 #pragma once
 
 #include <array>
@@ -38,30 +38,30 @@ class LineCarrier : public Carrier {
   // Without a stream, look() is called each `look_interval` after look_later().
   LineCarrier(asio::io_context& io, std::string name, std::chrono::milliseconds look_interval);
 
-  // --- what the ends do
+  // --- implemented by the ends
 
-  // Looks for the device, and starts the stream if it is there.
+  // Looks for the device, and starts the stream if the device is there.
   virtual void look() = 0;
   // The stream has ended and is closed: errno, or 0 for an end of file. Returns the problem to
   // report.
   virtual Problem on_lost(int error) = 0;
-  // Of a stream that asks: true if this program may read what has come. If not, the end closes the
-  // carrier.
+  // For a stream that asks: true if this program may read the bytes that have come. If not, the end
+  // closes the carrier.
   virtual bool may_read() { return true; }
   // A state is about to be sent. Called within send().
   virtual void before_state() {}
   // The system has taken that many bytes. Called within send().
   virtual void on_written(std::size_t) {}
 
-  // --- what they do it with
+  // --- for the ends
 
   // Begins to receive. The descriptor must not block. `asks`: may_read() is called before each
   // reading. Throws Error about `thing` if the system does not let the loop wait for the stream.
   void start(FileDescriptor descriptor, const std::string& thing, bool asks = false);
-  // Tells the handler that the stream is open.
+  // Notifies the handler that the stream is open.
   void report_up();
   void look_later();
-  // What was written has been thrown away on its way: the next line begins with a terminator.
+  // Written bytes were discarded on their way, so the next line begins with a terminator.
   void restart_line();
 
   asio::io_context& io_;

@@ -214,8 +214,8 @@ UdpEnd::Outcome UdpEnd::transmit_to(std::string_view bytes, const Endpoint& to, 
     return Outcome::sent;
   }
   if (error == EAGAIN || error == EWOULDBLOCK) return Outcome::busy;
-  if (error ==
-      ENOBUFS) {  // the interface's queue is full: the system does not report when it has room
+  // The interface's queue is full, and the system does not report when it has room.
+  if (error == ENOBUFS) {
     ++counters_.tx_dropped;
     return Outcome::sent;
   }

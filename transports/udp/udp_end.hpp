@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What both ends of UDP have in common: a socket, the datagrams that wait, and whether the network
-// is there. udp_host.hpp and udp_board.hpp are the ends.
+// The common part of both ends of UDP: a socket, the datagrams that wait, and the state of the
+// network. udp_host.hpp and udp_board.hpp are the ends.
 #pragma once
 
 #include <array>
@@ -37,7 +37,7 @@ class UdpEnd : public Carrier {
 
   UdpEnd(asio::io_context& io, UdpUrl url);
 
-  // --- what the ends do
+  // --- implemented by the ends
 
   // A packet from sender_.
   virtual void received(std::string_view bytes) = 0;
@@ -48,31 +48,31 @@ class UdpEnd : public Carrier {
   // The socket is bound: begins to receive.
   virtual void listen() { begin_to_receive(); }
 
-  // --- what they do it with
+  // --- for the ends
 
-  // The socket, not bound. Throws Error.
+  // Opens the socket without binding it. Throws Error.
   void open_socket(const Endpoint& local, bool v6_only);
-  // Closes the socket and throws why it cannot be bound. `fix`: for a port that another program
-  // has.
+  // Closes the socket and throws the reason why it cannot be bound. `fix`: for a port that another
+  // program has.
   [[noreturn]] void refuse(const asio::error_code& error, const Endpoint& local,
                            const std::string& fix);
-  // The socket is bound: receives, and is up.
+  // The socket is bound: begins to receive, and is up.
   void begin(Handler& handler);
   void hand_over(std::string_view bytes, Peer from);
-  // `standing`: to the destination of datagrams for everyone, which shows whether the network is
-  // there. `from`: an address of this computer; unspecified: any.
+  // `standing`: `to` is the destination of datagrams for everyone, which shows whether the network
+  // is there. `from`: an address of this computer; unspecified: any.
   Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing,
                       const asio::ip::address& from = {});
   void set_up(bool up);
-  // `error`: of probe(). Goes up or down by it. Errors that are not about the network have no
-  // effect.
+  // Goes up or down by `error`, the result of probe(). Errors that are not about the network have
+  // no effect.
   void judge_route(int error);
   void report();
   void warn(const std::string& reason, const std::string& fix);
-  // Reports why the host is down, once for each reason.
+  // Reports that the host is down, once for each reason.
   void tell_why_down(const Problem& problem);
 
-  // Why there is no route; `error` is errno.
+  // The problem of a missing route; `error` is errno.
   Problem no_route(const std::string& subject, int error) const;
 
   asio::io_context& io_;

@@ -60,6 +60,7 @@ TEST(Bridge, RefusesWhatCannotBeJoined) {
   const char* const same = "both sides of the bridge are the same";
   const char* const several = "a side of a bridge is one path, and these are several";
   const char* const no_key = "which asks for no key at its cable";
+  const char* const no_transport = "it does not begin with a transport and a colon";
   for (const Case& each : {
            Case{"udp://127.0.0.1:2018", "udp://127.0.0.1:2018", same},
            Case{"can://can0?node=1", "can://can0", same},
@@ -73,6 +74,8 @@ TEST(Bridge, RefusesWhatCannotBeJoined) {
            Case{"udp://127.0.0.1:0", "can://can0?node=1-2", "they stand for 1 and 2 transports"},
            Case{"udp://127.0.0.{1-2}:0", "can://can0?node={1,1}", "it is named twice"},
            Case{"udp://127.0.0.{1,1}:0", "can://can0?node=0-1", "it is named twice"},
+           Case{"robot", "serial:auto", no_transport},
+           Case{"udp://127.0.0.1:0", "robot", no_transport},
            Case{"sim:", "udp://192.0.2.1", "sim: is a board, it cannot listen"},
            Case{"udp://127.0.0.1:0", "replay:/tmp/x",
                 "a recording is no board: nobody can drive it"},

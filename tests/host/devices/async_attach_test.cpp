@@ -44,7 +44,7 @@ TEST_F(AsyncAttach, HasTheBoardReadItAndSendItsFieldsBesideThoseThatWereChosen) 
   const CommandResult result = attach(imu);
   EXPECT_EQ(result.outcome, Outcome::confirmed);
   EXPECT_EQ(result.step, 0);
-  run_until([&] { return imu.reading(board_.state(), "accel_z").number.has_value(); });
+  ASSERT_TRUE(run_until([&] { return imu.reading(board_.state(), "accel_z").number.has_value(); }));
   EXPECT_NEAR(imu.reading(board_.state(), "accel_z").number.value(), 9.80665, 1e-9);
   EXPECT_TRUE(board_.state().present.has(StateField::ain24)) << "the fields of before";
   const std::uint64_t before = commands();
@@ -136,9 +136,9 @@ TEST_F(AsyncAttach, IsGivenUpByItsCancellationSlotWhileItWaitsForTheDevice) {
 TEST_F(AsyncAttach, EndsWithTheBoard) {
   std::optional<CommandResult> result;
   board_.async_attach(slow(), 5s, [&](const CommandResult& r) { result = r; });
-  run_until([&] { return board_.state().i2c_answer.pnum != 0; });
+  ASSERT_TRUE(run_until([&] { return board_.state().i2c_answer.pnum != 0; }));
   board_.close();
-  run_until([&] { return result.has_value(); });
+  ASSERT_TRUE(run_until([&] { return result.has_value(); }));
   EXPECT_EQ(result->outcome, Outcome::closed);
 }
 
@@ -183,13 +183,13 @@ TEST_F(AsyncAttach, EndsAsCancelledWhenControlIsReleasedWhileTheDeviceIsGivenTim
   result_of([&](auto active) { board_.async_wait_active(5s, active); });
   const std::uint64_t before = commands();
   board_.async_attach(slow(), 20s, [&](const CommandResult& r) { attached = r; });
-  run_until([&] { return commands() >= before + 2; });  // the check, then the write
-  run_until([&, end = std::chrono::steady_clock::now() + 100ms] {
+  ASSERT_TRUE(run_until([&] { return commands() >= before + 2; }));  // the check, then the write
+  ASSERT_TRUE(run_until([&, end = std::chrono::steady_clock::now() + 100ms] {
     return std::chrono::steady_clock::now() > end;
-  });
+  }));
   ASSERT_FALSE(attached);
   board_.async_release_control(2s, [&](const CommandResult& r) { released = r; });
-  run_until([&] { return attached && released; });
+  ASSERT_TRUE(run_until([&] { return attached && released; }));
   EXPECT_EQ(attached->outcome, Outcome::cancelled);
   EXPECT_EQ(released->outcome, Outcome::confirmed);
 }

@@ -244,19 +244,19 @@ TEST(DeviceDescription, ReportsWhatIsWrongInALine) {
            WrongText{4, "value v p 0 u40be\n", "there is no such type"},
            WrongText{4, "value v p 0 u8 bits 0..8\n", "the highest bit is out of range"},
            WrongText{4, "value v p 0 u8 bits 5..3\n", "the highest bit is out of range"},
-           WrongText{4, "value v p 0 u8 bits 5\n", "the highest bit is no number"},
+           WrongText{4, "value v p 0 u8 bits 5\n", "the highest bit is not a number"},
            WrongText{4, "value v p 0 u8 scale 0\n", "the scale is 0"},
-           WrongText{4, "value v p 0 u8 scale 1/0\n", "the scale is no number"},
-           WrongText{4, "value v p 0 u8 scale nan\n", "the scale is no number"},
-           WrongText{4, "value v p 0 u8 offset 1/inf\n", "the offset is no number"},
+           WrongText{4, "value v p 0 u8 scale 1/0\n", "the scale is not a number"},
+           WrongText{4, "value v p 0 u8 scale nan\n", "the scale is not a number"},
+           WrongText{4, "value v p 0 u8 offset 1/inf\n", "the offset is not a number"},
            WrongText{4, "value v p 0 u8 scale 1e-31\n", "the scale is out of range"},
            WrongText{4, "value v p 0 u8 range 0 1e300\n", "the range is out of range"},
            WrongText{4, "value v p 0 u8 only w 1\nvalue w p 0 u8\n",
                      "no value above has that name"},
            WrongText{4, "value v p 0 u8 scale\n", "something is missing at its end"},
-           WrongText{4, "value v p 0 u8 unit a,b\n", "that is no unit"},
+           WrongText{4, "value v p 0 u8 unit a,b\n", "that is not a valid unit"},
            WrongText{4, "value v p 0 u8 range 1 1\n", "the range is empty"},
-           WrongText{4, "value v p 0 u8 unit V unit V\n", "a word is there twice"},
+           WrongText{4, "value v p 0 u8 unit V unit V\n", "a word is named twice"},
            WrongText{4, "value v p 0 u8 gain 3\n", "a word of the value is not known"},
            WrongText{4, "ready v 1\n", "no value above has that name"},
            WrongText{4, "lookalike x00 x01\n", "it has 3 words"},
@@ -277,13 +277,13 @@ TEST(DeviceDescription, ReportsWhatIsWrongAndInWhichLine) {
   for (const WrongText& each : {
            WrongText{0, "", "it is empty"},
            WrongText{1, "title x\n", "it does not begin with its name"},
-           WrongText{1, "device A\n", "that is no name"},
+           WrongText{1, "device A\n", "that is not a valid name"},
            WrongText{6, description_head + "\n\nregister x00\n",
                      "\"register\" is none of its words"},
            WrongText{2, "device a\naddress 7\n", "an address is out of range"},
            WrongText{2, "device a\naddress 0x78\n", "an address is out of range"},
-           WrongText{2, "device a\naddress 9 9\n", "an address is there twice"},
-           WrongText{2, "device a\naddress x28\n", "an address is no number"},
+           WrongText{2, "device a\naddress 9 9\n", "an address is named twice"},
+           WrongText{2, "device a\naddress x28\n", "an address is not a number"},
            WrongText{2, "device a\nrole car\n", "there is no such role"},
            WrongText{3, "device a\nrole imu\nrole imu\n", "it has a role already"},
            WrongText{3, "device a\ntitle b\ntitle c\n", "it has a title already"},
@@ -292,7 +292,7 @@ TEST(DeviceDescription, ReportsWhatIsWrongAndInWhichLine) {
                      "something is missing at its end"},
            WrongText{5, description_head + "value v p 0 u8\nready v 1 2\n", "it has 4 words"},
            WrongText{5, description_head + "value v p 0 u8\nready v x01\n",
-                     "what that value is while it is set up is no number"},
+                     "what that value is while it is set up is not a number"},
            WrongText{5, description_head + "value v p 0 u8\nvalue v p 1 u8\n",
                      "there is a value of that name"},
            WrongText{260, many, "it has more than 256 values"},
@@ -352,8 +352,8 @@ TEST(Device, IsNamedWithItsAddressAndSlot) {
   EXPECT_EQ(usage_of({"bno055@0x28:0"}),
             "bno055@0x28: it takes 2 slots from slot 0 on, and the board has 8");
   EXPECT_EQ(usage_of({"bno055@0x30"}), "bno055@0x30: it cannot have that address");
-  EXPECT_EQ(usage_of({"bno055@"}), "bno055@: its address or slot is no number");
-  EXPECT_EQ(usage_of({"bno055@0x28:"}), "bno055@0x28:: its address or slot is no number");
+  EXPECT_EQ(usage_of({"bno055@"}), "bno055@: its address or slot is not a number");
+  EXPECT_EQ(usage_of({"bno055@0x28:"}), "bno055@0x28:: its address or slot is not a number");
   EXPECT_EQ(usage_of({"mpu6050@0x68:2", "bno055@0x28:1"}),
             "bno055@0x28: mpu6050@0x68 has slot 2, too");
   EXPECT_EQ(usage_of({"mpu6050@0x68", "icm20948@0x68"}),

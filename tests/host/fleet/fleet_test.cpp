@@ -34,7 +34,7 @@ struct ActiveFleet : Fleet {
 
 // True if `done()` becomes true within 5 s.
 template <class Done>
-bool comes(Done done) {
+[[nodiscard]] bool comes(Done done) {
   const auto deadline = Clock::now() + 5s;
   while (!done()) {
     if (Clock::now() > deadline) return false;
@@ -191,7 +191,7 @@ TEST(Fleet, RefusesWrongUrlsBoardsAndCommands) {
   };
   EXPECT_EQ(problem({}).kind, ErrorKind::usage);
   EXPECT_EQ(problem({"sim:?node=0-3", "sim:?node=2"}).text(),
-            "sim:?node=2: it is named twice; name a board once");
+            "sim:?node=2: it is named twice; name it once");
   EXPECT_EQ(problem({"udp://10.0.0.{1-"}).kind, ErrorKind::usage);
   EXPECT_EQ(problem({"sim:", "serial:///dev/no-such-port"}).kind, ErrorKind::open);
   Fleet fleet({"sim:?node=0-1"});

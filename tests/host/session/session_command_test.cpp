@@ -98,7 +98,7 @@ TEST_F(SessionCommand, IsRefusedWithTheBoardsCode) {
   EXPECT_EQ(link.session.statistics(link.now).refused, 1U);
 }
 
-TEST_F(SessionCommand, ThatWasOvertakenAsksAtOnceAndEndsByTheAnswer) {
+TEST_F(SessionCommand, AsksAtOnceIfItWasOvertakenAndEndsByTheAnswer) {
   for (const char* answer : {"DUPLICATE", "STALE"}) {
     link.sent.clear();
     const Ticket first = link.session.send(turn_motor, 1s, link.now);
@@ -114,7 +114,7 @@ TEST_F(SessionCommand, ThatWasOvertakenAsksAtOnceAndEndsByTheAnswer) {
   }
 }
 
-TEST_F(SessionCommand, DuplicateAloneWaitsForTheState) {
+TEST_F(SessionCommand, IsNotConfirmedByDuplicateBeforeTheState) {
   const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   link.pass(60ms);
   link.nack(link.last('O').pnum, "DUPLICATE");
@@ -157,7 +157,7 @@ TEST_F(NewSession, AsksForFieldsUntilTheBoardKnowsHoweverManyAreLost) {
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
 }
 
-TEST_F(SessionCommand, OutsideItsRangesIsThrownBack) {
+TEST_F(SessionCommand, IsRefusedOutsideItsRanges) {
   for (const Command& wrong :
        {Command::osmc(1, Pwm(4096), Direction::forward),
         Command::osmc(1, Pwm(-1), Direction::forward),
@@ -219,7 +219,7 @@ TEST_F(NewSession, DoesNotConfirmIdentifyByASecondAnswerToAnEarlierQuestion) {
   EXPECT_EQ(outcome(second), Outcome::confirmed);
 }
 
-TEST_F(SessionCommand, CancelledIsRepeatedNoMore) {
+TEST_F(SessionCommand, IsNotRepeatedAfterItsCancellation) {
   const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   link.session.cancel(ticket, link.now);
   EXPECT_EQ(outcome(ticket), Outcome::cancelled);
@@ -236,7 +236,7 @@ TEST_F(SessionStop, CannotBeCancelled) {
   EXPECT_GT(link.count('E'), 3U) << "repeated";
 }
 
-TEST_F(SessionCommand, AllEndWithTheSession) {
+TEST_F(SessionCommand, EndsWithTheSession) {
   const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   const Ticket stop = link.session.stop(1s, link.now);
   link.session.end_all(link.now);
@@ -279,6 +279,7 @@ TEST_F(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
   EXPECT_EQ(link.session.statistics(link.now).timed_out, 0U) << "it ends only once";
   EXPECT_EQ(link.last('E').bytes, link.all('E').front().bytes);
 
+  link.executed(link.last('E').pnum);  // in control again after a second of silence
   for (const bool posts : {false, true}) {
     link.session.stop(1s, link.now);
     link.stopped(link.last('E').pnum);
@@ -288,6 +289,7 @@ TEST_F(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
     } else {
       link.session.send(Command::clear(), 1s, link.now);
     }
+    ASSERT_EQ(link.last('E').command.substr(0, 7), "E:CLEAR");
     const std::size_t stops = link.count('E');
     link.pass(40ms);
     EXPECT_EQ(link.count('E'), stops) << "not past an E:CLEAR of its own";
@@ -295,7 +297,7 @@ TEST_F(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
   }
 }
 
-TEST_F(SessionStop, IsNotConfirmedByTheReportOfAnother) {
+TEST_F(SessionStop, IsNotConfirmedByTheReportOfAnotherStop) {
   const Ticket first = link.session.stop(1s, link.now);
   const std::uint32_t number = link.last('E').pnum;
   link.stopped(number);
@@ -354,7 +356,7 @@ TEST_F(NewSession, DoesNotSendAWaitingClearPastANewerCause) {
   EXPECT_EQ(link.count('E'), 0U);
 }
 
-TEST_F(SessionClear, ThatIsAskedForBeforeAStopOfItsOwnIsConfirmedIsGivenUp) {
+TEST_F(SessionClear, IsGivenUpIfItIsAskedForBeforeAnOwnStopIsConfirmed) {
   link.heartbeat();
   const Ticket stop = link.session.stop(1s, link.now);
   const std::uint32_t number = link.last('E').pnum;

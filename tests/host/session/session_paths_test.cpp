@@ -66,7 +66,7 @@ TEST_F(TwoPaths, BringEachStateOnce) {
   EXPECT_GT(robot.session->path(1, robot.now()).round_trip_us, 0);
 }
 
-TEST(SessionPaths, OneThatLagsNeverReplacesNewerState) {
+TEST(SessionPaths, LetNoLaggingPathReplaceANewerState) {
   RobotOnPaths robot(Cables{{1}, {200}});
   robot.connect();
   robot.run(1000);
@@ -87,7 +87,7 @@ TEST(SessionPaths, OneThatLagsNeverReplacesNewerState) {
 }
 
 // The bar of the plan: one of two cut under full load, 1000 times.
-TEST(SessionPaths, OneIsCutAThousandTimesAndNothingIsMissed) {
+TEST(SessionPaths, MissNothingWhileOnePathIsCutAThousandTimes) {
   RobotOnPaths robot(Cables{{1}, {2}});
   robot.connect();
   robot.run(500);
@@ -222,7 +222,7 @@ TEST_F(TwoPaths, AreNotRefusedByABusyThatIsOlderThanTheProofOfControl) {
   EXPECT_EQ(robot.drive(5).outcome, Outcome::confirmed);
 }
 
-TEST(SessionPaths, ToTwoBoardsAreRefused) {
+TEST(SessionPaths, AreRefusedIfTheyLeadToTwoBoards) {
   RobotOnPaths robot(Cables{{1}, {1, 1}});
   robot.connect();
   EXPECT_EQ(robot.session->link().cause(), LinkCause::two_boards);
@@ -233,6 +233,7 @@ TEST(SessionPaths, ToTwoBoardsAreRefused) {
                       robot.now());
   robot.run(1000);
   for (const Cable& cable : robot.cables) {
+    ASSERT_FALSE(cable.sent.empty());
     EXPECT_EQ(cable.all('Q').size(), cable.sent.size()) << "nothing but questions";
   }
   robot.plug(1, false);

@@ -103,7 +103,8 @@ TEST_F(ShareHolderTest, DisconnectsAProgramThatMissesAnEventOfTheTransport) {
   const Problem unplugged{ErrorKind::open, "device:", "unplugged", "plug it in again"};
   for (int i = 0; i < 1000; ++i) {
     device.deliver("state;" + std::string(160, 'x'));
-    run_until(io, [&] { return awake->heard.datagrams.size() > static_cast<std::size_t>(i); });
+    ASSERT_TRUE(
+        run_until(io, [&] { return awake->heard.datagrams.size() > static_cast<std::size_t>(i); }));
   }
   device.report({Kind::down, unplugged});
   ASSERT_TRUE(run_until(io, [&] { return awake->heard.count(Kind::down) == 1; }));

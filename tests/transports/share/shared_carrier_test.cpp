@@ -48,7 +48,7 @@ TEST_F(SharedCarrier, LetsProgramsThatWatchHearBothDirections) {
     device.deliver(fmt::format("AIN24:{};", i));
     device.deliver(fmt::format("H:R4-ROS2;{};", i));
     driver->carrier->send(fmt::format("H:ROS2-R4;{};", i), Priority::normal);
-    run_until(io, [&] { return two->has(fmt::format("H:R4-ROS2;{};", i)); });
+    ASSERT_TRUE(run_until(io, [&] { return two->has(fmt::format("H:R4-ROS2;{};", i)); }));
   }
   for (const auto& each : {one.get(), two.get()}) {
     ASSERT_TRUE(run_until(io, [&] { return each->heard.overheard.size() == 100; }));

@@ -154,7 +154,7 @@ class SharedTransportTest : public testing::Test {
   }
   // Until `done()`, also while this loop has nothing to wait for.
   template <class Done>
-  bool in_time(Done done) {
+  [[nodiscard]] bool in_time(Done done) {
     const auto deadline = Clock::now() + patience;
     while (!done()) {
       if (Clock::now() >= deadline) return false;

@@ -3,14 +3,13 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
-#include <iterator>
 
 #include "../bus/candump.hpp"
 #include "protocol/datagram/numbers.hpp"
 #include "r4link/vocabulary.hpp"
 #include "transports/framing/can/packed_form.hpp"
+#include "transports/url.hpp"
 
 namespace r4::tool {
 namespace {
@@ -19,26 +18,12 @@ Time time_of(const BusTransfers::Place& place) {
   return Time{static_cast<std::int64_t>(place.time_us.value_or(0))};
 }
 
-bool is_plain(char c) {
-  return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' ||
-         c == '-' || c == '_';
-}
-
 }  // namespace
 
 std::string bus_url(std::string_view interface, std::uint8_t node) {
-  if (std::all_of(interface.begin(), interface.end(), is_plain)) {
-    return fmt::format("can://{}?node={}", interface, node);
-  }
-  std::string host;
-  for (const char c : interface) {
-    if (is_plain(c) || c == ':') {
-      host += c;
-    } else {
-      fmt::format_to(std::back_inserter(host), "%{:02X}", static_cast<unsigned char>(c));
-    }
-  }
-  return fmt::format("can://[{}]?node={}", host, node);
+  std::string host = percent_encoded(interface);
+  if (host != interface || host.find(':') != std::string::npos) host = "[" + host + "]";
+  return fmt::format("can://{}?node={}", host, node);
 }
 
 std::string bus_interface(const std::string& host) {

@@ -48,7 +48,7 @@ address_v4 address_of(const sockaddr* system) {
 }
 
 // A socket at this computer's address in a network, which sends by the network's own interface,
-// also where two interfaces are in one network. Not open: `network.trouble` says why.
+// even if two interfaces are in one network. If it is not open, `network.trouble` has the reason.
 FileDescriptor open_in(Network& network) {
   FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int on = 1;
@@ -136,7 +136,7 @@ class Round {
     }
   }
 
-  // Each address once, with its first answer.
+  // Keeps each address once, with its first answer.
   void keep(FoundBoard board) {
     if (!called_.empty() && board.board_id != called_ && board.name != called_) {
       others_.insert(board.board_id);
@@ -242,7 +242,7 @@ std::vector<Network> BoardSearch::networks_of_this_computer() {
     } else {
       if ((each->ifa_flags & IFF_BROADCAST) == 0 || each->ifa_netmask == nullptr) continue;
       const std::uint32_t hosts = ~address_of(each->ifa_netmask).to_uint();
-      if (hosts < 3) continue;  // a network of one or two has no broadcast
+      if (hosts < 3) continue;  // one or two addresses: no broadcast
       network.to = address_v4(network.from.to_uint() | hosts);
     }
     networks.push_back(std::move(network));

@@ -3,7 +3,7 @@
 // answers every host.
 //
 //     on each network:  socket at our address, any free port --- Q:ID, 3 times ---> broadcast:2018
-//                                             <--- I:R4,…;NAME:…;BUSY:… --- each board, from its :2018
+//                                     <--- I:R4,…;NAME:…;BUSY:… --- each board, from its :2018
 //
 // One search takes half a second and sends three packets a network, and nothing else. At most
 // `most_boards` answers are kept. The answers are not signed: any program on the network can answer
@@ -78,7 +78,7 @@ std::vector<FoundBoard> called(const std::vector<FoundBoard>& boards, std::strin
 std::string url_of(const FoundBoard& board, const std::vector<FoundBoard>& boards,
                    std::uint16_t port);
 
-// Searches. Returns where the board is, or why no board that has answered can be taken for it.
+// Searches. Returns the addresses of the board, or the reason why no answer can be taken for it.
 FoundHost find_board(const BoardSearch& search, const WantedBoard& wanted);
 
 }  // namespace r4

@@ -43,8 +43,8 @@ class CanBusTest : public testing::Test {
   static void TearDownTestSuite() { remove(); }
 
  protected:
-  void run_until(const std::function<bool()>& is_so) {
-    ASSERT_TRUE(test::run_until(io, is_so)) << "it did not come";
+  [[nodiscard]] bool run_until(const std::function<bool()>& is_so) {
+    return test::run_until(io, is_so);
   }
   void run_for(std::chrono::milliseconds time) { test::run_for(io, time); }
 
@@ -65,7 +65,7 @@ class CanBusTest : public testing::Test {
 
   void become_passive() {
     local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
-    run_until([&] { return bus->standing().has_value(); });
+    ASSERT_TRUE(run_until([&] { return bus->standing().has_value(); }));
   }
   std::unique_ptr<Carrier> host() {
     return make_can_carrier(io, Url::parse("can://vxcan7?node=3"), Role::host);

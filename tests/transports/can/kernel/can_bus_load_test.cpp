@@ -94,7 +94,7 @@ TEST_F(CanBusLoad, ReportsFramesThatWaitedAndSendsThemAllInOrder) {
   EXPECT_EQ(talker.accepted, static_cast<int>(CanBus::ahead));
   EXPECT_TRUE(bus->full());
   EXPECT_EQ(talker.late, 0);
-  run_until([&] { return !bus->full(); });
+  ASSERT_TRUE(run_until([&] { return !bus->full(); }));
   EXPECT_GT(talker.late, talker.accepted / 2) << "the kernel takes few at a time";
   EXPECT_LT(talker.late, talker.accepted) << "the first ones did not wait";
   CanFrame frame;
@@ -121,14 +121,14 @@ TEST_F(CanBusLoad, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
     }
     const bool full = bus->full();
     std::uint64_t arrived = 0, timed_out = 0;
-    run_until([&] {
+    ASSERT_TRUE(run_until([&] {
       arrived = timed_out = 0;
       for (const auto& link : links) {
         arrived += link->at_board.datagrams.size();
         timed_out += Link::timed_out(*link->host) + Link::timed_out(*link->board);
       }
       return arrived + timed_out >= links.size();
-    });
+    }));
     in_time = full && arrived == links.size();
   }
   EXPECT_TRUE(in_time);
@@ -142,7 +142,7 @@ TEST_F(CanBusLoad, AFirstFrameThatNobodyAnswersTimesOutThoughOthersKeepTheBusFul
   ASSERT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
   Talker talker(bus, 200);
   bus->send();
-  run_until([&] { return Link::timed_out(*link.host) == 1; });
+  ASSERT_TRUE(run_until([&] { return Link::timed_out(*link.host) == 1; }));
   EXPECT_TRUE(bus->full());
   EXPECT_LT(talker.accepted, 200);
 }
@@ -155,7 +155,7 @@ TEST_F(CanBusLoad, AnUnansweredDatagramTimesOutAfterAStateThatOccupiesTheBusLong
   const SlowBus slow(32000);
   ASSERT_EQ(board->send(std::string(max_datagram, 'A'), Priority::state), SendResult::sent);
   ASSERT_EQ(board->send("N:" + in_two_frames, Priority::normal), SendResult::sent);
-  run_until([&] { return Link::timed_out(*board) == 1; });
+  ASSERT_TRUE(run_until([&] { return Link::timed_out(*board) == 1; }));
   EXPECT_TRUE(bus->full()) << "the state was over before";
 }
 
@@ -195,17 +195,17 @@ TEST_F(CanBusLoad, DropsFramesThatTheBusDoesNotTakeForLong) {
   {
     const SlowBus slow(800);
     bus->send();
-    run_until([&] { return talker.stuck != 0; });
+    ASSERT_TRUE(run_until([&] { return talker.stuck != 0; }));
     EXPECT_GE(CanBus::Clock::now() - start, CanBus::patience);
     EXPECT_FALSE(bus->full());
     EXPECT_EQ(talker.late, 0);
   }
   // Frames in the kernel's queue are gone, or they arrive. No other frame does.
   Talker next(bus, 1);
-  run_until([&] {
+  ASSERT_TRUE(run_until([&] {
     bus->send();
     return next.accepted == 1 && !bus->full();
-  });
+  }));
 }
 
 // --- when frames came
@@ -244,7 +244,7 @@ class CanBusTimes : public CanBusTest {
     return sendings[n].after_us - sendings[n - 1].before_us;
   }
   void read_all() {
-    run_until([&] { return member.frames.size() == sendings.size(); });
+    ASSERT_TRUE(run_until([&] { return member.frames.size() == sendings.size(); }));
   }
   std::uint64_t timed_out() const { return reader->counters().transfers.value().timed_out; }
 
@@ -305,9 +305,9 @@ class CanBusOverflow : public CanBusTest {
   void flood() {
     const std::size_t before = member.frames.size();
     for (int i = 0; i < 3000; ++i) remote.send(data(1));
-    run_until([&] { return member.frames.size() > before; });
+    ASSERT_TRUE(run_until([&] { return member.frames.size() > before; }));
     remote.send(data(2));
-    run_until([&] { return member.frames.back() == 2; });
+    ASSERT_TRUE(run_until([&] { return member.frames.back() == 2; }));
   }
   std::uint64_t missed() const { return came() - came_before - member.frames.size(); }
 
@@ -321,9 +321,9 @@ TEST_F(CanBusOverflow, IsCountedToTheFrameAlsoWhenTheInterfaceWasDownMeanwhile) 
   EXPECT_GT(first, 0U);
   EXPECT_EQ(bus->overflows(), first);
   ASSERT_EQ(0, std::system("ip link set vxcan7 down"));
-  run_until([&] { return !bus->up(); });
+  ASSERT_TRUE(run_until([&] { return !bus->up(); }));
   ASSERT_EQ(0, std::system("ip link set vxcan7 up"));
-  run_until([&] { return bus->up(); });
+  ASSERT_TRUE(run_until([&] { return bus->up(); }));
   EXPECT_EQ(bus->overflows(), first);
   flood();
   EXPECT_GT(missed(), first);

@@ -25,14 +25,14 @@ using Bytes = std::vector<std::uint8_t>;
 TEST_F(CanBusTest, BusOffIsDownWithTheWayOutAndARestartIsUp) {
   Witness member(bus);
   local.send(error(CAN_ERR_BUSOFF));
-  run_until([&] { return member.events.size() == 1; });
+  ASSERT_TRUE(run_until([&] { return member.events.size() == 1; }));
   EXPECT_EQ(member.events, (Told{{Kind::down, bus_off}}));
   EXPECT_EQ(member.fix, std::string(look) +
                             ", then: ip link set vxcan7 type can restart (slcan: down, and up); "
                             "with restart-ms 100 it does so by itself");
   EXPECT_FALSE(bus->up());
   local.send(error(CAN_ERR_RESTARTED));
-  run_until([&] { return member.events.size() == 2; });
+  ASSERT_TRUE(run_until([&] { return member.events.size() == 2; }));
   EXPECT_EQ(member.events.back(), (std::pair<Kind, std::string>{Kind::up, ""}));
   EXPECT_TRUE(bus->up());
 }
@@ -40,14 +40,14 @@ TEST_F(CanBusTest, BusOffIsDownWithTheWayOutAndARestartIsUp) {
 TEST_F(CanBusTest, OtherProcessesOfThisMachineDoNotProveThatTheControllerIsBack) {
   Witness member(bus);
   local.send(error(CAN_ERR_BUSOFF));
-  run_until([&] { return !bus->up(); });
+  ASSERT_TRUE(run_until([&] { return !bus->up(); }));
   local.send(data(1));
   run_for(soon);
   EXPECT_EQ(member.events, (Told{{Kind::down, bus_off}}));
   EXPECT_TRUE(member.frames.empty()) << "what did not get to the bus";
   remote.send(data(2));
-  run_until([&] { return bus->up(); });
-  run_until([&] { return !member.frames.empty(); });
+  ASSERT_TRUE(run_until([&] { return bus->up(); }));
+  ASSERT_TRUE(run_until([&] { return !member.frames.empty(); }));
   EXPECT_EQ(member.frames, (Bytes{2}));
   EXPECT_EQ(member.events, (Told{{Kind::down, bus_off}, {Kind::up, ""}}));
 }
@@ -56,11 +56,11 @@ TEST_F(CanBusTest, AStopOfThisMachineIsHeardDuringBusOff) {
   Witness member(bus);
   bus->join(member, {0x010});
   local.send(error(CAN_ERR_BUSOFF));
-  run_until([&] { return !bus->up(); });
+  ASSERT_TRUE(run_until([&] { return !bus->up(); }));
   CanFrame stop{};
   stop.id = 0x010;
   local.send(stop);
-  run_until([&] { return !member.frames.empty(); });
+  ASSERT_TRUE(run_until([&] { return !member.frames.empty(); }));
   EXPECT_FALSE(bus->up());
 }
 
@@ -68,16 +68,16 @@ TEST_F(CanBusTest, TroubleIsToldOnceUntilItChangesAndWhenItIsOver) {
   Witness member(bus);
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING));
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_WARNING));
-  run_until([&] { return !member.events.empty(); });
+  ASSERT_TRUE(run_until([&] { return !member.events.empty(); }));
   EXPECT_EQ(member.fix, look);
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE));
-  run_until([&] { return member.events.size() == 2; });
+  ASSERT_TRUE(run_until([&] { return member.events.size() == 2; }));
   EXPECT_EQ(member.fix, look);
   EXPECT_TRUE(bus->up());
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
-  run_until([&] { return member.events.size() == 3; });
+  ASSERT_TRUE(run_until([&] { return member.events.size() == 3; }));
   run_for(soon);
   EXPECT_EQ(member.events,
             (Told{{Kind::warning, warns}, {Kind::warning, passive}, {Kind::warning, over}}));
@@ -87,17 +87,17 @@ TEST_F(CanBusTest, NoAcknowledgeIsAWarningUntilAnotherNodeIsHeard) {
   Witness member(bus);
   local.send(error(CAN_ERR_ACK));
   local.send(error(CAN_ERR_ACK));
-  run_until([&] { return !member.events.empty(); });
+  ASSERT_TRUE(run_until([&] { return !member.events.empty(); }));
   EXPECT_EQ(member.fix, "check that another node is on the bus, at this bit rate");
   local.send(data(1));
   local.send(error(CAN_ERR_ACK));
   run_for(soon);
   EXPECT_EQ(member.events, (Told{{Kind::warning, lonely}}));
   remote.send(data(2));
-  run_until([&] { return member.frames.size() == 2; });
+  ASSERT_TRUE(run_until([&] { return member.frames.size() == 2; }));
   EXPECT_EQ(member.events.back().second, over);
   local.send(error(CAN_ERR_ACK));
-  run_until([&] { return member.events.size() == 3; });
+  ASSERT_TRUE(run_until([&] { return member.events.size() == 3; }));
   EXPECT_EQ(member.events.back().second, lonely);
 }
 
@@ -106,10 +106,10 @@ TEST_F(CanBusTest, NoAcknowledgeIsNotToldOfAControllerInTroubleNorEndsIt) {
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
   local.send(error(CAN_ERR_ACK));
   remote.send(data(1));
-  run_until([&] { return !member.frames.empty(); });
+  ASSERT_TRUE(run_until([&] { return !member.frames.empty(); }));
   EXPECT_EQ(member.events, (Told{{Kind::warning, passive}}));
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
-  run_until([&] { return member.events.size() == 2; });
+  ASSERT_TRUE(run_until([&] { return member.events.size() == 2; }));
   EXPECT_EQ(member.events.back().second, over);
 }
 
@@ -118,7 +118,7 @@ TEST_F(CanBusTest, NoAcknowledgeIsNotToldOfAControllerInTroubleNorEndsIt) {
 TEST_F(CanBusTest, AHostThatOpensABusThatIsDownIsToldSoAndThenThatItIsUp) {
   Witness first(bus);
   local.send(error(CAN_ERR_BUSOFF));
-  run_until([&] { return !bus->up(); });
+  ASSERT_TRUE(run_until([&] { return !bus->up(); }));
   Recorder told;
   const auto carrier = host();
   carrier->open(told);
@@ -127,7 +127,7 @@ TEST_F(CanBusTest, AHostThatOpensABusThatIsDownIsToldSoAndThenThatItIsUp) {
   EXPECT_EQ(told.events[0].problem.reason, bus_off);
   EXPECT_FALSE(carrier->up());
   local.send(error(CAN_ERR_RESTARTED));
-  run_until([&] { return told.events.size() == 2; });
+  ASSERT_TRUE(run_until([&] { return told.events.size() == 2; }));
   EXPECT_EQ(told.events[1].kind, Kind::up);
   EXPECT_TRUE(carrier->up());
 }
@@ -159,7 +159,7 @@ TEST_F(CanBusTest, AHostThatOpensInsideAnEventIsToldOfItOnce) {
   const auto carrier = host();
   first.in_event = [&] { carrier->open(told); };
   local.send(error(CAN_ERR_BUSOFF));
-  run_until([&] { return !bus->up(); });
+  ASSERT_TRUE(run_until([&] { return !bus->up(); }));
   ASSERT_EQ(told.events.size(), 1U);
   EXPECT_EQ(told.events[0].kind, Kind::down);
 }
@@ -191,7 +191,7 @@ TEST_F(CanBusTest, ABusWhoseFiltersTheKernelRefusesIsDownUntilItTakesThem) {
   std::iota(ids.begin(), ids.end(), 0U);
   bus->join(greedy, ids);
   EXPECT_TRUE(member.events.empty()) << "told from the loop, not within join()";
-  run_until([&] { return !member.events.empty(); });
+  ASSERT_TRUE(run_until([&] { return !member.events.empty(); }));
   EXPECT_EQ(member.events.back().first, Kind::down);
   EXPECT_EQ(member.events.back().second.find("the kernel does not take the filters"), 0U);
   EXPECT_NE(member.fix.find("fewer nodes"), std::string::npos);
@@ -199,23 +199,23 @@ TEST_F(CanBusTest, ABusWhoseFiltersTheKernelRefusesIsDownUntilItTakesThem) {
   EXPECT_FALSE(bus->up());
   EXPECT_EQ(member.events.size(), 1U);
   greedy.leave();
-  run_until([&] { return bus->up(); });
+  ASSERT_TRUE(run_until([&] { return bus->up(); }));
   remote.send(data(7));
-  run_until([&] { return !member.frames.empty(); });
+  ASSERT_TRUE(run_until([&] { return !member.frames.empty(); }));
   EXPECT_EQ(member.frames, (Bytes{7}));
 }
 
 TEST_F(CanBusTest, AnInterfaceThatGoesDownAndThenAwayIsToldOfTwiceAndItsReturnOnce) {
   Witness member(bus);
   ASSERT_EQ(0, std::system("ip link set vxcan7 down"));
-  run_until([&] { return !bus->up(); });
+  ASSERT_TRUE(run_until([&] { return !bus->up(); }));
   TearDownTestSuite();
-  run_until([&] { return member.events.size() == 2; });
+  ASSERT_TRUE(run_until([&] { return member.events.size() == 2; }));
   EXPECT_EQ(member.events.back(),
             (std::pair<Kind, std::string>{Kind::warning, "there is no interface vxcan7"}));
   EXPECT_EQ(member.fix.find("plug its adapter in"), 0U) << member.fix;
   SetUpTestSuite();
-  run_until([&] { return bus->up(); });
+  ASSERT_TRUE(run_until([&] { return bus->up(); }));
   EXPECT_EQ(member.events.size(), 3U);
   EXPECT_EQ(member.events.back().first, Kind::up);
 }
@@ -225,7 +225,7 @@ TEST_F(CanBusTest, CountsFramesThatTheControllerLost) {
   EXPECT_EQ(bus->overflows(), 0U);
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_OVERFLOW));
   local.send(data(1));
-  run_until([&] { return !member.frames.empty(); });
+  ASSERT_TRUE(run_until([&] { return !member.frames.empty(); }));
   EXPECT_EQ(bus->overflows(), 1U);
   EXPECT_TRUE(member.events.empty()) << "it is counted, not told";
 
@@ -245,12 +245,12 @@ TEST_F(CanBusTest, MembersMayLeaveInsideADownEventAndNobodyIsSkipped) {
     third.leave();   // would be next
   };
   local.send(error(CAN_ERR_BUSOFF));
-  run_until([&] { return !fourth.events.empty(); });
+  ASSERT_TRUE(run_until([&] { return !fourth.events.empty(); }));
   EXPECT_EQ(first.events.size(), 1U);
   EXPECT_EQ(second.events.size(), 1U);
   EXPECT_TRUE(third.events.empty());
   local.send(error(CAN_ERR_RESTARTED));
-  run_until([&] { return fourth.events.size() == 2; });
+  ASSERT_TRUE(run_until([&] { return fourth.events.size() == 2; }));
   EXPECT_EQ(first.events.size() + second.events.size() + third.events.size(), 2U);
 }
 
@@ -262,7 +262,7 @@ TEST_F(CanBusTest, MembersMayLeaveInsideAFrameAndNobodyIsSkipped) {
     third.leave();
   };
   for (const std::uint8_t byte : Bytes{1, 2, 3}) local.send(data(byte));
-  run_until([&] { return fourth.frames.size() == 3; });
+  ASSERT_TRUE(run_until([&] { return fourth.frames.size() == 3; }));
   EXPECT_EQ(first.frames, (Bytes{1}));
   EXPECT_EQ(second.frames, (Bytes{1}));
   EXPECT_TRUE(third.frames.empty());
@@ -274,13 +274,13 @@ TEST_F(CanBusTest, TheLastMemberMayLeaveInsideACall) {
   auto member = std::make_unique<Witness>(std::exchange(bus, nullptr));
   member->in_frame = [&] { member->leave(); };
   for (const std::uint8_t byte : Bytes{1, 2, 3}) local.send(data(byte));
-  run_until([&] { return gone.expired(); });
+  ASSERT_TRUE(run_until([&] { return gone.expired(); }));
   EXPECT_EQ(member->frames, (Bytes{1}));
 
   member = std::make_unique<Witness>(CanBus::of(io, near_end, false));
   member->in_event = [&] { member->leave(); };
   local.send(error(CAN_ERR_BUSOFF));
-  run_until([&] { return !member->events.empty(); });
+  ASSERT_TRUE(run_until([&] { return !member->events.empty(); }));
   run_for(soon);
   EXPECT_EQ(member->events.size(), 1U);
 }
@@ -292,7 +292,7 @@ TEST_F(CanBusTest, AMemberThatJoinsInsideACallIsCalledFromThenOn) {
     if (!second) second = std::make_unique<Witness>(bus);
   };
   for (const std::uint8_t byte : Bytes{1, 2}) local.send(data(byte));
-  run_until([&] { return first.frames.size() == 2; });
+  ASSERT_TRUE(run_until([&] { return first.frames.size() == 2; }));
   EXPECT_EQ(second->frames.back(), 2);
 }
 

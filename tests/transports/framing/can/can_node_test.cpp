@@ -176,6 +176,7 @@ TEST(CanNode, StatesAndAnswersHaveIdsOfTheirOwn) {
   NodeBus bus;
   bus.board.begin(state_line, bus.now_us);
   bus.settle();
+  ASSERT_FALSE(bus.ids.empty());
   for (const std::uint32_t id : bus.ids) EXPECT_EQ(id, telemetry_id(3));
   bus.ids.clear();
   bus.board.begin(answer_line, bus.now_us);

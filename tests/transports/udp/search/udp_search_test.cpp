@@ -143,7 +143,7 @@ TEST_F(UdpSearchTest, DoesNotSearchWhileTheBoardIsHeard) {
     host->send(with_crc("Q:ID;"), Priority::normal);
     run_for(io, milliseconds(10));
   }
-  run_until(io, [&] { return boards.asked("0.2") >= before + sent; });
+  ASSERT_TRUE(run_until(io, [&] { return boards.asked("0.2") >= before + sent; }));
   EXPECT_EQ(boards.asked("0.2"), before + sent);
 }
 
