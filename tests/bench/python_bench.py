@@ -99,7 +99,7 @@ def sending(url):
             us = []
             for i in range(300):
                 began = time.perf_counter()
-                board.send(r4link.Command.proximity(1, i % 2))
+                board.send(r4link.Command.proximity(1, cm=i % 2))
                 us.append((time.perf_counter() - began) * 1e6)
         python.append(statistics.median(us))
     print(f'confirmed at 1000 Hz: p50 {statistics.median(python):.0f} us, in C++ {statistics.median(native):.0f} us')

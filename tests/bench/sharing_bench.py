@@ -44,7 +44,7 @@ with r4link.Board(url) as board:
     until = time.monotonic() + seconds
     step = time.monotonic()
     while time.monotonic() < until:
-        board.osmc(1).post(300)
+        board.osmc(1).post_pwm(300)
         step += 0.01
         time.sleep(max(0, step - time.monotonic()))
     if len(sys.argv) > 4:

@@ -62,7 +62,7 @@ assert r4link.__file__.startswith("/usr/lib/python3"), r4link.__file__
 with r4link.Board("sim:") as board:
     board.wait_active()
     board.arm()
-    board.osmc(1).set(358)'
+    board.osmc(1).set(0.1)'
 }
 step 'python3-r4link drives a board' python_drives
 

@@ -20,13 +20,13 @@ import r4link
 with r4link.Board('sim:') as board:
     board.wait_active()
     board.arm()
-    board.osmc(1).set(358)
+    board.osmc(1).set(0.1)
     pwm = next(iter(board.states())).osmc1.pwm
     board.stop()
 
 package = importlib.metadata.distribution('r4link')
 files = {str(each) for each in package.files}
-assert pwm == 358, pwm
+assert pwm == 410, pwm
 assert package.version == r4link.__version__
 assert list(importlib.metadata.entry_points(group='pytest11', name='r4link'))
 assert {'r4link/py.typed', 'r4link/_core.pyi', 'r4link_pytest.py'} <= files, files

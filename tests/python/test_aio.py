@@ -7,7 +7,7 @@ import pytest
 
 import r4link
 from machine import within
-from r4link import aio
+from r4link import Command, Setpoints, aio
 
 SILENT = 'udp://127.0.0.1:9?listen=0'
 
@@ -17,12 +17,12 @@ def test_drives(sim):
         async with aio.Board(sim.url) as board:
             await board.wait_active()
             with pytest.raises(r4link.NotArmedError):
-                await board.osmc(1).set(1)
+                await board.osmc(1).set_pwm(1)
             await board.arm()
-            await board.apply(r4link.Setpoints().osmc(1, 10).osmc(2, 20))
+            await board.apply(Setpoints(Command.osmc(1, pwm=10), Command.osmc(2, pwm=20)))
             await board.servo(1).set(1500)
-            await board.bldc(1).set(9)
-            assert board.osmc(3).post(30)
+            await board.bldc(1).set_pwm(9)
+            assert board.osmc(3).post_pwm(30)
             await board.relay(2).set(True)
             state = await board.next_state()
             assert (state.osmc1.pwm, state.servo1pos, state.relay(2)) == (10, 1500, True)
@@ -41,7 +41,7 @@ def test_commands_go_out_in_the_order_in_which_they_were_begun(sim):
             await board.wait_active()
             await board.arm()
             for last in (7, 0):
-                await asyncio.gather(*(board.osmc(1).set(pwm) for pwm in [100, 5, 60, last]))
+                await asyncio.gather(*(board.osmc(1).set_pwm(pwm) for pwm in [100, 5, 60, last]))
                 assert (await board.next_state()).osmc1.pwm == last
     asyncio.run(main())
 
@@ -119,7 +119,7 @@ def test_records_watches_and_has_a_watchdog(sim, tmp_path):
             board.record(tmp_path / 'drive.r4log', rotate_bytes=1 << 20)
             await board.wait_active()
             await board.arm()
-            await board.osmc(1).set(100)
+            await board.osmc(1).set_pwm(100)
             board.watchdog(0.03)
             board.feed()
             async for _ in board.states():
@@ -144,7 +144,7 @@ def test_takes_control_and_releases_it(sim):
             await board.take_control()
             await board.wait_active()
             await board.arm()
-            await board.osmc(1).set(100)
+            await board.osmc(1).set_pwm(100)
             assert board.role == 'control'
             await board.release_control()
             assert board.role == 'watch'
@@ -176,7 +176,7 @@ def test_with_a_key_it_drives_a_board_that_has_it_and_no_other(tmp_path):
             async with aio.Board(sim.url, key=right) as board:
                 await board.wait_active()
                 await board.arm()
-                await board.osmc(1).set(358)
+                await board.osmc(1).set_pwm(358)
                 assert (await board.next_state()).osmc1.pwm == 358
                 assert sim.look().osmc[0].pwm == 358
     asyncio.run(main())
@@ -194,9 +194,9 @@ def test_a_task_that_is_cancelled_takes_its_command_back_and_no_other(sim):
         async with aio.Board(sim.url) as board:
             await board.wait_active()
             await board.arm()
-            first = asyncio.create_task(board.osmc(1).set(1))
-            given_up = asyncio.create_task(board.osmc(1).set(999))
-            last = asyncio.create_task(board.osmc(2).set(2))
+            first = asyncio.create_task(board.osmc(1).set_pwm(1))
+            given_up = asyncio.create_task(board.osmc(1).set_pwm(999))
+            last = asyncio.create_task(board.osmc(2).set_pwm(2))
             await asyncio.sleep(0)
             given_up.cancel()
             await asyncio.gather(first, last)

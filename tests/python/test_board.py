@@ -11,16 +11,16 @@ import pytest
 
 import r4link
 from machine import within
-from r4link import FORWARD, REVERSE
+from r4link import FORWARD, REVERSE, Command, Setpoints
 
 
 def test_drives_and_tells_what_the_chips_do(sim, board, wait):
     board.arm()
-    board.osmc(1).set(358)
-    board.dhb12(2).set(700, REVERSE)
+    board.osmc(1).set_pwm(358)
+    board.dhb12(2).set_pwm(700, direction=REVERSE)
     board.servo(3).set(1500)
     board.relay(2).set(True)
-    board.bldc(4).set(2000, FORWARD, brake=False)
+    board.bldc(4).set_pwm(2000, direction=FORWARD, brake=False)
     board.stepper(1).move_to(100, speed=5000)
     assert board.state.osmc1 == (358, FORWARD) and board.state.osmc1.duty == pytest.approx(358 / 4095)
     assert board.state.relay(1) and not board.state.relay(3)
@@ -40,24 +40,44 @@ def test_drives_and_tells_what_the_chips_do(sim, board, wait):
 
 def test_a_group_is_executed_as_one_or_not_at_all(sim, board, wait):
     board.arm()
-    board.apply(r4link.Setpoints().osmc(1, 100).osmc(2, 200, REVERSE).servo(1, 900))
+    board.apply(Setpoints(Command.osmc(1, pwm=100), Command.osmc(2, pwm=200, direction=REVERSE),
+                          Command.servo(1, us=900)))
     wait(lambda: [each.pwm for each in sim.look().osmc[:2]] == [100, 200])
     with pytest.raises(r4link.UsageError, match='channel'):
-        r4link.Setpoints().osmc(1, 1).osmc(5, 1)
-    assert board.post(r4link.Setpoints().osmc(1, 7).osmc(2, 8))
-    board.osmc(3).set(1)  # behind it
+        Setpoints(Command.osmc(1, duty=0), Command.osmc(5, duty=0))
+    assert board.post(Setpoints(Command.osmc(1, pwm=7)).add(Command.osmc(2, pwm=8)))
+    board.osmc(3).set_pwm(1)  # after the group
     wait(lambda: [each.pwm for each in sim.look().osmc[:3]] == [7, 8, 1])
+
+
+@pytest.mark.parametrize('call', [
+    lambda _: Command.osmc(1, 0.1), lambda _: Command.osmc(1, pwm=0.1), lambda _: Command.osmc(1, duty='0.1'),
+    lambda _: Command.osmc(1, duty=0.1, pwm=410), lambda _: Command.servo(3, 1500), lambda _: Setpoints('O:0,1,1'),
+    lambda board: board.osmc(1).set_pwm(410, FORWARD), lambda board: board.stepper(1).move_to(100, 5000),
+    lambda board: board.dac(1650, 1)])
+def test_a_value_without_its_name_or_of_another_type_is_a_type_error(board, call):
+    with pytest.raises(TypeError):
+        call(board)
+
+
+def test_a_negative_duty_drives_reverse(sim, board, wait):
+    board.arm()
+    board.osmc(1).set(-0.25)
+    assert board.state.osmc1 == (1024, REVERSE)
+    board.apply(Setpoints(Command.osmc(1, duty=1), Command.bldc(2, duty=-0.5, brake=False)))
+    wait(lambda: sim.look().osmc[0] == (4095, FORWARD) and sim.look().bldc[1][:2] == (2048, REVERSE))
 
 
 def test_errors_name_the_thing_the_reason_and_the_fix(board):
     with pytest.raises(r4link.NotArmedError) as not_armed:
-        board.osmc(1).set(1)
+        board.osmc(1).set_pwm(1)
     assert not_armed.value.thing == 'O:1,1,1' and 'arm()' in not_armed.value.fix
     assert isinstance(not_armed.value, r4link.RefusedError) and not_armed.value.outcome == 'not armed'
-    assert board.osmc(1).post(1) is r4link.PostResult.NOT_ARMED and not board.osmc(1).post(1)
-    for wrong, error in [(lambda: board.servo(17).set(1), ValueError), (lambda: board.osmc(1).set(4096), ValueError),
-                         (lambda: board.osmc(1).set(1, 2), r4link.UsageError),
-                         (lambda: board.osmc(1).set(1 << 40), TypeError),
+    assert board.osmc(1).post(0) is r4link.PostResult.NOT_ARMED and not board.osmc(1).post(0)
+    for wrong, error in [(lambda: board.servo(17).set(1), ValueError), (lambda: board.osmc(1).set(1.5), ValueError),
+                         (lambda: board.osmc(1).set_pwm(4096), r4link.UsageError),
+                         (lambda: board.osmc(1).set_pwm(1, direction=2), r4link.UsageError),
+                         (lambda: board.osmc(1).set_pwm(1 << 40), TypeError),
                          (lambda: board.send('nonsense'), r4link.UsageError),
                          (lambda: board.send('F:NOSUCH'), r4link.UsageError),
                          (lambda: board.send('E:STOP\0'), r4link.Error),
@@ -80,7 +100,7 @@ def test_the_board_refuses(sim, board):
     sim.happen('handle released')
     with pytest.raises(r4link.RefusedError) as refused:
         for _ in range(1000):
-            board.osmc(1).set(1)
+            board.osmc(1).set(0.1)
     assert refused.value.outcome in ('refused', 'cancelled', 'not armed')
     assert board.next_state().dmhsta is False
     with pytest.raises(r4link.DataError):
@@ -201,7 +221,7 @@ def test_a_callback_may_command(sim, board, wait):
 
     def once(_):
         if not done:
-            board.osmc(2).set(77)
+            board.osmc(2).set_pwm(77)
             done.append(True)
 
     board.on_state(once)
@@ -212,7 +232,7 @@ def test_a_callback_that_hangs_makes_the_board_safe(sim, wait):
     with r4link.Board(sim.url, callback_limit=0.05) as board:
         board.wait_active()
         board.arm()
-        board.osmc(1).set(100)
+        board.osmc(1).set(0.1)
         go_on = threading.Event()
         board.on_link(lambda _: go_on.wait(20))
         wait(lambda: sim.look().is_safe)
@@ -223,7 +243,7 @@ def test_a_callback_that_hangs_makes_the_board_safe(sim, wait):
 
 def test_without_feed_the_board_goes_safe(sim, board, wait):
     board.arm()
-    board.osmc(1).set(100)
+    board.osmc(1).set(0.1)
     board.watchdog(0.05)
     wait(lambda: sim.look().is_safe)
     board.watchdog(0)
@@ -249,7 +269,7 @@ def test_takes_control_and_releases_it(sim, wait):
         board.take_control()  # that is no change
         board.wait_active()
         board.arm()
-        board.osmc(1).set(358)
+        board.osmc(1).set_pwm(358)
         assert board.role == 'control'
         wait(lambda: sim.look().osmc[0].pwm == 358)
         board.release_control()
@@ -298,7 +318,7 @@ def test_records_and_plays_again(sim, tmp_path):
     with r4link.Board(sim.url, arming=False) as board:
         board.record(path)
         board.wait_active()
-        board.osmc(1).set(358)
+        board.osmc(1).set_pwm(358)
         board.next_state()
         statistics, counters = board.statistics.as_dict(), board.carrier_counters
         assert statistics['states'] > 0 and statistics['lost'] == 0 and counters.rx_datagrams >= statistics['received']
@@ -332,7 +352,7 @@ def test_a_board_with_a_key_obeys_who_has_it(tmp_path, wait):
         with r4link.Board(sim.url, key=path) as board:
             board.wait_active()
             board.arm()
-            board.osmc(1).set(358)
+            board.osmc(1).set_pwm(358)
             assert board.link.causes == () and board.link.cause is None
             wait(lambda: sim.look().osmc[0].pwm == 358)
         path.write_text(KEY.replace('5a', '5b') + '\n')
@@ -369,7 +389,7 @@ def test_settings_proximity_and_link_timing(sim, board, wait):
     assert time.monotonic() - silent < within(0.95), 'after the timeout that was set'
     board.watchdog(0)
     board.wait_active()
-    board.proximity(1, 30)
+    board.proximity(1, cm=30)
     sim.obstacle(1, 15)
     wait(lambda: board.link.reason == 'proximity')
 
@@ -384,7 +404,7 @@ def test_a_stop_that_is_not_waited_for_and_a_restart_that_is_told(sim, board, wa
     restarts = []
     board.on_restart(lambda: restarts.append(True))
     board.arm()
-    board.osmc(1).set(100)
+    board.osmc(1).set(0.1)
     board.stop_async()
     wait(lambda: board.link.reason == 'stop' and sim.look().is_safe)
     sim.reboot()

@@ -15,7 +15,7 @@ def test_a_host_drives_the_board_behind_a_bridge():
         with r4link.Board(status.hosts.name + '?listen=0') as board:
             board.wait_active()
             board.arm()
-            board.osmc(1).set(358)
+            board.osmc(1).set(0.1)
             board.stop()
         counters = bridge.status()[0].hosts.counters
         assert counters.passed > counters.stops >= 1

@@ -6,7 +6,7 @@ import time
 import pytest
 
 import r4link
-from r4link import Setpoints, control
+from r4link import Command, Setpoints, control
 from r4link.testing import make_state
 
 
@@ -58,7 +58,7 @@ def a_board_that_may_drive(sim):
 
 
 def osmc(duty):
-    return Setpoints().osmc(1, round(abs(duty) * 4095), r4link.FORWARD if duty >= 0 else r4link.REVERSE)
+    return Setpoints(Command.osmc(1, duty=duty))
 
 
 def test_a_loop_controls_a_speed_and_comes_to_rest(armed, sim):

@@ -6,7 +6,7 @@ import itertools
 import pytest
 
 import r4link
-from r4link import aio
+from r4link import Command, Setpoints, aio
 
 
 def test_reads_writes_and_scans(board):
@@ -162,19 +162,19 @@ async def count(received):
 
 
 def test_voltages_are_part_of_a_group(sim, board, wait):
-    group = r4link.Setpoints().osmc(1, 100).dac(1, 1650).dac(2, 3300)
+    group = Setpoints(Command.osmc(1, pwm=100), Command.dac(1, millivolts=1650), Command.dac(2, millivolts=3300))
     with pytest.raises(r4link.NotArmedError):
         board.apply(group)
     board.fields('DEFAULT,DAC1,DAC2')
     board.arm()
     board.apply(group)
     wait(lambda: (board.state.osmc1.pwm, board.state.dac1, board.state.dac2) == (100, 1650, 3300))
-    assert board.post(r4link.Command.dac(1, 5))
+    assert board.post(Command.dac(1, millivolts=5))
     wait(lambda: board.state.dac1 == 5)
     with pytest.raises(r4link.UsageError, match='range'):
-        r4link.Setpoints().dac(1, 3301)
+        Setpoints(Command.dac(1, millivolts=3301))
     with pytest.raises(r4link.UsageError, match='same channel'):
-        r4link.Setpoints().dac(1, 1).dac(1, 2)
+        Setpoints(Command.dac(1, millivolts=1), Command.dac(1, millivolts=2))
     board.stop()
     with pytest.raises(r4link.RefusedError):
         board.apply(group)
@@ -184,9 +184,9 @@ def test_voltages_are_part_of_a_group(sim, board, wait):
 def test_a_voltage_is_an_output_and_spare_inputs_are_bits(board, sim, wait):
     board.fields('DEFAULT,DAC1,GPIO')
     with pytest.raises(r4link.NotArmedError):
-        board.dac(1, 1650)
+        board.dac(1, millivolts=1650)
     board.arm()
-    board.dac(1, 1650)
+    board.dac(1, millivolts=1650)
     board.setting('uart2', '9600:8N1')
     board.uart[2].write(b'ab')
     sim.happen('gpio 3 low')

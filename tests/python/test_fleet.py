@@ -4,6 +4,7 @@ import time
 import pytest
 
 import r4link
+from r4link import Command, Setpoints
 
 
 @pytest.fixture(name='fleet')
@@ -36,10 +37,10 @@ def test_commands_have_a_result_each(fleet):
 
 def test_setpoints_of_several_boards(fleet, wait):
     fleet.arm().require()
-    setpoints = {board: r4link.Setpoints().osmc(1, 100 + board) for board in range(8)}
+    setpoints = {board: Setpoints(Command.osmc(1, pwm=100 + board)) for board in range(8)}
     wait(lambda: all(fleet.post(setpoints)))
     wait(lambda: [state.osmc1.pwm for state in fleet.states()] == [100 + board for board in range(8)])
-    assert fleet.apply({'sim:?node=1': r4link.Setpoints().osmc(1, 7)})
+    assert fleet.apply({'sim:?node=1': Setpoints(Command.osmc(1, pwm=7))})
     assert fleet.states()[1].osmc1.pwm == 7
 
 

@@ -58,7 +58,7 @@ def test_the_interpreter_may_end_with_an_open_board(end):
 import r4link, sys
 board = r4link.Board(sys.argv[1])
 board.on_state(lambda state: state.as_dict())
-board.wait_active(); board.arm(); board.osmc(1).set(300)
+board.wait_active(); board.arm(); board.osmc(1).set(0.1)
 {end}
 """
             with run(program, url) as process:
@@ -85,7 +85,7 @@ def test_a_board_of_the_parent_is_none_of_a_fork(board):
         gc.collect()
         os._exit(code)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
-    board.osmc(1).set(5)
+    board.osmc(1).set(0.1)
 
 
 def in_a_fork(action):
@@ -119,10 +119,11 @@ def test_in_a_fork_each_call_is_refused_or_does_nothing_and_none_hangs(tmp_path)
         states = board.states()
         subscription = board.on_state(hold)
         assert in_callback.wait(10)
+        setpoints = r4link.Setpoints(r4link.Command.osmc(1, duty=0.1))
         refused = [lambda: board.state, lambda: board.identify(), board.stop, board.stop_async, lambda: board.paths,
-                   lambda: board.post(r4link.Setpoints().osmc(1, 5)), lambda: board.on_link(print), lambda: next(states),
+                   lambda: board.post(setpoints), lambda: board.on_link(print), lambda: next(states),
                    states.take, lambda: states.ended, lambda: board.watchdog(1), lambda: fleet.stop(),
-                   fleet.health, lambda: fleet.post({0: r4link.Setpoints().osmc(1, 5)}), fleet.next_event,
+                   fleet.health, lambda: fleet.post({0: setpoints}), fleet.next_event,
                    bridge.status, lambda: recording.records, lambda: recording.problem,
                    sim.look, lambda: sim.happen('handle released'), other.look,
                    lambda: other.happen('handle released')]
@@ -331,7 +332,7 @@ def test_a_spawned_process_has_boards_of_its_own(board):
 def drive_in_a_child(told):
     board = r4link.Board('sim:', arming=False)
     board.wait_active()
-    board.osmc(1).set(358)
+    board.osmc(1).set_pwm(358)
     told.put(board.state.osmc1.pwm)
 
 

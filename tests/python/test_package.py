@@ -34,7 +34,7 @@ def public(names):
 @pytest.mark.parametrize('example', sorted((ROOT / 'docs/examples/python').glob('*.py')), ids=lambda path: path.stem)
 def test_examples_run(example, sim, tmp_path):
     told = run(sys.executable, example, 'sim:', cwd=tmp_path)
-    assert 'OSMC 1: 358 forward' in told, told
+    assert 'OSMC 1: 410 forward' in told, told
 
 
 @pytest.mark.parametrize('page', ['README.md', 'docs/control.md', 'docs/fleet.md', 'docs/python.md'])

@@ -90,7 +90,7 @@ def test_copies_of_values_tell_the_same(sim, board):
     with r4link.Fleet('sim:') as fleet:
         fleet.wait_active()
         values = [board.state, board.next_state(), board.link, board.statistics, board.carrier_counters, board.identify(),
-                  *board.paths, r4link.Command.osmc(1, 5, 1), *fleet.health(), *fleet.stop(), sim.look(),
+                  *board.paths, r4link.Command.osmc(1, pwm=5), *fleet.health(), *fleet.stop(), sim.look(),
                   r4link.Device('bno055@0x29')]
         events = []
         board.on_event(events.append)
@@ -103,12 +103,13 @@ def test_copies_of_values_tell_the_same(sim, board):
 
 def test_a_copy_of_setpoints_does_the_same(board, sim, wait):
     board.arm()
-    for number, each in enumerate(copies(r4link.Setpoints().osmc(1, 5).servo(3, 1500)), 1):
+    setpoints = r4link.Setpoints(r4link.Command.osmc(1, pwm=5), r4link.Command.servo(3, us=1500))
+    for number, each in enumerate(copies(setpoints), 1):
         assert len(each) == 2
-        each.osmc(2, number)
+        each.add(r4link.Command.osmc(2, pwm=number))
         board.apply(each)
     wait(lambda: sim.look().osmc[1].pwm == number)
-    for each in copies(r4link.Command.osmc(2, 9, 1)):
+    for each in copies(r4link.Command.osmc(2, pwm=9)):
         board.send(each)
     wait(lambda: sim.look().osmc[1].pwm == 9)
 

@@ -37,8 +37,8 @@ def test_what_was_recorded_is_there(sim, tmp_path):
     with r4link.Board(sim.url, arming=False, fields='DEFAULT,ENC1,BLDC1,US1') as board:
         board.record(path)
         board.wait_active()
-        board.osmc(1).set(358, r4link.REVERSE)
-        board.bldc(1).set(100)
+        board.osmc(1).set_pwm(358, direction=r4link.REVERSE)
+        board.bldc(1).set_pwm(100)
         live = [board.next_state() for _ in range(20)]
         board.stop()
         board.next_state()

@@ -36,7 +36,7 @@ HAPPENINGS = [
     ('us 1 off', safe('proximity'), 'us 1 0'),
     ('enc 2 100', lambda sim, board: now(board, 'enc2', 100) and sim.look().encoder[1] == 100, ''),
     ('analog AIN24 21.5', volts, ''),
-    ('motor 1 stalled', lambda sim, board: board.osmc(1).post(4095) and sim.look().volts[0] < 24, 'motor 1 free'),
+    ('motor 1 stalled', lambda sim, board: board.osmc(1).post(1) and sim.look().volts[0] < 24, 'motor 1 free'),
     *((f'chip {name} off', fault_of(chip), f'chip {name} on') for name, chip in (
         ('osmc', 'PCA9685 0x40'), ('dhb', 'PCA9685 0x41'), ('servo', 'PCA9685 0x42'), ('expander', 'MCP23017 0x20'),
         ('dac', 'MCP4728 0x61'))),
@@ -67,9 +67,9 @@ def test_what_happens_to_a_board_in_a_process_is_seen(wait):
 
 def happens_and_is_seen(sim, board, wait, words, seen, end):
     board.fields('DEFAULT,ENC2,US1')
-    board.proximity(1, 5)
+    board.proximity(1, cm=5)
     board.arm()
-    board.osmc(1).set(100)
+    board.osmc(1).set(0.02)
     sim.happen(words)
     wait(lambda: seen(sim, board))
     if end:

@@ -67,7 +67,7 @@ def run(options: argparse.Namespace, course: Course | None, ends: contextlib.Exi
     board.wait_active()
     board.arm()
     # Behind arm(): a board that begins again forgets it, and is not armed any more either.
-    board.proximity(1, CLEARANCE_CM)
+    board.proximity(1, cm=CLEARANCE_CM)
     if hand:
         hand.begin()
     print('armed: it drives', flush=True)

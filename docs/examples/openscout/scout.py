@@ -8,7 +8,7 @@
 from typing import NamedTuple
 
 import r4link
-from r4link import control
+from r4link import Command, Setpoints, control
 
 TRACK = 0.30  # m
 SLIP = 1.6  # on the floor it was measured on
@@ -25,11 +25,8 @@ NEEDS = 'ENC1,ENC2,ENC3,ENC4'
 STANDSTILL = [control.Standstill(encoder=n, channel=n, drive='dhb12', pwm=1500, time=1.0) for n in ENCODERS]
 
 
-def motors(duties: tuple[float, ...]) -> r4link.Setpoints:
-    out = r4link.Setpoints()
-    for channel, duty in enumerate(duties, 1):
-        out.dhb12(channel, round(abs(duty) * 4095), r4link.FORWARD if duty >= 0 else r4link.REVERSE)
-    return out
+def motors(duties: tuple[float, ...]) -> Setpoints:
+    return Setpoints(*(Command.dhb12(channel, duty=duty) for channel, duty in enumerate(duties, 1)))
 
 
 REST = motors((0, 0, 0, 0))  # the arm stays where it is: a servo without a pulse would let it fall
@@ -66,8 +63,8 @@ class Scout:
         return tuple(pid.step(to, wheel.speed, dt)
                      for pid, to, wheel in zip(self._pids, self._drive.wheels(twist), self._wheels))
 
-    def command(self, wish: Wish, dt: float) -> r4link.Setpoints:
+    def command(self, wish: Wish, dt: float) -> Setpoints:
         out = motors(self.duties(wish.twist, dt))
         for channel, pulse in enumerate(wish.arm, 1):
-            out.servo(channel, pulse)
+            out.add(Command.servo(channel, us=pulse))
         return out

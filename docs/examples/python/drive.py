@@ -13,7 +13,7 @@ def main(url: str) -> None:
         print(f'board {who.board_id}, firmware {who.firmware}, at {board.name}')
         board.fields('DEFAULT,ENC1')
         board.arm()
-        board.osmc(1).set(358, r4link.FORWARD)
+        board.osmc(1).set(0.1)
         for count, state in enumerate(board.states()):
             if count % 10 == 0:
                 direction = 'forward' if state.osmc1.direction else 'reverse'

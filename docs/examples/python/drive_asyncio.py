@@ -11,7 +11,7 @@ async def main(url: str) -> None:
     async with aio.Board(url) as board:
         await board.wait_active()
         await board.arm()
-        await board.osmc(1).set(358)
+        await board.osmc(1).set(0.1)
         count = 0
         async for state in board.states():
             count += 1

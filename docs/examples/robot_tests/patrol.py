@@ -4,7 +4,7 @@ import sys
 
 import r4link
 
-SPEED = 1000
+DUTY = 0.25
 NEAR_CM = 40
 
 
@@ -13,18 +13,18 @@ def patrol(url: str, turns: int = 1) -> None:
         board.wait_active()
         board.arm(timeout=3)  # nothing turns yet; from here on a program that hangs stops the robot
         board.watchdog(0.3)
-        direction = r4link.FORWARD
-        board.osmc(1).set(SPEED, direction, timeout=0.25)
+        duty = DUTY
+        board.osmc(1).set(duty, timeout=0.25)
         for state in board.states():
             board.feed()
             near = 0 < state.us1 < NEAR_CM
-            wanted = r4link.REVERSE if near else r4link.FORWARD
-            if wanted != direction:
+            wanted = -DUTY if near else DUTY
+            if wanted != duty:
                 if turns == 0:
                     return
                 turns -= 1
-                direction = wanted
-                board.osmc(1).set(SPEED, direction, timeout=0.25)
+                duty = wanted
+                board.osmc(1).set(duty, timeout=0.25)
 
 
 if __name__ == '__main__':

@@ -20,7 +20,7 @@ def a_stop_button(request):
 def test_a_stop_button_on_the_bus_stops_every_board(r4_bus, button):
     for board in r4_bus:
         board.arm(timeout=3)
-        board.osmc(1).set(500, timeout=3)
+        board.osmc(1).set_pwm(500, timeout=3)
     button()
     for board in r4_bus:
         board.expect_safe('stop')
@@ -29,6 +29,6 @@ def test_a_stop_button_on_the_bus_stops_every_board(r4_bus, button):
 def test_each_board_obeys_its_own_host_alone(r4_bus):
     left, right = r4_bus
     left.arm(timeout=3)
-    left.osmc(1).set(500, timeout=3)
+    left.osmc(1).set_pwm(500, timeout=3)
     left.expect(osmc1=500)
     assert right.robot.look().is_safe

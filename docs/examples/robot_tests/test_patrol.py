@@ -17,9 +17,9 @@ def until(done, within=3.0):
 def test_it_goes_back_when_something_is_near(r4_robot):
     program = threading.Thread(target=patrol.patrol, args=(r4_robot.url,))
     program.start()
-    until(lambda: r4_robot.look().osmc[0] == (patrol.SPEED, 1))
+    until(lambda: r4_robot.look().osmc[0].duty > 0.2)
     r4_robot.happen('us 1 15')  # a wall
-    until(lambda: r4_robot.look().osmc[0] == (patrol.SPEED, 0))
+    until(lambda: r4_robot.look().osmc[0].duty < -0.2)
     r4_robot.happen('us 1 0')
     program.join(5)
     assert not program.is_alive()
@@ -27,7 +27,7 @@ def test_it_goes_back_when_something_is_near(r4_robot):
 
 def test_a_released_handle_stops_the_robot(r4_board):
     r4_board.arm(timeout=3)
-    r4_board.osmc(1).set(358, timeout=3)
+    r4_board.osmc(1).set_pwm(358, timeout=3)
     r4_board.expect(osmc1=358, ain24=lambda volts: volts > 20)
     r4_board.robot.happen('handle released')
     r4_board.expect_safe('handle', within=0.5)
@@ -37,7 +37,7 @@ def test_a_released_handle_stops_the_robot(r4_board):
 def test_the_wheels_of_three_boards_turn(r4_bus):
     for board in r4_bus:
         board.relay(1).set(True, timeout=3)
-        board.osmc(1).set(2000, timeout=3)
+        board.osmc(1).set_pwm(2000, timeout=3)
     for board in r4_bus:
         board.expect(osmc1=2000)
         until(lambda board=board: board.robot.look().encoder[0] > 10)
@@ -47,14 +47,14 @@ def test_the_wheels_of_three_boards_turn(r4_bus):
 def test_it_drives_over_a_bad_link(r4_link):
     r4_link.arm(timeout=3)
     for pwm in (100, 200, 300):
-        r4_link.osmc(1).set(pwm, timeout=3)
+        r4_link.osmc(1).set_pwm(pwm, timeout=3)
         r4_link.expect(osmc1=pwm)
 
 
 @pytest.mark.r4(link='cut=2s+1.3s')
 def test_the_motors_are_off_while_the_link_is_cut(r4_link):
     r4_link.arm(timeout=3)
-    r4_link.osmc(1).set(300, timeout=3)
+    r4_link.osmc(1).set_pwm(300, timeout=3)
     until(lambda: r4_link.robot.look().osmc[0] == (300, 1))
     until(lambda: r4_link.robot.look().is_safe, within=5)
     until(lambda: r4_link.robot.look().osmc[0] == (300, 1))  # the same program is back (recovery=last)
@@ -64,7 +64,7 @@ def test_the_motors_are_off_while_the_link_is_cut(r4_link):
 def test_damage_on_a_serial_line_is_noticed(r4_link):
     r4_link.arm(timeout=3)
     for pwm in (100, 200, 300):
-        r4_link.osmc(1).set(pwm, timeout=3)
+        r4_link.osmc(1).set_pwm(pwm, timeout=3)
         r4_link.expect(osmc1=pwm)
     until(lambda: r4_link.statistics.damaged > 0)
 

@@ -52,32 +52,76 @@ Direction direction_of(int number) {
   return static_cast<Direction>(number);
 }
 
+// What is driven by a duty, or by the board's own value and a direction.
+void bind_drive(py::class_<Command>& commands, const char* name, Command (*by_duty)(Channel, Duty),
+                Command (*by_pwm)(Channel, Pwm, Direction)) {
+  commands.def_static(
+      name, [by_duty](int channel, double duty) { return by_duty(channel, Duty(duty)); },
+      py::arg("channel"), py::kw_only(), py::arg("duty"));
+  commands.def_static(
+      name,
+      [by_pwm](int channel, int pwm, int direction) {
+        return by_pwm(channel, Pwm(pwm), direction_of(direction));
+      },
+      py::arg("channel"), py::kw_only(), py::arg("pwm"),
+      py::arg("direction") = static_cast<int>(Direction::forward));
+}
+
 void bind_commands(py::module_& module) {
-  py::class_<Command>(module, "Command")
-      .def_static("osmc",
-                  [](int channel, int pwm, int direction) {
-                    return Command::osmc(pwm, direction_of(direction), channel);
-                  })
-      .def_static("dhb12",
-                  [](int channel, int pwm, int direction) {
-                    return Command::dhb12(pwm, direction_of(direction), channel);
-                  })
-      .def_static("servo", [](int channel, int us) { return Command::servo(us, channel); })
-      .def_static("relay", [](int channel, bool on) { return Command::relay(channel, on); })
-      .def_static("stepper", [](int channel, std::int32_t position,
-                                int speed) { return Command::stepper(position, speed, channel); })
-      .def_static("zero", [](int channel) { return Command::zero(channel); })
-      .def_static("bldc",
-                  [](int channel, int speed, int direction, bool brake) {
-                    return Command::bldc(speed, direction_of(direction), brake, channel);
-                  })
-      .def_static("dac", &Command::dac)
-      .def_static("proximity", [](int channel, int cm) { return Command::proximity(cm, channel); })
+  py::class_<Command> commands(module, "Command");
+  bind_drive(commands, "osmc", &Command::osmc, &Command::osmc);
+  bind_drive(commands, "dhb12", &Command::dhb12, &Command::dhb12);
+  commands
+      .def_static(
+          "bldc",
+          [](int channel, double duty, bool brake) {
+            return Command::bldc(channel, Duty(duty), brake);
+          },
+          py::arg("channel"), py::kw_only(), py::arg("duty"), py::arg("brake") = false)
+      .def_static(
+          "bldc",
+          [](int channel, int pwm, int direction, bool brake) {
+            return Command::bldc(channel, Pwm(pwm), direction_of(direction), brake);
+          },
+          py::arg("channel"), py::kw_only(), py::arg("pwm"),
+          py::arg("direction") = static_cast<int>(Direction::forward), py::arg("brake") = false)
+      .def_static(
+          "servo", [](int channel, int us) { return Command::servo(channel, Microseconds(us)); },
+          py::arg("channel"), py::kw_only(), py::arg("us"))
+      .def_static(
+          "relay", [](int channel, bool on) { return Command::relay(channel, on); },
+          py::arg("channel"), py::kw_only(), py::arg("on"))
+      .def_static(
+          "stepper",
+          [](int channel, std::int32_t position, int speed) {
+            return Command::stepper(channel, Steps(position), StepsPerSecond(speed));
+          },
+          py::arg("channel"), py::kw_only(), py::arg("position"),
+          py::arg("speed") = stepper_speed_default)
+      .def_static(
+          "zero", [](int channel) { return Command::zero(channel); }, py::arg("channel"))
+      .def_static(
+          "dac",
+          [](int channel, int millivolts) { return Command::dac(channel, Millivolts(millivolts)); },
+          py::arg("channel"), py::kw_only(), py::arg("millivolts"))
+      .def_static(
+          "proximity",
+          [](int channel, int cm) { return Command::proximity(channel, Centimetres(cm)); },
+          py::arg("channel"), py::kw_only(), py::arg("cm"))
       .def_static("stop", &Command::stop)
       .def_static("clear", [] { return Command::clear(); })
       .def(pickled<Command>("Command"));
   py::class_<Setpoints>(module, "Setpoints")
-      .def(py::init<>())
+      .def(py::init([](const py::args& given) {
+        Setpoints setpoints;
+        for (const py::handle each : given) {
+          if (!py::isinstance<Command>(each)) {
+            throw py::type_error("Setpoints() takes commands, such as Command.osmc(1, duty=0.1)");
+          }
+          setpoints.add(each.cast<const Command&>());
+        }
+        return setpoints;
+      }))
       .def(pickled<Setpoints>("Setpoints"))
       .def("add", &Setpoints::add, py::return_value_policy::reference_internal)
       .def("__len__", &Setpoints::size);

@@ -7,11 +7,11 @@ if _importlib.find_spec('r4link._core') is None:
                       'build --target r4_python) and put build/python first on PYTHONPATH, or: pip install .')
 
 from . import aio, control, devices  # pylint: disable=wrong-import-position
-from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State,
-                    Statistics, Subscription, PathStatus, __version__)
+from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost,
+                    Setpoints, State, Statistics, Subscription, PathStatus, __version__)
 from .board import Board, States
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
-from .channels import (BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, Setpoints, StepperChannel, Uart)
+from .channels import BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, StepperChannel, Uart
 from .devices import Device, DeviceReading
 from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error, NotArmedError, NotConfirmedError,
                      OpenError, Program, RefusedError, UnsupportedError, UsageError)

@@ -298,32 +298,63 @@ class State:
     gpio: int
 
 class Command:
+    """A command to a board, for send(), post() and Setpoints. Channels count from 1."""
+    @overload
     @staticmethod
-    def osmc(channel: int, pwm: int, direction: int, /) -> Command: ...
+    def osmc(channel: int, *, duty: float) -> Command:
+        """Channel 1 to 4. `duty`: from -1, full reverse, to 1, full forward."""
+    @overload
     @staticmethod
-    def dhb12(channel: int, pwm: int, direction: int, /) -> Command: ...
+    def osmc(channel: int, *, pwm: int, direction: int = ...) -> Command:
+        """`pwm`: 0 to 4095. `direction`: FORWARD, which is the default, or REVERSE."""
+    @overload
     @staticmethod
-    def servo(channel: int, us: int, /) -> Command: ...
+    def dhb12(channel: int, *, duty: float) -> Command:
+        """Channel 1 to 4. `duty`: from -1, full reverse, to 1, full forward."""
+    @overload
     @staticmethod
-    def relay(channel: int, on: bool, /) -> Command: ...
+    def dhb12(channel: int, *, pwm: int, direction: int = ...) -> Command:
+        """`pwm`: 0 to 4095. `direction`: FORWARD, which is the default, or REVERSE."""
+    @overload
     @staticmethod
-    def stepper(channel: int, position: int, speed: int, /) -> Command: ...
+    def bldc(channel: int, *, duty: float, brake: bool = ...) -> Command:
+        """Channel 1 to 4. `duty`: from -1, full reverse, to 1, full forward."""
+    @overload
     @staticmethod
-    def zero(channel: int, /) -> Command: ...
+    def bldc(channel: int, *, pwm: int, direction: int = ..., brake: bool = ...) -> Command:
+        """`pwm`: 0 to 4095. `direction`: FORWARD, which is the default, or REVERSE."""
     @staticmethod
-    def bldc(channel: int, speed: int, direction: int, brake: bool, /) -> Command: ...
+    def servo(channel: int, *, us: int) -> Command:
+        """Channel 1 to 16. `us`: the pulse width, up to 2500 microseconds; 0: no pulses."""
     @staticmethod
-    def dac(channel: int, millivolts: int, /) -> Command: ...
+    def relay(channel: int, *, on: bool) -> Command:
+        """Channel 1 to 8."""
     @staticmethod
-    def proximity(channel: int, cm: int, /) -> Command: ...
+    def stepper(channel: int, *, position: int, speed: int = 1000) -> Command:
+        """Channel 1 to 4. `position`: steps, a signed 32-bit number. `speed`: 1 to 20000 steps a second."""
+    @staticmethod
+    def zero(channel: int) -> Command:
+        """Encoder and stepper `channel`, 1 to 4, count from 0 where they are."""
+    @staticmethod
+    def dac(channel: int, *, millivolts: int) -> Command:
+        """Channel 1 or 2, 0 to 3300 millivolts."""
+    @staticmethod
+    def proximity(channel: int, *, cm: int) -> Command:
+        """Channel 1 to 4. `cm`: 1 to 400 centimetres; 0: off."""
     @staticmethod
     def stop() -> Command: ...
     @staticmethod
     def clear() -> Command: ...
 
 class Setpoints:
-    def __init__(self) -> None: ...
-    def add(self, command: Command, /) -> Setpoints: ...
+    """Output commands that a board executes together, in one pass over its chips, or not at all. Raises UsageError for
+    a value outside its range and for a second command to the same channel.
+
+        board.apply(r4link.Setpoints(Command.osmc(1, duty=0.1), Command.servo(3, us=1500)))
+    """
+    def __init__(self, *commands: Command) -> None: ...
+    def add(self, command: Command, /) -> Setpoints:
+        """Returns these setpoints, with the command."""
     def __len__(self) -> int: ...
 
 class Subscription:

@@ -4,7 +4,7 @@
     async with r4link.aio.Board('udp://192.168.0.125') as board:
         await board.wait_active()
         await board.arm()
-        await board.osmc(1).set(358)
+        await board.osmc(1).set(0.1)
         async for state in board.states():
             …
 
@@ -19,15 +19,14 @@ import threading
 import weakref
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Callable, Iterable, Type, TypeVar
+from typing import TYPE_CHECKING, Any, Callable, Coroutine, Iterable, Type, TypeVar
 
 from . import board as blocking, channels
-from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
-                    Subscription, PathStatus)
-from .channels import Setpoints
+from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, Setpoints, State,
+                    Statistics, Subscription, PathStatus)
 from .devices import Device
 from .errors import ClosedError
-from .values import Direction, PostResult, UartData
+from .values import PostResult, UartData
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # since Python 3.11 in typing
@@ -108,70 +107,6 @@ class States:
     def dropped(self) -> int:
         """Those that gave way or found no room."""
         return self._states.dropped
-
-
-class _Channel:
-    def __init__(self, board: Board, channel: int) -> None:
-        self._board = board
-        self._channel = channel
-
-
-class DriveChannel(_Channel):
-    """An H-bridge: pwm 0-4095."""
-
-    def __init__(self, board: Board, channel: int, make: Callable[[int, int, int], Command]) -> None:
-        super().__init__(board, channel)
-        self._make = make
-
-    async def set(self, pwm: int, direction: int = Direction.FORWARD, timeout: float = 1.0) -> None:
-        await self._board.send(self._make(self._channel, pwm, direction), timeout)
-
-    def post(self, pwm: int, direction: int = Direction.FORWARD) -> PostResult:
-        return self._board.post(self._make(self._channel, pwm, direction))
-
-
-class ServoChannel(_Channel):
-    """A servo: pulse width in microseconds, 0 (off) to 2500."""
-
-    async def set(self, pulse_us: int, timeout: float = 1.0) -> None:
-        await self._board.send(Command.servo(self._channel, pulse_us), timeout)
-
-    def post(self, pulse_us: int) -> PostResult:
-        return self._board.post(Command.servo(self._channel, pulse_us))
-
-
-class RelayChannel(_Channel):
-    """A relay; 1 is the motor supply."""
-
-    async def set(self, on: bool, timeout: float = 1.0) -> None:
-        await self._board.send(Command.relay(self._channel, on), timeout)
-
-    def post(self, on: bool) -> PostResult:
-        return self._board.post(Command.relay(self._channel, on))
-
-
-class StepperChannel(_Channel):
-    """A stepper: position in steps, speed in steps a second (1-20000)."""
-
-    async def move_to(self, position: int, speed: int = 1000, timeout: float = 1.0) -> None:
-        await self._board.send(Command.stepper(self._channel, position, speed), timeout)
-
-    def post(self, position: int, speed: int = 1000) -> PostResult:
-        return self._board.post(Command.stepper(self._channel, position, speed))
-
-    async def zero(self, timeout: float = 1.0) -> None:
-        await self._board.send(Command.zero(self._channel), timeout)
-
-
-class BldcChannel(_Channel):
-    """A brushless motor: speed 0-4095."""
-
-    async def set(self, speed: int, direction: int = Direction.FORWARD, brake: bool = False,
-                  timeout: float = 1.0) -> None:
-        await self._board.send(Command.bldc(self._channel, speed, direction, brake), timeout)
-
-    def post(self, speed: int, direction: int = Direction.FORWARD, brake: bool = False) -> PostResult:
-        return self._board.post(Command.bldc(self._channel, speed, direction, brake))
 
 
 class I2c:
@@ -256,7 +191,7 @@ class _Uarts:
         return Uart(self._board, channel)
 
 
-class Board:
+class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
     """r4link.Board for asyncio; takes the same options. What does not wait is no coroutine there either."""
 
     def __init__(self, url: str | Iterable[str], **options: Any) -> None:
@@ -309,10 +244,6 @@ class Board:
     async def arm(self, timeout: float = 1.0) -> None:
         await self._commands.call(lambda: self._board.arm(timeout))
 
-    async def clear(self, timeout: float = 1.0) -> None:
-        """Takes away the stop, the watchdog or the fault that the board reports; moves nothing."""
-        await self.send(Command.clear(), timeout)
-
     async def identify(self, timeout: float = 1.0) -> Identity:
         return await self._commands.call(lambda: self._board.identify(timeout))
 
@@ -325,21 +256,9 @@ class Board:
         """uart[1] and uart[2]."""
         return _Uarts(self)
 
-    async def dac(self, channel: int, millivolts: int, timeout: float = 1.0) -> None:
-        await self.send(Command.dac(channel, millivolts), timeout)
-
     async def attach(self, device: Device, timeout: float = 1.0) -> None:
         """As r4link.Board.attach()."""
         await self._commands.call(lambda: self._board.attach(device, timeout))
-
-    async def proximity(self, channel: int, threshold_cm: int, timeout: float = 1.0) -> None:
-        await self.send(Command.proximity(channel, threshold_cm), timeout)
-
-    async def fields(self, names: str, timeout: float = 1.0) -> None:
-        await self.send(f'F:{names}', timeout)
-
-    async def setting(self, key: str, value: str, timeout: float = 1.0) -> None:
-        await self.send(f'C:{key},{value}', timeout)
 
     async def link_timing(self, board_timeout: float, heartbeat: float, timeout: float = 1.0) -> None:
         await self._commands.call(lambda: self._board.link_timing(board_timeout, heartbeat, timeout))
@@ -353,24 +272,6 @@ class Board:
 
     def post(self, command: Command | Setpoints) -> PostResult:
         return self._board.post(command)
-
-    def osmc(self, channel: int) -> DriveChannel:
-        return DriveChannel(self, channel, Command.osmc)
-
-    def dhb12(self, channel: int) -> DriveChannel:
-        return DriveChannel(self, channel, Command.dhb12)
-
-    def servo(self, channel: int) -> ServoChannel:
-        return ServoChannel(self, channel)
-
-    def relay(self, channel: int) -> RelayChannel:
-        return RelayChannel(self, channel)
-
-    def stepper(self, channel: int) -> StepperChannel:
-        return StepperChannel(self, channel)
-
-    def bldc(self, channel: int) -> BldcChannel:
-        return BldcChannel(self, channel)
 
     @property
     def disarmed_by(self) -> str:

@@ -13,10 +13,9 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, Type, TypeVar
 
 from . import _core
-from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, State, Statistics,
-                    Subscription, PathStatus)
-from .channels import (BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, Setpoints, StepperChannel, _ms,
-                       _Uarts)
+from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, Setpoints, State,
+                    Statistics, Subscription, PathStatus)
+from .channels import BoardCommands, I2c, _ms, _Uarts
 from .devices import Device
 from .errors import UsageError
 from .values import PostResult
@@ -73,7 +72,7 @@ class States:
         return self._states.missed
 
 
-class Board:
+class Board(BoardCommands[None]):
     """A board, opened by URL (docs/transports.md), or with_link(); see the options of include/r4link/options.hpp.
 
     Returns without waiting for the board: wait_active(). `role` is 'control', or 'watch' for a program that only
@@ -83,7 +82,7 @@ class Board:
         with r4link.Board('udp://192.168.0.125') as board:
             board.wait_active()
             board.arm()                 # closes relay 1, the motor supply
-            board.osmc(1).set(358)      # the board's own state has confirmed it
+            board.osmc(1).set(0.1)      # the board's own state has confirmed it
 
     Several URLs are paths to the one board (docs/redundancy.md): r4link.Board(['serial:auto', 'udp://192.168.0.125']).
     """
@@ -151,11 +150,11 @@ class Board:
 
     def post(self, command: Command | Setpoints) -> PostResult:
         """Sends once, without waiting or confirmation. on_refused() tells of what the board refuses."""
-        return PostResult(self._core.post(command._core if isinstance(command, Setpoints) else command))
+        return PostResult(self._core.post(command))
 
     def apply(self, setpoints: Setpoints, timeout: float = 1.0) -> None:
         """All of them in one pass, confirmed as one, or none."""
-        self._core.apply(setpoints._core, _ms(timeout))
+        self._core.apply(setpoints, _ms(timeout))
 
     def arm(self, timeout: float = 1.0) -> None:
         """Before the first output command, and again after whatever made the outputs safe but a lost link.
@@ -178,28 +177,6 @@ class Board:
         """The same, without waiting."""
         self._core.stop_async()
 
-    def clear(self, timeout: float = 1.0) -> None:
-        """Takes away the stop, the watchdog or the fault that the board reports; moves nothing."""
-        self.send(Command.clear(), timeout)
-
-    def osmc(self, channel: int) -> DriveChannel:
-        return DriveChannel(self, channel, Command.osmc)
-
-    def dhb12(self, channel: int) -> DriveChannel:
-        return DriveChannel(self, channel, Command.dhb12)
-
-    def servo(self, channel: int) -> ServoChannel:
-        return ServoChannel(self, channel)
-
-    def relay(self, channel: int) -> RelayChannel:
-        return RelayChannel(self, channel)
-
-    def stepper(self, channel: int) -> StepperChannel:
-        return StepperChannel(self, channel)
-
-    def bldc(self, channel: int) -> BldcChannel:
-        return BldcChannel(self, channel)
-
     @property
     def i2c(self) -> I2c:
         return I2c(self)
@@ -209,28 +186,12 @@ class Board:
         """uart[1] and uart[2]."""
         return _Uarts(self)
 
-    def dac(self, channel: int, millivolts: int, timeout: float = 1.0) -> None:
-        """A voltage of the board's, channel 1 or 2, 0-3300 mV; 0 in the safe state. An output: it takes arm(), and may
-        be one of Setpoints, or posted: post(Command.dac(1, 1650))."""
-        self.send(Command.dac(channel, millivolts), timeout)
-
     def attach(self, device: Device, timeout: float = 1.0) -> None:
         """Sets a described device up (r4link.devices): is it the one? Then what is to be written, which takes arm(), and
         the board's readings, until our session ends. Raises RefusedError if it does not answer, or is another device. To
         be done again after on_restart() and a lost link. `timeout`: for each step. Raises UsageError if another device,
         of another address or name, has one of its slots: i2c.poll_off() of that slot gives the other up."""
         self._core.attach(device._core, _ms(timeout))
-
-    def proximity(self, channel: int, threshold_cm: int, timeout: float = 1.0) -> None:
-        """The board goes safe when something is nearer than that; 0: off."""
-        self.send(Command.proximity(channel, threshold_cm), timeout)
-
-    def fields(self, names: str, timeout: float = 1.0) -> None:
-        """The state fields to ask for: 'DEFAULT,ENC1'."""
-        self.send(f'F:{names}', timeout)
-
-    def setting(self, key: str, value: str, timeout: float = 1.0) -> None:
-        self.send(f'C:{key},{value}', timeout)
 
     def link_timing(self, board_timeout: float, heartbeat: float, timeout: float = 1.0) -> None:
         """The board's timeout and heartbeat interval together."""

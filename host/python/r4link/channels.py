@@ -1,21 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a board has: its channels, the user's I2C bus and UARTs; and Setpoints, of several channels together.
+"""What a board has: its output channels, the user's I2C bus and UARTs.
 
-Times are seconds.
+The channel classes serve r4link.Board and r4link.aio.Board: a call that waits returns what the board's send() returns,
+None or a coroutine. Times are seconds. Every `timeout` is the time in which the board's state must confirm the command.
 """
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Callable, Iterator
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Callable, Generic, Iterator, TypeVar
 
-from . import _core
-from ._core import Command, Subscription
+from ._core import Command, Setpoints, Subscription
 from .errors import ClosedError, UsageError
 from .values import Direction, PostResult, UartData
 
 if TYPE_CHECKING:
     from .board import Board
 
+Sent = TypeVar('Sent')  # what send() returns: None, or a coroutine
 _MOST_S = 24 * 3600.0
 
 
@@ -26,109 +28,154 @@ def _ms(seconds: float) -> int:
     return math.ceil(max(-_MOST_S, min(seconds, _MOST_S)) * 1000)
 
 
-class Setpoints:
-    """Output commands that a board executes together, in one pass over its chips, or not at all.
+class BoardCommands(ABC, Generic[Sent]):
+    """The commands that r4link.Board and r4link.aio.Board have in common."""
 
-        board.apply(r4link.Setpoints().osmc(1, 358, FORWARD).osmc(2, 358, FORWARD).servo(3, 1500))
-    """
+    @abstractmethod
+    def send(self, command: str | Command, timeout: float = 1.0) -> Sent: ...
 
-    def __init__(self) -> None:
-        self._core = _core.Setpoints()
+    @abstractmethod
+    def post(self, command: Command | Setpoints) -> PostResult: ...
 
-    def add(self, command: Command) -> Setpoints:
-        """Any output command."""
-        self._core.add(command)
-        return self
+    def osmc(self, channel: int) -> DriveChannel[Sent]:
+        """`channel`: 1 to 4."""
+        return DriveChannel(self, channel, Command.osmc)
 
-    def osmc(self, channel: int, pwm: int, direction: int = Direction.FORWARD) -> Setpoints:
-        return self.add(Command.osmc(channel, pwm, direction))
+    def dhb12(self, channel: int) -> DriveChannel[Sent]:
+        """`channel`: 1 to 4, for DHB1A, DHB1B, DHB2A and DHB2B."""
+        return DriveChannel(self, channel, Command.dhb12)
 
-    def dhb12(self, channel: int, pwm: int, direction: int = Direction.FORWARD) -> Setpoints:
-        return self.add(Command.dhb12(channel, pwm, direction))
+    def servo(self, channel: int) -> ServoChannel[Sent]:
+        """`channel`: 1 to 16."""
+        return ServoChannel(self, channel)
 
-    def servo(self, channel: int, pulse_us: int) -> Setpoints:
-        return self.add(Command.servo(channel, pulse_us))
+    def relay(self, channel: int) -> RelayChannel[Sent]:
+        """`channel`: 1 to 8; relay 1 is in the motor supply."""
+        return RelayChannel(self, channel)
 
-    def relay(self, channel: int, on: bool) -> Setpoints:
-        return self.add(Command.relay(channel, on))
+    def stepper(self, channel: int) -> StepperChannel[Sent]:
+        """`channel`: 1 to 4."""
+        return StepperChannel(self, channel)
 
-    def stepper(self, channel: int, position: int, speed: int = 1000) -> Setpoints:
-        return self.add(Command.stepper(channel, position, speed))
+    def bldc(self, channel: int) -> BldcChannel[Sent]:
+        """`channel`: 1 to 4."""
+        return BldcChannel(self, channel)
 
-    def zero(self, channel: int) -> Setpoints:
-        return self.add(Command.zero(channel))
+    def dac(self, channel: int, *, millivolts: int, timeout: float = 1.0) -> Sent:
+        """Sets a voltage of the board: `channel` 1 or 2, `millivolts` 0 to 3300; 0 in the safe state. It is an output,
+        so it takes arm(). Command.dac() can be posted, and can be one of Setpoints."""
+        return self.send(Command.dac(channel, millivolts=millivolts), timeout)
 
-    def bldc(self, channel: int, speed: int, direction: int = Direction.FORWARD, brake: bool = False) -> Setpoints:
-        return self.add(Command.bldc(channel, speed, direction, brake))
+    def proximity(self, channel: int, *, cm: int, timeout: float = 1.0) -> Sent:
+        """The board goes safe when ultrasonic sensor `channel`, 1 to 4, measures less than `cm`, 1 to 400 centimetres;
+        0: off."""
+        return self.send(Command.proximity(channel, cm=cm), timeout)
 
-    def dac(self, channel: int, millivolts: int) -> Setpoints:
-        return self.add(Command.dac(channel, millivolts))
+    def fields(self, names: str, timeout: float = 1.0) -> Sent:
+        """The state fields to ask for: 'DEFAULT,ENC1'."""
+        return self.send(f'F:{names}', timeout)
 
-    def __len__(self) -> int:
-        return len(self._core)
+    def setting(self, key: str, value: str, timeout: float = 1.0) -> Sent:
+        return self.send(f'C:{key},{value}', timeout)
+
+    def clear(self, timeout: float = 1.0) -> Sent:
+        """Takes away the stop, the watchdog or the fault that the board reports; moves nothing."""
+        return self.send(Command.clear(), timeout)
 
 
-class _Channel:
-    def __init__(self, board: Board, channel: int) -> None:
+class _Channel(Generic[Sent]):
+    """A set method returns when the board's state confirms the setpoint, and raises RefusedError otherwise. A post
+    method sends the setpoint once, returns at once, and says whether it was sent."""
+
+    def __init__(self, board: BoardCommands[Sent], channel: int) -> None:
         self._board = board
         self._channel = channel
 
 
-class DriveChannel(_Channel):
-    """An H-bridge: pwm 0-4095."""
+class DriveChannel(_Channel[Sent]):
+    """An H-bridge."""
 
-    def __init__(self, board: Board, channel: int, make: Callable[[int, int, int], Command]) -> None:
+    def __init__(self, board: BoardCommands[Sent], channel: int, make: Callable[..., Command]) -> None:
         super().__init__(board, channel)
         self._make = make
 
-    def set(self, pwm: int, direction: int = Direction.FORWARD, timeout: float = 1.0) -> None:
-        self._board.send(self._make(self._channel, pwm, direction), timeout)
+    def set(self, duty: float, *, timeout: float = 1.0) -> Sent:
+        """`duty`: from -1, full reverse, to 1, full forward."""
+        return self._board.send(self._make(self._channel, duty=duty), timeout)
 
-    def post(self, pwm: int, direction: int = Direction.FORWARD) -> PostResult:
-        return self._board.post(self._make(self._channel, pwm, direction))
+    def set_pwm(self, pwm: int, *, direction: int = Direction.FORWARD, timeout: float = 1.0) -> Sent:
+        """`pwm`: 0 to 4095, always on. `direction`: FORWARD or REVERSE."""
+        return self._board.send(self._make(self._channel, pwm=pwm, direction=direction), timeout)
+
+    def post(self, duty: float) -> PostResult:
+        """`duty`: from -1, full reverse, to 1, full forward."""
+        return self._board.post(self._make(self._channel, duty=duty))
+
+    def post_pwm(self, pwm: int, *, direction: int = Direction.FORWARD) -> PostResult:
+        """`pwm`: 0 to 4095, always on. `direction`: FORWARD or REVERSE."""
+        return self._board.post(self._make(self._channel, pwm=pwm, direction=direction))
 
 
-class ServoChannel(_Channel):
-    """A servo: pulse width in microseconds, 0 (off) to 2500."""
+class ServoChannel(_Channel[Sent]):
+    """A servo."""
 
-    def set(self, pulse_us: int, timeout: float = 1.0) -> None:
-        self._board.send(Command.servo(self._channel, pulse_us), timeout)
+    def set(self, pulse_us: int, *, timeout: float = 1.0) -> Sent:
+        """`pulse_us`: the pulse width, up to 2500 microseconds; 0: no pulses."""
+        return self._board.send(Command.servo(self._channel, us=pulse_us), timeout)
 
     def post(self, pulse_us: int) -> PostResult:
-        return self._board.post(Command.servo(self._channel, pulse_us))
+        """`pulse_us`: the pulse width, up to 2500 microseconds; 0: no pulses."""
+        return self._board.post(Command.servo(self._channel, us=pulse_us))
 
 
-class RelayChannel(_Channel):
-    """A relay; 1 is the motor supply."""
+class RelayChannel(_Channel[Sent]):
+    """A relay; relay 1 is in the motor supply."""
 
-    def set(self, on: bool, timeout: float = 1.0) -> None:
-        self._board.send(Command.relay(self._channel, on), timeout)
+    def set(self, on: bool, *, timeout: float = 1.0) -> Sent:
+        """`on`: True closes the relay, False opens it."""
+        return self._board.send(Command.relay(self._channel, on=on), timeout)
 
     def post(self, on: bool) -> PostResult:
-        return self._board.post(Command.relay(self._channel, on))
+        """`on`: True closes the relay, False opens it."""
+        return self._board.post(Command.relay(self._channel, on=on))
 
 
-class StepperChannel(_Channel):
-    """A stepper: position in steps, speed in steps a second (1-20000)."""
+class StepperChannel(_Channel[Sent]):
+    """A stepper."""
 
-    def move_to(self, position: int, speed: int = 1000, timeout: float = 1.0) -> None:
-        self._board.send(Command.stepper(self._channel, position, speed), timeout)
+    def move_to(self, position: int, *, speed: int = 1000, timeout: float = 1.0) -> Sent:
+        """`position`: the target in steps, a signed 32-bit number. `speed`: 1 to 20000 steps a second. Returns when the
+        board has taken the target, not when the stepper is there."""
+        return self._board.send(Command.stepper(self._channel, position=position, speed=speed), timeout)
 
-    def post(self, position: int, speed: int = 1000) -> PostResult:
-        return self._board.post(Command.stepper(self._channel, position, speed))
+    def post(self, position: int, *, speed: int = 1000) -> PostResult:
+        """`position`: the target in steps, a signed 32-bit number. `speed`: 1 to 20000 steps a second."""
+        return self._board.post(Command.stepper(self._channel, position=position, speed=speed))
 
-    def zero(self, timeout: float = 1.0) -> None:
-        self._board.send(Command.zero(self._channel), timeout)
+    def zero(self, *, timeout: float = 1.0) -> Sent:
+        """The stepper and the encoder of this channel count from 0 here; the stepper does not move."""
+        return self._board.send(Command.zero(self._channel), timeout)
 
 
-class BldcChannel(_Channel):
-    """A brushless motor: speed 0-4095."""
+class BldcChannel(_Channel[Sent]):
+    """A brushless motor."""
 
-    def set(self, speed: int, direction: int = Direction.FORWARD, brake: bool = False, timeout: float = 1.0) -> None:
-        self._board.send(Command.bldc(self._channel, speed, direction, brake), timeout)
+    def set(self, duty: float, *, brake: bool = False, timeout: float = 1.0) -> Sent:
+        """`duty`: from -1, full reverse, to 1, full forward. `brake`: True applies the driver's brake."""
+        return self._board.send(Command.bldc(self._channel, duty=duty, brake=brake), timeout)
 
-    def post(self, speed: int, direction: int = Direction.FORWARD, brake: bool = False) -> PostResult:
-        return self._board.post(Command.bldc(self._channel, speed, direction, brake))
+    def set_pwm(self, pwm: int, *, direction: int = Direction.FORWARD, brake: bool = False,
+                timeout: float = 1.0) -> Sent:
+        """`pwm`: 0 to 4095, full speed. `direction`: FORWARD or REVERSE. `brake`: True applies the driver's brake."""
+        return self._board.send(Command.bldc(self._channel, pwm=pwm, direction=direction, brake=brake), timeout)
+
+    def post(self, duty: float, *, brake: bool = False) -> PostResult:
+        """`duty`: from -1, full reverse, to 1, full forward. `brake`: True applies the driver's brake."""
+        return self._board.post(Command.bldc(self._channel, duty=duty, brake=brake))
+
+    def post_pwm(self, pwm: int, *, direction: int = Direction.FORWARD, brake: bool = False) -> PostResult:
+        """`pwm`: 0 to 4095, full speed. `direction`: FORWARD or REVERSE. `brake`: True applies the driver's brake."""
+        return self._board.post(Command.bldc(self._channel, pwm=pwm, direction=direction, brake=brake))
 
 
 class I2c:

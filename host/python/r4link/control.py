@@ -10,9 +10,9 @@ import math
 from typing import Callable, Literal, NamedTuple, Sequence
 
 from . import _core
-from ._core import State
+from ._core import Setpoints, State
 from .board import Board
-from .channels import Setpoints, _ms
+from .channels import _ms
 
 LoopEnd = Literal['none', 'asked', 'late', 'not active', 'disarmed', 'standstill']
 
@@ -209,7 +209,7 @@ class LoopReport(NamedTuple):
 
 def _options(fields: str, late: float, first: float, standstill: Sequence[Standstill], rest: Setpoints,
              rest_timeout: float, watchdog: float, arming: bool = True) -> _core.LoopOptions:
-    options = _core.LoopOptions(fields, _ms(late), _ms(first), rest._core, _ms(rest_timeout), _ms(watchdog), arming)
+    options = _core.LoopOptions(fields, _ms(late), _ms(first), rest, _ms(rest_timeout), _ms(watchdog), arming)
     for each in standstill:
         options.add_standstill(each.encoder, each.drive, each.channel, each.pwm, each.counts, _ms(each.time))
     return options
@@ -230,7 +230,7 @@ class LoopGuard:
         return self._core.on_state(state, disarmed_by, now)
 
     def on_commanded(self, setpoints: Setpoints) -> None:
-        self._core.on_commanded(setpoints._core)
+        self._core.on_commanded(setpoints)
 
     def check(self, link: str, disarmed_by: str, now: float) -> str:
         """A LoopEnd: to be asked at `deadline` at the latest, with Board.link.state and Board.disarmed_by."""
@@ -256,12 +256,7 @@ def run_loop(board: Board, step: Callable[[State, float], Setpoints | None], *, 
     seconds since the step before on the board's clock. What it returns is posted; None ends the loop. Then the outputs
     are left as `rest` has them. `arming`: as of the board. What the step raises comes after that; so does Ctrl-C."""
     options = _options(fields, late, first, standstill, rest, rest_timeout, watchdog, arming)
-
-    def posted(state: State, dt: float) -> _core.Setpoints | None:
-        wanted = step(state, dt)
-        return None if wanted is None else wanted._core
-
-    return LoopReport(*board._core.run_loop(options, posted))
+    return LoopReport(*board._core.run_loop(options, step))
 
 
 def wrapped(angle: float) -> float:

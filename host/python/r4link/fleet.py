@@ -20,8 +20,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Iterable, Iterator, Mapping, NamedTuple, Sequence, Type
 
 from . import _core
-from ._core import BoardHealth, Command, Event, FleetResult, LinkStatus, Recording, RefusedPost, State
-from .channels import Setpoints, _ms
+from ._core import BoardHealth, Command, Event, FleetResult, LinkStatus, Recording, RefusedPost, Setpoints, State
+from .channels import _ms
 from .errors import Error, RefusedError, UsageError, error_of
 from .values import PostResult
 
@@ -202,5 +202,5 @@ class Fleet:
     def _indices(self, boards: Iterable[int | str] | None) -> list[int] | None:
         return None if boards is None else [self.index(each) for each in boards]
 
-    def _pairs(self, setpoints: Mapping[int | str, Setpoints]) -> list[tuple[int, _core.Setpoints]]:
-        return [(self.index(board), each._core) for board, each in setpoints.items()]
+    def _pairs(self, setpoints: Mapping[int | str, Setpoints]) -> list[tuple[int, Setpoints]]:
+        return [(self.index(board), each) for board, each in setpoints.items()]
