@@ -58,12 +58,6 @@ void require_control(BoardRole role, const Setpoints& group) {
   if (role != BoardRole::control) require_control(role, text_of(group));
 }
 
-Duty checked_duty(double duty) {
-  if (Duty(duty).is_in_range()) return Duty(duty);
-  throw Error(ErrorKind::usage, fmt::format("duty {}", duty), "is out of range",
-              "give -1 (full reverse) to 1 (full forward); set_pwm() takes 0 to 4095");
-}
-
 void require_timeout(std::string_view what, std::chrono::milliseconds timeout) {
   if (timeout.count() > 0) return;
   throw Error(ErrorKind::usage, fmt::format("{} within {} ms", what, timeout.count()),

@@ -12,7 +12,6 @@ namespace r4 {
 
 enum class BoardRole : std::uint8_t;
 struct Command;
-struct Duty;
 class Setpoints;
 struct SessionOptions;
 
@@ -23,9 +22,6 @@ void require_valid(const SessionOptions& options);
 void require_control(BoardRole role, std::string_view what);
 void require_control(BoardRole role, const Command& command);
 void require_control(BoardRole role, const Setpoints& group);
-
-// From -1 to 1.
-Duty checked_duty(double duty);
 
 // The time within which a command must be confirmed: longer than 0. A stop has no such limit, and
 // goes out with any timeout.

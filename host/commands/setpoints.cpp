@@ -30,6 +30,12 @@ Problem bad_group_member(const Command& command, std::size_t others) {
 
 }  // namespace
 
+Duty checked_duty(double duty) {
+  if (Duty(duty).is_in_range()) return Duty(duty);
+  throw Error(ErrorKind::usage, fmt::format("duty {}", duty), "is out of range",
+              "give -1 (full reverse) to 1 (full forward); set_pwm() takes 0 to 4095");
+}
+
 Setpoints& Setpoints::add(const Command& command) {
   require_valid(command);
   GroupRules rules;

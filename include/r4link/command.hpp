@@ -51,30 +51,38 @@ struct Duty {
   double value;
 };
 
+// In this order: output commands, which may be part of a group; other commands that may move
+// something; then all others.
 enum class CommandKind : std::uint8_t {
-  heartbeat,   // H:ROS2-R4
   osmc,        // O:pwm,dir,ch
   dhb12,       // D:pwm,dir,ch
   servo,       // S:us,ch
   relay,       // R:ch,On|Off
-  stop,        // E:STOP
-  clear,       // E:CLEAR,cause
-  leave,       // E:LEAVE
   stepper,     // P:pos[,speed],ch
   zero,        // Z:ch
   bldc,        // B:speed,dir,brake,ch
+  dac,         // X:DAC,channel,mV
+  i2c_write,   // X:WRITE,address,bytes[,count]
+  uart_write,  // X:UART,channel,bytes
+  i2c_read,    // X:READ,address,register,count
+  i2c_scan,    // X:SCAN
+  i2c_poll,    // X:POLL,address,register,count,period,slot and X:OFF,slot
   proximity,   // U:cm,ch
+  heartbeat,   // H:ROS2-R4
+  stop,        // E:STOP
+  clear,       // E:CLEAR,cause
+  leave,       // E:LEAVE
   fields,      // F:name,name…
   setting,     // C:key,value
   identify,    // Q:ID
   watch,       // W:rate[,name,name…]
-  i2c_read,    // X:READ,address,register,count
-  i2c_write,   // X:WRITE,address,bytes[,count]
-  i2c_scan,    // X:SCAN
-  i2c_poll,    // X:POLL,address,register,count,period,slot and X:OFF,slot
-  uart_write,  // X:UART,channel,bytes
-  dac,         // X:DAC,channel,mV
 };
+
+// True if the command may be part of a group.
+constexpr bool joins_groups(CommandKind kind) { return kind <= CommandKind::dac; }
+// True if the command may move something: an output, or an actuator on a bus or UART of the user's.
+// Such commands are refused in the safe state.
+constexpr bool drives_output(CommandKind kind) { return kind <= CommandKind::uart_write; }
 
 // One command. Which members count depends on `kind`; the factories set them. `text` and `text2`
 // are views: they must outlive the command.
@@ -141,12 +149,6 @@ struct R4LINK_API Command {
   // A voltage of the microcontroller's; 0 in the safe state.
   static Command dac(Channel channel, Millivolts voltage);
 };
-
-// May it move something? Those are refused in the safe state: O D S R P B Z, X:DAC, and X:WRITE and
-// X:UART, for what is written to a device of the user's may be an actuator's.
-R4LINK_API bool drives_output(CommandKind kind);
-// May it be part of a group? O D S R P B Z, X:DAC.
-R4LINK_API bool joins_groups(CommandKind kind);
 
 // The most commands of one datagram. Several are a group: output commands, no two of them for the same
 // channel, that are executed together, or none of them (docs/protocol.md; setpoints.hpp).

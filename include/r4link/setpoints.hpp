@@ -22,6 +22,9 @@
 
 namespace r4 {
 
+// `duty`: from -1 (full reverse) to 1 (full forward). Throws Error{usage} for others.
+R4LINK_API Duty checked_duty(double duty);
+
 class R4LINK_API Setpoints {
  public:
   Setpoints() = default;

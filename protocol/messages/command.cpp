@@ -15,51 +15,30 @@ constexpr Text identify_word("ID");
 constexpr Text default_fields("DEFAULT");
 constexpr Text all_fields("ALL");
 
-// What `value` and `channel` of a kind may be; no channels: the kind has none.
+// The ranges of a command's channel and value. No channels: the kind has none.
 struct Limits {
   int channels;
   std::int32_t min;
   std::int32_t max;
 };
 
+constexpr std::int32_t i32_min = -0x7FFFFFFF - 1;
+constexpr std::int32_t i32_max = 0x7FFFFFFF;
+// In the order of CommandKind.
+constexpr Limits output_limits[] = {
+    {osmc_channels, 0, pwm_max},          {dhb12_channels, 0, pwm_max},
+    {servo_channels, 0, servo_max_us},    {relay_channels, 0, 0},
+    {stepper_channels, i32_min, i32_max}, {encoder_channels, 0, 0},
+    {bldc_channels, 0, pwm_max},          {dac_channels, 0, dac_max_mv},
+};
+static_assert(sizeof output_limits / sizeof *output_limits ==
+                  static_cast<std::size_t>(CommandKind::dac) + 1,
+              "one row for each output");
+static_assert(encoder_channels == stepper_channels, "Z sets both");
+
 Limits limits_of(CommandKind kind) {
-  constexpr std::int32_t i32_min = -0x7FFFFFFF - 1;
-  constexpr std::int32_t i32_max = 0x7FFFFFFF;
-  switch (kind) {
-    case CommandKind::osmc:
-      return {osmc_channels, 0, pwm_max};
-    case CommandKind::dhb12:
-      return {dhb12_channels, 0, pwm_max};
-    case CommandKind::servo:
-      return {servo_channels, 0, servo_max_us};
-    case CommandKind::relay:
-      return {relay_channels, 0, 0};
-    case CommandKind::stepper:
-      return {stepper_channels, i32_min, i32_max};
-    case CommandKind::zero:
-      static_assert(encoder_channels == stepper_channels, "Z speaks of both");
-      return {encoder_channels, 0, 0};
-    case CommandKind::bldc:
-      return {bldc_channels, 0, pwm_max};
-    case CommandKind::proximity:
-      return {ultrasonic_channels, 0, proximity_max_cm};
-    case CommandKind::dac:
-      return {dac_channels, 0, dac_max_mv};
-    case CommandKind::heartbeat:
-    case CommandKind::stop:
-    case CommandKind::clear:
-    case CommandKind::leave:
-    case CommandKind::fields:
-    case CommandKind::setting:
-    case CommandKind::identify:
-    case CommandKind::watch:
-    case CommandKind::i2c_read:
-    case CommandKind::i2c_write:
-    case CommandKind::i2c_scan:
-    case CommandKind::i2c_poll:
-    case CommandKind::uart_write:
-      break;
-  }
+  if (joins_groups(kind)) return output_limits[static_cast<std::size_t>(kind)];
+  if (kind == CommandKind::proximity) return {ultrasonic_channels, 0, proximity_max_cm};
   return {0, 0, 0};
 }
 
@@ -181,40 +160,6 @@ bool add_fields(Text word, FieldSet& set) {
 }
 
 }  // namespace
-
-bool drives_output(CommandKind kind) {
-  switch (kind) {
-    case CommandKind::osmc:
-    case CommandKind::dhb12:
-    case CommandKind::servo:
-    case CommandKind::relay:
-    case CommandKind::stepper:
-    case CommandKind::zero:
-    case CommandKind::bldc:
-    case CommandKind::i2c_write:
-    case CommandKind::uart_write:
-    case CommandKind::dac:
-      return true;
-    case CommandKind::heartbeat:
-    case CommandKind::stop:
-    case CommandKind::clear:
-    case CommandKind::leave:
-    case CommandKind::proximity:
-    case CommandKind::fields:
-    case CommandKind::setting:
-    case CommandKind::identify:
-    case CommandKind::watch:
-    case CommandKind::i2c_read:
-    case CommandKind::i2c_scan:
-    case CommandKind::i2c_poll:
-      break;
-  }
-  return false;
-}
-
-bool joins_groups(CommandKind kind) {
-  return drives_output(kind) && (!is_device_command(kind) || kind == CommandKind::dac);
-}
 
 bool asks_to_stop(const Datagram& datagram) {
   for (const Field& field : datagram) {

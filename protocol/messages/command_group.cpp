@@ -5,50 +5,12 @@
 
 namespace r4 {
 
-// -1: no output.
-int GroupRules::row_of(CommandKind kind) {
-  switch (kind) {
-    case CommandKind::osmc:
-      return 0;
-    case CommandKind::dhb12:
-      return 1;
-    case CommandKind::servo:
-      return 2;
-    case CommandKind::relay:
-      return 3;
-    case CommandKind::stepper:
-      return 4;
-    case CommandKind::zero:
-      return 5;
-    case CommandKind::bldc:
-      return 6;
-    case CommandKind::dac:
-      return 7;
-    case CommandKind::heartbeat:
-    case CommandKind::stop:
-    case CommandKind::clear:
-    case CommandKind::leave:
-    case CommandKind::proximity:
-    case CommandKind::fields:
-    case CommandKind::setting:
-    case CommandKind::identify:
-    case CommandKind::watch:
-    case CommandKind::i2c_read:
-    case CommandKind::i2c_write:
-    case CommandKind::i2c_scan:
-    case CommandKind::i2c_poll:
-    case CommandKind::uart_write:
-      break;
-  }
-  return -1;
-}
-
 Refusal GroupRules::add(const Command& command) {
-  const int row = row_of(command.kind);
-  if (row < 0 || count_ == max_group) return Refusal::format;
+  if (!joins_groups(command.kind) || count_ == max_group) return Refusal::format;
+  std::uint16_t& taken = taken_[static_cast<std::size_t>(command.kind)];
   const unsigned bit = 1U << static_cast<unsigned>(command.channel - 1);
-  if ((taken_[row] & bit) != 0) return Refusal::format;
-  taken_[row] = static_cast<std::uint16_t>(taken_[row] | bit);
+  if ((taken & bit) != 0) return Refusal::format;
+  taken = static_cast<std::uint16_t>(taken | bit);
   ++count_;
   return Refusal::none;
 }

@@ -5,6 +5,7 @@
 //     O:358,1,1;O:358,1,2;PNum:2147488900;T:1699276044383;^0xc5a5ff80^
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "r4link/command.hpp"
@@ -18,13 +19,12 @@ constexpr Text group_capability("group");
 // What may stand side by side in a group. The same rules at both ends.
 class GroupRules {
  public:
-  // May `command`, which is right by itself, come next? Refusal::format if there are max_group of them
-  // already, it drives no output, or one before it drives the same.
+  // Refusal::none if `command`, which is valid by itself, may come next. Refusal::format if there are
+  // max_group commands already, it is not an output command, or an earlier one has its channel.
   Refusal add(const Command& command);
 
  private:
-  static constexpr int kinds = 8;  // that drive outputs
-  static int row_of(CommandKind kind);
+  static constexpr std::size_t kinds = static_cast<std::size_t>(CommandKind::dac) + 1;
 
   int count_ = 0;
   std::uint16_t taken_[kinds] = {};  // bit n-1: channel n

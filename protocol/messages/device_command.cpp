@@ -160,7 +160,7 @@ void write_device_command(DatagramWriter& writer, const Command& command) {
   const bool off = polls && command.count == 0;
   writer.field("X").value(off ? off_word : word->text);
   if (command.kind == CommandKind::i2c_scan) return;
-  if (command.kind >= CommandKind::uart_write) {
+  if (command.kind == CommandKind::uart_write || command.kind == CommandKind::dac) {
     writer.value(std::uint32_t{command.channel});
     command.kind == CommandKind::dac ? writer.value(command.value) : writer.value(command.text);
     return;

@@ -39,7 +39,7 @@ inline bool operator==(const UartMode& a, const UartMode& b) {
 inline bool operator!=(const UartMode& a, const UartMode& b) { return !(a == b); }
 
 constexpr bool is_device_command(CommandKind kind) {
-  return kind >= CommandKind::i2c_read && kind <= CommandKind::dac;
+  return kind >= CommandKind::dac && kind <= CommandKind::i2c_poll;
 }
 
 // As parse_command(), check_command() and write_command(), for those.

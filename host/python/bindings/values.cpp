@@ -56,7 +56,7 @@ Direction direction_of(int number) {
 void bind_drive(py::class_<Command>& commands, const char* name, Command (*by_duty)(Channel, Duty),
                 Command (*by_pwm)(Channel, Pwm, Direction)) {
   commands.def_static(
-      name, [by_duty](int channel, double duty) { return by_duty(channel, Duty(duty)); },
+      name, [by_duty](int channel, double duty) { return by_duty(channel, checked_duty(duty)); },
       py::arg("channel"), py::kw_only(), py::arg("duty"));
   commands.def_static(
       name,
@@ -75,7 +75,7 @@ void bind_commands(py::module_& module) {
       .def_static(
           "bldc",
           [](int channel, double duty, bool brake) {
-            return Command::bldc(channel, Duty(duty), brake);
+            return Command::bldc(channel, checked_duty(duty), brake);
           },
           py::arg("channel"), py::kw_only(), py::arg("duty"), py::arg("brake") = false)
       .def_static(
