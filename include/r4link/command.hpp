@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <type_traits>
 
 #include "config.hpp"
 #include "vocabulary.hpp"
@@ -17,9 +18,16 @@ constexpr Text host_heartbeat_word("ROS2-R4");
 // The number of a channel on the board, from 1. A command of a channel that the board lacks is
 // refused.
 struct Channel {
-  constexpr Channel(int channel) : number(channel) {}  // NOLINT(google-explicit-constructor)
-  Channel(bool) = delete;
-  int number;
+  template <class Integer, class = std::enable_if_t<std::is_integral<Integer>::value &&
+                                                    !std::is_same<Integer, bool>::value>>
+  constexpr Channel(Integer channel)  // NOLINT(google-explicit-constructor)
+      : number(in_range(static_cast<long>(channel))) {}
+  std::uint8_t number;  // 0, which no board has, for numbers outside 1-255
+
+ private:
+  static constexpr std::uint8_t in_range(long channel) {
+    return channel > 0 && channel <= 0xFF ? static_cast<std::uint8_t>(channel) : std::uint8_t{0};
+  }
 };
 
 // A number of one unit. A command with a value outside its range is refused.

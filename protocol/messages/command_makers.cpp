@@ -20,7 +20,7 @@ Number number_of(int value) {
 Command of_channel(CommandKind kind, Channel channel, std::int32_t value) {
   Command command = of_kind(kind);
   command.value = value;
-  command.channel = number_of<std::uint8_t>(channel.number);
+  command.channel = channel.number;
   return command;
 }
 

@@ -26,18 +26,18 @@ constexpr std::uint16_t board_port = 2018;
 extern void (*on_step)();
 
 // Interrupts come while one lives.
-class Steps {
+class Stepping {
  public:
-  explicit Steps(void (*handler)(), std::uint32_t first_us = step_us) {
+  explicit Stepping(void (*handler)(), std::uint32_t first_us = step_us) {
     on_step = handler;
     BoardClock::wake_every(step_us, first_us);
     give_way(Irq::timer1);
     disable(Irq::timer1);  // and forget what has come before
     enable(Irq::timer1);
   }
-  ~Steps() { disable(Irq::timer1); }
-  Steps(const Steps&) = delete;
-  Steps& operator=(const Steps&) = delete;
+  ~Stepping() { disable(Irq::timer1); }
+  Stepping(const Stepping&) = delete;
+  Stepping& operator=(const Stepping&) = delete;
 };
 
 inline std::uint32_t us_since(std::uint32_t ticks) {

@@ -28,7 +28,7 @@ struct Longest {
 template <class Trouble>
 void expect_unhindered(Trouble trouble, Longest& longest) {
   Bench& host = new_board();
-  const Steps steps(step_of_board);
+  const Stepping steps(step_of_board);
   host.drive_everything();
   Listener& listener = host.listen();
   trouble(host);
@@ -58,7 +58,7 @@ void expect_unhindered(Trouble trouble, Longest& longest) {
 
 TEST(Devices, AreReadAndToldWithTheirTime) {
   Bench& host = new_board();
-  const Steps steps(step_of_board);
+  const Stepping steps(step_of_board);
   host.heartbeat();
   host.run_ms(2);
   Listener& listener = host.listen();
@@ -107,7 +107,7 @@ TEST(Devices, NoiseOnTheUartsAtFullRateCostsTheBoardNothing) {
 
 TEST(Devices, AReceiverIsHeardAndAVoltageIsZeroBehindAStop) {
   Bench& host = new_board();
-  const Steps steps(step_of_board);
+  const Stepping steps(step_of_board);
   host.heartbeat();
   host.run_ms(2);
   Listener& listener = host.listen();

@@ -23,7 +23,7 @@ struct Heard {
   const State& state() const { return told.state(); }
 
   Bench& host;
-  const Steps steps;
+  const Stepping steps;
   Listener& told;
 };
 

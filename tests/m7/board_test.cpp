@@ -18,7 +18,7 @@ void wait_us(std::uint32_t us) {
 
 TEST(Board, EveryCommandReachesItsPins) {
   Bench& host = new_board();
-  const Steps steps(step_of_board);
+  const Stepping steps(step_of_board);
   host.drive_everything();
   const sim::ChipPins pins = host.pins();
   for (int i = 0; i < 4; ++i) {
@@ -63,7 +63,7 @@ Wheels wheels;
 TEST(Board, AGroupMovesFourWheelsAtOnce) {
   Bench& host = new_board();
   wheels = Wheels();
-  const Steps steps([] {
+  const Stepping steps([] {
     bench->step();
     wheels.look();
   });
@@ -95,7 +95,7 @@ TEST(Board, TheSafeStateInAnInterruptHoldsWhateverTransferItCutsShort) {
     {
       static bool done = false;
       done = false;
-      const Steps steps(
+      const Stepping steps(
           [] {
             if (!done) bench->board().hal().make_safe();
             done = true;
@@ -119,7 +119,7 @@ TEST(Board, TheSafeStateInAnInterruptHoldsWhateverTransferItCutsShort) {
 
 TEST(Board, ALoopThatHangsIsMadeSafeByTheTimerAndStarvesTheWatchdog) {
   Bench& host = new_board();
-  const Steps steps(step_of_board);
+  const Stepping steps(step_of_board);
   host.drive_everything();
   host.heartbeat();
   host.run_ms(2);
@@ -139,7 +139,7 @@ TEST(Board, ALoopThatHangsIsMadeSafeByTheTimerAndStarvesTheWatchdog) {
 
 TEST(Board, SilenceIsNoticedInTheTimerInterruptWhileTheLoopIsElsewhere) {
   Bench& host = new_board();
-  const Steps steps(step_of_board);
+  const Stepping steps(step_of_board);
   host.drive_everything();
   host.heartbeat();
   host.run_ms(2);
@@ -163,7 +163,7 @@ TEST(Board, SilenceIsNoticedInTheTimerInterruptWhileTheLoopIsElsewhere) {
 // E:STOP at each moment of the bus's busiest time: all outputs are being written anew.
 TEST(Board, AStopIsDoneWithinTwoMillisecondsOfItsLastByte) {
   Bench& host = new_board();
-  const Steps steps(step_of_board);
+  const Stepping steps(step_of_board);
   std::uint32_t longest_us = 0;
   for (std::uint32_t at_us = 0; at_us < 6000; at_us += 370) {
     host.execute(Command::clear(host.board().application().safe_report().cause));
