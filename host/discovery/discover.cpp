@@ -58,7 +58,7 @@ std::string searched(const Discovery& all) {
 
 }  // namespace
 
-const FoundBoard& Discovery::only() const {
+FoundBoard Discovery::only() const {
   if (boards.empty()) {
     throw Error(ErrorKind::open, "the only board",
                 fmt::format("no R4 board was found ({})", searched(*this)),

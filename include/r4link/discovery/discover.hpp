@@ -105,7 +105,7 @@ struct Discovery {
   // The only board. A board that is found by several transports, known by its board id, is one
   // board: its first URL. Throws Error: open if there is no board, with what was searched; usage if
   // there are several, with their URLs.
-  R4LINK_API const FoundBoard& only() const;
+  R4LINK_API FoundBoard only() const;
 };
 
 // Searches. Without a board the lists of the result are empty, and a transport that cannot be
