@@ -2,9 +2,9 @@
 # The installed library, in three forms of the same objects:
 #
 #   r4link::r4link   libr4link.a: everything but what R4LINK_API is on is local to it, Asio too, so that it
-#                    meets no Asio of the program's own. What include/r4link offers but async_board.hpp.
+#                    meets no Asio of the program's own. What include/r4link offers but async_*.hpp.
 #   r4link::shared   libr4link.so: the same as a shared library
-#   r4link::asio     libr4link-asio.a: AsyncBoard as well, for programs with Asio; theirs is used
+#   r4link::asio     libr4link-asio.a: AsyncBoard and async_discover() as well, for programs with Asio; theirs is used
 #
 # A program links one of them. find_package(r4link), or pkg-config r4link and r4link-asio.
 include(CMakePackageConfigHelpers)

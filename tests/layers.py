@@ -13,7 +13,7 @@ import pathlib
 import re
 import sys
 
-PUBLIC = {'include/r4link', 'include/r4link/control', 'include/r4link/devices'}
+PUBLIC = {'include/r4link', 'include/r4link/control', 'include/r4link/devices', 'include/r4link/discovery'}
 PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
 CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'transports/share', 'transports/udp',
@@ -21,16 +21,17 @@ CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'trans
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/devices', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/devices', 'firmware/ports/sim/robot'}
-HOST = TRANSPORTS | {'host', 'host/arming', 'host/async', 'host/blocking', 'host/commands', 'host/control', 'host/devices', 'host/link',
-                     'host/measurement', 'host/paths', 'host/recording', 'host/replay', 'host/session', 'host/uart'}
+HOST = TRANSPORTS | {'host', 'host/arming', 'host/async', 'host/blocking', 'host/commands', 'host/control', 'host/devices',
+                     'host/discovery', 'host/link', 'host/measurement', 'host/paths', 'host/recording', 'host/replay', 'host/session', 'host/uart'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = SIMULATED | {'tools/r4/shell'}
 FORMATS = {'tools/r4/formats', 'tools/r4/formats/mcap', 'tools/r4/formats/packets'}
 # room: the rooms it may include besides itself
 ALLOWED = {
-    'include/r4link': {'include/r4link/control', 'include/r4link/devices'},
+    'include/r4link': {'include/r4link/control', 'include/r4link/devices', 'include/r4link/discovery'},
     'include/r4link/control': {'include/r4link'},
     'include/r4link/devices': {'include/r4link'},
+    'include/r4link/discovery': {'include/r4link'},
     'protocol/datagram': PUBLIC,
     'protocol/keys': PUBLIC | {'protocol/datagram'},
     'protocol/messages': PUBLIC | {'protocol/datagram', 'protocol/keys'},
@@ -70,6 +71,7 @@ ALLOWED = {
     'host/commands': TRANSPORTS | {'host/arming', 'host/link', 'host/measurement', 'host/paths'},
     'host/control': PUBLIC,
     'host/devices': HOST,
+    'host/discovery': HOST,
     'host/fleet': HOST,
     'host/link': TRANSPORTS | {'host/measurement', 'host/paths'},
     'host/measurement': TRANSPORTS,
@@ -83,8 +85,8 @@ ALLOWED = {
     'tools/r4/shell': SIMULATED,
     'tools/r4/manual': SHELL,
     'tools/r4/drive': SHELL,
-    'tools/r4/list': SHELL,
-    'tools/r4/doctor': SHELL | {'tools/r4/bus', 'tools/r4/list'},
+    'tools/r4/list': PUBLIC | {'tools/r4/shell'},
+    'tools/r4/doctor': SHELL | {'tools/r4/bus'},
     'tools/r4/bridge': SHELL,
     'tools/r4/bus': SHELL,
     'tools/r4/formats': SHELL | {'tools/r4/bus'},

@@ -40,6 +40,7 @@
 #include "carrier.hpp"
 #include "config.hpp"
 #include "devices/device.hpp"
+#include "discovery/discover.hpp"
 #include "link.hpp"
 #include "options.hpp"
 #include "recording.hpp"
@@ -119,6 +120,9 @@ class R4LINK_API Board {
                  BoardCallbacks callbacks = {});
   explicit Board(const std::vector<CarrierMaker>& makers, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
+  // Opens the only board that discover() finds (discovery/discover.hpp), which takes 1.3 s at most. Throws
+  // Error as Discovery::only() does: open if there is no board, usage with the URLs of several.
+  static Board first(BoardOptions options = {}, const DiscoveryOptions& where = {});
   ~Board();
   Board(const Board&) = delete;
   Board& operator=(const Board&) = delete;

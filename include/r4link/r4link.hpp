@@ -14,6 +14,7 @@
 #include "datagram.hpp"
 #include "devices/description.hpp"
 #include "devices/device.hpp"
+#include "discovery/discover.hpp"
 #include "error.hpp"
 #include "fleet.hpp"
 #include "key.hpp"

@@ -198,7 +198,7 @@ if [[ $headers != "$public" ]]; then
   echo "install: of $public public headers $headers are installed"
   exit 1
 fi
-if grep -rl asio "$prefix"/include/r4link | grep -v '/async_board.hpp$' |
+if grep -rl asio "$prefix"/include/r4link | grep -vE '/async_[a-z]+\.hpp$' |
   xargs -r grep -n '#include.*asio'; then
   echo 'install: a header of the blocking API includes Asio'
   exit 1

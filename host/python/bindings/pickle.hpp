@@ -5,12 +5,14 @@
 
 #include <cstddef>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <vector>
 
 #include "bindings.hpp"
+#include "r4link/discovery/discover.hpp"
 #include "r4link/fleet.hpp"
 
 namespace r4::python {
@@ -62,6 +64,13 @@ class Pickle {
     all.resize(count(all.size()));
     for (Member& each : all) one(each);
   }
+  template <class Member>
+  void one(std::optional<Member>& some) {
+    bool has = some.has_value();
+    one(has);
+    if (has && !some) some.emplace();
+    if (has) one(*some);
+  }
   // Its texts belong to the program that it was made in.
   void one(Command& command) {
     command.text = command.text2 = Text();
@@ -89,6 +98,24 @@ inline void members_of(Pickle& pickle, PathStatus& it) {
 inline void members_of(Pickle& pickle, BoardHealth& it) {
   pickle(it.board, it.url, it.identity, it.link, it.in_control, it.disarmed_by, it.statistics,
          it.paths);
+}
+inline void members_of(Pickle& pickle, Program& it) { pickle(it.pid, it.name); }
+inline void members_of(Pickle& pickle, FoundBoard& it) {
+  pickle(it.url, it.place, it.address, it.node, it.identity, it.busy, it.holder, it.holder_controls,
+         it.foreign_frames);
+}
+inline void members_of(Pickle& pickle, SearchedPort& it) {
+  pickle(it.path, it.url, it.usb_id, it.serial_number, it.description, it.is_r4, it.asked,
+         it.trouble);
+}
+inline void members_of(Pickle& pickle, SearchedBus& it) {
+  pickle(it.interface, it.up, it.fd, it.has_controller, it.state, it.bit_rate, it.trouble);
+}
+inline void members_of(Pickle& pickle, SearchedNetwork& it) {
+  pickle(it.interface, it.address, it.trouble);
+}
+inline void members_of(Pickle& pickle, Discovery& it) {
+  pickle(it.boards, it.ports, it.buses, it.networks, it.more);
 }
 inline void members_of(Pickle& pickle, FleetResult& it) { pickle(it.board, it.result, it.problem); }
 

@@ -7,8 +7,9 @@ if _importlib.find_spec('r4link._core') is None:
                       'build --target r4_python) and put build/python first on PYTHONPATH, or: pip install .')
 
 from . import aio, control, devices  # pylint: disable=wrong-import-position
-from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost,
-                    Setpoints, State, Statistics, Subscription, PathStatus, __version__)
+from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Discovery, Event, FoundBoard, Identity, LinkStatus,
+                    Recording, RefusedPost, SearchedBus, SearchedNetwork, SearchedPort, Setpoints, State, Statistics,
+                    Subscription, PathStatus, discover, __version__)
 from .board import Board, States
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
 from .channels import BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, StepperChannel, Uart
@@ -25,12 +26,14 @@ REVERSE = Direction.REVERSE
 
 __all__ = [
     'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'Bridge', 'BridgeCounters', 'BridgeEnd', 'BridgeStatus',
-    'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'DataError', 'DeniedError', 'Device', 'DeviceReading', 'Direction', 'Drive',
-    'DriveChannel', 'Error', 'Event', 'FIELDS', 'FORWARD', 'Fleet', 'FleetEvent', 'FleetResults', 'I2c', 'I2cAnswer',
+    'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'DataError', 'DeniedError', 'Device', 'DeviceReading', 'Direction',
+    'Discovery', 'Drive',
+    'DriveChannel', 'Error', 'Event', 'FIELDS', 'FORWARD', 'Fleet', 'FleetEvent', 'FleetResults', 'FoundBoard', 'I2c', 'I2cAnswer',
     'I2cBusReport', 'I2cReading', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
     'NotConfirmedError', 'OpenError', 'PostResult', 'Program', 'REVERSE', 'RecordedBoard', 'RecordedDatagram',
-    'RecordedEvent', 'Recording', 'RefusedError', 'RefusedPost', 'RelayChannel', 'ServoChannel', 'Setpoints', 'SimBoard', 'State',
+    'RecordedEvent', 'Recording', 'RefusedError', 'RefusedPost', 'RelayChannel', 'SearchedBus', 'SearchedNetwork',
+    'SearchedPort', 'ServoChannel', 'Setpoints', 'SimBoard', 'State',
     'States', 'Statistics', 'StepperChannel', 'Subscription', 'Uart', 'UartBytes', 'UartData', 'UnsupportedError',
     'UsageError', 'PathStatus', 'aio', 'control', 'devices',
-    'read', 'with_link', '__version__',
+    'discover', 'read', 'with_link', '__version__',
 ]

@@ -7,6 +7,7 @@ from typing import Any, Callable, Sequence, Type, overload
 
 from typing_extensions import Self
 
+from .errors import Program
 from .values import Bldc, Drive, I2cAnswer, I2cBusReport, I2cReading, UartBytes, UartData
 
 __version__: str
@@ -395,6 +396,109 @@ class Device:
     def is_set_up(self, state: State, /) -> bool | None: ...
     def reading(self, state: State, value: str, /) -> tuple[float | None, int, int]: ...
     def readings(self, state: State, /) -> dict[str, tuple[float | None, int, int]]: ...
+
+class FoundBoard(_Record):
+    """A board that discover() has found: include/r4link/discovery/discover.hpp."""
+    @property
+    def url(self) -> str:
+        """Opens it: 'serial:?sn=…', 'can://can0?node=1', 'udp:?id=left-arm'."""
+    @property
+    def place(self) -> str:
+        """Where it was found: `path` of a port, `interface` of a bus or `address` of a network."""
+    @property
+    def address(self) -> str:
+        """UDP: its IPv4 address; else ''."""
+    @property
+    def node(self) -> int:
+        """CAN: its number on the bus, 0 to 31."""
+    @property
+    def identity(self) -> Identity | None:
+        """None: it did not say who it is."""
+    @property
+    def busy(self) -> bool | None:
+        """True if a host controls it; None: that is not known."""
+    @property
+    def holder(self) -> Program | None:
+        """Serial and CAN: the program of this computer that holds the transport. Its name is '' if it did not answer."""
+    @property
+    def holder_controls(self) -> bool:
+        """False: the holder watches."""
+    @property
+    def foreign_frames(self) -> bool:
+        """CAN: another protocol uses the board's command id. So the board was not asked."""
+
+class SearchedPort(_Record):
+    @property
+    def path(self) -> str: ...
+    @property
+    def url(self) -> str: ...
+    @property
+    def usb_id(self) -> str:
+        """'2341:0266'; '': not a USB device."""
+    @property
+    def serial_number(self) -> str: ...
+    @property
+    def description(self) -> str: ...
+    @property
+    def is_r4(self) -> bool:
+        """It has the USB id of a board."""
+    @property
+    def asked(self) -> bool:
+        """The port was asked, or a program of this computer holds it."""
+    @property
+    def trouble(self) -> str | None:
+        """Why the port could not be asked."""
+
+class SearchedBus(_Record):
+    @property
+    def interface(self) -> str: ...
+    @property
+    def up(self) -> bool: ...
+    @property
+    def fd(self) -> bool: ...
+    @property
+    def has_controller(self) -> bool: ...
+    @property
+    def state(self) -> str:
+        """Of the controller: 'error-active' …; '': not known."""
+    @property
+    def bit_rate(self) -> int:
+        """In bit/s; 0: not known."""
+    @property
+    def trouble(self) -> str | None:
+        """Why nothing could be heard."""
+
+class SearchedNetwork(_Record):
+    @property
+    def interface(self) -> str: ...
+    @property
+    def address(self) -> str:
+        """The IPv4 address of this computer in that network."""
+    @property
+    def trouble(self) -> str | None:
+        """Why the question could not be sent."""
+
+class Discovery:
+    """What discover() has found, and where it has searched."""
+    @property
+    def boards(self) -> list[FoundBoard]: ...
+    @property
+    def ports(self) -> list[SearchedPort]: ...
+    @property
+    def buses(self) -> list[SearchedBus]: ...
+    @property
+    def networks(self) -> list[SearchedNetwork]: ...
+    @property
+    def more(self) -> bool:
+        """More than 64 boards have answered by UDP."""
+    def only(self) -> FoundBoard:
+        """The only board; one that several transports reach is one board. Raises OpenError if there is no board, with
+        what was searched, and UsageError with the URLs of several."""
+
+def discover(*, serial: bool = True, can: bool = True, udp: bool = True, serial_ports: Sequence[str] = (),
+             udp_port: int = 2018) -> Discovery:
+    """The boards that this computer reaches, as `r4 list` shows them. Blocks for 0.5 to 1.3 s. `serial_ports`: ports to
+    ask whatever their USB id is, by path."""
 
 def shipped_devices() -> list[str]: ...
 def load_device(text: str, first_slot: int, /) -> Device: ...

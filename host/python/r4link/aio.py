@@ -21,9 +21,9 @@ from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Callable, Coroutine, Iterable, Type, TypeVar
 
-from . import board as blocking, channels
-from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, Setpoints, State,
-                    Statistics, Subscription, PathStatus)
+from . import _core, board as blocking, channels
+from ._core import (CarrierCounters, Command, Discovery, Event, Identity, LinkStatus, Recording, RefusedPost, Setpoints,
+                    State, Statistics, Subscription, PathStatus)
 from .devices import Device
 from .errors import ClosedError
 from .values import PostResult, UartData
@@ -202,6 +202,11 @@ class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
         self._stops = _Lane(interrupt)
         self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of loops over states and bytes
 
+    @classmethod
+    async def first(cls, **options: Any) -> Self:
+        """As r4link.Board.first(): `async with await aio.Board.first() as board: …`."""
+        return cls((await discover()).only().url, **options)
+
     async def close(self) -> None:
         """Says farewell; calls that wait raise ClosedError, loops over states and bytes end."""
         await asyncio.get_running_loop().run_in_executor(None, self._board.close)
@@ -341,6 +346,11 @@ class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
 
     def feed(self) -> None:
         self._board.feed()
+
+
+async def discover(**options: Any) -> Discovery:
+    """As r4link.discover(), with the same options. A task that is cancelled does not end the search, 1.3 s at most."""
+    return await asyncio.get_running_loop().run_in_executor(None, lambda: _core.discover(**options))
 
 
 def _on_loop(callback: Callable[..., object]) -> Callable[..., None]:

@@ -105,6 +105,12 @@ class Board(BoardCommands[None]):
             identify_interval=_ms(identify_interval), callback_limit=_ms(callback_limit))
         _open.add(self._core)
 
+    @classmethod
+    def first(cls, **options: Any) -> Self:
+        """Opens the only board that r4link.discover() finds, which takes 1.3 s at most. Raises OpenError if there is no
+        board, with what was searched, and UsageError with the URLs of several."""
+        return cls(_core.discover().only().url, **options)
+
     def close(self) -> None:
         """Says farewell and closes the transport: the board goes safe at once. Calls that wait in other threads
         raise ClosedError. Idempotent; a callback may call it."""

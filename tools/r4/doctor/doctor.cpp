@@ -13,12 +13,12 @@
 #include <utility>
 #include <vector>
 
-#include "../list/held_transport.hpp"
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
 #include "can_checks.hpp"
 #include "finding.hpp"
+#include "host/discovery/held_transport.hpp"
 #include "link_check.hpp"
 #include "machine.hpp"
 #include "serial_checks.hpp"
@@ -54,14 +54,14 @@ std::string device_of(const std::string& path) {
 // Who has it open, and lets the other programs of its user share it.
 pid_t sharing(const std::string& path) {
   asio::io_context io(1);
-  ListedBoard board;
+  FoundBoard board;
   HeldTransport held(io, board, [] {});
   try {
     held.join(serial_share_name(Url::parse("serial://" + path)));
   } catch (const Error&) {
     return 0;  // no such port, which the check of its permission tells
   }
-  return board.pid;
+  return board.holder ? board.holder->pid : 0;
 }
 
 std::vector<std::string> ports_of(const Machine& machine, const Url& url) {

@@ -1,61 +1,195 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 list: the serial ports, CAN interfaces and networks of this machine, the boards on them, and the URLs
-// that r4 knows.
+// r4 list: prints what r4::discover() finds, and the URLs that r4 knows.
 #include <fmt/format.h>
 
 #include <cstdint>
-#include <future>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../shell/help.hpp"
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "host/standard_registry.hpp"
-#include "list_can.hpp"
-#include "list_serial.hpp"
-#include "list_udp.hpp"
-#include "transports/registry.hpp"
+#include "r4link/discovery/discover.hpp"
 
 namespace r4::tool {
 namespace {
 
 struct Options {
   bool json = false;
-  std::uint64_t port = BoardSearch().port;
+  std::uint64_t port = DiscoveryOptions().udp_port;
   std::vector<std::string> serial;
 };
 
-void print_schemes() {
-  for (const Registry::Entry& entry : standard_registry().entries()) {
-    print_line({{"type", "scheme"},
-                {"scheme", entry.scheme},
-                {"usage", entry.usage},
-                {"meaning", entry.meaning}});
+std::vector<FoundBoard> boards_at(const Discovery& all, const std::string& place) {
+  std::vector<FoundBoard> boards;
+  for (const FoundBoard& board : all.boards) {
+    if (board.place == place) boards.push_back(board);
+  }
+  return boards;
+}
+
+// --- as text
+
+std::string text_of(const FoundBoard& board) {
+  std::string text = "it does not tell who it is";
+  if (board.identity) {
+    text = fmt::format("id {}{}, firmware {}", board.identity->board_id,
+                       board.identity->name.empty() ? "" : ", name " + board.identity->name,
+                       board.identity->firmware);
+  }
+  if (board.busy && !board.holder_controls) {
+    text += *board.busy ? ", controlled by a host" : ", free";
+  }
+  if (board.foreign_frames) text += ", frames that are not R4's come on its command id";
+  if (const std::optional<Program>& holder = board.holder) {
+    text +=
+        holder->name.empty()
+            ? fmt::format(", held by a program (pid {}) that does not answer", holder->pid)
+            : fmt::format(", {} by {} (pid {})", board.holder_controls ? "controlled" : "watched",
+                          holder->name, holder->pid);
+  }
+  return printable(text);
+}
+
+void print_board(const FoundBoard& board) {
+  fmt::print("    R4 board: {}  {}{}\n", printable(board.url),
+             board.address.empty() ? "" : fmt::format("at {}, ", board.address), text_of(board));
+}
+
+void print_trouble_of(const std::optional<Problem>& trouble) {
+  if (!trouble) return;
+  fmt::print("    {}{}{}\n", printable(trouble->reason), trouble->fix.empty() ? "" : "; ",
+             printable(trouble->fix));
+}
+
+void print_ports(const Discovery& all) {
+  fmt::print("Serial ports:\n");
+  if (all.ports.empty()) fmt::print("  none\n");
+  for (const SearchedPort& port : all.ports) {
+    fmt::print("  {:<14} {:<10} {:<24} {}\n", printable(port.path), port.usb_id,
+               printable(port.serial_number), printable(port.description));
+    const std::vector<FoundBoard> boards = boards_at(all, port.path);
+    for (const FoundBoard& board : boards) print_board(board);
+    if (port.asked && boards.empty()) {
+      fmt::print("    no R4 board has answered: {}\n", printable(port.url));
+    }
+    print_trouble_of(port.trouble);
   }
 }
 
-// All at once: each waits for answers.
+void print_buses(const Discovery& all) {
+  fmt::print("\nCAN interfaces:\n");
+  if (all.buses.empty()) fmt::print("  none\n");
+  for (const SearchedBus& bus : all.buses) {
+    const std::vector<FoundBoard> boards = boards_at(all, bus.interface);
+    const std::string rate = bus.bit_rate == 0 ? (bus.has_controller ? "no bit rate" : "virtual")
+                                               : fmt::format("{} kbit/s", bus.bit_rate / 1000.0);
+    fmt::print("  {:<14} {:<5}{:<14} {:<14}{}{}\n", printable(bus.interface),
+               bus.up ? "up" : "down", bus.state, rate, bus.fd ? "CAN FD  " : "",
+               boards.empty() && !bus.trouble ? "no board heard" : "");
+    for (const FoundBoard& board : boards) print_board(board);
+    print_trouble_of(bus.trouble);
+  }
+}
+
+void print_networks(const Discovery& all) {
+  fmt::print("\nNetworks (UDP):\n");
+  if (all.networks.empty()) fmt::print("  none\n");
+  for (const SearchedNetwork& network : all.networks) {
+    const std::vector<FoundBoard> boards = boards_at(all, network.address);
+    fmt::print("  {:<14} {:<19}{}\n", printable(network.interface), network.address,
+               boards.empty() && !network.trouble ? "no board answered" : "");
+    for (const FoundBoard& board : boards) print_board(board);
+    print_trouble_of(network.trouble);
+  }
+  if (all.more) fmt::print("  more than {} answered\n", Discovery::most_answers);
+}
+
+// --- as JSON
+
+void describe(const FoundBoard& board, Json& object) {
+  if (board.identity) {
+    object.update({{"board_id", board.identity->board_id},
+                   {"name", board.identity->name},
+                   {"firmware", board.identity->firmware},
+                   {"capabilities", board.identity->capabilities}});
+  }
+  if (board.busy) object["busy"] = *board.busy;
+  if (board.foreign_frames) object["foreign_frames"] = true;
+  if (!board.holder) return;
+  object["held_by"] = {{"program", board.holder->name},
+                       {"pid", board.holder->pid},
+                       {"controls", board.holder_controls}};
+}
+
+void print_json(const Discovery& all) {
+  for (const SearchedPort& port : all.ports) {
+    Json object{{"type", "port"},
+                {"path", port.path},
+                {"usb", port.usb_id},
+                {"serial_number", port.serial_number},
+                {"description", port.description},
+                {"r4", port.is_r4},
+                {"url", port.url}};
+    for (const FoundBoard& board : boards_at(all, port.path)) describe(board, object);
+    if (port.trouble) {
+      object.update({{"reason", port.trouble->reason}, {"fix", port.trouble->fix}});
+    }
+    print_line(object);
+  }
+  for (const SearchedBus& bus : all.buses) {
+    Json boards = Json::array();
+    for (const FoundBoard& board : boards_at(all, bus.interface)) {
+      Json object{{"node", board.node}, {"url", board.url}};
+      describe(board, object);
+      boards.push_back(std::move(object));
+    }
+    const Problem trouble = bus.trouble.value_or(Problem());
+    print_line({{"type", "can"},
+                {"interface", bus.interface},
+                {"up", bus.up},
+                {"state", bus.state},
+                {"bitrate", bus.bit_rate},
+                {"fd", bus.fd},
+                {"boards", std::move(boards)},
+                {"reason", trouble.reason},
+                {"fix", trouble.fix}});
+  }
+  for (const SearchedNetwork& network : all.networks) {
+    Json boards = Json::array();
+    for (const FoundBoard& board : boards_at(all, network.address)) {
+      Json object{{"address", board.address}};
+      describe(board, object);
+      object["url"] = board.url;
+      boards.push_back(std::move(object));
+    }
+    const Problem trouble = network.trouble.value_or(Problem());
+    print_line({{"type", "udp"},
+                {"interface", network.interface},
+                {"address", network.address},
+                {"boards", std::move(boards)},
+                {"reason", trouble.reason},
+                {"fix", trouble.fix}});
+  }
+}
+
 int list(const Options& options) {
-  BoardSearch search;
-  search.port = static_cast<std::uint16_t>(options.port);
-  auto answers = std::async(std::launch::async, [&search] { return search.run(); });
-  auto asked = std::async(std::launch::async, [&options] { return list_ports(options.serial); });
-  const std::vector<ListedBus> buses = list_buses();
-  const std::vector<ListedPort> ports = asked.get();
-  const BoardSearch::Result found = answers.get();
+  DiscoveryOptions where;
+  where.serial_ports = options.serial;
+  where.udp_port = static_cast<std::uint16_t>(options.port);
+  const Discovery found = discover(where);
   if (options.json) {
-    print_json(ports);
-    print_json(buses);
-    print_json(found, search.port);
-    print_schemes();
+    print_json(found);
+    print_url_schemes();
     return 0;
   }
-  print_text(ports);
-  print_text(buses);
-  print_text(found, search.port);
+  print_ports(found);
+  print_buses(found);
+  print_networks(found);
   fmt::print("\nURLs:\n{}", url_table());
   return 0;
 }

@@ -12,6 +12,7 @@
 
 #include "host/commands/command_help.hpp"
 #include "host/standard_registry.hpp"
+#include "json.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::tool {
@@ -59,6 +60,15 @@ std::string url_table() {
     table += fmt::format("  {}\n      {}\n", entry.usage, entry.meaning);
   }
   return table;
+}
+
+void print_url_schemes() {
+  for (const Registry::Entry& entry : standard_registry().entries()) {
+    print_line({{"type", "scheme"},
+                {"scheme", entry.scheme},
+                {"usage", entry.usage},
+                {"meaning", entry.meaning}});
+  }
 }
 
 std::string command_table() {

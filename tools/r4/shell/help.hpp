@@ -13,6 +13,8 @@ std::string root_footer();
 
 // The URLs that `r4` takes, one a line, from the registry of transports.
 std::string url_table();
+// Prints the same as JSON, {"type":"scheme"…} each.
+void print_url_schemes();
 
 // The board's commands with their ranges, one a line.
 std::string command_table();

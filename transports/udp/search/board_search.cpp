@@ -129,7 +129,7 @@ class Round {
       std::optional<IdentityAnswer> answer =
           read_identity_answer(Text(buffer_.data(), static_cast<std::size_t>(size)));
       if (!answer) continue;
-      FoundBoard board{std::move(*answer), {}, {}};
+      AnsweredBoard board{std::move(*answer), {}, {}};
       board.address = address_v4(ntohl(from.sin_addr.s_addr));
       board.heard_at = result_.networks[which].from;
       keep(std::move(board));
@@ -137,13 +137,13 @@ class Round {
   }
 
   // Keeps each address once, with its first answer.
-  void keep(FoundBoard board) {
+  void keep(AnsweredBoard board) {
     if (!called_.empty() && board.board_id != called_ && board.name != called_) {
       others_.insert(board.board_id);
       if (others_.size() > BoardSearch::most_boards) others_.erase(others_.begin());
       return;
     }
-    for (const FoundBoard& known : result_.boards) {
+    for (const AnsweredBoard& known : result_.boards) {
       if (known.address == board.address) return;
     }
     if (result_.boards.size() == BoardSearch::most_boards) {
@@ -160,10 +160,10 @@ class Round {
 
   // A simulated board that listens on all addresses of this computer answers from each address.
   void merge_own() {
-    std::vector<FoundBoard>& boards = result_.boards;
+    std::vector<AnsweredBoard>& boards = result_.boards;
     for (std::size_t i = 0; i < boards.size(); ++i) {
       if (!is_own(boards[i].address)) continue;
-      const auto same = [&](const FoundBoard& other) {
+      const auto same = [&](const AnsweredBoard& other) {
         return other.board_id == boards[i].board_id && is_own(other.address);
       };
       const auto after = boards.begin() + static_cast<std::ptrdiff_t>(i) + 1;
@@ -208,7 +208,7 @@ Problem nothing_found(const BoardSearch::Result& result, const WantedBoard& want
       "udp://192.168.1.77"};
 }
 
-Problem several_found(const std::vector<FoundBoard>& boards, const WantedBoard& wanted,
+Problem several_found(const std::vector<AnsweredBoard>& boards, const WantedBoard& wanted,
                       const BoardSearch::Result& result, std::uint16_t port) {
   std::string list;
   for (std::size_t i = 0; i < boards.size() && i < most_listed; ++i) {
@@ -255,21 +255,22 @@ BoardSearch::Result BoardSearch::run(std::string_view called) const {
   return Round(*this, called).run();
 }
 
-std::vector<FoundBoard> called(const std::vector<FoundBoard>& boards, std::string_view id_or_name) {
-  std::vector<FoundBoard> by_id;
-  std::vector<FoundBoard> by_name;
-  for (const FoundBoard& board : boards) {
+std::vector<AnsweredBoard> called(const std::vector<AnsweredBoard>& boards,
+                                  std::string_view id_or_name) {
+  std::vector<AnsweredBoard> by_id;
+  std::vector<AnsweredBoard> by_name;
+  for (const AnsweredBoard& board : boards) {
     if (board.board_id == id_or_name) by_id.push_back(board);
     if (board.name == id_or_name) by_name.push_back(board);
   }
   return by_id.empty() ? by_name : by_id;
 }
 
-std::string url_of(const FoundBoard& board, const std::vector<FoundBoard>& boards,
+std::string url_of(const AnsweredBoard& board, const std::vector<AnsweredBoard>& boards,
                    std::uint16_t port) {
   for (const std::string& text : {board.name, board.board_id}) {
     if (text.empty()) continue;
-    const std::vector<FoundBoard> meant = called(boards, text);
+    const std::vector<AnsweredBoard> meant = called(boards, text);
     if (meant.size() != 1 || meant.front().address != board.address) continue;
     const std::string url = "udp:?id=" + percent_encoded(text);
     return port == BoardSearch().port ? url : fmt::format("{}&port={}", url, port);
@@ -281,13 +282,14 @@ std::string url_of(const FoundBoard& board, const std::vector<FoundBoard>& board
 FoundHost find_board(const BoardSearch& search, const WantedBoard& wanted) {
   const BoardSearch::Result result =
       search.run(wanted.called.empty() ? wanted.board_id : wanted.called);
-  std::vector<FoundBoard> meant = result.boards;
+  std::vector<AnsweredBoard> meant = result.boards;
   if (!wanted.called.empty()) meant = called(result.boards, wanted.called);
   if (!wanted.board_id.empty()) {
     // Of several boards of that name, take the one that was found before. If the URL wants the only
     // board there is, another board does not replace it.
-    std::vector<FoundBoard> same = meant;
-    std::erase_if(same, [&](const FoundBoard& each) { return each.board_id != wanted.board_id; });
+    std::vector<AnsweredBoard> same = meant;
+    std::erase_if(same,
+                  [&](const AnsweredBoard& each) { return each.board_id != wanted.board_id; });
     if (!same.empty() || wanted.called.empty()) meant = std::move(same);
   }
   FoundHost found;
@@ -296,7 +298,7 @@ FoundHost find_board(const BoardSearch& search, const WantedBoard& wanted) {
   } else if (meant.size() > 1) {
     found.problem = several_found(meant, wanted, result, search.port);
   }
-  for (const FoundBoard& board : meant) found.addresses.emplace_back(board.address);
+  for (const AnsweredBoard& board : meant) found.addresses.emplace_back(board.address);
   if (!meant.empty()) found.board_id = meant.front().board_id;
   return found;
 }

@@ -25,11 +25,12 @@
 
 #include "../../identity_answer.hpp"
 #include "host_lookup.hpp"
+#include "r4link/discovery/discover.hpp"
 
 namespace r4 {
 
 // A board that has answered.
-struct FoundBoard : IdentityAnswer {
+struct AnsweredBoard : IdentityAnswer {
   asio::ip::address_v4 address;
   asio::ip::address_v4 heard_at;  // the address of this computer in its network
 };
@@ -48,7 +49,7 @@ struct BoardSearch {
 
   struct Result {
     std::vector<Network> networks;  // where the question was sent
-    std::vector<FoundBoard> boards;
+    std::vector<AnsweredBoard> boards;
     std::size_t others = 0;  // boards of another id and name
     bool more = false;       // more boards have answered than are kept
   };
@@ -56,10 +57,10 @@ struct BoardSearch {
   // board id or name, however many others answer; empty: all boards.
   Result run(std::string_view called = {}) const;
 
-  static constexpr std::size_t most_boards = 64;
+  static constexpr std::size_t most_boards = Discovery::most_answers;
 
   std::function<std::vector<Network>()> networks = networks_of_this_computer;
-  std::uint16_t port = 2018;  // at which boards listen
+  std::uint16_t port = DiscoveryOptions().udp_port;  // at which boards listen
   int questions = 3;
   std::chrono::milliseconds between{120};
   std::chrono::milliseconds patience{500};
@@ -71,11 +72,12 @@ struct WantedBoard {
 };
 
 // The boards with that id; if there is none, the boards with that name.
-std::vector<FoundBoard> called(const std::vector<FoundBoard>& boards, std::string_view id_or_name);
+std::vector<AnsweredBoard> called(const std::vector<AnsweredBoard>& boards,
+                                  std::string_view id_or_name);
 
 // The URL that finds one of `boards` again: by name, by id, or by address if another board has the
 // same name and id. `port`: of the search.
-std::string url_of(const FoundBoard& board, const std::vector<FoundBoard>& boards,
+std::string url_of(const AnsweredBoard& board, const std::vector<AnsweredBoard>& boards,
                    std::uint16_t port);
 
 // Searches. Returns the addresses of the board, or the reason why no answer can be taken for it.

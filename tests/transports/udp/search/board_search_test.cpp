@@ -20,13 +20,14 @@ using Clock = std::chrono::steady_clock;
 
 std::vector<std::string> ids(const BoardSearch::Result& found) {
   std::vector<std::string> ids;
-  for (const FoundBoard& board : found.boards) ids.push_back(board.board_id);
+  for (const AnsweredBoard& board : found.boards) ids.push_back(board.board_id);
   std::sort(ids.begin(), ids.end());
   return ids;
 }
 
-FoundBoard board(const std::string& address, const std::string& id, const std::string& name = "") {
-  FoundBoard board;
+AnsweredBoard board(const std::string& address, const std::string& id,
+                    const std::string& name = "") {
+  AnsweredBoard board;
   board.address = asio::ip::make_address_v4(address);
   board.board_id = id;
   board.name = name;
@@ -41,7 +42,7 @@ TEST(BoardSearch, ReportsTheAnswerAndTheAddressOfEachBoard) {
   const BoardSearch::Result found = boards.search().run();
   ASSERT_EQ(ids(found), (std::vector<std::string>{"old", "one", "two"}));
   EXPECT_FALSE(found.more);
-  for (const FoundBoard& each : found.boards) {
+  for (const AnsweredBoard& each : found.boards) {
     EXPECT_EQ(each.firmware, "0.1.0");
     EXPECT_EQ(each.capabilities, "udp");
     EXPECT_EQ(each.heard_at.to_string(), "127.0.0.1");
@@ -233,14 +234,15 @@ TEST(FindBoard, TheOnlyOneIsNotReplacedByAnotherButABoardOfThatNameIs) {
 }
 
 TEST(FindBoard, PrefersAnIdToTheSameTextAsAName) {
-  const std::vector<FoundBoard> boards = {board("10.0.0.1", "a", "b"), board("10.0.0.2", "b", "c")};
-  const std::vector<FoundBoard> meant = called(boards, "b");
+  const std::vector<AnsweredBoard> boards = {board("10.0.0.1", "a", "b"),
+                                             board("10.0.0.2", "b", "c")};
+  const std::vector<AnsweredBoard> meant = called(boards, "b");
   ASSERT_EQ(meant.size(), 1U);
   EXPECT_EQ(meant[0].address.to_string(), "10.0.0.2");
 }
 
 TEST(FindBoard, GivesEachBoardTheUrlThatFindsItAgain) {
-  const std::vector<FoundBoard> boards = {
+  const std::vector<AnsweredBoard> boards = {
       board("10.0.0.1", "a", "left"), board("10.0.0.2", "b", "same"),
       board("10.0.0.3", "c", "same"), board("10.0.0.4", "d&?=%"),
       board("10.0.0.5", "twin"),      board("10.0.0.6", "twin"),
