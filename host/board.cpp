@@ -6,6 +6,7 @@
 #include "board_impl.hpp"
 #include "commands/command_help.hpp"
 #include "commands/limits.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "standard_registry.hpp"
 
 namespace r4 {
@@ -87,12 +88,13 @@ void Board::send(const Command& command, Duration timeout) {
 }
 void Board::send(std::string_view command, Duration timeout) {
   if (is_group_text(command)) return apply(parse_group_text(command), timeout);
-  send(parse_command_text(command), timeout);
+  const OwnCommand one = parse_command_text(command);
+  send(one.get(), timeout);
 }
 PostResult Board::post(const Command& command) { return impl_->post(command); }
 void Board::apply(const Setpoints& setpoints, Duration timeout) {
   require_any(setpoints);
-  const std::string text = text_of(setpoints);
+  const std::string text = to_text(setpoints);
   require_timeout(text, timeout);
   const auto impl = impl_;
   impl->require_control(text);

@@ -9,6 +9,7 @@
 #include "commands/limits.hpp"
 #include "devices/device_steps.hpp"
 #include "r4link/board.hpp"
+#include "r4link/commands/command_text.hpp"
 
 namespace r4 {
 

@@ -8,6 +8,7 @@
 #include "../transports/file_descriptor.hpp"
 #include "commands/command_help.hpp"
 #include "commands/limits.hpp"
+#include "r4link/commands/command_text.hpp"
 
 namespace r4 {
 

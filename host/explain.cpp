@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "commands/command_help.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/link.hpp"
 #include "session/session.hpp"
 

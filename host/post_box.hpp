@@ -14,8 +14,8 @@
 #include <variant>
 #include <vector>
 
-#include "blocking/own_command.hpp"
 #include "r4link/command.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/setpoints.hpp"
 
 namespace r4 {

@@ -13,7 +13,8 @@ import pathlib
 import re
 import sys
 
-PUBLIC = {'include/r4link', 'include/r4link/control', 'include/r4link/devices', 'include/r4link/discovery'}
+PUBLIC = {'include/r4link', 'include/r4link/commands', 'include/r4link/control', 'include/r4link/devices',
+          'include/r4link/discovery'}
 PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
 CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'transports/share', 'transports/udp',
@@ -28,7 +29,8 @@ SHELL = SIMULATED | {'tools/r4/shell'}
 FORMATS = {'tools/r4/formats', 'tools/r4/formats/mcap', 'tools/r4/formats/packets'}
 # room: the rooms it may include besides itself
 ALLOWED = {
-    'include/r4link': {'include/r4link/control', 'include/r4link/devices', 'include/r4link/discovery'},
+    'include/r4link': PUBLIC,
+    'include/r4link/commands': {'include/r4link'},
     'include/r4link/control': {'include/r4link'},
     'include/r4link/devices': {'include/r4link'},
     'include/r4link/discovery': {'include/r4link'},

@@ -5,9 +5,8 @@
 #include <exception>
 #include <utility>
 
-#include "../commands/command_help.hpp"
-#include "own_command.hpp"
 #include "r4link/board.hpp"
+#include "r4link/commands/command_text.hpp"
 
 namespace r4 {
 

@@ -8,6 +8,7 @@
 
 #include "../../protocol/messages/command_field.hpp"
 #include "../../transports/url_pattern.hpp"
+#include "r4link/commands/command_text.hpp"
 
 namespace r4 {
 
@@ -99,32 +100,6 @@ const CommandHelp* command_help(char letter) {
   return found == table.end() ? nullptr : &*found;
 }
 
-std::string text_of(const Command& command) {
-  std::array<char, max_datagram> buffer;
-  DatagramWriter writer(buffer.data(), buffer.size());
-  write_command(writer, command);
-  const std::string_view field(buffer.data(), writer.ok() ? writer.size() : 0);
-  return std::string(field.substr(0, field.find_last_of(';')));
-}
-
-std::string text_of(const Setpoints& group) {
-  std::string text;
-  for (std::size_t i = 0; i < group.size(); ++i) {
-    if (i != 0) text += ';';
-    text += text_of(group[i]);
-  }
-  return text;
-}
-
-std::string shown(std::string_view text) {
-  const Text secret = secret_in(text);
-  if (secret.empty()) return printable(text);
-  const auto before = static_cast<std::size_t>(secret.begin() - text.data());
-  return printable(text.substr(0, before)) + "...";
-}
-
-std::string shown(const Command& command) { return shown(text_of(command)); }
-
 std::string_view meaning_of(Refusal refusal) {
   switch (refusal) {
     case Refusal::none:
@@ -188,7 +163,7 @@ Problem failed_transfer(std::string_view command, I2cOutcome outcome) {
 
 void require_valid(const Command& command) {
   if (const Refusal refusal = check_command(command); refusal != Refusal::none) {
-    throw Error(bad_command(text_of(command), refusal));
+    throw Error(bad_command(to_text(command), refusal));
   }
   if (command.kind == CommandKind::leave) {
     throw Error(ErrorKind::usage, "E:LEAVE",
@@ -225,45 +200,6 @@ void require_cable(std::string_view url, std::string_view secret) {
 void require_cable(std::string_view url, const Command& command) {
   if (command.kind == CommandKind::setting && is_secret_setting(command.text)) {
     require_cable(url, shown(command));
-  }
-}
-
-Command parse_command_text(std::string_view text) {
-  const std::string_view trimmed = text.substr(0, text.size() - (text.ends_with(';') ? 1 : 0));
-  const auto colon = trimmed.find(':');
-  if (colon == std::string_view::npos) throw Error(bad_command(trimmed, Refusal::format));
-  const Field field(Text(trimmed.substr(0, colon)), Text(trimmed.substr(colon + 1)));
-  Command command;
-  Refusal refusal = parse_command(field, command);
-  if (refusal == Refusal::none && command.kind == CommandKind::fields) {
-    FieldSet set;
-    refusal = parse_fields(command.text, set);
-  }
-  if (refusal == Refusal::none && command.kind == CommandKind::setting) {
-    Settings settings;  // the board's settings are unknown, so these leave each key its whole range
-    settings.heartbeat_ms = 50;
-    settings.timeout_ms = 10000;
-    refusal = set(settings, command.text, command.text2);
-  }
-  if (refusal != Refusal::none) throw Error(bad_command(trimmed, refusal));
-  // A text may hold bytes that the grammar forbids. Such a command cannot be written.
-  if (text_of(command).empty()) throw Error(bad_command(trimmed, Refusal::format));
-  return command;
-}
-
-bool is_group_text(std::string_view text) {
-  return text.substr(0, text.size() - (text.ends_with(';') ? 1 : 0)).find(';') !=
-         std::string_view::npos;
-}
-
-Setpoints parse_group_text(std::string_view text) {
-  if (text.ends_with(';')) text.remove_suffix(1);
-  Setpoints group;
-  for (;;) {
-    const std::size_t end = text.find(';');
-    group.add(parse_command_text(text.substr(0, end)));
-    if (end == std::string_view::npos) return group;
-    text.remove_prefix(end + 1);
   }
 }
 

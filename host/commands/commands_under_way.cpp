@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "../../protocol/messages/command_field.hpp"
-#include "command_help.hpp"
+#include "../../protocol/messages/site_settings.hpp"
 
 namespace r4 {
 

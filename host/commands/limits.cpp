@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <string>
 
-#include "../commands/command_help.hpp"
 #include "../commands/link_timing.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
 #include "r4link/options.hpp"
 
@@ -55,7 +55,7 @@ void require_control(BoardRole role, const Command& command) {
 }
 
 void require_control(BoardRole role, const Setpoints& group) {
-  if (role != BoardRole::control) require_control(role, text_of(group));
+  if (role != BoardRole::control) require_control(role, to_text(group));
 }
 
 void require_timeout(std::string_view what, std::chrono::milliseconds timeout) {

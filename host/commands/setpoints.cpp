@@ -5,6 +5,7 @@
 
 #include "../../protocol/messages/command_group.hpp"
 #include "command_help.hpp"
+#include "r4link/commands/command_text.hpp"
 
 namespace r4 {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "../../protocol/messages/command_field.hpp"
-#include "../commands/command_help.hpp"
+#include "r4link/commands/command_text.hpp"
 
 namespace r4 {
 

@@ -7,6 +7,7 @@
 #include "../commands/command_help.hpp"
 #include "../commands/limits.hpp"
 #include "fleet_impl.hpp"
+#include "r4link/commands/command_text.hpp"
 
 namespace r4 {
 
@@ -123,7 +124,10 @@ FleetResults Fleet::send(const Command& command, Duration timeout) {
   return send(impl_->all_boards, command, timeout);
 }
 FleetResults Fleet::send(const Boards& boards, std::string_view command, Duration timeout) {
-  if (!is_group_text(command)) return send(boards, parse_command_text(command), timeout);
+  if (!is_group_text(command)) {
+    const OwnCommand one = parse_command_text(command);
+    return send(boards, one.get(), timeout);
+  }
   std::vector<BoardSetpoints> setpoints;
   setpoints.reserve(boards.size());
   const Setpoints group = parse_group_text(command);

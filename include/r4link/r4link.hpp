@@ -5,6 +5,7 @@
 #include "board.hpp"
 #include "carrier.hpp"
 #include "command.hpp"
+#include "commands/command_text.hpp"
 #include "config.hpp"
 #include "control/kinematics.hpp"
 #include "control/loop.hpp"

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "host/commands/command_help.hpp"
 #include "input.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
 #include "tools/r4/ros2/command_text.hpp"
 #include "tools/r4/ros2/setpoint_units.hpp"
@@ -27,8 +27,9 @@ void is_sendable(const Command& command) {
                                  CommandKind::setting, CommandKind::fields}) {
     require(command.kind != kind);
   }
-  const std::string text = r4::text_of(command);
-  require(r4::text_of(parse_command_text(text)) == text);
+  const std::string text = to_text(command);
+  const OwnCommand again = parse_command_text(text);
+  require(to_text(again.get()) == text);
 }
 
 void read_string(std::string_view bytes) {
@@ -38,7 +39,8 @@ void read_string(std::string_view bytes) {
   const bool stops = asks_to_stop(*text);
   try {
     bool stop = false;
-    for (const Command& command : commands_of(*text)) {
+    for (const OwnCommand& own : commands_of(*text)) {
+      const Command command = own.get();
       is_sendable(command);
       stop = stop || command.kind == CommandKind::stop;
     }

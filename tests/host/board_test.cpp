@@ -11,7 +11,6 @@
 #include <thread>
 #include <vector>
 
-#include "host/commands/command_help.hpp"
 #include "r4link/error.hpp"
 #include "tests/bench/allocations.hpp"
 #include "tests/support/at_will.hpp"

@@ -7,7 +7,7 @@
 #include <asio/post.hpp>
 #include <future>
 
-#include "host/commands/command_help.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::test {
@@ -19,7 +19,7 @@ BoardInAThread::BoardInAThread(const std::vector<std::string>& transports,
   options.script = sim::Script::parse(script, "script");
   options.events.on_executed = [this](std::uint32_t, std::uint32_t, const Command& command) {
     const std::lock_guard lock(mutex_);
-    executed_.push_back(text_of(command));
+    executed_.push_back(to_text(command));
   };
   options.events.on_state = [this](std::uint32_t, firmware::BoardState state, SafeReason reason) {
     {

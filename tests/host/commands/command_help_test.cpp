@@ -5,39 +5,12 @@
 
 #include <string>
 
+#include "r4link/commands/command_text.hpp"
 #include "r4link/key.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
 namespace {
-
-TEST(CommandHelp, ShowsNoKeyAndNoPassword) {
-  const std::string digits(2 * key_size, 'e');
-  const struct {
-    std::string text;
-    std::string shown;
-  } cases[] = {
-      {"C:key,3:" + digits, "C:key,3:..."},
-      {"C:key,3:off", "C:key,3:off"},
-      {"C:key," + digits, "C:key,..."},
-      {"C:key," + digits + ":3", "C:key,..."},
-      {"C:key=3:" + digits, "C:key=3:..."},
-      {"C:3:" + digits, "C:3:..."},
-      {"C:Key,3:" + digits, "C:Key,..."},
-      {"C:password,letmein!", "C:password,..."},
-      {"C:pasword,letmein!", "C:pasword,..."},
-      {"C:password", "C:password"},
-      {"C:network,letmein!", "C:network,letmein!"},
-      {"C:rate,50", "C:rate,50"},
-      {"C:rate,100000", "C:rate,100000"},
-      {"O:358,1,1", "O:358,1,1"},
-  };
-  for (const auto& c : cases) {
-    EXPECT_EQ(shown(c.text), c.shown);
-    EXPECT_EQ(shown(c.shown), c.shown) << "once more";
-  }
-  EXPECT_EQ(shown(Command::setting("key", Text("3:" + digits))), "C:key,3:...");
-}
 
 TEST(CommandHelp, ReportsAWrongKeyOrPasswordWithoutShowingIt) {
   const std::string secret(2 * key_size - 1, 'e');
@@ -79,6 +52,16 @@ TEST(CommandHelp, ShowsTheValuesThatASettingTakes) {
     const std::string name(key.data(), key.size());
     EXPECT_TRUE(all.find(" " + name + " ") != std::string::npos || name.starts_with("AIN")) << name;
   }
+}
+
+TEST(CommandHelp, FindsTheCommandOfAGroup) {
+  EXPECT_EQ(part_of("a;b;c", 1), "a");
+  EXPECT_EQ(part_of("a;b;c", 2), "b");
+  EXPECT_EQ(part_of("a;b;c", 3), "c");
+  EXPECT_EQ(part_of("a;b;c", 0), "a;b;c");
+  EXPECT_EQ(part_of("a;b;c", 4), "a;b;c");
+  EXPECT_EQ(part_of("", 1), "");
+  EXPECT_EQ(part_of("a", 1), "a");
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "host/commands/command_help.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -20,10 +20,10 @@ TEST(Setpoints, AreTheCommandsInTheirOrder) {
                          Command::bldc(2, Pwm(9), Direction::forward, true),
                          Command::dac(1, Millivolts(1650)),
                          Command::osmc(2, Pwm(0), Direction::forward)};
-  EXPECT_EQ(text_of(all),
+  EXPECT_EQ(to_text(all),
             "O:358,1,1;D:410,0,2;S:1500,3;R:1,On;P:-100,500,4;P:5,1000,3;Z:4;B:9,1,1,2;"
             "X:DAC,1,1650;O:0,1,2");
-  EXPECT_EQ(text_of(parse_group_text(text_of(all) + ";")), text_of(all));
+  EXPECT_EQ(to_text(parse_group_text(to_text(all) + ";")), to_text(all));
   EXPECT_EQ(all.size(), 10U);
   EXPECT_TRUE(Setpoints{}.empty());
 }
@@ -63,16 +63,6 @@ TEST(Setpoints, InATextAreSeparatedBySemicolons) {
   for (const char* text : {"O:1,1,1;;", ";O:1,1,1", "O:1,1,1;;O:1,1,2", ";;"}) {
     EXPECT_EQ(problem_of([&] { parse_group_text(text); }).kind, ErrorKind::usage) << text;
   }
-}
-
-TEST(Setpoints, ThePartOfAText) {
-  EXPECT_EQ(part_of("a;b;c", 1), "a");
-  EXPECT_EQ(part_of("a;b;c", 2), "b");
-  EXPECT_EQ(part_of("a;b;c", 3), "c");
-  EXPECT_EQ(part_of("a;b;c", 0), "a;b;c");
-  EXPECT_EQ(part_of("a;b;c", 4), "a;b;c");
-  EXPECT_EQ(part_of("", 1), "");
-  EXPECT_EQ(part_of("a", 1), "a");
 }
 
 }  // namespace

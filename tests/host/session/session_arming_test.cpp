@@ -3,7 +3,7 @@
 // arm().
 #include <gtest/gtest.h>
 
-#include "host/commands/command_help.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/link.hpp"
 #include "scripted_link.hpp"
 #include "tests/support/datagrams.hpp"
@@ -68,10 +68,12 @@ TEST_F(SessionArming, BeginsDisarmedAndSaysWhyNothingIsSent) {
 
 TEST_F(SessionArming, HoldsBackOutputCommandsOnly) {
   for (const char* text : {"D:1,1,1", "S:1500,1", "R:1,1", "P:5,1", "Z:1", "B:1,1,0,1"}) {
-    EXPECT_EQ(link.session.post(parse_command_text(text), link.now), PostResult::not_armed) << text;
+    const OwnCommand command = parse_command_text(text);
+    EXPECT_EQ(link.session.post(command.get(), link.now), PostResult::not_armed) << text;
   }
   for (const char* text : {"U:15,1", "F:ENC1", "C:rate,10", "E:CLEAR"}) {
-    EXPECT_EQ(link.session.post(parse_command_text(text), link.now), PostResult::sent) << text;
+    const OwnCommand command = parse_command_text(text);
+    EXPECT_EQ(link.session.post(command.get(), link.now), PostResult::sent) << text;
   }
 }
 

@@ -2,9 +2,9 @@
 // How commands end: confirmed by the board's own state, refused, timed out, cancelled.
 #include <gtest/gtest.h>
 
-#include "host/commands/command_help.hpp"
 #include "host/session/session.hpp"
 #include "protocol/link/board_link.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
 #include "scripted_link.hpp"
 #include "tests/support/datagrams.hpp"
@@ -166,7 +166,7 @@ TEST_F(SessionCommand, IsRefusedOutsideItsRanges) {
         Command::fields("A;B"), Command::setting("rate", "1^2")}) {
     try {
       link.session.send(wrong, 1s, link.now);
-      ADD_FAILURE() << text_of(wrong) << " was taken";
+      ADD_FAILURE() << to_text(wrong) << " was taken";
     } catch (const Error& error) {
       EXPECT_EQ(error.kind(), ErrorKind::usage);
       EXPECT_FALSE(error.problem().fix.empty()) << error.what();

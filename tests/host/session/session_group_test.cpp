@@ -2,7 +2,7 @@
 // Groups of commands: one datagram if the board executes groups, otherwise one after the other.
 #include <gtest/gtest.h>
 
-#include "host/commands/command_help.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/setpoints.hpp"
 #include "scripted_link.hpp"
 #include "tests/support/datagrams.hpp"
@@ -60,7 +60,7 @@ TEST_F(SessionGroup, ARefusalNamesTheCommandAndThatNoneWasExecuted) {
   EXPECT_EQ(result(ticket).outcome, Outcome::refused);
   EXPECT_EQ(result(ticket).at, 2);
   EXPECT_EQ(result(ticket).executed, 0);
-  const Problem problem = explain(text_of(two_motors), result(ticket), link.session.link());
+  const Problem problem = explain(to_text(two_motors), result(ticket), link.session.link());
   EXPECT_EQ(problem.thing, "O:359,1,2");
   EXPECT_EQ(problem.at, 2);
   EXPECT_TRUE(contains(problem.reason, "CHANNEL"));
@@ -70,8 +70,8 @@ TEST_F(SessionGroup, ARefusalNamesTheCommandAndThatNoneWasExecuted) {
   const Ticket other = send();
   link.nack(link.last('O').pnum, "SAFE");
   EXPECT_EQ(result(other).at, 0);
-  EXPECT_EQ(explain(text_of(two_motors), result(other), link.session.link()).thing,
-            text_of(two_motors));
+  EXPECT_EQ(explain(to_text(two_motors), result(other), link.session.link()).thing,
+            to_text(two_motors));
 
   const Ticket wrong = send();
   nack_at(link.last('O').pnum, "RANGE", 4);
@@ -132,7 +132,7 @@ TEST_F(SessionGroup, OfABoardWithoutGroupsEndsAtTheFirstThatFails) {
   EXPECT_EQ(result(ticket).at, 2);
   EXPECT_EQ(result(ticket).executed, 1);
   EXPECT_EQ(link.count('S'), 0U);
-  const Problem problem = explain(text_of(two_motors), result(ticket), link.session.link());
+  const Problem problem = explain(to_text(two_motors), result(ticket), link.session.link());
   EXPECT_EQ(problem.thing, "O:359,1,2");
   EXPECT_TRUE(contains(problem.reason, "command 2 of 3, and those before it were executed"));
 
@@ -199,13 +199,13 @@ TEST_F(SessionGroup, IsPostedOnceAndItsRefusalIsReported) {
   EXPECT_EQ(link.count('O'), 1U);
   nack_at(link.last('O').pnum, "RANGE", 3);
   ASSERT_EQ(link.refused.size(), 1U);
-  EXPECT_EQ(text_of(link.refused[0].command), "S:1500,3");
+  EXPECT_EQ(to_text(link.refused[0].command), "S:1500,3");
   EXPECT_EQ(link.refused[0].at, 3);
   EXPECT_EQ(link.refused[0].group, 3);
   ASSERT_TRUE(post());
   link.nack(link.last('O').pnum, "SAFE");
   ASSERT_EQ(link.refused.size(), 2U);
-  EXPECT_EQ(text_of(link.refused[1].command), "O:358,1,1");
+  EXPECT_EQ(to_text(link.refused[1].command), "O:358,1,1");
   EXPECT_EQ(link.refused[1].at, 0);
 }
 

@@ -3,8 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "host/commands/command_help.hpp"
-
+#include "r4link/commands/command_text.hpp"
 namespace r4::tool::ros2 {
 namespace {
 
@@ -29,7 +28,7 @@ struct Driven {
   }
   std::vector<std::string> to_stop() {
     std::vector<std::string> texts;
-    for (const Command& each : drivers.to_stop(now).commands) texts.push_back(text_of(each));
+    for (const Command& each : drivers.to_stop(now).commands) texts.push_back(to_text(each));
     return texts;
   }
 };
@@ -134,7 +133,7 @@ TEST(Ros2Drivers, ACommandThatStopsIsRepeatedUntilTheBoardHasConfirmedIt) {
   driven.sent(Command::osmc(1, Pwm(0), Direction::forward));
   const Drivers::Stop stop = driven.drivers.to_stop(driven.now);
   ASSERT_EQ(stop.commands.size(), 1U) << "it may have been lost on its way";
-  EXPECT_EQ(text_of(stop.commands[0]), "O:0,1,1");
+  EXPECT_EQ(to_text(stop.commands[0]), "O:0,1,1");
   EXPECT_FALSE(stop.missed) << "nobody has gone";
   driven.sent(Command::osmc(1, Pwm(0), Direction::forward));  // as who drives by 0 repeats it
   driven.drivers.stopped(stop);
@@ -156,7 +155,7 @@ TEST(Ros2Drivers, AVoltageGoesToZeroBehindTheOthersWhichABoardWithoutOneWouldRef
   driven.now += 2s;
   const Drivers::Stop others = driven.drivers.to_stop(driven.now);
   ASSERT_EQ(others.commands.size(), 1U);
-  EXPECT_EQ(text_of(others.commands[0]), "O:0,1,1");
+  EXPECT_EQ(to_text(others.commands[0]), "O:0,1,1");
   driven.drivers.stopped(others);
   EXPECT_EQ(driven.to_stop(), Texts{"X:DAC,2,0"});
   driven.drivers.forget(Command::dac(2, Millivolts(3300)));

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "host/commands/command_help.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
 #include "tools/r4/ros2/command_text.hpp"
 
@@ -56,13 +56,13 @@ TEST(Ros2Units, AServoTurnsByItsCalibration) {
 
 TEST(Ros2Units, ATwistDrivesTwoWheelsAndKeepsTheirRatio) {
   const DifferentialDrive drive = differential_drive("osmc1,-osmc2", 0.5, 2.0);
-  EXPECT_EQ(text_of(*drive.setpoints(1, 0)), "O:2048,1,1;O:2048,0,2");
-  EXPECT_EQ(text_of(*drive.setpoints(0, 2)), "O:1024,0,1;O:1024,0,2");
-  EXPECT_EQ(text_of(*drive.setpoints(4, 0)), "O:4095,1,1;O:4095,0,2");
-  EXPECT_EQ(text_of(*drive.setpoints(4, 8)), "O:1365,1,1;O:4095,0,2") << "1 to 3, as wanted";
+  EXPECT_EQ(to_text(*drive.setpoints(1, 0)), "O:2048,1,1;O:2048,0,2");
+  EXPECT_EQ(to_text(*drive.setpoints(0, 2)), "O:1024,0,1;O:1024,0,2");
+  EXPECT_EQ(to_text(*drive.setpoints(4, 0)), "O:4095,1,1;O:4095,0,2");
+  EXPECT_EQ(to_text(*drive.setpoints(4, 8)), "O:1365,1,1;O:4095,0,2") << "1 to 3, as wanted";
   EXPECT_FALSE(drive.setpoints(not_a_number, 0));
   EXPECT_FALSE(drive.setpoints(0, infinite));
-  EXPECT_EQ(text_of(*differential_drive("dhb12_3,dhb12_4", 1, 1).setpoints(0.5, 0)),
+  EXPECT_EQ(to_text(*differential_drive("dhb12_3,dhb12_4", 1, 1).setpoints(0.5, 0)),
             "D:2048,1,3;D:2048,1,4");
   for (const char* wrong : {"", "osmc1", "osmc1,osmc1", "osmc1,-osmc1", "osmc5,osmc1",
                             "osmc1,servo1", "osmc1,osmc2,osmc3", "osmc,osmc2"}) {
@@ -94,8 +94,8 @@ TEST(Ros2CommandText, OfWhatIsNoTextNothingIsRepeated) {
 TEST(Ros2CommandText, SeveralCommandsStandBesideEachOther) {
   const auto commands = commands_of(" O:358,1,1 ;S:1500,2;\n");
   ASSERT_EQ(commands.size(), 2U);
-  EXPECT_EQ(text_of(commands[0]), "O:358,1,1");
-  EXPECT_EQ(text_of(commands[1]), "S:1500,2");
+  EXPECT_EQ(to_text(commands[0].get()), "O:358,1,1");
+  EXPECT_EQ(to_text(commands[1].get()), "S:1500,2");
   EXPECT_TRUE(commands_of(" ; ").empty());
   for (const char* wrong :
        {"O:358,1,1;X", "C:timeout,9000", "H:ROS2-R4", "E:LEAVE", "W:100", "F:AIN24", "O:358,1,9"}) {

@@ -24,6 +24,7 @@
 #include "host/commands/limits.hpp"
 #include "protocol/datagram/numbers.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
 #include "r4link/setpoints.hpp"
@@ -42,24 +43,25 @@ struct SendOptions {
 
 // What one argument says: a command, or several that are executed together.
 struct Order {
-  Command command;
+  OwnCommand own;
   Setpoints group;  // empty: it is one command
+  Command command() const { return own.get(); }
 };
 
 std::string shown(const Order& order) {
-  return order.group.empty() ? shown(order.command) : text_of(order.group);
+  return order.group.empty() ? shown(order.command()) : to_text(order.group);
 }
 
-// Checked; the texts of a command are views of `text`.
+// Throws Error{usage} for a command that is wrong, or that may not be sent to `url`.
 Order order_of(const std::string& text, const std::string& url) {
-  if (is_group_text(text)) return {Command(), parse_group_text(text)};
-  const Command command = parse_command_text(text);
-  if (command.kind == CommandKind::heartbeat) {
+  if (is_group_text(text)) return {OwnCommand(), parse_group_text(text)};
+  Order order{parse_command_text(text), Setpoints()};
+  if (order.command().kind == CommandKind::heartbeat) {
     throw Error(ErrorKind::usage, text, "heartbeats are sent by themselves",
                 "use --hold to keep the link up");
   }
-  require_cable(url, command);
-  return {command, Setpoints()};
+  require_cable(url, order.command());
+  return order;
 }
 
 // Does it turn a motor, which needs the motor supply?
@@ -80,11 +82,11 @@ bool turns_a_motor(const Order& order) {
   for (std::size_t i = 0; i < order.group.size(); ++i) {
     if (turns_a_motor(order.group[i])) return true;
   }
-  return turns_a_motor(order.command);
+  return turns_a_motor(order.command());
 }
 
 bool sets(const Order& order, std::string_view key) {
-  const Command& command = order.command;
+  const Command command = order.command();
   return command.kind == CommandKind::setting && command.text == Text(key);
 }
 
@@ -104,8 +106,8 @@ std::optional<LinkTiming> link_timing_at(const std::vector<Order>& orders, std::
   if (i + 1 >= orders.size()) return std::nullopt;
   const Order& a = orders[i];
   const Order& b = orders[i + 1];
-  const Milliseconds first = value_of(a.command);
-  const Milliseconds second = value_of(b.command);
+  const Milliseconds first = value_of(a.command());
+  const Milliseconds second = value_of(b.command());
   if (sets(a, "timeout") && sets(b, "heartbeat")) return LinkTiming{first, second};
   if (sets(a, "heartbeat") && sets(b, "timeout")) return LinkTiming{second, first};
   return std::nullopt;
@@ -123,7 +125,7 @@ BoardOptions board_options(const SendOptions& options, const std::vector<Order>&
   for (const Order& order : orders) {
     if (!sets(order, "timeout")) continue;
     std::uint32_t& ours = board_options.session.timing.heartbeat_ms;
-    ours = std::min(ours, static_cast<std::uint32_t>(value_of(order.command).count() / 3));
+    ours = std::min(ours, static_cast<std::uint32_t>(value_of(order.command()).count() / 3));
   }
   return board_options;
 }
@@ -165,7 +167,7 @@ class Sender {
       return;
     }
     const Order& order = orders_[next_];
-    const Command& command = order.command;
+    const Command command = order.command();
     const auto done = [this](const CommandResult& result) { on_result(result); };
     if (const auto timing = link_timing_at(orders_, next_)) {
       board_.async_link_timing(timing->timeout, timing->heartbeat, options_.timeout, done);
@@ -182,7 +184,7 @@ class Sender {
 
   // A transfer on the user's bus is begun when it is confirmed; a state tells how it ended.
   bool is_transfer() const {
-    const CommandKind kind = orders_[next_].command.kind;
+    const CommandKind kind = orders_[next_].command().kind;
     return orders_[next_].group.empty() &&
            (kind == CommandKind::i2c_read || kind == CommandKind::i2c_write ||
             kind == CommandKind::i2c_scan);
@@ -221,7 +223,7 @@ class Sender {
     } else if (confirmed) {
       fmt::print("{}  confirmed in {:.1f} ms{}\n", text, milliseconds(result),
                  next_ == 0 ? ", connecting included" : "");
-      if (orders_[next_].command.kind == CommandKind::identify) print_identity();
+      if (orders_[next_].command().kind == CommandKind::identify) print_identity();
       if (has_transfer && shows_bytes(transfer)) fmt::print("  {}\n", shown_bytes(transfer));
     } else {
       print_text(fmt::format("{}  {}\n", text, problem.reason));
@@ -257,11 +259,11 @@ class Sender {
   }
 
   bool shows_bytes(const I2cAnswer& transfer) const {
-    return transfer.data.size != 0 || orders_[next_].command.kind == CommandKind::i2c_scan;
+    return transfer.data.size != 0 || orders_[next_].command().kind == CommandKind::i2c_scan;
   }
   // A scan's are addresses.
   std::string shown_bytes(const I2cAnswer& transfer) const {
-    if (orders_[next_].command.kind == CommandKind::i2c_scan) {
+    if (orders_[next_].command().kind == CommandKind::i2c_scan) {
       return transfer.data.size == 0
                  ? "nobody answers"
                  : fmt::format("0x{:02x}",

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "command_text.hpp"
-#include "host/commands/command_help.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
 
 namespace r4::tool::ros2 {
@@ -122,13 +122,13 @@ void BoardCommands::post_wanted() {
 
 void BoardCommands::post(std::size_t first, std::size_t count) {
   PostResult result = PostResult::no_link;
-  std::string what = text_of(wanted_[first].command);
+  std::string what = to_text(wanted_[first].command);
   if (count == 1) {
     result = board_.post(wanted_[first].command);
   } else {
     Setpoints group;
     for (std::size_t i = first; i < first + count; ++i) group.add(wanted_[i].command);
-    what = text_of(group);
+    what = to_text(group);
     result = board_.post(group);
   }
   if (!result) tell(what, result);
@@ -158,7 +158,7 @@ void BoardCommands::on_tick() {
   Setpoints group;
   for (const Command& command : stop.commands) group.add(command);
   if (stop.missed) {
-    warn(fmt::format("{}: whoever drove it has gone or is silent", text_of(group)));
+    warn(fmt::format("{}: whoever drove it has gone or is silent", to_text(group)));
   }
   resting_ = true;
   board_.async_apply(group, oldest, [this, stop](const CommandResult& result) {

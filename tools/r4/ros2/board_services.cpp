@@ -8,7 +8,6 @@
 
 #include "board_commands.hpp"
 #include "command_text.hpp"
-#include "host/commands/command_help.hpp"
 #include "r4link/error.hpp"
 
 namespace r4::tool::ros2 {
@@ -199,7 +198,7 @@ void BoardCommands::send(const std::optional<std::string>& text, const void* sou
     return;
   }
   try {
-    const std::vector<Command> commands = commands_of(*text);
+    const std::vector<OwnCommand> commands = commands_of(*text);
     const LinkStatus& link = board_.link();
     if (!link.in_control) {  // nothing is kept for later
       done(false, explain(*text, link).text());
@@ -208,18 +207,20 @@ void BoardCommands::send(const std::optional<std::string>& text, const void* sou
     post_wanted();  // what came before goes before
     // It is repeated until it is too old to be executed.
     const auto left = left_of(origin);
-    if (commands.size() == 1 && !joins_groups(commands[0].kind)) {
-      if (commands[0].kind == CommandKind::clear && is_overtaken(origin)) {
+    if (commands.size() == 1 && !joins_groups(commands[0].get().kind)) {
+      const Command command = commands[0].get();
+      if (command.kind == CommandKind::clear && is_overtaken(origin)) {
         done(false, *text + overtaken);
-      } else if (commands[0].kind == CommandKind::clear) {
+      } else if (command.kind == CommandKind::clear) {
         clear(origin, done);
       } else {
-        board_.async_send(commands[0], left, in_words(board_, *text, done));
+        board_.async_send(command, left, in_words(board_, *text, done));
       }
       return;
     }
     Setpoints setpoints;
-    for (const Command& command : commands) {
+    for (const OwnCommand& own : commands) {
+      const Command command = own.get();
       if (const std::string objection = objection_to(command); !objection.empty()) {
         return done(false, objection);
       }
@@ -227,8 +228,8 @@ void BoardCommands::send(const std::optional<std::string>& text, const void* sou
     }
     board_.async_apply(setpoints, left, in_words(board_, *text, done));
     if (board_.disarmed_by() != DisarmCause::none) return;
-    for (const Command& command : commands) {
-      drivers_.on_sent(command, source, origin.publisher, BootClock::now());
+    for (const OwnCommand& own : commands) {
+      drivers_.on_sent(own.get(), source, origin.publisher, BootClock::now());
     }
   } catch (const Error& error) {
     done(false, error.problem().text());

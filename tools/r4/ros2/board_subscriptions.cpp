@@ -6,7 +6,7 @@
 
 #include "board_commands.hpp"
 #include "command_text.hpp"
-#include "host/commands/command_help.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
 
 namespace r4::tool::ros2 {
@@ -94,21 +94,22 @@ void BoardCommands::on_text(const std::string& text, const void* source, const O
     return;
   }
   if (is_stale("R4_Command", origin)) return;
-  std::vector<Command> commands;
+  std::vector<OwnCommand> commands;
   try {
     commands = commands_of(text);
-    for (const Command& command : commands) board_.require_sendable(command);
+    for (const OwnCommand& own : commands) board_.require_sendable(own.get());
   } catch (const Error& error) {
     warn(error.problem().text());
     return;
   }
-  for (const Command& command : commands) {
-    if (const std::string objection = objection_to(command); !objection.empty()) {
+  for (const OwnCommand& own : commands) {
+    if (const std::string objection = objection_to(own.get()); !objection.empty()) {
       warn(objection);
       return;
     }
   }
-  for (const Command& command : commands) {
+  for (const OwnCommand& own : commands) {
+    const Command command = own.get();
     if (joins_groups(command.kind)) {
       want(command, source, origin);
     } else if (command.kind == CommandKind::clear) {

@@ -2,8 +2,8 @@
 #include "command_text.hpp"
 
 #include <algorithm>
+#include <utility>
 
-#include "host/commands/command_help.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/error.hpp"
 
@@ -61,16 +61,16 @@ bool asks_to_stop(std::string_view text) {
   return stop;
 }
 
-std::vector<Command> commands_of(std::string_view text) {
+std::vector<OwnCommand> commands_of(std::string_view text) {
   if (!std::all_of(text.begin(), text.end(), is_ascii)) {  // nobody who reads /rosout would read on
     throw Error(ErrorKind::usage, "a command", "has characters that no command has",
                 "write it in ASCII");
   }
-  std::vector<Command> commands;
+  std::vector<OwnCommand> commands;
   each_part(text, [&commands](std::string_view part) {
-    const Command command = parse_command_text(part);
-    require_allowed(part, command);
-    commands.push_back(command);
+    OwnCommand command = parse_command_text(part);
+    require_allowed(part, command.get());
+    commands.push_back(std::move(command));
   });
   return commands;
 }

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "r4link/command.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/link.hpp"
 
 namespace r4::tool::ros2 {
@@ -19,10 +19,10 @@ std::optional<std::string> text_of(std::string_view bytes);
 // Is there E:STOP in it? It is obeyed whatever else is there.
 bool asks_to_stop(std::string_view text);
 
-// Its commands, all of them right; their texts are views of `text`. Throws Error{usage} naming the first that is wrong
+// Its commands, all of them right. Throws Error{usage} naming the first that is wrong
 // or that cannot come from a topic: settings, choices of fields, heartbeats and farewells. A text that is not ASCII is
 // not repeated there.
-std::vector<Command> commands_of(std::string_view text);
+std::vector<OwnCommand> commands_of(std::string_view text);
 
 // `problem` is the library's, which names its own call and r4 send. The board refuses those while
 // this bridge controls it, so a cause that came before this program is cleared by a service.

@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "host/commands/command_help.hpp"
 #include "host/standard_registry.hpp"
 #include "json.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::tool {

@@ -6,10 +6,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include "host/commands/command_help.hpp"
 #include "host/standard_registry.hpp"
 #include "protocol/datagram/numbers.hpp"
 #include "protocol/messages/command_field.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
 #include "r4link/state.hpp"
 #include "transports/registry.hpp"

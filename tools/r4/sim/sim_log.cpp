@@ -9,7 +9,7 @@
 #include <string_view>
 #include <tuple>
 
-#include "host/commands/command_help.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/state.hpp"
 #include "r4link/vocabulary.hpp"
 #include "transports/url.hpp"

@@ -10,11 +10,12 @@
 
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "host/commands/command_help.hpp"
 #include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/messages/command_field.hpp"
 #include "protocol/messages/message.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/error.hpp"
 #include "r4link/setpoints.hpp"
 #include "transports/framing/can/packed_form.hpp"
 
@@ -63,7 +64,9 @@ std::string text_of(const Field& field) {
 void check_all(const Datagram& datagram) {
   Setpoints group;
   for (const Field& field : datagram) {
-    if (is_command(field)) group.add(parse_command_text(text_of(field)));
+    if (!is_command(field)) continue;
+    const OwnCommand command = parse_command_text(text_of(field));
+    group.add(command.get());
   }
 }
 

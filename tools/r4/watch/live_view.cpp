@@ -12,9 +12,9 @@
 
 #include "../shell/json.hpp"
 #include "../shell/screen.hpp"
-#include "host/commands/command_help.hpp"
 #include "monitor_view.hpp"
 #include "protocol/messages/state_fields.hpp"
+#include "r4link/commands/command_text.hpp"
 
 namespace r4::tool {
 namespace {

@@ -13,9 +13,9 @@
 #include "../shell/json.hpp"
 #include "../shell/line_writer.hpp"
 #include "../shell/paths.hpp"
-#include "host/commands/command_help.hpp"
 #include "protocol/link/host_link.hpp"
 #include "protocol/messages/settings.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/link.hpp"
 
 namespace r4::tool {

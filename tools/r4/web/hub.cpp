@@ -8,7 +8,7 @@
 
 #include "../formats/json_lines.hpp"
 #include "../watch/board_metrics.hpp"
-#include "host/commands/command_help.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
 #include "r4link/setpoints.hpp"
 #include "transports/url_pattern.hpp"
@@ -340,7 +340,8 @@ void Hub::send(ClientId client, const PageRequest& request, AsyncBoard& board,
     board.async_apply(parse_group_text(text), command_time, done);
     return;
   }
-  const Command command = parse_command_text(text);
+  const OwnCommand own = parse_command_text(text);
+  const Command command = own.get();
   require_allowed(command);
   if (command.kind == CommandKind::stop) {
     board.async_stop(command_time, done);

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Commands as text: parsed, written and described. The text is the one that a board reads
+// (docs/protocol.md).
+//
+//     const r4::OwnCommand command = r4::parse_command_text("O:358,1,1");
+//     r4::to_text(command.get());   // "O:358,1,1"
+//     r4::describe(command.get());  // "OSMC 1 forward, duty 0.087"
+//
+// A command may hold a secret: a key, or the network's password. to_text() writes it; shown() and
+// describe() write "..." instead.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "../command.hpp"
+#include "../config.hpp"
+#include "../setpoints.hpp"
+#include "../vocabulary.hpp"
+
+namespace r4 {
+
+// A command that owns its texts. A `Command` holds views, which its caller's texts may not outlive.
+class OwnCommand {
+ public:
+  OwnCommand() = default;
+  explicit OwnCommand(const Command& command)
+      : command_(command),
+        text_(command.text.data(), command.text.size()),
+        text2_(command.text2.data(), command.text2.size()) {}
+
+  // The command's texts are views of this object.
+  Command get() const& {
+    Command command = command_;
+    command.text = text_;
+    command.text2 = text2_;
+    return command;
+  }
+  Command get() const&& = delete;
+
+ private:
+  Command command_;
+  std::string text_, text2_;
+};
+
+// Parses "O:358,1,1" (with or without the final ';'). Throws Error{usage} that names the fault.
+R4LINK_API OwnCommand parse_command_text(std::string_view text);
+
+// True for several commands, separated by semicolons: "O:358,1,1;O:358,1,2".
+R4LINK_API bool is_group_text(std::string_view text);
+// Parses one command or several. Throws Error{usage} that names the command that is wrong, or that
+// cannot be in a group.
+R4LINK_API Setpoints parse_group_text(std::string_view text);
+
+// "O:358,1,1". Empty if a text of the command has bytes that a datagram cannot hold.
+R4LINK_API std::string to_text(const Command& command);
+// "O:358,1,1;O:358,1,2"
+R4LINK_API std::string to_text(const Setpoints& group);
+
+// The text for people and logs: printable(), and without a secret: "C:password,...", "C:key,1:...".
+R4LINK_API std::string shown(const Command& command);
+R4LINK_API std::string shown(std::string_view text);
+
+// The command in words, with units and without a secret: "servo 3 at 1500 us", "relay 1 on",
+// "setting rate 50".
+R4LINK_API std::string describe(const Command& command);
+
+// What a board's refusal means: "no such channel".
+R4LINK_API std::string_view meaning_of(Refusal refusal);
+
+// One command of the board, for help and for the fix in an error.
+struct CommandHelp {
+  char letter;
+  std::string_view form;     // "O:pwm,dir,ch"
+  std::string_view meaning;  // "OSMC motor driver"
+  std::string_view ranges;   // "pwm 0-4095, dir 0 or 1, ch 1-4"
+};
+
+// The help of the command with that letter; nullptr if there is none.
+R4LINK_API const CommandHelp* command_help(char letter);
+// All commands, in the order of docs/protocol.md.
+R4LINK_API std::span<const CommandHelp> all_command_help();
+
+}  // namespace r4
