@@ -15,6 +15,7 @@
 #include "bindings.hpp"
 #include "callback.hpp"
 #include "process.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/control/loop.hpp"
 #include "r4link/simulation.hpp"
 
@@ -210,10 +211,12 @@ void bind_board(py::module_& module) {
           Released())
       .def(
           "send",
-          [](PyBoard& board, const Command& command, int ms) { board->send(command, Ms(ms)); },
+          [](PyBoard& board, const OwnCommand& command, int ms) {
+            board->send(command.get(), Ms(ms));
+          },
           Released())
-      .def("post",
-           [](PyBoard& board, const Command& command) { return to_text(board->post(command)); })
+      .def("post", [](PyBoard& board,
+                      const OwnCommand& command) { return to_text(board->post(command.get())); })
       .def("i2c_read",
            [](PyBoard& board, int address, const std::string& at, int count, int ms) {
              return bytes_of([&] {

@@ -160,8 +160,10 @@ void bind_fleet(py::module_& module) {
           Released())
       .def(
           "send",
-          [list](PyFleet& fleet, const Command& command, const std::optional<Boards>& boards,
-                 int ms) { return list(fleet->send(boards_of(fleet, boards), command, Ms(ms))); },
+          [list](PyFleet& fleet, const OwnCommand& command, const std::optional<Boards>& boards,
+                 int ms) {
+            return list(fleet->send(boards_of(fleet, boards), command.get(), Ms(ms)));
+          },
           Released())
       .def(
           "arm",

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "bindings.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/discovery/discover.hpp"
 #include "r4link/fleet.hpp"
 
@@ -71,11 +72,17 @@ class Pickle {
     if (has && !some) some.emplace();
     if (has) one(*some);
   }
-  // Its texts belong to the program that it was made in.
-  void one(Command& command) {
+  void one(OwnCommand& own) {
+    Command command = own.get();
+    std::string text(command.text.data(), command.text.size());
+    std::string text2(command.text2.data(), command.text2.size());
     command.text = command.text2 = Text();
     raw(static_cast<void*>(&command), sizeof command);
-    command.text = command.text2 = Text();
+    one(text);
+    one(text2);
+    command.text = text;
+    command.text2 = text2;
+    own = OwnCommand(command);
   }
 
   bool reads_ = false;

@@ -16,77 +16,94 @@ Direction direction_of(int number) {
 }
 
 // What is driven by a duty, or by the board's own value and a direction.
-void bind_drive(py::class_<Command>& commands, const char* name, Command (*by_duty)(Channel, Duty),
-                Command (*by_pwm)(Channel, Pwm, Direction)) {
+void bind_drive(py::class_<OwnCommand>& commands, const char* name,
+                Command (*by_duty)(Channel, Duty), Command (*by_pwm)(Channel, Pwm, Direction)) {
   commands.def_static(
-      name, [by_duty](int channel, double duty) { return by_duty(channel, checked_duty(duty)); },
+      name,
+      [by_duty](int channel, double duty) {
+        return OwnCommand(by_duty(channel, checked_duty(duty)));
+      },
       py::arg("channel"), py::kw_only(), py::arg("duty"));
   commands.def_static(
       name,
       [by_pwm](int channel, int pwm, int direction) {
-        return by_pwm(channel, Pwm(pwm), direction_of(direction));
+        return OwnCommand(by_pwm(channel, Pwm(pwm), direction_of(direction)));
       },
       py::arg("channel"), py::kw_only(), py::arg("pwm"),
       py::arg("direction") = static_cast<int>(Direction::forward));
 }
 
 void bind_commands(py::module_& module) {
-  py::class_<Command> commands(module, "Command");
+  py::class_<OwnCommand> commands(module, "Command");
   bind_drive(commands, "osmc", &Command::osmc, &Command::osmc);
   bind_drive(commands, "dhb12", &Command::dhb12, &Command::dhb12);
   commands
       .def_static(
           "bldc",
           [](int channel, double duty, bool brake) {
-            return Command::bldc(channel, checked_duty(duty), brake);
+            return OwnCommand(Command::bldc(channel, checked_duty(duty), brake));
           },
           py::arg("channel"), py::kw_only(), py::arg("duty"), py::arg("brake") = false)
       .def_static(
           "bldc",
           [](int channel, int pwm, int direction, bool brake) {
-            return Command::bldc(channel, Pwm(pwm), direction_of(direction), brake);
+            return OwnCommand(Command::bldc(channel, Pwm(pwm), direction_of(direction), brake));
           },
           py::arg("channel"), py::kw_only(), py::arg("pwm"),
           py::arg("direction") = static_cast<int>(Direction::forward), py::arg("brake") = false)
       .def_static(
-          "servo", [](int channel, int us) { return Command::servo(channel, Microseconds(us)); },
+          "servo",
+          [](int channel, int us) { return OwnCommand(Command::servo(channel, Microseconds(us))); },
           py::arg("channel"), py::kw_only(), py::arg("us"))
       .def_static(
-          "relay", [](int channel, bool on) { return Command::relay(channel, on); },
+          "relay", [](int channel, bool on) { return OwnCommand(Command::relay(channel, on)); },
           py::arg("channel"), py::kw_only(), py::arg("on"))
       .def_static(
           "stepper",
           [](int channel, std::int32_t position, int speed) {
-            return Command::stepper(channel, Steps(position), StepsPerSecond(speed));
+            return OwnCommand(Command::stepper(channel, Steps(position), StepsPerSecond(speed)));
           },
           py::arg("channel"), py::kw_only(), py::arg("position"),
           py::arg("speed") = stepper_speed_default)
       .def_static(
-          "zero", [](int channel) { return Command::zero(channel); }, py::arg("channel"))
+          "zero", [](int channel) { return OwnCommand(Command::zero(channel)); },
+          py::arg("channel"))
       .def_static(
           "dac",
-          [](int channel, int millivolts) { return Command::dac(channel, Millivolts(millivolts)); },
+          [](int channel, int millivolts) {
+            return OwnCommand(Command::dac(channel, Millivolts(millivolts)));
+          },
           py::arg("channel"), py::kw_only(), py::arg("millivolts"))
       .def_static(
           "proximity",
-          [](int channel, int cm) { return Command::proximity(channel, Centimetres(cm)); },
+          [](int channel, int cm) {
+            return OwnCommand(Command::proximity(channel, Centimetres(cm)));
+          },
           py::arg("channel"), py::kw_only(), py::arg("cm"))
-      .def_static("stop", &Command::stop)
-      .def_static("clear", [] { return Command::clear(); })
-      .def(pickled<Command>("Command"));
+      .def_static("stop", [] { return OwnCommand(Command::stop()); })
+      .def_static("clear", [] { return OwnCommand(Command::clear()); })
+      .def_static("parse", &parse_command_text, py::arg("text"))
+      .def("describe", [](const OwnCommand& command) { return describe(command.get()); })
+      .def("__str__", [](const OwnCommand& command) { return to_text(command.get()); })
+      .def(pickled<OwnCommand>("Command"));
   py::class_<Setpoints>(module, "Setpoints")
       .def(py::init([](const py::args& given) {
         Setpoints setpoints;
         for (const py::handle each : given) {
-          if (!py::isinstance<Command>(each)) {
+          if (!py::isinstance<OwnCommand>(each)) {
             throw py::type_error("Setpoints() takes commands, such as Command.osmc(1, duty=0.1)");
           }
-          setpoints.add(each.cast<const Command&>());
+          setpoints.add(each.cast<const OwnCommand&>().get());
         }
         return setpoints;
       }))
       .def(pickled<Setpoints>("Setpoints"))
-      .def("add", &Setpoints::add, py::return_value_policy::reference_internal)
+      .def(
+          "add",
+          [](Setpoints& setpoints, const OwnCommand& command) -> Setpoints& {
+            return setpoints.add(command.get());
+          },
+          py::return_value_policy::reference_internal)
       .def("__len__", &Setpoints::size);
 }
 

@@ -299,7 +299,11 @@ class State:
     gpio: int
 
 class Command:
-    """A command to a board, for send(), post() and Setpoints. Channels count from 1."""
+    """A command to a board, for send(), post() and Setpoints. Channels count from 1. str() gives its text, as
+    docs/protocol.md has it, with a key or password if it sets one:
+
+        str(Command.osmc(1, pwm=358))       # 'O:358,1,1'
+    """
     @overload
     @staticmethod
     def osmc(channel: int, *, duty: float) -> Command:
@@ -346,6 +350,17 @@ class Command:
     def stop() -> Command: ...
     @staticmethod
     def clear() -> Command: ...
+    @staticmethod
+    def parse(text: str) -> Command:
+        """The command of a text. Raises UsageError if there is none, or a value is outside its range.
+
+            Command.parse('O:358,1,1')      # as Command.osmc(1, pwm=358)
+        """
+    def describe(self) -> str:
+        """In words, with units. A key or password is hidden.
+
+            Command.parse('O:358,1,1').describe()       # 'OSMC 1 forward, duty 0.087'
+        """
 
 class Setpoints:
     """Output commands that a board executes together, in one pass over its chips, or not at all. Raises UsageError for
