@@ -34,7 +34,7 @@ Problem bad_group_member(const Command& command, std::size_t others) {
 Duty checked_duty(double duty) {
   if (Duty(duty).is_in_range()) return Duty(duty);
   throw Error(ErrorKind::usage, fmt::format("duty {}", duty), "is out of range",
-              "give -1 (full reverse) to 1 (full forward); set_pwm() takes 0 to 4095");
+              "give -1 (full reverse) to 1 (full forward)");
 }
 
 Setpoints& Setpoints::add(const Command& command) {

@@ -14,7 +14,7 @@
 
 namespace r4 {
 
-// The board has said who it is.
+// Puts the board's answer into `board`.
 void take(FoundBoard& board, IdentityAnswer answer);
 
 // True if the board and the program that holds the transport have answered.

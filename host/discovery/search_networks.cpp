@@ -17,15 +17,14 @@ Discovery search_networks(std::uint16_t port) {
       place.trouble = Problem{ErrorKind::open, network.interface, network.trouble,
                               "check the network and the firewall"};
     }
-    for (const AnsweredBoard& board : result.boards) {
-      if (board.heard_at != network.from) continue;
-      FoundBoard& each = found.boards.emplace_back();
-      each.url = url_of(board, result.boards, port);
-      each.place = place.address;
-      each.address = board.address.to_string();
-      each.identity = board;
-      each.busy = board.busy;
-    }
+  }
+  for (const AnsweredBoard& board : result.boards) {
+    FoundBoard& each = found.boards.emplace_back();
+    each.url = url_of(board, result.boards, port);
+    each.place = board.heard_at.to_string();
+    each.address = board.address.to_string();
+    each.identity = board;
+    each.busy = board.busy;
   }
   return found;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The search of each transport, for discover() (r4link/discovery/discover.hpp). Each blocks, and returns the
-// boards and the places of its transport.
+// The search of each transport, for discover() (r4link/discovery/discover.hpp). Each blocks, and
+// returns the boards and the places of its transport.
 #pragma once
 
 #include <chrono>

@@ -26,6 +26,7 @@
 #pragma once
 
 #include <chrono>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -120,8 +121,9 @@ class R4LINK_API Board {
                  BoardCallbacks callbacks = {});
   explicit Board(const std::vector<CarrierMaker>& makers, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
-  // Opens the only board that discover() finds (discovery/discover.hpp), which takes 1.3 s at most. Throws
-  // Error as Discovery::only() does: open if there is no board, usage with the URLs of several.
+  // Opens the only board that discover() finds (discovery/discover.hpp), which takes 1.3 s at most.
+  // Throws Error as Discovery::only() does: open if there is no board, usage with the URLs of
+  // several.
   static Board first(BoardOptions options = {}, const DiscoveryOptions& where = {});
   ~Board();
   Board(const Board&) = delete;
@@ -193,10 +195,14 @@ class R4LINK_API Board {
   // Each channel: set() is send(), confirmed; post() sends once and does not wait.
   class DriveChannel {
    public:
-    // `duty`: from -1 (full reverse) to 1 (full forward); set() throws Error{usage} for others, and
-    // post() as well.
+    // `duty`: from -1 (full reverse) to 1 (full forward); others throw Error{usage}. A bool, which
+    // would be full speed, does not compile.
     void set(double duty, Duration timeout = default_timeout) const;
     PostResult post(double duty) const;
+    template <std::same_as<bool> Bool>
+    void set(Bool, Duration = default_timeout) const = delete;
+    template <std::same_as<bool> Bool>
+    PostResult post(Bool) const = delete;
     // The board's own value: `pwm` 0-4095.
     void set_pwm(int pwm, Direction direction, Duration timeout = default_timeout) const;
     PostResult post_pwm(int pwm, Direction direction) const;
@@ -249,9 +255,13 @@ class R4LINK_API Board {
   };
   class BldcChannel {
    public:
-    // `duty` as of DriveChannel.
+    // `duty`: as for DriveChannel.
     void set(double duty, bool brake = false, Duration timeout = default_timeout) const;
     PostResult post(double duty, bool brake = false) const;
+    template <std::same_as<bool> Bool>
+    void set(Bool, bool = false, Duration = default_timeout) const = delete;
+    template <std::same_as<bool> Bool>
+    PostResult post(Bool, bool = false) const = delete;
     // The board's own value: `speed` 0-4095.
     void set_pwm(int speed, Direction direction, bool brake = false,
                  Duration timeout = default_timeout) const;

@@ -13,7 +13,8 @@ namespace r4 {
 // The value of a host's heartbeat.
 constexpr Text host_heartbeat_word("ROS2-R4");
 
-// --- channels and values. Each has a type of its own, so that swapped arguments do not compile.
+// --- channels and values of outputs. Each has a type of its own, so that swapped arguments do not
+// compile.
 
 // The number of a channel on the board, from 1. A command of a channel that the board lacks is
 // refused.
@@ -21,11 +22,11 @@ struct Channel {
   template <class Integer, class = std::enable_if_t<std::is_integral<Integer>::value &&
                                                     !std::is_same<Integer, bool>::value>>
   constexpr Channel(Integer channel)  // NOLINT(google-explicit-constructor)
-      : number(in_range(static_cast<long>(channel))) {}
+      : number(in_range(static_cast<std::int64_t>(channel))) {}
   std::uint8_t number;  // 0, which no board has, for numbers outside 1-255
 
  private:
-  static constexpr std::uint8_t in_range(long channel) {
+  static constexpr std::uint8_t in_range(std::int64_t channel) {
     return channel > 0 && channel <= 0xFF ? static_cast<std::uint8_t>(channel) : std::uint8_t{0};
   }
 };
@@ -45,7 +46,9 @@ using Centimetres = Quantity<struct CentimetresUnit>;        // 0 (off) to 400
 
 // How hard a motor is driven: from -1 (full reverse) to 1 (full forward).
 struct Duty {
-  constexpr explicit Duty(double duty) : value(duty) {}
+  template <class Number, class = std::enable_if_t<std::is_arithmetic<Number>::value &&
+                                                   !std::is_same<Number, bool>::value>>
+  constexpr explicit Duty(Number duty) : value(static_cast<double>(duty)) {}
   constexpr bool is_in_range() const { return value >= -1 && value <= 1; }
   // Rounded to the nearest; outside its range if the duty is.
   constexpr Pwm pwm() const {
@@ -91,6 +94,8 @@ constexpr bool joins_groups(CommandKind kind) { return kind <= CommandKind::dac;
 // True if the command may move something: an output, or an actuator on a bus or UART of the user's.
 // Such commands are refused in the safe state.
 constexpr bool drives_output(CommandKind kind) { return kind <= CommandKind::uart_write; }
+static_assert(static_cast<int>(CommandKind::watch) == 21,
+              "a new kind: its place says whether it drives an output; see limits_of(), too");
 
 // One command. Which members count depends on `kind`; the factories set them. `text` and `text2`
 // are views: they must outlive the command.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Everything of r4link::r4link. AsyncBoard, for programs with Asio, is in async_board.hpp (r4link::asio).
+// Everything of r4link::r4link. For programs with Asio, AsyncBoard is in async_board.hpp, and
+// async_discover() in discovery/async_discover.hpp (r4link::asio).
 #pragma once
 
 #include "board.hpp"

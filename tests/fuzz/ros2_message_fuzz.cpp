@@ -53,6 +53,9 @@ void read_string(std::string_view bytes) {
 }
 
 void read_numbers(double first, double second) {
+  const Duty duty(first);
+  require(duty.is_in_range() == (first >= -1 && first <= 1));
+  if (duty.is_in_range()) require(duty.pwm().value >= 0 && duty.pwm().value <= 4095);
   const MotorChannel left{CommandKind::osmc, 1, false}, right{CommandKind::dhb12, 4, true};
   if (const auto command = left.command(first)) is_sendable(*command);
   ServoCalibration servo;

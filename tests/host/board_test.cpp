@@ -45,6 +45,11 @@ TEST_P(BoardOver, ConfirmsEveryCommandOnceExecuted) {
   board.relay(3).set(true);
   board.stepper(2).move_to(Steps(-5), StepsPerSecond(20000));
   board.bldc(4).set_pwm(2000, Direction::forward, true);
+  board.dhb12(1).post(-0.25);
+  board.osmc(2).post_pwm(7, Direction::reverse);
+  board.bldc(1).post_pwm(8, Direction::reverse, true);
+  board.bldc(2).post(-1, true);
+  board.bldc(3).set(-0.25);
   board.proximity(1, Centimetres(15));
   board.stepper(1).zero();
   board.setting("recovery", "rearm");
@@ -57,8 +62,9 @@ TEST_P(BoardOver, ConfirmsEveryCommandOnceExecuted) {
   EXPECT_EQ(state.bldc[3], (Bldc{2000, Direction::forward, true}));
   EXPECT_EQ(state.servo_us[15], 0);
   const std::vector<std::string> after_settings{
-      "O:358,1,1",    "O:4095,0,4", "D:100,1,2", "S:1500,16",        "R:3,On", "P:-5,20000,2",
-      "B:2000,1,1,4", "U:15,1",     "Z:1",       "C:recovery,rearm", "S:0,16"};
+      "O:358,1,1",    "O:4095,0,4", "D:100,1,2",        "S:1500,16", "R:3,On",       "P:-5,20000,2",
+      "B:2000,1,1,4", "D:1024,0,1", "O:7,0,2",          "B:8,0,1,1", "B:4095,0,1,2", "B:1024,0,0,3",
+      "U:15,1",       "Z:1",        "C:recovery,rearm", "S:0,16"};
   std::vector<std::string> executed = simulated.executed();
   ASSERT_GE(executed.size(), after_settings.size());
   executed.erase(executed.begin(), executed.end() - static_cast<long>(after_settings.size()));

@@ -146,7 +146,7 @@ program_of "$source_tree/README.md" | sed "s,udp://192.168.0.125,$url," >readme.
 ./readme
 kill "$board"
 wait "$board" "$events"
-if ! grep '"osmc":\[\[358,1\]' "$work/events" | grep -q '"supply":true'; then
+if ! grep '"osmc":\[\[410,1\]' "$work/events" | grep -q '"supply":true'; then
   cut -c 1-200 "$work/events"
   echo 'install: the program in README.md drives a motor that has no supply'
   exit 1

@@ -54,7 +54,7 @@ def test_a_group_is_executed_as_one_or_not_at_all(sim, board, wait):
     lambda _: Command.osmc(1, 0.1), lambda _: Command.osmc(1, pwm=0.1), lambda _: Command.osmc(1, duty='0.1'),
     lambda _: Command.osmc(1, duty=0.1, pwm=410), lambda _: Command.servo(3, 1500), lambda _: Setpoints('O:0,1,1'),
     lambda board: board.osmc(1).set_pwm(410, FORWARD), lambda board: board.stepper(1).move_to(100, 5000),
-    lambda board: board.dac(1650, 1)])
+    lambda board: board.dac(1650, 1), lambda board: board.osmc(1).set(True)])
 def test_a_value_without_its_name_or_of_another_type_is_a_type_error(board, call):
     with pytest.raises(TypeError):
         call(board)

@@ -2,7 +2,6 @@
 #include "podcar.hpp"
 
 #include <cmath>
-#include <cstdlib>
 
 namespace {
 

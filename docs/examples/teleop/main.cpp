@@ -10,11 +10,9 @@
 //
 // Whatever makes the board safe needs another e. Exit code: 0 done, 2 usage, 3 refused, timed out or
 // the stop was not confirmed (then cut the power), 4 no such transport, 5 permission, 6 not supported.
-#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <r4link/board.hpp>
 #include <r4link/error.hpp>
 #include <r4link/link.hpp>

@@ -19,7 +19,7 @@ std::optional<std::string> text_of(const std::optional<Problem>& trouble) {
 py::object holder_of(const FoundBoard& board) {
   if (!board.holder) return py::none();
   return py::module_::import("r4link.errors")
-      .attr("Program")(board.holder->pid, board.holder->name);
+      .attr("Program")(board.holder->pid, printable(board.holder->name));
 }
 
 }  // namespace

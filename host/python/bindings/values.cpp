@@ -15,13 +15,20 @@ Direction direction_of(int number) {
   return static_cast<Direction>(number);
 }
 
-// What is driven by a duty, or by the board's own value and a direction.
+Duty duty_of(const py::object& duty) {
+  if (PyBool_Check(duty.ptr())) throw py::type_error("duty must be a number from -1 to 1");
+  const double value = PyFloat_AsDouble(duty.ptr());
+  if (PyErr_Occurred() != nullptr) throw py::error_already_set();
+  return checked_duty(value);
+}
+
+// A motor takes a duty, or the board's own value and a direction.
 void bind_drive(py::class_<OwnCommand>& commands, const char* name,
                 Command (*by_duty)(Channel, Duty), Command (*by_pwm)(Channel, Pwm, Direction)) {
   commands.def_static(
       name,
-      [by_duty](int channel, double duty) {
-        return OwnCommand(by_duty(channel, checked_duty(duty)));
+      [by_duty](int channel, const py::object& duty) {
+        return OwnCommand(by_duty(channel, duty_of(duty)));
       },
       py::arg("channel"), py::kw_only(), py::arg("duty"));
   commands.def_static(
@@ -40,8 +47,8 @@ void bind_commands(py::module_& module) {
   commands
       .def_static(
           "bldc",
-          [](int channel, double duty, bool brake) {
-            return OwnCommand(Command::bldc(channel, checked_duty(duty), brake));
+          [](int channel, const py::object& duty, bool brake) {
+            return OwnCommand(Command::bldc(channel, duty_of(duty), brake));
           },
           py::arg("channel"), py::kw_only(), py::arg("duty"), py::arg("brake") = false)
       .def_static(

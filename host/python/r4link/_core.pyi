@@ -494,7 +494,7 @@ class SearchedNetwork(_Record):
         """Why the question could not be sent."""
 
 class Discovery:
-    """What discover() has found, and where it has searched."""
+    """The boards that discover() has found, and where it has searched."""
     @property
     def boards(self) -> list[FoundBoard]: ...
     @property

@@ -104,7 +104,7 @@ class DriveChannel(_Channel[Sent]):
         return self._board.send(self._make(self._channel, duty=duty), timeout)
 
     def set_pwm(self, pwm: int, *, direction: int = Direction.FORWARD, timeout: float = 1.0) -> Sent:
-        """`pwm`: 0 to 4095, always on. `direction`: FORWARD or REVERSE."""
+        """`pwm`: 0 to 4095 (always on). `direction`: FORWARD or REVERSE."""
         return self._board.send(self._make(self._channel, pwm=pwm, direction=direction), timeout)
 
     def post(self, duty: float) -> PostResult:
@@ -112,7 +112,7 @@ class DriveChannel(_Channel[Sent]):
         return self._board.post(self._make(self._channel, duty=duty))
 
     def post_pwm(self, pwm: int, *, direction: int = Direction.FORWARD) -> PostResult:
-        """`pwm`: 0 to 4095, always on. `direction`: FORWARD or REVERSE."""
+        """`pwm`: 0 to 4095 (always on). `direction`: FORWARD or REVERSE."""
         return self._board.post(self._make(self._channel, pwm=pwm, direction=direction))
 
 
@@ -166,7 +166,7 @@ class BldcChannel(_Channel[Sent]):
 
     def set_pwm(self, pwm: int, *, direction: int = Direction.FORWARD, brake: bool = False,
                 timeout: float = 1.0) -> Sent:
-        """`pwm`: 0 to 4095, full speed. `direction`: FORWARD or REVERSE. `brake`: True applies the driver's brake."""
+        """`pwm`: 0 to 4095 (full speed). `direction`: FORWARD or REVERSE. `brake`: True applies the driver's brake."""
         return self._board.send(Command.bldc(self._channel, pwm=pwm, direction=direction, brake=brake), timeout)
 
     def post(self, duty: float, *, brake: bool = False) -> PostResult:
@@ -174,7 +174,7 @@ class BldcChannel(_Channel[Sent]):
         return self._board.post(Command.bldc(self._channel, duty=duty, brake=brake))
 
     def post_pwm(self, pwm: int, *, direction: int = Direction.FORWARD, brake: bool = False) -> PostResult:
-        """`pwm`: 0 to 4095, full speed. `direction`: FORWARD or REVERSE. `brake`: True applies the driver's brake."""
+        """`pwm`: 0 to 4095 (full speed). `direction`: FORWARD or REVERSE. `brake`: True applies the driver's brake."""
         return self._board.post(Command.bldc(self._channel, pwm=pwm, direction=direction, brake=brake))
 
 

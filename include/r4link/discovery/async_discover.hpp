@@ -2,8 +2,9 @@
 // r4::async_discover(): discover() for programs that have an Asio loop of their own. With
 // r4link::asio only.
 //
-//     r4::async_discover(io.get_executor(), {}, [](std::exception_ptr error, r4::Discovery found) { … });
-//     const r4::Discovery found = co_await r4::async_discover(executor, {}, asio::use_awaitable);
+//     r4::async_discover(io.get_executor(), {},
+//                        [](std::exception_ptr error, r4::Discovery found) { … });
+//     const auto found = co_await r4::async_discover(io.get_executor(), {}, asio::use_awaitable);
 #pragma once
 
 #include <asio/associated_executor.hpp>
@@ -15,27 +16,26 @@
 #include <asio/post.hpp>
 #include <asio/thread_pool.hpp>
 #include <exception>
+#include <optional>
 #include <utility>
 
 #include "discover.hpp"
 
 namespace r4 {
 
-// The thread of the searches of one io_context, which joins it: a search blocks.
+// The thread of the searches of one io_context, because a search blocks. The io_context joins it
+// and destroys the handlers of searches that have not begun.
 class DiscoveryThread final : public asio::execution_context::service {
  public:
   inline static asio::execution_context::id id;
 
   explicit DiscoveryThread(asio::execution_context& context) : service(context) {}
-  asio::thread_pool& pool() { return pool_; }
+  asio::thread_pool& pool() { return *pool_; }
 
  private:
-  void shutdown() override {
-    pool_.stop();
-    pool_.join();
-  }
+  void shutdown() override { pool_.reset(); }
 
-  asio::thread_pool pool_{1};
+  std::optional<asio::thread_pool> pool_{std::in_place, 1};
 };
 
 // void(std::exception_ptr, Discovery). Searches as discover() does, on a thread of its own, one

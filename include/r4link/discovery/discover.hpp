@@ -6,8 +6,8 @@
 //     for (const r4::FoundBoard& board : found.boards) fmt::print("{}\n", board.url);
 //     r4::Board board(found.only().url);   // or, shorter, r4::Board board = r4::Board::first();
 //
-// The transports are searched at the same time. discover() blocks for 0.5 to 1.3 s, so call it
-// neither in a control loop nor on the loop of an AsyncBoard: async_discover() is for these.
+// The transports are searched at the same time. discover() blocks for up to 1.3 s. So do
+// not call it in a control loop or on the loop of an AsyncBoard: async_discover() is for these.
 //
 //   serial  A port with the USB id of a board (2341:0266, Arduino Giga R1), and each port of
 //           `serial_ports`, is opened as a watcher opens it. The board there is asked who it is

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <asio/io_context.hpp>
+#include <asio/steady_timer.hpp>
 #include <asio/use_future.hpp>
 #include <exception>
 #include <future>
@@ -54,8 +55,10 @@ TEST(AsyncDiscover, ALoopThatIsDestroyedEndsTheSearchWithoutTheHandler) {
   {
     asio::io_context io;
     for (int i = 0; i < 2; ++i) {
+      // The second handler waits, and owns a timer, which must not outlive the loop.
       async_discover(io.get_executor(), at_port_by_udp(2018),
-                     [&called, held](std::exception_ptr, Discovery) { called = true; });
+                     [&called, held, timer = asio::steady_timer(io)](std::exception_ptr,
+                                                                     Discovery) { called = true; });
     }
   }
   EXPECT_FALSE(called);
