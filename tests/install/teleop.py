@@ -18,7 +18,7 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / 'integration'))
 from r4_process import PATIENCE_S, Board  # noqa: E402
 
-SPEED = 600
+SPEED = 614  # 0.15 of 4095
 
 
 class Teleop:
