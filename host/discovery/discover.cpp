@@ -69,7 +69,7 @@ FoundBoard Discovery::only() const {
   for (const FoundBoard& board : boards) urls.push_back(board.url);
   if (urls.size() > most_listed) {
     urls.resize(most_listed);
-    urls.push_back("…; r4 list shows more");
+    urls.emplace_back("…; r4 list shows more");
   }
   throw Error(ErrorKind::usage, "the only board", "several boards were found",
               fmt::format("open one of {}", fmt::join(urls, ", ")));

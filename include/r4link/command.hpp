@@ -52,9 +52,8 @@ struct Duty {
   constexpr bool is_in_range() const { return value >= -1 && value <= 1; }
   // Rounded to the nearest; outside its range if the duty is.
   constexpr Pwm pwm() const {
-    return Pwm(is_in_range()
-                   ? static_cast<std::int32_t>((value < 0 ? -value : value) * pwm_max + 0.5)
-                   : pwm_max + 1);
+    const double twice = 2 * pwm_max * (value < 0 ? -value : value);
+    return Pwm(is_in_range() ? (static_cast<std::int32_t>(twice) + 1) / 2 : pwm_max + 1);
   }
   constexpr Direction direction() const {
     return value < 0 ? Direction::reverse : Direction::forward;

@@ -66,10 +66,10 @@ TEST(CommandText, OfAnOwnCommandOutlivesTheTextItIsParsedFrom) {
   std::string text = "C:name,a-name-that-is-longer-than-most";
   OwnCommand first = parse_command_text(text);
   text.assign(text.size(), '!');
-  const OwnCommand moved = std::move(first);
-  const OwnCommand copy = moved;
+  const OwnCommand taken = std::move(first);
+  const OwnCommand copy = taken;
   EXPECT_EQ(to_text(copy.get()), "C:name,a-name-that-is-longer-than-most");
-  EXPECT_EQ(to_text(moved.get()), to_text(copy.get()));
+  EXPECT_EQ(to_text(taken.get()), to_text(copy.get()));
 }
 
 TEST(CommandText, ShowsNoKeyAndNoPassword) {
