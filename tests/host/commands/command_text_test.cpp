@@ -64,9 +64,9 @@ TEST(CommandText, IsParsedWrittenAndDescribedForEveryKind) {
 
 TEST(CommandText, OfAnOwnCommandOutlivesTheTextItIsParsedFrom) {
   std::string text = "C:name,a-name-that-is-longer-than-most";
-  OwnCommand first = parse_command_text(text);
+  OwnCommand parsed = parse_command_text(text);
   text.assign(text.size(), '!');
-  const OwnCommand taken = std::move(first);
+  const OwnCommand taken = std::move(parsed);
   const OwnCommand copy = taken;
   EXPECT_EQ(to_text(copy.get()), "C:name,a-name-that-is-longer-than-most");
   EXPECT_EQ(to_text(taken.get()), to_text(copy.get()));
