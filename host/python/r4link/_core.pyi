@@ -512,7 +512,7 @@ class Discovery:
 
 def discover(*, serial: bool = True, can: bool = True, udp: bool = True, serial_ports: Sequence[str] = (),
              udp_port: int = 2018) -> Discovery:
-    """The boards that this computer reaches, as `r4 list` shows them. Blocks for 0.5 to 1.3 s. `serial_ports`: ports to
+    """The boards that this computer reaches, as `r4 list` shows them. Blocks for up to 1.3 s. `serial_ports`: ports to
     ask whatever their USB id is, by path."""
 
 def shipped_devices() -> list[str]: ...

@@ -201,8 +201,9 @@ disturbed.
 
 On USB a board is known by its id, 2341:0266 (Arduino Giga R1), and asked who it is; --serial asks at
 a port that has another id: an adapter's, or the pty of a simulated board. On CAN interfaces that are
-up it listens for 0.7 s, and asks who has no host. On networks it asks by IPv4 broadcast, three
-times within half a second. Who has a host is heard when that one asks: all takes 1.3 s at most.
+up it listens for 0.7 s, and asks the boards that no host controls. On networks it asks by IPv4
+broadcast, three times within half a second. A controlled board is heard when its host asks it. The
+search takes 1.3 s at most.
 
 Broadcast passes no router, and often no VPN, container or WiFi with client isolation:
 there give the board's address, as in udp://192.168.1.77. A firewall must let in UDP from port 2018.
