@@ -53,7 +53,8 @@ class PathClock {
 struct PathQuestions {
   IdentityQuestion open;
   bool answered = false;  // at least one, since the transport came up
-  int unanswered = 0;     // since the last answer
+  bool in_doubt = false;  // a datagram has come since the newest question, and its T did not fit
+  int unanswered = 0;     // since the last answer, of those asked in doubt
   Time asked_at{0};
   Time ask_at{0};
   Time round_trip{0};

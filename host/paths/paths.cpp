@@ -29,7 +29,7 @@ void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
   path.can_ask = can_ask;
   path.known = up && (!can_ask || is_only());
   path.other = path.connecting = false;
-  path.questions.answered = false;
+  path.questions.answered = path.questions.in_doubt = false;
   path.questions.unanswered = 0;
   path.clock.forget();
   path.heard = path.heard_until = path.busy.until = Time{0};
@@ -76,13 +76,16 @@ void Paths::asked(std::size_t index, std::uint32_t pnum, bool sent, Time now) {
   questions.ask_at = path.known && sent ? Time::max() : again;
   if (!sent) return;
   questions.open.asked(pnum, now);
-  questions.unanswered += questions.unanswered < most_unanswered ? 1 : 0;
+  // While nothing comes, the board has no way to answer.
+  questions.unanswered += questions.in_doubt && questions.unanswered < most_unanswered ? 1 : 0;
+  questions.in_doubt = false;
 }
 
 // At once, but at most ten times a second.
 void Paths::ask_soon(Path& path, Time now) {
   if (!path.can_ask) return;
   PathQuestions& questions = path.questions;
+  questions.in_doubt = true;
   questions.ask_at = std::min(questions.ask_at, std::max(now, questions.asked_at + ask_interval));
 }
 

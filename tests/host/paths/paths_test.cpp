@@ -206,6 +206,17 @@ TEST_F(OnePath, ABoardThatStopsAnsweringIsBelievedAfterTenQuestions) {
   EXPECT_EQ(questions, 10) << "another firmware may run now";
 }
 
+TEST_F(OnePath, AQuestionWhileNothingComesIsNotCounted) {
+  heartbeat();
+  ask();
+  ASSERT_EQ(answer(), Admission::yes);
+  for (int i = 0; i < 20; ++i) {  // of the board's clock, in an outage
+    pass(100);
+    ask();
+  }
+  EXPECT_EQ(paths.admit(0, 5, board_t() - 3'600'000, now), Admission::no) << "a replay comes first";
+}
+
 TEST_F(OnePath, AQuestionThatTheTransportDidNotTakeIsRepeatedAndNotCounted) {
   heartbeat();
   ask();
