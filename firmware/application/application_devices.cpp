@@ -90,10 +90,10 @@ void Application::add_device_answer(FieldSet& fields, std::uint32_t t_ms) const 
 
 void Application::fill_devices(State& state) const {
   for (int i = 0; i < uart_channels; ++i) {
-    if (uarts_[i] != nullptr) uarts_[i]->tell(state.uart[i]);
+    if (uarts_[i] != nullptr) uarts_[i]->tell(state.raw.uart[i]);
   }
   if (i2c_ == nullptr) return;
-  std::memcpy(state.i2c, i2c_->readings(), sizeof state.i2c);
+  std::memcpy(state.raw.i2c, i2c_->readings(), sizeof state.raw.i2c);
   state.i2c_answer = i2c_->answer();
   state.i2c_bus = i2c_->report();
 }

@@ -245,22 +245,22 @@ void Application::send_part(Source to, std::uint32_t& pnum, DatagramWriter& writ
 }
 
 void Application::fill(State& state) const {
-  for (int i = 0; i < analog_channels; ++i) state.analog_cv[i] = inputs_.analog_cv[i];
+  for (int i = 0; i < analog_channels; ++i) state.raw.analog_cv[i] = inputs_.analog_cv[i];
   state.handle_held = inputs_.handle_held;
-  for (int i = 0; i < dhb12_channels; ++i) state.dhb12[i] = outputs_.dhb12[i];
-  for (int i = 0; i < osmc_channels; ++i) state.osmc[i] = outputs_.osmc[i];
-  for (int i = 0; i < servo_channels; ++i) state.servo_us[i] = outputs_.servo_us[i];
-  for (int i = 0; i < bldc_channels; ++i) state.bldc[i] = outputs_.bldc[i];
+  for (int i = 0; i < dhb12_channels; ++i) state.raw.dhb12[i] = outputs_.dhb12[i];
+  for (int i = 0; i < osmc_channels; ++i) state.raw.osmc[i] = outputs_.osmc[i];
+  for (int i = 0; i < servo_channels; ++i) state.raw.servo_us[i] = outputs_.servo_us[i];
+  for (int i = 0; i < bldc_channels; ++i) state.raw.bldc[i] = outputs_.bldc[i];
   state.relays = outputs_.relays;
-  for (int i = 0; i < dac_channels; ++i) state.dac_mv[i] = outputs_.dac_mv[i];
+  for (int i = 0; i < dac_channels; ++i) state.raw.dac_mv[i] = outputs_.dac_mv[i];
   state.gpio = inputs_.gpio;
-  for (int i = 0; i < stepper_channels; ++i) state.stepper_steps[i] = inputs_.stepper_steps[i];
+  for (int i = 0; i < stepper_channels; ++i) state.raw.stepper_steps[i] = inputs_.stepper_steps[i];
   for (int i = 0; i < encoder_channels; ++i) {
-    state.encoder_counts[i] = inputs_.encoder_counts[i];
-    state.encoder_hz[i] = inputs_.encoder_hz[i];
-    state.encoder_index_counts[i] = inputs_.encoder_index_counts[i];
+    state.raw.encoder_counts[i] = inputs_.encoder_counts[i];
+    state.raw.encoder_hz[i] = inputs_.encoder_hz[i];
+    state.raw.encoder_index_counts[i] = inputs_.encoder_index_counts[i];
   }
-  for (int i = 0; i < ultrasonic_channels; ++i) state.ultrasonic_cm[i] = inputs_.ultrasonic_cm[i];
+  for (int i = 0; i < ultrasonic_channels; ++i) state.raw.ultrasonic_cm[i] = inputs_.ultrasonic_cm[i];
   state.safe = safety_.reason();
   state.last_command = link_.last_executed();
   state.rx_ok = rx_ok_;

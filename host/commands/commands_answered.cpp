@@ -22,26 +22,26 @@ bool state_shows(const State& state, const Command& command) {
   switch (command.kind) {
     case CommandKind::osmc:
       return state.present.has(field_of(StateField::osmc1, StateField::osmc2, channel)) &&
-             state.osmc[i].pwm == command.value && state.osmc[i].direction == command.direction;
+             state.raw.osmc[i].pwm == command.value && state.raw.osmc[i].direction == command.direction;
     case CommandKind::dhb12:
       return state.present.has(field_of(StateField::dhb1a, StateField::dhb1b, channel)) &&
-             state.dhb12[i].pwm == command.value && state.dhb12[i].direction == command.direction;
+             state.raw.dhb12[i].pwm == command.value && state.raw.dhb12[i].direction == command.direction;
     case CommandKind::servo:
       return state.present.has(field_of(StateField::servo1pos, StateField::servo2pos, channel)) &&
-             state.servo_us[i] == command.value;
+             state.raw.servo_us[i] == command.value;
     case CommandKind::relay:
       return state.present.has(StateField::relays) &&
              (((state.relays >> i) & 1) != 0) == command.on;
     case CommandKind::stepper:
       return state.present.has(field_of(StateField::step1pos, StateField::step2pos, channel)) &&
-             state.stepper_steps[i] == command.value;
+             state.raw.stepper_steps[i] == command.value;
     case CommandKind::bldc:
       return state.present.has(field_of(StateField::bldc1, StateField::bldc2, channel)) &&
-             state.bldc[i].speed == command.value && state.bldc[i].direction == command.direction &&
-             state.bldc[i].brake == command.on;
+             state.raw.bldc[i].speed == command.value && state.raw.bldc[i].direction == command.direction &&
+             state.raw.bldc[i].brake == command.on;
     case CommandKind::dac:
       return state.present.has(field_of(StateField::dac1, StateField::dac2, channel)) &&
-             state.dac_mv[i] == command.value;
+             state.raw.dac_mv[i] == command.value;
     default:
       return false;
   }

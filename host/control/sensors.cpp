@@ -64,7 +64,7 @@ double Wheel::advance(const State& state) {
 }
 
 double Wheel::measured_m_s(const State& state) const {
-  return state.encoder_hz[geometry_.encoder - 1] * metres_a_count_;
+  return state.raw.encoder_hz[geometry_.encoder - 1] * metres_a_count_;
 }
 
 SteeringSensor::SteeringSensor(const Calibration& calibration) : calibration_(calibration) {

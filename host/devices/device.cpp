@@ -17,7 +17,7 @@ namespace {
 // The reading of the slot that has the value.
 const I2cReading& read_for(const Device& device, const State& state, std::size_t value) {
   const std::size_t poll = device.description().values[value].poll;
-  return state.i2c[static_cast<std::size_t>(device.first_slot() - 1) + poll];
+  return state.raw.i2c[static_cast<std::size_t>(device.first_slot() - 1) + poll];
 }
 
 // True if the value is `number`, but for the rounding of its scale.

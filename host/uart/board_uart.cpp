@@ -58,8 +58,8 @@ void Board::Impl::take_uarts(const State& fresh) {
     std::unique_lock lock(mutex);
     UartInbox& inbox = uarts[i];
     const bool reports = inbox.reports;
-    const bool any = reports ? inbox.stream.take(fresh.uart[i], inbox.to_read, inbox.to_report)
-                             : inbox.stream.take(fresh.uart[i], inbox.to_read);
+    const bool any = reports ? inbox.stream.take(fresh.raw.uart[i], inbox.to_read, inbox.to_report)
+                             : inbox.stream.take(fresh.raw.uart[i], inbox.to_read);
     lock.unlock();
     if (!any) continue;
     news.notify_all();

@@ -183,14 +183,9 @@ class R4LINK_API FieldSet {
 enum class Analog : std::uint8_t { ain24, ain12, ain5, aindmh, ainsteer, ain6, count };
 constexpr int analog_channels = static_cast<int>(Analog::count);
 
-// What the board reports. On the host, `present` tells which members the datagram carried; the
-// others keep the value of earlier datagrams. Channel n of the board is element n-1.
-struct State {
-  FieldSet present;
-  std::uint32_t pnum = 0;
-  std::uint32_t t_ms = 0;                        // the board's clock; wraps
+// The board's own numbers: channel n of the board is element n-1.
+struct ChannelValues {
   std::int32_t analog_cv[analog_channels] = {};  // hundredths of a volt
-  bool handle_held = false;
   Drive dhb12[dhb12_channels];
   Drive osmc[osmc_channels];
   std::int32_t stepper_steps[stepper_channels] = {};
@@ -200,8 +195,21 @@ struct State {
   std::int32_t encoder_index_counts[encoder_channels] = {};  // where the index line rose last
   std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};
   Bldc bldc[bldc_channels];
-  std::uint8_t relays = 0;
+  std::uint16_t dac_mv[dac_channels] = {};
+  I2cReading i2c[i2c_slots];
+  UartBytes uart[uart_channels];
+};
+
+// What the board reports. On the host, `present` tells which fields the datagram carried; the
+// others keep the value of earlier datagrams.
+struct State {
+  FieldSet present;
+  std::uint32_t pnum = 0;
+  std::uint32_t t_ms = 0;  // the board's clock; wraps
+  bool handle_held = false;
+  std::uint8_t relays = 0;  // bit n-1 is relay n
   SafeReason safe = SafeReason::none;
+  std::uint8_t gpio = 0;           // bit n-1 is input n
   std::uint32_t last_command = 0;  // CMD
   std::uint32_t rx_ok = 0;
   std::uint32_t rx_crc = 0;
@@ -209,22 +217,30 @@ struct State {
   std::uint32_t rx_duplicate = 0;
   std::uint32_t rx_refused = 0;
   std::uint32_t late = 0;
+  ChannelValues raw;
   ChipFault fault;
-  I2cReading i2c[i2c_slots];
   I2cAnswer i2c_answer;
   I2cBusReport i2c_bus;
-  UartBytes uart[uart_channels];
-  std::uint16_t dac_mv[dac_channels] = {};
-  std::uint8_t gpio = 0;
 
-  // The same by the names of channels, as on the board: from 1. A channel that is not there reads 0.
+  // By the board's names of channels, from 1. A channel that is not there reads 0.
   double volts(Analog input) const {
     const int i = static_cast<int>(input);
-    return i < analog_channels ? analog_cv[i] / 100.0 : 0.0;
+    return i < analog_channels ? raw.analog_cv[i] / 100.0 : 0.0;
   }
-  std::int32_t encoder(int channel) const { return reading(encoder_counts, channel); }
-  std::int32_t steps(int channel) const { return reading(stepper_steps, channel); }
-  int distance_cm(int channel) const { return reading(ultrasonic_cm, channel); }
+  Drive dhb12(int channel) const { return reading(raw.dhb12, channel); }
+  Drive osmc(int channel) const { return reading(raw.osmc, channel); }
+  Bldc bldc(int channel) const { return reading(raw.bldc, channel); }
+  std::int32_t steps(int channel) const { return reading(raw.stepper_steps, channel); }
+  int servo_us(int channel) const { return reading(raw.servo_us, channel); }
+  std::int32_t encoder(int channel) const { return reading(raw.encoder_counts, channel); }
+  // Counts a second; negative backwards.
+  std::int32_t encoder_hz(int channel) const { return reading(raw.encoder_hz, channel); }
+  // What the encoder counted where its index line rose last.
+  std::int32_t encoder_index(int channel) const {
+    return reading(raw.encoder_index_counts, channel);
+  }
+  int distance_cm(int channel) const { return reading(raw.ultrasonic_cm, channel); }
+  int dac_mv(int channel) const { return reading(raw.dac_mv, channel); }
   bool input(int channel) const {
     return channel >= 1 && channel <= gpio_channels && (gpio >> (channel - 1) & 1) != 0;
   }

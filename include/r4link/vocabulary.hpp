@@ -32,6 +32,8 @@ enum class Direction : std::uint8_t { reverse = 0, forward = 1 };
 struct Drive {
   std::uint16_t pwm = 0;  // 0-4095
   Direction direction = Direction::reverse;
+  // -1 to 1, negative in reverse.
+  double duty() const { return (direction == Direction::reverse ? -pwm : pwm) / double{pwm_max}; }
   friend bool operator==(Drive a, Drive b) { return a.pwm == b.pwm && a.direction == b.direction; }
   friend bool operator!=(Drive a, Drive b) { return !(a == b); }
 };
@@ -41,6 +43,8 @@ struct Bldc {
   std::uint16_t speed = 0;  // 0-4095
   Direction direction = Direction::reverse;
   bool brake = false;
+  // -1 to 1, negative in reverse.
+  double duty() const { return (direction == Direction::reverse ? -speed : speed) / double{pwm_max}; }
   friend bool operator==(Bldc a, Bldc b) {
     return a.speed == b.speed && a.direction == b.direction && a.brake == b.brake;
   }

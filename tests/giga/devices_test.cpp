@@ -78,11 +78,11 @@ TEST_F(GigaDevices, AreReadAtTheirRateBesideTheChips) {
   bench.giga.i2c.log.clear();
   bench.giga.user_i2c.log.clear();
   EXPECT_NEAR(static_cast<double>(states(1000)), 100, 3);
-  EXPECT_EQ(state.i2c[0].data.size, 14);
-  EXPECT_EQ(state.i2c[0].data.bytes[4], 0x40) << "1 g";
-  EXPECT_EQ(state.i2c[7].data.size, 2);
+  EXPECT_EQ(state.raw.i2c[0].data.size, 14);
+  EXPECT_EQ(state.raw.i2c[0].data.bytes[4], 0x40) << "1 g";
+  EXPECT_EQ(state.raw.i2c[7].data.size, 2);
   EXPECT_EQ(state.i2c_bus.errors, 0U);
-  EXPECT_LE(state.t_ms - state.i2c[0].t_ms, 15U);
+  EXPECT_LE(state.t_ms - state.raw.i2c[0].t_ms, 15U);
   const auto& log = bench.giga.user_i2c.log;
   const auto imu = std::count_if(log.begin(), log.end(), [](const auto& each) {
     return each == std::vector<std::uint8_t>{0x68 << 1, 0x3B};
@@ -129,8 +129,8 @@ TEST_F(GigaDevices, AReadingThatIsKeptAsASettingNeedsNoRecoveryAtBoot) {
   bench.drive(host, bench.usb());
   command("F:I2C1,I2CBUS");
   states(100);
-  EXPECT_EQ(state.i2c[0].data.size, 1);
-  EXPECT_EQ(state.i2c[0].errors, 0U);
+  EXPECT_EQ(state.raw.i2c[0].data.size, 1);
+  EXPECT_EQ(state.raw.i2c[0].errors, 0U);
   EXPECT_EQ(state.i2c_bus.recoveries, 0U);
 }
 
@@ -139,7 +139,7 @@ TEST_F(GigaDevices, ADeviceThatWasCutOffIsClockedFree) {
   bench.giga.user_i2c.hold_sda(9);
   states(200);
   EXPECT_EQ(state.i2c_bus.recoveries, 1U);
-  EXPECT_LE(state.t_ms - state.i2c[0].t_ms, 20U) << "it is read again";
+  EXPECT_LE(state.t_ms - state.raw.i2c[0].t_ms, 20U) << "it is read again";
 }
 
 TEST_F(GigaDevices, ALineThatIsHeldCostsTheBoardNothing) {
@@ -165,7 +165,7 @@ TEST_F(GigaDevices, ALineThatIsHeldCostsTheBoardNothing) {
   }
   bench.giga.user_i2c.hold_scl(false);
   states(300);
-  EXPECT_LE(state.t_ms - state.i2c[0].t_ms, 20U);
+  EXPECT_LE(state.t_ms - state.raw.i2c[0].t_ms, 20U);
 }
 
 // --- UARTs, DAC and spare inputs
@@ -220,16 +220,16 @@ TEST_F(GigaDevices, AUartHearsEachByteOnceAndSendsWhatItIsTold) {
   for (int i = 0; i < 60; ++i) sentence += static_cast<char>('A' + i % 26);
   bench.giga.uart[0].say(sentence);
   states(30);
-  EXPECT_EQ(state.uart[0].position + state.uart[0].data.size, 60U);
-  EXPECT_EQ(state.uart[0].lost, 0U);
-  EXPECT_EQ(state.uart[1].position + state.uart[1].data.size, 5U);
+  EXPECT_EQ(state.raw.uart[0].position + state.raw.uart[0].data.size, 60U);
+  EXPECT_EQ(state.raw.uart[0].lost, 0U);
+  EXPECT_EQ(state.raw.uart[1].position + state.raw.uart[1].data.size, 5U);
   command("X:UART,1,x48656c6c6f");
   states(20);
   EXPECT_EQ(bench.giga.uart[0].sent, "Hello");
   command("C:uart1,off");
   bench.giga.uart[0].say("nobody hears it");
   states(30);
-  EXPECT_EQ(state.uart[0].position + state.uart[0].data.size, 60U);
+  EXPECT_EQ(state.raw.uart[0].position + state.raw.uart[0].data.size, 60U);
 }
 
 TEST_F(GigaDevices, WhatAUartHasNotSentWhenAStopComesIsDropped) {
@@ -251,8 +251,8 @@ TEST_F(GigaDevices, NoDamagedByteIsToldAndNoOtherIsLost) {
   bench.giga.uart[0].noise = false;
   states(50);
   EXPECT_GT(bench.giga.uart[0].damaged, 50U);
-  EXPECT_EQ(state.uart[0].lost, bench.giga.uart[0].damaged);
-  EXPECT_EQ(state.uart[0].position + state.uart[0].data.size, bench.giga.uart[0].said);
+  EXPECT_EQ(state.raw.uart[0].lost, bench.giga.uart[0].damaged);
+  EXPECT_EQ(state.raw.uart[0].position + state.raw.uart[0].data.size, bench.giga.uart[0].said);
 }
 
 TEST_F(GigaDevices, NoiseOnTheUartsCostsTheBoardNothing) {
@@ -263,7 +263,7 @@ TEST_F(GigaDevices, NoiseOnTheUartsCostsTheBoardNothing) {
   bench.giga.uart[0].noise = bench.giga.uart[1].noise = true;
   states(200);
   EXPECT_NEAR(static_cast<double>(states(500)), 50, 2);
-  EXPECT_GT(state.uart[0].lost, 1000U);
+  EXPECT_GT(state.raw.uart[0].lost, 1000U);
   EXPECT_TRUE(bench.active());
   EXPECT_EQ(bench.pins().osmc[0].pwm, 358);
   bench.usb()(host.command("E:STOP"));

@@ -68,7 +68,7 @@ TEST_F(AsyncBoardSleep, DisarmsAndSwitchesTheMotorsOff) {
   ASSERT_EQ(result_of([&](auto armed) { board.async_arm(10s, armed); }).outcome,
             Outcome::confirmed);
   ASSERT_TRUE(board.post(Command::osmc(1, Pwm(500), Direction::forward)));
-  ASSERT_TRUE(run_until([&] { return board.state().osmc[0].pwm == 500; }));
+  ASSERT_TRUE(run_until([&] { return board.state().osmc(1).pwm == 500; }));
 
   slept_seconds += 3;
   ASSERT_TRUE(run_until([&] { return board.disarmed_by() != DisarmCause::none; }));
@@ -76,7 +76,7 @@ TEST_F(AsyncBoardSleep, DisarmsAndSwitchesTheMotorsOff) {
   EXPECT_EQ(board.post(Command::osmc(1, Pwm(500), Direction::forward)), PostResult::no_link);
   EXPECT_EQ(restarts, 1);
   ASSERT_TRUE(run_until([&] { return board.in_control() && board.state().any(); }));
-  EXPECT_EQ(board.state().osmc[0].pwm, 0) << "another session has begun";
+  EXPECT_EQ(board.state().osmc(1).pwm, 0) << "another session has begun";
   EXPECT_EQ(board.post(Command::osmc(1, Pwm(500), Direction::forward)), PostResult::not_armed);
   EXPECT_EQ(restarts, 1);
 }

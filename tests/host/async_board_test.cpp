@@ -122,7 +122,7 @@ TEST_F(AsyncBoardTest, WarnsOfAHoldUpOnceHoweverMuchFollowsIt) {
     for (int us = 1000; us < 1100; ++us) board.post(Command::servo(1, Microseconds(us)));
     posted = true;
   });
-  ASSERT_TRUE(run_until([&] { return posted && board.state().servo_us[0] == 1099; }));
+  ASSERT_TRUE(run_until([&] { return posted && board.state().servo_us(1) == 1099; }));
   EXPECT_EQ(warnings, 1);
 }
 

@@ -48,7 +48,7 @@ class Stream {
   std::thread thread_;
 };
 
-int driven(Board& board) { return board.next_state().osmc[0].pwm; }
+int driven(Board& board) { return board.next_state().osmc(1).pwm; }
 
 TEST(BoardArming, AStreamDoesNotStartTheMotorsAfterAStopThatIsCleared) {
   BoardInAThread simulated("udp");

@@ -111,12 +111,12 @@ TEST_F(DrivenGroup, IsConfirmedAsOneAndRefusedAsOne) {
   board.apply(Setpoints{Command::osmc(1, Pwm(358), forward), Command::osmc(2, Pwm(359), forward),
                         Command::servo(3, Microseconds(1500)), Command::dac(2, Millivolts(1650))});
   const State state = board.next_state();
-  EXPECT_EQ(state.osmc[0], (Drive{358, forward}));
-  EXPECT_EQ(state.osmc[1], (Drive{359, forward}));
-  EXPECT_EQ(state.servo_us[2], 1500);
-  EXPECT_EQ(state.dac_mv[1], 1650);
+  EXPECT_EQ(state.osmc(1), (Drive{358, forward}));
+  EXPECT_EQ(state.osmc(2), (Drive{359, forward}));
+  EXPECT_EQ(state.servo_us(3), 1500);
+  EXPECT_EQ(state.dac_mv(2), 1650);
   board.send("O:1,1,1;O:2,1,2");
-  EXPECT_EQ(board.next_state().osmc[1].pwm, 2);
+  EXPECT_EQ(board.next_state().osmc(2).pwm, 2);
   board.stop();
   const Problem refused = problem_of([&] { board.send("O:5,1,1;O:6,1,2"); });
   EXPECT_EQ(refused.outcome, Outcome::refused);

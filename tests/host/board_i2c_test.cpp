@@ -33,14 +33,14 @@ TEST_F(BoardI2c, PutsRepeatedReadingsIntoTheState) {
   board.i2c().poll(1, 0x68, {0x75}, 1, 10ms);
   board.fields("I2C1");
   ReceivedState state = board.next_state();
-  for (int i = 0; i < 100 && state.i2c[0].data.size == 0; ++i) state = board.next_state();
-  ASSERT_EQ(state.i2c[0].data.size, 1);
-  EXPECT_EQ(state.i2c[0].data.bytes[0], 0x68);
+  for (int i = 0; i < 100 && state.raw.i2c[0].data.size == 0; ++i) state = board.next_state();
+  ASSERT_EQ(state.raw.i2c[0].data.size, 1);
+  EXPECT_EQ(state.raw.i2c[0].data.bytes[0], 0x68);
   // A board that is late samples after the T of its state.
-  EXPECT_LE(static_cast<std::int32_t>(state.t_ms - state.i2c[0].t_ms), 40);
+  EXPECT_LE(static_cast<std::int32_t>(state.t_ms - state.raw.i2c[0].t_ms), 40);
   board.i2c().poll_off(1);
-  for (int i = 0; i < 100 && state.i2c[0].data.size != 0; ++i) state = board.next_state();
-  EXPECT_EQ(state.i2c[0].data.size, 0);
+  for (int i = 0; i < 100 && state.raw.i2c[0].data.size != 0; ++i) state = board.next_state();
+  EXPECT_EQ(state.raw.i2c[0].data.size, 0);
   EXPECT_THROW(board.i2c().poll(9, 0x68, {0x75}, 1, 10ms), Error);
   EXPECT_THROW(board.i2c().poll(1, 0x68, {0x75}, 1, 4ms), Error);
 }

@@ -81,7 +81,7 @@ TEST_P(BoardRoles, AreTakenAndGivenBackAgainAndAgain) {
   for (int i = 0; i < 3; ++i) {
     drive();
     EXPECT_EQ(board.role(), BoardRole::control);
-    EXPECT_EQ(board.state().osmc[0].pwm, 358);
+    EXPECT_EQ(board.state().osmc(1).pwm, 358);
     ASSERT_TRUE(hears_more_states());
     EXPECT_EQ(release(), Outcome::confirmed);
     EXPECT_TRUE(simulated.is_without_host());

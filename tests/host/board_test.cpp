@@ -55,12 +55,12 @@ TEST_P(BoardOver, ConfirmsEveryCommandOnceExecuted) {
   board.setting("recovery", "rearm");
   board.send("S:0,16");
   const State state = board.next_state();
-  EXPECT_EQ(state.osmc[0], (Drive{358, Direction::forward}));
-  EXPECT_EQ(state.osmc[3], (Drive{4095, Direction::reverse}));
-  EXPECT_EQ(state.dhb12[1], (Drive{100, Direction::forward}));
+  EXPECT_EQ(state.osmc(1), (Drive{358, Direction::forward}));
+  EXPECT_EQ(state.osmc(4), (Drive{4095, Direction::reverse}));
+  EXPECT_EQ(state.dhb12(2), (Drive{100, Direction::forward}));
   EXPECT_EQ(state.relays, 0b100);
-  EXPECT_EQ(state.bldc[3], (Bldc{2000, Direction::forward, true}));
-  EXPECT_EQ(state.servo_us[15], 0);
+  EXPECT_EQ(state.bldc(4), (Bldc{2000, Direction::forward, true}));
+  EXPECT_EQ(state.servo_us(16), 0);
   const std::vector<std::string> after_settings{
       "O:358,1,1",    "O:4095,0,4", "D:100,1,2",        "S:1500,16", "R:3,On",       "P:-5,20000,2",
       "B:2000,1,1,4", "D:1024,0,1", "O:7,0,2",          "B:8,0,1,1", "B:4095,0,1,2", "B:1024,0,0,3",
@@ -96,7 +96,7 @@ TEST_P(BoardOver, StopsUntilCleared) {
 
   board.clear();
   board.wait_active();
-  EXPECT_EQ(board.next_state().osmc[0].pwm, 0) << "nothing comes back after a stop";
+  EXPECT_EQ(board.next_state().osmc(1).pwm, 0) << "nothing comes back after a stop";
   board.osmc(1).set_pwm(5, Direction::forward);
 }
 
@@ -143,7 +143,7 @@ TEST(Board, ReportsARestartBeforeTheNewState) {
   board.on_restart([&] { duties.push_back(-1); });
   board.on_state([&, four](const State& state) {
     if (!state.present.has(StateField::osmc1)) return;
-    const int duty = state.osmc[0].pwm;
+    const int duty = state.osmc(1).pwm;
     if (!duties.empty() && duties.back() == duty) return;
     duties.push_back(duty);
     if (duties.size() == 4) four.set(duties);
@@ -310,7 +310,7 @@ TEST(Board, TakesCommandsFromSeveralThreadsAtOnce) {
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(confirmed, 200);
   const State state = board.next_state();
-  EXPECT_EQ(state.osmc[0].pwm, 49);
+  EXPECT_EQ(state.osmc(1).pwm, 49);
 }
 
 TEST(Board, LetsAStopCancelWhatOtherThreadsWaitFor) {

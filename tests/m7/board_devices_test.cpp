@@ -66,9 +66,9 @@ TEST(Devices, AreReadAndToldWithTheirTime) {
   read_all(host);
   host.run_alive_ms(200);
   const State& state = listener.state();
-  EXPECT(state.i2c[0].data.size == 14 && state.i2c[0].data.bytes[4] == 0x40);
-  EXPECT(state.i2c[7].data.size == 2 && state.i2c[7].data.bytes[1] == 0x02);
-  EXPECT(state.t_ms - state.i2c[0].t_ms <= 13 && state.i2c_bus.errors == 0);
+  EXPECT(state.raw.i2c[0].data.size == 14 && state.raw.i2c[0].data.bytes[4] == 0x40);
+  EXPECT(state.raw.i2c[7].data.size == 2 && state.raw.i2c[7].data.bytes[1] == 0x02);
+  EXPECT(state.t_ms - state.raw.i2c[0].t_ms <= 13 && state.i2c_bus.errors == 0);
 }
 
 // The stream, a stop and silence, with a bus that is free, held, and stretched for ever.
@@ -116,8 +116,8 @@ TEST(Devices, AReceiverIsHeardAndAVoltageIsZeroBehindAStop) {
   host.execute(Command::dac(1, Millivolts(1650)));
   host.run_alive_ms(300);
   const State& state = listener.state();
-  EXPECT(state.uart[0].position > 300 && state.uart[0].lost == 0);
-  EXPECT(state.dac_mv[0] == 1650 && host.model().dac_mv(1) == 1650 && state.gpio == 0xFF);
+  EXPECT(state.raw.uart[0].position > 300 && state.raw.uart[0].lost == 0);
+  EXPECT(state.raw.dac_mv[0] == 1650 && host.model().dac_mv(1) == 1650 && state.gpio == 0xFF);
   host.command(Command::stop());
   host.run_ms(3);
   EXPECT(host.model().dac_mv(1) == 0);

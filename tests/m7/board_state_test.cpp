@@ -42,20 +42,20 @@ TEST(BoardState, BringsEveryInputExactly) {
   board.host.execute(Command::stepper(3, Steps(50), StepsPerSecond(5000)));
   board.host.run_alive_ms(700);  // every sensor has its turn
   const State& state = board.state();
-  EXPECT(state.handle_held && state.stepper_steps[2] == 50);
-  for (int i = 0; i < analog_channels; ++i) EXPECT(state.analog_cv[i] == 100 * (i + 1) + i);
+  EXPECT(state.handle_held && state.raw.stepper_steps[2] == 50);
+  for (int i = 0; i < analog_channels; ++i) EXPECT(state.raw.analog_cv[i] == 100 * (i + 1) + i);
   for (int channel = 1; channel <= 4; ++channel) {
-    EXPECT(state.ultrasonic_cm[channel - 1] == 50 * channel);
-    EXPECT(state.encoder_counts[channel - 1] == turns_of(channel) + part_of(channel));
+    EXPECT(state.raw.ultrasonic_cm[channel - 1] == 50 * channel);
+    EXPECT(state.raw.encoder_counts[channel - 1] == turns_of(channel) + part_of(channel));
     EXPECT(state.encoder_index_counts[channel - 1] == turns_of(channel));
-    EXPECT(state.encoder_hz[channel - 1] == 0);
+    EXPECT(state.raw.encoder_hz[channel - 1] == 0);
   }
   board.host.execute(Command::setting("AIN24", "55.00"));
   for (int channel = 1; channel <= 4; ++channel) board.host.execute(Command::zero(channel));
   board.host.run_alive_ms(100);
-  EXPECT(state.analog_cv[0] == 110 && state.analog_cv[1] == 201 && state.stepper_steps[2] == 0);
+  EXPECT(state.raw.analog_cv[0] == 110 && state.raw.analog_cv[1] == 201 && state.raw.stepper_steps[2] == 0);
   for (int channel = 1; channel <= 4; ++channel) {
-    EXPECT(state.encoder_counts[channel - 1] == 0);
+    EXPECT(state.raw.encoder_counts[channel - 1] == 0);
     EXPECT(state.encoder_index_counts[channel - 1] == -part_of(channel));
   }
   board.host.execute(Command::relay(1, true));  // closes the motors' supply
@@ -64,7 +64,7 @@ TEST(BoardState, BringsEveryInputExactly) {
   }
   board.host.run_alive_ms(2000);
   for (int channel = 1; channel <= 4; ++channel) {
-    const std::int32_t off = state.encoder_hz[channel - 1] - 977 * channel;  // 4000 at 4095
+    const std::int32_t off = state.raw.encoder_hz[channel - 1] - 977 * channel;  // 4000 at 4095
     EXPECT(-20 <= off && off <= 20);
   }
   EXPECT(board.told.lost() == 0 && board.told.bad() == 0);

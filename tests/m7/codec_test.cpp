@@ -24,11 +24,11 @@ constexpr char captured[] =
 Text whole(char* buffer, std::size_t capacity) {
   DatagramWriter writer(buffer, capacity);
   State state;
-  state.analog_cv[0] = 2428;
-  state.analog_cv[1] = 1215;
-  state.analog_cv[2] = 511;
-  state.analog_cv[3] = 1219;
-  state.analog_cv[4] = 103;
+  state.raw.analog_cv[0] = 2428;
+  state.raw.analog_cv[1] = 1215;
+  state.raw.analog_cv[2] = 511;
+  state.raw.analog_cv[3] = 1219;
+  state.raw.analog_cv[4] = 103;
   state.handle_held = true;
   for (const StateField field : FieldSet::paper_default()) write_field(writer, field, state);
   return writer.finish(22, 79146);
@@ -79,7 +79,7 @@ TEST(StateDatagram, IsThatOfTheCapture) {
   Datagram seen;
   State state;
   EXPECT(read_datagram(datagram, seen));
-  EXPECT(read_state(seen, state) && state.analog_cv[0] == 2428 && state.handle_held);
+  EXPECT(read_state(seen, state) && state.raw.analog_cv[0] == 2428 && state.handle_held);
   EXPECT(state.pnum == 22 && state.t_ms == 79146);
 }
 

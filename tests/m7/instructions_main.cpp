@@ -108,11 +108,11 @@ class Bus final : public firmware::I2cBus {
 // A state as in the paper's capture: 154 bytes.
 State captured() {
   State state;
-  state.analog_cv[0] = 2428;
-  state.analog_cv[1] = 1215;
-  state.analog_cv[2] = 511;
-  state.analog_cv[3] = 1219;
-  state.analog_cv[4] = 103;
+  state.raw.analog_cv[0] = 2428;
+  state.raw.analog_cv[1] = 1215;
+  state.raw.analog_cv[2] = 511;
+  state.raw.analog_cv[3] = 1219;
+  state.raw.analog_cv[4] = 103;
   state.handle_held = true;
   return state;
 }

@@ -110,16 +110,16 @@ TEST(PaperCapture, TheFirstStateHasTheValuesOfThePrint) {
   ASSERT_TRUE(read_state(datagram, state));
   EXPECT_EQ(state.pnum, 7434U);
   EXPECT_EQ(state.t_ms, 79090U);
-  EXPECT_EQ(state.analog_cv[static_cast<int>(Analog::ain24)], 2428);
-  EXPECT_EQ(state.analog_cv[static_cast<int>(Analog::ain12)], 1212);
-  EXPECT_EQ(state.analog_cv[static_cast<int>(Analog::ain5)], 512);
-  EXPECT_EQ(state.analog_cv[static_cast<int>(Analog::aindmh)], 1211);
-  EXPECT_EQ(state.analog_cv[static_cast<int>(Analog::ainsteer)], 103);
+  EXPECT_EQ(state.raw.analog_cv[static_cast<int>(Analog::ain24)], 2428);
+  EXPECT_EQ(state.raw.analog_cv[static_cast<int>(Analog::ain12)], 1212);
+  EXPECT_EQ(state.raw.analog_cv[static_cast<int>(Analog::ain5)], 512);
+  EXPECT_EQ(state.raw.analog_cv[static_cast<int>(Analog::aindmh)], 1211);
+  EXPECT_EQ(state.raw.analog_cv[static_cast<int>(Analog::ainsteer)], 103);
   EXPECT_TRUE(state.handle_held);
-  EXPECT_EQ(state.dhb12[0], (Drive{4095, Direction::forward}));
-  EXPECT_EQ(state.osmc[0], (Drive{400, Direction::forward}));
-  EXPECT_EQ(state.stepper_steps[0], -100);
-  EXPECT_EQ(state.servo_us[0], 2000);
+  EXPECT_EQ(state.raw.dhb12[0], (Drive{4095, Direction::forward}));
+  EXPECT_EQ(state.raw.osmc[0], (Drive{400, Direction::forward}));
+  EXPECT_EQ(state.raw.stepper_steps[0], -100);
+  EXPECT_EQ(state.raw.servo_us[0], 2000);
 }
 
 }  // namespace

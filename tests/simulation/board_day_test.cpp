@@ -144,14 +144,14 @@ class Day final : private firmware::Port {
     live(500);
     const sim::Pins pins = board_.pins();
     for (int i = 0; i < stepper_channels; ++i) {
-      EXPECT_EQ(state_.stepper_steps[i], pins.stepper[i].position) << i;
+      EXPECT_EQ(state_.raw.stepper_steps[i], pins.stepper[i].position) << i;
     }
     for (int i = 0; i < encoder_channels; ++i) {
-      EXPECT_EQ(state_.encoder_counts[i], board_.shaft_count(i + 1)) << i;
-      EXPECT_EQ(state_.encoder_index_counts[i] % sim::BoardModel::counts_a_turn, 0) << i;
-      const std::int32_t beyond = state_.encoder_counts[i] - state_.encoder_index_counts[i];
+      EXPECT_EQ(state_.raw.encoder_counts[i], board_.shaft_count(i + 1)) << i;
+      EXPECT_EQ(state_.raw.encoder_index_counts[i] % sim::BoardModel::counts_a_turn, 0) << i;
+      const std::int32_t beyond = state_.raw.encoder_counts[i] - state_.raw.encoder_index_counts[i];
       EXPECT_TRUE(std::abs(beyond) < sim::BoardModel::counts_a_turn) << i << ": " << beyond;
-      EXPECT_NEAR(state_.encoder_hz[i], 0, 10) << i << ": it has run out";
+      EXPECT_NEAR(state_.raw.encoder_hz[i], 0, 10) << i << ": it has run out";
     }
   }
 

@@ -231,10 +231,10 @@ TEST(OpenPodcar, DoesNotDriveByASteeringSensorThatIsOff) {
 TEST(OpenPodcar, StaysWhereItIsWhenTheBoardRestarts) {
   Podcar podcar;
   State state;
-  state.analog_cv[static_cast<int>(Analog::ainsteer)] = 250;
+  state.raw.analog_cv[static_cast<int>(Analog::ainsteer)] = 250;
   const auto sense = [&](std::uint32_t t_ms, std::int32_t counts) {
     state.t_ms = t_ms;
-    state.encoder_counts[podcar_wheel.encoder - 1] = counts;
+    state.raw.encoder_counts[podcar_wheel.encoder - 1] = counts;
     EXPECT_TRUE(podcar.sense(state));
   };
   sense(60'000, 50'000);

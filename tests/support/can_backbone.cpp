@@ -48,19 +48,19 @@ class Voice {
     State state;
     const std::int32_t volts[] = {2428, 1215, 502, 331, 166, 598};
     for (int i = 0; i < analog_channels; ++i) {
-      state.analog_cv[i] = volts[i] + static_cast<std::int32_t>(random_.below(7)) - 3;
+      state.raw.analog_cv[i] = volts[i] + static_cast<std::int32_t>(random_.below(7)) - 3;
     }
     state.handle_held = true;
-    for (Drive& drive : state.dhb12) drive = any_drive();
-    for (Drive& drive : state.osmc) drive = any_drive();
-    for (std::int32_t& steps : state.stepper_steps) steps = moving(20000);
-    for (std::uint16_t& us : state.servo_us) {
+    for (Drive& drive : state.raw.dhb12) drive = any_drive();
+    for (Drive& drive : state.raw.osmc) drive = any_drive();
+    for (std::int32_t& steps : state.raw.stepper_steps) steps = moving(20000);
+    for (std::uint16_t& us : state.raw.servo_us) {
       us = static_cast<std::uint16_t>(random_.between(500, 2500));
     }
-    for (std::int32_t& count : state.encoder_counts) count = moving(200000);
-    for (std::int32_t& hz : state.encoder_hz) hz = moving(4000);
-    for (std::int32_t& count : state.encoder_index_counts) count = moving(200000);
-    for (std::uint16_t& cm : state.ultrasonic_cm) {
+    for (std::int32_t& count : state.raw.encoder_counts) count = moving(200000);
+    for (std::int32_t& hz : state.raw.encoder_hz) hz = moving(4000);
+    for (std::int32_t& count : state.raw.encoder_index_counts) count = moving(200000);
+    for (std::uint16_t& cm : state.raw.ultrasonic_cm) {
       cm = static_cast<std::uint16_t>(random_.between(5, 400));
     }
     state.last_command = host_pnum_;

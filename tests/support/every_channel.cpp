@@ -47,25 +47,25 @@ void expect_inputs(const ControlledBoard& board) {
       at.model().set_ultrasonic(channel, static_cast<std::uint16_t>(50 * channel));
     }
   });
-  const State state = await(board, [](const State& s) { return s.ultrasonic_cm[3] == 200; });
+  const State state = await(board, [](const State& s) { return s.distance_cm(4) == 200; });
   const State again = await(board, [&](const State& s) {  // every sensor was read since
     return s.t_ms - state.t_ms > 250;
   });
   EXPECT_TRUE(again.handle_held);
-  for (int i = 0; i < analog_channels; ++i) EXPECT_EQ(again.analog_cv[i], 100 * (i + 1) + i);
+  for (int i = 0; i < analog_channels; ++i) EXPECT_EQ(again.raw.analog_cv[i], 100 * (i + 1) + i);
   for (int channel = 1; channel <= encoder_channels; ++channel) {
-    EXPECT_EQ(again.encoder_counts[channel - 1], turns_of(channel) + part_of(channel));
-    EXPECT_EQ(again.encoder_index_counts[channel - 1], turns_of(channel));
-    EXPECT_EQ(again.encoder_hz[channel - 1], 0);
+    EXPECT_EQ(again.encoder(channel), turns_of(channel) + part_of(channel));
+    EXPECT_EQ(again.encoder_index(channel), turns_of(channel));
+    EXPECT_EQ(again.encoder_hz(channel), 0);
   }
   for (int channel = 1; channel <= ultrasonic_channels; ++channel) {
-    EXPECT_EQ(again.ultrasonic_cm[channel - 1], 50 * channel);
+    EXPECT_EQ(again.distance_cm(channel), 50 * channel);
   }
   for (int channel = 1; channel <= encoder_channels; ++channel) {
     board.command(fmt::format("Z:{}", channel));
     const State zeroed = board.next_state();
-    EXPECT_EQ(zeroed.encoder_counts[channel - 1], 0);
-    EXPECT_EQ(zeroed.encoder_index_counts[channel - 1], -part_of(channel));
+    EXPECT_EQ(zeroed.encoder(channel), 0);
+    EXPECT_EQ(zeroed.encoder_index(channel), -part_of(channel));
   }
 }
 
@@ -78,7 +78,7 @@ void expect_speeds(const ControlledBoard& board) {
   await(board, [](const State& s) {
     for (int channel = 1; channel <= encoder_channels; ++channel) {
       const int speed = 1000 * channel * sim::MotorModel::top_speed / pwm_max;
-      const int hz = channel % 2 == 0 ? -s.encoder_hz[channel - 1] : s.encoder_hz[channel - 1];
+      const int hz = channel % 2 == 0 ? -s.encoder_hz(channel) : s.encoder_hz(channel);
       if (hz < speed - speed / 8 || hz > speed + speed / 8) return false;
     }
     return true;
@@ -96,9 +96,9 @@ void expect_drives(const ControlledBoard& board) {
       const Drive osmc{pwm, direction};
       const Drive dhb12{static_cast<std::uint16_t>(pwm + 10), direction};
       EXPECT_EQ(pins.osmc[channel - 1], osmc) << channel;
-      EXPECT_EQ(state.osmc[channel - 1], osmc) << channel;
+      EXPECT_EQ(state.osmc(channel), osmc) << channel;
       EXPECT_EQ(pins.dhb12[channel - 1], dhb12) << channel;
-      EXPECT_EQ(state.dhb12[channel - 1], dhb12) << channel;
+      EXPECT_EQ(state.dhb12(channel), dhb12) << channel;
     }
   }
 }
@@ -107,7 +107,7 @@ void expect_servos_and_relays(const ControlledBoard& board) {
   for (int channel = 1; channel <= servo_channels; ++channel) {
     const int us = 700 + 100 * channel;
     board.command(fmt::format("S:{},{}", us, channel));
-    EXPECT_EQ(board.next_state().servo_us[channel - 1], us);
+    EXPECT_EQ(board.next_state().servo_us(channel), us);
     EXPECT_NEAR(pins_of(board).servo_us[channel - 1], us, 3) << channel;
   }
   unsigned on = 0;
@@ -128,7 +128,7 @@ void expect_brushless(const ControlledBoard& board) {
                       channel % 2 == 0 ? Direction::reverse : Direction::forward, brake};
       board.command(fmt::format("B:{},{},{},{}", bldc.speed, static_cast<int>(bldc.direction),
                                 brake ? 1 : 0, channel));
-      EXPECT_EQ(board.next_state().bldc[channel - 1], bldc) << channel;
+      EXPECT_EQ(board.next_state().bldc(channel), bldc) << channel;
       EXPECT_EQ(pins_of(board).bldc[channel - 1], bldc) << channel;
     }
   }
@@ -138,7 +138,7 @@ void expect_steppers(const ControlledBoard& board) {
   for (int channel = 1; channel <= stepper_channels; ++channel) {
     const int to = channel % 2 == 0 ? -50 * channel : 50 * channel;
     board.command(fmt::format("P:{},5000,{}", to, channel));
-    await(board, [&](const State& s) { return s.stepper_steps[channel - 1] == to; });
+    await(board, [&](const State& s) { return s.steps(channel) == to; });
     EXPECT_EQ(pins_of(board).stepper[channel - 1].position, to) << channel;
   }
 }
@@ -156,7 +156,7 @@ void drive(const ControlledBoard& board) {
 void expect_that_nothing_came_back(const ControlledBoard& board) {
   const State state = board.next_state();
   EXPECT_EQ(state.relays, 0);
-  EXPECT_EQ(state.osmc[0].pwm, 0);
+  EXPECT_EQ(state.osmc(1).pwm, 0);
   EXPECT_TRUE(pins_of(board).is_safe());
 }
 

@@ -25,15 +25,15 @@ void print_link(const r4::LinkStatus& link) {
 }
 
 void print_state(const r4::State& state) {
-  std::printf("state: %6.2f V, OSMC 1 at %4u %s\n", state.analog_cv[0] / 100.0, state.osmc[0].pwm,
-              state.osmc[0].direction == r4::Direction::forward ? "forward" : "reverse");
+  std::printf("state: %6.2f V, OSMC 1 at %4u %s\n", state.volts(r4::Analog::ain24), state.osmc(1).pwm,
+              state.osmc(1).direction == r4::Direction::forward ? "forward" : "reverse");
 }
 
 void drive(r4::Board& board) {
   board.on_link(print_link);
   board.on_state([last = r4::Drive{}](const r4::State& state) mutable {
-    if (state.osmc[0] == last) return;  // the state comes 100 times a second
-    last = state.osmc[0];
+    if (state.osmc(1) == last) return;  // the state comes 100 times a second
+    last = state.osmc(1);
     print_state(state);
   });
 

@@ -44,43 +44,43 @@ Form form_of(F field) {
 }
 
 Numbers numbers_of(const State& state, F field) {
-  if (const int n = nth(field, F::ain24, F::aindmh); n >= 0) return {state.analog_cv[n]};
+  if (const int n = nth(field, F::ain24, F::aindmh); n >= 0) return {state.raw.analog_cv[n]};
   if (const int n = nth(field, F::osmc1, F::osmc2, F::osmc4); n >= 0) {
-    return {state.osmc[n].pwm, static_cast<int>(state.osmc[n].direction)};
+    return {state.raw.osmc[n].pwm, static_cast<int>(state.raw.osmc[n].direction)};
   }
   if (const int n = nth(field, F::dhb1a, F::dhb1b, F::dhb2b); n >= 0) {
-    return {state.dhb12[n].pwm, static_cast<int>(state.dhb12[n].direction)};
+    return {state.raw.dhb12[n].pwm, static_cast<int>(state.raw.dhb12[n].direction)};
   }
   if (const int n = nth(field, F::bldc1, F::bldc4); n >= 0) {
-    const Bldc& bldc = state.bldc[n];
+    const Bldc& bldc = state.raw.bldc[n];
     return {bldc.speed, static_cast<int>(bldc.direction), bldc.brake ? 1 : 0};
   }
   if (const int n = nth(field, F::step1pos, F::step2pos, F::step4pos); n >= 0) {
-    return {state.stepper_steps[n]};
+    return {state.raw.stepper_steps[n]};
   }
   if (const int n = nth(field, F::servo1pos, F::servo2pos, F::servo16pos); n >= 0) {
-    return {state.servo_us[n]};
+    return {state.raw.servo_us[n]};
   }
-  if (const int n = nth(field, F::enc1, F::enc4); n >= 0) return {state.encoder_counts[n]};
-  if (const int n = nth(field, F::enc1hz, F::enc4hz); n >= 0) return {state.encoder_hz[n]};
+  if (const int n = nth(field, F::enc1, F::enc4); n >= 0) return {state.raw.encoder_counts[n]};
+  if (const int n = nth(field, F::enc1hz, F::enc4hz); n >= 0) return {state.raw.encoder_hz[n]};
   if (const int n = nth(field, F::enc1idx, F::enc4idx); n >= 0) {
-    return {state.encoder_index_counts[n]};
+    return {state.raw.encoder_index_counts[n]};
   }
-  if (const int n = nth(field, F::us1, F::us4); n >= 0) return {state.ultrasonic_cm[n]};
+  if (const int n = nth(field, F::us1, F::us4); n >= 0) return {state.raw.ultrasonic_cm[n]};
   if (const int n = nth(field, F::i2c1, F::i2c8); n >= 0) {
-    return {state.i2c[n].t_ms, state.i2c[n].errors};
+    return {state.raw.i2c[n].t_ms, state.raw.i2c[n].errors};
   }
   if (const int n = nth(field, F::uart1, F::uart2); n >= 0) {
-    return {state.uart[n].position, state.uart[n].lost};
+    return {state.raw.uart[n].position, state.raw.uart[n].lost};
   }
-  if (const int n = nth(field, F::dac1, F::dac2); n >= 0) return {state.dac_mv[n]};
+  if (const int n = nth(field, F::dac1, F::dac2); n >= 0) return {state.raw.dac_mv[n]};
   switch (field) {
     case F::gpio:
       return {state.gpio};
     case F::ainsteer:
-      return {state.analog_cv[static_cast<int>(Analog::ainsteer)]};
+      return {state.raw.analog_cv[static_cast<int>(Analog::ainsteer)]};
     case F::ain6:
-      return {state.analog_cv[static_cast<int>(Analog::ain6)]};
+      return {state.raw.analog_cv[static_cast<int>(Analog::ain6)]};
     case F::dmhsta:
       return {state.handle_held ? 1 : 0};
     case F::relays:
@@ -132,13 +132,13 @@ py::object value_of(const State& state, F field) {
       if (!state.fault.any()) return py::none();
       return py::str("{}: {}").format(chip_name(state.fault.address), to_text(state.fault.trouble));
     case Form::reading:
-      return to_python(state.i2c[nth(field, F::i2c1, F::i2c8)]);
+      return to_python(state.raw.i2c[nth(field, F::i2c1, F::i2c8)]);
     case Form::answer:
       return to_python(state.i2c_answer);
     case Form::bus:
       return to_python(state.i2c_bus);
     case Form::uart:
-      return to_python(state.uart[nth(field, F::uart1, F::uart2)]);
+      return to_python(state.raw.uart[nth(field, F::uart1, F::uart2)]);
     case Form::number:
       break;
   }
@@ -161,27 +161,27 @@ void set_numbers(State& state, F field, const Numbers& to) {
     return Drive{static_cast<std::uint16_t>(to[0]), static_cast<Direction>(to[1] != 0)};
   };
   if (int n = nth(field, F::ain24, F::aindmh); n >= 0) {
-    state.analog_cv[n] = whole(0);
+    state.raw.analog_cv[n] = whole(0);
   } else if (n = nth(field, F::osmc1, F::osmc2, F::osmc4); n >= 0) {
-    state.osmc[n] = drive();
+    state.raw.osmc[n] = drive();
   } else if (n = nth(field, F::dhb1a, F::dhb1b, F::dhb2b); n >= 0) {
-    state.dhb12[n] = drive();
+    state.raw.dhb12[n] = drive();
   } else if (n = nth(field, F::bldc1, F::bldc4); n >= 0) {
-    state.bldc[n] = {drive().pwm, drive().direction, to[2] != 0};
+    state.raw.bldc[n] = {drive().pwm, drive().direction, to[2] != 0};
   } else if (n = nth(field, F::step1pos, F::step2pos, F::step4pos); n >= 0) {
-    state.stepper_steps[n] = whole(0);
+    state.raw.stepper_steps[n] = whole(0);
   } else if (n = nth(field, F::servo1pos, F::servo2pos, F::servo16pos); n >= 0) {
-    state.servo_us[n] = static_cast<std::uint16_t>(to[0]);
+    state.raw.servo_us[n] = static_cast<std::uint16_t>(to[0]);
   } else if (n = nth(field, F::enc1, F::enc4); n >= 0) {
-    state.encoder_counts[n] = whole(0);
+    state.raw.encoder_counts[n] = whole(0);
   } else if (n = nth(field, F::enc1hz, F::enc4hz); n >= 0) {
-    state.encoder_hz[n] = whole(0);
+    state.raw.encoder_hz[n] = whole(0);
   } else if (n = nth(field, F::enc1idx, F::enc4idx); n >= 0) {
-    state.encoder_index_counts[n] = whole(0);
+    state.raw.encoder_index_counts[n] = whole(0);
   } else if (n = nth(field, F::us1, F::us4); n >= 0) {
-    state.ultrasonic_cm[n] = static_cast<std::uint16_t>(to[0]);
+    state.raw.ultrasonic_cm[n] = static_cast<std::uint16_t>(to[0]);
   } else if (field == F::ainsteer || field == F::ain6) {
-    state.analog_cv[static_cast<int>(field == F::ain6 ? Analog::ain6 : Analog::ainsteer)] =
+    state.raw.analog_cv[static_cast<int>(field == F::ain6 ? Analog::ain6 : Analog::ainsteer)] =
         whole(0);
   } else if (field == F::dmhsta) {
     state.handle_held = to[0] != 0;

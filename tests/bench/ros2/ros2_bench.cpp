@@ -121,7 +121,7 @@ void publish(std::size_t samples) {
   auto next = Clock::now();
   for (std::size_t i = 0; i < samples; ++i) {
     std::this_thread::sleep_until(next += period);
-    ++state.analog_cv[0];
+    ++state.raw.analog_cv[0];
     // As BoardNode does.
     outbox.push([topics, state, line = stamped(), sampled = std::chrono::system_clock::now()] {
       topics->on_datagram(line);

@@ -110,8 +110,8 @@ TEST_F(ApplicationDevices, ReadingsEndWithTheSessionAndThoseOfSettingsStay) {
   host.command("F:I2C1,I2C2");
   pass(50);
   State state = newest_state();
-  EXPECT_EQ(state.i2c[0].data.size, 1);
-  EXPECT_EQ(state.i2c[1].data.size, 0) << "this session has no use for it";
+  EXPECT_EQ(state.raw.i2c[0].data.size, 1);
+  EXPECT_EQ(state.raw.i2c[1].data.size, 0) << "this session has no use for it";
 
   pass(1200, false);  // silence
   ASSERT_EQ(board.reason(), SafeReason::link);
@@ -120,10 +120,10 @@ TEST_F(ApplicationDevices, ReadingsEndWithTheSessionAndThoseOfSettingsStay) {
   next.command("F:I2C1,I2C2");
   pass(50, false);
   state = newest_state();
-  EXPECT_EQ(state.i2c[0].data.size, 0) << "nobody's reading is another's";
-  EXPECT_EQ(state.i2c[0].t_ms, 0U);
-  EXPECT_EQ(state.i2c[1].data.size, 2);
-  EXPECT_NE(state.i2c[1].t_ms, 0U);
+  EXPECT_EQ(state.raw.i2c[0].data.size, 0) << "nobody's reading is another's";
+  EXPECT_EQ(state.raw.i2c[0].t_ms, 0U);
+  EXPECT_EQ(state.raw.i2c[1].data.size, 2);
+  EXPECT_NE(state.raw.i2c[1].t_ms, 0U);
 }
 
 TEST_F(ApplicationDevices, AReadingIsToldWithItsTimeInEveryState) {
@@ -134,7 +134,7 @@ TEST_F(ApplicationDevices, AReadingIsToldWithItsTimeInEveryState) {
   const auto states = board.take(MessageKind::state);
   ASSERT_EQ(states.size(), 10U);
   for (const Heard& heard : states) {
-    EXPECT_LE(heard.t_ms - state_of(heard).i2c[0].t_ms, 60U);
+    EXPECT_LE(heard.t_ms - state_of(heard).raw.i2c[0].t_ms, 60U);
   }
 }
 

@@ -371,7 +371,7 @@ TEST_F(ApplicationSafety, StateKeepsComingWhileStopped) {
   EXPECT_EQ(heard.size(), 10U);
   const State state = state_of(heard.back());
   EXPECT_EQ(state.safe, SafeReason::stop);
-  EXPECT_EQ(state.osmc[0].pwm, 0);  // as it is, not as it was commanded
+  EXPECT_EQ(state.raw.osmc[0].pwm, 0);  // as it is, not as it was commanded
 }
 
 // --- fault and watchdog

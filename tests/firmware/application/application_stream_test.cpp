@@ -64,12 +64,12 @@ TEST(ApplicationStream, CarriesTheNewestInputs) {
   board.take();
   board.run(10);
   const State state = state_of(board.take(MessageKind::state).back());
-  EXPECT_EQ(state.analog_cv[5], 33);
-  EXPECT_EQ(state.encoder_counts[3], -7);
-  EXPECT_EQ(state.encoder_hz[2], -4000);
-  EXPECT_EQ(state.encoder_index_counts[1], 1000);
-  EXPECT_EQ(state.ultrasonic_cm[2], 123);
-  EXPECT_EQ(state.stepper_steps[1], 2'000'000'000);
+  EXPECT_EQ(state.raw.analog_cv[5], 33);
+  EXPECT_EQ(state.raw.encoder_counts[3], -7);
+  EXPECT_EQ(state.raw.encoder_hz[2], -4000);
+  EXPECT_EQ(state.raw.encoder_index_counts[1], 1000);
+  EXPECT_EQ(state.raw.ultrasonic_cm[2], 123);
+  EXPECT_EQ(state.raw.stepper_steps[1], 2'000'000'000);
 }
 
 // Makes every field as long as it gets.

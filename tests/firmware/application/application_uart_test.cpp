@@ -52,9 +52,9 @@ TEST_F(ApplicationUarts, ASettingTurnsOneOnAndTheStateTellsWhatComes) {
   pass(500);
   const State state = newest_state();
   ASSERT_TRUE(state.present.has(StateField::uart1));
-  EXPECT_GT(state.uart[0].position, 1000U);
-  EXPECT_EQ(state.uart[0].lost, 0U);
-  EXPECT_EQ(state.uart[1].position, 0U) << "off";
+  EXPECT_GT(state.raw.uart[0].position, 1000U);
+  EXPECT_EQ(state.raw.uart[0].lost, 0U);
+  EXPECT_EQ(state.raw.uart[1].position, 0U) << "off";
   host.command("C:uart1,off");
   EXPECT_FALSE(devices.uarts[0].mode().on());
   EXPECT_EQ(refused("C:uart3,off"), "UNKNOWN");
@@ -73,7 +73,7 @@ TEST_F(ApplicationUarts, EachByteIsToldOnceOrRepeatedAtItsPosition) {
   pass(2000);
   std::uint32_t next = 0;
   for (const Heard& heard : board.take(MessageKind::state)) {
-    const UartBytes bytes = state_of(heard).uart[0];
+    const UartBytes bytes = state_of(heard).raw.uart[0];
     EXPECT_LE(bytes.position, next);
     next = bytes.position + bytes.data.size;
   }
@@ -84,14 +84,14 @@ TEST_F(ApplicationUarts, WhatCameWhileTheLinkWasLostIsNotToldAsNew) {
   host.command("C:uart1,115200:8N1");
   host.command("F:UART1");
   pass(500);
-  const std::uint32_t before = newest_state().uart[0].position;
+  const std::uint32_t before = newest_state().raw.uart[0].position;
   pass(5000, false);
   board.take();
   host.echo();
   pass(100);
   const auto heard = board.take(MessageKind::state);
   ASSERT_FALSE(heard.empty());
-  const UartBytes first = state_of(heard.front()).uart[0];
+  const UartBytes first = state_of(heard.front()).raw.uart[0];
   EXPECT_GT(first.position, before + firmware::UserUart::backlog)
       << "a gap, as long as what nobody heard";
   EXPECT_LT(first.data.size, 40) << "what came since";
@@ -128,7 +128,7 @@ TEST_F(ApplicationUarts, ADacIsAnOutputThatIsZeroInTheSafeState) {
   EXPECT_EQ(refused("X:DAC,2,3300"), "");
   EXPECT_EQ(board.outputs().dac_mv[0], 1650);
   pass(20);
-  EXPECT_EQ(newest_state().dac_mv[1], 3300);
+  EXPECT_EQ(newest_state().raw.dac_mv[1], 3300);
   EXPECT_EQ(refused("X:DAC,3,1"), "CHANNEL");
   EXPECT_EQ(refused("X:DAC,1,3301"), "RANGE");
   EXPECT_EQ(refused("X:DAC,1,-1"), "RANGE");

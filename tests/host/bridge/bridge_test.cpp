@@ -25,7 +25,7 @@ TEST(Bridge, AHostDrivesTheBoardThroughIt) {
   board.wait_active();
   board.arm();
   board.send("O:358,1,1");
-  EXPECT_EQ(board.state().osmc[0].pwm, 358);
+  EXPECT_EQ(board.state().osmc(1).pwm, 358);
   board.stop();
   const BridgeStatus status = bridge.status().at(0);
   EXPECT_TRUE(status.hosts.up && status.board.up);

@@ -76,7 +76,7 @@ TEST(Limits, OfEveryTimeout) {
   }
   expect_usage("wait_active()", [&] { board.wait_active(-1ms); });
   board.wait_active(0ms);  // only looks
-  EXPECT_EQ(board.next_state().osmc[0].pwm, 0);
+  EXPECT_EQ(board.next_state().osmc(1).pwm, 0);
 }
 
 TEST(Limits, NeverHoldAStopBack) {

@@ -99,7 +99,7 @@ TEST(LoopGuard, EndsWhereADrivenMotorStands) {
   const auto pass = [&](int states, std::int32_t counts_each) {
     while (states-- != 0 && guard.ended() == LoopEnd::none) {
       ReceivedState state = part(t_ms += 10, {StateField::enc3});
-      state.encoder_counts[2] = counts += counts_each;
+      state.raw.encoder_counts[2] = counts += counts_each;
       guard.on_state(state, DisarmCause::none, state.received);
     }
     return guard.ended();

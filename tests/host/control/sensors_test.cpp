@@ -20,7 +20,7 @@ constexpr WheelGeometry metre_wheel{// 1000 counts a metre
 State seen(std::uint32_t t_ms, std::int32_t counts) {
   State state;
   state.t_ms = t_ms;
-  state.encoder_counts[1] = counts;
+  state.raw.encoder_counts[1] = counts;
   return state;
 }
 
@@ -70,7 +70,7 @@ TEST(Wheel, KnowsItsSpeedOverTheLastWindow) {
   for (std::uint32_t t_ms = 210; t_ms <= 250; t_ms += 10) wheel.advance(seen(t_ms, counts));
   EXPECT_NEAR(wheel.speed_m_s(), 0, 1e-9) << "what is older than the window is forgotten";
   State state = seen(0, 0);
-  state.encoder_hz[1] = -1500;
+  state.raw.encoder_hz[1] = -1500;
   EXPECT_NEAR(wheel.measured_m_s(state), -1.5, 1e-9);
 }
 
@@ -79,7 +79,7 @@ TEST(SteeringSensor, KnowsTheAngleBetweenItsEndsAndNoneBeyond) {
       {.left_volts = 4, .left_rad = 0.6, .right_volts = 1, .right_rad = -0.5, .margin_volts = 0.2});
   const auto at = [&](std::int32_t centivolts) {
     State state;
-    state.analog_cv[static_cast<int>(Analog::ainsteer)] = centivolts;
+    state.raw.analog_cv[static_cast<int>(Analog::ainsteer)] = centivolts;
     return sensor.angle_rad(state);
   };
   EXPECT_NEAR(*at(400), 0.6, 1e-9);

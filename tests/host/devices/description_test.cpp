@@ -72,7 +72,7 @@ TEST(DeviceDescription, DecodesEachKindOfNumber) {
 TEST(Device, HasNoMeasurementOfAValueThatDoesNotCount) {
   const Device lidar(DeviceDescription::load("vl53l0x"), 0x29);
   State state;
-  I2cReading& read = state.i2c[0];
+  I2cReading& read = state.raw.i2c[0];
   read.data.size = 12;
   read.data.bytes[10] = 0x01;  // 300 mm
   read.data.bytes[11] = 0x2C;
@@ -101,11 +101,11 @@ constexpr std::string_view gauge =
 TEST(Device, HasNoMeasurementUntilItIsSetUp) {
   const Device device(DeviceDescription::parse(gauge), 0x48);
   State state;
-  state.i2c[0].data.size = 1;
-  state.i2c[0].data.bytes[0] = 0;
+  state.raw.i2c[0].data.size = 1;
+  state.raw.i2c[0].data.bytes[0] = 0;
   EXPECT_FALSE(device.is_set_up(state).has_value()) << "its modes were not read yet";
   EXPECT_FALSE(device.reading(state, "height").number);
-  I2cReading& modes = state.i2c[1];
+  I2cReading& modes = state.raw.i2c[1];
   modes.data.size = 2;
   const auto set_up_with = [&](std::uint8_t mode, std::uint8_t status) {
     modes.data.bytes[0] = mode;
@@ -161,11 +161,11 @@ TEST(Device, CountsByAScaledValueAsItIsWritten) {
                                                "value x s 1 u8 only mode 0.3\n"),
                       0x40);
   State state;
-  state.i2c[0].data.size = 2;
-  state.i2c[0].data.bytes[0] = 3;
-  state.i2c[0].data.bytes[1] = 9;
+  state.raw.i2c[0].data.size = 2;
+  state.raw.i2c[0].data.bytes[0] = 3;
+  state.raw.i2c[0].data.bytes[1] = 9;
   EXPECT_EQ(device.reading(state, "x").number, 9) << "3 times 0.1 is not quite 0.3";
-  state.i2c[0].data.bytes[0] = 4;
+  state.raw.i2c[0].data.bytes[0] = 4;
   EXPECT_FALSE(device.reading(state, "x").number);
 }
 
@@ -179,13 +179,13 @@ TEST(Device, TakesThePlaceOfWhatHasItsAddressOrASlotOfIt) {
 TEST(Device, WithoutItsMagnetAnEncoderHasNoAngle) {
   const Device encoder(DeviceDescription::load("as5600"), 0x36);
   State state;
-  state.i2c[0].data.size = 2;
-  state.i2c[0].data.bytes[0] = state.i2c[0].data.bytes[1] = 0;
+  state.raw.i2c[0].data.size = 2;
+  state.raw.i2c[0].data.bytes[0] = state.raw.i2c[0].data.bytes[1] = 0;
   EXPECT_FALSE(encoder.reading(state, "angle").number) << "its status was not read yet";
-  state.i2c[1].data.size = 1;
-  state.i2c[1].data.bytes[0] = 0x20;
+  state.raw.i2c[1].data.size = 1;
+  state.raw.i2c[1].data.bytes[0] = 0x20;
   EXPECT_EQ(encoder.reading(state, "angle").number, 0);
-  state.i2c[1].data.bytes[0] = 0x10;
+  state.raw.i2c[1].data.bytes[0] = 0x10;
   EXPECT_FALSE(encoder.reading(state, "angle").number);
 }
 
@@ -365,7 +365,7 @@ TEST(Device, DecodesTheSlotsOfAState) {
   const Device power = Device::from("ina219@0x40:3");
   State state;
   const auto put = [&](int slot, const Bytes& bytes, std::uint32_t t_ms) {
-    I2cReading& reading = state.i2c[slot - 1];
+    I2cReading& reading = state.raw.i2c[slot - 1];
     reading.data.size = static_cast<std::uint8_t>(bytes.size());
     std::copy(bytes.begin(), bytes.end(), reading.data.bytes);
     reading.t_ms = t_ms;

@@ -74,9 +74,9 @@ TEST(Fleet, ReportsAResultOfEachBoardAndCountsFailures) {
   EXPECT_EQ(problem.outcome, Outcome::not_armed);
   const std::vector<ReceivedState> states = fleet.states();
   for (const std::size_t board : {0U, 1U, 3U}) {
-    EXPECT_EQ(states[board].osmc[0], (Drive{358, Direction::forward})) << board;
+    EXPECT_EQ(states[board].osmc(1), (Drive{358, Direction::forward})) << board;
   }
-  EXPECT_EQ(states[2].osmc[0].pwm, 0);
+  EXPECT_EQ(states[2].osmc(1).pwm, 0);
   fleet[3].stop();
   const FleetResults two = fleet.send({3, 2, 0}, "O:1,1,1");
   EXPECT_EQ(two.failed(), (Boards{3, 2}));
@@ -89,7 +89,7 @@ TEST(Fleet, StopsAllBoardsUntilTheyAreCleared) {
   EXPECT_TRUE(fleet.stop().all_confirmed());
   EXPECT_TRUE(comes([&] {
     for (const ReceivedState& state : fleet.states()) {
-      if (state.safe != SafeReason::stop || state.osmc[0].pwm != 0) return false;
+      if (state.safe != SafeReason::stop || state.osmc(1).pwm != 0) return false;
     }
     return true;
   }));
@@ -112,7 +112,7 @@ TEST(Fleet, SendsSetpointsOfSeveralBoards) {
   EXPECT_TRUE(comes([&] {
     const std::vector<ReceivedState> states = fleet.states();
     for (std::size_t i = 0; i < 8; ++i) {
-      if (states[i].osmc[0].pwm != 100 + i) return false;
+      if (states[i].osmc(1).pwm != 100 + i) return false;
     }
     return true;
   }));
@@ -120,9 +120,9 @@ TEST(Fleet, SendsSetpointsOfSeveralBoards) {
   setpoints[0].setpoints = motor(7);
   setpoints[1].setpoints = motor(8);
   fleet.apply(setpoints).require();
-  EXPECT_EQ(fleet[0].state().osmc[0].pwm, 7);
-  EXPECT_EQ(fleet[1].state().osmc[0].pwm, 8);
-  EXPECT_EQ(fleet[2].state().osmc[0].pwm, 102);
+  EXPECT_EQ(fleet[0].state().osmc(1).pwm, 7);
+  EXPECT_EQ(fleet[1].state().osmc(1).pwm, 8);
+  EXPECT_EQ(fleet[2].state().osmc(1).pwm, 102);
 }
 
 TEST(Fleet, ReportsASilentBoardAndDrivesTheOtherBoards) {
@@ -139,7 +139,7 @@ TEST(Fleet, ReportsASilentBoardAndDrivesTheOtherBoards) {
   EXPECT_EQ(event->board, 0U);
   EXPECT_EQ(fleet.wait_active(0ms), Boards{0});
   EXPECT_EQ(fleet.send("O:5,1,1", 200ms).failed(), Boards{0});
-  EXPECT_EQ(fleet[1].state().osmc[0].pwm, 5);
+  EXPECT_EQ(fleet[1].state().osmc(1).pwm, 5);
 }
 
 TEST(Fleet, RepeatsAStopAfterItsCallHasReturned) {

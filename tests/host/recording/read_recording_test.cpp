@@ -22,7 +22,7 @@ struct VisitorOfAll final : RecordingVisitor {
     EXPECT_EQ(path, 1);
     EXPECT_GT(at, last);
     last = at;
-    pwm.push_back(state.osmc[0].pwm);
+    pwm.push_back(state.osmc(1).pwm);
   }
   void on_datagram(int, Time, bool from_board, std::string_view) override {
     ++(from_board ? from : to);

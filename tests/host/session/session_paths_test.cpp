@@ -291,8 +291,8 @@ TEST_F(TwoPaths, TakeAStateInPartsFromWhicheverBringsThem) {
   robot.bring(1, with_crc("AIN12:2.00;SAFE:0;PNum:70002;T:" + t + ";"));
   robot.bring(0, with_crc("AIN12:2.00;SAFE:0;PNum:90002;T:" + t + ";"));
   ASSERT_EQ(robot.states.size(), 2U) << "each part once";
-  EXPECT_EQ(robot.states[1].analog_cv[static_cast<int>(StateField::ain12)], 200);
-  EXPECT_EQ(robot.states[1].analog_cv[static_cast<int>(StateField::ain24)], 100);
+  EXPECT_EQ(robot.states[1].raw.analog_cv[static_cast<int>(StateField::ain12)], 200);
+  EXPECT_EQ(robot.states[1].raw.analog_cv[static_cast<int>(StateField::ain24)], 100);
 }
 
 TEST_F(TwoPaths, ReportOnlyTheFieldsOfTheNewestState) {

@@ -39,7 +39,7 @@ TEST_F(SessionRole, TakingControlBeginsAsAHostThatOpensTheBoard) {
   EXPECT_EQ(link.session.post(turn_motor, link.now), PostResult::not_armed);
   link.pass(2s);
   EXPECT_EQ(link.count('W'), 0U);
-  EXPECT_EQ(link.session.state().analog_cv[0], 2428) << "what is known stays";
+  EXPECT_EQ(link.session.state().raw.analog_cv[0], 2428) << "what is known stays";
   EXPECT_EQ(link.restarts, 0);
 }
 

@@ -36,7 +36,7 @@ TEST_F(SessionState, FollowsTheReasonOfHeartbeatsWhileNoStatesCome) {
   link.pass(1500ms);
   link.heartbeat(SafeReason::link);
   EXPECT_EQ(link.session.state().safe, SafeReason::link);
-  EXPECT_EQ(link.session.state().encoder_counts[0], 7);
+  EXPECT_EQ(link.session.state().encoder(1), 7);
   EXPECT_EQ(link.session.state().received, received) << "a heartbeat is no state";
   link.heartbeat();
   EXPECT_EQ(link.session.state().safe, SafeReason::none);
@@ -63,8 +63,8 @@ TEST_F(SessionState, IsOfOneBootOnly) {
   EXPECT_FALSE(link.session.state().any());
   link.state("AIN24:24.28;");
   const ReceivedState& state = link.session.state();
-  EXPECT_EQ(state.osmc[0].pwm, 0);
-  EXPECT_EQ(state.encoder_counts[0], 0);
+  EXPECT_EQ(state.osmc(1).pwm, 0);
+  EXPECT_EQ(state.encoder(1), 0);
   EXPECT_FALSE(state.fault.any());
   EXPECT_EQ(state.safe, SafeReason::none);
   EXPECT_EQ(link.restarts, 1);
@@ -76,10 +76,10 @@ TEST_F(SessionState, BeginsWithTheStateThatShowsTheRestart) {
   link.state("ENC2:5;SAFE:3;");  // the datagrams before it were lost
   EXPECT_EQ(link.restarts, 1);
   const ReceivedState& state = link.states.back();
-  EXPECT_EQ(state.encoder_counts[1], 5);
+  EXPECT_EQ(state.encoder(2), 5);
   EXPECT_EQ(state.safe, SafeReason::handle);
-  EXPECT_EQ(state.osmc[0].pwm, 0);
-  EXPECT_EQ(state.encoder_counts[0], 0);
+  EXPECT_EQ(state.osmc(1).pwm, 0);
+  EXPECT_EQ(state.encoder(1), 0);
 }
 
 TEST_F(SessionState, StaysOverAnOutage) {
@@ -89,7 +89,7 @@ TEST_F(SessionState, StaysOverAnOutage) {
   link.pass(10ms);
   link.executed(1);
   EXPECT_EQ(link.restarts, 0);
-  EXPECT_EQ(link.session.state().encoder_counts[0], 7);
+  EXPECT_EQ(link.session.state().encoder(1), 7);
 }
 
 TEST_F(SessionState, IsTheNewestButKeepsTheReasonOfAHeartbeatThatOvertookIt) {
@@ -100,7 +100,7 @@ TEST_F(SessionState, IsTheNewestButKeepsTheReasonOfAHeartbeatThatOvertookIt) {
     each.heartbeat(SafeReason::stop);
     each.raw(with_crc("AIN24:24.28;SAFE:0;PNum:" + std::to_string(number) +
                       ";T:" + std::to_string(each.board_ms() - earlier_ms) + ";"));
-    EXPECT_EQ(each.states.back().analog_cv[0], 2428) << "it is the newest state";
+    EXPECT_EQ(each.states.back().raw.analog_cv[0], 2428) << "it is the newest state";
     EXPECT_EQ(each.states.back().safe, SafeReason::stop) << earlier_ms;
     EXPECT_EQ(each.session.link().reason, SafeReason::stop) << earlier_ms;
   }

@@ -278,9 +278,9 @@ TEST_F(SessionLink, KeepsTheFieldsOfEarlierDatagrams) {
   link.state("AIN24:24.28;ENC1:7;SAFE:0;CMD:1;");
   link.state("AIN12:12.01;SAFE:0;CMD:1;");
   const State& state = link.session.state();
-  EXPECT_EQ(state.analog_cv[0], 2428);
-  EXPECT_EQ(state.analog_cv[1], 1201);
-  EXPECT_EQ(state.encoder_counts[0], 7);
+  EXPECT_EQ(state.raw.analog_cv[0], 2428);
+  EXPECT_EQ(state.raw.analog_cv[1], 1201);
+  EXPECT_EQ(state.encoder(1), 7);
   EXPECT_FALSE(state.present.has(StateField::ain24)) << "present is of the newest datagram";
 }
 
@@ -291,7 +291,7 @@ TEST_F(SessionLink, LetsNoOlderStateReplaceANewerOne) {
   link.board_pnum -= 2;
   link.state("ENC1:1;SAFE:0;CMD:1;");
   EXPECT_EQ(link.states.size(), known);
-  EXPECT_EQ(link.session.state().encoder_counts[0], 2);
+  EXPECT_EQ(link.session.state().encoder(1), 2);
   EXPECT_EQ(link.session.statistics(link.now).packets.late, 1U);
 }
 

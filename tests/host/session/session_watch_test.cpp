@@ -70,7 +70,7 @@ TEST_F(SessionWatch, OnALineAStopIsConfirmedByABoardWithoutAHost) {
 TEST_F(SessionWatch, HearsTheBoardAndIsNeverInControl) {
   link.state("AIN24:24.28;SAFE:0;CMD:7;");
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
-  EXPECT_EQ(link.session.state().analog_cv[0], 2428);
+  EXPECT_EQ(link.session.state().raw.analog_cv[0], 2428);
   EXPECT_FALSE(link.session.in_control(link.now));
   EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy));
   EXPECT_FALSE(link.session.link().gated());

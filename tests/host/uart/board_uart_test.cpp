@@ -168,8 +168,8 @@ TEST(BoardUart, WritesBytesAndVoltagesOnlyAfterArm) {
   board.fields("DAC1,GPIO");
   board.dac(1, Millivolts(1650));
   ReceivedState state = board.next_state();
-  for (int i = 0; i < 100 && state.dac_mv[0] != 1650; ++i) state = board.next_state();
-  EXPECT_EQ(state.dac_mv[0], 1650);
+  for (int i = 0; i < 100 && state.dac_mv(1) != 1650; ++i) state = board.next_state();
+  EXPECT_EQ(state.dac_mv(1), 1650);
   EXPECT_TRUE(state.input(1));
   EXPECT_THROW(board.dac(1, Millivolts(3301)), Error);
 }

@@ -44,28 +44,28 @@ std::vector<StateField> every_field() {
 // Every member different from every other, and from zero.
 State numbered_state() {
   State state;
-  for (int i = 0; i < analog_channels; ++i) state.analog_cv[i] = 1001 + i;
+  for (int i = 0; i < analog_channels; ++i) state.raw.analog_cv[i] = 1001 + i;
   state.handle_held = true;
   for (int i = 0; i < dhb12_channels; ++i) {
-    state.dhb12[i] = {static_cast<std::uint16_t>(2001 + i), Direction::forward};
+    state.raw.dhb12[i] = {static_cast<std::uint16_t>(2001 + i), Direction::forward};
   }
   for (int i = 0; i < osmc_channels; ++i) {
-    state.osmc[i] = {static_cast<std::uint16_t>(3001 + i), Direction::forward};
+    state.raw.osmc[i] = {static_cast<std::uint16_t>(3001 + i), Direction::forward};
   }
-  for (int i = 0; i < stepper_channels; ++i) state.stepper_steps[i] = -(4001 + i);
+  for (int i = 0; i < stepper_channels; ++i) state.raw.stepper_steps[i] = -(4001 + i);
   for (int i = 0; i < servo_channels; ++i) {
-    state.servo_us[i] = static_cast<std::uint16_t>(1501 + i);
+    state.raw.servo_us[i] = static_cast<std::uint16_t>(1501 + i);
   }
   for (int i = 0; i < encoder_channels; ++i) {
-    state.encoder_counts[i] = -(5001 + i);
-    state.encoder_hz[i] = -(7001 + i);
-    state.encoder_index_counts[i] = -(8001 + i);
+    state.raw.encoder_counts[i] = -(5001 + i);
+    state.raw.encoder_hz[i] = -(7001 + i);
+    state.raw.encoder_index_counts[i] = -(8001 + i);
   }
   for (int i = 0; i < ultrasonic_channels; ++i) {
-    state.ultrasonic_cm[i] = static_cast<std::uint16_t>(101 + i);
+    state.raw.ultrasonic_cm[i] = static_cast<std::uint16_t>(101 + i);
   }
   for (int i = 0; i < bldc_channels; ++i) {
-    state.bldc[i] = {static_cast<std::uint16_t>(6 + i), Direction::forward, true};
+    state.raw.bldc[i] = {static_cast<std::uint16_t>(6 + i), Direction::forward, true};
   }
   state.relays = 0x81;
   state.safe = SafeReason::proximity;
@@ -78,10 +78,10 @@ State numbered_state() {
   state.fault = {64, ChipTrouble::no_acknowledge};
   state.late = 17;
   for (int i = 0; i < i2c_slots; ++i) {
-    state.i2c[i].t_ms = static_cast<std::uint32_t>(9001 + i);
-    state.i2c[i].errors = static_cast<std::uint32_t>(1 + i);
-    state.i2c[i].data.size = 1;
-    state.i2c[i].data.bytes[0] = static_cast<std::uint8_t>(0xF1 + i);
+    state.raw.i2c[i].t_ms = static_cast<std::uint32_t>(9001 + i);
+    state.raw.i2c[i].errors = static_cast<std::uint32_t>(1 + i);
+    state.raw.i2c[i].data.size = 1;
+    state.raw.i2c[i].data.bytes[0] = static_cast<std::uint8_t>(0xF1 + i);
   }
   state.i2c_answer.pnum = 18;
   state.i2c_answer.outcome = I2cOutcome::cancelled;
@@ -89,12 +89,12 @@ State numbered_state() {
   state.i2c_bus.errors = 19;
   state.i2c_bus.recoveries = 20;
   for (int i = 0; i < uart_channels; ++i) {
-    UartBytes& uart = state.uart[i];
+    UartBytes& uart = state.raw.uart[i];
     uart.position = static_cast<std::uint32_t>(9101 + i);
     uart.lost = static_cast<std::uint32_t>(21 + i);
     uart.data.size = 1;
     uart.data.bytes[0] = static_cast<std::uint8_t>(0xE1 + i);
-    state.dac_mv[i] = static_cast<std::uint16_t>(1601 + i);
+    state.raw.dac_mv[i] = static_cast<std::uint16_t>(1601 + i);
   }
   state.gpio = 130;
   return state;
@@ -186,9 +186,9 @@ TEST(State, FieldsComeInAnyOrderWithUnknownOnesBetween) {
   expected.add(StateField::safe);
   expected.add(StateField::ain24);
   EXPECT_EQ(state.present, expected);
-  EXPECT_EQ(state.osmc[0], (Drive{400, Direction::forward}));
+  EXPECT_EQ(state.raw.osmc[0], (Drive{400, Direction::forward}));
   EXPECT_EQ(state.safe, SafeReason::stop);
-  EXPECT_EQ(state.analog_cv[0], 150);
+  EXPECT_EQ(state.raw.analog_cv[0], 150);
   EXPECT_EQ(state.pnum, 3U);
   EXPECT_EQ(state.t_ms, 7U);
 }
@@ -197,7 +197,7 @@ TEST(State, WhatADatagramDoesNotBringKeepsItsValue) {
   State state = numbered_state();
   ASSERT_TRUE(read_fields("PNum:1;T:2;RELAYS:3;", state));
   EXPECT_EQ(state.relays, 3);
-  EXPECT_EQ(state.osmc[3].pwm, 3004);
+  EXPECT_EQ(state.raw.osmc[3].pwm, 3004);
   ASSERT_TRUE(read_fields("RELAYS:4;", state));
   EXPECT_EQ(state.pnum, 1U);
   EXPECT_EQ(state.t_ms, 2U);
@@ -342,19 +342,34 @@ TEST(State, ASetGivesItsFieldsInTheOrderOfTheTable) {
 
 TEST(State, IsReadByTheNamesOfItsChannels) {
   State state;
-  state.analog_cv[static_cast<int>(Analog::ain6)] = 512;
-  state.encoder_counts[3] = -7;
-  state.stepper_steps[0] = 1000;
-  state.ultrasonic_cm[1] = 42;
+  state.raw.analog_cv[static_cast<int>(Analog::ain6)] = 512;
+  state.raw.encoder_counts[3] = -7;
+  state.raw.stepper_steps[0] = 1000;
+  state.raw.ultrasonic_cm[1] = 42;
+  state.raw.osmc[3] = {pwm_max, Direction::reverse};
+  state.raw.dhb12[1].pwm = 20;
+  state.raw.bldc[0] = {pwm_max, Direction::forward, true};
+  state.raw.servo_us[15] = 1500;
+  state.raw.encoder_hz[1] = -16;
+  state.raw.encoder_index_counts[2] = 8;
+  state.raw.dac_mv[1] = 1650;
   state.relays = 0x81;
   EXPECT_DOUBLE_EQ(state.volts(Analog::ain6), 5.12);
   EXPECT_EQ(state.encoder(4), -7);
   EXPECT_EQ(state.steps(1), 1000);
   EXPECT_EQ(state.distance_cm(2), 42);
+  EXPECT_EQ(state.osmc(4).duty(), -1);
+  EXPECT_EQ(state.dhb12(2).pwm, 20);
+  EXPECT_EQ(state.bldc(1).duty(), 1);
+  EXPECT_EQ(state.servo_us(16), 1500);
+  EXPECT_EQ(state.encoder_hz(2), -16);
+  EXPECT_EQ(state.encoder_index(3), 8);
+  EXPECT_EQ(state.dac_mv(2), 1650);
   EXPECT_TRUE(state.relay(1) && state.relay(8));
   EXPECT_FALSE(state.relay(2));
   for (const int none : {-1, 0, 9}) {
     EXPECT_EQ(state.encoder(none) + state.steps(none) + state.distance_cm(none), 0) << none;
+    EXPECT_EQ(state.osmc(none), Drive()) << none;
     EXPECT_FALSE(state.relay(none)) << none;
   }
   EXPECT_EQ(state.volts(Analog::count), 0);

@@ -73,8 +73,8 @@ class JointStates : public ::testing::Test {
 
 // 508 bytes, over the Giga's WiFi.
 TEST_F(JointStates, AreOneSampleOfAStateThatComesInSeveralDatagrams) {
-  state.encoder_hz[0] = 4096;
-  state.encoder_hz[1] = 2048;
+  state.raw.encoder_hz[0] = 4096;
+  state.raw.encoder_hz[1] = 2048;
   part(1010, {StateField::enc1, StateField::enc2});
   EXPECT_TRUE(told().empty()) << "the other half is yet to come";
   part(1010, {StateField::enc1hz, StateField::enc2hz});
@@ -104,7 +104,7 @@ TEST_F(JointStates, GoOnWhereTheyWereWhenCountsWrapAndTheBoardRestarts) {
   constexpr double turn = 2 * std::numbers::pi / 4096;
   constexpr std::int32_t last = std::numeric_limits<std::int32_t>::max();
   const auto position = [this](std::uint32_t t_ms, std::int32_t counts) {
-    state.encoder_counts[0] = counts;
+    state.raw.encoder_counts[0] = counts;
     part(t_ms, {StateField::enc1, StateField::enc2, StateField::enc1hz, StateField::enc2hz});
     const auto all = told();
     return all.size() == 1 ? all[0].positions[0] : std::nan("");

@@ -23,7 +23,7 @@ struct Driven {
   void told(int stepper, std::int32_t steps) {
     State state;
     state.present.add(position_of(stepper));
-    state.stepper_steps[stepper - 1] = steps;
+    state.raw.stepper_steps[stepper - 1] = steps;
     drivers.on_state(state, now);
   }
   std::vector<std::string> to_stop() {

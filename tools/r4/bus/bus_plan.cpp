@@ -96,20 +96,20 @@ class Speaker {
     const std::uint32_t centivolts[] = {2428, 1215, 502, 331, 166, 598};
     for (int i = 0; i < analog_channels; ++i) {
       const std::uint32_t cv = longest_ ? 3839 : between(centivolts[i] - 3, centivolts[i] + 3);
-      state.analog_cv[i] = static_cast<std::int32_t>(cv);
+      state.raw.analog_cv[i] = static_cast<std::int32_t>(cv);
     }
     state.handle_held = true;
-    for (Drive& drive : state.dhb12) drive = any_drive();
-    for (Drive& drive : state.osmc) drive = any_drive();
-    for (std::int32_t& steps : state.stepper_steps) steps = position(20000);
-    for (std::uint16_t& us : state.servo_us) {
+    for (Drive& drive : state.raw.dhb12) drive = any_drive();
+    for (Drive& drive : state.raw.osmc) drive = any_drive();
+    for (std::int32_t& steps : state.raw.stepper_steps) steps = position(20000);
+    for (std::uint16_t& us : state.raw.servo_us) {
       us = static_cast<std::uint16_t>(between(500, servo_max_us));
     }
-    for (std::int32_t& counts : state.encoder_counts) counts = position(200000);
-    for (std::int32_t& hz : state.encoder_hz) hz = position(4000);
-    for (std::int32_t& counts : state.encoder_index_counts) counts = position(200000);
-    for (std::uint16_t& cm : state.ultrasonic_cm) cm = static_cast<std::uint16_t>(between(5, 400));
-    for (Bldc& bldc : state.bldc) bldc.speed = static_cast<std::uint16_t>(between(0, pwm_max));
+    for (std::int32_t& counts : state.raw.encoder_counts) counts = position(200000);
+    for (std::int32_t& hz : state.raw.encoder_hz) hz = position(4000);
+    for (std::int32_t& counts : state.raw.encoder_index_counts) counts = position(200000);
+    for (std::uint16_t& cm : state.raw.ultrasonic_cm) cm = static_cast<std::uint16_t>(between(5, 400));
+    for (Bldc& bldc : state.raw.bldc) bldc.speed = static_cast<std::uint16_t>(between(0, pwm_max));
     state.relays = static_cast<std::uint8_t>(between(0, 255));
     state.last_command = any();
     state.rx_ok = board_pnum();

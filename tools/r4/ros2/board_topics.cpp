@@ -155,10 +155,10 @@ void BoardTopics::on_state(const State& state, WallTime sampled, std::uint32_t b
     const auto duty = [](const auto& drive) {
       return static_cast<float>(to_duty(drive.pwm, drive.direction));
     };
-    if (has.has(osmc_field(n))) publish<Float32Message>(osmc_[i], duty(state.osmc[i]), now);
-    if (has.has(dhb12_field(n))) publish<Float32Message>(dhb12_[i], duty(state.dhb12[i]), now);
+    if (has.has(osmc_field(n))) publish<Float32Message>(osmc_[i], duty(state.raw.osmc[i]), now);
+    if (has.has(dhb12_field(n))) publish<Float32Message>(dhb12_[i], duty(state.raw.dhb12[i]), now);
     if (has.has(nth(StateField::bldc1, n))) {
-      const Bldc& bldc = state.bldc[i];
+      const Bldc& bldc = state.raw.bldc[i];
       publish<Float32Message>(bldc_[i], static_cast<float>(to_duty(bldc.speed, bldc.direction)),
                               now);
     }
@@ -171,10 +171,10 @@ void BoardTopics::on_state(const State& state, WallTime sampled, std::uint32_t b
     if (!has.has(servo_field(n))) continue;
     // Compared as a pulse: what is off is no number, and those are never equal.
     auto& topic = servos_[i];
-    const auto pulse = static_cast<float>(state.servo_us[i]);
+    const auto pulse = static_cast<float>(state.raw.servo_us[i]);
     if (!topic.is_due(pulse, now)) continue;
     Float32Message message{};
-    message.data = static_cast<float>(from_pulse(options_.servo, state.servo_us[i]));
+    message.data = static_cast<float>(from_pulse(options_.servo, state.raw.servo_us[i]));
     (void)dds_write(topic.writer, &message);
   }
   for (std::size_t i = 0; i < analog_.size(); ++i) {
@@ -192,7 +192,7 @@ void BoardTopics::on_state(const State& state, WallTime sampled, std::uint32_t b
 }
 
 void BoardTopics::publish_battery(const State& state, WallTime sampled, Clock::time_point now) {
-  const std::int32_t centivolts = state.analog_cv[static_cast<int>(Analog::ain24)];
+  const std::int32_t centivolts = state.raw.analog_cv[static_cast<int>(Analog::ain24)];
   if (!state.present.has(StateField::ain24) || !battery_.is_due(centivolts, now)) return;
   std::string none;
   BatteryMessage message{};
@@ -213,7 +213,7 @@ void BoardTopics::publish_ranges(const State& state, WallTime sampled, Clock::ti
   constexpr std::uint8_t ultrasound = 0;
   for (int n = 1; n <= ultrasonic_channels; ++n) {
     auto& topic = ranges_[static_cast<std::size_t>(n - 1)];
-    const std::uint16_t cm = state.ultrasonic_cm[n - 1];
+    const std::uint16_t cm = state.distance_cm(n);
     if (!state.present.has(nth(StateField::us1, n)) || !topic.is_due(cm, now)) continue;
     const std::string frame = fmt::format("{}us{}", frame_prefix_, n);
     RangeMessage message{};
@@ -259,7 +259,7 @@ void BoardTopics::publish_joints() {
     const auto counts = position.advance(joints.state.encoder(n), joints.boot);
     positions.push_back(static_cast<double>(counts) * scale);
     velocities.push_back(joints.present.has(nth(StateField::enc1hz, n))
-                             ? joints.state.encoder_hz[n - 1] * scale
+                             ? joints.state.encoder_hz(n) * scale
                              : std::numeric_limits<double>::quiet_NaN());
   }
   for (int n = 1; n <= stepper_channels; ++n) {

@@ -25,7 +25,7 @@ std::optional<double> any_number_of(const Device& device, const State& state, st
   any.minimum = -infinity;
   any.maximum = infinity;
   const std::size_t slot = static_cast<std::size_t>(device.first_slot() - 1) + any.poll;
-  const auto& bytes = state.i2c[slot].data;
+  const auto& bytes = state.raw.i2c[slot].data;
   if (bytes.size != device.description().polls[any.poll].count) return std::nullopt;
   return any.decode(bytes.bytes, bytes.size);
 }

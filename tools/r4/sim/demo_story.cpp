@@ -174,7 +174,7 @@ void Story::command() {
       "supply    R:1,On closes relay 1: it is in the motors' supply, and opens in every safe "
       "state.");
   result_.confirmed_ms = milliseconds_of(send(Command::osmc(1, Pwm(358), Direction::forward)));
-  require(state_.osmc[0] == commanded, "the state does not show the command");
+  require(state_.osmc(1) == commanded, "the state does not show the command");
   teller_.say(
       "command   O:358,1,1 sets motor 1 (OSMC1) to 358 of 4095, forward. The state shows it:");
   teller_.show(state_bytes_);
@@ -186,8 +186,8 @@ void Story::command() {
 }
 
 void Story::require_that_the_motor_turns() {
-  const std::int32_t from = state_.encoder_counts[0];
-  require(wait_until([&] { return state_.encoder_counts[0] - from > turned; }, patience),
+  const std::int32_t from = state_.encoder(1);
+  require(wait_until([&] { return state_.encoder(1) - from > turned; }, patience),
           "the motor does not turn");
 }
 
@@ -236,7 +236,7 @@ void Story::recover() {
   const Clock::time_point start = Clock::now();
   const std::uint64_t before = states_;
   board_.watchdog(Milliseconds(0));
-  const auto is_back = [&] { return active() && states_ > before && state_.osmc[0] == commanded; };
+  const auto is_back = [&] { return active() && states_ > before && state_.osmc(1) == commanded; };
   require(wait_until(is_back, patience), "the last command was not restored");
   result_.recovered_ms = milliseconds(Clock::now() - start);
   teller_.say("recovery  Heartbeats again: the board takes up its last command by itself:");
@@ -248,7 +248,7 @@ void Story::recover() {
 void Story::stop() {
   result_.stop_ms = milliseconds_of(send(Command::stop()));
   const auto is_off = [this] {
-    return state_.safe == SafeReason::stop && state_.osmc[0] == Drive();
+    return state_.safe == SafeReason::stop && state_.osmc(1) == Drive();
   };
   require(wait_until(is_off, patience), "the state does not show the stop");
   teller_.say("stop      E:STOP, the emergency stop, which the board obeys from anyone:");
@@ -264,7 +264,7 @@ void Story::clear() {
   const std::uint64_t before = states_;
   require(wait_until([&] { return active() && states_ > before; }, patience),
           "E:CLEAR did not clear the stop");
-  require(state_.osmc[0] == Drive(), "a command came back after an emergency stop");
+  require(state_.osmc(1) == Drive(), "a command came back after an emergency stop");
   teller_.say(
       "clear     E:CLEAR allows it to move again. Nothing comes back by itself: the motor is off, "
       "and "

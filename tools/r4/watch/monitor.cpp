@@ -151,7 +151,7 @@ class Monitor {
       const std::vector<DeviceValue>& values = device.description().values;
       for (std::size_t poll = 0; poll < device.description().polls.size(); ++poll) {
         const std::size_t slot = static_cast<std::size_t>(device.first_slot() - 1) + poll;
-        const I2cReading& read = state.i2c[slot];
+        const I2cReading& read = state.raw.i2c[slot];
         if (read.data.size == 0 || told_ms_[slot] == read.t_ms) continue;
         told_ms_[slot] = read.t_ms;
         DeviceNews news{device, state.pnum, read.t_ms, {}};

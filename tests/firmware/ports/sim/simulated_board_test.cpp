@@ -213,8 +213,8 @@ TEST_F(SimulatedBoardTest, WaitsForAHostAndThenStreamsTheInputsOfTheBench) {
   ASSERT_EQ(seen.size(), 100U);
   for (std::size_t i = 0; i < seen.size(); ++i) {
     EXPECT_TRUE(seen[i].handle_held);
-    EXPECT_GE(seen[i].analog_cv[0], 2413);
-    EXPECT_LE(seen[i].analog_cv[0], 2456);
+    EXPECT_GE(seen[i].raw.analog_cv[0], 2413);
+    EXPECT_LE(seen[i].raw.analog_cv[0], 2456);
     if (i > 0) {
       EXPECT_EQ(seen[i].t_ms - seen[i - 1].t_ms, 10U);
     }
@@ -310,9 +310,9 @@ TEST_F(SimulatedBoardTest, FollowsItsScriptToTheMillisecond) {
   listener_.heard.clear();
   run_alive(300);
   const State state = states().back();
-  EXPECT_EQ(state.analog_cv[0], 2150);
-  EXPECT_EQ(state.encoder_counts[1], 100);
-  EXPECT_EQ(state.ultrasonic_cm[2], 42);
+  EXPECT_EQ(state.raw.analog_cv[0], 2150);
+  EXPECT_EQ(state.raw.encoder_counts[1], 100);
+  EXPECT_EQ(state.raw.ultrasonic_cm[2], 42);
   events_.clear();
   run_alive(200);
   EXPECT_EQ(events_, (Lines{"SAFE fault"}));

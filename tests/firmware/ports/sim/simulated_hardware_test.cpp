@@ -85,7 +85,7 @@ TEST(SimulatedHardware, AnalogInputsTakeTheValuesOfTheCapture) {
       continue;
     if (!state.present.has(StateField::ain24)) continue;
     for (int i = 0; i <= static_cast<int>(Analog::ainsteer); ++i) {
-      captured[i].insert(state.analog_cv[i]);
+      captured[i].insert(state.raw.analog_cv[i]);
     }
   }
   ASSERT_EQ(captured.size(), 5U);

@@ -60,19 +60,19 @@ std::string fields_of(FieldSet set, const State& state) {
 State busy_state() {
   State state;
   const std::int32_t volts[] = {2631, 1207, 503, 1198, 97, 330};
-  std::copy(std::begin(volts), std::end(volts), state.analog_cv);
+  std::copy(std::begin(volts), std::end(volts), state.raw.analog_cv);
   state.handle_held = true;
   for (int i = 0; i < 4; ++i) {
-    state.dhb12[i] = {static_cast<std::uint16_t>(4095 - i), Direction::forward};
-    state.osmc[i] = {static_cast<std::uint16_t>(358 * i), Direction::reverse};
-    state.stepper_steps[i] = -20000 * (i + 1);
-    state.encoder_counts[i] = 1234567 * (i - 1);
-    state.encoder_hz[i] = 4000 * (i - 1);
-    state.encoder_index_counts[i] = 1234000 * (i - 1);
-    state.ultrasonic_cm[i] = static_cast<std::uint16_t>(30 * i);
-    state.bldc[i] = {static_cast<std::uint16_t>(1000 * i), Direction::forward, i % 2 == 0};
+    state.raw.dhb12[i] = {static_cast<std::uint16_t>(4095 - i), Direction::forward};
+    state.raw.osmc[i] = {static_cast<std::uint16_t>(358 * i), Direction::reverse};
+    state.raw.stepper_steps[i] = -20000 * (i + 1);
+    state.raw.encoder_counts[i] = 1234567 * (i - 1);
+    state.raw.encoder_hz[i] = 4000 * (i - 1);
+    state.raw.encoder_index_counts[i] = 1234000 * (i - 1);
+    state.raw.ultrasonic_cm[i] = static_cast<std::uint16_t>(30 * i);
+    state.raw.bldc[i] = {static_cast<std::uint16_t>(1000 * i), Direction::forward, i % 2 == 0};
   }
-  for (int i = 0; i < servo_channels; ++i) state.servo_us[i] = static_cast<std::uint16_t>(1500 + i);
+  for (int i = 0; i < servo_channels; ++i) state.raw.servo_us[i] = static_cast<std::uint16_t>(1500 + i);
   state.relays = 0x81;
   state.last_command = 0x8123ABCDU;
   state.rx_ok = 864123;
@@ -120,7 +120,7 @@ TEST(PackedForm, EveryKindOfDatagramIsCompact) {
     more.add(field);
   }
   State extreme = state;
-  for (std::int32_t& steps : extreme.stepper_steps) steps = -2147483647 - 1;
+  for (std::int32_t& steps : extreme.raw.stepper_steps) steps = -2147483647 - 1;
   extreme.pnum = extreme.t_ms = extreme.last_command = 0xFFFFFFFFU;
   struct Case {
     const char* what;
