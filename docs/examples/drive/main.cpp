@@ -44,7 +44,7 @@ void drive(r4::Board& board) {
 
   // The board is to tell what encoder 1, on the motor's shaft, counts.
   board.fields("DEFAULT,ENC1");
-  const std::int32_t from = board.next_state().encoder_counts[0];
+  const std::int32_t from = board.next_state().encoder(1);
 
   // From here on this program must show that it is alive. If it hangs for 300 ms, the heartbeats
   // stop and the board switches its outputs off.
@@ -60,7 +60,7 @@ void drive(r4::Board& board) {
   }
 
   std::printf("motor 1 has turned by %d counts\n",
-              board.next_state(250ms).encoder_counts[0] - from);
+              board.next_state(250ms).encoder(1) - from);
 
   board.stop();  // every output safe, the motors without supply; latched until board.clear()
   const r4::Statistics statistics = board.statistics();
