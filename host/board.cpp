@@ -137,11 +137,23 @@ void Board::DriveChannel::set_pwm(int pwm, Direction direction, Duration timeout
 PostResult Board::DriveChannel::post_pwm(int pwm, Direction direction) const {
   return board_.post(command(Pwm(pwm), direction));
 }
-void Board::ServoChannel::set(int pulse_us, Duration timeout) const {
-  board_.send(Command::servo(channel_, Microseconds(pulse_us)), timeout);
+void Board::ServoChannel::set(Microseconds pulse, Duration timeout) const {
+  board_.send(Command::servo(channel_, pulse), timeout);
 }
-PostResult Board::ServoChannel::post(int pulse_us) const {
-  return board_.post(Command::servo(channel_, Microseconds(pulse_us)));
+PostResult Board::ServoChannel::post(Microseconds pulse) const {
+  return board_.post(Command::servo(channel_, pulse));
+}
+void Board::ServoChannel::calibrate(const ServoCalibration& calibration) const {
+  board_.impl_->calibrate_servo(channel_, calibration);
+}
+ServoCalibration Board::ServoChannel::calibration() const {
+  return board_.impl_->servo_calibration(channel_);
+}
+void Board::ServoChannel::set(Degrees angle, Duration timeout) const {
+  set(calibration().pulse(angle), timeout);
+}
+PostResult Board::ServoChannel::post(Degrees angle) const {
+  return post(calibration().pulse(angle));
 }
 void Board::RelayChannel::set(bool on, Duration timeout) const {
   board_.send(Command::relay(channel_, on), timeout);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "board_impl.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <asio/post.hpp>
 #include <utility>
@@ -67,6 +69,23 @@ void Board::Impl::close() {
   BlockingLoop::close([this] { shut(); });
   keep(nullptr);  // the farewell is recorded
   callbacks.stop();
+}
+
+static std::size_t servo_index(int channel) {
+  if (channel >= 1 && channel <= servo_channels) return static_cast<std::size_t>(channel - 1);
+  throw Error(ErrorKind::usage, fmt::format("servo({})", channel), "there is no such servo",
+              fmt::format("there are 1 to {}", servo_channels));
+}
+void Board::Impl::calibrate_servo(int channel, const ServoCalibration& calibration) {
+  const std::size_t index = servo_index(channel);
+  const std::lock_guard lock(mutex);
+  servo_calibrations[index] = calibration;
+}
+ServoCalibration Board::Impl::servo_calibration(int channel) {
+  if (const auto known = read(servo_calibrations[servo_index(channel)])) return *known;
+  throw Error(ErrorKind::usage, fmt::format("servo({})", channel), "it was not calibrated",
+              "first give calibrate() the pulse and the angle at each end of its travel, or set a "
+              "pulse in microseconds");
 }
 
 void Board::Impl::keep(std::unique_ptr<Recording> own) {

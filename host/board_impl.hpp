@@ -10,11 +10,13 @@
 // transport of its own.
 #pragma once
 
+#include <array>
 #include <asio/steady_timer.hpp>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -76,6 +78,10 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
     return run_on_loop(what, [&] { now = ask(); }) ? now : read(last);
   }
 
+  // Throw Error{usage} where there is no such servo.
+  void calibrate_servo(int channel, const ServoCalibration& calibration);
+  ServoCalibration servo_calibration(int channel);
+
   // Keeps a recording of this board's own until another one takes its place.
   void keep(std::unique_ptr<Recording> own);
 
@@ -129,6 +135,7 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   bool in_control = false;
   DisarmCause disarmed_by = DisarmCause::not_yet;
   std::uint64_t refused_here = 0;  // posts that did not reach the loop
+  std::array<std::optional<ServoCalibration>, servo_channels> servo_calibrations;
   Statistics last_statistics;
   CarrierCounters last_counters;
   std::vector<PathStatus> last_paths;

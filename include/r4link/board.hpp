@@ -39,6 +39,7 @@
 #include <vector>
 
 #include "carrier.hpp"
+#include "commands/servo_calibration.hpp"
 #include "config.hpp"
 #include "devices/device.hpp"
 #include "discovery/discover.hpp"
@@ -219,8 +220,16 @@ class R4LINK_API Board {
   };
   class ServoChannel {
    public:
-    void set(int pulse_us, Duration timeout = default_timeout) const;  // 0 (off) to 2500
-    PostResult post(int pulse_us) const;
+    void set(Microseconds pulse, Duration timeout = default_timeout) const;  // 0 (off) to 2500
+    PostResult post(Microseconds pulse) const;
+    // Once, before this servo is driven in degrees. The Board keeps it until it is destroyed, also
+    // while the link is lost; the board on the other side does not know it.
+    void calibrate(const ServoCalibration& calibration) const;
+    // Throws Error{usage} if the servo was not calibrated.
+    ServoCalibration calibration() const;
+    // Throw Error{usage} also for an angle outside of the calibration's range.
+    void set(Degrees angle, Duration timeout = default_timeout) const;
+    PostResult post(Degrees angle) const;
 
    private:
     friend class Board;
@@ -337,7 +346,7 @@ class R4LINK_API Board {
   // A voltage of the board's, channel 1 or 2, 0-3300 mV; 0 in the safe state.
   void dac(Channel channel, Millivolts voltage, Duration timeout = default_timeout);
 
-  // Channels count from 1, as on the board. A channel that does not exist throws at set().
+  // Channels count from 1, as on the board. A channel that does not exist throws when it is used.
   DriveChannel osmc(int channel) { return {*this, CommandKind::osmc, channel}; }
   DriveChannel dhb12(int channel) { return {*this, CommandKind::dhb12, channel}; }
   ServoChannel servo(int channel) { return {*this, channel}; }

@@ -7,6 +7,7 @@
 #include "carrier.hpp"
 #include "command.hpp"
 #include "commands/command_text.hpp"
+#include "commands/servo_calibration.hpp"
 #include "config.hpp"
 #include "control/kinematics.hpp"
 #include "control/loop.hpp"

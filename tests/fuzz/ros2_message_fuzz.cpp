@@ -58,11 +58,9 @@ void read_numbers(double first, double second) {
   if (duty.is_in_range()) require(duty.pwm().value >= 0 && duty.pwm().value <= 4095);
   const MotorChannel left{CommandKind::osmc, 1, false}, right{CommandKind::dhb12, 4, true};
   if (const auto command = left.command(first)) is_sendable(*command);
-  ServoCalibration servo;
-  for (const bool microseconds : {false, true}) {
-    servo.microseconds = microseconds;
-    if (const auto pulse = to_pulse(servo, first))
-      is_sendable(Command::servo(16, Microseconds(*pulse)));
+  for (const char* unit : {"us", "500,2500,3.14159265358979"}) {
+    if (const auto pulse = to_pulse(servo_unit(unit), first))
+      is_sendable(Command::servo(16, *pulse));
   }
   const auto wheels = DifferentialDrive{left, right, 0.4, 1.5}.setpoints(first, second);
   if (std::isnan(first) || std::isnan(second)) require(!wheels);

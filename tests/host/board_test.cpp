@@ -41,7 +41,7 @@ TEST_P(BoardOver, ConfirmsEveryCommandOnceExecuted) {
   board.osmc(1).set_pwm(358, Direction::forward);
   board.osmc(4).set(-1);
   board.dhb12(2).set_pwm(100, Direction::forward);
-  board.servo(16).set(1500);
+  board.servo(16).set(Microseconds(1500));
   board.relay(3).set(true);
   board.stepper(2).move_to(Steps(-5), StepsPerSecond(20000));
   board.bldc(4).set_pwm(2000, Direction::forward, true);

@@ -46,7 +46,7 @@ struct BoardThread : testing::Test {
   }
   // After the next command.
   bool has_executed(const std::string& command) {
-    board.servo(1).set(1500);
+    board.servo(1).set(Microseconds(1500));
     const std::vector<std::string> all = simulated.executed();
     return std::find(all.begin(), all.end(), command) != all.end();
   }

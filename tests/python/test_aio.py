@@ -20,7 +20,12 @@ def test_drives(sim):
                 await board.osmc(1).set_pwm(1)
             await board.arm()
             await board.apply(Setpoints(Command.osmc(1, pwm=10), Command.osmc(2, pwm=20)))
-            await board.servo(1).set(1500)
+            board.servo(1).calibrate(r4link.ServoCalibration(us=(1000, 2000), degrees=(-45, 45)))
+            await board.servo(1).set(us=1200)
+            assert board.servo(2).post(us=0)
+            with pytest.raises(r4link.UsageError, match='calibrate'):
+                await board.servo(2).set(degrees=0)
+            await board.servo(1).set(degrees=0)
             await board.bldc(1).set_pwm(9)
             assert board.osmc(3).post_pwm(30)
             await board.relay(2).set(True)

@@ -11,14 +11,16 @@ import pytest
 
 import r4link
 from machine import within
-from r4link import FORWARD, REVERSE, Command, Setpoints
+from r4link import FORWARD, REVERSE, Command, ServoCalibration, Setpoints
+
+ARM = ServoCalibration(us=(1000, 2000), degrees=(-45, 45))
 
 
 def test_drives_and_tells_what_the_chips_do(sim, board, wait):
     board.arm()
     board.osmc(1).set_pwm(358)
     board.dhb12(2).set_pwm(700, direction=REVERSE)
-    board.servo(3).set(1500)
+    board.servo(3).set(us=1500)
     board.relay(2).set(True)
     board.bldc(4).set_pwm(2000, direction=FORWARD, brake=False)
     board.stepper(1).move_to(100, speed=5000)
@@ -54,10 +56,58 @@ def test_a_group_is_executed_as_one_or_not_at_all(sim, board, wait):
     lambda _: Command.osmc(1, 0.1), lambda _: Command.osmc(1, pwm=0.1), lambda _: Command.osmc(1, duty='0.1'),
     lambda _: Command.osmc(1, duty=0.1, pwm=410), lambda _: Command.servo(3, 1500), lambda _: Setpoints('O:0,1,1'),
     lambda board: board.osmc(1).set_pwm(410, FORWARD), lambda board: board.stepper(1).move_to(100, 5000),
-    lambda board: board.dac(1650, 1), lambda board: board.osmc(1).set(True)])
+    lambda board: board.dac(1650, 1), lambda board: board.osmc(1).set(True), lambda board: board.servo(3).set(1500),
+    lambda board: board.servo(3).set(), lambda board: board.servo(3).post(us=1500, degrees=0),
+    lambda board: board.servo(3).set(us=1500.5), lambda board: board.servo(3).calibrate(30),
+    lambda _: ServoCalibration((1000, 2000), (-45, 45)), lambda _: ServoCalibration(us=(1000, 2000)),
+    lambda _: ServoCalibration(us=1000, degrees=-45), lambda _: ServoCalibration(us=(1000.5, 2000), degrees=(-45, 45)),
+    lambda _: ServoCalibration(us=(1000, 2000), degrees=('-45', 45)), lambda _: ARM.pulse(30), lambda _: ARM.degrees(1500),
+    lambda _: ARM.pulse(degrees=True)])
 def test_a_value_without_its_name_or_of_another_type_is_a_type_error(board, call):
     with pytest.raises(TypeError):
         call(board)
+
+
+def test_a_calibrated_servo_is_driven_in_degrees(sim, board, wait):
+    board.fields('DEFAULT,SERVO3POS')
+    board.servo(3).calibrate(ARM)
+    board.arm()
+    board.servo(3).set(degrees=30)
+    assert board.state.servo3pos == 1833 == ARM.pulse(degrees=30)
+    assert board.servo(3).calibration.degrees(us=board.state.servo3pos) == pytest.approx(30, abs=0.05)
+    assert board.servo(3).post(degrees=-45)
+    wait(lambda: sim.look().servo_us[2] == pytest.approx(1000, abs=3))
+    board.apply(Setpoints(Command.servo(3, us=ARM.pulse(degrees=0)), Command.osmc(1, duty=0)))
+    assert ARM.degrees(us=board.next_state().servo3pos) == 0
+    board.servo(3).set(us=0)
+    assert ARM.degrees(us=board.next_state().servo3pos) is None
+    board.release_control()
+    board.take_control()
+    board.wait_active()
+    board.arm()
+    board.servo(3).set(degrees=45)
+    assert board.next_state().servo3pos == 2000
+
+
+def test_degrees_that_a_servo_does_not_have_are_not_sent(board):
+    board.arm()
+    board.servo(1).set(us=1200)
+    for move in (board.servo(1).set, board.servo(1).post):
+        with pytest.raises(r4link.UsageError, match='calibrate'):
+            move(degrees=30)
+    board.servo(1).calibrate(ARM)
+    for wrong in (45.1, -46, math.nan, math.inf):
+        for move in (board.servo(1).set, board.servo(1).post):
+            with pytest.raises(r4link.UsageError):
+                move(degrees=wrong)
+    assert board.next_state().servo1pos == 1200
+    for wrong in ({'us': (1000, 1000), 'degrees': (-45, 45)}, {'us': (1000, 2000), 'degrees': (45, 45)},
+                  {'us': (0, 2000), 'degrees': (-45, 45)}, {'us': (1000, 2000), 'degrees': (-45, math.nan)}):
+        with pytest.raises(r4link.UsageError):
+            ServoCalibration(**wrong)
+    with pytest.raises(r4link.UsageError, match='no such servo'):
+        board.servo(17).calibrate(ARM)
+    assert repr(ARM) == 'ServoCalibration(us=(1000, 2000), degrees=(-45.0, 45.0))'
 
 
 def test_a_negative_duty_drives_reverse(sim, board, wait):
@@ -74,7 +124,7 @@ def test_errors_name_the_thing_the_reason_and_the_fix(board):
     assert not_armed.value.thing == 'O:1,1,1' and 'arm()' in not_armed.value.fix
     assert isinstance(not_armed.value, r4link.RefusedError) and not_armed.value.outcome == 'not armed'
     assert board.osmc(1).post(0) is r4link.PostResult.NOT_ARMED and not board.osmc(1).post(0)
-    for wrong, error in [(lambda: board.servo(17).set(1), ValueError), (lambda: board.osmc(1).set(1.5), ValueError),
+    for wrong, error in [(lambda: board.servo(17).set(us=1), ValueError), (lambda: board.osmc(1).set(1.5), ValueError),
                          (lambda: board.osmc(1).set_pwm(4096), r4link.UsageError),
                          (lambda: board.osmc(1).set_pwm(1, direction=2), r4link.UsageError),
                          (lambda: board.osmc(1).set_pwm(1 << 40), TypeError),

@@ -230,7 +230,7 @@ def test_many_threads_use_one_board(sim, board, wait):
     def work(channel):
         try:
             for i in range(30):
-                board.servo(channel).set(1000 + i)
+                board.servo(channel).set(us=1000 + i)
                 board.state.as_dict()
         except Exception as error:  # pylint: disable=broad-except
             errors.append(error)

@@ -70,7 +70,7 @@ def test_one_is_pulled_and_plugged_in_again_while_the_program_drives(paths, wait
 
         def drive(until):
             while not until():
-                board.servo(1).set(1000 + len(ages) % 1000)
+                board.servo(1).set(us=1000 + len(ages) % 1000)
                 while (state := states.take()) is not None:
                     ages.append(state.received)
 
@@ -106,7 +106,7 @@ def test_asyncio_has_them_too_and_a_text_joins_them(paths):
             await board.arm()
             cable.pull()
             await asyncio.wait_for(lost.wait(), 10)
-            await board.servo(2).set(1500)
+            await board.servo(2).set(us=1500)
             assert len(board.paths) == 2 and board.paths[0].state == 'carrying'
             cable.plug_in()
     asyncio.run(main())

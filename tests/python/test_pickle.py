@@ -91,7 +91,8 @@ def test_copies_of_values_tell_the_same(sim, board):
         fleet.wait_active()
         values = [board.state, board.next_state(), board.link, board.statistics, board.carrier_counters, board.identify(),
                   *board.paths, r4link.Command.osmc(1, pwm=5), *fleet.health(), *fleet.stop(), sim.look(),
-                  r4link.Device('bno055@0x29')]
+                  r4link.Device('bno055@0x29'),
+                  r4link.ServoCalibration(us=(1000, 2000), degrees=(-45, 45))]
         events = []
         board.on_event(events.append)
         board.stop()
@@ -99,6 +100,7 @@ def test_copies_of_values_tell_the_same(sim, board):
     for value in values:
         for each in copies(value):
             assert type(each) is type(value) and told(each) == told(value), value
+            assert not isinstance(value, r4link.ServoCalibration) or repr(each) == repr(value)
 
 
 def test_a_copy_of_setpoints_does_the_same(board, sim, wait):

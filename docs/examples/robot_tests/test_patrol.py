@@ -72,7 +72,7 @@ def test_damage_on_a_serial_line_is_noticed(r4_link):
 @pytest.mark.r4(transport='pty')
 def test_over_a_serial_line(r4_board):
     r4_board.arm(timeout=3)
-    r4_board.servo(3).set(1500, timeout=3)
+    r4_board.servo(3).set(us=1500, timeout=3)
     r4_board.expect(relays=1)
     r4_board.stop()
     r4_board.expect_safe('stop')

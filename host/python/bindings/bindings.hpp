@@ -28,6 +28,7 @@ void bind_discovery(py::module_& module);
 void bind_fleet(py::module_& module);
 void bind_bridge(py::module_& module);
 void bind_recording(py::module_& module);
+void bind_servo(py::module_& module);
 void bind_simulation(py::module_& module);
 
 // Of a board and of a fleet.

@@ -217,6 +217,12 @@ void bind_board(py::module_& module) {
           Released())
       .def("post", [](PyBoard& board,
                       const OwnCommand& command) { return to_text(board->post(command.get())); })
+      .def("calibrate_servo",
+           [](PyBoard& board, int channel, const ServoCalibration& calibration) {
+             board->servo(channel).calibrate(calibration);
+           })
+      .def("servo_calibration",
+           [](PyBoard& board, int channel) { return board->servo(channel).calibration(); })
       .def("i2c_read",
            [](PyBoard& board, int address, const std::string& at, int count, int ms) {
              return bytes_of([&] {

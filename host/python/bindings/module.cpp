@@ -9,6 +9,7 @@ PYBIND11_MODULE(_core, module) {
   r4::python::bind_state(module);
   r4::python::bind_control(module);
   r4::python::bind_devices(module);
+  r4::python::bind_servo(module);
   r4::python::bind_discovery(module);
   r4::python::bind_board(module);
   r4::python::bind_recording(module);

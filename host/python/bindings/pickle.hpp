@@ -126,6 +126,12 @@ inline void members_of(Pickle& pickle, Discovery& it) {
 }
 inline void members_of(Pickle& pickle, FleetResult& it) { pickle(it.board, it.result, it.problem); }
 
+// What reading a pickle begins with.
+template <class Value>
+Value blank() {
+  return Value{};
+}
+
 // For copy and pickle; a value of another version is refused with an Error.
 template <class Value>
 auto pickled(const char* name) {
@@ -140,7 +146,7 @@ auto pickled(const char* name) {
         const bool same = told.size() == 3 && told[0].cast<std::string>() == R4LINK_VERSION &&
                           told[1].cast<std::size_t>() == sizeof(Value);
         Pickle pickle(same ? told[2].cast<std::string>() : std::string());
-        Value value{};
+        Value value = blank<Value>();
         pickle(value);
         if (same && pickle.whole()) return value;
         throw Error(ErrorKind::data, name, "it was pickled by another version of R4 link",

@@ -8,8 +8,8 @@ if _importlib.find_spec('r4link._core') is None:
 
 from . import aio, control, devices  # pylint: disable=wrong-import-position
 from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Discovery, Event, FoundBoard, Identity, LinkStatus,
-                    Recording, RefusedPost, SearchedBus, SearchedNetwork, SearchedPort, Setpoints, State, Statistics,
-                    Subscription, PathStatus, discover, __version__)
+                    Recording, RefusedPost, SearchedBus, SearchedNetwork, SearchedPort, ServoCalibration, Setpoints, State,
+                    Statistics, Subscription, PathStatus, discover, __version__)
 from .board import Board, States
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
 from .channels import BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, StepperChannel, Uart
@@ -32,7 +32,7 @@ __all__ = [
     'I2cBusReport', 'I2cReading', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
     'NotConfirmedError', 'OpenError', 'PostResult', 'Program', 'REVERSE', 'RecordedBoard', 'RecordedDatagram',
     'RecordedEvent', 'Recording', 'RefusedError', 'RefusedPost', 'RelayChannel', 'SearchedBus', 'SearchedNetwork',
-    'SearchedPort', 'ServoChannel', 'Setpoints', 'SimBoard', 'State',
+    'SearchedPort', 'ServoCalibration', 'ServoChannel', 'Setpoints', 'SimBoard', 'State',
     'States', 'Statistics', 'StepperChannel', 'Subscription', 'Uart', 'UartBytes', 'UartData', 'UnsupportedError',
     'UsageError', 'PathStatus', 'aio', 'control', 'devices',
     'discover', 'read', 'with_link', '__version__',

@@ -196,7 +196,8 @@ class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
 
     def __init__(self, url: str | Iterable[str], **options: Any) -> None:
         self._board = blocking.Board(url, **options)
-        interrupt = self._board._core.interrupt
+        self._core = self._board._core
+        interrupt = self._core.interrupt
         self._commands = _Lane(interrupt)
         self._waits = _Lane(interrupt)
         self._stops = _Lane(interrupt)

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Callable, Generic, Iterator, TypeVar
+from typing import TYPE_CHECKING, Callable, Generic, Iterator, TypeVar, overload
 
-from ._core import Command, Setpoints, Subscription
+from ._core import Command, ServoCalibration, Setpoints, Subscription
 from .errors import ClosedError, UsageError
 from .values import Direction, PostResult, UartData
 
 if TYPE_CHECKING:
+    from ._core import Board as CoreBoard
     from .board import Board
 
 Sent = TypeVar('Sent')  # what send() returns: None, or a coroutine
@@ -30,6 +31,8 @@ def _ms(seconds: float) -> int:
 
 class BoardCommands(ABC, Generic[Sent]):
     """The commands that r4link.Board and r4link.aio.Board have in common."""
+
+    _core: CoreBoard
 
     @abstractmethod
     def send(self, command: str | Command, timeout: float = 1.0) -> Sent: ...
@@ -117,15 +120,45 @@ class DriveChannel(_Channel[Sent]):
 
 
 class ServoChannel(_Channel[Sent]):
-    """A servo."""
+    """A servo, driven by its pulse or, once it is calibrated, by its angle."""
 
-    def set(self, pulse_us: int, *, timeout: float = 1.0) -> Sent:
-        """`pulse_us`: the pulse width, up to 2500 microseconds; 0: no pulses."""
-        return self._board.send(Command.servo(self._channel, us=pulse_us), timeout)
+    def calibrate(self, calibration: ServoCalibration) -> None:
+        """Once, before this servo is driven in degrees. The Board keeps it, also while the link is lost; it is not sent to
+        the board."""
+        self._board._core.calibrate_servo(self._channel, calibration)
 
-    def post(self, pulse_us: int) -> PostResult:
-        """`pulse_us`: the pulse width, up to 2500 microseconds; 0: no pulses."""
-        return self._board.post(Command.servo(self._channel, us=pulse_us))
+    @property
+    def calibration(self) -> ServoCalibration:
+        """Raises UsageError if the servo was not calibrated."""
+        return self._board._core.servo_calibration(self._channel)
+
+    @overload
+    def set(self, *, us: int, timeout: float = ...) -> Sent: ...
+
+    @overload
+    def set(self, *, degrees: float, timeout: float = ...) -> Sent: ...
+
+    def set(self, *, us: int | None = None, degrees: float | None = None, timeout: float = 1.0) -> Sent:
+        """`us`: the pulse width, up to 2500 microseconds; 0: no pulses. `degrees`: the angle; raises UsageError for one
+        outside of the calibration's range, or without calibrate()."""
+        return self._board.send(self._command(us, degrees), timeout)
+
+    @overload
+    def post(self, *, us: int) -> PostResult: ...
+
+    @overload
+    def post(self, *, degrees: float) -> PostResult: ...
+
+    def post(self, *, us: int | None = None, degrees: float | None = None) -> PostResult:
+        """`us` or `degrees`: as for set()."""
+        return self._board.post(self._command(us, degrees))
+
+    def _command(self, us: int | None, degrees: float | None) -> Command:
+        if us is not None and degrees is None:
+            return Command.servo(self._channel, us=us)
+        if degrees is not None and us is None:
+            return Command.servo(self._channel, us=self.calibration.pulse(degrees=degrees))
+        raise TypeError('a servo takes either us or degrees')
 
 
 class RelayChannel(_Channel[Sent]):

@@ -5,9 +5,11 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
+#include "tools/r4/ros2/bridge.hpp"
 #include "tools/r4/ros2/command_text.hpp"
 
 namespace r4::tool::ros2 {
@@ -31,26 +33,35 @@ TEST(Ros2Units, AMotorOutsideItsDutyIsNotCommanded) {
   }
 }
 
+std::optional<int> to_us(const ServoUnit& unit, double value) {
+  const auto pulse = to_pulse(unit, value);
+  return pulse ? std::optional(pulse->value) : std::nullopt;
+}
+
 TEST(Ros2Units, AServoTurnsByItsCalibration) {
-  const ServoCalibration usual;
-  EXPECT_EQ(to_pulse(usual, 0), 1500);
-  EXPECT_EQ(to_pulse(usual, M_PI / 2), 2500);
-  EXPECT_EQ(to_pulse(usual, -M_PI / 2), 500);
-  EXPECT_FALSE(to_pulse(usual, 1.6));
-  EXPECT_FALSE(to_pulse(usual, not_a_number));
+  const ServoUnit usual = servo_unit(BridgeOptions().servo);
+  EXPECT_EQ(to_us(usual, 0), 1500);
+  EXPECT_EQ(to_us(usual, M_PI / 2), 2500);
+  EXPECT_EQ(to_us(usual, -M_PI / 2), 500);
+  EXPECT_EQ(to_us(usual, static_cast<float>(M_PI / 2)), 2500) << "as a topic carries it";
+  for (const double wrong : {1.6, not_a_number, infinite, std::numeric_limits<double>::max()}) {
+    EXPECT_FALSE(to_pulse(usual, wrong)) << wrong;
+  }
   EXPECT_NEAR(from_pulse(usual, 2000), M_PI / 4, 1e-9);
   EXPECT_TRUE(std::isnan(from_pulse(usual, 0)));
-  const ServoCalibration narrow = servo_calibration("1000,2000,1.0");
-  EXPECT_EQ(to_pulse(narrow, 0.25), 1750);
+  const ServoUnit narrow = servo_unit("1000,2000,1.0");
+  EXPECT_EQ(to_us(narrow, 0.25), 1750);
   EXPECT_FALSE(to_pulse(narrow, 0.6));
-  const ServoCalibration pulses = servo_calibration("us");
-  EXPECT_EQ(to_pulse(pulses, 1234), 1234);
-  EXPECT_EQ(to_pulse(pulses, 0), 0);
-  EXPECT_FALSE(to_pulse(pulses, 2501));
-  EXPECT_FALSE(to_pulse(pulses, -1));
+  const ServoUnit pulses = servo_unit("us");
+  EXPECT_EQ(to_us(pulses, 1234), 1234);
+  EXPECT_EQ(to_us(pulses, 0), 0);
+  EXPECT_EQ(from_pulse(pulses, 1234), 1234);
+  for (const double wrong : {2501.0, -1.0, not_a_number, infinite}) {
+    EXPECT_FALSE(to_pulse(pulses, wrong)) << wrong;
+  }
   for (const char* wrong :
        {"", "1,2", "2000,1000,1", "500,2501,1", "500,2500,0", "a,b,c", "1,2,3,4"}) {
-    EXPECT_THROW(servo_calibration(wrong), Error) << wrong;
+    EXPECT_THROW(servo_unit(wrong), Error) << wrong;
   }
 }
 

@@ -186,7 +186,7 @@ void BoardCommands::subscribe_outputs(Graph& graph, std::size_t node, Inbox& inb
               [n, servo = options_.servo](double value) -> std::optional<Command> {
                 const auto pulse = to_pulse(servo, value);
                 if (!pulse) return std::nullopt;
-                return Command::servo(n, Microseconds(*pulse));
+                return Command::servo(n, *pulse);
               });
   }
   for (int n = 2; n <= relay_channels; ++n) {  // relay 1 is arming's

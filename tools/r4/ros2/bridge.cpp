@@ -43,7 +43,7 @@ NodeOptions node_options(const BridgeOptions& options) {
   NodeOptions node;
   node.arm = options.arm;
   node.deadline = options.deadline;
-  if (!options.servo.empty()) node.servo = servo_calibration(options.servo);
+  node.servo = servo_unit(options.servo);
   if (!options.counts_per_turn.empty()) {
     node.counts_per_turn = positive_number("--counts-per-turn", options.counts_per_turn);
   }

@@ -18,7 +18,7 @@ struct BridgeOptions {
   std::vector<std::string> devices;
   bool arm = false;
   Milliseconds deadline{1000};
-  std::string servo;
+  std::string servo = "500,2500,3.14159265358979";
   std::string drive;
   std::string separation;
   std::string full_speed;

@@ -18,7 +18,7 @@ enum class LogLevel : std::uint8_t { info = 20, warning = 30, error = 40 };
 
 struct NodeOptions {
   FieldSet fields;  // those that the board is asked for
-  ServoCalibration servo;
+  ServoUnit servo;
   std::optional<double> counts_per_turn;     // of the encoders' joints; none: they are no joints
   std::optional<double> steps_per_turn;      // of the steppers'
   std::optional<DifferentialDrive> drive;    // none: there is no cmd_vel

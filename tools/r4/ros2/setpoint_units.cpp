@@ -5,12 +5,15 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include "r4link/error.hpp"
 
 namespace r4::tool::ros2 {
 namespace {
+
+constexpr double degrees_a_radian = 180 / std::numbers::pi;
 
 template <class Number>
 bool read(std::string_view text, Number& out) {
@@ -54,44 +57,40 @@ double to_duty(int pwm, Direction direction) {
   return direction == Direction::forward || pwm == 0 ? duty : -duty;
 }
 
-ServoCalibration servo_calibration(std::string_view text) {
-  ServoCalibration servo;
-  if (text == "us") {
-    servo.microseconds = true;
-    return servo;
-  }
+ServoUnit servo_unit(std::string_view text) {
+  if (text == "us") return std::nullopt;
+  int min_us = 0;
+  int max_us = 0;
+  double angle = 0;
   const auto parts = split(text);
-  const bool valid = parts.size() == 3 && read(parts[0], servo.min_us) &&
-                     read(parts[1], servo.max_us) && read(parts[2], servo.angle) &&
-                     servo.min_us > 0 && servo.max_us > servo.min_us &&
-                     servo.max_us <= servo_max_us && servo.angle > 0 && servo.angle < 100;
+  const bool valid = parts.size() == 3 && read(parts[0], min_us) && read(parts[1], max_us) &&
+                     read(parts[2], angle) && min_us > 0 && max_us > min_us &&
+                     max_us <= servo_max_us && angle > 0 && angle < 100;
   if (!valid) {
-    throw Error(ErrorKind::usage, "--servo " + std::string(text), "is no calibration",
+    throw Error(ErrorKind::usage, "--servo " + std::string(text), "is not a valid calibration",
                 "write us, or two pulse widths and the angle between them in radians, as in "
                 "500,2500,3.14");
   }
-  return servo;
+  const double half = angle / 2 * degrees_a_radian;
+  return ServoCalibration({Microseconds(min_us), Degrees(-half)},
+                          {Microseconds(max_us), Degrees(half)});
 }
 
-std::optional<int> to_pulse(const ServoCalibration& servo, double value) {
-  double pulse = value;
-  if (!servo.microseconds) {
-    const double middle = (servo.min_us + servo.max_us) / 2.0;
-    pulse = middle + value / servo.angle * (servo.max_us - servo.min_us);
+std::optional<Microseconds> to_pulse(const ServoUnit& unit, double value) {
+  if (!unit) {
+    const double us = std::round(value);
+    if (!(us >= 0 && us <= servo_max_us)) return std::nullopt;  // NaN, too
+    return Microseconds(static_cast<std::int32_t>(us));
   }
-  if (servo.microseconds && pulse == 0) return 0;  // off
-  // Half a microsecond more or less is the same pulse.
-  const double least = servo.microseconds ? 0 : servo.min_us;
-  const double most = servo.microseconds ? servo_max_us : servo.max_us;
-  if (!(pulse >= least - 0.5 && pulse <= most + 0.5)) return std::nullopt;  // NaN, too
-  return static_cast<int>(std::lround(std::clamp(pulse, least, most)));
+  const double degrees = value * degrees_a_radian;
+  if (!std::isfinite(degrees) || !unit->is_in_range(Degrees(degrees))) return std::nullopt;
+  return unit->pulse(Degrees(degrees));
 }
 
-double from_pulse(const ServoCalibration& servo, int pulse_us) {
-  if (servo.microseconds) return pulse_us;
-  if (pulse_us == 0) return std::numeric_limits<double>::quiet_NaN();
-  const double middle = (servo.min_us + servo.max_us) / 2.0;
-  return (pulse_us - middle) / (servo.max_us - servo.min_us) * servo.angle;
+double from_pulse(const ServoUnit& unit, int pulse_us) {
+  if (!unit) return pulse_us;
+  const auto angle = unit->degrees(pulse_us);
+  return angle ? angle->value / degrees_a_radian : std::numeric_limits<double>::quiet_NaN();
 }
 
 std::optional<Command> MotorChannel::command(double duty) const {

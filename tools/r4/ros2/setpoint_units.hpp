@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "r4link/command.hpp"
+#include "r4link/commands/servo_calibration.hpp"
 #include "r4link/setpoints.hpp"
 #include "r4link/vocabulary.hpp"
 
@@ -19,18 +20,14 @@ namespace r4::tool::ros2 {
 // From -1 (full reverse) to 1.
 double to_duty(int pwm, Direction direction);
 
-// Radians of a servo: from min_us to max_us it turns by `angle`; 0 is in the middle.
-struct ServoCalibration {
-  bool microseconds = false;  // its topics carry the pulse width instead
-  int min_us = 500;
-  int max_us = 2500;
-  double angle = 3.14159265358979;
-};
-// "us", or "500,2500,3.14". Throws Error{usage}.
-ServoCalibration servo_calibration(std::string_view text);
-std::optional<int> to_pulse(const ServoCalibration& servo, double value);
-// NaN for a servo that is off.
-double from_pulse(const ServoCalibration& servo, int pulse_us);
+// What the topics of servos carry: radians by a calibration; none: pulses in microseconds.
+using ServoUnit = std::optional<ServoCalibration>;
+// "us", or two pulses and the angle between them, with 0 in the middle: "500,2500,3.14". Throws
+// Error{usage}.
+ServoUnit servo_unit(std::string_view text);
+std::optional<Microseconds> to_pulse(const ServoUnit& unit, double value);
+// NaN for a servo that is off, in radians.
+double from_pulse(const ServoUnit& unit, int pulse_us);
 
 // A motor channel, and whether it is mounted the other way round: "osmc1", "-dhb12_3".
 struct MotorChannel {
