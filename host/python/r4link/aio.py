@@ -25,8 +25,9 @@ from . import _core, board as blocking, channels
 from ._core import (CarrierCounters, Command, Discovery, Event, Identity, LinkStatus, Recording, RefusedPost, Setpoints,
                     State, Statistics, Subscription, PathStatus)
 from .devices import Device
+from .enums import BoardRole, DisarmCause, PostResult
 from .errors import ClosedError
-from .values import PostResult, UartData
+from .values import UartData
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # since Python 3.11 in typing
@@ -223,7 +224,7 @@ class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
         await asyncio.shield(self.close())
 
     @property
-    def role(self) -> str:
+    def role(self) -> BoardRole:
         return self._board.role
 
     async def take_control(self) -> None:
@@ -279,7 +280,7 @@ class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
         return self._board.post(command)
 
     @property
-    def disarmed_by(self) -> str:
+    def disarmed_by(self) -> DisarmCause:
         return self._board.disarmed_by
 
     @property
@@ -330,7 +331,7 @@ class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
     def on_restart(self, callback: Callable[[], object]) -> Subscription:
         return self._board.on_restart(_on_loop(callback))
 
-    def on_arming(self, callback: Callable[[str], object]) -> Subscription:
+    def on_arming(self, callback: Callable[[DisarmCause], object]) -> Subscription:
         return self._board.on_arming(_on_loop(callback))
 
     def on_refused(self, callback: Callable[[RefusedPost], object]) -> Subscription:

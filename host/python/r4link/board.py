@@ -17,8 +17,8 @@ from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recor
                     Statistics, Subscription, PathStatus)
 from .channels import BoardCommands, I2c, _ms, _Uarts
 from .devices import Device
+from .enums import BoardRole, DisarmCause, PostResult
 from .errors import UsageError
-from .values import PostResult
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # since Python 3.11 in typing
@@ -75,8 +75,8 @@ class States:
 class Board(BoardCommands[None]):
     """A board, opened by URL (docs/transports.md), or with_link(); see the options of include/r4link/options.hpp.
 
-    Returns without waiting for the board: wait_active(). `role` is 'control', or 'watch' for a program that only
-    looks, and may stop the board, until take_control(). `key` is the path of a key file (`~` is yours). Raises
+    Returns without waiting for the board: wait_active(). `role` is BoardRole.CONTROL, or BoardRole.WATCH for a program
+    that only looks, and may stop the board, until take_control(). `key` is the path of a key file (`~` is yours). Raises
     UsageError, OpenError, DeniedError.
 
         with r4link.Board('udp://192.168.0.125') as board:
@@ -87,18 +87,16 @@ class Board(BoardCommands[None]):
     Several URLs are paths to the one board (docs/redundancy.md): r4link.Board(['serial:auto', 'udp://192.168.0.125']).
     """
 
-    def __init__(self, url: str | Iterable[str], *, role: str = 'control', arming: bool = True, fields: str = 'DEFAULT',
-                 key: str | os.PathLike[str] | None = None, watch_rate_hz: int = 100, heartbeat: float = 0.1,
-                 timeout: float = 1.0, command_retry: float = 0.05, stop_retry: float = 0.02,
+    def __init__(self, url: str | Iterable[str], *, role: BoardRole | str = BoardRole.CONTROL, arming: bool = True,
+                 fields: str = 'DEFAULT', key: str | os.PathLike[str] | None = None, watch_rate_hz: int = 100,
+                 heartbeat: float = 0.1, timeout: float = 1.0, command_retry: float = 0.05, stop_retry: float = 0.02,
                  stop_linger: float = 0.2, identify_interval: float = 1.0, callback_limit: float = 0.5) -> None:
-        if role not in ('control', 'watch'):
-            raise UsageError(f'role {role!r}', 'there is no such role', "give 'control' or 'watch'")
         paths = [url] if isinstance(url, str) else list(url)
         link = next((bad for bad in (getattr(each, 'link', '') for each in paths) if bad), '')
         if link and (len(paths) > 1):
             raise UsageError(f'a bad link {link}', 'it is for a board of one path', 'open that URL alone')
         self._core = _core.Board(
-            '+'.join(paths), link=link, watch=role == 'watch', arming=arming, fields=fields,
+            '+'.join(paths), link=link, role=role, arming=arming, fields=fields,
             key=None if key is None else os.path.expanduser(os.fspath(key)),
             watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout),
             command_retry=_ms(command_retry), stop_retry=_ms(stop_retry), stop_linger=_ms(stop_linger),
@@ -127,9 +125,9 @@ class Board(BoardCommands[None]):
         return f'<r4link.Board {self.name}: {self.link.state}>'
 
     @property
-    def role(self) -> str:
-        """'control' or 'watch'."""
-        return 'watch' if self._core.watches() else 'control'
+    def role(self) -> BoardRole:
+        """What this program is to the board at the moment."""
+        return self._core.role()
 
     def take_control(self) -> None:
         """From now on this program controls the board; callbacks and recordings stay. It begins disarmed: wait_active(),
@@ -156,7 +154,7 @@ class Board(BoardCommands[None]):
 
     def post(self, command: Command | Setpoints) -> PostResult:
         """Sends once, without waiting or confirmation. on_refused() tells of what the board refuses."""
-        return PostResult(self._core.post(command))
+        return self._core.post(command)
 
     def apply(self, setpoints: Setpoints, timeout: float = 1.0) -> None:
         """All of them in one pass, confirmed as one, or none."""
@@ -171,8 +169,8 @@ class Board(BoardCommands[None]):
         self._core.arm(_ms(timeout))
 
     @property
-    def disarmed_by(self) -> str:
-        """Why output commands are refused, such as 'not yet', 'stop' or 'earlier stop'; 'none' when armed."""
+    def disarmed_by(self) -> DisarmCause:
+        """Why output commands are refused; DisarmCause.NONE when armed."""
         return self._core.disarmed_by()
 
     def stop(self, timeout: float = 1.0) -> None:
@@ -265,8 +263,8 @@ class Board(BoardCommands[None]):
         """The board has begun again: what it was told is gone."""
         return self._core.on_restart(callback)
 
-    def on_arming(self, callback: Callable[[str], object]) -> Subscription:
-        """Armed ('none'), or not any more, and why."""
+    def on_arming(self, callback: Callable[[DisarmCause], object]) -> Subscription:
+        """Armed (DisarmCause.NONE), or not any more, and why."""
         return self._core.on_arming(callback)
 
     def on_refused(self, callback: Callable[[RefusedPost], object]) -> Subscription:

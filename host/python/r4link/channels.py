@@ -11,8 +11,9 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Callable, Generic, Iterator, TypeVar
 
 from ._core import Command, Setpoints, Subscription
+from .enums import Direction, PostResult
 from .errors import ClosedError, UsageError
-from .values import Direction, PostResult, UartData
+from .values import UartData
 
 if TYPE_CHECKING:
     from .board import Board

@@ -13,8 +13,7 @@ from . import _core
 from ._core import Setpoints, State
 from .board import Board
 from .channels import _ms
-
-LoopEnd = Literal['none', 'asked', 'late', 'not active', 'disarmed', 'standstill']
+from .enums import DisarmCause, LinkState, LoopEnd
 
 
 class Twist(NamedTuple):
@@ -201,7 +200,7 @@ class Standstill(NamedTuple):
 
 
 class LoopReport(NamedTuple):
-    end: str  # a LoopEnd
+    end: LoopEnd
     why: str
     at_rest: bool  # the outputs are as `rest` has them, or safe; if not, `why` says what to do
     steps: int
@@ -225,15 +224,15 @@ class LoopGuard:
     def start(self, now: float) -> None:
         self._core.start(now)
 
-    def on_state(self, state: State, disarmed_by: str, now: float) -> float | None:
+    def on_state(self, state: State, disarmed_by: DisarmCause, now: float) -> float | None:
         """The seconds since the last step, on the board's clock, if one is due."""
         return self._core.on_state(state, disarmed_by, now)
 
     def on_commanded(self, setpoints: Setpoints) -> None:
         self._core.on_commanded(setpoints)
 
-    def check(self, link: str, disarmed_by: str, now: float) -> str:
-        """A LoopEnd: to be asked at `deadline` at the latest, with Board.link.state and Board.disarmed_by."""
+    def check(self, link: LinkState, disarmed_by: DisarmCause, now: float) -> LoopEnd:
+        """To be asked at `deadline` at the latest, with Board.link.state and Board.disarmed_by."""
         return self._core.check(link, disarmed_by, now)
 
     @property
@@ -241,7 +240,7 @@ class LoopGuard:
         return self._core.deadline
 
     @property
-    def ended(self) -> str:
+    def ended(self) -> LoopEnd:
         return self._core.ended
 
     @property

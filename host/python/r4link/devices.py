@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from . import _core
 from ._core import State
+from .enums import DeviceRole
 
 
 class DeviceReading(NamedTuple):
@@ -55,8 +56,8 @@ class Device:
         return self._core.title
 
     @property
-    def role(self) -> str:
-        """'imu', 'power', 'range', 'angle' or 'none'."""
+    def role(self) -> DeviceRole:
+        """What it is for a robot."""
         return self._core.role
 
     @property

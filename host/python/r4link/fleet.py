@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Iterable, Iterator, Mapping, NamedTuple, Seque
 from . import _core
 from ._core import BoardHealth, Command, Event, FleetResult, LinkStatus, Recording, RefusedPost, Setpoints, State
 from .channels import _ms
+from .enums import BoardRole, DisarmCause, FleetEventKind, PostResult, SafeReason
 from .errors import Error, RefusedError, UsageError, error_of
-from .values import PostResult
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # since Python 3.11 in typing
@@ -40,11 +40,9 @@ def _close_all() -> None:
 
 class FleetEvent(NamedTuple):
     """Something that happened to a board."""
-    kind: str  # 'link', 'transport', 'arming', 'restart', 'refused', 'missed'
+    kind: FleetEventKind
     board: int
-    # By its kind: the link; the transport's event; why the board is not armed ('none': it is); nothing; the post that
-    # was refused; how many events were dropped, for nobody took them.
-    what: LinkStatus | Event | str | None | RefusedPost | int
+    what: LinkStatus | Event | DisarmCause | None | RefusedPost | int  # by its kind
 
 
 class FleetResults(Sequence[FleetResult]):
@@ -84,8 +82,9 @@ class FleetResults(Sequence[FleetResult]):
 
 
 class Fleet:
-    def __init__(self, *urls: str, role: str = 'control', arming: bool = True, key: str | os.PathLike[str] | None = None,
-                 fields: str = 'DEFAULT', watch_rate_hz: int = 100, heartbeat: float = 0.1, timeout: float = 1.0,
+    def __init__(self, *urls: str, role: BoardRole | str = BoardRole.CONTROL, arming: bool = True,
+                 key: str | os.PathLike[str] | None = None, fields: str = 'DEFAULT', watch_rate_hz: int = 100,
+                 heartbeat: float = 0.1, timeout: float = 1.0,
                  command_retry: float = 0.05, stop_retry: float = 0.02, stop_linger: float = 0.2,
                  identify_interval: float = 1.0) -> None:
         """Opens all transports and begins the links; returns without waiting for the boards.
@@ -93,8 +92,6 @@ class Fleet:
         Each of `urls` is a URL or a pattern of many: 'can://can0?node=0-7'. The options are those of Board. Raises
         UsageError, OpenError or DeniedError where one of them cannot be opened.
         """
-        if role not in ('control', 'watch'):
-            raise UsageError(f'role {role!r}', 'there is no such role', "give 'control' or 'watch'")
         for url in urls:
             if not isinstance(url, str):
                 raise UsageError(f'a fleet of {url!r}', 'each URL is a text of its own',
@@ -102,7 +99,7 @@ class Fleet:
             if getattr(url, 'link', ''):
                 raise UsageError(url, 'with_link() is for a Board alone, not for one of a Fleet',
                                  'open it by a Board, or let the simulated board have the bad link (r4 sim --link)')
-        self._core = _core.Fleet(list(urls), watch=role == 'watch', arming=arming, fields=fields,
+        self._core = _core.Fleet(list(urls), role=role, arming=arming, fields=fields,
                                  key=None if key is None else os.path.expanduser(os.fspath(key)),
                                  watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout),
                                  command_retry=_ms(command_retry), stop_retry=_ms(stop_retry),
@@ -140,7 +137,7 @@ class Fleet:
         if missing:
             others = f' (and {len(missing) - 1} other boards)' if len(missing) > 1 else ''
             health = self._core.health()[missing[0]]
-            state = f'is {health.link.state}' + ('' if health.link.reason == 'none' else f', {health.link.reason}')
+            state = f'is {health.link.state}' + ('' if health.link.reason is SafeReason.NONE else f', {health.link.reason}')
             raise RefusedError(health.url, state + others, 'see health(), and that they are on and reached')
 
     def health(self) -> list[BoardHealth]:
@@ -176,7 +173,7 @@ class Fleet:
 
     def post(self, setpoints: Mapping[int | str, Setpoints]) -> list[PostResult]:
         """The same sent once, in one pass, and not confirmed: for streams."""
-        return [PostResult(each) for each in self._core.post(self._pairs(setpoints))]
+        return self._core.post(self._pairs(setpoints))
 
     def next_event(self, timeout: float = 0.0) -> FleetEvent | None:
         """The next thing that has happened, oldest first; None if there is nothing in time."""

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Type
 from . import _core
 from ._core import FIELDS, State
 from .board import Board
+from .enums import LinkState, SafeReason
 from .errors import ClosedError, DataError, Error, OpenError, UsageError
 from .simulation import Look, SimBoard
 from .values import Bldc, Drive
@@ -189,19 +190,20 @@ class TestBoard(Board):
                 state = self.next_state(left)
                 count += 1
             except Error as error:
-                if self.link.state not in ('active', 'safe'):
+                if self.link.state not in (LinkState.ACTIVE, LinkState.SAFE):
                     raise AssertionError(f'no state came within {within} s: {error}') from None
         wrong = [f'{name} is {getattr(state, name)!r}, not {_words(wanted)}' for name, wanted in fields.items()
                  if not _is(getattr(state, name), wanted)]
         raise AssertionError(f'after {within} s and {count} states: {"; ".join(wrong)} '
                              f'(link {self.link.state}, reason {self.link.reason}; {state!r})')
 
-    def expect_safe(self, reason: str | None = None, within: float = 1.1) -> None:
+    def expect_safe(self, reason: SafeReason | str | None = None, within: float = 1.1) -> None:
         """That the board is safe in time, for that reason, and that no pin of its chips drives anything."""
+        reason = None if reason is None else SafeReason(reason)
         deadline = time.monotonic() + within
         while True:
             link, look = self.link, self.robot.look()
-            if link.state == 'safe' and reason in (None, link.reason) and look.is_safe:
+            if link.state is LinkState.SAFE and reason in (None, link.reason) and look.is_safe:
                 return
             if time.monotonic() >= deadline:
                 raise AssertionError(f'after {within} s the board is not safe{f" ({reason})" if reason else ""}: the '
