@@ -110,30 +110,6 @@ class States:
         return self._states.dropped
 
 
-class I2c:
-    """The devices on the user's I2C bus, as r4link.I2c."""
-
-    def __init__(self, board: Board) -> None:
-        self._commands = board._commands
-        self._i2c = board._board.i2c
-
-    async def read(self, address: int, register: int | bytes, count: int, timeout: float = 1.0) -> bytes:
-        return await self._commands.call(lambda: self._i2c.read(address, register, count, timeout))
-
-    async def write(self, address: int, data: bytes, count: int = 0, timeout: float = 1.0) -> bytes:
-        return await self._commands.call(lambda: self._i2c.write(address, data, count, timeout))
-
-    async def scan(self, timeout: float = 2.0) -> list[int]:
-        return await self._commands.call(lambda: self._i2c.scan(timeout))
-
-    async def poll(self, slot: int, address: int, register: int | bytes, count: int, period: float,
-                   timeout: float = 1.0) -> None:
-        await self._commands.call(lambda: self._i2c.poll(slot, address, register, count, period, timeout))
-
-    async def poll_off(self, slot: int, timeout: float = 1.0) -> None:
-        await self._commands.call(lambda: self._i2c.poll_off(slot, timeout))
-
-
 class UartStream:
     """What comes in on a UART: `async for data, lost in board.uart[1]: …`, until the board is closed. What waits is in
     the link; the callback of this one only tells that there is something."""
@@ -160,36 +136,15 @@ class UartStream:
             await self._news.wait()
 
 
-class Uart:
-    """A UART of the user's, as r4link.Uart: `async for data, lost in board.uart[1]: …`."""
+class Uart(channels.UartChannel[Coroutine[Any, Any, None], Coroutine[Any, Any, UartData]]):
+    """A UART of r4link.aio.Board: `async for data, lost in board.uart[1]: …`."""
 
-    def __init__(self, board: Board, channel: int) -> None:
-        self._board = board
-        self._commands = board._commands
-        self._uart = board._board.uart[channel]
-
-    async def write(self, data: bytes, timeout: float = 1.0) -> None:
-        await self._commands.call(lambda: self._uart.write(data, timeout))
-
-    async def read(self, timeout: float = 0.0) -> UartData:
-        return await self._board._waits.call(lambda: self._uart.read(timeout))
+    _board: Board
 
     def __aiter__(self) -> UartStream:
         news = asyncio.Event()
         self._board._news.add(news)
-        return UartStream(self._uart, news, self.on_bytes(lambda _: news.set()))
-
-    def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
-        """As r4link.Uart.on_bytes(), on the loop of the task that adds it."""
-        return self._uart.on_bytes(_on_loop(callback))
-
-
-class _Uarts:
-    def __init__(self, board: Board) -> None:
-        self._board = board
-
-    def __getitem__(self, channel: int) -> Uart:
-        return Uart(self._board, channel)
+        return UartStream(self._board._board.uart[self._channel], news, self.on_bytes(lambda _: news.set()))
 
 
 class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
@@ -197,11 +152,21 @@ class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
 
     def __init__(self, url: str | Iterable[str], **options: Any) -> None:
         self._board = blocking.Board(url, **options)
-        interrupt = self._board._core.interrupt
+        self._core = self._board._core
+        interrupt = self._core.interrupt
         self._commands = _Lane(interrupt)
         self._waits = _Lane(interrupt)
         self._stops = _Lane(interrupt)
         self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of loops over states and bytes
+
+    def _command(self, call: Callable[[], T]) -> Coroutine[Any, Any, T]:
+        return self._commands.call(call)
+
+    def _wait(self, call: Callable[[], T]) -> Coroutine[Any, Any, T]:
+        return self._waits.call(call)
+
+    def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
+        return _on_loop(callback)
 
     @classmethod
     async def first(cls, **options: Any) -> Self:
@@ -254,13 +219,14 @@ class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
         return await self._commands.call(lambda: self._board.identify(timeout))
 
     @property
-    def i2c(self) -> I2c:
-        return I2c(self)
+    def i2c(self) -> channels.I2c[Coroutine[Any, Any, None], Coroutine[Any, Any, bytes], Coroutine[Any, Any, list[int]]]:
+        """The devices on the user's I2C bus."""
+        return channels.I2c(self)
 
     @property
-    def uart(self) -> _Uarts:
+    def uart(self) -> channels.Uarts[Uart]:
         """uart[1] and uart[2]."""
-        return _Uarts(self)
+        return channels.Uarts(lambda channel: Uart(self, channel))
 
     async def attach(self, device: Device, timeout: float = 1.0) -> None:
         """As r4link.Board.attach()."""

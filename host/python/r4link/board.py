@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, Type, TypeV
 from . import _core
 from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, Setpoints, State,
                     Statistics, Subscription, PathStatus)
-from .channels import BoardCommands, I2c, _ms, _Uarts
+from .channels import BoardCommands, I2c, Uart, Uarts, _ms
 from .devices import Device
 from .enums import BoardRole, DisarmCause, PostResult
 from .errors import UsageError
@@ -109,6 +109,15 @@ class Board(BoardCommands[None]):
         board, with what was searched, and UsageError with the URLs of several."""
         return cls(_core.discover().only().url, **options)
 
+    def _command(self, call: Callable[[], Any]) -> Any:
+        return call()
+
+    def _wait(self, call: Callable[[], Any]) -> Any:
+        return call()
+
+    def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
+        return callback
+
     def close(self) -> None:
         """Says farewell and closes the transport: the board goes safe at once. Calls that wait in other threads
         raise ClosedError. Idempotent; a callback may call it."""
@@ -182,13 +191,14 @@ class Board(BoardCommands[None]):
         self._core.stop_async()
 
     @property
-    def i2c(self) -> I2c:
+    def i2c(self) -> I2c[None, bytes, list[int]]:
+        """The devices on the user's I2C bus."""
         return I2c(self)
 
     @property
-    def uart(self) -> _Uarts:
+    def uart(self) -> Uarts[Uart]:
         """uart[1] and uart[2]."""
-        return _Uarts(self)
+        return Uarts(lambda channel: Uart(self, channel))
 
     def attach(self, device: Device, timeout: float = 1.0) -> None:
         """Sets a described device up (r4link.devices): is it the one? Then what is to be written, which takes arm(), and

@@ -8,17 +8,20 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Callable, Generic, Iterator, TypeVar
+from typing import Any, Callable, Generic, Iterator, TypeVar
 
+from . import _core
 from ._core import Command, Setpoints, Subscription
 from .enums import Direction, PostResult
 from .errors import ClosedError, UsageError
 from .values import UartData
 
-if TYPE_CHECKING:
-    from .board import Board
-
-Sent = TypeVar('Sent')  # what send() returns: None, or a coroutine
+# What a call returns that waits for a command, for bytes, for addresses: that, or a coroutine of it.
+Sent = TypeVar('Sent')
+Read = TypeVar('Read')
+Scanned = TypeVar('Scanned')
+Received = TypeVar('Received')
+AnyUart = TypeVar('AnyUart')  # of a blocking or an asynchronous board
 _MOST_S = 24 * 3600.0
 
 
@@ -31,6 +34,20 @@ def _ms(seconds: float) -> int:
 
 class BoardCommands(ABC, Generic[Sent]):
     """The commands that r4link.Board and r4link.aio.Board have in common."""
+
+    _core: _core.Board
+
+    @abstractmethod
+    def _command(self, call: Callable[[], Any]) -> Any:
+        """Makes a call that waits for a command: returns what it returns, or a coroutine of that."""
+
+    @abstractmethod
+    def _wait(self, call: Callable[[], Any]) -> Any:
+        """Makes a call that waits, and sends nothing."""
+
+    @abstractmethod
+    def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
+        """What the thread of the callbacks calls for a callback of the program."""
 
     @abstractmethod
     def send(self, command: str | Command, timeout: float = 1.0) -> Sent: ...
@@ -179,53 +196,72 @@ class BldcChannel(_Channel[Sent]):
         return self._board.post(Command.bldc(self._channel, pwm=pwm, direction=direction, brake=brake))
 
 
-class I2c:
+class I2c(Generic[Sent, Read, Scanned]):
     """The devices on the user's I2C bus (docs/devices.md). read(), write() and scan() return when the device has
     answered, and raise RefusedError where none does."""
 
-    def __init__(self, board: Board) -> None:
-        self._board = board
+    def __init__(self, board: BoardCommands[Sent]) -> None:
+        self._core = board._core
+        self._call = board._command
 
-    def read(self, address: int, register: int | bytes, count: int, timeout: float = 1.0) -> bytes:
+    def read(self, address: int, register: int | bytes, count: int, timeout: float = 1.0) -> Read:
         """Of a register, of one byte or as bytes; b'' names none."""
-        return self._board._core.i2c_read(address, _register(register), count, _ms(timeout))
+        read: Read = self._call(lambda: self._core.i2c_read(address, _register(register), count, _ms(timeout)))
+        return read
 
-    def write(self, address: int, data: bytes, count: int = 0, timeout: float = 1.0) -> bytes:
+    def write(self, address: int, data: bytes, count: int = 0, timeout: float = 1.0) -> Read:
         """May move something, so that it takes arm(). Then reads `count` bytes."""
-        return self._board._core.i2c_write(address, bytes(data), count, _ms(timeout))
+        read: Read = self._call(lambda: self._core.i2c_write(address, bytes(data), count, _ms(timeout)))
+        return read
 
-    def scan(self, timeout: float = 2.0) -> list[int]:
+    def scan(self, timeout: float = 2.0) -> Scanned:
         """The addresses that answer, at most 32."""
-        return list(self._board._core.i2c_scan(_ms(timeout)))
+        addresses: Scanned = self._call(lambda: list(self._core.i2c_scan(_ms(timeout))))
+        return addresses
 
     def poll(self, slot: int, address: int, register: int | bytes, count: int, period: float,
-             timeout: float = 1.0) -> None:
+             timeout: float = 1.0) -> Sent:
         """The board reads it by itself from now on, into slot 1-8: state.i2c1, after fields('DEFAULT,I2C1')."""
-        self._board._core.i2c_poll(slot, address, _register(register), count, _ms(period), _ms(timeout))
+        sent: Sent = self._call(
+            lambda: self._core.i2c_poll(slot, address, _register(register), count, _ms(period), _ms(timeout)))
+        return sent
 
-    def poll_off(self, slot: int, timeout: float = 1.0) -> None:
-        self._board._core.i2c_poll_off(slot, _ms(timeout))
+    def poll_off(self, slot: int, timeout: float = 1.0) -> Sent:
+        sent: Sent = self._call(lambda: self._core.i2c_poll_off(slot, _ms(timeout)))
+        return sent
 
 
-class Uart:
+class UartChannel(Generic[Sent, Received]):
     """A UART of the user's, 1 or 2 (docs/devices.md): setting('uart1', '115200:8N1') turns it on,
-    fields('DEFAULT,UART1') has the board tell what comes in.
+    fields('DEFAULT,UART1') has the board tell what comes in."""
+
+    def __init__(self, board: BoardCommands[Sent], channel: int) -> None:
+        self._board, self._channel = board, channel
+
+    def write(self, data: bytes, timeout: float = 1.0) -> Sent:
+        """1 to 48 bytes; returns when the board has taken them all. May move something, so that it takes arm()."""
+        sent: Sent = self._board._command(
+            lambda: self._board._core.uart_write(self._channel, bytes(data), _ms(timeout)))
+        return sent
+
+    def read(self, timeout: float = 0.0) -> Received:
+        """What has come since the last read(), at most 64 KB: older bytes count as lost. Waits until there is
+        something; nothing where it does not come in time."""
+        received: Received = self._board._wait(lambda: self._board._core.uart_read(self._channel, _ms(timeout)))
+        return received
+
+    def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
+        """Called for each state that brings some, beside read(): each byte once, in order, and how many are missing.
+        From now on, where the other callbacks of the board are called."""
+        return self._board._core.uart_on_bytes(self._channel, self._board._callback(callback))
+
+
+class Uart(UartChannel[None, UartData]):
+    """A UART of r4link.Board.
 
         for data, lost in board.uart[1]:    # what read() would return, as it comes, until the board is closed
             parser.feed(data)
     """
-
-    def __init__(self, board: Board, channel: int) -> None:
-        self._board, self._channel = board, channel
-
-    def write(self, data: bytes, timeout: float = 1.0) -> None:
-        """1 to 48 bytes; returns when the board has taken them all. May move something, so that it takes arm()."""
-        self._board._core.uart_write(self._channel, bytes(data), _ms(timeout))
-
-    def read(self, timeout: float = 0.0) -> UartData:
-        """What has come since the last read(), at most 64 KB: older bytes count as lost. Waits until there is
-        something; nothing where it does not come in time."""
-        return self._board._core.uart_read(self._channel, _ms(timeout))
 
     def __iter__(self) -> Iterator[UartData]:
         while True:
@@ -236,18 +272,16 @@ class Uart:
             if received.data or received.lost:
                 yield received
 
-    def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
-        """Called for each state that brings some, beside read(): each byte once, in order, and how many are missing.
-        From now on, on the thread of the callbacks."""
-        return self._board._core.uart_on_bytes(self._channel, callback)
 
+class Uarts(Generic[AnyUart]):
+    """The UARTs of a board: board.uart[1] and board.uart[2]."""
 
-class _Uarts:
-    def __init__(self, board: Board) -> None:
-        self._board = board
+    def __init__(self, make: Callable[[int], AnyUart]) -> None:
+        self._make = make
 
-    def __getitem__(self, channel: int) -> Uart:
-        return Uart(self._board, channel)
+    def __getitem__(self, channel: int) -> AnyUart:
+        """`channel`: 1 or 2."""
+        return self._make(channel)
 
 
 def _register(register: int | bytes) -> bytes:

@@ -117,7 +117,7 @@ class Outcome(Word):
     CONFIRMED = 'confirmed', "the board's own state confirms the command"
     REFUSED = 'refused', 'the board refused the command and did not execute it: the Refusal says why'
     TIMED_OUT = 'timed out', 'no confirmation came in time: the command may or may not have been executed'
-    CANCELLED = 'cancelled', 'given up: a stop, a newer cause to be safe or a restart came first, or the program ended it'
+    CANCELLED = 'cancelled', 'given up by the program, or because a stop, a newer cause to be safe or a restart came first'
     CLOSED = 'closed', 'given up: the board was closed'
     BLOCKED = 'blocked', "the link's thread does not answer: the command was not sent, or not confirmed"
     FULL = 'full', 'not accepted: 64 commands are under way already'
