@@ -1,20 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a board has: its output channels, the user's I2C bus and UARTs.
 
-The channel classes serve r4link.Board and r4link.aio.Board: a call that waits returns what the board's send() returns,
-None or a coroutine. Times are seconds. Every `timeout` is the time in which the board's state must confirm the command.
+The classes serve r4link.Board and r4link.aio.Board: a call that waits returns what the board's send() returns, None or
+a coroutine. Times are seconds. Every `timeout` is the time in which the board's state must confirm the command.
 """
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from typing import Any, Callable, Generic, Iterator, TypeVar
+from typing import TYPE_CHECKING, Callable, Generic, Iterator, TypeVar
 
-from . import _core
 from ._core import Command, Setpoints, Subscription
 from .enums import Direction, PostResult
 from .errors import ClosedError, UsageError
 from .values import UartData
+
+if TYPE_CHECKING:
+    from .any_board import AnyBoard
 
 # What a call returns that waits for a command, for bytes, for addresses: that, or a coroutine of it.
 Sent = TypeVar('Sent')
@@ -32,80 +33,11 @@ def _ms(seconds: float) -> int:
     return math.ceil(max(-_MOST_S, min(seconds, _MOST_S)) * 1000)
 
 
-class BoardCommands(ABC, Generic[Sent]):
-    """The commands that r4link.Board and r4link.aio.Board have in common."""
-
-    _core: _core.Board
-
-    @abstractmethod
-    def _command(self, call: Callable[[], Any]) -> Any:
-        """Makes a call that waits for a command: returns what it returns, or a coroutine of that."""
-
-    @abstractmethod
-    def _wait(self, call: Callable[[], Any]) -> Any:
-        """Makes a call that waits, and sends nothing."""
-
-    @abstractmethod
-    def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
-        """What the thread of the callbacks calls for a callback of the program."""
-
-    @abstractmethod
-    def send(self, command: str | Command, timeout: float = 1.0) -> Sent: ...
-
-    @abstractmethod
-    def post(self, command: Command | Setpoints) -> PostResult: ...
-
-    def osmc(self, channel: int) -> DriveChannel[Sent]:
-        """`channel`: 1 to 4."""
-        return DriveChannel(self, channel, Command.osmc)
-
-    def dhb12(self, channel: int) -> DriveChannel[Sent]:
-        """`channel`: 1 to 4, for DHB1A, DHB1B, DHB2A and DHB2B."""
-        return DriveChannel(self, channel, Command.dhb12)
-
-    def servo(self, channel: int) -> ServoChannel[Sent]:
-        """`channel`: 1 to 16."""
-        return ServoChannel(self, channel)
-
-    def relay(self, channel: int) -> RelayChannel[Sent]:
-        """`channel`: 1 to 8; relay 1 is in the motor supply."""
-        return RelayChannel(self, channel)
-
-    def stepper(self, channel: int) -> StepperChannel[Sent]:
-        """`channel`: 1 to 4."""
-        return StepperChannel(self, channel)
-
-    def bldc(self, channel: int) -> BldcChannel[Sent]:
-        """`channel`: 1 to 4."""
-        return BldcChannel(self, channel)
-
-    def dac(self, channel: int, *, millivolts: int, timeout: float = 1.0) -> Sent:
-        """Sets a voltage of the board: `channel` 1 or 2, `millivolts` 0 to 3300; 0 in the safe state. It is an output,
-        so it takes arm(). Command.dac() can be posted, and can be one of Setpoints."""
-        return self.send(Command.dac(channel, millivolts=millivolts), timeout)
-
-    def proximity(self, channel: int, *, cm: int, timeout: float = 1.0) -> Sent:
-        """The board goes safe when ultrasonic sensor `channel`, 1 to 4, measures less than `cm`, 1 to 400 centimetres;
-        0: off."""
-        return self.send(Command.proximity(channel, cm=cm), timeout)
-
-    def fields(self, names: str, timeout: float = 1.0) -> Sent:
-        """The state fields to ask for: 'DEFAULT,ENC1'."""
-        return self.send(f'F:{names}', timeout)
-
-    def setting(self, key: str, value: str, timeout: float = 1.0) -> Sent:
-        return self.send(f'C:{key},{value}', timeout)
-
-    def clear(self, timeout: float = 1.0) -> Sent:
-        """Takes away the stop, the watchdog or the fault that the board reports; moves nothing."""
-        return self.send(Command.clear(), timeout)
-
-
 class _Channel(Generic[Sent]):
     """A set method returns when the board's state confirms the setpoint, and raises RefusedError otherwise. A post
     method sends the setpoint once, returns at once, and says whether it was sent."""
 
-    def __init__(self, board: BoardCommands[Sent], channel: int) -> None:
+    def __init__(self, board: AnyBoard[Sent], channel: int) -> None:
         self._board = board
         self._channel = channel
 
@@ -113,7 +45,7 @@ class _Channel(Generic[Sent]):
 class DriveChannel(_Channel[Sent]):
     """An H-bridge."""
 
-    def __init__(self, board: BoardCommands[Sent], channel: int, make: Callable[..., Command]) -> None:
+    def __init__(self, board: AnyBoard[Sent], channel: int, make: Callable[..., Command]) -> None:
         super().__init__(board, channel)
         self._make = make
 
@@ -200,7 +132,7 @@ class I2c(Generic[Sent, Read, Scanned]):
     """The devices on the user's I2C bus (docs/devices.md). read(), write() and scan() return when the device has
     answered, and raise RefusedError where none does."""
 
-    def __init__(self, board: BoardCommands[Sent]) -> None:
+    def __init__(self, board: AnyBoard[Sent]) -> None:
         self._core = board._core
         self._call = board._command
 
@@ -235,7 +167,7 @@ class UartChannel(Generic[Sent, Received]):
     """A UART of the user's, 1 or 2 (docs/devices.md): setting('uart1', '115200:8N1') turns it on,
     fields('DEFAULT,UART1') has the board tell what comes in."""
 
-    def __init__(self, board: BoardCommands[Sent], channel: int) -> None:
+    def __init__(self, board: AnyBoard[Sent], channel: int) -> None:
         self._board, self._channel = board, channel
 
     def write(self, data: bytes, timeout: float = 1.0) -> Sent:
