@@ -217,8 +217,10 @@ class State:
     @property
     def dmhsta(self) -> bool:
         """The dead-man's handle is held."""
-    def relay(self, channel: int) -> bool: ...
-    def as_dict(self) -> dict[str, Any]: ...
+    def relay(self, channel: int) -> bool:
+        """True if the relay is closed. `channel`: 1 to 8."""
+    def as_dict(self) -> dict[str, Any]:
+        """The fields that the newest datagram carries, with `pnum` and `t_ms`."""
     def __bool__(self) -> bool: ...
     # One attribute a field of docs/protocol.md, in its unit.
     ain24: float
@@ -312,7 +314,7 @@ class Command:
     @overload
     @staticmethod
     def osmc(channel: int, *, pwm: int, direction: int = ...) -> Command:
-        """`pwm`: 0 to 4095. `direction`: FORWARD, which is the default, or REVERSE."""
+        """Channel 1 to 4. `pwm`: 0 to 4095. `direction`: FORWARD, which is the default, or REVERSE."""
     @overload
     @staticmethod
     def dhb12(channel: int, *, duty: float) -> Command:
@@ -320,7 +322,7 @@ class Command:
     @overload
     @staticmethod
     def dhb12(channel: int, *, pwm: int, direction: int = ...) -> Command:
-        """`pwm`: 0 to 4095. `direction`: FORWARD, which is the default, or REVERSE."""
+        """Channel 1 to 4. `pwm`: 0 to 4095. `direction`: FORWARD, which is the default, or REVERSE."""
     @overload
     @staticmethod
     def bldc(channel: int, *, duty: float, brake: bool = ...) -> Command:
@@ -328,7 +330,7 @@ class Command:
     @overload
     @staticmethod
     def bldc(channel: int, *, pwm: int, direction: int = ..., brake: bool = ...) -> Command:
-        """`pwm`: 0 to 4095. `direction`: FORWARD, which is the default, or REVERSE."""
+        """Channel 1 to 4. `pwm`: 0 to 4095. `direction`: FORWARD, which is the default, or REVERSE."""
     @staticmethod
     def servo(channel: int, *, us: int) -> Command:
         """Channel 1 to 16. `us`: the pulse width, up to 2500 microseconds; 0: no pulses."""
@@ -343,14 +345,16 @@ class Command:
         """Encoder and stepper `channel`, 1 to 4, count from 0 where they are."""
     @staticmethod
     def dac(channel: int, *, millivolts: int) -> Command:
-        """Channel 1 or 2, 0 to 3300 millivolts."""
+        """Channel 1 or 2. `millivolts`: 0 to 3300."""
     @staticmethod
     def proximity(channel: int, *, cm: int) -> Command:
         """Channel 1 to 4. `cm`: 1 to 400 centimetres; 0: off."""
     @staticmethod
-    def stop() -> Command: ...
+    def stop() -> Command:
+        """All outputs off, latched until clear()."""
     @staticmethod
-    def clear() -> Command: ...
+    def clear() -> Command:
+        """Clears the stop, the watchdog or the fault that the board reports."""
     @staticmethod
     def parse(text: str) -> Command:
         """The command of a text. Raises UsageError if there is none, or a value is outside its range.
@@ -380,11 +384,12 @@ class Subscription:
         running."""
 
 class Recording:
-    """A recording of one or several boards (docs/recordings.md). A new file after `rotate_bytes` or `rotate_after`
-    seconds, and at most `keep_bytes` of them; 0: no limit."""
+    """A recording of one or several boards (docs/recordings.md). A new file after `rotate_bytes` bytes or `rotate_after`
+    seconds, and at most `keep_bytes` bytes are kept; 0: no limit."""
     def __init__(self, path: str | os.PathLike[str], *, rotate_bytes: int = ..., rotate_after: int = ...,
                  keep_bytes: int = ...) -> None: ...
-    def close(self) -> None: ...
+    def close(self) -> None:
+        """Writes what waits, and closes the file. Idempotent."""
     def __enter__(self) -> Self: ...
     def __exit__(self, kind: Type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None: ...
@@ -514,7 +519,7 @@ class Discovery:
 def discover(*, serial: bool = True, can: bool = True, udp: bool = True, serial_ports: Sequence[str] = (),
              udp_port: int = 2018) -> Discovery:
     """The boards that this computer reaches, as `r4 list` shows them. Blocks for up to 1.3 s. `serial_ports`: ports to
-    ask whatever their USB id is, by path."""
+    ask whatever their USB id is, by path. `udp_port`: 1 to 65535, where boards listen."""
 
 def shipped_devices() -> list[str]: ...
 def load_device(text: str, first_slot: int, /) -> Device: ...

@@ -210,7 +210,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
         return channels.Uarts(lambda channel: Uart(self, channel))
 
     def states(self, most: int | None = None, *, lossless: bool = False) -> States:
-        """The states from now on, until the board is closed: as those of r4link.Board."""
+        """The states from now on, until the board is closed: as those of r4link.Board. `most`: 1 or more states wait."""
         news = asyncio.Event()
         self._news.add(news)
         return States(self._board.states(most, lossless=lossless), news,

@@ -142,6 +142,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return self.send(f'F:{names}', timeout)
 
     def setting(self, key: str, value: str, timeout: float = 1.0) -> Sent:
+        """Changes a setting of the board (docs/protocol.md): setting('rate', '50')."""
         return self.send(f'C:{key},{value}', timeout)
 
     def clear(self, timeout: float = 1.0) -> Sent:
@@ -157,7 +158,8 @@ class AnyBoard(ABC, Generic[Sent]):
         return sent
 
     def link_timing(self, board_timeout: float, heartbeat: float, timeout: float = 1.0) -> Sent:
-        """The board's timeout and the interval of its heartbeats, in seconds, together."""
+        """Changes two settings together: `board_timeout`, the seconds without a host heartbeat after which the board goes
+        safe, and `heartbeat`, the seconds between its own heartbeats."""
         sent: Sent = self._command(lambda: self._core.link_timing(_ms(board_timeout), _ms(heartbeat), _ms(timeout)))
         return sent
 

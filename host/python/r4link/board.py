@@ -34,7 +34,7 @@ def _close_all() -> None:
 
 class States:
     """The states of a board from now on: `for state in board.states(): …`, until the board is closed. Keeps it open.
-    """
+    `most`: 1 or more states wait."""
 
     def __init__(self, board: Board, most: int | None, timeout: float, lossless: bool) -> None:
         if most is not None and most < 1:
@@ -83,6 +83,12 @@ class Board(AnyBoard[None]):
             board.osmc(1).set(0.1)      # the board's own state has confirmed it
 
     Several URLs are paths to the one board (docs/redundancy.md): r4link.Board(['serial:auto', 'udp://192.168.0.125']).
+
+    `watch_rate_hz`: 1 to 1000 states a second for a program that watches. `heartbeat`: seconds between heartbeats.
+    `timeout`: seconds of silence after which the link is lost. `command_retry`, `stop_retry`: seconds after which a command
+    or a stop is sent again. `stop_linger`: seconds for which a confirmed stop is repeated. `identify_interval`: seconds
+    after which the board is asked again who it is; 0: never. `callback_limit`: seconds for which a callback may run; 0: no
+    limit.
     """
 
     def __init__(self, url: str | Iterable[str], *, role: BoardRole | str = BoardRole.CONTROL, arming: bool = True,

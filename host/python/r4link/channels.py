@@ -43,7 +43,7 @@ class _Channel(Generic[Sent]):
 
 
 class DriveChannel(_Channel[Sent]):
-    """An H-bridge."""
+    """An H-bridge; `channel`: 1 to 4."""
 
     def __init__(self, board: AnyBoard[Sent], channel: int, make: Callable[..., Command]) -> None:
         super().__init__(board, channel)
@@ -130,14 +130,15 @@ class BldcChannel(_Channel[Sent]):
 
 class I2c(Generic[Sent, Read, Scanned]):
     """The devices on the user's I2C bus (docs/devices.md). read(), write() and scan() return when the device has
-    answered, and raise RefusedError where none does."""
+    answered, and raise RefusedError where none does. `address`: 0x08 to 0x77, without the read bit. `register`: 0 to 255,
+    or up to 2 bytes; b'' names none. `count`: up to 32 bytes. `slot`: 1 to 8."""
 
     def __init__(self, board: AnyBoard[Sent]) -> None:
         self._core = board._core
         self._call = board._command
 
     def read(self, address: int, register: int | bytes, count: int, timeout: float = 1.0) -> Read:
-        """Of a register, of one byte or as bytes; b'' names none."""
+        """Reads `count` bytes of a register."""
         read: Read = self._call(lambda: self._core.i2c_read(address, _register(register), count, _ms(timeout)))
         return read
 
@@ -153,18 +154,20 @@ class I2c(Generic[Sent, Read, Scanned]):
 
     def poll(self, slot: int, address: int, register: int | bytes, count: int, period: float,
              timeout: float = 1.0) -> Sent:
-        """The board reads it by itself from now on, into slot 1-8: state.i2c1, after fields('DEFAULT,I2C1')."""
+        """The board reads it by itself from now on, every `period` seconds (0.005 to 60), into that slot: state.i2c1,
+        after fields('DEFAULT,I2C1')."""
         sent: Sent = self._call(
             lambda: self._core.i2c_poll(slot, address, _register(register), count, _ms(period), _ms(timeout)))
         return sent
 
     def poll_off(self, slot: int, timeout: float = 1.0) -> Sent:
+        """The board ends the readings of that slot."""
         sent: Sent = self._call(lambda: self._core.i2c_poll_off(slot, _ms(timeout)))
         return sent
 
 
 class UartChannel(Generic[Sent, Received]):
-    """A UART of the user's, 1 or 2 (docs/devices.md): setting('uart1', '115200:8N1') turns it on,
+    """A UART of the user's; `channel`: 1 or 2 (docs/devices.md): setting('uart1', '115200:8N1') turns it on,
     fields('DEFAULT,UART1') has the board tell what comes in."""
 
     def __init__(self, board: AnyBoard[Sent], channel: int) -> None:

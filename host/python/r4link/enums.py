@@ -105,10 +105,10 @@ class DisarmCause(Word):
     RESTART = 'restart', 'the board restarted'
     SUPPLY = 'supply', 'relay 1, the motor supply, was opened'
     SLEEP = 'sleep', 'this computer slept for longer than the board waits for its host'
-    EARLIER_STOP = 'earlier stop', 'a stop that may have come before the program began: clear() clears it, arm() does not'
+    EARLIER_STOP = 'earlier stop', 'a stop that may have come before the program began: only clear() clears it'
     EARLIER_WATCHDOG = ('earlier watchdog',
                         'a watchdog that may have come before the program began: clear() clears it, arm() does not')
-    EARLIER_FAULT = 'earlier fault', 'a fault that may have come before the program began: clear() clears it, arm() does not'
+    EARLIER_FAULT = 'earlier fault', 'a fault that may have come before the program began: only clear() clears it'
 
 
 class Outcome(Word):
@@ -117,7 +117,7 @@ class Outcome(Word):
     CONFIRMED = 'confirmed', "the board's own state confirms the command"
     REFUSED = 'refused', 'the board refused the command and did not execute it: the Refusal says why'
     TIMED_OUT = 'timed out', 'no confirmation came in time: the command may or may not have been executed'
-    CANCELLED = 'cancelled', 'given up by the program, or because a stop, a newer cause to be safe or a restart came first'
+    CANCELLED = 'cancelled', 'given up by the program, or because a stop, a newer cause to be safe or a restart came'
     CLOSED = 'closed', 'given up: the board was closed'
     BLOCKED = 'blocked', "the link's thread does not answer: the command was not sent, or not confirmed"
     FULL = 'full', 'not accepted: 64 commands are under way already'

@@ -105,7 +105,8 @@ _OF_OUTCOME = {Outcome.TIMED_OUT: NotConfirmedError, Outcome.CANCELLED: Cancelle
 
 def error_of(kind: str, thing: str, reason: str, fix: str, outcome: Outcome, refusal: Refusal, at: int,
              holder: tuple[int, str] | None = None) -> Error:
-    """The error of a problem of C++ (include/r4link/error.hpp). `kind`: the name of the class, if the outcome has none."""
+    """The error of a problem of C++ (include/r4link/error.hpp). `kind`: the name of the class, if the outcome has none.
+    `at`: from 1; 0: no command in particular."""
     made = _OF_OUTCOME.get(outcome, _OF_KIND.get(kind, Error))
     return made(thing, reason, fix, outcome=outcome, refusal=refusal, at=at,
                 holder=None if holder is None else Program(*holder))

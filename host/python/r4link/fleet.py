@@ -66,7 +66,7 @@ class FleetResults(Sequence[FleetResult]):
         return [each.board for each in self._results if not each.confirmed]
 
     def error(self, index: int) -> Error | None:
-        """Why the board at that place did not confirm it."""
+        """Why a board did not confirm it. `index`: from 0, in the order of the results."""
         each = self._results[index]
         return None if each.confirmed else error_of(*each.problem)
 
@@ -89,8 +89,9 @@ class Fleet:
                  identify_interval: float = 1.0) -> None:
         """Opens all transports and begins the links; returns without waiting for the boards.
 
-        Each of `urls` is a URL or a pattern of many: 'can://can0?node=0-7'. The options are those of Board. Raises
-        UsageError, OpenError or DeniedError where one of them cannot be opened.
+        Each of `urls` is a URL or a pattern of many: 'can://can0?node=0-7'. Raises UsageError, OpenError or DeniedError
+        where one of them cannot be opened. The options are those of Board: `watch_rate_hz` is 1 to 1000 states a second;
+        `heartbeat`, `command_retry`, `stop_retry`, `stop_linger` and `identify_interval` are seconds.
         """
         for url in urls:
             if not isinstance(url, str):
@@ -125,10 +126,11 @@ class Fleet:
         return f'<r4link.Fleet of {len(self)} boards>'
 
     def index(self, board: int | str) -> int:
-        """Of a URL, a name or a board id; an index is what it is."""
+        """The index of a board, from 0. `board`: its URL, name or board id; an index is returned as it is."""
         return self._core.find(board) if isinstance(board, str) else board
 
     def url(self, board: int) -> str:
+        """The URL of a board. `board`: its index, from 0."""
         return self._core.url(board)
 
     def wait_active(self, timeout: float = 3.0) -> None:
@@ -141,6 +143,7 @@ class Fleet:
             raise RefusedError(health.url, state + others, 'see health(), and that they are on and reached')
 
     def health(self) -> list[BoardHealth]:
+        """How each board is, in the order of the URLs."""
         return self._core.health()
 
     def states(self) -> list[State]:
@@ -153,9 +156,11 @@ class Fleet:
         return FleetResults(self._core.send(command, self._indices(boards), _ms(timeout)))
 
     def arm(self, timeout: float = 1.0, *, boards: Iterable[int | str] | None = None) -> FleetResults:
+        """Arms all boards, or those, as Board.arm() does."""
         return FleetResults(self._core.arm(self._indices(boards), _ms(timeout)))
 
     def clear(self, timeout: float = 1.0) -> FleetResults:
+        """Clears the stop, the watchdog or the fault that a board reports, on all boards; moves nothing."""
         return self.send(Command.clear(), timeout)
 
     def stop(self, timeout: float = 1.0) -> FleetResults:
@@ -190,10 +195,11 @@ class Fleet:
         self._core.record(recording)
 
     def watchdog(self, period: float) -> None:
-        """Without feed() for so long the heartbeats stop, and all boards go safe; 0 turns it off."""
+        """Without feed() for `period` seconds the heartbeats stop, and all boards go safe; 0 turns it off."""
         self._core.watchdog(_ms(period))
 
     def feed(self) -> None:
+        """The program is well, for another period of watchdog()."""
         self._core.feed()
 
     def _indices(self, boards: Iterable[int | str] | None) -> list[int] | None:

@@ -39,11 +39,14 @@ class Robot(Protocol):
     """A simulated board with its motors, sensors and chips."""
 
     @property
-    def url(self) -> str: ...
+    def url(self) -> str:
+        """What a host opens."""
 
-    def happen(self, words: str) -> None: ...
+    def happen(self, words: str) -> None:
+        """A line of a scenario (docs/simulation.md), without its time."""
 
-    def look(self) -> Look: ...
+    def look(self) -> Look:
+        """What its pins and sensors do."""
 
 
 class SimProcess:
@@ -79,6 +82,7 @@ class SimProcess:
 
     @property
     def url(self) -> str:
+        """What a host opens."""
         return self._url
 
     def happen(self, words: str) -> None:
@@ -151,7 +155,7 @@ class SimProcess:
 def make_robot(transport: str, folder: pathlib.Path, *, interface: str = 'vcan0', node: int = 1,
                link: str = '') -> Robot:
     """A simulated robot: 'sim' in this process, else as a process on UDP, a pty in `folder` or a CAN bus, behind
-    such a `link` as r4 sim --link says."""
+    such a `link` as r4 sim --link says. `node`: 0 to 31, its number on the bus."""
     if link and transport == 'sim':
         raise UsageError(f'link {link!r}', "transport 'sim' has no link", "use 'udp', 'pty' or 'can'")
     if transport == 'sim':
