@@ -9,7 +9,7 @@ import pytest
 
 import r4link
 from r4link import _core, control, enums
-from r4link.testing import make_state
+from r4link.testing import TestBoard, make_state
 
 ENUMS = [each for each in vars(enums).values()
          if inspect.isclass(each) and issubclass(each, enums.Word) and each is not enums.Word]
@@ -48,11 +48,13 @@ def test_a_copy_of_a_member_is_the_member(member):
     assert all(each is member for each in [*copies, copy.copy(member), copy.deepcopy(member)])
 
 
-def test_a_text_that_is_no_member_is_refused():
+def test_a_text_that_is_not_a_member_is_refused(sim):
     with pytest.raises(r4link.UsageError, match="'pilot': it is not a valid BoardRole; give 'control' or 'watch'"):
         r4link.Board('sim:', role='pilot')
     with pytest.raises(ValueError, match='it is not a valid SafeReason'):
         make_state(1, safe='reason')
+    with TestBoard(sim.url) as board, pytest.raises(r4link.UsageError, match='it is not a valid SafeReason'):
+        board.expect_safe('handel')
 
 
 def test_a_match_takes_members_and_texts():

@@ -241,8 +241,8 @@ def _options(fields: str, late: float, first: float, standstill: Sequence[Stands
 
 
 class LoopGuard:
-    """When a loop has to end, for one of your own, with asyncio say. `late`, `first`: seconds, as of run_loop(). `now`: seconds of
-    time.monotonic()."""
+    """When a loop has to end, for one of your own, with asyncio say. `late`, `first`: seconds, as of run_loop(). `now`:
+    seconds of time.monotonic()."""
 
     def __init__(self, *, fields: str = '', late: float = 0.1, first: float = 1.0,
                  standstill: Sequence[Standstill] = ()) -> None:

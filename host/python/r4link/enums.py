@@ -106,8 +106,7 @@ class DisarmCause(Word):
     SUPPLY = 'supply', 'relay 1, the motor supply, was opened'
     SLEEP = 'sleep', 'this computer slept for longer than the board waits for its host'
     EARLIER_STOP = 'earlier stop', 'a stop that may have come before the program began: only clear() clears it'
-    EARLIER_WATCHDOG = ('earlier watchdog',
-                        'a watchdog that may have come before the program began: clear() clears it, arm() does not')
+    EARLIER_WATCHDOG = 'earlier watchdog', 'a watchdog that may have come before the program began: only clear() clears it'
     EARLIER_FAULT = 'earlier fault', 'a fault that may have come before the program began: only clear() clears it'
 
 
