@@ -52,7 +52,9 @@ std::string ms_text(std::chrono::milliseconds time) { return std::to_string(time
 
 const char* to_text(LoopEnd end) {
   constexpr std::array texts = {"none", "asked", "late", "not active", "disarmed", "standstill"};
-  return texts[static_cast<std::size_t>(end)];
+  static_assert(texts.size() == static_cast<std::size_t>(LoopEnd::standstill) + 1);
+  const auto at = static_cast<std::size_t>(end);
+  return at < texts.size() ? texts[at] : "unknown";
 }
 
 LoopGuard::LoopGuard(LoopOptions options)

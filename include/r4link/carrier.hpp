@@ -112,7 +112,7 @@ struct CarrierEvent {
   Problem problem;  // for up: thing is the transport, the rest is empty
 };
 
-// "up", "down", "warning".
+// "up", "down", "warning"; "unknown" for other numbers.
 constexpr const char* to_text(CarrierEvent::Kind kind) {
   switch (kind) {
     case CarrierEvent::Kind::up:
@@ -120,9 +120,9 @@ constexpr const char* to_text(CarrierEvent::Kind kind) {
     case CarrierEvent::Kind::down:
       return "down";
     case CarrierEvent::Kind::warning:
-      break;
+      return "warning";
   }
-  return "warning";
+  return "unknown";
 }
 
 // The loop of a board's thread, on which its carrier lives.

@@ -102,6 +102,24 @@ struct FleetEvent {
   RefusedPost refused{};
   std::uint64_t count = 0;
 };
+// "link", "transport", "arming", "restart", "refused", "missed"; "unknown" for other numbers.
+constexpr const char* to_text(FleetEvent::Kind kind) {
+  switch (kind) {
+    case FleetEvent::Kind::link:
+      return "link";
+    case FleetEvent::Kind::transport:
+      return "transport";
+    case FleetEvent::Kind::arming:
+      return "arming";
+    case FleetEvent::Kind::restart:
+      return "restart";
+    case FleetEvent::Kind::refused:
+      return "refused";
+    case FleetEvent::Kind::missed:
+      return "missed";
+  }
+  return "unknown";
+}
 
 // Output commands for one board, executed together there.
 struct BoardSetpoints {

@@ -19,6 +19,16 @@ enum class BoardRole : std::uint8_t {
   control,  // sends heartbeats, and commands the board as soon as no other host does
   watch,  // gets what the board says, and takes no control: it may stop the board, and nothing else
 };
+// "control", "watch"; "unknown" for other numbers.
+constexpr const char* to_text(BoardRole role) {
+  switch (role) {
+    case BoardRole::control:
+      return "control";
+    case BoardRole::watch:
+      return "watch";
+  }
+  return "unknown";
+}
 
 struct SessionOptions {
   // States a second for a program that watches, 1-1000; the board sends no more than its own `rate`. What else is

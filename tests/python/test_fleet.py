@@ -66,7 +66,7 @@ def test_has_one_recording(fleet, tmp_path):
 
 
 def test_wrong_options_are_refused_as_a_boards_are(monkeypatch, tmp_path):
-    with pytest.raises(r4link.UsageError, match='there is no such role'):
+    with pytest.raises(r4link.UsageError, match="'drive': it is not a valid BoardRole"):
         r4link.Fleet('sim:', role='drive')
     with pytest.raises(r4link.UsageError, match='for a Board alone'):
         r4link.Fleet(r4link.with_link('sim:', 'loss=5%'))

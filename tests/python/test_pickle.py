@@ -125,5 +125,5 @@ def test_a_value_of_another_version_is_refused():
 
 
 def test_an_error_of_the_library_keeps_its_outcome():
-    error = error_of(3, 'O:1,1,1', 'timed out', '', 'timed out', 'NONE', 0)
-    assert all(type(each) is r4link.NotConfirmedError and each.outcome == 'timed out' for each in copies(error))
+    error = error_of('RefusedError', 'O:1,1,1', 'timed out', '', r4link.Outcome.TIMED_OUT, r4link.Refusal.NONE, 0)
+    assert all(type(each) is r4link.NotConfirmedError and each.outcome is r4link.Outcome.TIMED_OUT for each in copies(error))

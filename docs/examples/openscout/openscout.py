@@ -75,7 +75,7 @@ def run(options: argparse.Namespace, course: Course | None, ends: contextlib.Exi
     start = control.Pose(0, 0, course.heading) if course and not options.course else None
     report = drive(board, hand, course, start)
     print(report.why, flush=True)
-    return 0 if report.end == 'asked' else 3
+    return 0 if report.end is control.LoopEnd.ASKED else 3
 
 
 def main() -> int:

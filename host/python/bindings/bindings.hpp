@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The module r4link._core: r4::Board for Python, times in milliseconds, enumerations as their names. What a
-// program uses is in r4link/*.py, on top of it.
+// The module r4link._core: r4::Board for Python, times in milliseconds. What a program uses is in r4link/*.py, on top
+// of it.
 //
 // The thread of the link never takes the GIL; that of the callbacks does, for each of them.
 #pragma once
@@ -12,12 +12,14 @@
 #include <optional>
 #include <string>
 
+#include "enums.hpp"
 #include "r4link/board.hpp"
 
 namespace r4::python {
 
 namespace py = pybind11;
 
+void bind_enums(py::module_& module);
 void bind_errors(py::module_& module);
 void bind_values(py::module_& module);
 void bind_state(py::module_& module);
@@ -32,12 +34,14 @@ void bind_servo(py::module_& module);
 void bind_simulation(py::module_& module);
 
 // Of a board and of a fleet.
-BoardOptions options_of(bool watch, bool arming, const std::string& fields,
+BoardOptions options_of(BoardRole role, bool arming, const std::string& fields,
                         const std::optional<std::string>& key, int watch_rate_hz, int heartbeat_ms,
                         int timeout_ms, int command_retry_ms, int stop_retry_ms, int stop_linger_ms,
                         int identify_interval_ms, int callback_limit_ms);
 
-inline py::str to_str(Text text) { return {text.data(), text.size()}; }
+// For error_of() of r4link/errors.py.
+py::tuple arguments_of(const Problem& problem);
+
 py::object to_python(Drive drive);
 py::object to_python(const Bldc& bldc);
 py::object to_python(const I2cReading& reading);

@@ -130,7 +130,7 @@ py::tuple run_loop(PyBoard& board, const control::LoopOptions& options, const py
                                  return wanted.cast<Setpoints>();
                                });
   }
-  return py::make_tuple(to_text(report.end), report.why, report.at_rest, report.steps);
+  return py::make_tuple(report.end, report.why, report.at_rest, report.steps);
 }
 
 py::object uart_data(const Board::UartData& data) {
@@ -153,12 +153,12 @@ py::bytes bytes_of(Call call) {
 
 }  // namespace
 
-BoardOptions options_of(bool watch, bool arming, const std::string& fields,
+BoardOptions options_of(BoardRole role, bool arming, const std::string& fields,
                         const std::optional<std::string>& key, int watch_rate_hz, int heartbeat_ms,
                         int timeout_ms, int command_retry_ms, int stop_retry_ms, int stop_linger_ms,
                         int identify_interval_ms, int callback_limit_ms) {
   BoardOptions options;
-  options.role = watch ? BoardRole::watch : BoardRole::control;
+  options.role = role;
   options.callback_limit = Ms(callback_limit_ms);
   SessionOptions& session = options.session;
   session.arming = arming ? Arming::required : Arming::off;
@@ -181,23 +181,23 @@ void bind_board(py::module_& module) {
       .def_property_readonly("missed", [](const PyStates& states) { return states->missed(); });
 
   py::class_<PyBoard>(module, "Board", py::custom_type_setup(collect_garbage))
-      .def(py::init([](const std::string& url, const std::string& link, bool watch, bool arming,
+      .def(py::init([](const std::string& url, const std::string& link, BoardRole role, bool arming,
                        const std::string& fields, const std::optional<std::string>& key,
                        int watch_rate_hz, int heartbeat, int timeout, int command_retry,
                        int stop_retry, int stop_linger, int identify_interval, int callback_limit) {
              return std::make_unique<PyBoard>(
                  url, link,
-                 options_of(watch, arming, fields, key, watch_rate_hz, heartbeat, timeout,
+                 options_of(role, arming, fields, key, watch_rate_hz, heartbeat, timeout,
                             command_retry, stop_retry, stop_linger, identify_interval,
                             callback_limit));
            }),
-           py::arg("url"), py::kw_only(), py::arg("link"), py::arg("watch"), py::arg("arming"),
+           py::arg("url"), py::kw_only(), py::arg("link"), py::arg("role"), py::arg("arming"),
            py::arg("fields"), py::arg("key"), py::arg("watch_rate_hz"), py::arg("heartbeat"),
            py::arg("timeout"), py::arg("command_retry"), py::arg("stop_retry"),
            py::arg("stop_linger"), py::arg("identify_interval"), py::arg("callback_limit"))
       .def("close", &PyBoard::close, Released())
       .def("interrupt", &PyBoard::interrupt)
-      .def("watches", [](PyBoard& board) { return board->role() == BoardRole::watch; })
+      .def("role", [](PyBoard& board) { return board->role(); })
       .def(
           "take_control", [](PyBoard& board) { board->take_control(); }, Released())
       .def(
@@ -216,7 +216,7 @@ void bind_board(py::module_& module) {
           },
           Released())
       .def("post", [](PyBoard& board,
-                      const OwnCommand& command) { return to_text(board->post(command.get())); })
+                      const OwnCommand& command) { return board->post(command.get()).value(); })
       .def("calibrate_servo",
            [](PyBoard& board, int channel, const ServoCalibration& calibration) {
              board->servo(channel).calibrate(calibration);
@@ -282,10 +282,10 @@ void bind_board(py::module_& module) {
           },
           Released())
       .def("post", [](PyBoard& board,
-                      const Setpoints& setpoints) { return to_text(board->post(setpoints)); })
+                      const Setpoints& setpoints) { return board->post(setpoints).value(); })
       .def(
           "arm", [](PyBoard& board, int ms) { board->arm(Ms(ms)); }, Released())
-      .def("disarmed_by", [](PyBoard& board) { return to_text(board->disarmed_by()); })
+      .def("disarmed_by", [](PyBoard& board) { return board->disarmed_by(); })
       .def(
           "stop", [](PyBoard& board, int ms) { board->stop(Ms(ms)); }, Released())
       .def("stop_async", [](PyBoard& board) { board->stop_async(); })
@@ -359,9 +359,8 @@ void bind_board(py::module_& module) {
            })
       .def("on_arming",
            [](PyBoard& board, py::object function) {
-             return board.subscribe(std::move(function), [&](const Callback& each) {
-               return board->on_arming([each](DisarmCause cause) { each(to_text(cause)); });
-             });
+             return board.subscribe(std::move(function),
+                                    [&](const Callback& each) { return board->on_arming(each); });
            })
       .def("on_refused", [](PyBoard& board, py::object function) {
         return board.subscribe(std::move(function),

@@ -37,23 +37,6 @@ Clock::time_point at(double seconds) {
       std::chrono::round<Clock::duration>(std::chrono::duration<double>(seconds)));
 }
 
-DisarmCause disarm_cause(const std::string& text) {
-  for (int i = 0; i <= static_cast<int>(DisarmCause::earlier_fault); ++i) {
-    if (text == to_text(static_cast<DisarmCause>(i))) return static_cast<DisarmCause>(i);
-  }
-  throw Error(ErrorKind::usage, "disarmed_by '" + text + "'", "there is no such cause",
-              "give Board.disarmed_by");
-}
-
-HostLinkState link_state(const std::string& text) {
-  for (const HostLinkState each : {HostLinkState::connecting, HostLinkState::active,
-                                   HostLinkState::safe, HostLinkState::lost}) {
-    if (text == to_text(each)) return each;
-  }
-  throw Error(ErrorKind::usage, "link '" + text + "'", "there is no such state",
-              "give Board.link.state");
-}
-
 CommandKind drive_kind(const std::string& name) {
   if (name == "osmc") return CommandKind::osmc;
   if (name == "dhb12") return CommandKind::dhb12;
@@ -193,21 +176,17 @@ void bind_control(py::module_& module) {
   py::class_<LoopGuard>(module, "LoopGuard")
       .def(py::init<LoopOptions>())
       .def("start", [](LoopGuard& self, double now) { self.start(at(now)); })
-      .def("on_state",
-           [](LoopGuard& self, const ReceivedState& state, const std::string& disarmed_by,
-              double now) { return self.on_state(state, disarm_cause(disarmed_by), at(now)); })
+      .def("on_state", [](LoopGuard& self, const ReceivedState& state, DisarmCause disarmed_by,
+                          double now) { return self.on_state(state, disarmed_by, at(now)); })
       .def("on_commanded", &LoopGuard::on_commanded)
-      .def(
-          "check",
-          [](LoopGuard& self, const std::string& link, const std::string& disarmed_by, double now) {
-            return to_text(self.check(link_state(link), disarm_cause(disarmed_by), at(now)));
-          })
+      .def("check", [](LoopGuard& self, HostLinkState link, DisarmCause disarmed_by,
+                       double now) { return self.check(link, disarmed_by, at(now)); })
       .def_property_readonly(
           "deadline",
           [](const LoopGuard& self) {
             return std::chrono::duration<double>(self.deadline().time_since_epoch()).count();
           })
-      .def_property_readonly("ended", [](const LoopGuard& self) { return to_text(self.ended()); })
+      .def_property_readonly("ended", &LoopGuard::ended)
       .def_property_readonly("why", &LoopGuard::why);
   module.def("wrapped", &control::wrapped);
 }

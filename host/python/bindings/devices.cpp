@@ -36,8 +36,7 @@ void bind_devices(py::module_& module) {
       .def("__str__", &Device::text)
       .def_property_readonly("name", [](const Device& self) { return self.description().name; })
       .def_property_readonly("title", [](const Device& self) { return self.description().title; })
-      .def_property_readonly("role",
-                             [](const Device& self) { return to_text(self.description().role); })
+      .def_property_readonly("role", [](const Device& self) { return self.description().role; })
       .def_property_readonly("address", &Device::address)
       .def_property_readonly("fields", &Device::fields)
       .def_property_readonly("units",

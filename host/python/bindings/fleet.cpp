@@ -56,7 +56,7 @@ py::object subject_of(const FleetEvent& event) {
     case FleetEvent::Kind::transport:
       return py::cast(event.transport);
     case FleetEvent::Kind::arming:
-      return py::str(to_text(event.disarmed_by));
+      return py::cast(event.disarmed_by);
     case FleetEvent::Kind::refused:
       return py::cast(event.refused);
     case FleetEvent::Kind::missed:
@@ -65,24 +65,6 @@ py::object subject_of(const FleetEvent& event) {
       break;
   }
   return py::none();
-}
-
-const char* kind_of(FleetEvent::Kind kind) {
-  switch (kind) {
-    case FleetEvent::Kind::link:
-      return "link";
-    case FleetEvent::Kind::transport:
-      return "transport";
-    case FleetEvent::Kind::arming:
-      return "arming";
-    case FleetEvent::Kind::restart:
-      return "restart";
-    case FleetEvent::Kind::refused:
-      return "refused";
-    case FleetEvent::Kind::missed:
-      break;
-  }
-  return "missed";
 }
 
 }  // namespace
@@ -95,8 +77,7 @@ void bind_fleet(py::module_& module) {
       .def_readonly("identity", &BoardHealth::identity)
       .def_readonly("link", &BoardHealth::link)
       .def_readonly("in_control", &BoardHealth::in_control)
-      .def_property_readonly("disarmed_by",
-                             [](const BoardHealth& health) { return to_text(health.disarmed_by); })
+      .def_readonly("disarmed_by", &BoardHealth::disarmed_by)
       .def_readonly("statistics", &BoardHealth::statistics)
       .def_readonly("paths", &BoardHealth::paths)
       .def_property_readonly("well", &BoardHealth::well);
@@ -105,36 +86,31 @@ void bind_fleet(py::module_& module) {
   py::class_<FleetResult>(module, "FleetResult")
       .def(pickled<FleetResult>("FleetResult"))
       .def_readonly("board", &FleetResult::board)
-      .def_property_readonly(
-          "outcome", [](const FleetResult& result) { return to_text(result.result.outcome); })
+      .def_property_readonly("outcome",
+                             [](const FleetResult& result) { return result.result.outcome; })
       .def_property_readonly("elapsed",
                              [](const FleetResult& result) {
                                return std::chrono::duration<double>(result.result.elapsed).count();
                              })
       .def_property_readonly("confirmed", &FleetResult::confirmed)
-      .def_property_readonly("problem", [](const FleetResult& result) {
-        const Problem& problem = result.problem;
-        return std::make_tuple(static_cast<int>(problem.kind), printable(problem.thing),
-                               printable(problem.reason), printable(problem.fix),
-                               std::string(to_text(problem.outcome)),
-                               to_str(name_of(problem.refusal)), static_cast<int>(problem.at));
-      });
+      .def_property_readonly(
+          "problem", [](const FleetResult& result) { return arguments_of(result.problem); });
 
   using Results = std::vector<FleetResult>;
   const auto list = [](const FleetResults& results) {
     return Results(results.begin(), results.end());
   };
   py::class_<PyFleet>(module, "Fleet")
-      .def(py::init([](const std::vector<std::string>& urls, bool watch, bool arming,
+      .def(py::init([](const std::vector<std::string>& urls, BoardRole role, bool arming,
                        const std::string& fields, const std::optional<std::string>& key,
                        int watch_rate_hz, int heartbeat, int timeout, int command_retry,
                        int stop_retry, int stop_linger, int identify_interval) {
              constexpr int no_callbacks = 0;
-             return opened(urls, options_of(watch, arming, fields, key, watch_rate_hz, heartbeat,
+             return opened(urls, options_of(role, arming, fields, key, watch_rate_hz, heartbeat,
                                             timeout, command_retry, stop_retry, stop_linger,
                                             identify_interval, no_callbacks));
            }),
-           py::arg("urls"), py::kw_only(), py::arg("watch"), py::arg("arming"), py::arg("fields"),
+           py::arg("urls"), py::kw_only(), py::arg("role"), py::arg("arming"), py::arg("fields"),
            py::arg("key"), py::arg("watch_rate_hz"), py::arg("heartbeat"), py::arg("timeout"),
            py::arg("command_retry"), py::arg("stop_retry"), py::arg("stop_linger"),
            py::arg("identify_interval"))
@@ -182,9 +158,9 @@ void bind_fleet(py::module_& module) {
       .def(
           "post",
           [](PyFleet& fleet, const std::vector<std::pair<std::size_t, Setpoints>>& setpoints) {
-            std::vector<std::string> results;
+            std::vector<PostResult::Value> results;
             for (const PostResult each : fleet->post(setpoints_of(setpoints))) {
-              results.emplace_back(to_text(each));
+              results.push_back(each.value());
             }
             return results;
           },
@@ -197,7 +173,7 @@ void bind_fleet(py::module_& module) {
                event = fleet->next_event(Ms(ms));
              }
              if (!event) return py::none();
-             return py::make_tuple(kind_of(event->kind), event->board, subject_of(*event));
+             return py::make_tuple(event->kind, event->board, subject_of(*event));
            })
       .def(
           "record", [](PyFleet& fleet, PyRecording& recording) { fleet->record(*recording); },

@@ -4,6 +4,7 @@
 PYBIND11_MODULE(_core, module) {
   module.doc() = "r4::Board for Python; see r4link";
   module.attr("__version__") = R4LINK_VERSION;
+  r4::python::bind_enums(module);
   r4::python::bind_errors(module);
   r4::python::bind_values(module);
   r4::python::bind_state(module);

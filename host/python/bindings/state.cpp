@@ -127,7 +127,7 @@ py::object value_of(const State& state, F field) {
       return to_python(Bldc{static_cast<std::uint16_t>(numbers[0]),
                             static_cast<Direction>(numbers[1]), numbers[2] != 0});
     case Form::safe:
-      return py::str(to_text(state.safe));
+      return py::cast(state.safe);
     case Form::fault:
       if (!state.fault.any()) return py::none();
       return py::str("{}: {}").format(chip_name(state.fault.address), to_text(state.fault.trouble));
@@ -208,11 +208,7 @@ Numbers numbers_from(F field, const py::handle& value) {
       return numbers;
     }
     case Form::safe:
-      for (int i = 0; i < safe_reason_count; ++i) {
-        if (value.cast<std::string>() == to_text(static_cast<SafeReason>(i))) return {i};
-      }
-      throw Error(ErrorKind::usage, "safe", "there is no such reason",
-                  "give one of docs/safety.md");
+      return {static_cast<int>(value.cast<SafeReason>())};
     case Form::flag:
     case Form::number:
     case Form::fault:

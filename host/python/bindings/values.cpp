@@ -140,11 +140,11 @@ py::object to_python(const I2cReading& reading) {
 }
 py::object to_python(const I2cAnswer& answer) {
   static const py::handle type = named("I2cAnswer");
-  return type(answer.pnum, to_text(answer.outcome), bytes_of(answer.data));
+  return type(answer.pnum, answer.outcome, bytes_of(answer.data));
 }
 py::object to_python(const I2cBusReport& report) {
   static const py::handle type = named("I2cBusReport");
-  return type(to_text(report.newest), report.errors, report.recoveries);
+  return type(report.newest, report.errors, report.recoveries);
 }
 
 py::object to_python(const UartBytes& received) {
@@ -155,19 +155,15 @@ py::object to_python(const UartBytes& received) {
 void bind_values(py::module_& module) {
   bind_commands(module);
   Record<LinkStatus>(module, "LinkStatus")
-      .has("state", [](const LinkStatus& link) { return to_text(link.state); })
-      .has("reason", [](const LinkStatus& link) { return to_text(link.reason); })
+      .has("state", &LinkStatus::state)
+      .has("reason", &LinkStatus::reason)
       .has("causes",
            [](const LinkStatus& link) {
              py::list causes;
-             for (const LinkCause cause : link.causes) causes.append(to_text(cause));
+             for (const LinkCause cause : link.causes) causes.append(cause);
              return py::tuple(causes);
            })
-      .has("cause",
-           [](const LinkStatus& link) {
-             const std::optional<LinkCause> cause = link.cause();
-             return cause ? py::object(py::str(to_text(*cause))) : py::none();
-           })
+      .has("cause", [](const LinkStatus& link) { return link.cause(); })
       .has("busy", [](const LinkStatus& link) { return link.causes.has(LinkCause::busy); })
       .has("gated", [](const LinkStatus& link) { return link.gated(); })
       .has("in_control", &LinkStatus::in_control)
@@ -185,7 +181,7 @@ void bind_values(py::module_& module) {
       });
   Record<PathStatus>(module, "PathStatus")
       .has("name", &PathStatus::name)
-      .has("state", [](const PathStatus& path) { return to_text(path.state); })
+      .has("state", &PathStatus::state)
       .has("busy", &PathStatus::busy)
       .has("board_id", &PathStatus::board_id)
       .has("received", [](const PathStatus& path) { return path.packets.received; })
@@ -240,13 +236,13 @@ void bind_values(py::module_& module) {
       .has("downs", &CarrierCounters::downs)
       .has("ups", &CarrierCounters::ups);
   Record<CarrierEvent>(module, "Event")
-      .has("kind", [](const CarrierEvent& event) { return to_text(event.kind); })
+      .has("kind", &CarrierEvent::kind)
       .has("thing", [](const CarrierEvent& event) { return printable(event.problem.thing); })
       .has("reason", [](const CarrierEvent& event) { return printable(event.problem.reason); })
       .has("fix", [](const CarrierEvent& event) { return printable(event.problem.fix); });
   Record<RefusedPost>(module, "RefusedPost")
-      .has("refusal", [](const RefusedPost& post) { return to_str(name_of(post.code)); })
-      .has("why", [](const RefusedPost& post) { return to_text(post.why); })
+      .has("refusal", &RefusedPost::code)
+      .has("why", [](const RefusedPost& post) { return post.why.value(); })
       .has("at", [](const RefusedPost& post) { return static_cast<int>(post.at); })
       .has("group", [](const RefusedPost& post) { return static_cast<int>(post.group); });
 }

@@ -14,26 +14,28 @@ from .board import Board, States
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
 from .channels import BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, StepperChannel, Uart
 from .devices import Device, DeviceReading
+from .enums import (BoardRole, DeviceRole, Direction, DisarmCause, EventKind, FleetEventKind, I2cOutcome, LinkCause,
+                    LinkState, Outcome, PathState, PostResult, Refusal, SafeReason)
 from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error, NotArmedError, NotConfirmedError,
                      OpenError, Program, RefusedError, UnsupportedError, UsageError)
 from .fleet import Fleet, FleetEvent, FleetResults
 from .recording import Log, RecordedBoard, RecordedDatagram, RecordedEvent, read
 from .simulation import LinkedUrl, Look, SimBoard, with_link
-from .values import Bldc, Direction, Drive, I2cAnswer, I2cBusReport, I2cReading, PostResult, UartBytes, UartData
+from .values import Bldc, Drive, I2cAnswer, I2cBusReport, I2cReading, UartBytes, UartData
 
 FORWARD = Direction.FORWARD
 REVERSE = Direction.REVERSE
 
 __all__ = [
-    'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'Bridge', 'BridgeCounters', 'BridgeEnd', 'BridgeStatus',
-    'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'DataError', 'DeniedError', 'Device', 'DeviceReading', 'Direction',
-    'Discovery', 'Drive',
-    'DriveChannel', 'Error', 'Event', 'FIELDS', 'FORWARD', 'Fleet', 'FleetEvent', 'FleetResults', 'FoundBoard', 'I2c', 'I2cAnswer',
-    'I2cBusReport', 'I2cReading', 'Identity', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError',
-    'NotConfirmedError', 'OpenError', 'PostResult', 'Program', 'REVERSE', 'RecordedBoard', 'RecordedDatagram',
-    'RecordedEvent', 'Recording', 'RefusedError', 'RefusedPost', 'RelayChannel', 'SearchedBus', 'SearchedNetwork',
-    'SearchedPort', 'ServoCalibration', 'ServoChannel', 'Setpoints', 'SimBoard', 'State',
-    'States', 'Statistics', 'StepperChannel', 'Subscription', 'Uart', 'UartBytes', 'UartData', 'UnsupportedError',
-    'UsageError', 'PathStatus', 'aio', 'control', 'devices',
-    'discover', 'read', 'with_link', '__version__',
+    'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'BoardRole', 'Bridge', 'BridgeCounters', 'BridgeEnd',
+    'BridgeStatus', 'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'DataError', 'DeniedError',
+    'Device', 'DeviceReading', 'DeviceRole', 'Direction', 'DisarmCause', 'Discovery', 'Drive', 'DriveChannel',
+    'Error', 'Event', 'EventKind', 'FIELDS', 'FORWARD', 'Fleet', 'FleetEvent', 'FleetEventKind', 'FleetResults',
+    'FoundBoard', 'I2c', 'I2cAnswer', 'I2cBusReport', 'I2cOutcome', 'I2cReading', 'Identity', 'LinkCause',
+    'LinkState', 'LinkStatus', 'LinkedUrl', 'Log', 'Look', 'NotArmedError', 'NotConfirmedError', 'OpenError',
+    'Outcome', 'PathState', 'PathStatus', 'PostResult', 'Program', 'REVERSE', 'RecordedBoard', 'RecordedDatagram',
+    'RecordedEvent', 'Recording', 'Refusal', 'RefusedError', 'RefusedPost', 'RelayChannel', 'SafeReason',
+    'SearchedBus', 'SearchedNetwork', 'SearchedPort', 'ServoCalibration', 'ServoChannel', 'Setpoints', 'SimBoard',
+    'State', 'States', 'Statistics', 'StepperChannel', 'Subscription', 'Uart', 'UartBytes', 'UartData',
+    'UnsupportedError', 'UsageError', 'aio', 'control', 'devices', 'discover', 'read', 'with_link', '__version__',
 ]

@@ -9,7 +9,8 @@
             …
 
 Commands of a board go out in the order in which they were begun, each when the one before has ended; stop() waits for
-none of them. A task that is cancelled takes its command back: it is sent no more, though it may have been executed.
+none of them. A task that is cancelled takes its command back: it is sent no more, though it may have been executed. Only a
+stop is still sent when its task is cancelled.
 """
 from __future__ import annotations
 
@@ -22,11 +23,10 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Callable, Coroutine, Iterable, Type, TypeVar
 
 from . import _core, board as blocking, channels
-from ._core import (CarrierCounters, Command, Discovery, Event, Identity, LinkStatus, Recording, RefusedPost, Setpoints,
-                    State, Statistics, Subscription, PathStatus)
-from .devices import Device
+from ._core import Discovery, Identity, State, Subscription
+from .any_board import AnyBoard
 from .errors import ClosedError
-from .values import PostResult, UartData
+from .values import UartData
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # since Python 3.11 in typing
@@ -109,30 +109,6 @@ class States:
         return self._states.dropped
 
 
-class I2c:
-    """The devices on the user's I2C bus, as r4link.I2c."""
-
-    def __init__(self, board: Board) -> None:
-        self._commands = board._commands
-        self._i2c = board._board.i2c
-
-    async def read(self, address: int, register: int | bytes, count: int, timeout: float = 1.0) -> bytes:
-        return await self._commands.call(lambda: self._i2c.read(address, register, count, timeout))
-
-    async def write(self, address: int, data: bytes, count: int = 0, timeout: float = 1.0) -> bytes:
-        return await self._commands.call(lambda: self._i2c.write(address, data, count, timeout))
-
-    async def scan(self, timeout: float = 2.0) -> list[int]:
-        return await self._commands.call(lambda: self._i2c.scan(timeout))
-
-    async def poll(self, slot: int, address: int, register: int | bytes, count: int, period: float,
-                   timeout: float = 1.0) -> None:
-        await self._commands.call(lambda: self._i2c.poll(slot, address, register, count, period, timeout))
-
-    async def poll_off(self, slot: int, timeout: float = 1.0) -> None:
-        await self._commands.call(lambda: self._i2c.poll_off(slot, timeout))
-
-
 class UartStream:
     """What comes in on a UART: `async for data, lost in board.uart[1]: …`, until the board is closed. What waits is in
     the link; the callback of this one only tells that there is something."""
@@ -159,40 +135,20 @@ class UartStream:
             await self._news.wait()
 
 
-class Uart:
-    """A UART of the user's, as r4link.Uart: `async for data, lost in board.uart[1]: …`."""
+class Uart(channels.UartChannel[Coroutine[Any, Any, None], Coroutine[Any, Any, UartData]]):
+    """A UART of r4link.aio.Board: `async for data, lost in board.uart[1]: …`."""
 
-    def __init__(self, board: Board, channel: int) -> None:
-        self._board = board
-        self._commands = board._commands
-        self._uart = board._board.uart[channel]
-
-    async def write(self, data: bytes, timeout: float = 1.0) -> None:
-        await self._commands.call(lambda: self._uart.write(data, timeout))
-
-    async def read(self, timeout: float = 0.0) -> UartData:
-        return await self._board._waits.call(lambda: self._uart.read(timeout))
+    _board: Board
 
     def __aiter__(self) -> UartStream:
         news = asyncio.Event()
         self._board._news.add(news)
-        return UartStream(self._uart, news, self.on_bytes(lambda _: news.set()))
-
-    def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
-        """As r4link.Uart.on_bytes(), on the loop of the task that adds it."""
-        return self._uart.on_bytes(_on_loop(callback))
+        return UartStream(self._board._board.uart[self._channel], news, self.on_bytes(lambda _: news.set()))
 
 
-class _Uarts:
-    def __init__(self, board: Board) -> None:
-        self._board = board
-
-    def __getitem__(self, channel: int) -> Uart:
-        return Uart(self._board, channel)
-
-
-class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
-    """r4link.Board for asyncio; takes the same options. What does not wait is no coroutine there either."""
+class Board(AnyBoard[Coroutine[Any, Any, None]]):
+    """r4link.Board for asyncio; takes the same options. A call that does not wait is not a coroutine. Callbacks run on the
+    loop of the task that adds them."""
 
     def __init__(self, url: str | Iterable[str], **options: Any) -> None:
         self._board = blocking.Board(url, **options)
@@ -202,6 +158,18 @@ class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
         self._waits = _Lane(interrupt)
         self._stops = _Lane(interrupt)
         self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of loops over states and bytes
+
+    def _command(self, call: Callable[[], T]) -> Coroutine[Any, Any, T]:
+        return self._commands.call(call)
+
+    def _wait(self, call: Callable[[], T]) -> Coroutine[Any, Any, T]:
+        return self._waits.call(call)
+
+    def _stop(self, call: Callable[[], T]) -> Coroutine[Any, Any, T]:
+        return self._stops.call(call)
+
+    def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
+        return _on_loop(callback)
 
     @classmethod
     async def first(cls, **options: Any) -> Self:
@@ -223,130 +191,30 @@ class Board(channels.BoardCommands[Coroutine[Any, Any, None]]):
                         trace: TracebackType | None) -> None:
         await asyncio.shield(self.close())
 
-    @property
-    def role(self) -> str:
-        return self._board.role
-
-    async def take_control(self) -> None:
-        """As r4link.Board.take_control()."""
-        await self._commands.call(self._board.take_control)
-
-    async def release_control(self, timeout: float = 1.0) -> None:
-        """As r4link.Board.release_control(), when the commands that were begun before have ended."""
-        await self._commands.call(lambda: self._board.release_control(timeout))
-
-    async def wait_active(self, timeout: float = 3.0) -> None:
-        await self._waits.call(lambda: self._board.wait_active(timeout))
-
     async def next_state(self, timeout: float = 1.0) -> State:
+        """Waits for a state, up to `timeout` seconds."""
         return await self._waits.call(lambda: self._board.next_state(timeout))
 
-    async def send(self, command: str | Command, timeout: float = 1.0) -> None:
-        await self._commands.call(lambda: self._board.send(command, timeout))
-
-    async def apply(self, setpoints: Setpoints, timeout: float = 1.0) -> None:
-        await self._commands.call(lambda: self._board.apply(setpoints, timeout))
-
-    async def arm(self, timeout: float = 1.0) -> None:
-        await self._commands.call(lambda: self._board.arm(timeout))
-
     async def identify(self, timeout: float = 1.0) -> Identity:
+        """Asks the board who it is. `timeout`: seconds to wait for the answer."""
         return await self._commands.call(lambda: self._board.identify(timeout))
 
     @property
-    def i2c(self) -> I2c:
-        return I2c(self)
+    def i2c(self) -> channels.I2c[Coroutine[Any, Any, None], Coroutine[Any, Any, bytes], Coroutine[Any, Any, list[int]]]:
+        """The devices on the user's I2C bus."""
+        return channels.I2c(self)
 
     @property
-    def uart(self) -> _Uarts:
+    def uart(self) -> channels.Uarts[Uart]:
         """uart[1] and uart[2]."""
-        return _Uarts(self)
-
-    async def attach(self, device: Device, timeout: float = 1.0) -> None:
-        """As r4link.Board.attach()."""
-        await self._commands.call(lambda: self._board.attach(device, timeout))
-
-    async def link_timing(self, board_timeout: float, heartbeat: float, timeout: float = 1.0) -> None:
-        await self._commands.call(lambda: self._board.link_timing(board_timeout, heartbeat, timeout))
-
-    async def stop(self, timeout: float = 1.0) -> None:
-        """Overtakes all that is under way. It goes on being sent when the task is cancelled."""
-        await self._stops.call(lambda: self._board.stop(timeout))
-
-    def stop_async(self) -> None:
-        self._board.stop_async()
-
-    def post(self, command: Command | Setpoints) -> PostResult:
-        return self._board.post(command)
-
-    @property
-    def disarmed_by(self) -> str:
-        return self._board.disarmed_by
-
-    @property
-    def state(self) -> State:
-        return self._board.state
-
-    @property
-    def link(self) -> LinkStatus:
-        return self._board.link
-
-    @property
-    def statistics(self) -> Statistics:
-        return self._board.statistics
-
-    @property
-    def carrier_counters(self) -> CarrierCounters:
-        return self._board.carrier_counters
-
-    @property
-    def name(self) -> str:
-        return self._board.name
-
-    @property
-    def paths(self) -> list[PathStatus]:
-        return self._board.paths
+        return channels.Uarts(lambda channel: Uart(self, channel))
 
     def states(self, most: int | None = None, *, lossless: bool = False) -> States:
-        """The states from now on, until the board is closed: as those of r4link.Board."""
+        """The states from now on, until the board is closed: as those of r4link.Board. `most`: 1 or more states wait."""
         news = asyncio.Event()
         self._news.add(news)
         return States(self._board.states(most, lossless=lossless), news,
                       self.on_state(lambda _: news.set()))
-
-    # --- callbacks, on the loop of the task that adds them
-
-    def on_state(self, callback: Callable[[State], object]) -> Subscription:
-        return self._board.on_state(_on_loop(callback))
-
-    def on_link(self, callback: Callable[[LinkStatus], object]) -> Subscription:
-        return self._board.on_link(_on_loop(callback))
-
-    def on_path(self, callback: Callable[[PathStatus], object]) -> Subscription:
-        return self._board.on_path(_on_loop(callback))
-
-    def on_event(self, callback: Callable[[Event], object]) -> Subscription:
-        return self._board.on_event(_on_loop(callback))
-
-    def on_restart(self, callback: Callable[[], object]) -> Subscription:
-        return self._board.on_restart(_on_loop(callback))
-
-    def on_arming(self, callback: Callable[[str], object]) -> Subscription:
-        return self._board.on_arming(_on_loop(callback))
-
-    def on_refused(self, callback: Callable[[RefusedPost], object]) -> Subscription:
-        return self._board.on_refused(_on_loop(callback))
-
-    def record(self, to: str | os.PathLike[str] | Recording, *, rotate_bytes: int = 0, rotate_after: int = 0,
-               keep_bytes: int = 0) -> None:
-        self._board.record(to, rotate_bytes=rotate_bytes, rotate_after=rotate_after, keep_bytes=keep_bytes)
-
-    def watchdog(self, period: float) -> None:
-        """What gates the heartbeats is feed(), not the loop: feed where the robot is looked after."""
-        self._board.watchdog(period)
-
-    def feed(self) -> None:
-        self._board.feed()
 
 
 async def discover(**options: Any) -> Discovery:

@@ -10,20 +10,18 @@ import atexit
 import os
 import weakref
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, Type, TypeVar
+from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, Type
 
 from . import _core
-from ._core import (CarrierCounters, Command, Event, Identity, LinkStatus, Recording, RefusedPost, Setpoints, State,
-                    Statistics, Subscription, PathStatus)
-from .channels import BoardCommands, I2c, _ms, _Uarts
-from .devices import Device
+from ._core import Identity, State
+from .any_board import AnyBoard
+from .channels import I2c, Uart, Uarts, _ms
+from .enums import BoardRole
 from .errors import UsageError
-from .values import PostResult
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # since Python 3.11 in typing
 
-F = TypeVar('F', bound=Callable[..., Any])
 _open: weakref.WeakSet[_core.Board] = weakref.WeakSet()
 
 
@@ -36,7 +34,7 @@ def _close_all() -> None:
 
 class States:
     """The states of a board from now on: `for state in board.states(): …`, until the board is closed. Keeps it open.
-    """
+    `most`: 1 or more states wait."""
 
     def __init__(self, board: Board, most: int | None, timeout: float, lossless: bool) -> None:
         if most is not None and most < 1:
@@ -72,11 +70,11 @@ class States:
         return self._states.missed
 
 
-class Board(BoardCommands[None]):
+class Board(AnyBoard[None]):
     """A board, opened by URL (docs/transports.md), or with_link(); see the options of include/r4link/options.hpp.
 
-    Returns without waiting for the board: wait_active(). `role` is 'control', or 'watch' for a program that only
-    looks, and may stop the board, until take_control(). `key` is the path of a key file (`~` is yours). Raises
+    Returns without waiting for the board: wait_active(). `role` is BoardRole.CONTROL, or BoardRole.WATCH for a program
+    that only looks, and may stop the board, until take_control(). `key` is the path of a key file (`~` is yours). Raises
     UsageError, OpenError, DeniedError.
 
         with r4link.Board('udp://192.168.0.125') as board:
@@ -85,20 +83,24 @@ class Board(BoardCommands[None]):
             board.osmc(1).set(0.1)      # the board's own state has confirmed it
 
     Several URLs are paths to the one board (docs/redundancy.md): r4link.Board(['serial:auto', 'udp://192.168.0.125']).
+
+    `watch_rate_hz`: 1 to 1000 states a second for a program that watches. `heartbeat`: seconds between heartbeats.
+    `timeout`: seconds of silence after which the link is lost. `command_retry`, `stop_retry`: seconds after which a command
+    or a stop is sent again. `stop_linger`: seconds for which a confirmed stop is repeated. `identify_interval`: seconds
+    after which the board is asked again who it is; 0: never. `callback_limit`: seconds for which a callback may run; 0: no
+    limit.
     """
 
-    def __init__(self, url: str | Iterable[str], *, role: str = 'control', arming: bool = True, fields: str = 'DEFAULT',
-                 key: str | os.PathLike[str] | None = None, watch_rate_hz: int = 100, heartbeat: float = 0.1,
-                 timeout: float = 1.0, command_retry: float = 0.05, stop_retry: float = 0.02,
+    def __init__(self, url: str | Iterable[str], *, role: BoardRole | str = BoardRole.CONTROL, arming: bool = True,
+                 fields: str = 'DEFAULT', key: str | os.PathLike[str] | None = None, watch_rate_hz: int = 100,
+                 heartbeat: float = 0.1, timeout: float = 1.0, command_retry: float = 0.05, stop_retry: float = 0.02,
                  stop_linger: float = 0.2, identify_interval: float = 1.0, callback_limit: float = 0.5) -> None:
-        if role not in ('control', 'watch'):
-            raise UsageError(f'role {role!r}', 'there is no such role', "give 'control' or 'watch'")
         paths = [url] if isinstance(url, str) else list(url)
         link = next((bad for bad in (getattr(each, 'link', '') for each in paths) if bad), '')
         if link and (len(paths) > 1):
             raise UsageError(f'a bad link {link}', 'it is for a board of one path', 'open that URL alone')
         self._core = _core.Board(
-            '+'.join(paths), link=link, watch=role == 'watch', arming=arming, fields=fields,
+            '+'.join(paths), link=link, role=role, arming=arming, fields=fields,
             key=None if key is None else os.path.expanduser(os.fspath(key)),
             watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout),
             command_retry=_ms(command_retry), stop_retry=_ms(stop_retry), stop_linger=_ms(stop_linger),
@@ -110,6 +112,18 @@ class Board(BoardCommands[None]):
         """Opens the only board that r4link.discover() finds, which takes 1.3 s at most. Raises OpenError if there is no
         board, with what was searched, and UsageError with the URLs of several."""
         return cls(_core.discover().only().url, **options)
+
+    def _command(self, call: Callable[[], Any]) -> Any:
+        return call()
+
+    def _wait(self, call: Callable[[], Any]) -> Any:
+        return call()
+
+    def _stop(self, call: Callable[[], Any]) -> Any:
+        return call()
+
+    def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
+        return callback
 
     def close(self) -> None:
         """Says farewell and closes the transport: the board goes safe at once. Calls that wait in other threads
@@ -127,165 +141,25 @@ class Board(BoardCommands[None]):
         return f'<r4link.Board {self.name}: {self.link.state}>'
 
     @property
-    def role(self) -> str:
-        """'control' or 'watch'."""
-        return 'watch' if self._core.watches() else 'control'
-
-    def take_control(self) -> None:
-        """From now on this program controls the board; callbacks and recordings stay. It begins disarmed: wait_active(),
-        arm(). Raises RefusedError if another program of this computer controls it, which `holder` names; then this one
-        watches on."""
-        self._core.take_control()
-
-    def release_control(self, timeout: float = 1.0) -> None:
-        """Disarms, says farewell until the board has answered, so that it is safe and free, and watches from then on.
-        Raises NotConfirmedError if it does not answer in time: it goes safe by its own timeout, and this program watches
-        all the same. Commands that other threads wait for raise CancelledError."""
-        self._core.release_control(_ms(timeout))
-
-    def wait_active(self, timeout: float = 3.0) -> None:
-        """Until the board is under our control or, where we only watch, is heard. Raises RefusedError that says what
-        it is instead."""
-        self._core.wait_active(_ms(timeout))
-
-    # --- commands: each returns when the board's own state confirms it, raises RefusedError otherwise
-
-    def send(self, command: str | Command, timeout: float = 1.0) -> None:
-        """A command, or its text: 'O:358,1,1'; 'O:358,1,1;O:358,1,2' is a group."""
-        self._core.send(command, _ms(timeout))
-
-    def post(self, command: Command | Setpoints) -> PostResult:
-        """Sends once, without waiting or confirmation. on_refused() tells of what the board refuses."""
-        return PostResult(self._core.post(command))
-
-    def apply(self, setpoints: Setpoints, timeout: float = 1.0) -> None:
-        """All of them in one pass, confirmed as one, or none."""
-        self._core.apply(setpoints, _ms(timeout))
-
-    def arm(self, timeout: float = 1.0) -> None:
-        """Before the first output command, and again after whatever made the outputs safe but a lost link.
-
-        Clears a stop, a watchdog or a fault that came while this program controlled the board, and closes relay 1. One
-        that may have come before the program began is not cleared: NotArmedError says so, and clear() clears it.
-        """
-        self._core.arm(_ms(timeout))
-
-    @property
-    def disarmed_by(self) -> str:
-        """Why output commands are refused, such as 'not yet', 'stop' or 'earlier stop'; 'none' when armed."""
-        return self._core.disarmed_by()
-
-    def stop(self, timeout: float = 1.0) -> None:
-        """Every output safe, at once, repeated until the board confirms it; latched until clear()."""
-        self._core.stop(_ms(timeout))
-
-    def stop_async(self) -> None:
-        """The same, without waiting."""
-        self._core.stop_async()
-
-    @property
-    def i2c(self) -> I2c:
+    def i2c(self) -> I2c[None, bytes, list[int]]:
+        """The devices on the user's I2C bus."""
         return I2c(self)
 
     @property
-    def uart(self) -> _Uarts:
+    def uart(self) -> Uarts[Uart]:
         """uart[1] and uart[2]."""
-        return _Uarts(self)
-
-    def attach(self, device: Device, timeout: float = 1.0) -> None:
-        """Sets a described device up (r4link.devices): is it the one? Then what is to be written, which takes arm(), and
-        the board's readings, until our session ends. Raises RefusedError if it does not answer, or is another device. To
-        be done again after on_restart() and a lost link. `timeout`: for each step. Raises UsageError if another device,
-        of another address or name, has one of its slots: i2c.poll_off() of that slot gives the other up."""
-        self._core.attach(device._core, _ms(timeout))
-
-    def link_timing(self, board_timeout: float, heartbeat: float, timeout: float = 1.0) -> None:
-        """The board's timeout and heartbeat interval together."""
-        self._core.link_timing(_ms(board_timeout), _ms(heartbeat), _ms(timeout))
-
-    # --- what the board says
+        return Uarts(lambda channel: Uart(self, channel))
 
     def identify(self, timeout: float = 1.0) -> Identity:
+        """Asks the board who it is. `timeout`: seconds to wait for the answer."""
         return self._core.identify(_ms(timeout))
 
-    @property
-    def state(self) -> State:
-        """The newest; false while none has come. `received` is when, on the clock of time.monotonic()."""
-        return self._core.state()
-
     def next_state(self, timeout: float = 1.0) -> State:
+        """Waits for a state, up to `timeout` seconds."""
         return self._core.next_state(_ms(timeout))
 
     def states(self, most: int | None = None, timeout: float = 1.0, *, lossless: bool = False) -> States:
-        """The states from now on, for a loop. The newest at a time; with `most` up to so many wait, then the oldest
-        give way. With `lossless` none does: 65536 wait (eleven minutes at 100 Hz) or `most`, and what found no room is
-        a DataError at its place."""
+        """The states from now on, for a loop, which waits up to `timeout` seconds for each. The newest at a time; with
+        `most` up to so many wait, then the oldest give way. With `lossless` none does: 65536 wait (eleven minutes at 100
+        Hz) or `most`, and what found no room is a DataError at its place."""
         return States(self, most, timeout, lossless)
-
-    @property
-    def link(self) -> LinkStatus:
-        return self._core.link()
-
-    @property
-    def statistics(self) -> Statistics:
-        return self._core.statistics()
-
-    @property
-    def carrier_counters(self) -> CarrierCounters:
-        """What the transport has carried."""
-        return self._core.carrier_counters()
-
-    @property
-    def name(self) -> str:
-        """The transport, for people; of several paths all of them."""
-        return self._core.name()
-
-    @property
-    def paths(self) -> list[PathStatus]:
-        """How each of its paths does, in the order of the URLs."""
-        return self._core.paths()
-
-    # --- callbacks: each is told first what there is already. As functions or as decorators.
-
-    def on_state(self, callback: Callable[[State], object]) -> Subscription:
-        return self._core.on_state(callback)
-
-    def on_link(self, callback: Callable[[LinkStatus], object]) -> Subscription:
-        return self._core.on_link(callback)
-
-    def on_path(self, callback: Callable[[PathStatus], object]) -> Subscription:
-        """A path has begun to carry, or ceased to."""
-        return self._core.on_path(callback)
-
-    def on_event(self, callback: Callable[[Event], object]) -> Subscription:
-        """The transport went up or down, or something is to be warned of."""
-        return self._core.on_event(callback)
-
-    def on_restart(self, callback: Callable[[], object]) -> Subscription:
-        """The board has begun again: what it was told is gone."""
-        return self._core.on_restart(callback)
-
-    def on_arming(self, callback: Callable[[str], object]) -> Subscription:
-        """Armed ('none'), or not any more, and why."""
-        return self._core.on_arming(callback)
-
-    def on_refused(self, callback: Callable[[RefusedPost], object]) -> Subscription:
-        """A command that was posted was refused: by the board, or on its way there."""
-        return self._core.on_refused(callback)
-
-    def record(self, to: str | os.PathLike[str] | Recording, *, rotate_bytes: int = 0, rotate_after: int = 0,
-               keep_bytes: int = 0) -> None:
-        """Every datagram from now on, in both directions, into a file (docs/recordings.md)."""
-        if isinstance(to, Recording):
-            self._core.record(to)
-        else:
-            self._core.record(os.fspath(to), rotate_bytes, rotate_after, keep_bytes)
-
-    def watchdog(self, period: float) -> None:
-        """Without feed() for so long our heartbeats stop and the board goes safe; 0 turns it off."""
-        self._core.watchdog(_ms(period))
-
-    def feed(self) -> None:
-        self._core.feed()
-
-

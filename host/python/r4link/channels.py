@@ -1,24 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a board has: its output channels, the user's I2C bus and UARTs.
 
-The channel classes serve r4link.Board and r4link.aio.Board: a call that waits returns what the board's send() returns,
-None or a coroutine. Times are seconds. Every `timeout` is the time in which the board's state must confirm the command.
+The classes serve r4link.Board and r4link.aio.Board: a call that waits returns what the board's send() returns, None or
+a coroutine. Times are seconds. Every `timeout` is the time in which the board's state must confirm the command.
 """
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Callable, Generic, Iterator, TypeVar, overload
 
 from ._core import Command, ServoCalibration, Setpoints, Subscription
+from .enums import Direction, PostResult
 from .errors import ClosedError, UsageError
-from .values import Direction, PostResult, UartData
+from .values import UartData
 
 if TYPE_CHECKING:
-    from ._core import Board as CoreBoard
-    from .board import Board
+    from .any_board import AnyBoard
 
-Sent = TypeVar('Sent')  # what send() returns: None, or a coroutine
+# What a call returns that waits for a command, for bytes, for addresses: that, or a coroutine of it.
+Sent = TypeVar('Sent')
+Read = TypeVar('Read')
+Scanned = TypeVar('Scanned')
+Received = TypeVar('Received')
+AnyUart = TypeVar('AnyUart')  # of a blocking or an asynchronous board
 _MOST_S = 24 * 3600.0
 
 
@@ -29,76 +33,19 @@ def _ms(seconds: float) -> int:
     return math.ceil(max(-_MOST_S, min(seconds, _MOST_S)) * 1000)
 
 
-class BoardCommands(ABC, Generic[Sent]):
-    """The commands that r4link.Board and r4link.aio.Board have in common."""
-
-    _core: CoreBoard
-
-    @abstractmethod
-    def send(self, command: str | Command, timeout: float = 1.0) -> Sent: ...
-
-    @abstractmethod
-    def post(self, command: Command | Setpoints) -> PostResult: ...
-
-    def osmc(self, channel: int) -> DriveChannel[Sent]:
-        """`channel`: 1 to 4."""
-        return DriveChannel(self, channel, Command.osmc)
-
-    def dhb12(self, channel: int) -> DriveChannel[Sent]:
-        """`channel`: 1 to 4, for DHB1A, DHB1B, DHB2A and DHB2B."""
-        return DriveChannel(self, channel, Command.dhb12)
-
-    def servo(self, channel: int) -> ServoChannel[Sent]:
-        """`channel`: 1 to 16."""
-        return ServoChannel(self, channel)
-
-    def relay(self, channel: int) -> RelayChannel[Sent]:
-        """`channel`: 1 to 8; relay 1 is in the motor supply."""
-        return RelayChannel(self, channel)
-
-    def stepper(self, channel: int) -> StepperChannel[Sent]:
-        """`channel`: 1 to 4."""
-        return StepperChannel(self, channel)
-
-    def bldc(self, channel: int) -> BldcChannel[Sent]:
-        """`channel`: 1 to 4."""
-        return BldcChannel(self, channel)
-
-    def dac(self, channel: int, *, millivolts: int, timeout: float = 1.0) -> Sent:
-        """Sets a voltage of the board: `channel` 1 or 2, `millivolts` 0 to 3300; 0 in the safe state. It is an output,
-        so it takes arm(). Command.dac() can be posted, and can be one of Setpoints."""
-        return self.send(Command.dac(channel, millivolts=millivolts), timeout)
-
-    def proximity(self, channel: int, *, cm: int, timeout: float = 1.0) -> Sent:
-        """The board goes safe when ultrasonic sensor `channel`, 1 to 4, measures less than `cm`, 1 to 400 centimetres;
-        0: off."""
-        return self.send(Command.proximity(channel, cm=cm), timeout)
-
-    def fields(self, names: str, timeout: float = 1.0) -> Sent:
-        """The state fields to ask for: 'DEFAULT,ENC1'."""
-        return self.send(f'F:{names}', timeout)
-
-    def setting(self, key: str, value: str, timeout: float = 1.0) -> Sent:
-        return self.send(f'C:{key},{value}', timeout)
-
-    def clear(self, timeout: float = 1.0) -> Sent:
-        """Takes away the stop, the watchdog or the fault that the board reports; moves nothing."""
-        return self.send(Command.clear(), timeout)
-
-
 class _Channel(Generic[Sent]):
     """A set method returns when the board's state confirms the setpoint, and raises RefusedError otherwise. A post
     method sends the setpoint once, returns at once, and says whether it was sent."""
 
-    def __init__(self, board: BoardCommands[Sent], channel: int) -> None:
+    def __init__(self, board: AnyBoard[Sent], channel: int) -> None:
         self._board = board
         self._channel = channel
 
 
 class DriveChannel(_Channel[Sent]):
-    """An H-bridge."""
+    """An H-bridge; `channel`: 1 to 4."""
 
-    def __init__(self, board: BoardCommands[Sent], channel: int, make: Callable[..., Command]) -> None:
+    def __init__(self, board: AnyBoard[Sent], channel: int, make: Callable[..., Command]) -> None:
         super().__init__(board, channel)
         self._make = make
 
@@ -211,53 +158,75 @@ class BldcChannel(_Channel[Sent]):
         return self._board.post(Command.bldc(self._channel, pwm=pwm, direction=direction, brake=brake))
 
 
-class I2c:
+class I2c(Generic[Sent, Read, Scanned]):
     """The devices on the user's I2C bus (docs/devices.md). read(), write() and scan() return when the device has
-    answered, and raise RefusedError where none does."""
+    answered, and raise RefusedError where none does. `address`: 0x08 to 0x77, without the read bit. `register`: 0 to 255,
+    or up to 2 bytes; b'' names none. `count`: up to 32 bytes. `slot`: 1 to 8."""
 
-    def __init__(self, board: Board) -> None:
-        self._board = board
+    def __init__(self, board: AnyBoard[Sent]) -> None:
+        self._core = board._core
+        self._call = board._command
 
-    def read(self, address: int, register: int | bytes, count: int, timeout: float = 1.0) -> bytes:
-        """Of a register, of one byte or as bytes; b'' names none."""
-        return self._board._core.i2c_read(address, _register(register), count, _ms(timeout))
+    def read(self, address: int, register: int | bytes, count: int, timeout: float = 1.0) -> Read:
+        """Reads `count` bytes of a register."""
+        read: Read = self._call(lambda: self._core.i2c_read(address, _register(register), count, _ms(timeout)))
+        return read
 
-    def write(self, address: int, data: bytes, count: int = 0, timeout: float = 1.0) -> bytes:
+    def write(self, address: int, data: bytes, count: int = 0, timeout: float = 1.0) -> Read:
         """May move something, so that it takes arm(). Then reads `count` bytes."""
-        return self._board._core.i2c_write(address, bytes(data), count, _ms(timeout))
+        read: Read = self._call(lambda: self._core.i2c_write(address, bytes(data), count, _ms(timeout)))
+        return read
 
-    def scan(self, timeout: float = 2.0) -> list[int]:
+    def scan(self, timeout: float = 2.0) -> Scanned:
         """The addresses that answer, at most 32."""
-        return list(self._board._core.i2c_scan(_ms(timeout)))
+        addresses: Scanned = self._call(lambda: list(self._core.i2c_scan(_ms(timeout))))
+        return addresses
 
     def poll(self, slot: int, address: int, register: int | bytes, count: int, period: float,
-             timeout: float = 1.0) -> None:
-        """The board reads it by itself from now on, into slot 1-8: state.i2c1, after fields('DEFAULT,I2C1')."""
-        self._board._core.i2c_poll(slot, address, _register(register), count, _ms(period), _ms(timeout))
+             timeout: float = 1.0) -> Sent:
+        """The board reads it by itself from now on, every `period` seconds (0.005 to 60), into that slot: state.i2c1,
+        after fields('DEFAULT,I2C1')."""
+        sent: Sent = self._call(
+            lambda: self._core.i2c_poll(slot, address, _register(register), count, _ms(period), _ms(timeout)))
+        return sent
 
-    def poll_off(self, slot: int, timeout: float = 1.0) -> None:
-        self._board._core.i2c_poll_off(slot, _ms(timeout))
+    def poll_off(self, slot: int, timeout: float = 1.0) -> Sent:
+        """The board ends the readings of that slot."""
+        sent: Sent = self._call(lambda: self._core.i2c_poll_off(slot, _ms(timeout)))
+        return sent
 
 
-class Uart:
-    """A UART of the user's, 1 or 2 (docs/devices.md): setting('uart1', '115200:8N1') turns it on,
-    fields('DEFAULT,UART1') has the board tell what comes in.
+class UartChannel(Generic[Sent, Received]):
+    """A UART of the user's; `channel`: 1 or 2 (docs/devices.md): setting('uart1', '115200:8N1') turns it on,
+    fields('DEFAULT,UART1') has the board tell what comes in."""
+
+    def __init__(self, board: AnyBoard[Sent], channel: int) -> None:
+        self._board, self._channel = board, channel
+
+    def write(self, data: bytes, timeout: float = 1.0) -> Sent:
+        """1 to 48 bytes; returns when the board has taken them all. May move something, so that it takes arm()."""
+        sent: Sent = self._board._command(
+            lambda: self._board._core.uart_write(self._channel, bytes(data), _ms(timeout)))
+        return sent
+
+    def read(self, timeout: float = 0.0) -> Received:
+        """What has come since the last read(), at most 64 KB: older bytes count as lost. Waits until there is
+        something; nothing where it does not come in time."""
+        received: Received = self._board._wait(lambda: self._board._core.uart_read(self._channel, _ms(timeout)))
+        return received
+
+    def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
+        """Called for each state that brings some, beside read(): each byte once, in order, and how many are missing.
+        From now on, where the other callbacks of the board are called."""
+        return self._board._core.uart_on_bytes(self._channel, self._board._callback(callback))
+
+
+class Uart(UartChannel[None, UartData]):
+    """A UART of r4link.Board.
 
         for data, lost in board.uart[1]:    # what read() would return, as it comes, until the board is closed
             parser.feed(data)
     """
-
-    def __init__(self, board: Board, channel: int) -> None:
-        self._board, self._channel = board, channel
-
-    def write(self, data: bytes, timeout: float = 1.0) -> None:
-        """1 to 48 bytes; returns when the board has taken them all. May move something, so that it takes arm()."""
-        self._board._core.uart_write(self._channel, bytes(data), _ms(timeout))
-
-    def read(self, timeout: float = 0.0) -> UartData:
-        """What has come since the last read(), at most 64 KB: older bytes count as lost. Waits until there is
-        something; nothing where it does not come in time."""
-        return self._board._core.uart_read(self._channel, _ms(timeout))
 
     def __iter__(self) -> Iterator[UartData]:
         while True:
@@ -268,18 +237,16 @@ class Uart:
             if received.data or received.lost:
                 yield received
 
-    def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
-        """Called for each state that brings some, beside read(): each byte once, in order, and how many are missing.
-        From now on, on the thread of the callbacks."""
-        return self._board._core.uart_on_bytes(self._channel, callback)
 
+class Uarts(Generic[AnyUart]):
+    """The UARTs of a board: board.uart[1] and board.uart[2]."""
 
-class _Uarts:
-    def __init__(self, board: Board) -> None:
-        self._board = board
+    def __init__(self, make: Callable[[int], AnyUart]) -> None:
+        self._make = make
 
-    def __getitem__(self, channel: int) -> Uart:
-        return Uart(self._board, channel)
+    def __getitem__(self, channel: int) -> AnyUart:
+        """`channel`: 1 or 2."""
+        return self._make(channel)
 
 
 def _register(register: int | bytes) -> bytes:

@@ -13,8 +13,7 @@ from . import _core
 from ._core import Setpoints, State
 from .board import Board
 from .channels import _ms
-
-LoopEnd = Literal['none', 'asked', 'late', 'not active', 'disarmed', 'standstill']
+from .enums import DisarmCause, LinkState, LoopEnd
 
 
 class Twist(NamedTuple):
@@ -48,7 +47,12 @@ class Pose(NamedTuple):
 
 class Pid:
     """Proportional, integral and derivative control of one value. The integral stands while the output cannot follow
-    (`minimum`, `maximum`, `rate` a second); the derivative is of the measured value, low-passed."""
+    (`minimum`, `maximum`, `rate` a second); the derivative is of the measured value, low-passed.
+
+    `setpoint` and `measured` are in one unit, any; `output`, `minimum` and `maximum` in units of the output, such as -1 to
+    1 for a duty. `kp`: units of the output per unit of error; `ki`: per unit and second; `kd`: per unit a second;
+    `feed_forward`: per unit of the setpoint. `derivative_filter`: seconds, the time constant of the low pass; 0: none.
+    `dt`: seconds."""
 
     def __init__(self, kp: float = 0.0, ki: float = 0.0, kd: float = 0.0, *, feed_forward: float = 0.0,
                  minimum: float = -1.0, maximum: float = 1.0, rate: float = math.inf,
@@ -56,10 +60,11 @@ class Pid:
         self._core = _core.Pid(kp, ki, kd, feed_forward, minimum, maximum, rate, derivative_filter)
 
     def step(self, setpoint: float, measured: float, dt: float) -> float:
-        """The output, `dt` seconds after the last step. Raises DataError for what is no finite number."""
+        """The output, `dt` seconds after the last step. Raises DataError for a number that is not finite."""
         return self._core.step(setpoint, measured, dt)
 
     def reset(self) -> None:
+        """Forgets all: the output is 0, or the limit next to it."""
         self._core.reset()
 
     def take_over(self, output: float, setpoint: float, measured: float) -> None:
@@ -68,79 +73,92 @@ class Pid:
 
     @property
     def output(self) -> float:
+        """The newest output."""
         return self._core.output
 
     @property
     def integral(self) -> float:
+        """The integral term of the output."""
         return self._core.integral
 
 
 class Wheel:
-    """A wheel with an encoder: give it each state, in order."""
+    """A wheel with an encoder: give it each state, in order. `encoder`: 1 to 4. `counts_a_turn`: counts of the encoder for
+    one turn of the wheel. `radius`: metres. `window`: seconds over which `speed` is the mean. `max_speed`: m/s; a faster
+    one is no movement, but an encoder that was set to zero or a board that restarted."""
 
     def __init__(self, encoder: int, counts_a_turn: float, radius: float, *, reversed: bool = False,
                  window: float = 0.05, max_speed: float = 20.0) -> None:
         self._core = _core.Wheel(encoder, counts_a_turn, radius, reversed, max(0, _ms(window)), max_speed)
 
     def advance(self, state: State) -> float:
-        """How far it has rolled since the state before, by ENCn."""
+        """How many metres it has rolled since the state before, by ENCn."""
         return self._core.advance(state)
 
     def measured(self, state: State) -> float:
-        """Its speed as the board measures it, by ENCnHZ: new ten times a second."""
+        """Its speed in m/s as the board measures it, by ENCnHZ: new ten times a second."""
         return self._core.measured(state)
 
     def reset(self) -> None:
+        """Forgets the states before."""
         self._core.reset()
 
     @property
     def speed(self) -> float:
-        """By the counts of the last `window`: new with each state."""
+        """In m/s, by the counts of the last `window`: new with each state."""
         return self._core.speed
 
 
 class SteeringSensor:
-    """The angle by AINSTEER, linear between two ends, (volts, angle) each."""
+    """The angle by AINSTEER, linear between two ends, (volts, radians) each. `margin`: volts beyond the ends that are still
+    an angle. `angle`: radians."""
 
     def __init__(self, left: tuple[float, float], right: tuple[float, float], margin: float = 0.3) -> None:
         self._core = _core.SteeringSensor(left, right, margin)
 
     def angle(self, state: State) -> float | None:
-        """None where the voltage cannot be: a cable is off. Do not drive then."""
+        """In radians; None if the voltage is not possible: a cable is off. Do not drive then."""
         return self._core.angle(state)
 
     def volts(self, angle: float) -> float:
+        """The voltage of an angle."""
         return self._core.volts(angle)
 
 
 class DifferentialDrive:
-    """Two driven wheels, `separation` apart. What is too fast becomes slower on the same path."""
+    """Two driven wheels, `separation` metres apart. What is faster than `max_wheel` m/s becomes slower on the same path."""
 
     def __init__(self, separation: float, max_wheel: float = math.inf) -> None:
         self._core = _core.DifferentialDrive(separation, max_wheel)
 
     def wheels(self, twist: Twist) -> SideSpeeds:
+        """The speed of each wheel for a movement of the robot."""
         return SideSpeeds(*self._core.wheels(*twist))
 
     def twist(self, wheels: SideSpeeds) -> Twist:
+        """How the robot moves with these speeds of its wheels."""
         return Twist(*self._core.twist(*wheels))
 
 
 class FourWheelDrive:
-    """Four driven wheels that slip to turn, as if `track` were wider by `slip`."""
+    """Four driven wheels that slip to turn, as if `track`, in metres from left to right, were wider by the ratio `slip`.
+    What is faster than `max_wheel` m/s becomes slower on the same path."""
 
     def __init__(self, track: float, slip: float = 1.5, max_wheel: float = math.inf) -> None:
         self._core = _core.FourWheelDrive(track, slip, max_wheel)
 
     def wheels(self, twist: Twist) -> WheelSpeeds:
+        """The speed of each wheel for a movement of the robot."""
         return WheelSpeeds(*self._core.wheels(*twist))
 
     def twist(self, wheels: WheelSpeeds) -> Twist:
+        """How the robot moves with these speeds of its wheels."""
         return Twist(*self._core.twist(*wheels))
 
 
 class Ackermann:
-    """A car, steered in front; the robot is where the middle of its rear axle is."""
+    """A car, steered in front; the robot is where the middle of its rear axle is. `wheelbase` and `track` are in metres,
+    `max_steering` and `steering` in radians, `max_speed` in m/s."""
 
     def __init__(self, wheelbase: float, max_steering: float, *, track: float = 0.0, max_speed: float = math.inf) -> None:
         self._core = _core.Ackermann(wheelbase, track, max_steering, max_speed)
@@ -150,34 +168,40 @@ class Ackermann:
         return CarCommand(*self._core.command(*twist))
 
     def twist(self, command: CarCommand) -> Twist:
+        """How the robot moves with that speed and steering."""
         return Twist(*self._core.twist(*command))
 
     def limited_steering(self, steering: float) -> float:
+        """The angle within the limits of the steering."""
         return self._core.limited_steering(steering)
 
     def front_wheels(self, steering: float) -> SideSpeeds:
-        """The angle of each front wheel."""
+        """The angle of each front wheel, in radians."""
         return SideSpeeds(*self._core.front_wheels(steering))
 
     def rear_wheels(self, command: CarCommand) -> SideSpeeds:
+        """The speed of each rear wheel, in m/s."""
         return SideSpeeds(*self._core.rear_wheels(*command))
 
 
 class Odometry:
-    """Where a robot is by what its wheels have done, and the covariance of that: variances in m^2 and rad^2 a metre of
-    the way, and rad^2 a radian turned."""
+    """Where a robot is by what its wheels have done, and the covariance of that. The variances of each step:
+    `length_per_m`, m^2 a metre of the way; `turn_per_m`, rad^2 a metre of the way; `turn_per_rad`, rad^2 a radian."""
 
     def __init__(self, *, length_per_m: float = 0.0004, turn_per_m: float = 0.0004, turn_per_rad: float = 0.0025) -> None:
         self._core = _core.Odometry(length_per_m, turn_per_m, turn_per_rad)
 
     def advance(self, length: float, turn: float) -> None:
+        """The robot has gone `length` metres (below 0: backwards) and turned by `turn` radians meanwhile."""
         self._core.advance(length, turn)
 
     def reset(self, pose: Pose = Pose(0.0, 0.0, 0.0), covariance: Sequence[float] = (0.0,) * 9) -> None:
+        """The robot is known to be there."""
         self._core.reset(*pose, covariance)
 
     @property
     def pose(self) -> Pose:
+        """Where the robot is."""
         return Pose(*self._core.pose)
 
     @property
@@ -186,7 +210,8 @@ class Odometry:
         return self._core.covariance
 
     def ros_covariance(self, unknown: float = 1e6) -> tuple[float, ...]:
-        """The 36 numbers of geometry_msgs/PoseWithCovariance."""
+        """The 36 numbers of geometry_msgs/PoseWithCovariance. `unknown`: the variance of z (m^2) and of the rotations about
+        x and y (rad^2), of which a robot on the ground knows nothing."""
         return self._core.ros_covariance(unknown)
 
 
@@ -201,7 +226,7 @@ class Standstill(NamedTuple):
 
 
 class LoopReport(NamedTuple):
-    end: str  # a LoopEnd
+    end: LoopEnd
     why: str
     at_rest: bool  # the outputs are as `rest` has them, or safe; if not, `why` says what to do
     steps: int
@@ -216,36 +241,42 @@ def _options(fields: str, late: float, first: float, standstill: Sequence[Stands
 
 
 class LoopGuard:
-    """When a loop has to end, for one of your own, with asyncio say; times are those of time.monotonic()."""
+    """When a loop has to end, for one of your own, with asyncio say. `late`, `first`: seconds, as of run_loop(). `now`:
+    seconds of time.monotonic()."""
 
     def __init__(self, *, fields: str = '', late: float = 0.1, first: float = 1.0,
                  standstill: Sequence[Standstill] = ()) -> None:
         self._core = _core.LoopGuard(_options(fields, late, first, standstill, Setpoints(), 0.2, 0.3))
 
     def start(self, now: float) -> None:
+        """The loop begins."""
         self._core.start(now)
 
-    def on_state(self, state: State, disarmed_by: str, now: float) -> float | None:
+    def on_state(self, state: State, disarmed_by: DisarmCause, now: float) -> float | None:
         """The seconds since the last step, on the board's clock, if one is due."""
         return self._core.on_state(state, disarmed_by, now)
 
     def on_commanded(self, setpoints: Setpoints) -> None:
+        """What the step commands. A motor that is not among them keeps what was commanded before."""
         self._core.on_commanded(setpoints)
 
-    def check(self, link: str, disarmed_by: str, now: float) -> str:
-        """A LoopEnd: to be asked at `deadline` at the latest, with Board.link.state and Board.disarmed_by."""
+    def check(self, link: LinkState, disarmed_by: DisarmCause, now: float) -> LoopEnd:
+        """To be asked at `deadline` at the latest, with Board.link.state and Board.disarmed_by."""
         return self._core.check(link, disarmed_by, now)
 
     @property
     def deadline(self) -> float:
+        """When states will be late, if none comes until then: seconds of time.monotonic()."""
         return self._core.deadline
 
     @property
-    def ended(self) -> str:
+    def ended(self) -> LoopEnd:
+        """Why the loop has ended; LoopEnd.NONE: it has not."""
         return self._core.ended
 
     @property
     def why(self) -> str:
+        """The same in words."""
         return self._core.why
 
 
@@ -254,13 +285,17 @@ def run_loop(board: Board, step: Callable[[State, float], Setpoints | None], *, 
              watchdog: float = 0.3, arming: bool = True) -> LoopReport:
     """Runs a loop on this thread until it ends: `step(state, dt)` for each new state that has all `fields`, with the
     seconds since the step before on the board's clock. What it returns is posted; None ends the loop. Then the outputs
-    are left as `rest` has them. `arming`: as of the board. What the step raises comes after that; so does Ctrl-C."""
+    are left as `rest` has them. `arming`: as of the board. What the step raises comes after that; so does Ctrl-C.
+
+    `late`: seconds after which the newest state is too old. `first`: seconds that the first state may take.
+    `rest_timeout`: seconds in which the board must confirm `rest`; if it does not, it is stopped. `watchdog`: seconds that
+    a step may take, as of Board.watchdog(); 0: the program feeds the watchdog itself, or has none."""
     options = _options(fields, late, first, standstill, rest, rest_timeout, watchdog, arming)
     return LoopReport(*board._core.run_loop(options, step))
 
 
 def wrapped(angle: float) -> float:
-    """The angle within -pi and pi."""
+    """The `angle`, in radians, within -pi and pi."""
     return _core.wrapped(angle)
 
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from . import _core
 from ._core import State
+from .enums import DeviceRole
 
 
 class DeviceReading(NamedTuple):
@@ -21,7 +22,7 @@ class DeviceReading(NamedTuple):
 
 
 class Device:
-    """A described device at an address, its readings in consecutive slots of the board's eight.
+    """A described device at an address, its readings in consecutive slots of the board's eight, from `first_slot`, 1 to 8.
 
     `text`: 'NAME[@ADDRESS[:SLOT]]', where NAME is shipped (shipped()) or the path of a file: './mine.device@0x40'.
     Raises UsageError for one that there is not and for what does not fit, DataError, with its line, for a file that is
@@ -34,7 +35,7 @@ class Device:
 
     @classmethod
     def parse(cls, description: str, address: int | None = None, first_slot: int = 1) -> Device:
-        """From the text of a description. Raises DataError."""
+        """From the text of a description. `address`: 0x08 to 0x77; None: the one of the description. Raises DataError."""
         device = cls.__new__(cls)
         device._core = _core.parse_device(description, address, first_slot)
         device._made = (Device.parse, (description, address, first_slot))
@@ -48,19 +49,22 @@ class Device:
 
     @property
     def name(self) -> str:
+        """What its description calls it: 'bno055'."""
         return self._core.name
 
     @property
     def title(self) -> str:
+        """What it is, in words."""
         return self._core.title
 
     @property
-    def role(self) -> str:
-        """'imu', 'power', 'range', 'angle' or 'none'."""
+    def role(self) -> DeviceRole:
+        """What it is for a robot."""
         return self._core.role
 
     @property
     def address(self) -> int:
+        """On the I2C bus, 0x08 to 0x77."""
         return self._core.address
 
     @property

@@ -4,7 +4,7 @@
     Error
       DataError            a datagram, a recording or a file is bad
       UsageError           a URL, an option or a command is wrong (a ValueError, too)
-      RefusedError         the board refused, or did not confirm; `refusal` is its code: 'SAFE', 'RANGE' …
+      RefusedError         the board refused, or did not confirm; `refusal` is its code: Refusal.SAFE, Refusal.RANGE …
         NotConfirmedError  no confirmation in time: it may have been executed or not (a TimeoutError, too)
         CancelledError     given up: a stop or a newer cause to be safe came first, or the program did
         ClosedError        the board was closed, or belongs to another process
@@ -17,6 +17,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from .enums import Outcome, Refusal
+
 
 class Program(NamedTuple):
     """A program of this computer."""
@@ -27,19 +29,18 @@ class Program(NamedTuple):
 class Error(Exception):
     """What went wrong (`thing`, `reason`), and what to do about it (`fix`, '' where nobody can know).
 
-    `outcome` tells how a command ended ('timed out', 'cancelled' …; 'none': it is about no command), `refusal`
-    why the board refused it ('NONE': it did not), and `at` which command of a group that was, from 1 (0: none in
-    particular). `holder` is the program that controls the board already, where that is the reason.
+    `outcome` says how a command ended, `refusal` why the board refused it, and `at` which command of a group that
+    was, from 1 (0: none in particular). `holder` is the program that controls the board already, where that is the reason.
     """
 
-    def __init__(self, thing: str, reason: str, fix: str = '', *, outcome: str = 'none', refusal: str = 'NONE',
-                 at: int = 0, holder: Program | None = None) -> None:
+    def __init__(self, thing: str, reason: str, fix: str = '', *, outcome: Outcome = Outcome.NONE,
+                 refusal: Refusal = Refusal.NONE, at: int = 0, holder: Program | None = None) -> None:
         super().__init__(f'{thing}: {reason}' + (f'; {fix}' if fix else ''))
         self.thing = thing
         self.reason = reason
         self.fix = fix
-        self.outcome = outcome
-        self.refusal = refusal
+        self.outcome = Outcome(outcome)
+        self.refusal = Refusal(refusal)
         self.at = at
         self.holder = holder
 
@@ -97,14 +98,15 @@ class UnsupportedError(Error):
     """Kernel support or an interface is missing."""
 
 
-_OF_KIND = {1: DataError, 2: UsageError, 3: RefusedError, 4: OpenError, 5: DeniedError, 6: UnsupportedError}
-_OF_OUTCOME = {'timed out': NotConfirmedError, 'cancelled': CancelledError, 'closed': ClosedError,
-               'not armed': NotArmedError}
+_OF_KIND = {each.__name__: each for each in (DataError, UsageError, RefusedError, OpenError, DeniedError, UnsupportedError)}
+_OF_OUTCOME = {Outcome.TIMED_OUT: NotConfirmedError, Outcome.CANCELLED: CancelledError, Outcome.CLOSED: ClosedError,
+               Outcome.NOT_ARMED: NotArmedError}
 
 
-def error_of(kind: int, thing: str, reason: str, fix: str, outcome: str, refusal: str, at: int,
+def error_of(kind: str, thing: str, reason: str, fix: str, outcome: Outcome, refusal: Refusal, at: int,
              holder: tuple[int, str] | None = None) -> Error:
-    """The error of that ErrorKind and Outcome (include/r4link/error.hpp)."""
+    """The error of a problem of C++ (include/r4link/error.hpp). `kind`: the name of the class, if the outcome has none.
+    `at`: from 1; 0: no command in particular."""
     made = _OF_OUTCOME.get(outcome, _OF_KIND.get(kind, Error))
     return made(thing, reason, fix, outcome=outcome, refusal=refusal, at=at,
                 holder=None if holder is None else Program(*holder))

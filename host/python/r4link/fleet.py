@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Iterable, Iterator, Mapping, NamedTuple, Seque
 from . import _core
 from ._core import BoardHealth, Command, Event, FleetResult, LinkStatus, Recording, RefusedPost, Setpoints, State
 from .channels import _ms
+from .enums import BoardRole, DisarmCause, FleetEventKind, PostResult, SafeReason
 from .errors import Error, RefusedError, UsageError, error_of
-from .values import PostResult
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # since Python 3.11 in typing
@@ -40,11 +40,9 @@ def _close_all() -> None:
 
 class FleetEvent(NamedTuple):
     """Something that happened to a board."""
-    kind: str  # 'link', 'transport', 'arming', 'restart', 'refused', 'missed'
+    kind: FleetEventKind
     board: int
-    # By its kind: the link; the transport's event; why the board is not armed ('none': it is); nothing; the post that
-    # was refused; how many events were dropped, for nobody took them.
-    what: LinkStatus | Event | str | None | RefusedPost | int
+    what: LinkStatus | Event | DisarmCause | None | RefusedPost | int  # by its kind
 
 
 class FleetResults(Sequence[FleetResult]):
@@ -68,7 +66,7 @@ class FleetResults(Sequence[FleetResult]):
         return [each.board for each in self._results if not each.confirmed]
 
     def error(self, index: int) -> Error | None:
-        """Why the board at that place did not confirm it."""
+        """Why a board did not confirm it. `index`: from 0, in the order of the results."""
         each = self._results[index]
         return None if each.confirmed else error_of(*each.problem)
 
@@ -84,17 +82,17 @@ class FleetResults(Sequence[FleetResult]):
 
 
 class Fleet:
-    def __init__(self, *urls: str, role: str = 'control', arming: bool = True, key: str | os.PathLike[str] | None = None,
-                 fields: str = 'DEFAULT', watch_rate_hz: int = 100, heartbeat: float = 0.1, timeout: float = 1.0,
+    def __init__(self, *urls: str, role: BoardRole | str = BoardRole.CONTROL, arming: bool = True,
+                 key: str | os.PathLike[str] | None = None, fields: str = 'DEFAULT', watch_rate_hz: int = 100,
+                 heartbeat: float = 0.1, timeout: float = 1.0,
                  command_retry: float = 0.05, stop_retry: float = 0.02, stop_linger: float = 0.2,
                  identify_interval: float = 1.0) -> None:
         """Opens all transports and begins the links; returns without waiting for the boards.
 
-        Each of `urls` is a URL or a pattern of many: 'can://can0?node=0-7'. The options are those of Board. Raises
-        UsageError, OpenError or DeniedError where one of them cannot be opened.
+        Each of `urls` is a URL or a pattern of many: 'can://can0?node=0-7'. Raises UsageError, OpenError or DeniedError
+        where one of them cannot be opened. The options are those of Board: `watch_rate_hz` is 1 to 1000 states a second;
+        `heartbeat`, `command_retry`, `stop_retry`, `stop_linger` and `identify_interval` are seconds.
         """
-        if role not in ('control', 'watch'):
-            raise UsageError(f'role {role!r}', 'there is no such role', "give 'control' or 'watch'")
         for url in urls:
             if not isinstance(url, str):
                 raise UsageError(f'a fleet of {url!r}', 'each URL is a text of its own',
@@ -102,7 +100,7 @@ class Fleet:
             if getattr(url, 'link', ''):
                 raise UsageError(url, 'with_link() is for a Board alone, not for one of a Fleet',
                                  'open it by a Board, or let the simulated board have the bad link (r4 sim --link)')
-        self._core = _core.Fleet(list(urls), watch=role == 'watch', arming=arming, fields=fields,
+        self._core = _core.Fleet(list(urls), role=role, arming=arming, fields=fields,
                                  key=None if key is None else os.path.expanduser(os.fspath(key)),
                                  watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout),
                                  command_retry=_ms(command_retry), stop_retry=_ms(stop_retry),
@@ -128,10 +126,11 @@ class Fleet:
         return f'<r4link.Fleet of {len(self)} boards>'
 
     def index(self, board: int | str) -> int:
-        """Of a URL, a name or a board id; an index is what it is."""
+        """The index of a board, from 0. `board`: its URL, name or board id; an index is returned as it is."""
         return self._core.find(board) if isinstance(board, str) else board
 
     def url(self, board: int) -> str:
+        """The URL of a board. `board`: its index, from 0."""
         return self._core.url(board)
 
     def wait_active(self, timeout: float = 3.0) -> None:
@@ -140,10 +139,11 @@ class Fleet:
         if missing:
             others = f' (and {len(missing) - 1} other boards)' if len(missing) > 1 else ''
             health = self._core.health()[missing[0]]
-            state = f'is {health.link.state}' + ('' if health.link.reason == 'none' else f', {health.link.reason}')
+            state = f'is {health.link.state}' + ('' if health.link.reason is SafeReason.NONE else f', {health.link.reason}')
             raise RefusedError(health.url, state + others, 'see health(), and that they are on and reached')
 
     def health(self) -> list[BoardHealth]:
+        """How each board is, in the order of the URLs."""
         return self._core.health()
 
     def states(self) -> list[State]:
@@ -156,9 +156,11 @@ class Fleet:
         return FleetResults(self._core.send(command, self._indices(boards), _ms(timeout)))
 
     def arm(self, timeout: float = 1.0, *, boards: Iterable[int | str] | None = None) -> FleetResults:
+        """Arms all boards, or those, as Board.arm() does."""
         return FleetResults(self._core.arm(self._indices(boards), _ms(timeout)))
 
     def clear(self, timeout: float = 1.0) -> FleetResults:
+        """Clears the stop, the watchdog or the fault that a board reports, on all boards; moves nothing."""
         return self.send(Command.clear(), timeout)
 
     def stop(self, timeout: float = 1.0) -> FleetResults:
@@ -176,7 +178,7 @@ class Fleet:
 
     def post(self, setpoints: Mapping[int | str, Setpoints]) -> list[PostResult]:
         """The same sent once, in one pass, and not confirmed: for streams."""
-        return [PostResult(each) for each in self._core.post(self._pairs(setpoints))]
+        return self._core.post(self._pairs(setpoints))
 
     def next_event(self, timeout: float = 0.0) -> FleetEvent | None:
         """The next thing that has happened, oldest first; None if there is nothing in time."""
@@ -193,10 +195,11 @@ class Fleet:
         self._core.record(recording)
 
     def watchdog(self, period: float) -> None:
-        """Without feed() for so long the heartbeats stop, and all boards go safe; 0 turns it off."""
+        """Without feed() for `period` seconds the heartbeats stop, and all boards go safe; 0 turns it off."""
         self._core.watchdog(_ms(period))
 
     def feed(self) -> None:
+        """The program is well, for another period of watchdog()."""
         self._core.feed()
 
     def _indices(self, boards: Iterable[int | str] | None) -> list[int] | None:

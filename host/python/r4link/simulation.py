@@ -120,19 +120,19 @@ class SimBoard:
         self.happen(f'handle {"held" if held else "released"}')
 
     def obstacle(self, sensor: int, cm: int | None) -> None:
-        """What an ultrasonic sensor sees; 0: nothing; None: its cable is off."""
+        """What an ultrasonic `sensor`, 1 to 4, measures: `cm` centimetres, 0: nothing, None: its cable is off."""
         self.happen(f'us {sensor} {"off" if cm is None else cm}')
 
     def turn(self, encoder: int, counts: int) -> None:
-        """Somebody turns it to so many counts, 1000 a millisecond."""
+        """Somebody turns `encoder`, 1 to 4, to so many `counts`, 1000 a millisecond."""
         self.happen(f'enc {encoder} {counts}')
 
     def analog(self, name: str, volts: float) -> None:
-        """'AIN24': it stays there."""
+        """An analog input, 'AIN24', stays at `volts`, to 0.01 V."""
         self.happen(f'analog {name.upper()} {volts:.2f}')
 
     def motor(self, osmc: int, stalled: bool) -> None:
-        """The motor of that OSMC is held fast, or free."""
+        """The motor of `osmc`, 1 to 4, is held fast, or free."""
         self.happen(f'motor {osmc} {"stalled" if stalled else "free"}')
 
     def chip(self, name: Literal['osmc', 'dhb', 'servo', 'expander', 'dac'],
@@ -145,7 +145,7 @@ class SimBoard:
         self.happen(f'i2c {"held" if held else "free"}')
 
     def hang(self, seconds: float) -> None:
-        """The firmware's loop stands still."""
+        """The firmware's loop stands still for `seconds`, to 1 ms."""
         self.happen(f'hang {seconds:.3f}')
 
     def reboot(self) -> None:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Type
 from . import _core
 from ._core import FIELDS, State
 from .board import Board
+from .enums import LinkState, SafeReason
 from .errors import ClosedError, DataError, Error, OpenError, UsageError
 from .simulation import Look, SimBoard
 from .values import Bldc, Drive
@@ -38,11 +39,14 @@ class Robot(Protocol):
     """A simulated board with its motors, sensors and chips."""
 
     @property
-    def url(self) -> str: ...
+    def url(self) -> str:
+        """What a host opens."""
 
-    def happen(self, words: str) -> None: ...
+    def happen(self, words: str) -> None:
+        """A line of a scenario (docs/simulation.md), without its time."""
 
-    def look(self) -> Look: ...
+    def look(self) -> Look:
+        """What its pins and sensors do."""
 
 
 class SimProcess:
@@ -78,6 +82,7 @@ class SimProcess:
 
     @property
     def url(self) -> str:
+        """What a host opens."""
         return self._url
 
     def happen(self, words: str) -> None:
@@ -150,7 +155,7 @@ class SimProcess:
 def make_robot(transport: str, folder: pathlib.Path, *, interface: str = 'vcan0', node: int = 1,
                link: str = '') -> Robot:
     """A simulated robot: 'sim' in this process, else as a process on UDP, a pty in `folder` or a CAN bus, behind
-    such a `link` as r4 sim --link says."""
+    such a `link` as r4 sim --link says. `node`: 0 to 31, its number on the bus."""
     if link and transport == 'sim':
         raise UsageError(f'link {link!r}', "transport 'sim' has no link", "use 'udp', 'pty' or 'can'")
     if transport == 'sim':
@@ -189,19 +194,20 @@ class TestBoard(Board):
                 state = self.next_state(left)
                 count += 1
             except Error as error:
-                if self.link.state not in ('active', 'safe'):
+                if self.link.state not in (LinkState.ACTIVE, LinkState.SAFE):
                     raise AssertionError(f'no state came within {within} s: {error}') from None
         wrong = [f'{name} is {getattr(state, name)!r}, not {_words(wanted)}' for name, wanted in fields.items()
                  if not _is(getattr(state, name), wanted)]
         raise AssertionError(f'after {within} s and {count} states: {"; ".join(wrong)} '
                              f'(link {self.link.state}, reason {self.link.reason}; {state!r})')
 
-    def expect_safe(self, reason: str | None = None, within: float = 1.1) -> None:
+    def expect_safe(self, reason: SafeReason | str | None = None, within: float = 1.1) -> None:
         """That the board is safe in time, for that reason, and that no pin of its chips drives anything."""
+        reason = None if reason is None else SafeReason(reason)
         deadline = time.monotonic() + within
         while True:
             link, look = self.link, self.robot.look()
-            if link.state == 'safe' and reason in (None, link.reason) and look.is_safe:
+            if link.state is LinkState.SAFE and reason in (None, link.reason) and look.is_safe:
                 return
             if time.monotonic() >= deadline:
                 raise AssertionError(f'after {within} s the board is not safe{f" ({reason})" if reason else ""}: the '

@@ -1,12 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Small values: what a channel is told, and what it says."""
-import enum
 from typing import NamedTuple
 
-
-class Direction(enum.IntEnum):
-    REVERSE = 0
-    FORWARD = 1
+from .enums import I2cOutcome
 
 
 class Drive(NamedTuple):
@@ -35,15 +31,15 @@ class I2cReading(NamedTuple):
 
 
 class I2cAnswer(NamedTuple):
-    """How the newest single transfer ended: 'done', 'no acknowledge', 'bus stuck', 'cancelled'."""
+    """How the newest single transfer ended."""
     pnum: int
-    outcome: str
+    outcome: I2cOutcome
     data: bytes
 
 
 class I2cBusReport(NamedTuple):
     """How the user's bus does: the newest outcome, transfers that failed, how often it was clocked free."""
-    outcome: str
+    outcome: I2cOutcome
     errors: int
     recoveries: int
 
@@ -60,14 +56,3 @@ class UartData(NamedTuple):
     """What has come in on a UART: each byte once, in order; `lost`: how many are missing before or among them."""
     data: bytes
     lost: int
-
-
-class PostResult(enum.Enum):
-    """What became of what was posted; true where it was sent."""
-    SENT = 'sent'
-    NOT_ARMED = 'not armed'  # it drives an output, and the program is not armed: arm()
-    NO_LINK = 'no link'  # the link is not up, or the board does not take our commands yet
-    QUEUE_FULL = 'queue full'  # too many wait to be sent already: try again later
-
-    def __bool__(self) -> bool:
-        return self is PostResult.SENT

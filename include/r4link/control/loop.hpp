@@ -39,7 +39,7 @@ namespace r4::control {
 
 // Why a loop has ended.
 enum class LoopEnd : std::uint8_t { none, asked, late, not_active, disarmed, standstill };
-// "none", "asked", "late", "not active", "disarmed", "standstill".
+// "none", "asked", "late", "not active", "disarmed", "standstill"; "unknown" for other numbers.
 R4LINK_API const char* to_text(LoopEnd end);
 
 // A motor that turns an encoder. One that is held fast burns, and an encoder whose cable is off makes its loop drive at

@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What r4link.Board and r4link.aio.Board have in common. Times are seconds.
+
+A call that waits returns None or, from r4link.aio.Board, a coroutine. Every `timeout` is the time in which the board's
+state must confirm the command; if it does not, the call raises RefusedError.
+"""
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from typing import Any, Callable, Generic
+
+from . import _core
+from ._core import (CarrierCounters, Command, Event, LinkStatus, PathStatus, Recording, RefusedPost, Setpoints, State,
+                    Statistics, Subscription)
+from .channels import BldcChannel, DriveChannel, RelayChannel, Sent, ServoChannel, StepperChannel, _ms
+from .devices import Device
+from .enums import BoardRole, DisarmCause, PostResult
+
+
+class AnyBoard(ABC, Generic[Sent]):
+    """A board, blocking or asynchronous."""
+
+    _core: _core.Board
+
+    @abstractmethod
+    def _command(self, call: Callable[[], Any]) -> Any:
+        """Makes a call that waits for a command. Returns its result, or a coroutine of that."""
+
+    @abstractmethod
+    def _wait(self, call: Callable[[], Any]) -> Any:
+        """Makes a call that waits and sends nothing."""
+
+    @abstractmethod
+    def _stop(self, call: Callable[[], Any]) -> Any:
+        """Makes a call that no other call may hold up."""
+
+    @abstractmethod
+    def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
+        """What the thread of the callbacks calls for a callback of the program."""
+
+    @property
+    def role(self) -> BoardRole:
+        """What this program is to the board at the moment."""
+        return self._core.role()
+
+    def take_control(self) -> Sent:
+        """From now on this program controls the board; callbacks and recordings stay. It begins disarmed: wait_active(),
+        arm(). Raises RefusedError if another program of this computer controls it, which `holder` names; then this one
+        watches on."""
+        sent: Sent = self._command(self._core.take_control)
+        return sent
+
+    def release_control(self, timeout: float = 1.0) -> Sent:
+        """Disarms, says farewell until the board has answered, so that it is safe and free, and watches from then on.
+        Raises NotConfirmedError if it does not answer in time: it goes safe by its own timeout, and this program watches
+        all the same. Commands that other threads wait for raise CancelledError."""
+        sent: Sent = self._command(lambda: self._core.release_control(_ms(timeout)))
+        return sent
+
+    def wait_active(self, timeout: float = 3.0) -> Sent:
+        """Until the board is under our control or, where we only watch, is heard. Raises RefusedError that says what
+        it is instead."""
+        sent: Sent = self._wait(lambda: self._core.wait_active(_ms(timeout)))
+        return sent
+
+    # --- commands
+
+    def send(self, command: str | Command, timeout: float = 1.0) -> Sent:
+        """A command, or its text: 'O:358,1,1'; 'O:358,1,1;O:358,1,2' is a group."""
+        sent: Sent = self._command(lambda: self._core.send(command, _ms(timeout)))
+        return sent
+
+    def post(self, command: Command | Setpoints) -> PostResult:
+        """Sends once, without waiting or confirmation. on_refused() reports what the board refuses."""
+        return self._core.post(command)
+
+    def apply(self, setpoints: Setpoints, timeout: float = 1.0) -> Sent:
+        """All of them in one pass, confirmed as one, or none."""
+        sent: Sent = self._command(lambda: self._core.apply(setpoints, _ms(timeout)))
+        return sent
+
+    def arm(self, timeout: float = 1.0) -> Sent:
+        """Before the first output command, and again after whatever made the outputs safe but a lost link.
+
+        Clears a stop, a watchdog or a fault that came while this program controlled the board, and closes relay 1. One
+        that may have come before the program began is not cleared: NotArmedError says so, and clear() clears it.
+        """
+        sent: Sent = self._command(lambda: self._core.arm(_ms(timeout)))
+        return sent
+
+    @property
+    def disarmed_by(self) -> DisarmCause:
+        """Why output commands are refused; DisarmCause.NONE when armed."""
+        return self._core.disarmed_by()
+
+    def stop(self, timeout: float = 1.0) -> Sent:
+        """Every output safe, at once, repeated until the board confirms it; latched until clear()."""
+        sent: Sent = self._stop(lambda: self._core.stop(_ms(timeout)))
+        return sent
+
+    def stop_async(self) -> None:
+        """Begins a stop as stop() does, and returns at once."""
+        self._core.stop_async()
+
+    def osmc(self, channel: int) -> DriveChannel[Sent]:
+        """`channel`: 1 to 4."""
+        return DriveChannel(self, channel, Command.osmc)
+
+    def dhb12(self, channel: int) -> DriveChannel[Sent]:
+        """`channel`: 1 to 4, for DHB1A, DHB1B, DHB2A and DHB2B."""
+        return DriveChannel(self, channel, Command.dhb12)
+
+    def servo(self, channel: int) -> ServoChannel[Sent]:
+        """`channel`: 1 to 16."""
+        return ServoChannel(self, channel)
+
+    def relay(self, channel: int) -> RelayChannel[Sent]:
+        """`channel`: 1 to 8; relay 1 is in the motor supply."""
+        return RelayChannel(self, channel)
+
+    def stepper(self, channel: int) -> StepperChannel[Sent]:
+        """`channel`: 1 to 4."""
+        return StepperChannel(self, channel)
+
+    def bldc(self, channel: int) -> BldcChannel[Sent]:
+        """`channel`: 1 to 4."""
+        return BldcChannel(self, channel)
+
+    def dac(self, channel: int, *, millivolts: int, timeout: float = 1.0) -> Sent:
+        """Sets a voltage of the board: `channel` 1 or 2, `millivolts` 0 to 3300; 0 in the safe state. It is an output,
+        so it takes arm(). Command.dac() can be posted, and can be one of Setpoints."""
+        return self.send(Command.dac(channel, millivolts=millivolts), timeout)
+
+    def proximity(self, channel: int, *, cm: int, timeout: float = 1.0) -> Sent:
+        """The board goes safe when ultrasonic sensor `channel`, 1 to 4, measures less than `cm`, 1 to 400 centimetres;
+        0: off."""
+        return self.send(Command.proximity(channel, cm=cm), timeout)
+
+    def fields(self, names: str, timeout: float = 1.0) -> Sent:
+        """The state fields to ask for: 'DEFAULT,ENC1'."""
+        return self.send(f'F:{names}', timeout)
+
+    def setting(self, key: str, value: str, timeout: float = 1.0) -> Sent:
+        """Changes a setting of the board (docs/protocol.md): setting('rate', '50')."""
+        return self.send(f'C:{key},{value}', timeout)
+
+    def clear(self, timeout: float = 1.0) -> Sent:
+        """Takes away the stop, the watchdog or the fault that the board reports; moves nothing."""
+        return self.send(Command.clear(), timeout)
+
+    def attach(self, device: Device, timeout: float = 1.0) -> Sent:
+        """Sets a described device up (r4link.devices): is it the one? Then what is to be written, which takes arm(), and
+        the board's readings, until our session ends. Raises RefusedError if it does not answer, or is another device. To
+        be done again after on_restart() and a lost link. `timeout`: for each step. Raises UsageError if another device,
+        of another address or name, has one of its slots: i2c.poll_off() of that slot gives the other up."""
+        sent: Sent = self._command(lambda: self._core.attach(device._core, _ms(timeout)))
+        return sent
+
+    def link_timing(self, board_timeout: float, heartbeat: float, timeout: float = 1.0) -> Sent:
+        """Changes two settings together: `board_timeout`, the seconds without a host heartbeat after which the board goes
+        safe, and `heartbeat`, the seconds between its own heartbeats."""
+        sent: Sent = self._command(lambda: self._core.link_timing(_ms(board_timeout), _ms(heartbeat), _ms(timeout)))
+        return sent
+
+    # --- what the board reports
+
+    @property
+    def state(self) -> State:
+        """The newest; false while none has come. `received` is when, on the clock of time.monotonic()."""
+        return self._core.state()
+
+    @property
+    def link(self) -> LinkStatus:
+        """How the link to the board is at the moment."""
+        return self._core.link()
+
+    @property
+    def statistics(self) -> Statistics:
+        """What the link has counted and measured."""
+        return self._core.statistics()
+
+    @property
+    def carrier_counters(self) -> CarrierCounters:
+        """What the transport has carried."""
+        return self._core.carrier_counters()
+
+    @property
+    def name(self) -> str:
+        """The transport, for people; of several paths all of them."""
+        return self._core.name()
+
+    @property
+    def paths(self) -> list[PathStatus]:
+        """How each of its paths does, in the order of the URLs."""
+        return self._core.paths()
+
+    # --- callbacks: each is told first what there is already. As functions or as decorators.
+
+    def on_state(self, callback: Callable[[State], object]) -> Subscription:
+        """A state has come."""
+        return self._core.on_state(self._callback(callback))
+
+    def on_link(self, callback: Callable[[LinkStatus], object]) -> Subscription:
+        """The link has changed."""
+        return self._core.on_link(self._callback(callback))
+
+    def on_path(self, callback: Callable[[PathStatus], object]) -> Subscription:
+        """A path has begun to carry, or ceased to."""
+        return self._core.on_path(self._callback(callback))
+
+    def on_event(self, callback: Callable[[Event], object]) -> Subscription:
+        """The transport went up or down, or something is to be warned of."""
+        return self._core.on_event(self._callback(callback))
+
+    def on_restart(self, callback: Callable[[], object]) -> Subscription:
+        """The board has restarted, and has lost its settings."""
+        return self._core.on_restart(self._callback(callback))
+
+    def on_arming(self, callback: Callable[[DisarmCause], object]) -> Subscription:
+        """Armed (DisarmCause.NONE), or not any more, and why."""
+        return self._core.on_arming(self._callback(callback))
+
+    def on_refused(self, callback: Callable[[RefusedPost], object]) -> Subscription:
+        """A command that was posted was refused: by the board, or on its way there."""
+        return self._core.on_refused(self._callback(callback))
+
+    def record(self, to: str | os.PathLike[str] | Recording, *, rotate_bytes: int = 0, rotate_after: int = 0,
+               keep_bytes: int = 0) -> None:
+        """Every datagram from now on, in both directions, into a file (docs/recordings.md). A new file is begun after
+        `rotate_bytes` bytes or `rotate_after` seconds, and at most `keep_bytes` bytes are kept; 0: no limit."""
+        if isinstance(to, Recording):
+            self._core.record(to)
+        else:
+            self._core.record(os.fspath(to), rotate_bytes, rotate_after, keep_bytes)
+
+    def watchdog(self, period: float) -> None:
+        """Without feed() for `period` seconds our heartbeats stop and the board goes safe; 0 turns it off. Feed where the
+        robot is looked after: callbacks and an event loop do not feed it."""
+        self._core.watchdog(_ms(period))
+
+    def feed(self) -> None:
+        """The program is well, for another period of watchdog()."""
+        self._core.feed()
