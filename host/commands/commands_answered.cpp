@@ -1,50 +1,47 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How the board's datagrams end the commands under way.
 #include "commands_under_way.hpp"
+#include "r4link/tables/state_fields.hpp"
 
 namespace r4 {
 
 namespace {
 
-// The field of a channel. `second`: the field of channel 2, which the fields of later channels
-// follow.
-StateField field_of(StateField first, StateField second, int channel) {
-  if (channel == 1) return first;
-  return static_cast<StateField>(static_cast<int>(second) + channel - 2);
-}
-
 // For boards that do not report CMD: true if `state`, as one datagram carried it, shows the value
 // that `command` sets. Commands without a state field (threshold, fields, settings) are never
 // shown.
 bool state_shows(const State& state, const Command& command) {
-  const int channel = command.channel;
-  const auto i = static_cast<std::size_t>(channel - 1);
+  FieldKind kind{};
   switch (command.kind) {
     case CommandKind::osmc:
-      return state.present.has(field_of(StateField::osmc1, StateField::osmc2, channel)) &&
-             state.raw.osmc[i].pwm == command.value && state.raw.osmc[i].direction == command.direction;
+      kind = FieldKind::osmc;
+      break;
     case CommandKind::dhb12:
-      return state.present.has(field_of(StateField::dhb1a, StateField::dhb1b, channel)) &&
-             state.raw.dhb12[i].pwm == command.value && state.raw.dhb12[i].direction == command.direction;
+      kind = FieldKind::dhb12;
+      break;
     case CommandKind::servo:
-      return state.present.has(field_of(StateField::servo1pos, StateField::servo2pos, channel)) &&
-             state.raw.servo_us[i] == command.value;
-    case CommandKind::relay:
-      return state.present.has(StateField::relays) &&
-             (((state.relays >> i) & 1) != 0) == command.on;
+      kind = FieldKind::servo;
+      break;
     case CommandKind::stepper:
-      return state.present.has(field_of(StateField::step1pos, StateField::step2pos, channel)) &&
-             state.raw.stepper_steps[i] == command.value;
+      kind = FieldKind::stepper;
+      break;
     case CommandKind::bldc:
-      return state.present.has(field_of(StateField::bldc1, StateField::bldc2, channel)) &&
-             state.raw.bldc[i].speed == command.value && state.raw.bldc[i].direction == command.direction &&
-             state.raw.bldc[i].brake == command.on;
+      kind = FieldKind::bldc;
+      break;
     case CommandKind::dac:
-      return state.present.has(field_of(StateField::dac1, StateField::dac2, channel)) &&
-             state.raw.dac_mv[i] == command.value;
+      kind = FieldKind::dac;
+      break;
+    case CommandKind::relay:
+      return state.present.has(StateField::relays) && state.relay(command.channel) == command.on;
     default:
       return false;
   }
+  const StateField field = state_field(kind, command.channel);
+  if (!state.present.has(field)) return false;
+  const StateNumbers shown = numbers_of(state, field);  // value, direction, brake
+  return shown[0] == command.value &&
+         (shown.count < 2 || shown[1] == static_cast<double>(command.direction)) &&
+         (shown.count < 3 || shown[2] == static_cast<double>(command.on));
 }
 
 }  // namespace

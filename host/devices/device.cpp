@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "r4link/error.hpp"
+#include "r4link/tables/state_fields.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4 {
@@ -63,7 +64,7 @@ std::string Device::fields() const {
 
 StateField Device::field(std::size_t value) const {
   const int slot = first_slot_ + static_cast<int>(description_.values[value].poll);
-  return static_cast<StateField>(static_cast<int>(StateField::i2c1) + slot - 1);
+  return state_field(FieldKind::i2c, slot);
 }
 
 std::optional<bool> Device::is_set_up(const State& state) const {

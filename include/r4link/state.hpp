@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The board's state as typed values, and the fields that carry it (paper section 4.1).
 //
-// One table names every field, its unit and where it lives in State; the board writes with it, the host
-// reads with it, the `F` command selects from it.
+// tables/state_fields.hpp names every field, its unit and its place in State. The board writes with that table,
+// the host reads with it, and the `F` command selects from it.
 #pragma once
 
 #include <cstdint>
@@ -119,6 +119,7 @@ constexpr int state_field_count = static_cast<int>(StateField::count);
 class R4LINK_API FieldSet {
  public:
   constexpr FieldSet() = default;
+  // No set has StateField::count.
   constexpr bool has(StateField f) const { return (words_[word_of(f)] & bit_of(f)) != 0; }
   void add(StateField f) { words_[word_of(f)] |= bit_of(f); }
   void remove(StateField f) { words_[word_of(f)] &= ~bit_of(f); }
@@ -170,7 +171,7 @@ class R4LINK_API FieldSet {
 
  private:
   static constexpr int word_bits = 32;
-  static constexpr int word_count = (state_field_count + word_bits - 1) / word_bits;
+  static constexpr int word_count = state_field_count / word_bits + 1;
   static constexpr int word_of(StateField f) { return static_cast<int>(f) / word_bits; }
   static constexpr std::uint32_t bit_of(StateField f) {
     return std::uint32_t{1} << static_cast<int>(f) % word_bits;
