@@ -57,7 +57,8 @@ std::string Device::place() const { return fmt::format("{}:{}", text(), first_sl
 std::string Device::fields() const {
   std::string names;
   for (int slot = first_slot_; slot <= last_slot(); ++slot) {
-    names += fmt::format("{}I2C{}", names.empty() ? "" : ",", slot);
+    const Text name = name_of(state_field(FieldKind::i2c, slot));
+    names.append(names.empty() ? "" : ",").append(name.data(), name.size());
   }
   return names;
 }

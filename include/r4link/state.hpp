@@ -14,25 +14,19 @@
 namespace r4 {
 
 // Every state field, in the order in which the board sends them. The first ten are the paper's
-// default set.
+// default set. What each field is, and its units: tables/state_fields.hpp.
 enum class StateField : std::uint8_t {
-  // volts, two decimals
   ain24,
   ain12,
   ain5,
   aindmh,
-  // 1: the dead-man's handle is held, 0: released
   dmhsta,
-  // volts
   ainsteer,
-  // pwm,direction
   dhb1a,
   osmc1,
-  // steps
   step1pos,
-  // microseconds of pulse width
   servo1pos,
-  // the rest, in the same forms
+  // the end of the default set
   ain6,
   dhb1b,
   dhb2a,
@@ -58,41 +52,36 @@ enum class StateField : std::uint8_t {
   servo14pos,
   servo15pos,
   servo16pos,
-  // counts
   enc1,
   enc2,
   enc3,
   enc4,
-  // centimetres; 0: no echo
   us1,
   us2,
   us3,
   us4,
-  // speed,direction,brake
   bldc1,
   bldc2,
   bldc3,
   bldc4,
-  relays,  // bit n-1 is relay n, 0-255
-  safe,    // SafeReason
-  cmd,     // PNum of the last command executed
-  rxok,    // datagrams accepted since boot
-  rxcrc,   // dropped: bad checksum, syntax or length
-  rxlost,  // gaps in the host's packet numbers
-  rxdup,   // received again
-  rxref,   // commands refused
-  late,    // state periods that the board's loop missed
-  // counts a second over the last tenth of a second; negative backwards
+  relays,
+  safe,
+  cmd,
+  rxok,
+  rxcrc,
+  rxlost,
+  rxdup,
+  rxref,
+  late,
   enc1hz,
   enc2hz,
   enc3hz,
   enc4hz,
-  // what the encoder counted where its index line rose last; 0 before the first time
   enc1idx,
   enc2idx,
   enc3idx,
   enc4idx,
-  // the user's I2C bus (docs/devices.md): t,errors,bytes of each repeated reading
+  // of the user's devices (docs/devices.md)
   i2c1,
   i2c2,
   i2c3,
@@ -101,16 +90,14 @@ enum class StateField : std::uint8_t {
   i2c6,
   i2c7,
   i2c8,
-  i2cx,    // PNum,outcome,bytes of the newest single transfer
-  i2cbus,  // outcome,errors,recoveries
-  // the user's UARTs: position,lost,bytes
+  i2cx,
+  i2cbus,
   uart1,
   uart2,
-  // millivolts
   dac1,
   dac2,
-  gpio,   // bit n-1 is input n, 0-255
-  fault,  // chip,trouble: ChipFault; 0,0: none
+  gpio,
+  fault,
   count
 };
 constexpr int state_field_count = static_cast<int>(StateField::count);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "r4link/state.hpp"
 
-#include <cmath>
-
 #include "../datagram/numbers.hpp"
 #include "../datagram/word_index.hpp"
 #include "device_fields.hpp"
@@ -57,9 +55,7 @@ static_assert(sizeof state_fields / sizeof state_fields[0] == state_field_count 
 static_assert(in_order(), "the tables are indexed by their enums, the names are of the grammar");
 static_assert(sizeof(State) <= 0xFFFF, "places have 16 bits");
 
-constexpr const Entry& entry_of(StateField field) {
-  return table.entries[static_cast<int>(field)];
-}
+constexpr const Entry& entry_of(StateField field) { return table.entries[static_cast<int>(field)]; }
 
 template <class Member>
 const Member& member(const State& state, const Entry& entry) {
@@ -296,7 +292,8 @@ bool read_fields(const Datagram& datagram, State& state) {
       if (index == state_field_count) continue;
     }
     const auto which = static_cast<StateField>(index);
-    if (present.has(which) || !parse_entry(field.values(), table.entries[index], state)) return false;
+    if (present.has(which) || !parse_entry(field.values(), table.entries[index], state))
+      return false;
     present.add(which);
     expected = index + 1;
   }
@@ -335,8 +332,9 @@ bool set_numbers(State& state, StateField field, const StateNumbers& numbers) {
   const bool volts = entry_of(field).form == Form::volts;
   const double most = volts ? INT32_MAX : UINT32_MAX;
   for (int i = 0; i < numbers.count; ++i) {
-    const double number = std::round(volts ? 100 * numbers[i] : numbers[i]);
-    if (!(number >= INT32_MIN && number <= most)) return false;
+    const double exact = volts ? 100 * numbers[i] : numbers[i];
+    const double number = exact + (exact < 0 ? -0.5 : 0.5);  // the cast below cuts it off
+    if (!(number > INT32_MIN - 1.0 && number < most + 1)) return false;
     if (volts) {
       writer.hundredths(static_cast<std::int32_t>(number));
     } else if (number < 0) {

@@ -45,8 +45,7 @@ BoardTopics::BoardTopics(Graph& graph, std::size_t node, const NodeOptions& opti
   for (const StateField field : fields) {
     const StateFieldRow& row = row_of(field);
     components_[static_cast<std::size_t>(field)].writer = make_topic(graph, node, row);
-    const bool is_of_encoder =
-        row.kind == FieldKind::encoder || row.kind == FieldKind::encoder_hz;
+    const bool is_of_encoder = row.kind == FieldKind::encoder || row.kind == FieldKind::encoder_hz;
     if ((is_of_encoder && options.counts_per_turn) ||
         (row.kind == FieldKind::stepper && options.steps_per_turn)) {
       joint_fields_.add(field);

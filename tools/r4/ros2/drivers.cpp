@@ -97,7 +97,8 @@ void Drivers::on_sent(const Command& command, const void* source, std::uint64_t 
 void Drivers::on_state(const State& state, Time sampled) {
   for (int n = 1; n <= stepper_channels; ++n) {
     Position& position = positions_[static_cast<std::size_t>(n - 1)];
-    if (!state.present.has(state_field(FieldKind::stepper, n)) || sampled < position.counts_from) continue;
+    if (!state.present.has(state_field(FieldKind::stepper, n)) || sampled < position.counts_from)
+      continue;
     position.steps = state.steps(n);
     position.sampled = sampled;
   }
