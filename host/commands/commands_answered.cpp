@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How the board's datagrams end the commands under way.
+#include <utility>
+
 #include "commands_under_way.hpp"
 #include "r4link/tables/state_fields.hpp"
 
@@ -7,41 +9,28 @@ namespace r4 {
 
 namespace {
 
+// The commands whose value the state shows, but `relay`.
+constexpr std::pair<CommandKind, FieldKind> shown_commands[] = {
+    {CommandKind::osmc, FieldKind::osmc},   {CommandKind::dhb12, FieldKind::dhb12},
+    {CommandKind::servo, FieldKind::servo}, {CommandKind::stepper, FieldKind::stepper},
+    {CommandKind::bldc, FieldKind::bldc},   {CommandKind::dac, FieldKind::dac}};
+
 // For boards that do not report CMD: true if `state`, as one datagram carried it, shows the value
 // that `command` sets. Commands without a state field (threshold, fields, settings) are never
 // shown.
 bool state_shows(const State& state, const Command& command) {
-  FieldKind kind{};
-  switch (command.kind) {
-    case CommandKind::osmc:
-      kind = FieldKind::osmc;
-      break;
-    case CommandKind::dhb12:
-      kind = FieldKind::dhb12;
-      break;
-    case CommandKind::servo:
-      kind = FieldKind::servo;
-      break;
-    case CommandKind::stepper:
-      kind = FieldKind::stepper;
-      break;
-    case CommandKind::bldc:
-      kind = FieldKind::bldc;
-      break;
-    case CommandKind::dac:
-      kind = FieldKind::dac;
-      break;
-    case CommandKind::relay:
-      return state.present.has(StateField::relays) && state.relay(command.channel) == command.on;
-    default:
-      return false;
+  if (command.kind == CommandKind::relay) {
+    return state.present.has(StateField::relays) && state.relay(command.channel) == command.on;
   }
-  const StateField field = state_field(kind, command.channel);
-  if (!state.present.has(field)) return false;
-  const StateNumbers shown = numbers_of(state, field);  // value, direction, brake
-  return shown[0] == command.value &&
-         (shown.count < 2 || shown[1] == static_cast<double>(command.direction)) &&
-         (shown.count < 3 || shown[2] == static_cast<double>(command.on));
+  for (const auto& [kind, shown] : shown_commands) {
+    const StateField field = state_field(shown, command.channel);
+    if (kind != command.kind || !state.present.has(field)) continue;
+    const StateNumbers numbers = numbers_of(state, field);  // value, direction, brake
+    return numbers[0] == command.value &&
+           (numbers.count < 2 || numbers[1] == static_cast<double>(command.direction)) &&
+           (numbers.count < 3 || numbers[2] == static_cast<double>(command.on));
+  }
+  return false;
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The board's state as typed values, and the fields that carry it (paper section 4.1).
 //
-// tables/state_fields.hpp names every field, its unit and its place in State. The board writes with that table,
-// the host reads with it, and the `F` command selects from it.
+// tables/state_fields.hpp names every field, its unit and its place in State. The board writes with
+// that table, the host reads with it, and the `F` command selects from it.
 #pragma once
 
 #include <cstdint>
@@ -15,91 +15,29 @@ namespace r4 {
 
 // Every state field, in the order in which the board sends them. The first ten are the paper's
 // default set. What each field is, and its units: tables/state_fields.hpp.
+// clang-format off
 enum class StateField : std::uint8_t {
-  ain24,
-  ain12,
-  ain5,
-  aindmh,
-  dmhsta,
-  ainsteer,
-  dhb1a,
-  osmc1,
-  step1pos,
-  servo1pos,
-  // the end of the default set
+  ain24, ain12, ain5, aindmh, dmhsta, ainsteer, dhb1a, osmc1, step1pos, servo1pos,
   ain6,
-  dhb1b,
-  dhb2a,
-  dhb2b,
-  osmc2,
-  osmc3,
-  osmc4,
-  step2pos,
-  step3pos,
-  step4pos,
-  servo2pos,
-  servo3pos,
-  servo4pos,
-  servo5pos,
-  servo6pos,
-  servo7pos,
-  servo8pos,
-  servo9pos,
-  servo10pos,
-  servo11pos,
-  servo12pos,
-  servo13pos,
-  servo14pos,
-  servo15pos,
-  servo16pos,
-  enc1,
-  enc2,
-  enc3,
-  enc4,
-  us1,
-  us2,
-  us3,
-  us4,
-  bldc1,
-  bldc2,
-  bldc3,
-  bldc4,
-  relays,
-  safe,
-  cmd,
-  rxok,
-  rxcrc,
-  rxlost,
-  rxdup,
-  rxref,
-  late,
-  enc1hz,
-  enc2hz,
-  enc3hz,
-  enc4hz,
-  enc1idx,
-  enc2idx,
-  enc3idx,
-  enc4idx,
+  dhb1b, dhb2a, dhb2b,
+  osmc2, osmc3, osmc4,
+  step2pos, step3pos, step4pos,
+  servo2pos, servo3pos, servo4pos, servo5pos, servo6pos, servo7pos, servo8pos, servo9pos,
+  servo10pos, servo11pos, servo12pos, servo13pos, servo14pos, servo15pos, servo16pos,
+  enc1, enc2, enc3, enc4,
+  us1, us2, us3, us4,
+  bldc1, bldc2, bldc3, bldc4,
+  relays, safe, cmd,
+  rxok, rxcrc, rxlost, rxdup, rxref, late,
+  enc1hz, enc2hz, enc3hz, enc4hz,
+  enc1idx, enc2idx, enc3idx, enc4idx,
   // of the user's devices (docs/devices.md)
-  i2c1,
-  i2c2,
-  i2c3,
-  i2c4,
-  i2c5,
-  i2c6,
-  i2c7,
-  i2c8,
-  i2cx,
-  i2cbus,
-  uart1,
-  uart2,
-  dac1,
-  dac2,
-  gpio,
+  i2c1, i2c2, i2c3, i2c4, i2c5, i2c6, i2c7, i2c8, i2cx, i2cbus,
+  uart1, uart2, dac1, dac2, gpio,
   fault,
   count
 };
+// clang-format on
 constexpr int state_field_count = static_cast<int>(StateField::count);
 
 // A set of state fields: the preamble's selection, or what a datagram brought.

@@ -230,54 +230,59 @@ void write_field(DatagramWriter& writer, StateField field, const State& state) {
   }
 }
 
+namespace {
+
+template <class... Values>
+StateNumbers numbers(Values... values) {
+  return {sizeof...(values), {static_cast<double>(values)...}};
+}
+
+}  // namespace
+
 StateNumbers numbers_of(const State& state, StateField field) {
   const Entry& entry = entry_of(field);
   switch (entry.form) {
     case Form::volts:
-      return {1, {member<std::int32_t>(state, entry) / 100.0}};
+      return numbers(member<std::int32_t>(state, entry) / 100.0);
     case Form::flag:
-      return {1, {member<bool>(state, entry) ? 1.0 : 0.0}};
+      return numbers(member<bool>(state, entry));
     case Form::drive: {
       const Drive& drive = member<Drive>(state, entry);
-      return {2, {double(drive.pwm), double(drive.direction)}};
+      return numbers(drive.pwm, drive.direction);
     }
     case Form::bldc: {
       const Bldc& bldc = member<Bldc>(state, entry);
-      return {3, {double(bldc.speed), double(bldc.direction), bldc.brake ? 1.0 : 0.0}};
+      return numbers(bldc.speed, bldc.direction, bldc.brake);
     }
     case Form::servo:
     case Form::u16:
-      return {1, {double(member<std::uint16_t>(state, entry))}};
+      return numbers(member<std::uint16_t>(state, entry));
     case Form::u8:
-      return {1, {double(member<std::uint8_t>(state, entry))}};
+      return numbers(member<std::uint8_t>(state, entry));
     case Form::i32:
-      return {1, {double(member<std::int32_t>(state, entry))}};
+      return numbers(member<std::int32_t>(state, entry));
     case Form::u32:
-      return {1, {double(member<std::uint32_t>(state, entry))}};
+      return numbers(member<std::uint32_t>(state, entry));
     case Form::reason:
-      return {1, {double(member<SafeReason>(state, entry))}};
+      return numbers(member<SafeReason>(state, entry));
     case Form::fault: {
       const ChipFault& fault = member<ChipFault>(state, entry);
-      return {2, {double(fault.address), double(fault.trouble)}};
+      return numbers(fault.address, fault.trouble);
     }
     case Form::reading: {
       const I2cReading& reading = member<I2cReading>(state, entry);
-      return {2, {double(reading.t_ms), double(reading.errors)}};
+      return numbers(reading.t_ms, reading.errors);
     }
-    case Form::answer: {
-      const I2cAnswer& answer = member<I2cAnswer>(state, entry);
-      return {2, {double(answer.pnum), double(answer.outcome)}};
-    }
-    case Form::bus: {
-      const I2cBusReport& bus = member<I2cBusReport>(state, entry);
-      return {3, {double(bus.newest), double(bus.errors), double(bus.recoveries)}};
-    }
+    case Form::answer:
+      return numbers(state.i2c_answer.pnum, state.i2c_answer.outcome);
+    case Form::bus:
+      return numbers(state.i2c_bus.newest, state.i2c_bus.errors, state.i2c_bus.recoveries);
     case Form::uart: {
       const UartBytes& uart = member<UartBytes>(state, entry);
-      return {2, {double(uart.position), double(uart.lost)}};
+      return numbers(uart.position, uart.lost);
     }
   }
-  return {0, {}};
+  return {};
 }
 
 namespace {

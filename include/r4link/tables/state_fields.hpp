@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state fields in two tables (docs/protocol.md). A row of the first says what a field is of: a kind and a
-// channel. A row of the second says what the values of that kind are: their form, units and place in State.
+// The state fields in two tables (docs/protocol.md). A row of the first says what a field is of: a
+// kind and a channel. A row of the second says what the values of that kind are: their form, units
+// and place in State.
 //
 //     for (const StateFieldRow& row : state_fields) …   in the order of the wire
 //     state_field(FieldKind::osmc, 2)                   StateField::osmc2
 //     numbers_of(state, StateField::osmc2)[0]           its duty cycle, 0-4095
 //     kind_row_of(StateField::osmc2).values[0].unit     "0-4095"
 //
-// Both tables are constants. A program that reads them only while it is compiled, as the firmware does, carries
-// none of their texts.
+// Both tables are constants. A program that reads them only while it is compiled, as the firmware
+// does, carries none of their texts.
 #pragma once
 
 #include <cstddef>
@@ -23,36 +24,14 @@
 
 namespace r4 {
 
+// clang-format off
 enum class FieldKind : std::uint8_t {
-  analog,
-  handle,
-  dhb12,
-  osmc,
-  stepper,
-  servo,
-  encoder,
-  ultrasonic,
-  bldc,
-  relays,
-  safe,
-  last_command,
-  rx_ok,
-  rx_crc,
-  rx_lost,
-  rx_duplicate,
-  rx_refused,
-  late,
-  encoder_hz,
-  encoder_index,
-  i2c,
-  i2c_answer,
-  i2c_bus,
-  uart,
-  dac,
-  gpio,
-  fault,
+  analog, handle, dhb12, osmc, stepper, servo, encoder, ultrasonic, bldc, relays,
+  safe, last_command, rx_ok, rx_crc, rx_lost, rx_duplicate, rx_refused, late,
+  encoder_hz, encoder_index, i2c, i2c_answer, i2c_bus, uart, dac, gpio, fault,
   count
 };
+// clang-format on
 constexpr int field_kind_count = static_cast<int>(FieldKind::count);
 
 // How the values of a field look on the wire, and which type of State's they are.
@@ -228,7 +207,8 @@ constexpr FieldKindRow field_kinds[] = {
      "The packet numbers of the controlling host that did not reach the board."},
     {R4_KIND(rx_duplicate, u32, rx_duplicate), {{"", "datagrams"}},
      "The datagrams that reached the board again."},
-    {R4_KIND(rx_refused, u32, rx_refused), {{"", "commands"}}, "The commands that the board refused."},
+    {R4_KIND(rx_refused, u32, rx_refused), {{"", "commands"}},
+     "The commands that the board refused."},
     {R4_KIND(late, u32, late), {{"", "periods"}},
      "The states that were left out because the board's loop was late."},
     {R4_KIND(encoder_hz, i32, raw.encoder_hz), {{"", "counts/s"}},
@@ -244,7 +224,8 @@ constexpr FieldKindRow field_kinds[] = {
     {R4_KIND(i2c_bus, bus, i2c_bus),
      {{"outcome", "0-3"}, {"errors", "transfers"}, {"recoveries", "times"}},
      "The state of the user's I2C bus."},
-    {R4_KIND(uart, uart, raw.uart), {{"position", "bytes"}, {"lost", "bytes"}, {"bytes", "hex"}},
+    {R4_KIND(uart, uart, raw.uart),
+     {{"position", "bytes"}, {"lost", "bytes"}, {"bytes", "hex"}},
      "The newest bytes that one of the user's UARTs received."},
     {R4_KIND(dac, u16, raw.dac_mv), {{"", "mV"}}, "One of the user's output voltages."},
     {R4_KIND(gpio, u8, gpio), {{"", "bits"}}, "The spare inputs that are high: bit n-1 is input n."},
@@ -271,8 +252,9 @@ struct StateNumbers {
   double operator[](int i) const { return values[i]; }
 };
 R4LINK_API StateNumbers numbers_of(const State& state, StateField field);
-// Writes what numbers_of() reads; a number of a whole type is rounded. False, with the state unchanged, if
-// a number is outside the range of the field, if the field has not so many, or if it has bytes.
+// Writes what numbers_of() reads, rounded to what the field can hold. `present` stays. False, with
+// the state unchanged, if a number is outside the range of the field, if the field has not so many
+// numbers, or if it has bytes.
 R4LINK_API bool set_numbers(State& state, StateField field, const StateNumbers& numbers);
 
 }  // namespace r4
