@@ -21,10 +21,10 @@ struct Entry {
   std::uint16_t place = 0;  // in State
 };
 
-struct Table {
+struct FieldTable {
   Entry entries[state_field_count];
 
-  constexpr Table() : entries() {
+  constexpr FieldTable() : entries() {
     for (int i = 0; i < state_field_count; ++i) {
       const StateFieldRow& row = state_fields[i];
       const FieldKindRow& kind = row_of(row.kind);
@@ -37,12 +37,12 @@ struct Table {
     }
   }
 };
-constexpr Table table;
+constexpr FieldTable field_table;
 
 constexpr bool in_order() {
   for (int i = 0; i < state_field_count; ++i) {
     if (state_fields[i].field != static_cast<StateField>(i)) return false;
-    if (!table.entries[i].name.allowed()) return false;
+    if (!field_table.entries[i].name.allowed()) return false;
   }
   for (int i = 0; i < field_kind_count; ++i) {
     if (field_kinds[i].kind != static_cast<FieldKind>(i)) return false;
@@ -55,7 +55,9 @@ static_assert(sizeof state_fields / sizeof state_fields[0] == state_field_count 
 static_assert(in_order(), "the tables are indexed by their enums, the names are of the grammar");
 static_assert(sizeof(State) <= 0xFFFF, "places have 16 bits");
 
-constexpr const Entry& entry_of(StateField field) { return table.entries[static_cast<int>(field)]; }
+constexpr const Entry& entry_of(StateField field) {
+  return field_table.entries[static_cast<int>(field)];
+}
 
 template <class Member>
 const Member& member(const State& state, const Entry& entry) {
@@ -67,7 +69,7 @@ Member& member(State& state, const Entry& entry) {
 }
 
 constexpr Text name_of_entry(const Entry& entry) { return entry.name.name(); }
-constexpr WordIndex<Entry, state_field_count, name_of_entry> name_index(table.entries);
+constexpr WordIndex<Entry, state_field_count, name_of_entry> name_index(field_table.entries);
 
 bool parse_up_to(Text text, std::uint32_t limit, std::uint32_t& out) {
   return parse_number(text, out) && out <= limit;
@@ -166,7 +168,7 @@ StateField state_field(Text name) {
 
 StateField state_field(FieldKind kind, int channel) {
   for (int i = 0; i < state_field_count; ++i) {
-    const Entry& entry = table.entries[i];
+    const Entry& entry = field_table.entries[i];
     if (entry.kind == kind && entry.channel == channel) return static_cast<StateField>(i);
   }
   return StateField::count;
@@ -292,12 +294,12 @@ bool read_fields(const Datagram& datagram, State& state) {
   int expected = 0;  // boards send in the table's order, so the next entry is the likely one
   for (const Field& field : datagram) {
     int index = expected;
-    if (index == state_field_count || table.entries[index].name.name() != field.name()) {
+    if (index == state_field_count || field_table.entries[index].name.name() != field.name()) {
       index = static_cast<int>(state_field(field.name()));
       if (index == state_field_count) continue;
     }
     const auto which = static_cast<StateField>(index);
-    if (present.has(which) || !parse_entry(field.values(), table.entries[index], state))
+    if (present.has(which) || !parse_entry(field.values(), field_table.entries[index], state))
       return false;
     present.add(which);
     expected = index + 1;

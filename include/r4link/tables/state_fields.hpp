@@ -228,7 +228,8 @@ constexpr FieldKindRow field_kinds[] = {
      {{"position", "bytes"}, {"lost", "bytes"}, {"bytes", "hex"}},
      "The newest bytes that one of the user's UARTs received."},
     {R4_KIND(dac, u16, raw.dac_mv), {{"", "mV"}}, "One of the user's output voltages."},
-    {R4_KIND(gpio, u8, gpio), {{"", "bits"}}, "The spare inputs that are high: bit n-1 is input n."},
+    {R4_KIND(gpio, u8, gpio), {{"", "bits"}},
+     "The spare inputs that are high: bit n-1 is input n."},
     {R4_KIND(fault, fault, fault), {{"chip", "address"}, {"trouble", "bits"}},
      "The chip of the board that has a fault, and which fault."},
 };

@@ -18,7 +18,7 @@ namespace {
 using test::str;
 
 // The values of a field as docs/protocol.md names them: "V", "pwm,direction".
-std::string values_of(const FieldKindRow& kind) {
+std::string value_cell_of(const FieldKindRow& kind) {
   if (kind.value_count() == 1) return kind.values[0].unit;
   std::string names;
   for (int i = 0; i < kind.value_count(); ++i) {
@@ -66,7 +66,7 @@ TEST(StateFields, AreThoseOfProtocolMd) {
     for (const std::string& name : names_in(names)) {
       ASSERT_NE(row, std::end(state_fields)) << name;
       EXPECT_EQ(name, str(row->name));
-      EXPECT_EQ(values, " " + values_of(row_of(row->kind)) + " ") << name;
+      EXPECT_EQ(values, " " + value_cell_of(row_of(row->kind)) + " ") << name;
       ++row;
     }
   }

@@ -152,7 +152,7 @@ void BoardTopics::on_state(const State& state, WallTime sampled, std::uint32_t b
   gather_joints(state, sampled, boot);
 }
 
-// Compared as a pulse: the position of a servo that is off is not a number, and never equals another.
+// Compared as a pulse: the position of a servo that is off is NaN, which never equals itself.
 void BoardTopics::publish_pulse(StateField servo, int pulse_us, Clock::time_point now) {
   Changing<double>& topic = components_[static_cast<std::size_t>(servo)];
   if (!topic.is_due(pulse_us, now)) return;
