@@ -1,50 +1,36 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How the board's datagrams end the commands under way.
+#include <utility>
+
 #include "commands_under_way.hpp"
+#include "r4link/tables/state_fields.hpp"
 
 namespace r4 {
 
 namespace {
 
-// The field of a channel. `second`: the field of channel 2, which the fields of later channels
-// follow.
-StateField field_of(StateField first, StateField second, int channel) {
-  if (channel == 1) return first;
-  return static_cast<StateField>(static_cast<int>(second) + channel - 2);
-}
+// The commands whose value the state shows, but `relay`.
+constexpr std::pair<CommandKind, FieldKind> shown_commands[] = {
+    {CommandKind::osmc, FieldKind::osmc},   {CommandKind::dhb12, FieldKind::dhb12},
+    {CommandKind::servo, FieldKind::servo}, {CommandKind::stepper, FieldKind::stepper},
+    {CommandKind::bldc, FieldKind::bldc},   {CommandKind::dac, FieldKind::dac}};
 
 // For boards that do not report CMD: true if `state`, as one datagram carried it, shows the value
 // that `command` sets. Commands without a state field (threshold, fields, settings) are never
 // shown.
 bool state_shows(const State& state, const Command& command) {
-  const int channel = command.channel;
-  const auto i = static_cast<std::size_t>(channel - 1);
-  switch (command.kind) {
-    case CommandKind::osmc:
-      return state.present.has(field_of(StateField::osmc1, StateField::osmc2, channel)) &&
-             state.raw.osmc[i].pwm == command.value && state.raw.osmc[i].direction == command.direction;
-    case CommandKind::dhb12:
-      return state.present.has(field_of(StateField::dhb1a, StateField::dhb1b, channel)) &&
-             state.raw.dhb12[i].pwm == command.value && state.raw.dhb12[i].direction == command.direction;
-    case CommandKind::servo:
-      return state.present.has(field_of(StateField::servo1pos, StateField::servo2pos, channel)) &&
-             state.raw.servo_us[i] == command.value;
-    case CommandKind::relay:
-      return state.present.has(StateField::relays) &&
-             (((state.relays >> i) & 1) != 0) == command.on;
-    case CommandKind::stepper:
-      return state.present.has(field_of(StateField::step1pos, StateField::step2pos, channel)) &&
-             state.raw.stepper_steps[i] == command.value;
-    case CommandKind::bldc:
-      return state.present.has(field_of(StateField::bldc1, StateField::bldc2, channel)) &&
-             state.raw.bldc[i].speed == command.value && state.raw.bldc[i].direction == command.direction &&
-             state.raw.bldc[i].brake == command.on;
-    case CommandKind::dac:
-      return state.present.has(field_of(StateField::dac1, StateField::dac2, channel)) &&
-             state.raw.dac_mv[i] == command.value;
-    default:
-      return false;
+  if (command.kind == CommandKind::relay) {
+    return state.present.has(StateField::relays) && state.relay(command.channel) == command.on;
   }
+  for (const auto& [kind, shown] : shown_commands) {
+    const StateField field = state_field(shown, command.channel);
+    if (kind != command.kind || !state.present.has(field)) continue;
+    const StateNumbers numbers = numbers_of(state, field);  // value, direction, brake
+    return numbers[0] == command.value &&
+           (numbers.count < 2 || numbers[1] == static_cast<double>(command.direction)) &&
+           (numbers.count < 3 || numbers[2] == static_cast<double>(command.on));
+  }
+  return false;
 }
 
 }  // namespace

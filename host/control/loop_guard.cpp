@@ -7,6 +7,7 @@
 
 #include "r4link/control/loop.hpp"
 #include "r4link/error.hpp"
+#include "r4link/tables/state_fields.hpp"
 
 namespace r4::control {
 namespace {
@@ -73,7 +74,7 @@ LoopGuard::LoopGuard(LoopOptions options)
     if (each.pwm <= 0 || each.counts < 0 || each.time.count() <= 0) {
       throw wrong("a standstill of no duty, counts or time", "give a duty and a time above 0");
     }
-    needed_.add(static_cast<StateField>(static_cast<int>(StateField::enc1) + each.encoder - 1));
+    needed_.add(state_field(FieldKind::encoder, each.encoder));
     motors_.push_back({.limits = each});
   }
 }

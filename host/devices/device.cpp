@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "r4link/error.hpp"
+#include "r4link/tables/state_fields.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4 {
@@ -56,14 +57,15 @@ std::string Device::place() const { return fmt::format("{}:{}", text(), first_sl
 std::string Device::fields() const {
   std::string names;
   for (int slot = first_slot_; slot <= last_slot(); ++slot) {
-    names += fmt::format("{}I2C{}", names.empty() ? "" : ",", slot);
+    const Text name = name_of(state_field(FieldKind::i2c, slot));
+    names.append(names.empty() ? "" : ",").append(name.data(), name.size());
   }
   return names;
 }
 
 StateField Device::field(std::size_t value) const {
   const int slot = first_slot_ + static_cast<int>(description_.values[value].poll);
-  return static_cast<StateField>(static_cast<int>(StateField::i2c1) + slot - 1);
+  return state_field(FieldKind::i2c, slot);
 }
 
 std::optional<bool> Device::is_set_up(const State& state) const {

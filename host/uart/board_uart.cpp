@@ -9,6 +9,7 @@
 #include "../commands/limits.hpp"
 #include "../devices/device_steps.hpp"
 #include "r4link/board.hpp"
+#include "r4link/tables/state_fields.hpp"
 
 namespace r4 {
 
@@ -54,7 +55,7 @@ void Board::dac(Channel channel, Millivolts voltage, Duration timeout) {
 // On the loop.
 void Board::Impl::take_uarts(const State& fresh) {
   for (int i = 0; i < uart_channels; ++i) {
-    if (!fresh.present.has(i == 0 ? StateField::uart1 : StateField::uart2)) continue;
+    if (!fresh.present.has(state_field(FieldKind::uart, i + 1))) continue;
     std::unique_lock lock(mutex);
     UartInbox& inbox = uarts[i];
     const bool reports = inbox.reports;

@@ -29,5 +29,6 @@
 #include "simulation.hpp"
 #include "state.hpp"
 #include "subscription.hpp"
+#include "tables/state_fields.hpp"
 #include "text.hpp"
 #include "vocabulary.hpp"

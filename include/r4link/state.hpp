@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The board's state as typed values, and the fields that carry it (paper section 4.1).
 //
-// One table names every field, its unit and where it lives in State; the board writes with it, the host
-// reads with it, the `F` command selects from it.
+// tables/state_fields.hpp names every field, its unit and its place in State. The board writes with
+// that table, the host reads with it, and the `F` command selects from it.
 #pragma once
 
 #include <cstdint>
@@ -14,111 +14,37 @@
 namespace r4 {
 
 // Every state field, in the order in which the board sends them. The first ten are the paper's
-// default set.
+// default set. What each field is, and its units: tables/state_fields.hpp.
+// clang-format off
 enum class StateField : std::uint8_t {
-  // volts, two decimals
-  ain24,
-  ain12,
-  ain5,
-  aindmh,
-  // 1: the dead-man's handle is held, 0: released
-  dmhsta,
-  // volts
-  ainsteer,
-  // pwm,direction
-  dhb1a,
-  osmc1,
-  // steps
-  step1pos,
-  // microseconds of pulse width
-  servo1pos,
-  // the rest, in the same forms
+  ain24, ain12, ain5, aindmh, dmhsta, ainsteer, dhb1a, osmc1, step1pos, servo1pos,
   ain6,
-  dhb1b,
-  dhb2a,
-  dhb2b,
-  osmc2,
-  osmc3,
-  osmc4,
-  step2pos,
-  step3pos,
-  step4pos,
-  servo2pos,
-  servo3pos,
-  servo4pos,
-  servo5pos,
-  servo6pos,
-  servo7pos,
-  servo8pos,
-  servo9pos,
-  servo10pos,
-  servo11pos,
-  servo12pos,
-  servo13pos,
-  servo14pos,
-  servo15pos,
-  servo16pos,
-  // counts
-  enc1,
-  enc2,
-  enc3,
-  enc4,
-  // centimetres; 0: no echo
-  us1,
-  us2,
-  us3,
-  us4,
-  // speed,direction,brake
-  bldc1,
-  bldc2,
-  bldc3,
-  bldc4,
-  relays,  // bit n-1 is relay n, 0-255
-  safe,    // SafeReason
-  cmd,     // PNum of the last command executed
-  rxok,    // datagrams accepted since boot
-  rxcrc,   // dropped: bad checksum, syntax or length
-  rxlost,  // gaps in the host's packet numbers
-  rxdup,   // received again
-  rxref,   // commands refused
-  late,    // state periods that the board's loop missed
-  // counts a second over the last tenth of a second; negative backwards
-  enc1hz,
-  enc2hz,
-  enc3hz,
-  enc4hz,
-  // what the encoder counted where its index line rose last; 0 before the first time
-  enc1idx,
-  enc2idx,
-  enc3idx,
-  enc4idx,
-  // the user's I2C bus (docs/devices.md): t,errors,bytes of each repeated reading
-  i2c1,
-  i2c2,
-  i2c3,
-  i2c4,
-  i2c5,
-  i2c6,
-  i2c7,
-  i2c8,
-  i2cx,    // PNum,outcome,bytes of the newest single transfer
-  i2cbus,  // outcome,errors,recoveries
-  // the user's UARTs: position,lost,bytes
-  uart1,
-  uart2,
-  // millivolts
-  dac1,
-  dac2,
-  gpio,   // bit n-1 is input n, 0-255
-  fault,  // chip,trouble: ChipFault; 0,0: none
+  dhb1b, dhb2a, dhb2b,
+  osmc2, osmc3, osmc4,
+  step2pos, step3pos, step4pos,
+  servo2pos, servo3pos, servo4pos, servo5pos, servo6pos, servo7pos, servo8pos, servo9pos,
+  servo10pos, servo11pos, servo12pos, servo13pos, servo14pos, servo15pos, servo16pos,
+  enc1, enc2, enc3, enc4,
+  us1, us2, us3, us4,
+  bldc1, bldc2, bldc3, bldc4,
+  relays, safe, cmd,
+  rxok, rxcrc, rxlost, rxdup, rxref, late,
+  enc1hz, enc2hz, enc3hz, enc4hz,
+  enc1idx, enc2idx, enc3idx, enc4idx,
+  // of the user's devices (docs/devices.md)
+  i2c1, i2c2, i2c3, i2c4, i2c5, i2c6, i2c7, i2c8, i2cx, i2cbus,
+  uart1, uart2, dac1, dac2, gpio,
+  fault,
   count
 };
+// clang-format on
 constexpr int state_field_count = static_cast<int>(StateField::count);
 
 // A set of state fields: the preamble's selection, or what a datagram brought.
 class R4LINK_API FieldSet {
  public:
   constexpr FieldSet() = default;
+  // No set has StateField::count.
   constexpr bool has(StateField f) const { return (words_[word_of(f)] & bit_of(f)) != 0; }
   void add(StateField f) { words_[word_of(f)] |= bit_of(f); }
   void remove(StateField f) { words_[word_of(f)] &= ~bit_of(f); }
@@ -170,7 +96,7 @@ class R4LINK_API FieldSet {
 
  private:
   static constexpr int word_bits = 32;
-  static constexpr int word_count = (state_field_count + word_bits - 1) / word_bits;
+  static constexpr int word_count = state_field_count / word_bits + 1;
   static constexpr int word_of(StateField f) { return static_cast<int>(f) / word_bits; }
   static constexpr std::uint32_t bit_of(StateField f) {
     return std::uint32_t{1} << static_cast<int>(f) % word_bits;

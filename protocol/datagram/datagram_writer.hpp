@@ -21,19 +21,19 @@ namespace r4 {
 
 // A name that is known when the program is compiled, as the wire has it in front of a value:
 // ";OSMC1:". Made at compile time, so that writing it takes no check and no loop. At most 12
-// characters.
+// characters: the compiler refuses a longer one.
 class FieldName {
  public:
-  template <std::size_t N>
-  explicit constexpr FieldName(const char (&name)[N]) : size_(N - 1) {
-    static_assert(N > 1 && N + 1 < sizeof text_, "a name has 1 to 12 characters");
+  constexpr FieldName() = default;
+  explicit constexpr FieldName(Text name) : size_(static_cast<std::uint8_t>(name.size())) {
     text_[0] = ';';
-    for (std::size_t i = 0; i + 1 < N; ++i) text_[i + 1] = name[i];
-    text_[N] = ':';
+    for (std::size_t i = 0; i < name.size(); ++i) text_[i + 1] = name[i];
+    text_[name.size() + 1] = ':';
   }
   constexpr Text name() const { return Text(text_ + 1, size_); }
-  // Is it of the grammar? For a static_assert beside the names.
+  // True if it is of the grammar. For a static_assert beside the names.
   constexpr bool allowed() const {
+    if (size_ == 0 || size_ > 12) return false;
     for (int i = 1; i <= size_; ++i) {
       const char c = text_[i];
       if (c <= ' ' || c > '~' || c == ':' || c == ';' || c == ',' || c == '^') return false;
@@ -44,7 +44,7 @@ class FieldName {
  private:
   friend class DatagramWriter;
   char text_[15] = {};
-  std::uint8_t size_;  // of the name alone
+  std::uint8_t size_ = 0;  // of the name alone
 };
 
 class DatagramWriter {

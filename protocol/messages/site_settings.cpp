@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "../datagram/numbers.hpp"
+#include "r4link/tables/state_fields.hpp"
 
 namespace r4 {
 namespace {
@@ -158,17 +159,13 @@ Refusal set_key(Key (&keys)[max_keys], Text value) {
   return Refusal::none;
 }
 
-constexpr StateField analog_fields[analog_channels] = {StateField::ain24,    StateField::ain12,
-                                                       StateField::ain5,     StateField::aindmh,
-                                                       StateField::ainsteer, StateField::ain6};
-
 // Which setting has that key; -1: none. The analog inputs follow those of `Site`.
 int index_of(Text key) {
   for (int i = 0; i < site_count; ++i) {
     if (site_keys[i] == key) return i;
   }
   for (int i = 0; i < analog_channels; ++i) {
-    if (name_of(analog_fields[i]) == key) return site_count + i;
+    if (name_of(state_field(FieldKind::analog, i + 1)) == key) return site_count + i;
   }
   return -1;
 }
@@ -271,7 +268,7 @@ bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_sit
   }
   if (index >= first_input) {
     const int input = index - first_input;
-    key = name_of(analog_fields[input]);
+    key = name_of(state_field(FieldKind::analog, input + 1));
     char* const end = write_hundredths(out, std::int32_t{settings.full_scale_cv[input]});
     value = Text(out, static_cast<std::size_t>(end - out));
     return true;

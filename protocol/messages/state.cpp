@@ -4,148 +4,72 @@
 #include "../datagram/numbers.hpp"
 #include "../datagram/word_index.hpp"
 #include "device_fields.hpp"
+#include "r4link/tables/state_fields.hpp"
 #include "state_fields.hpp"
 
 namespace r4 {
 namespace {
 
-// How a field's values look, and which type of State's they are.
-enum class Form : std::uint8_t {
-  volts,   // int32 in hundredths: "24.28"
-  flag,    // bool: 0 or 1
-  drive,   // Drive: pwm,direction
-  bldc,    // Bldc: speed,direction,brake
-  servo,   // uint16, 0-2500
-  u8,      // uint8
-  u16,     // uint16
-  i32,     // int32
-  u32,     // uint32
-  reason,  // SafeReason
-  fault,   // ChipFault: chip,trouble
-  // of devices on the user's bus: device_fields.hpp
-  reading,  // I2cReading
-  answer,   // I2cAnswer
-  bus,      // I2cBusReport
-  uart,     // UartBytes
-};
+using Form = FieldForm;
 
+// A row of the table of fields as the parser and the writer use it.
 struct Entry {
-  StateField field;
-  Form form;
   FieldName name;
-  std::size_t offset;  // in State
+  FieldForm form = FieldForm::volts;
+  FieldKind kind = FieldKind::count;
+  std::uint8_t channel = 0;
+  std::uint16_t place = 0;  // in State
 };
 
-// clang-format off
-#define R4_ENTRY(field, form, name, member) \
-  {StateField::field, Form::form, FieldName(name), offsetof(State, member)}
-constexpr Entry table[] = {
-    R4_ENTRY(ain24, volts, "AIN24", raw.analog_cv[0]),
-    R4_ENTRY(ain12, volts, "AIN12", raw.analog_cv[1]),
-    R4_ENTRY(ain5, volts, "AIN5", raw.analog_cv[2]),
-    R4_ENTRY(aindmh, volts, "AINDMH", raw.analog_cv[3]),
-    R4_ENTRY(dmhsta, flag, "DMHSTA", handle_held),
-    R4_ENTRY(ainsteer, volts, "AINSTEER", raw.analog_cv[4]),
-    R4_ENTRY(dhb1a, drive, "DHB1A", raw.dhb12[0]),
-    R4_ENTRY(osmc1, drive, "OSMC1", raw.osmc[0]),
-    R4_ENTRY(step1pos, i32, "STEP1POS", raw.stepper_steps[0]),
-    R4_ENTRY(servo1pos, servo, "SERVO1POS", raw.servo_us[0]),
-    R4_ENTRY(ain6, volts, "AIN6", raw.analog_cv[5]),
-    R4_ENTRY(dhb1b, drive, "DHB1B", raw.dhb12[1]),
-    R4_ENTRY(dhb2a, drive, "DHB2A", raw.dhb12[2]),
-    R4_ENTRY(dhb2b, drive, "DHB2B", raw.dhb12[3]),
-    R4_ENTRY(osmc2, drive, "OSMC2", raw.osmc[1]),
-    R4_ENTRY(osmc3, drive, "OSMC3", raw.osmc[2]),
-    R4_ENTRY(osmc4, drive, "OSMC4", raw.osmc[3]),
-    R4_ENTRY(step2pos, i32, "STEP2POS", raw.stepper_steps[1]),
-    R4_ENTRY(step3pos, i32, "STEP3POS", raw.stepper_steps[2]),
-    R4_ENTRY(step4pos, i32, "STEP4POS", raw.stepper_steps[3]),
-    R4_ENTRY(servo2pos, servo, "SERVO2POS", raw.servo_us[1]),
-    R4_ENTRY(servo3pos, servo, "SERVO3POS", raw.servo_us[2]),
-    R4_ENTRY(servo4pos, servo, "SERVO4POS", raw.servo_us[3]),
-    R4_ENTRY(servo5pos, servo, "SERVO5POS", raw.servo_us[4]),
-    R4_ENTRY(servo6pos, servo, "SERVO6POS", raw.servo_us[5]),
-    R4_ENTRY(servo7pos, servo, "SERVO7POS", raw.servo_us[6]),
-    R4_ENTRY(servo8pos, servo, "SERVO8POS", raw.servo_us[7]),
-    R4_ENTRY(servo9pos, servo, "SERVO9POS", raw.servo_us[8]),
-    R4_ENTRY(servo10pos, servo, "SERVO10POS", raw.servo_us[9]),
-    R4_ENTRY(servo11pos, servo, "SERVO11POS", raw.servo_us[10]),
-    R4_ENTRY(servo12pos, servo, "SERVO12POS", raw.servo_us[11]),
-    R4_ENTRY(servo13pos, servo, "SERVO13POS", raw.servo_us[12]),
-    R4_ENTRY(servo14pos, servo, "SERVO14POS", raw.servo_us[13]),
-    R4_ENTRY(servo15pos, servo, "SERVO15POS", raw.servo_us[14]),
-    R4_ENTRY(servo16pos, servo, "SERVO16POS", raw.servo_us[15]),
-    R4_ENTRY(enc1, i32, "ENC1", raw.encoder_counts[0]),
-    R4_ENTRY(enc2, i32, "ENC2", raw.encoder_counts[1]),
-    R4_ENTRY(enc3, i32, "ENC3", raw.encoder_counts[2]),
-    R4_ENTRY(enc4, i32, "ENC4", raw.encoder_counts[3]),
-    R4_ENTRY(us1, u16, "US1", raw.ultrasonic_cm[0]),
-    R4_ENTRY(us2, u16, "US2", raw.ultrasonic_cm[1]),
-    R4_ENTRY(us3, u16, "US3", raw.ultrasonic_cm[2]),
-    R4_ENTRY(us4, u16, "US4", raw.ultrasonic_cm[3]),
-    R4_ENTRY(bldc1, bldc, "BLDC1", raw.bldc[0]),
-    R4_ENTRY(bldc2, bldc, "BLDC2", raw.bldc[1]),
-    R4_ENTRY(bldc3, bldc, "BLDC3", raw.bldc[2]),
-    R4_ENTRY(bldc4, bldc, "BLDC4", raw.bldc[3]),
-    R4_ENTRY(relays, u8, "RELAYS", relays),
-    R4_ENTRY(safe, reason, "SAFE", safe),
-    R4_ENTRY(cmd, u32, "CMD", last_command),
-    R4_ENTRY(rxok, u32, "RXOK", rx_ok),
-    R4_ENTRY(rxcrc, u32, "RXCRC", rx_crc),
-    R4_ENTRY(rxlost, u32, "RXLOST", rx_lost),
-    R4_ENTRY(rxdup, u32, "RXDUP", rx_duplicate),
-    R4_ENTRY(rxref, u32, "RXREF", rx_refused),
-    R4_ENTRY(late, u32, "LATE", late),
-    R4_ENTRY(enc1hz, i32, "ENC1HZ", raw.encoder_hz[0]),
-    R4_ENTRY(enc2hz, i32, "ENC2HZ", raw.encoder_hz[1]),
-    R4_ENTRY(enc3hz, i32, "ENC3HZ", raw.encoder_hz[2]),
-    R4_ENTRY(enc4hz, i32, "ENC4HZ", raw.encoder_hz[3]),
-    R4_ENTRY(enc1idx, i32, "ENC1IDX", raw.encoder_index_counts[0]),
-    R4_ENTRY(enc2idx, i32, "ENC2IDX", raw.encoder_index_counts[1]),
-    R4_ENTRY(enc3idx, i32, "ENC3IDX", raw.encoder_index_counts[2]),
-    R4_ENTRY(enc4idx, i32, "ENC4IDX", raw.encoder_index_counts[3]),
-    R4_ENTRY(i2c1, reading, "I2C1", raw.i2c[0]),
-    R4_ENTRY(i2c2, reading, "I2C2", raw.i2c[1]),
-    R4_ENTRY(i2c3, reading, "I2C3", raw.i2c[2]),
-    R4_ENTRY(i2c4, reading, "I2C4", raw.i2c[3]),
-    R4_ENTRY(i2c5, reading, "I2C5", raw.i2c[4]),
-    R4_ENTRY(i2c6, reading, "I2C6", raw.i2c[5]),
-    R4_ENTRY(i2c7, reading, "I2C7", raw.i2c[6]),
-    R4_ENTRY(i2c8, reading, "I2C8", raw.i2c[7]),
-    R4_ENTRY(i2cx, answer, "I2CX", i2c_answer),
-    R4_ENTRY(i2cbus, bus, "I2CBUS", i2c_bus),
-    R4_ENTRY(uart1, uart, "UART1", raw.uart[0]),
-    R4_ENTRY(uart2, uart, "UART2", raw.uart[1]),
-    R4_ENTRY(dac1, u16, "DAC1", raw.dac_mv[0]),
-    R4_ENTRY(dac2, u16, "DAC2", raw.dac_mv[1]),
-    R4_ENTRY(gpio, u8, "GPIO", gpio),
-    R4_ENTRY(fault, fault, "FAULT", fault),
+struct FieldTable {
+  Entry entries[state_field_count];
+
+  constexpr FieldTable() : entries() {
+    for (int i = 0; i < state_field_count; ++i) {
+      const StateFieldRow& row = state_fields[i];
+      const FieldKindRow& kind = row_of(row.kind);
+      Entry& entry = entries[i];
+      entry.name = FieldName(row.name);
+      entry.form = kind.form;
+      entry.kind = row.kind;
+      entry.channel = row.channel;
+      entry.place = static_cast<std::uint16_t>(kind.place + (row.channel - 1) * kind.size);
+    }
+  }
 };
-#undef R4_ENTRY
-// clang-format on
+constexpr FieldTable field_table;
 
 constexpr bool in_order() {
   for (int i = 0; i < state_field_count; ++i) {
-    if (table[i].field != static_cast<StateField>(i) || !table[i].name.allowed()) return false;
+    if (state_fields[i].field != static_cast<StateField>(i)) return false;
+    if (!field_table.entries[i].name.allowed()) return false;
+  }
+  for (int i = 0; i < field_kind_count; ++i) {
+    if (field_kinds[i].kind != static_cast<FieldKind>(i)) return false;
   }
   return true;
 }
-static_assert(sizeof table / sizeof table[0] == state_field_count, "one entry for every field");
-static_assert(in_order(), "the table is indexed by StateField, its names are of the grammar");
+static_assert(sizeof state_fields / sizeof state_fields[0] == state_field_count &&
+                  sizeof field_kinds / sizeof field_kinds[0] == field_kind_count,
+              "one row for every field and every kind");
+static_assert(in_order(), "the tables are indexed by their enums, the names are of the grammar");
+static_assert(sizeof(State) <= 0xFFFF, "places have 16 bits");
 
-constexpr const Entry& entry_of(StateField field) { return table[static_cast<int>(field)]; }
+constexpr const Entry& entry_of(StateField field) {
+  return field_table.entries[static_cast<int>(field)];
+}
 
 template <class Member>
 const Member& member(const State& state, const Entry& entry) {
-  return *reinterpret_cast<const Member*>(reinterpret_cast<const char*>(&state) + entry.offset);
+  return *reinterpret_cast<const Member*>(reinterpret_cast<const char*>(&state) + entry.place);
 }
 template <class Member>
 Member& member(State& state, const Entry& entry) {
-  return *reinterpret_cast<Member*>(reinterpret_cast<char*>(&state) + entry.offset);
+  return *reinterpret_cast<Member*>(reinterpret_cast<char*>(&state) + entry.place);
 }
 
 constexpr Text name_of_entry(const Entry& entry) { return entry.name.name(); }
-constexpr WordIndex<Entry, state_field_count, name_of_entry> name_index(table);
+constexpr WordIndex<Entry, state_field_count, name_of_entry> name_index(field_table.entries);
 
 bool parse_up_to(Text text, std::uint32_t limit, std::uint32_t& out) {
   return parse_number(text, out) && out <= limit;
@@ -242,6 +166,14 @@ StateField state_field(Text name) {
   return index == no_index ? StateField::count : static_cast<StateField>(index);
 }
 
+StateField state_field(FieldKind kind, int channel) {
+  for (int i = 0; i < state_field_count; ++i) {
+    const Entry& entry = field_table.entries[i];
+    if (entry.kind == kind && entry.channel == channel) return static_cast<StateField>(i);
+  }
+  return StateField::count;
+}
+
 void write_field(DatagramWriter& writer, StateField field, const State& state) {
   const Entry& entry = entry_of(field);
   writer.field(entry.name);
@@ -302,17 +234,73 @@ void write_field(DatagramWriter& writer, StateField field, const State& state) {
 
 namespace {
 
+template <class... Values>
+StateNumbers numbers(Values... values) {
+  return {sizeof...(values), {static_cast<double>(values)...}};
+}
+
+}  // namespace
+
+StateNumbers numbers_of(const State& state, StateField field) {
+  const Entry& entry = entry_of(field);
+  switch (entry.form) {
+    case Form::volts:
+      return numbers(member<std::int32_t>(state, entry) / 100.0);
+    case Form::flag:
+      return numbers(member<bool>(state, entry));
+    case Form::drive: {
+      const Drive& drive = member<Drive>(state, entry);
+      return numbers(drive.pwm, drive.direction);
+    }
+    case Form::bldc: {
+      const Bldc& bldc = member<Bldc>(state, entry);
+      return numbers(bldc.speed, bldc.direction, bldc.brake);
+    }
+    case Form::servo:
+    case Form::u16:
+      return numbers(member<std::uint16_t>(state, entry));
+    case Form::u8:
+      return numbers(member<std::uint8_t>(state, entry));
+    case Form::i32:
+      return numbers(member<std::int32_t>(state, entry));
+    case Form::u32:
+      return numbers(member<std::uint32_t>(state, entry));
+    case Form::reason:
+      return numbers(member<SafeReason>(state, entry));
+    case Form::fault: {
+      const ChipFault& fault = member<ChipFault>(state, entry);
+      return numbers(fault.address, fault.trouble);
+    }
+    case Form::reading: {
+      const I2cReading& reading = member<I2cReading>(state, entry);
+      return numbers(reading.t_ms, reading.errors);
+    }
+    case Form::answer:
+      return numbers(state.i2c_answer.pnum, state.i2c_answer.outcome);
+    case Form::bus:
+      return numbers(state.i2c_bus.newest, state.i2c_bus.errors, state.i2c_bus.recoveries);
+    case Form::uart: {
+      const UartBytes& uart = member<UartBytes>(state, entry);
+      return numbers(uart.position, uart.lost);
+    }
+  }
+  return {};
+}
+
+namespace {
+
 bool read_fields(const Datagram& datagram, State& state) {
   FieldSet present;
   int expected = 0;  // boards send in the table's order, so the next entry is the likely one
   for (const Field& field : datagram) {
     int index = expected;
-    if (index == state_field_count || table[index].name.name() != field.name()) {
+    if (index == state_field_count || field_table.entries[index].name.name() != field.name()) {
       index = static_cast<int>(state_field(field.name()));
       if (index == state_field_count) continue;
     }
     const auto which = static_cast<StateField>(index);
-    if (present.has(which) || !parse_entry(field.values(), table[index], state)) return false;
+    if (present.has(which) || !parse_entry(field.values(), field_table.entries[index], state))
+      return false;
     present.add(which);
     expected = index + 1;
   }
@@ -339,6 +327,34 @@ bool read_state(const Datagram& datagram, State& state) {
   }
   if (datagram.has_pnum()) state.pnum = datagram.pnum();
   if (datagram.has_time()) state.t_ms = static_cast<std::uint32_t>(datagram.time_ms());
+  return true;
+}
+
+// By way of a datagram, so that the parser checks the numbers.
+bool set_numbers(State& state, StateField field, const StateNumbers& numbers) {
+  if (numbers.count > most_field_values) return false;
+  char buffer[128];
+  DatagramWriter writer(buffer, sizeof buffer);
+  writer.field(entry_of(field).name);
+  const bool volts = entry_of(field).form == Form::volts;
+  const double most = volts ? INT32_MAX : UINT32_MAX;
+  for (int i = 0; i < numbers.count; ++i) {
+    const double exact = volts ? 100 * numbers[i] : numbers[i];
+    const double number = exact + (exact < 0 ? -0.5 : 0.5);  // the cast below cuts it off
+    if (!(number > INT32_MIN - 1.0 && number < most + 1)) return false;
+    if (volts) {
+      writer.hundredths(static_cast<std::int32_t>(number));
+    } else if (number < 0) {
+      writer.value(static_cast<std::int32_t>(number));
+    } else {
+      writer.value(static_cast<std::uint32_t>(number));
+    }
+  }
+  Datagram datagram;
+  State changed = state;
+  if (!read_datagram(writer.finish(), datagram) || !read_state(datagram, changed)) return false;
+  changed.present = state.present;
+  state = changed;
   return true;
 }
 

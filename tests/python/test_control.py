@@ -138,3 +138,7 @@ def test_states_can_be_made_up_for_tests():
         make_state(0, enc9=1)
     with pytest.raises(r4link.UsageError, match='cmd'):
         make_state(0, cmd=1)
+    for field, value in {'osmc1': (4096, 1), 'bldc1': (1, 1), 'relays': 256, 'servo1pos': -1, 'ain24': math.nan}.items():
+        with pytest.raises(r4link.UsageError, match=field):
+            make_state(0, **{field: value})
+    assert make_state(0, dac2=3300, gpio=255).as_dict() == {'pnum': 0, 't_ms': 0, 'dac2': 3300, 'gpio': 255}

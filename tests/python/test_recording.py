@@ -116,6 +116,18 @@ def test_a_device_that_another_has_replaced_measures_nothing_any_more(tmp_path):
     assert np.isnan(board.states['ina219_current'][[0, 2]]).all(), 'the last is of another recording'
 
 
+def test_each_number_of_a_field_has_a_column(tmp_path):
+    path = tmp_path / 'numbers.r4log'
+    path.write_text(HEADER + line(0.1, 'AIN24:-0.05;OSMC1:400,1;BLDC1:7,0,1;RELAYS:129;SAFE:2;CMD:4294967295;ENC1:-5;'
+                                       'I2C1:5,1,x07;I2CX:5,3,x;I2CBUS:1,2,3;UART1:9,2,x41;FAULT:64,1;PNum:1;T:10;'))
+    [board] = r4link.read(path).boards
+    assert {name: board.states[name][0].item() for name in board.states.dtype.names[3:]} == {
+        'ain24': -0.05, 'osmc1_pwm': 400, 'osmc1_dir': 1, 'bldc1_speed': 7, 'bldc1_dir': 0, 'bldc1_brake': True,
+        'relays': 129, 'safe': 2, 'cmd': 4294967295, 'enc1': -5, 'i2c1_t_ms': 5, 'i2c1_errors': 1, 'i2cx_pnum': 5,
+        'i2cx_outcome': 3, 'i2cbus_outcome': 1, 'i2cbus_errors': 2, 'i2cbus_recoveries': 3, 'uart1_position': 9,
+        'uart1_lost': 2, 'fault_chip': 64, 'fault_trouble': 1}
+
+
 def test_values_may_be_called_as_other_columns_are(tmp_path):
     path = tmp_path / 'names.r4log'
     mine = 'device t\ntitle t\naddress 0x40\npoll all x00 1 100\nvalue ms all 0 u8\n'

@@ -14,6 +14,7 @@
 #include "devices/user_devices.hpp"
 #include "r4link/error.hpp"
 #include "r4link/state.hpp"
+#include "r4link/tables/state_fields.hpp"
 #include "r4link/vocabulary.hpp"
 #include "robot/board_model.hpp"
 
@@ -101,16 +102,12 @@ void read_encoder(const Line& line, ScriptStep& step) {
 }
 
 void read_analog(const Line& line, ScriptStep& step) {
-  static constexpr StateField fields[analog_channels] = {StateField::ain24,    StateField::ain12,
-                                                         StateField::ain5,     StateField::aindmh,
-                                                         StateField::ainsteer, StateField::ain6};
-  const StateField* const name =
-      std::find(std::begin(fields), std::end(fields), state_field(Text(line.words[1])));
-  if (name == std::end(fields)) {
+  const StateField field = state_field(Text(line.words[1]));
+  if (field == StateField::count || row_of(field).kind != FieldKind::analog) {
     fail(line, line.words[1], "is no analog input",
          "write AIN24, AIN12, AIN5, AINDMH, AINSTEER or AIN6");
   }
-  step.channel = static_cast<int>(name - std::begin(fields));
+  step.channel = row_of(field).channel - 1;
   if (!parse_hundredths(Text(line.words[2]), step.value)) {
     fail(line, line.words[2], "is no voltage", "write volts such as 21.5");
   }

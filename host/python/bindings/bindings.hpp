@@ -7,13 +7,13 @@
 
 #include <pybind11/pybind11.h>
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 
 #include "enums.hpp"
 #include "r4link/board.hpp"
+#include "r4link/tables/state_fields.hpp"
 
 namespace r4::python {
 
@@ -48,24 +48,6 @@ py::object to_python(const I2cReading& reading);
 py::object to_python(const I2cAnswer& answer);
 py::object to_python(const I2cBusReport& report);
 py::object to_python(const UartBytes& received);
-
-// What a field holds, and its numbers as they are on the wire: volts in hundredths.
-enum class Form : std::uint8_t {
-  volts,
-  flag,
-  number,
-  drive,
-  bldc,
-  safe,
-  fault,
-  reading,
-  answer,
-  bus,
-  uart
-};
-using Numbers = std::array<std::int64_t, 3>;
-Form form_of(StateField field);
-Numbers numbers_of(const State& state, StateField field);
 
 // A field of a state, in its unit (state.hpp): float of volts, bool of the handle, Drive, Bldc,
 // I2cReading, int.

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -16,6 +17,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -29,7 +31,7 @@ namespace {
 // One of the numbers of a field, in all states. Before the first one that has the field it is 0.
 struct Column {
   StateField field;
-  std::size_t which;
+  int which;
   std::vector<std::int32_t> numbers;
 };
 
@@ -60,11 +62,9 @@ struct RecordedBoard {
   std::vector<std::tuple<std::int64_t, bool, std::string>> datagrams;
 };
 
-std::size_t count_of(Form form) {
-  if (form == Form::bldc || form == Form::bus) return 3;
-  const bool two =
-      form == Form::drive || form == Form::fault || form == Form::reading || form == Form::answer;
-  return two ? 2 : 1;
+// A number as its column keeps it: volts in hundredths.
+std::int32_t kept(double number, FieldForm form) {
+  return static_cast<std::int32_t>(std::llround(form == FieldForm::volts ? 100 * number : number));
 }
 
 // "bno055_gyro_z"; of a second one of that kind "bno055_29_gyro_z", with its address.
@@ -128,7 +128,7 @@ class Columns final : public RecordingVisitor {
     for (const StateField field : state.present) {
       if (board.fields.has(field)) continue;
       board.fields.add(field);
-      for (std::size_t which = 0; which < count_of(form_of(field)); ++which) {
+      for (int which = 0; which < numbers_of(state, field).count; ++which) {
         board.columns.push_back({field, which, std::vector<std::int32_t>(board.pnum.size())});
       }
     }
@@ -136,8 +136,8 @@ class Columns final : public RecordingVisitor {
     board.t_ms.push_back(state.t_ms);
     board.pnum.push_back(state.pnum);
     for (Column& column : board.columns) {
-      const std::int64_t number = numbers_of(state, column.field)[column.which];
-      column.numbers.push_back(static_cast<std::int32_t>(number));
+      const double number = numbers_of(state, column.field)[column.which];
+      column.numbers.push_back(kept(number, kind_row_of(column.field).form));
     }
     for (Measured& each : board.measured) {
       double number = not_measured;
@@ -185,37 +185,44 @@ py::array_t<Number> to_array(std::vector<Number>&& numbers) {
   return py::array_t<Number>(static_cast<py::ssize_t>(all.size()), all.data(), owner);
 }
 
-// "osmc1_pwm", and numpy's type of it.
-std::pair<std::string, const char*> column_of(StateField field, std::size_t which) {
-  const std::string name = attribute_of(field);
-  switch (form_of(field)) {
-    case Form::volts:
-      return {name, "f8"};
-    case Form::flag:
-      return {name, "?"};
-    case Form::drive:
-      return which == 0 ? std::pair{name + "_pwm", "u2"} : std::pair{name + "_dir", "u1"};
-    case Form::bldc:
-      if (which == 0) return {name + "_speed", "u2"};
-      return which == 1 ? std::pair{name + "_dir", "u1"} : std::pair{name + "_brake", "?"};
-    case Form::safe:
-      return {name, "u1"};
-    case Form::fault:
-      return which == 0 ? std::pair{name + "_chip", "u1"} : std::pair{name + "_trouble", "u1"};
-    case Form::reading:  // its bytes are in the datagrams
-      return {name + (which == 0 ? "_t_ms" : "_errors"), "u4"};
-    case Form::answer:
-      return which == 0 ? std::pair{name + "_pnum", "u4"} : std::pair{name + "_outcome", "u1"};
-    case Form::bus:
-      if (which == 0) return {name + "_outcome", "u1"};
-      return {name + (which == 1 ? "_errors" : "_recoveries"), "u4"};
-    case Form::uart:
-      return {name + (which == 0 ? "_position" : "_lost"), "u4"};
-    case Form::number:
-      break;
+// "osmc1_pwm", of a field with several numbers.
+std::string column_of(StateField field, int which) {
+  const std::string_view value = kind_row_of(field).values[which].name;
+  std::string name = attribute_of(field);
+  if (value.empty()) return name;
+  // Python has shorter or clearer names for these.
+  if (value == "direction") return name + "_dir";
+  if (value == "t") return name + "_t_ms";
+  if (value == "command") return name + "_pnum";
+  return name.append("_").append(value);
+}
+
+// Numpy's type of the column.
+const char* type_of(StateField field, int which) {
+  switch (kind_row_of(field).form) {
+    case FieldForm::volts:
+      return "f8";
+    case FieldForm::flag:
+      return "?";
+    case FieldForm::drive:
+      return which == 0 ? "u2" : "u1";
+    case FieldForm::bldc:
+      return which == 0 ? "u2" : which == 1 ? "u1" : "?";
+    case FieldForm::reason:
+    case FieldForm::fault:
+      return "u1";
+    case FieldForm::answer:
+      return which == 0 ? "u4" : "u1";
+    case FieldForm::bus:
+      return which == 0 ? "u1" : "u4";
+    case FieldForm::reading:  // its bytes are in the datagrams
+    case FieldForm::uart:
+    case FieldForm::u8:
+    case FieldForm::u32:
+      return "u4";
+    default:
+      return "i4";
   }
-  const bool counts_up = field >= StateField::relays && field <= StateField::late;
-  return {name, counts_up ? "u4" : "i4"};
 }
 
 // (boards, events, damage); a board: (url, name, damaged, times, t_ms, pnum, [(column, type, numbers)], events,
@@ -225,8 +232,9 @@ py::tuple Columns::take() {
   for (RecordedBoard& board : boards_) {
     py::list columns;
     for (Column& column : board.columns) {
-      const auto [name, type] = column_of(column.field, column.which);
-      columns.append(py::make_tuple(name, type, to_array(std::move(column.numbers))));
+      columns.append(py::make_tuple(column_of(column.field, column.which),
+                                    type_of(column.field, column.which),
+                                    to_array(std::move(column.numbers))));
     }
     for (Measured& each : board.measured) {
       columns.append(py::make_tuple(each.name, "f8", to_array(std::move(each.numbers))));

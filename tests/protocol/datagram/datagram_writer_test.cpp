@@ -51,7 +51,8 @@ TEST(DatagramWriter, NamesKnownBeforehandAreWrittenTheSame) {
   constexpr FieldName twelve("TWELVELETTER");
   static_assert(one.allowed() && twelve.allowed());
   static_assert(!FieldName("A;B").allowed() && !FieldName("A B").allowed() &&
-                !FieldName("A:").allowed() && !FieldName("\x7F").allowed());
+                !FieldName("A:").allowed() && !FieldName("\x7F").allowed() &&
+                !FieldName("").allowed());
   EXPECT_EQ(str(twelve.name()), "TWELVELETTER");
   // In a buffer of every size, also where the fixed copy would not fit.
   for (std::size_t capacity = 0; capacity <= 64; ++capacity) {

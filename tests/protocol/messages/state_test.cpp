@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "protocol/messages/state_fields.hpp"
+#include "r4link/tables/state_fields.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4 {
@@ -150,6 +153,58 @@ TEST(State, EveryFieldIsReadIntoTheMemberItIsWrittenFrom) {
       if (other == field) continue;
       EXPECT_EQ(written(other, state), written(other, State())) << text;
     }
+  }
+}
+
+TEST(State, TheNumbersOfAFieldAreThoseOfTheWire) {
+  const State state = numbered_state();
+  for (const StateField field : every_field()) {
+    const std::string text = numbered_fields[static_cast<int>(field)];
+    std::istringstream wire(text.substr(text.find(':') + 1));
+    const StateNumbers numbers = numbers_of(state, field);
+    ASSERT_GE(numbers.count, 1) << text;
+    for (int i = 0; i < numbers.count; ++i) {
+      std::string value;
+      std::getline(wire, value, ',');
+      EXPECT_DOUBLE_EQ(numbers[i], std::stod(value)) << text;
+    }
+  }
+}
+
+TEST(State, NumbersAreSetWhereTheyAreReadFrom) {
+  const State from = numbered_state();
+  for (const StateField field : every_field()) {
+    State state;
+    const bool has_bytes = kind_row_of(field).has_bytes();
+    EXPECT_EQ(set_numbers(state, field, numbers_of(from, field)), !has_bytes);
+    EXPECT_TRUE(state.present.empty());
+    EXPECT_EQ(written(field, state), written(field, has_bytes ? State() : from));
+  }
+}
+
+TEST(State, NumbersOutsideTheRangeOfTheirFieldAreNotSet) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  State state;
+  EXPECT_TRUE(set_numbers(state, StateField::ain24, {1, {-0.054}}));
+  EXPECT_EQ(state.raw.analog_cv[0], -5);
+  EXPECT_TRUE(set_numbers(state, StateField::cmd, {1, {4294967295.0}}));
+  EXPECT_TRUE(set_numbers(state, StateField::enc1, {1, {-2147483648.0}}));
+  EXPECT_TRUE(set_numbers(state, StateField::osmc1, {2, {4095, 1}}));
+  const State before = state;
+  EXPECT_FALSE(set_numbers(state, StateField::osmc1, {2, {4096, 1}}));
+  EXPECT_FALSE(set_numbers(state, StateField::osmc1, {2, {1, 2}}));
+  EXPECT_FALSE(set_numbers(state, StateField::osmc1, {1, {1}}));
+  EXPECT_FALSE(set_numbers(state, StateField::osmc1, {3, {1, 1, 1}}));
+  EXPECT_FALSE(set_numbers(state, StateField::osmc1, {0, {}}));
+  EXPECT_FALSE(set_numbers(state, StateField::servo1pos, {1, {-1}}));
+  EXPECT_FALSE(set_numbers(state, StateField::ain24, {1, {1e9}}));
+  EXPECT_FALSE(set_numbers(state, StateField::cmd, {1, {4294967296.0}}));
+  for (const double none : {nan, 1e300, -1e300}) {
+    EXPECT_FALSE(set_numbers(state, StateField::enc1, {1, {none}}));
+    EXPECT_FALSE(set_numbers(state, StateField::ain24, {1, {none}}));
+  }
+  for (const StateField field : every_field()) {
+    EXPECT_EQ(written(field, state), written(field, before));
   }
 }
 

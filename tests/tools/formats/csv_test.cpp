@@ -6,8 +6,6 @@
 #include <sstream>
 
 #include "converted.hpp"
-#include "protocol/messages/state_fields.hpp"
-#include "tools/r4/formats/state_units.hpp"
 
 namespace r4::test {
 namespace {
@@ -207,22 +205,6 @@ TEST(Csv, OtherFormatsHaveTheDevicesOfARecordingToo) {
     EXPECT_EQ(and_back(recording, by), recording) << by;
     const std::string there = converted(recording, ".r4log", by).bytes;
     EXPECT_NE(converted(there, by, ".jsonl").bytes.find(measured), std::string::npos) << by;
-  }
-}
-
-TEST(Csv, HasAUnitForEachValueOfEveryField) {
-  for (int i = 0; i < state_field_count; ++i) {
-    const auto field = static_cast<StateField>(i);
-    char buffer[100];
-    DatagramWriter writer(buffer, sizeof buffer);
-    write_field(writer, field, State());
-    Datagram datagram;
-    ASSERT_TRUE(read_datagram(writer.finish(), datagram));
-    const tool::StateUnits units = tool::units_of(field);
-    EXPECT_EQ(units.count, (*datagram.begin()).count()) << str(name_of(field));
-    for (std::size_t value = 0; value < units.count; ++value) {
-      EXPECT_FALSE(units.values[value].empty()) << str(name_of(field));
-    }
   }
 }
 

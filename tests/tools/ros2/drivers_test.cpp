@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "r4link/commands/command_text.hpp"
+#include "r4link/tables/state_fields.hpp"
 namespace r4::tool::ros2 {
 namespace {
 
@@ -22,7 +23,7 @@ struct Driven {
   }
   void told(int stepper, std::int32_t steps) {
     State state;
-    state.present.add(position_of(stepper));
+    state.present.add(state_field(FieldKind::stepper, stepper));
     state.raw.stepper_steps[stepper - 1] = steps;
     drivers.on_state(state, now);
   }

@@ -5,8 +5,8 @@
 
 #include <set>
 
+#include "r4link/tables/state_fields.hpp"
 #include "tests/support/datagrams.hpp"
-#include "tools/r4/formats/state_units.hpp"
 
 namespace r4::tool::web {
 namespace {
@@ -37,7 +37,9 @@ Json rows_after(const Columns& columns, std::initializer_list<const char*> state
 TEST(WebRows, HaveAColumnForEachValueOfEveryField) {
   const Columns columns;
   std::size_t values = 0;
-  for (int i = 0; i < state_field_count; ++i) values += units_of(static_cast<StateField>(i)).count;
+  for (const StateFieldRow& row : state_fields) {
+    values += static_cast<std::size_t>(row_of(row.kind).value_count());
+  }
   EXPECT_EQ(columns.size(), values);
   EXPECT_EQ(columns.units().size(), values);
   const std::set<std::string> different(columns.names().begin(), columns.names().end());

@@ -10,7 +10,7 @@
 
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
-#include "state_units.hpp"
+#include "r4link/tables/state_fields.hpp"
 
 namespace r4::tool {
 namespace {
@@ -99,9 +99,11 @@ void CsvSink::write_header() {
   }
   row_ = "time [s],path,board,PNum,T [ms]";
   for (const StateField field : columns_) {
-    const StateUnits units = units_of(field);
-    for (std::size_t i = 0; i < units.count; ++i) {
-      fmt::format_to(std::back_inserter(row_), ",{} {}", view(name_of(field)), units.values[i]);
+    const FieldKindRow& kind = kind_row_of(field);
+    for (int i = 0; i < kind.value_count(); ++i) {
+      const auto& [name, unit] = kind.values[i];  // "pwm", "0-4095"
+      fmt::format_to(std::back_inserter(row_), ",{}{}{} [{}]", view(name_of(field)),
+                     *name == '\0' ? "" : " ", name, unit);
     }
   }
   for (const RecordedDevices::Known& known : devices_.all()) add_columns(known.device);
@@ -140,7 +142,7 @@ void CsvSink::on_record(const Record& record) {
     if (state.present.has(field)) {
       row_ += values[static_cast<std::size_t>(field)];
     } else {
-      row_.append(units_of(field).count - 1, ',');
+      row_.append(static_cast<std::size_t>(kind_row_of(field).value_count() - 1), ',');
     }
   }
   for (const DeviceColumn& column : device_columns_) {

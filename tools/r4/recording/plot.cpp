@@ -11,7 +11,6 @@
 #include <array>
 #include <cctype>
 #include <cerrno>
-#include <charconv>
 #include <cstdint>
 #include <cstring>
 #include <map>
@@ -22,7 +21,6 @@
 #include <vector>
 
 #include "../formats/output_file.hpp"
-#include "../formats/state_units.hpp"
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
@@ -31,6 +29,7 @@
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
 #include "r4link/error.hpp"
+#include "r4link/tables/state_fields.hpp"
 #include "read_file.hpp"
 #include "recording_summary.hpp"
 #include "transports/file_descriptor.hpp"
@@ -70,6 +69,12 @@ std::string format_of(const std::string& path) {
   }
   throw Error(ErrorKind::usage, "--output " + path, "has no ending that tells what to draw",
               "let it end in .svg, .png or .pdf");
+}
+
+// True if the second value of the field is the direction of the first.
+bool has_direction(StateField field) {
+  const FieldForm form = kind_row_of(field).form;
+  return form == FieldForm::drive || form == FieldForm::bldc;
 }
 
 // What a curve is drawn of: seconds and values.
@@ -119,7 +124,7 @@ class Curves final : public RecordingReader::Handler {
     State state;
     if (kind == MessageKind::state && !read_state(datagram, state)) return;
     be_safe(path, heartbeat_report(datagram).reason, record.time);
-    if (kind == MessageKind::state) take(path, datagram, state, record.time);
+    if (kind == MessageKind::state) take(path, state, record.time);
   }
   // All is read.
   void finish() {
@@ -155,26 +160,17 @@ class Curves final : public RecordingReader::Handler {
     path.safe = reason;
     path.safe_since = now;
   }
-  void take(PlottedPath& path, const Datagram& datagram, const State& state, Time now) {
+  void take(PlottedPath& path, const State& state, Time now) {
     for (const Wanted& each : wanted_) {
       if (!state.present.has(each.field) || !is_called(path, each.board)) continue;
-      std::array<Text, 3> values;
-      const Text text = datagram.find(r4::name_of(each.field)).values();
-      const std::size_t count = datagram.find(r4::name_of(each.field)).split(values.data(), 3);
-      double value = 0;
-      const Text first = count > 1 ? values[0] : text;
-      std::from_chars(first.begin(), first.end(), value);
-      if (is_signed(each.field) && values[1] == Text("0")) value = -value;
+      const StateNumbers numbers = numbers_of(state, each.field);
+      const double value = has_direction(each.field) && numbers[1] == 0 ? -numbers[0] : numbers[0];
       Curve& curve = path.curves[each.field];
       const double at = seconds_of(now);
       if (!curve.times.empty() && curve.times.back() == at) continue;  // it was asked for twice
       curve.times.push_back(at);
       curve.values.push_back(value);
     }
-  }
-  // Has it a direction beside its first number?
-  static bool is_signed(StateField field) {
-    return units_of(field).count > 1 && units_of(field).values[1].starts_with("direction");
   }
 
   const std::vector<Wanted>& wanted_;
@@ -184,16 +180,11 @@ class Curves final : public RecordingReader::Handler {
   std::uint64_t damage_ = 0;
 };
 
-// "V", "pwm [-4095-4095]".
+// "V", "t [ms]", "pwm [±4095]".
 std::string unit_of(StateField field) {
-  const StateUnits units = units_of(field);
-  std::string unit(units.values[0]);
-  if (units.count > 1 && units.values[1].starts_with("direction")) {
-    const std::size_t bracket = unit.find('[');
-    return unit.substr(0, bracket) + "[±" + unit.substr(unit.rfind('-') + 1);
-  }
-  if (unit.size() > 2 && unit.front() == '[') unit = unit.substr(1, unit.size() - 2);
-  return unit;
+  const auto& [name, unit] = kind_row_of(field).values[0];
+  if (has_direction(field)) return fmt::format("{} [±{}]", name, pwm_max);
+  return *name == '\0' ? unit : fmt::format("{} [{}]", name, unit);
 }
 
 // A file without a name, for what a program reads or writes.

@@ -11,6 +11,7 @@
 #include "command_text.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
+#include "r4link/tables/state_fields.hpp"
 
 namespace r4::tool::ros2 {
 namespace {
@@ -89,7 +90,7 @@ bool BoardCommands::is_stale(const std::string& what, const Origin& origin) {
 
 std::string BoardCommands::objection_to(const Command& command) const {
   if (command.kind != CommandKind::stepper ||
-      options_.fields.has(position_of(static_cast<int>(command.channel)))) {
+      options_.fields.has(state_field(FieldKind::stepper, command.channel))) {
     return {};
   }
   return fmt::format(

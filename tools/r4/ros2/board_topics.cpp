@@ -13,39 +13,6 @@ namespace {
 
 constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
 
-// The field of channel 1 and those behind it, which are not one after another for channel 1.
-StateField field_of(StateField first, StateField second, int channel) {
-  return channel == 1 ? first : static_cast<StateField>(static_cast<int>(second) + channel - 2);
-}
-StateField osmc_field(int channel) {
-  return field_of(StateField::osmc1, StateField::osmc2, channel);
-}
-StateField dhb12_field(int channel) {
-  return field_of(StateField::dhb1a, StateField::dhb1b, channel);
-}
-StateField servo_field(int channel) {
-  return field_of(StateField::servo1pos, StateField::servo2pos, channel);
-}
-StateField stepper_field(int channel) {
-  return field_of(StateField::step1pos, StateField::step2pos, channel);
-}
-StateField nth(StateField first, int channel) {
-  return static_cast<StateField>(static_cast<int>(first) + channel - 1);
-}
-
-struct AnalogTopic {
-  StateField field;
-  const char* topic;
-};
-constexpr std::array<AnalogTopic, analog_channels> analog_topics{{
-    {StateField::ain24, "analog/ain24"},
-    {StateField::ain12, "analog/ain12"},
-    {StateField::ain5, "analog/ain5"},
-    {StateField::aindmh, "analog/aindmh"},
-    {StateField::ainsteer, "analog/ainsteer"},
-    {StateField::ain6, "analog/ain6"},
-}};  // in the order of Analog
-
 TimeMessage stamp(BoardTopics::WallTime time) {
   const auto since = std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch());
   constexpr std::int64_t second = 1'000'000'000;
@@ -75,50 +42,49 @@ BoardTopics::BoardTopics(Graph& graph, std::size_t node, const NodeOptions& opti
   kept.lifespan = DDS_SECS(10);
   rosout_ = graph.publish<LogMessage>(node, "/rosout", kept);
   const FieldSet& fields = options.fields;
-  for (int n = 1; n <= osmc_channels; ++n) {
-    const auto i = static_cast<std::size_t>(n - 1);
-    if (fields.has(osmc_field(n))) {
-      osmc_[i].writer = graph.publish<Float32Message>(node, fmt::format("osmc{}/state", n));
-    }
-    if (fields.has(dhb12_field(n))) {
-      dhb12_[i].writer = graph.publish<Float32Message>(node, fmt::format("dhb12_{}/state", n));
-    }
-    if (fields.has(nth(StateField::bldc1, n))) {
-      bldc_[i].writer = graph.publish<Float32Message>(node, fmt::format("bldc{}/state", n));
-    }
-    if (fields.has(nth(StateField::enc1, n))) {
-      encoders_[i].writer = graph.publish<Int32Message>(node, fmt::format("encoder{}", n));
-    }
-    if (fields.has(stepper_field(n))) {
-      steppers_[i].writer = graph.publish<Int32Message>(node, fmt::format("stepper{}/state", n));
-    }
-    if (fields.has(nth(StateField::us1, n))) {
-      ranges_[i].writer = graph.publish<RangeMessage>(node, fmt::format("range/us{}", n));
+  for (const StateField field : fields) {
+    const StateFieldRow& row = row_of(field);
+    components_[static_cast<std::size_t>(field)].writer = make_topic(graph, node, row);
+    const bool is_of_encoder = row.kind == FieldKind::encoder || row.kind == FieldKind::encoder_hz;
+    if ((is_of_encoder && options.counts_per_turn) ||
+        (row.kind == FieldKind::stepper && options.steps_per_turn)) {
+      joint_fields_.add(field);
     }
   }
-  for (int n = 1; n <= servo_channels; ++n) {
-    if (!fields.has(servo_field(n))) continue;
-    servos_[static_cast<std::size_t>(n - 1)].writer =
-        graph.publish<Float32Message>(node, fmt::format("servo{}/state", n));
-  }
-  for (std::size_t i = 0; i < analog_.size(); ++i) {
-    if (!fields.has(analog_topics[i].field)) continue;
-    analog_[i].writer = graph.publish<Float32Message>(node, analog_topics[i].topic);
-  }
-  if (fields.has(StateField::relays)) relays_.writer = graph.publish<UInt32Message>(node, "relays");
-  if (fields.has(StateField::dmhsta)) handle_.writer = graph.publish<BoolMessage>(node, "handle");
   if (fields.has(StateField::ain24))
     battery_.writer = graph.publish<BatteryMessage>(node, "battery");
   if (options.counts_per_turn || options.steps_per_turn) {
     joints_ = graph.publish<JointStateMessage>(node, "joint_states");
   }
-  for (int n = 1; n <= encoder_channels; ++n) {
-    for (const StateField first : {StateField::enc1, StateField::enc1hz}) {
-      if (options.counts_per_turn && fields.has(nth(first, n))) joint_fields_.add(nth(first, n));
+}
+
+// The topic of a component; 0 if the field is of none.
+dds_entity_t BoardTopics::make_topic(Graph& graph, std::size_t node, const StateFieldRow& row) {
+  const char* const kind = row_of(row.kind).name;
+  switch (row.kind) {
+    case FieldKind::dhb12:
+      return graph.publish<Float32Message>(node, fmt::format("{}_{}/state", kind, row.channel));
+    case FieldKind::osmc:
+    case FieldKind::bldc:
+    case FieldKind::servo:
+      return graph.publish<Float32Message>(node, fmt::format("{}{}/state", kind, row.channel));
+    case FieldKind::stepper:
+      return graph.publish<Int32Message>(node, fmt::format("{}{}/state", kind, row.channel));
+    case FieldKind::encoder:
+      return graph.publish<Int32Message>(node, fmt::format("{}{}", kind, row.channel));
+    case FieldKind::ultrasonic:
+      return graph.publish<RangeMessage>(node, fmt::format("range/us{}", row.channel));
+    case FieldKind::analog: {
+      std::string input(row.name.data(), row.name.size());
+      for (char& c : input) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+      return graph.publish<Float32Message>(node, "analog/" + input);
     }
-  }
-  for (int n = 1; n <= stepper_channels; ++n) {
-    if (options.steps_per_turn && fields.has(stepper_field(n))) joint_fields_.add(stepper_field(n));
+    case FieldKind::relays:
+      return graph.publish<UInt32Message>(node, kind);
+    case FieldKind::handle:
+      return graph.publish<BoolMessage>(node, kind);
+    default:
+      return 0;
   }
 }
 
@@ -130,8 +96,9 @@ void BoardTopics::write_text(dds_entity_t writer, std::string_view text) {
   (void)dds_write(writer, &message);
 }
 
-template <class Message, class Value>
-void BoardTopics::publish(Changing<Value>& topic, Value value, Clock::time_point now) {
+template <class Message>
+void BoardTopics::publish(StateField field, double value, Clock::time_point now) {
+  Changing<double>& topic = components_[static_cast<std::size_t>(field)];
   if (!topic.is_due(value, now)) return;
   Message message{};
   message.data = static_cast<decltype(message.data)>(value);
@@ -149,46 +116,49 @@ void BoardTopics::on_active(bool active) const { write_text(active_, active ? "T
 
 void BoardTopics::on_state(const State& state, WallTime sampled, std::uint32_t boot) {
   const Clock::time_point now = Clock::now();
-  const FieldSet& has = state.present;
-  for (int n = 1; n <= osmc_channels; ++n) {
-    const auto i = static_cast<std::size_t>(n - 1);
-    const auto duty = [](const auto& drive) {
-      return static_cast<float>(to_duty(drive.pwm, drive.direction));
-    };
-    if (has.has(osmc_field(n))) publish<Float32Message>(osmc_[i], duty(state.raw.osmc[i]), now);
-    if (has.has(dhb12_field(n))) publish<Float32Message>(dhb12_[i], duty(state.raw.dhb12[i]), now);
-    if (has.has(nth(StateField::bldc1, n))) {
-      const Bldc& bldc = state.raw.bldc[i];
-      publish<Float32Message>(bldc_[i], static_cast<float>(to_duty(bldc.speed, bldc.direction)),
-                              now);
+  for (const StateField field : state.present) {
+    const StateNumbers numbers = numbers_of(state, field);
+    switch (row_of(field).kind) {
+      case FieldKind::osmc:
+      case FieldKind::dhb12:
+      case FieldKind::bldc:
+        publish<Float32Message>(
+            field, to_duty(static_cast<int>(numbers[0]), static_cast<Direction>(numbers[1])), now);
+        break;
+      case FieldKind::servo:
+        publish_pulse(field, static_cast<int>(numbers[0]), now);
+        break;
+      case FieldKind::analog:
+        publish<Float32Message>(field, numbers[0], now);
+        break;
+      case FieldKind::encoder:
+      case FieldKind::stepper:
+        publish<Int32Message>(field, numbers[0], now);
+        break;
+      case FieldKind::ultrasonic:
+        publish_range(field, numbers[0], sampled, now);
+        break;
+      case FieldKind::relays:
+        publish<UInt32Message>(field, numbers[0], now);
+        break;
+      case FieldKind::handle:
+        publish<BoolMessage>(field, numbers[0], now);
+        break;
+      default:
+        break;
     }
-    if (has.has(nth(StateField::enc1, n)))
-      publish<Int32Message>(encoders_[i], state.encoder(n), now);
-    if (has.has(stepper_field(n))) publish<Int32Message>(steppers_[i], state.steps(n), now);
   }
-  for (int n = 1; n <= servo_channels; ++n) {
-    const auto i = static_cast<std::size_t>(n - 1);
-    if (!has.has(servo_field(n))) continue;
-    // Compared as a pulse: what is off is no number, and those are never equal.
-    auto& topic = servos_[i];
-    const auto pulse = static_cast<float>(state.raw.servo_us[i]);
-    if (!topic.is_due(pulse, now)) continue;
-    Float32Message message{};
-    message.data = static_cast<float>(from_pulse(options_.servo, state.raw.servo_us[i]));
-    (void)dds_write(topic.writer, &message);
-  }
-  for (std::size_t i = 0; i < analog_.size(); ++i) {
-    if (!has.has(analog_topics[i].field)) continue;
-    publish<Float32Message>(analog_[i], static_cast<float>(state.volts(static_cast<Analog>(i))),
-                            now);
-  }
-  if (has.has(StateField::relays)) {
-    publish<UInt32Message>(relays_, static_cast<std::uint32_t>(state.relays), now);
-  }
-  if (has.has(StateField::dmhsta)) publish<BoolMessage>(handle_, state.handle_held, now);
   publish_battery(state, sampled, now);
-  publish_ranges(state, sampled, now);
   gather_joints(state, sampled, boot);
+}
+
+// Compared as a pulse: the position of a servo that is off is NaN, which never equals itself.
+void BoardTopics::publish_pulse(StateField servo, int pulse_us, Clock::time_point now) {
+  Changing<double>& topic = components_[static_cast<std::size_t>(servo)];
+  if (!topic.is_due(pulse_us, now)) return;
+  Float32Message message{};
+  message.data = static_cast<float>(from_pulse(options_.servo, pulse_us));
+  (void)dds_write(topic.writer, &message);
 }
 
 void BoardTopics::publish_battery(const State& state, WallTime sampled, Clock::time_point now) {
@@ -209,24 +179,23 @@ void BoardTopics::publish_battery(const State& state, WallTime sampled, Clock::t
   (void)dds_write(battery_.writer, &message);
 }
 
-void BoardTopics::publish_ranges(const State& state, WallTime sampled, Clock::time_point now) {
+void BoardTopics::publish_range(StateField sensor, double cm, WallTime sampled,
+                                Clock::time_point now) {
   constexpr std::uint8_t ultrasound = 0;
-  for (int n = 1; n <= ultrasonic_channels; ++n) {
-    auto& topic = ranges_[static_cast<std::size_t>(n - 1)];
-    const std::uint16_t cm = state.distance_cm(n);
-    if (!state.present.has(nth(StateField::us1, n)) || !topic.is_due(cm, now)) continue;
-    const std::string frame = fmt::format("{}us{}", frame_prefix_, n);
-    RangeMessage message{};
-    message.header.stamp = stamp(sampled);
-    message.header.frame_id = borrowed(frame);
-    message.radiation_type = ultrasound;
-    message.field_of_view = 0.26F;  // the HC-SR04's 15 degrees
-    message.min_range = 0.02F;
-    message.max_range = proximity_max_cm / 100.0F;
-    // No echo is nothing within reach: REP 117.
-    message.range = cm == 0 ? std::numeric_limits<float>::infinity() : cm / 100.0F;
-    (void)dds_write(topic.writer, &message);
-  }
+  Changing<double>& topic = components_[static_cast<std::size_t>(sensor)];
+  if (!topic.is_due(cm, now)) return;
+  const std::string frame = fmt::format("{}us{}", frame_prefix_, row_of(sensor).channel);
+  RangeMessage message{};
+  message.header.stamp = stamp(sampled);
+  message.header.frame_id = borrowed(frame);
+  message.radiation_type = ultrasound;
+  message.field_of_view = 0.26F;  // the HC-SR04's 15 degrees
+  message.min_range = 0.02F;
+  message.max_range = proximity_max_cm / 100.0F;
+  // No echo is nothing within reach: REP 117.
+  message.range =
+      cm == 0 ? std::numeric_limits<float>::infinity() : static_cast<float>(cm) / 100.0F;
+  (void)dds_write(topic.writer, &message);
 }
 
 void BoardTopics::gather_joints(const State& state, WallTime sampled, std::uint32_t boot) {
@@ -235,9 +204,7 @@ void BoardTopics::gather_joints(const State& state, WallTime sampled, std::uint3
   if (!gathered_) gathered_ = Joints{{}, {}, sampled, boot};
   gathered_->state = state;  // the values of its other parts are still there
   bool all = true;
-  for (int i = 0; i < state_field_count; ++i) {
-    const auto field = static_cast<StateField>(i);
-    if (!joint_fields_.has(field)) continue;
+  for (const StateField field : joint_fields_) {
     if (state.present.has(field)) gathered_->present.add(field);
     all = all && gathered_->present.has(field);
   }
@@ -252,18 +219,18 @@ void BoardTopics::publish_joints() {
   std::vector<double> velocities;
   constexpr double turn = 2 * std::numbers::pi;
   for (int n = 1; n <= encoder_channels; ++n) {
-    if (!joints.present.has(nth(StateField::enc1, n))) continue;
+    if (!joints.present.has(state_field(FieldKind::encoder, n))) continue;
     const double scale = turn / *options_.counts_per_turn;
     names.push_back(fmt::format("encoder{}", n));
     Position& position = encoder_positions_[static_cast<std::size_t>(n - 1)];
     const auto counts = position.advance(joints.state.encoder(n), joints.boot);
     positions.push_back(static_cast<double>(counts) * scale);
-    velocities.push_back(joints.present.has(nth(StateField::enc1hz, n))
+    velocities.push_back(joints.present.has(state_field(FieldKind::encoder_hz, n))
                              ? joints.state.encoder_hz(n) * scale
                              : std::numeric_limits<double>::quiet_NaN());
   }
   for (int n = 1; n <= stepper_channels; ++n) {
-    if (!joints.present.has(stepper_field(n))) continue;
+    if (!joints.present.has(state_field(FieldKind::stepper, n))) continue;
     names.push_back(fmt::format("stepper{}", n));
     Position& position = stepper_positions_[static_cast<std::size_t>(n - 1)];
     const auto steps = position.advance(joints.state.steps(n), joints.boot);

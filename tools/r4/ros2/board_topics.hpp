@@ -18,6 +18,7 @@
 #include "graph/message_types.hpp"
 #include "node_options.hpp"
 #include "r4link/link.hpp"
+#include "r4link/tables/state_fields.hpp"
 
 namespace r4::tool::ros2 {
 
@@ -60,10 +61,12 @@ class BoardTopics {
       return true;
     }
   };
-  template <class Message, class Value>
-  static void publish(Changing<Value>& topic, Value value, Clock::time_point now);
+  static dds_entity_t make_topic(Graph& graph, std::size_t node, const StateFieldRow& row);
+  template <class Message>
+  void publish(StateField field, double value, Clock::time_point now);
   void publish_battery(const State& state, WallTime sampled, Clock::time_point now);
-  void publish_ranges(const State& state, WallTime sampled, Clock::time_point now);
+  void publish_pulse(StateField servo, int pulse_us, Clock::time_point now);
+  void publish_range(StateField sensor, double cm, WallTime sampled, Clock::time_point now);
   void gather_joints(const State& state, WallTime sampled, std::uint32_t boot);
   void publish_joints();
   static void write_text(dds_entity_t writer, std::string_view text);
@@ -90,16 +93,7 @@ class BoardTopics {
   std::optional<Joints> gathered_;
   std::array<Position, encoder_channels> encoder_positions_;
   std::array<Position, stepper_channels> stepper_positions_;
-  std::array<Changing<float>, osmc_channels> osmc_;
-  std::array<Changing<float>, dhb12_channels> dhb12_;
-  std::array<Changing<float>, bldc_channels> bldc_;
-  std::array<Changing<float>, servo_channels> servos_;
-  std::array<Changing<std::int32_t>, encoder_channels> encoders_;
-  std::array<Changing<std::int32_t>, stepper_channels> steppers_;
-  std::array<Changing<float>, analog_channels> analog_;
-  std::array<Changing<std::uint16_t>, ultrasonic_channels> ranges_;
-  Changing<std::uint32_t> relays_;
-  Changing<bool> handle_;
+  std::array<Changing<double>, state_field_count> components_;  // by StateField
   Changing<std::int32_t> battery_;
 };
 

@@ -26,18 +26,23 @@
 #include "graph/outbox.hpp"
 #include "protocol/messages/command_field.hpp"
 #include "r4link/error.hpp"
+#include "r4link/tables/state_fields.hpp"
 #include "transports/url_pattern.hpp"
 
 namespace r4::tool::ros2 {
 namespace {
 
 // What all the topics need. On a CAN bus the paper's fields: others have to fit beside them.
-constexpr const char* component_fields =
-    "DEFAULT,AIN6,DHB1B,DHB2A,DHB2B,OSMC2,OSMC3,OSMC4,STEP2POS,STEP3POS,STEP4POS,SERVO2POS,"
-    "SERVO3POS,"
-    "SERVO4POS,SERVO5POS,SERVO6POS,SERVO7POS,SERVO8POS,SERVO9POS,SERVO10POS,SERVO11POS,SERVO12POS,"
-    "SERVO13POS,SERVO14POS,SERVO15POS,SERVO16POS,ENC1,ENC2,ENC3,ENC4,ENC1HZ,ENC2HZ,ENC3HZ,ENC4HZ,"
-    "US1,US2,US3,US4,BLDC1,BLDC2,BLDC3,BLDC4,RELAYS";
+std::string component_fields() {
+  std::string fields = "DEFAULT";
+  const FieldSet paper = FieldSet::paper_default();
+  for (const StateFieldRow& row : state_fields) {
+    if (paper.has(row.field)) continue;
+    if (row.field > StateField::relays && row.kind != FieldKind::encoder_hz) continue;
+    fields.append(",").append(row.name.data(), row.name.size());
+  }
+  return fields;
+}
 
 NodeOptions node_options(const BridgeOptions& options) {
   NodeOptions node;
@@ -151,7 +156,7 @@ class Bridge {
     const bool bus = has_path(named.url, "can");
     board_options.session.fields = !options_.fields.empty() ? options_.fields
                                    : bus                    ? "DEFAULT"
-                                                            : component_fields;
+                                                            : component_fields();
     shown.devices = Device::from(options_.devices);
     for (const Device& each : shown.devices) board_options.session.fields += "," + each.fields();
     parse_fields(Text(board_options.session.fields), shown.fields);

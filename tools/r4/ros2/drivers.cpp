@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "r4link/tables/state_fields.hpp"
+
 namespace r4::tool::ros2 {
 namespace {
 
@@ -33,12 +35,6 @@ bool Drivers::rests(const Command& command) {
     default:
       return command.value == 0;
   }
-}
-
-StateField position_of(int stepper) {
-  constexpr std::array<StateField, stepper_channels> fields{
-      StateField::step1pos, StateField::step2pos, StateField::step3pos, StateField::step4pos};
-  return fields[static_cast<std::size_t>(stepper - 1)];
 }
 
 std::optional<std::size_t> Drivers::index_of(const Command& command) {
@@ -101,7 +97,8 @@ void Drivers::on_sent(const Command& command, const void* source, std::uint64_t 
 void Drivers::on_state(const State& state, Time sampled) {
   for (int n = 1; n <= stepper_channels; ++n) {
     Position& position = positions_[static_cast<std::size_t>(n - 1)];
-    if (!state.present.has(position_of(n)) || sampled < position.counts_from) continue;
+    if (!state.present.has(state_field(FieldKind::stepper, n)) || sampled < position.counts_from)
+      continue;
     position.steps = state.steps(n);
     position.sampled = sampled;
   }

@@ -27,9 +27,6 @@
 
 namespace r4::tool::ros2 {
 
-// The field that has the position of stepper 1 to 4: without it none can be stopped.
-StateField position_of(int stepper);
-
 class Drivers {
  public:
   using Time = BootClock::time_point;

@@ -11,6 +11,7 @@
 
 #include "r4link/commands/command_text.hpp"
 #include "r4link/state.hpp"
+#include "r4link/tables/state_fields.hpp"
 #include "r4link/vocabulary.hpp"
 #include "transports/url.hpp"
 
@@ -95,9 +96,6 @@ std::string pins_text(const sim::Pins& pins) {
 }
 
 Json sensors_json(const sim::BoardModel& model) {
-  static constexpr StateField analog_fields[analog_channels] = {
-      StateField::ain24,  StateField::ain12,    StateField::ain5,
-      StateField::aindmh, StateField::ainsteer, StateField::ain6};
   Json json{{"supply", model.motors_have_supply()},
             {"handle", model.handle_held() ? "held" : "released"},
             {"enc", Json::array()},
@@ -111,7 +109,7 @@ Json sensors_json(const sim::BoardModel& model) {
     json["us"].push_back(sensor.connected() ? Json(sensor.distance()) : Json("off"));
   }
   for (int i = 0; i < analog_channels; ++i) {
-    const Text name = name_of(analog_fields[i]);
+    const Text name = name_of(state_field(FieldKind::analog, i + 1));
     json["analog"][std::string(name.data(), name.size())] =
         model.analog_cv(static_cast<Analog>(i)) / 100.0;
   }

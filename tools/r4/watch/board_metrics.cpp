@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "board_metrics.hpp"
 
-#include <array>
 #include <chrono>
 #include <utility>
 
-#include "protocol/messages/state_fields.hpp"
 #include "r4link/link.hpp"
+#include "r4link/tables/state_fields.hpp"
 #include "transports/url_pattern.hpp"
 
 namespace r4::tool {
@@ -104,16 +103,12 @@ void describe(const MetricBoard& each, MetricFamilies& out) {
     out.gauge("r4_clock_error_seconds", "How well the time of a sample is known.", one,
               std::chrono::duration<double>(state.sampled_error).count());
   }
-  constexpr std::array<StateField, analog_channels> fields{
-      StateField::ain24,  StateField::ain12,    StateField::ain5,
-      StateField::aindmh, StateField::ainsteer, StateField::ain6};  // in the order of Analog
-  for (int i = 0; i < analog_channels; ++i) {
-    const auto input = static_cast<Analog>(i);
-    const StateField field = fields[static_cast<std::size_t>(i)];
-    if (!state.present.has(field)) continue;
+  for (const StateField field : state.present) {
+    if (row_of(field).kind != FieldKind::analog) continue;
     const Text name = name_of(field);
-    out.gauge("r4_analog_volts", "An analog input.",
-              with(one, "input", std::string(name.data(), name.size())), state.volts(input));
+    out.gauge("r4_analog_volts", kind_row_of(field).help,
+              with(one, "input", std::string(name.data(), name.size())),
+              numbers_of(state, field)[0]);
   }
 }
 

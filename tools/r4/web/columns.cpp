@@ -4,12 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <string_view>
 #include <utility>
 
-#include "../formats/state_units.hpp"
 #include "protocol/messages/state_fields.hpp"
+#include "r4link/tables/state_fields.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4::tool::web {
@@ -17,41 +16,22 @@ namespace {
 
 std::string_view view(Text text) { return {text.data(), text.size()}; }
 
-struct Channels {
-  const char* kind;
-  const char* label;
-  int count;
-  StateField (*field)(int index);
-  std::vector<const char*> parts;
-};
-
-StateField at(StateField first, int index) {
-  return static_cast<StateField>(static_cast<int>(first) + index);
-}
-
-// The first of a kind is one of the paper's ten, the others are further down the table.
-StateField split(StateField first, StateField second, int index) {
-  return index == 0 ? first : at(second, index - 1);
+// The column of a value: "AIN24", "OSMC1.pwm".
+std::string column_of(const StateFieldRow& field, const FieldValue& value) {
+  std::string name(view(field.name));
+  if (*value.name != '\0') name.append(".").append(value.name);
+  return name;
 }
 
 }  // namespace
 
 Columns::Columns(std::vector<Device> devices) : devices_(std::move(devices)) {
-  for (int i = 0; i < state_field_count; ++i) {
-    const auto field = static_cast<StateField>(i);
-    const StateUnits units = units_of(field);
-    first_[static_cast<std::size_t>(i)] = names_.size();
-    for (std::size_t part = 0; part < units.count; ++part) {
-      const std::string_view all = units.values[part];  // "pwm [0-4095]", "[V]"
-      const std::size_t bracket = all.find('[');
-      std::string name(view(name_of(field)));
-      if (bracket != 0 && bracket != std::string_view::npos) {
-        name += "." + std::string(all.substr(0, bracket - 1));
-      }
-      names_.push_back(std::move(name));
-      units_.emplace_back(bracket == std::string_view::npos
-                              ? std::string_view()
-                              : all.substr(bracket + 1, all.size() - bracket - 2));
+  for (const StateFieldRow& row : state_fields) {
+    first_[static_cast<std::size_t>(row.field)] = names_.size();
+    const FieldKindRow& kind = row_of(row.kind);
+    for (int i = 0; i < kind.value_count(); ++i) {
+      names_.push_back(column_of(row, kind.values[i]));
+      units_.emplace_back(kind.values[i].unit);
     }
   }
   first_of_devices_ = names_.size();
@@ -64,20 +44,12 @@ Columns::Columns(std::vector<Device> devices) : devices_(std::move(devices)) {
 }
 
 void Columns::fill(const Datagram& state, std::vector<double>& row) const {
-  for (const Field& field : state) {
-    const StateField known = state_field(field.name());
-    if (known == StateField::count) continue;
-    std::size_t column = first_[static_cast<std::size_t>(known)];
-    const std::size_t parts = units_of(known).count;
-    std::string_view rest = view(field.values());
-    for (std::size_t part = 0; part < parts; ++part, ++column) {
-      const std::size_t comma = std::min(rest.find(','), rest.size());
-      std::from_chars(rest.data(), rest.data() + comma, row[column]);
-      rest.remove_prefix(std::min(comma + 1, rest.size()));
-    }
-  }
   State values;
-  if (devices_.empty() || !read_state(state, values)) return;
+  if (!read_state(state, values)) return;
+  for (const StateField field : values.present) {
+    const StateNumbers numbers = numbers_of(values, field);
+    std::copy_n(numbers.values, numbers.count, &row[first_[static_cast<std::size_t>(field)]]);
+  }
   std::size_t column = first_of_devices_;
   for (const Device& device : devices_) {
     for (std::size_t i = 0; i < device.description().values.size(); ++i, ++column) {
@@ -88,48 +60,30 @@ void Columns::fill(const Datagram& state, std::vector<double>& row) const {
 }
 
 Json channels_json() {
-  using F = StateField;
-  const std::vector<Channels> kinds{
-      {"osmc",
-       "OSMC",
-       osmc_channels,
-       [](int i) { return split(F::osmc1, F::osmc2, i); },
-       {".pwm", ".direction"}},
-      {"dhb12",
-       "DHB12",
-       dhb12_channels,
-       [](int i) { return split(F::dhb1a, F::dhb1b, i); },
-       {".pwm", ".direction"}},
-      {"servo",
-       "Servo",
-       servo_channels,
-       [](int i) { return split(F::servo1pos, F::servo2pos, i); },
-       {""}},
-      {"stepper",
-       "Stepper",
-       stepper_channels,
-       [](int i) { return split(F::step1pos, F::step2pos, i); },
-       {""}},
-      {"bldc",
-       "BLDC",
-       bldc_channels,
-       [](int i) { return at(F::bldc1, i); },
-       {".speed", ".direction", ".brake"}},
-      {"relay", "Relay", relay_channels, [](int) { return F::relays; }, {""}}};
   Json all = Json::array();
-  for (const Channels& kind : kinds) {
-    for (int i = 0; i < kind.count; ++i) {
-      Json fields = Json::array();
-      for (const char* part : kind.parts) {
-        fields.push_back(std::string(view(name_of(kind.field(i)))) + part);
-      }
-      all.push_back({{"id", fmt::format("{}{}", kind.kind, i + 1)},
-                     {"kind", kind.kind},
-                     {"channel", i + 1},
-                     {"label", fmt::format("{} {}", kind.label, i + 1)},
-                     {"fields", std::move(fields)}});
+  const auto add = [&all](const char* kind, const char* label, int channel,
+                          const StateFieldRow& row) {
+    Json fields = Json::array();
+    for (int i = 0; i < row_of(row.kind).value_count(); ++i) {
+      fields.push_back(column_of(row, row_of(row.kind).values[i]));
+    }
+    all.push_back({{"id", fmt::format("{}{}", kind, channel)},
+                   {"kind", kind},
+                   {"channel", channel},
+                   {"label", fmt::format("{} {}", label, channel)},
+                   {"fields", std::move(fields)}});
+  };
+  constexpr std::pair<FieldKind, const char*> kinds[] = {{FieldKind::osmc, "OSMC"},
+                                                         {FieldKind::dhb12, "DHB12"},
+                                                         {FieldKind::servo, "Servo"},
+                                                         {FieldKind::stepper, "Stepper"},
+                                                         {FieldKind::bldc, "BLDC"}};
+  for (const auto& [kind, label] : kinds) {
+    for (const StateFieldRow& row : state_fields) {
+      if (row.kind == kind) add(row_of(kind).name, label, row.channel, row);
     }
   }
+  for (int i = 1; i <= relay_channels; ++i) add("relay", "Relay", i, row_of(StateField::relays));
   return all;
 }
 

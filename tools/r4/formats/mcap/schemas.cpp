@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 
 #include "../../shell/json.hpp"
-#include "../state_units.hpp"
 #include "mcap.hpp"
+#include "r4link/tables/state_fields.hpp"
 
 namespace r4::tool::mcap {
 namespace {
@@ -15,15 +15,15 @@ Json of_type(const char* type, const char* description) {
 }
 
 Json field_schema(StateField field) {
-  const StateUnits units = units_of(field);
-  if (units.count == 1) return of_type("number", std::string(units.values[0]).c_str());
-  std::string all;
-  for (std::size_t i = 0; i < units.count; ++i) {
-    all += fmt::format("{}{}", i == 0 ? "" : ", ", units.values[i]);
+  const FieldKindRow& kind = kind_row_of(field);
+  const int count = kind.value_count();
+  std::string values;  // "pwm [0-4095], direction [0/1]"
+  for (int i = 0; i < count; ++i) {
+    const auto& [name, unit] = kind.values[i];
+    values += fmt::format("{}{}{}[{}]", i == 0 ? "" : ", ", name, *name == '\0' ? "" : " ", unit);
   }
-  Json schema = of_type("array", all.c_str());
-  const bool has_text = units.values[units.count - 1] == bytes_unit;
-  if (!has_text) schema["items"] = {{"type", "number"}};
+  Json schema = of_type(count == 1 ? "number" : "array", (values + ": " + kind.help).c_str());
+  if (count > 1 && !kind.has_bytes()) schema["items"] = {{"type", "number"}};
   return schema;
 }
 
@@ -39,10 +39,8 @@ std::string text_of(std::string_view title, const Json& properties) {
 
 std::string record_schema_text() {
   Json fields = Json::object();
-  for (int i = 0; i < state_field_count; ++i) {
-    const auto field = static_cast<StateField>(i);
-    const Text name = name_of(field);
-    fields[std::string(name.data(), name.size())] = field_schema(field);
+  for (const StateFieldRow& row : state_fields) {
+    fields[std::string(row.name.data(), row.name.size())] = field_schema(row.field);
   }
   Json all = of_type("object", "of the datagram, but PNum and T");
   all["properties"] = fields;
