@@ -260,7 +260,8 @@ void Application::fill(State& state) const {
     state.raw.encoder_hz[i] = inputs_.encoder_hz[i];
     state.raw.encoder_index_counts[i] = inputs_.encoder_index_counts[i];
   }
-  for (int i = 0; i < ultrasonic_channels; ++i) state.raw.ultrasonic_cm[i] = inputs_.ultrasonic_cm[i];
+  for (int i = 0; i < ultrasonic_channels; ++i)
+    state.raw.ultrasonic_cm[i] = inputs_.ultrasonic_cm[i];
   state.safe = safety_.reason();
   state.last_command = link_.last_executed();
   state.rx_ok = rx_ok_;

@@ -44,7 +44,9 @@ struct Bldc {
   Direction direction = Direction::reverse;
   bool brake = false;
   // -1 to 1, negative in reverse.
-  double duty() const { return (direction == Direction::reverse ? -speed : speed) / double{pwm_max}; }
+  double duty() const {
+    return (direction == Direction::reverse ? -speed : speed) / double{pwm_max};
+  }
   friend bool operator==(Bldc a, Bldc b) {
     return a.speed == b.speed && a.direction == b.direction && a.brake == b.brake;
   }

@@ -100,7 +100,8 @@ TEST(SimulatedRobot, MakesObstaclesVoltagesAndFaults) {
   robot.happen("analog AIN24 21.5");
   robot.happen("us 2 15");
   await(board, [](const State& state) {
-    return state.raw.analog_cv[static_cast<int>(Analog::ain24)] == 2150 && state.distance_cm(2) == 15;
+    return state.raw.analog_cv[static_cast<int>(Analog::ain24)] == 2150 &&
+           state.distance_cm(2) == 15;
   });
   robot.happen("chip dac off");
   await(board, [](const State& state) { return state.safe == SafeReason::fault; });

@@ -53,7 +53,8 @@ TEST(BoardState, BringsEveryInputExactly) {
   board.host.execute(Command::setting("AIN24", "55.00"));
   for (int channel = 1; channel <= 4; ++channel) board.host.execute(Command::zero(channel));
   board.host.run_alive_ms(100);
-  EXPECT(state.raw.analog_cv[0] == 110 && state.raw.analog_cv[1] == 201 && state.raw.stepper_steps[2] == 0);
+  EXPECT(state.raw.analog_cv[0] == 110 && state.raw.analog_cv[1] == 201 &&
+         state.raw.stepper_steps[2] == 0);
   for (int channel = 1; channel <= 4; ++channel) {
     EXPECT(state.raw.encoder_counts[channel - 1] == 0);
     EXPECT(state.encoder_index_counts[channel - 1] == -part_of(channel));

@@ -108,7 +108,8 @@ class Speaker {
     for (std::int32_t& counts : state.raw.encoder_counts) counts = position(200000);
     for (std::int32_t& hz : state.raw.encoder_hz) hz = position(4000);
     for (std::int32_t& counts : state.raw.encoder_index_counts) counts = position(200000);
-    for (std::uint16_t& cm : state.raw.ultrasonic_cm) cm = static_cast<std::uint16_t>(between(5, 400));
+    for (std::uint16_t& cm : state.raw.ultrasonic_cm)
+      cm = static_cast<std::uint16_t>(between(5, 400));
     for (Bldc& bldc : state.raw.bldc) bldc.speed = static_cast<std::uint16_t>(between(0, pwm_max));
     state.relays = static_cast<std::uint8_t>(between(0, 255));
     state.last_command = any();

@@ -72,7 +72,8 @@ State busy_state() {
     state.raw.ultrasonic_cm[i] = static_cast<std::uint16_t>(30 * i);
     state.raw.bldc[i] = {static_cast<std::uint16_t>(1000 * i), Direction::forward, i % 2 == 0};
   }
-  for (int i = 0; i < servo_channels; ++i) state.raw.servo_us[i] = static_cast<std::uint16_t>(1500 + i);
+  for (int i = 0; i < servo_channels; ++i)
+    state.raw.servo_us[i] = static_cast<std::uint16_t>(1500 + i);
   state.relays = 0x81;
   state.last_command = 0x8123ABCDU;
   state.rx_ok = 864123;
