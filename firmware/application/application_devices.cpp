@@ -10,10 +10,9 @@ namespace firmware {
 
 Refusal Application::carry_out_device(std::uint32_t pnum, const Command& command,
                                       std::uint32_t now_ms) {
-  if (command.kind == CommandKind::dac) return carry_out(command, setpoints_);
   if (command.kind == CommandKind::uart_write) return write_uart(command);
   if (i2c_ == nullptr) return Refusal::unknown;
-  if (command.kind == CommandKind::i2c_poll) {
+  if (command.kind == CommandKind::i2c_poll || command.kind == CommandKind::i2c_poll_off) {
     i2c_->poll_slot(command.channel, poll_of(command), now_ms);
     return Refusal::none;
   }
