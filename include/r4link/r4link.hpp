@@ -28,5 +28,6 @@
 #include "simulation.hpp"
 #include "state.hpp"
 #include "subscription.hpp"
+#include "tables/commands.hpp"
 #include "text.hpp"
 #include "vocabulary.hpp"

@@ -177,8 +177,7 @@ CLI::Option* add_fields(CLI::App& command, std::string& out, const std::string& 
             FieldSet set;
             if (parse_fields(Text(text), set) != Refusal::none) {
               throw Error(ErrorKind::usage, "--fields " + text, "there is no such state field",
-                          std::string("use ") + std::string(command_help('F')->ranges) +
-                              ", separated by commas");
+                          "use " + command_help(CommandKind::fields).ranges + ", separated by commas");
             }
             out = text;
           },

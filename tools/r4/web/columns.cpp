@@ -10,7 +10,7 @@
 
 #include "../formats/state_units.hpp"
 #include "protocol/messages/state_fields.hpp"
-#include "r4link/vocabulary.hpp"
+#include "r4link/tables/commands.hpp"
 
 namespace r4::tool::web {
 namespace {
@@ -20,7 +20,7 @@ std::string_view view(Text text) { return {text.data(), text.size()}; }
 struct Channels {
   const char* kind;
   const char* label;
-  int count;
+  CommandKind command;
   StateField (*field)(int index);
   std::vector<const char*> parts;
 };
@@ -92,33 +92,33 @@ Json channels_json() {
   const std::vector<Channels> kinds{
       {"osmc",
        "OSMC",
-       osmc_channels,
+       CommandKind::osmc,
        [](int i) { return split(F::osmc1, F::osmc2, i); },
        {".pwm", ".direction"}},
       {"dhb12",
        "DHB12",
-       dhb12_channels,
+       CommandKind::dhb12,
        [](int i) { return split(F::dhb1a, F::dhb1b, i); },
        {".pwm", ".direction"}},
       {"servo",
        "Servo",
-       servo_channels,
+       CommandKind::servo,
        [](int i) { return split(F::servo1pos, F::servo2pos, i); },
        {""}},
       {"stepper",
        "Stepper",
-       stepper_channels,
+       CommandKind::stepper,
        [](int i) { return split(F::step1pos, F::step2pos, i); },
        {""}},
       {"bldc",
        "BLDC",
-       bldc_channels,
+       CommandKind::bldc,
        [](int i) { return at(F::bldc1, i); },
        {".speed", ".direction", ".brake"}},
-      {"relay", "Relay", relay_channels, [](int) { return F::relays; }, {""}}};
+      {"relay", "Relay", CommandKind::relay, [](int) { return F::relays; }, {""}}};
   Json all = Json::array();
   for (const Channels& kind : kinds) {
-    for (int i = 0; i < kind.count; ++i) {
+    for (int i = 0; i < row_of(kind.command).channels; ++i) {
       Json fields = Json::array();
       for (const char* part : kind.parts) {
         fields.push_back(std::string(view(name_of(kind.field(i)))) + part);
