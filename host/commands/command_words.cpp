@@ -80,7 +80,7 @@ constexpr std::array<ValueWords, command_values> value_words{{
     {CommandValue::count, "count", "count {}-{}"},
     {CommandValue::answer_count, "count", "count {}-{}"},
     {CommandValue::period, "period", "period {}-{} ms"},
-    {CommandValue::cause, "cause", "cause as the heartbeats number it"},
+    {CommandValue::cause, "cause", "cause {}-{}"},
     {CommandValue::names, "name,name…", "DEFAULT, ALL or names such as ENC1"},
     {CommandValue::watched_names, "name,name…", "names as for F"},
     {CommandValue::rate, "rate", "rate {}-{} Hz"},
