@@ -8,35 +8,12 @@
 
 #include "../../protocol/messages/command_field.hpp"
 #include "../../transports/url_pattern.hpp"
+#include "command_words.hpp"
 #include "r4link/commands/command_text.hpp"
 
 namespace r4 {
 
 namespace {
-
-struct SettingHelp {
-  std::string_view name;
-  std::string_view values;
-};
-
-constexpr std::array<SettingHelp, 16> settings_table{{
-    {"rate", "1-1000 states a second"},
-    {"heartbeat", "50-1000 ms, below the timeout"},
-    {"timeout", "100-10000 ms, above the heartbeat"},
-    {"recovery", "last or rearm"},
-    {"pack", "0 or 1"},
-    {"i2c1", "address:register:count:period, such as 0x68:x3B:14:10, or off; up to i2c8"},
-    {"uart1", "baud:framing, 1200-460800 and 8N1, 8E1, 8O1 or with 2 stop bits, or off; uart2"},
-    {"network", "1-32 bytes, or off"},
-    {"password", "8-63 bytes, or off"},
-    {"host", "an IPv4 address, or off"},
-    {"port", "1-65535"},
-    {"node", "0-31"},
-    {"chips", "0-31"},
-    {"name", "1-31 letters, digits, _ and -, or off"},
-    {"key", "id:digits, the id 1-9, then 64 hexadecimal digits; or id:off"},
-    {"AIN24", "0.01-650 volts; AIN12, AIN5 and the others likewise"},
-}};
 
 // The parts of a text "C:key,value". Without a comma the key ends at a space, colon or equals sign.
 struct SettingText {
@@ -50,19 +27,11 @@ struct SettingText {
 };
 
 std::string setting_fix(const SettingText& setting) {
-  Settings settings;
-  const bool known = set(settings, Text(setting.name), Text(setting.value)) != Refusal::unknown;
-  const bool analog = known && setting.name.starts_with("AIN");
-  const bool slot = poll_slot_of(Text(setting.name)) != 0;
-  const bool uart = uart_of(Text(setting.name)) != 0;
-  for (const SettingHelp& each : settings_table) {
-    if (each.name == setting.name || (analog && each.name.starts_with("AIN")) ||
-        (slot && each.name.starts_with("i2c")) || (uart && each.name.starts_with("uart"))) {
-      return "write " + std::string(setting.name) + ",value with " + std::string(each.values);
-    }
+  if (const FoundSetting found = find_setting(Text(setting.name)); found.row != nullptr) {
+    return "write " + std::string(setting.name) + ",value with " + values_of(found.row->setting);
   }
   std::string fix = "write key,value with a key of";
-  for (const SettingHelp& each : settings_table) fix += " " + std::string(each.name);
+  for (const SettingRow& row : setting_rows) fix += " " + std::string(row.key.begin(), row.key.end());
   return fix + " …";
 }
 

@@ -84,8 +84,34 @@ constexpr std::array<ValueWords, command_values> value_words{{
     {CommandValue::names, "name,name…", "DEFAULT, ALL or names such as ENC1"},
     {CommandValue::watched_names, "name,name…", "names as for F"},
     {CommandValue::rate, "rate", "rate {}-{} Hz"},
-    {CommandValue::key, "key", "a key and a value of docs/protocol.md, section 3"},
+    {CommandValue::key, "key", ""},
     {CommandValue::setting, "value", ""},
+}};
+
+// What a setting takes: {0} and {1} are the least and the most, {2} and {3} a hundredth of them.
+struct SettingWords {
+  Setting setting;
+  std::string_view values;
+};
+
+// In the order of Setting.
+constexpr std::array<SettingWords, setting_kinds> taken_values{{
+    {Setting::rate, "{}-{} states a second"},
+    {Setting::heartbeat, "{}-{} ms, below the timeout"},
+    {Setting::timeout, "{}-{} ms, above the heartbeat"},
+    {Setting::recovery, "last or rearm"},
+    {Setting::pack, "{} or {}"},
+    {Setting::i2c, "address:register:count:period, such as 0x68:x3B:14:10, or off; up to i2c8"},
+    {Setting::uart, "baud:framing, {}-{} and 8N1, 8E1, 8O1 or with 2 stop bits, or off; uart2"},
+    {Setting::network, "{}-{} bytes, or off"},
+    {Setting::password, "{}-{} bytes, or off"},
+    {Setting::host, "an IPv4 address, or off"},
+    {Setting::port, "{}-{}"},
+    {Setting::node, "{}-{}"},
+    {Setting::chips, "{}-{}"},
+    {Setting::name, "{}-{} letters, digits, _ and -, or off"},
+    {Setting::full_scale, "{2:g}-{3:g} volts; AIN12, AIN5 and the others likewise"},
+    {Setting::key, "id:digits, the id {}-{}, then 64 hexadecimal digits; or id:off"},
 }};
 
 constexpr bool are_in_order() {
@@ -95,9 +121,12 @@ constexpr bool are_in_order() {
   for (std::size_t i = 0; i < command_values; ++i) {
     if (static_cast<std::size_t>(value_words[i].value) != i) return false;
   }
+  for (std::size_t i = 0; i < setting_kinds; ++i) {
+    if (static_cast<std::size_t>(taken_values[i].setting) != i) return false;
+  }
   return true;
 }
-static_assert(are_in_order(), "each kind and each value has its words");
+static_assert(are_in_order(), "each kind, value and setting has its words");
 
 const ValueWords& words_of(CommandValue value) {
   return value_words[static_cast<std::size_t>(value)];
@@ -129,12 +158,24 @@ std::string ranges_of(CommandKind kind) {
     if (!ranges.empty()) ranges += ", ";
     ranges += fmt::format(fmt::runtime(range), min, max);
   }
+  if (kind != CommandKind::setting) return ranges;
+  for (const SettingRow& each : setting_rows) {
+    ranges += fmt::format("{}{} {}", ranges.empty() ? "" : "; ",
+                          std::string_view(each.key.data(), each.key.size()),
+                          values_of(each.setting));
+  }
   return ranges;
 }
 
 }  // namespace
 
 const KindWords& words_of(CommandKind kind) { return kind_words[static_cast<std::size_t>(kind)]; }
+
+std::string values_of(Setting setting) {
+  const SettingRow& row = row_of(setting);
+  return fmt::format(fmt::runtime(taken_values[static_cast<std::size_t>(setting)].values), row.min,
+                     row.max, row.min / 100.0, row.max / 100.0);
+}
 
 std::string_view name_of(CommandKind kind) { return words_of(kind).name; }
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The words of commands and settings for people, beside the tables of the portable core
-// (r4link/tables/commands.hpp, protocol/messages/setting_table.hpp).
+// The words of commands and settings for people, beside the tables of the portable core (r4link/tables/).
 #pragma once
 
+#include <string>
 #include <string_view>
 
 #include "r4link/tables/commands.hpp"
+#include "r4link/tables/settings.hpp"
 
 namespace r4 {
 
@@ -19,5 +20,8 @@ struct KindWords {
   std::string_view empty_sentence = {};
 };
 const KindWords& words_of(CommandKind kind);
+
+// What the setting takes: "50-1000 ms, below the timeout".
+std::string values_of(Setting setting);
 
 }  // namespace r4

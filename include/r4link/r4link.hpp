@@ -29,5 +29,6 @@
 #include "state.hpp"
 #include "subscription.hpp"
 #include "tables/commands.hpp"
+#include "tables/settings.hpp"
 #include "text.hpp"
 #include "vocabulary.hpp"

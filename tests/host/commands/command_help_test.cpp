@@ -69,9 +69,35 @@ TEST(CommandHelp, HasTheFormsAndRangesOfTheDocumentedProtocol) {
   }
   for (const CommandHelp& each : all_command_help()) {
     ASSERT_EQ(documented.count(each.form), 1U) << each.form;
+    if (each.kind == CommandKind::setting) continue;  // it has tables of its own
     EXPECT_EQ(documented[each.form], each.ranges) << each.form;
   }
   EXPECT_EQ(documented.size(), all_command_help().size()) << "a row of no command";
+}
+
+// The tables of settings there have the range and the default of each.
+TEST(CommandHelp, TakesTheDocumentedSettings) {
+  std::ifstream file(R4_TEST_DATA "/../../docs/protocol.md");
+  std::map<std::string, std::string> documented;
+  for (std::string line; std::getline(file, line);) {
+    std::smatch parts;
+    static const std::regex row(R"(\| `([A-Za-z0-9]+)`.* \| .* \| .* \|)");
+    if (std::regex_match(line, parts, row)) documented[parts.str(1)] = line;
+  }
+  for (const SettingRow& row : setting_rows) {
+    const std::string key(row.key.data(), row.key.size());
+    ASSERT_EQ(documented.count(key), 1U) << key;
+    const std::string& line = documented[key];
+    const bool volts = row.setting == Setting::full_scale;
+    const bool flag = row.setting == Setting::pack;
+    if (row.max != 0 && !flag) {
+      const std::string range =
+          volts ? "0.01–650" : std::to_string(row.min) + "–" + std::to_string(row.max);
+      EXPECT_TRUE(contains(line, range)) << key;
+    }
+    if (row.standard == 0) continue;
+    EXPECT_TRUE(contains(line, volts ? "| 50.00 |" : "| " + std::to_string(row.standard) + " |"));
+  }
 }
 
 TEST(CommandHelp, ShowsTheOneCommandThatAWrongTextBeginsAs) {
