@@ -31,7 +31,8 @@ std::string setting_fix(const SettingText& setting) {
     return "write " + std::string(setting.name) + ",value with " + values_of(found.row->setting);
   }
   std::string fix = "write key,value with a key of";
-  for (const SettingRow& row : setting_rows) fix += " " + std::string(row.key.begin(), row.key.end());
+  for (const SettingRow& row : setting_rows)
+    fix += " " + std::string(row.key.begin(), row.key.end());
   return fix + " …";
 }
 

@@ -17,7 +17,8 @@ constexpr std::string_view drive_sentence = "{name} {ch} {direction}, duty {duty
 constexpr std::array<KindWords, command_kinds> kind_words{{
     {CommandKind::osmc, "OSMC", "OSMC motor driver", drive_sentence},
     {CommandKind::dhb12, "DHB12", "DHB12 motor driver", drive_sentence},
-    {CommandKind::servo, "servo", "servo pulse width", "servo {ch} at {value} us", "servo {ch} off"},
+    {CommandKind::servo, "servo", "servo pulse width", "servo {ch} at {value} us",
+     "servo {ch} off"},
     {CommandKind::relay, "relay", "relay (1 is the dead-man's-handle relay)", "relay {ch} {on}"},
     {CommandKind::stepper, "stepper", "stepper target",
      "stepper {ch} to {value} steps at {speed} steps/s"},
@@ -160,9 +161,9 @@ std::string ranges_of(CommandKind kind) {
   }
   if (kind != CommandKind::setting) return ranges;
   for (const SettingRow& each : setting_rows) {
-    ranges += fmt::format("{}{} {}", ranges.empty() ? "" : "; ",
-                          std::string_view(each.key.data(), each.key.size()),
-                          values_of(each.setting));
+    ranges +=
+        fmt::format("{}{} {}", ranges.empty() ? "" : "; ",
+                    std::string_view(each.key.data(), each.key.size()), values_of(each.setting));
   }
   return ranges;
 }

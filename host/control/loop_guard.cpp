@@ -138,9 +138,8 @@ void LoopGuard::look_at_motors(const ReceivedState& state) {
     if (std::chrono::milliseconds(state.t_ms - motor.since_ms) < limits.time) continue;
     end(LoopEnd::standstill, "ENC" + std::to_string(limits.encoder) + " stands still, although " +
                                  std::string(name_of(limits.drive)) + " " +
-                                 std::to_string(limits.channel) +
-                                 " has been driven with " + std::to_string(motor.pwm) + " for " +
-                                 ms_text(limits.time) +
+                                 std::to_string(limits.channel) + " has been driven with " +
+                                 std::to_string(motor.pwm) + " for " + ms_text(limits.time) +
                                  "; look at the wheel, and at the encoder's cable");
     return;
   }

@@ -78,7 +78,8 @@ std::string command_table() {
     const bool by_itself = each.kind == CommandKind::heartbeat || each.kind == CommandKind::leave ||
                            each.kind == CommandKind::watch;
     if (by_itself) continue;
-    const std::string first = fmt::format("  {:<21} {}{}", each.form, each.meaning, each.ranges.empty() ? "" : ":");
+    const std::string first =
+        fmt::format("  {:<21} {}{}", each.form, each.meaning, each.ranges.empty() ? "" : ":");
     const bool fits = first.size() + each.ranges.size() < widest;
     table += first + (fits ? " " : "\n      ");
     std::string_view ranges = each.ranges;
