@@ -116,8 +116,8 @@ FORBIDDEN = {room: {'transports/registry.hpp'} for room in CARRIERS}
 PORTABLE = (FIRMWARE - PUBLIC) | {'firmware/ports/sim/chips', 'firmware/ports/sim/devices'}
 # Those public headers that the board has, too.
 PORTABLE_PUBLIC = {f'include/r4link/{name}.hpp' for name in (
-    'command', 'config', 'datagram', 'key', 'simulated_pins', 'state', 'tables/state_fields', 'text',
-    'vocabulary')}
+    'command', 'config', 'datagram', 'key', 'simulated_pins', 'state', 'tables/commands', 'tables/settings',
+    'tables/state_fields', 'text', 'vocabulary')}
 # No heap, no I/O, no clock, nothing GCC 7 in C++14 lacks; C headers in both spellings.
 PORTABLE_STANDARD = {
     'algorithm', 'array', 'atomic', 'cassert', 'climits', 'cmath', 'cstddef', 'cstdint', 'cstring',

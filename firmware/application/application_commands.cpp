@@ -168,7 +168,8 @@ void Application::take_effect(std::uint32_t pnum, const Command& command, std::u
       break;
     case CommandKind::setting:
       follow_device_setting(command.text, now_ms);
-      if (command.text == key_setting) authentication_.use(setpoints_.settings.site.keys);
+      if (command.text == row_of(Setting::key).key)
+        authentication_.use(setpoints_.settings.site.keys);
       link_.set_timing(timing_of(setpoints_.settings));
       expect_host();
       schedule_.set_period(setpoints_.settings.state_period_ms());

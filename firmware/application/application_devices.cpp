@@ -10,10 +10,9 @@ namespace firmware {
 
 Refusal Application::carry_out_device(std::uint32_t pnum, const Command& command,
                                       std::uint32_t now_ms) {
-  if (command.kind == CommandKind::dac) return carry_out(command, setpoints_);
   if (command.kind == CommandKind::uart_write) return write_uart(command);
   if (i2c_ == nullptr) return Refusal::unknown;
-  if (command.kind == CommandKind::i2c_poll) {
+  if (command.kind == CommandKind::i2c_poll || command.kind == CommandKind::i2c_poll_off) {
     i2c_->poll_slot(command.channel, poll_of(command), now_ms);
     return Refusal::none;
   }
@@ -59,13 +58,13 @@ void Application::begin_devices(std::uint32_t now_ms) {
 }
 
 void Application::follow_device_setting(Text key, std::uint32_t now_ms) {
-  const int uart = uart_of(key);
-  if (uart != 0 && uarts_[uart - 1] != nullptr) {
-    uarts_[uart - 1]->set_up(setpoints_.settings.uarts[uart - 1]);
+  const FoundSetting found = find_setting(key);
+  const int i = found.number - 1;
+  if (found.row->setting == Setting::uart && uarts_[i] != nullptr) {
+    uarts_[i]->set_up(setpoints_.settings.uarts[i]);
   }
-  const int slot = poll_slot_of(key);
-  if (slot != 0 && i2c_ != nullptr) {
-    i2c_->poll_slot(slot, setpoints_.settings.polls[slot - 1], now_ms);
+  if (found.row->setting == Setting::i2c && i2c_ != nullptr) {
+    i2c_->poll_slot(found.number, setpoints_.settings.polls[i], now_ms);
   }
 }
 

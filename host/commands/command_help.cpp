@@ -8,59 +8,12 @@
 
 #include "../../protocol/messages/command_field.hpp"
 #include "../../transports/url_pattern.hpp"
+#include "command_words.hpp"
 #include "r4link/commands/command_text.hpp"
 
 namespace r4 {
 
 namespace {
-
-constexpr std::array<CommandHelp, 14> table{{
-    {'O', "O:pwm,dir,ch", "OSMC motor driver", "pwm 0-4095, dir 0 or 1, ch 1-4"},
-    {'D', "D:pwm,dir,ch", "DHB12 motor driver", "pwm 0-4095, dir 0 or 1, ch 1-4"},
-    {'S', "S:us,ch", "servo pulse width", "us 0 (off) to 2500, ch 1-16"},
-    {'R', "R:ch,On|Off", "relay", "ch 1-8 (1 is the dead-man's-handle relay), On or Off"},
-    {'P', "P:pos[,speed],ch", "stepper target", "pos in steps, speed 1-20000 steps/s, ch 1-4"},
-    {'Z', "Z:ch", "encoder and stepper position to zero", "ch 1-4"},
-    {'B', "B:speed,dir,brake,ch", "brushless motor driver",
-     "speed 0-4095, dir 0 or 1, brake 0 or 1, ch 1-4"},
-    {'U', "U:cm,ch", "proximity threshold", "cm 0 (off) to 400, ch 1-4"},
-    {'E', "E:STOP|CLEAR", "every output safe, until E:CLEAR", "STOP or CLEAR"},
-    {'F', "F:name,name…", "which state fields are sent", "DEFAULT, ALL or names such as ENC1"},
-    {'C', "C:key,value", "settings",
-     "rate 1-1000 Hz, heartbeat 50-1000 ms, timeout 100-10000 ms, recovery last|rearm, pack 0|1 …"},
-    {'X', "X:READ|WRITE|POLL|OFF|SCAN|UART|DAC,…",
-     "user I2C bus, UARTs and DAC: see docs/devices.md",
-     "READ,address,register,count WRITE,address,bytes[,count] POLL,address,register,count,ms,slot "
-     "OFF,slot SCAN UART,uart,bytes DAC,channel,mV; address 8-119 or 0x08-0x77, bytes as x3B00, x "
-     "is none, count 1-32, 5-60000 ms, slot 1-8, uart 1-2 that C:uart1,115200:8N1 has turned on, "
-     "1-48 bytes, channel 1-2, 0-3300 mV"},
-    {'Q', "Q:ID", "asks who the board is", "ID"},
-    {'H', "H:ROS2-R4", "host heartbeat", "ROS2-R4"},
-}};
-
-struct SettingHelp {
-  std::string_view name;
-  std::string_view values;
-};
-
-constexpr std::array<SettingHelp, 16> settings_table{{
-    {"rate", "1-1000 states a second"},
-    {"heartbeat", "50-1000 ms, below the timeout"},
-    {"timeout", "100-10000 ms, above the heartbeat"},
-    {"recovery", "last or rearm"},
-    {"pack", "0 or 1"},
-    {"i2c1", "address:register:count:period, such as 0x68:x3B:14:10, or off; up to i2c8"},
-    {"uart1", "baud:framing, 1200-460800 and 8N1, 8E1, 8O1 or with 2 stop bits, or off; uart2"},
-    {"network", "1-32 bytes, or off"},
-    {"password", "8-63 bytes, or off"},
-    {"host", "an IPv4 address, or off"},
-    {"port", "1-65535"},
-    {"node", "0-31"},
-    {"chips", "0-31"},
-    {"name", "1-31 letters, digits, _ and -, or off"},
-    {"key", "id:digits, the id 1-9, then 64 hexadecimal digits; or id:off"},
-    {"AIN24", "0.01-650 volts; AIN12, AIN5 and the others likewise"},
-}};
 
 // The parts of a text "C:key,value". Without a comma the key ends at a space, colon or equals sign.
 struct SettingText {
@@ -74,31 +27,33 @@ struct SettingText {
 };
 
 std::string setting_fix(const SettingText& setting) {
-  Settings settings;
-  const bool known = set(settings, Text(setting.name), Text(setting.value)) != Refusal::unknown;
-  const bool analog = known && setting.name.starts_with("AIN");
-  const bool slot = poll_slot_of(Text(setting.name)) != 0;
-  const bool uart = uart_of(Text(setting.name)) != 0;
-  for (const SettingHelp& each : settings_table) {
-    if (each.name == setting.name || (analog && each.name.starts_with("AIN")) ||
-        (slot && each.name.starts_with("i2c")) || (uart && each.name.starts_with("uart"))) {
-      return "write " + std::string(setting.name) + ",value with " + std::string(each.values);
-    }
+  if (const FoundSetting found = find_setting(Text(setting.name)); found.row != nullptr) {
+    return "write " + std::string(setting.name) + ",value with " + values_of(found.row->setting);
   }
   std::string fix = "write key,value with a key of";
-  for (const SettingHelp& each : settings_table) fix += " " + std::string(each.name);
+  for (const SettingRow& row : setting_rows)
+    fix += " " + std::string(row.key.begin(), row.key.end());
   return fix + " …";
 }
 
-}  // namespace
-
-std::span<const CommandHelp> all_command_help() { return table; }
-
-const CommandHelp* command_help(char letter) {
-  const auto found = std::find_if(table.begin(), table.end(),
-                                  [letter](const CommandHelp& h) { return h.letter == letter; });
-  return found == table.end() ? nullptr : &*found;
+// The form and ranges of the command that `text` begins as; without its word, the forms of all that
+// have its letter. Empty: no command has it.
+std::string forms_like(std::string_view text) {
+  std::string forms;
+  if (text.empty() || (text.size() > 1 && text[1] != ':')) return forms;
+  const std::string_view values = text.substr(std::min<std::size_t>(2, text.size()));
+  for (const CommandHelp& each : all_command_help()) {
+    const CommandRow& row = row_of(each.kind);
+    if (row.letter != text.front()) continue;
+    if (row.word.empty() || row.word == Text(values.substr(0, values.find(',')))) {
+      return each.form + (each.ranges.empty() ? "" : " with " + each.ranges);
+    }
+    forms += (forms.empty() ? "" : ", ") + each.form;
+  }
+  return forms;
 }
+
+}  // namespace
 
 std::string_view meaning_of(Refusal refusal) {
   switch (refusal) {
@@ -130,16 +85,14 @@ std::string_view meaning_of(Refusal refusal) {
 
 Problem bad_command(std::string_view text, Refusal refusal) {
   Problem problem{ErrorKind::usage, shown(text), std::string(meaning_of(refusal)), ""};
-  const CommandHelp* help = text.empty() ? nullptr : command_help(text.front());
-  const bool is_letter = text.size() == 1 || (text.size() > 1 && text[1] == ':');
   if (text.starts_with("C:")) {
     problem.fix = setting_fix(SettingText(text));
-  } else if (help != nullptr && is_letter) {
-    problem.fix = "use " + std::string(help->form) + " with " + std::string(help->ranges);
+  } else if (const std::string forms = forms_like(text); !forms.empty()) {
+    problem.fix = "use " + forms;
   } else {
     problem.reason = "no such command";
     problem.fix = "the commands are";
-    for (const CommandHelp& each : table) problem.fix += " " + std::string(each.form);
+    for (const CommandHelp& each : all_command_help()) problem.fix += " " + each.form;
   }
   return problem;
 }

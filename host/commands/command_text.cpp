@@ -9,6 +9,7 @@
 #include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/settings.hpp"
 #include "command_help.hpp"
+#include "command_words.hpp"
 #include "r4link/error.hpp"
 
 namespace r4 {
@@ -45,29 +46,17 @@ Command parsed(std::string_view text) {
 
 std::string words(Text text) { return printable(std::string_view(text.data(), text.size())); }
 
-// "OSMC 1 forward, duty 0.087"
-std::string drive_words(std::string_view driver, const Command& command) {
-  const double duty = std::round(1000.0 * command.value / pwm_max) / 1000;
-  return fmt::format("{} {} {}, duty {:g}{}", driver, command.channel,
-                     command.direction == Direction::forward ? "forward" : "reverse", duty,
-                     command.on ? ", brake on" : "");
+// "14 bytes at x3B"
+std::string byte_words(int count, Text at = Text()) {
+  return fmt::format("{} byte{}{}", count, count == 1 ? "" : "s",
+                     at.size() <= 1 ? "" : " at " + words(at));
 }
 
-// "setting rate 50"
+// "rate 50"
 std::string setting_words(const Command& command) {
-  std::string text = shown(command);
-  text.replace(0, 2, "setting ");
+  std::string text = shown(command).substr(2);
   if (const std::size_t comma = text.find(','); comma != std::string::npos) text[comma] = ' ';
   return text;
-}
-
-std::string byte_words(int count) { return fmt::format("{} byte{}", count, count == 1 ? "" : "s"); }
-
-// "read 14 bytes at x3B of I2C device 0x68"
-std::string read_words(const Command& command) {
-  const std::string at = command.text == Text("x") ? "" : " at " + words(command.text);
-  return fmt::format("read {}{} of I2C device {:#04x}", byte_words(command.count), at,
-                     command.value);
 }
 
 }  // namespace
@@ -116,64 +105,23 @@ std::string shown(std::string_view text) {
 std::string shown(const Command& command) { return shown(to_text(command)); }
 
 std::string describe(const Command& command) {
-  const int channel = command.channel;
-  const std::int32_t value = command.value;
-  switch (command.kind) {
-    case CommandKind::osmc:
-      return drive_words("OSMC", command);
-    case CommandKind::dhb12:
-      return drive_words("DHB12", command);
-    case CommandKind::bldc:
-      return drive_words("BLDC", command);
-    case CommandKind::servo:
-      return value == 0 ? fmt::format("servo {} off", channel)
-                        : fmt::format("servo {} at {} us", channel, value);
-    case CommandKind::relay:
-      return fmt::format("relay {} {}", channel, command.on ? "on" : "off");
-    case CommandKind::stepper:
-      return fmt::format("stepper {} to {} steps at {} steps/s", channel, value, command.speed);
-    case CommandKind::zero:
-      return fmt::format("encoder and stepper {} to zero", channel);
-    case CommandKind::dac:
-      return fmt::format("DAC {} at {} mV", channel, value);
-    case CommandKind::i2c_write: {
-      const std::string then = command.count == 0 ? "" : ", then read " + byte_words(command.count);
-      return fmt::format("write {} to I2C device {:#04x}{}", words(command.text), value, then);
-    }
-    case CommandKind::uart_write:
-      return fmt::format("write {} to UART {}", words(command.text), channel);
-    case CommandKind::i2c_read:
-      return read_words(command);
-    case CommandKind::i2c_scan:
-      return "scan the user I2C bus";
-    case CommandKind::i2c_poll:
-      if (command.count == 0) return fmt::format("reading {} off", channel);
-      return fmt::format("reading {}: {} every {} ms", channel, read_words(command),
-                         command.period_ms);
-    case CommandKind::proximity:
-      return value == 0 ? fmt::format("proximity sensor {} off", channel)
-                        : fmt::format("proximity sensor {} below {} cm", channel, value);
-    case CommandKind::heartbeat:
-      return "host heartbeat";
-    case CommandKind::stop:
-      return "stop every output";
-    case CommandKind::clear:
-      return value == Command::unnamed_cause ? "clear the safe state"
-                                             : fmt::format("clear cause {}", value);
-    case CommandKind::leave:
-      return "end control";
-    case CommandKind::fields:
-      return "send fields " + words(command.text);
-    case CommandKind::setting:
-      return setting_words(command);
-    case CommandKind::identify:
-      return "ask who the board is";
-    case CommandKind::watch:
-      if (value == 0) return "stop watching";
-      return fmt::format("watch at {} Hz{}{}", value, command.text.empty() ? "" : ", fields ",
-                         words(command.text));
-  }
-  return "unknown command";
+  const KindWords& of_kind = words_of(command.kind);
+  const std::int32_t none = command.kind == CommandKind::clear ? Command::unnamed_cause : 0;
+  const bool empty = command.value == none && !of_kind.empty_sentence.empty();
+  const std::string text = words(command.text);
+  const bool setting = command.kind == CommandKind::setting;
+  return fmt::format(
+      fmt::runtime(empty ? of_kind.empty_sentence : of_kind.sentence),
+      fmt::arg("name", of_kind.name), fmt::arg("ch", command.channel),
+      fmt::arg("value", command.value), fmt::arg("speed", command.speed),
+      fmt::arg("period", command.period_ms), fmt::arg("on", command.on ? "on" : "off"),
+      fmt::arg("direction", command.direction == Direction::forward ? "forward" : "reverse"),
+      fmt::arg("duty", std::round(1000.0 * command.value / pwm_max) / 1000),
+      fmt::arg("brake", command.on ? ", brake on" : ""), fmt::arg("text", text),
+      fmt::arg("fields", text.empty() ? "" : ", fields " + text),
+      fmt::arg("bytes", byte_words(command.count, command.text)),
+      fmt::arg("answer", command.count == 0 ? "" : ", then read " + byte_words(command.count)),
+      fmt::arg("setting", setting ? setting_words(command) : ""));
 }
 
 }  // namespace r4

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "r4link/commands/command_text.hpp"
 #include "r4link/control/loop.hpp"
 #include "r4link/error.hpp"
 #include "r4link/tables/state_fields.hpp"
@@ -31,20 +32,9 @@ FieldSet fields_of(std::string_view names) {
   return fields;
 }
 
-struct DriveKind {
-  CommandKind kind;
-  const char* name;
-  int channels;
-};
-
-// The drive of that kind; one without channels if there is none.
-DriveKind drive_of(CommandKind kind) {
-  for (const DriveKind& each : {DriveKind{CommandKind::osmc, "OSMC ", osmc_channels},
-                                DriveKind{CommandKind::dhb12, "DHB12 ", dhb12_channels},
-                                DriveKind{CommandKind::bldc, "BLDC ", bldc_channels}}) {
-    if (each.kind == kind) return each;
-  }
-  return {kind, "", 0};
+// True for a motor whose duty is commanded, and so known.
+bool is_drive(CommandKind kind) {
+  return kind == CommandKind::osmc || kind == CommandKind::dhb12 || kind == CommandKind::bldc;
 }
 
 std::string ms_text(std::chrono::milliseconds time) { return std::to_string(time.count()) + " ms"; }
@@ -67,7 +57,7 @@ LoopGuard::LoopGuard(LoopOptions options)
     if (each.encoder < 1 || each.encoder > encoder_channels) {
       throw wrong("there is no encoder " + std::to_string(each.encoder), "give 1 to 4");
     }
-    if (each.channel < 1 || each.channel > drive_of(each.drive).channels) {
+    if (!is_drive(each.drive) || each.channel < 1 || each.channel > row_of(each.drive).channels) {
       throw wrong("a standstill is watched of a motor that is not there",
                   "give a channel 1 to 4 of osmc, dhb12 or bldc");
     }
@@ -150,9 +140,9 @@ void LoopGuard::look_at_motors(const ReceivedState& state) {
     }
     if (std::chrono::milliseconds(state.t_ms - motor.since_ms) < limits.time) continue;
     end(LoopEnd::standstill, "ENC" + std::to_string(limits.encoder) + " stands still, although " +
-                                 drive_of(limits.drive).name + std::to_string(limits.channel) +
-                                 " has been driven with " + std::to_string(motor.pwm) + " for " +
-                                 ms_text(limits.time) +
+                                 std::string(name_of(limits.drive)) + " " +
+                                 std::to_string(limits.channel) + " has been driven with " +
+                                 std::to_string(motor.pwm) + " for " + ms_text(limits.time) +
                                  "; look at the wheel, and at the encoder's cable");
     return;
   }

@@ -149,7 +149,7 @@ void AsyncBoard::require_slots(const Device& device) const {
 }
 
 void AsyncBoard::Impl::give_up_slot(const Command& command) {
-  if (command.kind != CommandKind::i2c_poll || command.count != 0) return;
+  if (command.kind != CommandKind::i2c_poll_off) return;
   std::erase_if(devices, [&](const Device& each) {
     return each.first_slot() <= command.channel && command.channel <= each.last_slot();
   });

@@ -6,12 +6,10 @@
 #include <type_traits>
 
 #include "config.hpp"
+#include "tables/commands.hpp"
 #include "vocabulary.hpp"
 
 namespace r4 {
-
-// The value of a host's heartbeat.
-constexpr Text host_heartbeat_word("ROS2-R4");
 
 // --- channels and values of outputs. Each has a type of its own, so that swapped arguments do not
 // compile.
@@ -61,41 +59,6 @@ struct Duty {
   double value;
 };
 
-// In this order: output commands, which may be part of a group; other commands that may move
-// something; then all others.
-enum class CommandKind : std::uint8_t {
-  osmc,        // O:pwm,dir,ch
-  dhb12,       // D:pwm,dir,ch
-  servo,       // S:us,ch
-  relay,       // R:ch,On|Off
-  stepper,     // P:pos[,speed],ch
-  zero,        // Z:ch
-  bldc,        // B:speed,dir,brake,ch
-  dac,         // X:DAC,channel,mV
-  i2c_write,   // X:WRITE,address,bytes[,count]
-  uart_write,  // X:UART,channel,bytes
-  i2c_read,    // X:READ,address,register,count
-  i2c_scan,    // X:SCAN
-  i2c_poll,    // X:POLL,address,register,count,period,slot and X:OFF,slot
-  proximity,   // U:cm,ch
-  heartbeat,   // H:ROS2-R4
-  stop,        // E:STOP
-  clear,       // E:CLEAR,cause
-  leave,       // E:LEAVE
-  fields,      // F:name,name…
-  setting,     // C:key,value
-  identify,    // Q:ID
-  watch,       // W:rate[,name,name…]
-};
-
-// True if the command may be part of a group.
-constexpr bool joins_groups(CommandKind kind) { return kind <= CommandKind::dac; }
-// True if the command may move something: an output, or an actuator on a bus or UART of the user's.
-// Such commands are refused in the safe state.
-constexpr bool drives_output(CommandKind kind) { return kind <= CommandKind::uart_write; }
-static_assert(static_cast<int>(CommandKind::watch) == 21,
-              "a new kind: its place says whether it drives an output; see limits_of(), too");
-
 // One command. Which members count depends on `kind`; the factories set them. `text` and `text2`
 // are views: they must outlive the command.
 struct R4LINK_API Command {
@@ -108,7 +71,7 @@ struct R4LINK_API Command {
   std::int32_t speed = stepper_speed_default;  // stepper, steps per second
   Direction direction = Direction::reverse;    // osmc, dhb12, bldc
   bool on = false;                             // relay; bldc: brake
-  std::uint8_t count = 0;                      // i2c: how many bytes to read; i2c_poll: 0 is off
+  std::uint8_t count = 0;                      // i2c: how many bytes to read
   // fields, watch: the list; setting: the key; i2c: the register or what is written, as "x3B"; uart: bytes
   Text text;
   Text text2;  // setting: the value

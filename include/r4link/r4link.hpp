@@ -29,6 +29,8 @@
 #include "simulation.hpp"
 #include "state.hpp"
 #include "subscription.hpp"
+#include "tables/commands.hpp"
+#include "tables/settings.hpp"
 #include "tables/state_fields.hpp"
 #include "text.hpp"
 #include "vocabulary.hpp"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Reads, checks and writes commands by their rows in include/r4link/tables/commands.hpp.
 #include "r4link/command.hpp"
 
 #include "../datagram/numbers.hpp"
@@ -8,39 +9,13 @@
 namespace r4 {
 namespace {
 
-constexpr Text stop_word("STOP");
-constexpr Text clear_word("CLEAR");
-constexpr Text leave_word("LEAVE");
-constexpr Text identify_word("ID");
+constexpr Text stop_word = row_of(CommandKind::stop).word;
 constexpr Text default_fields("DEFAULT");
 constexpr Text all_fields("ALL");
+// Kept out of the loop over values, which each setpoint goes through.
+#define R4_SELDOM __attribute__((noinline))
 
-// The ranges of a command's channel and value. No channels: the kind has none.
-struct Limits {
-  int channels;
-  std::int32_t min;
-  std::int32_t max;
-};
-
-constexpr std::int32_t i32_min = -0x7FFFFFFF - 1;
-constexpr std::int32_t i32_max = 0x7FFFFFFF;
-// In the order of CommandKind.
-constexpr Limits output_limits[] = {
-    {osmc_channels, 0, pwm_max},          {dhb12_channels, 0, pwm_max},
-    {servo_channels, 0, servo_max_us},    {relay_channels, 0, 0},
-    {stepper_channels, i32_min, i32_max}, {encoder_channels, 0, 0},
-    {bldc_channels, 0, pwm_max},          {dac_channels, 0, dac_max_mv},
-};
-static_assert(sizeof output_limits / sizeof *output_limits ==
-                  static_cast<std::size_t>(CommandKind::dac) + 1,
-              "one row for each output");
-static_assert(encoder_channels == stepper_channels, "Z sets both");
-
-Limits limits_of(CommandKind kind) {
-  if (joins_groups(kind)) return output_limits[static_cast<std::size_t>(kind)];
-  if (kind == CommandKind::proximity) return {ultrasonic_channels, 0, proximity_max_cm};
-  return {0, 0, 0};
-}
+constexpr std::size_t most_values = sizeof CommandRow::values / sizeof(CommandValue);
 
 // `lower` is in lower case.
 bool equal_in_any_case(Text text, Text lower) {
@@ -52,99 +27,124 @@ bool equal_in_any_case(Text text, Text lower) {
   return true;
 }
 
-// Reads the values of a field and notes what is wrong with them.
-class Values {
+// The gravest fault of a command: its form, then its channel, then a range.
+class Faults {
  public:
-  explicit Values(const Field& field) : count_(field.split(values_, max)) {}
-
-  // Is there this number of values? Asked first, by every command.
-  bool count_is(std::size_t expected) {
-    if (count_ != expected) bad_format_ = true;
-    return count_ == expected;
+  void note(Refusal found) {
+    if (found == Refusal::none || gravest_ == Refusal::format) return;
+    if (found == Refusal::format || gravest_ != Refusal::channel) gravest_ = found;
   }
-  std::size_t count() const { return count_; }
-  Text text(std::size_t i) const { return values_[i]; }
-
-  // A whole number; one that does not fit is out of range.
-  std::int32_t number(std::size_t i) {
-    std::int32_t number = 0;
-    if (!parse_number(values_[i], number)) {
-      (is_whole_number(values_[i]) ? out_of_range_ : bad_format_) = true;
-    }
-    return number;
-  }
-  // The number of a cause: from 0.
-  std::int32_t cause(std::size_t i) {
-    const std::int32_t value = number(i);
-    if (value < 0) out_of_range_ = true;
-    return value;
-  }
-  bool flag(std::size_t i) {
-    const std::int32_t value = number(i);
-    if (value != 0 && value != 1) out_of_range_ = true;
-    return value != 0;
-  }
-  Direction direction(std::size_t i) { return flag(i) ? Direction::forward : Direction::reverse; }
-  bool on_or_off(std::size_t i) {
-    if (equal_in_any_case(values_[i], "on")) return true;
-    if (equal_in_any_case(values_[i], "off")) return false;
-    return flag(i);
-  }
-
-  // The verdict on `command`, made of these values.
-  Refusal judge(const Command& command) const {
-    if (bad_format_) return Refusal::format;
-    const Refusal refusal = check_command(command);
-    return refusal == Refusal::none && out_of_range_ ? Refusal::range : refusal;
-  }
+  Refusal gravest() const { return gravest_; }
 
  private:
-  static constexpr std::size_t max = 4;
-  Text values_[max];
-  std::size_t count_;
-  bool bad_format_ = false;
-  bool out_of_range_ = false;
+  Refusal gravest_ = Refusal::none;
 };
 
-// E, H and Q: is it one of the letter's words?
-bool read_word(char letter, Text word, CommandKind& out) {
-  if (letter == 'H' && word == host_heartbeat_word) {
-    out = CommandKind::heartbeat;
-  } else if (letter == 'E' && word == stop_word) {
-    out = CommandKind::stop;
-  } else if (letter == 'E' && word == clear_word) {
-    out = CommandKind::clear;
-  } else if (letter == 'E' && word == leave_word) {
-    out = CommandKind::leave;
-  } else if (letter == 'Q' && word == identify_word) {
-    out = CommandKind::identify;
-  } else {
-    return false;
+Refusal check_number(const CommandRow& row, const ValueRow& value, std::int32_t number) {
+  const bool channel = value.role == ValueRole::channel;
+  const std::int32_t max = channel ? row.channels : value.max;
+  if (number >= value.min && number <= max) return Refusal::none;
+  return channel ? Refusal::channel : Refusal::range;
+}
+
+Refusal check_text(const ValueRow& value, Text text) {
+  if (value.role != ValueRole::bytes) return text.empty() ? Refusal::format : Refusal::none;
+  std::uint8_t bytes[uart_max_write];
+  std::uint8_t size = 0;
+  const Refusal refusal = parse_bytes(text, bytes, static_cast<std::size_t>(value.max), size);
+  return refusal == Refusal::none && size < value.min ? Refusal::range : refusal;
+}
+
+R4_SELDOM Refusal read_text(const ValueRow& value, Text text, Command& command) {
+  (value.role == ValueRole::text2 ? command.text2 : command.text) = text;
+  return check_text(value, text);
+}
+
+// Reads what is not the decimal of an std::int32_t: another way to write a number, or none.
+R4_SELDOM Refusal read_other_number(ValueRole role, Text text, std::int32_t& number) {
+  if (role == ValueRole::on_off) {
+    number = equal_in_any_case(text, "on") ? 1 : 0;
+    if (number == 1 || equal_in_any_case(text, "off")) return Refusal::none;
   }
-  return true;
+  if (role == ValueRole::address && text.size() > 2 && text[0] == '0' && text[1] == 'x') {
+    std::uint32_t address = 0;
+    if (!parse_hex(text.substr(2), address)) return Refusal::format;
+    number = address <= i2c_last_address ? static_cast<std::int32_t>(address) : 0;
+    return Refusal::none;
+  }
+  if (!is_whole_number(text)) return Refusal::format;
+  return role == ValueRole::channel ? Refusal::channel : Refusal::range;
 }
 
-Command read_clear(Values& v) {
-  if (v.count() == 1) return Command::clear();
-  return v.count_is(2) ? Command::clear(v.cause(1)) : Command();
+// The member that holds a number.
+std::int32_t number_of(const Command& command, ValueRole role) {
+  switch (role) {
+    case ValueRole::channel:
+      return command.channel;
+    case ValueRole::speed:
+      return command.speed;
+    case ValueRole::direction:
+      return static_cast<std::int32_t>(command.direction);
+    case ValueRole::on:
+    case ValueRole::on_off:
+      return command.on ? 1 : 0;
+    case ValueRole::count:
+      return command.count;
+    case ValueRole::period_ms:
+      return command.period_ms;
+    default:
+      return command.value;
+  }
 }
 
-Command read_stepper(Values& v) {
-  if (v.count() == 2)
-    return Command::stepper(v.number(1), Steps(v.number(0)), StepsPerSecond(stepper_speed_default));
-  if (!v.count_is(3)) return Command();
-  return Command::stepper(v.number(2), Steps(v.number(0)), StepsPerSecond(v.number(1)));
+// `number` is in its range.
+void set_number(Command& command, ValueRole role, std::int32_t number) {
+  switch (role) {
+    case ValueRole::channel:
+      command.channel = static_cast<std::uint8_t>(number);
+      break;
+    case ValueRole::speed:
+      command.speed = number;
+      break;
+    case ValueRole::direction:
+      command.direction = static_cast<Direction>(number);
+      break;
+    case ValueRole::on:
+    case ValueRole::on_off:
+      command.on = number != 0;
+      break;
+    case ValueRole::count:
+      command.count = static_cast<std::uint8_t>(number);
+      break;
+    case ValueRole::period_ms:
+      command.period_ms = static_cast<std::uint16_t>(number);
+      break;
+    default:
+      command.value = number;
+      break;
+  }
 }
 
-// The rate, and behind it a list.
-Command read_watch(Values& v, Text values) {
-  const std::size_t rate = v.text(0).size();
-  const bool has_list = values.size() > rate;
-  return Command::watch(
-      v.number(0), has_list ? Text(values.data() + rate + 1, values.size() - rate - 1) : Text());
+Text text_of(const Command& command, ValueRole role) {
+  return role == ValueRole::text2 ? command.text2 : command.text;
 }
 
-std::uint32_t number_of(Direction direction) { return static_cast<std::uint32_t>(direction); }
+// True if an optional value was left out.
+bool is_missing(const Command& command, const ValueRow& value) {
+  if (!value.optional) return false;
+  return is_text(value.role) ? text_of(command, value.role).empty()
+                             : number_of(command, value.role) == value.missing;
+}
+
+const CommandRow* find_row(char letter, Text word, Refusal& refusal) {
+  refusal = Refusal::unknown;
+  for (const CommandRow& row : command_rows) {
+    if (row.letter != letter) continue;
+    if (row.word.empty() || row.word == word) return &row;
+    if (word.empty()) refusal = Refusal::format;
+  }
+  return nullptr;
+}
 
 bool add_fields(Text word, FieldSet& set) {
   if (word == default_fields) {
@@ -176,160 +176,79 @@ bool stop_number(const Datagram& datagram, std::uint32_t& out) {
 }
 
 Refusal parse_command(const Field& field, Command& out) {
-  if (!is_command(field)) return Refusal::unknown;
-  const char letter = field.name()[0];
-  Values v(field);
-  Command command;
-  switch (letter) {
-    case 'H':
-    case 'E':
-    case 'Q':
-      if (v.text(0).empty()) return Refusal::format;
-      if (!read_word(letter, v.text(0), command.kind)) return Refusal::unknown;
-      if (command.kind == CommandKind::clear) {
-        command = read_clear(v);
-      } else {
-        v.count_is(1);
-      }
-      break;
-    case 'O':
-      if (v.count_is(3)) command = Command::osmc(v.number(2), Pwm(v.number(0)), v.direction(1));
-      break;
-    case 'D':
-      if (v.count_is(3)) command = Command::dhb12(v.number(2), Pwm(v.number(0)), v.direction(1));
-      break;
-    case 'S':
-      if (v.count_is(2)) command = Command::servo(v.number(1), Microseconds(v.number(0)));
-      break;
-    case 'R':
-      if (v.count_is(2)) command = Command::relay(v.number(0), v.on_or_off(1));
-      break;
-    case 'P':
-      command = read_stepper(v);
-      break;
-    case 'Z':
-      if (v.count_is(1)) command = Command::zero(v.number(0));
-      break;
-    case 'B':
-      if (v.count_is(4)) {
-        command = Command::bldc(v.number(3), Pwm(v.number(0)), v.direction(1), v.flag(2));
-      }
-      break;
-    case 'U':
-      if (v.count_is(2)) command = Command::proximity(v.number(1), Centimetres(v.number(0)));
-      break;
-    case 'W':
-      command = read_watch(v, field.values());
-      break;
-    case 'X':
-      return parse_device_command(field, out);
-    case 'F':
-      command = Command::fields(field.values());
-      break;
-    case 'C':
-      if (v.count_is(2)) command = Command::setting(v.text(0), v.text(1));
-      break;
-    default:
-      return Refusal::unknown;
+  if (field.name().size() != 1) return Refusal::unknown;
+  Text texts[most_values + 1];
+  std::size_t count = field.split(texts, most_values + 1);
+  Refusal refusal = Refusal::none;
+  const CommandRow* const row = find_row(field.name()[0], texts[0], refusal);
+  if (row == nullptr) return refusal;
+  const std::size_t word = row->word.empty() ? 0 : 1;
+  count -= word;
+  if (count > row->most && row->most != 0) {
+    const std::size_t last = row->most - 1U;
+    if (row_of(row->values[last]).role == ValueRole::list) {
+      const char* const list = texts[last + word].data();
+      texts[last + word] = Text(list, static_cast<std::size_t>(field.values().end() - list));
+      count = row->most;
+    }
   }
-  const Refusal refusal = v.judge(command);
-  if (refusal == Refusal::none) out = command;
-  return refusal;
+  return read_values(*row, texts + word, count, out);
+}
+
+Refusal read_values(const CommandRow& row, const Text* texts, std::size_t count, Command& out) {
+  if (count < row.least || count > row.most) return Refusal::format;
+  Faults faults;
+  Command command;
+  command.kind = row.kind;
+  for (const CommandValue each : row) {
+    const ValueRow& value = row_of(each);
+    const bool given = !value.optional || count == row.most;
+    if (is_text(value.role)) {
+      if (given) faults.note(read_text(value, *texts++, command));
+      continue;
+    }
+    std::int32_t number = value.missing;
+    if (given) {
+      const Text text = *texts++;
+      Refusal refusal = Refusal::none;
+      if (!parse_number(text, number)) refusal = read_other_number(value.role, text, number);
+      faults.note(refusal == Refusal::none ? check_number(row, value, number) : refusal);
+    }
+    set_number(command, value.role, number);
+  }
+  if (faults.gravest() == Refusal::none) out = command;
+  return faults.gravest();
 }
 
 Refusal check_command(const Command& command) {
-  if (command.kind == CommandKind::fields) {
-    return command.text.empty() ? Refusal::format : Refusal::none;
+  const CommandRow& row = row_of(command.kind);
+  Faults faults;
+  for (const CommandValue each : row) {
+    const ValueRow& value = row_of(each);
+    if (is_missing(command, value)) continue;
+    faults.note(is_text(value.role) ? check_text(value, text_of(command, value.role))
+                                    : check_number(row, value, number_of(command, value.role)));
   }
-  if (command.kind == CommandKind::setting) {
-    return command.text.empty() || command.text2.empty() ? Refusal::format : Refusal::none;
-  }
-  if (command.kind == CommandKind::clear) {
-    return command.value < Command::unnamed_cause ? Refusal::range : Refusal::none;
-  }
-  if (command.kind == CommandKind::watch) {
-    const bool rate = command.value >= 0 && command.value <= state_rate_max_hz;
-    return rate ? Refusal::none : Refusal::range;
-  }
-  const Limits limits = limits_of(command.kind);
-  if (limits.channels == 0) {
-    return is_device_command(command.kind) ? check_device_command(command) : Refusal::none;
-  }
-  if (command.channel < 1 || command.channel > limits.channels) return Refusal::channel;
-  if (command.value < limits.min || command.value > limits.max) return Refusal::range;
-  if (command.direction > Direction::forward) return Refusal::range;
-  if (command.kind == CommandKind::stepper &&
-      (command.speed < 1 || command.speed > stepper_speed_max)) {
-    return Refusal::range;
-  }
-  return Refusal::none;
+  return faults.gravest();
 }
 
 void write_command(DatagramWriter& writer, const Command& command) {
-  const std::uint32_t channel = command.channel;
-  switch (command.kind) {
-    case CommandKind::heartbeat:
-      writer.field("H").value(host_heartbeat_word);
-      break;
-    case CommandKind::osmc:
-      writer.field("O").value(command.value).value(number_of(command.direction)).value(channel);
-      break;
-    case CommandKind::dhb12:
-      writer.field("D").value(command.value).value(number_of(command.direction)).value(channel);
-      break;
-    case CommandKind::servo:
-      writer.field("S").value(command.value).value(channel);
-      break;
-    case CommandKind::relay:
-      writer.field("R").value(channel).value(command.on ? Text("On") : Text("Off"));
-      break;
-    case CommandKind::stop:
-      writer.field("E").value(stop_word);
-      break;
-    case CommandKind::clear:
-      writer.field("E").value(clear_word);
-      if (command.value != Command::unnamed_cause) writer.value(command.value);
-      break;
-    case CommandKind::leave:
-      writer.field("E").value(leave_word);
-      break;
-    case CommandKind::stepper:
-      writer.field("P").value(command.value).value(command.speed).value(channel);
-      break;
-    case CommandKind::zero:
-      writer.field("Z").value(channel);
-      break;
-    case CommandKind::bldc:
-      writer.field("B")
-          .value(command.value)
-          .value(number_of(command.direction))
-          .value(std::uint32_t{command.on})
-          .value(channel);
-      break;
-    case CommandKind::proximity:
-      writer.field("U").value(command.value).value(channel);
-      break;
-    case CommandKind::fields:
-      writer.field("F").values(command.text);
-      break;
-    case CommandKind::setting:
-      writer.field("C").value(command.text).value(command.text2);
-      break;
-    case CommandKind::identify:
-      writer.field("Q").value(identify_word);
-      break;
-    case CommandKind::watch:
-      writer.field("W").value(command.value);
-      if (!command.text.empty()) writer.values(command.text);
-      break;
-    case CommandKind::i2c_read:
-    case CommandKind::i2c_write:
-    case CommandKind::i2c_scan:
-    case CommandKind::i2c_poll:
-    case CommandKind::uart_write:
-    case CommandKind::dac:
-      write_device_command(writer, command);
-      break;
+  const CommandRow& row = row_of(command.kind);
+  writer.field(Text(&row.letter, 1));
+  if (!row.word.empty()) writer.value(row.word);
+  for (const CommandValue each : row) {
+    const ValueRow& value = row_of(each);
+    // One that is missing and in its range, the speed of a stepper, is written.
+    if (is_missing(command, value) && (is_text(value.role) || value.missing < value.min)) continue;
+    if (value.role == ValueRole::list) {
+      writer.values(text_of(command, value.role));
+    } else if (is_text(value.role)) {
+      writer.value(text_of(command, value.role));
+    } else if (value.role == ValueRole::on_off) {
+      writer.value(command.on ? Text("On") : Text("Off"));
+    } else {
+      writer.value(number_of(command, value.role));
+    }
   }
 }
 

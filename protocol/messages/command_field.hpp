@@ -31,6 +31,8 @@ bool stop_number(const Datagram& datagram, std::uint32_t& out);
 // this order; `out` is only written on Refusal::none. Its texts are views of `field`. Ranges of
 // settings and names of fields are checked by settings.hpp and parse_fields.
 Refusal parse_command(const Field& field, Command& out);
+// The same for a command of that row, given as its values without the word.
+Refusal read_values(const CommandRow& row, const Text* texts, std::size_t count, Command& out);
 
 // Appends the command's field: "O:358,1,1;".
 void write_command(DatagramWriter& writer, const Command& command);

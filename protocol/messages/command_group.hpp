@@ -25,6 +25,8 @@ class GroupRules {
 
  private:
   static constexpr std::size_t kinds = static_cast<std::size_t>(CommandKind::dac) + 1;
+  static_assert(kinds_that_move(CommandEffect::output) == (1U << kinds) - 1,
+                "all that join groups");
 
   int count_ = 0;
   std::uint16_t taken_[kinds] = {};  // bit n-1: channel n

@@ -107,13 +107,11 @@ Command Command::i2c_scan() { return of_kind(CommandKind::i2c_scan); }
 Command Command::i2c_poll(int slot, int address, Text register_bytes, int count, int period_ms) {
   Command command = of_device(CommandKind::i2c_poll, address, register_bytes, count);
   command.channel = number_of<std::uint8_t>(slot);
-  // 0 bytes would be its end.
-  if (command.count == 0) command.count = out_of_range;
   command.period_ms = number_of<std::uint16_t>(period_ms);
   return command;
 }
 Command Command::i2c_poll_off(int slot) {
-  Command command = of_kind(CommandKind::i2c_poll);
+  Command command = of_kind(CommandKind::i2c_poll_off);
   command.channel = number_of<std::uint8_t>(slot);
   return command;
 }

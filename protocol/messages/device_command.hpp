@@ -38,14 +38,10 @@ inline bool operator==(const UartMode& a, const UartMode& b) {
 }
 inline bool operator!=(const UartMode& a, const UartMode& b) { return !(a == b); }
 
+// True if the user's devices have to carry it out: it moves what is on them, or asks them.
 constexpr bool is_device_command(CommandKind kind) {
-  return kind >= CommandKind::dac && kind <= CommandKind::i2c_poll;
+  return kind >= CommandKind::i2c_write && kind <= CommandKind::i2c_poll_off;
 }
-
-// As parse_command(), check_command() and write_command(), for those.
-Refusal parse_device_command(const Field& field, Command& out);
-Refusal check_device_command(const Command& command);
-void write_device_command(DatagramWriter& writer, const Command& command);
 
 // What a command X:POLL or X:OFF says, which is right.
 I2cPoll poll_of(const Command& command);

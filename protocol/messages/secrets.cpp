@@ -56,7 +56,7 @@ Text secret_in(Text command) {
   if (name_end == command.end()) return Text();
   const Text name = between(name_begin, name_end);
   const Text value = between(name_end + 1, command.end());
-  if (name == key_setting) {
+  if (name == row_of(Setting::key).key) {
     // Which key it is, and that it is taken away, is no secret.
     std::uint8_t id = 0;
     Text digits;

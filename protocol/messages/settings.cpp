@@ -9,32 +9,6 @@
 namespace r4 {
 namespace {
 
-struct NumberSetting {
-  Text key;
-  std::uint32_t min;
-  std::uint32_t max;
-  std::uint16_t Settings::*member;
-};
-
-constexpr NumberSetting number_settings[] = {
-    {"rate", 1, state_rate_max_hz, &Settings::state_rate_hz},
-    {"heartbeat", 50, 1000, &Settings::heartbeat_ms},
-    {"timeout", 100, 10000, &Settings::timeout_ms},
-};
-
-Refusal set_number(Settings& settings, const NumberSetting& setting, Text value) {
-  std::uint32_t number = 0;
-  if (!parse_number(value, number)) {
-    return is_whole_number(value) ? Refusal::range : Refusal::format;
-  }
-  if (number < setting.min || number > setting.max) return Refusal::range;
-  Settings changed = settings;
-  changed.*setting.member = static_cast<std::uint16_t>(number);
-  if (changed.heartbeat_ms >= changed.timeout_ms) return Refusal::range;
-  settings = changed;
-  return Refusal::none;
-}
-
 Refusal set_recovery(Settings& settings, Text value) {
   if (value == Text("last")) {
     settings.recovery = Recovery::last;
@@ -43,16 +17,6 @@ Refusal set_recovery(Settings& settings, Text value) {
   } else {
     return Refusal::format;
   }
-  return Refusal::none;
-}
-
-Refusal set_pack(Settings& settings, Text value) {
-  std::uint32_t number = 0;
-  if (!parse_number(value, number)) {
-    return is_whole_number(value) ? Refusal::range : Refusal::format;
-  }
-  if (number > 1) return Refusal::range;
-  settings.pack = number == 1;
   return Refusal::none;
 }
 
@@ -89,27 +53,37 @@ class Lines {
   bool ok_ = true;
 };
 
-// The digit from 1 to `most` behind a prefix; 0: it is another key.
-int number_behind(Text prefix, int most, Text key) {
-  if (key.size() != prefix.size() + 1 || key.substr(0, prefix.size()) != prefix) return 0;
-  const int number = key[prefix.size()] - '0';
-  return number >= 1 && number <= most ? number : 0;
-}
-
 }  // namespace
 
-int poll_slot_of(Text key) { return number_behind("i2c", i2c_slots, key); }
-int uart_of(Text key) { return number_behind("uart", uart_channels, key); }
-
 Refusal set(Settings& settings, Text key, Text value) {
-  for (const NumberSetting& setting : number_settings) {
-    if (setting.key == key) return set_number(settings, setting, value);
+  const FoundSetting found = find_setting(key);
+  if (found.row == nullptr) return Refusal::unknown;
+  const SettingRow& row = *found.row;
+  const auto timing = [&settings, &row, value](std::uint16_t& member) {
+    const std::uint16_t before = member;
+    const Refusal refusal = set_number(member, row, value);
+    if (settings.heartbeat_ms < settings.timeout_ms) return refusal;
+    member = before;
+    return Refusal::range;
+  };
+  switch (row.setting) {
+    case Setting::rate:
+      return set_number(settings.state_rate_hz, row, value);
+    case Setting::heartbeat:
+      return timing(settings.heartbeat_ms);
+    case Setting::timeout:
+      return timing(settings.timeout_ms);
+    case Setting::recovery:
+      return set_recovery(settings, value);
+    case Setting::pack:
+      return set_number(settings.pack, row, value);
+    case Setting::i2c:
+      return parse_poll(value, settings.polls[found.number - 1]);
+    case Setting::uart:
+      return parse_uart_mode(value, settings.uarts[found.number - 1]);
+    default:
+      return set(settings.site, found, value);
   }
-  if (key == Text("recovery")) return set_recovery(settings, value);
-  if (key == Text("pack")) return set_pack(settings, value);
-  if (const int slot = poll_slot_of(key)) return parse_poll(value, settings.polls[slot - 1]);
-  if (const int uart = uart_of(key)) return parse_uart_mode(value, settings.uarts[uart - 1]);
-  return set(settings.site, key, value);
 }
 
 bool operator==(const Settings& a, const Settings& b) {
@@ -120,13 +94,16 @@ bool operator==(const Settings& a, const Settings& b) {
 
 bool write_settings(const Settings& settings, char* out, std::size_t capacity, Text& text) {
   Lines lines(out, capacity);
-  for (const NumberSetting& setting : number_settings) {
+  const auto add_number = [&lines](Setting setting, std::uint32_t number) {
     char digits[max_number_text];
-    const char* const end = write_number(digits, std::uint32_t{settings.*setting.member});
-    lines.add(setting.key, Text(digits, static_cast<std::size_t>(end - digits)));
-  }
+    const char* const end = write_number(digits, number);
+    lines.add(row_of(setting).key, Text(digits, static_cast<std::size_t>(end - digits)));
+  };
+  add_number(Setting::rate, settings.state_rate_hz);
+  add_number(Setting::heartbeat, settings.heartbeat_ms);
+  add_number(Setting::timeout, settings.timeout_ms);
   lines.add("recovery", settings.recovery == Recovery::last ? Text("last") : Text("rearm"));
-  lines.add("pack", settings.pack ? Text("1") : Text("0"));
+  add_number(Setting::pack, settings.pack ? 1 : 0);
   char key_text[] = "i2c1";
   char poll[max_poll_text];
   for (int i = 0; i < i2c_slots; ++i) {

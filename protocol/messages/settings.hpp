@@ -1,16 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's settings (`C:key,value`): keys, ranges, defaults (paper section 8.1: 100 Hz state,
-// 2 Hz heartbeat, 1 s timeout).
-//
-//     key        value         default  meaning
-//     rate       1-1000        100      state datagrams a second; 1000/rate is rounded down to
-//                                       whole milliseconds
-//     heartbeat  50-1000       500      ms between the board's heartbeats; below the timeout
-//     timeout    100-10000     1000     ms of silence until the safe state; above `heartbeat`
-//     recovery   last | rearm  last     outputs after SAFE(link)
-//     pack       0 | 1         1        1: on CAN the board packs for a host that packs; 0: never
-//
-// Beside them those of the place where the board stands: site_settings.hpp.
+// The board's settings, whose keys, ranges and defaults are in r4link/tables/settings.hpp (paper
+// section 8.1: 100 Hz state, 2 Hz heartbeat, 1 s timeout). The heartbeat interval is below the timeout.
+// 1000/rate is rounded down to whole milliseconds. Beside them those of the place where the board stands:
+// site_settings.hpp.
 #pragma once
 
 #include <cstddef>
@@ -26,11 +18,11 @@ namespace r4 {
 enum class Recovery : std::uint8_t { last, rearm };
 
 struct Settings {
-  std::uint16_t state_rate_hz = 100;
-  std::uint16_t heartbeat_ms = 500;
-  std::uint16_t timeout_ms = 1000;
+  std::uint16_t state_rate_hz = row_of(Setting::rate).standard;
+  std::uint16_t heartbeat_ms = row_of(Setting::heartbeat).standard;
+  std::uint16_t timeout_ms = row_of(Setting::timeout).standard;
   Recovery recovery = Recovery::last;
-  bool pack = true;
+  bool pack = row_of(Setting::pack).standard != 0;
   I2cPoll polls[i2c_slots];  // that are there when a session begins
   UartMode uarts[uart_channels];
   SiteSettings site;
@@ -47,11 +39,6 @@ Refusal set(Settings& settings, Text key, Text value);
 // All settings as lines "key,value", each ended by a line feed, so that they can be kept. False:
 // more than `capacity` bytes.
 constexpr std::size_t max_settings_text = 1200;
-// The slot of a setting "i2c1" to "i2c8", from 1; 0: it is another one.
-int poll_slot_of(Text key);
-// The same of "uart1" and "uart2".
-int uart_of(Text key);
-
 bool write_settings(const Settings& settings, char* out, std::size_t capacity, Text& text);
 // Takes such lines, in any order. What is not known or not allowed is passed over: the text may be
 // of an older or newer firmware.

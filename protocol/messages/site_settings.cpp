@@ -11,36 +11,8 @@ namespace {
 
 constexpr Text off_word("off");
 
-enum class Site : int { network, password, host, port, node, chips, name, key, count };
-constexpr int site_count = static_cast<int>(Site::count);
-constexpr Text site_keys[site_count] = {"network", "password", "host", "port",
-                                        "node",    "chips",    "name", key_setting};
-
-struct Range {
-  std::uint32_t min;
-  std::uint32_t max;
-};
-
-Refusal read_number(Text value, Range range, std::uint32_t& out) {
-  std::uint32_t number = 0;
-  if (!parse_number(value, number)) {
-    return is_whole_number(value) ? Refusal::range : Refusal::format;
-  }
-  if (number < range.min || number > range.max) return Refusal::range;
-  out = number;
-  return Refusal::none;
-}
-
-template <class Number>
-Refusal set_number(Number& member, Text value, Range range) {
-  std::uint32_t number = 0;
-  const Refusal refusal = read_number(value, range, number);
-  if (refusal == Refusal::none) member = static_cast<Number>(number);
-  return refusal;
-}
-
 // Decodes %XX; `out` ends in NUL. Not for an empty text, nor a NUL within.
-Refusal decode(Text value, char* out, std::size_t min, std::size_t max) {
+Refusal decode(const SettingRow& row, Text value, char* out) {
   std::size_t size = 0;
   for (std::size_t i = 0; i < value.size(); ++i) {
     char c = value[i];
@@ -52,11 +24,11 @@ Refusal decode(Text value, char* out, std::size_t min, std::size_t max) {
       c = static_cast<char>(byte);
       i += 2;
     }
-    if (size == max) return Refusal::range;
+    if (size == row.max) return Refusal::range;
     out[size++] = c;
   }
   out[size] = '\0';
-  return size < min ? Refusal::range : Refusal::none;
+  return size < row.min ? Refusal::range : Refusal::none;
 }
 
 bool is_in_board_name(char c) {
@@ -93,7 +65,7 @@ Text encode(const char* bytes, char* out) {
 Refusal set_network(SiteSettings& settings, Text value) {
   char name[network_max + 1] = {};
   if (value != off_word) {
-    const Refusal refusal = decode(value, name, 1, network_max);
+    const Refusal refusal = decode(row_of(Setting::network), value, name);
     if (refusal != Refusal::none) return refusal;
   }
   if (std::strcmp(name, settings.network) == 0) return Refusal::none;
@@ -105,7 +77,7 @@ Refusal set_network(SiteSettings& settings, Text value) {
 Refusal set_password(SiteSettings& settings, Text value) {
   char password[password_max + 1] = {};
   if (value != off_word) {
-    const Refusal refusal = decode(value, password, password_min, password_max);
+    const Refusal refusal = decode(row_of(Setting::password), value, password);
     if (refusal != Refusal::none) return refusal;
   }
   std::memcpy(settings.password, password, sizeof password);
@@ -119,7 +91,7 @@ Refusal set_host(SiteSettings& settings, Text value) {
     while (size < value.size() && value[size] != '.') ++size;
     if ((part < 3) != (size < value.size())) return Refusal::format;
     std::uint32_t byte = 0;
-    const Refusal refusal = read_number(value.substr(0, size), Range{0, 255}, byte);
+    const Refusal refusal = read_number(value.substr(0, size), 0, 255, byte);
     if (refusal != Refusal::none) return refusal;
     address = address << 8 | byte;
     if (part < 3) value = value.substr(size + 1);
@@ -159,23 +131,20 @@ Refusal set_key(Key (&keys)[max_keys], Text value) {
   return Refusal::none;
 }
 
-// Which setting has that key; -1: none. The analog inputs follow those of `Site`.
-int index_of(Text key) {
-  for (int i = 0; i < site_count; ++i) {
-    if (site_keys[i] == key) return i;
-  }
-  for (int i = 0; i < analog_channels; ++i) {
-    if (name_of(state_field(FieldKind::analog, i + 1)) == key) return site_count + i;
-  }
-  return -1;
+bool has_key(const SettingRow& row, int number, Text key) {
+  if (row.setting == Setting::full_scale) return name_of(state_field(FieldKind::analog, number)) == key;
+  if (row.keys == 1) return row.key == key;
+  const std::size_t digit = row.key.size() - 1;
+  return key.size() == row.key.size() && key.substr(0, digit) == row.key.substr(0, digit) &&
+         key[digit] == '0' + number;
 }
 
 Refusal set_full_scale(std::uint16_t& full_scale_cv, Text value) {
-  constexpr std::int32_t max_cv = 65000;
+  constexpr SettingRow row = row_of(Setting::full_scale);
   std::int32_t cv = 0;
   if (!parse_hundredths(value, cv))
     return is_whole_number(value) ? Refusal::range : Refusal::format;
-  if (cv < 1 || cv > max_cv) return Refusal::range;
+  if (cv < std::int32_t{row.min} || cv > std::int32_t{row.max}) return Refusal::range;
   full_scale_cv = static_cast<std::uint16_t>(cv);
   return Refusal::none;
 }
@@ -220,49 +189,70 @@ bool is_board_id(Text text) {
   return !text.empty() && text.size() <= board_id_max;
 }
 
-bool is_site_setting(Text key) { return index_of(key) >= 0; }
-
-bool is_secret_setting(Text key) {
-  const int index = index_of(key);
-  return index == static_cast<int>(Site::password) || index == static_cast<int>(Site::key);
+FoundSetting find_setting(Text key) {
+  for (const SettingRow& row : setting_rows) {
+    for (int number = 1; number <= row.keys; ++number) {
+      if (has_key(row, number, key)) return {&row, number};
+    }
+  }
+  return {nullptr, 0};
 }
 
-Refusal set(SiteSettings& settings, Text key, Text value) {
-  const int index = index_of(key);
-  if (index < 0) return Refusal::unknown;
-  if (index >= site_count) return set_full_scale(settings.full_scale_cv[index - site_count], value);
-  switch (static_cast<Site>(index)) {
-    case Site::network:
-      return set_network(settings, value);
-    case Site::password:
-      return set_password(settings, value);
-    case Site::host:
-      return set_host(settings, value);
-    case Site::port:
-      return set_number(settings.udp_port, value, Range{1, 65535});
-    case Site::node:
-      return set_number(settings.can_node, value, Range{0, 31});
-    case Site::chips:
-      return set_number(settings.chips, value, Range{0, 31});
-    case Site::name:
-      return set_name(settings, value);
-    case Site::key:
-      return set_key(settings.keys, value);
-    case Site::count:
-      break;
+bool is_site_setting(Text key) {
+  const SettingRow* const row = find_setting(key).row;
+  return row != nullptr && row->setting >= Setting::network;
+}
+
+bool is_secret_setting(Text key) {
+  return key == row_of(Setting::password).key || key == row_of(Setting::key).key;
+}
+
+Refusal read_number(Text value, std::uint32_t min, std::uint32_t max, std::uint32_t& out) {
+  std::uint32_t number = 0;
+  if (!parse_number(value, number)) {
+    return is_whole_number(value) ? Refusal::range : Refusal::format;
   }
-  return Refusal::unknown;
+  if (number < min || number > max) return Refusal::range;
+  out = number;
+  return Refusal::none;
+}
+
+Refusal set(SiteSettings& settings, FoundSetting found, Text value) {
+  const SettingRow& row = *found.row;
+  switch (row.setting) {
+    case Setting::network:
+      return set_network(settings, value);
+    case Setting::password:
+      return set_password(settings, value);
+    case Setting::host:
+      return set_host(settings, value);
+    case Setting::port:
+      return set_number(settings.udp_port, row, value);
+    case Setting::node:
+      return set_number(settings.can_node, row, value);
+    case Setting::chips:
+      return set_number(settings.chips, row, value);
+    case Setting::name:
+      return set_name(settings, value);
+    case Setting::full_scale:
+      return set_full_scale(settings.full_scale_cv[found.number - 1], value);
+    case Setting::key:
+      return set_key(settings.keys, value);
+    default:
+      return Refusal::unknown;
+  }
 }
 
 bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_site_value],
          Text& value) {
   // The single ones, the analog inputs, the keys.
-  constexpr int first_input = static_cast<int>(Site::key);
+  constexpr int single = static_cast<int>(Setting::network);
+  constexpr int first_input = static_cast<int>(Setting::full_scale) - single;
   constexpr int first_key = first_input + analog_channels;
   if (index < 0 || index >= first_key + max_keys) return false;
   if (index >= first_key) {
     const Key& one = settings.keys[index - first_key];
-    key = site_keys[static_cast<int>(Site::key)];
+    key = row_of(Setting::key).key;
     value = Text(out, static_cast<std::size_t>(write_key(out, one) - out));
     return one.id != 0;
   }
@@ -273,29 +263,28 @@ bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_sit
     value = Text(out, static_cast<std::size_t>(end - out));
     return true;
   }
-  key = site_keys[index];
-  switch (static_cast<Site>(index)) {
-    case Site::network:
+  const SettingRow& row = setting_rows[single + index];
+  key = row.key;
+  switch (row.setting) {
+    case Setting::network:
       value = encode(settings.network, out);
       break;
-    case Site::password:
+    case Setting::password:
       value = encode(settings.password, out);
       break;
-    case Site::host:
+    case Setting::host:
       value = write_host(out, settings.host);
       break;
-    case Site::port:
+    case Setting::port:
       value = write(out, std::uint32_t{settings.udp_port});
       break;
-    case Site::node:
+    case Setting::node:
       value = write(out, std::uint32_t{settings.can_node});
       break;
-    case Site::name:
+    case Setting::name:
       value = encode(settings.name, out);
       break;
-    case Site::chips:
-    case Site::key:
-    case Site::count:
+    default:
       value = write(out, std::uint32_t{settings.chips});
       break;
   }

@@ -79,7 +79,7 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['send', NO_BOARD, ';'.join(f'S:1500,{i}' for i in range(1, 17)) + ';R:1,On'], USAGE, 'one more than the 16'),
     (['send', NO_BOARD, 'O:358,1,1;O:358,1,2', '--timeout', '0.3'], REFUSED, 'not confirmed within 3'),
     (['send', NO_BOARD, 'G:1'], USAGE, 'no such command; the commands are O:'),
-    (['send', NO_BOARD, 'X:1'], USAGE, r'^r4: X:1: the board knows no such command.*use X:READ'),
+    (['send', NO_BOARD, 'X:1'], USAGE, r'^r4: X:1: the board knows no such command.*use X:DAC,channel,mV.*X:READ,'),
     (['send', NO_BOARD, 'X:READ,3,x75,1'], USAGE, 'outside its range.*address 8-119'),
     (['send', NO_BOARD, 'X:READ,104,75,1'], USAGE, 'not the form.*bytes as x3B00'),
     (['send', NO_BOARD, 'X:POLL,104,x3b,14,10,9'], USAGE, 'no such channel.*slot 1-8'),

@@ -254,7 +254,8 @@ def test_fields_and_units_are_those_of_the_product(shown, tmp_path):
 
 
 def test_commands_are_those_of_r4_send(shown, tmp_path):
-    forms = re.findall(r'^  ([A-Z]):(\S+) ', run('send', '--help').stdout, re.MULTILINE)
+    # A word, as in E:STOP, is a value of its own; the values of X have no names.
+    forms = re.findall(r'^  ([A-WYZ]):(?:[A-Z]{2,})?(\S*) ', run('send', '--help').stdout, re.MULTILINE)
     assert len(forms) >= 12
     for letter, form in forms:
         for value in re.findall(r'[a-z]+', form):

@@ -69,17 +69,18 @@ R4LINK_API std::string describe(const Command& command);
 // What a board's refusal means: "no such channel".
 R4LINK_API std::string_view meaning_of(Refusal refusal);
 
-// One command of the board, for help and for the fix in an error.
-struct CommandHelp {
-  char letter;
-  std::string_view form;     // "O:pwm,dir,ch"
-  std::string_view meaning;  // "OSMC motor driver"
-  std::string_view ranges;   // "pwm 0-4095, dir 0 or 1, ch 1-4"
-};
+// What the kind is called: "OSMC", "servo".
+R4LINK_API std::string_view name_of(CommandKind kind);
 
-// The help of the command with that letter; nullptr if there is none.
-R4LINK_API const CommandHelp* command_help(char letter);
-// All commands, in the order of docs/protocol.md.
+// One kind of command, for help and for the fix in an error.
+struct CommandHelp {
+  CommandKind kind = CommandKind::heartbeat;
+  std::string form;          // "O:pwm,dir,ch"
+  std::string_view meaning;  // "OSMC motor driver"
+  std::string ranges;        // "pwm 0-4095, dir 0 or 1, ch 1-4"
+};
+R4LINK_API const CommandHelp& command_help(CommandKind kind);
+// All kinds, in the order of CommandKind.
 R4LINK_API std::span<const CommandHelp> all_command_help();
 
 }  // namespace r4

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <map>
+#include <regex>
 #include <string>
 
 #include "r4link/commands/command_text.hpp"
@@ -52,6 +55,58 @@ TEST(CommandHelp, ShowsTheValuesThatASettingTakes) {
     const std::string name(key.data(), key.size());
     EXPECT_TRUE(all.find(" " + name + " ") != std::string::npos || name.starts_with("AIN")) << name;
   }
+}
+
+// Section 3 of docs/protocol.md has a row for each kind, with the form and the ranges of the tables.
+TEST(CommandHelp, HasTheFormsAndRangesOfTheDocumentedProtocol) {
+  std::ifstream file(R4_TEST_DATA "/../../docs/protocol.md");
+  std::map<std::string, std::string> documented;
+  for (std::string line; std::getline(file, line);) {
+    std::smatch parts;
+    static const std::regex row(R"(\| `([A-Z]:.*?)` \| .* \| ?(.*?) ?\|)");
+    if (!std::regex_match(line, parts, row)) continue;
+    documented[std::regex_replace(parts.str(1), std::regex(R"(\\\|)"), "|")] = parts.str(2);
+  }
+  for (const CommandHelp& each : all_command_help()) {
+    ASSERT_EQ(documented.count(each.form), 1U) << each.form;
+    if (each.kind == CommandKind::setting) continue;  // it has tables of its own
+    EXPECT_EQ(documented[each.form], each.ranges) << each.form;
+  }
+  EXPECT_EQ(documented.size(), all_command_help().size()) << "a row of no command";
+}
+
+// The tables of settings there have the range and the default of each.
+TEST(CommandHelp, TakesTheDocumentedSettings) {
+  std::ifstream file(R4_TEST_DATA "/../../docs/protocol.md");
+  std::map<std::string, std::string> documented;
+  for (std::string line; std::getline(file, line);) {
+    std::smatch parts;
+    static const std::regex row(R"(\| `([A-Za-z0-9]+)`.* \| .* \| .* \|)");
+    if (std::regex_match(line, parts, row)) documented[parts.str(1)] = line;
+  }
+  for (const SettingRow& row : setting_rows) {
+    const std::string key(row.key.data(), row.key.size());
+    ASSERT_EQ(documented.count(key), 1U) << key;
+    const std::string& line = documented[key];
+    const bool volts = row.setting == Setting::full_scale;
+    const bool flag = row.setting == Setting::pack;
+    if (row.max != 0 && !flag) {
+      const std::string range =
+          volts ? "0.01–650" : std::to_string(row.min) + "–" + std::to_string(row.max);
+      EXPECT_TRUE(contains(line, range)) << key;
+    }
+    if (row.standard == 0) continue;
+    EXPECT_TRUE(contains(line, volts ? "| 50.00 |" : "| " + std::to_string(row.standard) + " |"));
+  }
+}
+
+TEST(CommandHelp, ShowsTheOneCommandThatAWrongTextBeginsAs) {
+  EXPECT_EQ(bad_command("X:DAC,3,1", Refusal::channel).fix,
+            "use X:DAC,channel,mV with channel 1-2, mV 0-3300");
+  EXPECT_EQ(bad_command("E:GO", Refusal::unknown).fix, "use E:STOP, E:CLEAR[,cause], E:LEAVE");
+  EXPECT_EQ(bad_command("E:STOP,1", Refusal::format).fix, "use E:STOP");
+  EXPECT_NE(bad_command("G:1", Refusal::unknown).fix.find("the commands are O:pwm,dir,ch D:"),
+            std::string::npos);
 }
 
 TEST(CommandHelp, FindsTheCommandOfAGroup) {

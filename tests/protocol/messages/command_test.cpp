@@ -55,8 +55,23 @@ TEST(Command, EveryCommandIsReadAndWrittenAgain) {
         "R:8,Off",   "E:STOP",        "E:CLEAR",       "E:CLEAR,0",       "E:CLEAR,2147483647",
         "E:LEAVE",   "P:-100,2000,4", "Z:4",           "B:4095,1,0,4",    "B:0,0,1,1",
         "U:400,4",   "F:DEFAULT",     "F:AIN24,OSMC1", "C:recovery,last", "C:rate,100",
-        "Q:ID"}) {
+        "Q:ID",      "W:0",           "W:1000",        "W:10,AIN24,ENC1"}) {
     EXPECT_EQ(again(text), text);
+  }
+  EXPECT_EQ(again("W:1001"), "RANGE");
+  EXPECT_EQ(again("W:-1"), "RANGE");
+  EXPECT_EQ(again("W:10,"), "FORMAT");
+}
+
+TEST(Command, TheTableHasOneRowForEachLetterAndWord) {
+  for (const CommandRow& row : command_rows) {
+    for (const CommandRow& other : command_rows) {
+      const bool apart = row.letter != other.letter ||
+                         (row.word != other.word && !row.word.empty() && !other.word.empty());
+      EXPECT_TRUE(apart || row.kind == other.kind) << row.letter << str(row.word);
+    }
+    EXPECT_TRUE(is_command_letter(row.letter)) << row.letter;
+    EXPECT_LE(row.most - row.least, 1) << row.letter << ": which one is left out must be known";
   }
 }
 
@@ -228,6 +243,7 @@ TEST(Command, CommandsOfTheFactoriesAreCheckedTheSame) {
   EXPECT_EQ(check_command(Command::stepper(1, Steps(1), StepsPerSecond(0))), Refusal::range);
   EXPECT_EQ(check_command(Command::stepper(1, Steps(1), StepsPerSecond(20001))), Refusal::range);
   EXPECT_EQ(check_command(Command::proximity(1, Centimetres(401))), Refusal::range);
+  EXPECT_EQ(check_command(Command::bldc(1, Pwm(4096), Direction::forward, false)), Refusal::range);
   EXPECT_EQ(check_command(Command::fields("")), Refusal::format);
   EXPECT_EQ(check_command(Command::setting("", "1")), Refusal::format);
   EXPECT_EQ(check_command(Command::setting("rate", "")), Refusal::format);

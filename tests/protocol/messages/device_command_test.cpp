@@ -96,8 +96,8 @@ TEST(DeviceCommand, OnlyAWriteAndAVoltageMayMoveSomethingAndTheVoltageJoinsGroup
   }
   EXPECT_TRUE(drives_output(CommandKind::dac));
   EXPECT_TRUE(joins_groups(CommandKind::dac));
-  for (const CommandKind kind :
-       {CommandKind::i2c_read, CommandKind::i2c_scan, CommandKind::i2c_poll}) {
+  for (const CommandKind kind : {CommandKind::i2c_read, CommandKind::i2c_scan,
+                                 CommandKind::i2c_poll, CommandKind::i2c_poll_off}) {
     EXPECT_FALSE(drives_output(kind));
   }
 }

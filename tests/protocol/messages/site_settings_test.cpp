@@ -11,7 +11,8 @@ namespace r4 {
 namespace {
 
 Refusal set_text(SiteSettings& settings, const std::string& key, const std::string& value) {
-  return set(settings, Text(key), Text(value));
+  const FoundSetting found = find_setting(Text(key));
+  return found.row == nullptr ? Refusal::unknown : set(settings, found, Text(value));
 }
 
 std::string written(const Settings& settings) {

@@ -8,17 +8,6 @@
 namespace r4::tool::ros2 {
 namespace {
 
-struct Kind {
-  CommandKind kind;
-  int channels;
-};
-constexpr std::array<Kind, 7> kinds{{{CommandKind::osmc, osmc_channels},
-                                     {CommandKind::dhb12, dhb12_channels},
-                                     {CommandKind::servo, servo_channels},
-                                     {CommandKind::relay, relay_channels},
-                                     {CommandKind::stepper, stepper_channels},
-                                     {CommandKind::bldc, bldc_channels},
-                                     {CommandKind::dac, dac_channels}}};
 constexpr int supply_relay = 1;
 
 }  // namespace
@@ -39,46 +28,34 @@ bool Drivers::rests(const Command& command) {
 
 std::optional<std::size_t> Drivers::index_of(const Command& command) {
   std::size_t first = 0;
-  for (const Kind& each : kinds) {
-    if (command.kind == each.kind) {
-      if (each.kind == CommandKind::relay && command.channel == supply_relay) return std::nullopt;
+  for (const CommandRow& row : command_rows) {
+    if (!is_driven(row)) continue;
+    if (command.kind == row.kind) {
+      if (row.kind == CommandKind::relay && command.channel == supply_relay) return std::nullopt;
       return first + command.channel - 1U;
     }
-    first += static_cast<std::size_t>(each.channels);
+    first += row.channels;
   }
   return std::nullopt;
 }
 
 std::optional<Command> Drivers::stop_of(std::size_t index, Time now) const {
-  std::size_t first = 0;
-  for (const Kind& each : kinds) {
-    const auto channels = static_cast<std::size_t>(each.channels);
-    if (index >= first + channels) {
-      first += channels;
-      continue;
-    }
-    const int channel = static_cast<int>(index - first) + 1;
-    switch (each.kind) {
-      case CommandKind::osmc:
-        return Command::osmc(channel, Pwm(0), Direction::forward);
-      case CommandKind::dhb12:
-        return Command::dhb12(channel, Pwm(0), Direction::forward);
-      case CommandKind::servo:
-        return Command::servo(channel, Microseconds(0));
-      case CommandKind::relay:
-        return Command::relay(channel, false);
-      case CommandKind::stepper: {
-        const Position& position = positions_[index - first];
-        if (!position.sampled || now - *position.sampled > oldest_position) return std::nullopt;
-        return Command::stepper(channel, Steps(position.steps));
-      }
-      case CommandKind::dac:
-        return Command::dac(channel, Millivolts(0));
-      default:
-        return Command::bldc(channel, Pwm(0), Direction::forward, true);
-    }
+  std::size_t i = index;
+  const CommandRow* row = command_rows;
+  for (; !is_driven(*row) || i >= row->channels; ++row) {
+    if (is_driven(*row)) i -= row->channels;
   }
-  return std::nullopt;
+  Command stop;  // a value of 0, or off
+  stop.kind = row->kind;
+  stop.channel = static_cast<std::uint8_t>(i + 1);
+  stop.direction = Direction::forward;
+  stop.on = row->kind == CommandKind::bldc;  // the brake
+  if (row->kind == CommandKind::stepper) {
+    const Position& position = positions_[i];
+    if (!position.sampled || now - *position.sampled > oldest_position) return std::nullopt;
+    stop.value = position.steps;
+  }
+  return stop;
 }
 
 void Drivers::on_sent(const Command& command, const void* source, std::uint64_t publisher,

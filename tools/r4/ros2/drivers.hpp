@@ -27,6 +27,16 @@
 
 namespace r4::tool::ros2 {
 
+// True for the kinds whose channels are driven. Z moves nothing.
+constexpr bool is_driven(const CommandRow& row) {
+  return joins_groups(row.kind) && row.kind != CommandKind::zero;
+}
+constexpr std::size_t number_of_outputs() {
+  std::size_t outputs = 0;
+  for (const CommandRow& row : command_rows) outputs += is_driven(row) ? row.channels : 0U;
+  return outputs;
+}
+
 class Drivers {
  public:
   using Time = BootClock::time_point;
@@ -79,9 +89,7 @@ class Drivers {
   static constexpr Duration oldest_position{250};
   // Of Z to the board: a state of meanwhile may still be of before.
   static constexpr Duration longest_way{100};
-  static constexpr std::size_t outputs = osmc_channels + dhb12_channels + servo_channels +
-                                         relay_channels + stepper_channels + bldc_channels +
-                                         dac_channels;
+  static constexpr std::size_t outputs = number_of_outputs();
   static std::optional<std::size_t> index_of(const Command& command);
   std::optional<Command> stop_of(std::size_t index, Time now) const;
 

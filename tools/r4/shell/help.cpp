@@ -75,8 +75,11 @@ std::string command_table() {
   constexpr std::size_t widest = 100;
   std::string table;
   for (const CommandHelp& each : all_command_help()) {
-    if (each.letter == 'H') continue;  // those are sent by themselves
-    const std::string first = fmt::format("  {:<21} {}:", each.form, each.meaning);
+    const bool by_itself = each.kind == CommandKind::heartbeat || each.kind == CommandKind::leave ||
+                           each.kind == CommandKind::watch;
+    if (by_itself) continue;
+    const std::string first =
+        fmt::format("  {:<21} {}{}", each.form, each.meaning, each.ranges.empty() ? "" : ":");
     const bool fits = first.size() + each.ranges.size() < widest;
     table += first + (fits ? " " : "\n      ");
     std::string_view ranges = each.ranges;

@@ -176,9 +176,9 @@ CLI::Option* add_fields(CLI::App& command, std::string& out, const std::string& 
           [&out](const std::string& text) {
             FieldSet set;
             if (parse_fields(Text(text), set) != Refusal::none) {
-              throw Error(ErrorKind::usage, "--fields " + text, "there is no such state field",
-                          std::string("use ") + std::string(command_help('F')->ranges) +
-                              ", separated by commas");
+              throw Error(
+                  ErrorKind::usage, "--fields " + text, "there is no such state field",
+                  "use " + command_help(CommandKind::fields).ranges + ", separated by commas");
             }
             out = text;
           },

@@ -2,8 +2,10 @@
 // r4 encode: fields in, a datagram with packet number, time and checksum out.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -91,7 +93,10 @@ void check(const Datagram& datagram) {
     }
     case MessageKind::command:
     case MessageKind::host_heartbeat:
-      if (command_help(text.front()) != nullptr) parse_command_text(text);
+      if (std::any_of(std::begin(command_rows), std::end(command_rows),
+                      [&](const CommandRow& row) { return row.letter == text.front(); })) {
+        parse_command_text(text);
+      }
       break;
     case MessageKind::board_heartbeat:
     case MessageKind::state:
