@@ -61,8 +61,8 @@ def test_a_group_is_executed_as_one_or_not_at_all(sim, board, wait):
     lambda board: board.servo(3).set(us=1500.5), lambda board: board.servo(3).calibrate(30),
     lambda _: ServoCalibration((1000, 2000), (-45, 45)), lambda _: ServoCalibration(us=(1000, 2000)),
     lambda _: ServoCalibration(us=1000, degrees=-45), lambda _: ServoCalibration(us=(1000.5, 2000), degrees=(-45, 45)),
-    lambda _: ServoCalibration(us=(1000, 2000), degrees=('-45', 45)), lambda _: ARM.pulse(30), lambda _: ARM.degrees(1500),
-    lambda _: ARM.pulse(degrees=True)])
+    lambda _: ServoCalibration(us=(1000, 2000), degrees=('-45', 45)), lambda _: ARM.pulse(30),
+    lambda _: ARM.degrees(1500), lambda _: ARM.pulse(degrees=True)])
 def test_a_value_without_its_name_or_of_another_type_is_a_type_error(board, call):
     with pytest.raises(TypeError):
         call(board)

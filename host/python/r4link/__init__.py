@@ -8,8 +8,8 @@ if _importlib.find_spec('r4link._core') is None:
 
 from . import aio, control, devices  # pylint: disable=wrong-import-position
 from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Discovery, Event, FoundBoard, Identity, LinkStatus,
-                    Recording, RefusedPost, SearchedBus, SearchedNetwork, SearchedPort, ServoCalibration, Setpoints, State,
-                    Statistics, Subscription, PathStatus, discover, __version__)
+                    Recording, RefusedPost, SearchedBus, SearchedNetwork, SearchedPort, ServoCalibration, Setpoints,
+                    State, Statistics, Subscription, PathStatus, discover, __version__)
 from .board import Board, States
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
 from .channels import BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, StepperChannel, Uart

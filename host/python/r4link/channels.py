@@ -70,8 +70,8 @@ class ServoChannel(_Channel[Sent]):
     """A servo, driven by its pulse or, once it is calibrated, by its angle."""
 
     def calibrate(self, calibration: ServoCalibration) -> None:
-        """Once, before this servo is driven in degrees. The Board keeps it, also while the link is lost; it is not sent to
-        the board."""
+        """Once, before this servo is driven in degrees. The Board keeps it, also while the link is lost; it is not sent
+        to the board."""
         self._board._core.calibrate_servo(self._channel, calibration)
 
     @property
