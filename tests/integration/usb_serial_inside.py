@@ -18,6 +18,7 @@ import threading
 import time
 import tty
 
+from machine import account
 from r4_process import Running, driving, free_port, is_link, is_state, monitor, objects, run, send, stop_takes_ms, watch
 from test_usb_serial import carry
 from host_on_paths import HostOnPaths
@@ -133,7 +134,7 @@ def shared_by_programs():
 
 
 def one_of_two_paths(terminal, commands):
-    """The other is UDP, by a gateway; `commands`: the file for those that the board must have executed."""
+    """The other is UDP, by a gateway; `commands`: the file for what became of each command."""
     reports = kernel_reports()
     port = free_port()
 
@@ -172,6 +173,7 @@ def one_of_two_paths(terminal, commands):
             assert second.process.poll() is None
 
 
+account.begin()
 TERMINAL = other_path()
 listed_with_who_controls_it()
 streams_at_the_boards_rate()
