@@ -77,6 +77,7 @@ void work(const std::vector<std::string>& urls) {
       board.send(command, 5s);
     } catch (const r4::Error& error) {
       result["confirmed"] = false;
+      result["outcome"] = r4::to_text(error.outcome());
       result["error"] = error.what();
     }
     print(result);

@@ -10,7 +10,7 @@ import subprocess
 import threading
 import time
 
-from r4_process import PATIENCE_S, R4, Board, Running
+from r4_process import PATIENCE_S, R4, Board, Running, again
 
 PROGRAM = os.path.join(os.path.dirname(R4), 'tests', 'ros2_peer')
 # Of ROS; each graph has its own, for who was killed stays in the old one for a while.
@@ -161,20 +161,6 @@ def join(ros2, peer, topic, of):
     """A publisher of the peer, known at both ends: what is written now is read."""
     peer.writer(f'rt/{topic}', of)
     ros2.logged(f'{topic}: 1 publishers')
-
-
-def again(write, wait):
-    """Writes as who drives does, again and again, until what `wait` waits for is there: on a machine that has no time
-    a sample may come later than a command may live. When it was written last, and what was waited for."""
-    deadline = time.monotonic() + PATIENCE_S
-    while True:
-        write()
-        written = time.monotonic()
-        try:
-            return written, wait(0.25)
-        except AssertionError:
-            if time.monotonic() > deadline:
-                raise
 
 
 def arm(ros2, peer):

@@ -10,11 +10,11 @@ import time
 import pytest
 
 from lan import Lan
-from machine import within
+from machine import was_held_up, within
 from r4_process import (ERROR, PATIENCE_S, Board, Running, free_port, is_link, is_state, lasts, monitor, objects,
                         run, text_of)
 from host_on_paths import (BACK_WITHIN_S, LONGEST_GAP_S, REPORTED_WITHIN_S, TIMEOUT_S, HostOnPaths, Relay, has_joined,
-                        has_left)
+                           has_left, require_executed_as_told)
 
 
 @contextlib.contextmanager
@@ -72,8 +72,8 @@ def judge(host, began, what):
     print(f'{what}; longest gap between states {gap * 1e3:.0f} ms')
     times = [each['t'] for each in states]
     assert times == sorted(set(times)), 'a state was told twice, or after a newer one'
-    assert not [each for each in host.log if each['type'] == 'link' and each['came'] > began and
-                each['fields']['state'] != 'active']
+    assert was_held_up() or not [each for each in host.log if each['type'] == 'link' and each['came'] > began and
+                                 each['fields']['state'] != 'active']
     assert gap <= within(LONGEST_GAP_S)
 
 
@@ -113,37 +113,61 @@ def test_a_path_that_is_held_up_and_then_brings_what_is_old_disturbs_nothing():
     assert lost <= within(TIMEOUT_S + REPORTED_WITHIN_S) and back <= within(BACK_WITHIN_S)
 
 
+class Sends:
+    """r4 send of one command after the other. Each has its own value. A machine that keeps a program waiting may cost the
+    link, or make a command too old: that ends r4 send, and another goes on with the next command."""
+
+    def __init__(self, urls, most):
+        self.urls, self.most = urls, most
+        self.results = []
+        self.host = None
+        self._begin()
+
+    def _begin(self):
+        first = len(self.results)
+        commands = [f'S:{1000 + i % 1000},{i % 16 + 1}' for i in range(first, first + self.most - self.confirmed())]
+        self.host = Running('send', *self.urls, *commands, '--json', '--hold', '60')
+
+    def confirmed(self):
+        return sum(each['confirmed'] for each in self.results)
+
+    def until(self, confirmed):
+        while self.confirmed() < confirmed:
+            result = self.host.next()
+            self.results.append(result)
+            if result['confirmed']:
+                continue
+            assert was_held_up(), result
+            assert len(self.results) < 2 * self.most, self.results[-10:]
+            assert self.host.wait() == 3
+            self._begin()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.host.__exit__()
+
+
 def test_commands_are_executed_once_each_while_paths_come_and_go():
-    commands = [f'S:{1000 + i % 1000},{i % 16 + 1}' for i in range(400)]
     with wired('pty', 'udp') as (board, paths):
-        with Running('send', *(path.url for path in paths), *commands, '--json', '--hold', '60') as host:
-            results = []
-
-            def confirmed(most):
-                while len(results) < most:
-                    results.append(host.next())
-
-            def both():
-                board.next(lambda each: each.get('path', {}).get('event') == 'joined' and each['path']['paths'] == 2)
-
-            both()
-            confirmed(50)
+        with Sends([path.url for path in paths], 400) as sends:
+            board.next(has_joined(2))
+            sends.until(50)
             paths[0].pull()
-            confirmed(120)
+            sends.until(120)
             paths[0].plug_in()
-            both()  # before that there is only one, which must not go
-            confirmed(190)
+            board.next(has_joined(2))  # before that there is only one, which must not go
+            sends.until(190)
             paths[1].signal(signal.SIGSTOP)
-            confirmed(260)
+            sends.until(260)
             paths[1].signal(signal.SIGCONT)
-            confirmed(330)
+            sends.until(330)
             paths[1].pull()
-            confirmed(400)
-            slowest = max(each['ms'] for each in results)
-        executed = [each['executed']['command'] for each in board.rest() if 'executed' in each]
-        print(f'400 commands: the slowest took {slowest:.0f} ms')
-        assert [each['command'] for each in results] == commands and all(each['confirmed'] for each in results)
-        assert [each for each in executed if each.startswith('S:')] == commands
+            sends.until(400)
+        slowest = max(each['ms'] for each in sends.results)
+        print(f'{len(sends.results)} commands: the slowest took {slowest:.0f} ms')
+        require_executed_as_told(sends.results, board.rest())
 
 
 @pytest.mark.parametrize('signals', [(signal.SIGSTOP, signal.SIGCONT), (signal.SIGKILL, None)])
@@ -196,7 +220,7 @@ def test_each_command_takes_the_paths_of_a_board(tmp_path):
         assert run('send', *urls, 'R:1,On', 'Q:ID').returncode == 0
         measured = run('bench', *reversed(urls), '--duration', '0.5', '--json')
         assert measured.returncode == 0, measured
-        assert objects(measured.stdout)[0]['lost'] == 0
+        assert objects(measured.stdout)[0]['lost'] == 0 or was_held_up()
         told = objects(run('doctor', joined, '--duration', '0.3', '--json').stdout)
         assert {each['url'] for each in told if each['type'] == 'link'} == set(urls)
 
@@ -227,7 +251,8 @@ def test_paths_that_lead_to_two_boards_are_refused_with_both_names():
             assert ERROR.search(refused.stderr) and 'left' in refused.stderr and 'right' in refused.stderr, refused
         for board in boards:
             board.skip_past()
-        assert run('stop', left.host_url, right.host_url).returncode == 3
+        # One that answers alone for longer than r4 stop lasts is the only one that is known of.
+        assert run('stop', left.host_url, right.host_url).returncode == 3 or was_held_up()
         for board in boards:  # each is stopped all the same
             board.executed('E:STOP')
 

@@ -4,8 +4,8 @@ import signal
 import time
 
 from machine import within
-from r4_process import Board, lasts
-from ros2_peer import (DIAGNOSTICS, FLOAT32, STRING, Peer, Ros2, again, armed, drive, float32, health_of, join,
+from r4_process import Board, again, lasts
+from ros2_peer import (DIAGNOSTICS, FLOAT32, STRING, Peer, Ros2, armed, drive, float32, health_of, join,
                        own_domain, pwm, text)
 from host_on_paths import Relay, has_joined, has_left
 

@@ -7,8 +7,8 @@ import time
 import pytest
 
 from machine import within
-from r4_process import Board, run
-from ros2_peer import (BOOL, DIAGNOSTICS, FLOAT32, INT32, LOG, STRING, TWIST, TWIST_STAMPED, Peer, Ros2, again, arm,
+from r4_process import Board, again, run
+from ros2_peer import (BOOL, DIAGNOSTICS, FLOAT32, INT32, LOG, STRING, TWIST, TWIST_STAMPED, Peer, Ros2, arm,
                        armed, drive, float32, health_of, join, own_domain, pwm, stamped, text, twist)
 
 ON, OFF = b'\x01', b'\x00'

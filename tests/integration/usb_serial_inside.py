@@ -18,7 +18,8 @@ import threading
 import time
 import tty
 
-from r4_process import Running, driving, free_port, is_link, is_state, monitor, objects, run, send, stop_takes_ms, watch
+from machine import account
+from r4_process import PATIENCE_S, Running, driving, free_port, is_link, is_state, monitor, objects, run, send, stop_takes_ms, watch
 from test_usb_serial import carry
 from host_on_paths import HostOnPaths
 
@@ -96,12 +97,12 @@ def unplugged_and_plugged_in_again(url, times):
         for _ in range(times):
             host.next(is_state)
             subprocess.run(['r4-usb', 'unplug'], check=True)
-            removed = reports.get(timeout=5)
+            removed = reports.get(timeout=PATIENCE_S)
             assert removed[1] == 'remove'
             down = host.next(is_down)
             delay = down['came'] - removed[0]
             subprocess.run(['r4-usb', 'plug'], check=True)
-            added = reports.get(timeout=5)
+            added = reports.get(timeout=PATIENCE_S)
             assert added[1] == 'add'
             active = host.next(is_link('active'))
             host.next(is_state)
@@ -133,7 +134,7 @@ def shared_by_programs():
 
 
 def one_of_two_paths(terminal, commands):
-    """The other is UDP, by a gateway; `commands`: the file for those that the board must have executed."""
+    """The other is UDP, by a gateway; `commands`: the file for what became of each command."""
     reports = kernel_reports()
     port = free_port()
 
@@ -143,7 +144,7 @@ def one_of_two_paths(terminal, commands):
     def by_usb(order, action):
         def act():
             subprocess.run(['r4-usb', order], check=True)
-            at, what = reports.get(timeout=5)
+            at, what = reports.get(timeout=PATIENCE_S)
             assert what == action
             return at
         return act
@@ -172,6 +173,7 @@ def one_of_two_paths(terminal, commands):
             assert second.process.poll() is None
 
 
+account.begin()
 TERMINAL = other_path()
 listed_with_who_controls_it()
 streams_at_the_boards_rate()

@@ -46,8 +46,9 @@ class Card {
     this.#clear.onclick = () => ask('clear');
     this.node = element('article', {className: 'card', 'aria-label': `Board ${board_name(board)}`},
       element('div', {className: 'head'}, element('h2', {title: board.url}, board_name(board)), this.#identity),
-      element('p', {className: 'state', role: 'status'}, this.#state, this.#why),
-      this.#figures, this.#paths, element('div', {className: 'act'}, this.#arm, this.#clear, this.#answer));
+      element('div', {className: 'told'}, element('p', {className: 'state', role: 'status'}, this.#state, this.#why),
+        this.#answer, this.#figures, this.#paths),
+      element('div', {className: 'act'}, this.#arm, this.#clear));
     this.show(null);
   }
 
@@ -56,7 +57,8 @@ class Card {
     this.node.dataset.state = kind;
     put(this.#state, word);
     put(this.#why, why);
-    put(this.#identity, health ? [health.id, health.firmware].filter(Boolean).join(' · ') : '');
+    this.#identity.title = health ? [health.id, health.firmware].filter(Boolean).join(' · ') : '';
+    put(this.#identity, this.#identity.title);
     const there = health && kind !== 'lost';
     put(this.#values.get('rate'), there ? `${health.rate_hz.toFixed(1)} Hz` : '–');
     put(this.#values.get('loss'), there ? `${(100 * health.loss).toFixed(1)} %` : '–');
