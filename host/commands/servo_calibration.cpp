@@ -44,7 +44,7 @@ Microseconds ServoCalibration::pulse(Degrees angle) const {
 std::optional<Degrees> ServoCalibration::degrees(int pulse_us) const {
   if (pulse_us == 0) return std::nullopt;
   const double share =
-      static_cast<double>(pulse_us - one_.pulse.value) / (other_.pulse.value - one_.pulse.value);
+      (static_cast<double>(pulse_us) - one_.pulse.value) / (other_.pulse.value - one_.pulse.value);
   return Degrees(one_.angle.value + share * (other_.angle.value - one_.angle.value));
 }
 

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 
-from machine import was_held_up, within
+from machine import within
 from r4_process import R4, Running
 
 PROGRAM = pathlib.Path(R4).parent / 'tests' / 'host_on_paths'
@@ -79,7 +79,7 @@ class HostOnPaths(Running):
         log = board.rest()
         require_executed_as_told(commands, log)
         safe = [each for each in log if each.get('state') == 'SAFE' and self.began < each['came'] < self.ended]
-        assert not safe or was_held_up(), safe
+        assert not safe, safe
 
     def commands_at_its_end(self):
         """The same as far as the host can tell: the commands and what became of each."""
@@ -98,8 +98,9 @@ class HostOnPaths(Running):
         times = [each['t'] for each in states]
         assert times == sorted(set(times)), 'a state was told twice, or after a newer one'
         missed = [each for each in log if self.began < each.get('at', 0) < self.ended and each.get('active') is False]
-        missed += [each for each in commands if not each['confirmed']]
-        assert not missed or was_held_up(), missed
+        # A busy machine may hold a command up until it is too old.
+        missed += [each for each in commands if not each['confirmed'] and 'STALE' not in each['error']]
+        assert not missed, missed
         assert gap <= within(LONGEST_GAP_S)
         return commands
 

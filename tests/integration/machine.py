@@ -4,7 +4,6 @@
 A program keeps a promise of milliseconds only while it has a processor. So within() adds to a bound the time for which the
 kernel kept the programs of the test waiting for one. On a machine that has nothing else to do it adds nothing.
 """
-import collections
 import contextlib
 import math
 import os
@@ -16,7 +15,6 @@ SANITIZED = 'R4_SANITIZER' in os.environ
 # Where a promise of milliseconds can be kept; the guest of tools/with-can emulates its processor. Elsewhere a test holds
 # what must not come too early, and what comes after what.
 PROMPT = not SANITIZED and 'R4_CAN_GUEST' not in os.environ
-HELD_UP_S = 0.2  # for less no link is lost, no browser loses its control, and no command is too old when it comes
 LOOK_S = 0.1  # what a program waits between the last look and its end is not counted
 
 
@@ -37,8 +35,6 @@ class Account:
 
     def __init__(self):
         self.standstill_s = 0.0  # the longest that this thread was kept from running
-        self.worst_second_s = 0.0  # the most that all threads waited within one second, as the looks show it
-        self._looks = collections.deque()  # from a second ago on: when, and waited_s()
         self._lock = threading.Lock()
         self._before = {}
         self._waits = {}
@@ -47,17 +43,17 @@ class Account:
     def begin(self):
         with self._lock:
             self.standstill_s, self._before = 0.0, {}
-            waits_of(os.getpid(), self._before)
+            if PROMPT:
+                waits_of(os.getpid(), self._before)
             self._waits = dict(self._before)
-            self.worst_second_s = 0.0
-            self._looks.clear()
         if not self._thread.is_alive():
             self._thread.start()
 
     def waited_s(self):
         """The sum over all threads, also of programs that have ended."""
         with self._lock:
-            waits_of(os.getpid(), self._waits)
+            if PROMPT:
+                waits_of(os.getpid(), self._waits)
             return sum(waited - self._before.get(thread, 0) for thread, waited in self._waits.items()) / 1e9
 
     def _look(self):
@@ -65,15 +61,7 @@ class Account:
             began = time.monotonic()
             time.sleep(LOOK_S)
             self.standstill_s = max(self.standstill_s, time.monotonic() - began - LOOK_S)
-            self.look()
-
-    def look(self):
-        waited_s, now = self.waited_s(), time.monotonic()
-        with self._lock:
-            self._looks.append((now, waited_s))
-            while len(self._looks) > 1 and self._looks[1][0] <= now - 1:
-                self._looks.popleft()
-            self.worst_second_s = max(self.worst_second_s, waited_s - self._looks[0][1])
+            self.waited_s()
 
 
 account = Account()
@@ -86,9 +74,3 @@ def within(seconds):
 
 def within_ms(milliseconds):
     return 1000 * within(milliseconds / 1000)
-
-
-def was_held_up():
-    """The programs of this test may have lost a link or a command because the machine kept them waiting."""
-    account.look()
-    return max(account.worst_second_s, account.standstill_s) > HELD_UP_S

@@ -40,6 +40,15 @@ def test_drives(sim):
     asyncio.run(main())
 
 
+def test_a_forgotten_await_is_told_with_the_name_of_the_method(sim):
+    async def main():
+        async with aio.Board(sim.url) as board:
+            for name, begin in (('stop', board.stop), ('take_control', board.take_control), ('send', lambda: board.relay(2).set(True))):
+                with pytest.warns(RuntimeWarning, match=rf"'Board\.{name}' was never awaited"):
+                    begin()
+    asyncio.run(main())
+
+
 def test_commands_go_out_in_the_order_in_which_they_were_begun(sim):
     async def main():
         async with aio.Board(sim.url) as board:

@@ -21,10 +21,7 @@ def test_its_own_tests_pass():
 
 
 def test_it_drives_the_model():
-    for _ in range(5):
-        ended = run('openscout.py', 'model', '--course', '0.5,0')
-        if 'newest state' not in ended.stdout:  # this machine kept a state from it for 0.15 s: it stops, as it should
-            break
+    ended = run('openscout.py', 'model', '--course', '0.5,0')
     assert (ended.returncode, ended.stdout) == (0, 'armed: it drives\nthe step has ended it\n'), ended.stderr
 
 

@@ -146,6 +146,13 @@ class Uart(channels.UartChannel[Coroutine[Any, Any, None], Coroutine[Any, Any, U
         return UartStream(self._board._board.uart[self._channel], news, self.on_bytes(lambda _: news.set()))
 
 
+def _named_after(call: Callable[[], T], coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
+    """Python's warning of a forgotten await names the method that made `call`."""
+    method = call.__qualname__.split('.<locals>')[0].rsplit('.', 1)[-1]
+    coroutine.__qualname__ = f'Board.{method}'
+    return coroutine
+
+
 class Board(AnyBoard[Coroutine[Any, Any, None]]):
     """r4link.Board for asyncio; takes the same options. A call that does not wait is not a coroutine. Callbacks run on the
     loop of the task that adds them."""
@@ -160,13 +167,13 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
         self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of loops over states and bytes
 
     def _command(self, call: Callable[[], T]) -> Coroutine[Any, Any, T]:
-        return self._commands.call(call)
+        return _named_after(call, self._commands.call(call))
 
     def _wait(self, call: Callable[[], T]) -> Coroutine[Any, Any, T]:
-        return self._waits.call(call)
+        return _named_after(call, self._waits.call(call))
 
     def _stop(self, call: Callable[[], T]) -> Coroutine[Any, Any, T]:
-        return self._stops.call(call)
+        return _named_after(call, self._stops.call(call))
 
     def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
         return _on_loop(callback)

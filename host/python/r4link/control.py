@@ -252,7 +252,7 @@ class LoopGuard:
         """The loop begins."""
         self._core.start(now)
 
-    def on_state(self, state: State, disarmed_by: DisarmCause, now: float) -> float | None:
+    def on_state(self, state: State, disarmed_by: DisarmCause | str, now: float) -> float | None:
         """The seconds since the last step, on the board's clock, if one is due."""
         return self._core.on_state(state, disarmed_by, now)
 
@@ -260,7 +260,7 @@ class LoopGuard:
         """What the step commands. A motor that is not among them keeps what was commanded before."""
         self._core.on_commanded(setpoints)
 
-    def check(self, link: LinkState, disarmed_by: DisarmCause, now: float) -> LoopEnd:
+    def check(self, link: LinkState | str, disarmed_by: DisarmCause | str, now: float) -> LoopEnd:
         """To be asked at `deadline` at the latest, with Board.link.state and Board.disarmed_by."""
         return self._core.check(link, disarmed_by, now)
 

@@ -33,8 +33,8 @@ class Error(Exception):
     was, from 1 (0: none in particular). `holder` is the program that controls the board already, where that is the reason.
     """
 
-    def __init__(self, thing: str, reason: str, fix: str = '', *, outcome: Outcome = Outcome.NONE,
-                 refusal: Refusal = Refusal.NONE, at: int = 0, holder: Program | None = None) -> None:
+    def __init__(self, thing: str, reason: str, fix: str = '', *, outcome: Outcome | str = Outcome.NONE,
+                 refusal: Refusal | str = Refusal.NONE, at: int = 0, holder: Program | None = None) -> None:
         super().__init__(f'{thing}: {reason}' + (f'; {fix}' if fix else ''))
         self.thing = thing
         self.reason = reason
