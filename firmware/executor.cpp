@@ -30,6 +30,8 @@ void stop_motors(Outputs& outputs) {
 
 Refusal carry_out(const Command& command, Setpoints& setpoints) {
   const int i = command.channel - 1;
+  const int channels = row_of(command.kind).channels;
+  if (channels != 0 && (i < 0 || i >= channels)) return Refusal::channel;  // it is an index below
   const std::uint16_t value = static_cast<std::uint16_t>(command.value);
   Outputs& outputs = setpoints.outputs;
   switch (command.kind) {

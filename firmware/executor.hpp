@@ -20,8 +20,8 @@ struct Setpoints {
   Settings settings;
 };
 
-// Carries `command` out on `setpoints`: wholly, or not at all with the reason why. check_command() has
-// found nothing wrong with it, so only names of fields and settings are refused here. Stop, clear,
+// Carries `command` out on `setpoints`: wholly, or not at all with the reason why. The caller
+// has used check_command(), so only names of fields and settings, and channels, are refused here. Stop, clear,
 // zero, heartbeat and identify change no setpoint and are left to the application.
 Refusal carry_out(const Command& command, Setpoints& setpoints);
 

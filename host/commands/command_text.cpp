@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -54,7 +55,9 @@ std::string byte_words(int count, Text at = Text()) {
 
 // "rate 50"
 std::string setting_words(const Command& command) {
-  std::string text = shown(command).substr(2);
+  std::string text = shown(command);
+  text.erase(0,
+             std::min(text.size(), std::string_view("C:").size()));  // none if it cannot be written
   if (const std::size_t comma = text.find(','); comma != std::string::npos) text[comma] = ' ';
   return text;
 }

@@ -29,6 +29,7 @@ class FieldName {
     text_[0] = ';';
     for (std::size_t i = 0; i < name.size(); ++i) text_[i + 1] = name[i];
     text_[name.size() + 1] = ':';
+    text_[name.size() + 2] = '\0';  // outside of text_ for a longer one
   }
   constexpr Text name() const { return Text(text_ + 1, size_); }
   // True if it is of the grammar. For a static_assert beside the names.

@@ -221,6 +221,7 @@ Refusal read_values(const CommandRow& row, const Text* texts, std::size_t count,
 }
 
 Refusal check_command(const Command& command) {
+  if (command.kind > CommandKind::watch) return Refusal::unknown;
   const CommandRow& row = row_of(command.kind);
   Faults faults;
   for (const CommandValue each : row) {

@@ -132,7 +132,8 @@ Refusal set_key(Key (&keys)[max_keys], Text value) {
 }
 
 bool has_key(const SettingRow& row, int number, Text key) {
-  if (row.setting == Setting::full_scale) return name_of(state_field(FieldKind::analog, number)) == key;
+  if (row.setting == Setting::full_scale)
+    return name_of(state_field(FieldKind::analog, number)) == key;
   if (row.keys == 1) return row.key == key;
   const std::size_t digit = row.key.size() - 1;
   return key.size() == row.key.size() && key.substr(0, digit) == row.key.substr(0, digit) &&

@@ -242,6 +242,7 @@ StateNumbers numbers(Values... values) {
 }  // namespace
 
 StateNumbers numbers_of(const State& state, StateField field) {
+  if (field >= StateField::count) return {};
   const Entry& entry = entry_of(field);
   switch (entry.form) {
     case Form::volts:
@@ -332,7 +333,7 @@ bool read_state(const Datagram& datagram, State& state) {
 
 // By way of a datagram, so that the parser checks the numbers.
 bool set_numbers(State& state, StateField field, const StateNumbers& numbers) {
-  if (numbers.count > most_field_values) return false;
+  if (field >= StateField::count || numbers.count > most_field_values) return false;
   char buffer[128];
   DatagramWriter writer(buffer, sizeof buffer);
   writer.field(entry_of(field).name);

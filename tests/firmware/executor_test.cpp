@@ -87,6 +87,11 @@ TEST(Executor, ChangesNothingWhenItRefuses) {
   carry_out(Command::osmc(1, Pwm(1), Direction::forward), setpoints);
   const Setpoints before = setpoints;
   const std::pair<Command, Refusal> cases[] = {
+      {Command::osmc(5, Pwm(1), Direction::forward), Refusal::channel},
+      {Command::servo(0, Microseconds(1)), Refusal::channel},
+      {Command::relay(9, true), Refusal::channel},
+      {Command::zero(5), Refusal::channel},
+      {Command::proximity(255, Centimetres(1)), Refusal::channel},
       {Command::fields("AIN24,NONSENSE"), Refusal::unknown},
       {Command::setting("rate", "1001"), Refusal::range},
       {Command::setting("rate", "x"), Refusal::format},

@@ -236,6 +236,38 @@ constexpr bool has_a_row_of_each() {
   return sizeof command_rows / sizeof *command_rows == command_kinds &&
          sizeof value_rows / sizeof *value_rows == command_values;
 }
+// True if a value fits into its member of Command.
+constexpr bool fits(const ValueRow& value) {
+  switch (value.role) {
+    case ValueRole::direction:
+    case ValueRole::on:
+    case ValueRole::on_off:
+      return value.min == 0 && value.max == 1;
+    case ValueRole::count:
+      return value.min >= 0 && value.max <= 0xFF;
+    case ValueRole::period_ms:
+      return value.min >= 0 && value.max <= 0xFFFF;
+    case ValueRole::bytes:
+      return value.max <= uart_max_write;
+    default:
+      return true;
+  }
+}
+constexpr bool has_values_that_fit() {
+  for (const ValueRow& value : value_rows) {
+    if (!fits(value)) return false;
+  }
+  for (const CommandRow& row : command_rows) {
+    if (row.most - row.least > 1) return false;
+    if (row.effect == CommandEffect::output && row.channels == 0) return false;
+    for (const CommandValue* value = row.begin(); value + 1 < row.end(); ++value) {
+      if (row_of(*value).role == ValueRole::list) return false;
+    }
+  }
+  return true;
+}
+static_assert(has_values_that_fit(),
+              "a value fits into its member; one may be left out; a list is the last");
 static_assert(has_a_row_of_each(), "the rows stand in the order of their enum");
 static_assert(encoder_channels == stepper_channels, "Z sets both");
 

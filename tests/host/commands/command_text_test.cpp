@@ -100,6 +100,7 @@ TEST(CommandText, ShowsNoKeyAndNoPassword) {
   const OwnCommand key = parse_command_text("C:key,3:" + digits);
   EXPECT_EQ(shown(key.get()), "C:key,3:...");
   EXPECT_EQ(describe(key.get()), "setting key 3:...");
+  EXPECT_EQ(describe(Command::setting("rate", "5;0")), "setting ") << "no datagram can carry it";
 }
 
 }  // namespace

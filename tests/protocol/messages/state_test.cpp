@@ -192,6 +192,8 @@ TEST(State, NumbersOutsideTheRangeOfTheirFieldAreNotSet) {
   EXPECT_TRUE(set_numbers(state, StateField::osmc1, {2, {4095, 1}}));
   const State before = state;
   EXPECT_FALSE(set_numbers(state, StateField::osmc1, {2, {4096, 1}}));
+  EXPECT_FALSE(set_numbers(state, StateField::count, {1, {1}}));
+  EXPECT_EQ(numbers_of(state, StateField::count).count, 0);
   EXPECT_FALSE(set_numbers(state, StateField::osmc1, {2, {1, 2}}));
   EXPECT_FALSE(set_numbers(state, StateField::osmc1, {1, {1}}));
   EXPECT_FALSE(set_numbers(state, StateField::osmc1, {3, {1, 1, 1}}));
