@@ -55,20 +55,21 @@ def does(page, act, shows, refused='false', again=lambda: None):
 
 
 def ask_for_control(page):
-    """What the page then says of it."""
+    """Presses the button for control, and returns what the page says then."""
     page.evaluate('document.querySelector("#holder").textContent = ""')
     page.click('#control')
     return page.until('document.querySelector("#holder").textContent')
 
 
 def take_control(page):
-    """Where it does not have it."""
+    """Takes control, unless the page has it."""
     if not page.evaluate(IN_CONTROL):
         does(page, lambda: ask_for_control(page), IN_CONTROL)
+        page.until(f'!{IN_CONTROL} || document.querySelector("#holder").textContent.startsWith("You control")')
 
 
 def press(page, button):
-    """A button of the card. What the board answers; nothing where control was lost before."""
+    """Presses a button of the card, and returns the board's answer, or '' if control was lost before it."""
     page.evaluate('document.querySelector(".card output").textContent = ""')
     page.click(button)
     return page.until('(({textContent: told}) => told.length > 1 ? told : '
@@ -86,7 +87,7 @@ def arm(page):
 
 
 def drives(page, act, shows):
-    """What a person does to an output of an armed board."""
+    """Drives an output of an armed board as a person would."""
     def do():
         page.evaluate('document.querySelectorAll(".answer").forEach((each) => { each.textContent = ""; })')
         act()

@@ -126,7 +126,7 @@ inline void members_of(Pickle& pickle, Discovery& it) {
 }
 inline void members_of(Pickle& pickle, FleetResult& it) { pickle(it.board, it.result, it.problem); }
 
-// What reading a pickle begins with.
+// The value that a pickle is read into.
 template <class Value>
 Value blank() {
   return Value{};

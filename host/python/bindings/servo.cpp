@@ -10,7 +10,7 @@
 namespace r4::python {
 namespace {
 
-// An int is an angle, too; a bool is none.
+// An int is an angle, too. A bool is not.
 Degrees degrees_of(const py::object& degrees) {
   if (PyBool_Check(degrees.ptr())) throw py::type_error("degrees must be a number");
   const double value = PyFloat_AsDouble(degrees.ptr());
@@ -20,7 +20,6 @@ Degrees degrees_of(const py::object& degrees) {
 
 }  // namespace
 
-// For the value that a pickle fills.
 template <>
 inline ServoCalibration blank<ServoCalibration>() {
   return {{Microseconds(1), Degrees(0)}, {Microseconds(2), Degrees(1)}};

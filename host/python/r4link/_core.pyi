@@ -28,12 +28,7 @@ class LinkStatus(_Record):
         """Why the board is safe."""
     @property
     def causes(self) -> tuple[LinkCause, ...]:
-        """What is wrong with the link, the gravest first. In order of gravity: 'transport down' (of several paths: all
-        are), 'two boards' (the paths lead to two, and no state is heard), 'watchdog' (it was not fed), 'callback' (one does
-        not return), 'foreign frames' (another protocol uses the board's command id), 'busy' (another host controls the
-        board), 'board has no key', 'key needed', 'key not taken', 'watchers full', 'not watchable' (the firmware streams
-        only to the controlling host), 'late frames' (flow control does not come in time), 'other board' (a path leads to
-        another one and is not used, but the link is up)."""
+        """All that is wrong with the link, the gravest first: in the order of LinkCause."""
     @property
     def cause(self) -> LinkCause | None:
         """The gravest."""

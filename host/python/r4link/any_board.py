@@ -37,7 +37,7 @@ class AnyBoard(ABC, Generic[Sent]):
 
     @abstractmethod
     def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
-        """What the thread of the callbacks calls for a callback of the program."""
+        """Returns the function that the thread of the callbacks calls for a callback of the program."""
 
     @property
     def role(self) -> BoardRole:
@@ -150,10 +150,10 @@ class AnyBoard(ABC, Generic[Sent]):
         return self.send(Command.clear(), timeout)
 
     def attach(self, device: Device, timeout: float = 1.0) -> Sent:
-        """Sets a described device up (r4link.devices): is it the one? Then what is to be written, which takes arm(), and
-        the board's readings, until our session ends. Raises RefusedError if it does not answer, or is another device. To
-        be done again after on_restart() and a lost link. `timeout`: for each step. Raises UsageError if another device,
-        of another address or name, has one of its slots: i2c.poll_off() of that slot gives the other up."""
+        """Sets a described device up (r4link.devices): checks its identity, writes its settings, which takes arm(), and
+        starts the board's readings, until this session ends. Raises RefusedError if the device does not answer, or is
+        another one. Call it again after on_restart() and a lost link. `timeout`: of each step. Raises UsageError if a
+        device of another address or name has one of the slots: i2c.poll_off() of that slot frees it."""
         sent: Sent = self._command(lambda: self._core.attach(device._core, _ms(timeout)))
         return sent
 
@@ -195,7 +195,7 @@ class AnyBoard(ABC, Generic[Sent]):
         """How each of its paths does, in the order of the URLs."""
         return self._core.paths()
 
-    # --- callbacks: each is told first what there is already. As functions or as decorators.
+    # --- callbacks: each is first called with what is already there. As functions or as decorators.
 
     def on_state(self, callback: Callable[[State], object]) -> Subscription:
         """A state has come."""

@@ -276,7 +276,7 @@ class LoopGuard:
 
     @property
     def why(self) -> str:
-        """The same in words."""
+        """Why the loop has ended, in words."""
         return self._core.why
 
 
