@@ -11,6 +11,7 @@ from running import ROOT
 SOURCES = sorted(path for path in (ROOT / 'host/python/r4link').glob('*.py*')
                  if path.name not in ('__init__.py', 'py.typed', 'pytest_plugin.py'))
 SECONDS = {'timeout', 'within'}  # in the whole package: docs/python.md
+UNITS = {'us', 'degrees', 'cm', 'millivolts'}  # their name is their unit
 # What has to follow the name of a number.
 UNIT_OR_RANGE = re.compile(r'\d|FORWARD|\b(seconds?|time\.monotonic|volts?|metres?|m/s|radians?|rad|steps|counts'
                            r'|bytes|index|ratio|per|a (second|metre|turn)|units? of)\b')
@@ -23,11 +24,17 @@ def is_public(path, names):
     return names[-1] == '__init__' or not any(name.startswith('_') for name in names)
 
 
+def is_overload(function):
+    """True for the signature of one way to call a function. The function itself follows, with its docstring."""
+    return 'overload' in map(ast.unparse, function.decorator_list)
+
+
 def functions_of(path):
     """Each public one, with the texts that may describe its arguments: its own, and its class's."""
     for node in ast.parse(path.read_text()).body:
         for each in node.body if isinstance(node, ast.ClassDef) else [node]:
-            if isinstance(each, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            if isinstance(each, (ast.FunctionDef, ast.AsyncFunctionDef)) and not (
+                    path.suffix == '.py' and is_overload(each)):
                 parts = [node] if each is node else [node, each]
                 names = [part.name for part in parts]
                 if is_public(path, names) and not names[0].startswith('_'):
@@ -56,4 +63,4 @@ def test_a_number_has_a_unit_or_a_range(path, function, texts):
         return any(UNIT_OR_RANGE.search(text, found.end(), found.end() + REACH)
                    for text in texts for found in re.finditer(rf'\b{name}\b', text, re.IGNORECASE))
 
-    assert [name for name in numbers_of(function) if name not in SECONDS and not is_described(name)] == []
+    assert [name for name in numbers_of(function) if name not in SECONDS | UNITS and not is_described(name)] == []

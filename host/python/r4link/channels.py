@@ -70,8 +70,8 @@ class ServoChannel(_Channel[Sent]):
     """A servo, driven by its pulse or, once it is calibrated, by its angle."""
 
     def calibrate(self, calibration: ServoCalibration) -> None:
-        """Once, before this servo is driven in degrees. The Board keeps it, also while the link is lost; it is not sent
-        to the board."""
+        """Has to be called once before this servo is driven in degrees. The Board keeps the calibration, also while the
+        link is lost; it is not sent to the board."""
         self._board._core.calibrate_servo(self._channel, calibration)
 
     @property
@@ -86,8 +86,8 @@ class ServoChannel(_Channel[Sent]):
     def set(self, *, degrees: float, timeout: float = ...) -> Sent: ...
 
     def set(self, *, us: int | None = None, degrees: float | None = None, timeout: float = 1.0) -> Sent:
-        """`us`: the pulse width, up to 2500 microseconds; 0: no pulses. `degrees`: the angle; raises UsageError for one
-        outside of the calibration's range, or without calibrate()."""
+        """Takes either `us`, the pulse width up to 2500 microseconds (0: no pulses), or `degrees`, an angle between the
+        two ends of the calibration. Raises UsageError for an angle beyond them, or before calibrate()."""
         return self._board.send(self._command(us, degrees), timeout)
 
     @overload
@@ -97,7 +97,7 @@ class ServoChannel(_Channel[Sent]):
     def post(self, *, degrees: float) -> PostResult: ...
 
     def post(self, *, us: int | None = None, degrees: float | None = None) -> PostResult:
-        """`us` or `degrees`: as for set()."""
+        """Takes either `us` or `degrees`, as set() does."""
         return self._board.post(self._command(us, degrees))
 
     def _command(self, us: int | None, degrees: float | None) -> Command:
