@@ -234,62 +234,6 @@ void write_field(DatagramWriter& writer, StateField field, const State& state) {
 
 namespace {
 
-template <class... Values>
-StateNumbers numbers(Values... values) {
-  return {sizeof...(values), {static_cast<double>(values)...}};
-}
-
-}  // namespace
-
-StateNumbers numbers_of(const State& state, StateField field) {
-  if (field >= StateField::count) return {};
-  const Entry& entry = entry_of(field);
-  switch (entry.form) {
-    case Form::volts:
-      return numbers(member<std::int32_t>(state, entry) / 100.0);
-    case Form::flag:
-      return numbers(member<bool>(state, entry));
-    case Form::drive: {
-      const Drive& drive = member<Drive>(state, entry);
-      return numbers(drive.pwm, drive.direction);
-    }
-    case Form::bldc: {
-      const Bldc& bldc = member<Bldc>(state, entry);
-      return numbers(bldc.speed, bldc.direction, bldc.brake);
-    }
-    case Form::servo:
-    case Form::u16:
-      return numbers(member<std::uint16_t>(state, entry));
-    case Form::u8:
-      return numbers(member<std::uint8_t>(state, entry));
-    case Form::i32:
-      return numbers(member<std::int32_t>(state, entry));
-    case Form::u32:
-      return numbers(member<std::uint32_t>(state, entry));
-    case Form::reason:
-      return numbers(member<SafeReason>(state, entry));
-    case Form::fault: {
-      const ChipFault& fault = member<ChipFault>(state, entry);
-      return numbers(fault.address, fault.trouble);
-    }
-    case Form::reading: {
-      const I2cReading& reading = member<I2cReading>(state, entry);
-      return numbers(reading.t_ms, reading.errors);
-    }
-    case Form::answer:
-      return numbers(state.i2c_answer.pnum, state.i2c_answer.outcome);
-    case Form::bus:
-      return numbers(state.i2c_bus.newest, state.i2c_bus.errors, state.i2c_bus.recoveries);
-    case Form::uart: {
-      const UartBytes& uart = member<UartBytes>(state, entry);
-      return numbers(uart.position, uart.lost);
-    }
-  }
-  return {};
-}
-
-namespace {
-
 bool read_fields(const Datagram& datagram, State& state) {
   FieldSet present;
   int expected = 0;  // boards send in the table's order, so the next entry is the likely one
@@ -328,34 +272,6 @@ bool read_state(const Datagram& datagram, State& state) {
   }
   if (datagram.has_pnum()) state.pnum = datagram.pnum();
   if (datagram.has_time()) state.t_ms = static_cast<std::uint32_t>(datagram.time_ms());
-  return true;
-}
-
-// By way of a datagram, so that the parser checks the numbers.
-bool set_numbers(State& state, StateField field, const StateNumbers& numbers) {
-  if (field >= StateField::count || numbers.count > most_field_values) return false;
-  char buffer[128];
-  DatagramWriter writer(buffer, sizeof buffer);
-  writer.field(entry_of(field).name);
-  const bool volts = entry_of(field).form == Form::volts;
-  const double most = volts ? INT32_MAX : UINT32_MAX;
-  for (int i = 0; i < numbers.count; ++i) {
-    const double exact = volts ? 100 * numbers[i] : numbers[i];
-    const double number = exact + (exact < 0 ? -0.5 : 0.5);  // the cast below cuts it off
-    if (!(number > INT32_MIN - 1.0 && number < most + 1)) return false;
-    if (volts) {
-      writer.hundredths(static_cast<std::int32_t>(number));
-    } else if (number < 0) {
-      writer.value(static_cast<std::int32_t>(number));
-    } else {
-      writer.value(static_cast<std::uint32_t>(number));
-    }
-  }
-  Datagram datagram;
-  State changed = state;
-  if (!read_datagram(writer.finish(), datagram) || !read_state(datagram, changed)) return false;
-  changed.present = state.present;
-  state = changed;
   return true;
 }
 

@@ -37,4 +37,39 @@ const char* to_text(I2cOutcome outcome) {
   return "unknown";
 }
 
+const char* to_text(ChipTrouble trouble) {
+  switch (trouble) {
+    case ChipTrouble::none:
+      return "none";
+    case ChipTrouble::no_acknowledge:
+      return "no acknowledge";
+    case ChipTrouble::bus_stuck:
+      return "bus stuck";
+    case ChipTrouble::was_reset:
+      return "was reset";
+    case ChipTrouble::wrong_register:
+      return "wrong register";
+    case ChipTrouble::not_ready:
+      return "not ready";
+  }
+  return "unknown";
+}
+
+const char* chip_name(std::uint8_t address) {
+  switch (address) {
+    case 0x20:
+      return "MCP23017 0x20 (relays, BLDC direction and brake)";
+    case 0x40:
+      return "PCA9685 0x40 (OSMC)";
+    case 0x41:
+      return "PCA9685 0x41 (DHB12)";
+    case 0x42:
+      return "PCA9685 0x42 (servos)";
+    case 0x61:
+      return "MCP4728 0x61 (BLDC speed)";
+    default:
+      return "unknown chip";
+  }
+}
+
 }  // namespace r4

@@ -47,7 +47,7 @@ TEST(BoardState, BringsEveryInputExactly) {
   for (int channel = 1; channel <= 4; ++channel) {
     EXPECT(state.raw.ultrasonic_cm[channel - 1] == 50 * channel);
     EXPECT(state.raw.encoder_counts[channel - 1] == turns_of(channel) + part_of(channel));
-    EXPECT(state.encoder_index_counts[channel - 1] == turns_of(channel));
+    EXPECT(state.raw.encoder_index_counts[channel - 1] == turns_of(channel));
     EXPECT(state.raw.encoder_hz[channel - 1] == 0);
   }
   board.host.execute(Command::setting("AIN24", "55.00"));
@@ -57,7 +57,7 @@ TEST(BoardState, BringsEveryInputExactly) {
          state.raw.stepper_steps[2] == 0);
   for (int channel = 1; channel <= 4; ++channel) {
     EXPECT(state.raw.encoder_counts[channel - 1] == 0);
-    EXPECT(state.encoder_index_counts[channel - 1] == -part_of(channel));
+    EXPECT(state.raw.encoder_index_counts[channel - 1] == -part_of(channel));
   }
   board.host.execute(Command::relay(1, true));  // closes the motors' supply
   for (int channel = 1; channel <= 4; ++channel) {
