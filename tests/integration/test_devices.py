@@ -63,7 +63,8 @@ def test_a_receiver_on_a_uart_a_voltage_and_inputs(board):
     assert b'$GPRMC,' in text
     off = run('send', board.host_url, 'X:UART,2,x24')
     assert off.returncode == 3 and 'CHANNEL' in off.stderr or 'channel' in off.stderr, off.stderr
-    assert 'uart1,115200:8N1' in run('send', board.host_url, 'X:UART,1').stderr
+    assert 'use X:UART,uart,bytes' in run('send', board.host_url, 'X:UART,1').stderr
+    assert 'C:uart1,115200:8N1' in run('send', '--help').stdout
 
 
 def test_a_bus_that_is_held_stops_nothing(tmp_path):
