@@ -7,6 +7,7 @@ import random
 import shutil
 import signal
 import subprocess
+import tempfile
 import termios
 import time
 
@@ -171,25 +172,25 @@ def test_a_terminal_is_a_terminal_inside():
     os.close(terminal)
 
 
-def test_an_ordinary_user_has_it_too_with_his_own_ids_and_the_status_is_the_signal_that_ends_the_command(
-        tmp_path_factory):
+def test_an_ordinary_user_has_it_too_with_his_own_ids_and_the_status_is_the_signal_that_ends_the_command():
     if os.geteuid() != 0:
         result = run('sh', '-c', 'id -u; ip link set can0 down; kill -SEGV $$')
         assert (result.stdout, result.stderr) == (b'%d\n' % os.geteuid(), b'')
         assert result.returncode == 128 + signal.SIGSEGV
         return
-    folder = tmp_path_factory.mktemp('user')
-    for each in (folder, folder.parent, folder.parent.parent):
-        os.chmod(each, 0o755)
-    cache = os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')
-    shutil.copytree(f'{cache}/r4link/with-can', folder / 'r4link' / 'with-can')
-    shutil.copy(TOOLS / 'with-can', folder)
-    shutil.copy(TOOLS / 'trouble.py', folder)
-    shutil.copytree(TOOLS / 'with-can.d', folder / 'with-can.d')
-    result = subprocess.run(
-        ['runuser', '-u', 'nobody', '--', 'env', f'XDG_CACHE_HOME={folder}', folder / 'with-can',
-         '--guest', 'sh', '-c', 'id -un; ip link set can0 down && echo down; cat /etc/shadow; kill -SEGV $$'],
-        capture_output=True, timeout=PATIENCE_S, check=False, cwd='/', stdin=subprocess.DEVNULL)
+    # Not one of pytest's folders: every pytest that starts keeps them from other users.
+    with tempfile.TemporaryDirectory(prefix='r4-user-') as name:
+        folder = pathlib.Path(name)
+        os.chmod(folder, 0o755)
+        cache = os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')
+        shutil.copytree(f'{cache}/r4link/with-can', folder / 'r4link' / 'with-can')
+        shutil.copy(TOOLS / 'with-can', folder)
+        shutil.copy(TOOLS / 'trouble.py', folder)
+        shutil.copytree(TOOLS / 'with-can.d', folder / 'with-can.d')
+        result = subprocess.run(
+            ['runuser', '-u', 'nobody', '--', 'env', f'XDG_CACHE_HOME={folder}', folder / 'with-can',
+             '--guest', 'sh', '-c', 'id -un; ip link set can0 down && echo down; cat /etc/shadow; kill -SEGV $$'],
+            capture_output=True, timeout=PATIENCE_S, check=False, cwd='/', stdin=subprocess.DEVNULL)
     assert result.stdout == b'nobody\ndown\n', result
     assert b'Permission denied' in result.stderr and result.returncode == 128 + signal.SIGSEGV
 
