@@ -158,9 +158,9 @@ constexpr const ValueRow& row_of(CommandValue value) {
 struct CommandRow {
   constexpr CommandRow(CommandKind of, char name, Text first, CommandEffect moves, int count,
                        std::initializer_list<CommandValue> all)
-      : kind(of),
+      : word(first),
+        kind(of),
         letter(name),
-        word(first),
         effect(moves),
         channels(static_cast<std::uint8_t>(count)) {
     for (const CommandValue value : all) {
@@ -171,9 +171,9 @@ struct CommandRow {
   constexpr const CommandValue* begin() const { return values; }
   constexpr const CommandValue* end() const { return values + most; }
 
+  Text word;  // the first value where the letter alone does not say the kind: "STOP"
   CommandKind kind;
   char letter;
-  Text word;  // the first value where the letter alone does not say the kind: "STOP"
   CommandEffect effect;
   std::uint8_t channels;   // 0: none
   std::uint8_t least = 0;  // number of values, without the word

@@ -35,8 +35,8 @@ enum class Setting : std::uint8_t {
 constexpr std::size_t setting_kinds = static_cast<std::size_t>(Setting::key) + 1;
 
 struct SettingRow {
+  Text key;  // where there are several: that of the first
   Setting setting;
-  Text key;           // where there are several: that of the first
   std::uint8_t keys;  // how many there are
   // Of a number in a value; of a text, how many bytes. Both 0: a word.
   std::uint32_t min;
@@ -45,22 +45,22 @@ struct SettingRow {
 };
 
 constexpr SettingRow setting_rows[] = {
-    {Setting::rate, "rate", 1, 1, state_rate_max_hz, 100},
-    {Setting::heartbeat, "heartbeat", 1, 50, 1000, 500},
-    {Setting::timeout, "timeout", 1, 100, 10000, 1000},
-    {Setting::recovery, "recovery", 1, 0, 0, 0},
-    {Setting::pack, "pack", 1, 0, 1, 1},
-    {Setting::i2c, "i2c1", i2c_slots, 0, 0, 0},
-    {Setting::uart, "uart1", uart_channels, uart_min_baud, uart_max_baud, 0},
-    {Setting::network, "network", 1, 1, 32, 0},
-    {Setting::password, "password", 1, 8, 63, 0},
-    {Setting::host, "host", 1, 0, 0, 0},
-    {Setting::port, "port", 1, 1, 65535, 2018},
-    {Setting::node, "node", 1, 0, 31, 1},
-    {Setting::chips, "chips", 1, 0, 31, 31},
-    {Setting::name, "name", 1, 1, 31, 0},
-    {Setting::full_scale, "AIN24", analog_channels, 1, 65000, 5000},  // hundredths of a volt
-    {Setting::key, "key", 1, 1, max_key_id, 0},
+    {"rate", Setting::rate, 1, 1, state_rate_max_hz, 100},
+    {"heartbeat", Setting::heartbeat, 1, 50, 1000, 500},
+    {"timeout", Setting::timeout, 1, 100, 10000, 1000},
+    {"recovery", Setting::recovery, 1, 0, 0, 0},
+    {"pack", Setting::pack, 1, 0, 1, 1},
+    {"i2c1", Setting::i2c, i2c_slots, 0, 0, 0},
+    {"uart1", Setting::uart, uart_channels, uart_min_baud, uart_max_baud, 0},
+    {"network", Setting::network, 1, 1, 32, 0},
+    {"password", Setting::password, 1, 8, 63, 0},
+    {"host", Setting::host, 1, 0, 0, 0},
+    {"port", Setting::port, 1, 1, 65535, 2018},
+    {"node", Setting::node, 1, 0, 31, 1},
+    {"chips", Setting::chips, 1, 0, 31, 31},
+    {"name", Setting::name, 1, 1, 31, 0},
+    {"AIN24", Setting::full_scale, analog_channels, 1, 65000, 5000},  // hundredths of a volt
+    {"key", Setting::key, 1, 1, max_key_id, 0},
 };
 constexpr const SettingRow& row_of(Setting setting) {
   return setting_rows[static_cast<std::size_t>(setting)];

@@ -55,15 +55,15 @@ enum class FieldForm : std::uint8_t {
 };
 
 struct StateFieldRow {
-  StateField field;
   Text name;  // on the wire
+  StateField field;
   FieldKind kind;
   std::uint8_t channel;  // from 1; of a kind with one field it is 1
 };
 
 // clang-format off
 #define R4_FIELD(field, name, kind, channel) \
-  {StateField::field, name, FieldKind::kind, channel}
+  {name, StateField::field, FieldKind::kind, channel}
 constexpr StateFieldRow state_fields[] = {
     R4_FIELD(ain24, "AIN24", analog, 1),
     R4_FIELD(ain12, "AIN12", analog, 2),
@@ -157,8 +157,8 @@ struct FieldValue {
 constexpr int most_field_values = 3;
 
 struct FieldKindRow {
-  FieldKind kind;
   const char* name;  // "osmc"
+  FieldKind kind;
   FieldForm form;
   std::uint16_t place;                   // of channel 1 in State; channel n is n-1 sizes after it
   std::uint16_t size;                    // of the value of a channel in State
@@ -178,7 +178,7 @@ struct FieldKindRow {
 
 // clang-format off
 #define R4_KIND(kind, form, member) \
-  FieldKind::kind, #kind, FieldForm::form, static_cast<std::uint16_t>(offsetof(State, member)), \
+  #kind, FieldKind::kind, FieldForm::form, static_cast<std::uint16_t>(offsetof(State, member)), \
       sizeof(std::remove_extent_t<decltype(std::declval<State&>().member)>)
 constexpr FieldKindRow field_kinds[] = {
     {R4_KIND(analog, volts, raw.analog_cv), {{"", "V"}}, "The voltage of an analog input."},
