@@ -73,8 +73,8 @@ void Board::Impl::close() {
 
 static std::size_t servo_index(int channel) {
   if (channel >= 1 && channel <= servo_channels) return static_cast<std::size_t>(channel - 1);
-  throw Error(ErrorKind::usage, fmt::format("servo({})", channel), "there is no such servo",
-              fmt::format("there are 1 to {}", servo_channels));
+  throw Error(ErrorKind::usage, fmt::format("servo({})", channel), "the channel is out of range",
+              fmt::format("give 1 to {}", servo_channels));
 }
 void Board::Impl::calibrate_servo(int channel, const ServoCalibration& calibration) {
   const std::size_t index = servo_index(channel);
@@ -83,9 +83,10 @@ void Board::Impl::calibrate_servo(int channel, const ServoCalibration& calibrati
 }
 ServoCalibration Board::Impl::servo_calibration(int channel) {
   if (const auto known = read(servo_calibrations[servo_index(channel)])) return *known;
-  throw Error(ErrorKind::usage, fmt::format("servo({})", channel), "it was not calibrated",
-              "first give calibrate() the pulse and the angle at each end of its travel, or set a "
-              "pulse in microseconds");
+  throw Error(
+      ErrorKind::usage, fmt::format("servo({})", channel), "the servo was not calibrated",
+      "call calibrate() first, with the pulse and the angle at each end of its travel; or set "
+      "a pulse in microseconds");
 }
 
 void Board::Impl::keep(std::unique_ptr<Recording> own) {

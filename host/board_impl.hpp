@@ -78,7 +78,7 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
     return run_on_loop(what, [&] { now = ask(); }) ? now : read(last);
   }
 
-  // Throw Error{usage} where there is no such servo.
+  // Both throw Error{usage} if `channel` is not 1 to 16.
   void calibrate_servo(int channel, const ServoCalibration& calibration);
   ServoCalibration servo_calibration(int channel);
 

@@ -14,9 +14,9 @@ struct KindWords {
   CommandKind kind;
   std::string_view name;     // "OSMC"
   std::string_view meaning;  // "OSMC motor driver"
-  // The command in words, for describe(): what stands in braces is listed there.
+  // The command in words. describe() replaces the names in braces.
   std::string_view sentence;
-  // The same for a value of 0, and for an optional value that is left out; empty: `sentence`.
+  // Used for a value of 0, and if an optional value is left out. Empty: `sentence` is used.
   std::string_view empty_sentence = {};
 };
 const KindWords& words_of(CommandKind kind);

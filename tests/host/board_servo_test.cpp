@@ -42,9 +42,10 @@ TEST_F(BoardServo, IsDrivenInDegreesByItsOwnCalibration) {
 
 TEST_F(BoardServo, RefusesDegreesThatItsCalibrationDoesNotHave) {
   board.servo(1).set(Microseconds(1200));
-  EXPECT_EQ(problem_of([&] { board.servo(1).set(Degrees(30)); }).text(),
-            "servo(1): it was not calibrated; first give calibrate() the pulse and the angle at "
-            "each end of its travel, or set a pulse in microseconds");
+  EXPECT_EQ(
+      problem_of([&] { board.servo(1).set(Degrees(30)); }).text(),
+      "servo(1): the servo was not calibrated; call calibrate() first, with the pulse and the "
+      "angle at each end of its travel; or set a pulse in microseconds");
   EXPECT_EQ(problem_of([&] { board.servo(1).post(Degrees(30)); }).kind, ErrorKind::usage);
   board.servo(1).calibrate(gripper);
   EXPECT_EQ(problem_of([&] { board.servo(1).set(Degrees(46)); }).kind, ErrorKind::usage);
@@ -52,8 +53,8 @@ TEST_F(BoardServo, RefusesDegreesThatItsCalibrationDoesNotHave) {
   EXPECT_EQ(board.next_state().servo_us(1), 1200) << "nothing was sent";
   for (const int none : {-1, 0, 17}) {
     EXPECT_TRUE(
-        contains(problem_of([&] { board.servo(none).calibrate(gripper); }).reason, "no such"));
-    EXPECT_TRUE(contains(problem_of([&] { board.servo(none).set(Degrees(0)); }).reason, "no such"));
+        contains(problem_of([&] { board.servo(none).calibrate(gripper); }).fix, "give 1 to 16"));
+    EXPECT_TRUE(contains(problem_of([&] { board.servo(none).set(Degrees(0)); }).fix, "give 1 to 16"));
   }
 }
 

@@ -105,7 +105,7 @@ def test_degrees_that_a_servo_does_not_have_are_not_sent(board):
                   {'us': (0, 2000), 'degrees': (-45, 45)}, {'us': (1000, 2000), 'degrees': (-45, math.nan)}):
         with pytest.raises(r4link.UsageError):
             ServoCalibration(**wrong)
-    with pytest.raises(r4link.UsageError, match='no such servo'):
+    with pytest.raises(r4link.UsageError, match='give 1 to 16'):
         board.servo(17).calibrate(ARM)
     assert repr(ARM) == 'ServoCalibration(us=(1000, 2000), degrees=(-45.0, 45.0))'
 

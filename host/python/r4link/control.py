@@ -126,7 +126,8 @@ class SteeringSensor:
 
 
 class DifferentialDrive:
-    """Two driven wheels, `separation` metres apart. What is faster than `max_wheel` m/s becomes slower on the same path."""
+    """Two driven wheels, `separation` metres apart. If a wheel would be faster than `max_wheel` m/s, the robot is slowed down
+    on the same path."""
 
     def __init__(self, separation: float, max_wheel: float = math.inf) -> None:
         self._core = _core.DifferentialDrive(separation, max_wheel)
@@ -142,7 +143,7 @@ class DifferentialDrive:
 
 class FourWheelDrive:
     """Four driven wheels that slip to turn, as if `track`, in metres from left to right, were wider by the ratio `slip`.
-    What is faster than `max_wheel` m/s becomes slower on the same path."""
+    If a wheel would be faster than `max_wheel` m/s, the robot is slowed down on the same path."""
 
     def __init__(self, track: float, slip: float = 1.5, max_wheel: float = math.inf) -> None:
         self._core = _core.FourWheelDrive(track, slip, max_wheel)

@@ -32,7 +32,7 @@ struct Degrees {
   static constexpr double finite(double degrees) {
     constexpr double most = std::numeric_limits<double>::max();
     if (degrees >= -most && degrees <= most) return degrees;
-    throw Error(ErrorKind::usage, "an angle", "is not a finite number", "give degrees");
+    throw Error(ErrorKind::usage, "an angle", "it is not a finite number", "give degrees");
   }
 };
 

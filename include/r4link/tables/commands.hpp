@@ -47,11 +47,11 @@ enum class CommandKind : std::uint8_t {
 };
 constexpr std::size_t command_kinds = static_cast<std::size_t>(CommandKind::watch) + 1;
 
-// What a command may move.
+// The effect of a command.
 enum class CommandEffect : std::uint8_t {
   none,
-  device,  // what is on a bus or UART of the user's. Refused in the safe state
-  output,  // an output. Likewise; the command may be part of a group
+  device,  // may move a device on a bus or UART of the user. Refused in the safe state
+  output,  // may move an output. Refused in the safe state; may be part of a group
 };
 
 // The member of `Command` that holds a value, and how the value is written.
@@ -108,7 +108,7 @@ constexpr std::size_t command_values = static_cast<std::size_t>(CommandValue::en
 struct ValueRow {
   constexpr ValueRow(CommandValue of, ValueRole in, std::int32_t least, std::int32_t most)
       : value(of), role(in), min(least), max(most) {}
-  // An optional value. The member is `none` where the value is left out.
+  // An optional value. The member is `none` if the value is left out.
   constexpr ValueRow(CommandValue of, ValueRole in, std::int32_t least, std::int32_t most,
                      std::int32_t none)
       : value(of), role(in), optional(true), min(least), max(most), missing(none) {}
@@ -171,7 +171,7 @@ struct CommandRow {
   constexpr const CommandValue* begin() const { return values; }
   constexpr const CommandValue* end() const { return values + most; }
 
-  Text word;  // the first value where the letter alone does not say the kind: "STOP"
+  Text word;  // the first value, if the letter alone does not name the kind: "STOP"
   CommandKind kind;
   char letter;
   CommandEffect effect;
