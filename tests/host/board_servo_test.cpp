@@ -54,7 +54,8 @@ TEST_F(BoardServo, RefusesDegreesThatItsCalibrationDoesNotHave) {
   for (const int none : {-1, 0, 17}) {
     EXPECT_TRUE(
         contains(problem_of([&] { board.servo(none).calibrate(gripper); }).fix, "give 1 to 16"));
-    EXPECT_TRUE(contains(problem_of([&] { board.servo(none).set(Degrees(0)); }).fix, "give 1 to 16"));
+    EXPECT_TRUE(
+        contains(problem_of([&] { board.servo(none).set(Degrees(0)); }).fix, "give 1 to 16"));
   }
 }
 
