@@ -3,6 +3,7 @@
 import math
 import os
 import pickle
+import re
 import sys
 import threading
 import time
@@ -11,7 +12,7 @@ import pytest
 
 import r4link
 from machine import within
-from r4link import FORWARD, REVERSE, Command, ServoCalibration, Setpoints
+from r4link import FORWARD, REVERSE, Command, ServoCalibration, Setpoints, testing
 
 ARM = ServoCalibration(us=(1000, 2000), degrees=(-45, 45))
 
@@ -164,11 +165,23 @@ def test_a_state_is_all_that_the_board_says(board):
     assert list(state.as_dict())[:3] == ['pnum', 't_ms', 'ain24']
     assert repr(state).startswith('State(pnum=') and 'osmc1=Drive(pwm=0, direction=0)' in repr(state)
     assert 0 <= time.monotonic() - state.received < 5
-    assert state.safe == 'none' and state.fault is None
+    assert state.safe == 'none'
     assert time.monotonic() - 5 < state.sampled <= state.received
     assert abs(state.sampled_utc.timestamp() - time.time()) < 5
-    for name in r4link.FIELDS:
-        getattr(state, name)
+    assert {name for name in r4link.FIELDS if hasattr(state, name)} == set(state.present)
+    assert set(state.present) < set(dir(state)) and 'enc2' not in dir(state)
+
+
+def test_a_field_that_the_state_does_not_carry_is_an_error(board):
+    state = board.next_state()
+    with pytest.raises(AttributeError, match=re.escape("enc2: the state does not carry this field; ask the board for it: "
+                                                       "fields('DEFAULT,ENC2')")):
+        state.enc2
+    board.fields('DEFAULT,FAULT')
+    state = board.next_state()
+    assert state.fault is None
+    with pytest.raises(AttributeError, match='relays: '):
+        testing.make_state(1).relay(1)
 
 
 def test_a_state_tells_when_it_was_sampled_and_how_well_that_is_known(board):

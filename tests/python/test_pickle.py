@@ -66,7 +66,7 @@ def state_of_a_board(fields):
     with r4link.Board('sim:') as board:
         board.wait_active()
         board.fields(fields)
-        while not hasattr(state := board.next_state(), 'enc1') or 'enc1' not in state.present:
+        while not hasattr(state := board.next_state(), 'enc1'):
             pass
         return state
 

@@ -100,6 +100,17 @@ ReceivedState make_state(std::uint32_t t_ms, double at, const py::dict& fields) 
   return state;
 }
 
+// Throws AttributeError for a field that the newest datagram does not carry: its value would be an
+// old one, or 0.
+void require(const ReceivedState& state, F field) {
+  if (state.present.has(field)) return;
+  const Text name = name_of(field);
+  throw py::attribute_error(attribute_of(field) +
+                            ": the state does not carry this field; ask the board for it: "
+                            "fields('DEFAULT," +
+                            std::string(name.data(), name.size()) + "')");
+}
+
 }  // namespace
 
 void bind_state(py::module_& module) {
@@ -110,6 +121,7 @@ void bind_state(py::module_& module) {
     const std::string name = attribute_of(row.field);
     names.append(name);
     state.def_property_readonly(name.c_str(), [field = row.field](const ReceivedState& self) {
+      require(self, field);
       return value_of(self, field);
     });
   }
@@ -124,8 +136,23 @@ void bind_state(py::module_& module) {
                                  present.append(attribute_of(field));
                                return py::tuple(present);
                              })
-      .def("relay", &ReceivedState::relay)
+      .def("relay",
+           [](const ReceivedState& self, int channel) {
+             require(self, F::relays);
+             return self.relay(channel);
+           })
       .def("__bool__", &ReceivedState::any)
+      // Lists the fields that the state carries, so that Python suggests no other one.
+      .def("__dir__",
+           [](const py::object& self) {
+             py::set names(py::module_::import("builtins").attr("dir")(py::type::of(self)));
+             const auto& carried = self.cast<const ReceivedState&>();
+             for (const StateFieldRow& row : state_fields) {
+               if (carried.present.has(row.field)) continue;
+               names.attr("discard")(attribute_of(row.field));
+             }
+             return names;
+           })
       // On the clock of time.monotonic().
       .def_property_readonly(
           "received",

@@ -184,7 +184,10 @@ class RefusedPost(_Record):
     def group(self) -> int: ...
 
 class State:
-    """What the board reports. A field that the newest datagram does not carry (`present`) keeps its value."""
+    """What the board reports.
+
+    A field that the state does not carry (see `present`) raises AttributeError: ask for it by `Board.fields()`.
+    """
     @property
     def pnum(self) -> int: ...
     @property
