@@ -101,9 +101,9 @@ ReceivedState make_state(std::uint32_t t_ms, double at, const py::dict& fields) 
 }
 
 // Throws AttributeError for a field that the newest datagram does not carry: its value would be an
-// old one, or 0.
+// old one, or 0. A state without FAULT reports that there is none (docs/protocol.md).
 void require(const ReceivedState& state, F field) {
-  if (state.present.has(field)) return;
+  if (state.present.has(field) || field == F::fault) return;
   const Text name = name_of(field);
   throw py::attribute_error(attribute_of(field) +
                             ": the state does not carry this field; ask the board for it: "
@@ -148,7 +148,7 @@ void bind_state(py::module_& module) {
              py::set names(py::module_::import("builtins").attr("dir")(py::type::of(self)));
              const auto& carried = self.cast<const ReceivedState&>();
              for (const StateFieldRow& row : state_fields) {
-               if (carried.present.has(row.field)) continue;
+               if (carried.present.has(row.field) || row.field == F::fault) continue;
                names.attr("discard")(attribute_of(row.field));
              }
              return names;

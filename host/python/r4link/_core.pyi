@@ -187,6 +187,7 @@ class State:
     """What the board reports.
 
     A field that the state does not carry (see `present`) raises AttributeError: ask for it by `Board.fields()`.
+    `fault` is always there: None, if the board reports no fault.
     """
     @property
     def pnum(self) -> int: ...
