@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "r4link/state.hpp"
 
+#include <cstddef>
+#include <cstring>
+#include <type_traits>
+
 #include "../datagram/numbers.hpp"
 #include "../datagram/word_index.hpp"
 #include "device_fields.hpp"
@@ -234,7 +238,34 @@ void write_field(DatagramWriter& writer, StateField field, const State& state) {
 
 namespace {
 
-bool read_fields(const Datagram& datagram, State& state) {
+// A state as it was before a datagram was read into it. The members behind `rare_place` are half of
+// it and few datagrams carry them, so they are copied only before the first of them changes.
+class Before {
+ public:
+  explicit Before(State& state) : state_(state) { std::memcpy(common_, bytes(), rare_place); }
+  void will_change(const Entry& entry) {
+    if (entry.place < rare_place || rare_copied_) return;
+    std::memcpy(rare_, bytes() + rare_place, sizeof rare_);
+    rare_copied_ = true;
+  }
+  void restore() {
+    std::memcpy(bytes(), common_, rare_place);
+    if (rare_copied_) std::memcpy(bytes() + rare_place, rare_, sizeof rare_);
+  }
+
+ private:
+  static constexpr std::size_t rare_place = offsetof(State, raw.i2c);
+  static_assert(std::is_trivially_copyable<State>::value, "its bytes are copied");
+
+  char* bytes() { return reinterpret_cast<char*>(&state_); }
+
+  State& state_;
+  bool rare_copied_ = false;
+  char common_[rare_place];
+  char rare_[sizeof(State) - rare_place];
+};
+
+bool read_fields(const Datagram& datagram, State& state, Before& before) {
   FieldSet present;
   int expected = 0;  // boards send in the table's order, so the next entry is the likely one
   for (const Field& field : datagram) {
@@ -244,8 +275,9 @@ bool read_fields(const Datagram& datagram, State& state) {
       if (index == state_field_count) continue;
     }
     const auto which = static_cast<StateField>(index);
-    if (present.has(which) || !parse_entry(field.values(), field_table.entries[index], state))
-      return false;
+    const Entry& entry = field_table.entries[index];
+    before.will_change(entry);
+    if (present.has(which) || !parse_entry(field.values(), entry, state)) return false;
     present.add(which);
     expected = index + 1;
   }
@@ -265,9 +297,9 @@ bool parse_safe_reason(Text text, SafeReason& out) {
 bool read_state(const Datagram& datagram, State& state) {
   if (datagram.has_time() && datagram.time_ms() > 0xFFFFFFFFU) return false;
   // Written in place and taken back on failure: copying what was just written costs more.
-  const State before = state;
-  if (!read_fields(datagram, state)) {
-    state = before;
+  Before before(state);
+  if (!read_fields(datagram, state, before)) {
+    before.restore();
     return false;
   }
   if (datagram.has_pnum()) state.pnum = datagram.pnum();

@@ -340,6 +340,19 @@ TEST(State, AValueOutsideItsRangeOrFormRefusesTheWhole) {
   EXPECT_FALSE(accepts("AIN24:1.00;T:4294967296;")) << "the board's clock has 32 bits";
 }
 
+TEST(State, ARefusedDatagramLeavesEachFieldAsItWas) {
+  const State before = numbered_state();
+  for (const StateField field : every_field()) {
+    if (field == StateField::enc1) continue;
+    State state = before;
+    const std::string zero = written(field, State());
+    EXPECT_FALSE(read_fields(zero + "ENC1:x;", state)) << zero;
+    for (const StateField each : every_field()) {
+      EXPECT_EQ(written(each, state), written(each, before)) << zero;
+    }
+  }
+}
+
 TEST(State, AFieldThatStandsTwiceRefusesTheWhole) {
   EXPECT_FALSE(accepts("AIN24:1.00;AIN24:1.00;"));
   EXPECT_FALSE(accepts("OSMC1:1,1;AIN24:1.00;OSMC1:1,1;"));
