@@ -130,28 +130,31 @@ program_of() {
   echo '}'
 }
 
-# The program in README.md drives a simulated robot, whose motors have supply only while relay 1 is
-# closed.
-mkfifo "$work/board"
-"$build_tree/r4" sim --json --duration 30 udp://127.0.0.1:0 >"$work/board" &
-board=$!
-exec 3<"$work/board"
-read -r listening <&3
-cat <&3 >"$work/events" &
-events=$!
-url=${listening#*\"host_url\":\"}
-url="${url%%\"*}?listen=0"
-program_of "$source_tree/README.md" | sed "s,udp://192.168.0.125,$url," >readme.cpp
-"$cxx" -std=c++20 -O1 readme.cpp "${flags[@]}" -o readme
-./readme
-kill "$board"
-wait "$board" "$events"
-if ! grep '"osmc":\[\[410,1\]' "$work/events" | grep -q '"supply":true'; then
-  cut -c 1-200 "$work/events"
-  echo 'install: the program in README.md drives a motor that has no supply'
-  exit 1
-fi
-echo 'install: README.md drives a motor'
+# The programs in README.md and in the quick start drive a simulated robot, whose motors have supply only
+# while relay 1 is closed.
+for page in README.md docs/quick-start.md; do
+  rm -f "$work/board"
+  mkfifo "$work/board"
+  "$build_tree/r4" sim --json --duration 30 udp://127.0.0.1:0 >"$work/board" &
+  board=$!
+  exec 3<"$work/board"
+  read -r listening <&3
+  cat <&3 >"$work/events" &
+  events=$!
+  url=${listening#*\"host_url\":\"}
+  url="${url%%\"*}?listen=0"
+  program_of "$source_tree/$page" | sed -E "s,udp://(192.168.0.125|127.0.0.1),$url," >page.cpp
+  "$cxx" -std=c++20 -O1 page.cpp "${flags[@]}" -o page
+  ./page
+  kill "$board"
+  wait "$board" "$events"
+  if ! grep '"osmc":\[\[410,1\]' "$work/events" | grep -q '"supply":true'; then
+    cut -c 1-200 "$work/events"
+    echo "install: the program in $page drives a motor that has no supply"
+    exit 1
+  fi
+  echo "install: $page drives a motor"
+done
 
 program_of "$source_tree/docs/simulation.md" >simulation.cpp
 "$cxx" -std=c++20 -O1 simulation.cpp "${flags[@]}" -o simulation
