@@ -21,7 +21,7 @@ const Registry& standard_registry();
 std::unique_ptr<Carrier> make_host_carrier(asio::io_context& io, std::string_view url,
                                            BoardRole role);
 
-// The carriers of all paths to one board. A text may join URLs (url_pattern.hpp). Throws
+// The carriers of all paths to one board. A text may join URLs (r4link/discovery/url_pattern.hpp). Throws
 // Error{usage} for no URL, for more URLs than a session has paths, for a duplicate, and if one of
 // several is a board of its own (sim:, replay:). Only the first udp: URL has the port of hosts,
 // unless the URLs name ports.

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "r4link/carrier.hpp"
+#include "r4link/discovery/url.hpp"
 #include "r4link/options.hpp"
 #include "share_name.hpp"
-#include "url.hpp"
 
 namespace r4 {
 

@@ -16,10 +16,10 @@
 #include "../../transports/can/can_carrier.hpp"
 #include "../../transports/can/can_interface.hpp"
 #include "../../transports/can/can_listener.hpp"
-#include "../../transports/url.hpp"
 #include "held_transport.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/discovery/url.hpp"
 #include "searches.hpp"
 
 namespace r4 {

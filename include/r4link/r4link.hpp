@@ -18,6 +18,8 @@
 #include "devices/description.hpp"
 #include "devices/device.hpp"
 #include "discovery/discover.hpp"
+#include "discovery/url.hpp"
+#include "discovery/url_pattern.hpp"
 #include "error.hpp"
 #include "fleet.hpp"
 #include "key.hpp"

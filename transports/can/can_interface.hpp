@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "../url.hpp"
+#include "r4link/discovery/url.hpp"
 #include "r4link/error.hpp"
 
 namespace r4 {

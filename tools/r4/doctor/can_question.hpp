@@ -10,8 +10,8 @@
 #include <optional>
 
 #include "r4link/carrier.hpp"
+#include "r4link/discovery/url.hpp"
 #include "r4link/text.hpp"
-#include "transports/url.hpp"
 
 namespace r4::tool {
 

@@ -21,12 +21,12 @@
 #include "host/discovery/held_transport.hpp"
 #include "link_check.hpp"
 #include "machine.hpp"
+#include "r4link/discovery/url.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "serial_checks.hpp"
 #include "system_checks.hpp"
 #include "transports/serial/port_list.hpp"
 #include "transports/serial/serial_carrier.hpp"
-#include "transports/url.hpp"
-#include "transports/url_pattern.hpp"
 #include "udev_rules.hpp"
 
 namespace r4::tool {

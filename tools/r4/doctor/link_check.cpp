@@ -12,9 +12,9 @@
 #include "can_checks.hpp"
 #include "can_question.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/discovery/url.hpp"
 #include "transports/can/can_interface.hpp"
 #include "transports/can/can_listener.hpp"
-#include "transports/url.hpp"
 
 namespace r4::tool {
 namespace {

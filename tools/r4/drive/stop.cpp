@@ -17,11 +17,11 @@
 #include "../shell/subcommands.hpp"
 #include "host/standard_registry.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/discovery/url.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
 #include "transports/udp/udp_url.hpp"
-#include "transports/url.hpp"
-#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {
