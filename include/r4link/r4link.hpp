@@ -18,6 +18,7 @@
 #include "devices/description.hpp"
 #include "devices/device.hpp"
 #include "discovery/discover.hpp"
+#include "discovery/transports.hpp"
 #include "discovery/url.hpp"
 #include "discovery/url_pattern.hpp"
 #include "error.hpp"

@@ -37,7 +37,4 @@ Refusal read_values(const CommandRow& row, const Text* texts, std::size_t count,
 // Appends the command's field: "O:358,1,1;".
 void write_command(DatagramWriter& writer, const Command& command);
 
-// `F` values: "DEFAULT", "ALL" or field names, comma-separated. Refusal::unknown for another name.
-Refusal parse_fields(Text list, FieldSet& out);
-
 }  // namespace r4

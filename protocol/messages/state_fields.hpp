@@ -15,9 +15,4 @@ void write_field(DatagramWriter& writer, StateField field, const State& state);
 // no number.
 bool parse_safe_reason(Text text, SafeReason& out);
 
-// Reads the state fields of `datagram` into `state` and sets `present`, `pnum` and `t_ms`. Unknown
-// fields are passed over (they stay reachable through the datagram). Returns false, with `state`
-// untouched, when a known field has values that are not of its form or range, or stands twice.
-bool read_state(const Datagram& datagram, State& state);
-
 }  // namespace r4

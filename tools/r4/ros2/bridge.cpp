@@ -24,7 +24,6 @@
 #include "graph/graph.hpp"
 #include "graph/inbox.hpp"
 #include "graph/outbox.hpp"
-#include "protocol/messages/command_field.hpp"
 #include "r4link/discovery/url_pattern.hpp"
 #include "r4link/error.hpp"
 #include "r4link/tables/state_fields.hpp"
