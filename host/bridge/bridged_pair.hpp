@@ -34,7 +34,6 @@
 #include <string_view>
 #include <vector>
 
-#include "../../protocol/datagram/datagram_writer.hpp"
 #include "../../protocol/link/answer_budget.hpp"
 #include "../../transports/board_end.hpp"
 #include "../measurement/boot_clock.hpp"
@@ -45,6 +44,7 @@
 #include "r4link/carrier.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/fleet.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "waiting_time.hpp"
 
 namespace r4 {

@@ -2,8 +2,8 @@
 // The board's state as fields of a datagram (paper section 4.1).
 #pragma once
 
-#include "../datagram/datagram_writer.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "r4link/state.hpp"
 
 namespace r4 {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/messages/message.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "tests/fuzz/input.hpp"
 #include "transports/can/can_survey.hpp"
 #include "transports/framing/can/can_node.hpp"

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/messages/message.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "transports/framing/can/can_node.hpp"
 
 namespace r4 {

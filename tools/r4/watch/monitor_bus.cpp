@@ -15,7 +15,7 @@
 #include "../shell/line_writer.hpp"
 #include "../shell/run_end.hpp"
 #include "../shell/screen.hpp"
-#include "protocol/messages/message.hpp"
+#include "r4link/messages/message.hpp"
 #include "transports/can/can_listener.hpp"
 
 namespace r4::tool {
