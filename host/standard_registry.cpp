@@ -116,6 +116,10 @@ std::unique_ptr<Carrier> make_host_carrier(asio::io_context& io, std::string_vie
   return standard_registry().make_shared(io, url, role);
 }
 
+std::unique_ptr<Carrier> make_own_carrier(asio::io_context& io, std::string_view url) {
+  return standard_registry().make(io, with_any_port(std::string(url)), Role::host);
+}
+
 CarrierMaker sim::with_link(std::string_view url, std::string_view link) {
   return [url = std::string(url), impairment = Impairment::parse(link)](Loop& loop) {
     asio::io_context& io = context_of(loop);

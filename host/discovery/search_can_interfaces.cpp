@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "../../transports/can/can_carrier.hpp"
-#include "../../transports/can/can_interface.hpp"
-#include "../../transports/can/can_listener.hpp"
 #include "held_transport.hpp"
+#include "r4link/can/async_listener.hpp"
+#include "r4link/can/can_interface.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/discovery/url.hpp"

@@ -5,7 +5,7 @@
 #include <asio/use_future.hpp>
 #include <utility>
 
-#include "../measurement/boot_clock.hpp"
+#include "r4link/control/boot_clock.hpp"
 #include "r4link/discovery/url_pattern.hpp"
 
 namespace r4 {

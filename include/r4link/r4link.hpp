@@ -4,11 +4,17 @@
 #pragma once
 
 #include "board.hpp"
+#include "can/can_bits.hpp"
+#include "can/can_frame.hpp"
+#include "can/can_ids.hpp"
+#include "can/can_interface.hpp"
+#include "can/can_survey.hpp"
 #include "carrier.hpp"
 #include "command.hpp"
 #include "commands/command_text.hpp"
 #include "commands/servo_calibration.hpp"
 #include "config.hpp"
+#include "control/boot_clock.hpp"
 #include "control/kinematics.hpp"
 #include "control/loop.hpp"
 #include "control/odometry.hpp"

@@ -11,9 +11,9 @@
 
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
+#include "r4link/can/can_ids.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/messages/packed_form.hpp"
-#include "transports/framing/can/can_ids.hpp"
 #include "transports/framing/can/isotp_receiver.hpp"
 #include "transports/framing/can/isotp_sender.hpp"
 

@@ -9,8 +9,8 @@
 
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
+#include "r4link/can/can_ids.hpp"
 #include "r4link/messages/packed_form.hpp"
-#include "transports/framing/can/can_ids.hpp"
 #include "transports/framing/can/isotp_sender.hpp"
 
 namespace r4::tool {
