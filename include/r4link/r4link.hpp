@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Everything of r4link::r4link. For programs with Asio, AsyncBoard is in async_board.hpp, and
-// async_discover() in discovery/async_discover.hpp (r4link::asio).
+// Everything of r4link::r4link. For programs with Asio (r4link::asio), AsyncBoard is in
+// async_board.hpp, async_discover() in discovery/async_discover.hpp, CanListener in
+// can/async_listener.hpp.
 #pragma once
 
 #include "board.hpp"
