@@ -10,8 +10,8 @@
 #include "../firmware/ports/sim/sim_carrier.hpp"
 #include "../transports/impaired/impaired_carrier.hpp"
 #include "../transports/udp/udp_url.hpp"
-#include "../transports/url_pattern.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "r4link/simulation.hpp"
 #include "replay/replay_carrier.hpp"
 #include "session/session.hpp"
@@ -22,7 +22,7 @@ namespace {
 
 Registry with_all() {
   Registry registry = Registry::standard();
-  registry.add({"sim", "sim:[?node=1]", "a simulated board in this process",
+  registry.add({{"sim", "sim:[?node=1]", "a simulated board in this process"},
                 [](asio::io_context& io, const Url& url, Role role, const Claim&) {
                   if (role == Role::board) {
                     throw Error(ErrorKind::usage, url.text(), "sim: is a board, it cannot listen",
@@ -30,10 +30,11 @@ Registry with_all() {
                   }
                   return sim::make_sim_carrier(io, url);
                 }});
-  registry.add({"replay", "replay:FILE[?speed=1&path=1&from=0]", "what a board said in a recording",
-                [](asio::io_context& io, const Url& url, Role role, const Claim&) {
-                  return make_replay_carrier(io, url, role);
-                }});
+  registry.add(
+      {{"replay", "replay:FILE[?speed=1&path=1&from=0]", "what a board said in a recording"},
+       [](asio::io_context& io, const Url& url, Role role, const Claim&) {
+         return make_replay_carrier(io, url, role);
+       }});
   return registry;
 }
 
@@ -66,6 +67,11 @@ std::string path_of(const std::string& text) {
 const Registry& standard_registry() {
   static const Registry registry = with_all();
   return registry;
+}
+
+std::vector<TransportHelp> transports() {
+  const std::vector<Registry::Entry>& entries = standard_registry().entries();
+  return {entries.begin(), entries.end()};
 }
 
 void require_paths(std::size_t count) {
@@ -108,6 +114,10 @@ std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
 std::unique_ptr<Carrier> make_host_carrier(asio::io_context& io, std::string_view url,
                                            BoardRole role) {
   return standard_registry().make_shared(io, url, role);
+}
+
+std::unique_ptr<Carrier> make_own_carrier(asio::io_context& io, std::string_view url) {
+  return standard_registry().make(io, with_any_port(std::string(url)), Role::host);
 }
 
 CarrierMaker sim::with_link(std::string_view url, std::string_view link) {

@@ -3,8 +3,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <system_error>
+#include <utility>
+
+#include "file_descriptor.hpp"
 
 namespace r4 {
 namespace {
@@ -81,6 +86,16 @@ const char* to_text(Outcome outcome) {
   static_assert(names.size() == static_cast<std::size_t>(Outcome::not_armed) + 1);
   const auto at = static_cast<std::size_t>(outcome);
   return at < names.size() ? names[at] : "unknown";
+}
+
+Problem problem_of(const std::string& thing, const std::system_error& error) {
+  if (auto problem = out_of_resources(thing, error.code().value())) return *std::move(problem);
+  if (error.code().value() == EAGAIN) {
+    return {ErrorKind::open, thing, "this user may have no more threads",
+            "end some programs, or allow more: ulimit -u shows how many"};
+  }
+  return {ErrorKind::open, thing, "the system refuses it: " + error.code().message(),
+          "end some programs, and try again"};
 }
 
 }  // namespace r4

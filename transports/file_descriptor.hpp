@@ -70,18 +70,6 @@ inline std::optional<Problem> out_of_resources(const std::string& thing, int err
           std::to_string(4 * limit.rlim_cur)};
 }
 
-// The problem behind an error of Asio or the standard library: the system refuses a thread, a
-// descriptor, a watch.
-inline Problem problem_of(const std::string& thing, const std::system_error& error) {
-  if (auto problem = out_of_resources(thing, error.code().value())) return *std::move(problem);
-  if (error.code().value() == EAGAIN) {
-    return {ErrorKind::open, thing, "this user may have no more threads",
-            "end some programs, or allow more: ulimit -u shows how many"};
-  }
-  return {ErrorKind::open, thing, "the system refuses it: " + error.code().message(),
-          "end some programs, and try again"};
-}
-
 // Throws std::system_error if an event loop that is made now could not be woken. Asio does not
 // check that the system lets a loop wait for its timers and for calls: such a loop would sleep for
 // ever.

@@ -4,9 +4,9 @@
 #include <array>
 #include <cstddef>
 
-#include "../protocol/datagram/datagram_writer.hpp"
 #include "../protocol/messages/message.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 
 namespace r4 {
 namespace {

@@ -56,16 +56,20 @@ ShareGroup take_share_group(Url& url) {
 
 Registry Registry::standard() {
   Registry registry;
-  registry.add({"udp", "udp://HOST[:2018][?listen=2390&local=ADDRESS], udp:auto, udp:?id=NAME",
-                "WiFi or Ethernet; for a board: udp://BIND[:2018][?peer=HOST[:2390]]",
-                make_udp_carrier, udp_share_name, udp_has_own_port});
-  registry.add({"serial", "serial:///dev/ttyACM0[?baud=1000000], serial:auto, serial:?sn=SERIAL",
-                "USB serial, or the pty of a simulated board", make_serial_carrier,
+  registry.add({{"udp", "udp://HOST[:2018][?listen=2390&local=ADDRESS], udp:auto, udp:?id=NAME",
+                 "WiFi or Ethernet; for a board: udp://BIND[:2018][?peer=HOST[:2390]]"},
+                make_udp_carrier,
+                udp_share_name,
+                udp_has_own_port});
+  registry.add({{"serial", "serial:///dev/ttyACM0[?baud=1000000], serial:auto, serial:?sn=SERIAL",
+                 "USB serial, or the pty of a simulated board"},
+                make_serial_carrier,
                 serial_share_name});
   registry.add(
-      {"pty", "pty:[PATH]", "for a board: a pty that a host opens as serial", make_pty_carrier});
-  registry.add({"can", "can://can0[?node=1&fd=0&pack=1]", "ISO-TP on a CAN bus (SocketCAN)",
-                make_can_carrier, can_share_name});
+      {{"pty", "pty:[PATH]", "for a board: a pty that a host opens as serial"}, make_pty_carrier});
+  registry.add({{"can", "can://can0[?node=1&fd=0&pack=1]", "ISO-TP on a CAN bus (SocketCAN)"},
+                make_can_carrier,
+                can_share_name});
   return registry;
 }
 

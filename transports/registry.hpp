@@ -11,9 +11,10 @@
 #include <vector>
 
 #include "r4link/carrier.hpp"
+#include "r4link/discovery/transports.hpp"
+#include "r4link/discovery/url.hpp"
 #include "r4link/options.hpp"
 #include "share_name.hpp"
-#include "url.hpp"
 
 namespace r4 {
 
@@ -24,10 +25,7 @@ using CarrierFactory = std::function<std::unique_ptr<Carrier>(asio::io_context& 
 
 class Registry {
  public:
-  struct Entry {
-    std::string scheme;
-    std::string usage;    // "udp://HOST[:2018][?listen=2390&local=ADDRESS]"
-    std::string meaning;  // one line for --help
+  struct Entry : TransportHelp {
     CarrierFactory make;
     // The name under which programs share the transport of a URL. Null: programs do not share it.
     // Throws Error if the transport cannot be found.

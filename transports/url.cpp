@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "url.hpp"
+#include "r4link/discovery/url.hpp"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "url_pattern.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 
 #include <fmt/format.h>
 
@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "../protocol/datagram/numbers.hpp"
+#include "r4link/discovery/url.hpp"
 #include "r4link/error.hpp"
-#include "url.hpp"
 
 namespace r4 {
 namespace {

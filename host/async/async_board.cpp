@@ -12,6 +12,7 @@
 #include "../commands/link_timing.hpp"
 #include "../standard_registry.hpp"
 #include "async_board_impl.hpp"
+#include "r4link/commands/command_text.hpp"
 
 namespace r4 {
 

@@ -20,12 +20,12 @@
 #include <utility>
 #include <vector>
 
-#include "../measurement/boot_clock.hpp"
 #include "../session/session.hpp"
 #include "../subscribers.hpp"
 #include "backlog.hpp"
 #include "board_path.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/control/boot_clock.hpp"
 #include "waits.hpp"
 
 namespace r4 {

@@ -28,8 +28,8 @@
 #include <thread>
 #include <vector>
 
-#include "../measurement/boot_clock.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/control/boot_clock.hpp"
 #include "r4link/error.hpp"
 
 namespace r4 {

@@ -12,10 +12,10 @@
 
 #include "../../transports/file_descriptor.hpp"
 #include "../../transports/operation_slot.hpp"
-#include "../../transports/url.hpp"
 #include "../standard_registry.hpp"
 #include "bridge_urls.hpp"
 #include "bridged_pair.hpp"
+#include "r4link/discovery/url.hpp"
 
 namespace r4 {
 namespace {

@@ -8,8 +8,8 @@
 #include "../../transports/file_descriptor.hpp"
 #include "../../transports/serial/serial_device.hpp"
 #include "../../transports/udp/udp_url.hpp"
-#include "../../transports/url.hpp"
-#include "../../transports/url_pattern.hpp"
+#include "r4link/discovery/url.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "r4link/error.hpp"
 
 namespace r4 {

@@ -12,9 +12,9 @@
 #include <string>
 #include <string_view>
 
-#include "../../protocol/datagram/datagram_writer.hpp"
 #include "../paths/lease.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 
 namespace r4 {
 

@@ -34,17 +34,17 @@
 #include <string_view>
 #include <vector>
 
-#include "../../protocol/datagram/datagram_writer.hpp"
 #include "../../protocol/link/answer_budget.hpp"
 #include "../../transports/board_end.hpp"
-#include "../measurement/boot_clock.hpp"
 #include "bridge_audience.hpp"
 #include "bridge_guard.hpp"
 #include "bridge_hosts.hpp"
 #include "bridge_watch.hpp"
 #include "r4link/carrier.hpp"
+#include "r4link/control/boot_clock.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/fleet.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "waiting_time.hpp"
 
 namespace r4 {

@@ -7,9 +7,9 @@
 #include <array>
 
 #include "../../protocol/messages/command_field.hpp"
-#include "../../transports/url_pattern.hpp"
 #include "command_words.hpp"
 #include "r4link/commands/command_text.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 
 namespace r4 {
 

@@ -28,11 +28,4 @@ Problem failed_transfer(std::string_view command, I2cOutcome outcome);
 // Throws Error{usage} for a group without commands. Setpoints holds only valid commands.
 void require_any(const Setpoints& group);
 
-// Throws Error{usage} unless every path of `url` is a board's own cable. On a network or a bus
-// others would see the secret, and the board does not take it there. `secret`: its name for the
-// error.
-void require_cable(std::string_view url, std::string_view secret);
-// The same for a command with a secret. Other commands may go anywhere.
-void require_cable(std::string_view url, const Command& command);
-
 }  // namespace r4

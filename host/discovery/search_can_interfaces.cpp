@@ -14,12 +14,12 @@
 #include <vector>
 
 #include "../../transports/can/can_carrier.hpp"
-#include "../../transports/can/can_interface.hpp"
-#include "../../transports/can/can_listener.hpp"
-#include "../../transports/url.hpp"
 #include "held_transport.hpp"
+#include "r4link/can/async_listener.hpp"
+#include "r4link/can/can_interface.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/discovery/url.hpp"
 #include "searches.hpp"
 
 namespace r4 {

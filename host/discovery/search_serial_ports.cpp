@@ -15,9 +15,9 @@
 #include "../../transports/registry.hpp"
 #include "../../transports/serial/port_list.hpp"
 #include "../../transports/serial/serial_carrier.hpp"
-#include "../../transports/url.hpp"
 #include "../standard_registry.hpp"
 #include "held_transport.hpp"
+#include "r4link/discovery/url.hpp"
 #include "searches.hpp"
 
 namespace r4 {

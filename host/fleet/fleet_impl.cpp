@@ -5,8 +5,8 @@
 #include <asio/use_future.hpp>
 #include <utility>
 
-#include "../../transports/url_pattern.hpp"
-#include "../measurement/boot_clock.hpp"
+#include "r4link/control/boot_clock.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 
 namespace r4 {
 

@@ -18,7 +18,7 @@
 #include <string>
 #include <string_view>
 
-#include "../../protocol/messages/settings.hpp"
+#include "r4link/messages/message.hpp"
 #include "record.hpp"
 
 namespace r4 {

@@ -14,8 +14,8 @@
 #include <asio/io_context.hpp>
 #include <memory>
 
-#include "../../transports/url.hpp"
 #include "r4link/carrier.hpp"
+#include "r4link/discovery/url.hpp"
 
 namespace r4 {
 

@@ -59,14 +59,20 @@ class R4LINK_API Field {
   Text values_;
 };
 
-// Reads one field that stands alone, without its semicolon: "O:358,1,1". False if it is not of the
-// grammar above; `out` is only written on success.
-R4LINK_API bool read_field(Text text, Field& out);
-
-// Is a field with this letter for its name a command? Of T (time) and A (authentication) it is not.
+// True if a field with this letter for its name is a command. T (time) and A (authentication) are
+// not.
 constexpr bool is_command_letter(char c) {
   return ((c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z')) && c != 'T' && c != 'A';
 }
+
+// True if the field is a command, by its name.
+inline bool is_command(const Field& field) {
+  return field.name().size() == 1 && is_command_letter(field.name()[0]);
+}
+
+// Reads one field that stands alone, without its semicolon: "O:358,1,1". False if it is not of the
+// grammar above; `out` is only written on success.
+R4LINK_API bool read_field(Text text, Field& out);
 
 class R4LINK_API Datagram {
  public:

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "config.hpp"
@@ -87,5 +88,9 @@ class R4LINK_API Error : public std::runtime_error {
  private:
   Problem problem_;
 };
+
+// The problem behind an error of Asio or of the standard library: the system refuses `thing` a
+// thread, a descriptor, a watch. Of kind open.
+R4LINK_API Problem problem_of(const std::string& thing, const std::system_error& error);
 
 }  // namespace r4

@@ -1,14 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Everything of r4link::r4link. For programs with Asio, AsyncBoard is in async_board.hpp, and
-// async_discover() in discovery/async_discover.hpp (r4link::asio).
+// Everything of r4link::r4link. For programs with Asio (r4link::asio), AsyncBoard is in
+// async_board.hpp, async_discover() in discovery/async_discover.hpp, CanListener in
+// can/async_listener.hpp.
 #pragma once
 
 #include "board.hpp"
+#include "can/can_bits.hpp"
+#include "can/can_frame.hpp"
+#include "can/can_ids.hpp"
+#include "can/can_interface.hpp"
+#include "can/can_survey.hpp"
 #include "carrier.hpp"
 #include "command.hpp"
 #include "commands/command_text.hpp"
 #include "commands/servo_calibration.hpp"
 #include "config.hpp"
+#include "control/boot_clock.hpp"
 #include "control/kinematics.hpp"
 #include "control/loop.hpp"
 #include "control/odometry.hpp"
@@ -18,10 +25,16 @@
 #include "devices/description.hpp"
 #include "devices/device.hpp"
 #include "discovery/discover.hpp"
+#include "discovery/transports.hpp"
+#include "discovery/url.hpp"
+#include "discovery/url_pattern.hpp"
 #include "error.hpp"
 #include "fleet.hpp"
 #include "key.hpp"
 #include "link.hpp"
+#include "messages/datagram_writer.hpp"
+#include "messages/message.hpp"
+#include "messages/packed_form.hpp"
 #include "options.hpp"
 #include "recording.hpp"
 #include "setpoints.hpp"

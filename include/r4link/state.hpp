@@ -13,6 +13,8 @@
 
 namespace r4 {
 
+class Datagram;
+
 // Every state field, in the order in which the board sends them. The first ten are the paper's
 // default set. What each field is, and its units: tables/state_fields.hpp.
 // clang-format off
@@ -185,5 +187,14 @@ struct State {
 R4LINK_API Text name_of(StateField field);
 // The field of that name; StateField::count if there is none. Constant time.
 R4LINK_API StateField state_field(Text name);
+
+// Reads the values of `F`: "DEFAULT", "ALL" or names of fields, separated by commas.
+// Refusal::unknown for another name.
+R4LINK_API Refusal parse_fields(Text list, FieldSet& out);
+
+// Reads the state fields of `datagram` into `state` and sets `present`, `pnum` and `t_ms`. Unknown
+// fields are passed over (they stay reachable through the datagram). Returns false, with `state`
+// untouched, if a known field has values that are not of its form or range, or is there twice.
+R4LINK_API bool read_state(const Datagram& datagram, State& state);
 
 }  // namespace r4

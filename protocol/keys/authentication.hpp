@@ -16,10 +16,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "../datagram/datagram_writer.hpp"
 #include "blake2s.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/key.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 
 namespace r4 {
 

@@ -7,17 +7,12 @@
 
 #include <cstdint>
 
-#include "../datagram/datagram_writer.hpp"
 #include "r4link/command.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "r4link/state.hpp"
 
 namespace r4 {
-
-// Is it a command, by its name?
-inline bool is_command(const Field& field) {
-  return field.name().size() == 1 && is_command_letter(field.name()[0]);
-}
 
 // Is there E:STOP among its fields? A stop is obeyed whatever else is in its datagram.
 bool asks_to_stop(const Datagram& datagram);
@@ -36,8 +31,5 @@ Refusal read_values(const CommandRow& row, const Text* texts, std::size_t count,
 
 // Appends the command's field: "O:358,1,1;".
 void write_command(DatagramWriter& writer, const Command& command);
-
-// `F` values: "DEFAULT", "ALL" or field names, comma-separated. Refusal::unknown for another name.
-Refusal parse_fields(Text list, FieldSet& out);
 
 }  // namespace r4

@@ -7,9 +7,9 @@
 
 #include <cstdint>
 
-#include "../datagram/datagram_writer.hpp"
 #include "r4link/command.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4 {

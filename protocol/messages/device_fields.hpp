@@ -3,7 +3,7 @@
 // (docs/protocol.md).
 #pragma once
 
-#include "../datagram/datagram_writer.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "r4link/text.hpp"
 #include "r4link/vocabulary.hpp"
 

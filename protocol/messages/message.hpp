@@ -1,30 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What kind of message a datagram is, and the small ones that are neither state nor command:
-// heartbeats, refusals and identification.
+// Writes the small messages that are neither state nor command: heartbeats, refusals and
+// identification. Reads heartbeats; r4link/messages/message.hpp reads the other two.
 #pragma once
 
 #include <cstdint>
 
-#include "../datagram/datagram_writer.hpp"
 #include "../keys/authentication.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
+#include "r4link/messages/message.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4 {
-
-enum class MessageKind : std::uint8_t {
-  board_heartbeat,  // H:R4-ROS2
-  host_heartbeat,   // H:ROS2-R4
-  command,          // one of command.hpp's letters, or several
-  nack,             // N:<PNum>,<code>
-  identity,         // I:R4,<firmware>,<board id>,<capabilities>;NAME:…;BUSY:…;ASKED:…
-  state,            // anything else
-};
-
-// "heartbeat" (both sides'), "command", "nack", "identity", "state": the `type` of `r4 decode`.
-const char* to_text(MessageKind kind);
-
-MessageKind kind_of(const Datagram& datagram);
 
 // Is it a single command, W?
 bool asks_to_watch(const Datagram& datagram);
@@ -56,23 +43,8 @@ Text heartbeat_nonce(const Datagram& datagram);
 // unless it carries a nonce.
 bool is_connecting_heartbeat(const Datagram& datagram);
 
-// False if the datagram's N field is not of that form.
-bool read_nack(const Datagram& datagram, Nack& out);
 void write_nack(DatagramWriter& writer, const Nack& nack);
 
-// Who the board is; views of the datagram. `NAME` and `BUSY` are fields of their own: who does not know
-// them passes over them, and not every board tells them.
-struct Identity {
-  Text firmware;       // "0.1.0"
-  Text board_id;       // serial number, unique; is_board_id()
-  Text capabilities;   // words joined by '+': "udp+serial+leave"
-  Text name = Text();  // that its owner gave it (`C:name`); empty: none
-  bool has_busy = false;
-  bool busy = false;  // another host than the one that asked controls it
-  bool has_asked = false;
-  std::uint32_t asked = 0;     // the number of the question
-  SessionId sid = no_session;  // of the host that asked
-};
 // What the firmware can do besides, whatever the board: it obeys E:LEAVE, and serves who watches by W.
 constexpr Text leave_capability("leave");
 constexpr Text watch_capability("watch");
@@ -83,7 +55,6 @@ constexpr Text uart_capability("uart");
 constexpr Text dac_capability("dac");
 // Is it one of those words?
 bool has_capability(Text capabilities, Text word);
-bool read_identity(const Datagram& datagram, Identity& out);
 void write_identity(DatagramWriter& writer, const Identity& identity);  // its `I`
 void write_identity_fields(DatagramWriter& writer,
                            const Identity& identity);  // and what is behind it

@@ -8,9 +8,9 @@
 #include <cstring>
 
 #include "protocol/datagram/crc32.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/messages/state_fields.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "r4link/state.hpp"
 #include "tests/bench/measure.hpp"
 

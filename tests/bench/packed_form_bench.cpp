@@ -5,8 +5,8 @@
 
 #include <cstring>
 
+#include "r4link/messages/packed_form.hpp"
 #include "tests/bench/measure.hpp"
-#include "transports/framing/can/packed_form.hpp"
 
 namespace r4::bench {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "allocations.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "tests/support/driven_session.hpp"
 
 namespace r4::bench {

@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/messages/message.hpp"
+#include "r4link/can/can_survey.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "tests/fuzz/input.hpp"
-#include "transports/can/can_survey.hpp"
 #include "transports/framing/can/can_node.hpp"
 
 namespace r4 {
@@ -183,7 +183,7 @@ class Listener {
     require(sum.frames == frames_ && sum.busy_ns == survey_.busy_ns());
     std::uint64_t heard = 0;
     for (std::uint8_t node = 0; node < can_nodes; ++node) {
-      const HeardBoard& board = survey_.board(node);
+      const HeardNode& board = survey_.board(node);
       heard += board.states + board.heartbeats + board.answers;
       require(board.damaged <= frames_);
     }

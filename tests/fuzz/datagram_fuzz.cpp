@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "protocol/datagram/crc32.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/datagram/numbers.hpp"
 #include "protocol/messages/command_field.hpp"
 #include "protocol/messages/command_group.hpp"
@@ -16,6 +15,7 @@
 #include "protocol/messages/state_fields.hpp"
 #include "r4link/command.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "r4link/state.hpp"
 
 namespace r4 {

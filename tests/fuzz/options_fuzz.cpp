@@ -7,9 +7,9 @@
 #include <string_view>
 
 #include "input.hpp"
+#include "r4link/discovery/url.hpp"
 #include "r4link/error.hpp"
 #include "transports/impaired/impairment.hpp"
-#include "transports/url.hpp"
 
 namespace r4 {
 namespace {

@@ -10,7 +10,7 @@
 #include "protocol/datagram/crc32.hpp"
 #include "protocol/datagram/numbers.hpp"
 #include "r4link/datagram.hpp"
-#include "transports/framing/can/packed_form.hpp"
+#include "r4link/messages/packed_form.hpp"
 
 namespace r4 {
 namespace {

@@ -21,7 +21,7 @@
 
 #include "firmware/ports/sim/devices/user_devices.hpp"
 #include "firmware/ports/sim/robot/board_chips.hpp"
-#include "transports/framing/can/can_frame.hpp"
+#include "r4link/can/can_frame.hpp"
 
 struct I2C_TypeDef;
 struct USART_TypeDef;

@@ -10,9 +10,9 @@
 #include <ctime>
 #include <optional>
 
-#include "host/measurement/boot_clock.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/board.hpp"
+#include "r4link/control/boot_clock.hpp"
 #include "r4link/error.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "tests/support/on_a_loop.hpp"

@@ -10,9 +10,9 @@
 
 #include "firmware/ports/m7/board_program.hpp"
 #include "on_target.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/messages/command_field.hpp"
 #include "r4link/command.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 
 namespace r4 {
 namespace m7 {

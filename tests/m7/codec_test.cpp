@@ -3,13 +3,13 @@
 // numbers, lines, the packed form.
 #include "on_target.hpp"
 #include "protocol/datagram/crc32.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/datagram/numbers.hpp"
 #include "protocol/keys/authentication.hpp"
 #include "protocol/messages/state_fields.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
+#include "r4link/messages/packed_form.hpp"
 #include "r4link/state.hpp"
-#include "transports/framing/can/packed_form.hpp"
 #include "transports/framing/line_framing.hpp"
 
 namespace {

@@ -11,13 +11,13 @@
 #include "firmware/ports/sim/robot/board_model.hpp"
 #include "on_target.hpp"
 #include "protocol/datagram/crc32.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/messages/device_command.hpp"
 #include "protocol/messages/state_fields.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
+#include "r4link/messages/packed_form.hpp"
 #include "r4link/state.hpp"
 #include "transports/framing/can/isotp_sender.hpp"
-#include "transports/framing/can/packed_form.hpp"
 
 namespace {
 

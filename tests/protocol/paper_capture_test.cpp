@@ -4,12 +4,12 @@
 
 #include <string>
 
-#include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/messages/command_field.hpp"
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
 #include "r4link/command.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "r4link/state.hpp"
 #include "tests/support/datagrams.hpp"
 

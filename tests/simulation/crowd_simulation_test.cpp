@@ -15,7 +15,7 @@
 
 #include "environment.hpp"
 #include "firmware/application/application.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "random.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/driven_session.hpp"

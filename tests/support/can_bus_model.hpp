@@ -23,8 +23,8 @@
 #include <map>
 #include <vector>
 
+#include "r4link/can/can_bits.hpp"
 #include "tests/simulation/random.hpp"
-#include "transports/framing/can/can_bits.hpp"
 
 namespace r4::test {
 

@@ -43,7 +43,7 @@ TEST(Registry, NamesTheTransportsThatItHas) {
 TEST(Registry, TakesFurtherTransports) {
   asio::io_context io;
   Registry registry = Registry::standard();
-  registry.add({"memory", "memory:", "for this test",
+  registry.add({{"memory", "memory:", "for this test"},
                 [](asio::io_context& loop, const Url&, Role, const Claim&) {
                   return make_memory_pair(loop).first;
                 }});

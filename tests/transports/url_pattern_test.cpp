@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "transports/url_pattern.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The grammar of URLs as a table of what is taken, and how, and what is refused, and why.
-#include "transports/url.hpp"
+#include "r4link/discovery/url.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <asio/post.hpp>
 #include <random>
 
-#include "../framing/can/can_ids.hpp"
+#include "r4link/can/can_ids.hpp"
 
 namespace r4 {
 

@@ -12,8 +12,8 @@
 #include <utility>
 
 #include "../file_descriptor.hpp"
-#include "../framing/can/can_ids.hpp"
-#include "can_interface.hpp"
+#include "r4link/can/can_ids.hpp"
+#include "r4link/can/can_interface.hpp"
 
 namespace r4 {
 namespace {

@@ -5,7 +5,7 @@
 #include <cerrno>
 
 #include "can_bus.hpp"
-#include "can_interface.hpp"
+#include "r4link/can/can_interface.hpp"
 
 namespace r4 {
 namespace {

@@ -18,10 +18,10 @@
 #include "../operation_slot.hpp"
 #include "../send_queue.hpp"
 #include "can_bus.hpp"
-#include "can_interface.hpp"
 #include "can_trouble.hpp"
 #include "can_turn.hpp"
 #include "overheard_lane.hpp"
+#include "r4link/can/can_interface.hpp"
 #include "r4link/command.hpp"
 
 namespace r4 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "can_interface.hpp"
+#include "r4link/can/can_interface.hpp"
 
 #include <fmt/format.h>
 #include <linux/can.h>

@@ -16,8 +16,8 @@
 #include <ctime>
 #include <utility>
 
-#include "../framing/can/can_ids.hpp"
-#include "can_interface.hpp"
+#include "r4link/can/can_ids.hpp"
+#include "r4link/can/can_interface.hpp"
 #include "r4link/error.hpp"
 
 namespace r4 {

@@ -12,9 +12,13 @@
 #include <vector>
 
 #include "../file_descriptor.hpp"
-#include "../framing/can/can_frame.hpp"
+#include "r4link/can/can_frame.hpp"
+#include "r4link/error.hpp"
 
 namespace r4 {
+
+// What an errno of a socket on that interface means, with the fix where there is one.
+Problem can_problem(const std::string& interface, int error);
 
 class CanSocket {
  public:

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "can_survey.hpp"
+#include "r4link/can/can_survey.hpp"
 
 #include <utility>
 
+#include "../../protocol/link/packet_tracker.hpp"
 #include "../../protocol/messages/message.hpp"
 #include "overheard_lane.hpp"
 
@@ -91,7 +92,7 @@ void CanSurvey::receive(std::uint8_t node, const CanFrame& frame, CanIdKind kind
 }
 
 void CanSurvey::take(std::uint8_t node, Text bytes, std::uint32_t at_us) {
-  HeardBoard& board = boards_[node];
+  HeardNode& board = boards_[node];
   Datagram datagram;
   if (!read_datagram(bytes, datagram) || !datagram.has_pnum() || !datagram.has_time()) {
     ++board.damaged;

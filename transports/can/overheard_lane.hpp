@@ -8,7 +8,7 @@
 
 #include "../framing/can/can_node.hpp"
 #include "../framing/can/isotp_receiver.hpp"
-#include "../framing/can/packed_form.hpp"
+#include "r4link/messages/packed_form.hpp"
 
 namespace r4 {
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "stop_numbers.hpp"
 
-#include "../../protocol/datagram/datagram_writer.hpp"
 #include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/message.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 
 namespace r4 {
 

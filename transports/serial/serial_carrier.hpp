@@ -14,8 +14,8 @@
 #include <memory>
 
 #include "../share_name.hpp"
-#include "../url.hpp"
 #include "r4link/carrier.hpp"
+#include "r4link/discovery/url.hpp"
 
 namespace r4 {
 

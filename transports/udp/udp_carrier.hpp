@@ -30,8 +30,8 @@
 #include <memory>
 
 #include "../share_name.hpp"
-#include "../url.hpp"
 #include "r4link/carrier.hpp"
+#include "r4link/discovery/url.hpp"
 #include "search/board_search.hpp"
 #include "search/host_lookup.hpp"
 

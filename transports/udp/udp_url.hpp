@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <string>
 
-#include "../url.hpp"
 #include "r4link/carrier.hpp"
+#include "r4link/discovery/url.hpp"
 
 namespace r4 {
 

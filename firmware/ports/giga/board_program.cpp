@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "board_program.hpp"
 
-#include "../../../transports/framing/can/can_ids.hpp"
 #include "chip/board_clock.hpp"
 #include "chip/interrupt_stack.hpp"
 #include "chip/true_random.hpp"
+#include "r4link/can/can_ids.hpp"
 #include "r4link/config.hpp"
 
 namespace r4 {

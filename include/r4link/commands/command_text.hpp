@@ -66,6 +66,14 @@ R4LINK_API std::string shown(std::string_view text);
 // "setting rate 50".
 R4LINK_API std::string describe(const Command& command);
 
+// Throws Error{usage} unless every path of `url` is a board's own cable. On a network or a bus
+// others would see the secret, and the board does not accept it there. `secret` is its name in the
+// error.
+R4LINK_API void require_cable(std::string_view url, std::string_view secret);
+// The same for a command that holds a secret. Other commands may go anywhere. The boards call it
+// before they send.
+R4LINK_API void require_cable(std::string_view url, const Command& command);
+
 // What a board's refusal means: "no such channel".
 R4LINK_API std::string_view meaning_of(Refusal refusal);
 

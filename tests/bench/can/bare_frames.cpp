@@ -8,8 +8,8 @@
 #include <cerrno>
 #include <chrono>
 
+#include "r4link/can/can_ids.hpp"
 #include "tests/transports/can/kernel/raw_can.hpp"
-#include "transports/framing/can/can_ids.hpp"
 
 namespace r4::bench {
 

@@ -31,10 +31,10 @@
 
 #include "bare_frames.hpp"
 #include "can_processes.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/messages/datagram_writer.hpp"
+#include "r4link/messages/packed_form.hpp"
 #include "tests/support/at_will.hpp"
-#include "transports/framing/can/packed_form.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::bench {

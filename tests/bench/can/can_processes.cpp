@@ -14,9 +14,9 @@
 #include <memory>
 
 #include "firmware/ports/sim/simulated_board.hpp"
+#include "r4link/can/can_ids.hpp"
 #include "r4link/vocabulary.hpp"
 #include "transports/board_end.hpp"
-#include "transports/framing/can/can_ids.hpp"
 #include "transports/registry.hpp"
 
 namespace r4::bench {

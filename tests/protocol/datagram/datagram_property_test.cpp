@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "protocol/datagram/datagram_writer.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4 {

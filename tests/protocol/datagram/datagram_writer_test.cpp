@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "protocol/datagram/datagram_writer.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 
 #include <gtest/gtest.h>
 

@@ -9,6 +9,7 @@
 #include "protocol/messages/settings.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/key.hpp"
+#include "r4link/messages/message.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4::test {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "r4link/messages/packed_form.hpp"
 #include "tests/support/datagrams.hpp"
-#include "transports/framing/can/packed_form.hpp"
 
 namespace r4::tool {
 namespace {

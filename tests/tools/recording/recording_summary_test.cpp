@@ -8,7 +8,7 @@
 #include <string>
 
 #include "host/recording/record_line.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/problems.hpp"
 

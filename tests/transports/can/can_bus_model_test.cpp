@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "r4link/can/can_ids.hpp"
 #include "tests/transports/framing/can/can_frames.hpp"
-#include "transports/framing/can/can_ids.hpp"
 
 namespace r4::test {
 namespace {

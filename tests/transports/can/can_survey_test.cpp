@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "transports/can/can_survey.hpp"
+#include "r4link/can/can_survey.hpp"
 
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
-#include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/messages/message.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "transports/framing/can/can_node.hpp"
 
 namespace r4 {
@@ -78,7 +78,7 @@ TEST(CanSurvey, HearsEveryDatagramOfABoard) {
   for (std::uint32_t pnum = 10; pnum < 30; ++pnum) bus.state(pnum);
   ASSERT_EQ(bus.heard.size(), 20U);
   EXPECT_EQ(bus.heard[0].substr(0, 13), "3 AIN24:2428;");
-  const HeardBoard& board = bus.survey.board(3);
+  const HeardNode& board = bus.survey.board(3);
   EXPECT_EQ(board.states, 20U);
   EXPECT_EQ(board.lost, 0U);
   EXPECT_EQ(board.damaged, 0U);

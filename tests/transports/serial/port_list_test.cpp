@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "transports/url.hpp"
+#include "r4link/discovery/url.hpp"
 
 namespace r4 {
 namespace {

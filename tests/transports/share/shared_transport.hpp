@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "../recorder.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/datagram_writer.hpp"
 #include "transports/file_descriptor.hpp"
 #include "transports/share/shared_carrier.hpp"
 

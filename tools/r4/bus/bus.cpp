@@ -13,9 +13,9 @@
 #include "bus_live.hpp"
 #include "bus_plan.hpp"
 #include "protocol/messages/command_field.hpp"
+#include "r4link/can/can_ids.hpp"
 #include "r4link/command.hpp"
 #include "r4link/error.hpp"
-#include "transports/framing/can/can_ids.hpp"
 
 namespace r4::tool {
 namespace {

@@ -17,9 +17,9 @@
 #include "../shell/run_end.hpp"
 #include "../shell/screen.hpp"
 #include "foreign_ids.hpp"
-#include "transports/can/can_interface.hpp"
-#include "transports/can/can_listener.hpp"
-#include "transports/url.hpp"
+#include "r4link/can/async_listener.hpp"
+#include "r4link/can/can_interface.hpp"
+#include "r4link/discovery/url.hpp"
 
 namespace r4::tool {
 namespace {

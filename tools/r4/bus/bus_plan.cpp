@@ -9,9 +9,9 @@
 
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
-#include "transports/framing/can/can_ids.hpp"
+#include "r4link/can/can_ids.hpp"
+#include "r4link/messages/packed_form.hpp"
 #include "transports/framing/can/isotp_sender.hpp"
-#include "transports/framing/can/packed_form.hpp"
 
 namespace r4::tool {
 namespace {

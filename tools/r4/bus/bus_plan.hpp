@@ -9,8 +9,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "r4link/can/can_bits.hpp"
 #include "r4link/state.hpp"
-#include "transports/framing/can/can_bits.hpp"
 
 namespace r4::tool {
 

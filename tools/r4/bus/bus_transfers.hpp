@@ -15,8 +15,8 @@
 #include <string_view>
 #include <vector>
 
+#include "r4link/can/can_ids.hpp"
 #include "r4link/datagram.hpp"
-#include "transports/framing/can/can_ids.hpp"
 #include "transports/framing/can/isotp_receiver.hpp"
 
 namespace r4::tool {

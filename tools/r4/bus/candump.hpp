@@ -14,7 +14,7 @@
 #include <optional>
 #include <string_view>
 
-#include "transports/framing/can/can_frame.hpp"
+#include "r4link/can/can_frame.hpp"
 
 namespace r4::tool {
 

@@ -7,8 +7,8 @@
 
 #include "finding.hpp"
 #include "machine.hpp"
-#include "transports/can/can_interface.hpp"
-#include "transports/can/can_survey.hpp"
+#include "r4link/can/can_interface.hpp"
+#include "r4link/can/can_survey.hpp"
 
 namespace r4::tool {
 

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "can_question.hpp"
 
+#include <array>
 #include <system_error>
 
-#include "transports/can/can_carrier.hpp"
-#include "transports/identity_answer.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/discovery/async_carriers.hpp"
+#include "r4link/messages/datagram_writer.hpp"
+#include "r4link/messages/message.hpp"
 
 namespace r4::tool {
 namespace {
@@ -14,8 +17,8 @@ constexpr std::chrono::milliseconds look_at_bus{20};  // while the bus is not ou
 
 }  // namespace
 
-CanQuestion::CanQuestion(asio::io_context& io, const Url& url)
-    : carrier_(make_can_carrier(io, url, Role::host)), timer_(io) {
+CanQuestion::CanQuestion(asio::io_context& io, std::string_view url)
+    : carrier_(make_own_carrier(io, url)), timer_(io) {
   carrier_->open(*this);
   ask();
 }
@@ -24,7 +27,11 @@ void CanQuestion::ask() {
   if (const TransportTrouble now = carrier_->trouble(); now != TransportTrouble::none)
     trouble_ = now;
   if (answer_us_ > 0) return;
-  const bool sent = carrier_->send(identity_question(), Priority::normal) == SendResult::sent;
+  std::array<char, 64> buffer;
+  const Text question =
+      DatagramWriter(buffer.data(), buffer.size()).field("Q").value("ID").finish();
+  const bool sent =
+      carrier_->send({question.data(), question.size()}, Priority::normal) == SendResult::sent;
   if (sent) {
     asked_ = Clock::now();
     if (!first_asked_) first_asked_ = asked_;
@@ -35,8 +42,8 @@ void CanQuestion::ask() {
   });
 }
 
-void CanQuestion::hear(Text datagram) {
-  if (!asked_ || !read_identity_answer(datagram)) return;
+void CanQuestion::hear(const Datagram& datagram) {
+  if (!asked_ || kind_of(datagram) != MessageKind::identity) return;
   answer_us_ = std::chrono::duration<double, std::micro>(Clock::now() - *asked_).count();
   asked_.reset();
 }

@@ -8,23 +8,23 @@
 #include <chrono>
 #include <memory>
 #include <optional>
+#include <string_view>
 
 #include "r4link/carrier.hpp"
-#include "r4link/text.hpp"
-#include "transports/url.hpp"
+#include "r4link/datagram.hpp"
 
 namespace r4::tool {
 
 class CanQuestion final : private Carrier::Handler {
  public:
   // Asks until the board has answered. Throws Error if the bus cannot be opened.
-  CanQuestion(asio::io_context& io, const Url& url);
+  CanQuestion(asio::io_context& io, std::string_view url);
   ~CanQuestion() { carrier_->close(); }
   CanQuestion(const CanQuestion&) = delete;
   CanQuestion& operator=(const CanQuestion&) = delete;
 
   // A datagram of the board.
-  void hear(Text datagram);
+  void hear(const Datagram& datagram);
   // Question to answer; 0: there was none.
   double answer_us() const { return answer_us_; }
   // How long ago the first question went out; 0: none did.

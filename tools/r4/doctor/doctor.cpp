@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <asio/io_context.hpp>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -18,15 +18,14 @@
 #include "../shell/subcommands.hpp"
 #include "can_checks.hpp"
 #include "finding.hpp"
-#include "host/discovery/held_transport.hpp"
 #include "link_check.hpp"
 #include "machine.hpp"
+#include "r4link/can/can_interface.hpp"
+#include "r4link/discovery/discover.hpp"
+#include "r4link/discovery/url.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "serial_checks.hpp"
 #include "system_checks.hpp"
-#include "transports/serial/port_list.hpp"
-#include "transports/serial/serial_carrier.hpp"
-#include "transports/url.hpp"
-#include "transports/url_pattern.hpp"
 #include "udev_rules.hpp"
 
 namespace r4::tool {
@@ -51,31 +50,40 @@ std::string device_of(const std::string& path) {
   return error ? path : device.string();
 }
 
-// Who has it open, and lets the other programs of its user share it.
-pid_t sharing(const std::string& path) {
-  asio::io_context io(1);
-  FoundBoard board;
-  HeldTransport held(io, board, [] {});
-  try {
-    held.join(serial_share_name(Url::parse("serial://" + path)));
-  } catch (const Error&) {
-    return 0;  // no such port, which the check of its permission tells
+// The program that has it open, and lets the other programs of its user share it; 0: none.
+int sharing(const Discovery& found, const std::string& device) {
+  for (const FoundBoard& board : found.boards) {
+    if (board.holder && device_of(board.place) == device) return board.holder->pid;
   }
-  return board.holder ? board.holder->pid : 0;
+  return 0;
 }
 
-std::vector<std::string> ports_of(const Machine& machine, const Url& url) {
+std::vector<std::string> ports_of(const Machine& machine, const Discovery& found, const Url& url) {
   if (url.path().starts_with('/')) return {url.path()};
   std::vector<std::string> ports;
   const std::optional<std::string> serial_number = url.get("sn");
-  for (const SerialPort& port : list_serial_ports()) {
+  for (const SearchedPort& port : found.ports) {
     if (serial_number ? port.serial_number == *serial_number : port.is_r4)
       ports.push_back(port.path);
   }
   return ports.empty() ? likely_ports(machine) : ports;
 }
 
-Findings check_ports(const Machine& machine, std::vector<std::string> ports) {
+// The serial ports of this computer, with the programs that share them. The boards at `urls`, and
+// at ports with the USB id of a board, are asked who they are.
+Discovery search_ports(const std::vector<Url>& urls) {
+  DiscoveryOptions options;
+  options.can = options.udp = false;
+  for (const Url& url : urls) {
+    // At the wrong baud rate the question would be noise.
+    const bool named = url.scheme() == "serial" && url.path().starts_with('/') && !url.get("baud");
+    if (named) options.serial_ports.push_back(device_of(url.path()));
+  }
+  return discover(options);
+}
+
+Findings check_ports(const Machine& machine, const Discovery& found,
+                     std::vector<std::string> ports) {
   std::sort(ports.begin(), ports.end());
   ports.erase(std::unique(ports.begin(), ports.end()), ports.end());
   Findings findings;
@@ -83,7 +91,7 @@ Findings check_ports(const Machine& machine, std::vector<std::string> ports) {
   for (const std::string& path : ports) {
     const std::string device = devices.emplace_back(device_of(path));
     append(findings, check_port_permission(machine, device));
-    append(findings, check_port_holders(machine, device, sharing(device)));
+    append(findings, check_port_holders(machine, device, sharing(found, device)));
     append(findings, check_latency_timer(machine, device));
   }
   append(findings, check_brltty(machine, devices));
@@ -95,13 +103,15 @@ Findings check_machine(const Machine& machine, const std::vector<Url>& urls) {
   Findings findings;
   std::vector<std::string> ports;
   std::vector<CanInterface> buses;
-  bool serial = urls.empty();
+  const bool serial = urls.empty() || std::any_of(urls.begin(), urls.end(), [](const Url& url) {
+                        return url.scheme() == "serial";
+                      });
+  const Discovery found = serial ? search_ports(urls) : Discovery();
   bool can = urls.empty();
   bool network = urls.empty();
   for (const Url& url : urls) {
     if (url.scheme() == "serial") {
-      serial = true;
-      for (std::string& path : ports_of(machine, url)) ports.push_back(std::move(path));
+      for (std::string& path : ports_of(machine, found, url)) ports.push_back(std::move(path));
     } else if (url.scheme() == "can") {
       can = true;
       buses.push_back(can_interface(can_interface_of(url)));
@@ -113,7 +123,7 @@ Findings check_machine(const Machine& machine, const std::vector<Url>& urls) {
     ports = likely_ports(machine);
     buses = list_can_interfaces();
   }
-  if (serial) append(findings, check_ports(machine, std::move(ports)));
+  if (serial) append(findings, check_ports(machine, found, std::move(ports)));
   if (serial) append(findings, check_udev_rules(machine, udev_rules));
   if (can) append(findings, check_can_kernel(machine));
   for (const CanInterface& bus : buses) append(findings, check_can_interface(machine, bus));

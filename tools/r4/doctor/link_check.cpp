@@ -12,9 +12,9 @@
 #include "can_checks.hpp"
 #include "can_question.hpp"
 #include "r4link/async_board.hpp"
-#include "transports/can/can_interface.hpp"
-#include "transports/can/can_listener.hpp"
-#include "transports/url.hpp"
+#include "r4link/can/async_listener.hpp"
+#include "r4link/can/can_interface.hpp"
+#include "r4link/discovery/url.hpp"
 
 namespace r4::tool {
 namespace {
@@ -126,9 +126,9 @@ class Listening {
     const CanInterface interface = can_interface(name);
     const std::uint32_t rate = interface.bit_rate != 0 ? interface.bit_rate : doctor_bit_rate;
     bus_ = std::make_unique<CanListener>(io, name, CanBitRate{rate, interface.data_bit_rate});
-    question_ = std::make_unique<CanQuestion>(io, url);
+    question_ = std::make_unique<CanQuestion>(io, url.text());
     bus_->survey().on_datagram([this](std::uint8_t node, const Datagram& datagram) {
-      if (node == node_) question_->hear(datagram.bytes());
+      if (node == node_) question_->hear(datagram);
     });
   }
 

@@ -11,8 +11,8 @@
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "host/commands/command_help.hpp"
 #include "r4link/board.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
 #include "r4link/options.hpp"
 

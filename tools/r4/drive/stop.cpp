@@ -15,13 +15,12 @@
 #include "../shell/options.hpp"
 #include "../shell/paths.hpp"
 #include "../shell/subcommands.hpp"
-#include "host/standard_registry.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/discovery/async_carriers.hpp"
+#include "r4link/discovery/url.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
-#include "transports/udp/udp_url.hpp"
-#include "transports/url.hpp"
-#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {
@@ -42,7 +41,7 @@ std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
     if (Url::parse(urls[i]).scheme() == "serial") {
       options.role = BoardRole::watch;
     } else {
-      paths[i] = standard_registry().make(io, with_any_port(urls[i]), Role::host);
+      paths[i] = make_own_carrier(io, urls[i]);
     }
   }
   auto board = std::make_unique<AsyncBoard>(io, std::move(paths), options);

@@ -7,9 +7,9 @@
 
 #include "../bus/candump.hpp"
 #include "protocol/datagram/numbers.hpp"
+#include "r4link/discovery/url.hpp"
+#include "r4link/messages/packed_form.hpp"
 #include "r4link/vocabulary.hpp"
-#include "transports/framing/can/packed_form.hpp"
-#include "transports/url.hpp"
 
 namespace r4::tool {
 namespace {

@@ -6,9 +6,9 @@
 #include <algorithm>
 
 #include "../bus/candump.hpp"
+#include "r4link/discovery/url.hpp"
 #include "r4link/error.hpp"
 #include "transports/framing/can/can_node.hpp"
-#include "transports/url.hpp"
 
 namespace r4::tool {
 namespace {

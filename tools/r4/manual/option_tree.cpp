@@ -4,8 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <string_view>
 
-#include "host/standard_registry.hpp"
-#include "transports/registry.hpp"
+#include "r4link/discovery/transports.hpp"
 
 namespace r4::tool {
 
@@ -32,7 +31,7 @@ std::string choices_of(const CLI::Option& option) {
 
 std::vector<std::string> url_beginnings() {
   std::vector<std::string> beginnings;
-  for (const Registry::Entry& entry : standard_registry().entries()) {
+  for (const TransportHelp& entry : transports()) {
     const std::string_view usage = entry.usage;
     const std::size_t colon = usage.find(':');
     beginnings.emplace_back(usage.substr(0, colon + 1));

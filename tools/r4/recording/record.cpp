@@ -23,12 +23,12 @@
 #include "host/standard_registry.hpp"
 #include "limits.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/can/async_listener.hpp"
+#include "r4link/can/can_interface.hpp"
+#include "r4link/discovery/url.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "r4link/error.hpp"
 #include "r4link/recording.hpp"
-#include "transports/can/can_interface.hpp"
-#include "transports/can/can_listener.hpp"
-#include "transports/url.hpp"
-#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {

@@ -24,10 +24,9 @@
 #include "graph/graph.hpp"
 #include "graph/inbox.hpp"
 #include "graph/outbox.hpp"
-#include "protocol/messages/command_field.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "r4link/error.hpp"
 #include "r4link/tables/state_fields.hpp"
-#include "transports/url_pattern.hpp"
 
 namespace r4::tool::ros2 {
 namespace {

@@ -21,8 +21,8 @@
 #include <optional>
 #include <vector>
 
-#include "host/measurement/boot_clock.hpp"
 #include "r4link/command.hpp"
+#include "r4link/control/boot_clock.hpp"
 #include "r4link/state.hpp"
 
 namespace r4::tool::ros2 {

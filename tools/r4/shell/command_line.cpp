@@ -23,7 +23,6 @@
 #include "r4link/config.hpp"
 #include "r4link/error.hpp"
 #include "subcommands.hpp"
-#include "transports/file_descriptor.hpp"
 
 namespace r4::tool {
 namespace {

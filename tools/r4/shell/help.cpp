@@ -10,10 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "host/standard_registry.hpp"
 #include "json.hpp"
 #include "r4link/commands/command_text.hpp"
-#include "transports/registry.hpp"
+#include "r4link/discovery/transports.hpp"
 
 namespace r4::tool {
 namespace {
@@ -56,14 +55,14 @@ class Layout : public CLI::Formatter {
 
 std::string url_table() {
   std::string table;
-  for (const Registry::Entry& entry : standard_registry().entries()) {
+  for (const TransportHelp& entry : transports()) {
     table += fmt::format("  {}\n      {}\n", entry.usage, entry.meaning);
   }
   return table;
 }
 
 void print_url_schemes() {
-  for (const Registry::Entry& entry : standard_registry().entries()) {
+  for (const TransportHelp& entry : transports()) {
     print_line({{"type", "scheme"},
                 {"scheme", entry.scheme},
                 {"usage", entry.usage},

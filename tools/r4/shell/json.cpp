@@ -10,9 +10,8 @@
 #include <vector>
 
 #include "host/recording/record_line.hpp"
-#include "protocol/messages/message.hpp"
-#include "protocol/messages/settings.hpp"
-#include "transports/framing/can/packed_form.hpp"
+#include "r4link/messages/message.hpp"
+#include "r4link/messages/packed_form.hpp"
 
 namespace r4::tool {
 namespace {

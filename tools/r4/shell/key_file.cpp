@@ -15,7 +15,6 @@
 #include "options.hpp"
 #include "r4link/error.hpp"
 #include "r4link/options.hpp"
-#include "transports/file_descriptor.hpp"
 
 namespace r4::tool {
 namespace {
@@ -53,15 +52,17 @@ void make_key_file(const std::string& path, std::uint8_t id) {
   }
   std::array<char, key_text_size + 1> text;
   *write_key(text.data(), key) = '\n';
-  const FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
-  if (!file) {
+  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (file < 0) {
     throw system_error(path, errno,
                        errno == EEXIST ? "choose another name; a key is never overwritten"
                                        : "choose a place that can be written");
   }
-  const auto written = ::write(file.get(), text.data(), text.size());
-  if (written != static_cast<ssize_t>(text.size()) || ::fsync(file.get()) != 0) {
-    const int error = written < 0 ? errno : ENOSPC;
+  const auto written = ::write(file, text.data(), text.size());
+  const bool kept = written == static_cast<ssize_t>(text.size()) && ::fsync(file) == 0;
+  const int error = written < 0 ? errno : ENOSPC;
+  ::close(file);
+  if (!kept) {
     ::unlink(path.c_str());
     throw system_error(path, error, "make room, then again");
   }

@@ -5,36 +5,43 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
+#include <ratio>
+#include <system_error>
 
-#include "host/standard_registry.hpp"
-#include "protocol/datagram/numbers.hpp"
-#include "protocol/messages/command_field.hpp"
 #include "r4link/commands/command_text.hpp"
+#include "r4link/discovery/transports.hpp"
 #include "r4link/error.hpp"
 #include "r4link/state.hpp"
-#include "transports/registry.hpp"
 
 namespace r4::tool {
 namespace {
 
 Milliseconds read_seconds(const std::string& name, const std::string& text, Zero zero) {
-  std::int32_t hundredths = 0;
-  if (!parse_hundredths(Text(text), hundredths) || hundredths < 0) {
+  constexpr double most = 10'000'000;
+  double value = 0;
+  const char* const end = text.data() + text.size();
+  const auto read = std::from_chars(text.data(), end, value, std::chars_format::fixed);
+  if (read.ec != std::errc() || read.ptr != end || !(value >= 0 && value <= most)) {
     throw Error(ErrorKind::usage, fmt::format("{} {}", name, text), "is no time",
                 "write seconds such as 5 or 0.25");
   }
-  if (hundredths == 0 && zero == Zero::refused) {
+  const Milliseconds time = std::chrono::round<std::chrono::duration<std::int64_t, std::centi>>(
+      std::chrono::duration<double>(value));
+  if (time.count() == 0 && zero == Zero::refused) {
     throw Error(ErrorKind::usage, fmt::format("{} {}", name, text), "is too short for anything",
                 "write seconds such as 5 or 0.25");
   }
-  return Milliseconds(std::int64_t{hundredths} * 10);
+  return time;
 }
 
 std::uint64_t read_number(const std::string& name, const std::string& text, std::uint64_t min,
                           std::uint64_t max) {
   std::uint64_t number = 0;
-  if (!parse_number(Text(text), number) || number < min || number > max) {
-    const bool is_number = is_whole_number(Text(text));
+  const char* const end = text.data() + text.size();
+  const auto read = std::from_chars(text.data(), end, number);
+  if (read.ec != std::errc() || read.ptr != end || number < min || number > max) {
+    const bool is_number = read.ptr == end && read.ec != std::errc::invalid_argument;
     throw Error(ErrorKind::usage, fmt::format("{} {}", name, text),
                 is_number ? "is out of range" : "is no whole number",
                 fmt::format("write {} to {}", min, max));
@@ -163,9 +170,9 @@ void take_paths(std::string& url, std::vector<std::string>& words, const std::st
 }
 
 bool is_url(std::string_view text) {
-  const std::vector<Registry::Entry>& entries = standard_registry().entries();
-  return std::any_of(entries.begin(), entries.end(), [&](const Registry::Entry& entry) {
-    return text.starts_with(entry.scheme + ":");
+  const std::vector<TransportHelp> all = transports();
+  return std::any_of(all.begin(), all.end(), [&](const TransportHelp& each) {
+    return text.starts_with(each.scheme + ":");
   });
 }
 

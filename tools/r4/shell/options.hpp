@@ -59,8 +59,9 @@ CLI::Option* add_number(CLI::App& command, const std::string& name,
 
 CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning);
 
-// Where a board is. A text may join the URLs of several paths to it by '+' (transports/url_pattern.hpp), for every
-// command. One that has a single board takes several URLs for its paths, too:
+// Where a board is. A '+' may join the URLs of several paths to it
+// (r4link/discovery/url_pattern.hpp), for every command. A command for one board also takes several
+// URLs as its paths:
 //
 //     r4 stop serial:auto udp://192.168.0.125             is         r4 stop serial:auto+udp://192.168.0.125
 //

@@ -17,11 +17,11 @@
 #include "child_board.hpp"
 #include "demo_story.hpp"
 #include "protocol/messages/message.hpp"
+#include "r4link/can/can_ids.hpp"
+#include "r4link/can/can_interface.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/error.hpp"
-#include "transports/can/can_interface.hpp"
 #include "transports/can/can_socket.hpp"
-#include "transports/framing/can/can_ids.hpp"
 
 namespace r4::tool {
 namespace {

@@ -22,11 +22,11 @@
 #include "input_lines.hpp"
 #include "protocol/messages/settings.hpp"
 #include "r4link/config.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "r4link/vocabulary.hpp"
 #include "sim_log.hpp"
 #include "transports/impaired/impaired_carrier.hpp"
 #include "transports/registry.hpp"
-#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {

@@ -10,10 +10,10 @@
 #include <tuple>
 
 #include "r4link/commands/command_text.hpp"
+#include "r4link/discovery/url.hpp"
 #include "r4link/state.hpp"
 #include "r4link/tables/state_fields.hpp"
 #include "r4link/vocabulary.hpp"
-#include "transports/url.hpp"
 
 namespace r4::tool {
 namespace {

@@ -23,9 +23,9 @@
 #include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
-#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {

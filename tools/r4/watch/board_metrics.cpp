@@ -4,9 +4,9 @@
 #include <chrono>
 #include <utility>
 
+#include "r4link/discovery/url_pattern.hpp"
 #include "r4link/link.hpp"
 #include "r4link/tables/state_fields.hpp"
-#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {

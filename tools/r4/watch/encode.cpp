@@ -12,14 +12,13 @@
 
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
-#include "protocol/messages/command_field.hpp"
-#include "protocol/messages/message.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/error.hpp"
+#include "r4link/messages/datagram_writer.hpp"
+#include "r4link/messages/message.hpp"
+#include "r4link/messages/packed_form.hpp"
 #include "r4link/setpoints.hpp"
-#include "transports/framing/can/packed_form.hpp"
 
 namespace r4::tool {
 namespace {

@@ -13,8 +13,8 @@
 #include "../shell/json.hpp"
 #include "../shell/screen.hpp"
 #include "monitor_view.hpp"
-#include "protocol/messages/state_fields.hpp"
 #include "r4link/commands/command_text.hpp"
+#include "r4link/state.hpp"
 
 namespace r4::tool {
 namespace {

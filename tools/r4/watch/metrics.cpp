@@ -21,10 +21,10 @@
 #include "../web/server/server.hpp"
 #include "board_metrics.hpp"
 #include "r4link/async_board.hpp"
-#include "transports/can/can_interface.hpp"
-#include "transports/can/can_listener.hpp"
-#include "transports/url.hpp"
-#include "transports/url_pattern.hpp"
+#include "r4link/can/async_listener.hpp"
+#include "r4link/can/can_interface.hpp"
+#include "r4link/discovery/url.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {

@@ -24,12 +24,12 @@
 #include "monitor_bus.hpp"
 #include "monitor_view.hpp"
 #include "r4link/async_board.hpp"
+#include "r4link/can/can_interface.hpp"
 #include "r4link/devices/device.hpp"
+#include "r4link/discovery/url.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
-#include "transports/can/can_interface.hpp"
-#include "transports/url.hpp"
-#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {

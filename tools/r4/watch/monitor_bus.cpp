@@ -15,8 +15,8 @@
 #include "../shell/line_writer.hpp"
 #include "../shell/run_end.hpp"
 #include "../shell/screen.hpp"
-#include "protocol/messages/message.hpp"
-#include "transports/can/can_listener.hpp"
+#include "r4link/can/async_listener.hpp"
+#include "r4link/messages/message.hpp"
 
 namespace r4::tool {
 namespace {
@@ -62,7 +62,7 @@ class BusMonitor {
 
  private:
   std::string name() const { return "can://" + options_.interface; }
-  const HeardBoard& board(std::uint8_t node) const { return listener_.survey().board(node); }
+  const HeardNode& board(std::uint8_t node) const { return listener_.survey().board(node); }
   bool any_heard() const {
     for (std::uint8_t node = 0; node < can_nodes; ++node) {
       if (board(node).heard()) return true;
@@ -139,7 +139,7 @@ class BusMonitor {
     rows.push_back(fmt::format("{:>4}  {:<18}{:>8}  {:>8}{:>9}{:>12}{:>12}", "node", "board", "Hz",
                                "lost", "damaged", "PNum", "T"));
     for (std::uint8_t node = 0; node < can_nodes; ++node) {
-      const HeardBoard& heard = board(node);
+      const HeardNode& heard = board(node);
       if (!heard.heard()) continue;
       const std::uint64_t states = heard.states - states_before_[node];
       states_before_[node] = heard.states;
@@ -150,9 +150,9 @@ class BusMonitor {
     return rows;
   }
 
-  static std::string status(const HeardBoard& heard) {
+  static std::string status(const HeardNode& heard) {
     constexpr std::uint32_t silence_us = 1500000;  // three heartbeats
-    if (CanBus::now_us() - heard.heard_us > silence_us) return "silent";
+    if (CanListener::now_us() - heard.heard_us > silence_us) return "silent";
     if (heard.reason != SafeReason::none) return fmt::format("SAFE ({})", to_text(heard.reason));
     return heard.connected ? "ACTIVE" : "CONNECTING";
   }

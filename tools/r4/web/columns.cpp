@@ -7,7 +7,6 @@
 #include <string_view>
 #include <utility>
 
-#include "protocol/messages/state_fields.hpp"
 #include "r4link/tables/state_fields.hpp"
 #include "r4link/vocabulary.hpp"
 

@@ -9,9 +9,9 @@
 #include "../formats/json_lines.hpp"
 #include "../watch/board_metrics.hpp"
 #include "r4link/commands/command_text.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "r4link/error.hpp"
 #include "r4link/setpoints.hpp"
-#include "transports/url_pattern.hpp"
 
 namespace r4::tool::web {
 namespace {

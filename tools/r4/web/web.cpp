@@ -16,8 +16,8 @@
 #include "../shell/subcommands.hpp"
 #include "../watch/board_metrics.hpp"
 #include "hub.hpp"
+#include "r4link/discovery/url_pattern.hpp"
 #include "server/access.hpp"
-#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "can_bits.hpp"
+#include "r4link/can/can_bits.hpp"
 
 namespace r4 {
 namespace {

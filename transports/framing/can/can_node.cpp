@@ -3,11 +3,11 @@
 
 #include <cstring>
 
-#include "../../../protocol/datagram/datagram_writer.hpp"
 #include "../../../protocol/messages/command_field.hpp"
 #include "../../../protocol/messages/message.hpp"
-#include "packed_form.hpp"
 #include "r4link/command.hpp"
+#include "r4link/messages/datagram_writer.hpp"
+#include "r4link/messages/packed_form.hpp"
 
 namespace r4 {
 namespace {

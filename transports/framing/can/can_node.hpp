@@ -16,10 +16,10 @@
 
 #include <cstdint>
 
-#include "can_frame.hpp"
-#include "can_ids.hpp"
 #include "isotp_receiver.hpp"
 #include "isotp_sender.hpp"
+#include "r4link/can/can_frame.hpp"
+#include "r4link/can/can_ids.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/vocabulary.hpp"
 

@@ -25,7 +25,7 @@
 #include <cstdint>
 
 #include "../../../protocol/datagram/wrapping.hpp"
-#include "can_frame.hpp"
+#include "r4link/can/can_frame.hpp"
 #include "r4link/text.hpp"
 
 namespace r4 {

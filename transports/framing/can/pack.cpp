@@ -3,8 +3,8 @@
 #include "../../../protocol/datagram/grammar.hpp"
 #include "../../../protocol/datagram/numbers.hpp"
 #include "packed_digits.hpp"
-#include "packed_form.hpp"
 #include "packed_layout.hpp"
+#include "r4link/messages/packed_form.hpp"
 
 namespace r4 {
 namespace packed {

@@ -2,8 +2,8 @@
 // The reading half of packed_form.hpp.
 #include "../../../protocol/datagram/grammar.hpp"
 #include "../../../protocol/datagram/numbers.hpp"
-#include "packed_form.hpp"
 #include "packed_layout.hpp"
+#include "r4link/messages/packed_form.hpp"
 
 namespace r4 {
 namespace packed {

@@ -18,8 +18,8 @@
 #include <utility>
 
 #include "../../file_descriptor.hpp"
-#include "../../url.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/discovery/url.hpp"
 
 namespace r4 {
 namespace {

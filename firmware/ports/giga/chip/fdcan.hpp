@@ -16,8 +16,8 @@
 
 #include <cstdint>
 
-#include "../../../../transports/framing/can/can_frame.hpp"
 #include "chip.hpp"
+#include "r4link/can/can_frame.hpp"
 
 namespace r4 {
 namespace giga {

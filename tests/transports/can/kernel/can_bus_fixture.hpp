@@ -16,11 +16,11 @@
 #include <utility>
 #include <vector>
 
+#include "r4link/discovery/url.hpp"
 #include "tests/transports/can/kernel/raw_can.hpp"
 #include "tests/transports/recorder.hpp"
 #include "transports/can/can_bus.hpp"
 #include "transports/can/can_carrier.hpp"
-#include "transports/url.hpp"
 
 namespace r4::test {
 

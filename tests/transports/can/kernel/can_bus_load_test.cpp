@@ -5,8 +5,8 @@
 #include <fstream>
 #include <thread>
 
+#include "r4link/can/can_ids.hpp"
 #include "tests/transports/can/kernel/can_bus_fixture.hpp"
-#include "transports/framing/can/can_ids.hpp"
 #include "transports/framing/can/can_node.hpp"
 
 namespace r4::test {

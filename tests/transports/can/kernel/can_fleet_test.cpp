@@ -9,11 +9,11 @@
 #include <thread>
 #include <vector>
 
+#include "r4link/can/can_ids.hpp"
 #include "r4link/fleet.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
 #include "tests/transports/can/kernel/raw_can.hpp"
-#include "transports/framing/can/can_ids.hpp"
 
 namespace r4::test {
 namespace {

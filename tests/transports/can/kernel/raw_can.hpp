@@ -17,7 +17,7 @@
 #include <string>
 #include <system_error>
 
-#include "transports/framing/can/can_frame.hpp"
+#include "r4link/can/can_frame.hpp"
 #include "transports/framing/can/isotp.hpp"
 
 namespace r4::test {

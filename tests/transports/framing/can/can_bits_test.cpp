@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The length of frames against published values, and against a second computation that writes every
 // bit down as a character.
-#include "transports/framing/can/can_bits.hpp"
+#include "r4link/can/can_bits.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>

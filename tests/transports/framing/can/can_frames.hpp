@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "transports/framing/can/can_frame.hpp"
+#include "r4link/can/can_frame.hpp"
 
 namespace r4::test {
 

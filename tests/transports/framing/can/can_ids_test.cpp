@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "transports/framing/can/can_ids.hpp"
+#include "r4link/can/can_ids.hpp"
 
 #include <gtest/gtest.h>
 

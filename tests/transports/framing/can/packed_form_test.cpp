@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "transports/framing/can/packed_form.hpp"
+#include "r4link/messages/packed_form.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

@@ -10,8 +10,8 @@
 
 #include "answering_boards.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/discovery/url.hpp"
 #include "r4link/error.hpp"
-#include "transports/url.hpp"
 
 namespace r4::test {
 namespace {

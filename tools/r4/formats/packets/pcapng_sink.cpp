@@ -9,8 +9,8 @@
 #include "../byte_order.hpp"
 #include "packets.hpp"
 #include "r4link/config.hpp"
+#include "r4link/discovery/url.hpp"
 #include "r4link/error.hpp"
-#include "transports/url.hpp"
 
 namespace r4::tool {
 namespace {

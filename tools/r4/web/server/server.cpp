@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server.hpp"
 
+#include <fcntl.h>
+
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/post.hpp>
 #include <filesystem>
@@ -9,7 +11,6 @@
 #include "http_exchange.hpp"
 #include "r4link/error.hpp"
 #include "server_impl.hpp"
-#include "transports/file_descriptor.hpp"
 #include "websocket_client.hpp"
 
 namespace r4::tool::web {
@@ -17,6 +18,9 @@ namespace {
 
 // What is in the kernel cannot be taken back for newer states.
 constexpr int send_buffer = 64 << 10;
+
+// A child process would keep the port while it runs.
+void close_on_exec(int descriptor) { ::fcntl(descriptor, F_SETFD, FD_CLOEXEC); }
 
 }  // namespace
 
@@ -31,7 +35,8 @@ void Server::Impl::listen() {
                 "ip address shows which there are");
   }
   const tcp::endpoint endpoint = found.begin()->endpoint();
-  open_close_on_exec(acceptor, endpoint.protocol(), error);
+  acceptor.open(endpoint.protocol(), error);
+  if (!error) close_on_exec(acceptor.native_handle());
   if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
   if (!error) acceptor.bind(endpoint, error);
   if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);

@@ -13,14 +13,15 @@
 #include <string>
 #include <string_view>
 
-#include "r4link/error.hpp"
+#include "../config.hpp"
+#include "../error.hpp"
 
 namespace r4 {
 
 class Url {
  public:
   // Throws Error{usage} that names the URL and what is wrong with it.
-  static Url parse(std::string_view text);
+  R4LINK_API static Url parse(std::string_view text);
 
   const std::string& text() const { return text_; }  // as it was given
   const std::string& scheme() const { return scheme_; }
@@ -29,13 +30,13 @@ class Url {
   const std::string& path() const { return path_; }  // "/dev/ttyACM0", "auto", "can0"
 
   // The value of a key, if the URL has it.
-  std::optional<std::string> get(std::string_view key) const;
+  R4LINK_API std::optional<std::string> get(std::string_view key) const;
   // The same; removes the key.
-  std::optional<std::string> take(std::string_view key);
+  R4LINK_API std::optional<std::string> take(std::string_view key);
   // The value as a whole number, or `fallback`. Throws Error{usage} unless it is within [min, max].
-  long get_number(std::string_view key, long min, long max, long fallback) const;
+  R4LINK_API long get_number(std::string_view key, long min, long max, long fallback) const;
   // Throws Error{usage} naming the first key that is not in the space-separated `allowed`.
-  void allow_only(std::string_view allowed) const;
+  R4LINK_API void allow_only(std::string_view allowed) const;
 
  private:
   std::string text_, scheme_, host_, path_;
@@ -44,6 +45,6 @@ class Url {
 };
 
 // The text as a value in a URL: what a URL, a shell or a terminal may interpret becomes %NN.
-std::string percent_encoded(std::string_view text);
+R4LINK_API std::string percent_encoded(std::string_view text);
 
 }  // namespace r4

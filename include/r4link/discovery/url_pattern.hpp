@@ -22,6 +22,8 @@
 #include <string_view>
 #include <vector>
 
+#include "../config.hpp"
+
 namespace r4 {
 
 struct PatternUrl {
@@ -34,14 +36,14 @@ constexpr std::size_t most_pattern_urls = 10'000;
 
 // The URLs that a pattern stands for, in order; a URL stands for itself. Throws Error{usage} for
 // invalid braces and ranges, for more than most_pattern_urls, and if a result is not a valid URL.
-std::vector<PatternUrl> expand_urls(std::string_view pattern);
+R4LINK_API std::vector<PatternUrl> expand_urls(std::string_view pattern);
 // The same for several texts. Throws Error{usage}, too, if two of them name the same URL.
-std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns);
+R4LINK_API std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns);
 
 // The URLs that a text joins. They are not checked.
-std::vector<std::string> split_paths(std::string_view text);
-std::string join_paths(const std::vector<std::string>& urls);
+R4LINK_API std::vector<std::string> split_paths(std::string_view text);
+R4LINK_API std::string join_paths(const std::vector<std::string>& urls);
 // True if one of the joined URLs has that scheme.
-bool has_path(std::string_view text, std::string_view scheme);
+R4LINK_API bool has_path(std::string_view text, std::string_view scheme);
 
 }  // namespace r4

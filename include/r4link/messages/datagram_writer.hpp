@@ -14,8 +14,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "r4link/text.hpp"
-#include "r4link/vocabulary.hpp"
+#include "../config.hpp"
+#include "../text.hpp"
+#include "../vocabulary.hpp"
 
 namespace r4 {
 
@@ -48,7 +49,7 @@ class FieldName {
   std::uint8_t size_ = 0;  // of the name alone
 };
 
-class DatagramWriter {
+class R4LINK_API DatagramWriter {
  public:
   // Goes on behind the first `used` bytes of the buffer: size() of a writer that wrote them there.
   DatagramWriter(char* buffer, std::size_t capacity, std::size_t used = 0)
@@ -97,10 +98,10 @@ class DatagramWriter {
   static constexpr std::size_t trailer_max = 52;
 
  private:
-  bool reserve(std::size_t bytes);
-  DatagramWriter& append(Text text, std::uint8_t allowed);
+  R4LINK_PRIVATE bool reserve(std::size_t bytes);
+  R4LINK_PRIVATE DatagramWriter& append(Text text, std::uint8_t allowed);
   template <class Number>
-  DatagramWriter& number(Number value, char* (*write)(char*, Number));
+  R4LINK_PRIVATE DatagramWriter& number(Number value, char* (*write)(char*, Number));
 
   char* begin_;
   char* at_;

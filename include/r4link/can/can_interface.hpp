@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "../url.hpp"
-#include "r4link/error.hpp"
+#include "../config.hpp"
+#include "../discovery/url.hpp"
 
 namespace r4 {
 
@@ -30,15 +30,12 @@ struct CanInterface {
   std::uint16_t rx_errors = 0;
 };
 
-CanInterface can_interface(const std::string& name);
+R4LINK_API CanInterface can_interface(const std::string& name);
 
 // The interface that can://INTERFACE names. Throws Error{usage} if the URL is of another form.
-const std::string& can_interface_of(const Url& url);
+R4LINK_API const std::string& can_interface_of(const Url& url);
 
 // All CAN interfaces of this computer, by name; none if the system does not report them.
-std::vector<CanInterface> list_can_interfaces();
-
-// What an errno of a socket on that interface means, with the fix where there is one.
-Problem can_problem(const std::string& interface, int error);
+R4LINK_API std::vector<CanInterface> list_can_interfaces();
 
 }  // namespace r4

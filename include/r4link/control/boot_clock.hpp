@@ -10,7 +10,7 @@
 #include <chrono>
 #include <ctime>
 
-#include "r4link/link.hpp"
+#include "../link.hpp"
 
 namespace r4 {
 

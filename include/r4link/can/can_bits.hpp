@@ -20,6 +20,7 @@
 
 #include <cstdint>
 
+#include "../config.hpp"
 #include "can_frame.hpp"
 
 namespace r4 {
@@ -42,17 +43,19 @@ struct CanBitRate {
 };
 
 // The bits of that very frame. Its size must be one that it can have (has_valid_size()).
-CanBits can_bits(const CanFrame& frame, bool switches_rate = true);
+R4LINK_API CanBits can_bits(const CanFrame& frame, bool switches_rate = true);
 
 // No frame of that format, id length and size has more. `size` must be one that a frame can have.
-CanBits worst_can_bits(std::uint8_t size, bool fd, bool extended, bool switches_rate = true);
+R4LINK_API CanBits worst_can_bits(std::uint8_t size, bool fd, bool extended,
+                                  bool switches_rate = true);
 
 // The same without any stuff bit, but for those of an FD frame that are always there.
-CanBits least_can_bits(std::uint8_t size, bool fd, bool extended, bool switches_rate = true);
+R4LINK_API CanBits least_can_bits(std::uint8_t size, bool fd, bool extended,
+                                  bool switches_rate = true);
 
 // How long the bits take, in nanoseconds, rounded up.
-std::uint64_t time_ns(CanBits bits, CanBitRate rate);
+R4LINK_API std::uint64_t time_ns(CanBits bits, CanBitRate rate);
 // How long the frame holds the bus, its intermission included.
-std::uint64_t time_ns(const CanFrame& frame, CanBitRate rate);
+R4LINK_API std::uint64_t time_ns(const CanFrame& frame, CanBitRate rate);
 
 }  // namespace r4

@@ -27,7 +27,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "r4link/datagram.hpp"
+#include "../config.hpp"
+#include "../datagram.hpp"
 
 namespace r4 {
 
@@ -39,7 +40,7 @@ constexpr bool is_packed(std::uint8_t first_byte) { return first_byte >= 0x80; }
 // Packs one datagram (without line terminator). Returns the size at `out`, always smaller than the
 // datagram's; 0, with `out` undefined, if it must travel plain: not of the grammar, a checksum not in
 // the form that writers print, a name too long, no gain, or more than `capacity` bytes.
-std::size_t pack(Text datagram, std::uint8_t* out, std::size_t capacity);
+R4LINK_API std::size_t pack(Text datagram, std::uint8_t* out, std::size_t capacity);
 
 enum class UnpackError : std::uint8_t {
   none,
@@ -49,7 +50,7 @@ enum class UnpackError : std::uint8_t {
 };
 
 // "length", "version", "syntax"; "" for none.
-const char* to_text(UnpackError error);
+R4LINK_API const char* to_text(UnpackError error);
 
 struct UnpackResult {
   UnpackError error = UnpackError::none;
@@ -59,6 +60,7 @@ struct UnpackResult {
 
 // Unpacks into `out`. Any bytes are safe; never more than `capacity` bytes are written, and what is
 // there after an error has no meaning. The checksum is copied, not checked: read_datagram() does.
-UnpackResult unpack(const std::uint8_t* bytes, std::size_t size, char* out, std::size_t capacity);
+R4LINK_API UnpackResult unpack(const std::uint8_t* bytes, std::size_t size, char* out,
+                               std::size_t capacity);
 
 }  // namespace r4

@@ -17,17 +17,17 @@
 #include <map>
 #include <memory>
 
-#include "../../protocol/link/packet_tracker.hpp"
-#include "../framing/can/can_bits.hpp"
-#include "../framing/can/can_frame.hpp"
-#include "../framing/can/can_ids.hpp"
-#include "r4link/datagram.hpp"
-#include "r4link/vocabulary.hpp"
+#include "../config.hpp"
+#include "../datagram.hpp"
+#include "../vocabulary.hpp"
+#include "can_bits.hpp"
+#include "can_frame.hpp"
+#include "can_ids.hpp"
 
 namespace r4 {
 
 // Counts of a node, and its newest values.
-struct HeardBoard {
+struct HeardNode {
   std::uint64_t states = 0;
   std::uint64_t heartbeats = 0;
   std::uint64_t answers = 0;             // N and I
@@ -57,21 +57,21 @@ class CanSurvey {
   static constexpr std::uint32_t extended_ids = max_can_id + 1;
 
   // With rate.data 0, FD frames count as not switching their rate.
-  explicit CanSurvey(CanBitRate rate);
-  ~CanSurvey();
+  R4LINK_API explicit CanSurvey(CanBitRate rate);
+  R4LINK_API ~CanSurvey();
   CanSurvey(const CanSurvey&) = delete;
   CanSurvey& operator=(const CanSurvey&) = delete;
 
   // A board's datagram (plain form, its CRC is right), or an emergency stop of a host.
-  void on_datagram(std::function<void(std::uint8_t node, const Datagram&)> callback);
-  void on_stop(std::function<void()> callback);
+  R4LINK_API void on_datagram(std::function<void(std::uint8_t node, const Datagram&)> callback);
+  R4LINK_API void on_stop(std::function<void()> callback);
 
-  void on_frame(const CanFrame& frame, std::uint32_t at_us);
+  R4LINK_API void on_frame(const CanFrame& frame, std::uint32_t at_us);
 
   // True if the id is one of R4's, and frames with it make R4's datagrams. False: another protocol
   // uses it.
-  bool is_r4(std::uint32_t id) const;
-  const HeardBoard& board(std::uint8_t node) const { return boards_[node % can_nodes]; }
+  R4LINK_API bool is_r4(std::uint32_t id) const;
+  const HeardNode& board(std::uint8_t node) const { return boards_[node % can_nodes]; }
   const std::map<std::uint32_t, CanTraffic>& traffic() const { return traffic_; }
   std::uint64_t busy_ns() const { return busy_ns_; }
 
@@ -86,7 +86,7 @@ class CanSurvey {
   std::function<void(std::uint8_t, const Datagram&)> datagram_callback_;
   std::function<void()> stop_callback_;
   std::array<std::unique_ptr<Lanes>, can_nodes> lanes_;  // made when the node is heard first
-  std::array<HeardBoard, can_nodes> boards_;
+  std::array<HeardNode, can_nodes> boards_;
   std::map<std::uint32_t, CanTraffic> traffic_;
   std::uint64_t busy_ns_ = 0;
 };
