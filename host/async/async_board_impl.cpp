@@ -5,8 +5,8 @@
 #include <array>
 #include <string>
 
-#include "../../protocol/messages/settings.hpp"
 #include "../../transports/file_descriptor.hpp"
+#include "r4link/messages/messages.hpp"
 
 namespace r4 {
 

@@ -5,6 +5,7 @@
 #include "../datagram/crc32.hpp"
 #include "../datagram/numbers.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/messages.hpp"
 #include "settings.hpp"
 
 namespace r4 {

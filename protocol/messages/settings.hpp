@@ -51,12 +51,4 @@ void read_settings(Text text, Settings& settings);
 // setting that is not known is taken for a secret, because its name may be misspelled.
 Text secret_in(Text command);
 
-// A datagram as it may leave the program for anything but the board. Of each secret up to three dots
-// remain, and the checksum is that of the result: "C:key,1:...;PNum:66;T:79146;^0x…^". In bytes that
-// are no valid datagram the first secret and all bytes after it become those dots. Returns `bytes`
-// where there is no secret, else the result in `room`, which must have room for bytes.size() +
-// masking_room characters.
-constexpr std::size_t masking_room = 8;  // a checksum may be written with more digits
-Text without_secrets(Text bytes, char* room);
-
 }  // namespace r4

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's state as fields of a datagram (paper section 4.1).
+// The board's state as fields of a datagram (paper section 4.1). Read: r4link/messages/messages.hpp.
 #pragma once
 
 #include "../datagram/datagram_writer.hpp"
-#include "r4link/datagram.hpp"
+#include "r4link/messages/messages.hpp"
 #include "r4link/state.hpp"
 
 namespace r4 {
@@ -14,10 +14,5 @@ void write_field(DatagramWriter& writer, StateField field, const State& state);
 // The value of SAFE. A number without a meaning here, a newer board's, is a fault. False if it is
 // no number.
 bool parse_safe_reason(Text text, SafeReason& out);
-
-// Reads the state fields of `datagram` into `state` and sets `present`, `pnum` and `t_ms`. Unknown
-// fields are passed over (they stay reachable through the datagram). Returns false, with `state`
-// untouched, when a known field has values that are not of its form or range, or stands twice.
-bool read_state(const Datagram& datagram, State& state);
 
 }  // namespace r4

@@ -17,11 +17,11 @@
 #include <map>
 #include <memory>
 
-#include "../../protocol/link/packet_tracker.hpp"
 #include "../framing/can/can_bits.hpp"
 #include "../framing/can/can_frame.hpp"
 #include "../framing/can/can_ids.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/packet_tracker.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4 {

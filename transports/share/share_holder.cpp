@@ -12,8 +12,8 @@
 #include <utility>
 
 #include "../../protocol/messages/command_field.hpp"
-#include "../../protocol/messages/settings.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/messages/messages.hpp"
 #include "share_socket.hpp"
 
 namespace r4 {

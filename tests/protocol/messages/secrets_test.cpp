@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "protocol/messages/settings.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/key.hpp"
+#include "r4link/messages/messages.hpp"
 #include "tests/support/datagrams.hpp"
 
 namespace r4::test {

@@ -17,9 +17,9 @@
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
 #include "formats.hpp"
-#include "host/recording/record_line.hpp"
 #include "r4link/devices/device.hpp"
 #include "r4link/error.hpp"
+#include "r4link/recordings/record_line.hpp"
 #include "read_file.hpp"
 
 namespace r4::tool {

@@ -6,10 +6,11 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <string_view>
 
-#include "host/recording/file_form.hpp"
-#include "transports/framing/line_framing.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/recordings/file_form.hpp"
 
 namespace r4::tool {
 
@@ -23,17 +24,23 @@ class NumberedLines {
       const std::size_t end = std::min(bytes.find_first_of("\r\n"), bytes.size());
       const bool ends = end != bytes.size();
       const std::size_t taken = end + (ends ? 1 : 0);
+      const std::string_view part = bytes.substr(0, end);
+      // A line that is here as a whole is not copied.
+      const bool whole = ends && size_ == 0;
       size_ += end;
-      framing_.push(bytes.data(), taken, [&](Text framed) {
-        std::string_view text(framed.data(), framed.size());
-        if (number_ == 1 && text.starts_with(utf8_mark)) text.remove_prefix(utf8_mark.size());
-        if (!text.empty()) line(number_, text);
-      });
+      if (!whole && size_ <= max_datagram) line_ += part;
       if (!ends) {
         after_cr_ = false;
         return;
       }
-      if (size_ > max_datagram) too_long(number_, size_);
+      if (size_ > max_datagram) {
+        too_long(number_, size_);
+      } else {
+        std::string_view text = whole ? part : std::string_view(line_);
+        if (number_ == 1 && text.starts_with(utf8_mark)) text.remove_prefix(utf8_mark.size());
+        if (!text.empty()) line(number_, text);
+      }
+      line_.clear();
       const bool second_half = bytes[end] == '\n' && end == 0 && after_cr_;  // of CR LF
       if (!second_half) ++number_;
       begin_ += size_ + 1;
@@ -51,7 +58,7 @@ class NumberedLines {
   }
 
  private:
-  LineFraming framing_;
+  std::string line_;  // what has come of it
   std::uint64_t number_ = 1;
   std::uint64_t begin_ = 0;
   std::uint64_t size_ = 0;  // of the line so far

@@ -14,9 +14,9 @@
 #include "../shell/line_writer.hpp"
 #include "../shell/paths.hpp"
 #include "protocol/link/host_link.hpp"
-#include "protocol/messages/settings.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/link.hpp"
+#include "r4link/messages/messages.hpp"
 
 namespace r4::tool {
 namespace {

@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "page_files.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <libdeflate.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <memory>
-
-#include "protocol/datagram/crc32.hpp"
-#include "r4link/text.hpp"
-#include "transports/file_descriptor.hpp"
+#include <system_error>
 
 namespace r4::tool::web {
 namespace {
@@ -37,33 +35,25 @@ std::string gzip(std::string_view content) {
 }  // namespace
 
 PageFile page_file(std::string_view name, std::string_view content) {
-  return {type_of(name), fmt::format("\"{:08x}-{}\"", crc32(Text(content)), content.size()),
+  return {type_of(name),
+          fmt::format("\"{:08x}-{}\"", libdeflate_crc32(0, content.data(), content.size()),
+                      content.size()),
           std::string(content), gzip(content)};
 }
 
 std::optional<PageFile> page_file_in(const std::string& folder, std::string_view path) {
-  constexpr off_t largest = 4 << 20;
+  constexpr std::uintmax_t largest = 4 << 20;
   if (!path.starts_with('/') || path.starts_with("/.") ||
       path.find('/', 1) != std::string_view::npos) {
     return std::nullopt;
   }
-  // O_NONBLOCK: a named pipe would wait for somebody who writes into it.
-  const FileDescriptor file(
-      ::open((folder + std::string(path)).c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK));
-  struct stat status {};
-  if (!file || ::fstat(file.get(), &status) != 0 || !S_ISREG(status.st_mode) ||
-      status.st_size > largest) {
-    return std::nullopt;
-  }
-  std::string content(static_cast<std::size_t>(status.st_size), '\0');
-  std::size_t size = 0;
-  while (size < content.size()) {
-    const ssize_t n = ::read(file.get(), content.data() + size, content.size() - size);
-    if (n < 0) return std::nullopt;
-    if (n == 0) break;  // it has become shorter meanwhile
-    size += static_cast<std::size_t>(n);
-  }
-  content.resize(size);
+  const std::filesystem::path file = folder + std::string(path);
+  std::error_code error;
+  // A named pipe would wait for a program that writes into it.
+  if (!is_regular_file(file, error) || file_size(file, error) > largest) return std::nullopt;
+  std::ifstream stream(file, std::ios::binary);
+  std::string content(std::istreambuf_iterator<char>(stream), {});
+  if (!stream) return std::nullopt;
   return page_file(path, content);
 }
 
