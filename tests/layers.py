@@ -114,8 +114,9 @@ ALLOWED = {
 EXCEPTIONS = {
     'transports/registry.cpp': CARRIERS,
     'host/standard_registry.cpp': {'firmware/ports/sim'},
-    # It makes the frames that a board and a host send.
+    # It makes the frames of the ends of a CAN bus, flow control included, by the node of both.
     'tools/r4/formats/candump_log.cpp': {'transports', 'transports/framing/can'},
+    # URLs have no public header.
     'tools/r4/formats/bus_records.cpp': {'transports'},
     'tools/r4/formats/packets/pcapng_sink.cpp': {'transports'},
     'tools/r4/recording/record.cpp': {'host', 'transports', 'transports/can'},

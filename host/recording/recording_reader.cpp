@@ -23,6 +23,11 @@ bool complete(std::string& beginning, std::string_view& bytes, std::size_t wante
 
 }  // namespace
 
+std::string to_text(const RecordingDamage& damage) {
+  const std::string line = damage.line == 0 ? "" : "line " + std::to_string(damage.line) + ", ";
+  return line + "byte " + std::to_string(damage.offset) + ": " + std::string(damage.reason);
+}
+
 // --- lines
 
 const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream) {

@@ -148,10 +148,7 @@ class Columns final : public RecordingVisitor {
       ++board.damaged;
     }
   }
-  void on_damage(const RecordingDamage& damage) override {
-    add_damage("line " + std::to_string(damage.line) + ", byte " + std::to_string(damage.offset) +
-               ": " + std::string(damage.reason));
-  }
+  void on_damage(const RecordingDamage& damage) override { add_damage(to_text(damage)); }
 
   py::tuple take();
 

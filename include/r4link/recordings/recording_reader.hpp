@@ -64,7 +64,7 @@ class R4LINK_API RecordingLines {
     std::optional<std::uint32_t> stream;
   };
   enum class Damage : std::uint8_t { none, here, reported };  // since the newest header
-  void give(const Record& record);
+  R4LINK_PRIVATE void give(const Record& record);
 
   RecordingVisitor& visitor_;
   const std::string name_;
@@ -92,12 +92,12 @@ class R4LINK_API RecordingReader {
   // A file with this many bytes without a line of a recording is not a recording.
   static constexpr std::uint64_t patience = 65536;
 
-  void on_compressed(std::string_view bytes);
-  void on_text(std::string_view text);
-  void on_lines(std::string_view text);
-  void end_line(std::string_view rest);
-  void damage(RecordingDamage::Kind kind, std::string_view reason);
-  [[noreturn]] void fail_as_none() const;
+  R4LINK_PRIVATE void on_compressed(std::string_view bytes);
+  R4LINK_PRIVATE void on_text(std::string_view text);
+  R4LINK_PRIVATE void on_lines(std::string_view text);
+  R4LINK_PRIVATE void end_line(std::string_view rest);
+  R4LINK_PRIVATE void damage(RecordingDamage::Kind kind, std::string_view reason);
+  [[noreturn]] R4LINK_PRIVATE void fail_as_none() const;
 
   RecordingLines lines_;
   RecordingVisitor& visitor_;

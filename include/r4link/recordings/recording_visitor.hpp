@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
 
+#include "../config.hpp"
 #include "record.hpp"
 
 namespace r4 {
@@ -21,15 +23,13 @@ struct RecordingDamage {
   std::uint64_t offset = 0;  // of its first byte: in the text; for zstd in the file
   std::string_view reason;
 };
+// "line 12, byte 480: longer than any line of a recording". `reason` may have bytes of the file.
+R4LINK_API std::string to_text(const RecordingDamage& damage);
 
 // All is in the order of the file, and valid within the call.
 class RecordingVisitor {
  public:
-  RecordingVisitor() = default;
-  RecordingVisitor(const RecordingVisitor&) = default;
-  RecordingVisitor& operator=(const RecordingVisitor&) = default;
   virtual ~RecordingVisitor() = default;
-
   // A datagram, also a damaged one, or an event. A path that no path line has named is possible.
   virtual void on_record(const Record& record) = 0;
   // What follows the damage is read.

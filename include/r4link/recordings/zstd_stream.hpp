@@ -52,8 +52,8 @@ class R4LINK_API ZstdReader {
   bool between_frames() const { return !in_frame_; }
 
  private:
-  bool find_frame(std::string_view& bytes);
-  void search(std::string_view& bytes, bool from_found);
+  R4LINK_PRIVATE bool find_frame(std::string_view& bytes);
+  R4LINK_PRIVATE void search(std::string_view& bytes, bool from_found);
 
   struct Free {
     void operator()(ZSTD_DCtx_s* context) const;

@@ -34,8 +34,8 @@ OutputFile::OutputFile(std::string path, bool replace)
   if (named_) {
     file = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
   }
-  if (file < 0) fail(errno);
-  file_.reset(::fdopen(file, "wb"));
+  file_.reset(file < 0 ? nullptr : ::fdopen(file, "wb"));
+  if (!file_) fail(errno);
 }
 
 OutputFile::~OutputFile() {

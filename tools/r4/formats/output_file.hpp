@@ -35,8 +35,8 @@ class OutputFile final : public Output {
 
   const std::string path_;
   std::string part_;  // its name before that, if it has one
-  bool named_ = false;
   FilePointer file_;
+  bool named_ = false;
   const bool replace_;
 };
 

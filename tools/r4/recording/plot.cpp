@@ -191,9 +191,10 @@ std::string unit_of(StateField field) {
 
 // A file without a name, which another program reads or writes.
 FilePointer make_memory(const char* name) {
-  const int memory = ::memfd_create(name, MFD_CLOEXEC);
-  if (memory < 0) fail_for_memory();
-  return FilePointer(::fdopen(memory, "w+b"));
+  const int descriptor = ::memfd_create(name, MFD_CLOEXEC);
+  FilePointer memory(descriptor < 0 ? nullptr : ::fdopen(descriptor, "w+b"));
+  if (!memory) fail_for_memory();
+  return memory;
 }
 
 void write_all(const FilePointer& memory, const void* bytes, std::size_t size) {

@@ -23,12 +23,8 @@ class NumberedLines {
     while (!bytes.empty()) {
       const std::size_t end = std::min(bytes.find_first_of("\r\n"), bytes.size());
       const bool ends = end != bytes.size();
-      const std::size_t taken = end + (ends ? 1 : 0);
-      const std::string_view part = bytes.substr(0, end);
-      // A line that is here as a whole is not copied.
-      const bool whole = ends && size_ == 0;
       size_ += end;
-      if (!whole && size_ <= max_datagram) line_ += part;
+      if (size_ <= max_datagram) line_ += bytes.substr(0, end);
       if (!ends) {
         after_cr_ = false;
         return;
@@ -36,7 +32,7 @@ class NumberedLines {
       if (size_ > max_datagram) {
         too_long(number_, size_);
       } else {
-        std::string_view text = whole ? part : std::string_view(line_);
+        std::string_view text = line_;
         if (number_ == 1 && text.starts_with(utf8_mark)) text.remove_prefix(utf8_mark.size());
         if (!text.empty()) line(number_, text);
       }
@@ -46,7 +42,7 @@ class NumberedLines {
       begin_ += size_ + 1;
       size_ = 0;
       after_cr_ = bytes[end] == '\r';
-      bytes.remove_prefix(taken);
+      bytes.remove_prefix(end + 1);
     }
   }
   // The byte of the input, from 0, where the line begins that is told of.
@@ -58,7 +54,7 @@ class NumberedLines {
   }
 
  private:
-  std::string line_;  // what has come of it
+  std::string line_;  // what has come of it, unless it is too long
   std::uint64_t number_ = 1;
   std::uint64_t begin_ = 0;
   std::uint64_t size_ = 0;  // of the line so far
