@@ -14,7 +14,8 @@ import re
 import sys
 
 PUBLIC = {'include/r4link', 'include/r4link/can', 'include/r4link/commands', 'include/r4link/control',
-          'include/r4link/devices', 'include/r4link/discovery', 'include/r4link/messages', 'include/r4link/tables'}
+          'include/r4link/devices', 'include/r4link/discovery', 'include/r4link/messages', 'include/r4link/recordings',
+          'include/r4link/tables'}
 PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
 CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'transports/share', 'transports/udp',
@@ -26,19 +27,20 @@ HOST = TRANSPORTS | {'host', 'host/arming', 'host/async', 'host/blocking', 'host
                      'host/discovery', 'host/link', 'host/measurement', 'host/paths', 'host/recording', 'host/replay', 'host/session', 'host/uart'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = PUBLIC | {'tools/r4/shell'}
-# Tools use the public interface alone. These rooms may look below it: the analysis of frames (bus), the simulated
-# board's own room (sim), and the forms of recordings (formats, recording). Single files: EXCEPTIONS.
+# Tools use the public interface alone. These rooms may look below it: the analysis of frames (bus) and the simulated
+# board's own room (sim). Single files: EXCEPTIONS.
 BELOW = SIMULATED | SHELL
 FORMATS = {'tools/r4/formats', 'tools/r4/formats/mcap', 'tools/r4/formats/packets'}
 # room: the rooms it may include besides itself
 ALLOWED = {
     'include/r4link': PUBLIC,
-    'include/r4link/can': {'include/r4link', 'include/r4link/discovery'},
+    'include/r4link/can': {'include/r4link', 'include/r4link/discovery', 'include/r4link/messages'},
     'include/r4link/commands': {'include/r4link'},
     'include/r4link/control': {'include/r4link'},
     'include/r4link/devices': {'include/r4link'},
     'include/r4link/discovery': {'include/r4link'},
     'include/r4link/messages': {'include/r4link'},
+    'include/r4link/recordings': {'include/r4link', 'include/r4link/messages'},
     'include/r4link/tables': {'include/r4link'},
     'protocol/datagram': PUBLIC,
     'protocol/keys': PUBLIC | {'protocol/datagram'},
@@ -97,11 +99,11 @@ ALLOWED = {
     'tools/r4/doctor': SHELL | {'tools/r4/bus'},
     'tools/r4/bridge': SHELL,
     'tools/r4/bus': BELOW,
-    'tools/r4/formats': BELOW | {'tools/r4/bus'},
-    'tools/r4/formats/mcap': BELOW | {'tools/r4/bus', 'tools/r4/formats'},
-    'tools/r4/formats/packets': BELOW | {'tools/r4/bus', 'tools/r4/formats'},
+    'tools/r4/formats': SHELL | {'tools/r4/bus'},
+    'tools/r4/formats/mcap': SHELL | {'tools/r4/formats'},
+    'tools/r4/formats/packets': SHELL | {'tools/r4/bus', 'tools/r4/formats'},
     'tools/r4/devices': SHELL,
-    'tools/r4/recording': BELOW | FORMATS,
+    'tools/r4/recording': SHELL | FORMATS,
     'tools/r4/watch': SHELL | {'tools/r4/bus', 'tools/r4/devices', 'tools/r4/web/server'},
     'tools/r4/ros2/graph': SHELL,
     'tools/r4/ros2/discovery': SHELL | {'tools/r4/ros2/graph'},
@@ -115,21 +117,20 @@ ALLOWED = {
 EXCEPTIONS = {
     'transports/registry.cpp': CARRIERS,
     'host/standard_registry.cpp': {'firmware/ports/sim'},
-    # The lines of recordings and of byte streams, which these two read and write as the library does.
-    'tools/r4/shell/json.cpp': {'host/recording'},
-    'tools/r4/shell/numbered_lines.hpp': {'host/recording', 'transports/framing'},
     # Every part of a datagram, as the wire has it.
     'tools/r4/watch/decode.cpp': BELOW,
     'tools/r4/drive/send.cpp': {'host/commands', 'protocol/datagram'},
+    # It makes the frames of the ends of a CAN bus, flow control included, by the node of both.
+    'tools/r4/formats/candump_log.cpp': {'transports', 'transports/framing/can'},
 }
 # What a room may not include although it is in a room that it may.
 FORBIDDEN = {room: {'transports/registry.hpp'} for room in CARRIERS}
 PORTABLE = (FIRMWARE - PUBLIC) | {'firmware/ports/sim/chips', 'firmware/ports/sim/devices'}
 # Those public headers that the board has, too.
 PORTABLE_PUBLIC = {f'include/r4link/{name}.hpp' for name in (
-    'can/can_bits', 'can/can_frame', 'can/can_ids', 'command', 'config', 'datagram', 'key', 'messages/datagram_writer', 'messages/message',
-    'messages/packed_form', 'simulated_pins', 'state', 'tables/commands', 'tables/settings', 'tables/state_fields',
-    'text', 'vocabulary')}
+    'can/can_bits', 'can/can_frame', 'can/can_ids', 'command', 'config', 'datagram', 'key', 'messages/datagram_writer',
+    'messages/message', 'messages/packed_form', 'messages/packet_tracker', 'simulated_pins', 'state', 'tables/commands',
+    'tables/settings', 'tables/state_fields', 'text', 'vocabulary')}
 # No heap, no I/O, no clock, nothing GCC 7 in C++14 lacks; C headers in both spellings.
 PORTABLE_STANDARD = {
     'algorithm', 'array', 'atomic', 'cassert', 'climits', 'cmath', 'cstddef', 'cstdint', 'cstring',

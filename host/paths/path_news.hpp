@@ -10,9 +10,10 @@
 #include <optional>
 #include <vector>
 
-#include "../../protocol/link/packet_tracker.hpp"
+#include "../../protocol/datagram/wrapping.hpp"
 #include "../../protocol/messages/message.hpp"
 #include "../../protocol/messages/state_fields.hpp"
+#include "r4link/messages/packet_tracker.hpp"
 
 namespace r4 {
 

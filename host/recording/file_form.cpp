@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "file_form.hpp"
+#include "r4link/recordings/file_form.hpp"
 
 #include <array>
 
-#include "zstd_stream.hpp"
+#include "r4link/recordings/zstd_stream.hpp"
 
 namespace r4 {
 namespace {

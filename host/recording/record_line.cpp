@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "record_line.hpp"
+#include "r4link/recordings/record_line.hpp"
 
 #include <fmt/format.h>
 
@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "../../protocol/datagram/numbers.hpp"
+#include "../../protocol/messages/site_settings.hpp"
 #include "r4link/config.hpp"
 
 namespace r4 {

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "../../transports/file_descriptor.hpp"
-#include "record_line.hpp"
+#include "r4link/recordings/record_line.hpp"
 
 namespace r4 {
 namespace {

@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "r4link/error.hpp"
-#include "record.hpp"
+#include "r4link/recordings/record.hpp"
 #include "recording_writer.hpp"
 
 namespace r4 {

@@ -12,8 +12,9 @@
 #include <utility>
 
 #include "r4link/error.hpp"
-#include "recording_reader.hpp"
-#include "zstd_stream.hpp"
+#include "r4link/recording.hpp"
+#include "r4link/recordings/recording_reader.hpp"
+#include "r4link/recordings/zstd_stream.hpp"
 
 namespace r4 {
 namespace {
@@ -123,12 +124,14 @@ std::string_view RecordingInput::read() {
   }
 }
 
-void read_recording(const std::string& path, RecordingReader::Handler& handler) {
+void read_in_pieces(const std::string& path, const std::function<void(std::string_view)>& take) {
   RecordingInput input(path);
-  RecordingReader reader(handler, input.name());
-  for (std::string_view piece = input.read(); !piece.empty(); piece = input.read()) {
-    reader.feed(piece);
-  }
+  for (std::string_view piece = input.read(); !piece.empty(); piece = input.read()) take(piece);
+}
+
+void read_recording(const std::string& path, RecordingVisitor& visitor) {
+  RecordingReader reader(visitor, path == "-" ? "standard input" : path);
+  read_in_pieces(path, [&reader](std::string_view piece) { reader.feed(piece); });
   reader.finish();
 }
 

@@ -48,7 +48,6 @@ class RecordingInput {
   explicit RecordingInput(const std::string& path);
   // The next bytes; empty at the end. Valid until the next call. Throws Error.
   std::string_view read();
-  const std::string& name() const { return name_; }
 
  private:
   const std::string name_;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "recording_reader.hpp"
+#include "r4link/recordings/recording_reader.hpp"
 
 #include <algorithm>
 #include <utility>
 
 #include "r4link/error.hpp"
+#include "r4link/recordings/file_form.hpp"
 
 namespace r4 {
 namespace {
@@ -21,6 +22,11 @@ bool complete(std::string& beginning, std::string_view& bytes, std::size_t wante
 }
 
 }  // namespace
+
+std::string to_text(const RecordingDamage& damage) {
+  const std::string line = damage.line == 0 ? "" : "line " + std::to_string(damage.line) + ", ";
+  return line + "byte " + std::to_string(damage.offset) + ": " + std::string(damage.reason);
+}
 
 // --- lines
 
@@ -56,22 +62,22 @@ const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream)
       ended_ = false;
       damage_ = Damage::none;
       paths_.clear();
-      handler_.on_header();
+      visitor_.on_header();
       break;
     case LineKind::path: {
       Path& path = paths_[read_.path.number];
       if (!path.url.empty() && path.url != read_.path.url) on_sign_of_mixture();
       path = {read_.path.url, std::nullopt};
-      handler_.on_path(read_.path);
+      visitor_.on_path(read_.path);
       return nullptr;
     }
     case LineKind::device:
-      handler_.on_device(read_.device);
+      visitor_.on_device(read_.device);
       break;
     case LineKind::comment:
       break;
   }
-  handler_.on_comment(line);
+  visitor_.on_comment(line);
   return nullptr;
 }
 
@@ -87,7 +93,7 @@ void RecordingLines::give(const Record& record) {
   if (ended_) on_sign_of_mixture();
   after_header_ = false;
   ended_ = record.path == no_path && record.kind == RecordKind::event && record.bytes == "end";
-  handler_.on_record(record);
+  visitor_.on_record(record);
 }
 
 void RecordingLines::on_sign_of_mixture() {
@@ -96,14 +102,14 @@ void RecordingLines::on_sign_of_mixture() {
                 "several recordings are mixed in it, so whose datagrams these are is unknown",
                 "read each recording alone, or join them one after the other: cat A.r4log B.r4log");
   }
-  if (damage_ == Damage::here) handler_.on_comment(damage_line);
+  if (damage_ == Damage::here) visitor_.on_comment(damage_line);
   damage_ = Damage::reported;
 }
 
 // --- a file
 
-RecordingReader::RecordingReader(Handler& handler, std::string name)
-    : lines_(handler, name), handler_(handler), name_(std::move(name)) {
+RecordingReader::RecordingReader(RecordingVisitor& visitor, std::string name)
+    : lines_(visitor, name), visitor_(visitor), name_(std::move(name)) {
   part_.reserve(max_record_line + 1);
 }
 
@@ -128,7 +134,7 @@ void RecordingReader::on_compressed(std::string_view bytes) {
                     "unpack it first: zstd -d --long=31 FILE.zst");
       }
       lines_.on_damage();
-      handler_.on_damage({RecordingDamage::Kind::zstd, line_, taken_, zstd_->problem()});
+      visitor_.on_damage({RecordingDamage::Kind::zstd, line_, taken_, zstd_->problem()});
     }
     taken_ += before - bytes.size();
     if (step == ZstdReader::Step::more) break;
@@ -199,7 +205,7 @@ void RecordingReader::finish() {
 
 void RecordingReader::damage(RecordingDamage::Kind kind, std::string_view reason) {
   lines_.on_damage();
-  handler_.on_damage({kind, line_, offset_, reason});
+  visitor_.on_damage({kind, line_, offset_, reason});
 }
 
 void RecordingReader::fail_as_none() const {

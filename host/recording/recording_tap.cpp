@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "record_line.hpp"
+#include "r4link/recordings/record_line.hpp"
 
 namespace r4 {
 

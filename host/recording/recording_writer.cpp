@@ -5,7 +5,7 @@
 
 #include <utility>
 
-#include "record_line.hpp"
+#include "r4link/recordings/record_line.hpp"
 
 namespace r4 {
 namespace {

@@ -12,11 +12,11 @@
 
 #include "r4link/error.hpp"
 #include "r4link/recording.hpp"
-#include "record.hpp"
-#include "record_line.hpp"
+#include "r4link/recordings/record.hpp"
+#include "r4link/recordings/record_line.hpp"
+#include "r4link/recordings/zstd_stream.hpp"
 #include "recording_file.hpp"
 #include "recording_parts.hpp"
-#include "zstd_stream.hpp"
 
 namespace r4 {
 

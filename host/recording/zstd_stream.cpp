@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "zstd_stream.hpp"
+#include "r4link/recordings/zstd_stream.hpp"
 
+#include <zstd.h>
 #include <zstd_errors.h>
 
 #include <algorithm>
@@ -33,6 +34,9 @@ std::string_view until_a_frame(std::string_view bytes) {
 }
 
 }  // namespace
+
+void ZstdWriter::Free::operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
+void ZstdReader::Free::operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
 
 ZstdWriter::ZstdWriter() : context_(ZSTD_createCCtx()) {
   if (!context_) throw std::bad_alloc();

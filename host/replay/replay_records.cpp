@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "../../protocol/datagram/numbers.hpp"
-#include "../recording/record_line.hpp"
+#include "r4link/recordings/record_line.hpp"
 
 namespace r4 {
 namespace {

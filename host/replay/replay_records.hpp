@@ -8,7 +8,7 @@
 #include <string>
 
 #include "../recording/recording_file.hpp"
-#include "../recording/recording_reader.hpp"
+#include "r4link/recordings/recording_reader.hpp"
 
 namespace r4 {
 
@@ -22,7 +22,7 @@ struct ReplayStart {
   static ReplayStart of(const std::string& thing, const std::string& text);
 };
 
-class ReplayRecords final : private RecordingReader::Handler {
+class ReplayRecords final : private RecordingVisitor {
  public:
   struct Item {
     Time time;  // as recorded

@@ -21,12 +21,11 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 
 #include "config.hpp"
-#include "devices/device.hpp"
 #include "error.hpp"
-#include "link.hpp"
+#include "recordings/recorded_states.hpp"
+#include "recordings/recording_visitor.hpp"
 
 namespace r4 {
 
@@ -42,40 +41,8 @@ struct RecordingOptions {
   std::uint64_t keep_bytes = 0;
 };
 
-// What read_recording() finds, in the order of the file. Times are microseconds since 1970 (UTC); what is handed over
-// is valid within the call.
-class RecordingVisitor {
- public:
-  virtual ~RecordingVisitor() = default;
-  // A recording begins, or another one in the same file: its paths and devices may be others.
-  virtual void on_beginning() {}
-  // How a board is reached, before the first record of that path, and again when its name is known: its own or its id.
-  virtual void on_path(int path, const std::string& url, const std::string& name) {
-    static_cast<void>(path), static_cast<void>(url), static_cast<void>(name);
-  }
-  // A described device of that path's board, from now on: device.readings(state) is what it has measured.
-  virtual void on_device(int path, const Device& device) {
-    static_cast<void>(path), static_cast<void>(device);
-  }
-  // A state, whose fields are merged over those before.
-  virtual void on_state(int path, Time at, const State& state) {
-    static_cast<void>(path), static_cast<void>(at), static_cast<void>(state);
-  }
-  // Every datagram, also of states and damaged ones.
-  virtual void on_datagram(int path, Time at, bool from_board, std::string_view bytes) {
-    static_cast<void>(path), static_cast<void>(at), static_cast<void>(from_board),
-        static_cast<void>(bytes);
-  }
-  // "up udp://192.168.0.125", "link safe stop": docs/recordings.md. Path 0 is the recording itself.
-  virtual void on_event(int path, Time at, std::string_view words) {
-    static_cast<void>(path), static_cast<void>(at), static_cast<void>(words);
-  }
-  // A place that cannot be read, or a description, in words; what is behind it is read again.
-  virtual void on_damage(const std::string& words) { static_cast<void>(words); }
-};
-
-// Reads a recording, compressed or not; "-" is the standard input. In constant memory, however long it is. Throws
-// Error: open, permission, data for what is none.
+// Reads a recording, compressed or not, in constant memory; "-" is the standard input. Throws Error:
+// open, permission, data for a file that is not a recording. docs/recordings.md has an example.
 R4LINK_API void read_recording(const std::string& path, RecordingVisitor& visitor);
 
 class R4LINK_API Recording {

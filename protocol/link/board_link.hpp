@@ -21,7 +21,8 @@
 
 #include <cstdint>
 
-#include "packet_tracker.hpp"
+#include "../datagram/wrapping.hpp"
+#include "r4link/messages/packet_tracker.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4 {

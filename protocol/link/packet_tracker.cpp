@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "packet_tracker.hpp"
+#include "r4link/messages/packet_tracker.hpp"
+
+#include "../datagram/wrapping.hpp"
 
 namespace r4 {
 

@@ -14,7 +14,7 @@
 #include <cstdint>
 
 #include "board_link.hpp"
-#include "packet_tracker.hpp"
+#include "r4link/messages/packet_tracker.hpp"
 
 namespace r4 {
 

@@ -16,33 +16,14 @@ namespace r4 {
 // Is it a single command, W?
 bool asks_to_watch(const Datagram& datagram);
 
-// Why the board is safe, as its heartbeats tell it.
-struct SafeReport {
-  SafeReport() = default;
-  SafeReport(SafeReason why) : reason(why) {}  // NOLINT(google-explicit-constructor)
-  SafeReason reason = SafeReason::none;
-  // The number of the newest cause that only E:CLEAR ends, which E:CLEAR has to name; 0: there is none.
-  std::int32_t cause = 0;
-  // The number of the newest E:STOP that was obeyed, if that had one, while the stop lasts.
-  bool has_stop = false;
-  std::uint32_t stop = 0;
-};
-
 // The board's heartbeat: `H:R4-ROS2;PNum:…;T:…;`, and behind the T what there is of `SAFE:n;`,
 // `CAUSE:n;`, `STOP:n;` and `AN:<nonce>;` (authentication.hpp).
 Text write_board_heartbeat(char* buffer, std::size_t capacity, std::uint32_t pnum,
                            std::uint32_t t_ms, const SafeReport& safe, Text nonce = Text());
-// What a board heartbeat tells of it. A SAFE that cannot be read is taken for a fault, a CAUSE or STOP
-// for none.
-SafeReport heartbeat_report(const Datagram& datagram);
-// Its reason alone; none if it carries no SAFE.
+// The reason alone of heartbeat_report(); none if there is no SAFE.
 SafeReason heartbeat_reason(const Datagram& datagram);
 // The nonce that it carries; empty if it carries none.
 Text heartbeat_nonce(const Datagram& datagram);
-// Does it say that the board waits for a host, in CONNECTING? Its PNum is 0 then, and its T too,
-// unless it carries a nonce.
-bool is_connecting_heartbeat(const Datagram& datagram);
-
 void write_nack(DatagramWriter& writer, const Nack& nack);
 
 // What the firmware can do besides, whatever the board: it obeys E:LEAVE, and serves who watches by W.

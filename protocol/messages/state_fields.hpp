@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's state as fields of a datagram (paper section 4.1).
+// The board's state as fields of a datagram (paper section 4.1). Read: r4link/messages/message.hpp.
 #pragma once
 
 #include "r4link/datagram.hpp"

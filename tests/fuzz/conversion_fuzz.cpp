@@ -9,10 +9,10 @@
 #include <string>
 #include <string_view>
 
-#include "host/recording/zstd_stream.hpp"
 #include "input.hpp"
 #include "r4link/devices/description.hpp"
 #include "r4link/error.hpp"
+#include "r4link/recordings/zstd_stream.hpp"
 #include "tools/r4/recording/formats.hpp"
 #include "tools/r4/recording/recording_summary.hpp"
 
@@ -34,8 +34,7 @@ struct Made final : tool::Output {
 
 constexpr const char* native = "x.r4log";
 
-void read(std::string_view bytes, const char* from, std::size_t piece,
-          RecordingReader::Handler& handler) {
+void read(std::string_view bytes, const char* from, std::size_t piece, RecordingVisitor& handler) {
   const std::unique_ptr<tool::Source> source = tool::make_source(from, handler);
   for (; !bytes.empty(); bytes.remove_prefix(std::min(piece, bytes.size()))) {
     source->feed(bytes.substr(0, piece));

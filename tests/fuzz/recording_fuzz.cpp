@@ -11,15 +11,15 @@
 #include <string_view>
 #include <vector>
 
-#include "host/recording/recording_reader.hpp"
 #include "host/replay/replay_records.hpp"
 #include "input.hpp"
 #include "r4link/error.hpp"
+#include "r4link/recordings/recording_reader.hpp"
 
 namespace r4 {
 namespace {
 
-class Lines final : public RecordingReader::Handler {
+class Lines final : public RecordingVisitor {
  public:
   void on_record(const Record& record) override {
     std::string line;

@@ -26,7 +26,11 @@ namespace {
 using namespace std::chrono_literals;
 
 struct RecordedNumbers : RecordingVisitor {
-  void on_state(int, Time, const State& state) override { numbers.push_back(state.pnum); }
+  void on_record(const Record& record) override {
+    if (const State* const state = states.take(record)) numbers.push_back(state->pnum);
+  }
+  void on_damage(const RecordingDamage& damage) override { ADD_FAILURE() << damage.reason; }
+  RecordedStates states;
   std::vector<std::uint32_t> numbers;
 };
 

@@ -3,7 +3,6 @@
 
 #include <utility>
 
-#include "../../protocol/link/packet_tracker.hpp"
 #include "../../protocol/messages/message.hpp"
 #include "overheard_lane.hpp"
 

@@ -24,6 +24,7 @@
 
 #include "process.hpp"
 #include "r4link/datagram.hpp"
+#include "r4link/devices/device.hpp"
 
 namespace r4::python {
 namespace {
@@ -84,25 +85,32 @@ class Columns final : public RecordingVisitor {
   explicit Columns(bool datagrams) : with_datagrams_(datagrams) {}
 
   // Texts of the file are printable(): any bytes may be there, and a str of Python has none.
-  void on_path(int path, const std::string& told, const std::string& name) override {
-    const std::string url = printable(told);
+  void on_path(const RecordedPath& path) override {
+    const std::string url = printable(path.url);
     const auto known = std::find_if(boards_.begin(), boards_.end(),
                                     [&url](const RecordedBoard& each) { return each.url == url; });
     const auto index = static_cast<std::size_t>(known - boards_.begin());
     if (known == boards_.end()) boards_.emplace_back().url = url;
-    if (!name.empty()) boards_[index].name = name;
-    index_of_[path] = index;
+    if (!path.name.empty()) boards_[index].name = path.name;
+    index_of_[path.number] = index;
   }
-  void on_beginning() override {
+  void on_header() override {
+    states_.clear();
     for (RecordedBoard& board : boards_) {
       for (Measured& each : board.measured) each.here = false;
     }
   }
-  void on_device(int path, const Device& told) override {
-    RecordedBoard& board = of(path);
-    for (Measured& each : board.measured)
-      each.here = each.here && !told.takes_place_of(*each.device);
-    const auto device = std::make_shared<const Device>(told);
+  void on_device(const RecordedDevice& told) override {
+    RecordedBoard& board = of(told.path);
+    std::shared_ptr<const Device> device;
+    try {
+      device = std::make_shared<const Device>(Device::parse(told.place, told.description));
+    } catch (const Error& error) {
+      return add_damage(error.what());
+    }
+    for (Measured& each : board.measured) {
+      each.here = each.here && !device->takes_place_of(*each.device);
+    }
     const std::string text = device->text();
     const std::vector<DeviceValue>& values = device->description().values;
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -119,12 +127,33 @@ class Columns final : public RecordingVisitor {
                                   column_of(*device, values[i], board.measured),
                                   std::vector<double>(board.pnum.size(), not_measured)});
       } else {
-        return on_damage(text + ": more values than the devices of one board have");
+        return add_damage(text + ": more values than the devices of one board have");
       }
     }
   }
-  void on_state(int path, Time at, const State& state) override {
-    RecordedBoard& board = of(path);
+  void on_record(const Record& record) override {
+    const std::int64_t at = record.time.count();
+    if (record.kind == RecordKind::event) {
+      auto& events = record.path == no_path ? events_ : of(record.path).events;
+      events.emplace_back(at, printable(record.bytes));
+      return;
+    }
+    const bool from_board = record.kind == RecordKind::from_board;
+    RecordedBoard& board = of(record.path);
+    if (with_datagrams_) board.datagrams.emplace_back(at, from_board, record.bytes);
+    Datagram datagram;
+    if (const State* const state = states_.take(record)) {
+      add(board, at, *state);
+    } else if (!read_datagram(Text(record.bytes), datagram)) {
+      ++board.damaged;
+    }
+  }
+  void on_damage(const RecordingDamage& damage) override { add_damage(to_text(damage)); }
+
+  py::tuple take();
+
+ private:
+  static void add(RecordedBoard& board, std::int64_t at, const State& state) {
     for (const StateField field : state.present) {
       if (board.fields.has(field)) continue;
       board.fields.add(field);
@@ -132,7 +161,7 @@ class Columns final : public RecordingVisitor {
         board.columns.push_back({field, which, std::vector<std::int32_t>(board.pnum.size())});
       }
     }
-    board.times_us.push_back(at.count());
+    board.times_us.push_back(at);
     board.t_ms.push_back(state.t_ms);
     board.pnum.push_back(state.pnum);
     for (Column& column : board.columns) {
@@ -147,28 +176,16 @@ class Columns final : public RecordingVisitor {
       each.numbers.push_back(number);
     }
   }
-  void on_datagram(int path, Time at, bool from_board, std::string_view bytes) override {
-    Datagram datagram;
-    RecordedBoard& board = of(path);
-    if (!read_datagram(Text(bytes.data(), bytes.size()), datagram)) ++board.damaged;
-    if (with_datagrams_) board.datagrams.emplace_back(at.count(), from_board, bytes);
-  }
-  void on_event(int path, Time at, std::string_view words) override {
-    (path == 0 ? events_ : of(path).events).emplace_back(at.count(), printable(words));
-  }
-  void on_damage(const std::string& words) override { damage_.push_back(printable(words)); }
-
-  py::tuple take();
-
- private:
-  RecordedBoard& of(int path) {
-    if (!index_of_.contains(path)) on_path(path, "path " + std::to_string(path), "");
+  void add_damage(const std::string& words) { damage_.push_back(printable(words)); }
+  RecordedBoard& of(std::uint16_t path) {
+    if (!index_of_.contains(path)) on_path({path, "path " + std::to_string(path), ""});
     return boards_[index_of_[path]];
   }
 
   const bool with_datagrams_;
   std::vector<RecordedBoard> boards_;
-  std::map<int, std::size_t> index_of_;
+  std::map<std::uint16_t, std::size_t> index_of_;
+  RecordedStates states_;
   std::vector<std::pair<std::int64_t, std::string>> events_;
   std::vector<std::string> damage_;
 };

@@ -19,6 +19,7 @@
 
 #include "../config.hpp"
 #include "../datagram.hpp"
+#include "../messages/packet_tracker.hpp"
 #include "../vocabulary.hpp"
 #include "can_bits.hpp"
 #include "can_frame.hpp"

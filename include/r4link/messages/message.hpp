@@ -49,6 +49,26 @@ struct Identity {
 // False if the datagram's I field is not of that form; `out` is only written on success.
 R4LINK_API bool read_identity(const Datagram& datagram, Identity& out);
 
+// Why the board is in the safe state, as its heartbeats report it.
+struct SafeReport {
+  SafeReport() = default;
+  SafeReport(SafeReason why) : reason(why) {}  // NOLINT(google-explicit-constructor)
+  SafeReason reason = SafeReason::none;
+  // The number of the newest cause that only E:CLEAR ends, which E:CLEAR has to name; 0: there is
+  // none.
+  std::int32_t cause = 0;
+  // The number of the newest E:STOP that was obeyed, if that had one, while the stop lasts.
+  bool has_stop = false;
+  std::uint32_t stop = 0;
+};
+
+// The report of a board heartbeat; the reason of a state, too. A SAFE that cannot be read counts as
+// a fault, a CAUSE or STOP that cannot be read as none.
+R4LINK_API SafeReport heartbeat_report(const Datagram& datagram);
+// True if a board heartbeat says that the board waits for a host, in CONNECTING. Its PNum is 0
+// then, and its T too, unless it has a nonce.
+R4LINK_API bool is_connecting_heartbeat(const Datagram& datagram);
+
 // The datagram as it may leave the program to anything but the board. Up to three dots remain of
 // each secret, and the checksum is that of the result:
 // "C:key,1:...;PNum:66;T:79146;^0x…^". In bytes that are not a valid datagram, the first secret and

@@ -238,7 +238,11 @@ TEST(Fleet, RecordsAllBoardsInOneFile) {
   }
   struct Paths final : RecordingVisitor {
     std::set<int> paths;
-    void on_state(int path, Time, const State&) override { paths.insert(path); }
+    RecordedStates states;
+    void on_record(const Record& record) override {
+      if (states.take(record) != nullptr) paths.insert(record.path);
+    }
+    void on_damage(const RecordingDamage& damage) override { ADD_FAILURE() << damage.reason; }
   } read;
   read_recording(path.string(), read);
   EXPECT_EQ(read.paths.size(), 4U);

@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "host/recording/recording_reader.hpp"
+#include "r4link/recordings/recording_reader.hpp"
 
 namespace r4::test {
 
-struct Heard final : RecordingReader::Handler {
+struct Heard final : RecordingVisitor {
   struct Damage {
     RecordingDamage::Kind kind;
     std::uint64_t line, offset;

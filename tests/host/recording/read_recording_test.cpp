@@ -10,28 +10,31 @@
 
 #include "r4link/board.hpp"
 #include "tests/support/at_will.hpp"
+#include "tests/support/datagrams.hpp"
 
 namespace r4::test {
 namespace {
 
 struct VisitorOfAll final : RecordingVisitor {
-  void on_path(int path, const std::string& url, const std::string& name) override {
-    paths.push_back(std::to_string(path) + " " + url + " " + name);
+  void on_path(const RecordedPath& path) override {
+    paths.push_back(std::to_string(path.number) + " " + path.url + " " + path.name);
   }
-  void on_state(int path, Time at, const State& state) override {
-    EXPECT_EQ(path, 1);
-    EXPECT_GT(at, last);
-    last = at;
-    pwm.push_back(state.osmc(1).pwm);
+  void on_record(const Record& record) override {
+    if (record.kind == RecordKind::event) {
+      events.push_back(std::to_string(record.path) + " " + std::string(record.bytes));
+      return;
+    }
+    ++(record.kind == RecordKind::from_board ? from : to);
+    const State* const state = states.take(record);
+    if (state == nullptr) return;
+    EXPECT_EQ(record.path, 1);
+    EXPECT_GT(record.time, last);
+    last = record.time;
+    pwm.push_back(state->osmc(1).pwm);
   }
-  void on_datagram(int, Time, bool from_board, std::string_view) override {
-    ++(from_board ? from : to);
-  }
-  void on_event(int path, Time, std::string_view words) override {
-    events.push_back(std::to_string(path) + " " + std::string(words));
-  }
-  void on_damage(const std::string& words) override { ADD_FAILURE() << words; }
+  void on_damage(const RecordingDamage& damage) override { ADD_FAILURE() << damage.reason; }
 
+  RecordedStates states;
   std::vector<std::string> paths, events;
   std::vector<int> pwm;
   Time last{0};
@@ -59,6 +62,34 @@ TEST(ReadRecording, VisitsAllThatWasRecorded) {
   EXPECT_GE(visitor.from + 10, static_cast<int>(live.received)) << "but what came before record()";
   EXPECT_GT(visitor.to, 2);
   EXPECT_EQ(visitor.events.back(), "0 end");
+}
+
+Record record_of(std::uint16_t path, RecordKind kind, const std::string& bytes) {
+  Record record;
+  record.path = path;
+  record.kind = kind;
+  record.bytes = bytes;
+  return record;
+}
+
+TEST(RecordedStates, MergeTheStatesOfEachPath) {
+  RecordedStates states;
+  const std::string volts = with_crc("AIN24:24.28;PNum:7;T:1;");
+  const std::string relays = with_crc("RELAYS:3;PNum:8;T:2;");
+  const std::string heartbeat = with_crc("H:R4-ROS2;PNum:9;T:3;");
+  ASSERT_NE(states.take(record_of(1, RecordKind::from_board, volts)), nullptr);
+  const State* const merged = states.take(record_of(1, RecordKind::from_board, relays));
+  ASSERT_NE(merged, nullptr);
+  EXPECT_EQ(merged->raw.analog_cv[0], 2428);
+  EXPECT_EQ(merged->relays, 3);
+  EXPECT_FALSE(merged->present.has(StateField::ain24));
+  EXPECT_EQ(states.datagram().pnum(), 8U);
+  const State* const other = states.take(record_of(2, RecordKind::from_board, relays));
+  ASSERT_NE(other, nullptr);
+  EXPECT_EQ(other->raw.analog_cv[0], 0) << "another board's";
+  EXPECT_EQ(states.take(record_of(1, RecordKind::from_board, heartbeat)), nullptr);
+  EXPECT_EQ(states.take(record_of(1, RecordKind::to_board, volts)), nullptr);
+  EXPECT_EQ(states.take(record_of(1, RecordKind::from_board, volts + "x")), nullptr);
 }
 
 }  // namespace

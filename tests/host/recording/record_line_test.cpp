@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The lines of a recording.
-#include "host/recording/record_line.hpp"
+#include "r4link/recordings/record_line.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads recordings in every state: damage has a place, and the rest is read.
-#include "host/recording/recording_reader.hpp"
+#include "r4link/recordings/recording_reader.hpp"
 
 #include <gtest/gtest.h>
 #include <zstd.h>
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "heard.hpp"
-#include "host/recording/zstd_stream.hpp"
+#include "r4link/recordings/zstd_stream.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {

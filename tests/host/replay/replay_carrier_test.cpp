@@ -10,9 +10,9 @@
 #include <fstream>
 #include <string>
 
-#include "host/recording/record_line.hpp"
 #include "host/standard_registry.hpp"
 #include "r4link/board.hpp"
+#include "r4link/recordings/record_line.hpp"
 #include "tests/support/problems.hpp"
 #include "tests/transports/recorder.hpp"
 #include "transports/registry.hpp"

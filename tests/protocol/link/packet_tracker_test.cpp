@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "protocol/link/packet_tracker.hpp"
+#include "r4link/messages/packet_tracker.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
 #include <set>
 #include <vector>
+
+#include "protocol/datagram/wrapping.hpp"
 
 namespace r4 {
 namespace {

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "protocol/messages/settings.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/key.hpp"
 #include "r4link/messages/message.hpp"

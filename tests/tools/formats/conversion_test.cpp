@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "converted.hpp"
-#include "host/recording/zstd_stream.hpp"
+#include "r4link/recordings/zstd_stream.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {
@@ -89,7 +89,7 @@ TEST(Conversion, RefusesEndingsThatAreNoFormat) {
     EXPECT_EQ(problem.kind, ErrorKind::usage) << name;
     EXPECT_TRUE(contains(problem.fix, ".r4log.zst"));
   }
-  struct Nobody final : RecordingReader::Handler {
+  struct Nobody final : RecordingVisitor {
     void on_record(const Record&) override {}
     void on_path(const RecordedPath&) override {}
     void on_damage(const RecordingDamage&) override {}

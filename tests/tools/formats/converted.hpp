@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "host/recording/record_line.hpp"
+#include "r4link/recordings/record_line.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tools/r4/recording/formats.hpp"
 
@@ -37,7 +37,7 @@ inline Converted converted(std::string_view bytes, const std::string& from, cons
   StringOutput output;
   Converted result;
   const std::unique_ptr<tool::Sink> sink = tool::make_sink("test" + to, output, std::move(devices));
-  const auto read = [&](RecordingReader::Handler& handler) {
+  const auto read = [&](RecordingVisitor& handler) {
     const std::unique_ptr<tool::Source> source = tool::make_source("test" + from, handler, options);
     for (std::string_view rest = bytes; !rest.empty();
          rest.remove_prefix(std::min(piece, rest.size()))) {

@@ -6,7 +6,7 @@
 #include <lz4frame.h>
 
 #include "converted.hpp"
-#include "host/recording/zstd_stream.hpp"
+#include "r4link/recordings/zstd_stream.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {

@@ -7,8 +7,8 @@
 #include <chrono>
 #include <string>
 
-#include "host/recording/record_line.hpp"
 #include "r4link/messages/datagram_writer.hpp"
+#include "r4link/recordings/record_line.hpp"
 #include "tests/support/datagrams.hpp"
 #include "tests/support/problems.hpp"
 

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "bus_datagram.hpp"
 #include "r4link/vocabulary.hpp"
 
 namespace r4::tool {
@@ -136,7 +137,7 @@ void BusLog::on_datagram(const BusTransfers::Lane& lane) {
   if (lane.first.time_us && lane.last.time_us && *lane.last.time_us >= *lane.first.time_us) {
     object["took_ms"] = static_cast<double>(*lane.last.time_us - *lane.first.time_us) / 1e3;
   }
-  if (!add_datagram_json(object, lane.receiver.data(), lane.receiver.size())) ++bad_;
+  if (!add_bus_json(object, lane.receiver.data(), lane.receiver.size())) ++bad_;
   print_(object);
 }
 

@@ -3,10 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <array>
-
+#include "../bus/bus_datagram.hpp"
 #include "../bus/candump.hpp"
-#include "protocol/datagram/numbers.hpp"
+#include "number.hpp"
 #include "r4link/discovery/url.hpp"
 #include "r4link/messages/packed_form.hpp"
 #include "r4link/vocabulary.hpp"
@@ -29,11 +28,11 @@ std::string bus_url(std::string_view interface, std::uint8_t node) {
 std::string bus_interface(const std::string& host) {
   std::string name;
   for (std::size_t i = 0; i < host.size(); ++i) {
-    std::uint32_t code = 0;
     if (host[i] != '%') {
       name += host[i];
-    } else if (parse_hex(Text(std::string_view(host).substr(i + 1, 2)), code)) {
-      name += static_cast<char>(code);
+    } else if (const auto code =
+                   number_in<std::uint8_t>(std::string_view(host).substr(i + 1, 2), 16)) {
+      name += static_cast<char>(*code);
       i += 2;
     } else {
       return host;
@@ -57,23 +56,15 @@ void BusRecords::finish() {
 }
 
 void BusRecords::on_datagram(const BusTransfers::Lane& lane) {
-  const std::uint8_t* const bytes = lane.receiver.data();
-  const std::size_t size = lane.receiver.size();
-  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): bytes as characters
-  std::string_view datagram(reinterpret_cast<const char*>(bytes), size);
-  std::array<char, max_datagram> plain;
-  if (size != 0 && is_packed(bytes[0])) {
-    const UnpackResult result = unpack(bytes, size, plain.data(), plain.size());
-    if (!result) {
-      return damage(lane.last,
-                    fmt::format("a packed datagram that is none: {}", to_text(result.error)));
-    }
-    datagram = {plain.data(), result.size};
+  UnpackRoom room;
+  const PlainForm plain = plain_form(lane.receiver.data(), lane.receiver.size(), room);
+  if (plain.problem != nullptr) {
+    return damage(lane.last, fmt::format("a packed datagram that is none: {}", plain.problem));
   }
   const std::uint16_t path = path_of(lane.interface, lane.meaning.node);
   const bool from_host = lane.meaning.kind == CanIdKind::command;
   tell({time_of(lane.last), path, from_host ? RecordKind::to_board : RecordKind::from_board,
-        datagram});
+        plain.bytes});
 }
 
 void BusRecords::on_failure(const BusTransfers::Lane& lane, const BusTransfers::Place& place,
@@ -102,18 +93,18 @@ std::uint16_t BusRecords::path_of(const std::string& interface, std::uint8_t nod
 }
 
 std::uint16_t BusRecords::add_path(const std::string& url) {
-  handler_.on_path({++last_path_, url, ""});
+  visitor_.on_path({++last_path_, url, ""});
   return last_path_;
 }
 
 void BusRecords::tell(const Record& record) {
   told_ = true;
-  handler_.on_record(record);
+  visitor_.on_record(record);
 }
 
 void BusRecords::damage(const BusTransfers::Place& place, const std::string& reason) {
   told_ = true;
-  handler_.on_damage({RecordingDamage::Kind::line, place.line, place.offset, reason});
+  visitor_.on_damage({RecordingDamage::Kind::line, place.line, place.offset, reason});
 }
 
 }  // namespace r4::tool

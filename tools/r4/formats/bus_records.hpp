@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "../bus/bus_transfers.hpp"
-#include "host/recording/recording_reader.hpp"
+#include "r4link/recordings/recording_visitor.hpp"
 
 namespace r4::tool {
 
@@ -24,7 +24,7 @@ std::string bus_interface(const std::string& host);
 
 class BusRecords final : BusTransfers::Handler {
  public:
-  explicit BusRecords(RecordingReader::Handler& handler) : handler_(handler) {}
+  explicit BusRecords(RecordingVisitor& visitor) : visitor_(visitor) {}
 
   // `place` has a time. A frame that is none of ours is passed over.
   void on_frame(std::string_view interface, const CanFrame& frame,
@@ -46,7 +46,7 @@ class BusRecords final : BusTransfers::Handler {
   void tell(const Record& record);
   void damage(const BusTransfers::Place& place, const std::string& reason);
 
-  RecordingReader::Handler& handler_;
+  RecordingVisitor& visitor_;
   BusTransfers transfers_{*this};
   std::map<std::pair<std::string, std::uint8_t>, std::uint16_t> paths_;
   std::uint16_t last_path_ = 0;

@@ -89,7 +89,7 @@ std::uint64_t CandumpSource::dated(std::uint64_t time_us) {
 }
 
 void CandumpSource::damage(std::uint64_t number, const char* reason) {
-  handler_.on_damage({RecordingDamage::Kind::line, number, lines_.begin(), reason});
+  visitor_.on_damage({RecordingDamage::Kind::line, number, lines_.begin(), reason});
 }
 
 void CandumpSource::fail(const char* reason, const char* fix) const {

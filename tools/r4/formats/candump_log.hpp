@@ -23,9 +23,9 @@ namespace r4::tool {
 class CandumpSource final : public Source {
  public:
   // `start`: when the first frame was, where times do not count from 1970.
-  CandumpSource(RecordingReader::Handler& handler, std::string name,
+  CandumpSource(RecordingVisitor& visitor, std::string name,
                 std::optional<Time> start = std::nullopt)
-      : handler_(handler), records_(handler), name_(std::move(name)), start_(start) {}
+      : visitor_(visitor), records_(visitor), name_(std::move(name)), start_(start) {}
   // True if a log of frames may have that line.
   static bool recognises(std::string_view line);
   void feed(std::string_view bytes) override;
@@ -38,7 +38,7 @@ class CandumpSource final : public Source {
   [[noreturn]] void fail(const char* reason, const char* fix) const;
   [[noreturn]] void fail_as_none() const;
 
-  RecordingReader::Handler& handler_;
+  RecordingVisitor& visitor_;
   BusRecords records_;
   const std::string name_;
   const std::optional<Time> start_;

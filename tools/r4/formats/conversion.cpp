@@ -5,31 +5,6 @@
 
 namespace r4::tool {
 
-const char* tell_line(std::string_view line, RecordLine& read, RecordingReader::Handler& handler) {
-  read_record_line(line, read);
-  switch (read.kind) {
-    case LineKind::damaged:
-      return read.problem;
-    case LineKind::record:
-      handler.on_record(read.record);
-      return nullptr;
-    case LineKind::path:
-      handler.on_path(read.path);
-      return nullptr;
-    case LineKind::header:
-      if (read.version != record_version) return "of a later version: read it with a newer r4";
-      handler.on_header();
-      break;
-    case LineKind::device:
-      handler.on_device(read.device);
-      break;
-    case LineKind::comment:
-      break;
-  }
-  handler.on_comment(line);
-  return nullptr;
-}
-
 void Conversion::on_record(const Record& record) {
   if (!begun_) begin(record.time);
   time_ = record.time;

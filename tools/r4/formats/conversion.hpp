@@ -2,7 +2,7 @@
 // What every format of recordings is to `r4 convert`: a source that tells what is in a file, or a sink that makes a
 // file of it, in constant memory however long the recording is.
 //
-//     file --> Source --(RecordingReader::Handler)--> Conversion --> Sink --> Output
+//     file --> Source --(RecordingVisitor)--> Conversion --> Sink --> Output
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,12 @@
 #include <utility>
 #include <vector>
 
-#include "host/recording/recording_reader.hpp"
+#include "r4link/recordings/record_line.hpp"
+#include "r4link/recordings/recording_visitor.hpp"
 
 namespace r4::tool {
 
-// Tells a RecordingReader::Handler what is in a file. What cannot be read is told as damage, with the line 0 where
+// Tells a RecordingVisitor what is in a file. What cannot be read is told as damage, with the line 0 where
 // the format has none, and the rest is read.
 class Source {
  public:
@@ -26,10 +27,6 @@ class Source {
   // The file has ended. Throws Error{data} if it was of another kind.
   virtual void finish() = 0;
 };
-
-// Tells the handler of a line of the native format that another format carries; nullptr, or why it is none. `read` is
-// used again for the next one.
-const char* tell_line(std::string_view line, RecordLine& read, RecordingReader::Handler& handler);
 
 // Where a sink writes to.
 class Output {
@@ -65,7 +62,7 @@ class Sink {
 };
 
 // A first look at a recording for a sink.
-class Survey final : public RecordingReader::Handler {
+class Survey final : public RecordingVisitor {
  public:
   explicit Survey(Sink& sink) : sink_(sink) {}
   void on_record(const Record& record) override { sink_.survey(record); }
@@ -78,7 +75,7 @@ class Survey final : public RecordingReader::Handler {
 };
 
 // From a source to a sink.
-class Conversion final : public RecordingReader::Handler {
+class Conversion final : public RecordingVisitor {
  public:
   using TellDamage = std::function<void(const RecordingDamage&)>;
 

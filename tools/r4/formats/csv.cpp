@@ -8,8 +8,6 @@
 #include <string_view>
 #include <utility>
 
-#include "protocol/messages/message.hpp"
-#include "protocol/messages/state_fields.hpp"
 #include "r4link/tables/state_fields.hpp"
 
 namespace r4::tool {
@@ -81,14 +79,14 @@ void CsvSink::on_header() {
   states_.clear();
 }
 
-bool CsvSink::read(const Record& record) {
-  return record.kind == RecordKind::from_board && read_datagram(Text(record.bytes), datagram_) &&
-         kind_of(datagram_) == MessageKind::state && read_state(datagram_, states_[record.path]) &&
-         !states_[record.path].present.empty();
+// Nothing for a record that has no state's fields.
+const State* CsvSink::read(const Record& record) {
+  const State* const state = states_.take(record);
+  return state != nullptr && !state->present.empty() ? state : nullptr;
 }
 
 void CsvSink::survey(const Record& record) {
-  if (read(record)) columns_.add(states_[record.path].present);
+  if (const State* const state = read(record)) columns_.add(state->present);
 }
 
 void CsvSink::write_header() {
@@ -118,14 +116,15 @@ void CsvSink::write_header() {
 
 void CsvSink::on_record(const Record& record) {
   if (!begun_) write_header();
-  if (!read(record)) {
+  const State* const state = read(record);
+  if (state == nullptr) {
     ++others_;
     return;
   }
-  const State& state = states_[record.path];
-  // A field's values as they came: read_state() has found that they are numbers, and how many.
+  const Datagram& datagram = states_.datagram();
+  // A field's values as they came: take() has found that they are numbers, and how many.
   std::array<std::string_view, state_field_count + 1> values;
-  for (const Field& field : datagram_) {
+  for (const Field& field : datagram) {
     values[static_cast<std::size_t>(state_field(field.name()))] = view(field.values());
   }
   row_.clear();
@@ -134,12 +133,12 @@ void CsvSink::on_record(const Record& record) {
   fmt::format_to(out, "{}.{:06},{},", us / 1'000'000, us % 1'000'000, record.path);
   append_cell(row_, names_.of(record.path));
   row_ += ',';
-  if (datagram_.has_pnum()) fmt::format_to(out, "{}", datagram_.pnum());
+  if (datagram.has_pnum()) fmt::format_to(out, "{}", datagram.pnum());
   row_ += ',';
-  if (datagram_.has_time()) fmt::format_to(out, "{}", datagram_.time_ms());
+  if (datagram.has_time()) fmt::format_to(out, "{}", datagram.time_ms());
   for (const StateField field : columns_) {
     row_ += ',';
-    if (state.present.has(field)) {
+    if (state->present.has(field)) {
       row_ += values[static_cast<std::size_t>(field)];
     } else {
       row_.append(static_cast<std::size_t>(kind_row_of(field).value_count() - 1), ',');
@@ -147,19 +146,18 @@ void CsvSink::on_record(const Record& record) {
   }
   for (const DeviceColumn& column : device_columns_) {
     row_ += ',';
-    append_measured(column, record.path);
+    append_measured(column, record.path, *state);
   }
   row_ += '\n';
   output_.write(row_);
 }
 
-void CsvSink::append_measured(const DeviceColumn& column, std::uint16_t path) {
+void CsvSink::append_measured(const DeviceColumn& column, std::uint16_t path, const State& state) {
   for (const RecordedDevices::Known& known : devices_.all()) {
     const Device& device = known.device;
     if (!known.is_of(path) || device.text() != column.device) continue;
     const auto value = device.description().find(column.value);
     if (!value || device.description().values[*value].unit != column.unit) continue;
-    const State& state = states_[path];
     if (!state.present.has(device.field(*value))) continue;
     if (const auto number = device.reading(state, *value).number) {
       fmt::format_to(std::back_inserter(row_), "{}", *number);

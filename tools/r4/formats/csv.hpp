@@ -6,15 +6,13 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <string>
 #include <vector>
 
 #include "conversion.hpp"
 #include "path_names.hpp"
-#include "r4link/datagram.hpp"
 #include "r4link/devices/device.hpp"
-#include "r4link/state.hpp"
+#include "r4link/recordings/recorded_states.hpp"
 #include "recorded_devices.hpp"
 
 namespace r4::tool {
@@ -37,7 +35,7 @@ class CsvSink final : public Sink {
   std::string left_out() const override;
 
  private:
-  bool read(const Record& record);
+  const State* read(const Record& record);
   void write_header();
   // A value of a device, whichever path's.
   struct DeviceColumn {
@@ -46,15 +44,14 @@ class CsvSink final : public Sink {
     std::string unit;
   };
   void add_columns(const Device& device);
-  void append_measured(const DeviceColumn& column, std::uint16_t path);
+  void append_measured(const DeviceColumn& column, std::uint16_t path, const State& state);
 
   Output& output_;
   RecordedDevices devices_;
   RecordedDevices surveyed_;
   std::vector<DeviceColumn> device_columns_;
   PathNames names_;
-  Datagram datagram_;
-  std::map<std::uint16_t, State> states_;  // of each path: what is merged is one board's
+  RecordedStates states_;
   FieldSet columns_;
   bool begun_ = false;
   std::string row_;

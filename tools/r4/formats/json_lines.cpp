@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "json_lines.hpp"
 
-#include "protocol/messages/message.hpp"
-#include "protocol/messages/state_fields.hpp"
-
 namespace r4::tool {
 
 void add_record_json(Json& object, const Record& record) {
@@ -13,9 +10,7 @@ void add_record_json(Json& object, const Record& record) {
     return;
   }
   object["from"] = record.kind == RecordKind::from_board ? "board" : "host";
-  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): characters as bytes
-  add_datagram_json(object, reinterpret_cast<const std::uint8_t*>(record.bytes.data()),
-                    record.bytes.size(), DatagramForm::plain);
+  add_datagram_json(object, record.bytes);
 }
 
 void JsonLinesSink::on_record(const Record& record) {
@@ -27,19 +22,16 @@ void JsonLinesSink::on_record(const Record& record) {
 }
 
 void MeasuredJson::add_to(Json& object, const Record& record, const RecordedDevices& devices) {
-  if (devices.all().empty() || record.kind != RecordKind::from_board ||
-      !read_datagram(Text(record.bytes), datagram_) || kind_of(datagram_) != MessageKind::state) {
-    return;
-  }
-  State& state = states_[record.path];
-  if (!read_state(datagram_, state)) return;
+  if (devices.all().empty()) return;
+  const State* const state = states_.take(record);
+  if (state == nullptr) return;
   for (const RecordedDevices::Known& known : devices.all()) {
     if (!known.is_of(record.path)) continue;
     const Device& device = known.device;
     const std::vector<DeviceValue>& values = device.description().values;
     for (std::size_t i = 0; i < values.size(); ++i) {
-      if (!state.present.has(device.field(i))) continue;
-      const auto number = device.reading(state, i).number;
+      if (!state->present.has(device.field(i))) continue;
+      const auto number = device.reading(*state, i).number;
       object["devices"][device.text()][values[i].name] = number ? Json(*number) : Json();
     }
   }

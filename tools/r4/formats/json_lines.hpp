@@ -5,8 +5,6 @@
 //     {"time":1795468293.404765,"path":1,"board":"left-arm","type":"event","event":"up udp://192.168.0.125"}
 #pragma once
 
-#include <cstdint>
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,9 +12,8 @@
 #include "../shell/json.hpp"
 #include "conversion.hpp"
 #include "path_names.hpp"
-#include "r4link/datagram.hpp"
 #include "r4link/devices/device.hpp"
-#include "r4link/state.hpp"
+#include "r4link/recordings/recorded_states.hpp"
 #include "recorded_devices.hpp"
 
 namespace r4::tool {
@@ -34,8 +31,7 @@ class MeasuredJson {
   void on_header() { states_.clear(); }
 
  private:
-  Datagram datagram_;                      // used again and again
-  std::map<std::uint16_t, State> states_;  // of each path: what is merged is one board's
+  RecordedStates states_;
 };
 
 class JsonLinesSink final : public Sink {

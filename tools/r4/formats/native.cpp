@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "native.hpp"
 
-#include "host/recording/record_line.hpp"
+#include "r4link/recordings/record_line.hpp"
 
 namespace r4::tool {
 namespace {

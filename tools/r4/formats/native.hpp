@@ -6,14 +6,14 @@
 #include <string>
 
 #include "conversion.hpp"
-#include "host/recording/zstd_stream.hpp"
+#include "r4link/recordings/recording_reader.hpp"
+#include "r4link/recordings/zstd_stream.hpp"
 
 namespace r4::tool {
 
 class NativeSource final : public Source {
  public:
-  NativeSource(RecordingReader::Handler& handler, std::string name)
-      : reader_(handler, std::move(name)) {}
+  NativeSource(RecordingVisitor& visitor, std::string name) : reader_(visitor, std::move(name)) {}
   void feed(std::string_view bytes) override { reader_.feed(bytes); }
   void finish() override { reader_.finish(); }
 

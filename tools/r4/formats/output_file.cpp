@@ -13,12 +13,6 @@
 #include "r4link/error.hpp"
 
 namespace r4::tool {
-namespace {
-
-constexpr std::size_t most_waiting = 65536;
-
-}  // namespace
-
 OutputFile::OutputFile(std::string path, bool replace)
     : path_(std::move(path)), part_(path_ + ".part"), replace_(replace) {
   struct stat status {};
@@ -35,13 +29,13 @@ OutputFile::OutputFile(std::string path, bool replace)
   // Without a name, so that nothing is left of it whatever ends this program. Not every file system has that.
   const std::size_t slash = path_.rfind('/');
   const std::string folder = slash == std::string::npos ? "." : path_.substr(0, slash + 1);
-  file_.reset(::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666));
-  named_ = !file_;
+  int file = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
+  named_ = file < 0;
   if (named_) {
-    file_.reset(::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666));
+    file = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
   }
+  file_.reset(file < 0 ? nullptr : ::fdopen(file, "wb"));
   if (!file_) fail(errno);
-  waiting_.reserve(2 * most_waiting);
 }
 
 OutputFile::~OutputFile() {
@@ -49,27 +43,13 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::write(std::string_view bytes) {
-  waiting_ += bytes;
-  if (waiting_.size() >= most_waiting) write_out();
-}
-
-void OutputFile::write_out() {
-  std::string_view rest = waiting_;
-  while (!rest.empty()) {
-    const ssize_t n = ::write(file_.get(), rest.data(), rest.size());
-    if (n >= 0) {
-      rest.remove_prefix(static_cast<std::size_t>(n));
-    } else if (errno != EINTR) {
-      fail(errno);
-    }
-  }
-  waiting_.clear();
+  if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) fail(errno);
 }
 
 void OutputFile::finish() {
-  write_out();
+  if (std::fflush(file_.get()) != 0) fail(errno);
   if (!named_) {
-    const std::string here = "/proc/self/fd/" + std::to_string(file_.get());
+    const std::string here = "/proc/self/fd/" + std::to_string(::fileno(file_.get()));
     ::unlink(part_.c_str());
     if (::linkat(AT_FDCWD, here.c_str(), AT_FDCWD, part_.c_str(), AT_SYMLINK_FOLLOW) != 0) {
       fail(errno);

@@ -2,13 +2,19 @@
 // The file that a conversion makes. It is there as a whole or not at all.
 #pragma once
 
+#include <cstdio>
+#include <memory>
 #include <string>
 #include <string_view>
 
 #include "conversion.hpp"
-#include "transports/file_descriptor.hpp"
 
 namespace r4::tool {
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using FilePointer = std::unique_ptr<std::FILE, CloseFile>;
 
 class OutputFile final : public Output {
  public:
@@ -25,14 +31,12 @@ class OutputFile final : public Output {
   const std::string& path() const { return path_; }
 
  private:
-  void write_out();
   [[noreturn]] void fail(int error) const;
 
   const std::string path_;
   std::string part_;  // its name before that, if it has one
+  FilePointer file_;
   bool named_ = false;
-  FileDescriptor file_;
-  std::string waiting_;
   const bool replace_;
 };
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <unordered_map>
 
-#include "host/recording/record.hpp"
+#include "r4link/recordings/record.hpp"
 
 namespace r4::tool {
 

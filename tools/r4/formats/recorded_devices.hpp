@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "host/recording/record.hpp"
 #include "r4link/devices/device.hpp"
+#include "r4link/recordings/record.hpp"
 
 namespace r4::tool {
 

@@ -17,9 +17,9 @@
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
 #include "formats.hpp"
-#include "host/recording/record_line.hpp"
 #include "r4link/devices/device.hpp"
 #include "r4link/error.hpp"
+#include "r4link/recordings/record_line.hpp"
 #include "read_file.hpp"
 
 namespace r4::tool {
@@ -114,9 +114,8 @@ int convert(const ConvertOptions& options) {
   Conversion conversion(*sink, [&](const RecordingDamage& damage) {
     if (++told > most_damage) return;
     progress.clear();
-    const std::string line = damage.line == 0 ? "" : fmt::format("line {}, ", damage.line);
-    print_trouble(fmt::format("r4: {}: {}byte {}: {}; it is left out", called(options.input), line,
-                              damage.offset, damage.reason));
+    print_trouble(
+        fmt::format("r4: {}: {}; it is left out", called(options.input), to_text(damage)));
   });
   read_file(options.input, conversion, source, advance);
   conversion.finish();

@@ -8,8 +8,8 @@
 #include "../formats/mcap/mcap_source.hpp"
 #include "../formats/native.hpp"
 #include "../formats/packets/pcap_source.hpp"
-#include "host/recording/file_form.hpp"
 #include "r4link/error.hpp"
+#include "r4link/recordings/file_form.hpp"
 
 namespace r4::tool {
 namespace {
@@ -41,7 +41,7 @@ void DetectedSource::finish() {
     decide(detect(true).value_or(named()));
   }
   if (zstd_ && !zstd_->between_frames()) {
-    handler_.on_damage({RecordingDamage::Kind::torn, 0, taken_, "the compression was not ended"});
+    visitor_.on_damage({RecordingDamage::Kind::torn, 0, taken_, "the compression was not ended"});
   }
   source_->finish();
 }
@@ -61,7 +61,7 @@ void DetectedSource::take_compressed(std::string_view bytes) {
     if (step == ZstdReader::Step::text) {
       take(zstd_->text());
     } else if (source_) {
-      handler_.on_damage({RecordingDamage::Kind::zstd, 0, at, zstd_->problem()});
+      visitor_.on_damage({RecordingDamage::Kind::zstd, 0, at, zstd_->problem()});
     } else {
       decide(Format::native);
     }
@@ -116,16 +116,16 @@ DetectedSource::Format DetectedSource::named() const {
 void DetectedSource::decide(Format format) {
   switch (format) {
     case Format::native:
-      source_ = std::make_unique<NativeSource>(handler_, name_);
+      source_ = std::make_unique<NativeSource>(visitor_, name_);
       break;
     case Format::candump:
-      source_ = std::make_unique<CandumpSource>(handler_, name_, options_.start);
+      source_ = std::make_unique<CandumpSource>(visitor_, name_, options_.start);
       break;
     case Format::packets:
-      source_ = std::make_unique<PcapSource>(handler_, name_, options_.port);
+      source_ = std::make_unique<PcapSource>(visitor_, name_, options_.port);
       break;
     case Format::mcap:
-      source_ = std::make_unique<McapSource>(handler_, name_);
+      source_ = std::make_unique<McapSource>(visitor_, name_);
       break;
   }
   if (format == Format::native) zstd_.reset();

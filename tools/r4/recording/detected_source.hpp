@@ -11,14 +11,14 @@
 #include <string_view>
 
 #include "formats.hpp"
-#include "host/recording/zstd_stream.hpp"
+#include "r4link/recordings/zstd_stream.hpp"
 
 namespace r4::tool {
 
 class DetectedSource final : public Source {
  public:
-  DetectedSource(RecordingReader::Handler& handler, std::string name, const SourceOptions& options)
-      : handler_(handler), name_(std::move(name)), options_(options) {}
+  DetectedSource(RecordingVisitor& visitor, std::string name, const SourceOptions& options)
+      : visitor_(visitor), name_(std::move(name)), options_(options) {}
   // Throws Error{data} for a form that is not read.
   void feed(std::string_view bytes) override;
   void finish() override;
@@ -31,7 +31,7 @@ class DetectedSource final : public Source {
   Format named() const;
   void decide(Format format);
 
-  RecordingReader::Handler& handler_;
+  RecordingVisitor& visitor_;
   const std::string name_;
   const SourceOptions options_;
   std::unique_ptr<Source> source_;    // once the format is known

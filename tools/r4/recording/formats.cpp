@@ -17,7 +17,7 @@ namespace r4::tool {
 
 std::string called(const std::string& path) { return path == "-" ? "standard input" : path; }
 
-std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Handler& handler,
+std::unique_ptr<Source> make_source(const std::string& path, RecordingVisitor& visitor,
                                     const SourceOptions& options) {
   for (const std::string_view ending : {".csv", ".jsonl"}) {
     if (path.ends_with(ending)) {
@@ -25,7 +25,7 @@ std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Ha
                   "convert the recording that it was made of");
     }
   }
-  return std::make_unique<DetectedSource>(handler, called(path), options);
+  return std::make_unique<DetectedSource>(visitor, called(path), options);
 }
 
 std::unique_ptr<Sink> make_sink(const std::string& path, Output& output,

@@ -28,7 +28,7 @@ struct SourceOptions {
 
 // Reads the file of that name, "-" being the standard input, whatever its format. Throws Error{usage} for a format that
 // is only written.
-std::unique_ptr<Source> make_source(const std::string& path, RecordingReader::Handler& handler,
+std::unique_ptr<Source> make_source(const std::string& path, RecordingVisitor& visitor,
                                     const SourceOptions& options = {});
 
 // Writes the file of that name. Throws Error{usage} where its ending is none that is written.

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string_view>
 
-#include "protocol/datagram/numbers.hpp"
+#include "../formats/number.hpp"
 #include "r4link/error.hpp"
 
 namespace r4::tool {
@@ -25,12 +25,10 @@ constexpr std::uint64_t most = 1'000'000;
 template <std::size_t n>
 std::optional<std::uint64_t> read(std::string_view text, const std::array<Unit, n>& units) {
   const std::size_t digits = std::min(text.find_first_not_of("0123456789"), text.size());
-  std::uint64_t number = 0;
-  if (!parse_number(Text(text.substr(0, digits)), number) || number == 0 || number > most) {
-    return std::nullopt;
-  }
+  const auto number = number_in<std::uint64_t>(text.substr(0, digits));
+  if (!number || *number == 0 || *number > most) return std::nullopt;
   for (const Unit& unit : units) {
-    if (text.substr(digits) == unit.name) return number * unit.factor;
+    if (text.substr(digits) == unit.name) return *number * unit.factor;
   }
   return std::nullopt;
 }

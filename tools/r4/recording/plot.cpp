@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4 plot: curves of a recording as a picture, which Python's matplotlib draws.
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
 #include <sys/mman.h>
@@ -12,6 +11,7 @@
 #include <cctype>
 #include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <map>
 #include <memory>
@@ -24,15 +24,12 @@
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "host/recording/recording_reader.hpp"
 #include "plot_script.hpp"
-#include "protocol/messages/message.hpp"
-#include "protocol/messages/state_fields.hpp"
 #include "r4link/error.hpp"
+#include "r4link/messages/message.hpp"
 #include "r4link/tables/state_fields.hpp"
 #include "read_file.hpp"
 #include "recording_summary.hpp"
-#include "transports/file_descriptor.hpp"
 
 namespace r4::tool {
 namespace {
@@ -97,7 +94,7 @@ struct PlottedPath {
   bool heard = false;
 };
 
-class Curves final : public RecordingReader::Handler {
+class Curves final : public RecordingVisitor {
  public:
   explicit Curves(const std::vector<Wanted>& wanted) : wanted_(wanted) {}
 
@@ -187,33 +184,26 @@ std::string unit_of(StateField field) {
   return *name == '\0' ? unit : fmt::format("{} [{}]", name, unit);
 }
 
-// A file without a name, for what a program reads or writes.
-FileDescriptor make_memory(const char* name) {
-  FileDescriptor memory(::memfd_create(name, MFD_CLOEXEC));
-  if (!memory) {
-    throw Error(ErrorKind::open, "memory for the picture", std::strerror(errno),
-                "free some memory");
-  }
+[[noreturn]] void fail_for_memory() {
+  throw Error(ErrorKind::open, "memory for the picture", std::strerror(errno),
+              "free some memory, or plot fewer fields");
+}
+
+// A file without a name, which another program reads or writes.
+FilePointer make_memory(const char* name) {
+  const int descriptor = ::memfd_create(name, MFD_CLOEXEC);
+  FilePointer memory(descriptor < 0 ? nullptr : ::fdopen(descriptor, "w+b"));
+  if (!memory) fail_for_memory();
   return memory;
 }
 
-void write_all(const FileDescriptor& memory, const void* bytes, std::size_t size) {
-  const char* next = static_cast<const char*>(bytes);
-  while (size != 0) {
-    const ssize_t n = ::write(memory.get(), next, size);
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) {
-      throw Error(ErrorKind::open, "memory for the picture", std::strerror(errno),
-                  "free some memory, or plot fewer fields");
-    }
-    next += n;
-    size -= static_cast<std::size_t>(n);
-  }
+void write_all(const FilePointer& memory, const void* bytes, std::size_t size) {
+  if (std::fwrite(bytes, 1, size, memory.get()) != size) fail_for_memory();
 }
 
 // What Python is told (plot.py); the spans are those of the boards that have curves.
-FileDescriptor make_plan(const Curves& curves, const std::vector<Wanted>& wanted,
-                         const std::string& title, const std::string& format) {
+FilePointer make_plan(const Curves& curves, const std::vector<Wanted>& wanted,
+                      const std::string& title, const std::string& format) {
   Json plan{{"title", printable(title)},
             {"format", format},
             {"seconds", curves.seconds_of(curves.last())},
@@ -247,7 +237,7 @@ FileDescriptor make_plan(const Curves& curves, const std::vector<Wanted>& wanted
                                {"to", curves.seconds_of(span.to)}});
     }
   }
-  FileDescriptor input = make_memory("plan");
+  FilePointer input = make_memory("plan");
   const std::string line = line_of(plan);
   write_all(input, line.data(), line.size());
   for (const Curve* curve : drawn) {
@@ -255,19 +245,20 @@ FileDescriptor make_plan(const Curves& curves, const std::vector<Wanted>& wanted
       write_all(input, numbers->data(), numbers->size() * sizeof(double));
     }
   }
+  if (std::fflush(input.get()) != 0) fail_for_memory();
   return input;
 }
 
 // Runs plot.py; its exit code, or nothing if there is no such Python. It runs in the root directory: Python imports what
 // is in the working directory, matplotlib reads its settings there, and files that were downloaded may lie there.
-std::optional<int> run_python(const char* python, const FileDescriptor& plan,
-                              const FileDescriptor& picture) {
-  ::lseek(plan.get(), 0, SEEK_SET);
+std::optional<int> run_python(const char* python, const FilePointer& plan,
+                              const FilePointer& picture) {
+  std::rewind(plan.get());
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addchdir_np(&actions, "/");
-  posix_spawn_file_actions_adddup2(&actions, plan.get(), STDIN_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, picture.get(), STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, ::fileno(plan.get()), STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, ::fileno(picture.get()), STDOUT_FILENO);
   const char* const arguments[] = {python, "-c", plot_script, nullptr};
   pid_t pid = 0;
   const int error =
@@ -281,9 +272,9 @@ std::optional<int> run_python(const char* python, const FileDescriptor& plan,
 }
 
 // What plot.py draws. Who has a Python of their own, in which there is no matplotlib, may have the system's.
-FileDescriptor draw(const FileDescriptor& plan) {
+FilePointer draw(const FilePointer& plan) {
   constexpr int no_matplotlib = 3;  // of plot.py
-  FileDescriptor picture = make_memory("picture");
+  FilePointer picture = make_memory("picture");
   std::optional<int> code = run_python("python3", plan, picture);
   if (!code || *code == no_matplotlib) code = run_python("/usr/bin/python3", plan, picture);
   if (!code || *code == no_matplotlib) {
@@ -314,14 +305,13 @@ int plot(const PlotOptions& options) {
     throw Error(ErrorKind::data, options.fields[i], "is in no state of " + options.file,
                 "see `r4 info` for its boards; a program chooses the fields of its states (F)");
   }
-  const FileDescriptor plan = make_plan(
+  const FilePointer plan = make_plan(
       curves, wanted, options.file + ", from " + record_time_text(curves.first()), format);
-  const FileDescriptor picture = draw(plan);
-  ::lseek(picture.get(), 0, SEEK_SET);
+  const FilePointer picture = draw(plan);
+  std::rewind(picture.get());
   std::array<char, 65536> piece;
-  ssize_t n = 0;
-  while ((n = ::read(picture.get(), piece.data(), piece.size())) > 0) {
-    output.write({piece.data(), static_cast<std::size_t>(n)});
+  while (const std::size_t n = std::fread(piece.data(), 1, piece.size(), picture.get())) {
+    output.write({piece.data(), n});
   }
   output.finish();
   if (curves.damaged()) {

@@ -4,18 +4,17 @@
 #include <memory>
 #include <string_view>
 
-#include "host/recording/recording_file.hpp"
+#include "r4link/recordings/recording_reader.hpp"
 
 namespace r4::tool {
 
-void read_file(const std::string& path, RecordingReader::Handler& handler,
-               const SourceOptions& options, const std::function<void(std::size_t)>& advance) {
-  const std::unique_ptr<Source> source = make_source(path, handler, options);
-  RecordingInput input(path);
-  for (std::string_view piece = input.read(); !piece.empty(); piece = input.read()) {
+void read_file(const std::string& path, RecordingVisitor& visitor, const SourceOptions& options,
+               const std::function<void(std::size_t)>& advance) {
+  const std::unique_ptr<Source> source = make_source(path, visitor, options);
+  read_in_pieces(path, [&](std::string_view piece) {
     source->feed(piece);
     if (advance) advance(piece.size());
-  }
+  });
   source->finish();
 }
 

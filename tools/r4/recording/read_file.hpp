@@ -10,9 +10,9 @@
 
 namespace r4::tool {
 
-// Tells the handler what is in the file of that name, "-" being the standard input. `advance` is told how many bytes were
+// Tells the visitor what is in the file of that name, "-" being the standard input. `advance` is told how many bytes were
 // read. Throws Error if it cannot be read, or is of another kind.
-void read_file(const std::string& path, RecordingReader::Handler& handler,
+void read_file(const std::string& path, RecordingVisitor& visitor,
                const SourceOptions& options = {},
                const std::function<void(std::size_t)>& advance = {});
 

@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <string_view>
 
+#include "../formats/number.hpp"
 #include "formats.hpp"
-#include "protocol/datagram/numbers.hpp"
-#include "protocol/messages/message.hpp"
-#include "r4link/state.hpp"
+#include "r4link/messages/message.hpp"
 
 namespace r4::tool {
 namespace {
@@ -99,8 +98,7 @@ void RecordingSummary::on_record(const Record& record) {
 
 void RecordingSummary::on_event(const Record& record) {
   if (record.path == no_path) {
-    std::uint64_t count = 0;
-    if (parse_number(Text(word_after(record.bytes, "dropped ")), count)) dropped_ += count;
+    dropped_ += number_in<std::uint64_t>(word_after(record.bytes, "dropped ")).value_or(0);
     if (record.bytes == "end") ended_ = true;
   } else if (record.bytes.starts_with("down ")) {
     ++of(record.path).downs;
@@ -134,11 +132,7 @@ void RecordingSummary::on_received(PathSummary& path, const Record& record) {
   }
   if (kind == MessageKind::state) ++path.states;
   if (kind != MessageKind::state && kind != MessageKind::board_heartbeat) return;
-  // A board that is not safe may leave it out.
-  const Field safe = datagram.find("SAFE");
-  std::uint32_t reason = 0;
-  if (!safe.name().empty() && !parse_number(safe.values(), reason)) return;
-  be_safe(path, to_safe_reason(reason), record.time);
+  be_safe(path, heartbeat_report(datagram).reason, record.time);
 }
 
 void RecordingSummary::be_safe(PathSummary& path, SafeReason reason, Time now) {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "../shell/json.hpp"
-#include "host/recording/recording_reader.hpp"
-#include "protocol/link/packet_tracker.hpp"
+#include "r4link/messages/packet_tracker.hpp"
+#include "r4link/recordings/recording_visitor.hpp"
 
 namespace r4::tool {
 
@@ -42,7 +42,7 @@ struct PathSummary {
   Time longest_gap_at{0};
 };
 
-class RecordingSummary final : public RecordingReader::Handler {
+class RecordingSummary final : public RecordingVisitor {
  public:
   void on_header() override;
   void on_path(const RecordedPath& path) override;

@@ -3,15 +3,14 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cstdio>
 #include <set>
 #include <string>
 #include <vector>
 
-#include "host/recording/record_line.hpp"
 #include "r4link/messages/message.hpp"
 #include "r4link/messages/packed_form.hpp"
+#include "r4link/recordings/record_line.hpp"
 
 namespace r4::tool {
 namespace {
@@ -87,28 +86,11 @@ Json bad_datagram_json(const ReadResult& result) {
   return object;
 }
 
-bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size,
-                       DatagramForm form) {
-  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): bytes as characters
-  Text text(reinterpret_cast<const char*>(bytes), size);
-  std::array<char, max_datagram> plain;
-  const bool packed = form == DatagramForm::packed ||
-                      (form == DatagramForm::by_first_byte && size != 0 && is_packed(bytes[0]));
-  if (packed) {
-    const UnpackResult result = unpack(bytes, size, plain.data(), plain.size());
-    if (!result) {
-      object["ok"] = false;
-      object["error"] = "packed";
-      object["reason"] = to_text(result.error);
-      object["text"] = fmt::format("packed:{:02x}", fmt::join(bytes, bytes + size, ""));
-      return false;
-    }
-    text = Text(plain.data(), result.size);
-  }
+bool add_datagram_json(Json& object, std::string_view bytes) {
+  const Text text = bytes;
   Datagram datagram;
   const ReadResult result = read_datagram(text, datagram);
   object["ok"] = static_cast<bool>(result);
-  if (packed) object["packed"] = size;
   std::vector<char> room(text.size() + masking_room);
   const Text masked = without_secrets(text, room.data());
   if (result && masked.data() != text.data()) (void)read_datagram(masked, datagram);

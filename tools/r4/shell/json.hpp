@@ -28,13 +28,9 @@ Json fields_json(const Datagram& datagram);
 // {"error":"crc","position":…,"expected":"0x…","found":"0x…"}; the last two only for crc.
 Json bad_datagram_json(const ReadResult& result);
 
-enum class DatagramForm : std::uint8_t { plain, packed, by_first_byte };
-
-// Adds to `object` what the bytes of a datagram are: `ok`; `packed`, their number, if they are in
-// that form; `type`, `pnum`, `t` and `fields`, or `error` and where it is; `text`, the plain form.
-// True if they are a valid datagram.
-bool add_datagram_json(Json& object, const std::uint8_t* bytes, std::size_t size,
-                       DatagramForm form = DatagramForm::by_first_byte);
+// Adds to `object` what the bytes of a datagram in its plain form are: `ok`; `type`, `pnum`, `t` and
+// `fields`, or `error` and where it is; `text`. True if they are a valid datagram.
+bool add_datagram_json(Json& object, std::string_view bytes);
 
 // {"type":"error","kind":…,"thing":…,"reason":…,"fix":…}; of a command also its "outcome" and, where the
 // board refused it, the "code".

@@ -6,10 +6,11 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <string_view>
 
-#include "host/recording/file_form.hpp"
-#include "transports/framing/line_framing.hpp"
+#include "r4link/datagram.hpp"
+#include "r4link/recordings/file_form.hpp"
 
 namespace r4::tool {
 
@@ -22,24 +23,26 @@ class NumberedLines {
     while (!bytes.empty()) {
       const std::size_t end = std::min(bytes.find_first_of("\r\n"), bytes.size());
       const bool ends = end != bytes.size();
-      const std::size_t taken = end + (ends ? 1 : 0);
       size_ += end;
-      framing_.push(bytes.data(), taken, [&](Text framed) {
-        std::string_view text(framed.data(), framed.size());
-        if (number_ == 1 && text.starts_with(utf8_mark)) text.remove_prefix(utf8_mark.size());
-        if (!text.empty()) line(number_, text);
-      });
+      if (size_ <= max_datagram) line_ += bytes.substr(0, end);
       if (!ends) {
         after_cr_ = false;
         return;
       }
-      if (size_ > max_datagram) too_long(number_, size_);
+      if (size_ > max_datagram) {
+        too_long(number_, size_);
+      } else {
+        std::string_view text = line_;
+        if (number_ == 1 && text.starts_with(utf8_mark)) text.remove_prefix(utf8_mark.size());
+        if (!text.empty()) line(number_, text);
+      }
+      line_.clear();
       const bool second_half = bytes[end] == '\n' && end == 0 && after_cr_;  // of CR LF
       if (!second_half) ++number_;
       begin_ += size_ + 1;
       size_ = 0;
       after_cr_ = bytes[end] == '\r';
-      bytes.remove_prefix(taken);
+      bytes.remove_prefix(end + 1);
     }
   }
   // The byte of the input, from 0, where the line begins that is told of.
@@ -51,7 +54,7 @@ class NumberedLines {
   }
 
  private:
-  LineFraming framing_;
+  std::string line_;  // what has come of it, unless it is too long
   std::uint64_t number_ = 1;
   std::uint64_t begin_ = 0;
   std::uint64_t size_ = 0;  // of the line so far

@@ -13,6 +13,7 @@
 #include <string>
 #include <string_view>
 
+#include "../bus/bus_datagram.hpp"
 #include "../bus/bus_log.hpp"
 #include "../shell/json.hpp"
 #include "../shell/numbered_lines.hpp"
@@ -101,9 +102,7 @@ class DatagramLines {
 
  private:
   static bool add_plain(Json& object, std::string_view line) {
-    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): characters as bytes
-    return add_datagram_json(object, reinterpret_cast<const std::uint8_t*>(line.data()),
-                             line.size(), DatagramForm::plain);
+    return add_datagram_json(object, line);
   }
   static bool add_packed(Json& object, std::string_view line) {
     const std::string_view hex = line.substr(packed_prefix.size());
@@ -116,7 +115,7 @@ class DatagramLines {
       bytes[i] = static_cast<std::uint8_t>(byte);
     }
     if (good) {
-      good = add_datagram_json(object, bytes.data(), size, DatagramForm::packed);
+      good = add_packed_json(object, bytes.data(), size);
     } else {
       object.update({{"ok", false}, {"error", "packed"}, {"reason", "hex"}});
     }

@@ -2,11 +2,11 @@
 #include "mcap_sink.hpp"
 
 #include <fmt/format.h>
+#include <libdeflate.h>
 
 #include <algorithm>
 #include <utility>
 
-#include "protocol/datagram/crc32.hpp"
 #include "r4link/config.hpp"
 #include "r4link/error.hpp"
 #include "schemas.hpp"
@@ -76,7 +76,7 @@ void McapSink::begin() {
 void McapSink::write(std::string_view bytes) {
   output_.write(bytes);
   offset_ += bytes.size();
-  crc_ = crc32(Text(bytes), crc_);
+  crc_ = libdeflate_crc32(crc_, bytes.data(), bytes.size());
 }
 
 void McapSink::on_comment(std::string_view line, Time time) { write_line(line, time); }
@@ -151,7 +151,7 @@ void McapSink::write_chunk() {
   append_number(record_, chunk_has_messages_ ? chunk_first_ns_ : 0);
   append_number(record_, chunk_has_messages_ ? chunk_last_ns_ : 0);
   append_number(record_, std::uint64_t{chunk_.size()});
-  append_number(record_, crc32(Text(chunk_)));
+  append_number(record_, libdeflate_crc32(0, chunk_.data(), chunk_.size()));
   append_string(record_, chunk_compression);
   append_number(record_, std::uint64_t{compressed_.size()});
   record_ += compressed_;

@@ -15,8 +15,8 @@
 #include "../json_lines.hpp"
 #include "../path_names.hpp"
 #include "../recorded_devices.hpp"
-#include "host/recording/zstd_stream.hpp"
 #include "mcap.hpp"
+#include "r4link/recordings/zstd_stream.hpp"
 
 namespace r4::tool {
 

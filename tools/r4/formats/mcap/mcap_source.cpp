@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "mcap_source.hpp"
 
+#include <libdeflate.h>
 #include <lz4frame.h>
 
 #include <algorithm>
 #include <memory>
 #include <new>
 
-#include "host/recording/zstd_stream.hpp"
-#include "protocol/datagram/crc32.hpp"
-#include "protocol/datagram/numbers.hpp"
+#include "../number.hpp"
 #include "r4link/error.hpp"
+#include "r4link/recordings/zstd_stream.hpp"
 
 namespace r4::tool {
 namespace {
@@ -70,7 +70,7 @@ void McapSource::take() {
   while (!rest.empty()) {
     const std::size_t taken = std::min(take_next(rest), rest.size());
     if (taken == 0) break;
-    crc_ = crc32(Text(rest.substr(0, taken)), crc_);
+    crc_ = libdeflate_crc32(crc_, rest.data(), taken);
     offset_ += taken;
     rest.remove_prefix(taken);
   }
@@ -151,10 +151,7 @@ void McapSource::on_channel(std::string_view content) {
   while (!metadata.rest().empty()) {
     const std::string_view key = metadata.string();
     const std::string_view value = metadata.string();
-    std::uint32_t path = 0;
-    if (key == mcap::path_key && parse_number(Text(value), path) && path <= 65535) {
-      channel.path = static_cast<std::uint16_t>(path);
-    }
+    if (key == mcap::path_key) channel.path = number_in<std::uint16_t>(value);
     std::string* const text = key == mcap::url_key    ? &channel.url
                               : key == mcap::name_key ? &channel.name
                                                       : nullptr;
@@ -177,7 +174,8 @@ void McapSource::on_chunk(std::string_view content) {
   const std::string_view bytes = fields.take(fields.number<std::uint64_t>());
   if (!fields.good() || size > max_record) return damage("a chunk that is not whole");
   if (!unpack(compression, bytes, size)) return damage("a chunk that does not unpack");
-  if (crc != 0 && crc != crc32(Text(chunk_))) return damage("a chunk whose checksum is wrong");
+  if (crc != 0 && crc != libdeflate_crc32(0, chunk_.data(), chunk_.size()))
+    return damage("a chunk whose checksum is wrong");
   std::string_view rest = chunk_;
   while (!rest.empty()) {
     Fields record(rest);
@@ -245,7 +243,7 @@ void McapSource::on_message(std::string_view content) {
                                              : RecordKind::to_board;
   // A filter may have left out the topic of the lines, which declare the paths.
   if (!channel->second.told && !lines_.recognised() && !channel->second.url.empty()) {
-    handler_.on_path({path, channel->second.url, channel->second.name});
+    visitor_.on_path({path, channel->second.url, channel->second.name});
   }
   channel->second.told = true;
   lines_.on_record({Time{static_cast<std::int64_t>(time_ns / 1000)}, path, kind,
@@ -256,7 +254,7 @@ void McapSource::on_message(std::string_view content) {
 void McapSource::damage(std::string_view reason) {
   any_damage_ = true;
   lines_.on_damage();
-  handler_.on_damage({RecordingDamage::Kind::line, 0, offset_, reason});
+  visitor_.on_damage({RecordingDamage::Kind::line, 0, offset_, reason});
 }
 
 void McapSource::fail_as_none() const {

@@ -15,13 +15,14 @@
 #include "../../shell/json.hpp"
 #include "../conversion.hpp"
 #include "mcap.hpp"
+#include "r4link/recordings/recording_reader.hpp"
 
 namespace r4::tool {
 
 class McapSource final : public Source {
  public:
-  McapSource(RecordingReader::Handler& handler, std::string name)
-      : handler_(handler), name_(std::move(name)), lines_(handler, name_) {}
+  McapSource(RecordingVisitor& visitor, std::string name)
+      : visitor_(visitor), name_(std::move(name)), lines_(visitor, name_) {}
   void feed(std::string_view bytes) override;
   void finish() override;
 
@@ -43,7 +44,7 @@ class McapSource final : public Source {
   void damage(std::string_view reason);
   [[noreturn]] void fail_as_none() const;
 
-  RecordingReader::Handler& handler_;
+  RecordingVisitor& visitor_;
   const std::string name_;
   Part part_ = Part::magic;
   std::string waiting_;       // what is not taken yet

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
+#include "../number.hpp"
 #include "packets.hpp"
 #include "pcapng_sink.hpp"
-#include "protocol/datagram/numbers.hpp"
 #include "r4link/error.hpp"
 
 namespace r4::tool {
@@ -203,16 +203,16 @@ void PacketRecords::on_line(const PacketInterface& interface, const Packet& pack
 void PacketRecords::on_own(const PacketInterface& interface, const Packet& packet) {
   const auto path = std::string_view(interface.description).substr(path_interface.size());
   Udp udp;
-  std::uint32_t number = 0;
-  if (!parse_number(Text(path), number) || number > 65535 || !read_ip(packet.bytes, udp)) {
+  const auto number = number_in<std::uint16_t>(path);
+  if (!number || !read_ip(packet.bytes, udp)) {
     return damage(packet, "no datagram of a recording");
   }
   if (packet.cut || udp.cut) return damage(packet, "the packet is cut");
   const bool to_board = udp.from == made_up_host_text;
   be(Kind::recorded);
-  lines_.on_record({packet.time, static_cast<std::uint16_t>(number),
-                    to_board ? RecordKind::to_board : RecordKind::from_board, udp.payload},
-                   interface.number, interface.name);
+  lines_.on_record(
+      {packet.time, *number, to_board ? RecordKind::to_board : RecordKind::from_board, udp.payload},
+      interface.number, interface.name);
 }
 
 // IPv4 or IPv6 with UDP in it, whole or the first of its fragments.
@@ -259,7 +259,7 @@ void PacketRecords::on_ip(std::string_view bytes, const Packet& packet) {
   be(Kind::captured);
   const std::uint16_t path = path_of(from_board ? udp.from : udp.to);
   if (path == no_path) return damage(packet, "more than 1000 boards");
-  handler_.on_record({packet.time, path, from_board ? RecordKind::from_board : RecordKind::to_board,
+  visitor_.on_record({packet.time, path, from_board ? RecordKind::from_board : RecordKind::to_board,
                       without_end(udp.payload)});
 }
 
@@ -315,7 +315,7 @@ std::uint16_t PacketRecords::path_of(const std::string& address) {
 void PacketRecords::damage(const Packet& packet, std::string_view reason) {
   told_ = true;
   lines_.on_damage();
-  handler_.on_damage({RecordingDamage::Kind::line, 0, packet.offset, reason});
+  visitor_.on_damage({RecordingDamage::Kind::line, 0, packet.offset, reason});
 }
 
 }  // namespace r4::tool

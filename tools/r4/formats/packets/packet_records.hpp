@@ -17,7 +17,7 @@
 #include "../../bus/bus_transfers.hpp"
 #include "../bus_records.hpp"
 #include "../byte_order.hpp"
-#include "host/recording/recording_reader.hpp"
+#include "r4link/recordings/recording_reader.hpp"
 
 namespace r4::tool {
 
@@ -39,11 +39,11 @@ struct Packet {
 class PacketRecords {
  public:
   // `name`: what errors are about; `port`: of the boards.
-  PacketRecords(RecordingReader::Handler& handler, std::string name, std::uint16_t port)
-      : handler_(handler),
+  PacketRecords(RecordingVisitor& visitor, std::string name, std::uint16_t port)
+      : visitor_(visitor),
         name_(std::move(name)),
-        lines_(handler, name_),
-        bus_(handler),
+        lines_(visitor, name_),
+        bus_(visitor),
         port_(port) {}
 
   // Throws Error{data} for recordings that are mixed.
@@ -81,7 +81,7 @@ class PacketRecords {
     Time time{-1'000'000'000};
   };
 
-  RecordingReader::Handler& handler_;
+  RecordingVisitor& visitor_;
   const std::string name_;
   RecordingLines lines_;
   BusRecords bus_;

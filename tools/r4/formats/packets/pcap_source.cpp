@@ -241,7 +241,7 @@ Time PcapSource::time_of(const Interface& interface, std::uint64_t ticks) {
 void PcapSource::damage(std::string_view reason) {
   any_damage_ = true;
   records_.on_damage();
-  handler_.on_damage({RecordingDamage::Kind::line, 0, offset_, reason});
+  visitor_.on_damage({RecordingDamage::Kind::line, 0, offset_, reason});
 }
 
 }  // namespace r4::tool

@@ -19,8 +19,8 @@ namespace r4::tool {
 class PcapSource final : public Source {
  public:
   // `port`: of the boards.
-  PcapSource(RecordingReader::Handler& handler, std::string name, std::uint16_t port = board_port)
-      : handler_(handler), records_(handler, name, port), name_(std::move(name)) {}
+  PcapSource(RecordingVisitor& visitor, std::string name, std::uint16_t port = board_port)
+      : visitor_(visitor), records_(visitor, name, port), name_(std::move(name)) {}
   void feed(std::string_view bytes) override;
   void finish() override;
 
@@ -53,7 +53,7 @@ class PcapSource final : public Source {
   }
   static Time time_of(const Interface& interface, std::uint64_t ticks);
 
-  RecordingReader::Handler& handler_;
+  RecordingVisitor& visitor_;
   PacketRecords records_;
   const std::string name_;
   Form form_ = Form::unknown;

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <libdeflate.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <system_error>
 
@@ -40,22 +42,18 @@ PageFile page_file(std::string_view name, std::string_view content) {
 }
 
 std::optional<PageFile> page_file_in(const std::string& folder, std::string_view path) {
-  constexpr std::size_t largest = 4 << 20;
+  constexpr std::uintmax_t largest = 4 << 20;
   if (!path.starts_with('/') || path.starts_with("/.") ||
       path.find('/', 1) != std::string_view::npos) {
     return std::nullopt;
   }
-  const std::string name = folder + std::string(path);
+  const std::filesystem::path file = folder + std::string(path);
   std::error_code error;
-  // Opening a named pipe would wait for a program that writes into it.
-  if (!std::filesystem::is_regular_file(name, error)) return std::nullopt;
-  const auto size = std::filesystem::file_size(name, error);
-  if (error || size > largest) return std::nullopt;
-  std::string content(size, '\0');
-  std::ifstream file(name, std::ios::binary);
-  file.read(content.data(), static_cast<std::streamsize>(size));
-  if (!file.is_open() || file.bad()) return std::nullopt;
-  content.resize(static_cast<std::size_t>(file.gcount()));  // it may have become shorter meanwhile
+  // A named pipe would wait for a program that writes into it.
+  if (!is_regular_file(file, error) || file_size(file, error) > largest) return std::nullopt;
+  std::ifstream stream(file, std::ios::binary);
+  std::string content(std::istreambuf_iterator<char>(stream), {});
+  if (!stream) return std::nullopt;
   return page_file(path, content);
 }
 

@@ -7,7 +7,8 @@
 #include <string>
 #include <string_view>
 
-#include "r4link/error.hpp"
+#include "../config.hpp"
+#include "../error.hpp"
 
 namespace r4 {
 
@@ -27,12 +28,12 @@ enum class FileForm : std::uint8_t {
 // This many bytes distinguish all forms.
 constexpr std::size_t form_bytes = 8;
 
-FileForm form_of(std::string_view beginning);
+R4LINK_API FileForm form_of(std::string_view beginning);
 
 // The mark that some editors write in front of UTF-8.
 constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
 
 // Says why a file of that form is not a recording, and how to make one of it.
-Error not_a_recording(const std::string& name, FileForm form);
+R4LINK_API Error not_a_recording(const std::string& name, FileForm form);
 
 }  // namespace r4

@@ -18,33 +18,32 @@
 #include <string>
 #include <string_view>
 
-#include "r4link/messages/message.hpp"
+#include "../config.hpp"
+#include "../messages/message.hpp"
 #include "record.hpp"
 
 namespace r4 {
 
 constexpr std::uint32_t record_version = 1;
-// The most bytes that a record holds. A datagram is shorter; bytes of a damaged stream may be more.
-constexpr std::size_t max_record_bytes = 4096;
 // The longest line without its end: every byte escaped, after a time and a path.
 constexpr std::size_t max_record_line = 4 * max_record_bytes + 64;
 
 // A record as it may be stored: without the secrets of its datagram, or of the beginning of one in
 // an event `oversize`. It has at most max_record_bytes, which may be in `room`.
 using RecordRoom = std::array<char, max_record_bytes + masking_room>;
-Record without_secrets(Record record, RecordRoom& room);
+R4LINK_API Record without_secrets(Record record, RecordRoom& room);
 
 // --- writing; each appends one line with its end
 
-void write_record_header(std::string& out);
+R4LINK_API void write_record_header(std::string& out);
 // For people: the time of the first record.
-void write_beginning(std::string& out, Time time);
-void write_path(std::string& out, const RecordedPath& path);
+R4LINK_API void write_beginning(std::string& out, Time time);
+R4LINK_API void write_path(std::string& out, const RecordedPath& path);
 // At most max_record_bytes of description.
-void write_device(std::string& out, const RecordedDevice& device);
+R4LINK_API void write_device(std::string& out, const RecordedDevice& device);
 // Bytes beyond max_record_bytes are left out. A time outside of the years 1970 to 9999 is written
 // as the nearest time inside.
-void write_record(std::string& out, const Record& record);
+R4LINK_API void write_record(std::string& out, const Record& record);
 
 // --- reading
 
@@ -69,19 +68,19 @@ struct RecordLine {
 };
 
 // Reads a line without its end. False if it is damaged.
-bool read_record_line(std::string_view line, RecordLine& out);
+R4LINK_API bool read_record_line(std::string_view line, RecordLine& out);
 
 // --- bytes as a record has them
 
 // Appends bytes; a backslash, and a byte that is not printable ASCII, as \xNN.
-void append_escaped(std::string& out, std::string_view bytes);
+R4LINK_API void append_escaped(std::string& out, std::string_view bytes);
 // The reverse. False if the text is not written so.
-bool append_unescaped(std::string& out, std::string_view text);
+R4LINK_API bool append_unescaped(std::string& out, std::string_view text);
 
 // "2026-11-23T21:11:33.404765Z"
-std::string record_time_text(Time time);
+R4LINK_API std::string record_time_text(Time time);
 // The reverse, also with fewer decimals or none, and without the Z. Empty if the text is not a
 // time.
-std::optional<Time> read_record_time(std::string_view text);
+R4LINK_API std::optional<Time> read_record_time(std::string_view text);
 
 }  // namespace r4

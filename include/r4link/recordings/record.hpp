@@ -2,11 +2,12 @@
 // The parts of a recording (docs/recordings.md). Each record has a time and a path.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
 
-#include "r4link/link.hpp"
+#include "../link.hpp"
 
 namespace r4 {
 
@@ -15,6 +16,9 @@ enum class RecordKind : std::uint8_t {
   to_board,    // a datagram of any host
   event,       // an event, in words
 };
+
+// The most bytes that a record holds. A datagram is shorter; bytes of a damaged stream may be more.
+constexpr std::size_t max_record_bytes = 4096;
 
 // The path of events of the recording itself.
 constexpr std::uint16_t no_path = 0;

@@ -2,16 +2,19 @@
 // Compresses and decompresses zstd, in pieces and in bounded memory.
 #pragma once
 
-#include <zstd.h>
-
 #include <cstddef>
 #include <memory>
 #include <string>
 #include <string_view>
 
+#include "../config.hpp"
+
+struct ZSTD_CCtx_s;  // of zstd.h
+struct ZSTD_DCtx_s;
+
 namespace r4 {
 
-class ZstdWriter {
+class R4LINK_API ZstdWriter {
  public:
   ZstdWriter();
   // Appends to `out` everything that a reader needs to read all of `bytes`. `end_frame` ends the
@@ -20,13 +23,13 @@ class ZstdWriter {
 
  private:
   struct Free {
-    void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
+    void operator()(ZSTD_CCtx_s* context) const;
   };
-  std::unique_ptr<ZSTD_CCtx, Free> context_;
+  std::unique_ptr<ZSTD_CCtx_s, Free> context_;
 };
 
 // Reads frames one after the other. After damage it goes on with the next frame.
-class ZstdReader {
+class R4LINK_API ZstdReader {
  public:
   static constexpr const char* window_problem =
       "a zstd frame that needs a window of more than 128 MiB";
@@ -49,13 +52,13 @@ class ZstdReader {
   bool between_frames() const { return !in_frame_; }
 
  private:
-  bool find_frame(std::string_view& bytes);
-  void search(std::string_view& bytes, bool from_found);
+  R4LINK_PRIVATE bool find_frame(std::string_view& bytes);
+  R4LINK_PRIVATE void search(std::string_view& bytes, bool from_found);
 
   struct Free {
-    void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
+    void operator()(ZSTD_DCtx_s* context) const;
   };
-  std::unique_ptr<ZSTD_DCtx, Free> context_;
+  std::unique_ptr<ZSTD_DCtx_s, Free> context_;
   std::string output_;
   std::size_t size_ = 0;
   bool in_frame_ = false;
@@ -66,6 +69,6 @@ class ZstdReader {
 };
 
 // True if a file with that beginning holds frames of zstd; four bytes suffice.
-bool is_zstd(std::string_view beginning);
+R4LINK_API bool is_zstd(std::string_view beginning);
 
 }  // namespace r4

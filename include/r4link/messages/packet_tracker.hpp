@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tells lost, duplicate, reordered and restarted packet numbers apart (paper section 4.1: PNum).
 //
-// Packet numbers are unsigned 32 bit and wrap (datagram/wrapping.hpp).
+// Packet numbers are unsigned 32 bit and wrap (RFC 1982).
 // The last 64 numbers are remembered, so a late packet is told from a repeated one and takes its
 // loss back. A number that is further behind is old news, until two old ones in a row rise: then
 // the sender has restarted (the rule of RFC 3550 A.1).
@@ -9,8 +9,8 @@
 
 #include <cstdint>
 
-#include "../datagram/wrapping.hpp"
-#include "r4link/vocabulary.hpp"
+#include "../config.hpp"
+#include "../vocabulary.hpp"
 
 namespace r4 {
 
@@ -30,7 +30,7 @@ constexpr bool is_current(Arrival arrival) {
          arrival == Arrival::restart;
 }
 
-class PacketTracker {
+class R4LINK_API PacketTracker {
  public:
   Arrival on(std::uint32_t pnum);
   // The sender is known to have begun again: the next number is taken as its first.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -11,44 +12,13 @@
 #include <string_view>
 #include <utility>
 
-#include "file_form.hpp"
+#include "../config.hpp"
+#include "record.hpp"
 #include "record_line.hpp"
+#include "recording_visitor.hpp"
 #include "zstd_stream.hpp"
 
 namespace r4 {
-
-// A part of a recording that cannot be read.
-struct RecordingDamage {
-  enum class Kind : std::uint8_t {
-    line,  // not a line of a recording
-    torn,  // the last line has no end: the program that wrote it was ended there
-    zstd,  // a part of a compressed recording; its lines are not counted
-  };
-  Kind kind = Kind::line;
-  std::uint64_t line = 1;    // from 1; 0 in a file of a format without lines
-  std::uint64_t offset = 0;  // of its first byte: in the text; for zstd in the file
-  std::string_view reason;
-};
-
-// Receives the content of a recording while it is read. The views are valid within the call.
-class RecordingHandler {
- public:
-  virtual void on_record(const Record& record) = 0;
-  // Comes before the first record of that path, and again when its name is known. After a new
-  // header a path number may mean another path.
-  virtual void on_path(const RecordedPath& path) = 0;
-  virtual void on_damage(const RecordingDamage& damage) = 0;
-  // The device at that place of that path from now on, until a header.
-  virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
-  // A recording begins or continues here: one file may hold several.
-  virtual void on_header() {}
-  // Any other line that begins with #. The lines of headers and devices follow on_header() and
-  // on_device().
-  virtual void on_comment(std::string_view line) { static_cast<void>(line); }
-
- protected:
-  ~RecordingHandler() = default;
-};
 
 // Reads the lines of the native format, in a native file or in a file of another format.
 //
@@ -60,20 +30,20 @@ class RecordingHandler {
 // - a path whose URL changes without a header,
 // - lines, or datagrams of one path, that come from another stream (an interface of a capture, a
 //   channel of MCAP) without a new header or path.
-// After damage, the missing part may explain such a sign. Then the file is read on, and the handler
+// After damage, the missing part may explain such a sign. Then the file is read on, and the visitor
 // gets the line damage_line, so that a copy of the file can be read, too.
-class RecordingLines {
+class R4LINK_API RecordingLines {
  public:
   static constexpr std::string_view damage_line = "# damage: a part before this could not be read";
 
   // `name`: the subject of errors.
-  RecordingLines(RecordingHandler& handler, std::string name)
-      : handler_(handler), name_(std::move(name)) {}
+  RecordingLines(RecordingVisitor& visitor, std::string name)
+      : visitor_(visitor), name_(std::move(name)) {}
 
-  // Gives the content of a line to the handler. Returns why it is not a line of a recording, or
+  // Gives the content of a line to the visitor. Returns why it is not a line of a recording, or
   // nullptr. Throws Error{data} for a later version of the format, and for mixed recordings.
   const char* on_line(std::string_view line, std::uint32_t stream = 0);
-  // Gives a record of that stream to the handler which is not written as a line. `url`: how the
+  // Gives a record of that stream to the visitor which is not written as a line. `url`: how the
   // stream says that its board is reached; empty if it does not say. Throws Error{data} for mixed
   // recordings.
   void on_record(const Record& record, std::uint32_t stream, std::string_view url);
@@ -94,9 +64,9 @@ class RecordingLines {
     std::optional<std::uint32_t> stream;
   };
   enum class Damage : std::uint8_t { none, here, reported };  // since the newest header
-  void give(const Record& record);
+  R4LINK_PRIVATE void give(const Record& record);
 
-  RecordingHandler& handler_;
+  RecordingVisitor& visitor_;
   const std::string name_;
   RecordLine read_;
   bool recognised_ = false;
@@ -107,12 +77,10 @@ class RecordingLines {
   std::map<std::uint16_t, Path> paths_;
 };
 
-class RecordingReader {
+class R4LINK_API RecordingReader {
  public:
-  using Handler = RecordingHandler;
-
   // `name`: the subject of errors.
-  RecordingReader(Handler& handler, std::string name);
+  RecordingReader(RecordingVisitor& visitor, std::string name);
 
   // Takes the next bytes. Lines may end in CR LF, and the UTF-8 mark may precede them. Throws
   // Error{data} for a later version of the format, for mixed recordings, and for other files.
@@ -124,15 +92,15 @@ class RecordingReader {
   // A file with this many bytes without a line of a recording is not a recording.
   static constexpr std::uint64_t patience = 65536;
 
-  void on_compressed(std::string_view bytes);
-  void on_text(std::string_view text);
-  void on_lines(std::string_view text);
-  void end_line(std::string_view rest);
-  void damage(RecordingDamage::Kind kind, std::string_view reason);
-  [[noreturn]] void fail_as_none() const;
+  R4LINK_PRIVATE void on_compressed(std::string_view bytes);
+  R4LINK_PRIVATE void on_text(std::string_view text);
+  R4LINK_PRIVATE void on_lines(std::string_view text);
+  R4LINK_PRIVATE void end_line(std::string_view rest);
+  R4LINK_PRIVATE void damage(RecordingDamage::Kind kind, std::string_view reason);
+  [[noreturn]] R4LINK_PRIVATE void fail_as_none() const;
 
   RecordingLines lines_;
-  Handler& handler_;
+  RecordingVisitor& visitor_;
   const std::string name_;
   std::unique_ptr<ZstdReader> zstd_;
   std::string beginning_;       // magic_size bytes of the file, which show whether it is compressed
@@ -144,8 +112,9 @@ class RecordingReader {
   std::uint64_t part_size_ = 0;  // the size of that line so far; more than part_ if it is too long
 };
 
-// Reads the file of that name; "-" is the standard input. Throws Error if it cannot be read, or is
-// not a recording.
-void read_recording(const std::string& path, RecordingReader::Handler& handler);
+// Gives the bytes of the file of that name to `take`, in pieces; "-" is the standard input. Throws
+// Error: open, permission.
+R4LINK_API void read_in_pieces(const std::string& path,
+                               const std::function<void(std::string_view)>& take);
 
 }  // namespace r4

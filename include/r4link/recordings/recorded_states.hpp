@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The states in a recording's datagrams, each path's merged.
+#pragma once
+
+#include <cstdint>
+#include <map>
+
+#include "../config.hpp"
+#include "../datagram.hpp"
+#include "../state.hpp"
+#include "record.hpp"
+
+namespace r4 {
+
+class R4LINK_API RecordedStates {
+ public:
+  // The state that the record is, merged over the earlier states of its path; nullptr if it is not
+  // a state. Valid until the next call.
+  const State* take(const Record& record);
+  // The datagram of the record that take() has read as a state. Valid as long as the record.
+  const Datagram& datagram() const { return datagram_; }
+  // For on_header(): the paths may be other ones.
+  void clear() { states_.clear(); }
+
+ private:
+  Datagram datagram_;
+  std::map<std::uint16_t, State> states_;
+};
+
+}  // namespace r4

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What receives the content of a recording while it is read.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "../config.hpp"
+#include "record.hpp"
+
+namespace r4 {
+
+// A part of a recording that cannot be read.
+struct RecordingDamage {
+  enum class Kind : std::uint8_t {
+    line,  // not a line of a recording
+    torn,  // the last line has no end: the program that wrote it was ended there
+    zstd,  // a part of a compressed recording; its lines are not counted
+  };
+  Kind kind = Kind::line;
+  std::uint64_t line = 1;    // from 1; 0 in a file of a format without lines
+  std::uint64_t offset = 0;  // of its first byte: in the text; for zstd in the file
+  std::string_view reason;
+};
+// "line 12, byte 480: longer than any line of a recording". `reason` may have bytes of the file.
+R4LINK_API std::string to_text(const RecordingDamage& damage);
+
+// All is in the order of the file, and valid within the call.
+class RecordingVisitor {
+ public:
+  virtual ~RecordingVisitor() = default;
+  // A datagram, also a damaged one, or an event. A path that no path line has named is possible.
+  virtual void on_record(const Record& record) = 0;
+  // What follows the damage is read.
+  virtual void on_damage(const RecordingDamage& damage) = 0;
+  // Comes before the first record of that path, and again when its name is known. After a new
+  // header a path number may mean another path.
+  virtual void on_path(const RecordedPath& path) { static_cast<void>(path); }
+  // The device at that place of that path from now on, until a header. Device::parse() reads it.
+  virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
+  // A recording begins or continues here: one file may hold several.
+  virtual void on_header() {}
+  // Any other line that begins with #. The lines of headers and devices follow on_header() and
+  // on_device().
+  virtual void on_comment(std::string_view line) { static_cast<void>(line); }
+};
+
+}  // namespace r4
