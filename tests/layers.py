@@ -25,7 +25,7 @@ MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/devices', 'firmware/po
 HOST = TRANSPORTS | {'host', 'host/arming', 'host/async', 'host/blocking', 'host/commands', 'host/control', 'host/devices',
                      'host/discovery', 'host/link', 'host/measurement', 'host/paths', 'host/recording', 'host/replay', 'host/session', 'host/uart'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
-SHELL = SIMULATED | {'tools/r4/shell'}
+SHELL = SIMULATED | {'tools/r4/boards', 'tools/r4/shell'}
 FORMATS = {'tools/r4/formats', 'tools/r4/formats/mcap', 'tools/r4/formats/packets'}
 # room: the rooms it may include besides itself
 ALLOWED = {
@@ -86,6 +86,7 @@ ALLOWED = {
     'host/python/bindings': PUBLIC,
     'host': HOST,
     'tools/r4/shell': SIMULATED,
+    'tools/r4/boards': SIMULATED | {'tools/r4/shell'},
     'tools/r4/manual': SHELL,
     'tools/r4/drive': SHELL,
     'tools/r4/list': PUBLIC | {'tools/r4/shell'},

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "can_question.hpp"
 
-#include <system_error>
-
 #include "transports/can/can_carrier.hpp"
 #include "transports/identity_answer.hpp"
 
@@ -29,10 +27,7 @@ void CanQuestion::ask() {
     asked_ = Clock::now();
     if (!first_asked_) first_asked_ = asked_;
   }
-  timer_.expires_after(sent ? ask_again : look_at_bus);
-  timer_.async_wait([this](const std::error_code& error) {
-    if (!error) ask();
-  });
+  timer_.after(sent ? ask_again : look_at_bus, [this] { ask(); });
 }
 
 void CanQuestion::hear(Text datagram) {

@@ -115,17 +115,17 @@ int convert(const ConvertOptions& options) {
     if (++told > most_damage) return;
     progress.clear();
     const std::string line = damage.line == 0 ? "" : fmt::format("line {}, ", damage.line);
-    print_trouble(fmt::format("r4: {}: {}byte {}: {}; it is left out", called(options.input), line,
-                              damage.offset, damage.reason));
+    print_trouble("r4: {}: {}byte {}: {}; it is left out", called(options.input), line,
+                  damage.offset, damage.reason);
   });
   read_file(options.input, conversion, source, advance);
   conversion.finish();
   output.finish();
   progress.clear();
-  if (told > most_damage) fmt::print(stderr, "r4: and {} more\n", told - most_damage);
+  if (told > most_damage) print_trouble("r4: and {} more", told - most_damage);
   const std::string left_out = sink->left_out();
-  print_text(fmt::format("{}: {} records{}\n", printable(options.output), conversion.records(),
-                         left_out.empty() ? "" : "; left out are " + printable(left_out)));
+  print_text("{}: {} records{}\n", printable(options.output), conversion.records(),
+             left_out.empty() ? "" : "; left out are " + printable(left_out));
   return conversion.damage() == 0 ? 0 : static_cast<int>(ErrorKind::data);
 }
 

@@ -6,7 +6,6 @@
 
 #include "r4link/link.hpp"
 #include "r4link/tables/state_fields.hpp"
-#include "transports/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {
@@ -22,9 +21,9 @@ std::uint64_t lost_in_turn(const PacketCounters& packets) {
 }
 
 // Of several paths to a board each one.
-void describe_paths(const MetricBoard& each, const MetricLabels& one, MetricFamilies& out) {
+void describe_paths(const SetBoard& each, const MetricLabels& one, MetricFamilies& out) {
   const std::vector<std::string> urls = split_paths(each.url);
-  const std::vector<PathStatus> paths = each.board->paths();
+  const std::vector<PathStatus> paths = each.board.paths();
   if (paths.size() < 2) return;
   for (std::size_t i = 0; i < paths.size(); ++i) {
     const PathStatus& path = paths[i];
@@ -53,8 +52,8 @@ void describe_paths(const MetricBoard& each, const MetricLabels& one, MetricFami
 
 }  // namespace
 
-void describe(const MetricBoard& each, MetricFamilies& out) {
-  const AsyncBoard& board = *each.board;
+void describe(const SetBoard& each, MetricFamilies& out) {
+  const AsyncBoard& board = each.board;
   const BoardIdentity& who = board.identity();
   const LinkStatus& link = board.link();
   const Statistics statistics = board.statistics();

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "r4link/async_board.hpp"
+#include "../boards/board_set.hpp"
 
 namespace r4::tool {
 
@@ -59,13 +59,7 @@ class MetricFamilies {
   std::vector<MetricFamily> families_;
 };
 
-// A board under the URL that the user gave: the same whenever the program is started.
-struct MetricBoard {
-  std::string url;
-  const AsyncBoard* board;
-};
-
 // What is told of one board.
-void describe(const MetricBoard& each, MetricFamilies& out);
+void describe(const SetBoard& each, MetricFamilies& out);
 
 }  // namespace r4::tool
