@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "board_metrics.hpp"
 
+#include <fmt/format.h>
+
 #include <chrono>
 #include <utility>
 
+#include "r4link/error.hpp"
 #include "r4link/link.hpp"
 #include "r4link/tables/state_fields.hpp"
 
@@ -50,7 +53,35 @@ void describe_paths(const SetBoard& each, const MetricLabels& one, MetricFamilie
   }
 }
 
+// A value of a label may come from a board, so it is made printable. A backslash and quotes are escaped.
+std::string label_text(const std::string& value) {
+  std::string text;
+  for (const char c : printable(value)) {
+    if (c == '\\' || c == '"') text += '\\';
+    text += c;
+  }
+  return text;
+}
+
 }  // namespace
+
+void MetricFamilies::add(const char* name, const char* help, const char* type,
+                         const MetricLabels& labels, double value) {
+  std::string& text = families_[name];
+  if (text.empty()) text = fmt::format("# HELP {0} {1}\n# TYPE {0} {2}\n", name, help, type);
+  text += name;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    text += fmt::format("{}{}=\"{}\"", i == 0 ? '{' : ',', labels[i].first,
+                        label_text(labels[i].second));
+  }
+  text += fmt::format("{} {}\n", labels.empty() ? "" : "}", value);
+}
+
+std::string MetricFamilies::text() const {
+  std::string all;
+  for (const auto& [name, text] : families_) all += text;
+  return all;
+}
 
 void describe(const SetBoard& each, MetricFamilies& out) {
   const AsyncBoard& board = each.board;

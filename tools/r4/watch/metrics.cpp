@@ -38,7 +38,7 @@ struct MetricsOptions {
 web::ServerOptions server_options(const MetricsOptions& options) {
   web::ServerOptions server;
   server.address = web::listen_address(options.listen);
-  server.offer = web::Offer::metrics;
+  server.page = false;
   for (const std::string& each : options.hosts) server.hosts.push_back(web::host_name(each));
   return server;
 }
@@ -124,10 +124,7 @@ class MetricsCommand final : web::ServerEvents {
   web::Server server_;
 };
 
-int serve_metrics(const MetricsOptions& options) {
-  require_metrics();
-  return MetricsCommand(options).run(options);
-}
+int serve_metrics(const MetricsOptions& options) { return MetricsCommand(options).run(options); }
 
 constexpr const char* metrics_footer =
     R"(Answers Prometheus at http://127.0.0.1:9618/metrics (docs/metrics.md): of each board whether it is heard,

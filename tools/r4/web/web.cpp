@@ -12,7 +12,6 @@
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "../watch/board_metrics.hpp"
 #include "hub.hpp"
 #include "server/access.hpp"
 
@@ -45,7 +44,6 @@ int serve_web(const Options& options) {
   }
   hub_options.server.origins = options.origins;
   hub_options.server.page_folder = options.page;
-  if (!has_metrics()) hub_options.server.offer = web::Offer::page;
   // A name is for other computers, though a proxy in front asks from this one.
   const bool secret =
       options.token || !options.hosts.empty() || !web::is_loopback(hub_options.server.address.host);
