@@ -72,7 +72,7 @@ TEST(BoardSet, OfNoBoardsLeavesAtOnce) {
 
 TEST(BoardSet, AsksForTheFieldsOfTheDevicesToo) {
   BoardOptions options;
-  ask_for(options, "DEFAULT", Device::from({"bno055@0x28"}));
+  ask_for(options, "DEFAULT", {Device::from("bno055@0x28")});
   EXPECT_TRUE(options.session.fields.starts_with("DEFAULT,")) << options.session.fields;
   const BoardOptions watched = watching("", "ENC1");
   EXPECT_EQ(watched.role, BoardRole::watch);

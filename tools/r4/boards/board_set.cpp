@@ -3,14 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <utility>
-
 #include "../shell/key_file.hpp"
 #include "paths.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"
-#include "transports/can/can_interface.hpp"
-#include "transports/url.hpp"
 
 namespace r4::tool {
 
@@ -65,9 +61,10 @@ void ask_for(BoardOptions& options, const std::string& fields, const std::vector
 }
 
 std::string whole_bus(std::string_view url) {
-  const bool one = split_paths(url).size() == 1 && url.find('?') == std::string_view::npos;
-  if (!one || Url::parse(url).scheme() != "can") return {};
-  return can_interface_of(Url::parse(url));
+  constexpr std::string_view scheme = "can://";
+  const bool whole =
+      url.starts_with(scheme) && url.find_first_of("/?+", scheme.size()) == std::string_view::npos;
+  return whole ? std::string(url.substr(scheme.size())) : std::string();
 }
 
 }  // namespace r4::tool

@@ -17,6 +17,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "r4link/async_board.hpp"
@@ -60,7 +61,7 @@ class BoardSet {
     end_.watch(duration);
   }
   void run() { io_.run(); }
-  // Ends run(). What had come together with the last datagram may follow until then.
+  // Ends run(). Callbacks for datagrams that were read together may still follow.
   void stop() { io_.stop(); }
   bool stopped() const { return io_.stopped(); }
   // After run(): all boards say farewell at once, until each has answered, but not for longer than `limit`. So the

@@ -215,7 +215,7 @@ int monitor(const MonitorOptions& options) {
 constexpr const char* monitor_footer =
     R"(On a terminal: a status, redrawn in place. Into a pipe: one line a state. With --json: one object a
 line, with type (state, heartbeat, link, nack, error), transport, pnum, t and fields (numbers as
-numbers, several values as an array); of one board on a CAN bus, at the end, one of type transfers.
+numbers, several values as an array); of a board on a CAN bus, at the end, one of type transfers.
 The causes of a link say what is wrong with it, the gravest first: transport down, two boards,
 watchdog, callback, foreign frames, busy (another host controls the board), board has no key,
 key needed, key not taken, watchers full, not watchable, late frames, other board.
