@@ -26,7 +26,7 @@ MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/devices', 'firmware/po
 HOST = TRANSPORTS | {'host', 'host/arming', 'host/async', 'host/blocking', 'host/commands', 'host/control', 'host/devices',
                      'host/discovery', 'host/link', 'host/measurement', 'host/paths', 'host/recording', 'host/replay', 'host/session', 'host/uart'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
-SHELL = PUBLIC | {'tools/r4/shell'}
+SHELL = PUBLIC | {'tools/r4/boards', 'tools/r4/shell'}
 # Tools use the public interface alone. These rooms may look below it: the analysis of frames (bus) and the simulated
 # board's own room (sim). Single files: EXCEPTIONS.
 BELOW = SIMULATED | SHELL
@@ -93,6 +93,7 @@ ALLOWED = {
     'host/python/bindings': PUBLIC,
     'host': HOST,
     'tools/r4/shell': PUBLIC,
+    'tools/r4/boards': PUBLIC | {'tools/r4/shell'},
     'tools/r4/manual': SHELL,
     'tools/r4/drive': SHELL,
     'tools/r4/list': SHELL,

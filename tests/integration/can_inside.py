@@ -13,7 +13,7 @@ import urllib.request
 
 import pytest
 
-from r4_process import (DATA, ERROR, METRICS, PATIENCE_S, Board, Running, driving, is_link, is_state, lasts, monitor,
+from r4_process import (DATA, ERROR, PATIENCE_S, Board, Running, driving, is_link, is_state, lasts, monitor,
                         objects, run, send, wait_for, watch)
 
 BUS = 'can://vcan0?node=3'
@@ -459,8 +459,6 @@ def test_a_recording_is_a_board_on_the_bus(tmp_path):
 
 
 def test_prometheus_is_told_how_busy_a_bus_is_and_for_whom():
-    if not METRICS:
-        return
     boards = 'can://vcan0?node=2-3'
     with Board(boards, listens=2, options=PATIENTLY), driving('can://vcan0?node=3', 'O:358,1,1'):
         with Running('metrics', boards, '--json', '--listen', '127.0.0.1:0') as metrics:

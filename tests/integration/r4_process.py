@@ -20,7 +20,6 @@ from machine import PROMPT, within_ms
 
 R4 = os.environ['R4']
 DATA = os.environ.get('R4_TEST_DATA', os.path.join(os.path.dirname(__file__), '..', 'data'))
-METRICS = os.environ.get('R4_METRICS') != 'OFF'  # as CMake's option
 PATIENCE_S = 10 if PROMPT else 30
 
 # The one shape of an error: thing, reason, fix.

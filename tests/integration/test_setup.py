@@ -11,8 +11,8 @@ import pytest
 TOOLS = pathlib.Path(__file__).resolve().parents[2] / 'tools'
 PRODUCT = {'g++', 'cmake', 'ninja-build', 'pkg-config', 'libasio-dev', 'libboost-dev', 'libserialport-dev',
            'libnl-route-3-dev', 'libfmt-dev', 'libdeflate-dev', 'libzstd-dev', 'liblz4-dev', 'libcli11-dev',
-           'nlohmann-json3-dev', 'prometheus-cpp-dev', 'cyclonedds-dev', 'cyclonedds-tools'}
-PARTS = {'prometheus-cpp-dev', 'cyclonedds-dev', 'cyclonedds-tools'}
+           'nlohmann-json3-dev', 'cyclonedds-dev', 'cyclonedds-tools'}
+PARTS = {'cyclonedds-dev', 'cyclonedds-tools'}
 UNIT_TESTS = {'libgtest-dev', 'librapidcheck-dev', 'libbenchmark-dev', 'python3', 'python3-pytest', 'libpython3-dev',
               'pybind11-dev'}
 
@@ -84,7 +84,7 @@ def test_what_the_product_needs_is_named_by_library_and_version_where_there_is_n
 def test_a_part_of_the_product_is_skipped_where_its_library_is_too_old(tmp_path):
     ended, installed = Release(tmp_path, {'cyclonedds-dev', 'cyclonedds-tools'}, PRODUCT - PARTS, '0.8.2').set_up()
     assert (ended.returncode, installed) == (0, set())
-    assert re.search(r'skipped.*prometheus-cpp-dev cyclonedds-dev cyclonedds-tools', ended.stderr)
+    assert re.search(r'skipped.*cyclonedds-dev cyclonedds-tools', ended.stderr)
 
 
 def test_for_another_architecture_the_compiler_is_a_cross_compiler_and_libraries_are_its_own(tmp_path):

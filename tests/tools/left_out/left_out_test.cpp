@@ -5,7 +5,6 @@
 
 #include "r4link/error.hpp"
 #include "tools/r4/ros2/bridge.hpp"
-#include "tools/r4/watch/board_metrics.hpp"
 
 namespace r4::tool {
 namespace {
@@ -27,16 +26,6 @@ TEST(LeftOut, Ros2NamesTheOptionThatItWasBuiltWithAndTheLibraryThatItNeeds) {
   EXPECT_TRUE(text.starts_with("unsupported: r4 ros2: ")) << text;
   EXPECT_NE(text.find("R4_ROS2=OFF"), std::string::npos) << text;
   EXPECT_NE(text.find("Cyclone DDS"), std::string::npos) << text;
-}
-
-TEST(LeftOut, MetricsNameTheOptionThatTheyWereBuiltWithAndTheLibraryThatTheyNeed) {
-  EXPECT_FALSE(has_metrics());
-  for (const std::string& text :
-       {thrown_by(require_metrics), thrown_by([] { MetricFamilies().text(); })}) {
-    EXPECT_TRUE(text.starts_with("unsupported: r4 metrics: ")) << text;
-    EXPECT_NE(text.find("R4_METRICS=OFF"), std::string::npos) << text;
-    EXPECT_NE(text.find("prometheus-cpp"), std::string::npos) << text;
-  }
 }
 
 }  // namespace

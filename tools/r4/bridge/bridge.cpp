@@ -4,20 +4,18 @@
 
 #include <array>
 #include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
-#include <cstdio>
+#include <asio/post.hpp>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "../boards/run_end.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
-#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "r4link/fleet.hpp"
 
@@ -53,45 +51,24 @@ constexpr std::array<NamedCounter, 9> named_counters{{
 
 const char* to_text(BridgeSide side) { return side == BridgeSide::hosts ? "hosts" : "board"; }
 
-// What it tells, from two threads: its own and the bridge's.
+// What it tells, on its own thread: the bridge must not wait for a reader of the output.
 class Report {
  public:
   explicit Report(bool json) : json_(json) {}
 
   void joined(const std::vector<BridgeStatus>& all) {
-    const std::lock_guard lock(mutex_);
     told_.resize(all.size());
     for (const BridgeStatus& each : all) {
       if (json_) {
-        print_line({{"type", "bridge"}, {"hosts", each.hosts.name}, {"board", each.board.name}});
+        lines_.write(
+            line_of({{"type", "bridge"}, {"hosts", each.hosts.name}, {"board", each.board.name}}));
       } else {
-        print_text(fmt::format("{} <-> {}\n", each.hosts.name, each.board.name));
+        lines_.write(fmt::format("{} <-> {}\n", each.hosts.name, each.board.name));
       }
     }
-    joined_ = true;
-    for (const BridgeEvent& each : std::exchange(early_, {})) tell(each);
   }
 
   void event(const BridgeEvent& event) {
-    const std::lock_guard lock(mutex_);
-    if (joined_) {
-      tell(event);
-    } else {
-      early_.push_back(event);
-    }
-  }
-
-  // Of those that have changed since they were told.
-  void counters(const std::vector<BridgeStatus>& all) {
-    const std::lock_guard lock(mutex_);
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      tell_counters(BridgeSide::hosts, all[i].hosts, told_[i].hosts);
-      tell_counters(BridgeSide::board, all[i].board, told_[i].board);
-    }
-  }
-
- private:
-  void tell(const BridgeEvent& event) const {
     const Problem& problem = event.event.problem;
     const char* const kind = r4::to_text(event.event.kind);
     if (json_) {
@@ -99,15 +76,24 @@ class Report {
       line["type"] = "transport";
       line["event"] = kind;
       line["side"] = to_text(event.side);
-      print_line(line);
+      lines_.write(line_of(line));
     } else if (event.event.kind == CarrierEvent::Kind::up) {
       print_trouble(problem.thing + ": up");
     } else {
-      print_trouble(fmt::format("{} ({})", problem.text(), kind));
+      print_trouble("{} ({})", problem.text(), kind);
     }
   }
 
-  void tell_counters(BridgeSide side, const BridgeEnd& now, BridgeEnd& told) const {
+  // Of those that have changed since they were told.
+  void counters(const std::vector<BridgeStatus>& all) {
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      tell_counters(BridgeSide::hosts, all[i].hosts, told_[i].hosts);
+      tell_counters(BridgeSide::board, all[i].board, told_[i].board);
+    }
+  }
+
+ private:
+  void tell_counters(BridgeSide side, const BridgeEnd& now, BridgeEnd& told) {
     bool changed = told.name.empty();
     for (const NamedCounter& each : named_counters) {
       changed = changed || now.from.*each.value != told.from.*each.value;
@@ -118,7 +104,7 @@ class Report {
       Json line{
           {"type", "counters"}, {"side", to_text(side)}, {"transport", now.name}, {"up", now.up}};
       for (const NamedCounter& each : named_counters) line[each.name] = now.from.*each.value;
-      return print_line(line);
+      return lines_.write(line_of(line));
     }
     std::string text;
     for (const NamedCounter& each : named_counters) {
@@ -128,13 +114,11 @@ class Report {
       if (name == "kept_out") name = "kept out";
       text += fmt::format("{}{} {}", text.empty() ? "" : ", ", now.from.*each.value, name);
     }
-    print_trouble(fmt::format("from {}: {}", now.name, text));
+    print_trouble("from {}: {}", now.name, text);
   }
 
   const bool json_;
-  std::mutex mutex_;
-  bool joined_ = false;
-  std::vector<BridgeEvent> early_;  // until the bridge is told of
+  LineWriter lines_{std::size_t{1} << 16};
   std::vector<BridgeStatus> told_;
 };
 
@@ -145,24 +129,20 @@ int bridge(const Options& options) {
   bridge_options.timeout = options.timeout;
   for (const std::string& path : options.keys) bridge_options.keys.push_back(load_key(path));
   bridge_options.open = options.open;
-  bridge_options.on_event = [&report](const BridgeEvent& event) { report.event(event); };
+  bridge_options.on_event = [&](const BridgeEvent& event) {
+    asio::post(io, [&report, event] { report.event(event); });
+  };
   Bridge bridge(options.hosts, options.board, std::move(bridge_options));
   RunEnd run_end(io);
   run_end.watch(options.duration);
   report.joined(bridge.status());
 
-  asio::steady_timer timer(io);
-  const std::function<void()> tell_later = [&] {
-    timer.expires_after(options.every);
-    timer.async_wait([&](const std::error_code& error) {
-      if (error) return;
-      report.counters(bridge.status());
-      tell_later();
-    });
-  };
-  tell_later();
+  Timer timer(io);
+  timer.every(options.every, [&] { report.counters(bridge.status()); });
   io.run();
   bridge.close();
+  io.restart();
+  io.poll();  // what happened last
   report.counters(bridge.status());
   return 0;
 }

@@ -2,7 +2,6 @@
 // r4 bus: does a planned CAN bus carry its boards? And how full is a real one (bus_live.hpp)?
 #include <fmt/format.h>
 
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
@@ -79,20 +78,20 @@ std::string plan_text(const BusPlan& plan, const Options& options) {
 }
 
 void print_row(const BusTraffic& row) {
-  fmt::print("{:<16}{:>10.0f}{:>8.1f}{:>10.0f}{:>11.0f}{:>9.1f} %{:>8.1f} %\n", row.name,
+  print_text("{:<16}{:>10.0f}{:>8.1f}{:>10.0f}{:>11.0f}{:>9.1f} %{:>8.1f} %\n", row.name,
              row.datagrams, row.bytes, row.frames, row.bits, 100 * row.load, 100 * row.worst_load);
 }
 
 void print_table(const BusPlan& plan, const Options& options, const BusLoad& load) {
-  fmt::print("{}\n\n", plan_text(plan, options));
-  fmt::print("{:<16}{:>10}{:>8}{:>10}{:>11}{:>11}{:>10}\n", "", "datagrams", "bytes", "frames",
+  print_text("{}\n\n", plan_text(plan, options));
+  print_text("{:<16}{:>10}{:>8}{:>10}{:>11}{:>11}{:>10}\n", "", "datagrams", "bytes", "frames",
              "bits", "load", "worst");
-  fmt::print("{:<16}{:>10}{:>8}{:>10}{:>11}\n", "", "/s", "of one", "/s", "/s");
+  print_text("{:<16}{:>10}{:>8}{:>10}{:>11}\n", "", "/s", "of one", "/s", "/s");
   for (const BusTraffic& row : load.traffic) print_row(row);
   print_row(load.total);
   const std::uint32_t boards = most_boards(plan, nearly_full_bus);
   const std::uint32_t rate = highest_rate(plan, nearly_full_bus);
-  fmt::print("\nWith 20 % to spare this bus carries {} at {} Hz{}.\n",
+  print_text("\nWith 20 % to spare this bus carries {} at {} Hz{}.\n",
              boards == 0 ? "no board" : counted(boards, "board"), plan.states_hz,
              rate == 0 ? "" : fmt::format(", or {} at {} Hz", counted(plan.boards, "board"), rate));
 }
@@ -153,8 +152,7 @@ int bus(const Options& options) {
     throw Error(ErrorKind::data, "the bus", "would need " + taken, remedy(plan));
   }
   if (load.total.load > nearly_full_bus) {
-    std::fflush(stdout);
-    fmt::print(stderr, "r4: warning: the bus: nearly full, {} is taken; {}\n", taken, remedy(plan));
+    print_trouble("r4: warning: the bus: nearly full, {} is taken; {}", taken, remedy(plan));
   }
   return 0;
 }

@@ -5,16 +5,14 @@
 #include <unistd.h>
 
 #include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
-#include <cstdio>
 #include <map>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "../boards/run_end.hpp"
 #include "../shell/json.hpp"
-#include "../shell/run_end.hpp"
 #include "../shell/screen.hpp"
 #include "foreign_ids.hpp"
 #include "r4link/can/async_listener.hpp"
@@ -89,7 +87,11 @@ class LiveBus {
       }
     });
     run_end_.watch();
-    wait();
+    if (live_) {
+      timer_.every(interval, [this] { draw(); });
+    } else {
+      timer_.after(options_.duration.value_or(usual_duration), [this] { io_.stop(); });
+    }
     io_.run();
     if (live_) return;
     const Window window = look();
@@ -98,10 +100,9 @@ class LiveBus {
     } else {
       for (const std::string& row : table(window)) print_text(row + "\n");
     }
-    std::fflush(stdout);
-    for (const std::string& trouble : troubles()) fmt::print(stderr, "r4: warning: {}\n", trouble);
+    for (const std::string& trouble : troubles()) print_trouble("r4: warning: {}", trouble);
     if (window.load(window.total) > nearly_full_) {
-      fmt::print(stderr, "r4: warning: {}\n", fullness(window));
+      print_trouble("r4: warning: {}", fullness(window));
     }
   }
 
@@ -137,21 +138,13 @@ class LiveBus {
     return rate;
   }
 
-  void wait() {
-    timer_.expires_after(live_ ? interval : options_.duration.value_or(usual_duration));
-    timer_.async_wait([this](const std::error_code& error) {
-      if (error) return;
-      if (!live_) return io_.stop();
-      if (Screen::has_room()) {
-        const Window window = look();
-        std::vector<std::string> rows = table(window);
-        if (window.load(window.total) > nearly_full_)
-          rows.push_back("warning: " + fullness(window));
-        for (const std::string& trouble : troubles()) rows.push_back(trouble);
-        screen_.draw(std::move(rows));
-      }
-      wait();
-    });
+  void draw() {
+    if (!Screen::has_room()) return;
+    const Window window = look();
+    std::vector<std::string> rows = table(window);
+    if (window.load(window.total) > nearly_full_) rows.push_back("warning: " + fullness(window));
+    for (const std::string& trouble : troubles()) rows.push_back(trouble);
+    screen_.draw(std::move(rows));
   }
 
   Window look() {
@@ -249,7 +242,7 @@ class LiveBus {
   asio::io_context io_{1};
   CanListener listener_;
   RunEnd run_end_;
-  asio::steady_timer timer_;
+  Timer timer_;
   const bool live_;
   Screen screen_;
   std::string problem_;

@@ -31,11 +31,7 @@ DeviceSetup::DeviceSetup(asio::io_context& io, AsyncBoard& board,
 }
 
 void DeviceSetup::look_later() {
-  timer_.expires_after(look_interval);
-  timer_.async_wait([here = std::weak_ptr(here_)](const std::error_code& error) {
-    const auto still = here.lock();
-    if (!error && still) (*still)->look();
-  });
+  timer_.after(look_interval, [this] { look(); });
 }
 
 // Begins to set up the devices that are due.

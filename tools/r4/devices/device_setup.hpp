@@ -7,7 +7,6 @@
 
 #include <asio/cancellation_signal.hpp>
 #include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
 #include <cstddef>
 #include <functional>
@@ -15,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "../boards/timer.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/devices/device.hpp"
 #include "r4link/error.hpp"
@@ -52,7 +52,7 @@ class DeviceSetup {
   AsyncBoard& board_;
   const std::vector<Device>& devices_;
   std::function<void(const Problem&)> told_;
-  asio::steady_timer timer_;
+  Timer timer_;
   std::vector<Progress> progress_;
   std::size_t next_ = 0;  // that is set up now
   ScopedSubscription restarts_;

@@ -44,21 +44,21 @@ Json json_of(const DeviceDescription& device) {
 }
 
 void print_values(const DeviceDescription& device) {
-  print_text(fmt::format("{}: {}\n", device.name, device.title));
-  print_text(fmt::format("  role {}, at {}, {} of 8 slots\n", to_text(device.role),
-                         addresses_of(device), device.polls.size()));
+  print_text("{}: {}\n", device.name, device.title);
+  print_text("  role {}, at {}, {} of 8 slots\n", to_text(device.role), addresses_of(device),
+             device.polls.size());
   for (const DeviceValue& value : device.values) {
     const DevicePoll& poll = device.polls[value.poll];
-    print_text(fmt::format("  {:<16} {:<8} every {} ms\n", value.name,
-                           value.unit.empty() ? "-" : value.unit, poll.period.count()));
+    print_text("  {:<16} {:<8} every {} ms\n", value.name, value.unit.empty() ? "-" : value.unit,
+               poll.period.count());
   }
   for (const DeviceReady& each : device.ready) {
     const std::string& name = device.values[each.value].name;
-    fmt::print("  it is set up while {} is {}\n", name,
+    print_text("  it is set up while {} is {}\n", name,
                each.number ? fmt::format("{}", *each.number) : "a measurement");
   }
   if (device.ready.empty() && !device.writes.empty()) {
-    fmt::print(
+    print_text(
         "  after a reset its values are not told from measurements: add a line: ready VALUE "
         "NUMBER\n");
   }
@@ -75,7 +75,7 @@ int devices(const Options& options) {
     if (options.json) {
       print_line(json_of(device));
     } else {
-      fmt::print("{:<10} {:<6} {:<11} {}\n", name, to_text(device.role), addresses_of(device),
+      print_text("{:<10} {:<6} {:<11} {}\n", name, to_text(device.role), addresses_of(device),
                  device.title);
     }
   }

@@ -36,10 +36,7 @@ void CanQuestion::ask() {
     asked_ = Clock::now();
     if (!first_asked_) first_asked_ = asked_;
   }
-  timer_.expires_after(sent ? ask_again : look_at_bus);
-  timer_.async_wait([this](const std::error_code& error) {
-    if (!error) ask();
-  });
+  timer_.after(sent ? ask_again : look_at_bus, [this] { ask(); });
 }
 
 void CanQuestion::hear(const Datagram& datagram) {

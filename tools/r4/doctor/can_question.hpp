@@ -4,12 +4,12 @@
 #pragma once
 
 #include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
 #include <memory>
 #include <optional>
 #include <string_view>
 
+#include "../boards/timer.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/datagram.hpp"
 
@@ -39,7 +39,7 @@ class CanQuestion final : private Carrier::Handler {
   void on_carrier_event(const CarrierEvent&) override {}
 
   std::unique_ptr<Carrier> carrier_;
-  asio::steady_timer timer_;
+  Timer timer_;
   std::optional<Clock::time_point> first_asked_;
   std::optional<Clock::time_point> asked_;  // the newest question that is not answered
   double answer_us_ = 0;

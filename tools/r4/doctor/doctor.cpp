@@ -145,9 +145,9 @@ void print(const Findings& findings, bool json) {
                   {"automatic", each.mending == Mending::automatic}});
       continue;
     }
-    print_text(fmt::format("{:<8} {}: {}\n", to_text(each.severity), printable(each.thing),
-                           printable(each.reason)));
-    if (!each.fix.empty()) print_text(fmt::format("           {}\n", printable(each.fix)));
+    print_text("{:<8} {}: {}\n", to_text(each.severity), printable(each.thing),
+               printable(each.reason));
+    if (!each.fix.empty()) print_text("           {}\n", printable(each.fix));
   }
 }
 
@@ -160,8 +160,8 @@ int mend(const Findings& findings, bool json) {
     if (each.mending != Mending::automatic || each.severity == Severity::ok || known) continue;
     done.push_back(each.fix);
     if (!json) {
-      print_text(fmt::format("{}: {}\n$ {}\n", printable(each.thing), printable(each.reason),
-                             printable(each.fix)));
+      print_text("{}: {}\n$ {}\n", printable(each.thing), printable(each.reason),
+                 printable(each.fix));
     }
     // What it says is for people: with --json it must not get between the objects.
     const std::string command = json ? "{ " + each.fix + "; } >&2" : each.fix;
@@ -229,7 +229,7 @@ void print_summary(const Findings& findings, bool json) {
   } else if (errors + warnings == 0) {
     print_text("nothing is wrong\n");
   } else {
-    print_text(fmt::format("{} errors, {} warnings\n", errors, warnings));
+    print_text("{} errors, {} warnings\n", errors, warnings);
   }
 }
 

@@ -10,6 +10,7 @@
 
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
+#include "../shell/output.hpp"
 #include "../shell/subcommands.hpp"
 #include "r4link/board.hpp"
 #include "r4link/commands/command_text.hpp"
@@ -32,7 +33,7 @@ int make(const KeyOptions& options) {
   }
   const auto id = static_cast<std::uint8_t>(options.id.value_or(1));
   make_key_file(options.file, id);
-  fmt::print(
+  print_text(
       "{}: key {}\n"
       "give it to the board over USB:   r4 key give {} serial:auto\n"
       "then open the board with it:     r4 monitor udp://... --key {}\n",
@@ -55,7 +56,7 @@ int give(const KeyOptions& options) {
   Board board(options.url);
   // It need not be active: a board that is stopped takes a key, too.
   board.setting("key", {text.data(), text.size()}, std::chrono::seconds{5});
-  fmt::print(
+  print_text(
       "the board has key {} now: from networks and buses it obeys only who has it, stops "
       "excepted\n",
       key.id);

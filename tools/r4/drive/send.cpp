@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -13,12 +11,12 @@
 #include <utility>
 #include <vector>
 
+#include "../boards/board_set.hpp"
+#include "../boards/paths.hpp"
 #include "../shell/help.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
-#include "../shell/paths.hpp"
-#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "host/commands/command_help.hpp"
 #include "host/commands/limits.hpp"
@@ -135,26 +133,26 @@ class Sender {
   Sender(const SendOptions& options, const std::vector<Order>& orders)
       : options_(options),
         orders_(orders),
-        board_(io_, options.url, board_options(options, orders)),
-        hold_(io_),
-        answer_limit_(io_) {}
+        board_(boards_.add(options.url, board_options(options, orders)).board),
+        hold_(boards_.io()),
+        answer_limit_(boards_.io()) {}
 
   int run() {
     const Subscription states = board_.on_state([this](const ReceivedState&, const Datagram&) {
       if (waiting_ && is_answered(*waiting_)) tell(*std::exchange(waiting_, std::nullopt));
     });
     const Subscription refused = board_.on_link([this](const LinkStatus& link) {
-      if (link.causes.has(LinkCause::two_boards)) io_.stop();
+      if (link.causes.has(LinkCause::two_boards)) boards_.stop();
     });
     const Subscription events = board_.on_event([this](const CarrierEvent& event) {
       if (event.kind == CarrierEvent::Kind::down) down_ = event.problem;
     });
     board_.open();
     send_next();
-    io_.run();
+    boards_.run();
     require_one_board(board_);
     tell_paths_down(board_.paths(), options_.json);
-    say_farewell(io_, board_);
+    boards_.leave();
     if (failure_) throw Error(*failure_);
     return 0;
   }
@@ -162,8 +160,7 @@ class Sender {
  private:
   void send_next() {
     if (next_ == orders_.size()) {
-      hold_.expires_after(options_.hold);
-      hold_.async_wait([this](const std::error_code&) { io_.stop(); });
+      hold_.after(options_.hold, [this] { boards_.stop(); });
       return;
     }
     const Order& order = orders_[next_];
@@ -198,9 +195,8 @@ class Sender {
         result.outcome == Outcome::confirmed && is_transfer() && !is_answered(result);
     if (!waits) return tell(result);
     waiting_ = result;
-    answer_limit_.expires_after(options_.timeout);
-    answer_limit_.async_wait([this](const std::error_code& error) {
-      if (error || !waiting_) return;
+    answer_limit_.after(options_.timeout, [this] {
+      if (!waiting_) return;
       CommandResult late = *std::exchange(waiting_, std::nullopt);
       late.outcome = Outcome::timed_out;
       tell(late);
@@ -221,28 +217,26 @@ class Sender {
     if (options_.json) {
       print_line(result_json(text, result, problem, confirmed));
     } else if (confirmed) {
-      fmt::print("{}  confirmed in {:.1f} ms{}\n", text, milliseconds(result),
+      print_text("{}  confirmed in {:.1f} ms{}\n", text, milliseconds(result),
                  next_ == 0 ? ", connecting included" : "");
       if (orders_[next_].command().kind == CommandKind::identify) print_identity();
-      if (has_transfer && shows_bytes(transfer)) fmt::print("  {}\n", shown_bytes(transfer));
+      if (has_transfer && shows_bytes(transfer)) print_text("  {}\n", shown_bytes(transfer));
     } else {
-      print_text(fmt::format("{}  {}\n", text, problem.reason));
+      print_text("{}  {}\n", text, problem.reason);
     }
     if (!confirmed) {
       for (std::size_t i = next_ + size; i < orders_.size() && !options_.json; ++i) {
-        fmt::print("{}  not sent\n", shown(orders_[i]));
+        print_text("{}  not sent\n", shown(orders_[i]));
       }
       failure_ = problem;
       failure_->thing = fmt::format("{} to {}", problem.thing, board_.name());
       if (down_ && board_.link().causes.has(LinkCause::transport_down))
         failure_->fix = down_->text();
-      io_.stop();
+      boards_.stop();
       return;
     }
-    std::fflush(stdout);
     if (supply_is_missing() && !options_.json) {
-      fmt::print(
-          stderr,
+      print_trouble(
           "r4: {}: the motor supply is open (relay 1 is off), so no motor turns; send R:1,On "
           "before it\n",
           text);
@@ -275,8 +269,7 @@ class Sender {
   void print_identity() const {
     const BoardIdentity& id = board_.identity();
     const std::string name = id.name.empty() ? "" : " (" + id.name + ")";
-    print_text(fmt::format("  board {}{}, firmware {}, {}\n", id.board_id, name, id.firmware,
-                           id.capabilities));
+    print_text("  board {}{}, firmware {}, {}\n", id.board_id, name, id.firmware, id.capabilities);
   }
 
   static double milliseconds(const CommandResult& result) {
@@ -319,10 +312,10 @@ class Sender {
 
   const SendOptions& options_;
   const std::vector<Order>& orders_;
-  asio::io_context io_{1};
-  AsyncBoard board_;
-  asio::steady_timer hold_;
-  asio::steady_timer answer_limit_;
+  BoardSet boards_;
+  AsyncBoard& board_;
+  Timer hold_;
+  Timer answer_limit_;
   std::optional<CommandResult> waiting_;  // for the end of a transfer
   std::size_t next_ = 0;
   std::optional<Problem> failure_;

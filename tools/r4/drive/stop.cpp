@@ -3,17 +3,16 @@
 #include <fmt/format.h>
 
 #include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "../boards/board_set.hpp"
+#include "../boards/paths.hpp"
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
-#include "../shell/paths.hpp"
 #include "../shell/subcommands.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/discovery/async_carriers.hpp"
@@ -60,11 +59,10 @@ void print_confirmed(const StopOptions& options, const CommandResult& result) {
   if (options.json) {
     print_line({{"type", "result"}, {"command", "E:STOP"}, {"confirmed", true}, {"ms", ms}});
   } else {
-    fmt::print(
+    print_text(
         "stopped: the board reports SAFE (stop), after {:.1f} ms\n"
         "it stays so until: r4 send {} E:CLEAR\n",
         ms, join_paths(options.urls));
-    std::fflush(stdout);
   }
 }
 
@@ -73,14 +71,13 @@ int stop(const StopOptions& options) {
   const std::string url = join_paths(options.urls);
   const std::unique_ptr<AsyncBoard> board = open(io, url);
   std::optional<CommandResult> result;
-  asio::steady_timer repeating(io);
+  Timer repeating(io);
   board->async_stop(options.timeout, [&](const CommandResult& r) {
     result = r;
     if (r.outcome != Outcome::confirmed) return io.stop();
     print_confirmed(options, r);
     // The library repeats it for a while longer.
-    repeating.expires_after(SessionOptions().stop_linger);
-    repeating.async_wait([&](const std::error_code&) { io.stop(); });
+    repeating.after(SessionOptions().stop_linger, [&] { io.stop(); });
   });
   io.run();
   const LinkStatus link = board->link();

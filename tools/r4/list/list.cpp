@@ -56,39 +56,39 @@ std::string text_of(const FoundBoard& board) {
 }
 
 void print_board(const FoundBoard& board) {
-  fmt::print("    R4 board: {}  {}{}\n", printable(board.url),
+  print_text("    R4 board: {}  {}{}\n", printable(board.url),
              board.address.empty() ? "" : fmt::format("at {}, ", board.address), text_of(board));
 }
 
 void print_trouble_of(const std::optional<Problem>& trouble) {
   if (!trouble) return;
-  fmt::print("    {}{}{}\n", printable(trouble->reason), trouble->fix.empty() ? "" : "; ",
+  print_text("    {}{}{}\n", printable(trouble->reason), trouble->fix.empty() ? "" : "; ",
              printable(trouble->fix));
 }
 
 void print_ports(const Discovery& all) {
-  fmt::print("Serial ports:\n");
-  if (all.ports.empty()) fmt::print("  none\n");
+  print_text("Serial ports:\n");
+  if (all.ports.empty()) print_text("  none\n");
   for (const SearchedPort& port : all.ports) {
-    fmt::print("  {:<14} {:<10} {:<24} {}\n", printable(port.path), port.usb_id,
+    print_text("  {:<14} {:<10} {:<24} {}\n", printable(port.path), port.usb_id,
                printable(port.serial_number), printable(port.description));
     const std::vector<FoundBoard> boards = boards_at(all, port.path);
     for (const FoundBoard& board : boards) print_board(board);
     if (port.asked && boards.empty()) {
-      fmt::print("    no R4 board has answered: {}\n", printable(port.url));
+      print_text("    no R4 board has answered: {}\n", printable(port.url));
     }
     print_trouble_of(port.trouble);
   }
 }
 
 void print_buses(const Discovery& all) {
-  fmt::print("\nCAN interfaces:\n");
-  if (all.buses.empty()) fmt::print("  none\n");
+  print_text("\nCAN interfaces:\n");
+  if (all.buses.empty()) print_text("  none\n");
   for (const SearchedBus& bus : all.buses) {
     const std::vector<FoundBoard> boards = boards_at(all, bus.interface);
     const std::string rate = bus.bit_rate == 0 ? (bus.has_controller ? "no bit rate" : "virtual")
                                                : fmt::format("{} kbit/s", bus.bit_rate / 1000.0);
-    fmt::print("  {:<14} {:<5}{:<14} {:<14}{}{}\n", printable(bus.interface),
+    print_text("  {:<14} {:<5}{:<14} {:<14}{}{}\n", printable(bus.interface),
                bus.up ? "up" : "down", bus.state, rate, bus.fd ? "CAN FD  " : "",
                boards.empty() && !bus.trouble ? "no board heard" : "");
     for (const FoundBoard& board : boards) print_board(board);
@@ -97,16 +97,16 @@ void print_buses(const Discovery& all) {
 }
 
 void print_networks(const Discovery& all) {
-  fmt::print("\nNetworks (UDP):\n");
-  if (all.networks.empty()) fmt::print("  none\n");
+  print_text("\nNetworks (UDP):\n");
+  if (all.networks.empty()) print_text("  none\n");
   for (const SearchedNetwork& network : all.networks) {
     const std::vector<FoundBoard> boards = boards_at(all, network.address);
-    fmt::print("  {:<14} {:<19}{}\n", printable(network.interface), network.address,
+    print_text("  {:<14} {:<19}{}\n", printable(network.interface), network.address,
                boards.empty() && !network.trouble ? "no board answered" : "");
     for (const FoundBoard& board : boards) print_board(board);
     print_trouble_of(network.trouble);
   }
-  if (all.more) fmt::print("  more than {} answered\n", Discovery::most_answers);
+  if (all.more) print_text("  more than {} answered\n", Discovery::most_answers);
 }
 
 // --- as JSON
@@ -190,7 +190,7 @@ int list(const Options& options) {
   print_ports(found);
   print_buses(found);
   print_networks(found);
-  fmt::print("\nURLs:\n{}", url_table());
+  print_text("\nURLs:\n{}", url_table());
   return 0;
 }
 

@@ -13,6 +13,7 @@
 #include "option_tree.hpp"
 #include "r4link/error.hpp"
 #include "tools/r4/shell/options.hpp"
+#include "tools/r4/shell/output.hpp"
 #include "tools/r4/shell/subcommands.hpp"
 
 namespace r4::tool {
@@ -211,9 +212,9 @@ if [[ $funcstack[1] == _r4 ]]; then _r4 "$@"; else compdef _r4 r4; fi
 
 int print_completion(const Options& options) {
   const CLI::App& root = *options.root;
-  fmt::print("{}", options.shell == "bash"  ? bash_script(root)
-                   : options.shell == "zsh" ? zsh_script(root)
-                                            : fish_script(root));
+  print_raw(options.shell == "bash"  ? bash_script(root)
+            : options.shell == "zsh" ? zsh_script(root)
+                                     : fish_script(root));
   return 0;
 }
 

@@ -13,6 +13,7 @@
 #include "man_page.hpp"
 #include "r4link/error.hpp"
 #include "tools/r4/shell/options.hpp"
+#include "tools/r4/shell/output.hpp"
 #include "tools/r4/shell/subcommands.hpp"
 
 namespace r4::tool {
@@ -53,7 +54,7 @@ int print_pages(const ManOptions& options) {
     throw Error(ErrorKind::usage, options.command, "there is no such command",
                 "r4 --help lists them");
   }
-  fmt::print("{}", man_page(root, *shown));
+  print_raw(man_page(root, *shown));
   return 0;
 }
 

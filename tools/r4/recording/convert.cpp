@@ -114,17 +114,16 @@ int convert(const ConvertOptions& options) {
   Conversion conversion(*sink, [&](const RecordingDamage& damage) {
     if (++told > most_damage) return;
     progress.clear();
-    print_trouble(
-        fmt::format("r4: {}: {}; it is left out", called(options.input), to_text(damage)));
+    print_trouble("r4: {}: {}; it is left out", called(options.input), to_text(damage));
   });
   read_file(options.input, conversion, source, advance);
   conversion.finish();
   output.finish();
   progress.clear();
-  if (told > most_damage) fmt::print(stderr, "r4: and {} more\n", told - most_damage);
+  if (told > most_damage) print_trouble("r4: and {} more", told - most_damage);
   const std::string left_out = sink->left_out();
-  print_text(fmt::format("{}: {} records{}\n", printable(options.output), conversion.records(),
-                         left_out.empty() ? "" : "; left out are " + printable(left_out)));
+  print_text("{}: {} records{}\n", printable(options.output), conversion.records(),
+             left_out.empty() ? "" : "; left out are " + printable(left_out));
   return conversion.damage() == 0 ? 0 : static_cast<int>(ErrorKind::data);
 }
 

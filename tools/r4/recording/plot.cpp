@@ -315,7 +315,7 @@ int plot(const PlotOptions& options) {
   }
   output.finish();
   if (curves.damaged()) {
-    print_trouble(fmt::format("r4: {}: some of it could not be read; see r4 info", options.file));
+    print_trouble("r4: {}: some of it could not be read; see r4 info", options.file);
   }
   return curves.damaged() ? static_cast<int>(ErrorKind::data) : 0;
 }

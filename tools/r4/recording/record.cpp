@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <asio/io_context.hpp>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -14,19 +13,16 @@
 #include <utility>
 #include <vector>
 
+#include "../boards/board_set.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
-#include "../shell/paths.hpp"
-#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
-#include "host/standard_registry.hpp"
 #include "limits.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/can/async_listener.hpp"
 #include "r4link/can/can_interface.hpp"
 #include "r4link/discovery/url.hpp"
-#include "r4link/discovery/url_pattern.hpp"
 #include "r4link/error.hpp"
 #include "r4link/recording.hpp"
 
@@ -51,27 +47,12 @@ RecordingOptions limits_of(const RecordOptions& options) {
   return limits;
 }
 
-BoardOptions board_options(const RecordOptions& options, const std::vector<Device>& devices) {
-  BoardOptions board_options = with_key(options.key);
-  board_options.role = BoardRole::watch;
-  board_options.session.arming = Arming::off;  // it drives nothing
-  if (!options.fields.empty()) board_options.session.fields = options.fields;
-  for (const Device& device : devices) board_options.session.fields += "," + device.fields();
-  return board_options;
-}
-
-// can://can0, without a node: all boards that are heard on it.
-bool is_whole_bus(const std::string& text) {
-  return split_paths(text).size() == 1 && Url::parse(text).scheme() == "can" &&
-         text.find('?') == std::string::npos;
-}
-
 // Tells the nodes of the boards on a bus, when they are heard first.
 class BusListener {
  public:
-  BusListener(asio::io_context& io, const std::string& url,
+  BusListener(asio::io_context& io, const std::string& interface,
               std::function<void(std::uint8_t node)> on_board)
-      : url_(url), listener_(io, can_interface_of(Url::parse(url)), any_rate) {
+      : url_("can://" + interface), listener_(io, interface, any_rate) {
     listener_.survey().on_datagram(
         [this, on_board = std::move(on_board)](std::uint8_t node, const Datagram&) {
           if (!std::exchange(heard_[node % can_nodes], true)) on_board(node);
@@ -97,42 +78,39 @@ class Recorders {
  public:
   explicit Recorders(const RecordOptions& options)
       : devices_(Device::from(options.devices)),
-        board_options_(board_options(options, devices_)),
-        run_end_(io_) {
+        board_options_(watching(options.key, options.fields, devices_)) {
     std::vector<std::string> buses;
     for (const PatternUrl& each : expand_urls(options.urls)) {
-      is_whole_bus(each.url) ? buses.push_back(each.url) : add(each.url);
+      const std::string bus = whole_bus(each.url);
+      bus.empty() ? add(each.url) : buses.push_back(bus);
     }
     recording_.emplace(options.file, limits_of(options));
     for (const std::string& bus : buses) {
-      buses_.push_back(std::make_unique<BusListener>(io_, bus, [this, bus](std::uint8_t node) {
-        add(fmt::format("{}?node={}", bus, node));
-        open(*boards_.back());
-      }));
+      buses_.push_back(
+          std::make_unique<BusListener>(boards_.io(), bus, [this, bus](std::uint8_t node) {
+            add(fmt::format("can://{}?node={}", bus, node));
+            open(boards_[boards_.size() - 1].board);
+          }));
     }
   }
 
   int run(const RecordOptions& options) {
-    for (const auto& board : boards_) open(*board);
-    run_end_.watch(options.duration);
+    for (SetBoard& each : boards_) open(each.board);
+    boards_.end_by_signal(options.duration);
     const auto began = std::chrono::steady_clock::now();
-    io_.run();
+    boards_.run();
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
-    for (const auto& board : boards_) board->close();
+    boards_.leave();
     recording_->close();
     if (has_ended()) throw Error(*recording_->problem());
     tell_loss();
-    print_text(fmt::format("{}: {} datagrams and events in {:.1f} s\n", printable(options.file),
-                           recording_->records(), took.count()));
+    print_text("{}: {} datagrams and events in {:.1f} s\n", options.file, recording_->records(),
+               took.count());
     if (recording_->dropped() != 0) {
-      fmt::print(stderr, "r4: {} more were left out: the disk is too slow\n",
-                 recording_->dropped());
+      print_trouble("r4: {} more were left out: the disk is too slow", recording_->dropped());
     }
     for (const auto& bus : buses_) bus->require_boards();
-    for (const auto& board : boards_) {
-      require_one_board(*board);
-      if (board->statistics().received == 0) throw Error(explain(board->name(), board->link()));
-    }
+    boards_.require_heard();
     return lost_ ? static_cast<int>(ErrorKind::data) : 0;
   }
 
@@ -147,12 +125,10 @@ class Recorders {
     if (!problem || std::exchange(lost_, true)) return;
     print_trouble("r4: " + problem->text());
   }
-  void add(const std::string& url) {
-    boards_.push_back(std::make_unique<AsyncBoard>(io_, url, board_options_));
-  }
+  void add(const std::string& url) { boards_.add(url, board_options_); }
   void open(AsyncBoard& board) {
     board.on_event([this](const CarrierEvent&) {
-      if (has_ended()) return io_.stop();
+      if (has_ended()) return boards_.stop();
       tell_loss();
     });
     for (const Device& device : devices_) board.describe(device);
@@ -162,11 +138,9 @@ class Recorders {
 
   const std::vector<Device> devices_;
   const BoardOptions board_options_;
-  asio::io_context io_{1};
   std::optional<Recording> recording_;
-  std::vector<std::unique_ptr<AsyncBoard>> boards_;
+  BoardSet boards_;
   std::vector<std::unique_ptr<BusListener>> buses_;
-  RunEnd run_end_;
   bool lost_ = false;  // what was recorded is, and that is told
 };
 

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "../shell/paths.hpp"
+#include "../boards/paths.hpp"
 
 namespace r4::tool::ros2 {
 namespace {
@@ -17,15 +17,14 @@ constexpr auto tick_period = 20ms;
 
 }  // namespace
 
-BoardNode::BoardNode(asio::io_context& io, const std::string& url,
-                     const BoardOptions& board_options, Graph& graph, std::size_t node,
+BoardNode::BoardNode(asio::io_context& io, AsyncBoard& board, Graph& graph, std::size_t node,
                      Inbox& inbox, Outbox& outbox, const NodeOptions& options, Logged logged)
     : options_(options),
       name_(graph.node(node).full()),
       inbox_(inbox),
       outbox_(outbox),
       logged_(std::move(logged)),
-      board_(io, url, board_options),
+      board_(board),
       topics_(std::make_shared<BoardTopics>(graph, node, options)),
       device_topics_(std::make_shared<DeviceTopics>(graph, node, options.devices)),
       commands_(board_, graph, node, inbox, outbox, options,
@@ -37,10 +36,10 @@ BoardNode::BoardNode(asio::io_context& io, const std::string& url,
                  [this](const Problem& problem) { log(LogLevel::warning, problem.text()); });
 }
 
-void BoardNode::open() {
-  board_.open();
+void BoardNode::start() {
   outbox_.push([topics = topics_] { topics->on_active(false); });
   tick();
+  tick_.every(tick_period, [this] { tick(); });
 }
 
 void BoardNode::connect() {
@@ -121,10 +120,6 @@ void BoardNode::tick() {
     tell_health();
     outbox_.push([topics = topics_, heard = heard_] { topics->on_active(heard); });
   }
-  tick_.expires_after(tick_period);
-  tick_.async_wait([this](const std::error_code& error) {
-    if (!error) tick();
-  });
 }
 
 void BoardNode::tell_health() {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -21,6 +20,7 @@
 #include "graph/outbox.hpp"
 #include "node_options.hpp"
 #include "r4link/async_board.hpp"
+#include "tools/r4/boards/timer.hpp"
 #include "tools/r4/devices/device_setup.hpp"
 
 namespace r4::tool::ros2 {
@@ -31,12 +31,11 @@ class BoardNode {
   using Logged =
       std::function<void(LogLevel level, const std::string& node, const std::string& text)>;
 
-  BoardNode(asio::io_context& io, const std::string& url, const BoardOptions& board_options,
-            Graph& graph, std::size_t node, Inbox& inbox, Outbox& outbox,
-            const NodeOptions& options, Logged logged);
+  BoardNode(asio::io_context& io, AsyncBoard& board, Graph& graph, std::size_t node, Inbox& inbox,
+            Outbox& outbox, const NodeOptions& options, Logged logged);
 
-  // Throws Error if the transport cannot be opened.
-  void open();
+  // When the board is open.
+  void start();
   // The inbox is drained.
   void flush() { commands_.flush(); }
   void warn(const std::string& text) { log(LogLevel::warning, text); }
@@ -62,12 +61,12 @@ class BoardNode {
   const Inbox& inbox_;
   Outbox& outbox_;
   const Logged logged_;
-  AsyncBoard board_;
+  AsyncBoard& board_;
   const std::shared_ptr<BoardTopics> topics_;
   const std::shared_ptr<DeviceTopics> device_topics_;
   std::optional<DeviceSetup> setup_;
   BoardCommands commands_;
-  asio::steady_timer tick_;
+  Timer tick_;
   Clock::time_point next_second_{};
   std::map<EntityId, Mismatch> mismatches_;
   std::uint32_t boots_ = 0;

@@ -3,19 +3,17 @@
 
 #include <fmt/format.h>
 
-#include <asio/io_context.hpp>
 #include <asio/post.hpp>
-#include <asio/steady_timer.hpp>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "../boards/board_set.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
-#include "../shell/line_writer.hpp"
-#include "../shell/run_end.hpp"
+#include "../shell/output.hpp"
 #include "board_node.hpp"
 #include "discovery/discovery.hpp"
 #include "discovery/mismatches.hpp"
@@ -127,11 +125,10 @@ class Bridge {
         urls_(named_urls(options)),
         graph_(domain_),
         outbox_(jobs_a_board * urls_.size()),
-        inbox_(io_, domain_.one_computer ? Transit::Clocks::one : Transit::Clocks::two,
+        inbox_(boards_.io(), domain_.one_computer ? Transit::Clocks::one : Transit::Clocks::two,
                [this] {
                  for (const auto& node : nodes_) node->flush();
-               }),
-        run_end_(io_) {
+               }) {
     NodeOptions shown = node_options(options);
     shown.one_clock = domain_.one_computer;
     for (const NamedUrl& each : urls_) add(each, shown);
@@ -139,32 +136,33 @@ class Bridge {
   }
 
   int run() {
-    for (const auto& node : nodes_) node->open();
+    boards_.open();
+    for (const auto& node : nodes_) node->start();
     introduce();
     discover();
     inbox_.start();
-    run_end_.watch(options_.duration);
-    io_.run();
-    leave();
+    boards_.end_by_signal(options_.duration);
+    boards_.run();
+    inbox_.stop();  // no sample is taken any more
+    boards_.leave();
+    outbox_.stop();
+    graph_.leave();  // which may take its time
     return 0;
   }
 
  private:
   void add(const NamedUrl& named, NodeOptions shown) {
     BoardOptions board_options = with_key(options_.key);
-    const bool bus = has_path(named.url, "can");
-    board_options.session.fields = !options_.fields.empty() ? options_.fields
-                                   : bus                    ? "DEFAULT"
-                                                            : component_fields();
+    const std::string usual = has_path(named.url, "can") ? "DEFAULT" : component_fields();
     shown.devices = Device::from(options_.devices);
-    for (const Device& each : shown.devices) board_options.session.fields += "," + each.fields();
+    ask_for(board_options, options_.fields.empty() ? usual : options_.fields, shown.devices);
     parse_fields(Text(board_options.session.fields), shown.fields);
     shown.fields.add(StateField::relays);  // arming asks for it
-    nodes_.push_back(std::make_unique<BoardNode>(
-        io_, named.url, board_options, graph_, graph_.add_node(named.name), inbox_, outbox_, shown,
-        [this](LogLevel level, const std::string& node, const std::string& text) {
-          say(level, node, text);
-        }));
+    nodes_.push_back(
+        std::make_unique<BoardNode>(boards_.io(), boards_.add(named.url, board_options).board,
+                                    graph_, graph_.add_node(named.name), inbox_, outbox_, shown,
+                                    [this](LogLevel level, const std::string& node,
+                                           const std::string& text) { say(level, node, text); }));
   }
 
   // Publishers often forget the namespace.
@@ -186,17 +184,19 @@ class Bridge {
     namesakes_.emplace(graph_.nodes());
     mismatches_.emplace(graph_, [this](std::size_t node, const EntityId& who,
                                        const std::optional<Mismatch>& mismatch) {
-      asio::post(io_, [this, node, who, mismatch] { nodes_[node]->on_mismatch(who, mismatch); });
+      asio::post(boards_.io(),
+                 [this, node, who, mismatch] { nodes_[node]->on_mismatch(who, mismatch); });
     });
     discovery_.emplace(graph_.participants(), [this](const Announced& announced) {
       graph_.on_announced(announced);
       mismatches_->on_announced(announced);
       const auto node = namesakes_->node_of(announced);
       if (!node) return;
-      asio::post(io_, [this, node = *node,
-                       who = announced.owner.empty() ? "another participant" : announced.owner] {
-        warn_of(node, who);
-      });
+      asio::post(boards_.io(),
+                 [this, node = *node,
+                  who = announced.owner.empty() ? "another participant" : announced.owner] {
+                   warn_of(node, who);
+                 });
     });
     for (const dds_entity_t each : discovery_->entities()) {
       inbox_.watch(each, [this] { discovery_->look(); });
@@ -248,35 +248,18 @@ class Bridge {
     }
   }
 
-  // No sample is taken any more, and the boards hear that they are free; then ROS, which may take its time.
-  void leave() {
-    inbox_.stop();
-    std::size_t left = nodes_.size();
-    io_.restart();
-    constexpr Milliseconds limit{100};
-    for (const auto& node : nodes_) {
-      node->board().async_close(limit, [this, &left](const CommandResult&) {
-        if (--left == 0) io_.stop();
-      });
-    }
-    io_.run();
-    outbox_.stop();
-    graph_.leave();
-  }
-
   const BridgeOptions& options_;
   LineWriter output_;
-  asio::io_context io_{1};
   const Domain domain_;
   const std::vector<NamedUrl> urls_;
   Graph graph_;
   std::optional<Namesakes> namesakes_;
   std::optional<Mismatches> mismatches_;
   std::optional<Discovery> discovery_;
+  BoardSet boards_;
   Outbox outbox_;
   Inbox inbox_;
   std::vector<std::unique_ptr<BoardNode>> nodes_;
-  RunEnd run_end_;
 };
 
 }  // namespace

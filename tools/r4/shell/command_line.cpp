@@ -8,10 +8,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstdio>
 #include <exception>
-#include <iostream>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -19,7 +17,6 @@
 
 #include "help.hpp"
 #include "json.hpp"
-#include "line_writer.hpp"
 #include "r4link/config.hpp"
 #include "r4link/error.hpp"
 #include "subcommands.hpp"
@@ -124,16 +121,6 @@ void occupy_standard_streams() {
   }
 }
 
-// What was printed must have gone somewhere: a full disk is no success.
-void flush_output() {
-  errno = 0;
-  std::cout.flush();  // CLI11 prints help there
-  if (!std::cout || std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
-    throw output_error(errno != 0 ? errno : EIO);
-  }
-  LineWriter::finish();
-}
-
 }  // namespace
 
 int run(int argc, const char* const* argv) {
@@ -154,9 +141,11 @@ int run(int argc, const char* const* argv) {
       root.parse(argc, argv);
       code = chosen();
     } catch (const CLI::Success& success) {  // --help, --version
-      code = root.exit(success);
+      std::ostringstream text;
+      code = root.exit(success, text);
+      print_raw(text.str());
     }
-    flush_output();
+    require_output();  // a full disk is no success
     return code;
   } catch (const CLI::ParseError& error) {
     return report(usage_problem(root, error), json);

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
+#include <array>
 #include <set>
 #include <string>
 #include <vector>
@@ -161,30 +161,6 @@ std::string text_of(const Json& value) {
 
 std::string line_of(const Json& object) { return text_of(object) + "\n"; }
 
-std::string printable_lines(std::string_view text) {
-  std::string out;
-  for (std::size_t end = 0; end != std::string_view::npos;) {
-    end = text.find('\n');
-    out += printable(text.substr(0, end));
-    if (end == std::string_view::npos) break;
-    out += '\n';
-    text.remove_prefix(end + 1);
-  }
-  return out;
-}
-
-void print_raw(std::string_view text) {
-  std::fwrite(text.data(), 1, text.size(), stdout);
-  std::fflush(stdout);
-}
-
-void print_text(std::string_view text) { print_raw(printable_lines(text)); }
-
 void print_line(const Json& object) { print_raw(line_of(object)); }
-
-void print_trouble(std::string_view text) {
-  std::fflush(stdout);
-  fmt::print(stderr, "{}\n", printable(text));
-}
 
 }  // namespace r4::tool

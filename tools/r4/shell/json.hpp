@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "output.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/error.hpp"
@@ -53,15 +54,7 @@ std::string escaped(std::string_view bytes);
 std::string text_of(const Json& value);
 std::string line_of(const Json& object);
 
-// Each line of it printable(): what a text for people goes through that may hold names of others.
-std::string printable_lines(std::string_view text);
-// Text for people, by printable_lines(), or an object on a line of its own, to stdout and handed to
-// the system at once.
-void print_text(std::string_view text);
+// An object on a line of its own, to standard output.
 void print_line(const Json& object);
-// Text as it is: of ours alone, with what moves the cursor.
-void print_raw(std::string_view text);
-// A line for people on stderr, printable().
-void print_trouble(std::string_view text);
 
 }  // namespace r4::tool

@@ -58,10 +58,7 @@ constexpr std::array<Captured, 4> captured{{
      "damaged", false},
 }};
 
-void print(const std::string& text) {
-  fmt::print("{}\n", text);
-  std::fflush(stdout);
-}
+void print(const std::string& text) { print_text(text + "\n"); }
 
 // Reads the captured datagrams; true if each is what it should be.
 bool decode_capture(bool json) {
@@ -214,7 +211,7 @@ void print_table(const std::vector<StoryResult>& results, const std::optional<Pr
 }
 
 int demo(const DemoOptions& options) {
-  if (!options.json) fmt::print("{}", introduction);
+  if (!options.json) print_text(introduction);
   bool good = decode_capture(options.json);
   std::vector<StoryResult> results;
   int chapter = 2;

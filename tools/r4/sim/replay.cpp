@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
 #include <cstdint>
 #include <map>
@@ -13,9 +12,9 @@
 #include <string>
 #include <utility>
 
+#include "../boards/run_end.hpp"
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
-#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "host/replay/replay_records.hpp"
 #include "host/standard_registry.hpp"
@@ -77,7 +76,7 @@ class Replay : private Carrier::Handler {
     began_ = Clock::now();
     io_.run();
     if (!options_.json) {
-      print_text(fmt::format("{}: {} datagrams\n", printable(options_.file), sent_));
+      print_text("{}: {} datagrams\n", printable(options_.file), sent_);
     }
     return damaged_ ? static_cast<int>(ErrorKind::data) : 0;
   }
@@ -104,9 +103,7 @@ class Replay : private Carrier::Handler {
   }
 
   void wait() {
-    timer_.expires_at(due());
-    timer_.async_wait([this](const std::error_code& error) {
-      if (error) return;
+    timer_.at(due(), [this] {
       for (int i = 0; i < steps_in_a_turn && !io_.stopped(); ++i) {
         if (records_.next() == nullptr) {
           if (!read_on()) return io_.stop();
@@ -128,7 +125,7 @@ class Replay : private Carrier::Handler {
       play(item);
       if (item.kind != RecordKind::from_board) continue;
       const std::chrono::duration<double> at = item.time - first_;
-      print_text(fmt::format("{:.6f} {}\n", at.count(), escaped(item.bytes)));
+      print_text("{:.6f} {}\n", at.count(), escaped(item.bytes));
       return;
     }
     io_.stop();
@@ -168,7 +165,7 @@ class Replay : private Carrier::Handler {
   asio::io_context io_{1};
   ReplayRecords records_;
   const std::unique_ptr<Carrier> carrier_;
-  asio::steady_timer timer_;
+  Timer timer_;
   RunEnd run_end_;
   const Time first_;
   Clock::time_point began_;

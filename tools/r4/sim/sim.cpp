@@ -6,15 +6,14 @@
 
 #include <algorithm>
 #include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "../boards/run_end.hpp"
 #include "../shell/options.hpp"
-#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "host/commands/command_help.hpp"
@@ -175,30 +174,6 @@ class ServedBoard {
   std::vector<const ImpairedCarrier*> links_;
 };
 
-// Tells the sensors of all boards again and again.
-class SensorClock {
- public:
-  SensorClock(asio::io_context& io, Milliseconds period,
-              const std::vector<std::unique_ptr<ServedBoard>>& boards)
-      : timer_(io), period_(period), boards_(boards) {
-    wait();
-  }
-
- private:
-  void wait() {
-    timer_.expires_after(period_);
-    timer_.async_wait([this](const std::error_code& error) {
-      if (error) return;
-      for (const auto& board : boards_) board->tell_sensors();
-      wait();
-    });
-  }
-
-  asio::steady_timer timer_;
-  const Milliseconds period_;
-  const std::vector<std::unique_ptr<ServedBoard>>& boards_;
-};
-
 int simulate(const SimOptions& options) {
   if (options.sensors && (!options.json || options.quiet)) {
     throw Error(ErrorKind::usage, "--sensors", "is for JSON", "add --json, and leave out --quiet");
@@ -225,8 +200,12 @@ int simulate(const SimOptions& options) {
       for (const sim::ScriptStep& step : connections) board->happen(step);
     }
 
-    std::optional<SensorClock> sensors;
-    if (options.sensors) sensors.emplace(io, *options.sensors, boards);
+    Timer sensors(io);
+    if (options.sensors) {
+      sensors.every(*options.sensors, [&boards] {
+        for (const auto& board : boards) board->tell_sensors();
+      });
+    }
     std::optional<InputLines> input;
     if (options.input) {
       input.emplace(

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "../shell/json.hpp"
-#include "../shell/line_writer.hpp"
+#include "../shell/output.hpp"
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "transports/impaired/impaired_carrier.hpp"
 

@@ -6,8 +6,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -16,11 +14,11 @@
 #include <utility>
 #include <vector>
 
+#include "../boards/board_set.hpp"
+#include "../boards/paths.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
-#include "../shell/paths.hpp"
-#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/discovery/url_pattern.hpp"
@@ -73,9 +71,9 @@ class Bench {
  public:
   explicit Bench(const BenchOptions& options)
       : options_(options),
-        board_(io_, join_paths(options.urls), bench_board(options.key)),
-        timer_(io_),
-        pause_(io_) {}
+        board_(boards_.add(join_paths(options.urls), bench_board(options.key)).board),
+        timer_(boards_.io()),
+        pause_(boards_.io()) {}
 
   int run() {
     board_.open();
@@ -83,7 +81,7 @@ class Bench {
     listen();
     ask();
     command();
-    say_farewell(io_, board_);
+    boards_.leave();
     if (options_.json) {
       print_json();
     } else {
@@ -95,18 +93,15 @@ class Bench {
  private:
   // Runs the loop for `time`, or until something stops it.
   void run_for(Milliseconds time) {
-    timer_.expires_after(time);
-    timer_.async_wait([this](const std::error_code& error) {
-      if (!error) io_.stop();
-    });
-    io_.restart();
-    io_.run();
+    timer_.after(time, [this] { boards_.stop(); });
+    boards_.io().restart();
+    boards_.run();
   }
 
   // Proof of control is a state.
   void connect() {
     Subscription waiting = board_.on_state([this](const State&, const Datagram&) {
-      if (board_.in_control()) io_.stop();
+      if (board_.in_control()) boards_.stop();
     });
     const Clock::time_point start = Clock::now();
     run_for(connect_timeout);
@@ -141,11 +136,7 @@ class Bench {
   }
   void ask_next(std::size_t left) {
     if (left == 0) {
-      pause_.expires_after(pause);
-      pause_.async_wait([this](const std::error_code& error) {
-        if (!error && running_) ask_next(burst);
-      });
-      return;
+      return pause_.after(pause, [this] { ask_next(burst); });
     }
     board_.async_identify(answer_timeout, [this, left](const CommandResult& result) {
       if (running_ && count(result, round_trips_, unanswered_)) ask_next(left - 1);
@@ -209,45 +200,45 @@ class Bench {
 
   void print_table() {
     print_text(board_.name() + "\n");
-    fmt::print("  in control after      {:>9.1f} ms\n", connect_us_ / 1000);
-    fmt::print("  states                {:>9.1f} Hz    {} received, {} lost, {} damaged\n",
+    print_text("  in control after      {:>9.1f} ms\n", connect_us_ / 1000);
+    print_text("  states                {:>9.1f} Hz    {} received, {} lost, {} damaged\n",
                state_hz_, states_, lost_, damaged_);
-    fmt::print("  jitter                {:>9.0f} us\n", jitter_us_);
+    print_text("  jitter                {:>9.0f} us\n", jitter_us_);
     const auto row = [](const char* what, Durations& durations, std::uint64_t failed) {
-      fmt::print("  {:<21} {:>9.0f} us    p90 {:.0f}, p99 {:.0f}, max {:.0f}; {} of {} failed\n",
+      print_text("  {:<21} {:>9.0f} us    p90 {:.0f}, p99 {:.0f}, max {:.0f}; {} of {} failed\n",
                  what, durations.quantile(0.5), durations.quantile(0.9), durations.quantile(0.99),
                  durations.quantile(1), failed, failed + durations.count());
     };
     row("round trip, median", round_trips_, unanswered_);
     row("command confirmed", confirmations_, unconfirmed_);
-    fmt::print("  commands confirmed    {:>9.0f} a second, one at a time\n", per_second());
+    print_text("  commands confirmed    {:>9.0f} a second, one at a time\n", per_second());
     print_transfers(board_.carrier_counters());
   }
 
   static void print_transfers(const CarrierCounters& counters) {
     if (!counters.transfers) return;
     const TransferCounters& transfers = *counters.transfers;
-    fmt::print(
+    print_text(
         "  transfers lost        {:>9}       {} wrong sequence, {} timed out, {} overflow, "
         "{} interrupted, {} cancelled\n",
         transfers.wrong_sequence + transfers.timed_out + transfers.overflow +
             transfers.interrupted + transfers.cancelled,
         transfers.wrong_sequence, transfers.timed_out, transfers.overflow, transfers.interrupted,
         transfers.cancelled);
-    fmt::print(
+    print_text(
         "  frames passed over    {:>9}       {} unexpected, {} malformed; dropped unread "
         "{}\n",
         transfers.unexpected + transfers.malformed, transfers.unexpected, transfers.malformed,
         counters.rx_overflows);
-    fmt::print("  packed datagrams      {:>9}       {} of bad form\n", transfers.packed,
+    print_text("  packed datagrams      {:>9}       {} of bad form\n", transfers.packed,
                transfers.bad_form);
   }
 
   const BenchOptions& options_;
-  asio::io_context io_{1};
-  AsyncBoard board_;
-  asio::steady_timer timer_;
-  asio::steady_timer pause_;
+  BoardSet boards_;
+  AsyncBoard& board_;
+  Timer timer_;
+  Timer pause_;
   double connect_us_ = 0;
   std::uint64_t states_ = 0;
   std::uint64_t lost_ = 0;

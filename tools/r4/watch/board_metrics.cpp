@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "board_metrics.hpp"
 
+#include <fmt/format.h>
+
 #include <chrono>
 #include <utility>
 
-#include "r4link/discovery/url_pattern.hpp"
+#include "r4link/error.hpp"
 #include "r4link/link.hpp"
 #include "r4link/tables/state_fields.hpp"
 
@@ -22,9 +24,9 @@ std::uint64_t lost_in_turn(const PacketCounters& packets) {
 }
 
 // Of several paths to a board each one.
-void describe_paths(const MetricBoard& each, const MetricLabels& one, MetricFamilies& out) {
+void describe_paths(const SetBoard& each, const MetricLabels& one, MetricFamilies& out) {
   const std::vector<std::string> urls = split_paths(each.url);
-  const std::vector<PathStatus> paths = each.board->paths();
+  const std::vector<PathStatus> paths = each.board.paths();
   if (paths.size() < 2) return;
   for (std::size_t i = 0; i < paths.size(); ++i) {
     const PathStatus& path = paths[i];
@@ -51,10 +53,38 @@ void describe_paths(const MetricBoard& each, const MetricLabels& one, MetricFami
   }
 }
 
+// A value of a label may come from a board, so it is made printable. A backslash and quotes are escaped.
+std::string label_text(const std::string& value) {
+  std::string text;
+  for (const char c : printable(value)) {
+    if (c == '\\' || c == '"') text += '\\';
+    text += c;
+  }
+  return text;
+}
+
 }  // namespace
 
-void describe(const MetricBoard& each, MetricFamilies& out) {
-  const AsyncBoard& board = *each.board;
+void MetricFamilies::add(const char* name, const char* help, const char* type,
+                         const MetricLabels& labels, double value) {
+  std::string& text = families_[name];
+  if (text.empty()) text = fmt::format("# HELP {0} {1}\n# TYPE {0} {2}\n", name, help, type);
+  text += name;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    text += fmt::format("{}{}=\"{}\"", i == 0 ? '{' : ',', labels[i].first,
+                        label_text(labels[i].second));
+  }
+  text += fmt::format("{} {}\n", labels.empty() ? "" : "}", value);
+}
+
+std::string MetricFamilies::text() const {
+  std::string all;
+  for (const auto& [name, text] : families_) all += text;
+  return all;
+}
+
+void describe(const SetBoard& each, MetricFamilies& out) {
+  const AsyncBoard& board = each.board;
   const BoardIdentity& who = board.identity();
   const LinkStatus& link = board.link();
   const Statistics statistics = board.statistics();

@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "../bus/bus_datagram.hpp"
 #include "../bus/bus_log.hpp"
@@ -72,20 +72,17 @@ bool is_packed_line(std::string_view line) {
   return line.starts_with(packed_prefix) && line.find(';') == std::string_view::npos;
 }
 
-void print(const Json& object) {
-  const std::string line = line_of(object);
-  std::fwrite(line.data(), 1, line.size(), stdout);
-}
-
 // Datagrams, one a line.
 class DatagramLines {
  public:
+  explicit DatagramLines(const BusLog::Print& print) : print_(print) {}
+
   void on_line(std::uint64_t number, std::string_view line) {
     Json object{{"line", number}};
     if (!(is_packed_line(line) ? add_packed(object, line) : add_plain(object, line))) {
       any_bad_ = true;
     }
-    print(object);
+    print_(object);
   }
   void on_long_line(std::uint64_t number, std::uint64_t size) {
     any_bad_ = true;
@@ -95,7 +92,7 @@ class DatagramLines {
     Json object{{"line", number}, {"ok", false}};
     object.update(bad_datagram_json(result));
     object["size"] = size;
-    print(object);
+    print_(object);
   }
   void finish() {}
   bool any_bad() const { return any_bad_; }
@@ -123,11 +120,12 @@ class DatagramLines {
     return good;
   }
 
+  const BusLog::Print& print_;
   bool any_bad_ = false;
 };
 
 template <class Reader>
-int decode_lines(Input& input, Reader& reader) {
+int decode_lines(Input& input, Reader& reader, std::string& printed) {
   NumberedLines lines;
   const auto line = [&](std::uint64_t number, std::string_view text) {
     reader.on_line(number, text);
@@ -137,21 +135,24 @@ int decode_lines(Input& input, Reader& reader) {
   };
   for (std::string_view bytes = input.read(); !bytes.empty(); bytes = input.read()) {
     lines.push(bytes, line, too_long);
-    std::fflush(stdout);  // a pipe's reader need not wait for more
+    print_raw(std::exchange(printed, {}));
   }
   lines.finish(line, too_long);
   reader.finish();
+  print_raw(printed);
   return reader.any_bad() ? static_cast<int>(ErrorKind::data) : 0;
 }
 
 int decode(const DecodeOptions& options) {
   Input input(options.file);
+  std::string printed;  // of a block of input at once
+  const BusLog::Print print = [&printed](const Json& object) { printed += line_of(object); };
   if (options.candump) {
     BusLog log(print);
-    return decode_lines(input, log);
+    return decode_lines(input, log, printed);
   }
-  DatagramLines datagrams;
-  return decode_lines(input, datagrams);
+  DatagramLines datagrams(print);
+  return decode_lines(input, datagrams, printed);
 }
 
 constexpr const char* decode_footer = R"(One JSON object for each line of input that is not empty:

@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "../shell/options.hpp"
+#include "../shell/output.hpp"
 #include "../shell/subcommands.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/datagram.hpp"
@@ -127,9 +128,9 @@ int encode(const EncodeOptions& options) {
   std::array<std::uint8_t, max_datagram> packed;
   const std::size_t size = options.packed ? pack(bytes, packed.data(), packed.size()) : 0;
   if (size != 0) {
-    fmt::print("packed:{:02x}\n", fmt::join(packed.data(), packed.data() + size, ""));
+    print_raw(fmt::format("packed:{:02x}\n", fmt::join(packed.data(), packed.data() + size, "")));
   } else {
-    fmt::print("{}\n", std::string_view(bytes.data(), bytes.size()));
+    print_raw(std::string(bytes.data(), bytes.size()) + "\n");
   }
   return 0;
 }

@@ -2,10 +2,8 @@
 // r4 metrics: boards and their links for Prometheus.
 #include <fmt/format.h>
 
-#include <asio/io_context.hpp>
 #include <asio/post.hpp>
 #include <cstdint>
-#include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
@@ -13,10 +11,10 @@
 #include <utility>
 #include <vector>
 
+#include "../boards/board_set.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
-#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
 #include "../web/server/server.hpp"
 #include "board_metrics.hpp"
@@ -24,7 +22,6 @@
 #include "r4link/can/async_listener.hpp"
 #include "r4link/can/can_interface.hpp"
 #include "r4link/discovery/url.hpp"
-#include "r4link/discovery/url_pattern.hpp"
 
 namespace r4::tool {
 namespace {
@@ -41,7 +38,7 @@ struct MetricsOptions {
 web::ServerOptions server_options(const MetricsOptions& options) {
   web::ServerOptions server;
   server.address = web::listen_address(options.listen);
-  server.offer = web::Offer::metrics;
+  server.page = false;
   for (const std::string& each : options.hosts) server.hosts.push_back(web::host_name(each));
   return server;
 }
@@ -82,13 +79,8 @@ class BusMetrics {
 class MetricsCommand final : web::ServerEvents {
  public:
   explicit MetricsCommand(const MetricsOptions& options)
-      : run_end_(io_), server_(server_options(options), *this) {
-    BoardOptions board_options = with_key(options.key);
-    board_options.role = BoardRole::watch;
-    board_options.session.arming = Arming::off;  // it drives nothing
-    for (const PatternUrl& each : expand_urls(options.urls)) {
-      boards_.push_back(std::make_unique<AsyncBoard>(io_, each.url, board_options));
-      described_.push_back({each.url, boards_.back().get()});
+      : boards_(options.urls, watching(options.key)), server_(server_options(options), *this) {
+    for (const SetBoard& each : boards_) {
       for (const std::string& path : split_paths(each.url)) {
         const Url url = Url::parse(path);
         if (url.scheme() == "can") interfaces_.try_emplace(can_interface_of(url));
@@ -97,20 +89,19 @@ class MetricsCommand final : web::ServerEvents {
   }
 
   int run(const MetricsOptions& options) {
-    for (const auto& board : boards_) board->open();
+    boards_.open();
     for (auto& [name, bus] : interfaces_) {
-      bus = std::make_unique<BusMetrics>(io_, can_interface(name));
+      bus = std::make_unique<BusMetrics>(boards_.io(), can_interface(name));
     }
     server_.start();
-    run_end_.watch(options.duration);
+    boards_.end_by_signal(options.duration);
     const std::string url = fmt::format("http://{}/metrics", server_.address().text());
     if (options.json) {
       print_line({{"type", "listening"}, {"url", url}, {"boards", boards_.size()}});
     } else {
-      fmt::print("{} of {} boards\n", url, boards_.size());
-      std::fflush(stdout);
+      print_text("{} of {} boards\n", url, boards_.size());
     }
-    io_.run();
+    boards_.run();
     return 0;
   }
 
@@ -120,26 +111,20 @@ class MetricsCommand final : web::ServerEvents {
   void on_message(web::ClientId, web::Protocol, std::string) override {}
   void on_closed(web::ClientId, web::Protocol) override {}
   void on_metrics() override {
-    asio::post(io_, [this] {
+    asio::post(boards_.io(), [this] {
       MetricFamilies families;
-      for (const MetricBoard& board : described_) describe(board, families);
+      for (const SetBoard& each : boards_) describe(each, families);
       for (const auto& [name, bus] : interfaces_) bus->describe(families);
       server_.set_metrics(families.text());
     });
   }
 
-  asio::io_context io_{1};
-  RunEnd run_end_;
-  std::vector<std::unique_ptr<AsyncBoard>> boards_;
-  std::vector<MetricBoard> described_;
+  BoardSet boards_;
   std::map<std::string, std::unique_ptr<BusMetrics>> interfaces_;
   web::Server server_;
 };
 
-int serve_metrics(const MetricsOptions& options) {
-  require_metrics();
-  return MetricsCommand(options).run(options);
-}
+int serve_metrics(const MetricsOptions& options) { return MetricsCommand(options).run(options); }
 
 constexpr const char* metrics_footer =
     R"(Answers Prometheus at http://127.0.0.1:9618/metrics (docs/metrics.md): of each board whether it is heard,

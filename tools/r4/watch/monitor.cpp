@@ -1,26 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4 monitor: shows what a board says, and keeps its link alive meanwhile.
-#include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
-#include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
-#include <csignal>
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "../boards/board_set.hpp"
+#include "../boards/paths.hpp"
 #include "../devices/device_setup.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
-#include "../shell/paths.hpp"
-#include "../shell/run_end.hpp"
+#include "../shell/output.hpp"
 #include "../shell/subcommands.hpp"
-#include "monitor_boards.hpp"
+#include "board_table.hpp"
 #include "monitor_bus.hpp"
 #include "monitor_view.hpp"
 #include "r4link/async_board.hpp"
@@ -35,11 +32,14 @@ namespace r4::tool {
 namespace {
 
 constexpr Milliseconds tick{100};
-// With --count alone: how long a board may stay silent from the start.
+constexpr Milliseconds table_interval{1000};
+// With --count alone: how long the boards may stay silent from the start.
 constexpr Milliseconds patience{5000};
 // With --device: for how long another host must control the board until it is left to that one, and
 // how long the board has to confirm that.
 constexpr Milliseconds busy_patience{1500}, release_time{200};
+// Bytes that wait for a reader: of a board half a second of states.
+constexpr std::size_t unread_of_board = 32768, most_unread = std::size_t{1} << 18;
 
 struct MonitorOptions {
   std::vector<std::string> urls;
@@ -52,86 +52,103 @@ struct MonitorOptions {
   std::string key;
 };
 
-BoardOptions board_options(const MonitorOptions& options, const std::vector<Device>& devices = {}) {
-  BoardOptions board_options = with_key(options.key);
-  const bool controls = options.control && devices.empty();
-  board_options.role = controls ? BoardRole::control : BoardRole::watch;
-  board_options.session.arming = Arming::off;  // it drives nothing
-  if (!options.fields.empty()) board_options.session.fields = options.fields;
-  for (const Device& device : devices) board_options.session.fields += "," + device.fields();
-  return board_options;
+BoardOptions board_options(const MonitorOptions& options, const std::vector<Device>& devices) {
+  BoardOptions board = watching(options.key, options.fields, devices);
+  if (options.control && devices.empty()) board.role = BoardRole::control;
+  return board;
 }
 
 class Monitor {
  public:
-  Monitor(const MonitorOptions& options, std::string url)
+  explicit Monitor(const MonitorOptions& options)
       : options_(options),
-        url_(std::move(url)),
         devices_(Device::from(options.devices)),
-        board_(io_, url_, board_options(options, devices_)),
-        view_(options.json                   ? make_json_view(board_)
-              : ::isatty(STDOUT_FILENO) != 0 ? make_live_view(board_)
-                                             : make_plain_view()),
-        run_end_(io_),
-        tick_(io_),
-        end_(io_) {}
+        boards_(options.urls, board_options(options, devices_)),
+        lines_(std::in_place, std::min(unread_of_board * boards_.size(), most_unread)),
+        tick_(boards_.io()),
+        table_tick_(boards_.io()),
+        patience_(boards_.io()) {
+    if (boards_.size() > 1 && !devices_.empty()) {
+      throw Error(ErrorKind::usage, "--device", "is for one board", "name one");
+    }
+    const bool live = ::isatty(STDOUT_FILENO) != 0;
+    if (boards_.size() > 1 && !options.json) table_.emplace(boards_, live, *lines_);
+    for (const SetBoard& each : boards_) {
+      views_.push_back(options.json ? make_json_view(each.board, *lines_)
+                       : table_     ? table_->view(each.index)
+                       : live       ? make_live_view(each.board)
+                                    : make_plain_view(*lines_));
+    }
+  }
 
   int run() {
-    connect();
-    board_.open();
+    for (SetBoard& each : boards_) listen(each.board, *views_[each.index]);
+    boards_.open();
     if (!devices_.empty()) set_devices_up();
-    run_end_.watch();
-    end_after(options_.duration ? *options_.duration : patience);
-    next_tick();
-    io_.run();
-    view_->on_end();
-    view_->on_tick();
-    const std::uint64_t skipped = view_->skipped();
-    if (skipped != 0) {
-      fmt::print(stderr, "r4: {} lines were left out: whoever reads the output is too slow\n",
-                 skipped);
+    boards_.end_by_signal(options_.duration);
+    if (options_.count != 0 && !options_.duration) {
+      patience_.after(patience, [this] {
+        if (none_heard()) boards_.stop();
+      });
     }
-    const Statistics statistics = board_.statistics();
-    require_one_board(board_);
-    say_farewell(io_, board_);
-    view_.reset();
-    if (statistics.received == 0) throw silence(statistics);
+    tick_.every(tick, [this] {
+      for (const auto& view : views_) view->on_tick();
+      look_who_controls();
+    });
+    if (table_) table_tick_.every(table_interval, [this] { table_->show(); });
+    boards_.run();
+    tick_.cancel();
+    table_tick_.cancel();
+    for (const auto& view : views_) {
+      view->on_end();
+      view->on_tick();
+    }
+    if (table_) table_->show();
+    if (const std::uint64_t lost = lines_->lost(); lost != 0) {
+      print_trouble("r4: {} lines were left out: whoever reads the output is too slow", lost);
+    }
+    boards_.leave();
+    views_.clear();
+    lines_.reset();
+    boards_.require_heard();
     return 0;
   }
 
  private:
-  void connect() {
-    board_.on_state([this](const ReceivedState& state, const Datagram& datagram) {
-      view_->on_state(state, datagram);
+  void listen(AsyncBoard& board, MonitorView& view) {
+    board.on_state([this, &view](const ReceivedState& state, const Datagram& datagram) {
+      if (boards_.stopped()) return;  // what came together with the last one
+      view.on_state(state, datagram);
       tell_readings(state);
-      if (++states_ == options_.count) io_.stop();
+      if (++states_ == options_.count) boards_.stop();
     });
-    board_.on_board_heartbeat([this](const Datagram& d) { view_->on_heartbeat(d); });
-    board_.on_nack([this](const Nack& nack, const Datagram& d) {
+    board.on_board_heartbeat([&view](const Datagram& datagram) { view.on_heartbeat(datagram); });
+    board.on_nack([&board, &view](const Nack& nack, const Datagram& datagram) {
       // A path that is about to join is answered so, while another one carries.
-      const LinkStatus link = board_.link();
+      const LinkStatus link = board.link();
       const bool busy = link.causes.has(LinkCause::busy);
       if (nack.code == Refusal::busy && link.carrying != 0 && !busy) return;
-      view_->on_nack(nack, d);
+      view.on_nack(nack, datagram);
     });
-    board_.on_bad_datagram([this](const ReadResult& result, std::string_view bytes) {
-      view_->on_bad_datagram(result, bytes);
+    board.on_bad_datagram([&view](const ReadResult& result, std::string_view bytes) {
+      view.on_bad_datagram(result, bytes);
     });
-    board_.on_link([this](const LinkStatus& status) {
-      view_->on_link(status);
-      if (status.causes.has(LinkCause::two_boards)) io_.stop();
+    board.on_link([this, &view](const LinkStatus& status) {
+      view.on_link(status);
+      if (status.causes.has(LinkCause::two_boards)) boards_.stop();
     });
-    board_.on_event([this](const CarrierEvent& event) { view_->on_event(event); });
-    on_paths(board_, [this](const PathStatus& path) { view_->on_path(path); });
+    board.on_event([&view](const CarrierEvent& event) { view.on_event(event); });
+    on_paths(board, [&view](const PathStatus& path) { view.on_path(path); });
   }
 
   // The program that controls the board sets devices up: this one, where no other does. Else what
   // that program has set up is shown.
   void set_devices_up() {
-    setup_.emplace(io_, board_, devices_,
-                   [this](const Problem& problem) { view_->on_device_trouble(problem); });
+    AsyncBoard& board = boards_[0].board;
+    setup_.emplace(boards_.io(), board, devices_,
+                   [this](const Problem& problem) { views_[0]->on_device_trouble(problem); });
     try {
-      board_.take_control();
+      board.take_control();
     } catch (const Error& error) {
       if (!error.holder()) throw;
     }
@@ -139,10 +156,11 @@ class Monitor {
 
   // A host that was killed keeps its board until the board's timeout.
   void look_who_controls() {
-    const bool busy = board_.link().causes.has(LinkCause::busy);
-    busy_ticks_ = setup_ && busy ? busy_ticks_ + 1 : 0;
+    if (!setup_) return;
+    AsyncBoard& board = boards_[0].board;
+    busy_ticks_ = board.link().causes.has(LinkCause::busy) ? busy_ticks_ + 1 : 0;
     if (busy_ticks_ * tick != busy_patience) return;
-    board_.async_release_control(release_time, [](const CommandResult&) {});
+    board.async_release_control(release_time, [](const CommandResult&) {});
   }
 
   // Each reading once, and again when the board has begun anew.
@@ -159,89 +177,48 @@ class Monitor {
           if (values[i].poll != poll) continue;
           news.values.push_back({&values[i], device.reading(state, i).number});
         }
-        view_->on_reading(news);
+        views_[0]->on_reading(news);
       }
     }
   }
 
-  void end_after(Milliseconds time) {
-    end_.expires_after(time);
-    end_.async_wait([this](const std::error_code& error) {
-      if (error) return;
-      const bool waited_in_vain = options_.count != 0 && board_.statistics().received == 0;
-      if (options_.duration || waited_in_vain) io_.stop();
-    });
-  }
-
-  void next_tick() {
-    tick_.expires_after(tick);
-    tick_.async_wait([this](const std::error_code& error) {
-      if (error) return;
-      view_->on_tick();
-      look_who_controls();
-      next_tick();
-    });
-  }
-
-  Error silence(const Statistics& statistics) const {
-    if (statistics.damaged != 0) {
-      return {ErrorKind::refused, url_,
-              fmt::format("{} datagrams came, none of them valid", statistics.damaged),
-              "see that it is an R4 board, and that both ends have the same speed"};
-    }
-    return Error(explain(url_, board_.link()));
+  bool none_heard() const {
+    return std::all_of(boards_.begin(), boards_.end(),
+                       [](const SetBoard& each) { return each.board.statistics().received == 0; });
   }
 
   const MonitorOptions& options_;
-  const std::string url_;
   const std::vector<Device> devices_;
-  asio::io_context io_{1};
-  AsyncBoard board_;
-  std::unique_ptr<MonitorView> view_;
-  RunEnd run_end_;
-  asio::steady_timer tick_;
-  asio::steady_timer end_;
-  std::uint64_t states_ = 0;
+  BoardSet boards_;
+  std::optional<LineWriter> lines_;
+  std::optional<BoardTable> table_;
+  std::vector<std::unique_ptr<MonitorView>> views_;  // of each board
+  Timer tick_;
+  Timer table_tick_;
+  Timer patience_;
+  std::uint64_t states_ = 0;  // of all boards together
   std::optional<DeviceSetup> setup_;
   std::array<std::optional<std::uint32_t>, i2c_slots> told_ms_;
   int busy_ticks_ = 0;
 };
 
-// can://can0 and nothing else: all boards.
-bool is_whole_bus(const std::string& text) {
-  if (split_paths(text).size() > 1) return false;
-  const Url url = Url::parse(text);
-  return url.scheme() == "can" && text.find('?') == std::string::npos;
-}
-
 int monitor(const MonitorOptions& options) {
-  std::vector<std::string> urls;
-  for (PatternUrl& each : expand_urls(options.urls)) urls.push_back(std::move(each.url));
-  if (urls.size() == 1 && is_whole_bus(urls.front())) {
-    const Url url = Url::parse(urls.front());
-    const std::string& interface = can_interface_of(url);
-    if (!options.fields.empty() || !options.devices.empty()) {
-      throw Error(ErrorKind::usage, options.fields.empty() ? "--device" : "--fields",
-                  "only one board can be asked for its fields",
-                  "name the board: " + url.text() + "?node=1");
-    }
-    monitor_bus({interface, options.json, options.count, options.duration});
-    return 0;
+  const std::vector<PatternUrl> urls = expand_urls(options.urls);
+  const std::string bus = urls.size() == 1 ? whole_bus(urls.front().url) : "";
+  if (bus.empty()) return Monitor(options).run();
+  if (!options.fields.empty() || !options.devices.empty()) {
+    throw Error(ErrorKind::usage, options.fields.empty() ? "--device" : "--fields",
+                "only one board can be asked for its fields",
+                "name the board: can://" + bus + "?node=1");
   }
-  if (urls.size() > 1) {
-    if (!options.devices.empty()) {
-      throw Error(ErrorKind::usage, "--device", "is for one board", "name one");
-    }
-    monitor_boards({urls, board_options(options), options.json, options.count, options.duration});
-    return 0;
-  }
-  return Monitor(options, urls.front()).run();
+  monitor_bus({bus, options.json, options.count, options.duration});
+  return 0;
 }
 
 constexpr const char* monitor_footer =
     R"(On a terminal: a status, redrawn in place. Into a pipe: one line a state. With --json: one object a
 line, with type (state, heartbeat, link, nack, error), transport, pnum, t and fields (numbers as
-numbers, several values as an array); of one board on a CAN bus, at the end, one of type transfers.
+numbers, several values as an array); of a board on a CAN bus, at the end, one of type transfers.
 The causes of a link say what is wrong with it, the gravest first: transport down, two boards,
 watchdog, callback, foreign frames, busy (another host controls the board), board has no key,
 key needed, key not taken, watchers full, not watchable, late frames, other board.

@@ -6,14 +6,13 @@
 
 #include <array>
 #include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
 #include <string>
 #include <vector>
 
+#include "../boards/run_end.hpp"
 #include "../shell/json.hpp"
-#include "../shell/line_writer.hpp"
-#include "../shell/run_end.hpp"
+#include "../shell/output.hpp"
 #include "../shell/screen.hpp"
 #include "r4link/can/async_listener.hpp"
 #include "r4link/messages/message.hpp"
@@ -38,7 +37,7 @@ class BusMonitor {
         listener_(io_, options.interface, any_rate),
         run_end_(io_),
         tick_(io_),
-        end_(io_),
+        patience_(io_),
         live_(!options.json && ::isatty(STDOUT_FILENO) != 0) {}
 
   void run() {
@@ -46,12 +45,13 @@ class BusMonitor {
         [this](std::uint8_t node, const Datagram& datagram) { on_datagram(node, datagram); });
     listener_.survey().on_stop([this] { on_stop(); });
     listener_.on_event([this](const CarrierEvent& event) { on_event(event); });
-    run_end_.watch();
-    end_.expires_after(options_.duration.value_or(bus_patience));
-    end_.async_wait([this](const std::error_code& error) {
-      if (!error && (options_.duration || (options_.count != 0 && !any_heard()))) io_.stop();
-    });
-    next_tick();
+    run_end_.watch(options_.duration);
+    if (options_.count != 0 && !options_.duration) {
+      patience_.after(bus_patience, [this] {
+        if (!any_heard()) io_.stop();
+      });
+    }
+    tick_.every(live_ ? bus_tick : plain_interval, [this] { show(); });
     io_.run();
     if (!any_heard()) {
       throw Error(ErrorKind::refused, name(), "no board was heard",
@@ -106,15 +106,6 @@ class BusMonitor {
     }
   }
 
-  void next_tick() {
-    tick_.expires_after(live_ ? bus_tick : plain_interval);
-    tick_.async_wait([this](const std::error_code& error) {
-      if (error) return;
-      show();
-      next_tick();
-    });
-  }
-
   void show() {
     if (options_.json || (live_ && !Screen::has_room())) return;
     const Clock::time_point now = Clock::now();
@@ -161,8 +152,8 @@ class BusMonitor {
   asio::io_context io_{1};
   CanListener listener_;
   RunEnd run_end_;
-  asio::steady_timer tick_;
-  asio::steady_timer end_;
+  Timer tick_;
+  Timer patience_;
   const bool live_;
   LineWriter lines_{unread_of_bus};
   Screen screen_;

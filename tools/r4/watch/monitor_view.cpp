@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "../boards/paths.hpp"
 #include "../shell/json.hpp"
-#include "../shell/line_writer.hpp"
-#include "../shell/paths.hpp"
+#include "../shell/output.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/link.hpp"
 #include "r4link/messages/message.hpp"
@@ -22,8 +22,6 @@ namespace {
 
 std::string_view view(Text text) { return {text.data(), text.size()}; }
 
-// Bytes that wait for a reader: half a second of states.
-constexpr std::size_t unread_of_view = 32768;
 constexpr std::size_t most_shown = 600;  // of a damaged datagram
 
 std::string shown(std::string_view bytes) {
@@ -34,11 +32,7 @@ std::string shown(std::string_view bytes) {
 
 class JsonView final : public MonitorView {
  public:
-  // No `shared`: lines of its own.
-  JsonView(const AsyncBoard& board, LineWriter* shared)
-      : board_(board),
-        own_(shared == nullptr ? std::make_unique<LineWriter>(unread_of_view) : nullptr),
-        lines_(shared == nullptr ? *own_ : *shared) {}
+  JsonView(const AsyncBoard& board, LineWriter& lines) : board_(board), lines_(lines) {}
 
   void on_state(const ReceivedState& state, const Datagram& datagram) override {
     Json json = object_of("state", datagram);
@@ -103,7 +97,6 @@ class JsonView final : public MonitorView {
     Json transfers = transfers_json(board_.carrier_counters());
     if (!transfers.is_null()) lines_.write(line_of(object("transfers", std::move(transfers))));
   }
-  std::uint64_t skipped() const override { return lines_.lost(); }
 
  private:
   Json object(const char* type, Json fields) const {
@@ -124,13 +117,14 @@ class JsonView final : public MonitorView {
   }
 
   const AsyncBoard& board_;
-  const std::unique_ptr<LineWriter> own_;
   LineWriter& lines_;
   bool up_ = true;
 };
 
 class PlainView final : public MonitorView {
  public:
+  explicit PlainView(LineWriter& lines) : lines_(lines) {}
+
   void on_state(const ReceivedState&, const Datagram& datagram) override {
     std::string line = fmt::format("state {:>10} T {:>10} ", datagram.pnum(), datagram.time_ms());
     for (const Field& field : datagram) {
@@ -140,7 +134,6 @@ class PlainView final : public MonitorView {
     line += '\n';
     lines_.write(line);
   }
-  void on_heartbeat(const Datagram&) override {}
   void on_reading(const DeviceNews& news) override {
     std::string line = fmt::format("{} T {:>10} ", news.device.text(), news.t_ms);
     for (const DeviceNews::Value& value : news.values) line += " " + value_text(value);
@@ -167,22 +160,19 @@ class PlainView final : public MonitorView {
   void on_path(const PathStatus& path) override {
     lines_.write(fmt::format("path {}: {}\n", path.name, to_text(path.state)));
   }
-  std::uint64_t skipped() const override { return lines_.lost(); }
 
  private:
-  LineWriter lines_{unread_of_view};
+  LineWriter& lines_;
 };
 
 }  // namespace
 
-std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board) {
-  return std::make_unique<JsonView>(board, nullptr);
-}
 std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board, LineWriter& lines) {
-  return std::make_unique<JsonView>(board, &lines);
+  return std::make_unique<JsonView>(board, lines);
 }
-
-std::unique_ptr<MonitorView> make_plain_view() { return std::make_unique<PlainView>(); }
+std::unique_ptr<MonitorView> make_plain_view(LineWriter& lines) {
+  return std::make_unique<PlainView>(lines);
+}
 
 std::string value_text(const DeviceNews::Value& value) {
   const std::string number = value.number ? fmt::format("{:.5g}", *value.number) : "-";

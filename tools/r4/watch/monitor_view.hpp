@@ -36,31 +36,27 @@ class MonitorView {
   MonitorView(const MonitorView&) = delete;
   MonitorView& operator=(const MonitorView&) = delete;
 
-  virtual void on_state(const ReceivedState& state, const Datagram& datagram) = 0;
-  virtual void on_heartbeat(const Datagram& datagram) = 0;
+  virtual void on_state(const ReceivedState&, const Datagram&) {}
+  virtual void on_heartbeat(const Datagram&) {}
   // What a described device has measured newly, of one of its polls.
-  virtual void on_reading(const DeviceNews& news) = 0;
+  virtual void on_reading(const DeviceNews&) {}
   // What stands in the way of setting one up.
-  virtual void on_device_trouble(const Problem& problem) = 0;
+  virtual void on_device_trouble(const Problem&) {}
   virtual void on_end() {}
-  virtual void on_nack(const Nack& nack, const Datagram& datagram) = 0;
-  virtual void on_bad_datagram(const ReadResult& result, std::string_view bytes) = 0;
-  virtual void on_link(const LinkStatus& status) = 0;
-  virtual void on_event(const CarrierEvent& event) = 0;
+  virtual void on_nack(const Nack&, const Datagram&) {}
+  virtual void on_bad_datagram(const ReadResult&, std::string_view) {}
+  virtual void on_link(const LinkStatus&) {}
+  virtual void on_event(const CarrierEvent&) {}
   // One of several has begun to carry, or ceased to.
-  virtual void on_path(const PathStatus& path) = 0;
+  virtual void on_path(const PathStatus&) {}
   // Ten times a second.
   virtual void on_tick() {}
-  // Lines that were left out because nobody read the output.
-  virtual std::uint64_t skipped() const { return 0; }
 };
 
-// One object a line: type, transport, pnum, t, fields.
-std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board);
-// The same among those of other boards.
+// One object a line: type, transport, pnum, t, fields. The lines outlive the view.
 std::unique_ptr<MonitorView> make_json_view(const AsyncBoard& board, LineWriter& lines);
 // One line a state, for people who pipe it.
-std::unique_ptr<MonitorView> make_plain_view();
+std::unique_ptr<MonitorView> make_plain_view(LineWriter& lines);
 // A status of a few lines, redrawn in place.
 std::unique_ptr<MonitorView> make_live_view(const AsyncBoard& board);
 

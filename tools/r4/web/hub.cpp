@@ -29,14 +29,6 @@ Unit wall_time() {
 }
 std::int64_t wall_ms() { return wall_time<std::chrono::milliseconds>().count(); }
 
-BoardOptions options_for(const std::string& url, const HubOptions& options) {
-  BoardOptions board = options.board;
-  const bool bus = has_path(url, "can");
-  board.session.fields = !options.fields.empty() ? options.fields : bus ? "DEFAULT" : "ALL";
-  for (const Device& each : options.devices) board.session.fields += "," + each.fields();
-  return board;
-}
-
 // What pages may not say: it is for who sets the robot up, or is said by r4 web itself.
 void require_allowed(const Command& command) {
   switch (command.kind) {
@@ -54,26 +46,26 @@ void require_allowed(const Command& command) {
 
 }  // namespace
 
-Hub::Hub(asio::io_context& io, const std::vector<std::string>& urls, const HubOptions& options)
-    : io_(io),
+Hub::Hub(BoardSet& boards, const HubOptions& options)
+    : io_(boards.io()),
       devices_(options.devices),
       columns_(devices_),
-      changed_(urls.size()),
-      tick_(io),
-      deadline_(io),
+      changed_(boards.size()),
+      tick_(io_),
+      deadline_(io_),
       recording_(
-          io, options.record_folder,
+          io_, options.record_folder,
           [this](Recording& recording) {
             for (const auto& board : boards_) board->board().record(recording);
           },
           [this](const WebRecording::Told&) { tell_recording(); }),
       foxglove_(
-          urls.size(), std::to_string(wall_ms()),
+          boards.size(), std::to_string(wall_ms()),
           [this](ClientId client, Outgoing message) { server_.send(client, std::move(message)); }),
       server_(options.server, *this) {
-  for (const std::string& url : urls) {
-    boards_.push_back(std::make_unique<WebBoard>(io, boards_.size(), url, options_for(url, options),
-                                                 devices_, static_cast<WebBoard::Events&>(*this)));
+  for (SetBoard& each : boards) {
+    boards_.push_back(
+        std::make_unique<WebBoard>(io_, each, devices_, static_cast<WebBoard::Events&>(*this)));
     all_.push_back(boards_.back().get());
     rows_.emplace_back(columns_);
   }
@@ -81,23 +73,17 @@ Hub::Hub(asio::io_context& io, const std::vector<std::string>& urls, const HubOp
 
 Hub::~Hub() = default;
 
-void Hub::open() {
-  for (const auto& board : boards_) board->open();
+void Hub::start() {
   server_.start();
   tick();
+  tick_.every(tick_time, [this] { tick(); });
 }
 
-void Hub::close(std::function<void()> done) {
+void Hub::end() {
   closing_ = true;
   tick_.cancel();
   deadline_.cancel();
   recording_.end();
-  const auto left = std::make_shared<std::size_t>(boards_.size());
-  for (const auto& board : boards_) {
-    board->close([left, done] {
-      if (--*left == 0) done();
-    });
-  }
 }
 
 Control::Time Hub::now() const {
@@ -140,7 +126,7 @@ void Hub::on_metrics() {
   asio::post(io_, [this] {
     MetricFamilies families;
     for (const auto& each : boards_) {
-      describe({each->url(), &each->board()}, families);
+      describe(each->set_board(), families);
     }
     server_.set_metrics(families.text());
   });
@@ -239,9 +225,7 @@ void Hub::want_control(ClientId client, bool wanted) {
 }
 
 void Hub::watch_holder() {
-  deadline_.expires_after(*control_.deadline() - now());
-  deadline_.async_wait([this](const std::error_code& error) {
-    if (error) return;
+  deadline_.after(*control_.deadline() - now(), [this] {
     look_at_holder();
     if (control_.holder()) watch_holder();
   });
@@ -389,10 +373,6 @@ void Hub::tick() {
     if (second || changed_[i]) tell_board(i);
     changed_[i] = false;
   }
-  tick_.expires_after(tick_time);
-  tick_.async_wait([this](const std::error_code& error) {
-    if (!error) tick();
-  });
 }
 
 void Hub::tell_board(std::size_t board) {

@@ -3,8 +3,6 @@
 // clients say comes there message by message, checked, and costs it little.
 #pragma once
 
-#include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -12,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "../boards/board_set.hpp"
 #include "columns.hpp"
 #include "control.hpp"
 #include "foxglove.hpp"
@@ -27,22 +26,19 @@ namespace r4::tool::web {
 struct HubOptions {
   ServerOptions server;
   std::string record_folder;
-  BoardOptions board;
-  std::string fields;           // empty: all; on a CAN bus the paper's
   std::vector<Device> devices;  // on the user's I2C bus of each board
 };
 
 class Hub final : ServerEvents, WebBoard::Events {
  public:
-  // Throws Error if it cannot listen, or for a wrong URL.
-  Hub(asio::io_context& io, const std::vector<std::string>& urls, const HubOptions& options);
+  // The boards are watched, not yet open, and outlive it. Throws Error if it cannot listen.
+  Hub(BoardSet& boards, const HubOptions& options);
   ~Hub();
 
-  // Throws Error for a board that cannot be opened.
-  void open();
+  void start();
   const ListenAddress& address() const { return server_.address(); }
-  // Nobody is served any more; the boards are free when `done` is called.
-  void close(std::function<void()> done);
+  // Nobody is served any more.
+  void end();
 
  private:
   // On the server's thread.
@@ -94,8 +90,8 @@ class Hub final : ServerEvents, WebBoard::Events {
   std::vector<bool> changed_;
   std::set<ClientId> pages_;
   Control control_;
-  asio::steady_timer tick_;
-  asio::steady_timer deadline_;
+  Timer tick_;
+  Timer deadline_;
   Control::Time told_states_{0};
   Control::Time next_second_{0};
   bool closing_ = false;

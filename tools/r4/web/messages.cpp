@@ -7,7 +7,7 @@
 #include <iterator>
 #include <limits>
 
-#include "../shell/paths.hpp"
+#include "../boards/paths.hpp"
 #include "r4link/config.hpp"
 
 namespace r4::tool::web {

@@ -2,19 +2,16 @@
 // r4 web: boards in a browser.
 #include <fmt/format.h>
 
-#include <asio/io_context.hpp>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "../boards/board_set.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
-#include "../shell/run_end.hpp"
 #include "../shell/subcommands.hpp"
-#include "../watch/board_metrics.hpp"
 #include "hub.hpp"
 #include "r4link/discovery/url_pattern.hpp"
 #include "server/access.hpp"
@@ -37,9 +34,10 @@ struct Options {
   bool json = false;
 };
 
+// As long as a radio may need.
+constexpr Milliseconds farewell_time{200};
+
 int serve_web(const Options& options) {
-  std::vector<std::string> urls;
-  for (PatternUrl& each : expand_urls(options.urls)) urls.push_back(std::move(each.url));
   web::HubOptions hub_options;
   hub_options.server.address = web::listen_address(options.listen);
   for (const std::string& each : options.hosts) {
@@ -47,33 +45,35 @@ int serve_web(const Options& options) {
   }
   hub_options.server.origins = options.origins;
   hub_options.server.page_folder = options.page;
-  if (!has_metrics()) hub_options.server.offer = web::Offer::page;
   // A name is for other computers, though a proxy in front asks from this one.
   const bool secret =
       options.token || !options.hosts.empty() || !web::is_loopback(hub_options.server.address.host);
   if (secret) hub_options.server.token = web::random_token();
   hub_options.record_folder = options.record_folder;
-  hub_options.board = with_key(options.key);
-  hub_options.fields = options.fields;
   hub_options.devices = Device::from(options.devices);
 
-  asio::io_context io{1};
-  web::Hub hub(io, urls, hub_options);
-  hub.open();
-  RunEnd run_end(io);
-  run_end.watch(options.duration);
+  BoardSet boards;
+  for (const PatternUrl& each : expand_urls(options.urls)) {
+    const char* const usual = has_path(each.url, "can") ? "DEFAULT" : "ALL";
+    BoardOptions board = with_key(options.key);
+    board.role = BoardRole::watch;
+    ask_for(board, options.fields.empty() ? usual : options.fields, hub_options.devices);
+    boards.add(each.url, board);
+  }
+  web::Hub hub(boards, hub_options);
+  boards.open();
+  hub.start();
+  boards.end_by_signal(options.duration);
   std::string url = fmt::format("http://{}/", hub.address().text());
   if (secret) url += "#token=" + hub_options.server.token;
   if (options.json) {
-    print_line({{"type", "listening"}, {"url", url}, {"boards", urls.size()}});
+    print_line({{"type", "listening"}, {"url", url}, {"boards", boards.size()}});
   } else {
-    fmt::print("{}\n", url);
-    std::fflush(stdout);
+    print_text("{}\n", url);
   }
-  io.run();
-  io.restart();
-  hub.close([&io] { io.stop(); });
-  io.run();
+  boards.run();
+  hub.end();
+  boards.leave(farewell_time);
   return 0;
 }
 

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <utility>
 
-#include "../shell/paths.hpp"
+#include "../boards/paths.hpp"
 #include "control.hpp"
 
 namespace r4::tool::web {
@@ -17,21 +17,11 @@ using namespace std::chrono_literals;
 constexpr auto farewell_time = 200ms;
 constexpr auto stop_time = 2s;
 
-BoardOptions watching(BoardOptions options) {
-  options.role = BoardRole::watch;
-  return options;
-}
-
 }  // namespace
 
-WebBoard::WebBoard(asio::io_context& io, std::size_t number, std::string url, BoardOptions options,
-                   const std::vector<Device>& devices, Events& events)
-    : io_(io),
-      number_(number),
-      url_(std::move(url)),
-      devices_(devices),
-      events_(events),
-      board_(io, url_, watching(std::move(options))) {
+WebBoard::WebBoard(asio::io_context& io, SetBoard& board, const std::vector<Device>& devices,
+                   Events& events)
+    : io_(io), set_(board), devices_(devices), events_(events) {
   board_.watchdog(Control::limit);
   connect();
 }
@@ -43,44 +33,39 @@ void WebBoard::take_control() {
     setup_.emplace(io_, board_, devices_,
                    [this](const Problem& problem) { say(Level::warning, problem.text()); });
   }
-  events_.on_change(number_);
+  events_.on_change(set_.index);
 }
 
 void WebBoard::leave_control(Done done) {
   setup_.reset();
   board_.async_release_control(farewell_time, [this, done = std::move(done)](const auto&) {
-    events_.on_change(number_);
+    events_.on_change(set_.index);
     done();
   });
-}
-
-void WebBoard::close(Done done) {
-  setup_.reset();
-  board_.async_close(farewell_time, [done = std::move(done)](const auto&) { done(); });
 }
 
 void WebBoard::stop(OnResult done) { board_.async_stop(stop_time, std::move(done)); }
 
 void WebBoard::connect() {
   board_.on_state([this](const ReceivedState& state, const Datagram& datagram) {
-    events_.on_state(number_, state, datagram);
+    events_.on_state(set_.index, state, datagram);
   });
   board_.on_board_heartbeat([this](const Datagram& datagram) {
     if (const BoardIdentity& now = board_.identity(); !now.board_id.empty()) identity_ = now;
-    events_.on_datagram(number_, datagram);
+    events_.on_datagram(set_.index, datagram);
   });
   board_.on_nack(
-      [this](const Nack&, const Datagram& datagram) { events_.on_datagram(number_, datagram); });
+      [this](const Nack&, const Datagram& datagram) { events_.on_datagram(set_.index, datagram); });
   board_.on_link([this](const LinkStatus& link) { on_link(link); });
   board_.on_event([this](const CarrierEvent& event) {
     if (event.kind != CarrierEvent::Kind::up) say(Level::warning, event.problem.text());
-    events_.on_change(number_);
+    events_.on_change(set_.index);
   });
   on_paths(board_, [this](const PathStatus& path) {
     const bool carries = path.state == PathState::carrying;
     say(carries ? Level::info : Level::warning,
         fmt::format("path {}: {}", path.name, to_text(path.state)));
-    events_.on_change(number_);
+    events_.on_change(set_.index);
   });
   board_.on_restart([this] { say(Level::warning, "the board has begun again"); });
   board_.on_arming([this](DisarmCause cause) {
@@ -89,7 +74,7 @@ void WebBoard::connect() {
     } else if (cause != DisarmCause::not_yet) {
       say(Level::warning, fmt::format("disarmed: {}", to_text(cause)));
     }
-    events_.on_change(number_);
+    events_.on_change(set_.index);
   });
 }
 
@@ -97,7 +82,7 @@ void WebBoard::on_link(const LinkStatus& link) {
   const bool heard = is_heard(link.state);
   if (heard && !heard_) say(Level::info, "the board is there");
   const bool lost = link.state == HostLinkState::lost;
-  if (lost && heard_) say(Level::warning, explain(url_, link).reason);
+  if (lost && heard_) say(Level::warning, explain(url(), link).reason);
   heard_ = heard || (heard_ && !lost);  // that it begins anew is told already
   if (heard && link.reason != link_.reason) {
     const bool safe = link.reason != SafeReason::none;
@@ -106,7 +91,7 @@ void WebBoard::on_link(const LinkStatus& link) {
              : "the outputs are free");
   }
   link_ = link;
-  events_.on_change(number_);
+  events_.on_change(set_.index);
 }
 
 }  // namespace r4::tool::web

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "../boards/board_set.hpp"
 #include "../devices/device_setup.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/recording.hpp"
@@ -33,35 +34,31 @@ class WebBoard {
   using OnResult = std::function<void(const CommandResult&)>;
 
   // While it is controlled, it sets `devices` up, which outlive it.
-  WebBoard(asio::io_context& io, std::size_t number, std::string url, BoardOptions options,
-           const std::vector<Device>& devices, Events& events);
+  WebBoard(asio::io_context& io, SetBoard& board, const std::vector<Device>& devices,
+           Events& events);
 
-  // To watch. Throws Error.
-  void open() { board_.open(); }
   // Throws Error where it cannot: then it is watched on.
   void take_control();
   // Its heartbeats end now. `done` when the board is free, or does not answer.
   void leave_control(Done done);
-  // The same at the end of the program.
-  void close(Done done);
   void stop(OnResult done);
 
   AsyncBoard& board() { return board_; }
+  const SetBoard& set_board() const { return set_; }
   bool controlling() const { return board_.role() == BoardRole::control; }
-  const std::string& url() const { return url_; }
+  const std::string& url() const { return set_.url; }
   const BoardIdentity& identity() const { return identity_; }
 
  private:
   void connect();
   void on_link(const LinkStatus& link);
-  void say(Level level, const std::string& text) { events_.on_event(number_, level, text); }
+  void say(Level level, const std::string& text) { events_.on_event(set_.index, level, text); }
 
   asio::io_context& io_;
-  const std::size_t number_;
-  const std::string url_;
+  SetBoard& set_;
   const std::vector<Device>& devices_;
   Events& events_;
-  AsyncBoard board_;
+  AsyncBoard& board_{set_.board};
   std::optional<DeviceSetup> setup_;
   BoardIdentity identity_;
   LinkStatus link_;

@@ -154,10 +154,7 @@ void Inbox::on_posted() {
     drain();
     return;
   }
-  timer_.expires_at(next_);
-  timer_.async_wait([this](const std::error_code& error) {
-    if (!error) drain();
-  });
+  timer_.at(next_, [this] { drain(); });
 }
 
 void Inbox::drain() {

@@ -11,7 +11,6 @@
 
 #include <array>
 #include <asio/io_context.hpp>
-#include <asio/steady_timer.hpp>
 #include <atomic>
 #include <chrono>
 #include <cstddef>
@@ -27,6 +26,7 @@
 #include <vector>
 
 #include "entity.hpp"
+#include "tools/r4/boards/timer.hpp"
 #include "transit.hpp"
 
 namespace r4::tool::ros2 {
@@ -131,7 +131,7 @@ class Inbox {
   bool ended_ = false;
 
   // Of the loop's thread.
-  asio::steady_timer timer_;
+  Timer timer_;
   Clock::time_point next_{};
 };
 

@@ -87,7 +87,7 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
         std::distance(origins.first, origins.second) > 1) {
       return refuse(http::status::bad_request, "there must be one Host");
     }
-    if (websocket::is_upgrade(request) && server_.offer != Offer::metrics) return upgrade();
+    if (websocket::is_upgrade(request) && server_.page) return upgrade();
     const std::string_view host = view(request[http::field::host]);
     const std::string_view origin = view(request[http::field::origin]);
     if (const Verdict verdict = server_.access.check(host, origin); verdict != Verdict::allowed) {
@@ -105,10 +105,6 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
     const Verdict verdict =
         server_.access.check_token(view(request[http::field::authorization]), target, {});
     if (verdict != Verdict::allowed) return refuse(http::status::unauthorized, to_text(verdict));
-    if (server_.offer == Offer::page) {
-      return refuse(http::status::not_implemented,
-                    "this build of r4 does not have metrics (R4_METRICS=OFF)");
-    }
     server_.ask_metrics(*this);
   }
 

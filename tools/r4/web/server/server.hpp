@@ -20,11 +20,10 @@ namespace r4::tool::web {
 
 using ClientId = std::uint32_t;
 enum class Protocol : std::uint8_t { page, foxglove };
-enum class Offer : std::uint8_t { page_and_metrics, metrics, page };
 
 struct ServerOptions {
   ListenAddress address;
-  Offer offer = Offer::page_and_metrics;
+  bool page = true;                  // and what is live, besides /metrics
   std::vector<std::string> hosts;    // NAME or NAME:PORT by which it is asked besides the address
   std::string token;                 // empty: none is needed
   std::vector<std::string> origins;  // of foreign pages that may read by the Foxglove protocol

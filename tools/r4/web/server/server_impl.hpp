@@ -44,10 +44,10 @@ struct Server::Impl {
 
   Impl(const ServerOptions& options, ServerEvents& server_events)
       : events(server_events),
-        offer(options.offer),
+        page(options.page),
         access(options.address.host, options.hosts, options.token, options.origins),
         folder(options.page_folder),
-        files(offer == Offer::metrics ? PageFiles() : page_files()),
+        files(page ? page_files() : PageFiles()),
         listen_address(options.address) {}
 
   void listen();
@@ -56,7 +56,7 @@ struct Server::Impl {
   void answer_metrics() const;
 
   ServerEvents& events;
-  const Offer offer;
+  const bool page;
   const Access access;
   const std::string folder;
   const PageFiles files;

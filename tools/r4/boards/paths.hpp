@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "json.hpp"
+#include "../shell/json.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/error.hpp"
 #include "r4link/link.hpp"

@@ -4,13 +4,12 @@
 
 #include <asio/io_context.hpp>
 #include <asio/signal_set.hpp>
-#include <asio/steady_timer.hpp>
 #include <chrono>
 #include <csignal>
 #include <optional>
 #include <system_error>
 
-#include "r4link/async_board.hpp"
+#include "timer.hpp"
 
 namespace r4::tool {
 
@@ -18,7 +17,7 @@ namespace r4::tool {
 // ignored when the program started stays ignored: nohup and the & of a shell script ask for that.
 class RunEnd {
  public:
-  explicit RunEnd(asio::io_context& io) : io_(io), signals_(io), timer_(io) {}
+  explicit RunEnd(asio::io_context& io) : io_(io), signals_(io), limit_(io) {}
 
   // Before this call a signal ends the program at once. `duration`: the longest run, if it has a limit.
   void watch(const std::optional<std::chrono::milliseconds>& duration = std::nullopt) {
@@ -26,9 +25,7 @@ class RunEnd {
       if (!is_ignored(number)) signals_.add(number);
     }
     signals_.async_wait([this](const std::error_code&, int) { io_.stop(); });
-    if (!duration) return;
-    timer_.expires_after(*duration);
-    timer_.async_wait([this](const std::error_code&) { io_.stop(); });
+    if (duration) limit_.after(*duration, [this] { io_.stop(); });
   }
 
  private:
@@ -39,16 +36,7 @@ class RunEnd {
 
   asio::io_context& io_;
   asio::signal_set signals_;
-  asio::steady_timer timer_;
+  Timer limit_;
 };
-
-// The end of a command that had a board: runs `io`, which was stopped, until the board has said that it is
-// free, or does not answer, and closes it. So the next command need not wait for the board's timeout.
-inline void say_farewell(asio::io_context& io, AsyncBoard& board) {
-  constexpr std::chrono::milliseconds limit{100};
-  board.async_close(limit, [&io](const CommandResult&) { io.stop(); });
-  io.restart();
-  io.run();
-}
 
 }  // namespace r4::tool

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/r4/boards/timer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <asio/post.hpp>
+#include <chrono>
+#include <optional>
+#include <string>
+
+namespace r4::tool {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(CommandTimer, RunsATaskAgainAndAgainUntilTheTaskEndsThat) {
+  asio::io_context io;
+  Timer timer(io);
+  int runs = 0;
+  timer.every(1ms, [&] {
+    if (++runs == 3) timer.cancel();
+  });
+  io.run();
+  EXPECT_EQ(runs, 3);
+}
+
+TEST(CommandTimer, RunsOnlyTheNewestTask) {
+  asio::io_context io;
+  Timer timer(io);
+  std::string ran;
+  timer.every(1ms, [&] { ran += "first"; });
+  timer.after(2ms, [&] { ran += "second"; });
+  io.run();
+  EXPECT_EQ(ran, "second");
+}
+
+TEST(CommandTimer, ATaskMayReplaceItself) {
+  asio::io_context io;
+  Timer timer(io);
+  std::string ran;
+  timer.every(1ms, [&] {
+    ran += "a";
+    timer.after(1ms, [&] { ran += "b"; });
+  });
+  io.run();
+  EXPECT_EQ(ran, "ab");
+}
+
+// The time has come for both, and the loop calls the first: the second is cancelled, or its timer is gone.
+TEST(CommandTimer, RunsNoTaskAfterItWasCancelledThoughItsTimeHadCome) {
+  for (const bool destroyed : {false, true}) {
+    asio::io_context io;
+    std::optional<Timer> first(std::in_place, io);
+    std::optional<Timer> second(std::in_place, io);
+    int runs = 0;
+    const auto run = [&](std::optional<Timer>& other) {
+      ++runs;
+      if (destroyed) {
+        other.reset();
+      } else {
+        other->cancel();
+      }
+    };
+    const Timer::Clock::time_point past = Timer::Clock::now() - 1s;
+    first->at(past, [&] { run(second); });
+    second->at(past, [&] { run(first); });
+    io.run();
+    EXPECT_EQ(runs, 1) << destroyed;
+  }
+}
+
+}  // namespace
+}  // namespace r4::tool

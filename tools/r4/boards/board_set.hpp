@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The boards of a command, one or many, on one loop:
+//
+//     BoardSet boards(options.urls, watching(options.key));
+//     for (SetBoard& each : boards) each.board.on_state(…);
+//     boards.open();
+//     boards.end_by_signal(options.duration);
+//     boards.run();            // until then, or until boards.stop()
+//     boards.leave();          // all say farewell at once
+//     boards.require_heard();
+#pragma once
+
+#include <asio/io_context.hpp>
+#include <chrono>
+#include <cstddef>
+#include <deque>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "r4link/async_board.hpp"
+#include "r4link/devices/device.hpp"
+#include "run_end.hpp"
+#include "r4link/discovery/url_pattern.hpp"
+
+namespace r4::tool {
+
+struct SetBoard {
+  SetBoard(asio::io_context& io, std::size_t board_index, std::string board_url,
+           const BoardOptions& options)
+      : index(board_index), url(std::move(board_url)), board(io, url, options) {}
+
+  const std::size_t index;  // from 0, in the order of the URLs
+  const std::string url;    // that the user gave: the same whenever the program is started
+  AsyncBoard board;
+};
+
+class BoardSet {
+ public:
+  BoardSet() = default;
+  // Throws Error{usage} for a wrong URL or pattern.
+  BoardSet(const std::vector<std::string>& patterns, const BoardOptions& options);
+
+  // The board is not opened, also where the others are open.
+  SetBoard& add(const std::string& url, const BoardOptions& options);
+
+  asio::io_context& io() { return io_; }
+  std::size_t size() const { return boards_.size(); }
+  SetBoard& operator[](std::size_t board) { return boards_[board]; }
+  auto begin() { return boards_.begin(); }
+  auto end() { return boards_.end(); }
+  auto begin() const { return boards_.begin(); }
+  auto end() const { return boards_.end(); }
+
+  // Throws Error for the first board that cannot be opened.
+  void open();
+  // A signal ends run(), or the end of that time: RunEnd.
+  void end_by_signal(const std::optional<std::chrono::milliseconds>& duration = std::nullopt) {
+    end_.watch(duration);
+  }
+  void run() { io_.run(); }
+  // Ends run(). Callbacks for datagrams that were read together may still follow.
+  void stop() { io_.stop(); }
+  bool stopped() const { return io_.stopped(); }
+  // After run(): all boards say farewell at once, until each has answered, but not for longer than `limit`. So the
+  // next command need not wait for their timeouts.
+  void leave(std::chrono::milliseconds limit = std::chrono::milliseconds{100});
+
+  // Throws Error{refused} for the first board that was not heard, or whose paths lead to two boards.
+  void require_heard() const;
+
+ private:
+  asio::io_context io_{1};
+  RunEnd end_{io_};
+  std::deque<SetBoard> boards_;
+};
+
+// The options of a board that is watched, and asked for those fields and the ones of `devices`. No `fields`: DEFAULT.
+BoardOptions watching(const std::string& key, const std::string& fields = {},
+                      const std::vector<Device>& devices = {});
+void ask_for(BoardOptions& options, const std::string& fields, const std::vector<Device>& devices);
+
+// The interface of can://can0 without a node: all boards that are heard on it. Empty for any other URL.
+std::string whole_bus(std::string_view url);
+
+}  // namespace r4::tool
