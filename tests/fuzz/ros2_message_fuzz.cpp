@@ -40,7 +40,7 @@ void read_string(std::string_view bytes) {
   try {
     bool stop = false;
     for (const OwnCommand& own : commands_of(*text)) {
-      const Command command = own.get();
+      const Command command = own;
       is_sendable(command);
       stop = stop || command.kind == CommandKind::stop;
     }

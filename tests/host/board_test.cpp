@@ -94,7 +94,7 @@ TEST_P(BoardOver, StopsUntilCleared) {
   EXPECT_TRUE(contains(refused.reason, "emergency stop"));
   EXPECT_TRUE(contains(refused.fix, "E:CLEAR"));
 
-  board.clear();
+  board.send(Command::clear());
   board.wait_active();
   EXPECT_EQ(board.next_state().osmc(1).pwm, 0) << "nothing comes back after a stop";
   board.osmc(1).set_pwm(5, Direction::forward);

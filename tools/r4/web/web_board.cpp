@@ -59,7 +59,9 @@ void WebBoard::close(Done done) {
   board_.async_close(farewell_time, [done = std::move(done)](const auto&) { done(); });
 }
 
-void WebBoard::stop(OnResult done) { board_.async_stop(stop_time, std::move(done)); }
+void WebBoard::stop(OnResult done) {
+  board_.async_send(Command::stop(), stop_time, std::move(done));
+}
 
 void WebBoard::connect() {
   board_.on_state([this](const ReceivedState& state, const Datagram& datagram) {
