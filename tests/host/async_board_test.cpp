@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <asio/bind_executor.hpp>
 #include <asio/co_spawn.hpp>
 #include <asio/detached.hpp>
@@ -95,6 +96,26 @@ TEST_F(AsyncBoardTest, OnlyListensAsAWatcherOnABusButForLeasesAndStops) {
   watching.async_send(Command::stop(), 50ms, [](const CommandResult&) {});
   ASSERT_TRUE(run_until([&] { return !sent.empty(); }));
   EXPECT_EQ(sent[0].substr(0, 7), "E:STOP;");
+}
+
+TEST_F(AsyncBoardTest, SendsAStopWhateverItsTimeoutAndRepeatsOneThatIsPosted) {
+  std::vector<std::string> sent;
+  BoardOptions options;
+  options.role = BoardRole::watch;
+  AsyncBoard watching(io, std::make_unique<Bus>(sent), options);
+  const auto stops = [&] {
+    return std::count_if(sent.begin(), sent.end(),
+                         [](const std::string& each) { return each.starts_with("E:STOP;"); });
+  };
+  EXPECT_EQ(watching.post(Command::stop()), PostResult::no_link) << "it is not open";
+  watching.open();
+  for (const auto timeout : {0ms, -1ms}) {
+    sent.clear();
+    watching.async_send(Command::stop(), timeout, [](const CommandResult&) {});
+    EXPECT_EQ(stops(), 1) << timeout.count();
+  }
+  EXPECT_EQ(watching.post(Command::stop()), PostResult::sent);
+  EXPECT_TRUE(run_until([&] { return stops() >= 4; }));
 }
 
 TEST_F(AsyncBoardTest, ReportsStatesOfATransportThatIsNeverDrained) {

@@ -122,5 +122,17 @@ TEST(Explain, BlamesNoFramesForAStopWhichIsAFrameOfItsOwn) {
   EXPECT_EQ(problem.reason.find("20 ms"), std::string::npos) << problem.reason;
 }
 
+TEST(Explain, NamesACommandWithoutItsSecret) {
+  const CommandResult refused{Outcome::refused, Refusal::auth, Time{0}};
+  EXPECT_EQ(explain(Command::setting("password", "eeeeeeee"), refused, {}).thing, "C:password,...");
+}
+
+TEST(Explain, TakesTheNameOfARequestForNoCommand) {
+  const CommandResult refused{Outcome::refused, Refusal::range, Time{0}};
+  EXPECT_EQ(explain("arm()", refused, {}).thing, "arm()");
+  EXPECT_EQ(explain("arm()", refused, {}).fix, "");
+  EXPECT_EQ(explain("E:STOP", timed_out_command(), {}).reason.find("the stop"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace r4

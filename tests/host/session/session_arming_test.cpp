@@ -256,7 +256,7 @@ TEST_F(EarlierCause, IsNotClearedByArming) {
   EXPECT_EQ(problem.reason, "not armed: stopped before this program began");
   EXPECT_EQ(
       problem.fix,
-      "clear it on purpose: r4 send URL E:CLEAR, or board.send(Command::clear()), then call arm()");
+      "clear it on purpose: r4 send URL E:CLEAR, or board.send(\"E:CLEAR\"), then call arm()");
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::earlier_stop);
   link.pass(2s);
   EXPECT_EQ(link.count('E') + link.count('R'), 0U);
