@@ -194,7 +194,7 @@ TEST(Board, ReportsThatAnotherHostControlsTheBoard) {
 
   other.stop();  // which anyone may
   EXPECT_TRUE(hears_of(owner, SafeReason::stop));
-  owner.clear();
+  owner.send(Command::clear());
   owner.close();
   ASSERT_NO_THROW(other.wait_active(5s)) << "control is free once the owner is silent";
 }
