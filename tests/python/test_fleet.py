@@ -42,6 +42,8 @@ def test_setpoints_of_several_boards(fleet, wait):
     wait(lambda: [state.osmc1.pwm for state in fleet.states()] == [100 + board for board in range(8)])
     assert fleet.send({'sim:?node=1': Setpoints(Command.osmc(1, pwm=7))})
     assert fleet.states()[1].osmc1.pwm == 7
+    with pytest.raises(TypeError, match='leave `boards` out'):
+        fleet.send(setpoints, boards=[1])
 
 
 def test_tells_what_happens_to_its_boards(fleet):
