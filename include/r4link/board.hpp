@@ -162,8 +162,8 @@ class R4LINK_API Board {
   // nothing.
   void send(const Command& command, Duration timeout = default_timeout);
   // Several output commands that the board executes together, in one pass over its chips, or not at all:
-  // all wheels of a robot, say. They are confirmed as one, and the Error names the command that was in the
-  // way: Error::at(), from 1. A board that knows no groups (without `group` in BoardIdentity::capabilities)
+  // all wheels of a robot, say. They are confirmed as one, and the Error names the command that was
+  // in the way: Error::at(), from 1. A board that knows no groups (without `group` in BoardIdentity::capabilities)
   // is sent one after the other: then those before it were executed, and the Error says so. It is asked when
   // the link comes up; until it has answered, what is posted is not sent (no_link).
   void send(const Setpoints& setpoints, Duration timeout = default_timeout);
@@ -181,7 +181,8 @@ class R4LINK_API Board {
   // while this program controlled the board), then closes relay 1, the motor supply. Throws
   // Error{refused} if the handle is released or something is in the way, when a stop comes
   // meanwhile, and for a stop, a watchdog or a fault that may have come before this program began:
-  // Command::clear() clears that, on purpose, so that a program which is restarted does not drive off again.
+  // Command::clear() clears that, on purpose, so that a program which is restarted does not drive
+  // off again.
   // BoardOptions: options.session.arming = Arming::off does without.
   void arm(Duration timeout = default_timeout);
   // Why output commands are refused; none when armed.

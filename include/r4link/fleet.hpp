@@ -183,7 +183,8 @@ class R4LINK_API Fleet {
   FleetResults stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
 
-  // Setpoints sent once, in one pass of the loop, and not confirmed: which were sent, in their order. For streams.
+  // Setpoints sent once, in one pass of the loop, and not confirmed: which were sent, in their
+  // order. For streams.
   std::vector<PostResult> post(const std::vector<BoardSetpoints>& setpoints);
 
   // The next thing that has happened, oldest first; none if there is nothing in time. The newest 4096 are kept.
