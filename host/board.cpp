@@ -2,6 +2,7 @@
 #include "r4link/board.hpp"
 
 #include <utility>
+#include <variant>
 
 #include "board_impl.hpp"
 #include "commands/command_help.hpp"
@@ -81,28 +82,18 @@ void Board::wait_active(Duration timeout) {
 
 void Board::send(const Command& command, Duration timeout) {
   const auto impl = impl_;
-  impl->require_sendable(command);
+  // A stop goes out whatever the timeout.
   if (command.kind == CommandKind::stop && timeout.count() <= 0) impl->post(command);
-  require_timeout(shown(command), timeout);
   impl->execute(command, timeout);
 }
-void Board::send(std::string_view command, Duration timeout) {
-  if (is_group_text(command)) return apply(parse_group_text(command), timeout);
-  const OwnCommand one = parse_command_text(command);
-  send(one.get(), timeout);
+void Board::send(const Setpoints& setpoints, Duration timeout) {
+  const auto impl = impl_;
+  impl->execute(setpoints, timeout);
+}
+void Board::send(std::string_view text, Duration timeout) {
+  std::visit([&](const auto& each) { send(each, timeout); }, parse_text(text));
 }
 PostResult Board::post(const Command& command) { return impl_->post(command); }
-void Board::apply(const Setpoints& setpoints, Duration timeout) {
-  require_any(setpoints);
-  const std::string text = to_text(setpoints);
-  require_timeout(text, timeout);
-  const auto impl = impl_;
-  impl->require_control(text);
-  const auto apply = [setpoints](AsyncBoard& board, std::size_t, Duration left, auto end) {
-    board.async_apply(setpoints, left, std::move(end));
-  };
-  impl->execute(text, apply, timeout);
-}
 PostResult Board::post(const Setpoints& setpoints) { return impl_->post(setpoints); }
 void Board::arm(Duration timeout) {
   require_timeout("arm()", timeout);
@@ -117,7 +108,6 @@ DisarmCause Board::disarmed_by() const { return impl_->read(impl_->disarmed_by);
 
 void Board::stop(Duration timeout) { send(Command::stop(), timeout); }
 void Board::stop_async() { impl_->post(Command::stop()); }
-void Board::clear(Duration timeout) { send(Command::clear(), timeout); }
 
 Command Board::DriveChannel::command(Pwm pwm, Direction direction) const {
   return kind_ == CommandKind::osmc ? Command::osmc(channel_, pwm, direction)
@@ -207,7 +197,6 @@ void Board::link_timing(Duration board_timeout, Duration heartbeat, Duration tim
 }
 
 BoardIdentity Board::identify(Duration timeout) {
-  require_timeout("identify()", timeout);
   const auto impl = impl_;
   impl->execute(Command::identify(), timeout);
   return impl->read(impl->identity);

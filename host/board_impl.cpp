@@ -14,6 +14,17 @@
 
 namespace r4 {
 
+namespace {
+
+// Throws an error that explains why `what` was not confirmed.
+template <class What, class Part>
+Part confirmed(const What& what, Part part) {
+  if (part->result.outcome == Outcome::confirmed) return part;
+  throw Error(explain(what, part->result, part->link));
+}
+
+}  // namespace
+
 Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first)
     : BlockingLoop({"board", "a transport of your own must return at once"}, 1,
                    std::move(options.on_wait)),
@@ -182,11 +193,8 @@ void Board::Impl::on_callback_end(Clock::duration busy) {
   });
 }
 
-void Board::Impl::deliver(const OwnCommand& own) {
-  const Command command = own.get();
-  if (command.kind == CommandKind::stop) {
-    async.async_stop(default_timeout, [](const CommandResult&) {});
-  } else if (const PostResult result = post_now(command); !result) {
+void Board::Impl::deliver(const Command& command) {
+  if (const PostResult result = post_now(command); !result) {
     RefusedPost refused{command, Refusal::none, result};
     refused.command.text = refused.command.text2 = Text();
     callbacks.notify(refused);
@@ -225,6 +233,11 @@ void Board::Impl::require_control(std::string_view what) {
   r4::require_control(role, what);
 }
 
+void Board::Impl::require_sendable(const Setpoints& setpoints) {
+  require_any(setpoints);
+  const std::lock_guard lock(mutex);
+  r4::require_control(role, setpoints);
+}
 void Board::Impl::require_sendable(const Command& command) {
   require_valid(command);
   const std::lock_guard lock(mutex);
@@ -235,14 +248,22 @@ void Board::Impl::require_sendable(const Command& command) {
 
 std::shared_ptr<const Board::Impl::Part> Board::Impl::execute(const Command& command,
                                                               Duration timeout) {
-  return execute(shown(command), start_of(command), timeout, command.kind == CommandKind::stop);
+  require_sendable(command);
+  const std::string text = shown(command);
+  require_timeout(text, timeout);
+  return confirmed(command, run(text, start_of(OwnCommand(command)), timeout,
+                                command.kind == CommandKind::stop));
 }
 
-std::shared_ptr<const Board::Impl::Part> Board::Impl::execute(const std::string& text, Start start,
-                                                              Duration timeout, bool stop) {
-  auto part = run(text, std::move(start), timeout, stop);
-  if (part->result.outcome == Outcome::confirmed) return part;
-  throw Error(explain(text, part->result, part->link));
+void Board::Impl::execute(const Setpoints& setpoints, Duration timeout) {
+  require_sendable(setpoints);
+  const std::string text = shown(setpoints);
+  require_timeout(text, timeout);
+  confirmed(setpoints, run(text, start_of(setpoints), timeout));
+}
+
+void Board::Impl::execute(const std::string& request, Start start, Duration timeout) {
+  confirmed(request, run(request, std::move(start), timeout));
 }
 
 std::shared_ptr<const Board::Impl::Part> Board::Impl::run(const std::string& text, Start start,
@@ -264,9 +285,8 @@ PostResult Board::Impl::post(const Command& command) {
   return box.put(command) ? PostResult::sent : PostResult::queue_full;
 }
 PostResult Board::Impl::post(const Setpoints& setpoints) {
-  require_any(setpoints);
+  require_sendable(setpoints);
   const std::lock_guard lock(mutex);
-  r4::require_control(role, setpoints);
   if (closed || !in_control) return PostResult::no_link;
   if (is_held_back()) return PostResult::not_armed;
   return box.put(setpoints) ? PostResult::sent : PostResult::queue_full;

@@ -47,10 +47,12 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
 
   void require_control(std::string_view what);
   void require_sendable(const Command& command);
-  // Has the board execute a command. Throws if it is not confirmed.
+  void require_sendable(const Setpoints& setpoints);
+  // Has the board execute a command, a group, or the request of that name. Throws if it is not
+  // confirmed.
   std::shared_ptr<const Part> execute(const Command& command, Duration timeout);
-  std::shared_ptr<const Part> execute(const std::string& text, Start start, Duration timeout,
-                                      bool stop = false);
+  void execute(const Setpoints& setpoints, Duration timeout);
+  void execute(const std::string& request, Start start, Duration timeout);
   // The same, but the caller judges the outcome. Throws if that is not known, or the board is
   // closed.
   std::shared_ptr<const Part> run(const std::string& text, Start start, Duration timeout,
@@ -92,9 +94,13 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   // Control may have been released since it was posted.
   template <class What>
   PostResult post_now(const What& what) {
-    return async.role() == BoardRole::control ? async.post(what) : PostResult::no_link;
+    try {
+      return async.post(what);
+    } catch (const Error&) {
+      return PostResult::no_link;
+    }
   }
-  void deliver(const OwnCommand& own);
+  void deliver(const Command& command);
   void deliver(const Setpoints& setpoints);
   void take_uarts(const State& fresh);
   void on_end() override;

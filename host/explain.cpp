@@ -116,7 +116,7 @@ CauseWords words_of(LinkCause cause) {
 }
 
 constexpr const char* clear_on_purpose =
-    "clear it on purpose: r4 send URL E:CLEAR, or board.clear(), ";
+    "clear it on purpose: r4 send URL E:CLEAR, or board.send(\"E:CLEAR\"), ";
 
 // Why outputs are not driven, and what to do before arm() is called.
 Words disarm_words(DisarmCause cause) {
@@ -189,14 +189,17 @@ bool link_is_well(const LinkStatus& link) {
   return link.state == HostLinkState::active && link.causes.without(harmless).empty();
 }
 
-// True for a setting that a board accepts over its own cable only.
-bool sets_the_site(std::string_view command) {
-  constexpr std::string_view setting = "C:";
-  return command.starts_with(setting) &&
-         is_site_setting(Text(command.substr(setting.size(), command.find(',') - setting.size())));
+// In the functions below `command` is null for a request that is not a command.
+
+bool is(CommandKind kind, const Command* command) {
+  return command != nullptr && command->kind == kind;
 }
 
-Words refusal_words(std::string_view command, Refusal code, const LinkStatus& link) {
+bool sets(std::string_view key, const Command* command) {
+  return is(CommandKind::setting, command) && command->text == Text(key);
+}
+
+Words refusal_words(const Command* command, Refusal code, const LinkStatus& link) {
   Words words{
       fmt::format("refused by the board: {} ({})",
                   std::string_view(name_of(code).data(), name_of(code).size()), meaning_of(code)),
@@ -206,14 +209,13 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
     case Refusal::format:
     case Refusal::range:
     case Refusal::channel:
-      words.fix = bad_command(command, code).fix;
+      if (command != nullptr) words.fix = bad_command(*command, code).fix;
       // An invalid key is not sent, so the board has no room for it.
-      if (code == Refusal::range && command.starts_with("C:key,")) {
+      if (code == Refusal::range && sets("key", command)) {
         words.reason = fmt::format("refused by the board: RANGE (it holds {} keys)", max_keys);
         words.fix = "take one away: C:key,id:off";
       }
-      if (code == Refusal::range &&
-          (command.starts_with("C:timeout,") || command.starts_with("C:heartbeat,"))) {
+      if (code == Refusal::range && (sets("timeout", command) || sets("heartbeat", command))) {
         words.fix =
             "the board's heartbeat interval must stay below its timeout: set both in one step, "
             "r4 send URL C:timeout,MS C:heartbeat,MS or link_timing()";
@@ -232,13 +234,15 @@ Words refusal_words(std::string_view command, Refusal code, const LinkStatus& li
       words.fix = words_of(LinkCause::busy).fix;
       break;
     case Refusal::stale:
-      words.fix = command.substr(0, 7) == "E:CLEAR"
+      words.fix = is(CommandKind::clear, command)
                       ? "a stop or fault may have come since: look at the robot, then send it again"
                       : "send it again if it is still wanted";
       break;
     case Refusal::auth:
-      words.fix = sets_the_site(command) ? "send it over USB: serial:auto"
-                                         : words_of(LinkCause::key_needed).fix;
+      // A board accepts such a setting over its own cable only.
+      words.fix = is(CommandKind::setting, command) && is_site_setting(command->text)
+                      ? "send it over USB: serial:auto"
+                      : words_of(LinkCause::key_needed).fix;
       break;
     case Refusal::full:
       words.fix = "send it again when the transfer that is under way has ended";
@@ -273,10 +277,8 @@ Words unconfirmed_stop_words(const CommandResult& result, LinkStatus link) {
   return words;
 }
 
-bool is_stop(std::string_view command) { return command.starts_with("E:STOP"); }
-
-Words outcome_words(std::string_view command, const CommandResult& result, const LinkStatus& link) {
-  if (is_stop(command) && result.outcome != Outcome::confirmed) {
+Words outcome_words(const Command* command, const CommandResult& result, const LinkStatus& link) {
+  if (is(CommandKind::stop, command) && result.outcome != Outcome::confirmed) {
     return unconfirmed_stop_words(result, link);
   }
   Words words;
@@ -321,7 +323,7 @@ Words outcome_words(std::string_view command, const CommandResult& result, const
       words.fix = "wait until some of them are confirmed";
       break;
     case Outcome::not_armed: {
-      Problem why = explain(command, result.disarmed);
+      Problem why = explain("", result.disarmed);
       words = {std::move(why.reason), std::move(why.fix)};
       break;
     }
@@ -332,14 +334,24 @@ Words outcome_words(std::string_view command, const CommandResult& result, const
 }
 
 // What became of the other commands of a group.
-std::string group_words(std::string_view group, const CommandResult& result) {
-  const auto size = 1 + std::count(group.begin(), group.end(), ';');
+std::string group_words(std::size_t size, const CommandResult& result) {
+  if (size == 1) return "";
   if (result.executed != 0) {
     return fmt::format("; it is command {} of {}, and those before it were executed", result.at,
                        size);
   }
   if (result.outcome != Outcome::refused && result.outcome != Outcome::not_armed) return "";
   return fmt::format("; none of the {} commands was executed", size);
+}
+
+Problem problem_of(std::string thing, Words words, const CommandResult& result) {
+  return {.kind = ErrorKind::refused,
+          .thing = std::move(thing),
+          .reason = std::move(words.reason),
+          .fix = std::move(words.fix),
+          .outcome = result.outcome,
+          .refusal = result.code,
+          .at = result.at};
 }
 
 }  // namespace
@@ -363,10 +375,10 @@ Problem explain(LinkCause cause) {
   return {ErrorKind::refused, words.name, words.reason, words.fix};
 }
 
-Problem explain(std::string_view command, DisarmCause cause) {
+Problem explain(std::string_view what, DisarmCause cause) {
   const Words words = disarm_words(cause);
   const bool first = words.fix.empty();
-  return {ErrorKind::refused, std::string(command), "not armed: " + words.reason,
+  return {ErrorKind::refused, std::string(what), "not armed: " + words.reason,
           words.fix + (first ? "call arm()" : "then call arm()")};
 }
 
@@ -390,17 +402,20 @@ Problem explain(const std::vector<PathStatus>& paths) {
           "give the URLs of one board, or open each board by itself"};
 }
 
-Problem explain(std::string_view command, const CommandResult& result, const LinkStatus& link) {
-  const std::string_view failed = part_of(command, result.at);
-  Words words = outcome_words(failed, result, link);
-  if (is_group_text(command)) words.reason += group_words(command, result);
-  return {.kind = ErrorKind::refused,
-          .thing = std::string(failed),
-          .reason = std::move(words.reason),
-          .fix = std::move(words.fix),
-          .outcome = result.outcome,
-          .refusal = result.code,
-          .at = result.at};
+Problem explain(const Command& command, const CommandResult& result, const LinkStatus& link) {
+  return problem_of(shown(command), outcome_words(&command, result, link), result);
+}
+
+Problem explain(const Setpoints& group, const CommandResult& result, const LinkStatus& link) {
+  const bool named = result.at >= 1 && result.at <= group.size();
+  const Command failed = group[named ? result.at - 1U : 0U];
+  Words words = outcome_words(&failed, result, link);
+  words.reason += group_words(group.size(), result);
+  return problem_of(named ? shown(failed) : shown(group), std::move(words), result);
+}
+
+Problem explain(std::string_view request, const CommandResult& result, const LinkStatus& link) {
+  return problem_of(std::string(request), outcome_words(nullptr, result, link), result);
 }
 
 }  // namespace r4

@@ -23,7 +23,7 @@ namespace r4 {
 class PostBox {
  public:
   static constexpr std::size_t capacity = 256;
-  using Letter = std::variant<OwnCommand, Setpoints>;
+  using Letter = CommandOrGroup;
 
   // `deliver` is called on the loop, once for each command or group. The loop must end before the
   // box is destroyed.

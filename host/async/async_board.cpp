@@ -29,6 +29,8 @@ std::vector<std::unique_ptr<Carrier>> checked(std::vector<std::unique_ptr<Carrie
   return carriers;
 }
 
+constexpr AsyncBoard::Duration posted_stop_time{1000};
+
 }  // namespace
 
 AsyncBoard::AsyncBoard(const executor_type& executor, std::string_view url, BoardOptions options)
@@ -78,36 +80,20 @@ void AsyncBoard::require_wait(std::string_view what, Duration timeout) {
   r4::require_wait(what, timeout);
 }
 
-void AsyncBoard::start_send(const Command& command, Duration timeout, CompletionPtr completion) {
+template <class What>
+void AsyncBoard::start_send(const What& what, Duration timeout, CompletionPtr completion) {
   Impl& impl = *impl_;
-  impl.give_up_slot(command);
+  impl.give_up_slot(what);
   impl.begin(std::move(completion),
-             [&] { return impl.session.send(command, Impl::time_of(timeout), impl.now); });
+             [&] { return impl.session.send(what, Impl::time_of(timeout), impl.now); });
 }
-
-void AsyncBoard::start_apply(const Setpoints& setpoints, Duration timeout,
-                             CompletionPtr completion) {
-  Impl& impl = *impl_;
-  impl.begin(std::move(completion),
-             [&] { return impl.session.send(setpoints, Impl::time_of(timeout), impl.now); });
-}
-
-void AsyncBoard::start_stop(Duration timeout, CompletionPtr completion) {
-  Impl& impl = *impl_;
-  impl.begin(std::move(completion),
-             [&] { return impl.session.stop(Impl::time_of(timeout), impl.now); });
-}
+template void AsyncBoard::start_send(const Command&, Duration, CompletionPtr);
+template void AsyncBoard::start_send(const Setpoints&, Duration, CompletionPtr);
 
 void AsyncBoard::start_arm(Duration timeout, CompletionPtr completion) {
   Impl& impl = *impl_;
   impl.begin(std::move(completion),
              [&] { return impl.session.arm(Impl::time_of(timeout), impl.now); });
-}
-
-void AsyncBoard::start_identify(Duration timeout, CompletionPtr completion) {
-  Impl& impl = *impl_;
-  impl.begin(std::move(completion),
-             [&] { return impl.session.identify(Impl::time_of(timeout), impl.now); });
 }
 
 void AsyncBoard::start_wait_active(Duration timeout, CompletionPtr completion) {
@@ -230,6 +216,11 @@ void AsyncBoard::require_sendable(const Setpoints& setpoints) const {
 }
 
 PostResult AsyncBoard::post(const Command& command) {
+  if (command.kind == CommandKind::stop) {
+    if (!impl_->is_open()) return PostResult::no_link;
+    async_send(command, posted_stop_time, [](const CommandResult&) {});
+    return PostResult::sent;
+  }
   require_sendable(command);
   impl_->give_up_slot(command);
   return impl_->post(command);

@@ -182,6 +182,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void describe_in_recording(const Device& device);
   // X:OFF gives up the device that has that slot.
   void give_up_slot(const Command& command);
+  void give_up_slot(const Setpoints&) {}
   void warn_of_recordings();
 
   // --- time

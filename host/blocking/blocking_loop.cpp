@@ -4,9 +4,9 @@
 #include <asio/post.hpp>
 #include <exception>
 #include <utility>
+#include <variant>
 
 #include "r4link/board.hpp"
-#include "r4link/commands/command_text.hpp"
 
 namespace r4 {
 
@@ -22,12 +22,9 @@ static_assert(patience == Board::default_timeout);
 
 }  // namespace
 
-BlockingLoop::Start BlockingLoop::start_of(const Command& command) {
-  return [own = OwnCommand(command)](AsyncBoard& board, std::size_t, Duration left, BoundEnd end) {
-    const Command asked = own.get();
-    if (asked.kind == CommandKind::stop) return board.async_stop(left, std::move(end));
-    if (asked.kind == CommandKind::identify) return board.async_identify(left, std::move(end));
-    board.async_send(asked, left, std::move(end));
+BlockingLoop::Start BlockingLoop::start_of(CommandOrGroup what) {
+  return [what = std::move(what)](AsyncBoard& board, std::size_t, Duration left, BoundEnd end) {
+    std::visit([&](const auto& each) { board.async_send(each, left, std::move(end)); }, what);
   };
 }
 

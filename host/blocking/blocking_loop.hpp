@@ -29,6 +29,7 @@
 #include <vector>
 
 #include "r4link/async_board.hpp"
+#include "r4link/commands/command_text.hpp"
 #include "r4link/control/boot_clock.hpp"
 #include "r4link/error.hpp"
 
@@ -79,8 +80,7 @@ class BlockingLoop {
     std::condition_variable ended;
     const Clock::time_point called = Clock::now();
   };
-  // Stops a board, asks for its identity, or sends the command.
-  static Start start_of(const Command& command);
+  static Start start_of(CommandOrGroup what);
 
   // How errors name it, "board" or "fleet", and their fix if its thread does not answer.
   struct Name {

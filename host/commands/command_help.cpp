@@ -15,25 +15,24 @@ namespace r4 {
 
 namespace {
 
-// The parts of a text "C:key,value". Without a comma the key ends at a space, colon or equals sign.
-struct SettingText {
-  explicit SettingText(std::string_view text) : name(text.substr(2)) {
-    const std::size_t end = std::min(name.find_first_of(", :="), name.size());
-    value = name.substr(std::min(end + 1, name.size()));
-    name = name.substr(0, end);
-  }
-  std::string_view name;
-  std::string_view value;
-};
+// The key in a text "C:key,value". Without a comma it ends at a space, colon or equals sign.
+std::string_view key_in(std::string_view text) {
+  const std::string_view key = text.substr(2);
+  return key.substr(0, key.find_first_of(", :="));
+}
 
-std::string setting_fix(const SettingText& setting) {
-  if (const FoundSetting found = find_setting(Text(setting.name)); found.row != nullptr) {
-    return "write " + std::string(setting.name) + ",value with " + values_of(found.row->setting);
+std::string setting_fix(std::string_view key) {
+  if (const FoundSetting found = find_setting(Text(key)); found.row != nullptr) {
+    return "write " + std::string(key) + ",value with " + values_of(found.row->setting);
   }
   std::string fix = "write key,value with a key of";
   for (const SettingRow& row : setting_rows)
     fix += " " + std::string(row.key.begin(), row.key.end());
   return fix + " …";
+}
+
+std::string form_with_ranges(const CommandHelp& command) {
+  return command.form + (command.ranges.empty() ? "" : " with " + command.ranges);
 }
 
 // The form and ranges of the command that `text` begins as; without its word, the forms of all that
@@ -46,7 +45,7 @@ std::string forms_like(std::string_view text) {
     const CommandRow& row = row_of(each.kind);
     if (row.letter != text.front()) continue;
     if (row.word.empty() || row.word == Text(values.substr(0, values.find(',')))) {
-      return each.form + (each.ranges.empty() ? "" : " with " + each.ranges);
+      return form_with_ranges(each);
     }
     forms += (forms.empty() ? "" : ", ") + each.form;
   }
@@ -86,7 +85,7 @@ std::string_view meaning_of(Refusal refusal) {
 Problem bad_command(std::string_view text, Refusal refusal) {
   Problem problem{ErrorKind::usage, shown(text), std::string(meaning_of(refusal)), ""};
   if (text.starts_with("C:")) {
-    problem.fix = setting_fix(SettingText(text));
+    problem.fix = setting_fix(key_in(text));
   } else if (const std::string forms = forms_like(text); !forms.empty()) {
     problem.fix = "use " + forms;
   } else {
@@ -95,6 +94,13 @@ Problem bad_command(std::string_view text, Refusal refusal) {
     for (const CommandHelp& each : all_command_help()) problem.fix += " " + each.form;
   }
   return problem;
+}
+
+Problem bad_command(const Command& command, Refusal refusal) {
+  return {ErrorKind::usage, shown(command), std::string(meaning_of(refusal)),
+          command.kind == CommandKind::setting
+              ? setting_fix({command.text.data(), command.text.size()})
+              : "use " + form_with_ranges(command_help(command.kind))};
 }
 
 Problem failed_transfer(std::string_view command, I2cOutcome outcome) {
@@ -116,7 +122,7 @@ Problem failed_transfer(std::string_view command, I2cOutcome outcome) {
 
 void require_valid(const Command& command) {
   if (const Refusal refusal = check_command(command); refusal != Refusal::none) {
-    throw Error(bad_command(to_text(command), refusal));
+    throw Error(bad_command(command, refusal));
   }
   if (command.kind == CommandKind::leave) {
     throw Error(ErrorKind::usage, "E:LEAVE",
@@ -154,15 +160,6 @@ void require_cable(std::string_view url, const Command& command) {
   if (command.kind == CommandKind::setting && is_secret_setting(command.text)) {
     require_cable(url, shown(command));
   }
-}
-
-std::string_view part_of(std::string_view text, std::size_t at) {
-  std::string_view rest = text;
-  for (std::size_t i = 1; i < at && !rest.empty(); ++i) {
-    rest.remove_prefix(std::min(rest.find(';'), rest.size() - 1) + 1);
-  }
-  const std::string_view part = rest.substr(0, rest.find(';'));
-  return at == 0 || part.empty() ? text : part;
 }
 
 }  // namespace r4

@@ -13,11 +13,10 @@
 
 namespace r4 {
 
-// The `at`th command of a group's text, from 1; the whole text if it has no such command.
-std::string_view part_of(std::string_view text, std::size_t at);
-
-// The problem of a command, given as text, whose form or values are refused before it is sent.
+// The problem of a text that is not a valid command.
 Problem bad_command(std::string_view text, Refusal refusal);
+// The problem of a command whose values are wrong.
+Problem bad_command(const Command& command, Refusal refusal);
 
 // Throws Error{usage} for a command that cannot be sent: outside its ranges, or with texts that do
 // not fit into a datagram.

@@ -66,12 +66,9 @@ std::string setting_words(const Command& command) {
 
 OwnCommand parse_command_text(std::string_view text) { return OwnCommand(parsed(text)); }
 
-bool is_group_text(std::string_view text) {
-  return without_last_semicolon(text).find(';') != std::string_view::npos;
-}
-
-Setpoints parse_group_text(std::string_view text) {
+CommandOrGroup parse_text(std::string_view text) {
   text = without_last_semicolon(text);
+  if (text.find(';') == std::string_view::npos) return parse_command_text(text);
   Setpoints group;
   for (;;) {
     const std::size_t end = text.find(';');
@@ -106,6 +103,7 @@ std::string shown(std::string_view text) {
 }
 
 std::string shown(const Command& command) { return shown(to_text(command)); }
+std::string shown(const Setpoints& group) { return to_text(group); }
 
 std::string describe(const Command& command) {
   const KindWords& of_kind = words_of(command.kind);

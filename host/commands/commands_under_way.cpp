@@ -70,7 +70,14 @@ bool CommandsUnderWay::name_cause(Pending& pending) const {
 }
 
 Ticket CommandsUnderWay::send(const Command& command, Time timeout, Time now) {
-  return queue(allocate(command, timeout, now), now);
+  switch (command.kind) {
+    case CommandKind::stop:
+      return stop(timeout, now);
+    case CommandKind::identify:
+      return send_at_once(command, timeout, now);
+    default:
+      return queue(allocate(command, timeout, now), now);
+  }
 }
 
 Ticket CommandsUnderWay::send(const Setpoints& group, Time timeout, Time now) {

@@ -59,13 +59,9 @@ class CommandsUnderWay {
 
   // --- calls of the program. Each returns 0 if there is no room.
 
+  // A stop is sent even if there is no room. The caller ends all other commands under way before.
   Ticket send(const Command& command, Time timeout, Time now);
   Ticket send(const Setpoints& group, Time timeout, Time now);
-  Ticket identify(Time timeout, Time now) {
-    return send_at_once(Command::identify(), timeout, now);
-  }
-  // Sent even if there is no room. The caller ends all other commands under way.
-  Ticket stop(Time timeout, Time now);
   // The farewell.
   Ticket leave(Time timeout, Time now);
   // For a request that is not a command itself.
@@ -135,6 +131,7 @@ class CommandsUnderWay {
   Pending* allocate(const Command& command, Time timeout, Time now);
   Ticket queue(Pending* pending, Time now);
   Ticket send_at_once(const Command& command, Time timeout, Time now);
+  Ticket stop(Time timeout, Time now);
   void transmit(Pending& pending, Time now);
   void finish(Pending& pending, Outcome outcome, Refusal code, Time now);
   bool name_cause(Pending& pending) const;

@@ -46,7 +46,7 @@ std::string come_to_rest(Board& board, const LoopOptions& options, bool& at_rest
   // A disarmed board's outputs are safe already, and nothing would be sent to it.
   if (is_safe() && board.disarmed_by() != DisarmCause::not_yet) return {};
   try {
-    board.apply(options.rest, options.rest_timeout);
+    board.send(options.rest, options.rest_timeout);
     return {};
   } catch (const Error&) {
     if (is_safe()) return {};

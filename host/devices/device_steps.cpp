@@ -108,11 +108,11 @@ std::string fields_with(const std::string& chosen, const Device& device) {
 
 Problem explain(const Device& device, const CommandResult& result, const LinkStatus& link) {
   const std::vector<DeviceStep> steps = steps_of(device);
-  std::string command = "F:" + device.fields();  // after the steps
+  Problem problem;
   if (result.step >= 1 && result.step <= steps.size()) {
     const DeviceStep& step = steps[result.step - 1U];
     if (result.transfer.pnum != 0) {
-      if (auto problem = trouble_with(device, step, result.transfer)) return *problem;
+      if (auto trouble = trouble_with(device, step, result.transfer)) return *trouble;
     }
     if (result.outcome == Outcome::timed_out && result.executed != 0) {
       return {ErrorKind::refused, device.text(),
@@ -120,9 +120,10 @@ Problem explain(const Device& device, const CommandResult& result, const LinkSta
               "give each step more time, or look at the field I2CX of the state",
               Outcome::timed_out};
     }
-    command = shown(step.command());
+    problem = explain(step.command(), result, link);
+  } else {  // after the steps
+    problem = explain(Command::fields(device.fields()), result, link);
   }
-  Problem problem = explain(command, result, link);
   problem.thing = device.text() + ": " + problem.thing;
   return problem;
 }

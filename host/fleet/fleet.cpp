@@ -2,6 +2,7 @@
 #include "r4link/fleet.hpp"
 
 #include <utility>
+#include <variant>
 
 #include "../../transports/file_descriptor.hpp"
 #include "../commands/command_help.hpp"
@@ -118,24 +119,22 @@ FleetResults Fleet::send(const Boards& boards, const Command& command, Duration 
   require_control(impl_->role, command);
   if (command.kind == CommandKind::stop) return impl_->stop(boards, timeout);
   require_timeout(shown(command), timeout);
-  return impl_->execute(shown(command), boards, timeout, Impl::start_of(command));
+  return impl_->execute(shown(command), boards, timeout, Impl::start_of(OwnCommand(command)),
+                        why_of(command));
 }
 FleetResults Fleet::send(const Command& command, Duration timeout) {
   return send(impl_->all_boards, command, timeout);
 }
-FleetResults Fleet::send(const Boards& boards, std::string_view command, Duration timeout) {
-  if (!is_group_text(command)) {
-    const OwnCommand one = parse_command_text(command);
-    return send(boards, one.get(), timeout);
-  }
+FleetResults Fleet::send(const Boards& boards, std::string_view text, Duration timeout) {
+  const CommandOrGroup what = parse_text(text);
+  if (const auto* command = std::get_if<OwnCommand>(&what)) return send(boards, *command, timeout);
   std::vector<BoardSetpoints> setpoints;
   setpoints.reserve(boards.size());
-  const Setpoints group = parse_group_text(command);
-  for (const std::size_t board : boards) setpoints.push_back({board, group});
-  return apply(setpoints, timeout);
+  for (const std::size_t board : boards) setpoints.push_back({board, std::get<Setpoints>(what)});
+  return send(setpoints, timeout);
 }
-FleetResults Fleet::send(std::string_view command, Duration timeout) {
-  return send(impl_->all_boards, command, timeout);
+FleetResults Fleet::send(std::string_view text, Duration timeout) {
+  return send(impl_->all_boards, text, timeout);
 }
 
 FleetResults Fleet::arm(const Boards& boards, Duration timeout) {
@@ -144,22 +143,24 @@ FleetResults Fleet::arm(const Boards& boards, Duration timeout) {
   const auto arm = [](AsyncBoard& board, std::size_t, Duration left, auto end) {
     board.async_arm(left, std::move(end));
   };
-  return impl_->execute("arm()", boards, timeout, arm);
+  return impl_->execute("arm()", boards, timeout, arm, why_of("arm()"));
 }
 FleetResults Fleet::arm(Duration timeout) { return arm(impl_->all_boards, timeout); }
-FleetResults Fleet::clear(Duration timeout) { return send(Command::clear(), timeout); }
 
 FleetResults Fleet::stop(Duration timeout) { return impl_->stop(impl_->all_boards, timeout); }
 void Fleet::stop_async() { impl_->stop_async(impl_->all_boards); }
 
-FleetResults Fleet::apply(const std::vector<BoardSetpoints>& setpoints, Duration timeout) {
+FleetResults Fleet::send(const std::vector<BoardSetpoints>& setpoints, Duration timeout) {
   for (const BoardSetpoints& each : setpoints) require_any(each.setpoints);
-  require_timeout("apply()", timeout);
-  require_control(impl_->role, "apply()");
-  const auto apply = [setpoints](AsyncBoard& board, std::size_t part, Duration left, auto end) {
-    board.async_apply(setpoints[part].setpoints, left, std::move(end));
+  require_timeout("send()", timeout);
+  require_control(impl_->role, "send()");
+  const auto start = [setpoints](AsyncBoard& board, std::size_t part, Duration left, auto end) {
+    board.async_send(setpoints[part].setpoints, left, std::move(end));
   };
-  return impl_->execute("apply()", boards_of(setpoints), timeout, apply);
+  const auto why = [&](std::size_t part, const CommandResult& result, const LinkStatus& link) {
+    return explain(setpoints[part].setpoints, result, link);
+  };
+  return impl_->execute("send()", boards_of(setpoints), timeout, start, why);
 }
 
 std::vector<PostResult> Fleet::post(const std::vector<BoardSetpoints>& setpoints) {
@@ -203,18 +204,17 @@ void Fleet::feed() {
 void FleetBoard::send(const Command& command, Duration timeout) {
   fleet_->send({board_}, command, timeout).require();
 }
-void FleetBoard::send(std::string_view command, Duration timeout) {
-  fleet_->send({board_}, command, timeout).require();
+void FleetBoard::send(const Setpoints& setpoints, Duration timeout) {
+  fleet_->send({{board_, setpoints}}, timeout).require();
 }
-void FleetBoard::apply(const Setpoints& setpoints, Duration timeout) {
-  fleet_->apply({{board_, setpoints}}, timeout).require();
+void FleetBoard::send(std::string_view text, Duration timeout) {
+  fleet_->send({board_}, text, timeout).require();
 }
 PostResult FleetBoard::post(const Setpoints& setpoints) {
   return fleet_->post({{board_, setpoints}}).front();
 }
 void FleetBoard::arm(Duration timeout) { fleet_->arm({board_}, timeout).require(); }
 void FleetBoard::stop(Duration timeout) { send(Command::stop(), timeout); }
-void FleetBoard::clear(Duration timeout) { send(Command::clear(), timeout); }
 BoardIdentity FleetBoard::identify(Duration timeout) {
   send(Command::identify(), timeout);
   return health().identity;

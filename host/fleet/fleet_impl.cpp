@@ -156,19 +156,19 @@ Fleet::Impl::CallPtr Fleet::Impl::call_of(std::string text, const Boards& which,
 }
 
 FleetResults Fleet::Impl::execute(std::string text, const Boards& which, Duration timeout,
-                                  Start start, bool stop) {
+                                  Start start, const Why& why, bool stop) {
   const CallPtr call = call_of(std::move(text), which, std::move(start), stop);
   BlockingLoop::run(call, timeout);
   std::vector<FleetResult> results;
   for (const Part& part : call->parts) {
+    const std::size_t index = results.size();
     FleetResult& mine = results.emplace_back();
-    mine.board = which[results.size() - 1];
+    mine.board = which[index];
     mine.result = part.result;
     if (mine.confirmed()) continue;
-    mine.problem = part.trouble ? *part.trouble
-                   : part.result.outcome == Outcome::closed
-                       ? closed_error(call->text).problem()
-                       : explain(call->text, part.result, part.link);
+    mine.problem = part.trouble                             ? *part.trouble
+                   : part.result.outcome == Outcome::closed ? closed_error(call->text).problem()
+                                                            : why(index, part.result, part.link);
     mine.problem.thing = urls[mine.board] + ": " + mine.problem.thing;
   }
   return FleetResults(std::move(results));
@@ -216,15 +216,16 @@ std::optional<FleetEvent> Fleet::Impl::next_event(Duration timeout) {
 }
 
 FleetResults Fleet::Impl::stop(const Boards& which, Duration timeout) {
-  FleetResults results =
-      execute("E:STOP", which, std::max(timeout, Duration{1}), start_of(Command::stop()), true);
+  const Command stop = Command::stop();
+  FleetResults results = execute(shown(stop), which, std::max(timeout, Duration{1}),
+                                 start_of(OwnCommand(stop)), why_of(stop), true);
   // The stop must not be lost when its caller does not wait any longer.
   if (!results.all_confirmed()) stop_async(results.failed());
   return results;
 }
 
 void Fleet::Impl::stop_async(const Boards& which) {
-  run_unawaited(call_of("E:STOP", which, start_of(Command::stop()), true));
+  run_unawaited(call_of("E:STOP", which, start_of(OwnCommand(Command::stop())), true));
 }
 
 }  // namespace r4

@@ -36,9 +36,12 @@ struct Fleet::Impl final : BlockingLoop {
 
   // --- on any thread
 
+  // explain() for the part of a board that was not confirmed.
+  using Why =
+      std::function<Problem(std::size_t part, const CommandResult& result, const LinkStatus& link)>;
   // Starts a part at each board, and waits until all have ended.
   FleetResults execute(std::string text, const Boards& which, Duration timeout, Start start,
-                       bool stop = false);
+                       const Why& why, bool stop = false);
   // Throws if the fleet is closed, too.
   void run_on_loop(std::string_view what, const std::function<void()>& action);
   Boards wait_active(const Boards& which, Duration timeout);
@@ -67,5 +70,13 @@ struct Fleet::Impl final : BlockingLoop {
   std::deque<FleetEvent> events;
   std::uint64_t missed_events = 0;
 };
+
+// All boards are asked for the same.
+template <class What>
+auto why_of(const What& what) {
+  return [&what](std::size_t, const CommandResult& result, const LinkStatus& link) {
+    return explain(what, result, link);
+  };
+}
 
 }  // namespace r4

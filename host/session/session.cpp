@@ -172,6 +172,11 @@ Ticket Session::arm(Time timeout, Time now) {
 Ticket Session::send(const Command& command, Time timeout, Time now) {
   require_valid(command);
   require_control(board_role(), command);
+  if (command.kind == CommandKind::stop) {
+    // No command from before a stop may follow it.
+    end_all_but_stops(Outcome::cancelled, now);
+    arming_.disarm(DisarmCause::stop);
+  }
   return commands_.send(keeper_.with_needed_fields(command), timeout, now);
 }
 
@@ -217,15 +222,6 @@ PostResult Session::post(const Setpoints& group, Time now) {
   if (!commands_.knows_groups(now) || posts_apart()) return PostResult::no_link;
   return posts_.send(group, now);
 }
-
-// No command from before a stop may follow it.
-Ticket Session::stop(Time timeout, Time now) {
-  end_all_but_stops(Outcome::cancelled, now);
-  arming_.disarm(DisarmCause::stop);
-  return commands_.stop(timeout, now);
-}
-
-Ticket Session::identify(Time timeout, Time now) { return commands_.identify(timeout, now); }
 
 void Session::cancel(Ticket ticket, Time now) {
   if (!arming_.cancel(ticket, now)) commands_.cancel(ticket, now);

@@ -90,6 +90,10 @@ class Session {
   // --- commands. CommandEnded reports the end, at the latest at `timeout` from now.
 
   // Throws Error{usage} for a command outside its ranges. Returns 0 if 64 are under way already.
+  // Command::identify(): confirmed by the answer, and BoardIdentified follows.
+  // Command::stop(): discards all other commands. Confirmed when the board reports that it has
+  // obeyed this very stop. If 16 stops are under way already, it returns 0, and still sends the
+  // stop.
   Ticket send(const Command& command, Time timeout, Time now);
   // Commands that the board executes together or not at all. If the board knows no groups, they are
   // sent one after the other, each when its predecessor is confirmed. Throws Error{usage} for an
@@ -98,11 +102,6 @@ class Session {
   // Clears the cause of the safe state, if it can be cleared, and closes relay 1, the motor supply.
   // Confirmed when the board's state shows it. Output commands that are sent after it wait for it.
   Ticket arm(Time timeout, Time now);
-  // E:STOP. Discards all other commands. Confirmed when the board reports that it has obeyed this
-  // very stop. If 16 stops are under way already, it returns 0, and still sends the stop.
-  Ticket stop(Time timeout, Time now);
-  // Asks for the board's identity; BoardIdentified follows. Confirmed by the answer.
-  Ticket identify(Time timeout, Time now);
   // Ends every command under way but stops, ends the heartbeats, and sends the farewell: the
   // board's outputs are safe at once, and another host need not wait for the timeout. Confirmed
   // when the board reports it. Returns 0 if no board hears it, or the board knows no farewells.

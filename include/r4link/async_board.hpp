@@ -128,47 +128,34 @@ class AsyncBoard {
   void require_sendable(const Setpoints& setpoints) const;
 
   // void(CommandResult). Throws as require_sendable() does, and for a timeout of nothing.
+  //
+  // A stop overtakes and cancels everything, also before the link is up. It is sent whatever the
+  // timeout, and by a watcher, too. Command::identify() is confirmed by the board's answer, which
+  // identity() has. Command::clear() takes away the stop, watchdog or fault that the board reports.
   template <class Token>
   auto async_send(const Command& command, Duration timeout, Token&& token) {
     require_sendable(command);
-    require_timeout("async_send()", timeout);
-    return initiate<&AsyncBoard::start_send, Token>(token, command, timeout);
+    if (command.kind != CommandKind::stop) require_timeout("async_send()", timeout);
+    return initiate<&AsyncBoard::start_send<Command>, Token>(token, command, timeout);
   }
   // void(CommandResult). Several output commands that the board executes together, in one pass over its chips,
   // or not at all; a board that knows no groups is sent one after the other, up to the first that fails:
   // CommandResult::at, executed. Throws Error{usage} for none, and for a timeout of nothing.
   template <class Token>
-  auto async_apply(const Setpoints& setpoints, Duration timeout, Token&& token) {
+  auto async_send(const Setpoints& setpoints, Duration timeout, Token&& token) {
     require_sendable(setpoints);
-    require_timeout("async_apply()", timeout);
-    return initiate<&AsyncBoard::start_apply, Token>(token, setpoints, timeout);
-  }
-  // void(CommandResult). E:STOP: overtakes and cancels everything, also before the link is up. It is
-  // sent whatever the timeout.
-  template <class Token>
-  auto async_stop(Duration timeout, Token&& token) {
-    return initiate<&AsyncBoard::start_stop, Token>(token, timeout);
+    require_timeout("async_send()", timeout);
+    return initiate<&AsyncBoard::start_send<Setpoints>, Token>(token, setpoints, timeout);
   }
   // void(CommandResult). Clears a stop, a watchdog or a fault that came while this program controlled
   // the board, and closes relay 1, the motor supply. Confirmed by the board's state: output commands
   // go out from then on. Not armed: what stands against it cannot be cleared, or may have come before
-  // the program began, which async_clear() clears.
+  // the program began, which Command::clear() clears.
   template <class Token>
   auto async_arm(Duration timeout, Token&& token) {
     require_timeout("async_arm()", timeout);
     require_control("async_arm()");
     return initiate<&AsyncBoard::start_arm, Token>(token, timeout);
-  }
-  // void(CommandResult). Takes away the stop, watchdog or fault that the board reports.
-  template <class Token>
-  auto async_clear(Duration timeout, Token&& token) {
-    return async_send(Command::clear(), timeout, std::forward<Token>(token));
-  }
-  // void(CommandResult). Confirmed by the board's answer; identity() has it.
-  template <class Token>
-  auto async_identify(Duration timeout, Token&& token) {
-    require_timeout("async_identify()", timeout);
-    return initiate<&AsyncBoard::start_identify, Token>(token, timeout);
   }
 
   // void(CommandResult). Confirmed as soon as the board is ACTIVE and takes our commands, so that the
@@ -210,7 +197,7 @@ class AsyncBoard {
   void require_link_timing(Duration board_timeout, Duration heartbeat) const;
 
   // Sends once, without confirmation, and says why it did not; on_refused() tells if the board refuses
-  // it. Throws Error{usage}.
+  // it. A stop is sent as by async_send(), for a second. Throws Error{usage}.
   PostResult post(const Command& command);
   // The same of several that are executed together; where the board knows no groups, they are posted one by one,
   // up to the first that is not sent.
@@ -326,11 +313,9 @@ class AsyncBoard {
   static void require_wait(std::string_view what, Duration timeout);
   // Throws Error{usage} for a program that only watches.
   void require_control(std::string_view what) const;
-  void start_send(const Command& command, Duration timeout, CompletionPtr completion);
-  void start_apply(const Setpoints& setpoints, Duration timeout, CompletionPtr completion);
-  void start_stop(Duration timeout, CompletionPtr completion);
+  template <class What>  // Command, Setpoints
+  void start_send(const What& what, Duration timeout, CompletionPtr completion);
   void start_arm(Duration timeout, CompletionPtr completion);
-  void start_identify(Duration timeout, CompletionPtr completion);
   void start_wait_active(Duration timeout, CompletionPtr completion);
   void start_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
                          CompletionPtr completion);

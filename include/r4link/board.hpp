@@ -158,20 +158,21 @@ class R4LINK_API Board {
   // --- commands: each returns when the board's own state confirms it, throws Error{refused}
   // otherwise
 
+  // Command::clear() takes away the stop, the watchdog or the fault that the board reports; it moves
+  // nothing.
   void send(const Command& command, Duration timeout = default_timeout);
-  // The same from the text of design: "O:358,1,1"; "O:358,1,1;O:358,1,2" is a group.
-  void send(std::string_view command, Duration timeout = default_timeout);
-  // Sends once, without waiting or confirmation, and says why it did not: also when 256 wait to be
-  // sent. For streams of setpoints where the next one replaces this one; on_refused() tells of those
-  // that the board refuses. Allocates nothing.
-  PostResult post(const Command& command);
-
   // Several output commands that the board executes together, in one pass over its chips, or not at all:
-  // all wheels of a robot, say. apply() is confirmed as one, and its Error names the command that was in the
-  // way: Error::at(), from 1. A board that knows no groups (without `group` in BoardIdentity::capabilities)
+  // all wheels of a robot, say. They are confirmed as one, and the Error names the command that was
+  // in the way: Error::at(), from 1. A board that knows no groups (without `group` in BoardIdentity::capabilities)
   // is sent one after the other: then those before it were executed, and the Error says so. It is asked when
   // the link comes up; until it has answered, what is posted is not sent (no_link).
-  void apply(const Setpoints& setpoints, Duration timeout = default_timeout);
+  void send(const Setpoints& setpoints, Duration timeout = default_timeout);
+  // The same from the text of design: "O:358,1,1"; "O:358,1,1;O:358,1,2" is a group.
+  void send(std::string_view text, Duration timeout = default_timeout);
+  // Sends once, without waiting or confirmation, and says why it did not: also when 256 wait to be
+  // sent. For streams of setpoints where the next one replaces this one; on_refused() tells of those
+  // that the board refuses. A stop is repeated as by stop_async(). Allocates nothing.
+  PostResult post(const Command& command);
   PostResult post(const Setpoints& setpoints);
 
   // Before the first output command (O D S R P B Z), and again after whatever made the outputs safe but
@@ -180,18 +181,17 @@ class R4LINK_API Board {
   // while this program controlled the board), then closes relay 1, the motor supply. Throws
   // Error{refused} if the handle is released or something is in the way, when a stop comes
   // meanwhile, and for a stop, a watchdog or a fault that may have come before this program began:
-  // clear() clears that, on purpose, so that a program which is restarted does not drive off again.
+  // Command::clear() clears that, on purpose, so that a program which is restarted does not drive
+  // off again.
   // BoardOptions: options.session.arming = Arming::off does without.
   void arm(Duration timeout = default_timeout);
   // Why output commands are refused; none when armed.
   DisarmCause disarmed_by() const;
 
-  // Every output safe, at once, repeated until the board confirms it; latched until clear(). Where it
-  // is not confirmed, the error says to cut the power.
+  // Every output safe, at once, repeated until the board confirms it; latched until Command::clear().
+  // Where it is not confirmed, the error says to cut the power.
   void stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
-  // Takes away the stop, the watchdog or the fault that the board reports; moves nothing.
-  void clear(Duration timeout = default_timeout);
 
   // Each channel: set() is send(), confirmed; post() sends once and does not wait.
   class DriveChannel {

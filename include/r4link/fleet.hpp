@@ -167,12 +167,14 @@ class R4LINK_API Fleet {
   FleetResults send(const Boards& boards, const Command& command,
                     Duration timeout = default_timeout);
   // The same from text: "O:358,1,1", or a group "O:358,1,1;O:358,1,2".
-  FleetResults send(std::string_view command, Duration timeout = default_timeout);
-  FleetResults send(const Boards& boards, std::string_view command,
+  FleetResults send(std::string_view text, Duration timeout = default_timeout);
+  FleetResults send(const Boards& boards, std::string_view text,
+                    Duration timeout = default_timeout);
+  // Setpoints of several boards, each confirmed by its own.
+  FleetResults send(const std::vector<BoardSetpoints>& setpoints,
                     Duration timeout = default_timeout);
   FleetResults arm(Duration timeout = default_timeout);
   FleetResults arm(const Boards& boards, Duration timeout = default_timeout);
-  FleetResults clear(Duration timeout = default_timeout);
 
   // E:STOP to all in one pass, before this waits for anything: by one frame on each CAN bus, which stops all its
   // boards, ours or not; repeated until each has confirmed it. Does not throw where boards do not confirm: their
@@ -181,10 +183,8 @@ class R4LINK_API Fleet {
   FleetResults stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
 
-  // Setpoints of several boards, each confirmed by its own.
-  FleetResults apply(const std::vector<BoardSetpoints>& setpoints,
-                     Duration timeout = default_timeout);
-  // The same sent once, in one pass of the loop, and not confirmed: which were sent, in their order. For streams.
+  // Setpoints sent once, in one pass of the loop, and not confirmed: which were sent, in their
+  // order. For streams.
   std::vector<PostResult> post(const std::vector<BoardSetpoints>& setpoints);
 
   // The next thing that has happened, oldest first; none if there is nothing in time. The newest 4096 are kept.
@@ -212,12 +212,11 @@ class R4LINK_API FleetBoard {
   const std::string& url() const { return fleet_->url(board_); }
 
   void send(const Command& command, Duration timeout = Fleet::default_timeout);
-  void send(std::string_view command, Duration timeout = Fleet::default_timeout);
-  void apply(const Setpoints& setpoints, Duration timeout = Fleet::default_timeout);
+  void send(const Setpoints& setpoints, Duration timeout = Fleet::default_timeout);
+  void send(std::string_view text, Duration timeout = Fleet::default_timeout);
   PostResult post(const Setpoints& setpoints);
   void arm(Duration timeout = Fleet::default_timeout);
   void stop(Duration timeout = Fleet::default_timeout);
-  void clear(Duration timeout = Fleet::default_timeout);
   BoardIdentity identify(Duration timeout = Fleet::default_timeout);
   void wait_active(Duration timeout = Duration{3000});
 

@@ -16,6 +16,7 @@
 #include "command.hpp"
 #include "config.hpp"
 #include "error.hpp"
+#include "setpoints.hpp"
 #include "state.hpp"
 #include "vocabulary.hpp"
 
@@ -138,7 +139,7 @@ enum class DisarmCause : std::uint8_t {
   supply,     // relay 1, the motor supply, was opened
   sleep,      // this computer slept for longer than the board waits for its host
   // arm() has found one of these that may have come before the program began, and does not clear
-  // it: clear() does
+  // it: Command::clear() does
   earlier_stop,
   earlier_watchdog,
   earlier_fault,
@@ -313,11 +314,17 @@ R4LINK_API Problem explain(const std::vector<PathStatus>& paths);
 // What is wrong with a link, and what to do; of kind refused.
 R4LINK_API Problem explain(LinkCause cause);
 
-// Why the session is not armed, and what to do; of kind refused. Not for DisarmCause::none.
-R4LINK_API Problem explain(std::string_view command, DisarmCause cause);
+// Why the session is not armed, and what to do; of kind refused. Not for DisarmCause::none. `what`
+// names what was asked for.
+R4LINK_API Problem explain(std::string_view what, DisarmCause cause);
 
-// Why `command` ("O:358,1,1") was not confirmed. `link` is the link at that time. Of kind refused.
-R4LINK_API Problem explain(std::string_view command, const CommandResult& result,
+// Why a command or a group was not confirmed. `link` is the link at that time. Of kind refused.
+R4LINK_API Problem explain(const Command& command, const CommandResult& result,
+                           const LinkStatus& link);
+R4LINK_API Problem explain(const Setpoints& group, const CommandResult& result,
+                           const LinkStatus& link);
+// The same for a request that is not a command, by its name: "arm()".
+R4LINK_API Problem explain(std::string_view request, const CommandResult& result,
                            const LinkStatus& link);
 
 }  // namespace r4

@@ -2,8 +2,8 @@
 // r4::Setpoints: output commands that a board executes together, in one pass over its chips, or none of
 // them.
 //
-//     board.apply({r4::Command::osmc(1, r4::Duty(0.1)), r4::Command::osmc(2, r4::Duty(0.1)),
-//                  r4::Command::servo(3, r4::Microseconds(1500))});
+//     board.send({r4::Command::osmc(1, r4::Duty(0.1)), r4::Command::osmc(2, r4::Duty(0.1)),
+//                 r4::Command::servo(3, r4::Microseconds(1500))});
 //
 // Their effect is that of the commands one after the other, in the order in which they were added,
 // with nothing in between: relay 1, closed after a motor's command, takes that back

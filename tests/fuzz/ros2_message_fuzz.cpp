@@ -29,7 +29,7 @@ void is_sendable(const Command& command) {
   }
   const std::string text = to_text(command);
   const OwnCommand again = parse_command_text(text);
-  require(to_text(again.get()) == text);
+  require(to_text(again) == text);
 }
 
 void read_string(std::string_view bytes) {
@@ -40,7 +40,7 @@ void read_string(std::string_view bytes) {
   try {
     bool stop = false;
     for (const OwnCommand& own : commands_of(*text)) {
-      const Command command = own.get();
+      const Command command = own;
       is_sendable(command);
       stop = stop || command.kind == CommandKind::stop;
     }

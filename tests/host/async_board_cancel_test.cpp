@@ -65,7 +65,7 @@ TEST(AsyncBoardCancellations, EndACommandAnArmASettingAndAWait) {
 TEST_F(AsyncBoardCancellation, EndsTheWaitForAStopThatGoesOn) {
   asio::cancellation_signal signal;
   const CommandResult result = result_of([&](auto note) {
-    board.async_stop(1h, asio::bind_cancellation_slot(signal.slot(), note));
+    board.async_send(Command::stop(), 1h, asio::bind_cancellation_slot(signal.slot(), note));
     asio::post(io, [&] { signal.emit(asio::cancellation_type::terminal); });
   });
   EXPECT_EQ(result.outcome, Outcome::cancelled);

@@ -57,9 +57,10 @@ TEST_P(ThrownIn, LeavesTheLoopAndTheBoardGoesOn) {
   if (place == "restart") board.on_restart(throw_once);
   board.open();
   const Command drive = Command::osmc(1, Pwm(1), Direction::forward);
-  if (place == "handler") board.async_identify(5s, throw_once);
+  if (place == "handler") board.async_send(Command::identify(), 5s, throw_once);
   if (place == "nack") {
-    board.async_stop(5s, [&](const auto&) { board.async_send(drive, 5s, [](const auto&) {}); });
+    board.async_send(Command::stop(), 5s,
+                     [&](const auto&) { board.async_send(drive, 5s, [](const auto&) {}); });
   }
   EXPECT_THROW(io.run_for(5s), Thrown);
   const int states_then = states;
@@ -71,8 +72,9 @@ TEST_P(ThrownIn, LeavesTheLoopAndTheBoardGoesOn) {
     ASSERT_NE(io.run_one_for(5s), 0U) << "reception or a timer is gone";
     if (states < states_then + 10 || asked) continue;
     asked = true;
-    board.async_identify(
-        5s, [&](const CommandResult& result) { EXPECT_EQ(result.outcome, Outcome::confirmed); });
+    board.async_send(Command::identify(), 5s, [&](const CommandResult& result) {
+      EXPECT_EQ(result.outcome, Outcome::confirmed);
+    });
   }
   EXPECT_GE(thrown, 1);
   EXPECT_NE(board.link().state, HostLinkState::lost);

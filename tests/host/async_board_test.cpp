@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <asio/bind_executor.hpp>
 #include <asio/co_spawn.hpp>
 #include <asio/detached.hpp>
@@ -87,14 +88,34 @@ TEST_F(AsyncBoardTest, OnlyListensAsAWatcherOnABusButForLeasesAndStops) {
   options.role = BoardRole::watch;
   AsyncBoard watching(io, std::make_unique<Bus>(sent), options);
   watching.open();
-  result_of([&](auto end) { watching.async_identify(600ms, end); });
+  result_of([&](auto end) { watching.async_send(Command::identify(), 600ms, end); });
   ASSERT_FALSE(sent.empty());
   for (const std::string& each : sent) EXPECT_EQ(each.substr(0, 2), "W:") << each;
   EXPECT_FALSE(watching.link().causes.has(LinkCause::busy)) << "nobody controls it";
   sent.clear();
-  watching.async_stop(50ms, [](const CommandResult&) {});
+  watching.async_send(Command::stop(), 50ms, [](const CommandResult&) {});
   ASSERT_TRUE(run_until([&] { return !sent.empty(); }));
   EXPECT_EQ(sent[0].substr(0, 7), "E:STOP;");
+}
+
+TEST_F(AsyncBoardTest, SendsAStopWhateverItsTimeoutAndRepeatsOneThatIsPosted) {
+  std::vector<std::string> sent;
+  BoardOptions options;
+  options.role = BoardRole::watch;
+  AsyncBoard watching(io, std::make_unique<Bus>(sent), options);
+  const auto stops = [&] {
+    return std::count_if(sent.begin(), sent.end(),
+                         [](const std::string& each) { return each.starts_with("E:STOP;"); });
+  };
+  EXPECT_EQ(watching.post(Command::stop()), PostResult::no_link) << "it is not open";
+  watching.open();
+  for (const auto timeout : {0ms, -1ms}) {
+    sent.clear();
+    watching.async_send(Command::stop(), timeout, [](const CommandResult&) {});
+    EXPECT_EQ(stops(), 1) << timeout.count();
+  }
+  EXPECT_EQ(watching.post(Command::stop()), PostResult::sent);
+  EXPECT_TRUE(run_until([&] { return stops() >= 4; }));
 }
 
 TEST_F(AsyncBoardTest, ReportsStatesOfATransportThatIsNeverDrained) {
@@ -130,7 +151,8 @@ TEST_F(AsyncBoardTest, GivesEverySubscriberTheNewestCause) {
   std::vector<DisarmCause> told;
   AsyncBoard armed(io, "sim:");
   armed.on_arming([&](DisarmCause cause) {
-    if (cause == DisarmCause::none) armed.async_stop(1s, [](const CommandResult&) {});
+    if (cause == DisarmCause::none)
+      armed.async_send(Command::stop(), 1s, [](const CommandResult&) {});
   });
   armed.on_arming([&](DisarmCause cause) { told.push_back(cause); });
   armed.open();
@@ -151,7 +173,7 @@ TEST_F(AsyncBoardTest, ConfirmsThroughACoroutine) {
   std::vector<Outcome> outcomes;
   auto program = [&]() -> asio::awaitable<void> {
     board.open();
-    CommandResult result = co_await board.async_identify(1s, asio::use_awaitable);
+    CommandResult result = co_await board.async_send(Command::identify(), 1s, asio::use_awaitable);
     outcomes.push_back(result.outcome);
     EXPECT_EQ(board.identity().board_id, "sim-1");
     for (int i = 0; i < 3; ++i) {
@@ -159,7 +181,7 @@ TEST_F(AsyncBoardTest, ConfirmsThroughACoroutine) {
                                          asio::use_awaitable);
       outcomes.push_back(result.outcome);
     }
-    result = co_await board.async_stop(1s, asio::use_awaitable);
+    result = co_await board.async_send(Command::stop(), 1s, asio::use_awaitable);
     outcomes.push_back(result.outcome);
     result = co_await board.async_send(start_motor, 1s, asio::use_awaitable);
     outcomes.push_back(result.outcome);
@@ -211,10 +233,10 @@ TEST_F(AsyncBoardTest, HandlersMaySendAgain) {
   int confirmed = 0;
   std::function<void(const CommandResult&)> again = [&](const CommandResult& result) {
     EXPECT_EQ(result.outcome, Outcome::confirmed);
-    if (++confirmed < 1000) board.async_identify(1s, again);
+    if (++confirmed < 1000) board.async_send(Command::identify(), 1s, again);
   };
   board.open();
-  board.async_identify(1s, again);
+  board.async_send(Command::identify(), 1s, again);
   ASSERT_TRUE(run_until([&] { return confirmed == 1000; }));
 }
 
@@ -236,12 +258,12 @@ TEST_F(AsyncBoardTest, CancelsWhenItClosesAndNoCallbackFollows) {
   board.open();
   ASSERT_TRUE(run_until([&] { return board.in_control(); }));
   board.async_send(start_motor, 10s, note);
-  board.async_stop(10s, note);
+  board.async_send(Command::stop(), 10s, note);
   board.on_state([](const State&, const Datagram&) { ADD_FAILURE() << "called after close()"; });
   board.close();
   board.close();
   board.async_send(start_motor, 1s, note);
-  board.async_stop(1s, note);
+  board.async_send(Command::stop(), 1s, note);
   EXPECT_FALSE(board.post(start_motor));
   EXPECT_TRUE(outcomes.empty()) << "handlers run on the loop";
   io.restart();
@@ -294,9 +316,9 @@ TEST_P(DestroyedIn, TheBoardMayBeDestroyedInAnyCallback) {
     if (place == "nack") board->on_nack(destroy);
     board->open();
     if (place == "handler") {
-      board->async_identify(10s, destroy);
+      board->async_send(Command::identify(), 10s, destroy);
     } else if (place == "nack") {
-      board->async_stop(1s, [&](const CommandResult&) {
+      board->async_send(Command::stop(), 1s, [&](const CommandResult&) {
         if (board) board->async_send(start_motor, 1s, [](const CommandResult&) {});
       });
     }
@@ -337,7 +359,8 @@ TEST(AsyncBoardEnd, IsDestroyedBeforeOrWithoutItsLoop) {
 
   AsyncBoard never_opened(io, "sim:");
   std::optional<Outcome> outcome;
-  never_opened.async_stop(1s, [&](const CommandResult& r) { outcome = r.outcome; });
+  never_opened.async_send(Command::stop(), 1s,
+                          [&](const CommandResult& r) { outcome = r.outcome; });
   io.restart();
   io.run();
   EXPECT_EQ(outcome, Outcome::closed);

@@ -62,7 +62,7 @@ TEST(BoardArming, AStreamDoesNotStartTheMotorsAfterAStopThatIsCleared) {
   EXPECT_EQ(driven(board), 500);
   Board(simulated.url()).stop();
   ASSERT_TRUE(hears_of(board, SafeReason::stop));
-  board.clear();
+  board.send(Command::clear());
   board.wait_active();
   EXPECT_EQ(stream.later(), PostResult::not_armed);
   EXPECT_EQ(board.disarmed_by(), DisarmCause::stop);

@@ -75,10 +75,10 @@ double skew_of(const std::string& transport, int osmc, Drive before, Drive wante
       wheels.add(Command::dhb12(i, Pwm(drive.pwm), drive.direction));
     return wheels;
   };
-  board.apply(all(before));
+  board.send(all(before));
   std::optional<Wheels> wheels;
   simulated.run([&](sim::SimulatedBoard& b) { wheels.emplace(b.model().chips(), wanted, osmc); });
-  board.apply(all(wanted));
+  board.send(all(wanted));
   double skew_ms = -1;
   simulated.run([&](sim::SimulatedBoard&) {
     EXPECT_TRUE(wheels->all());
@@ -108,8 +108,8 @@ struct DrivenGroup : DrivenBoard {};
 
 TEST_F(DrivenGroup, IsConfirmedAsOneAndRefusedAsOne) {
   board.fields("DEFAULT,OSMC2,SERVO3POS,DAC2");
-  board.apply(Setpoints{Command::osmc(1, Pwm(358), forward), Command::osmc(2, Pwm(359), forward),
-                        Command::servo(3, Microseconds(1500)), Command::dac(2, Millivolts(1650))});
+  board.send(Setpoints{Command::osmc(1, Pwm(358), forward), Command::osmc(2, Pwm(359), forward),
+                       Command::servo(3, Microseconds(1500)), Command::dac(2, Millivolts(1650))});
   const State state = board.next_state();
   EXPECT_EQ(state.osmc(1), (Drive{358, forward}));
   EXPECT_EQ(state.osmc(2), (Drive{359, forward}));
@@ -123,20 +123,20 @@ TEST_F(DrivenGroup, IsConfirmedAsOneAndRefusedAsOne) {
   EXPECT_EQ(refused.refusal, Refusal::safe);
   EXPECT_EQ(refused.thing, "O:5,1,1;O:6,1,2");
   EXPECT_TRUE(contains(refused.reason, "none of the 2 commands was executed"));
-  EXPECT_EQ(problem_of([&] { board.apply(Setpoints{}); }).kind, ErrorKind::usage);
+  EXPECT_EQ(problem_of([&] { board.send(Setpoints{}); }).kind, ErrorKind::usage);
   EXPECT_EQ(problem_of([&] { board.send("O:5,1,1;E:CLEAR"); }).kind, ErrorKind::usage);
   EXPECT_EQ(
-      problem_of([&] { board.apply(Setpoints{Command::servo(1, Microseconds(1))}, 0ms); }).kind,
+      problem_of([&] { board.send(Setpoints{Command::servo(1, Microseconds(1))}, 0ms); }).kind,
       ErrorKind::usage);
 }
 
 TEST(AsyncBoardGroup, IsRefusedIfItIsEmptyAndEndsIfTheBoardIsClosed) {
   OnALoop loop;
   AsyncBoard board(loop.io, "sim:", at_will());
-  EXPECT_THROW(board.async_apply(Setpoints{}, 1s, [](const CommandResult&) {}), Error);
+  EXPECT_THROW(board.async_send(Setpoints{}, 1s, [](const CommandResult&) {}), Error);
   EXPECT_THROW(board.post(Setpoints{}), Error);
   const auto apply = [&](auto end) {
-    board.async_apply(Setpoints{Command::servo(1, Microseconds(1))}, 1s, end);
+    board.async_send(Setpoints{Command::servo(1, Microseconds(1))}, 1s, end);
   };
   EXPECT_EQ(loop.result_of(apply).outcome, Outcome::closed);
 }

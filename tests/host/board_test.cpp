@@ -94,7 +94,7 @@ TEST_P(BoardOver, StopsUntilCleared) {
   EXPECT_TRUE(contains(refused.reason, "emergency stop"));
   EXPECT_TRUE(contains(refused.fix, "E:CLEAR"));
 
-  board.clear();
+  board.send(Command::clear());
   board.wait_active();
   EXPECT_EQ(board.next_state().osmc(1).pwm, 0) << "nothing comes back after a stop";
   board.osmc(1).set_pwm(5, Direction::forward);
@@ -194,7 +194,7 @@ TEST(Board, ReportsThatAnotherHostControlsTheBoard) {
 
   other.stop();  // which anyone may
   EXPECT_TRUE(hears_of(owner, SafeReason::stop));
-  owner.clear();
+  owner.send(Command::clear());
   owner.close();
   ASSERT_NO_THROW(other.wait_active(5s)) << "control is free once the owner is silent";
 }

@@ -99,7 +99,7 @@ TEST(Explain, NamesAPathToAnotherBoardOnlyWhereAllElseIsWell) {
 TEST(Explain, NamesAnotherProtocolInsteadOfAnotherHost) {
   const LinkStatus link{.causes = {LinkCause::busy, LinkCause::foreign_frames}};
   EXPECT_EQ(reason_of_link(link).substr(0, 36), "frames that make no R4 datagram come");
-  const Problem problem = explain("R:1,On", timed_out_command(), link);
+  const Problem problem = explain(Command::relay(1, true), timed_out_command(), link);
   EXPECT_NE(problem.reason.find("another protocol, such as CANopen"), std::string::npos);
   EXPECT_NE(problem.fix.find("r4 bus"), std::string::npos);
 }
@@ -109,7 +109,7 @@ TEST(Explain, SaysThatFlowControlIsLate) {
     const LinkStatus link{
         .state = state, .reason = SafeReason::link, .causes = {LinkCause::late_frames}};
     EXPECT_NE(reason_of_link(link).find("does not come within 20 ms"), std::string::npos);
-    const Problem problem = explain("R:1,On", timed_out_command(), link);
+    const Problem problem = explain(Command::relay(1, true), timed_out_command(), link);
     EXPECT_NE(problem.reason.find("does not come within 20 ms"), std::string::npos);
   }
 }
@@ -118,8 +118,20 @@ TEST(Explain, BlamesNoFramesForAStopWhichIsAFrameOfItsOwn) {
   const LinkStatus link{.state = HostLinkState::safe,
                         .reason = SafeReason::handle,
                         .causes = {LinkCause::late_frames}};
-  const Problem problem = explain("E:STOP", timed_out_command(), link);
+  const Problem problem = explain(Command::stop(), timed_out_command(), link);
   EXPECT_EQ(problem.reason.find("20 ms"), std::string::npos) << problem.reason;
+}
+
+TEST(Explain, NamesACommandWithoutItsSecret) {
+  const CommandResult refused{Outcome::refused, Refusal::auth, Time{0}};
+  EXPECT_EQ(explain(Command::setting("password", "eeeeeeee"), refused, {}).thing, "C:password,...");
+}
+
+TEST(Explain, TakesTheNameOfARequestForNoCommand) {
+  const CommandResult refused{Outcome::refused, Refusal::range, Time{0}};
+  EXPECT_EQ(explain("arm()", refused, {}).thing, "arm()");
+  EXPECT_EQ(explain("arm()", refused, {}).fix, "");
+  EXPECT_EQ(explain("E:STOP", timed_out_command(), {}).reason.find("the stop"), std::string::npos);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ def use_all_of_it(sim):
                 state.as_dict()
                 break
             told.wait(5)
-            board.apply(r4link.Setpoints(r4link.Command.osmc(1, pwm=5), r4link.Command.servo(1, us=1500)))
+            board.send(r4link.Setpoints(r4link.Command.osmc(1, pwm=5), r4link.Command.servo(1, us=1500)))
             for wrong in (lambda: board.osmc(9).set(0.1), lambda: board.send('nonsense'),
                           lambda: sim.happen('nonsense')):
                 try:

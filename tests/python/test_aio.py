@@ -19,7 +19,7 @@ def test_drives(sim):
             with pytest.raises(r4link.NotArmedError):
                 await board.osmc(1).set_pwm(1)
             await board.arm()
-            await board.apply(Setpoints(Command.osmc(1, pwm=10), Command.osmc(2, pwm=20)))
+            await board.send(Setpoints(Command.osmc(1, pwm=10), Command.osmc(2, pwm=20)))
             board.servo(1).calibrate(r4link.ServoCalibration(us=(1000, 2000), degrees=(-45, 45)))
             await board.servo(1).set(us=1200)
             assert board.servo(2).post(us=0)
@@ -34,7 +34,7 @@ def test_drives(sim):
             assert (await board.identify()).board_id == 'sim-1'
             await board.stop()
             assert board.link.reason == 'stop'
-            await board.clear()
+            await board.send(Command.clear())
         with pytest.raises((r4link.ClosedError, RuntimeError)):
             await board.identify()
     asyncio.run(main())

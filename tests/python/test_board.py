@@ -34,7 +34,7 @@ def test_drives_and_tells_what_the_chips_do(sim, board, wait):
     board.stop()
     assert board.link.reason == 'stop' and board.disarmed_by == 'stop'
     wait(lambda: sim.look().is_safe)
-    board.clear()
+    board.send(Command.clear())
     board.arm()
     board.send('O:5,1,1;O:6,0,2')
     assert board.state.osmc1 == (5, 1)
@@ -43,7 +43,7 @@ def test_drives_and_tells_what_the_chips_do(sim, board, wait):
 
 def test_a_group_is_executed_as_one_or_not_at_all(sim, board, wait):
     board.arm()
-    board.apply(Setpoints(Command.osmc(1, pwm=100), Command.osmc(2, pwm=200, direction=REVERSE),
+    board.send(Setpoints(Command.osmc(1, pwm=100), Command.osmc(2, pwm=200, direction=REVERSE),
                           Command.servo(1, us=900)))
     wait(lambda: [each.pwm for each in sim.look().osmc[:2]] == [100, 200])
     with pytest.raises(r4link.UsageError, match='channel'):
@@ -78,7 +78,7 @@ def test_a_calibrated_servo_is_driven_in_degrees(sim, board, wait):
     assert board.servo(3).calibration.degrees(us=board.state.servo3pos) == pytest.approx(30, abs=0.05)
     assert board.servo(3).post(degrees=-45)
     wait(lambda: sim.look().servo_us[2] == pytest.approx(1000, abs=3))
-    board.apply(Setpoints(Command.servo(3, us=ARM.pulse(degrees=0)), Command.osmc(1, duty=0)))
+    board.send(Setpoints(Command.servo(3, us=ARM.pulse(degrees=0)), Command.osmc(1, duty=0)))
     assert ARM.degrees(us=board.next_state().servo3pos) == 0
     board.servo(3).set(us=0)
     assert ARM.degrees(us=board.next_state().servo3pos) is None
@@ -115,7 +115,7 @@ def test_a_negative_duty_drives_reverse(sim, board, wait):
     board.arm()
     board.osmc(1).set(-0.25)
     assert board.state.osmc1 == (1024, REVERSE)
-    board.apply(Setpoints(Command.osmc(1, duty=1), Command.bldc(2, duty=-0.5, brake=False)))
+    board.send(Setpoints(Command.osmc(1, duty=1), Command.bldc(2, duty=-0.5, brake=False)))
     wait(lambda: sim.look().osmc[0] == (4095, FORWARD) and sim.look().bldc[1][:2] == (2048, REVERSE))
 
 

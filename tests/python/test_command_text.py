@@ -53,6 +53,6 @@ def test_a_wrong_text_is_refused_with_a_reason(text, fault):
 def test_a_parsed_command_is_sent_and_joins_setpoints(board, sim, wait):
     board.arm()
     board.send(Command.parse('O:358,1,1'))
-    board.apply(r4link.Setpoints(Command.parse('O:410,1,2')).add(Command.parse('S:1500,3')))
+    board.send(r4link.Setpoints(Command.parse('O:410,1,2')).add(Command.parse('S:1500,3')))
     wait(lambda: (sim.look().osmc[0].pwm, sim.look().osmc[1].pwm) == (358, 410))
     board.send(Command.parse('C:rate,50'))

@@ -164,10 +164,10 @@ async def count(received):
 def test_voltages_are_part_of_a_group(sim, board, wait):
     group = Setpoints(Command.osmc(1, pwm=100), Command.dac(1, millivolts=1650), Command.dac(2, millivolts=3300))
     with pytest.raises(r4link.NotArmedError):
-        board.apply(group)
+        board.send(group)
     board.fields('DEFAULT,DAC1,DAC2')
     board.arm()
-    board.apply(group)
+    board.send(group)
     wait(lambda: (board.state.osmc1.pwm, board.state.dac1, board.state.dac2) == (100, 1650, 3300))
     assert board.post(Command.dac(1, millivolts=5))
     wait(lambda: board.state.dac1 == 5)
@@ -177,7 +177,7 @@ def test_voltages_are_part_of_a_group(sim, board, wait):
         Setpoints(Command.dac(1, millivolts=1), Command.dac(1, millivolts=2))
     board.stop()
     with pytest.raises(r4link.RefusedError):
-        board.apply(group)
+        board.send(group)
     wait(lambda: (board.state.osmc1.pwm, board.state.dac1, board.state.dac2) == (0, 0, 0))
 
 

@@ -32,7 +32,7 @@ def test_commands_have_a_result_each(fleet):
     assert isinstance(results.error(1), r4link.NotArmedError) and 'sim:?node=5' in str(results.error(1))
     with pytest.raises(r4link.NotArmedError, match='and 1 other boards'):
         results.require()
-    fleet.clear().require()
+    fleet.send(Command.clear()).require()
 
 
 def test_setpoints_of_several_boards(fleet, wait):
@@ -40,8 +40,10 @@ def test_setpoints_of_several_boards(fleet, wait):
     setpoints = {board: Setpoints(Command.osmc(1, pwm=100 + board)) for board in range(8)}
     wait(lambda: all(fleet.post(setpoints)))
     wait(lambda: [state.osmc1.pwm for state in fleet.states()] == [100 + board for board in range(8)])
-    assert fleet.apply({'sim:?node=1': Setpoints(Command.osmc(1, pwm=7))})
+    assert fleet.send({'sim:?node=1': Setpoints(Command.osmc(1, pwm=7))})
     assert fleet.states()[1].osmc1.pwm == 7
+    with pytest.raises(TypeError, match='leave `boards` out'):
+        fleet.send(setpoints, boards=[1])
 
 
 def test_tells_what_happens_to_its_boards(fleet):

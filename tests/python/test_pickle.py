@@ -109,7 +109,7 @@ def test_a_copy_of_setpoints_does_the_same(board, sim, wait):
     for number, each in enumerate(copies(setpoints), 1):
         assert len(each) == 2
         each.add(r4link.Command.osmc(2, pwm=number))
-        board.apply(each)
+        board.send(each)
     wait(lambda: sim.look().osmc[1].pwm == number)
     for each in copies(r4link.Command.osmc(2, pwm=9)):
         board.send(each)

@@ -139,7 +139,7 @@ class PilotRun {
     }
   }
   void end(const std::string& why) {
-    robot.session().stop(patience, robot.now());
+    robot.session().send(Command::stop(), patience, robot.now());
     pilot.end(why);
     phase_ = Phase::waiting;
   }

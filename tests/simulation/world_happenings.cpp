@@ -92,7 +92,7 @@ void World::happen(const Happening& happening, bool over) {
 }
 
 void World::stop(Host& host) {
-  const Ticket ticket = host.session->stop(Time{500'000}, host.time());
+  const Ticket ticket = host.session->send(Command::stop(), Time{500'000}, host.time());
   if (ticket != 0) host.stops[ticket].pnum = host.stop_pnum;
   poll_host(host.index);
 }

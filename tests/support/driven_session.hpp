@@ -66,8 +66,6 @@ class DrivenSession : public Session {
     return done(post_by(*this, what, now, [&] { send_all(now); }), now);
   }
   Ticket arm(Time timeout, Time now) { return done(Session::arm(timeout, now), now); }
-  Ticket stop(Time timeout, Time now) { return done(Session::stop(timeout, now), now); }
-  Ticket identify(Time timeout, Time now) { return done(Session::identify(timeout, now), now); }
   Ticket leave(Time timeout, Time now) { return done(Session::leave(timeout, now), now); }
   Ticket release_control(Time timeout, Time now) {
     return done(Session::release_control(timeout, now), now);

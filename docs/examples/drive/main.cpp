@@ -25,7 +25,8 @@ void print_link(const r4::LinkStatus& link) {
 }
 
 void print_state(const r4::State& state) {
-  std::printf("state: %6.2f V, OSMC 1 at %4u %s\n", state.volts(r4::Analog::ain24), state.osmc(1).pwm,
+  std::printf("state: %6.2f V, OSMC 1 at %4u %s\n", state.volts(r4::Analog::ain24),
+              state.osmc(1).pwm,
               state.osmc(1).direction == r4::Direction::forward ? "forward" : "reverse");
 }
 
@@ -59,15 +60,14 @@ void drive(r4::Board& board) {
     std::this_thread::sleep_for(50ms);
   }
 
-  std::printf("motor 1 has turned by %d counts\n",
-              board.next_state(250ms).encoder(1) - from);
+  std::printf("motor 1 has turned by %d counts\n", board.next_state(250ms).encoder(1) - from);
 
-  board.stop();  // every output safe, the motors without supply; latched until board.clear()
+  board.stop();  // every output safe, the motors without supply; latched until E:CLEAR
   const r4::Statistics statistics = board.statistics();
   std::printf("%llu states, %.1f a second, %.0f us round trip, %.1f %% lost\n",
               static_cast<unsigned long long>(statistics.states), statistics.state_rate_hz,
               statistics.round_trip_us, statistics.loss() * 100);
-  board.clear();
+  board.send(r4::Command::clear());
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 import asyncio
 import sys
 
-from r4link import aio
+from r4link import Command, aio
 
 
 async def main(url: str) -> None:
@@ -22,7 +22,7 @@ async def main(url: str) -> None:
                 break
         await board.stop()
         print(f'link: {board.link.state}, reason {board.link.reason}')
-        await board.clear()  # a stop is latched until then
+        await board.send(Command.clear())  # a stop is latched until then
 
 
 if __name__ == '__main__':

@@ -124,7 +124,7 @@ void teleoperate(r4::Board& board, Keyboard& keyboard) {
     board.feed();
     if (key == 'q') break;
     if (key == ' ') stop(board);
-    if (key == 'c') attempt([&] { board.clear(patience); });
+    if (key == 'c') attempt([&] { board.send(r4::Command::clear(), patience); });
     if (key == 'e') attempt([&] { board.arm(patience); });
     if (key) hand.press(*key, Clock::now());
 

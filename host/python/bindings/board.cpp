@@ -211,12 +211,16 @@ void bind_board(py::module_& module) {
           Released())
       .def(
           "send",
-          [](PyBoard& board, const OwnCommand& command, int ms) {
-            board->send(command.get(), Ms(ms));
+          [](PyBoard& board, const OwnCommand& command, int ms) { board->send(command, Ms(ms)); },
+          Released())
+      .def(
+          "send",
+          [](PyBoard& board, const Setpoints& setpoints, int ms) {
+            board->send(setpoints, Ms(ms));
           },
           Released())
-      .def("post", [](PyBoard& board,
-                      const OwnCommand& command) { return board->post(command.get()).value(); })
+      .def("post",
+           [](PyBoard& board, const OwnCommand& command) { return board->post(command).value(); })
       .def("calibrate_servo",
            [](PyBoard& board, int channel, const ServoCalibration& calibration) {
              board->servo(channel).calibrate(calibration);
@@ -274,12 +278,6 @@ void bind_board(py::module_& module) {
       .def(
           "attach",
           [](PyBoard& board, const Device& device, int ms) { board->attach(device, Ms(ms)); },
-          Released())
-      .def(
-          "apply",
-          [](PyBoard& board, const Setpoints& setpoints, int ms) {
-            board->apply(setpoints, Ms(ms));
-          },
           Released())
       .def("post", [](PyBoard& board,
                       const Setpoints& setpoints) { return board->post(setpoints).value(); })

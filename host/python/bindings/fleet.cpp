@@ -137,9 +137,7 @@ void bind_fleet(py::module_& module) {
       .def(
           "send",
           [list](PyFleet& fleet, const OwnCommand& command, const std::optional<Boards>& boards,
-                 int ms) {
-            return list(fleet->send(boards_of(fleet, boards), command.get(), Ms(ms)));
-          },
+                 int ms) { return list(fleet->send(boards_of(fleet, boards), command, Ms(ms))); },
           Released())
       .def(
           "arm",
@@ -151,9 +149,9 @@ void bind_fleet(py::module_& module) {
           "stop", [list](PyFleet& fleet, int ms) { return list(fleet->stop(Ms(ms))); }, Released())
       .def("stop_async", [](PyFleet& fleet) { fleet->stop_async(); })
       .def(
-          "apply",
+          "send",
           [list](PyFleet& fleet, const std::vector<std::pair<std::size_t, Setpoints>>& setpoints,
-                 int ms) { return list(fleet->apply(setpoints_of(setpoints), Ms(ms))); },
+                 int ms) { return list(fleet->send(setpoints_of(setpoints), Ms(ms))); },
           Released())
       .def(
           "post",

@@ -73,7 +73,7 @@ class Pickle {
     if (has) one(*some);
   }
   void one(OwnCommand& own) {
-    Command command = own.get();
+    Command command = own;
     std::string text(command.text.data(), command.text.size());
     std::string text2(command.text2.data(), command.text2.size());
     command.text = command.text2 = Text();

@@ -90,8 +90,8 @@ void bind_commands(py::module_& module) {
       .def_static("stop", [] { return OwnCommand(Command::stop()); })
       .def_static("clear", [] { return OwnCommand(Command::clear()); })
       .def_static("parse", &parse_command_text, py::arg("text"))
-      .def("describe", [](const OwnCommand& command) { return describe(command.get()); })
-      .def("__str__", [](const OwnCommand& command) { return to_text(command.get()); })
+      .def("describe", [](const OwnCommand& command) { return describe(command); })
+      .def("__str__", [](const OwnCommand& command) { return to_text(command); })
       .def(pickled<OwnCommand>("Command"));
   py::class_<Setpoints>(module, "Setpoints")
       .def(py::init([](const py::args& given) {
@@ -100,7 +100,7 @@ void bind_commands(py::module_& module) {
           if (!py::isinstance<OwnCommand>(each)) {
             throw py::type_error("Setpoints() takes commands, such as Command.osmc(1, duty=0.1)");
           }
-          setpoints.add(each.cast<const OwnCommand&>().get());
+          setpoints.add(each.cast<const OwnCommand&>());
         }
         return setpoints;
       }))
@@ -108,7 +108,7 @@ void bind_commands(py::module_& module) {
       .def(
           "add",
           [](Setpoints& setpoints, const OwnCommand& command) -> Setpoints& {
-            return setpoints.add(command.get());
+            return setpoints.add(command);
           },
           py::return_value_policy::reference_internal)
       .def("__len__", &Setpoints::size);

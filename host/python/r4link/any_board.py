@@ -66,8 +66,10 @@ class AnyBoard(ABC, Generic[Sent]):
 
     # --- commands
 
-    def send(self, command: str | Command, timeout: float = 1.0) -> Sent:
-        """A command, or its text: 'O:358,1,1'; 'O:358,1,1;O:358,1,2' is a group."""
+    def send(self, command: str | Command | Setpoints, timeout: float = 1.0) -> Sent:
+        """A command, or its text: 'O:358,1,1'. Setpoints, as in 'O:358,1,1;O:358,1,2', are executed in one pass and
+        confirmed as one, or none is. Command.clear() clears the stop, the watchdog or the fault that the board
+        reports; it moves nothing."""
         sent: Sent = self._command(lambda: self._core.send(command, _ms(timeout)))
         return sent
 
@@ -75,16 +77,11 @@ class AnyBoard(ABC, Generic[Sent]):
         """Sends once, without waiting or confirmation. on_refused() reports what the board refuses."""
         return self._core.post(command)
 
-    def apply(self, setpoints: Setpoints, timeout: float = 1.0) -> Sent:
-        """All of them in one pass, confirmed as one, or none."""
-        sent: Sent = self._command(lambda: self._core.apply(setpoints, _ms(timeout)))
-        return sent
-
     def arm(self, timeout: float = 1.0) -> Sent:
         """Before the first output command, and again after whatever made the outputs safe but a lost link.
 
         Clears a stop, a watchdog or a fault that came while this program controlled the board, and closes relay 1. One
-        that may have come before the program began is not cleared: NotArmedError says so, and clear() clears it.
+        that may have come before the program began is not cleared: NotArmedError says so, and Command.clear() clears it.
         """
         sent: Sent = self._command(lambda: self._core.arm(_ms(timeout)))
         return sent
@@ -95,7 +92,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return self._core.disarmed_by()
 
     def stop(self, timeout: float = 1.0) -> Sent:
-        """Every output safe, at once, repeated until the board confirms it; latched until clear()."""
+        """Every output safe, at once, repeated until the board confirms it; latched until Command.clear()."""
         sent: Sent = self._stop(lambda: self._core.stop(_ms(timeout)))
         return sent
 
@@ -144,10 +141,6 @@ class AnyBoard(ABC, Generic[Sent]):
     def setting(self, key: str, value: str, timeout: float = 1.0) -> Sent:
         """Changes a setting of the board (docs/protocol.md): setting('rate', '50')."""
         return self.send(f'C:{key},{value}', timeout)
-
-    def clear(self, timeout: float = 1.0) -> Sent:
-        """Takes away the stop, the watchdog or the fault that the board reports; moves nothing."""
-        return self.send(Command.clear(), timeout)
 
     def attach(self, device: Device, timeout: float = 1.0) -> Sent:
         """Sets a described device up (r4link.devices): checks its identity, writes its settings, which takes arm(), and

@@ -59,7 +59,7 @@ class SafeReason(Word):
     """Why the outputs of a board are safe. The position of a member is its number in the SAFE field."""
     NONE = 'none', 'the outputs are not safe: they obey commands'
     LINK = 'link', 'no valid host heartbeat came within the timeout, or the transport is down'
-    STOP = 'stop', 'an emergency stop came; it lasts until clear() or arm()'
+    STOP = 'stop', 'an emergency stop came; it lasts until Command.clear() or arm()'
     HANDLE = 'handle', "the dead-man's handle is released"
     PROXIMITY = 'proximity', 'an ultrasonic sensor measures less than its threshold'
     WATCHDOG = 'watchdog', "a duty of the board's firmware missed its deadline"
@@ -105,9 +105,9 @@ class DisarmCause(Word):
     RESTART = 'restart', 'the board restarted'
     SUPPLY = 'supply', 'relay 1, the motor supply, was opened'
     SLEEP = 'sleep', 'this computer slept for longer than the board waits for its host'
-    EARLIER_STOP = 'earlier stop', 'a stop that may have come before the program began: only clear() clears it'
-    EARLIER_WATCHDOG = 'earlier watchdog', 'a watchdog that may have come before the program began: only clear() clears it'
-    EARLIER_FAULT = 'earlier fault', 'a fault that may have come before the program began: only clear() clears it'
+    EARLIER_STOP = 'earlier stop', 'a stop that may have come before the program began: only Command.clear() clears it'
+    EARLIER_WATCHDOG = 'earlier watchdog', 'a watchdog that may have come before the program began: only Command.clear() clears it'
+    EARLIER_FAULT = 'earlier fault', 'a fault that may have come before the program began: only Command.clear() clears it'
 
 
 class Outcome(Word):

@@ -150,18 +150,19 @@ class Fleet:
         """The newest state of each, at one instant."""
         return self._core.states()
 
-    def send(self, command: str | Command, timeout: float = 1.0, *,
+    def send(self, command: str | Command | Mapping[int | str, Setpoints], timeout: float = 1.0, *,
              boards: Iterable[int | str] | None = None) -> FleetResults:
-        """A command to all boards, or to those; each is confirmed by its own state."""
+        """A command to all boards, or to those; each is confirmed by its own state. A mapping has the setpoints of
+        each of its boards."""
+        if isinstance(command, Mapping):
+            if boards is not None:
+                raise TypeError('the mapping names its boards: leave `boards` out')
+            return FleetResults(self._core.send(self._pairs(command), _ms(timeout)))
         return FleetResults(self._core.send(command, self._indices(boards), _ms(timeout)))
 
     def arm(self, timeout: float = 1.0, *, boards: Iterable[int | str] | None = None) -> FleetResults:
         """Arms all boards, or those, as Board.arm() does."""
         return FleetResults(self._core.arm(self._indices(boards), _ms(timeout)))
-
-    def clear(self, timeout: float = 1.0) -> FleetResults:
-        """Clears the stop, the watchdog or the fault that a board reports, on all boards; moves nothing."""
-        return self.send(Command.clear(), timeout)
 
     def stop(self, timeout: float = 1.0) -> FleetResults:
         """Every output of every board safe, at once; on a CAN bus by one frame. Does not raise where boards do not
@@ -172,12 +173,8 @@ class Fleet:
         """The same without waiting for the boards."""
         self._core.stop_async()
 
-    def apply(self, setpoints: Mapping[int | str, Setpoints], timeout: float = 1.0) -> FleetResults:
-        """Setpoints of several boards, confirmed."""
-        return FleetResults(self._core.apply(self._pairs(setpoints), _ms(timeout)))
-
     def post(self, setpoints: Mapping[int | str, Setpoints]) -> list[PostResult]:
-        """The same sent once, in one pass, and not confirmed: for streams."""
+        """Setpoints of several boards, sent once, in one pass, and not confirmed: for streams."""
         return self._core.post(self._pairs(setpoints))
 
     def next_event(self, timeout: float = 0.0) -> FleetEvent | None:

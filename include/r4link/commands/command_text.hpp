@@ -3,8 +3,8 @@
 // (docs/protocol.md).
 //
 //     const r4::OwnCommand command = r4::parse_command_text("O:358,1,1");
-//     r4::to_text(command.get());   // "O:358,1,1"
-//     r4::describe(command.get());  // "OSMC 1 forward, duty 0.087"
+//     r4::to_text(command);   // "O:358,1,1"
+//     r4::describe(command);  // "OSMC 1 forward, duty 0.087"
 //
 // A command may hold a secret: a key, or the network's password. to_text() writes it; shown() and
 // describe() write "..." instead.
@@ -13,6 +13,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
 
 #include "../command.hpp"
 #include "../config.hpp"
@@ -31,13 +32,13 @@ class OwnCommand {
         text2_(command.text2.data(), command.text2.size()) {}
 
   // The command's texts are views of this object.
-  Command get() const& {
+  operator Command() const& {  // NOLINT(google-explicit-constructor)
     Command command = command_;
     command.text = text_;
     command.text2 = text2_;
     return command;
   }
-  Command get() const&& = delete;
+  operator Command() const&& = delete;  // NOLINT(google-explicit-constructor)
 
  private:
   Command command_;
@@ -47,11 +48,11 @@ class OwnCommand {
 // Parses "O:358,1,1" (with or without the final ';'). Throws Error{usage} that names the fault.
 R4LINK_API OwnCommand parse_command_text(std::string_view text);
 
-// True for several commands, separated by semicolons: "O:358,1,1;O:358,1,2".
-R4LINK_API bool is_group_text(std::string_view text);
-// Parses one command or several. Throws Error{usage} that names the command that is wrong, or that
-// cannot be in a group.
-R4LINK_API Setpoints parse_group_text(std::string_view text);
+// A command, or a group of several.
+using CommandOrGroup = std::variant<OwnCommand, Setpoints>;
+// Parses "O:358,1,1", or a group: "O:358,1,1;O:358,1,2". Throws Error{usage} that names the command
+// that is wrong, or that cannot be in a group.
+R4LINK_API CommandOrGroup parse_text(std::string_view text);
 
 // "O:358,1,1". Empty if a text of the command has bytes that a datagram cannot hold.
 R4LINK_API std::string to_text(const Command& command);
@@ -60,6 +61,7 @@ R4LINK_API std::string to_text(const Setpoints& group);
 
 // The text for people and logs: printable(), and without a secret: "C:password,...", "C:key,1:...".
 R4LINK_API std::string shown(const Command& command);
+R4LINK_API std::string shown(const Setpoints& group);
 R4LINK_API std::string shown(std::string_view text);
 
 // The command in words, with units and without a secret: "servo 3 at 1500 us", "relay 1 on",

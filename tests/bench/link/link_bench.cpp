@@ -90,7 +90,7 @@ struct AsyncHost {
       }
       void again() const {
         start = Clock::now();
-        host.board.async_identify(1s, *this);
+        host.board.async_send(Command::identify(), 1s, *this);
       }
     };
     Ask{*this, seconds, left, start}.again();
@@ -136,7 +136,7 @@ void compare_round_trips(Transport path, int count, bool judged) {
   const Percentiles a = percentiles(async);
   const Percentiles b = percentiles(blocking);
   std::printf("%s  plain ping-pong   p50 %6.1f us   p99 %6.1f us\n", to_text(path), r.p50, r.p99);
-  std::printf("%s  async_identify    p50 %6.1f us   p99 %6.1f us   %.2f times%s%s\n", to_text(path),
+  std::printf("%s  async_send        p50 %6.1f us   p99 %6.1f us   %.2f times%s%s\n", to_text(path),
               a.p50, a.p99, a.p50 / r.p50, judged ? ", bar 1.30: " : "",
               judged ? verdict(a.p50 <= 1.3 * r.p50) : "");
   std::printf("%s  Board::identify   p50 %6.1f us   p99 %6.1f us   %.2f times\n", to_text(path),
@@ -208,7 +208,7 @@ void count_allocations(Transport path) {
       void operator()(const CommandResult&) const { ask(); }
       void ask() const {
         if (count.left-- == 0) return count.end();
-        count.host.board.async_identify(1s, *this);
+        count.host.board.async_send(Command::identify(), 1s, *this);
       }
     };
     struct Send {
@@ -230,7 +230,7 @@ void count_allocations(Transport path) {
       count.left = 1000;
       Post{count}();
     });
-    measure("async_identify, 1000", [&] {
+    measure("async_send of Q:ID, 1000", [&] {
       count.left = 1000;
       Identify{count}.ask();
     });

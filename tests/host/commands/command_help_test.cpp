@@ -109,14 +109,14 @@ TEST(CommandHelp, ShowsTheOneCommandThatAWrongTextBeginsAs) {
             std::string::npos);
 }
 
-TEST(CommandHelp, FindsTheCommandOfAGroup) {
-  EXPECT_EQ(part_of("a;b;c", 1), "a");
-  EXPECT_EQ(part_of("a;b;c", 2), "b");
-  EXPECT_EQ(part_of("a;b;c", 3), "c");
-  EXPECT_EQ(part_of("a;b;c", 0), "a;b;c");
-  EXPECT_EQ(part_of("a;b;c", 4), "a;b;c");
-  EXPECT_EQ(part_of("", 1), "");
-  EXPECT_EQ(part_of("a", 1), "a");
+TEST(CommandHelp, ShowsTheFormOfACommandWithAWrongValue) {
+  EXPECT_EQ(bad_command(Command::dac(3, Millivolts(1)), Refusal::channel).fix,
+            "use X:DAC,channel,mV with channel 1-2, mV 0-3300");
+  EXPECT_EQ(bad_command(Command::stop(), Refusal::format).fix, "use E:STOP");
+  EXPECT_NE(bad_command(Command::setting("rate", "0"), Refusal::range).fix.find("1-1000"),
+            std::string::npos);
+  EXPECT_EQ(bad_command(Command::setting("password", "eeeeeeee"), Refusal::range).thing,
+            "C:password,...");
 }
 
 }  // namespace

@@ -55,9 +55,9 @@ TEST(CommandText, IsParsedWrittenAndDescribedForEveryKind) {
   std::set<CommandKind> kinds;
   for (const auto& c : cases) {
     const OwnCommand command = parse_command_text(c.text + ";");
-    EXPECT_EQ(to_text(command.get()), c.text);
-    EXPECT_EQ(describe(command.get()), c.words);
-    kinds.insert(command.get().kind);
+    EXPECT_EQ(to_text(command), c.text);
+    EXPECT_EQ(describe(command), c.words);
+    kinds.insert(Command(command).kind);
   }
   EXPECT_EQ(kinds.size(), static_cast<std::size_t>(CommandKind::watch) + 1) << "every kind";
 }
@@ -68,8 +68,8 @@ TEST(CommandText, OfAnOwnCommandOutlivesTheTextItIsParsedFrom) {
   text.assign(text.size(), '!');
   const OwnCommand taken = std::move(parsed);
   const OwnCommand copy = taken;
-  EXPECT_EQ(to_text(copy.get()), "C:name,a-name-that-is-longer-than-most");
-  EXPECT_EQ(to_text(taken.get()), to_text(copy.get()));
+  EXPECT_EQ(to_text(copy), "C:name,a-name-that-is-longer-than-most");
+  EXPECT_EQ(to_text(taken), to_text(copy));
 }
 
 TEST(CommandText, ShowsNoKeyAndNoPassword) {
@@ -98,8 +98,8 @@ TEST(CommandText, ShowsNoKeyAndNoPassword) {
     EXPECT_EQ(shown(c.shown), c.shown) << "once more";
   }
   const OwnCommand key = parse_command_text("C:key,3:" + digits);
-  EXPECT_EQ(shown(key.get()), "C:key,3:...");
-  EXPECT_EQ(describe(key.get()), "setting key 3:...");
+  EXPECT_EQ(shown(key), "C:key,3:...");
+  EXPECT_EQ(describe(key), "setting key 3:...");
   EXPECT_EQ(describe(Command::setting("rate", "5;0")), "setting ") << "no datagram can carry it";
 }
 

@@ -66,13 +66,15 @@ TEST(Limits, OfEveryTimeout) {
   for (const auto wrong : {-1ms, 0ms, std::chrono::milliseconds::min()}) {
     expect_usage("O:1,1,1", [&] { board.osmc(1).set_pwm(1, Direction::forward, wrong); });
     expect_usage("C:rate,50", [&] { board.setting("rate", "50", wrong); });
-    expect_usage("E:CLEAR", [&] { board.clear(wrong); });
-    expect_usage("identify()", [&] { board.identify(wrong); });
+    expect_usage("E:CLEAR", [&] { board.send(Command::clear(), wrong); });
+    expect_usage("Q:ID", [&] { board.identify(wrong); });
     expect_usage("next_state()", [&] { board.next_state(wrong); });
     expect_usage("async_send()", [&] {
       async.async_send(Command::servo(1, Microseconds(1)), wrong, [](const auto&) {});
     });
-    expect_usage("async_identify()", [&] { async.async_identify(wrong, [](const auto&) {}); });
+    expect_usage("async_send()", [&] {
+      async.async_send(Setpoints{Command::servo(1, Microseconds(1))}, wrong, [](const auto&) {});
+    });
   }
   expect_usage("wait_active()", [&] { board.wait_active(-1ms); });
   board.wait_active(0ms);  // only looks

@@ -23,7 +23,7 @@ TEST(Setpoints, AreTheCommandsInTheirOrder) {
   EXPECT_EQ(to_text(all),
             "O:358,1,1;D:410,0,2;S:1500,3;R:1,On;P:-100,500,4;P:5,1000,3;Z:4;B:9,1,1,2;"
             "X:DAC,1,1650;O:0,1,2");
-  EXPECT_EQ(to_text(parse_group_text(to_text(all) + ";")), to_text(all));
+  EXPECT_EQ(to_text(std::get<Setpoints>(parse_text(to_text(all) + ";"))), to_text(all));
   EXPECT_EQ(all.size(), 10U);
   EXPECT_TRUE(Setpoints{}.empty());
 }
@@ -54,14 +54,12 @@ TEST(Setpoints, CanBeSentAsTheyAre) {
 }
 
 TEST(Setpoints, InATextAreSeparatedBySemicolons) {
-  EXPECT_TRUE(is_group_text("O:1,1,1;O:1,1,2"));
-  EXPECT_TRUE(is_group_text("O:1,1,1;;"));
-  EXPECT_FALSE(is_group_text("O:1,1,1;"));
-  EXPECT_FALSE(is_group_text(""));
-  EXPECT_EQ(problem_of([] { parse_group_text("O:1,1,1;O:1,1,5"); }).thing, "O:1,1,5");
-  EXPECT_EQ(problem_of([] { parse_group_text("O:1,1,1;E:STOP"); }).thing, "E:STOP");
-  for (const char* text : {"O:1,1,1;;", ";O:1,1,1", "O:1,1,1;;O:1,1,2", ";;"}) {
-    EXPECT_EQ(problem_of([&] { parse_group_text(text); }).kind, ErrorKind::usage) << text;
+  EXPECT_EQ(std::get<Setpoints>(parse_text("O:1,1,1;O:1,1,2")).size(), 2U);
+  EXPECT_TRUE(std::holds_alternative<OwnCommand>(parse_text("O:1,1,1;")));
+  EXPECT_EQ(problem_of([] { parse_text("O:1,1,1;O:1,1,5"); }).thing, "O:1,1,5");
+  EXPECT_EQ(problem_of([] { parse_text("O:1,1,1;E:STOP"); }).thing, "E:STOP");
+  for (const char* text : {"O:1,1,1;;", ";O:1,1,1", "O:1,1,1;;O:1,1,2", ";;", ""}) {
+    EXPECT_EQ(problem_of([&] { parse_text(text); }).kind, ErrorKind::usage) << text;
   }
 }
 

@@ -94,7 +94,7 @@ TEST(Fleet, StopsAllBoardsUntilTheyAreCleared) {
     return true;
   }));
   EXPECT_EQ(fleet.send("O:1,1,1").failed().size(), 8U);
-  fleet.clear().require();
+  fleet.send(Command::clear()).require();
   fleet.send("O:1,1,1").require();
 }
 
@@ -119,7 +119,7 @@ TEST(Fleet, SendsSetpointsOfSeveralBoards) {
   setpoints.resize(2);
   setpoints[0].setpoints = motor(7);
   setpoints[1].setpoints = motor(8);
-  fleet.apply(setpoints).require();
+  fleet.send(setpoints).require();
   EXPECT_EQ(fleet[0].state().osmc(1).pwm, 7);
   EXPECT_EQ(fleet[1].state().osmc(1).pwm, 8);
   EXPECT_EQ(fleet[2].state().osmc(1).pwm, 102);
@@ -155,7 +155,7 @@ TEST(Fleet, CountsTheEventsThatTheProgramDoesNotTake) {
   // Each stop and its end are two events of a board, at least.
   for (int i = 0; i < 70; ++i) {
     ASSERT_TRUE(fleet.stop().all_confirmed());
-    fleet.clear().require();
+    fleet.send(Command::clear()).require();
   }
   const std::optional<FleetEvent> first = fleet.next_event();
   ASSERT_TRUE(first);

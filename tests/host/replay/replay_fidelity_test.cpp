@@ -85,7 +85,7 @@ TEST(ReplayFidelity, TheSameStatesEventsAndStatisticsAsLive) {
   board.async_send(Command::relay(1, true), 1s, ignore);
   board.async_send(Command::osmc(1, Pwm(358), Direction::forward), 1s, ignore);
   io.run_for(1s);
-  board.async_stop(1s, ignore);
+  board.async_send(Command::stop(), 1s, ignore);
   io.run_for(300ms);
   board.close();
   recording.close();

@@ -59,7 +59,8 @@ TEST_F(SessionArming, BeginsDisarmedAndSaysWhyNothingIsSent) {
   const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   link.pass(1ms);
   EXPECT_EQ(outcome(ticket), Outcome::not_armed);
-  const Problem problem = explain("O:358,1,1", link.results[ticket], link.session.link());
+  const Problem problem = explain(Command::osmc(1, Pwm(358), Direction::forward),
+                                  link.results[ticket], link.session.link());
   EXPECT_EQ(problem.reason, "not armed: a session begins disarmed");
   EXPECT_EQ(problem.fix, "call arm()");
   EXPECT_EQ(link.count('O'), 0U);
@@ -69,11 +70,11 @@ TEST_F(SessionArming, BeginsDisarmedAndSaysWhyNothingIsSent) {
 TEST_F(SessionArming, HoldsBackOutputCommandsOnly) {
   for (const char* text : {"D:1,1,1", "S:1500,1", "R:1,1", "P:5,1", "Z:1", "B:1,1,0,1"}) {
     const OwnCommand command = parse_command_text(text);
-    EXPECT_EQ(link.session.post(command.get(), link.now), PostResult::not_armed) << text;
+    EXPECT_EQ(link.session.post(command, link.now), PostResult::not_armed) << text;
   }
   for (const char* text : {"U:15,1", "F:ENC1", "C:rate,10", "E:CLEAR"}) {
     const OwnCommand command = parse_command_text(text);
-    EXPECT_EQ(link.session.post(command.get(), link.now), PostResult::sent) << text;
+    EXPECT_EQ(link.session.post(command, link.now), PostResult::sent) << text;
   }
 }
 
@@ -145,7 +146,7 @@ TEST_F(SessionArming, ACauseThatWasMissedIsSeenByTheOpenRelay) {
 
 TEST_F(SessionArming, AStopOfItsOwnDisarmsAtOnce) {
   armed();
-  link.session.stop(1s, link.now);
+  link.session.send(Command::stop(), 1s, link.now);
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::stop);
   EXPECT_EQ(post(), PostResult::not_armed);
 }
@@ -253,8 +254,9 @@ TEST_F(EarlierCause, IsNotClearedByArming) {
   EXPECT_EQ(result.disarmed, DisarmCause::earlier_stop);
   const Problem problem = explain("arm()", result, link.session.link());
   EXPECT_EQ(problem.reason, "not armed: stopped before this program began");
-  EXPECT_EQ(problem.fix,
-            "clear it on purpose: r4 send URL E:CLEAR, or board.clear(), then call arm()");
+  EXPECT_EQ(
+      problem.fix,
+      "clear it on purpose: r4 send URL E:CLEAR, or board.send(\"E:CLEAR\"), then call arm()");
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::earlier_stop);
   link.pass(2s);
   EXPECT_EQ(link.count('E') + link.count('R'), 0U);
@@ -368,13 +370,13 @@ TEST_F(SessionArming, SendsNothingAfterItsDeadlineItsCancellationOrAStop) {
   link.session.cancel(cancelled, link.now);
   ends_as(cancelled, Outcome::cancelled);
   const Ticket stopped = arm();
-  link.session.stop(1s, link.now);
+  link.session.send(Command::stop(), 1s, link.now);
   ends_as(stopped, Outcome::cancelled);
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::stop);
 }
 
 TEST_F(SessionArming, ThatIsAskedForBeforeAStopOfItsOwnIsConfirmedEnds) {
-  link.session.stop(1s, link.now);
+  link.session.send(Command::stop(), 1s, link.now);
   const std::uint32_t stop = link.last('E').pnum;
   Ticket ticket = arm();
   EXPECT_EQ(link.count('R'), 0U);

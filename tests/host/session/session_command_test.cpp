@@ -183,8 +183,8 @@ TEST_F(NewSession, TakesAtMostSixtyFourCommands) {
     EXPECT_NE(link.session.send(turn_motor, 1s, link.now), 0U);
   }
   EXPECT_EQ(link.session.send(turn_motor, 1s, link.now), 0U);
-  EXPECT_EQ(link.session.identify(1s, link.now), 0U);
-  EXPECT_NE(link.session.stop(1s, link.now), 0U) << "a stop always is";
+  EXPECT_EQ(link.session.send(Command::identify(), 1s, link.now), 0U);
+  EXPECT_NE(link.session.send(Command::stop(), 1s, link.now), 0U) << "a stop always is";
   EXPECT_EQ(link.results.size(), Session::max_pending);
 }
 
@@ -199,7 +199,7 @@ TEST_F(SessionCommand, SentOnceIsNotRepeatedAndDoesNotOvertakeEarlierCommands) {
 }
 
 TEST_F(NewSession, ConfirmsIdentifyByTheAnswerInAnyState) {
-  const Ticket ticket = link.session.identify(1s, link.now);
+  const Ticket ticket = link.session.send(Command::identify(), 1s, link.now);
   EXPECT_EQ(link.last('Q').command, "Q:ID");
   link.pass(2ms);
   link.identity();
@@ -209,8 +209,8 @@ TEST_F(NewSession, ConfirmsIdentifyByTheAnswerInAnyState) {
 }
 
 TEST_F(NewSession, DoesNotConfirmIdentifyByASecondAnswerToAnEarlierQuestion) {
-  link.session.identify(1s, link.now);
-  const Ticket second = link.session.identify(1s, link.now);
+  link.session.send(Command::identify(), 1s, link.now);
+  const Ticket second = link.session.send(Command::identify(), 1s, link.now);
   const auto questions = link.all('Q');
   link.answer(questions[0].pnum);
   link.answer(questions[0].pnum);
@@ -229,7 +229,7 @@ TEST_F(SessionCommand, IsNotRepeatedAfterItsCancellation) {
 }
 
 TEST_F(SessionStop, CannotBeCancelled) {
-  const Ticket stop = link.session.stop(1s, link.now);
+  const Ticket stop = link.session.send(Command::stop(), 1s, link.now);
   link.session.cancel(stop, link.now);
   EXPECT_TRUE(link.results.empty());
   link.pass(100ms);
@@ -238,14 +238,14 @@ TEST_F(SessionStop, CannotBeCancelled) {
 
 TEST_F(SessionCommand, EndsWithTheSession) {
   const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
-  const Ticket stop = link.session.stop(1s, link.now);
+  const Ticket stop = link.session.send(Command::stop(), 1s, link.now);
   link.session.end_all(link.now);
   EXPECT_EQ(outcome(ticket), Outcome::cancelled) << "by the stop";
   EXPECT_EQ(outcome(stop), Outcome::closed);
 }
 
 TEST_F(NewSession, SendsAStopBeforeTheLinkIsUpWithTheTopPriority) {
-  link.session.stop(1s, link.now);
+  link.session.send(Command::stop(), 1s, link.now);
   ASSERT_EQ(link.count('E'), 1U);
   EXPECT_EQ(link.last('E').command, "E:STOP");
   EXPECT_EQ(link.last('E').priority, Priority::stop);
@@ -253,7 +253,7 @@ TEST_F(NewSession, SendsAStopBeforeTheLinkIsUpWithTheTopPriority) {
 
 TEST_F(SessionStop, IsRepeatedEveryTwentyMillisecondsUntilTheBoardReportsIt) {
   const Time start = link.now;
-  const Ticket ticket = link.session.stop(1s, link.now);
+  const Ticket ticket = link.session.send(Command::stop(), 1s, link.now);
   link.pass(50ms);
   link.executed(1);
   EXPECT_TRUE(under_way(ticket));
@@ -271,7 +271,7 @@ TEST_F(SessionStop, IsRepeatedEveryTwentyMillisecondsUntilTheBoardReportsIt) {
 }
 
 TEST_F(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
-  link.session.stop(1s, link.now);
+  link.session.send(Command::stop(), 1s, link.now);
   link.stopped(link.last('E').pnum);
   link.pass(1s);
   EXPECT_EQ(link.count('E'), 10U) << "every 20 ms for 200 ms";
@@ -281,7 +281,7 @@ TEST_F(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
 
   link.executed(link.last('E').pnum);  // in control again after a second of silence
   for (const bool posts : {false, true}) {
-    link.session.stop(1s, link.now);
+    link.session.send(Command::stop(), 1s, link.now);
     link.stopped(link.last('E').pnum);
     link.pass(30ms);
     if (posts) {
@@ -298,13 +298,13 @@ TEST_F(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
 }
 
 TEST_F(SessionStop, IsNotConfirmedByTheReportOfAnotherStop) {
-  const Ticket first = link.session.stop(1s, link.now);
+  const Ticket first = link.session.send(Command::stop(), 1s, link.now);
   const std::uint32_t number = link.last('E').pnum;
   link.stopped(number);
   EXPECT_EQ(outcome(first), Outcome::confirmed);
   link.heartbeat();  // another program has cleared it
 
-  const Ticket ticket = link.session.stop(1s, link.now);
+  const Ticket ticket = link.session.send(Command::stop(), 1s, link.now);
   link.stopped(number);  // a late copy, of a board that drives
   link.heartbeat(SafeReason::stop);
   link.state("SAFE:2;");
@@ -358,7 +358,7 @@ TEST_F(NewSession, DoesNotSendAWaitingClearPastANewerCause) {
 
 TEST_F(SessionClear, IsGivenUpIfItIsAskedForBeforeAnOwnStopIsConfirmed) {
   link.heartbeat();
-  const Ticket stop = link.session.stop(1s, link.now);
+  const Ticket stop = link.session.send(Command::stop(), 1s, link.now);
   const std::uint32_t number = link.last('E').pnum;
   const Ticket clear = link.session.send(Command::clear(), 1s, link.now);
   link.stopped(number, 7);  // the program did not know this cause
@@ -390,7 +390,7 @@ TEST_F(NewSession, CancelsEveryCommandByAStopAndSendsNoneAfterIt) {
   const Ticket queued = link.session.send(turn_motor, 5s, link.now);
   link.connect();
   const Ticket sent = link.session.send(Command::servo(2, Microseconds(1500)), 5s, link.now);
-  link.session.stop(1s, link.now);
+  link.session.send(Command::stop(), 1s, link.now);
   EXPECT_EQ(outcome(queued), Outcome::cancelled);
   EXPECT_EQ(outcome(sent), Outcome::cancelled);
   const std::size_t before = link.count('O') + link.count('S');
@@ -400,9 +400,9 @@ TEST_F(NewSession, CancelsEveryCommandByAStopAndSendsNoneAfterIt) {
 
 TEST_F(NewSession, SendsAStopEvenWhenSixteenAreUnderWay) {
   for (std::size_t i = 0; i < Session::max_stops; ++i) {
-    EXPECT_NE(link.session.stop(1s, link.now), 0U);
+    EXPECT_NE(link.session.send(Command::stop(), 1s, link.now), 0U);
   }
-  EXPECT_EQ(link.session.stop(1s, link.now), 0U);
+  EXPECT_EQ(link.session.send(Command::stop(), 1s, link.now), 0U);
   EXPECT_EQ(link.count('E'), Session::max_stops + 1);
 }
 
@@ -418,7 +418,7 @@ TEST_F(SessionBusy, AHostThatLostItsPlaceOnTheBusMayOnlyStopTheBoard) {
   }
   EXPECT_EQ(link.sent.size(), 0U);
   EXPECT_FALSE(link.session.in_control(link.now));
-  const Ticket stop = link.session.stop(1s, link.now);
+  const Ticket stop = link.session.send(Command::stop(), 1s, link.now);
   EXPECT_EQ(link.count('E'), 1U);
   link.stopped(link.last('E').pnum);
   EXPECT_EQ(outcome(stop), Outcome::confirmed);

@@ -60,7 +60,7 @@ TEST_F(SessionGroup, ARefusalNamesTheCommandAndThatNoneWasExecuted) {
   EXPECT_EQ(result(ticket).outcome, Outcome::refused);
   EXPECT_EQ(result(ticket).at, 2);
   EXPECT_EQ(result(ticket).executed, 0);
-  const Problem problem = explain(to_text(two_motors), result(ticket), link.session.link());
+  const Problem problem = explain(two_motors, result(ticket), link.session.link());
   EXPECT_EQ(problem.thing, "O:359,1,2");
   EXPECT_EQ(problem.at, 2);
   EXPECT_TRUE(contains(problem.reason, "CHANNEL"));
@@ -70,8 +70,7 @@ TEST_F(SessionGroup, ARefusalNamesTheCommandAndThatNoneWasExecuted) {
   const Ticket other = send();
   link.nack(link.last('O').pnum, "SAFE");
   EXPECT_EQ(result(other).at, 0);
-  EXPECT_EQ(explain(to_text(two_motors), result(other), link.session.link()).thing,
-            to_text(two_motors));
+  EXPECT_EQ(explain(two_motors, result(other), link.session.link()).thing, to_text(two_motors));
 
   const Ticket wrong = send();
   nack_at(link.last('O').pnum, "RANGE", 4);
@@ -132,7 +131,7 @@ TEST_F(SessionGroup, OfABoardWithoutGroupsEndsAtTheFirstThatFails) {
   EXPECT_EQ(result(ticket).at, 2);
   EXPECT_EQ(result(ticket).executed, 1);
   EXPECT_EQ(link.count('S'), 0U);
-  const Problem problem = explain(to_text(two_motors), result(ticket), link.session.link());
+  const Problem problem = explain(two_motors, result(ticket), link.session.link());
   EXPECT_EQ(problem.thing, "O:359,1,2");
   EXPECT_TRUE(contains(problem.reason, "command 2 of 3, and those before it were executed"));
 
@@ -184,7 +183,7 @@ TEST_F(SessionGroup, AStopEndsItAtAnyStep) {
   connect("udp");
   const Ticket ticket = send();
   link.executed(link.last('O').pnum);
-  link.session.stop(1s, link.now);
+  link.session.send(Command::stop(), 1s, link.now);
   EXPECT_EQ(result(ticket).outcome, Outcome::cancelled);
   const std::size_t sent = link.count('O');
   link.pass(1s);

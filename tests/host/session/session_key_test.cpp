@@ -144,7 +144,7 @@ TEST_F(SessionKey, RefusesABoardThatHasNone) {
   link.sent.clear();
   const Ticket ticket = link.session.send(turn_motor, 500ms, link.now);
   EXPECT_FALSE(link.session.post(turn_motor, link.now));
-  link.session.identify(500ms, link.now);
+  link.session.send(Command::identify(), 500ms, link.now);
   for (int i = 0; i < 20; ++i) {
     link.pass(50ms);
     link.state("AIN24:24.28;SAFE:0;CMD:1;");
@@ -158,11 +158,11 @@ TEST_F(SessionKey, RefusesABoardThatHasNone) {
 }
 
 TEST_F(SessionKey, SendsAnUnsignedStopBeforeItKnowsANonceAndToABoardWithoutAKey) {
-  link.session.stop(1s, link.now);
+  link.session.send(Command::stop(), 1s, link.now);
   EXPECT_EQ(signature_of(link.last('E')), "");
   link.heartbeat();
   link.sent.clear();
-  const Ticket ticket = link.session.stop(500ms, link.now);
+  const Ticket ticket = link.session.send(Command::stop(), 500ms, link.now);
   ASSERT_EQ(link.count('E'), 1U);
   EXPECT_EQ(signature_of(link.last('E')), "");
   link.stopped(link.last('E').pnum);
@@ -274,16 +274,21 @@ TEST_F(NewSession, NeedsNoKeyOverACableOfTheBoard) {
 
 TEST(Explain, SaysThatABoardHoldsAsManyKeysAsItCan) {
   const CommandResult refused{Outcome::refused, Refusal::range, Time{0}};
-  EXPECT_NE(explain("C:key,5:...", refused, {}).reason.find("it holds 4 keys"), std::string::npos);
-  EXPECT_NE(explain("C:rate,50", refused, {}).fix.find("1-1000"), std::string::npos);
+  EXPECT_NE(explain(Command::setting("key", "5:..."), refused, {}).reason.find("it holds 4 keys"),
+            std::string::npos);
+  EXPECT_NE(explain(Command::setting("rate", "50"), refused, {}).fix.find("1-1000"),
+            std::string::npos);
 }
 
 TEST(Explain, DistinguishesASettingForTheCableFromOneThatNeedsAKey) {
   const CommandResult refused{Outcome::refused, Refusal::auth, Time{0}};
-  EXPECT_EQ(explain("C:key,1:...", refused, {}).fix, "send it over USB: serial:auto");
-  EXPECT_EQ(explain("C:node,5", refused, {}).fix, "send it over USB: serial:auto");
-  for (const char* command : {"C:rate,50", "C:rate", "O:1,1,1"}) {
-    EXPECT_NE(explain(command, refused, {}).fix.find("--key FILE"), std::string::npos) << command;
+  EXPECT_EQ(explain(Command::setting("key", "1:..."), refused, {}).fix,
+            "send it over USB: serial:auto");
+  EXPECT_EQ(explain(Command::setting("node", "5"), refused, {}).fix,
+            "send it over USB: serial:auto");
+  for (const Command& command :
+       {Command::setting("rate", "50"), Command::osmc(1, Pwm(1), Direction::forward)}) {
+    EXPECT_NE(explain(command, refused, {}).fix.find("--key FILE"), std::string::npos);
   }
 }
 

@@ -327,7 +327,7 @@ TEST(SessionPaths, AllCarryAStopEvenToAnUnknownBoard) {
   RobotOnPaths robot(Cables{{1}, {1}, {1}});
   robot.plug(0, true);
   robot.plug(1, true);
-  const Ticket early = robot.session->stop(RobotOnPaths::timeout, robot.now());
+  const Ticket early = robot.session->send(Command::stop(), RobotOnPaths::timeout, robot.now());
   for (const std::size_t path : {0U, 1U}) {
     EXPECT_EQ(robot.cables[path].all('E').size(), 1U) << "also before its board is known";
   }
@@ -335,7 +335,8 @@ TEST(SessionPaths, AllCarryAStopEvenToAnUnknownBoard) {
   robot.run(1000);
   robot.finish(robot.session->send(Command::clear(), RobotOnPaths::timeout, robot.now()));
   robot.cut(0);
-  EXPECT_EQ(robot.finish(robot.session->stop(RobotOnPaths::timeout, robot.now())).outcome,
+  EXPECT_EQ(robot.finish(robot.session->send(Command::stop(), RobotOnPaths::timeout, robot.now()))
+                .outcome,
             Outcome::confirmed);
 }
 

@@ -118,7 +118,7 @@ TEST_F(SessionRole, EachControlIsASessionOfItsOwn) {
 
 TEST_F(SessionRole, AStopGoesOnOverEveryChange) {
   link.state("SAFE:0;");
-  const Ticket ticket = link.session.stop(10s, link.now);
+  const Ticket ticket = link.session.send(Command::stop(), 10s, link.now);
   const std::uint32_t pnum = link.last('E').pnum;
   for (const BoardRole role : {BoardRole::control, BoardRole::watch}) {
     change(role);

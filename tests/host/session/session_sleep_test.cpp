@@ -122,7 +122,7 @@ TEST_P(SleepingHost, StopsTheBoardAllTheSame) {
   robot.connect();
   ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
   cut_all(robot);
-  const Ticket stop = robot.session->stop(std::chrono::seconds{30}, robot.now());
+  const Ticket stop = robot.session->send(Command::stop(), std::chrono::seconds{30}, robot.now());
   robot.sleep(60'000);
   cut_all(robot, false);
   EXPECT_EQ(robot.finish(stop, 5000).outcome, Outcome::confirmed);

@@ -51,7 +51,7 @@ TEST_F(SessionLink, BecomesActiveWithTheBoardsStateAndSaysSoOnce) {
 }
 
 TEST_F(SessionLink, IgnoresAnswersToAnotherSession) {
-  const Ticket question = link.session.identify(1s, link.now);
+  const Ticket question = link.session.send(Command::identify(), 1s, link.now);
   const Ticket command = link.session.send(Command::servo(1, Microseconds(1500)), 1s, link.now);
   const SessionId ours = std::exchange(link.host_session, 0x1234);
   link.answer(link.last('Q').pnum, "udp");
@@ -162,7 +162,7 @@ TEST_F(SessionFarewell, IsSentToABoardOfUnknownIdentityIfItConfirmsCommands) {
 
 TEST_F(SessionFarewell, AStopUnderWayGoesOn) {
   link.identity("leave");
-  const Ticket stop = link.session.stop(1s, link.now);
+  const Ticket stop = link.session.send(Command::stop(), 1s, link.now);
   link.session.leave(100ms, link.now);
   link.sent.clear();
   link.pass(50ms);

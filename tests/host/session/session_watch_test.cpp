@@ -60,7 +60,7 @@ TEST_F(SessionWatch, AsksAtOnceOnATransportThatHasComeUp) {
 
 TEST_F(SessionWatch, OnALineAStopIsConfirmedByABoardWithoutAHost) {
   link.state("AIN24:24.28;SAFE:1;");
-  const Ticket ticket = link.session.stop(1s, link.now);
+  const Ticket ticket = link.session.send(Command::stop(), 1s, link.now);
   link.raw(with_crc(
       "H:R4-ROS2;PNum:0;T:0;SAFE:2;CAUSE:1;STOP:" + std::to_string(link.last('E').pnum) + ";"));
   ASSERT_EQ(link.results.count(ticket), 1U);
@@ -108,9 +108,9 @@ TEST_F(SessionWatch, ReportsThatTheFirmwareServesNoWatchers) {
 
 TEST_F(SessionWatch, MayStopAndIdentifyTheBoardAndCommandsNothing) {
   link.state("SAFE:0;");
-  EXPECT_NE(link.session.stop(1s, link.now), 0U);
+  EXPECT_NE(link.session.send(Command::stop(), 1s, link.now), 0U);
   EXPECT_EQ(link.count('E'), 1U);
-  EXPECT_NE(link.session.identify(1s, link.now), 0U);
+  EXPECT_NE(link.session.send(Command::identify(), 1s, link.now), 0U);
   EXPECT_EQ(link.count('Q'), 1U);
   const auto refused = [&](auto action) {
     const Problem problem = problem_of(action);

@@ -31,7 +31,7 @@ TEST_F(SessionWatchdog, HoldsCommandsBackOfAProgramThatDoesNotFeed) {
   EXPECT_EQ(link.count('O'), sent);
   EXPECT_EQ(link.results.count(lost), 0U);
 
-  link.session.stop(1s, link.now);
+  link.session.send(Command::stop(), 1s, link.now);
   link.pass(100ms);
   EXPECT_GE(link.count('E'), 4U) << "a stop is never held back";
   EXPECT_EQ(link.results.at(late).outcome, Outcome::cancelled);
@@ -72,7 +72,7 @@ TEST_F(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
   EXPECT_EQ(link.results.count(waits), 0U);
 
   link.session.hold(true, link.now);
-  link.session.stop(1s, link.now);
+  link.session.send(Command::stop(), 1s, link.now);
   link.pass(100ms);
   EXPECT_GE(link.count('E'), 4U) << "a stop is never held back";
 }
@@ -156,12 +156,12 @@ TEST(Explain, OfAStopThatIsNotConfirmedSaysToCutThePower) {
   LinkStatus link;
   link.causes = {LinkCause::watchdog, LinkCause::busy, LinkCause::key_needed};
   const CommandResult unheard{Outcome::timed_out, Refusal::none, 1s};
-  const Problem silent = explain("E:STOP", unheard, link);
+  const Problem silent = explain(Command::stop(), unheard, link);
   EXPECT_TRUE(contains(silent.reason, "not confirmed within 1000 ms: nothing was heard"));
   EXPECT_TRUE(silent.fix.starts_with("CUT THE POWER")) << silent.fix;
   EXPECT_EQ(silent.text().find("watchdog"), std::string::npos) << silent.text();
   link.state = HostLinkState::active;
-  const Problem drives = explain("E:STOP", unheard, link);
+  const Problem drives = explain(Command::stop(), unheard, link);
   EXPECT_TRUE(contains(drives.reason, "reports no stop"));
   EXPECT_TRUE(drives.fix.starts_with("CUT THE POWER"));
 }

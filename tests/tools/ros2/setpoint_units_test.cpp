@@ -105,8 +105,8 @@ TEST(Ros2CommandText, OfWhatIsNoTextNothingIsRepeated) {
 TEST(Ros2CommandText, SeveralCommandsStandBesideEachOther) {
   const auto commands = commands_of(" O:358,1,1 ;S:1500,2;\n");
   ASSERT_EQ(commands.size(), 2U);
-  EXPECT_EQ(to_text(commands[0].get()), "O:358,1,1");
-  EXPECT_EQ(to_text(commands[1].get()), "S:1500,2");
+  EXPECT_EQ(to_text(commands[0]), "O:358,1,1");
+  EXPECT_EQ(to_text(commands[1]), "S:1500,2");
   EXPECT_TRUE(commands_of(" ; ").empty());
   for (const char* wrong :
        {"O:358,1,1;X", "C:timeout,9000", "H:ROS2-R4", "E:LEAVE", "W:100", "F:AIN24", "O:358,1,9"}) {

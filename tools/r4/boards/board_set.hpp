@@ -22,8 +22,8 @@
 
 #include "r4link/async_board.hpp"
 #include "r4link/devices/device.hpp"
-#include "run_end.hpp"
 #include "r4link/discovery/url_pattern.hpp"
+#include "run_end.hpp"
 
 namespace r4::tool {
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "../boards/board_set.hpp"
@@ -39,30 +40,35 @@ struct SendOptions {
   bool json = false;
 };
 
-// What one argument says: a command, or several that are executed together.
-struct Order {
-  OwnCommand own;
-  Setpoints group;  // empty: it is one command
-  Command command() const { return own.get(); }
-};
+// What one argument says.
+using Order = CommandOrGroup;
 
 std::string shown(const Order& order) {
-  return order.group.empty() ? shown(order.command()) : to_text(order.group);
+  return std::visit([](const auto& each) { return r4::shown(each); }, order);
+}
+
+// Nothing for a group.
+std::optional<Command> command_of(const Order& order) {
+  const auto* const own = std::get_if<OwnCommand>(&order);
+  return own == nullptr ? std::nullopt : std::optional<Command>(*own);
+}
+
+bool is(CommandKind kind, const Order& order) {
+  const auto command = command_of(order);
+  return command && command->kind == kind;
 }
 
 // Throws Error{usage} for a command that is wrong, or that may not be sent to `url`.
 Order order_of(const std::string& text, const std::string& url) {
-  if (is_group_text(text)) return {OwnCommand(), parse_group_text(text)};
-  Order order{parse_command_text(text), Setpoints()};
-  if (order.command().kind == CommandKind::heartbeat) {
+  Order order = parse_text(text);
+  if (is(CommandKind::heartbeat, order)) {
     throw Error(ErrorKind::usage, text, "heartbeats are sent by themselves",
                 "use --hold to keep the link up");
   }
-  require_cable(url, order.command());
+  if (const auto command = command_of(order)) require_cable(url, *command);
   return order;
 }
 
-// Does it turn a motor, which needs the motor supply?
 bool turns_a_motor(const Command& command) {
   switch (command.kind) {
     case CommandKind::osmc:
@@ -76,21 +82,22 @@ bool turns_a_motor(const Command& command) {
   }
 }
 
-bool turns_a_motor(const Order& order) {
-  for (std::size_t i = 0; i < order.group.size(); ++i) {
-    if (turns_a_motor(order.group[i])) return true;
+bool turns_a_motor(const Setpoints& group) {
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    if (turns_a_motor(group[i])) return true;
   }
-  return turns_a_motor(order.command());
+  return false;
 }
 
-bool sets(const Order& order, std::string_view key) {
-  const Command command = order.command();
-  return command.kind == CommandKind::setting && command.text == Text(key);
+bool needs_motor_supply(const Order& order) {
+  return std::visit([](const auto& each) { return turns_a_motor(each); }, order);
 }
 
-Milliseconds value_of(const Command& setting) {
+// The value in milliseconds, if `order` sets that key.
+std::optional<Milliseconds> setting_of(const Order& order, std::string_view key) {
+  if (!is(CommandKind::setting, order) || command_of(order)->text != Text(key)) return {};
   std::uint32_t ms = 0;
-  parse_number(setting.text2, ms);  // checked with the command
+  parse_number(command_of(order)->text2, ms);  // checked with the command
   return Milliseconds(ms);
 }
 
@@ -102,13 +109,14 @@ struct LinkTiming {
 };
 std::optional<LinkTiming> link_timing_at(const std::vector<Order>& orders, std::size_t i) {
   if (i + 1 >= orders.size()) return std::nullopt;
-  const Order& a = orders[i];
-  const Order& b = orders[i + 1];
-  const Milliseconds first = value_of(a.command());
-  const Milliseconds second = value_of(b.command());
-  if (sets(a, "timeout") && sets(b, "heartbeat")) return LinkTiming{first, second};
-  if (sets(a, "heartbeat") && sets(b, "timeout")) return LinkTiming{second, first};
-  return std::nullopt;
+  const auto timing = [&](const Order& a, const Order& b) -> std::optional<LinkTiming> {
+    const auto timeout = setting_of(a, "timeout");
+    const auto heartbeat = setting_of(b, "heartbeat");
+    if (!timeout || !heartbeat) return std::nullopt;
+    return LinkTiming{*timeout, *heartbeat};
+  };
+  const auto in_order = timing(orders[i], orders[i + 1]);
+  return in_order ? in_order : timing(orders[i + 1], orders[i]);
 }
 
 // What a person types is deliberate: it is sent without being armed. Where a motor is to turn, the
@@ -117,13 +125,14 @@ std::optional<LinkTiming> link_timing_at(const std::vector<Order>& orders, std::
 BoardOptions board_options(const SendOptions& options, const std::vector<Order>& orders) {
   BoardOptions board_options = with_key(options.key);
   board_options.session.arming = Arming::off;
-  const bool turns =
-      std::any_of(orders.begin(), orders.end(), [](const Order& o) { return turns_a_motor(o); });
+  const bool turns = std::any_of(orders.begin(), orders.end(),
+                                 [](const Order& o) { return needs_motor_supply(o); });
   if (turns) board_options.session.fields = "DEFAULT,RELAYS";
   for (const Order& order : orders) {
-    if (!sets(order, "timeout")) continue;
+    const auto timeout = setting_of(order, "timeout");
+    if (!timeout) continue;
     std::uint32_t& ours = board_options.session.timing.heartbeat_ms;
-    ours = std::min(ours, static_cast<std::uint32_t>(value_of(order.command()).count() / 3));
+    ours = std::min(ours, static_cast<std::uint32_t>(timeout->count() / 3));
   }
   return board_options;
 }
@@ -163,28 +172,20 @@ class Sender {
       hold_.after(options_.hold, [this] { boards_.stop(); });
       return;
     }
-    const Order& order = orders_[next_];
-    const Command command = order.command();
     const auto done = [this](const CommandResult& result) { on_result(result); };
     if (const auto timing = link_timing_at(orders_, next_)) {
       board_.async_link_timing(timing->timeout, timing->heartbeat, options_.timeout, done);
-    } else if (!order.group.empty()) {
-      board_.async_apply(order.group, options_.timeout, done);
-    } else if (command.kind == CommandKind::stop) {
-      board_.async_stop(options_.timeout, done);
-    } else if (command.kind == CommandKind::identify) {
-      board_.async_identify(options_.timeout, done);
     } else {
-      board_.async_send(command, options_.timeout, done);
+      std::visit([&](const auto& each) { board_.async_send(each, options_.timeout, done); },
+                 orders_[next_]);
     }
   }
 
   // A transfer on the user's bus is begun when it is confirmed; a state tells how it ended.
   bool is_transfer() const {
-    const CommandKind kind = orders_[next_].command().kind;
-    return orders_[next_].group.empty() &&
-           (kind == CommandKind::i2c_read || kind == CommandKind::i2c_write ||
-            kind == CommandKind::i2c_scan);
+    const Order& order = orders_[next_];
+    return is(CommandKind::i2c_read, order) || is(CommandKind::i2c_write, order) ||
+           is(CommandKind::i2c_scan, order);
   }
   bool is_answered(const CommandResult& result) const {
     return board_.state().i2c_answer.pnum == result.pnum;
@@ -212,14 +213,15 @@ class Sender {
     const bool has_transfer = is_transfer() && is_answered(result);
     const bool failed = has_transfer && transfer.outcome != I2cOutcome::done;
     const bool confirmed = result.outcome == Outcome::confirmed && !failed;
-    const Problem problem =
-        failed ? failed_transfer(text, transfer.outcome) : explain(text, result, board_.link());
+    const Problem problem = failed      ? failed_transfer(text, transfer.outcome)
+                            : size == 2 ? explain(text, result, board_.link())
+                                        : explain_next(result);
     if (options_.json) {
       print_line(result_json(text, result, problem, confirmed));
     } else if (confirmed) {
       print_text("{}  confirmed in {:.1f} ms{}\n", text, milliseconds(result),
                  next_ == 0 ? ", connecting included" : "");
-      if (orders_[next_].command().kind == CommandKind::identify) print_identity();
+      if (is(CommandKind::identify, orders_[next_])) print_identity();
       if (has_transfer && shows_bytes(transfer)) print_text("  {}\n", shown_bytes(transfer));
     } else {
       print_text("{}  {}\n", text, problem.reason);
@@ -245,19 +247,24 @@ class Sender {
     send_next();
   }
 
+  Problem explain_next(const CommandResult& result) const {
+    return std::visit([&](const auto& each) { return explain(each, result, board_.link()); },
+                      orders_[next_]);
+  }
+
   // Was the command to turn a motor that has no supply?
   bool supply_is_missing() const {
     const State& state = board_.state();
-    return turns_a_motor(orders_[next_]) && state.present.has(StateField::relays) &&
+    return needs_motor_supply(orders_[next_]) && state.present.has(StateField::relays) &&
            (state.relays & 1) == 0;
   }
 
   bool shows_bytes(const I2cAnswer& transfer) const {
-    return transfer.data.size != 0 || orders_[next_].command().kind == CommandKind::i2c_scan;
+    return transfer.data.size != 0 || is(CommandKind::i2c_scan, orders_[next_]);
   }
   // A scan's are addresses.
   std::string shown_bytes(const I2cAnswer& transfer) const {
-    if (orders_[next_].command().kind == CommandKind::i2c_scan) {
+    if (is(CommandKind::i2c_scan, orders_[next_])) {
       return transfer.data.size == 0
                  ? "nobody answers"
                  : fmt::format("0x{:02x}",
@@ -292,7 +299,7 @@ class Sender {
       object["executed"] = result.executed;
     }
     if (!confirmed) object["reason"] = problem.reason;
-    if (confirmed && turns_a_motor(orders_[next_])) {
+    if (confirmed && needs_motor_supply(orders_[next_])) {
       object["motor_supply"] = supply_is_missing() ? "open" : "closed";
     }
     if (is_transfer() && is_answered(result)) {
@@ -300,7 +307,7 @@ class Sender {
       object["transfer"] = to_text(board_.state().i2c_answer.outcome);
       object["bytes"] = fmt::format("x{:02x}", fmt::join(data.begin(), data.end(), ""));
     }
-    if (confirmed && text == "Q:ID") {
+    if (confirmed && is(CommandKind::identify, orders_[next_])) {
       const BoardIdentity& id = board_.identity();
       object["board_id"] = id.board_id;
       object["name"] = id.name;

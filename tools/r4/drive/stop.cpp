@@ -72,7 +72,7 @@ int stop(const StopOptions& options) {
   const std::unique_ptr<AsyncBoard> board = open(io, url);
   std::optional<CommandResult> result;
   Timer repeating(io);
-  board->async_stop(options.timeout, [&](const CommandResult& r) {
+  board->async_send(Command::stop(), options.timeout, [&](const CommandResult& r) {
     result = r;
     if (r.outcome != Outcome::confirmed) return io.stop();
     print_confirmed(options, r);
@@ -85,7 +85,7 @@ int stop(const StopOptions& options) {
   board->close();
   tell_paths_down(paths, options.json);
   if (!result || result->outcome != Outcome::confirmed) {
-    Problem problem = explain("E:STOP", result.value_or(CommandResult()), link);
+    Problem problem = explain(Command::stop(), result.value_or(CommandResult()), link);
     problem.thing = fmt::format("E:STOP to {}", board->name());
     throw Error(problem);
   }

@@ -162,7 +162,7 @@ void BoardCommands::on_tick() {
     warn(fmt::format("{}: whoever drove it has gone or is silent", to_text(group)));
   }
   resting_ = true;
-  board_.async_apply(group, oldest, [this, stop](const CommandResult& result) {
+  board_.async_send(group, oldest, [this, stop](const CommandResult& result) {
     resting_ = false;
     if (result.outcome == Outcome::confirmed) drivers_.stopped(stop);
   });

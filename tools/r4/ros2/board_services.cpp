@@ -19,13 +19,15 @@ constexpr auto arm_patience = 3000ms;  // for its steps
 constexpr auto stop_patience = 5000ms;
 constexpr const char* overtaken = ": a stop came after it; ask again when the danger is over";
 
-std::function<void(const CommandResult&)> in_words(const AsyncBoard& board, std::string what,
+// `what`: a command, a group, or the name of another request.
+template <class What>
+std::function<void(const CommandResult&)> in_words(const AsyncBoard& board, What what,
                                                    BoardCommands::Done done) {
   return [&board, what = std::move(what), done = std::move(done)](const CommandResult& result) {
     if (result.outcome == Outcome::confirmed) {
-      done(true, fmt::format("{}: confirmed by the board", what));
+      done(true, fmt::format("{}: confirmed by the board", shown(what)));
     } else if (result.outcome == Outcome::cancelled && !board.in_control()) {
-      done(false, explain(what, board.link()).text());
+      done(false, explain(shown(what), board.link()).text());
     } else {
       done(false, for_a_node(explain(what, result, board.link()), result.disarmed).text());
     }
@@ -133,9 +135,9 @@ void BoardCommands::stop(Done done) {
 // Until the board confirms it: after an outage it would do again what it did before.
 void BoardCommands::repeat_stop() {
   stopping_ = true;
-  board_.async_stop(stop_patience, [this](const CommandResult& result) {
+  board_.async_send(Command::stop(), stop_patience, [this](const CommandResult& result) {
     stopping_ = false;
-    in_words(board_, "E:STOP", [this](bool stopped, const std::string& text) {
+    in_words(board_, Command::stop(), [this](bool stopped, const std::string& text) {
       warn(stopped ? text : fmt::format("{}; {}", text, stop_last_resort));
       for (const Done& each : std::exchange(stops_, {})) each(stopped, text);
     })(result);
@@ -165,7 +167,7 @@ AsyncBoard::Duration BoardCommands::left_of(const Origin& origin) {
 void BoardCommands::clear(const Origin& origin, Done done) {
   if (is_without_link("E:CLEAR", done)) return;
   board_.async_send(Command::clear(), left_of(origin),
-                    in_words(board_, "E:CLEAR", std::move(done)));
+                    in_words(board_, Command::clear(), std::move(done)));
 }
 
 void BoardCommands::arm(Done done) {
@@ -207,29 +209,25 @@ void BoardCommands::send(const std::optional<std::string>& text, const void* sou
     post_wanted();  // what came before goes before
     // It is repeated until it is too old to be executed.
     const auto left = left_of(origin);
-    if (commands.size() == 1 && !joins_groups(commands[0].get().kind)) {
-      const Command command = commands[0].get();
+    if (commands.size() == 1 && !joins_groups(Command(commands[0]).kind)) {
+      const Command command = commands[0];
       if (command.kind == CommandKind::clear && is_overtaken(origin)) {
-        done(false, *text + overtaken);
-      } else if (command.kind == CommandKind::clear) {
-        clear(origin, done);
-      } else {
-        board_.async_send(command, left, in_words(board_, *text, done));
+        return done(false, *text + overtaken);
       }
-      return;
+      return board_.async_send(command, left, in_words(board_, commands[0], done));
     }
     Setpoints setpoints;
     for (const OwnCommand& own : commands) {
-      const Command command = own.get();
+      const Command command = own;
       if (const std::string objection = objection_to(command); !objection.empty()) {
         return done(false, objection);
       }
       setpoints.add(command);
     }
-    board_.async_apply(setpoints, left, in_words(board_, *text, done));
+    board_.async_send(setpoints, left, in_words(board_, setpoints, done));
     if (board_.disarmed_by() != DisarmCause::none) return;
     for (const OwnCommand& own : commands) {
-      drivers_.on_sent(own.get(), source, origin.publisher, BootClock::now());
+      drivers_.on_sent(own, source, origin.publisher, BootClock::now());
     }
   } catch (const Error& error) {
     done(false, error.problem().text());

@@ -97,19 +97,19 @@ void BoardCommands::on_text(const std::string& text, const void* source, const O
   std::vector<OwnCommand> commands;
   try {
     commands = commands_of(text);
-    for (const OwnCommand& own : commands) board_.require_sendable(own.get());
+    for (const OwnCommand& own : commands) board_.require_sendable(own);
   } catch (const Error& error) {
     warn(error.problem().text());
     return;
   }
   for (const OwnCommand& own : commands) {
-    if (const std::string objection = objection_to(own.get()); !objection.empty()) {
+    if (const std::string objection = objection_to(own); !objection.empty()) {
       warn(objection);
       return;
     }
   }
   for (const OwnCommand& own : commands) {
-    const Command command = own.get();
+    const Command command = own;
     if (joins_groups(command.kind)) {
       want(command, source, origin);
     } else if (command.kind == CommandKind::clear) {

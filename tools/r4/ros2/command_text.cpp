@@ -69,7 +69,7 @@ std::vector<OwnCommand> commands_of(std::string_view text) {
   std::vector<OwnCommand> commands;
   each_part(text, [&commands](std::string_view part) {
     OwnCommand command = parse_command_text(part);
-    require_allowed(part, command.get());
+    require_allowed(part, command);
     commands.push_back(std::move(command));
   });
   return commands;

@@ -108,17 +108,10 @@ bool Story::active() const {
 
 CommandResult Story::send(const Command& command) {
   ended_.reset();
-  const auto done = [this](const CommandResult& result) { ended_ = result; };
-  if (command.kind == CommandKind::stop) {
-    board_.async_stop(patience, done);
-  } else if (command.kind == CommandKind::identify) {
-    board_.async_identify(patience, done);
-  } else {
-    board_.async_send(command, patience, done);
-  }
+  board_.async_send(command, patience, [this](const CommandResult& result) { ended_ = result; });
   wait_until([this] { return ended_.has_value(); }, 2 * patience);
   if (!ended_ || ended_->outcome != Outcome::confirmed) {
-    throw Error(explain("the command", ended_.value_or(CommandResult()), board_.link()));
+    throw Error(explain(command, ended_.value_or(CommandResult()), board_.link()));
   }
   return *ended_;
 }

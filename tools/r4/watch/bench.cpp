@@ -138,9 +138,11 @@ class Bench {
     if (left == 0) {
       return pause_.after(pause, [this] { ask_next(burst); });
     }
-    board_.async_identify(answer_timeout, [this, left](const CommandResult& result) {
-      if (running_ && count(result, round_trips_, unanswered_)) ask_next(left - 1);
-    });
+    board_.async_send(Command::identify(), answer_timeout,
+                      [this, left](const CommandResult& result) {
+                        if (running_ && count(result, round_trips_, unanswered_))
+                          ask_next(left - 1);
+                      });
   }
 
   // The session's own choice of fields again: a command that changes nothing.

@@ -68,7 +68,7 @@ void check_all(const Datagram& datagram) {
   for (const Field& field : datagram) {
     if (!is_command(field)) continue;
     const OwnCommand command = parse_command_text(text_of(field));
-    group.add(command.get());
+    group.add(command);
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include <asio/post.hpp>
 #include <utility>
+#include <variant>
 
 #include "../formats/json_lines.hpp"
 #include "../watch/board_metrics.hpp"
@@ -279,8 +280,9 @@ void Hub::answer(ClientId client, const PageRequest& request, std::size_t board,
   tell(client, result_text(request.request, board, ok, ms, text));
 }
 
+template <class What>
 WebBoard::OnResult Hub::answering(ClientId client, const PageRequest& request, std::size_t board,
-                                  std::string what) {
+                                  What what) {
   return [this, client, request, board, what = std::move(what)](const CommandResult& result) {
     const bool ok = result.outcome == Outcome::confirmed;
     const double ms = std::chrono::duration<double, std::milli>(result.elapsed).count();
@@ -293,7 +295,7 @@ WebBoard::OnResult Hub::answering(ClientId client, const PageRequest& request, s
 
 void Hub::stop(ClientId client, const PageRequest& request) {
   for (std::size_t i = 0; i < boards_.size(); ++i) {
-    boards_[i]->stop(answering(client, request, i, "E:STOP"));
+    boards_[i]->stop(answering(client, request, i, OwnCommand(Command::stop())));
   }
 }
 
@@ -319,21 +321,13 @@ void Hub::command(ClientId client, const PageRequest& request) {
 
 void Hub::send(ClientId client, const PageRequest& request, AsyncBoard& board,
                const std::string& text) {
-  const WebBoard::OnResult done = answering(client, request, request.board, text);
-  if (is_group_text(text)) {
-    board.async_apply(parse_group_text(text), command_time, done);
-    return;
-  }
-  const OwnCommand own = parse_command_text(text);
-  const Command command = own.get();
-  require_allowed(command);
-  if (command.kind == CommandKind::stop) {
-    board.async_stop(command_time, done);
-  } else if (command.kind == CommandKind::identify) {
-    board.async_identify(command_time, done);
-  } else {
-    board.async_send(command, command_time, done);
-  }
+  const CommandOrGroup what = parse_text(text);
+  if (const auto* command = std::get_if<OwnCommand>(&what)) require_allowed(*command);
+  std::visit(
+      [&](const auto& each) {
+        board.async_send(each, command_time, answering(client, request, request.board, each));
+      },
+      what);
 }
 
 // --- what pages hear

@@ -69,8 +69,9 @@ class Hub final : ServerEvents, WebBoard::Events {
   void stop(ClientId client, const PageRequest& request);
   void answer(ClientId client, const PageRequest& request, std::size_t board, bool ok, double ms,
               const std::string& text);
+  template <class What>  // a command, a group, or the name of another request
   WebBoard::OnResult answering(ClientId client, const PageRequest& request, std::size_t board,
-                               std::string what);
+                               What what);
   void tell(ClientId client, std::string text);
   void tell_all(std::string text, Outgoing::Kind kind = Outgoing::Kind::other);
   void tell_recording();

@@ -44,7 +44,9 @@ void WebBoard::leave_control(Done done) {
   });
 }
 
-void WebBoard::stop(OnResult done) { board_.async_stop(stop_time, std::move(done)); }
+void WebBoard::stop(OnResult done) {
+  board_.async_send(Command::stop(), stop_time, std::move(done));
+}
 
 void WebBoard::connect() {
   board_.on_state([this](const ReceivedState& state, const Datagram& datagram) {

@@ -49,7 +49,7 @@ TEST(CanFleet, IsStoppedByOneFrameAndEachBoardConfirmsIt) {
     EXPECT_GE(stops.size(), 2U) << "the bare frame, and the one with the number";
     EXPECT_LE(stops.size(), 25U) << "repeated every 20 ms by all together";
   }
-  fleet.clear(std::chrono::seconds{5}).require();
+  fleet.send(Command::clear(), std::chrono::seconds{5}).require();
   send_to_all(fleet, "O:1,1,1");
 }
 
