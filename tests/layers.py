@@ -117,7 +117,7 @@ PORTABLE = (FIRMWARE - PUBLIC) | {'firmware/ports/sim/chips', 'firmware/ports/si
 # Those public headers that the board has, too.
 PORTABLE_PUBLIC = {f'include/r4link/{name}.hpp' for name in (
     'command', 'config', 'datagram', 'key', 'simulated_pins', 'state', 'tables/commands', 'tables/settings',
-    'tables/state_fields', 'text', 'vocabulary')}
+    'tables/state_fields', 'text', 'vocabulary')} | {'include/r4link/tables/board.def'}
 # No heap, no I/O, no clock, nothing GCC 7 in C++14 lacks; C headers in both spellings.
 PORTABLE_STANDARD = {
     'algorithm', 'array', 'atomic', 'cassert', 'climits', 'cmath', 'cstddef', 'cstdint', 'cstring',
@@ -175,7 +175,7 @@ def main():
     root = pathlib.Path(sys.argv[1]).resolve()
     tops = ('include', 'protocol', 'transports', 'firmware', 'host', 'tools')
     sources = sorted(str(path.relative_to(root)) for top in tops
-                     for path in (root / top).rglob('*') if path.suffix in ('.hpp', '.cpp'))
+                     for path in (root / top).rglob('*') if path.suffix in ('.hpp', '.cpp', '.def'))
     faults = [f'{path}:{line}: {reason}' for path in sources for line, reason in faults_of(root, path)]
     rooms = collections.Counter(str(pathlib.PurePath(path).parent) for path in sources)
     faults += [f'{room} holds {count} sources, {MOST_SOURCES} at most: make a room of what belongs together'
