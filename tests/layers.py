@@ -175,7 +175,7 @@ def main():
     root = pathlib.Path(sys.argv[1]).resolve()
     tops = ('include', 'protocol', 'transports', 'firmware', 'host', 'tools')
     sources = sorted(str(path.relative_to(root)) for top in tops
-                     for path in (root / top).rglob('*') if path.suffix in ('.hpp', '.cpp', '.def'))
+                     for path in (root / top).rglob('*') if path.suffix in ('.hpp', '.cpp'))
     faults = [f'{path}:{line}: {reason}' for path in sources for line, reason in faults_of(root, path)]
     rooms = collections.Counter(str(pathlib.PurePath(path).parent) for path in sources)
     faults += [f'{room} holds {count} sources, {MOST_SOURCES} at most: make a room of what belongs together'
