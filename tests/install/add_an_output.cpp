@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drives the lamp of docs/contributing.md on the simulated board: add_an_output.py compiles this with
+// Drives the winch of docs/contributing.md on the simulated board: add_an_output.py compiles this with
 // the edit of that page. Prints what is wrong.
 #include <cstdio>
+#include <fstream>
+#include <iterator>
 #include <string>
 
 #include "firmware/ports/sim/simulated_hardware.hpp"
@@ -34,7 +36,7 @@ class Host final : public firmware::Port {
     application_.add_port(*this);
     application_.start(now_ms_);
     run(1000);
-    say("F:LAMP1,LAMP2,SAFE");
+    say("F:WINCH1,WINCH2,SAFE");
     say("E:CLEAR");
   }
 
@@ -88,47 +90,55 @@ class Host final : public firmware::Port {
 void check_board() {
   Host host;
   const auto duty = [&host](int line) { return host.model.chips().osmc.duty(line); };
-  host.say("L:1000,1");
-  host.say("L:4000,2");
-  expect(duty(8) == 1000 && duty(9) == 4000, "the lines of both lamps");
-  const StateField field = state_field(FieldKind::lamp, 2);
+  host.say("L:1000,1,1");
+  host.say("L:4000,0,2");
+  expect(duty(8) == 1000 && duty(9) == 4096 && duty(10) == 4000 && duty(11) == 0, "the lines");
+  const StateField field = state_field(FieldKind::winch, 2);
   expect(host.state.present.has(field) && numbers_of(host.state, field)[0] == 4000 &&
-             host.state.raw.lamp[0] == 1000 && host.state.lamp(2) == 4000,
+             host.state.raw.winch[0].pwm == 1000 && host.state.winch(2).pwm == 4000,
          "the state: " + host.text);
-  expect(host.text.find("LAMP1:1000;LAMP2:4000;") != std::string::npos, "its text: " + host.text);
+  expect(host.text.find("WINCH1:1000,1;WINCH2:4000,0;") != std::string::npos,
+         "its text: " + host.text);
   std::uint8_t packed[max_datagram];
   char unpacked[max_datagram];
   const std::size_t size = pack(host.text, packed, sizeof packed);
   const UnpackResult result = unpack(packed, size, unpacked, sizeof unpacked);
   expect(size > 0 && size < host.text.size() && str(Text(unpacked, result.size)) == host.text,
          "the packed form on a CAN bus");
-  host.say("L:5000,1");
+  host.say("L:5000,1,1");
   expect(host.refusal.find(",RANGE;") != std::string::npos, "the range: " + host.refusal);
-  host.say("L:5,3");
+  host.say("L:5,1,3");
   expect(host.refusal.find(",CHANNEL;") != std::string::npos, "the channel: " + host.refusal);
-  expect(host.state.lamp(1) == 1000, "a refused command changes nothing: " + host.text);
+  expect(host.state.winch(1).pwm == 1000, "a refused command changes nothing: " + host.text);
+  host.say("R:1,On");
+  expect(host.state.winch(1).pwm == 0 && duty(8) == 0, "no motor starts when its supply comes");
+  host.say("L:1000,1,1");
   host.say("E:STOP");
   expect(duty(8) == 0 && duty(9) == 0, "the lines in the safe state");
-  expect(host.state.lamp(1) == 0 && host.state.lamp(2) == 0, "the safe state: " + host.text);
-  host.say("L:1000,1");
+  expect(host.state.winch(1) == Drive() && host.state.winch(2) == Drive(),
+         "the safe state: " + host.text);
+  host.say("L:1000,1,1");
   expect(host.refusal.find(",SAFE;") != std::string::npos, "the safe state: " + host.refusal);
 }
 
-void check_words() {
-  const CommandHelp& help = command_help(CommandKind::lamp);
-  expect(help.form == "L:pwm,ch" && help.ranges == "pwm 0-4095, ch 1-2", "the help: " + help.form);
-  const OwnCommand command = parse_command_text("L:1000,2");
-  expect(describe(command.get()) == "lamp 2 at 1000", "the description");
-  const FieldKindRow& kind = row_of(FieldKind::lamp);
-  expect(std::string(kind.values[0].unit) == "0-4095" && shown_by(CommandKind::lamp) == kind.kind,
-         "the field's unit");
+// `protocol`: the text of docs/protocol.md.
+void check_words(const std::string& protocol) {
+  const CommandHelp& help = command_help(CommandKind::winch);
+  expect(help.form == "L:pwm,dir,ch", "the help: " + help.form);
+  const std::string row =
+      "| `" + help.form + "` | " + std::string(help.meaning) + " | " + help.ranges;
+  expect(protocol.find(row) != std::string::npos, "docs/protocol.md has no " + row);
+  const OwnCommand command = parse_command_text("L:4095,1,2");
+  expect(describe(command.get()) == "winch 2 forward, duty 1", "the description");
+  expect(shown_by(CommandKind::winch) == FieldKind::winch, "the field that shows it");
 }
 
 }  // namespace
 }  // namespace r4
 
-int main() {
+int main(int, char** arguments) {
+  std::ifstream protocol(arguments[1]);
   r4::check_board();
-  r4::check_words();
+  r4::check_words({std::istreambuf_iterator<char>(protocol), {}});
   return r4::faults == 0 ? 0 : 1;
 }

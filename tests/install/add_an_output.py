@@ -9,7 +9,7 @@ import sys
 import tempfile
 
 MOST_FILES = 3
-COPIED = ('include', 'protocol', 'transports', 'firmware', 'host')
+COPIED = ('docs', 'include', 'protocol', 'transports', 'firmware', 'host')
 # The board, the codec with its packed form, and the words of commands: no carriers, no links of a host.
 PORTABLE = ('protocol/*/*.cpp', 'transports/framing/can/*pack*.cpp', 'firmware/*.cpp', 'firmware/application/*.cpp',
             'firmware/devices/*.cpp', 'firmware/drivers/*.cpp', 'firmware/ports/sim/chips/*.cpp',
@@ -49,7 +49,7 @@ def main():
         sources = sorted(path for pattern in PORTABLE + HOST for path in scratch.glob(pattern))
         program = scratch / 'add_an_output'
         subprocess.run([*flags, '-o', program, tree / 'tests/install/add_an_output.cpp', *sources, '-lfmt'], check=True)
-        subprocess.run([program], check=True)
+        subprocess.run([program, scratch / 'docs/protocol.md'], check=True)
 
 
 if __name__ == '__main__':
