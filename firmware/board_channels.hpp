@@ -24,19 +24,25 @@ constexpr std::uint8_t dhb12_pwm_address = 0x41;  // PCA9685
 constexpr std::uint8_t servo_pwm_address = 0x42;  // PCA9685
 constexpr std::uint8_t dac_address = 0x61;        // MCP4728
 
+enum class Chip : std::uint8_t { osmc_pwm, dhb12_pwm, expander, dac, servo_pwm, count };
+constexpr int chip_count = static_cast<int>(Chip::count);
+
 // The frequency of the pulses. The PCA9685 ends at 1526 Hz.
 constexpr std::uint32_t drive_hz = 1000;
 constexpr std::uint32_t servo_hz = 50;
 
 // An H-bridge: outputs of its PCA9685. Duty and direction are neighbours: they change in one
 // transfer. Direction: high is forward.
+template <Chip chip>
 struct DriveLines {
   std::uint8_t pwm;
   std::uint8_t direction;
 };
 constexpr int drive_lines = 2;
-constexpr DriveLines osmc_lines[osmc_channels] = {{0, 1}, {2, 3}, {4, 5}, {6, 7}};
-constexpr DriveLines dhb12_lines[dhb12_channels] = {{0, 1}, {2, 3}, {4, 5}, {6, 7}};
+constexpr DriveLines<Chip::osmc_pwm> osmc_lines[] = {{0, 1}, {2, 3}, {4, 5}, {6, 7}};
+constexpr DriveLines<Chip::dhb12_pwm> dhb12_lines[] = {{0, 1}, {2, 3}, {4, 5}, {6, 7}};
+// The kinds of H-bridges.
+#define R4_DRIVES(DRIVE) DRIVE(osmc) DRIVE(dhb12)
 
 // A servo: output of its PCA9685.
 constexpr std::uint8_t servo_lines[servo_channels] = {0, 1, 2,  3,  4,  5,  6,  7,

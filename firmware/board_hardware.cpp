@@ -20,11 +20,6 @@ constexpr std::uint8_t pca9685_chips = 1U << static_cast<int>(Chip::osmc_pwm) |
 constexpr Chip safe_order[chip_count] = {Chip::dac, Chip::expander, Chip::osmc_pwm, Chip::dhb12_pwm,
                                          Chip::servo_pwm};
 
-void set_drive(Pca9685& pwm, const DriveLines& lines, Drive drive) {
-  pwm.set_duty(lines.pwm, drive.pwm);
-  pwm.set_level(lines.direction, drive.direction == Direction::forward);
-}
-
 }  // namespace
 
 std::uint8_t address_of(Chip chip) {
@@ -133,9 +128,20 @@ void BoardHardware::apply(const Outputs& outputs) {
   leave();
 }
 
+template <Chip chip, int count>
+void BoardHardware::set_drives(const DriveLines<chip> (&lines)[count],
+                               const Drive (&drives)[count]) {
+  static_assert((pca9685_chips >> static_cast<int>(chip) & 1) != 0, "the lines are of a PCA9685");
+  Pca9685& pwm = static_cast<Pca9685&>(*chips_[static_cast<int>(chip)]);
+  for (int i = 0; i < count; ++i) {
+    pwm.set_duty(lines[i].pwm, drives[i].pwm);
+    pwm.set_level(lines[i].direction, drives[i].direction == Direction::forward);
+  }
+}
+
 void BoardHardware::set_outputs(const Outputs& outputs) {
-  for (int i = 0; i < osmc_channels; ++i) set_drive(osmc_, osmc_lines[i], outputs.osmc[i]);
-  for (int i = 0; i < dhb12_channels; ++i) set_drive(dhb12_, dhb12_lines[i], outputs.dhb12[i]);
+#define R4_DRIVE(kind) set_drives(kind##_lines, outputs.kind);
+  R4_DRIVES(R4_DRIVE)
   for (int i = 0; i < servo_channels; ++i) {
     servo_.set_pulse_us(servo_lines[i], outputs.servo_us[i]);
   }

@@ -42,8 +42,6 @@
 namespace r4 {
 namespace firmware {
 
-enum class Chip : std::uint8_t { osmc_pwm, dhb12_pwm, expander, dac, servo_pwm, count };
-constexpr int chip_count = static_cast<int>(Chip::count);
 std::uint8_t address_of(Chip chip);
 
 // The microcontroller's pins; all of them must be there and outlive the hardware.
@@ -114,6 +112,8 @@ class BoardHardware final : public Hal {
   int drive_chips_safe(int held_before);
   bool drive_chip_safe(int chip);
   void set_outputs(const Outputs& outputs);
+  template <Chip chip, int count>
+  void set_drives(const DriveLines<chip> (&lines)[count], const Drive (&drives)[count]);
   void for_each_chip(BusBudget& budget, bool set_up);
   void set_up_again();
   void reset_lost_modes();

@@ -15,15 +15,33 @@ void set_relay(std::uint8_t& relays, int channel, bool on) {
   relays = static_cast<std::uint8_t>(on ? relays | bit : relays & ~bit);
 }
 
+void set_value(std::uint16_t& output, std::uint16_t value) { output = value; }
+void set_value(Drive& output, std::uint16_t value) { output.pwm = value; }
+void set_value(Bldc& output, std::uint16_t value) { output.speed = value; }
+
+void set(std::uint16_t& output, const Command& command) {
+  output = static_cast<std::uint16_t>(command.value);
+}
+void set(Drive& output, const Command& command) {
+  output.pwm = static_cast<std::uint16_t>(command.value);
+  output.direction = command.direction;
+}
+void set(Bldc& output, const Command& command) {
+  output.speed = static_cast<std::uint16_t>(command.value);
+  output.direction = command.direction;
+  output.brake = command.on;
+}
+
 // Called when the relay of the motors' supply is about to close: a motor whose command came while
 // there was no supply, or was held back by a network, must not start because of the relay. A voltage
 // may be the throttle of one.
 void stop_motors(Outputs& outputs) {
-  for (Drive& channel : outputs.osmc) channel.pwm = 0;
-  for (Drive& channel : outputs.dhb12) channel.pwm = 0;
-  for (Bldc& channel : outputs.bldc) channel.speed = 0;
+#define R4_OUTPUT(kind, Value, member, channels, motor) \
+  for (auto& channel : outputs.member) {                \
+    if (motor) set_value(channel, 0);                   \
+  }
+#include "r4link/tables/board.def"
   for (StepperTarget& channel : outputs.stepper) channel = StepperTarget();
-  for (std::uint16_t& millivolts : outputs.dac_mv) millivolts = 0;
 }
 
 }  // namespace
@@ -32,20 +50,13 @@ Refusal carry_out(const Command& command, Setpoints& setpoints) {
   const int i = command.channel - 1;
   const int channels = row_of(command.kind).channels;
   if (channels != 0 && (i < 0 || i >= channels)) return Refusal::channel;  // it is an index below
-  const std::uint16_t value = static_cast<std::uint16_t>(command.value);
   Outputs& outputs = setpoints.outputs;
   switch (command.kind) {
-    case CommandKind::osmc:
-      outputs.osmc[i].pwm = value;
-      outputs.osmc[i].direction = command.direction;
-      break;
-    case CommandKind::dhb12:
-      outputs.dhb12[i].pwm = value;
-      outputs.dhb12[i].direction = command.direction;
-      break;
-    case CommandKind::servo:
-      outputs.servo_us[i] = value;
-      break;
+#define R4_OUTPUT(kind, Value, member, ...) \
+  case CommandKind::kind:                   \
+    set(outputs.member[i], command);        \
+    break;
+#include "r4link/tables/board.def"
     case CommandKind::relay:
       if (command.channel == supply_relay && command.on && (outputs.relays & 1) == 0) {
         stop_motors(outputs);
@@ -60,16 +71,8 @@ Refusal carry_out(const Command& command, Setpoints& setpoints) {
     case CommandKind::zero:
       if (i < stepper_channels) outputs.stepper[i] = StepperTarget();
       break;
-    case CommandKind::bldc:
-      outputs.bldc[i].speed = value;
-      outputs.bldc[i].direction = command.direction;
-      outputs.bldc[i].brake = command.on;
-      break;
-    case CommandKind::dac:
-      outputs.dac_mv[i] = value;
-      break;
     case CommandKind::proximity:
-      setpoints.proximity_cm[i] = value;
+      set(setpoints.proximity_cm[i], command);
       break;
     case CommandKind::fields:
       return parse_fields(command.text, setpoints.fields);

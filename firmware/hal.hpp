@@ -28,13 +28,10 @@ struct Outputs {
   Outputs() {
     for (Bldc& channel : bldc) channel.brake = true;
   }
-  Drive osmc[osmc_channels];
-  Drive dhb12[dhb12_channels];
-  std::uint16_t servo_us[servo_channels] = {};  // 0: no pulses
-  std::uint8_t relays = 0;                      // bit n-1: relay n is on
-  Bldc bldc[bldc_channels];
+#define R4_OUTPUT(kind, Value, member, channels, ...) Value member[channels] = {};
+#include "r4link/tables/board.def"
+  std::uint8_t relays = 0;  // bit n-1: relay n is on
   StepperTarget stepper[stepper_channels];
-  std::uint16_t dac_mv[dac_channels] = {};
 };
 bool operator==(const Outputs& a, const Outputs& b);
 inline bool operator!=(const Outputs& a, const Outputs& b) { return !(a == b); }

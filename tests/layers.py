@@ -131,7 +131,7 @@ PORTABLE = (FIRMWARE - PUBLIC) | {'firmware/ports/sim/chips', 'firmware/ports/si
 PORTABLE_PUBLIC = {f'include/r4link/{name}.hpp' for name in (
     'can/can_bits', 'can/can_frame', 'can/can_ids', 'command', 'config', 'datagram', 'key', 'messages/datagram_writer',
     'messages/message', 'messages/packed_form', 'messages/packet_tracker', 'simulated_pins', 'state', 'tables/commands',
-    'tables/settings', 'tables/state_fields', 'text', 'vocabulary')}
+    'tables/settings', 'tables/state_fields', 'text', 'vocabulary')} | {'include/r4link/tables/board.def'}
 # No heap, no I/O, no clock, nothing GCC 7 in C++14 lacks; C headers in both spellings.
 PORTABLE_STANDARD = {
     'algorithm', 'array', 'atomic', 'cassert', 'climits', 'cmath', 'cstddef', 'cstdint', 'cstring',

@@ -247,12 +247,10 @@ void Application::send_part(Source to, std::uint32_t& pnum, DatagramWriter& writ
 void Application::fill(State& state) const {
   for (int i = 0; i < analog_channels; ++i) state.raw.analog_cv[i] = inputs_.analog_cv[i];
   state.handle_held = inputs_.handle_held;
-  for (int i = 0; i < dhb12_channels; ++i) state.raw.dhb12[i] = outputs_.dhb12[i];
-  for (int i = 0; i < osmc_channels; ++i) state.raw.osmc[i] = outputs_.osmc[i];
-  for (int i = 0; i < servo_channels; ++i) state.raw.servo_us[i] = outputs_.servo_us[i];
-  for (int i = 0; i < bldc_channels; ++i) state.raw.bldc[i] = outputs_.bldc[i];
+#define R4_OUTPUT(kind, Value, member, channels, ...) \
+  for (int i = 0; i < (channels); ++i) state.raw.member[i] = outputs_.member[i];
+#include "r4link/tables/board.def"
   state.relays = outputs_.relays;
-  for (int i = 0; i < dac_channels; ++i) state.raw.dac_mv[i] = outputs_.dac_mv[i];
   state.gpio = inputs_.gpio;
   for (int i = 0; i < stepper_channels; ++i) state.raw.stepper_steps[i] = inputs_.stepper_steps[i];
   for (int i = 0; i < encoder_channels; ++i) {

@@ -1,19 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How the board's datagrams end the commands under way.
-#include <utility>
-
 #include "commands_under_way.hpp"
 #include "r4link/tables/state_fields.hpp"
 
 namespace r4 {
 
 namespace {
-
-// The commands whose value the state shows, but `relay`.
-constexpr std::pair<CommandKind, FieldKind> shown_commands[] = {
-    {CommandKind::osmc, FieldKind::osmc},   {CommandKind::dhb12, FieldKind::dhb12},
-    {CommandKind::servo, FieldKind::servo}, {CommandKind::stepper, FieldKind::stepper},
-    {CommandKind::bldc, FieldKind::bldc},   {CommandKind::dac, FieldKind::dac}};
 
 // For boards that do not report CMD: true if `state`, as one datagram carried it, shows the value
 // that `command` sets. Commands without a state field (threshold, fields, settings) are never
@@ -22,15 +14,12 @@ bool state_shows(const State& state, const Command& command) {
   if (command.kind == CommandKind::relay) {
     return state.present.has(StateField::relays) && state.relay(command.channel) == command.on;
   }
-  for (const auto& [kind, shown] : shown_commands) {
-    const StateField field = state_field(shown, command.channel);
-    if (kind != command.kind || !state.present.has(field)) continue;
-    const StateNumbers numbers = numbers_of(state, field);  // value, direction, brake
-    return numbers[0] == command.value &&
-           (numbers.count < 2 || numbers[1] == static_cast<double>(command.direction)) &&
-           (numbers.count < 3 || numbers[2] == static_cast<double>(command.on));
-  }
-  return false;
+  const StateField field = state_field(shown_by(command.kind), command.channel);
+  if (!state.present.has(field)) return false;
+  const StateNumbers numbers = numbers_of(state, field);  // value, direction, brake
+  return numbers[0] == command.value &&
+         (numbers.count < 2 || numbers[1] == static_cast<double>(command.direction)) &&
+         (numbers.count < 3 || numbers[2] == static_cast<double>(command.on));
 }
 
 }  // namespace

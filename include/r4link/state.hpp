@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The board's state as typed values, and the fields that carry it (paper section 4.1).
 //
-// tables/state_fields.hpp names every field, its unit and its place in State. The board writes with
-// that table, the host reads with it, and the `F` command selects from it.
+// tables/board.def names every field, its unit and its place in State. The board writes with that
+// table, the host reads with it, and the `F` command selects from it.
 #pragma once
 
 #include <cstdint>
@@ -16,30 +16,12 @@ namespace r4 {
 class Datagram;
 
 // Every state field, in the order in which the board sends them. The first ten are the paper's
-// default set. What each field is, and its units: tables/state_fields.hpp.
-// clang-format off
+// default set; from I2C1 on they are of the user's devices (docs/devices.md) and of faults.
 enum class StateField : std::uint8_t {
-  ain24, ain12, ain5, aindmh, dmhsta, ainsteer, dhb1a, osmc1, step1pos, servo1pos,
-  ain6,
-  dhb1b, dhb2a, dhb2b,
-  osmc2, osmc3, osmc4,
-  step2pos, step3pos, step4pos,
-  servo2pos, servo3pos, servo4pos, servo5pos, servo6pos, servo7pos, servo8pos, servo9pos,
-  servo10pos, servo11pos, servo12pos, servo13pos, servo14pos, servo15pos, servo16pos,
-  enc1, enc2, enc3, enc4,
-  us1, us2, us3, us4,
-  bldc1, bldc2, bldc3, bldc4,
-  relays, safe, cmd,
-  rxok, rxcrc, rxlost, rxdup, rxref, late,
-  enc1hz, enc2hz, enc3hz, enc4hz,
-  enc1idx, enc2idx, enc3idx, enc4idx,
-  // of the user's devices (docs/devices.md)
-  i2c1, i2c2, i2c3, i2c4, i2c5, i2c6, i2c7, i2c8, i2cx, i2cbus,
-  uart1, uart2, dac1, dac2, gpio,
-  fault,
+#define R4_STATE_FIELD(field, ...) field,
+#include "tables/board.def"
   count
 };
-// clang-format on
 constexpr int state_field_count = static_cast<int>(StateField::count);
 
 // A set of state fields: the preamble's selection, or what a datagram brought.
@@ -114,16 +96,13 @@ constexpr int analog_channels = static_cast<int>(Analog::count);
 // The board's own numbers: channel n of the board is element n-1.
 struct ChannelValues {
   std::int32_t analog_cv[analog_channels] = {};  // hundredths of a volt
-  Drive dhb12[dhb12_channels];
-  Drive osmc[osmc_channels];
+#define R4_OUTPUT(kind, Value, member, channels, ...) Value member[channels] = {};
+#include "tables/board.def"
   std::int32_t stepper_steps[stepper_channels] = {};
-  std::uint16_t servo_us[servo_channels] = {};
   std::int32_t encoder_counts[encoder_channels] = {};
   std::int32_t encoder_hz[encoder_channels] = {};            // counts a second
   std::int32_t encoder_index_counts[encoder_channels] = {};  // where the index line rose last
   std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};
-  Bldc bldc[bldc_channels];
-  std::uint16_t dac_mv[dac_channels] = {};
   I2cReading i2c[i2c_slots];
   UartBytes uart[uart_channels];
 };
@@ -155,11 +134,11 @@ struct State {
     const int i = static_cast<int>(input);
     return i < analog_channels ? raw.analog_cv[i] / 100.0 : 0.0;
   }
-  Drive dhb12(int channel) const { return reading(raw.dhb12, channel); }
-  Drive osmc(int channel) const { return reading(raw.osmc, channel); }
-  Bldc bldc(int channel) const { return reading(raw.bldc, channel); }
+  // dhb12(), osmc(), servo_us(), bldc(), dac_mv(): what each channel is set to.
+#define R4_OUTPUT(kind, Value, member, channels, ...) \
+  Value member(int channel) const { return reading(raw.member, channel); }
+#include "tables/board.def"
   std::int32_t steps(int channel) const { return reading(raw.stepper_steps, channel); }
-  int servo_us(int channel) const { return reading(raw.servo_us, channel); }
   std::int32_t encoder(int channel) const { return reading(raw.encoder_counts, channel); }
   // Counts a second; negative backwards.
   std::int32_t encoder_hz(int channel) const { return reading(raw.encoder_hz, channel); }
@@ -168,7 +147,6 @@ struct State {
     return reading(raw.encoder_index_counts, channel);
   }
   int distance_cm(int channel) const { return reading(raw.ultrasonic_cm, channel); }
-  int dac_mv(int channel) const { return reading(raw.dac_mv, channel); }
   bool input(int channel) const {
     return channel >= 1 && channel <= gpio_channels && (gpio >> (channel - 1) & 1) != 0;
   }

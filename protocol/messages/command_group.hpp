@@ -24,9 +24,10 @@ class GroupRules {
   Refusal add(const Command& command);
 
  private:
-  static constexpr std::size_t kinds = static_cast<std::size_t>(CommandKind::dac) + 1;
+  static constexpr std::size_t kinds =
+      static_cast<std::size_t>(__builtin_popcount(kinds_that_move(CommandEffect::output)));
   static_assert(kinds_that_move(CommandEffect::output) == (1U << kinds) - 1,
-                "all that join groups");
+                "those that join groups come first");
 
   int count_ = 0;
   std::uint16_t taken_[kinds] = {};  // bit n-1: channel n

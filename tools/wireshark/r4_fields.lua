@@ -1,92 +1,85 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
 -- The fields of an R4 datagram: the state's in the order of the wire, with the units that r4 convert writes into CSV,
--- and the commands' values, named as in r4 send --help. tests/integration/test_wireshark.py compares both with r4.
+-- and the commands' values, named as in r4 send --help. Both are rows of r4_board.def, which lies beside this file.
+-- tests/integration/test_wireshark.py compares them with r4.
 
--- What the values of a form are called ("": the field itself), their types in Wireshark, and their units.
-local forms = {
-  volts = { { "", "double", "V" } },
-  flag = { { "", "uint8", "0/1" } },
-  drive = { { "pwm", "uint16", "0-4095" }, { "direction", "uint8", "0/1" } },
-  bldc = { { "speed", "uint16", "0-4095" }, { "direction", "uint8", "0/1" }, { "brake", "uint8", "0/1" } },
-  steps = { { "", "int32", "steps" } },
-  servo = { { "", "uint16", "us" } },
-  counts = { { "", "int32", "counts" } },
-  speed = { { "", "int32", "counts/s" } },
-  distance = { { "", "uint16", "cm" } },
-  relays = { { "", "uint8", "bits" } },
-  reason = { { "", "uint32", "reason" } },
-  pnum = { { "", "uint32", "PNum" } },
-  datagrams = { { "", "uint32", "datagrams" } },
-  commands = { { "", "uint32", "commands" } },
-  periods = { { "", "uint32", "periods" } },
-  reading = { { "t", "uint32", "ms" }, { "errors", "uint32", "transfers" }, { "bytes", "string", "hex" } },
-  answer = { { "command", "uint32", "PNum" }, { "outcome", "uint8", "0-3" }, { "bytes", "string", "hex" } },
-  bus = { { "outcome", "uint8", "0-3" }, { "errors", "uint32", "transfers" }, { "recoveries", "uint32", "times" } },
-  received = { { "position", "uint32", "bytes" }, { "lost", "uint32", "bytes" }, { "bytes", "string", "hex" } },
-  voltage = { { "", "uint16", "mV" } },
-  fault = { { "chip", "uint8", "address" }, { "trouble", "uint8", "bits" } },
+-- The types in Wireshark of a form's values (FieldForm), and of a command's value (ValueRole).
+local types = {
+  volts = { "double" }, flag = { "uint8" }, drive = { "uint16", "uint8" }, bldc = { "uint16", "uint8", "uint8" },
+  servo = { "uint16" }, u8 = { "uint8" }, u16 = { "uint16" }, i32 = { "int32" }, u32 = { "uint32" },
+  reason = { "uint32" }, fault = { "uint8", "uint8" }, reading = { "uint32", "uint32", "string" },
+  answer = { "uint32", "uint8", "string" }, bus = { "uint8", "uint32", "uint32" },
+  uart = { "uint32", "uint32", "string" },
+}
+local roles = {
+  channel = "uint8", value = "uint16", speed = "uint16", direction = "uint8", on = "uint8", on_off = "switch",
+  text = "string", text2 = "string", list = "string",
 }
 
-local state = {}
-local function add(form, names)
-  for name in names:gmatch("%S+") do
-    state[#state + 1] = { name = name, form = form }
+local folder = debug.getinfo(1, "S").source:match("^@(.*[/\\])") or ""
+local file = assert(io.open(folder .. "r4_board.def"))
+local text = file:read("*a")
+file:close()
+
+-- The arguments of each row, by the name of its macro. Of a string they have what is between its quotes.
+local rows = {}
+for macro, list in text:gmatch("\nR4_([%u_]+)(%b())") do
+  local row, argument, depth, quoted = {}, "", 0, false
+  for c in list:sub(2, -2):gmatch(".") do
+    quoted = (c == '"') ~= quoted
+    depth = depth + ((quoted or not c:find("[({]")) and 0 or 1) - ((quoted or not c:find("[)}]")) and 0 or 1)
+    if c == "," and depth == 0 and not quoted then
+      row[#row + 1], argument = argument, ""
+    elseif depth > 0 or quoted or not c:find('[%s"]') then
+      argument = argument .. (c == '"' and depth == 0 and "" or c)
+    end
   end
-end
-local function numbered(form, pattern, first, last)
-  for n = first, last do
-    add(form, pattern:format(n))
-  end
+  row[#row + 1] = argument
+  rows[macro] = rows[macro] or {}
+  table.insert(rows[macro], row)
 end
 
-add("volts", "AIN24 AIN12 AIN5 AINDMH")
-add("flag", "DMHSTA")
-add("volts", "AINSTEER")
-add("drive", "DHB1A OSMC1")
-add("steps", "STEP1POS")
-add("servo", "SERVO1POS")
-add("volts", "AIN6")
-add("drive", "DHB1B DHB2A DHB2B OSMC2 OSMC3 OSMC4")
-numbered("steps", "STEP%dPOS", 2, 4)
-numbered("servo", "SERVO%dPOS", 2, 16)
-numbered("counts", "ENC%d", 1, 4)
-numbered("distance", "US%d", 1, 4)
-numbered("bldc", "BLDC%d", 1, 4)
-add("relays", "RELAYS")
-add("reason", "SAFE")
-add("pnum", "CMD")
-add("datagrams", "RXOK RXCRC RXLOST RXDUP")
-add("commands", "RXREF")
-add("periods", "LATE")
-numbered("speed", "ENC%dHZ", 1, 4)
-numbered("counts", "ENC%dIDX", 1, 4)
-numbered("reading", "I2C%d", 1, 8)
-add("answer", "I2CX")
-add("bus", "I2CBUS")
-numbered("received", "UART%d", 1, 2)
-numbered("voltage", "DAC%d", 1, 2)
-add("relays", "GPIO")
-add("fault", "FAULT")
+-- A form is that of a kind: what its values are called ("": the field itself), their types, and their units.
+local state, forms = {}, {}
+for _, row in ipairs(rows.STATE_FIELD) do
+  state[#state + 1] = { name = row[2], form = row[3] }
+end
+for _, row in ipairs(rows.FIELD_KIND) do
+  local form = {}
+  for i, type in ipairs(types[row[2]]) do
+    local name, unit = row[4 + i]:match('"(.*)", "(.*)"')
+    form[i] = { name, type, unit }
+  end
+  forms[row[1]] = form
+end
 
--- A command's values in their order. `last` takes all that are left, one by one; `maybe` may be left out.
+-- A command's values in their order. `last` takes all that are left, one by one; `maybe` may be left out. A letter
+-- that needs a word has the words of all its kinds.
 local commands = {
-  O = { title = "OSMC motor driver", { "pwm", "uint16" }, { "dir", "uint8" }, { "ch", "uint8" } },
-  D = { title = "DHB12 motor driver", { "pwm", "uint16" }, { "dir", "uint8" }, { "ch", "uint8" } },
-  S = { title = "servo pulse width", { "us", "uint16" }, { "ch", "uint8" } },
-  R = { title = "relay", { "ch", "uint8" }, { "on", "switch" } },
-  P = { title = "stepper target", { "pos", "int32" }, { "speed", "uint16", maybe = true }, { "ch", "uint8" } },
-  Z = { title = "position to zero", { "ch", "uint8" } },
-  B = { title = "brushless motor driver", { "speed", "uint16" }, { "dir", "uint8" }, { "brake", "uint8" },
-    { "ch", "uint8" } },
-  U = { title = "proximity threshold", { "cm", "uint16" }, { "ch", "uint8" } },
   E = { title = "emergency", { "word", "string" }, { "cause", "uint32", last = true } },
-  F = { title = "state fields wanted", { "name", "string", last = true } },
-  C = { title = "setting", { "key", "string" }, { "value", "string", last = true } },
   X = { title = "the user's devices", { "word", "string" }, { "value", "string", last = true } },
   Q = { title = "question", { "word", "string" } },
-  W = { title = "watch", { "rate", "uint16" }, { "name", "string", last = true } },
   H = { title = "heartbeat", { "word", "string" } },
 }
+local values = {}
+for _, row in ipairs(rows.COMMAND_VALUE) do
+  local last = row[2] == "text2" or row[2] == "list" or nil
+  values[row[1]] = { row[5]:match("%w+"):lower(), row[3]:find("^-") and "int32" or roles[row[2]], last = last }
+end
+for _, row in ipairs(rows.OPTIONAL_VALUE) do
+  local last = row[2] == "list" or nil
+  values[row[1]] = { row[6]:match("%w+"):lower(), roles[row[2]], last = last, maybe = not last or nil }
+end
+for _, row in ipairs(rows.COMMAND) do
+  local letter = row[2]:sub(2, 2)
+  if not commands[letter] then
+    local command = { title = row[8] }
+    for value in row[6]:gmatch("V::([%w_]+)") do
+      command[#command + 1] = values[value]
+    end
+    commands[letter] = command
+  end
+end
 
 -- What else a board says, field by field.
 local answers = {

@@ -103,7 +103,8 @@ TEST(WebChannels, NameColumnsThatThereAre) {
   const Columns columns;
   const std::set<std::string> names(columns.names().begin(), columns.names().end());
   const Json channels = channels_json();
-  EXPECT_EQ(channels.size(), 40U);
+  EXPECT_EQ(channels.size(), 42U);
+  EXPECT_EQ(channels[0]["command"], "O:{value},{direction},1");
   for (const Json& channel : channels) {
     for (const Json& field : channel["fields"])
       EXPECT_TRUE(names.contains(field.get<std::string>())) << field;

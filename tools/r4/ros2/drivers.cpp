@@ -103,10 +103,10 @@ Drivers::Stop Drivers::to_stop(Time now) {
     const bool silent = deadline_.count() != 0 && now - output.last >= deadline_;
     if (output.stage == Stage::driven && silent) output.stage = Stage::stopping;
     if (output.stage != Stage::stopping || stop.commands.size() == max_group) continue;
-    const bool voltage = i >= outputs - dac_channels;  // the last of them
-    if (voltage && !stop.commands.empty() && stop.commands[0].kind != CommandKind::dac) continue;
     const auto command = stop_of(i, now);
     if (!command) continue;
+    const bool voltage = command->kind == CommandKind::dac;
+    if (voltage && !stop.commands.empty() && stop.commands[0].kind != CommandKind::dac) continue;
     stop.commands.push_back(*command);
     stop.missed = stop.missed || !output.asked;
   }

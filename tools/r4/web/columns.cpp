@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <string_view>
 #include <utility>
 
+#include "r4link/commands/command_text.hpp"
 #include "r4link/tables/state_fields.hpp"
 #include "r4link/vocabulary.hpp"
 
@@ -20,6 +22,39 @@ std::string column_of(const StateFieldRow& field, const FieldValue& value) {
   std::string name(view(field.name));
   if (*value.name != '\0') name.append(".").append(value.name);
   return name;
+}
+
+// The command of an output with the values that the page fills in, "O:{value},{direction},1", and
+// their ranges.
+void add_command(Json& output, const CommandRow& row, int channel) {
+  std::string command = fmt::format("{}:{}", row.letter, view(row.word));
+  for (const CommandValue each : row) {
+    const ValueRow& value = row_of(each);
+    if (command.back() != ':') command += ',';
+    switch (value.role) {
+      case ValueRole::channel:
+        command += std::to_string(channel);
+        break;
+      case ValueRole::direction:
+        command += "{direction}";
+        break;
+      case ValueRole::on:
+        command += "{brake}";
+        break;
+      case ValueRole::on_off:
+        command += "{switch}";
+        break;
+      case ValueRole::speed:
+        command += "{speed}";
+        output["speed"] = {{"min", value.min}, {"max", value.max}, {"value", value.missing}};
+        break;
+      default:
+        command += "{value}";
+        output["min"] = value.min;
+        output["max"] = value.max;
+    }
+  }
+  output["command"] = command;
 }
 
 }  // namespace
@@ -60,29 +95,33 @@ void Columns::fill(const Datagram& state, std::vector<double>& row) const {
 
 Json channels_json() {
   Json all = Json::array();
-  const auto add = [&all](const char* kind, const char* label, int channel,
-                          const StateFieldRow& row) {
-    Json fields = Json::array();
-    for (int i = 0; i < row_of(row.kind).value_count(); ++i) {
-      fields.push_back(column_of(row, row_of(row.kind).values[i]));
-    }
-    all.push_back({{"id", fmt::format("{}{}", kind, channel)},
-                   {"kind", kind},
-                   {"channel", channel},
-                   {"label", fmt::format("{} {}", label, channel)},
-                   {"fields", std::move(fields)}});
-  };
-  constexpr std::pair<FieldKind, const char*> kinds[] = {{FieldKind::osmc, "OSMC"},
-                                                         {FieldKind::dhb12, "DHB12"},
-                                                         {FieldKind::servo, "Servo"},
-                                                         {FieldKind::stepper, "Stepper"},
-                                                         {FieldKind::bldc, "BLDC"}};
-  for (const auto& [kind, label] : kinds) {
-    for (const StateFieldRow& row : state_fields) {
-      if (row.kind == kind) add(row_of(kind).name, label, row.channel, row);
+  for (const CommandRow& row : command_rows) {
+    const FieldKind shown = shown_by(row.kind);
+    if (shown == FieldKind::count) continue;
+    const FieldKindRow& kind = row_of(shown);
+    std::string title(name_of(row.kind));
+    std::string id = title;
+    std::transform(id.begin(), id.end(), id.begin(), [](char c) { return std::tolower(c); });
+    title[0] = static_cast<char>(std::toupper(title[0]));
+    for (int channel = 1; channel <= row.channels; ++channel) {
+      const bool relay = row.kind == CommandKind::relay;
+      const StateFieldRow& field = row_of(state_field(shown, relay ? 1 : channel));
+      Json fields = Json::array();
+      for (int i = 0; i < kind.value_count(); ++i) {
+        fields.push_back(column_of(field, kind.values[i]));
+      }
+      Json object{
+          {"id", fmt::format("{}{}", id, channel)},
+          {"kind", id},
+          {"channel", channel},
+          {"title", title},
+          {"label", fmt::format("{} {}", title, channel)},
+          {"name", *kind.values[0].name != '\0' ? kind.values[0].name : kind.values[0].unit},
+          {"fields", std::move(fields)}};
+      add_command(object, row, channel);
+      all.push_back(std::move(object));
     }
   }
-  for (int i = 1; i <= relay_channels; ++i) add("relay", "Relay", i, row_of(StateField::relays));
   return all;
 }
 

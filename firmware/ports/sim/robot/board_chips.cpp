@@ -10,7 +10,8 @@ namespace {
 
 using firmware::Chip;
 
-Drive drive_of(const Pca9685Model& chip, const firmware::DriveLines& lines) {
+template <firmware::Chip of>
+Drive drive_of(const Pca9685Model& chip, const firmware::DriveLines<of>& lines) {
   const int duty = chip.duty(lines.pwm);
   Drive drive;
   drive.pwm = static_cast<std::uint16_t>(duty < pwm_max ? duty : pwm_max);

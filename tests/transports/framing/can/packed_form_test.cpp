@@ -191,7 +191,10 @@ TEST(PackedForm, TheTableHasEveryNameAndWordOfTheProtocol) {
   for (int i = 0; i < state_field_count; ++i) {
     const Text name = name_of(static_cast<StateField>(i));
     const unsigned code = packed::code_of(name);
-    ASSERT_TRUE(known(str(name))) << str(name);
+    if (!known(str(name))) {
+      EXPECT_FALSE(FieldSet::all().has(static_cast<StateField>(i))) << str(name);
+      continue;
+    }
     if (i < static_cast<int>(packed::state_words)) {
       EXPECT_EQ(code, static_cast<unsigned>(i)) << str(name) << ": the code of its place";
     }

@@ -2,7 +2,7 @@
 // The control of one output. A slider streams: while one command waits for the board's confirmation the newest value
 // waits behind it. What is shown follows the board's report whenever nobody is setting it, so after a stop no
 // old setpoint stands in a slider.
-import {KINDS} from './channel_kinds.js';
+import {kind_of} from './channel_kinds.js';
 import {element, put} from './text.js';
 
 const SETTLE_MS = 200;  // the report may come behind the confirmation
@@ -27,7 +27,7 @@ export class Channel {
 
   // `ask(command)` resolves to the board's answer.
   constructor(channel, fields, ask) {
-    this.#kind = KINDS[channel.kind];
+    this.#kind = kind_of(channel);
     this.#channel = channel.channel;
     this.#fields = fields;
     this.#ask = ask;
@@ -96,7 +96,7 @@ export class Channel {
 
   #set(set = {value: this.#number.value, direction: this.#direction?.value, brake: this.#brake?.value,
     speed: this.#speed?.value}) {
-    this.#send(this.#kind.command(this.#channel, set));
+    this.#send(this.#kind.command(set));
   }
 
   async #send(command) {
@@ -131,7 +131,7 @@ export class Channel {
   draw(history) {
     const values = this.#fields.map((field) => history.newest(field));
     if (Number.isNaN(values[0])) return put(this.#reported, '–');
-    const {value, direction, brake} = this.#kind.of(values, this.#channel);
+    const {value, direction, brake} = this.#kind.of(values);
     put(this.#reported, this.#toggle ? '' : [value, value && direction !== undefined ? (direction ? 'fwd' : 'rev') : '']
       .filter((each) => each !== '').join(' '));
     this.#reported.classList.toggle('moves', Boolean(value) && !this.#kind.zero);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The outputs of all boards: a panel for each, and in it a group for each kind of channel.
 import {Channel} from './channel.js';
-import {KINDS} from './channel_kinds.js';
 import {board_name, element} from './text.js';
 
 export class Outputs {
@@ -10,16 +9,16 @@ export class Outputs {
 
   constructor(hello, link) {
     this.#panels = hello.boards.map((board) => {
-      const channels = hello.channels.filter((each) => KINDS[each.kind]).map((each) => {
+      const channels = hello.channels.map((each) => {
         const fields = each.fields.map((name) => hello.fields.indexOf(name));
         const ask = (command) => link.send({type: 'command', board: board.board, command});
         return {kind: each.kind, made: new Channel(each, fields, ask)};
       });
-      const groups = Object.keys(KINDS).map((kind) => {
+      const groups = [...new Set(channels.map((each) => each.kind))].map((kind) => {
         const of_kind = channels.filter((each) => each.kind === kind).map((each) => each.made.node);
-        const unit = KINDS[kind].unit ?? KINDS[kind].value?.name ?? '';
+        const {title, name, max} = hello.channels.find((each) => each.kind === kind);
         return element('fieldset', {disabled: true, className: kind},
-          element('legend', {}, KINDS[kind].title, element('small', {}, unit)), ...of_kind);
+          element('legend', {}, title, element('small', {}, max ? name : '')), ...of_kind);
       });
       this.#groups.push(...groups);
       const title = hello.boards.length > 1 ? [element('h3', {}, board_name(board))] : [];
