@@ -105,7 +105,7 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_close, Token>(token, timeout);
   }
 
-  BoardRole role() const;  // BoardOptions::role at first
+  BoardRole role() const;  // BoardOptions::role at first; may be called from any thread
   // Controls the board from now on, disarmed, as if it had been opened so. Callbacks, recordings
   // and what is known of the board stay. Throws Error{refused} if another program of this computer,
   // its holder(), controls the board: then this one watches on. Throws Error{usage} while the board
@@ -152,17 +152,21 @@ class AsyncBoard {
   // void(CommandResult). Clears a stop, a watchdog or a fault that came while this program controlled
   // the board, and closes relay 1, the motor supply. Confirmed by the board's state: output commands
   // go out from then on. Not armed: what stands against it cannot be cleared, or may have come before
-  // the program began, which async_clear() clears.
+  // the program began, which Command::clear() clears.
   template <class Token>
   auto async_arm(Duration timeout, Token&& token) {
     require_timeout("async_arm()", timeout);
     require_control("async_arm()");
     return initiate<&AsyncBoard::start_arm, Token>(token, timeout);
   }
-  // void(CommandResult). Takes away the stop, watchdog or fault that the board reports.
+  // void(CommandResult). Sends a transfer on the user's I2C bus (Command::i2c_read(), i2c_write(),
+  // i2c_scan()), and ends with the answer of the device: CommandResult::transfer. Refused also if
+  // the transfer failed.
   template <class Token>
-  auto async_clear(Duration timeout, Token&& token) {
-    return async_send(Command::clear(), timeout, std::forward<Token>(token));
+  auto async_transfer(const Command& command, Duration timeout, Token&& token) {
+    require_sendable(command);
+    require_timeout("async_transfer()", timeout);
+    return initiate<&AsyncBoard::start_transfer, Token>(token, command, timeout);
   }
   // void(CommandResult). Confirmed by the board's answer; identity() has it.
   template <class Token>
@@ -173,7 +177,7 @@ class AsyncBoard {
 
   // void(CommandResult). Confirmed as soon as the board is ACTIVE and takes our commands, so that the
   // first post() goes out, or, where the program only watches, as soon as it is heard; timed out, if it does not
-  // come to that. A timeout of 0 only looks.
+  // come to that; refused, if the paths lead to two boards. A timeout of 0 only looks.
   template <class Token>
   auto async_wait_active(Duration timeout, Token&& token) {
     require_wait("async_wait_active()", timeout);
@@ -192,13 +196,9 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_link_timing, Token>(token, board_timeout, heartbeat,
                                                            timeout);
   }
-  // void(CommandResult). Sets a described device up (devices/device.hpp, docs/described-devices.md): is it the one?
-  // Then what is to be written, which takes async_arm(), and the board's readings, until our session ends; their
-  // fields are asked for beside those that were chosen. `timeout`: for each step. Confirmed: device.reading(state())
-  // has its values from now on. Else explain(device, result, link()) tells why, Outcome::refused also where it does
-  // not answer or is another device; what was begun stays so. After on_restart() and a lost link it is to be set up
-  // again. Recordings tell of it as by describe(). Throws Error{usage} if another device, of another address or name,
-  // has one of its slots: its readings would become this one's. X:OFF of that slot gives the other up.
+  // void(CommandResult). Sets a described device up as Board::attach() does, and describe()s it.
+  // `timeout`: for each step. Confirmed: device.reading(state()) has its values from now on.
+  // Otherwise explain(device, result, link()) says why.
   template <class Token>
   auto async_attach(const Device& device, Duration timeout, Token&& token) {
     require_timeout("async_attach()", timeout);
@@ -262,9 +262,8 @@ class AsyncBoard {
   void describe(const Device& device);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
-  // Error{usage} for less than nothing and more than an hour. feed()
-  // may be called from any thread, costs no system call and counts from the next time the loop
-  // runs.
+  // Error{usage} for less than nothing and more than an hour. feed() may be called from any thread,
+  // costs no system call and counts from the next time the loop runs.
   void watchdog(Duration period);
   void feed();
   // Stops heartbeats and commands, so that the board goes safe, until it is called with false.
@@ -328,6 +327,7 @@ class AsyncBoard {
   void require_control(std::string_view what) const;
   void start_send(const Command& command, Duration timeout, CompletionPtr completion);
   void start_apply(const Setpoints& setpoints, Duration timeout, CompletionPtr completion);
+  void start_transfer(const Command& command, Duration timeout, CompletionPtr completion);
   void start_stop(Duration timeout, CompletionPtr completion);
   void start_arm(Duration timeout, CompletionPtr completion);
   void start_identify(Duration timeout, CompletionPtr completion);
@@ -341,6 +341,7 @@ class AsyncBoard {
   void start_release_control(Duration timeout, CompletionPtr completion);
 
   class TimingSteps;
+  class TransferSteps;
   class AttachSteps;
   class Farewell;
   std::shared_ptr<Impl> impl_;
