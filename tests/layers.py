@@ -84,6 +84,7 @@ ALLOWED = {
     'host/session': TRANSPORTS | {'host/arming', 'host/commands', 'host/link', 'host/measurement', 'host/paths'},
     'host/uart': HOST,
     'host/python/bindings': PUBLIC,
+    'host/python/bindings/board': PUBLIC | {'host/python/bindings'},
     'host': HOST,
     'tools/r4/shell': SIMULATED,
     'tools/r4/manual': SHELL,
