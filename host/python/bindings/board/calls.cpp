@@ -107,8 +107,13 @@ class Calls {
       };
       try {
         start(board, asio::bind_cancellation_slot(call->cancelled().slot(), std::move(handler)));
-      } catch (const Error&) {
-        call->end_with([]() -> Value { throw; });
+      } catch (const Error& error) {
+        call->end_with([&]() -> Value {
+          Problem problem = error.problem();
+          if (!problem.thing.starts_with("async_")) throw;
+          problem.thing = text;
+          throw Error(std::move(problem));
+        });
       }
     };
     if (!board_->post_to_loop(action)) {
