@@ -83,7 +83,7 @@ class States:
 
 class UartStream:
     """What comes in on a UART: `async for data, lost in board.uart[1]: …`, until the board is closed. What waits is in
-    the link; the callback of this one only tells that there is something."""
+    the link; the callback of this one only tells that there is something. `channel`: 1 or 2."""
 
     def __init__(self, core: _core.Board, channel: int, news: asyncio.Event, subscription: Subscription) -> None:
         self._core, self._channel = core, channel
