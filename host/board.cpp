@@ -36,14 +36,11 @@ Board::~Board() { impl_->close(); }
 
 void Board::close() { impl_->close(); }
 
-BoardRole Board::role() const { return impl_->read(impl_->role); }
+BoardRole Board::role() const { return impl_->async.role(); }
 void Board::take_control() {
   const auto impl = impl_;
-  const bool here = impl->run_on_loop("take_control()", [impl = impl.get()] {
-    impl->async.take_control();
-    const std::lock_guard lock(impl->mutex);
-    impl->role = impl->async.role();
-  });
+  const bool here =
+      impl->run_on_loop("take_control()", [impl = impl.get()] { impl->async.take_control(); });
   if (!here) throw impl->closed_error("take_control()");
 }
 void Board::release_control(Duration timeout) {
@@ -60,6 +57,11 @@ void Board::release_control(Duration timeout) {
   throw Error(explain(text, part->result, part->link));
 }
 
+bool Board::post_to_loop(std::function<void(AsyncBoard&)> action) {
+  return impl_->post_to_loop(
+      [impl = impl_.get(), action = std::move(action)] { action(impl->async); });
+}
+
 // A call owns the Impl, so that the Board may be destroyed while it waits.
 
 void Board::wait_active(Duration timeout) {
@@ -72,7 +74,7 @@ void Board::wait_active(Duration timeout) {
   const bool active = impl->wait_for_news(timeout, [&] {
     const LinkStatus& link = impl->link;
     if (refused(link)) return true;
-    if (impl->role == BoardRole::watch) return is_heard(link.state);
+    if (impl->async.role() == BoardRole::watch) return is_heard(link.state);
     return link.state == HostLinkState::active && impl->in_control && !link.gated();
   });
   const LinkStatus link = impl->read(impl->link);

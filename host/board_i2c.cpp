@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The devices on the user's I2C bus: a command, and its answer, which comes with the state; the
-// set-up of a described device.
+// The devices on the user's I2C bus, and the set-up of a described device.
 #include <algorithm>
 #include <string>
 
 #include "board_impl.hpp"
-#include "commands/command_help.hpp"
 #include "commands/limits.hpp"
 #include "devices/device_steps.hpp"
 #include "r4link/board.hpp"
@@ -25,17 +23,17 @@ int milliseconds(Board::Duration period) {
 Board::I2c::Bytes Board::I2c::read(int address, const Bytes& register_bytes, int count,
                                    Duration timeout) const {
   const std::string text = hex_of(register_bytes);
-  return answer(Command::i2c_read(address, text, count), timeout);
+  return transfer(Command::i2c_read(address, text, count), timeout);
 }
 
 Board::I2c::Bytes Board::I2c::write(int address, const Bytes& bytes, int count,
                                     Duration timeout) const {
   const std::string text = hex_of(bytes);
-  return answer(Command::i2c_write(address, text, count), timeout);
+  return transfer(Command::i2c_write(address, text, count), timeout);
 }
 
 Board::I2c::Bytes Board::I2c::scan(Duration timeout) const {
-  return answer(Command::i2c_scan(), timeout);
+  return transfer(Command::i2c_scan(), timeout);
 }
 
 void Board::I2c::poll(int slot, int address, const Bytes& register_bytes, int count,
@@ -48,32 +46,21 @@ void Board::I2c::poll_off(int slot, Duration timeout) const {
   board_.send(Command::i2c_poll_off(slot), timeout);
 }
 
-I2cAnswer Board::I2c::ask(const Command& command, Duration timeout) const {
+Board::I2c::Bytes Board::I2c::transfer(const Command& command, Duration timeout) const {
   const auto impl = board_.impl_;
   const std::string text = shown(command);
-  const auto deadline = Impl::Clock::now() + Impl::bounded(timeout);
-  const std::uint32_t pnum = impl->execute(command, timeout)->result.pnum;
-  I2cAnswer found;
-  const auto left = std::chrono::ceil<Duration>(deadline - Impl::Clock::now());
-  const bool answered = impl->wait_for_news(std::max(left, Duration{0}), [&] {
-    found = impl->state.i2c_answer;
-    return found.pnum == pnum;
-  });
-  if (!answered) {
-    throw Error(ErrorKind::refused, text, "was begun, and its end was not heard in time",
-                "give it more time, or look at the field I2CX");
+  impl->require_sendable(command);
+  require_timeout(text, timeout);
+  const auto start = [own = OwnCommand(command)](AsyncBoard& board, std::size_t, Duration left,
+                                                 auto end) {
+    board.async_transfer(own, left, std::move(end));
+  };
+  const auto part = impl->run(text, start, timeout);
+  if (part->result.outcome != Outcome::confirmed) {
+    throw Error(explain(command, part->result, part->link));
   }
-  return found;
-}
-
-Board::I2c::Bytes Board::I2c::answer(const Command& command, Duration timeout) const {
-  const I2cAnswer found = ask(command, timeout);
-  if (found.outcome != I2cOutcome::done) {
-    Problem problem = failed_transfer(shown(command), found.outcome);
-    problem.outcome = Outcome::refused;
-    throw Error(std::move(problem));
-  }
-  return {found.data.begin(), found.data.end()};
+  const auto& bytes = part->result.transfer.data;
+  return {bytes.begin(), bytes.end()};
 }
 
 void Board::attach(const Device& device, Duration timeout) {

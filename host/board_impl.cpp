@@ -35,8 +35,7 @@ Board::Impl::Impl(const CarriersMaker& make, BoardOptions options, BoardCallback
           [this](const PostBox::Letter& letter) {
             std::visit([this](const auto& what) { deliver(what); }, letter);
           }),
-      callbacks([this](Clock::duration busy) { on_callback_end(busy); }),
-      role(options.role) {
+      callbacks([this](Clock::duration busy) { on_callback_end(busy); }) {
   require_callback_limit(callback_limit);
   callbacks.add<ReceivedState>(std::move(first.on_state));
   callbacks.add<LinkStatus>(std::move(first.on_link));
@@ -209,10 +208,7 @@ void Board::Impl::deliver(const Setpoints& setpoints) {
   }
 }
 
-void Board::Impl::on_end() {
-  identity = async.identity();
-  role = async.role();
-}
+void Board::Impl::on_end() { identity = async.identity(); }
 
 void Board::Impl::shut() {
   const bool first = mark_closed([this] {
@@ -230,18 +226,18 @@ void Board::Impl::shut() {
 
 void Board::Impl::require_control(std::string_view what) {
   const std::lock_guard lock(mutex);
-  r4::require_control(role, what);
+  r4::require_control(async.role(), what);
 }
 
 void Board::Impl::require_sendable(const Setpoints& setpoints) {
   require_any(setpoints);
   const std::lock_guard lock(mutex);
-  r4::require_control(role, setpoints);
+  r4::require_control(async.role(), setpoints);
 }
 void Board::Impl::require_sendable(const Command& command) {
   require_valid(command);
   const std::lock_guard lock(mutex);
-  r4::require_control(role, command);
+  r4::require_control(async.role(), command);
   if (command.kind != CommandKind::setting) return;
   for (const std::string& path : path_names) require_cable(path, command);
 }

@@ -7,7 +7,7 @@
 //            <-- ended, news --
 //
 // The link's thread (blocking_loop.hpp) does not wait: no code of the program runs there but a
-// transport of its own.
+// transport of its own, and what it gives to post_to_loop().
 #pragma once
 
 #include <array>
@@ -136,7 +136,6 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   };
   UartInbox uarts[uart_channels];
   LinkStatus link;
-  BoardRole role;
   BoardIdentity identity;
   bool in_control = false;
   DisarmCause disarmed_by = DisarmCause::not_yet;

@@ -287,9 +287,17 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
       words.reason = "confirmed by the board's state";
       break;
     case Outcome::refused:
+      if (result.transfer.outcome != I2cOutcome::done) {
+        Problem why = failed_transfer({}, result.transfer.outcome);
+        return {std::move(why.reason), std::move(why.fix)};
+      }
       words = refusal_words(command, result.code, link);
       break;
     case Outcome::timed_out: {
+      if (result.at == 0 && result.executed != 0) {  // a transfer, which is no group
+        return {"was begun, and its end was not heard in time",
+                "give it more time, or look at the field I2CX"};
+      }
       const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(result.elapsed).count();
       words.reason = fmt::format("not confirmed within {} ms", ms);
       if (link_is_well(link)) {

@@ -91,6 +91,7 @@ ALLOWED = {
     'host/session': TRANSPORTS | {'host/arming', 'host/commands', 'host/link', 'host/measurement', 'host/paths'},
     'host/uart': HOST,
     'host/python/bindings': PUBLIC,
+    'host/python/bindings/board': PUBLIC | {'host/python/bindings'},
     'host': HOST,
     'tools/r4/shell': PUBLIC,
     'tools/r4/boards': PUBLIC | {'tools/r4/shell'},

@@ -134,6 +134,53 @@ class AsyncBoard::TimingSteps final : public Impl::Sequence {
   const Time deadline_;
 };
 
+// Sends a transfer, then waits for the answer that names it.
+class AsyncBoard::TransferSteps final : public Impl::Sequence {
+ public:
+  TransferSteps(Impl& impl, Time timeout, CompletionPtr completion)
+      : Sequence(impl, std::move(completion)),
+        timeout_(timeout),
+        deadline_(Impl::steady_now() + timeout) {}
+
+  void begin(const Command& command) {
+    impl_.begin(CompletionPtr(this),
+                [&] { return impl_.session.send(command, timeout_, impl_.now); });
+  }
+  void complete(const CommandResult& result, How how) override {
+    CommandResult ended = result;
+    if (pnum_ == 0) {
+      if (ended.outcome != Outcome::confirmed) return end(ended, how);
+      pnum_ = ended.pnum;
+      return impl_.enter(How::post, [&] {
+        impl_.waits.add(
+            {Impl::Waits::For::answer, id_, pnum_, impl_.now, deadline_, CompletionPtr(this)});
+      });
+    }
+    ended.pnum = pnum_;
+    ended.executed = 1;
+    if (ended.outcome == Outcome::confirmed) {
+      ended.transfer = impl_.session.state().i2c_answer;
+      if (ended.transfer.outcome != I2cOutcome::done) ended.outcome = Outcome::refused;
+    }
+    end(ended, how);
+  }
+
+ private:
+  const Time timeout_;
+  const Time deadline_;
+  std::uint32_t pnum_ = 0;  // of the command, once the board has confirmed it
+};
+
+void AsyncBoard::start_transfer(const Command& command, Duration timeout,
+                                CompletionPtr completion) {
+  if (command.kind != CommandKind::i2c_read && command.kind != CommandKind::i2c_write &&
+      command.kind != CommandKind::i2c_scan) {
+    throw Error(ErrorKind::usage, shown(command), "is not a transfer on the I2C bus",
+                "use async_send()");
+  }
+  (new TransferSteps(*impl_, Impl::time_of(timeout), std::move(completion)))->begin(command);
+}
+
 // Closes the board, or watches it, after the farewell, and hands the result on.
 class AsyncBoard::Farewell final : public Impl::Sequence {
  public:
@@ -158,7 +205,7 @@ void AsyncBoard::start_close(Duration timeout, CompletionPtr completion) {
 
 // --- the role
 
-BoardRole AsyncBoard::role() const { return impl_->session.board_role(); }
+BoardRole AsyncBoard::role() const { return impl_->role; }
 
 // The role must not change while control is being released: the board is not known to be safe yet.
 void AsyncBoard::require_role_settled(std::string_view what) const {

@@ -36,6 +36,7 @@ AsyncBoard::Impl::Impl(asio::io_context& context, std::vector<std::unique_ptr<Ca
       heartbeat_ms(options.session.timing.heartbeat_ms),
       board_timeout(std::chrono::milliseconds(options.session.timing.timeout_ms)),
       session(with_clock(std::move(options.session), steady_now()), options.role, paths.size()),
+      role(options.role),
       timer(context),
       reopening(context) {}
 
@@ -116,6 +117,12 @@ bool AsyncBoard::Impl::end_waits() {
       [this](const Waits::Condition& each) -> std::optional<Outcome> {
         if (!is_open()) return Outcome::closed;
         if (has_come(each)) return Outcome::confirmed;
+        const LinkStatus& link = session.link();
+        // The link never begins.
+        const bool hopeless = each.what == Waits::For::active &&
+                              link.state == HostLinkState::connecting &&
+                              link.causes.has(LinkCause::two_boards);
+        if (hopeless) return Outcome::refused;
         return now >= each.deadline ? std::optional(Outcome::timed_out) : std::nullopt;
       },
       now);
@@ -214,21 +221,22 @@ void AsyncBoard::Impl::cancel_waits() {
 
 // Control is taken on all paths or on none, but watching cannot be refused. Each path restarts: its
 // transport may be opened again, at another port.
-void AsyncBoard::Impl::become(BoardRole role) {
+void AsyncBoard::Impl::become(BoardRole fresh) {
   std::size_t changed = 0;
   try {
-    for (; changed < paths.size(); ++changed) carrier(changed).change_role(role);
+    for (; changed < paths.size(); ++changed) carrier(changed).change_role(fresh);
   } catch (...) {
-    if (role == BoardRole::control) {
+    if (fresh == BoardRole::control) {
       for (std::size_t i = 0; i < changed; ++i) carrier(i).change_role(session.board_role());
       throw;
     }
     guarded([] { throw; });
-    while (++changed < paths.size()) guarded([&] { carrier(changed).change_role(role); });
+    while (++changed < paths.size()) guarded([&] { carrier(changed).change_role(fresh); });
   }
   enter(Completion::How::post, [&] {
-    session.change_role(role, now);
-    if (role == BoardRole::watch) cancel_waits();
+    session.change_role(fresh, now);
+    role = fresh;
+    if (fresh == BoardRole::watch) cancel_waits();
     for (const auto& path : paths) {
       if (!path->carrier->up()) continue;
       session.on_transport(path->index, true, now, !only_listens(path->index));

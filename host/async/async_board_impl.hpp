@@ -173,7 +173,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   // Sends a farewell. Returns its ticket, or 0 if no board hears it.
   Ticket leave(Time timeout);
   void close();
-  void become(BoardRole role);
+  void become(BoardRole fresh);
   // Ends the conditions that a program waits for.
   void cancel_waits();
 
@@ -230,6 +230,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   bool poll_wanted = false;
   Completion::How how = Completion::How::post;
   Phase phase = Phase::made;
+  std::atomic<BoardRole> role;  // of the session, for any thread
 
   Time now{0};
   Time due{0};

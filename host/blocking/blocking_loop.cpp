@@ -77,9 +77,13 @@ void BlockingLoop::run(const CallPtr& call, Duration timeout) {
 }
 
 void BlockingLoop::run_unawaited(const CallPtr& call) {
+  post_to_loop([this, call, deadline = call->called + patience] { begin(call, deadline); });
+}
+
+bool BlockingLoop::post_to_loop(std::function<void()> action) {
   const std::lock_guard lock(mutex);
-  if (closed) return;
-  asio::post(io, [this, call, deadline = call->called + patience] { begin(call, deadline); });
+  if (!closed) asio::post(io, std::move(action));
+  return !closed;
 }
 
 bool BlockingLoop::run_on_loop(std::string_view what, const std::function<void()>& action) {

@@ -101,6 +101,8 @@ class BlockingLoop {
   // Begins the call, with Board::default_timeout, and does not wait. Does nothing if the loop is
   // closed.
   void run_unawaited(const CallPtr& call);
+  // Runs `action` on the loop, and does not wait. False if the loop is closed.
+  bool post_to_loop(std::function<void()> action);
   // Runs `action` on the loop and waits until it has ended. False if the loop is closed. Throws if
   // the loop does not begin it in time: then it never runs. Passes on what `action` throws.
   bool run_on_loop(std::string_view what, const std::function<void()>& action);

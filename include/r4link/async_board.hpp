@@ -105,7 +105,7 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_close, Token>(token, timeout);
   }
 
-  BoardRole role() const;  // BoardOptions::role at first
+  BoardRole role() const;  // BoardOptions::role at first; may be called from any thread
   // Controls the board from now on, disarmed, as if it had been opened so. Callbacks, recordings
   // and what is known of the board stay. Throws Error{refused} if another program of this computer,
   // its holder(), controls the board: then this one watches on. Throws Error{usage} while the board
@@ -157,10 +157,19 @@ class AsyncBoard {
     require_control("async_arm()");
     return initiate<&AsyncBoard::start_arm, Token>(token, timeout);
   }
+  // void(CommandResult). Sends a transfer on the user's I2C bus (Command::i2c_read(), i2c_write(),
+  // i2c_scan()), and ends with the answer of the device: CommandResult::transfer. Refused also if
+  // the transfer failed.
+  template <class Token>
+  auto async_transfer(const Command& command, Duration timeout, Token&& token) {
+    require_sendable(command);
+    require_timeout("async_transfer()", timeout);
+    return initiate<&AsyncBoard::start_transfer, Token>(token, command, timeout);
+  }
 
   // void(CommandResult). Confirmed as soon as the board is ACTIVE and takes our commands, so that the
   // first post() goes out, or, where the program only watches, as soon as it is heard; timed out, if it does not
-  // come to that. A timeout of 0 only looks.
+  // come to that; refused, if the paths lead to two boards. A timeout of 0 only looks.
   template <class Token>
   auto async_wait_active(Duration timeout, Token&& token) {
     require_wait("async_wait_active()", timeout);
@@ -179,13 +188,9 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_link_timing, Token>(token, board_timeout, heartbeat,
                                                            timeout);
   }
-  // void(CommandResult). Sets a described device up (devices/device.hpp, docs/described-devices.md): is it the one?
-  // Then what is to be written, which takes async_arm(), and the board's readings, until our session ends; their
-  // fields are asked for beside those that were chosen. `timeout`: for each step. Confirmed: device.reading(state())
-  // has its values from now on. Else explain(device, result, link()) tells why, Outcome::refused also where it does
-  // not answer or is another device; what was begun stays so. After on_restart() and a lost link it is to be set up
-  // again. Recordings tell of it as by describe(). Throws Error{usage} if another device, of another address or name,
-  // has one of its slots: its readings would become this one's. X:OFF of that slot gives the other up.
+  // void(CommandResult). Sets a described device up as Board::attach() does, and describe()s it.
+  // `timeout`: for each step. Confirmed: device.reading(state()) has its values from now on.
+  // Otherwise explain(device, result, link()) says why.
   template <class Token>
   auto async_attach(const Device& device, Duration timeout, Token&& token) {
     require_timeout("async_attach()", timeout);
@@ -249,9 +254,8 @@ class AsyncBoard {
   void describe(const Device& device);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
-  // Error{usage} for less than nothing and more than an hour. feed()
-  // may be called from any thread, costs no system call and counts from the next time the loop
-  // runs.
+  // Error{usage} for less than nothing and more than an hour. feed() may be called from any thread,
+  // costs no system call and counts from the next time the loop runs.
   void watchdog(Duration period);
   void feed();
   // Stops heartbeats and commands, so that the board goes safe, until it is called with false.
@@ -315,6 +319,7 @@ class AsyncBoard {
   void require_control(std::string_view what) const;
   template <class What>  // Command, Setpoints
   void start_send(const What& what, Duration timeout, CompletionPtr completion);
+  void start_transfer(const Command& command, Duration timeout, CompletionPtr completion);
   void start_arm(Duration timeout, CompletionPtr completion);
   void start_wait_active(Duration timeout, CompletionPtr completion);
   void start_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
@@ -326,6 +331,7 @@ class AsyncBoard {
   void start_release_control(Duration timeout, CompletionPtr completion);
 
   class TimingSteps;
+  class TransferSteps;
   class AttachSteps;
   class Farewell;
   std::shared_ptr<Impl> impl_;

@@ -51,6 +51,8 @@
 
 namespace r4 {
 
+class AsyncBoard;
+
 // Callbacks that are there before the transport is opened, so that they are told everything.
 struct BoardCallbacks {
   std::function<void(const ReceivedState&)> on_state;
@@ -296,6 +298,8 @@ class R4LINK_API Board {
                 Duration timeout = default_timeout) const;
     // The addresses that answer, at most 32.
     Bytes scan(Duration timeout = Duration{2000}) const;
+    // The same of Command::i2c_read(), i2c_write() or i2c_scan().
+    Bytes transfer(const Command& command, Duration timeout = default_timeout) const;
     // From now on, and until our session ends, the board reads every 5 to 60000 ms by itself, into slot 1-8:
     // State::i2c and fields("DEFAULT,I2C1").
     void poll(int slot, int address, const Bytes& register_bytes, int count, Duration period,
@@ -305,8 +309,6 @@ class R4LINK_API Board {
    private:
     friend class Board;
     explicit I2c(Board& board) : board_(board) {}
-    Bytes answer(const Command& command, Duration timeout) const;
-    I2cAnswer ask(const Command& command, Duration timeout) const;
     Board& board_;
   };
   I2c i2c() { return I2c(*this); }
@@ -412,6 +414,13 @@ class R4LINK_API Board {
   // its timeout. So give the calls of the thread that feeds timeouts below the period.
   void watchdog(Duration period);
   void feed();
+
+  // For programs with an event loop of their own (async_board.hpp, with r4link::asio only). Calls
+  // `action` on the thread of the link with the AsyncBoard there, and returns at once. False if the
+  // Board is closed: then it is never called. `action`, and the handlers of what it starts there,
+  // must return at once, for heartbeats wait for them, and must not throw, nor call what waits
+  // here, nor open or close the AsyncBoard. Every handler has been called when close() returns.
+  bool post_to_loop(std::function<void(AsyncBoard&)> action);
 
  private:
   struct R4LINK_PRIVATE Impl;

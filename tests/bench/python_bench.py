@@ -6,6 +6,7 @@
 
 Exit code 1 if one of them is missed. Processor time is that of this process, link and interpreter together.
 """
+import asyncio
 import os
 import pathlib
 import resource
@@ -88,22 +89,46 @@ def callbacks(board):
           f'p99 {ages[len(ages) * 99 // 100] * 1e6:.0f} us')
 
 
+def blocking_us(url, count):
+    with r4link.Board(url) as board:
+        board.wait_active()
+        us = []
+        for i in range(count):
+            began = time.perf_counter()
+            board.send(r4link.Command.proximity(1, cm=i % 2))
+            us.append((time.perf_counter() - began) * 1e6)
+    return us
+
+
 def sending(url):
     """Confirmed commands, Python and C++ by turns."""
     python, native = [], []
     for _ in range(5):
         native.append(float(subprocess.run([BUILD / 'tests/bench/r4_confirmed_send', url, '300'], check=True,
                                            stdout=subprocess.PIPE).stdout))
-        with r4link.Board(url) as board:
-            board.wait_active()
-            us = []
-            for i in range(300):
-                began = time.perf_counter()
-                board.send(r4link.Command.proximity(1, cm=i % 2))
-                us.append((time.perf_counter() - began) * 1e6)
-        python.append(statistics.median(us))
+        python.append(statistics.median(blocking_us(url, 300)))
     print(f'confirmed at 1000 Hz: p50 {statistics.median(python):.0f} us, in C++ {statistics.median(native):.0f} us')
     tell('confirmed send against C++', statistics.median(python) / statistics.median(native), '', 1.1)
+
+
+async def awaited_us(url, count):
+    async with r4link.aio.Board(url) as board:
+        await board.wait_active()
+        us = []
+        for i in range(count):
+            began = time.perf_counter()
+            await board.send(r4link.Command.proximity(1, cm=i % 2))
+            us.append((time.perf_counter() - began) * 1e6)
+    return us
+
+
+def awaiting(url):
+    """Confirmed commands, awaited and blocking by turns."""
+    awaited, blocking = [], []
+    for _ in range(5):
+        awaited.append(statistics.median(asyncio.run(awaited_us(url, 300))))
+        blocking.append(statistics.median(blocking_us(url, 300)))
+    tell('confirmed send, asyncio against blocking', statistics.median(awaited) / statistics.median(blocking), '', 1.2)
 
 
 def reading(folder):
@@ -128,6 +153,7 @@ def main():
             receiving(board)
             callbacks(board)
         sending(sim.url)
+        awaiting(sim.url)
     with tempfile.TemporaryDirectory() as folder:
         reading(pathlib.Path(folder))
     sys.exit(bool(missed))

@@ -29,6 +29,12 @@ TEST_F(BoardI2c, ReadsWritesAndScans) {
   EXPECT_EQ(read(0x168).kind, ErrorKind::usage);
 }
 
+TEST_F(BoardI2c, RefusesATransferThatIsNoTransfer) {
+  const Problem problem = problem_of([&] { board.i2c().transfer(Command::relay(2, false)); });
+  EXPECT_EQ(problem.kind, ErrorKind::usage);
+  EXPECT_EQ(problem.reason, "is not a transfer on the I2C bus");
+}
+
 TEST_F(BoardI2c, PutsRepeatedReadingsIntoTheState) {
   board.i2c().poll(1, 0x68, {0x75}, 1, 10ms);
   board.fields("I2C1");

@@ -15,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "r4link/async_board.hpp"
 #include "r4link/board.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/board_in_a_thread.hpp"
@@ -339,6 +340,41 @@ TEST(BoardCallbacks, GetTheNewestOfTheStatesThatCameMeanwhile) {
   board.next_state();
   late.set_value();
   EXPECT_GE(next.get(), newest);
+}
+
+struct BoardLoop : DrivenBoard {
+  // The outcome of what `start(board, handler)` starts on the loop.
+  template <class Start>
+  std::future<Outcome> begin(Start start) {
+    const auto ended = std::make_shared<std::promise<Outcome>>();
+    EXPECT_TRUE(board.post_to_loop([start, ended](AsyncBoard& async) {
+      start(async, [ended](const CommandResult& result) { ended->set_value(result.outcome); });
+    }));
+    return ended->get_future();
+  }
+};
+
+TEST_F(BoardLoop, TakesWorkForTheAsyncBoardWithoutWaiting) {
+  board.arm();
+  const auto set = [](AsyncBoard& async, auto end) {
+    async.async_send(Command::osmc(1, Pwm(100), Direction::forward), 1s, std::move(end));
+  };
+  EXPECT_EQ(begin(set).get(), Outcome::confirmed);
+  EXPECT_EQ(board.state().raw.osmc[0].pwm, 100);
+}
+
+TEST_F(BoardLoop, EndsItsWorkAsClosedAndThenTakesNoMore) {
+  board.release_control();
+  simulated.switch_off();
+  std::future<Outcome> late = begin([](AsyncBoard& async, auto end) {
+    async.take_control();
+    async.async_wait_active(1h, std::move(end));
+  });
+  while (board.role() != BoardRole::control) std::this_thread::yield();
+  board.close();
+  ASSERT_EQ(late.wait_for(0s), std::future_status::ready);
+  EXPECT_EQ(late.get(), Outcome::closed);
+  EXPECT_FALSE(board.post_to_loop([](AsyncBoard&) { ADD_FAILURE() << "it is closed"; }));
 }
 
 }  // namespace

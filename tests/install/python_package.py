@@ -37,7 +37,7 @@ def test_installs_into_a_venv_and_builds_a_source_distribution(tmp_path):
     run(sys.executable, '-c', 'import build_backend; build_backend.configure("build")',
         cwd=tmp_path / 'source' / f'r4link-{r4link.__version__}',
         env={**OFFLINE, 'PYTHONPATH': 'host/python'})
-    assert f'r4link-{r4link.__version__}/host/python/bindings/board.cpp' in names
+    assert f'r4link-{r4link.__version__}/host/python/bindings/board/board.cpp' in names
     assert not any('__pycache__' in each or each.endswith('.so') for each in names)
 
 

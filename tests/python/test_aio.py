@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """r4link.aio.Board."""
 import asyncio
+import os
 import time
 
 import pytest
@@ -230,4 +231,78 @@ def test_waiting_ends_at_once_when_it_is_cancelled_and_the_next_call_waits():
                 assert time.monotonic() - begin < within(1)
             with pytest.raises(r4link.RefusedError):
                 await board.wait_active(0.05)
+    asyncio.run(main())
+
+
+def test_no_call_needs_a_thread():
+    async def main():
+        async with aio.Board(SILENT) as board:
+            threads = len(os.listdir('/proc/self/task'))
+            waiting = [asyncio.create_task(board.wait_active(60)) for _ in range(100)]
+            await asyncio.sleep(0.05)
+            assert len(os.listdir('/proc/self/task')) <= threads
+            for task in waiting:
+                task.cancel()
+            assert {type(each) for each in await asyncio.gather(*waiting, return_exceptions=True)} == {asyncio.CancelledError}
+    asyncio.run(main())
+
+
+def test_a_board_that_is_closed_ends_what_is_under_way():
+    async def main():
+        board = aio.Board(SILENT)
+        waiting = [asyncio.create_task(each) for each in (board.wait_active(60), board.identify(60), board.next_state(60))]
+        await asyncio.sleep(0.05)
+        await board.close()
+        for task in waiting:
+            with pytest.raises(r4link.ClosedError):
+                await asyncio.wait_for(task, 5)
+    asyncio.run(main())
+
+
+def test_a_stop_goes_on_when_its_task_is_cancelled(sim):
+    async def main():
+        async with aio.Board(sim.url) as board:
+            await board.wait_active()
+            stop = asyncio.create_task(board.stop())
+            await asyncio.sleep(0)
+            stop.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await stop
+            async for _ in board.states():
+                if board.link.reason == 'stop':
+                    break
+    asyncio.run(main())
+
+
+def test_a_loop_that_ends_with_calls_under_way_leaves_the_board_well(sim):
+    board = aio.Board(sim.url)
+
+    async def leave():
+        await board.wait_active()
+        board.on_state(lambda state: None)
+        waiting = asyncio.create_task(board.next_state(60))
+        unheard = asyncio.create_task(board.identify(60))
+        await asyncio.sleep(0)
+        del waiting, unheard
+
+    async def go_on():
+        assert (await board.identify()).board_id == 'sim-1'
+        await board.close()
+
+    asyncio.run(leave())
+    time.sleep(0.05)  # states come for a loop that is closed
+    asyncio.run(go_on())
+
+
+def test_devices_on_the_bus_answer(sim):
+    async def main():
+        async with aio.Board(sim.url) as board:
+            await board.wait_active()
+            assert await board.i2c.scan() == [0x40, 0x68]
+            assert await board.i2c.read(0x68, 0x75, 1) == b'h'
+            with pytest.raises(r4link.RefusedError, match='no acknowledge'):
+                await board.i2c.read(0x50, 0, 1)
+            with pytest.raises(r4link.UsageError, match='outside its range'):
+                await board.i2c.read(3, 0, 1)
+            assert (await board.uart[1].read(0.02)).data == b''
     asyncio.run(main())

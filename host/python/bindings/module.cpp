@@ -13,6 +13,7 @@ PYBIND11_MODULE(_core, module) {
   r4::python::bind_servo(module);
   r4::python::bind_discovery(module);
   r4::python::bind_board(module);
+  r4::python::bind_calls(module);
   r4::python::bind_recording(module);
   r4::python::bind_simulation(module);
   r4::python::bind_fleet(module);

@@ -10,70 +10,42 @@
 
 Commands of a board go out in the order in which they were begun, each when the one before has ended; stop() waits for
 none of them. A task that is cancelled takes its command back: it is sent no more, though it may have been executed. Only a
-stop is still sent when its task is cancelled.
+stop is still sent when its task is cancelled. The calls of a board belong to one event loop.
 """
 from __future__ import annotations
 
 import asyncio
-import os
-import threading
 import weakref
-from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Callable, Coroutine, Iterable, Type, TypeVar
+from typing import TYPE_CHECKING, Any, Callable, Coroutine, Iterable, Type
 
 from . import _core, board as blocking, channels
 from ._core import Discovery, Identity, State, Subscription
 from .any_board import AnyBoard
+from .channels import _ms
 from .errors import ClosedError
 from .values import UartData
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # since Python 3.11 in typing
 
-T = TypeVar('T')
+
+async def _result(call: _core.Call) -> Any:
+    """The result of a call, which the thread of the link ends: it makes the descriptor readable."""
+    loop = asyncio.get_running_loop()
+    ended = loop.create_future()
+    loop.add_reader(call.fileno(), _end, ended)
+    try:
+        await ended
+    finally:
+        loop.remove_reader(call.fileno())
+        call.cancel()  # unless it has ended
+    return call.result()
 
 
-class _Lane:
-    """Calls, one after the other, in a thread of their own."""
-
-    def __init__(self, interrupt: Callable[[int], None]) -> None:
-        self._thread = ThreadPoolExecutor(1, 'r4link')
-        self._process = os.getpid()
-        self._interrupt = interrupt
-        self._lock = threading.Lock()
-        self._running: object = None
-
-    async def call(self, function: Callable[[], T]) -> T:
-        if os.getpid() != self._process:  # in a fork its thread is missing
-            raise ClosedError('the board', f'it was opened by the process {self._process}, of which this one is a fork',
-                              'open it here, after the fork')
-        token = object()
-        thread = 0
-
-        def run() -> T:
-            nonlocal thread
-            with self._lock:
-                self._running, thread = token, threading.get_ident()
-            try:
-                return function()
-            finally:
-                with self._lock:
-                    self._running = None
-                    self._interrupt(0)
-
-        future = self._thread.submit(run)
-        try:
-            return await asyncio.wrap_future(future)
-        except asyncio.CancelledError:
-            with self._lock:
-                if self._running is token:
-                    self._interrupt(thread)
-            raise
-
-    def end(self) -> None:
-        if os.getpid() == self._process:
-            self._thread.shutdown(wait=False)
+def _end(ended: asyncio.Future[None]) -> None:
+    if not ended.done():
+        ended.set_result(None)
 
 
 class States:
@@ -111,10 +83,10 @@ class States:
 
 class UartStream:
     """What comes in on a UART: `async for data, lost in board.uart[1]: …`, until the board is closed. What waits is in
-    the link; the callback of this one only tells that there is something."""
+    the link; the callback of this one only tells that there is something. `channel`: 1 or 2."""
 
-    def __init__(self, uart: channels.Uart, news: asyncio.Event, subscription: Subscription) -> None:
-        self._uart = uart
+    def __init__(self, core: _core.Board, channel: int, news: asyncio.Event, subscription: Subscription) -> None:
+        self._core, self._channel = core, channel
         self._news = news
         self._end = weakref.finalize(self, subscription.cancel)
 
@@ -126,7 +98,7 @@ class UartStream:
         while True:
             self._news.clear()
             try:
-                received = self._uart.read()
+                received = self._core.uart_read(self._channel, 0)
             except ClosedError:
                 self._end()
                 raise StopAsyncIteration from None
@@ -135,7 +107,7 @@ class UartStream:
             await self._news.wait()
 
 
-class Uart(channels.UartChannel[Coroutine[Any, Any, None], Coroutine[Any, Any, UartData]]):
+class Uart(channels.UartChannel[Coroutine[Any, Any, None]]):
     """A UART of r4link.aio.Board: `async for data, lost in board.uart[1]: …`."""
 
     _board: Board
@@ -143,14 +115,17 @@ class Uart(channels.UartChannel[Coroutine[Any, Any, None], Coroutine[Any, Any, U
     def __aiter__(self) -> UartStream:
         news = asyncio.Event()
         self._board._news.add(news)
-        return UartStream(self._board._board.uart[self._channel], news, self.on_bytes(lambda _: news.set()))
+        return UartStream(self._board._core, self._channel, news, self.on_bytes(lambda _: news.set()))
 
-
-def _named_after(call: Callable[[], T], coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
-    """Python's warning of a forgotten await names the method that made `call`."""
-    method = call.__qualname__.split('.<locals>')[0].rsplit('.', 1)[-1]
-    coroutine.__qualname__ = f'Board.{method}'
-    return coroutine
+    async def read(self, timeout: float = 0.0) -> UartData:
+        """As that of r4link.Board."""
+        received = self._board._core.uart_read(self._channel, 0)
+        if received.data or received.lost or _ms(timeout) <= 0:
+            return received
+        try:
+            return await asyncio.wait_for(anext(aiter(self)), timeout)
+        except (asyncio.TimeoutError, StopAsyncIteration):
+            return self._board._core.uart_read(self._channel, 0)
 
 
 class Board(AnyBoard[Coroutine[Any, Any, None]]):
@@ -160,20 +135,23 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
     def __init__(self, url: str | Iterable[str], **options: Any) -> None:
         self._board = blocking.Board(url, **options)
         self._core = self._board._core
-        interrupt = self._core.interrupt
-        self._commands = _Lane(interrupt)
-        self._waits = _Lane(interrupt)
-        self._stops = _Lane(interrupt)
+        self._calls: Any = _core.Calls(self._core)  # as _core.Board has them, but each returns at once
+        self._turn = asyncio.Lock()
         self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of loops over states and bytes
 
-    def _command(self, call: Callable[[], T]) -> Coroutine[Any, Any, T]:
-        return _named_after(call, self._commands.call(call))
+    def _call(self, call: Callable[[_core.Board], Any], *, at_once: bool = False,
+              then: Callable[[Any], Any] = lambda result: result) -> Any:
+        async def run() -> Any:
+            if at_once:
+                return then(await _result(call(self._calls)))
+            async with self._turn:
+                return then(await _result(call(self._calls)))
 
-    def _wait(self, call: Callable[[], T]) -> Coroutine[Any, Any, T]:
-        return _named_after(call, self._waits.call(call))
-
-    def _stop(self, call: Callable[[], T]) -> Coroutine[Any, Any, T]:
-        return _named_after(call, self._stops.call(call))
+        coroutine = run()
+        # Python's warning of a forgotten await names the method that made `call`.
+        method = call.__qualname__.split('.<locals>')[0].rsplit('.', 1)[-1]
+        coroutine.__qualname__ = f'Board.{method}'
+        return coroutine
 
     def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
         return _on_loop(callback)
@@ -186,8 +164,6 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
     async def close(self) -> None:
         """Says farewell; calls that wait raise ClosedError, loops over states and bytes end."""
         await asyncio.get_running_loop().run_in_executor(None, self._board.close)
-        for lane in (self._commands, self._waits, self._stops):
-            lane.end()
         for news in list(self._news):
             news.set()
 
@@ -200,11 +176,15 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
 
     async def next_state(self, timeout: float = 1.0) -> State:
         """Waits for a state, up to `timeout` seconds."""
-        return await self._waits.call(lambda: self._board.next_state(timeout))
+        try:
+            return await asyncio.wait_for(anext(self.states()), _ms(timeout) / 1000)
+        except (asyncio.TimeoutError, StopAsyncIteration):
+            return self._core.next_state(1)  # says why there is none
 
-    async def identify(self, timeout: float = 1.0) -> Identity:
+    def identify(self, timeout: float = 1.0) -> Coroutine[Any, Any, Identity]:
         """Asks the board who it is. `timeout`: seconds to wait for the answer."""
-        return await self._commands.call(lambda: self._board.identify(timeout))
+        identity: Coroutine[Any, Any, Identity] = self._call(lambda core: core.identify(_ms(timeout)))
+        return identity
 
     @property
     def i2c(self) -> channels.I2c[Coroutine[Any, Any, None], Coroutine[Any, Any, bytes], Coroutine[Any, Any, list[int]]]:

@@ -10,9 +10,8 @@ import os
 from abc import ABC, abstractmethod
 from typing import Any, Callable, Generic
 
-from . import _core
-from ._core import (CarrierCounters, Command, Event, LinkStatus, PathStatus, Recording, RefusedPost, Setpoints, State,
-                    Statistics, Subscription)
+from ._core import (Board as Core, CarrierCounters, Command, Event, LinkStatus, PathStatus, Recording, RefusedPost,
+                    Setpoints, State, Statistics, Subscription)
 from .channels import BldcChannel, DriveChannel, RelayChannel, Sent, ServoChannel, StepperChannel, _ms
 from .devices import Device
 from .enums import BoardRole, DisarmCause, PostResult
@@ -21,19 +20,13 @@ from .enums import BoardRole, DisarmCause, PostResult
 class AnyBoard(ABC, Generic[Sent]):
     """A board, blocking or asynchronous."""
 
-    _core: _core.Board
+    _core: Core
 
     @abstractmethod
-    def _command(self, call: Callable[[], Any]) -> Any:
-        """Makes a call that waits for a command. Returns its result, or a coroutine of that."""
-
-    @abstractmethod
-    def _wait(self, call: Callable[[], Any]) -> Any:
-        """Makes a call that waits and sends nothing."""
-
-    @abstractmethod
-    def _stop(self, call: Callable[[], Any]) -> Any:
-        """Makes a call that no other call may hold up."""
+    def _call(self, call: Callable[[Core], Any], *, at_once: bool = False,
+              then: Callable[[Any], Any] = lambda result: result) -> Any:
+        """Makes a call that waits. Returns then(its result), or a coroutine of that, which waits for the calls before
+        it unless it goes `at_once`."""
 
     @abstractmethod
     def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
@@ -48,20 +41,20 @@ class AnyBoard(ABC, Generic[Sent]):
         """From now on this program controls the board; callbacks and recordings stay. It begins disarmed: wait_active(),
         arm(). Raises RefusedError if another program of this computer controls it, which `holder` names; then this one
         watches on."""
-        sent: Sent = self._command(self._core.take_control)
+        sent: Sent = self._call(lambda core: core.take_control())
         return sent
 
     def release_control(self, timeout: float = 1.0) -> Sent:
         """Disarms, says farewell until the board has answered, so that it is safe and free, and watches from then on.
         Raises NotConfirmedError if it does not answer in time: it goes safe by its own timeout, and this program watches
         all the same. Commands that other threads wait for raise CancelledError."""
-        sent: Sent = self._command(lambda: self._core.release_control(_ms(timeout)))
+        sent: Sent = self._call(lambda core: core.release_control(_ms(timeout)))
         return sent
 
     def wait_active(self, timeout: float = 3.0) -> Sent:
         """Until the board is under our control or, where we only watch, is heard. Raises RefusedError that says what
         it is instead."""
-        sent: Sent = self._wait(lambda: self._core.wait_active(_ms(timeout)))
+        sent: Sent = self._call(lambda core: core.wait_active(_ms(timeout)), at_once=True)
         return sent
 
     # --- commands
@@ -70,7 +63,7 @@ class AnyBoard(ABC, Generic[Sent]):
         """A command, or its text: 'O:358,1,1'. Setpoints, as in 'O:358,1,1;O:358,1,2', are executed in one pass and
         confirmed as one, or none is. Command.clear() clears the stop, the watchdog or the fault that the board
         reports; it moves nothing."""
-        sent: Sent = self._command(lambda: self._core.send(command, _ms(timeout)))
+        sent: Sent = self._call(lambda core: core.send(command, _ms(timeout)))
         return sent
 
     def post(self, command: Command | Setpoints) -> PostResult:
@@ -83,7 +76,7 @@ class AnyBoard(ABC, Generic[Sent]):
         Clears a stop, a watchdog or a fault that came while this program controlled the board, and closes relay 1. One
         that may have come before the program began is not cleared: NotArmedError says so, and Command.clear() clears it.
         """
-        sent: Sent = self._command(lambda: self._core.arm(_ms(timeout)))
+        sent: Sent = self._call(lambda core: core.arm(_ms(timeout)))
         return sent
 
     @property
@@ -93,7 +86,7 @@ class AnyBoard(ABC, Generic[Sent]):
 
     def stop(self, timeout: float = 1.0) -> Sent:
         """Every output safe, at once, repeated until the board confirms it; latched until Command.clear()."""
-        sent: Sent = self._stop(lambda: self._core.stop(_ms(timeout)))
+        sent: Sent = self._call(lambda core: core.stop(_ms(timeout)), at_once=True)
         return sent
 
     def stop_async(self) -> None:
@@ -147,13 +140,13 @@ class AnyBoard(ABC, Generic[Sent]):
         starts the board's readings, until this session ends. Raises RefusedError if the device does not answer, or is
         another one. Call it again after on_restart() and a lost link. `timeout`: of each step. Raises UsageError if a
         device of another address or name has one of the slots: i2c.poll_off() of that slot frees it."""
-        sent: Sent = self._command(lambda: self._core.attach(device._core, _ms(timeout)))
+        sent: Sent = self._call(lambda core: core.attach(device._core, _ms(timeout)))
         return sent
 
     def link_timing(self, board_timeout: float, heartbeat: float, timeout: float = 1.0) -> Sent:
         """Changes two settings together: `board_timeout`, the seconds without a host heartbeat after which the board goes
         safe, and `heartbeat`, the seconds between its own heartbeats."""
-        sent: Sent = self._command(lambda: self._core.link_timing(_ms(board_timeout), _ms(heartbeat), _ms(timeout)))
+        sent: Sent = self._call(lambda core: core.link_timing(_ms(board_timeout), _ms(heartbeat), _ms(timeout)))
         return sent
 
     # --- what the board reports

@@ -18,6 +18,7 @@ from .any_board import AnyBoard
 from .channels import I2c, Uart, Uarts, _ms
 from .enums import BoardRole
 from .errors import UsageError
+from .events import log_events
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # since Python 3.11 in typing
@@ -106,6 +107,7 @@ class Board(AnyBoard[None]):
             command_retry=_ms(command_retry), stop_retry=_ms(stop_retry), stop_linger=_ms(stop_linger),
             identify_interval=_ms(identify_interval), callback_limit=_ms(callback_limit))
         _open.add(self._core)
+        log_events(self)
 
     @classmethod
     def first(cls, **options: Any) -> Self:
@@ -113,14 +115,9 @@ class Board(AnyBoard[None]):
         board, with what was searched, and UsageError with the URLs of several."""
         return cls(_core.discover().only().url, **options)
 
-    def _command(self, call: Callable[[], Any]) -> Any:
-        return call()
-
-    def _wait(self, call: Callable[[], Any]) -> Any:
-        return call()
-
-    def _stop(self, call: Callable[[], Any]) -> Any:
-        return call()
+    def _call(self, call: Callable[[_core.Board], Any], *, at_once: bool = False,
+              then: Callable[[Any], Any] = lambda result: result) -> Any:
+        return then(call(self._core))
 
     def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
         return callback

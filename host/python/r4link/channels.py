@@ -7,7 +7,7 @@ a coroutine. Times are seconds. Every `timeout` is the time in which the board's
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Callable, Generic, Iterator, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Callable, Generic, Iterator, TypeVar, overload
 
 from ._core import Command, ServoCalibration, Setpoints, Subscription
 from .enums import Direction, PostResult
@@ -17,11 +17,10 @@ from .values import UartData
 if TYPE_CHECKING:
     from .any_board import AnyBoard
 
-# What a call returns that waits for a command, for bytes, for addresses: that, or a coroutine of it.
+# What a call that waits returns for a command, for bytes, for addresses: that, or a coroutine of it.
 Sent = TypeVar('Sent')
 Read = TypeVar('Read')
 Scanned = TypeVar('Scanned')
-Received = TypeVar('Received')
 AnyUart = TypeVar('AnyUart')  # of a blocking or an asynchronous board
 _MOST_S = 24 * 3600.0
 
@@ -164,39 +163,39 @@ class I2c(Generic[Sent, Read, Scanned]):
     or up to 2 bytes; b'' names none. `count`: up to 32 bytes. `slot`: 1 to 8."""
 
     def __init__(self, board: AnyBoard[Sent]) -> None:
-        self._core = board._core
-        self._call = board._command
+        self._board = board
 
     def read(self, address: int, register: int | bytes, count: int, timeout: float = 1.0) -> Read:
         """Reads `count` bytes of a register."""
-        read: Read = self._call(lambda: self._core.i2c_read(address, _register(register), count, _ms(timeout)))
+        read: Read = self._transfer(f'X:READ,{address},{_register(register)},{count}', timeout)
         return read
 
     def write(self, address: int, data: bytes, count: int = 0, timeout: float = 1.0) -> Read:
         """May move something, so that it takes arm(). Then reads `count` bytes."""
-        read: Read = self._call(lambda: self._core.i2c_write(address, bytes(data), count, _ms(timeout)))
+        text = f'X:WRITE,{address},x{bytes(data).hex()}' + (f',{count}' if count else '')
+        read: Read = self._transfer(text, timeout)
         return read
 
     def scan(self, timeout: float = 2.0) -> Scanned:
         """The addresses that answer, at most 32."""
-        addresses: Scanned = self._call(lambda: list(self._core.i2c_scan(_ms(timeout))))
+        addresses: Scanned = self._transfer('X:SCAN', timeout, list)
         return addresses
 
     def poll(self, slot: int, address: int, register: int | bytes, count: int, period: float,
              timeout: float = 1.0) -> Sent:
         """The board reads it by itself from now on, every `period` seconds (0.005 to 60), into that slot: state.i2c1,
         after fields('DEFAULT,I2C1')."""
-        sent: Sent = self._call(
-            lambda: self._core.i2c_poll(slot, address, _register(register), count, _ms(period), _ms(timeout)))
-        return sent
+        return self._board.send(f'X:POLL,{address},{_register(register)},{count},{_ms(period)},{slot}', timeout)
 
     def poll_off(self, slot: int, timeout: float = 1.0) -> Sent:
         """The board ends the readings of that slot."""
-        sent: Sent = self._call(lambda: self._core.i2c_poll_off(slot, _ms(timeout)))
-        return sent
+        return self._board.send(f'X:OFF,{slot}', timeout)
+
+    def _transfer(self, text: str, timeout: float, then: Callable[[bytes], object] = bytes) -> Any:
+        return self._board._call(lambda core: core.transfer(text, _ms(timeout)), then=then)
 
 
-class UartChannel(Generic[Sent, Received]):
+class UartChannel(Generic[Sent]):
     """A UART of the user's; `channel`: 1 or 2 (docs/devices.md): setting('uart1', '115200:8N1') turns it on,
     fields('DEFAULT,UART1') has the board tell what comes in."""
 
@@ -205,15 +204,7 @@ class UartChannel(Generic[Sent, Received]):
 
     def write(self, data: bytes, timeout: float = 1.0) -> Sent:
         """1 to 48 bytes; returns when the board has taken them all. May move something, so that it takes arm()."""
-        sent: Sent = self._board._command(
-            lambda: self._board._core.uart_write(self._channel, bytes(data), _ms(timeout)))
-        return sent
-
-    def read(self, timeout: float = 0.0) -> Received:
-        """What has come since the last read(), at most 64 KB: older bytes count as lost. Waits until there is
-        something; nothing where it does not come in time."""
-        received: Received = self._board._wait(lambda: self._board._core.uart_read(self._channel, _ms(timeout)))
-        return received
+        return self._board.send(f'X:UART,{self._channel},x{bytes(data).hex()}', timeout)
 
     def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
         """Called for each state that brings some, beside read(): each byte once, in order, and how many are missing.
@@ -221,12 +212,17 @@ class UartChannel(Generic[Sent, Received]):
         return self._board._core.uart_on_bytes(self._channel, self._board._callback(callback))
 
 
-class Uart(UartChannel[None, UartData]):
+class Uart(UartChannel[None]):
     """A UART of r4link.Board.
 
         for data, lost in board.uart[1]:    # what read() would return, as it comes, until the board is closed
             parser.feed(data)
     """
+
+    def read(self, timeout: float = 0.0) -> UartData:
+        """What has come since the last read(), at most 64 KB: older bytes count as lost. Waits until there is
+        something; nothing where it does not come in time."""
+        return self._board._core.uart_read(self._channel, _ms(timeout))
 
     def __iter__(self) -> Iterator[UartData]:
         while True:
@@ -249,5 +245,6 @@ class Uarts(Generic[AnyUart]):
         return self._make(channel)
 
 
-def _register(register: int | bytes) -> bytes:
-    return register.to_bytes(1, 'big') if isinstance(register, int) else bytes(register)
+def _register(register: int | bytes) -> str:
+    """As a command has it: 'x3b00'."""
+    return 'x' + (register.to_bytes(1, 'big') if isinstance(register, int) else bytes(register)).hex()

@@ -4,7 +4,6 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -12,84 +11,15 @@
 #include <utility>
 #include <vector>
 
-#include "bindings.hpp"
-#include "callback.hpp"
-#include "process.hpp"
+#include "../bindings.hpp"
+#include "py_board.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/control/loop.hpp"
-#include "r4link/simulation.hpp"
 
 namespace r4::python {
 namespace {
 
-using Ms = std::chrono::milliseconds;
-using Released = py::call_guard<py::gil_scoped_release>;
 using PyStates = OfThisProcess<States>;
-
-class PyBoard {
- public:
-  // `link`: what is wrong with it (sim::with_link()); "": nothing.
-  PyBoard(const std::string& url, const std::string& link, BoardOptions options) {
-    options.on_wait = [this] { on_wait(); };
-    const py::gil_scoped_release free;
-    board_.emplace("the board", link.empty() ? std::make_unique<Board>(url, std::move(options))
-                                             : std::make_unique<Board>(sim::with_link(url, link),
-                                                                       std::move(options)));
-  }
-  PyBoard(const PyBoard&) = delete;
-  PyBoard& operator=(const PyBoard&) = delete;
-  ~PyBoard() = default;
-
-  Board* operator->() { return &board_->get(); }
-
-  // The GIL is not held.
-  void close() {
-    board_->if_here([this](Board& board) {
-      board.close();
-      const py::gil_scoped_acquire gil;
-      clear();  // they may refer to this board
-    });
-  }
-
-  // What a call that waits asks on its thread: was it interrupted, by a signal or by another thread?
-  void on_wait() {
-    const py::gil_scoped_acquire gil;
-    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    unsigned long self = PyThread_get_thread_ident();
-    if (interrupted_.compare_exchange_strong(self, 0)) {
-      throw Error(
-          Problem{ErrorKind::refused, "the call", "it was cancelled", "", Outcome::cancelled});
-    }
-  }
-  void interrupt(unsigned long thread) { interrupted_ = thread; }
-
-  template <class Subscribe>
-  Subscription subscribe(py::object function, Subscribe to) {
-    const Callback callback(std::move(function));
-    std::erase_if(callbacks_, [](const auto& each) { return each.expired(); });
-    callbacks_.push_back(callback.held());
-    const py::gil_scoped_release free;
-    return to(callback);
-  }
-
-  // For the garbage collector: functions of Python that refer to the board are circles.
-  int traverse(visitproc visit, void* arg) const {
-    for (const auto& each : callbacks_) {
-      if (const auto held = each.lock()) Py_VISIT(held->function.ptr());
-    }
-    return 0;
-  }
-  void clear() {
-    for (const auto& each : callbacks_) {
-      if (const auto held = each.lock()) held->function = py::none();
-    }
-  }
-
- private:
-  std::vector<std::weak_ptr<Callback::Held>> callbacks_;  // with the GIL
-  std::atomic<unsigned long> interrupted_{0};             // a thread
-  std::optional<OfThisProcess<Board>> board_;             // it goes first: its threads use the rest
-};
 
 // None while the constructor has not made one.
 PyBoard* board_in(PyObject* self) {
@@ -140,17 +70,6 @@ py::object uart_data(const Board::UartData& data) {
               data.lost);
 }
 
-// What a call that waits returns, as Python has it.
-template <class Call>
-py::bytes bytes_of(Call call) {
-  Board::I2c::Bytes bytes;
-  {
-    const py::gil_scoped_release free;
-    bytes = call();
-  }
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 }  // namespace
 
 BoardOptions options_of(BoardRole role, bool arming, const std::string& fields,
@@ -196,7 +115,6 @@ void bind_board(py::module_& module) {
            py::arg("timeout"), py::arg("command_retry"), py::arg("stop_retry"),
            py::arg("stop_linger"), py::arg("identify_interval"), py::arg("callback_limit"))
       .def("close", &PyBoard::close, Released())
-      .def("interrupt", &PyBoard::interrupt)
       .def("role", [](PyBoard& board) { return board->role(); })
       .def(
           "take_control", [](PyBoard& board) { board->take_control(); }, Released())
@@ -227,36 +145,16 @@ void bind_board(py::module_& module) {
            })
       .def("servo_calibration",
            [](PyBoard& board, int channel) { return board->servo(channel).calibration(); })
-      .def("i2c_read",
-           [](PyBoard& board, int address, const std::string& at, int count, int ms) {
-             return bytes_of([&] {
-               return board->i2c().read(address, {at.begin(), at.end()}, count, Ms(ms));
-             });
+      .def("transfer",
+           [](PyBoard& board, const std::string& text, int ms) {
+             const OwnCommand command = parse_command_text(text);
+             Board::I2c::Bytes bytes;
+             {
+               const py::gil_scoped_release free;
+               bytes = board->i2c().transfer(command, Ms(ms));
+             }
+             return py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
            })
-      .def("i2c_write",
-           [](PyBoard& board, int address, const std::string& bytes, int count, int ms) {
-             return bytes_of([&] {
-               return board->i2c().write(address, {bytes.begin(), bytes.end()}, count, Ms(ms));
-             });
-           })
-      .def("i2c_scan", [](PyBoard& board,
-                          int ms) { return bytes_of([&] { return board->i2c().scan(Ms(ms)); }); })
-      .def(
-          "i2c_poll",
-          [](PyBoard& board, int slot, int address, const std::string& at, int count, int period_ms,
-             int ms) {
-            board->i2c().poll(slot, address, {at.begin(), at.end()}, count, Ms(period_ms), Ms(ms));
-          },
-          Released())
-      .def(
-          "i2c_poll_off",
-          [](PyBoard& board, int slot, int ms) { board->i2c().poll_off(slot, Ms(ms)); }, Released())
-      .def(
-          "uart_write",
-          [](PyBoard& board, int channel, const std::string& bytes, int ms) {
-            board->uart(channel).write({bytes.begin(), bytes.end()}, Ms(ms));
-          },
-          Released())
       .def("uart_read",
            [](PyBoard& board, int channel, int ms) {
              Board::UartData data;

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A board as Python holds it.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "../bindings.hpp"
+#include "../callback.hpp"
+#include "../process.hpp"
+#include "r4link/simulation.hpp"
+
+namespace r4::python {
+
+using Ms = std::chrono::milliseconds;
+using Released = py::call_guard<py::gil_scoped_release>;
+
+class PyBoard {
+ public:
+  // `link`: what is wrong with it (sim::with_link()); "": nothing.
+  PyBoard(const std::string& url, const std::string& link, BoardOptions options) {
+    options.on_wait = on_wait;
+    const py::gil_scoped_release free;
+    board_.emplace("the board", link.empty() ? std::make_unique<Board>(url, std::move(options))
+                                             : std::make_unique<Board>(sim::with_link(url, link),
+                                                                       std::move(options)));
+  }
+  PyBoard(const PyBoard&) = delete;
+  PyBoard& operator=(const PyBoard&) = delete;
+  ~PyBoard() = default;
+
+  Board* operator->() { return &board_->get(); }
+
+  // The GIL is not held.
+  void close() {
+    board_->if_here([this](Board& board) {
+      board.close();
+      const py::gil_scoped_acquire gil;
+      clear();  // they may refer to this board
+    });
+  }
+
+  // Ends a call that waits, on its thread, if a signal has come.
+  static void on_wait() {
+    const py::gil_scoped_acquire gil;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  }
+  // Nothing in a fork.
+  template <class Action>
+  void if_here(Action action) const {
+    board_->if_here(action);
+  }
+
+  template <class Subscribe>
+  Subscription subscribe(py::object function, Subscribe to) {
+    const Callback callback(std::move(function));
+    std::erase_if(callbacks_, [](const auto& each) { return each.expired(); });
+    callbacks_.push_back(callback.held());
+    const py::gil_scoped_release free;
+    return to(callback);
+  }
+
+  // For the garbage collector: functions of Python that refer to the board are circles.
+  int traverse(visitproc visit, void* arg) const {
+    for (const auto& each : callbacks_) {
+      if (const auto held = each.lock()) Py_VISIT(held->function.ptr());
+    }
+    return 0;
+  }
+  void clear() {
+    for (const auto& each : callbacks_) {
+      if (const auto held = each.lock()) held->function = py::none();
+    }
+  }
+
+ private:
+  std::vector<std::weak_ptr<Callback::Held>> callbacks_;  // with the GIL
+  std::optional<OfThisProcess<Board>> board_;             // it goes first: its threads use the rest
+};
+
+}  // namespace r4::python

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The logger 'r4link': what happens to a board's link, for logging (docs/python.md)."""
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+from ._core import RefusedPost
+from .enums import DisarmCause, EventKind, LinkState, PathState
+
+if TYPE_CHECKING:
+    from .board import Board
+
+_logger = logging.getLogger('r4link')
+_logger.addHandler(logging.NullHandler())  # the program decides where the texts go
+
+_LINK_LEVELS = {LinkState.SAFE: logging.WARNING, LinkState.LOST: logging.ERROR}
+_QUIET_PATHS = (PathState.ASKING, PathState.CARRYING)
+
+
+def log_events(board: Board) -> None:
+    """Logs the events of `board` from now on, on the thread of its callbacks. Refers to the board by name only."""
+    name = _printable(board.name)
+
+    def log(level: int, text: str) -> None:
+        _logger.log(level, '%s: %s', name, _printable(text))
+
+    def log_refusal(refused: RefusedPost) -> None:
+        log(logging.WARNING, f'a posted command was refused: {refused.refusal if refused.why else refused.why}')
+
+    board.on_event(lambda event: log(logging.INFO if event.kind is EventKind.UP else logging.WARNING, ': '.join(
+        filter(None, (f'transport {event.kind}', event.reason, event.fix)))))
+    board.on_link(lambda link: log(_LINK_LEVELS.get(link.state, logging.INFO), f'link {link.state}' + ''.join(
+        f', {each}' for each in ((link.reason,) if link.state is LinkState.SAFE else ()) + link.causes)))
+    board.on_path(lambda path: log(logging.INFO if path.state in _QUIET_PATHS else logging.WARNING,
+                                   f'path {path.name} {path.state}'))
+    board.on_restart(lambda: log(logging.WARNING, 'the board has restarted, and has lost its settings'))
+    board.on_arming(lambda cause: log(logging.INFO, 'armed' if cause is DisarmCause.NONE else f'not armed: {cause}'))
+    board.on_refused(log_refusal)
+
+
+def _printable(text: str) -> str:
+    """Control characters would write lines of their own."""
+    return ''.join(each if each.isprintable() else '?' for each in text)
