@@ -14,10 +14,10 @@ import re
 import sys
 
 PUBLIC = {'include/r4link', 'include/r4link/commands', 'include/r4link/control', 'include/r4link/devices',
-          'include/r4link/discovery', 'include/r4link/tables'}
+          'include/r4link/discovery', 'include/r4link/tables', 'include/r4link/transports'}
 PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
-CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'transports/share', 'transports/udp',
+CARRIERS = {'transports/can', 'transports/impaired', 'transports/own', 'transports/serial', 'transports/share', 'transports/udp',
             'transports/udp/network', 'transports/udp/search'}
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/devices', 'firmware/drivers'}
@@ -35,6 +35,7 @@ ALLOWED = {
     'include/r4link/devices': {'include/r4link'},
     'include/r4link/discovery': {'include/r4link'},
     'include/r4link/tables': {'include/r4link'},
+    'include/r4link/transports': {'include/r4link'},
     'protocol/datagram': PUBLIC,
     'protocol/keys': PUBLIC | {'protocol/datagram'},
     'protocol/messages': PUBLIC | {'protocol/datagram', 'protocol/keys'},
@@ -45,6 +46,7 @@ ALLOWED = {
     'transports/can': FRAMING | {'transports'},
     'transports/impaired': FRAMING | {'transports'},
     'transports/serial': FRAMING | {'transports'},
+    'transports/own': FRAMING | {'transports', 'transports/can'},
     'transports/share': FRAMING | {'transports'},
     'transports/udp/search': FRAMING | {'transports'},
     'transports/udp/network': {'transports'},
@@ -84,6 +86,7 @@ ALLOWED = {
     'host/session': TRANSPORTS | {'host/arming', 'host/commands', 'host/link', 'host/measurement', 'host/paths'},
     'host/uart': HOST,
     'host/python/bindings': PUBLIC,
+    'host/python/bindings/transports': PUBLIC | {'host/python/bindings'},
     'host': HOST,
     'tools/r4/shell': SIMULATED,
     'tools/r4/manual': SHELL,
