@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Transports of your own: a subclass of Transport moves datagrams, and CanTransport takes any bus of python-can.
+
+open(), send() and close() are called on one thread that does nothing else, so they may wait: the link does not wait for
+them. Of a board on such a transport the heartbeats do need the interpreter, so a program that does not leave it to
+other threads loses its link. A method that raises takes the transport down: on_event() reports what it raised, close() is
+called, and open() five times a second until it returns.
+"""
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING, Any, Callable
+
+from .errors import UsageError
+
+if TYPE_CHECKING:
+    import can
+
+_BUS_PATIENCE = 0.1  # seconds for which a bus may take no frame
+
+
+class Transport:
+    """Moves whole datagrams, of 1 to 1024 bytes of any content, to one board and back.
+
+        class Radio(r4link.Transport):
+            def open(self):
+                self.modem = Modem()                     # its callback is any thread
+                self.modem.on_packet = self.received
+            def send(self, datagram):
+                self.modem.transmit(datagram)
+            def close(self):
+                self.modem.close()
+
+        with r4link.Board(Radio()) as board:
+            ...
+
+    An object serves one board at a time. As UDP, it may lose and reorder datagrams.
+    """
+
+    _receive: Callable[..., None] | None = None  # while it is open
+
+    @property
+    def name(self) -> str:
+        """For people: board.name, and in errors."""
+        return type(self).__name__
+
+    def open(self) -> None:
+        """Begins to receive. What the first call raises is an OpenError of the Board."""
+
+    def send(self, datagram: bytes) -> None:
+        """Sends one datagram. While it waits, later datagrams do; each of them waits 100 ms, but a stop waits for ever."""
+        raise NotImplementedError(f'{type(self).__name__} has no send()')
+
+    def close(self) -> None:
+        """Ends what open() began; not called if that has raised. The board waits 1 s for it."""
+
+    def received(self, datagram: bytes) -> None:
+        """To be called with each datagram that has come, from any thread. Does not wait; does nothing while the transport
+        is closed. Raises UsageError if it is longer than 1024 bytes."""
+        receive = self._receive
+        if receive is not None:
+            receive(memoryview(datagram).tobytes())
+
+    def _open(self, receive: Callable[..., None]) -> None:
+        if self._receive is not None:
+            raise UsageError(self.name, 'it carries another board already', 'give each board a transport of its own')
+        self._receive = receive
+        try:
+            self.open()
+        except BaseException:
+            self._receive = None
+            raise
+
+    def _close(self) -> None:
+        self._receive = None
+        self.close()
+
+
+class CanTransport(Transport):
+    """A board on a CAN bus of python-can, whichever of its interfaces that is (docs/can.md):
+
+        with can.Bus(interface='slcan', channel='/dev/ttyACM0', bitrate=1000000) as bus:
+            with r4link.Board(r4link.CanTransport(bus, node=3)) as board:
+                ...
+
+    `node`: the board's number on the bus, 0 to 31. `fd`: sends CAN FD frames. `pack`: sends and gets the packed form; False:
+    text. The bus stays open when the board is closed. Whatever else receives from it must not take frames away from it. An
+    interface of Linux is better opened by its URL, can://can0, which does not need the interpreter.
+    """
+
+    def __init__(self, bus: can.BusABC, *, node: int = 1, fd: bool = False, pack: bool = True) -> None:
+        self.bus = bus
+        self.node = node
+        self.fd = fd
+        self.pack = pack
+        self._failure: Exception | None = None  # of the thread that receives
+        self._ending = threading.Event()
+        self._reader = threading.Thread()
+
+    @property
+    def name(self) -> str:
+        """What python-can calls the bus."""
+        return str(self.bus.channel_info)
+
+    def open(self) -> None:
+        """Begins to receive from the bus."""
+        self._failure = None
+        self._ending.clear()
+        self._reader = threading.Thread(target=self._read, name='r4link.CanTransport', daemon=True)
+        self._reader.start()
+
+    def close(self) -> None:
+        """Leaves the bus."""
+        self._ending.set()
+        self._reader.join()
+
+    def _read(self) -> None:
+        try:
+            while not self._ending.is_set():
+                message = self.bus.recv(0.05)
+                receive = self._receive
+                if message is None or receive is None or not message.is_rx or message.is_error_frame or \
+                        message.is_remote_frame:
+                    continue
+                receive(message.arbitration_id, bytes(message.data), message.is_extended_id, message.is_fd)
+        except Exception as error:  # pylint: disable=broad-except
+            self._failure = error  # for the next frame that is sent: a host sends some ten times a second
+
+    def _send_frame(self, can_id: int, data: bytes, extended: bool, fd: bool) -> None:
+        import can  # pylint: disable=import-outside-toplevel, redefined-outer-name
+        if self._failure is not None:
+            raise self._failure
+        message: Any = can.Message(arbitration_id=can_id, data=data, is_extended_id=extended, is_fd=fd, bitrate_switch=fd)
+        deadline = time.monotonic() + _BUS_PATIENCE
+        while True:
+            try:
+                return self.bus.send(message, timeout=_BUS_PATIENCE)
+            except can.CanOperationError:  # its queue is full
+                if time.monotonic() >= deadline:
+                    raise
+                time.sleep(0.001)
