@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a CanBus is on: a socket of SocketCAN, or a bus of a program's own. For one thread, that of an event loop,
-// and no function waits but open().
+// What a CanBus sends and receives frames on: a socket of SocketCAN, or a bus of a program's own. For
+// the thread of one event loop. No function waits, except open().
 #pragma once
 
 #include <array>
@@ -52,7 +52,7 @@ class CanMedium {
   virtual bool heard_rate_switch() const { return false; }
   // The state of its controller, as far as it is known: CanInterface::state.
   virtual std::string state() const { return ""; }
-  // What that errno means.
+  // The meaning of that errno.
   virtual Problem problem(int error) const = 0;
 
   // Hears the frames with exactly these 11-bit ids (the id of the emergency stop includes the stops

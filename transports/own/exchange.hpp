@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Between a transport of a program's own, whose calls may wait, and the loop of a link: the thread that makes the
-// calls, what waits to be sent, and what has come.
+// Between a transport of a program's own, whose calls may wait, and the loop of a link: the thread
+// that makes the calls, what waits to be sent, and what has come.
 //
 //                     open() returns           a call throws
 //     opening ──────────────────────────▶ up ───────────────▶ down

@@ -25,7 +25,7 @@ struct TimedFrame {
   CanMedium::Clock::time_point at;
 };
 
-// As SocketCAN's: few frames wait, for those can be neither replaced nor overtaken.
+// As in SocketCAN, few frames wait here, because they can be neither replaced nor overtaken.
 struct Outbox {
   using Item = TimedFrame;
   static constexpr std::size_t most = 8;
@@ -84,7 +84,8 @@ struct Calls {
   std::shared_ptr<OwnCanBus> bus;
 };
 
-// Its exchange opens the bus again by itself: after the first time, open() only finds out whether it has.
+// Its exchange opens the bus again by itself. After the first time, open() only finds out whether it
+// has.
 class OwnCanMedium final : public CanMedium {
  public:
   explicit OwnCanMedium(std::shared_ptr<OwnCanBus> bus)
@@ -121,7 +122,7 @@ class OwnCanMedium final : public CanMedium {
     for (; count < batch && !came_.empty(); ++count, came_.pop_front()) {
       frames[count] = Received{came_.front().frame, 0, false, came_.front().at};
     }
-    // More than one call takes: the next one is to come.
+    // The next call takes the rest.
     if (!came_.empty()) ::eventfd_write(news_.get(), 1);
     if (count != 0) return static_cast<int>(count);
     return exchange_->up() ? -EAGAIN : -EIO;

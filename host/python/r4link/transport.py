@@ -8,14 +8,12 @@ called, and open() five times a second until it returns.
 """
 from __future__ import annotations
 
+import importlib
 import threading
 import time
-from typing import TYPE_CHECKING, Any, Callable
+from typing import Any, Callable
 
 from .errors import UsageError
-
-if TYPE_CHECKING:
-    import can
 
 _BUS_PATIENCE = 0.1  # seconds for which a bus may take no frame
 
@@ -84,12 +82,13 @@ class CanTransport(Transport):
             with r4link.Board(r4link.CanTransport(bus, node=3)) as board:
                 ...
 
-    `node`: the board's number on the bus, 0 to 31. `fd`: sends CAN FD frames. `pack`: sends and gets the packed form; False:
+    `bus`: a can.BusABC. `node`: the board's number on the bus, 0 to 31. `fd`: sends CAN FD frames. `pack`: sends and gets the packed form; False:
     text. The bus stays open when the board is closed. Whatever else receives from it must not take frames away from it. An
     interface of Linux is better opened by its URL, can://can0, which does not need the interpreter.
     """
 
-    def __init__(self, bus: can.BusABC, *, node: int = 1, fd: bool = False, pack: bool = True) -> None:
+    def __init__(self, bus: Any, *, node: int = 1, fd: bool = False, pack: bool = True) -> None:
+        self._can: Any = importlib.import_module('can')
         self.bus = bus
         self.node = node
         self.fd = fd
@@ -128,15 +127,16 @@ class CanTransport(Transport):
             self._failure = error  # for the next frame that is sent: a host sends some ten times a second
 
     def _send_frame(self, can_id: int, data: bytes, extended: bool, fd: bool) -> None:
-        import can  # pylint: disable=import-outside-toplevel, redefined-outer-name
         if self._failure is not None:
             raise self._failure
-        message: Any = can.Message(arbitration_id=can_id, data=data, is_extended_id=extended, is_fd=fd, bitrate_switch=fd)
+        message = self._can.Message(arbitration_id=can_id, data=data, is_extended_id=extended, is_fd=fd,
+                                    bitrate_switch=fd)
         deadline = time.monotonic() + _BUS_PATIENCE
         while True:
             try:
-                return self.bus.send(message, timeout=_BUS_PATIENCE)
-            except can.CanOperationError:  # its queue is full
+                self.bus.send(message, timeout=_BUS_PATIENCE)
+                return
+            except self._can.CanOperationError:  # its queue is full
                 if time.monotonic() >= deadline:
                     raise
                 time.sleep(0.001)

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "tests/transports/can/kernel/can_bus_fixture.hpp"
+#include "transports/can/can_socket.hpp"
 
 namespace r4::test {
 namespace {
