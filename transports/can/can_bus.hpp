@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One CAN medium, mostly an interface, shared by everything in an event loop that uses it: one
+// One CAN medium, for example an interface, shared by everything in an event loop that uses it: one
 // socket with kernel filters for the ids in use, frames read and written in batches, and its state
 // as events.
 //

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Transports of your own: a subclass of Transport moves datagrams, and CanTransport takes any bus of python-can.
 
-open(), send() and close() are called on one thread that does nothing else, so they may wait: the link does not wait for
-them. Of a board on such a transport the heartbeats do need the interpreter, so a program that does not leave it to
-other threads loses its link. A method that raises takes the transport down: on_event() reports what it raised, close() is
-called, and open() five times a second until it returns.
+open(), send() and close() are called on one thread that does nothing else. They may wait, and the link goes on meanwhile.
+
+The heartbeats on such a transport need the interpreter. A program that keeps the interpreter busy for a second loses its
+link, and the board goes safe.
+
+A method that raises takes the transport down: on_event() reports the exception, close() is called, and open() five times
+a second until it returns.
 """
 from __future__ import annotations
 
@@ -19,11 +22,11 @@ _BUS_PATIENCE = 0.1  # seconds for which a bus may take no frame
 
 
 class Transport:
-    """Moves whole datagrams, of 1 to 1024 bytes of any content, to one board and back.
+    """Moves whole datagrams, of at most 1024 bytes of any content, to one board and back.
 
         class Radio(r4link.Transport):
             def open(self):
-                self.modem = Modem()                     # its callback is any thread
+                self.modem = Modem()                     # it calls back on a thread of its own
                 self.modem.on_packet = self.received
             def send(self, datagram):
                 self.modem.transmit(datagram)
@@ -33,7 +36,7 @@ class Transport:
         with r4link.Board(Radio()) as board:
             ...
 
-    An object serves one board at a time. As UDP, it may lose and reorder datagrams.
+    An object serves one board at a time. Datagrams may be lost and reordered, as on UDP.
     """
 
     _receive: Callable[..., None] | None = None  # while it is open
@@ -44,14 +47,14 @@ class Transport:
         return type(self).__name__
 
     def open(self) -> None:
-        """Begins to receive. What the first call raises is an OpenError of the Board."""
+        """Begins to receive. If the first call raises, the Board raises OpenError."""
 
     def send(self, datagram: bytes) -> None:
-        """Sends one datagram. While it waits, later datagrams do; each of them waits 100 ms, but a stop waits for ever."""
+        """Sends one datagram. While it waits, later datagrams wait too: for 100 ms, a stop without a limit."""
         raise NotImplementedError(f'{type(self).__name__} has no send()')
 
     def close(self) -> None:
-        """Ends what open() began; not called if that has raised. The board waits 1 s for it."""
+        """Undoes open(). It is not called after an open() that raised. Board.close() waits 1 s for it."""
 
     def received(self, datagram: bytes) -> None:
         """To be called with each datagram that has come, from any thread. Does not wait; does nothing while the transport
@@ -83,8 +86,8 @@ class CanTransport(Transport):
                 ...
 
     `bus`: a can.BusABC. `node`: the board's number on the bus, 0 to 31. `fd`: sends CAN FD frames. `pack`: sends and gets the packed form; False:
-    text. The bus stays open when the board is closed. Whatever else receives from it must not take frames away from it. An
-    interface of Linux is better opened by its URL, can://can0, which does not need the interpreter.
+    text. The bus stays open when the board is closed. While it is open, nothing else may call bus.recv(). An interface of
+    Linux is better opened by its URL, can://can0, which does not need the interpreter.
     """
 
     def __init__(self, bus: Any, *, node: int = 1, fd: bool = False, pack: bool = True) -> None:
@@ -99,7 +102,7 @@ class CanTransport(Transport):
 
     @property
     def name(self) -> str:
-        """What python-can calls the bus."""
+        """The name that python-can gives to the bus."""
         return str(self.bus.channel_info)
 
     def open(self) -> None:
