@@ -15,10 +15,10 @@ import sys
 
 PUBLIC = {'include/r4link', 'include/r4link/can', 'include/r4link/commands', 'include/r4link/control',
           'include/r4link/devices', 'include/r4link/discovery', 'include/r4link/messages', 'include/r4link/recordings',
-          'include/r4link/tables'}
+          'include/r4link/tables', 'include/r4link/transports'}
 PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
-CARRIERS = {'transports/can', 'transports/impaired', 'transports/serial', 'transports/share', 'transports/udp',
+CARRIERS = {'transports/can', 'transports/impaired', 'transports/own', 'transports/serial', 'transports/share', 'transports/udp',
             'transports/udp/network', 'transports/udp/search'}
 TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/devices', 'firmware/drivers'}
@@ -42,6 +42,7 @@ ALLOWED = {
     'include/r4link/messages': {'include/r4link'},
     'include/r4link/recordings': {'include/r4link', 'include/r4link/messages'},
     'include/r4link/tables': {'include/r4link'},
+    'include/r4link/transports': {'include/r4link'},
     'protocol/datagram': PUBLIC,
     'protocol/keys': PUBLIC | {'protocol/datagram'},
     'protocol/messages': PUBLIC | {'protocol/datagram', 'protocol/keys'},
@@ -52,6 +53,7 @@ ALLOWED = {
     'transports/can': FRAMING | {'transports'},
     'transports/impaired': FRAMING | {'transports'},
     'transports/serial': FRAMING | {'transports'},
+    'transports/own': FRAMING | {'transports', 'transports/can'},
     'transports/share': FRAMING | {'transports'},
     'transports/udp/search': FRAMING | {'transports'},
     'transports/udp/network': {'transports'},
@@ -92,6 +94,7 @@ ALLOWED = {
     'host/uart': HOST,
     'host/python/bindings': PUBLIC,
     'host/python/bindings/board': PUBLIC | {'host/python/bindings'},
+    'host/python/bindings/transports': PUBLIC | {'host/python/bindings'},
     'host': HOST,
     'tools/r4/shell': PUBLIC,
     'tools/r4/boards': PUBLIC | {'tools/r4/shell'},

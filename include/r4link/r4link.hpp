@@ -54,4 +54,5 @@
 #include "tables/settings.hpp"
 #include "tables/state_fields.hpp"
 #include "text.hpp"
+#include "transports/own_transport.hpp"
 #include "vocabulary.hpp"

@@ -90,9 +90,13 @@ class Peer:
 
     def __init__(self, interface, own_id, other_id, ids, fd=False):
         self.fd, self.own_id, self.other_id = fd, own_id, other_id
-        self.bus = can.Bus(interface='socketcan', channel=interface, fd=True,
-                           can_filters=[{'can_id': each, 'can_mask': 0x7FF, 'extended': False} for each in ids] +
-                          [{'can_id': EMERGENCY_STOP << 18, 'can_mask': 0x7FF << 18, 'extended': True}])
+        filters = [{'can_id': each, 'can_mask': 0x7FF, 'extended': False} for each in ids]
+        filters.append({'can_id': EMERGENCY_STOP << 18, 'can_mask': 0x7FF << 18, 'extended': True})
+        if isinstance(interface, can.BusABC):
+            self.bus = interface
+            self.bus.set_filters(filters)
+        else:
+            self.bus = can.Bus(interface='socketcan', channel=interface, fd=True, can_filters=filters)
         self.receivers = {}
         self.flow_control = None  # the newest one, while we wait for it
         self.failed_sends = 0

@@ -8,8 +8,8 @@
 
 namespace r4 {
 
-BusStops::BusStops(asio::io_context& io, CanSocket& socket)
-    : io_(io), socket_(socket), announced_(std::random_device{}()) {}
+BusStops::BusStops(asio::io_context& io, CanMedium& medium)
+    : io_(io), medium_(medium), announced_(std::random_device{}()) {}
 
 SendResult BusStops::send_bare() {
   CanFrame frame{};
@@ -46,10 +46,10 @@ SendResult BusStops::repeat(std::uint32_t number) {
 }
 
 SendResult BusStops::send_first(const CanFrame& frame) {
-  if (socket_.number() < 0) return SendResult::down;
-  const CanSocket::Outcome outcome = socket_.send_first(frame);
-  if (outcome == CanSocket::Outcome::done) return SendResult::sent;
-  return outcome == CanSocket::Outcome::failed ? SendResult::down : SendResult::full;
+  if (medium_.number() < 0) return SendResult::down;
+  const CanMedium::Outcome outcome = medium_.send_first(frame);
+  if (outcome == CanMedium::Outcome::done) return SendResult::sent;
+  return outcome == CanMedium::Outcome::failed ? SendResult::down : SendResult::full;
 }
 
 }  // namespace r4

@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "../operation_slot.hpp"
-#include "can_socket.hpp"
+#include "can_medium.hpp"
 #include "r4link/carrier.hpp"
 #include "stop_numbers.hpp"
 
@@ -24,7 +24,7 @@ class BusStops {
   // repeats a confirmed stop, so a host that clears the stop meanwhile finds it pressed again.
   static constexpr std::chrono::milliseconds together{100};
 
-  BusStops(asio::io_context& io, CanSocket& socket);
+  BusStops(asio::io_context& io, CanMedium& medium);
 
   // Sends the frame without a number, which boards of every version of the id plan obey. A board
   // takes each such frame for a new stop.
@@ -37,11 +37,11 @@ class BusStops {
   SendResult repeat(std::uint32_t number);
 
  private:
-  using Clock = CanSocket::Clock;
+  using Clock = CanMedium::Clock;
   SendResult send_first(const CanFrame& frame);
 
   asio::io_context& io_;
-  CanSocket& socket_;
+  CanMedium& medium_;
   std::uint32_t announced_;  // the newest number
   Clock::time_point announced_at_;
   bool announcing_ = false;  // in this turn of the loop

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "../file_descriptor.hpp"
+#include "can_socket.hpp"
 #include "r4link/can/can_ids.hpp"
 #include "r4link/can/can_interface.hpp"
 
@@ -26,8 +27,7 @@ constexpr std::chrono::microseconds most_polling{400};
 // After that the loop may sleep, so that a caller of its poll() gets control back.
 constexpr std::chrono::milliseconds most_awake{10};
 
-Problem filter_problem(const std::string& interface, int error) {
-  Problem problem = can_problem(interface, error);
+Problem filter_problem(Problem problem) {
   if (problem.fix.empty()) {
     problem.reason =
         "the kernel does not take the filters for what is to be heard: " + problem.reason;
@@ -54,24 +54,28 @@ std::shared_ptr<CanBus> CanBus::of(asio::io_context& io, const std::string& inte
   std::weak_ptr<CanBus>& known = asio::use_service<Buses>(io).buses[{interface, fd}];
   std::shared_ptr<CanBus> bus = known.lock();
   if (!bus) {
-    bus = std::make_shared<CanBus>(io, interface, fd);
+    bus = on(io, std::make_unique<CanSocket>(interface, fd));
     known = bus;
-    bus->look_at_controller();
   }
   return bus;
 }
 
-CanBus::CanBus(asio::io_context& io, std::string interface, bool fd)
+std::shared_ptr<CanBus> CanBus::on(asio::io_context& io, std::unique_ptr<CanMedium> medium) {
+  auto bus = std::make_shared<CanBus>(io, std::move(medium));
+  bus->look_at_controller();
+  return bus;
+}
+
+CanBus::CanBus(asio::io_context& io, std::unique_ptr<CanMedium> medium)
     : io_(io),
-      interface_(std::move(interface)),
-      fd_(fd),
-      stops_(io, socket_),
+      medium_(std::move(medium)),
+      stops_(io, *medium_),
       readable_(io),
       writable_(io),
       retry_timer_(io),
       look_timer_(io),
       polling_(most_polling) {
-  socket_.open(interface_, fd_);
+  medium_->open();
   watch_socket();
   listen();
 }
@@ -114,9 +118,10 @@ void CanBus::clear_places() {
 // A bus that hears less than its members asked for is down. The loop reports that later, because a
 // member may just be joining or leaving.
 void CanBus::hear() {
-  if (socket_.number() < 0 || set_filters()) return;
-  asio::post(io_, deafness_.handler(
-                      [this, error = errno] { go_down(filter_problem(interface_, error), true); }));
+  if (medium_->number() < 0 || set_filters()) return;
+  asio::post(io_, deafness_.handler([this, error = errno] {
+    go_down(filter_problem(medium_->problem(error)), true);
+  }));
 }
 
 // False, with errno, if the kernel does not take them.
@@ -124,19 +129,19 @@ bool CanBus::set_filters() {
   std::vector<std::uint32_t> ids;
   for (const Place& place : members_) {
     if (place.member == nullptr) continue;
-    if (place.all) return socket_.hear_everything();
+    if (place.all) return medium_->hear_everything();
     ids.insert(ids.end(), place.ids.begin(), place.ids.end());
   }
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  return socket_.hear(ids);
+  return medium_->hear(ids);
 }
 
 // --- receiving
 
 // Throws Error if the system does not let the loop wait for the socket.
 void CanBus::watch_socket() {
-  with_system_errors("can://" + interface_, [&] { readable_.assign(socket_.number()); });
+  with_system_errors(medium_->name(), [&] { readable_.assign(medium_->number()); });
 }
 
 void CanBus::listen() {
@@ -155,8 +160,8 @@ bool CanBus::someone_awaits_a_frame() const {
 void CanBus::receive() {
   const std::shared_ptr<CanBus> alive = shared_from_this();
   if (take()) send();
-  if (socket_.number() < 0) return;
-  if (!socket_.simulated()) return listen();
+  if (medium_->number() < 0) return;
+  if (!medium_->simulated()) return listen();
   const Clock::time_point now = Clock::now();
   polling_.on_silence(someone_awaits_a_frame() ? AdaptivePolling::Silence::within
                                                : AdaptivePolling::Silence::between,
@@ -170,18 +175,18 @@ void CanBus::receive() {
 bool CanBus::take() {
   if (receiving_) return false;
   bool any = false;
-  for (int looks = 0; looks < most_looks && socket_.number() >= 0; ++looks) {
-    const int count = socket_.receive(in_);
+  for (int looks = 0; looks < most_looks && medium_->number() >= 0; ++looks) {
+    const int count = medium_->receive(in_);
     if (count == -EAGAIN || count == -EINTR) break;
     if (count < 0) {
-      go_down(can_problem(interface_, -count), true);
+      go_down(medium_->problem(-count), true);
       return true;
     }
     if (!std::exchange(any, true)) polling_.on_arrival(Clock::now());
     hand_over(static_cast<std::size_t>(count));
     if (static_cast<std::size_t>(count) < in_.size()) break;
   }
-  if (any && socket_.number() >= 0) {
+  if (any && medium_->number() >= 0) {
     for_each_member([](Member& member) { member.on_drained(); });
   }
   return any;
@@ -206,7 +211,7 @@ void CanBus::hand_over(std::size_t count) {
   receiving_ = false;
 }
 
-void CanBus::on_error_frame(const CanSocket::Received& received) {
+void CanBus::on_error_frame(const CanMedium::Received& received) {
   if ((received.error & CAN_ERR_BUSOFF) != 0) return go_bus_off();
   if ((received.error & CAN_ERR_RESTARTED) != 0) return come_up();
   if ((received.error & CAN_ERR_CRTL) != 0) {
@@ -226,7 +231,7 @@ void CanBus::on_error_frame(const CanSocket::Received& received) {
 
 // Error frames report changes of the state only, so a new socket asks for it.
 void CanBus::look_at_controller() {
-  const std::string state = can_interface(interface_).state;
+  const std::string state = medium_->state();
   if (state == "bus-off") return go_bus_off();
   if (!up()) come_up();
   if (state == "error-passive") warn_of(Trouble::error_passive);
@@ -234,10 +239,10 @@ void CanBus::look_at_controller() {
 }
 
 void CanBus::go_bus_off() {
-  go_down({ErrorKind::open, "can://" + interface_, "the controller is bus-off: too many errors",
+  go_down({ErrorKind::open, medium_->name(), "the controller is bus-off: too many errors",
            fmt::format("{}, then: ip link set {} type can restart (slcan: down, and up); with "
                        "restart-ms 100 it does so by itself",
-                       check_the_wire, interface_)},
+                       check_the_wire, medium_->name().substr(medium_->name().rfind('/') + 1))},
           false);
 }
 
@@ -245,7 +250,7 @@ void CanBus::go_bus_off() {
 void CanBus::warn_of(Trouble trouble) {
   if (!up() || trouble_ == trouble) return;
   trouble_ = trouble;
-  Problem problem{ErrorKind::open, "can://" + interface_, "the controller warns of errors",
+  Problem problem{ErrorKind::open, medium_->name(), "the controller warns of errors",
                   check_the_wire};
   if (trouble == Trouble::error_passive) problem.reason = "the controller is error-passive";
   if (trouble == Trouble::not_acknowledged) {
@@ -267,7 +272,7 @@ void CanBus::go_down(Problem problem, bool reopen) {
   if (reopen) {
     reading_.cancel();
     if (readable_.is_open()) readable_.release();
-    socket_.close();
+    medium_->close();
     look_later();
   }
   be_down(std::move(problem));
@@ -285,7 +290,7 @@ void CanBus::be_down(Problem problem) {
 void CanBus::come_up() {
   const Trouble before = std::exchange(trouble_, Trouble::none);
   standing_.reset();
-  Problem problem{ErrorKind::open, "can://" + interface_, "", ""};
+  Problem problem{ErrorKind::open, medium_->name(), "", ""};
   if (before == Trouble::down) return tell({CarrierEvent::Kind::up, std::move(problem)});
   if (before == Trouble::none) return;
   problem.reason = "the trouble is over";
@@ -301,11 +306,11 @@ void CanBus::look_later() {
 void CanBus::look() {
   const std::shared_ptr<CanBus> alive = shared_from_this();
   try {
-    socket_.open(interface_, fd_);
-    if (!set_filters()) throw Error(filter_problem(interface_, errno));
+    medium_->open();
+    if (!set_filters()) throw Error(filter_problem(medium_->problem(errno)));
     watch_socket();
   } catch (const Error& error) {
-    socket_.close();
+    medium_->close();
     look_later();
     return be_down(error.problem());
   }

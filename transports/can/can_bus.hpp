@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One CAN interface, shared by everything in an event loop that uses it: one socket with kernel
-// filters for the ids in use, frames read and written in batches, and its state as events.
+// One CAN medium, for example an interface, shared by everything in an event loop that uses it: one
+// socket with kernel filters for the ids in use, frames read and written in batches, and its state
+// as events.
 //
 // Each member hears every frame that any member asked for, except the frames that members send.
 // Frames leave in the order in which members offer them; a member's transfer is not interrupted by
@@ -25,7 +26,7 @@
 #include "../operation_slot.hpp"
 #include "../writable_wait.hpp"
 #include "bus_stops.hpp"
-#include "can_socket.hpp"
+#include "can_medium.hpp"
 #include "r4link/carrier.hpp"
 
 namespace r4 {
@@ -34,7 +35,7 @@ namespace r4 {
 // that wait for it, and the members change together with every frame.
 class CanBus : public std::enable_shared_from_this<CanBus> {
  public:
-  using Clock = CanSocket::Clock;
+  using Clock = CanMedium::Clock;
   static constexpr std::size_t ahead = 32;
   static constexpr std::chrono::milliseconds patience{100};
 
@@ -71,7 +72,10 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   // The bus of that interface in this event loop; opens it if it is not open. Throws Error.
   static std::shared_ptr<CanBus> of(asio::io_context& io, const std::string& interface, bool fd);
 
-  CanBus(asio::io_context& io, std::string interface, bool fd);
+  // A bus of its own on that medium, which it opens. Throws Error.
+  static std::shared_ptr<CanBus> on(asio::io_context& io, std::unique_ptr<CanMedium> medium);
+
+  CanBus(asio::io_context& io, std::unique_ptr<CanMedium> medium);
   ~CanBus();
   CanBus(const CanBus&) = delete;
   CanBus& operator=(const CanBus&) = delete;
@@ -101,10 +105,10 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
     const auto end = out_.begin() + static_cast<std::ptrdiff_t>(out_count_);
     return std::any_of(out_.begin(), end, predicate);
   }
-  bool heard_rate_switch() const { return socket_.heard_rate_switch(); }
+  bool heard_rate_switch() const { return medium_->heard_rate_switch(); }
   // Frames that the kernel dropped because this program did not take them in time, plus the number
   // of overflows that the controller reported.
-  std::uint32_t overflows() const { return socket_.overflows() + controller_overflows_; }
+  std::uint32_t overflows() const { return medium_->overflows() + controller_overflows_; }
 
  private:
   enum class Trouble : std::uint8_t { none, not_acknowledged, error_warning, error_passive, down };
@@ -119,12 +123,12 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   void receive();
   bool someone_awaits_a_frame() const;
   void hand_over(std::size_t count);
-  void on_error_frame(const CanSocket::Received& received);
+  void on_error_frame(const CanMedium::Received& received);
   void send_urgent(std::uint32_t now_us);
   bool refill(std::uint32_t now_us);
   void have_left(std::size_t count);
   void drop_queue();
-  void send_later();
+  void send_later(CanMedium::Outcome outcome);
   void go_bus_off();
   void warn_of(Trouble trouble);
   void go_down(Problem problem, bool reopen);
@@ -141,9 +145,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   void for_each_member(Action action);
 
   asio::io_context& io_;
-  const std::string interface_;
-  const bool fd_;
-  CanSocket socket_;
+  const std::unique_ptr<CanMedium> medium_;
   BusStops stops_;
   LoopDescriptor readable_;
   OperationSlot reading_;
@@ -170,7 +172,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   Trouble trouble_ = Trouble::none;
   std::optional<CarrierEvent> standing_;  // what was reported of the trouble
   std::uint32_t controller_overflows_ = 0;
-  std::array<CanSocket::Received, CanSocket::batch> in_;
+  std::array<CanMedium::Received, CanMedium::batch> in_;
 };
 
 // Members may leave and join in any call. A member that joins is not called with this event.

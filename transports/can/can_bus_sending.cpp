@@ -20,7 +20,7 @@ void CanBus::send_urgent(std::uint32_t now_us) {
   CanFrame frame;
   for (const Place& place : members_) {
     while (place.member != nullptr && place.member->offer_urgent(now_us, frame) &&
-           socket_.send_first(frame) == CanSocket::Outcome::done) {
+           medium_->send_first(frame) == CanMedium::Outcome::done) {
       place.member->frame_sent(now_us);
     }
   }
@@ -68,32 +68,31 @@ void CanBus::drop_queue() {
 void CanBus::send() {
   if (!up() || sending_) return;
   sending_ = true;
-  CanSocket::Outcome outcome = CanSocket::Outcome::done;
+  CanMedium::Outcome outcome = CanMedium::Outcome::done;
   if (out_count_ == 0) progress_ = Clock::now();
   send_urgent(now_us());
-  while (outcome == CanSocket::Outcome::done && (out_count_ != 0 || refill(now_us()))) {
+  while (outcome == CanMedium::Outcome::done && (out_count_ != 0 || refill(now_us()))) {
     std::size_t sent = 0;
-    outcome = socket_.send(out_.data(), out_count_, sent);
+    outcome = medium_->send(out_.data(), out_count_, sent);
     const int error = errno;
     have_left(sent);
-    if (outcome == CanSocket::Outcome::failed) {
-      asio::post(
-          io_, retrying_.handler([this, error] { go_down(can_problem(interface_, error), true); }));
+    if (outcome == CanMedium::Outcome::failed) {
+      asio::post(io_, retrying_.handler([this, error] { go_down(medium_->problem(error), true); }));
     }
   }
   sending_ = false;
   clear_places();
-  if (outcome == CanSocket::Outcome::done) {
+  if (outcome == CanMedium::Outcome::done) {
     writable_.stop();
-  } else if (outcome != CanSocket::Outcome::failed) {
-    send_later();
+  } else if (outcome != CanMedium::Outcome::failed) {
+    send_later(outcome);
   }
   for_each_member([](Member& member) { member.on_sent(); });
 }
 
 // The system reports a writable socket, but not room in the queue of the interface: hence the
 // timer.
-void CanBus::send_later() {
+void CanBus::send_later(CanMedium::Outcome outcome) {
   if (Clock::now() - progress_ > patience) {
     drop_queue();
     progress_ = Clock::now();
@@ -101,7 +100,7 @@ void CanBus::send_later() {
   }
   retry_timer_.expires_after(retry_interval);
   retry_timer_.async_wait(retrying_.handler([this] { send(); }));
-  writable_.start(socket_.number(), [this] { send(); });
+  if (outcome == CanMedium::Outcome::busy) writable_.start(medium_->number(), [this] { send(); });
 }
 
 }  // namespace r4

@@ -31,10 +31,11 @@ constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;  // newest wins
 constexpr std::uint32_t look_again_us = 20000;
 
-// It has more than 15 members: six are from its URL, and four are its timer.
+// It has more than 15 members: four are its timer.
 class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member {
  public:
-  CanCarrier(asio::io_context& io, Url url, Role role);
+  CanCarrier(asio::io_context& io, CanCarrierOptions options,
+             std::function<std::shared_ptr<CanBus>()> open_bus);
   ~CanCarrier() override { close(); }
 
   void open(Handler& handler) override;
@@ -44,7 +45,7 @@ class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member
   bool up() const override { return handler_ != nullptr && bus_->up(); }
   TransportTrouble trouble() const override;
   bool is_shared() const override { return true; }
-  const std::string& name() const override { return name_; }
+  const std::string& name() const override { return is_.name; }
   const CarrierCounters& counters() const override;
 
  private:
@@ -79,13 +80,8 @@ class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member
   void arm();
   void on_deadline();
 
-  asio::io_context& io_;
-  const Url url_;
-  const Role role_;
-  const std::uint8_t number_;
-  const bool fd_;
-  const bool packs_;  // of a host; a board follows its setting
-  const std::string name_;
+  const CanCarrierOptions is_;
+  const std::function<std::shared_ptr<CanBus>()> open_bus_;
   CanNode node_;
   CanTurn turn_{std::random_device{}()};  // of a host
   OverheardLane others_;                  // commands of other hosts to the same board
@@ -108,22 +104,17 @@ std::uint8_t node_of(const Url& url, Role role) {
   return static_cast<std::uint8_t>(url.get_number("node", 0, can_nodes - 1, 1));
 }
 
-CanCarrier::CanCarrier(asio::io_context& io, Url url, Role role)
-    : io_(io),
-      url_(std::move(url)),
-      role_(role),
-      number_(node_of(url_, role)),
-      fd_(url_.get_number("fd", 0, 1, 0) == 1),
-      packs_(role == Role::host && url_.get_number("pack", 0, 1, 1) == 1),
-      name_(fmt::format("can://{}?node={}{}{}", url_.host(), number_, fd_ ? "&fd=1" : "",
-                        role == Role::board || packs_ ? "" : "&pack=0")),
-      node_(role == Role::board ? CanEnd::board : CanEnd::host, number_, fd_),
-      others_(CanIdKind::command, number_),
+CanCarrier::CanCarrier(asio::io_context& io, CanCarrierOptions options,
+                       std::function<std::shared_ptr<CanBus>()> open_bus)
+    : is_(std::move(options)),
+      open_bus_(std::move(open_bus)),
+      node_(is_.role == Role::board ? CanEnd::board : CanEnd::host, is_.node, is_.fd),
+      others_(CanIdKind::command, is_.node),
       lanes_{
           Lane{CanLane::dialogue, SendQueue(normal_entries, state_entries, counters_.tx_dropped)},
           Lane{CanLane::telemetry, SendQueue(normal_entries, state_entries, counters_.tx_dropped)}},
       timer_(io) {
-  node_.use_packed_form(packs_);
+  node_.use_packed_form(is_.role == Role::host && is_.packs);
 }
 
 TransferCounters transfers_of(const CanNode& node) {
@@ -147,15 +138,15 @@ TransferCounters transfers_of(const CanNode& node) {
 
 void CanCarrier::open(Handler& handler) {
   close();
-  const std::shared_ptr<CanBus> bus = CanBus::of(io_, url_.host(), fd_);
+  const std::shared_ptr<CanBus> bus = open_bus_();
   bus_ = bus;
   handler_ = &handler;
-  bus->join(*this, role_ == Role::board
-                       ? std::vector<std::uint32_t>{emergency_stop_id, command_id(number_),
-                                                    watch_id(number_)}
-                       : std::vector<std::uint32_t>{reply_id(number_), telemetry_id(number_),
-                                                    command_id(number_)});
-  if (bus->up()) on_bus({CarrierEvent::Kind::up, Problem{ErrorKind::open, name_, "", ""}});
+  bus->join(*this, is_.role == Role::board
+                       ? std::vector<std::uint32_t>{emergency_stop_id, command_id(is_.node),
+                                                    watch_id(is_.node)}
+                       : std::vector<std::uint32_t>{reply_id(is_.node), telemetry_id(is_.node),
+                                                    command_id(is_.node)});
+  if (bus->up()) on_bus({CarrierEvent::Kind::up, Problem{ErrorKind::open, is_.name, "", ""}});
   const std::optional<CarrierEvent> standing = bus->standing();
   if (standing && bus_ == bus) on_bus(*standing);  // not closed meanwhile
 }
@@ -178,13 +169,13 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
     ++counters_.tx_errors;
     return SendResult::full;
   }
-  if (priority == Priority::stop && role_ == Role::host) {
+  if (priority == Priority::stop && is_.role == Role::host) {
     const SendResult result = send_stop(bytes);
     ++(result == SendResult::sent ? counters_.tx_datagrams : counters_.tx_errors);
     return result;
   }
-  if (priority == Priority::lease && role_ == Role::host) return send_lease();
-  if (role_ == Role::host && !turn_.ours(Clock::now())) {
+  if (priority == Priority::lease && is_.role == Role::host) return send_lease();
+  if (is_.role == Role::host && !turn_.ours(Clock::now())) {
     return turn_.others() ? SendResult::busy : SendResult::down;
   }
   Lane& own = lane(node_.lane_of(Text(bytes.data(), bytes.size())));
@@ -236,7 +227,7 @@ SendResult CanCarrier::send_lease() {
 // hosts of a program share the bus.
 void CanCarrier::listen_for_others(const CanFrame& frame) {
   const CanIdMeaning meaning = classify(frame);
-  if (role_ != Role::host || meaning.node != number_) return;
+  if (is_.role != Role::host || meaning.node != is_.node) return;
   const Clock::time_point now = Clock::now();
   if (meaning.kind == CanIdKind::went_safe || meaning.kind == CanIdKind::reply ||
       meaning.kind == CanIdKind::telemetry) {
@@ -257,7 +248,7 @@ void CanCarrier::count_late_transfers() {
 }
 
 TransportTrouble CanCarrier::trouble() const {
-  return role_ == Role::host && up() ? trouble_.now(Clock::now()) : TransportTrouble::none;
+  return is_.role == Role::host && up() ? trouble_.now(Clock::now()) : TransportTrouble::none;
 }
 
 // Begins the next datagram of each lane that has become idle. True if there was one.
@@ -279,7 +270,7 @@ bool CanCarrier::offer(std::uint32_t now_us, CanFrame& frame) {
 
 void CanCarrier::on_frame(const CanFrame& frame, std::uint32_t at_us) {
   listen_for_others(frame);
-  if (role_ == Role::host && classify(frame).kind == CanIdKind::command) {
+  if (is_.role == Role::host && classify(frame).kind == CanIdKind::command) {
     const std::optional<Text> command = others_.on_frame(frame, at_us);
     if (!command || command->empty()) return;
     Datagram whole;
@@ -332,7 +323,7 @@ void CanCarrier::on_deadline() {
 
 void CanCarrier::on_bus(const CarrierEvent& event) {
   CarrierEvent own = event;
-  own.problem.thing = name_;
+  own.problem.thing = is_.name;
   if (event.kind == CarrierEvent::Kind::down) {
     ++counters_.downs;
     node_.cancel();
@@ -351,9 +342,21 @@ void CanCarrier::on_stuck() {
 
 }  // namespace
 
+std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, CanCarrierOptions options,
+                                          std::function<std::shared_ptr<CanBus>()> open_bus) {
+  return std::make_unique<CanCarrier>(io, std::move(options), std::move(open_bus));
+}
+
 std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role,
                                           const Claim&) {
-  return std::make_unique<CanCarrier>(io, url, role);
+  CanCarrierOptions options{role, node_of(url, role), false, true, ""};
+  options.fd = url.get_number("fd", 0, 1, 0) == 1;
+  options.packs = role == Role::board || url.get_number("pack", 0, 1, 1) == 1;
+  options.name = fmt::format("can://{}?node={}{}{}", url.host(), options.node,
+                             options.fd ? "&fd=1" : "", options.packs ? "" : "&pack=0");
+  return make_can_carrier(io, options, [&io, interface = url.host(), fd = options.fd] {
+    return CanBus::of(io, interface, fd);
+  });
 }
 
 ShareName can_share_name(const Url& url) {

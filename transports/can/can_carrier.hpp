@@ -13,13 +13,30 @@
 #pragma once
 
 #include <asio/io_context.hpp>
+#include <cstdint>
+#include <functional>
 #include <memory>
+#include <string>
 
 #include "../share_name.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/discovery/url.hpp"
 
 namespace r4 {
+
+class CanBus;
+
+struct CanCarrierOptions {
+  Role role = Role::host;
+  std::uint8_t node = 1;  // the board's number, 0-31
+  bool fd = false;        // sends CAN FD frames
+  bool packs = true;      // of a host; a board follows its setting
+  std::string name;
+};
+
+// On the bus that `open_bus()` returns, which open() calls. It throws Error.
+std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, CanCarrierOptions options,
+                                          std::function<std::shared_ptr<CanBus>()> open_bus);
 
 std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role,
                                           const Claim& = {});

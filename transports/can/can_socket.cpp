@@ -106,40 +106,46 @@ struct CanSocket::Inbox {
   std::array<Control, batch> controls{};
 };
 
-CanSocket::CanSocket() : inbox_(std::make_unique<Inbox>()) {}
+CanSocket::CanSocket(std::string interface, bool fd)
+    : interface_(std::move(interface)),
+      name_("can://" + interface_),
+      fd_(fd),
+      inbox_(std::make_unique<Inbox>()) {}
 CanSocket::~CanSocket() = default;
 
-void CanSocket::open(const std::string& interface, bool fd) {
+std::string CanSocket::state() const { return can_interface(interface_).state; }
+Problem CanSocket::problem(int error) const { return can_problem(interface_, error); }
+
+void CanSocket::open() {
   close();
   // Tells a kernel without CAN from a missing interface.
   FileDescriptor probe(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW));
-  if (!probe) fail(interface, errno);
-  const CanInterface state = can_interface(interface);
+  if (!probe) fail(interface_, errno);
+  const CanInterface state = can_interface(interface_);
   if (!state.unknown.empty()) {
     throw Error(
-        ErrorKind::open, "can://" + interface,
-        "the system does not tell about it: netlink: " + state.unknown,
+        ErrorKind::open, name_, "the system does not tell about it: netlink: " + state.unknown,
         "let this program have netlink sockets (of a service: RestrictAddressFamilies= with "
         "AF_NETLINK) and enough open files (ulimit -n)");
   }
-  if (!state.exists) fail(interface, ENODEV);
+  if (!state.exists) fail(interface_, ENODEV);
   if (!state.is_can) {
-    throw Error(ErrorKind::usage, "can://" + interface, interface + " is no CAN interface",
+    throw Error(ErrorKind::usage, name_, interface_ + " is no CAN interface",
                 "r4 list shows those that are there");
   }
-  if (!state.up) fail(interface, ENETDOWN);
-  if (fd && !state.fd) {
-    throw Error(ErrorKind::open, "can://" + interface, "the interface is not set up for CAN FD",
+  if (!state.up) fail(interface_, ENETDOWN);
+  if (fd_ && !state.fd) {
+    throw Error(ErrorKind::open, name_, "the interface is not set up for CAN FD",
                 state.has_controller
                     ? fmt::format("ip link set {0} down && ip link set {0} up type can bitrate "
                                   "1000000 dbitrate 5000000 fd on; or leave fd=1 out",
-                                  interface)
+                                  interface_)
                     : fmt::format("ip link set {0} down && ip link set {0} mtu 72 up; or leave "
                                   "fd=1 out",
-                                  interface));
+                                  interface_));
   }
-  FileDescriptor socket = open_socket(interface, state.index);
-  FileDescriptor first = open_socket(interface, state.index);
+  FileDescriptor socket = open_socket(interface_, state.index);
+  FileDescriptor first = open_socket(interface_, state.index);
   const int number = socket.get();
   const int yes = 1;
   const can_err_mask_t errors = CAN_ERR_BUSOFF | CAN_ERR_CRTL | CAN_ERR_RESTARTED | CAN_ERR_ACK |
@@ -151,7 +157,7 @@ void CanSocket::open(const std::string& interface, bool fd) {
              set_option(number, SOL_SOCKET, SO_RCVBUF, receive_buffer) &&
              set_option(number, SOL_SOCKET, SO_SNDBUF, least_send_buffer) &&
              set_option(first.get(), SOL_SOCKET, SO_PRIORITY, highest_priority);
-  if (!set) fail(interface, errno);
+  if (!set) fail(interface_, errno);
   simulated_ = !state.has_controller;
   overflows_before_ += std::exchange(overflows_, 0);  // the kernel counts from 0 for each socket
   descriptor_ = std::move(socket);

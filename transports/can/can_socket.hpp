@@ -4,7 +4,6 @@
 #pragma once
 
 #include <array>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -12,67 +11,43 @@
 #include <vector>
 
 #include "../file_descriptor.hpp"
+#include "can_medium.hpp"
 #include "r4link/can/can_frame.hpp"
 #include "r4link/error.hpp"
 
 namespace r4 {
 
-// What an errno of a socket on that interface means, with the fix where there is one.
+// The meaning of an errno of a socket on that interface, with the fix if there is one.
 Problem can_problem(const std::string& interface, int error);
 
-class CanSocket {
+class CanSocket final : public CanMedium {
  public:
-  using Clock = std::chrono::steady_clock;
-  static constexpr std::size_t batch = 64;
+  // On `interface`. With `fd`, CAN FD frames can be sent.
+  CanSocket(std::string interface, bool fd);
+  ~CanSocket() override;
 
-  CanSocket();
-  ~CanSocket();
-  CanSocket(const CanSocket&) = delete;
-  CanSocket& operator=(const CanSocket&) = delete;
-
-  struct Received {
-    CanFrame frame;           // of an error frame, the data hold its details
-    std::uint32_t error = 0;  // the error classes of <linux/can/error.h>; 0 in a data frame
-    bool local = false;       // sent on this computer: it proves nothing about the wire
-    Clock::time_point at;     // when the kernel got it
-  };
-
-  enum class Outcome : std::uint8_t {
-    done,    // everything was taken
-    busy,    // the socket's share of the queue is used up: wait until it is writable
-    full,    // the interface's queue is full: the system does not report when it has room
-    failed,  // with errno
-  };
-
-  // Opens it on `interface`; it hears nothing yet. With `fd`, CAN FD frames can be sent. Throws
-  // Error: unsupported if this kernel has no CAN or there is no such interface, open if the
+  const std::string& name() const override { return name_; }
+  // Throws Error: unsupported if this kernel has no CAN or there is no such interface, open if the
   // interface is down, is not CAN or does not do CAN FD, permission.
-  void open(const std::string& interface, bool fd);
-  void close() noexcept;
-  int number() const { return descriptor_.get(); }
-  // True without a controller and a wire: frames come as fast as programs make them.
-  bool simulated() const { return simulated_; }
-  // True if a CAN FD frame came whose data have a bit rate of their own (BRS).
-  bool heard_rate_switch() const { return heard_rate_switch_; }
-
-  // Hears the frames with exactly these 11-bit ids (the id of the emergency stop includes the stops
-  // with a number), or everything, extended and remote frames too. False, with errno, if the kernel
-  // does not take that; then it hears what it heard before.
-  [[nodiscard]] bool hear(const std::vector<std::uint32_t>& ids);
-  [[nodiscard]] bool hear_everything();
-
-  // Takes up to `batch` frames; returns how many, or -errno (EAGAIN: none is there).
-  int receive(std::array<Received, batch>& frames);
-  // Hands frames over in order. Sets `sent` to the number of frames that were taken.
-  Outcome send(const CanFrame* frames, std::size_t count, std::size_t& sent);
-  // Hands one frame over ahead of everything that waits in the interface's queue.
-  Outcome send_first(const CanFrame& frame);
-
-  // Frames that were lost because the socket's buffer was full, over all openings.
-  std::uint32_t overflows() const { return overflows_before_ + overflows_; }
+  void open() override;
+  void close() noexcept override;
+  int number() const override { return descriptor_.get(); }
+  bool simulated() const override { return simulated_; }
+  bool heard_rate_switch() const override { return heard_rate_switch_; }
+  std::string state() const override;
+  Problem problem(int error) const override;
+  [[nodiscard]] bool hear(const std::vector<std::uint32_t>& ids) override;
+  [[nodiscard]] bool hear_everything() override;
+  int receive(std::array<Received, batch>& frames) override;
+  Outcome send(const CanFrame* frames, std::size_t count, std::size_t& sent) override;
+  Outcome send_first(const CanFrame& frame) override;
+  std::uint32_t overflows() const override { return overflows_before_ + overflows_; }
 
  private:
   struct Inbox;
+  const std::string interface_;
+  const std::string name_;
+  const bool fd_;
   FileDescriptor descriptor_;
   FileDescriptor first_;  // with a priority and a queue of its own
   bool simulated_ = false;

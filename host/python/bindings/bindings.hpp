@@ -2,7 +2,8 @@
 // The module r4link._core: r4::Board for Python, times in milliseconds. What a program uses is in r4link/*.py, on top
 // of it.
 //
-// The thread of the link never takes the GIL; that of the callbacks does, for each of them.
+// The thread of the link never takes the GIL; that of the callbacks does, for each of them, and so does that of a
+// transport in Python.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -10,6 +11,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "enums.hpp"
 #include "r4link/board.hpp"
@@ -39,6 +41,9 @@ BoardOptions options_of(BoardRole role, bool arming, const std::string& fields,
                         const std::optional<std::string>& key, int watch_rate_hz, int heartbeat_ms,
                         int timeout_ms, int command_retry_ms, int stop_retry_ms, int stop_linger_ms,
                         int identify_interval_ms, int callback_limit_ms);
+
+// Of r4link.Transport objects, which they keep.
+std::vector<CarrierMaker> makers_of(const py::list& transports);
 
 // For error_of() of r4link/errors.py.
 py::tuple arguments_of(const Problem& problem);

@@ -9,6 +9,15 @@
 
 namespace r4::python {
 
+// True when no other thread gets the GIL: what is left of the interpreter's objects stays.
+inline bool interpreter_ends() {
+#if PY_VERSION_HEX >= 0x030D0000
+  return Py_IsInitialized() == 0 || Py_IsFinalizing() != 0;
+#else
+  return Py_IsInitialized() == 0 || _Py_IsFinalizing() != 0;
+#endif
+}
+
 // The interpreter's state of a thread that is not its own, kept until the thread ends: making one for each call, with
 // the memory of its first frame, costs more than the call.
 class KeptThreadState {
@@ -18,7 +27,7 @@ class KeptThreadState {
   KeptThreadState& operator=(const KeptThreadState&) = delete;
   ~KeptThreadState() {
     if (!kept_) return;
-    if (Py_IsInitialized() == 0) {  // the interpreter has ended, and taken it along
+    if (interpreter_ends()) {
       static_cast<void>(kept_.release());
       return;
     }
@@ -45,7 +54,7 @@ class Callback {
 
   explicit Callback(py::object function)
       : held_(new Held{std::move(function)}, [](Held* held) {
-          if (!Py_IsInitialized()) return;  // the interpreter has ended: it is gone
+          if (interpreter_ends()) return;
           const py::gil_scoped_acquire gil;
           delete held;
         }) {}

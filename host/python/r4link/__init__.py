@@ -21,6 +21,7 @@ from .errors import (CancelledError, ClosedError, DataError, DeniedError, Error,
 from .fleet import Fleet, FleetEvent, FleetResults
 from .recording import Log, RecordedBoard, RecordedDatagram, RecordedEvent, read
 from .simulation import LinkedUrl, Look, SimBoard, with_link
+from .transport import CanTransport, Transport
 from .values import Bldc, Drive, I2cAnswer, I2cBusReport, I2cReading, UartBytes, UartData
 
 FORWARD = Direction.FORWARD
@@ -28,7 +29,7 @@ REVERSE = Direction.REVERSE
 
 __all__ = [
     'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'BoardRole', 'Bridge', 'BridgeCounters', 'BridgeEnd',
-    'BridgeStatus', 'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'DataError', 'DeniedError',
+    'BridgeStatus', 'CanTransport', 'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'DataError', 'DeniedError',
     'Device', 'DeviceReading', 'DeviceRole', 'Direction', 'DisarmCause', 'Discovery', 'Drive', 'DriveChannel',
     'Error', 'Event', 'EventKind', 'FIELDS', 'FORWARD', 'Fleet', 'FleetEvent', 'FleetEventKind', 'FleetResults',
     'FoundBoard', 'I2c', 'I2cAnswer', 'I2cBusReport', 'I2cOutcome', 'I2cReading', 'Identity', 'LinkCause',
@@ -36,6 +37,6 @@ __all__ = [
     'Outcome', 'PathState', 'PathStatus', 'PostResult', 'Program', 'REVERSE', 'RecordedBoard', 'RecordedDatagram',
     'RecordedEvent', 'Recording', 'Refusal', 'RefusedError', 'RefusedPost', 'RelayChannel', 'SafeReason',
     'SearchedBus', 'SearchedNetwork', 'SearchedPort', 'ServoCalibration', 'ServoChannel', 'Setpoints', 'SimBoard',
-    'State', 'States', 'Statistics', 'StepperChannel', 'Subscription', 'Uart', 'UartBytes', 'UartData',
+    'State', 'States', 'Statistics', 'StepperChannel', 'Subscription', 'Transport', 'Uart', 'UartBytes', 'UartData',
     'UnsupportedError', 'UsageError', 'aio', 'control', 'devices', 'discover', 'read', 'with_link', '__version__',
 ]

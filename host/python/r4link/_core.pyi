@@ -10,6 +10,7 @@ from typing_extensions import Self
 from .enums import (BoardRole, DeviceRole, DisarmCause, EventKind, FleetEventKind, LinkCause, LinkState, LoopEnd, Outcome,
                     PathState, PostResult, Refusal, SafeReason, Word)
 from .errors import Program
+from .transport import Transport
 from .values import Bldc, Drive, I2cAnswer, I2cBusReport, I2cReading, UartBytes, UartData
 
 __version__: str
@@ -618,7 +619,7 @@ class States:
     def missed(self) -> int: ...
 
 class Board:
-    def __init__(self, url: str, *, link: str, role: BoardRole | str, arming: bool, fields: str, key: str | None,
+    def __init__(self, url: str, *, transports: list[Transport], link: str, role: BoardRole | str, arming: bool, fields: str, key: str | None,
                  watch_rate_hz: int, heartbeat: int, timeout: int, command_retry: int, stop_retry: int, stop_linger: int,
                  identify_interval: int, callback_limit: int) -> None: ...
     def close(self) -> None: ...

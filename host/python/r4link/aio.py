@@ -24,6 +24,7 @@ from ._core import Discovery, Identity, State, Subscription
 from .any_board import AnyBoard
 from .channels import _ms
 from .errors import ClosedError
+from .transport import Transport
 from .values import UartData
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
     """r4link.Board for asyncio; takes the same options. A call that does not wait is not a coroutine. Callbacks run on the
     loop of the task that adds them."""
 
-    def __init__(self, url: str | Iterable[str], **options: Any) -> None:
+    def __init__(self, url: str | Transport | Iterable[str] | Iterable[Transport], **options: Any) -> None:
         self._board = blocking.Board(url, **options)
         self._core = self._board._core
         self._calls: Any = _core.Calls(self._core)  # as _core.Board has them, but each returns at once

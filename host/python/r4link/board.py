@@ -19,6 +19,7 @@ from .channels import I2c, Uart, Uarts, _ms
 from .enums import BoardRole
 from .errors import UsageError
 from .events import log_events
+from .transport import Transport
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # since Python 3.11 in typing
@@ -84,6 +85,7 @@ class Board(AnyBoard[None]):
             board.osmc(1).set(0.1)      # the board's own state has confirmed it
 
     Several URLs are paths to the one board (docs/redundancy.md): r4link.Board(['serial:auto', 'udp://192.168.0.125']).
+    In place of URLs it takes a Transport of your own, or several.
 
     `watch_rate_hz`: 1 to 1000 states a second for a program that watches. `heartbeat`: seconds between heartbeats.
     `timeout`: seconds of silence after which the link is lost. `command_retry`, `stop_retry`: seconds after which a command
@@ -92,16 +94,20 @@ class Board(AnyBoard[None]):
     limit.
     """
 
-    def __init__(self, url: str | Iterable[str], *, role: BoardRole | str = BoardRole.CONTROL, arming: bool = True,
+    def __init__(self, url: str | Transport | Iterable[str] | Iterable[Transport], *, role: BoardRole | str = BoardRole.CONTROL, arming: bool = True,
                  fields: str = 'DEFAULT', key: str | os.PathLike[str] | None = None, watch_rate_hz: int = 100,
                  heartbeat: float = 0.1, timeout: float = 1.0, command_retry: float = 0.05, stop_retry: float = 0.02,
                  stop_linger: float = 0.2, identify_interval: float = 1.0, callback_limit: float = 0.5) -> None:
-        paths = [url] if isinstance(url, str) else list(url)
-        link = next((bad for bad in (getattr(each, 'link', '') for each in paths) if bad), '')
+        paths = [url] if isinstance(url, (str, Transport)) else list(url)
+        own = [each for each in paths if isinstance(each, Transport)]
+        urls = [each for each in paths if isinstance(each, str)]
+        if len(own) != len(paths) and own:
+            raise UsageError('URLs and transports for one board', 'it takes either', 'give URLs only, or transports only')
+        link = next((bad for bad in (getattr(each, 'link', '') for each in urls) if bad), '')
         if link and (len(paths) > 1):
             raise UsageError(f'a bad link {link}', 'it is for a board of one path', 'open that URL alone')
         self._core = _core.Board(
-            '+'.join(paths), link=link, role=role, arming=arming, fields=fields,
+            '+'.join(urls), transports=own, link=link, role=role, arming=arming, fields=fields,
             key=None if key is None else os.path.expanduser(os.fspath(key)),
             watch_rate_hz=watch_rate_hz, heartbeat=_ms(heartbeat), timeout=_ms(timeout),
             command_retry=_ms(command_retry), stop_retry=_ms(stop_retry), stop_linger=_ms(stop_linger),

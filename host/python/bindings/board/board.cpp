@@ -100,20 +100,22 @@ void bind_board(py::module_& module) {
       .def_property_readonly("missed", [](const PyStates& states) { return states->missed(); });
 
   py::class_<PyBoard>(module, "Board", py::custom_type_setup(collect_garbage))
-      .def(py::init([](const std::string& url, const std::string& link, BoardRole role, bool arming,
-                       const std::string& fields, const std::optional<std::string>& key,
-                       int watch_rate_hz, int heartbeat, int timeout, int command_retry,
-                       int stop_retry, int stop_linger, int identify_interval, int callback_limit) {
+      .def(py::init([](const std::string& url, const py::list& transports, const std::string& link,
+                       BoardRole role, bool arming, const std::string& fields,
+                       const std::optional<std::string>& key, int watch_rate_hz, int heartbeat,
+                       int timeout, int command_retry, int stop_retry, int stop_linger,
+                       int identify_interval, int callback_limit) {
              return std::make_unique<PyBoard>(
-                 url, link,
+                 url, makers_of(transports), link,
                  options_of(role, arming, fields, key, watch_rate_hz, heartbeat, timeout,
                             command_retry, stop_retry, stop_linger, identify_interval,
                             callback_limit));
            }),
-           py::arg("url"), py::kw_only(), py::arg("link"), py::arg("role"), py::arg("arming"),
-           py::arg("fields"), py::arg("key"), py::arg("watch_rate_hz"), py::arg("heartbeat"),
-           py::arg("timeout"), py::arg("command_retry"), py::arg("stop_retry"),
-           py::arg("stop_linger"), py::arg("identify_interval"), py::arg("callback_limit"))
+           py::arg("url"), py::kw_only(), py::arg("transports"), py::arg("link"), py::arg("role"),
+           py::arg("arming"), py::arg("fields"), py::arg("key"), py::arg("watch_rate_hz"),
+           py::arg("heartbeat"), py::arg("timeout"), py::arg("command_retry"),
+           py::arg("stop_retry"), py::arg("stop_linger"), py::arg("identify_interval"),
+           py::arg("callback_limit"))
       .def("close", &PyBoard::close, Released())
       .def("role", [](PyBoard& board) { return board->role(); })
       .def(

@@ -21,10 +21,15 @@ using Released = py::call_guard<py::gil_scoped_release>;
 
 class PyBoard {
  public:
-  // `link`: what is wrong with it (sim::with_link()); "": nothing.
-  PyBoard(const std::string& url, const std::string& link, BoardOptions options) {
+  // `link`: the faults of its link (sim::with_link()), or "". With `transports` it is opened on those.
+  PyBoard(const std::string& url, const std::vector<CarrierMaker>& transports,
+          const std::string& link, BoardOptions options) {
     options.on_wait = on_wait;
     const py::gil_scoped_release free;
+    if (!transports.empty()) {
+      board_.emplace("the board", std::make_unique<Board>(transports, std::move(options)));
+      return;
+    }
     board_.emplace("the board", link.empty() ? std::make_unique<Board>(url, std::move(options))
                                              : std::make_unique<Board>(sim::with_link(url, link),
                                                                        std::move(options)));

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cerrno>
+#include <cstring>
+#include <string>
 #include <system_error>
 #include <type_traits>
 #include <utility>
@@ -69,10 +71,16 @@ void ModelledController::pump() {
 
 struct CanSocket::Inbox {};
 
-CanSocket::CanSocket() = default;
+CanSocket::CanSocket(std::string interface, bool fd)
+    : interface_(std::move(interface)), name_("can://" + interface_), fd_(fd) {}
 CanSocket::~CanSocket() = default;
 
-void CanSocket::open(const std::string&, bool) {
+std::string CanSocket::state() const { return ""; }
+Problem CanSocket::problem(int error) const {
+  return {ErrorKind::open, name_, std::strerror(error), ""};
+}
+
+void CanSocket::open() {
   auto [first, first_of_kernel] = test::make_socket();
   auto [rest, rest_of_kernel] = test::make_socket();
   first_ = std::move(first);

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "tests/transports/can/kernel/can_bus_fixture.hpp"
+#include "transports/can/can_socket.hpp"
 
 namespace r4::test {
 namespace {
@@ -166,7 +167,7 @@ TEST_F(CanBusTest, AHostThatOpensInsideAnEventIsToldOfItOnce) {
 
 // Netlink fails here because the process has no free descriptor.
 TEST_F(CanBusTest, AnInterfaceOfWhichTheSystemTellsNothingIsNotSaidToBeMissing) {
-  r4::CanSocket socket;
+  r4::CanSocket socket(near_end, false);
   rlimit before{};
   ASSERT_EQ(0, ::getrlimit(RLIMIT_NOFILE, &before));
   const int next = ::dup(STDIN_FILENO);
@@ -174,13 +175,13 @@ TEST_F(CanBusTest, AnInterfaceOfWhichTheSystemTellsNothingIsNotSaidToBeMissing) 
   ::close(next);
   const rlimit one{static_cast<rlim_t>(next) + 1, before.rlim_max};
   ASSERT_EQ(0, ::setrlimit(RLIMIT_NOFILE, &one));
-  const auto refused = error_of([&] { socket.open(near_end, false); });
+  const auto refused = error_of([&] { socket.open(); });
   ASSERT_EQ(0, ::setrlimit(RLIMIT_NOFILE, &before));
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->problem().reason.find("the system does not tell about it"), 0U)
       << refused->what();
   EXPECT_NE(refused->problem().fix.find("AF_NETLINK"), std::string::npos) << refused->what();
-  EXPECT_NO_THROW(socket.open(near_end, false));
+  EXPECT_NO_THROW(socket.open());
 }
 
 // The kernel refuses more ids than it has filters for.

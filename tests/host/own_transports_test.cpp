@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Boards on transports of a program's own whose calls may wait (r4link/transports/own_transport.hpp).
+#include <gtest/gtest.h>
+
+#include <asio/executor_work_guard.hpp>
+#include <asio/io_context.hpp>
+#include <asio/post.hpp>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "firmware/ports/sim/simulated_board.hpp"
+#include "host/board_loop.hpp"
+#include "r4link/board.hpp"
+#include "r4link/transports/own_transport.hpp"
+#include "tests/support/at_will.hpp"
+#include "tests/support/first.hpp"
+#include "transports/framing/can/can_ids.hpp"
+#include "transports/own/own_carriers.hpp"
+
+namespace r4::test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+// What both ends of a transport in memory have: whom to hand over what the other end sends, and faults.
+template <class Received>
+class End {
+ public:
+  void begin(Received received) {
+    const std::lock_guard lock(mutex_);
+    if (opens) throw std::runtime_error("no modem");
+    received_ = std::move(received);
+    ++openings;
+  }
+  void finish() {
+    const std::lock_guard lock(mutex_);
+    received_ = nullptr;
+    ++closings;
+  }
+  template <class... Parts>
+  void hand_over(Parts... parts) {
+    const std::lock_guard lock(mutex_);
+    if (received_) received_(parts...);
+  }
+  void may_throw() const {
+    if (fails) throw std::runtime_error("the modem is gone");
+  }
+
+  std::atomic<bool> opens{false};  // throws
+  std::atomic<bool> fails{false};
+  std::atomic<int> openings{0};
+  std::atomic<int> closings{0};
+
+ private:
+  std::mutex mutex_;
+  Received received_;
+};
+
+struct Modem final : OwnTransport, End<OwnTransport::Received> {
+  std::string name() const override { return "modem"; }
+  void open(OwnTransport::Received received) override { begin(std::move(received)); }
+  void send(std::string_view datagram) override {
+    may_throw();
+    if (hold) return std::this_thread::sleep_for(seconds(3));
+    if (other != nullptr) other->hand_over(datagram);
+  }
+  void close() override { finish(); }
+
+  std::atomic<bool> hold{false};
+  Modem* other = nullptr;
+};
+
+struct Frame {
+  std::uint32_t id;
+  bool extended;
+};
+
+struct Adapter final : OwnCanBus, End<OwnCanBus::Received> {
+  std::string name() const override { return "adapter"; }
+  void open(OwnCanBus::Received received) override { begin(std::move(received)); }
+  void send(std::uint32_t id, bool extended, bool fd, std::string_view data) override {
+    may_throw();
+    {
+      const std::lock_guard lock(mutex);
+      frames.push_back({id, extended});
+    }
+    if (other != nullptr) other->hand_over(id, extended, fd, data);
+  }
+  void close() override { finish(); }
+
+  bool has_sent(std::uint32_t id, bool extended) {
+    const std::lock_guard lock(mutex);
+    for (const Frame& each : frames) {
+      if (each.extended == extended && each.id == id) return true;
+    }
+    return false;
+  }
+
+  std::mutex mutex;
+  std::vector<Frame> frames;
+  Adapter* other = nullptr;
+};
+
+// A simulated board on a thread of its own, on the carrier that `make(io, loop)` makes.
+class SimulatedEnd {
+ public:
+  template <class Make>
+  explicit SimulatedEnd(Make make) {
+    board_ = std::make_unique<sim::SimulatedBoard>(io_, sim::SimulatedBoard::Options());
+    board_->add_carrier(make(io_, loop_));
+    board_->start();
+    thread_ = std::thread([this] { io_.run(); });
+  }
+  ~SimulatedEnd() {
+    asio::post(io_, [this] {
+      board_.reset();
+      work_.reset();
+    });
+    thread_.join();
+  }
+  SimulatedEnd(const SimulatedEnd&) = delete;
+  SimulatedEnd& operator=(const SimulatedEnd&) = delete;
+
+ private:
+  asio::io_context io_;
+  asio::executor_work_guard<asio::io_context::executor_type> work_ = asio::make_work_guard(io_);
+  BoardLoop loop_{io_};
+  std::unique_ptr<sim::SimulatedBoard> board_;
+  std::thread thread_;
+};
+
+template <class Own>
+struct Pair {
+  Pair() {
+    here->other = there.get();
+    there->other = here.get();
+  }
+  std::shared_ptr<Own> here = std::make_shared<Own>();
+  std::shared_ptr<Own> there = std::make_shared<Own>();
+};
+
+struct ModemBench : Pair<Modem> {
+  SimulatedEnd board{
+      [this](asio::io_context&, Loop& loop) { return make_own_carrier(loop, there); }};
+};
+struct CanBench : Pair<Adapter> {
+  explicit CanBench(OwnCanNode node = {}) : is(node) {}
+  OwnCanNode is;
+  SimulatedEnd board{[this](asio::io_context& io, Loop&) {
+    return make_own_can_carrier(io, there, is, Role::board);
+  }};
+};
+
+template <class Condition>
+bool comes(Condition condition) {
+  const auto deadline = std::chrono::steady_clock::now() + seconds(5);
+  while (!condition() && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(milliseconds(2));
+  }
+  return condition();
+}
+
+TEST(OwnTransports, CarryABoardThatIsDrivenAndStopped) {
+  ModemBench bench;
+  {
+    Board board(carrier_on(bench.here), at_will());
+    board.wait_active();
+    EXPECT_EQ(board.name(), "modem");
+    EXPECT_NO_THROW(board.send("O:358,1,1"));
+    EXPECT_NO_THROW(board.stop());
+    EXPECT_GT(board.carrier_counters().tx_datagrams, 2U);
+    EXPECT_GT(board.carrier_counters().rx_datagrams, 2U);
+  }
+  EXPECT_EQ(bench.here->closings, 1);
+}
+
+TEST(OwnTransports, WhatTheFirstOpenThrowsIsThrownWhereTheBoardIsOpened) {
+  const auto modem = std::make_shared<Modem>();
+  modem->opens = true;
+  try {
+    const Board board(carrier_on(modem));
+    ADD_FAILURE() << "it is open";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.problem().thing, "modem");
+    EXPECT_EQ(error.problem().reason, "no modem");
+  }
+  EXPECT_EQ(modem->closings, 0);
+}
+
+TEST(OwnTransports, ASendThatThrowsIsDownUntilItCanBeOpenedAgain) {
+  ModemBench bench;
+  const First<std::string> down;
+  BoardCallbacks callbacks;
+  callbacks.on_event = [down](const CarrierEvent& event) {
+    if (event.kind == CarrierEvent::Kind::down) down.set(event.problem.reason);
+  };
+  Board board(carrier_on(bench.here), at_will(), callbacks);
+  board.wait_active();
+  bench.here->opens = true;
+  bench.here->fails = true;
+  EXPECT_EQ(down.get(), "the modem is gone");
+  ASSERT_TRUE(comes([&] { return board.link().state != HostLinkState::active; }));
+  bench.here->fails = false;
+  bench.here->opens = false;
+  board.wait_active(seconds(5));
+  EXPECT_EQ(bench.here->openings, 2);
+  EXPECT_EQ(bench.here->closings, 1);
+}
+
+TEST(OwnTransports, ASendThatDoesNotReturnHoldsUpNothingElse) {
+  ModemBench bench;
+  std::optional<Board> board(std::in_place, carrier_on(bench.here), at_will());
+  board->wait_active();
+  bench.here->hold = true;
+  const auto before = std::chrono::steady_clock::now();
+  EXPECT_THROW(board->send("O:358,1,1", milliseconds(50)), Error);
+  EXPECT_LT(std::chrono::steady_clock::now() - before, seconds(1));
+  board.reset();
+  EXPECT_LT(std::chrono::steady_clock::now() - before, milliseconds(2500));
+}
+
+TEST(OwnTransports, ADatagramThatIsTooLongIsRefusedWhereItIsHandedOver) {
+  ModemBench bench;
+  const Board board(carrier_on(bench.here), at_will());
+  EXPECT_THROW(bench.here->hand_over(std::string(max_datagram + 1, 'x')), Error);
+  EXPECT_NO_THROW(bench.here->hand_over(std::string(max_datagram, '\0')));
+}
+
+TEST(OwnTransports, ACanBusCarriesANodeAndItsEmergencyStop) {
+  for (const bool fd : {false, true}) {
+    CanBench bench({.node = 3, .fd = fd});
+    Board board(carrier_on(bench.here, {.node = 3, .fd = fd}), at_will());
+    board.wait_active(seconds(5));
+    EXPECT_EQ(board.name(), "adapter, node 3");
+    EXPECT_NO_THROW(board.send("O:358,1,1"));
+    EXPECT_TRUE(bench.here->has_sent(command_id(3), false));
+    EXPECT_NO_THROW(board.stop());
+    EXPECT_TRUE(bench.here->has_sent(emergency_stop_id, false));
+    EXPECT_GT(board.carrier_counters().transfers->packed, 0U);
+  }
+}
+
+TEST(OwnTransports, ACanBusThatFailsIsDownUntilItCanBeOpenedAgain) {
+  CanBench bench;
+  const First<std::string> down;
+  BoardCallbacks callbacks;
+  callbacks.on_event = [down](const CarrierEvent& event) {
+    if (event.kind == CarrierEvent::Kind::down) down.set(event.problem.reason);
+  };
+  Board board(carrier_on(bench.here), at_will(), callbacks);
+  board.wait_active(seconds(5));
+  bench.here->opens = true;
+  bench.here->fails = true;
+  EXPECT_EQ(down.get(), "the modem is gone");
+  ASSERT_TRUE(comes([&] { return board.link().state != HostLinkState::active; }));
+  bench.here->fails = false;
+  bench.here->opens = false;
+  board.wait_active(seconds(5));
+  EXPECT_NO_THROW(board.send("O:358,1,1"));
+  EXPECT_EQ(bench.here->openings, 2);
+}
+
+TEST(OwnTransports, ACanFrameThatIsTooLongAndANodeOutOfRangeAreRefused) {
+  CanBench bench;
+  const Board board(carrier_on(bench.here), at_will());
+  const std::string nine(9, 'x');
+  EXPECT_THROW(bench.here->hand_over(1U, false, false, std::string_view(nine)), Error);
+  EXPECT_NO_THROW(bench.here->hand_over(1U, false, true, std::string_view(nine)));
+  EXPECT_THROW(Board(carrier_on(std::make_shared<Adapter>(), {.node = 32})), Error);
+}
+
+}  // namespace
+}  // namespace r4::test

@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Transports of a program's own: r4link.Transport and r4link.CanTransport (docs/python.md)."""
+import asyncio
+import gc
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+import weakref
+
+import can
+import pytest
+
+import r4link
+import can_python  # of tests/integration: conftest.py
+
+
+class Forward(r4link.Transport):
+    """To a board on UDP."""
+
+    def __init__(self, url):
+        self.address = url.split('//')[1].split('?')[0].split(':')
+        self.failure = None
+        self.closings = 0
+
+    def open(self):
+        if self.failure:
+            raise self.failure
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.connect((self.address[0], int(self.address[1])))
+        self.reader = threading.Thread(target=self.read)
+        self.reader.start()
+
+    def send(self, datagram):
+        if self.failure:
+            raise self.failure
+        assert isinstance(datagram, bytes)
+        self.socket.send(datagram)
+
+    def close(self):
+        self.closings += 1
+        self.socket.shutdown(socket.SHUT_RDWR)
+        self.reader.join()
+        self.socket.close()
+
+    def read(self):
+        while datagram := self.socket.recv(1024):
+            self.received(datagram)
+
+
+@pytest.fixture(name='forward')
+def to_a_simulated_board():
+    with r4link.SimBoard('udp://127.0.0.1:0') as simulated:
+        yield Forward(simulated.url)
+
+
+class Silent(r4link.Transport):
+    """Nobody is at its other end."""
+
+    def send(self, datagram):
+        pass
+
+
+def test_it_carries_a_board_that_is_driven_and_stopped(forward):
+    with r4link.Board(forward) as board:
+        board.wait_active()
+        assert board.name == 'Forward'
+        board.arm()
+        board.osmc(1).set_pwm(358)
+        board.stop()
+        counters = board.carrier_counters
+        assert counters.tx_datagrams > 2 and counters.rx_datagrams > 2 and counters.ups == 1
+        assert forward.closings == 0
+    assert forward.closings == 1
+
+
+def test_it_is_one_of_several_paths(forward):
+    with r4link.Board([forward, Silent()]) as board:
+        board.wait_active()
+        assert [path.name for path in board.paths] == ['Forward', 'Silent']
+    with pytest.raises(r4link.UsageError, match='transports only'):
+        r4link.Board([forward, 'sim:'])
+
+
+def test_what_the_first_open_raises_is_raised_where_the_board_is_opened(forward):
+    forward.failure = ValueError('no modem')
+    with pytest.raises(r4link.OpenError) as raised:
+        r4link.Board(forward)
+    assert raised.value.thing == 'Forward' and raised.value.reason == 'it raised ValueError: no modem'
+    assert forward.closings == 0
+    forward.failure = None
+    with r4link.Board(forward) as board:
+        board.wait_active()
+
+
+def test_a_class_without_send_says_so(wait):
+    events = []
+    with r4link.Board(r4link.Transport()) as board:
+        board.on_event(events.append)
+        wait(lambda: any('Transport has no send()' in event.reason for event in events))
+
+
+def test_a_send_that_raises_is_an_event_and_it_comes_back(forward, wait):
+    events = []
+    with r4link.Board(forward) as board:
+        board.on_event(events.append)
+        board.wait_active()
+        forward.failure = OSError(19, 'No such device')
+        wait(lambda: any(event.kind is r4link.EventKind.DOWN for event in events))
+        assert events[-1].reason == 'it raised OSError: [Errno 19] No such device'
+        wait(lambda: board.link.state is not r4link.LinkState.ACTIVE)
+        forward.failure = None
+        board.wait_active(5)
+    assert forward.closings == 2
+
+
+def test_any_bytes_are_received_from_any_thread_and_none_is_too_long(wait):
+    transport = Silent()
+    transport.received(b'nobody listens')
+    with r4link.Board(transport) as board:
+        threads = [threading.Thread(target=lambda: [transport.received(os.urandom(100)) for _ in range(100)])
+                   for _ in range(4)]
+        for each in threads:
+            each.start()
+        for each in threads:
+            each.join()
+        wait(lambda: board.carrier_counters.rx_datagrams + board.carrier_counters.rx_overflows == 400)
+        transport.received(bytearray(1024))
+        with pytest.raises(r4link.UsageError, match='1025 bytes'):
+            transport.received(bytes(1025))
+        for wrong in ('text', 5, None):
+            with pytest.raises(TypeError):
+                transport.received(wrong)
+    transport.received(b'nobody listens')
+
+
+def test_an_object_serves_one_board_at_a_time():
+    transport = Silent()
+    with r4link.Board(transport):
+        with pytest.raises(r4link.OpenError, match='another board'):
+            r4link.Board(transport)
+    r4link.Board(transport).close()
+
+
+def test_a_board_that_is_collected_closes_it(forward):
+    board = r4link.Board(forward)
+    board.wait_active()
+    gone = weakref.ref(board)
+    del board
+    gc.collect()
+    assert gone() is None and forward.closings == 1
+
+
+@pytest.mark.parametrize('method', ['send', 'close'])
+def test_its_methods_may_close_the_board(method):
+    closed = threading.Event()
+    opened = threading.Event()
+
+    class Closes(Silent):
+        def act(self, *_):
+            opened.wait(10)
+            board.close()
+            closed.set()
+
+    setattr(Closes, method, Closes.act)
+    board = r4link.Board(Closes())
+    opened.set()
+    if method == 'close':
+        board.close()
+    assert closed.wait(10)
+
+
+def test_a_send_that_waits_holds_up_neither_calls_nor_close():
+    class Waits(Silent):
+        def send(self, datagram):
+            time.sleep(2)
+
+    board = r4link.Board(Waits())
+    before = time.monotonic()
+    board.post(r4link.Command.stop())
+    time.sleep(0.1)
+    assert board.link.state is r4link.LinkState.CONNECTING
+    board.close()
+    assert time.monotonic() - before < 1.8
+
+
+@pytest.mark.parametrize('send', ['pass', 'raise OSError("gone")', 'time.sleep(0.3)', 'board.stop_async()'])
+def test_the_interpreter_may_end_with_it_open(send):
+    program = f"""
+import sys, threading, time, r4link
+class Own(r4link.Transport):
+    def open(self):
+        threading.Thread(target=self.read, daemon=True).start()
+    def send(self, datagram):
+        {send}
+    def read(self):
+        while True:
+            self.received(bytes(10))
+board = r4link.Board(Own())
+time.sleep(0.05)
+"""
+    ended = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, timeout=30, check=False)
+    assert (ended.returncode, ended.stderr) == (0, '')
+
+
+def test_asyncio_has_it(forward):
+    async def drive():
+        async with r4link.aio.Board(forward) as board:
+            await board.wait_active()
+            await board.arm()
+            await board.osmc(1).set(0.1)
+
+    asyncio.run(drive())
+
+
+# --- CAN: a bus of python-can in this process, with the board of the integration tests at its other end
+
+
+@pytest.fixture(name='bus')
+def a_bus(request):
+    with can.Bus(interface='virtual', channel=request.node.name) as bus:
+        yield bus
+
+
+@pytest.fixture(name='can_board')
+def a_board_on_the_bus(request):
+    with can_python.Board(can.Bus(interface='virtual', channel=request.node.name), 3) as board:
+        yield board
+
+
+def test_a_can_bus_carries_a_node(bus, can_board):
+    with r4link.Board(r4link.CanTransport(bus, node=3), arming=False) as board:
+        board.wait_active(5)
+        assert board.name.endswith(', node 3')
+        board.osmc(1).set_pwm(358)
+        assert can_board.osmc == '358,1'
+        board.stop()
+        assert can_board.stops > 0 and can_board.heard_packed
+    bus.send(can.Message())  # it is still open
+
+
+def test_a_full_queue_of_a_can_bus_is_waited_for(bus, can_board, monkeypatch):
+    refusals = [can.CanOperationError('Transmit buffer full')] * 3
+    send = bus.send
+
+    def refuse(message, timeout):
+        assert 0 < timeout < 1
+        if refusals:
+            raise refusals.pop()
+        send(message, timeout)
+
+    monkeypatch.setattr(bus, 'send', refuse)
+    with r4link.Board(r4link.CanTransport(bus, node=3)) as board:
+        board.wait_active(5)
+        assert board.carrier_counters.downs == 0 and not refusals and can_board.osmc
+
+
+@pytest.mark.parametrize('method', ['send', 'recv'])
+def test_a_can_bus_that_fails_is_down_and_comes_back(bus, wait, monkeypatch, method):
+    def fail(*_, **__):
+        raise OSError('adapter unplugged')
+
+    events = []
+    with r4link.Board(r4link.CanTransport(bus)) as board:
+        board.on_event(events.append)
+        with monkeypatch.context() as unplugged:
+            unplugged.setattr(bus, method, fail)
+            wait(lambda: any(event.kind is r4link.EventKind.DOWN for event in events))
+            assert events[-1].reason == 'it raised OSError: adapter unplugged'
+        wait(lambda: events[-1].kind is r4link.EventKind.UP)
+
+
+@pytest.mark.parametrize('node', [-1, 32])
+def test_a_node_out_of_range_is_refused(bus, node):
+    with pytest.raises(r4link.UsageError, match='0 to 31'):
+        r4link.Board(r4link.CanTransport(bus, node=node))

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Between a transport of a program's own, whose calls may wait, and the loop of a link: the thread
+// that makes the calls, what waits to be sent, and what has come.
+//
+//                     open() returns           a call throws
+//     opening ──────────────────────────▶ up ───────────────▶ down
+//        │ it throws                      │ ▲  open() returns   │
+//        ▼               end()            ▼ └───────────────────┤ five times a second
+//      ended ◀──────────────────────────────────────────────────┘
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "r4link/carrier.hpp"
+
+namespace r4 {
+
+// `Own` has open(received), send(item) and close(), which may throw. `Outbox` has
+//
+//     Item                              what is sent and received, one at a time
+//     std::optional<Item> next(Time)    takes what to send next
+//     void clear()
+template <class Own, class Outbox>
+class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
+ public:
+  using Clock = std::chrono::steady_clock;
+  using Item = typename Outbox::Item;
+  static constexpr std::size_t most_received = 1024;
+  static constexpr std::chrono::milliseconds pause{200};  // between two attempts to open it
+  static constexpr std::chrono::seconds end_patience{1};
+
+  // `news()`: something has come, or it went up or down. On any thread, under the lock.
+  Exchange(std::string name, std::unique_ptr<Own> own, std::unique_ptr<Outbox> outbox,
+           std::function<void()> news)
+      : name_(std::move(name)),
+        own_(std::move(own)),
+        outbox_(std::move(outbox)),
+        news_(std::move(news)) {}
+
+  // --- on the loop
+
+  // Opens it, for which it waits. Throws Error.
+  void start() {
+    std::unique_lock lock(mutex_);
+    thread_ = std::thread([self = this->shared_from_this()] { self->run(); });
+    changed_.wait(lock, [this] { return state_ != State::opening; });
+    if (state_ == State::ended) throw Error(problem_);
+  }
+  // Sends what waits and closes it. A call that does not return is left to its thread.
+  void end() noexcept {
+    if (!thread_.joinable()) return;
+    std::unique_lock lock(mutex_);
+    ending_ = true;
+    news_ = nullptr;
+    changed_.notify_all();
+    const bool ended =
+        changed_.wait_for(lock, end_patience, [this] { return state_ == State::ended; });
+    lock.unlock();
+    ended ? thread_.join() : thread_.detach();
+  }
+  // Calls `put(outbox)` if it is up. True if it was.
+  template <class Put>
+  bool send(Put put) {
+    const std::lock_guard lock(mutex_);
+    if (state_ != State::up) return false;
+    put(*outbox_);
+    changed_.notify_all();
+    return true;
+  }
+  // What has come since the last call, oldest first.
+  std::vector<Item> take() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(inbox_, {});
+  }
+  bool up() const {
+    const std::lock_guard lock(mutex_);
+    return state_ == State::up;
+  }
+  // Why it is down.
+  Problem problem() const {
+    const std::lock_guard lock(mutex_);
+    return problem_;
+  }
+  std::uint64_t sent() const {
+    const std::lock_guard lock(mutex_);
+    return sent_;
+  }
+  // Of what has come, found no room.
+  std::uint64_t overflows() const {
+    const std::lock_guard lock(mutex_);
+    return overflows_;
+  }
+
+  // --- on any thread
+
+  void received(Item item) {
+    const std::lock_guard lock(mutex_);
+    if (ending_) return;
+    if (inbox_.size() == most_received) {
+      ++overflows_;
+      return;
+    }
+    inbox_.push_back(std::move(item));
+    if (inbox_.size() == 1) news_();
+  }
+
+ private:
+  enum class State : std::uint8_t { opening, up, down, ended };
+
+  void run() {
+    std::unique_lock lock(mutex_);
+    bool opened = call(lock, [this] { open(); });
+    if (opened) change(State::up);
+    while (opened && !(ending_ && state_ == State::down)) {
+      if (state_ == State::down) {
+        if (changed_.wait_for(lock, pause, [this] { return ending_; })) break;
+        if (!call(lock, [this] { open(); })) continue;
+        outbox_->clear();
+        change(State::up);
+      } else if (std::optional<Item> item = outbox_->next(Clock::now())) {
+        if (call(lock, [&] { own_->send(*item); })) {
+          ++sent_;
+          continue;
+        }
+        change(State::down);
+        const Problem why = problem_;
+        call(lock, [this] { own_->close(); });
+        problem_ = why;
+      } else if (ending_) {
+        call(lock, [this] { own_->close(); });
+        break;
+      } else {
+        changed_.wait(lock);
+      }
+    }
+    change(State::ended);
+  }
+  void open() {
+    own_->open([weak = this->weak_from_this()](Item item) {
+      if (const auto self = weak.lock()) self->received(std::move(item));
+    });
+  }
+  // Without the lock. False if it throws.
+  template <class Function>
+  bool call(std::unique_lock<std::mutex>& lock, Function function) {
+    lock.unlock();
+    std::optional<Problem> thrown;
+    try {
+      function();
+    } catch (const Error& error) {
+      thrown = error.problem();
+    } catch (const std::exception& error) {
+      thrown = Problem{ErrorKind::open, name_, error.what(), ""};
+    }
+    lock.lock();
+    if (thrown) problem_ = std::move(*thrown);
+    return !thrown;
+  }
+  void change(State state) {
+    state_ = state;
+    changed_.notify_all();
+    if (news_) news_();
+  }
+
+  const std::string name_;
+  const std::unique_ptr<Own> own_;
+  const std::unique_ptr<Outbox> outbox_;
+  mutable std::mutex mutex_;  // what follows, and the outbox
+  std::function<void()> news_;
+  std::condition_variable changed_;
+  State state_ = State::opening;
+  bool ending_ = false;
+  Problem problem_{ErrorKind::open, "", "", ""};
+  std::vector<Item> inbox_;
+  std::uint64_t sent_ = 0;
+  std::uint64_t overflows_ = 0;
+  std::thread thread_;
+};
+
+}  // namespace r4

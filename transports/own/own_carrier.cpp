@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "../send_queue.hpp"
+#include "exchange.hpp"
+#include "own_carriers.hpp"
+#include "r4link/datagram.hpp"
+
+namespace r4 {
+namespace {
+
+constexpr std::size_t normal_entries = 32;
+constexpr std::size_t state_entries = 1;  // newest wins
+
+struct Outbox {
+  using Item = std::string;
+  std::optional<Item> next(SendQueue::Time now) {
+    const SendQueue::Entry* const entry = queue.front(now);
+    if (entry == nullptr) return std::nullopt;
+    Item item(entry->text());
+    queue.pop();
+    return item;
+  }
+  void clear() { queue.clear(); }
+
+  std::uint64_t dropped = 0;
+  SendQueue queue{normal_entries, state_entries, dropped};
+};
+
+struct Calls {
+  template <class Received>
+  void open(Received received) {
+    transport->open([received = std::move(received)](std::string_view datagram) {
+      if (datagram.size() > max_datagram) {
+        throw Error(ErrorKind::usage, fmt::format("a datagram of {} bytes", datagram.size()),
+                    fmt::format("it is longer than {} bytes", max_datagram),
+                    "hand over one whole datagram at a time");
+      }
+      received(std::string(datagram));
+    });
+  }
+  void send(const std::string& datagram) { transport->send(datagram); }
+  void close() { transport->close(); }
+
+  std::shared_ptr<OwnTransport> transport;
+};
+
+class OwnCarrier final : public Carrier {
+ public:
+  OwnCarrier(Loop& loop, std::shared_ptr<OwnTransport> transport)
+      : loop_(loop), transport_(std::move(transport)), name_(transport_->name()) {}
+  ~OwnCarrier() override { close(); }
+
+  void open(Handler& handler) override {
+    close();
+    handler_ = &handler;
+    opening_ = std::make_shared<int>();
+    exchange_ = std::make_shared<Exchange<Calls, Outbox>>(
+        name_, std::make_unique<Calls>(Calls{transport_}), std::make_unique<Outbox>(),
+        [this, weak = std::weak_ptr<int>(opening_)] {
+          loop_.post([this, weak] {
+            if (!weak.expired()) take();
+          });
+        });
+    try {
+      exchange_->start();
+    } catch (...) {
+      close();
+      throw;
+    }
+    report();
+  }
+  void close() noexcept override {
+    handler_ = nullptr;
+    opening_.reset();
+    reported_up_ = false;
+    if (!exchange_) return;
+    exchange_->end();
+    counters();
+    before_ = counters_;
+    exchange_.reset();
+  }
+  SendResult send(std::string_view bytes, Priority priority, Peer) override {
+    if (bytes.size() > max_datagram) {
+      ++before_.tx_errors;
+      return SendResult::full;
+    }
+    SendResult result = SendResult::down;
+    if (!reported_up_) return result;
+    exchange_->send([&](Outbox& outbox) {
+      result = outbox.queue.push(bytes, priority, everyone, SendQueue::Time::clock::now());
+      dropped_ = outbox.dropped;
+    });
+    if (result == SendResult::sent) before_.tx_bytes += bytes.size();
+    return result;
+  }
+  bool up() const override { return reported_up_; }
+  const std::string& name() const override { return name_; }
+  const CarrierCounters& counters() const override {
+    counters_ = before_;
+    if (!exchange_) return counters_;
+    counters_.tx_datagrams += exchange_->sent();
+    counters_.tx_dropped += dropped_;
+    counters_.rx_overflows += exchange_->overflows();
+    return counters_;
+  }
+
+ private:
+  void take() {
+    const std::weak_ptr<int> opening = opening_;
+    report();
+    if (opening.expired()) return;
+    for (const std::string& datagram : exchange_->take()) {
+      ++before_.rx_datagrams;
+      before_.rx_bytes += datagram.size();
+      handler_->on_datagram(datagram, everyone);
+      if (opening.expired()) return;
+    }
+    handler_->on_drained();
+  }
+  void report() {
+    const bool is_up = exchange_->up();
+    if (is_up == reported_up_) return;
+    reported_up_ = is_up;
+    ++(is_up ? before_.ups : before_.downs);
+    Problem problem = is_up ? Problem{} : exchange_->problem();
+    problem.thing = name_;
+    handler_->on_carrier_event(
+        {is_up ? CarrierEvent::Kind::up : CarrierEvent::Kind::down, std::move(problem)});
+  }
+
+  Loop& loop_;
+  const std::shared_ptr<OwnTransport> transport_;
+  const std::string name_;
+  Handler* handler_ = nullptr;
+  std::shared_ptr<int> opening_;  // null: closed
+  std::shared_ptr<Exchange<Calls, Outbox>> exchange_;
+  bool reported_up_ = false;
+  std::uint64_t dropped_ = 0;         // by the outbox of this opening
+  CarrierCounters before_;            // all but what the exchange counts
+  mutable CarrierCounters counters_;  // the sum
+};
+
+}  // namespace
+
+std::unique_ptr<Carrier> make_own_carrier(Loop& loop, std::shared_ptr<OwnTransport> transport) {
+  return std::make_unique<OwnCarrier>(loop, std::move(transport));
+}
+
+}  // namespace r4
