@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "protocol/messages/settings.hpp"
 #include "r4link/datagram.hpp"
 #include "r4link/key.hpp"
 #include "r4link/messages/message.hpp"
