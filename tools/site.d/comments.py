@@ -6,20 +6,30 @@
     declaration;  // what is behind it             ///< …, also where it goes on in the next lines
     // after the licence, of the file              /// \\file, then the text
 
-What would be markup is escaped. The number of lines stays.
+What would be markup is escaped, and rows of board.def are written out. The number of lines stays.
 """
+import pathlib
 import re
+import subprocess
 import sys
 
 ALONE = re.compile(r'^(\s*)//\s?(.*)$')
 BEHIND = re.compile(r'^(.*\S\s*)//\s(.*)$')
 CODE = re.compile(r'(`[^`]*`)')
+ROWS = re.compile(r'^(?:#define R4_\w+\((?:.*\\\n)*.*\n)+#include "[^"]*board\.def"\n', re.MULTILINE)
 MARKUP = re.compile(r'([\\<>#@&%]|(?<!\w)::)')
 
 
 def escaped(text):
     parts = CODE.split(text)
     return ''.join(part if part.startswith('`') else MARKUP.sub(r'\\\1', part) for part in parts)
+
+
+def with_rows(path):
+    def written_out(found):
+        made = subprocess.run(['cpp', '-P', f'-I{path.parent}'], input=found[0], stdout=subprocess.PIPE, check=True, text=True)
+        return '\n' * (found[0].count('\n') - 1) + ' '.join(made.stdout.split()) + '\n'
+    return ROWS.sub(written_out, path.read_text('utf-8'))
 
 
 def documented(lines):
@@ -43,8 +53,7 @@ def documented(lines):
 
 
 def main():
-    with open(sys.argv[1], encoding='utf-8') as file:
-        print('\n'.join(documented(file.read().split('\n'))))
+    print('\n'.join(documented(with_rows(pathlib.Path(sys.argv[1])).split('\n'))))
 
 
 if __name__ == '__main__':
