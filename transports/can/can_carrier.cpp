@@ -342,8 +342,8 @@ void CanCarrier::on_stuck() {
 
 }  // namespace
 
-std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, CanCarrierOptions options,
-                                          std::function<std::shared_ptr<CanBus>()> open_bus) {
+std::unique_ptr<Carrier> make_can_carrier_on(asio::io_context& io, CanCarrierOptions options,
+                                             std::function<std::shared_ptr<CanBus>()> open_bus) {
   return std::make_unique<CanCarrier>(io, std::move(options), std::move(open_bus));
 }
 
@@ -354,7 +354,7 @@ std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, 
   options.packs = role == Role::board || url.get_number("pack", 0, 1, 1) == 1;
   options.name = fmt::format("can://{}?node={}{}{}", url.host(), options.node,
                              options.fd ? "&fd=1" : "", options.packs ? "" : "&pack=0");
-  return make_can_carrier(io, options, [&io, interface = url.host(), fd = options.fd] {
+  return make_can_carrier_on(io, options, [&io, interface = url.host(), fd = options.fd] {
     return CanBus::of(io, interface, fd);
   });
 }

@@ -35,8 +35,8 @@ struct CanCarrierOptions {
 };
 
 // On the bus that `open_bus()` returns, which open() calls. It throws Error.
-std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, CanCarrierOptions options,
-                                          std::function<std::shared_ptr<CanBus>()> open_bus);
+std::unique_ptr<Carrier> make_can_carrier_on(asio::io_context& io, CanCarrierOptions options,
+                                             std::function<std::shared_ptr<CanBus>()> open_bus);
 
 std::unique_ptr<Carrier> make_can_carrier(asio::io_context& io, const Url& url, Role role,
                                           const Claim& = {});

@@ -26,7 +26,7 @@ struct TimedFrame {
 };
 
 // As in SocketCAN, few frames wait here, because they can be neither replaced nor overtaken.
-struct Outbox {
+struct FrameOutbox {
   using Item = TimedFrame;
   static constexpr std::size_t most = 8;
 
@@ -65,7 +65,7 @@ CanFrame frame_of(std::uint32_t id, bool extended, bool fd, std::string_view dat
   return frame;
 }
 
-struct Calls {
+struct FrameCalls {
   template <class Received>
   void open(Received received) {
     bus->open([received = std::move(received)](std::uint32_t id, bool extended, bool fd,
@@ -91,9 +91,9 @@ class OwnCanMedium final : public CanMedium {
   explicit OwnCanMedium(std::shared_ptr<OwnCanBus> bus)
       : name_(bus->name()),
         news_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
-        exchange_(std::make_shared<Exchange<Calls, Outbox>>(
-            name_, std::make_unique<Calls>(Calls{std::move(bus)}), std::make_unique<Outbox>(),
-            [this] { ::eventfd_write(news_.get(), 1); })) {}
+        exchange_(std::make_shared<Exchange<FrameCalls, FrameOutbox>>(
+            name_, std::make_unique<FrameCalls>(FrameCalls{std::move(bus)}),
+            std::make_unique<FrameOutbox>(), [this] { ::eventfd_write(news_.get(), 1); })) {}
   ~OwnCanMedium() override { exchange_->end(); }
 
   const std::string& name() const override { return name_; }
@@ -129,8 +129,8 @@ class OwnCanMedium final : public CanMedium {
   }
   Outcome send(const CanFrame* frames, std::size_t count, std::size_t& sent) override {
     sent = 0;
-    const bool up = exchange_->send([&](Outbox& outbox) {
-      for (; sent < count && outbox.rest.size() < Outbox::most; ++sent) {
+    const bool up = exchange_->send([&](FrameOutbox& outbox) {
+      for (; sent < count && outbox.rest.size() < FrameOutbox::most; ++sent) {
         outbox.rest.push_back({frames[sent], Clock::now()});
       }
     });
@@ -138,8 +138,8 @@ class OwnCanMedium final : public CanMedium {
   }
   Outcome send_first(const CanFrame& frame) override {
     bool taken = false;
-    const bool up = exchange_->send([&](Outbox& outbox) {
-      taken = outbox.first.size() < Outbox::most;
+    const bool up = exchange_->send([&](FrameOutbox& outbox) {
+      taken = outbox.first.size() < FrameOutbox::most;
       if (taken) outbox.first.push_back({frame, Clock::now()});
     });
     return outcome_of(up, taken);
@@ -159,7 +159,7 @@ class OwnCanMedium final : public CanMedium {
   std::deque<TimedFrame> came_;
   bool started_ = false;
   bool open_ = false;
-  const std::shared_ptr<Exchange<Calls, Outbox>> exchange_;
+  const std::shared_ptr<Exchange<FrameCalls, FrameOutbox>> exchange_;
 };
 
 }  // namespace
@@ -170,7 +170,7 @@ std::unique_ptr<Carrier> make_own_can_carrier(asio::io_context& io, std::shared_
     throw Error(ErrorKind::usage, fmt::format("node {}", node.node), "the node is out of range",
                 fmt::format("give 0 to {}", can_nodes - 1));
   }
-  return make_can_carrier(
+  return make_can_carrier_on(
       io,
       {role, static_cast<std::uint8_t>(node.node), node.fd, node.pack,
        fmt::format("{}, node {}", bus->name(), node.node)},

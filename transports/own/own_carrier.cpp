@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;  // newest wins
 
-struct Outbox {
+struct DatagramOutbox {
   using Item = std::string;
   std::optional<Item> next(SendQueue::Time now) {
     const SendQueue::Entry* const entry = queue.front(now);
@@ -32,7 +32,7 @@ struct Outbox {
   SendQueue queue{normal_entries, state_entries, dropped};
 };
 
-struct Calls {
+struct DatagramCalls {
   template <class Received>
   void open(Received received) {
     transport->open([received = std::move(received)](std::string_view datagram) {
@@ -60,9 +60,9 @@ class OwnCarrier final : public Carrier {
     close();
     handler_ = &handler;
     opening_ = std::make_shared<int>();
-    exchange_ = std::make_shared<Exchange<Calls, Outbox>>(
-        name_, std::make_unique<Calls>(Calls{transport_}), std::make_unique<Outbox>(),
-        [this, weak = std::weak_ptr<int>(opening_)] {
+    exchange_ = std::make_shared<Exchange<DatagramCalls, DatagramOutbox>>(
+        name_, std::make_unique<DatagramCalls>(DatagramCalls{transport_}),
+        std::make_unique<DatagramOutbox>(), [this, weak = std::weak_ptr<int>(opening_)] {
           loop_.post([this, weak] {
             if (!weak.expired()) take();
           });
@@ -92,7 +92,7 @@ class OwnCarrier final : public Carrier {
     }
     SendResult result = SendResult::down;
     if (!reported_up_) return result;
-    exchange_->send([&](Outbox& outbox) {
+    exchange_->send([&](DatagramOutbox& outbox) {
       result = outbox.queue.push(bytes, priority, everyone, SendQueue::Time::clock::now());
       dropped_ = outbox.dropped;
     });
@@ -139,7 +139,7 @@ class OwnCarrier final : public Carrier {
   const std::string name_;
   Handler* handler_ = nullptr;
   std::shared_ptr<int> opening_;  // null: closed
-  std::shared_ptr<Exchange<Calls, Outbox>> exchange_;
+  std::shared_ptr<Exchange<DatagramCalls, DatagramOutbox>> exchange_;
   bool reported_up_ = false;
   std::uint64_t dropped_ = 0;         // by the outbox of this opening
   CarrierCounters before_;            // all but what the exchange counts

@@ -149,7 +149,7 @@ std::vector<Stage> stages(std::optional<Problem>& missing) {
     return all;
   }
   try {
-    CanSocket().open("vcan0", false);
+    CanSocket("vcan0", false).open();
   } catch (const Error& error) {
     missing = error.problem();
   }
