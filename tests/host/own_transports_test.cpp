@@ -20,10 +20,10 @@
 #include "firmware/ports/sim/simulated_board.hpp"
 #include "host/board_loop.hpp"
 #include "r4link/board.hpp"
+#include "r4link/can/can_ids.hpp"
 #include "r4link/transports/own_transport.hpp"
 #include "tests/support/at_will.hpp"
 #include "tests/support/first.hpp"
-#include "transports/framing/can/can_ids.hpp"
 #include "transports/own/own_carriers.hpp"
 
 namespace r4::test {

@@ -7,13 +7,13 @@
 #include <string>
 
 #include "firmware/ports/sim/simulated_hardware.hpp"
-#include "protocol/datagram/datagram_writer.hpp"
 #include "protocol/messages/command_field.hpp"
 #include "protocol/messages/message.hpp"
 #include "protocol/messages/state_fields.hpp"
 #include "r4link/commands/command_text.hpp"
+#include "r4link/messages/datagram_writer.hpp"
+#include "r4link/messages/packed_form.hpp"
 #include "r4link/tables/state_fields.hpp"
-#include "transports/framing/can/packed_form.hpp"
 
 namespace r4 {
 namespace {

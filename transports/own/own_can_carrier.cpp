@@ -55,7 +55,7 @@ CanFrame frame_of(std::uint32_t id, bool extended, bool fd, std::string_view dat
     throw Error(
         ErrorKind::usage, fmt::format("a CAN frame of {} bytes", data.size()),
         fmt::format("its data are longer than {} bytes", fd ? max_fd_size : max_classic_size),
-        fd ? "" : "tell of a CAN FD frame that it is one");
+        fd ? "" : "pass fd = true for a CAN FD frame");
   }
   frame.id = id;
   frame.extended = extended;

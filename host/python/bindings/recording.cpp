@@ -131,7 +131,7 @@ class Columns final : public RecordingVisitor {
       }
     }
   }
-  void on_record(const Record& record) override {
+  void on_record(const r4::Record& record) override {
     const std::int64_t at = record.time.count();
     if (record.kind == RecordKind::event) {
       auto& events = record.path == no_path ? events_ : of(record.path).events;
