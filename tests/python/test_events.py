@@ -28,7 +28,7 @@ def test_tells_what_happens_to_the_link_by_its_gravity(sim, wait, logged):
         wait(lambda: has(logged, 'INFO', 'link active') and has(logged, 'INFO', ': armed'))
         board.stop()
         wait(lambda: has(logged, 'WARNING', 'link safe, stop') and has(logged, 'INFO', 'not armed: stop'))
-        board.clear()
+        board.send(r4link.Command.clear())
         board.arm()
         sim.reboot()
         wait(lambda: has(logged, 'WARNING', 'the board has restarted'))
