@@ -92,8 +92,9 @@ def changed_folders():
 
 
 def included_twice(file):
-    """A check of clang-tidy that has no meaning where files follow each other."""
-    lines = collections.Counter(line for line in file.read_text().splitlines() if line.startswith("#include"))
+    """A check of clang-tidy that has no meaning where files follow each other. A .def gives other rows each time."""
+    lines = collections.Counter(line for line in file.read_text().splitlines()
+                                if line.startswith("#include") and not line.endswith('.def"'))
     return [f"{file}: {line} is there twice\n" for line, times in lines.items() if times > 1]
 
 

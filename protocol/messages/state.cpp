@@ -44,8 +44,8 @@ struct FieldTable {
 constexpr FieldTable field_table;
 
 constexpr bool has_allowed_names() {
-  for (int i = 0; i < state_field_count; ++i) {
-    if (!field_table.entries[i].name.allowed()) return false;
+  for (const Entry& entry : field_table.entries) {
+    if (!entry.name.allowed()) return false;
   }
   return true;
 }

@@ -290,7 +290,7 @@ def test_the_service_send_answers_for_the_board(graph):
     def send(commands):
         return ask(peer, 'send', text(commands))
 
-    assert send('O:900,1,3; S:1500,2') == (True, 'O:900,1,3; S:1500,2: confirmed by the board')
+    assert send('O:900,1,3; S:1500,2') == (True, 'O:900,1,3;S:1500,2: confirmed by the board')
     outputs = board.outputs(lambda each: pwm(each, 3) == 900)['outputs']
     assert outputs['servo'][1] == pytest.approx(1500, abs=5)
     for wrong, why in (('O:100,1,3;O:5000,1,4', '5000'), ('O:100,1,3;E:CLEAR', 'E:CLEAR'), ('', ''),
