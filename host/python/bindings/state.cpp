@@ -145,13 +145,13 @@ void bind_state(py::module_& module) {
       // Lists the fields that the state carries, so that Python suggests no other one.
       .def("__dir__",
            [](const py::object& self) {
-             py::set names(py::module_::import("builtins").attr("dir")(py::type::of(self)));
+             py::set attributes(py::module_::import("builtins").attr("dir")(py::type::of(self)));
              const auto& carried = self.cast<const ReceivedState&>();
              for (const StateFieldRow& row : state_fields) {
                if (carried.present.has(row.field) || row.field == F::fault) continue;
-               names.attr("discard")(attribute_of(row.field));
+               attributes.attr("discard")(attribute_of(row.field));
              }
-             return names;
+             return attributes;
            })
       // On the clock of time.monotonic().
       .def_property_readonly(
