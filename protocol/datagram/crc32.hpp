@@ -10,8 +10,7 @@
 
 namespace r4 {
 
-// `crc` is the CRC of the preceding bytes. The host uses libdeflate if available, the board a 1 KiB
-// table.
+// `crc`: CRC of the preceding bytes. Host: libdeflate if available; board: a 1 KiB table.
 std::uint32_t crc32(Text bytes, std::uint32_t crc = 0);
 
 // The table form: the board uses it, and tests compare with it.

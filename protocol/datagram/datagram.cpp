@@ -24,9 +24,8 @@ Text without_line_end(Text bytes) {
   return bytes.substr(0, size);
 }
 
-// The checksum and its delimiters, after the fields.
 struct Trailer {
-  const char* digits = nullptr;  // the checksum's first digit
+  const char* digits = nullptr;
   std::uint32_t crc = 0;
   const char* error = nullptr;  // first wrong byte; nullptr if the trailer is valid
 };

@@ -52,7 +52,6 @@ Separators separators(Text block) {
 
 namespace {
 
-// Half a block in 32-bit words, for the board's processor.
 struct Half {
   std::uint32_t colons = 0;
   std::uint32_t semicolons = 0;

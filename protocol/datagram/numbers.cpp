@@ -26,7 +26,6 @@ inline bool parse_short(const char* at, const char* end, std::uint32_t& out) {
   return true;
 }
 
-// Reads digits up to `limit`; false for anything else, and for empty text.
 inline bool parse_digits(const char* at, const char* end, std::uint64_t limit, std::uint64_t& out) {
   constexpr std::uint32_t e9 = 1000000000;
   if (at == end) return false;

@@ -16,8 +16,7 @@ bool parse_number(Text text, std::uint32_t& out);
 bool parse_number(Text text, std::uint64_t& out);
 bool parse_number(Text text, std::int32_t& out);
 
-// True if the text is digits of any count, with an optional '-'. Separates a number out of range
-// from a wrong form.
+// True for digits of any count after an optional '-': separates out of range from wrong form.
 bool is_whole_number(Text text);
 
 // A decimal such as "24.28", "-0.5" or "12" in hundredths of its unit (2428, -50, 1200). Further

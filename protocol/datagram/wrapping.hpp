@@ -8,7 +8,6 @@
 
 namespace r4 {
 
-// True if `a` is newer than `b`.
 constexpr bool newer(std::uint32_t a, std::uint32_t b) {
   return static_cast<std::int32_t>(a - b) > 0;
 }

@@ -25,13 +25,11 @@ constexpr std::size_t tag_size = 11;    // characters
 // The longest `A` field: ";A:9,18446744073709551615,4294967295,<tag>".
 constexpr std::size_t signature_max = 3 + 1 + 1 + 20 + 1 + 10 + 1 + tag_size;
 
-// The tag of a datagram whose bytes before the tag are `before` and a comma. `key` is from
-// signing_key().
+// `before`: the datagram's bytes before the tag and its comma. `key` is from signing_key().
 void write_tag(const Blake2sKey& key, Text nonce, Text before, char (&tag)[tag_size]);
 // The key for the direction host to board, derived from the shared key.
 Blake2sKey signing_key(const Key& key);
 
-// The result for one datagram.
 enum class Verdict : std::uint8_t {
   authentic,
   missing,      // the last field is not a valid A
@@ -47,9 +45,8 @@ class Authentication {
  public:
   static constexpr std::size_t chance_size = 32;
   static constexpr std::uint32_t age_limit_ms = 250;
-  // The newest counters of all keys together are remembered; a counter below a forgotten one counts
-  // as used. Each path of a session uses its own counters. So with r datagrams a second over p
-  // paths, a path may lag by 112 / (p r) seconds.
+  // The newest counters of all keys are remembered; one below a forgotten one counts as used. With
+  // r datagrams a second over p paths, each with its own counters, a path may lag by 112 / (p r) s.
   static constexpr int counters_remembered = 112;
 
   // `chance`: random bytes, different at each boot, for the nonces. If nullptr, the board sends no
@@ -58,7 +55,6 @@ class Authentication {
 
   // Sets the board's keys; an id of 0 means no key. Takes a new nonce.
   void use(const Key (&keys)[max_keys]);
-  // True if there is a key, so that a signature is needed.
   bool required() const { return required_; }
 
   // The nonce for heartbeats; empty while no signature is needed.
@@ -69,7 +65,6 @@ class Authentication {
   // authentic. With another nonce, counters restart.
   void follow(Text nonce);
 
-  // True if random numbers can be made.
   bool has_chance() const { return has_chance_; }
   // An unpredictable number, never 0. Call only if has_chance().
   std::uint32_t random();
@@ -86,7 +81,7 @@ class Authentication {
  private:
   struct Entry {
     Blake2sKey key;
-    std::uint64_t highest = 0;    // highest used counter
+    std::uint64_t highest = 0;
     std::uint64_t forgotten = 0;  // highest counter that is not remembered
     std::uint8_t id = 0;
   };
@@ -115,8 +110,7 @@ class Signer {
  public:
   explicit Signer(const Key& key) : key_(signing_key(key)), id_(key.id) {}
 
-  // The nonce of the board's newest heartbeat (heartbeat_nonce()); empty: the board has no key.
-  // True if it differs from the previous one.
+  // The nonce of the board's newest heartbeat; empty: the board has no key. True if it is new.
   bool on_nonce(Text nonce);
   // The T of the board's newest datagram. `now_ms`: the host's clock, which wraps.
   void on_board_time(std::uint32_t t_ms, std::uint32_t now_ms);

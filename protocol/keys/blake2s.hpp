@@ -53,7 +53,7 @@ class Blake2s {
 
   std::uint32_t state_[8];
   std::uint8_t block_[blake2s_block];  // the last block is marked, so it is not compressed early
-  std::uint8_t used_ = 0;              // bytes used in block_
+  std::uint8_t used_ = 0;
   std::uint8_t digest_size_;
   std::uint32_t count_ = 0;
 };

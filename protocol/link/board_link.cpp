@@ -109,9 +109,8 @@ void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
   if (clock_ == Clock::unknown && heartbeat.t != 0) clock_ = known ? Clock::echo : Clock::own;
   if (!heartbeat.has_pnum) return;
   newest_heartbeat_ = heartbeat.pnum;
-  // The marks cover late_limit_ms at any heartbeat rate. Heartbeats between two marks count as
-  // arrived at the earlier mark. When the oldest mark is dropped, the next is itself older than the
-  // limit.
+  // The marks cover late_limit_ms at any heartbeat rate; heartbeats between two marks count as
+  // arrived at the earlier one. When the oldest is dropped, the next is itself past the limit.
   constexpr std::uint32_t spacing_ms = late_limit_ms / (mark_count - 1) + 1;
   if (marks_used_ != 0 && at_ms - marks_[marks_used_ - 1].at_ms < spacing_ms) {
     marks_[marks_used_ - 1].pnum = heartbeat.pnum;
@@ -163,8 +162,7 @@ bool BoardLink::is_next(std::uint32_t pnum) const {
 
 Refusal BoardLink::admit(HostId host, std::uint32_t pnum, std::uint32_t now_ms) const {
   const bool ours = is_session_of(host);
-  // In every link state: a spent number always gets the same answer, so that the host can rely on
-  // it.
+  // A spent number always gets the same answer, in every link state.
   if (ours && has_baseline_ && !newer(pnum, newest_)) {
     const Refusal code = code_of_spent(pnum);
     if (code != Refusal::stale) return code;

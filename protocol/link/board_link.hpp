@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The board's end of the link: which host controls the board, whether that host is alive, and which
 // of its commands may be executed (paper section 4.3; docs/protocol.md "The link", docs/safety.md).
+//
 //                 heartbeat that may begin a session      the host is silent for the timeout,
 //     CONNECTING ------------------------------> ACTIVE -- leaves, or all its paths are gone ---+
 //       (boot)                                     ^                                            v
 //                                                  +---- heartbeat that may begin or resume -- LOST
+//
 //     host with a session id (SID)  Each heartbeat must echo the T of a board heartbeat that is at
 //                                   most `timeout` old and, in LOST, was sent after the loss.
 //     paper host (no SID)           Its source identifies it. If its T was an echo once, it must
 //                                   continue to echo. Otherwise T is its own clock, and heartbeats
 //                                   count on arrival. It never resumes a session, because in LOST
 //                                   nothing proves that it is the same host.
+//
 // All times are the board's clock in ms, which wraps; it must start at a random value at boot.
 #pragma once
 
@@ -62,9 +65,8 @@ class BoardLink {
   explicit BoardLink(Timing timing) : timing_(timing) {}
   void set_timing(Timing timing) { timing_ = timing; }
 
-  // `pnum` is valid only if `has_pnum`; `t` is 0 if the heartbeat has none. It arrived at most
-  // `waited_ms` before this call, and counts from then. A heartbeat that may have waited for the
-  // timeout is stale.
+  // `t` is 0 if the heartbeat has none. It arrived at most `waited_ms` before this call, and counts
+  // from then. A heartbeat that may have waited for the timeout is stale.
   struct HostHeartbeat {
     HostId host;
     bool has_pnum = false;
@@ -74,9 +76,8 @@ class BoardLink {
   };
   HeartbeatEffect on_heartbeat(const HostHeartbeat& heartbeat, std::uint32_t now_ms);
 
-  // The reason not to execute this command: stale, duplicate, safe, busy, or the code of a repeated
-  // refusal. None if it may be executed. The number is not spent until executed() or refused() is
-  // called.
+  // The reason not to execute this command: stale, duplicate, safe, busy, or a repeated refusal.
+  // Otherwise none. The number is not spent until executed() or refused() is called.
   Refusal admit(HostId host, std::uint32_t pnum, std::uint32_t now_ms) const;
   // The session's command was executed: its number and all older numbers are spent.
   void executed(std::uint32_t pnum);
@@ -91,7 +92,7 @@ class BoardLink {
   bool poll(std::uint32_t now_ms);
   // Every path of the session is gone. True if a host was in control: ACTIVE -> LOST.
   bool lose(std::uint32_t now_ms);
-  // The session's host has left: ACTIVE -> LOST. Its id cannot begin a session again.
+  // ACTIVE -> LOST. The ids of the last left_memory hosts that left cannot begin a session again.
   void leave(std::uint32_t now_ms);
 
   // The board's own heartbeats are regular. A missing echo causes another every echo_retry_ms, and
@@ -100,7 +101,6 @@ class BoardLink {
   void heartbeat_sent(std::uint32_t t_ms);
   // A heartbeat with this T was sent to some peer, so the T can be echoed.
   void shown(std::uint32_t t_ms);
-  // Makes the next heartbeat due at once, because it carries news.
   void send_soon() { send_now_ = true; }
   // The T of a heartbeat that answers one peer. Answers within answer_spacing_ms share it, so that
   // frequent requests do not push a T that another host will echo out of the memory.
@@ -117,9 +117,8 @@ class BoardLink {
   std::uint32_t fed_ms() const { return fed_ms_; }
   // When the link is lost if the host stays silent. Valid only while ACTIVE.
   std::uint32_t deadline_ms() const { return fed_ms_ + timing_.timeout_ms; }
-  // The number of the heartbeat that began this host's session. A refusal reports it: every command
-  // sent after that heartbeat is remembered. False if this is not the host's session, or if its
-  // heartbeats have no numbers.
+  // The number of the heartbeat that began this host's session. A refusal reports it: later
+  // commands are remembered. False for another host, or if its heartbeats have no numbers.
   bool first_heartbeat(HostId host, std::uint32_t& pnum) const;
   // The last command executed in this session (the CMD field); 0 before the first.
   std::uint32_t last_executed() const { return last_executed_; }
@@ -133,7 +132,6 @@ class BoardLink {
   // Executed numbers are remembered this far back; there DUPLICATE and STALE are exact.
   static constexpr std::uint32_t memory = 64;
   static constexpr int refused_memory = 16;
-  // The number of left sessions that are remembered.
   static constexpr int left_memory = 4;
 
  private:
@@ -192,7 +190,7 @@ class BoardLink {
   bool any_sent_ = false;
   std::uint32_t last_sent_ms_ = 0;
   std::uint32_t lost_ms_ = 0;
-  bool send_now_ = true;  // at boot, and after ACTIVE or LOST was entered
+  bool send_now_ = true;
 };
 
 }  // namespace r4

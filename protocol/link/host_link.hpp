@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The host's end of the link: heartbeats, their gate, and the known state of the board (paper
 // section 4.3; docs/protocol.md "The link").
+//
 //     connecting --> active <--> safe        active, safe --> lost --> active, safe, connecting
+//
 //     connecting  nothing heard yet, or the board is booting (it sends `PNum:0;T:0`)
 //     active      the board streams its state and reports no reason to be safe
 //     safe        the board reports a reason
 //     lost        nothing valid from the board for the timeout
+//
 // Times are the host's clock in ms, which wraps.
 #pragma once
 
@@ -18,13 +21,11 @@ namespace r4 {
 
 class HostLink {
  public:
-  // `first_pnum` must be random, so that it differs from the number of another host's executed
-  // command (CMD).
+  // `first_pnum` is random, to differ from another host's executed command (CMD).
   HostLink(LinkTiming timing, std::uint32_t first_pnum)
       : timing_(timing), first_pnum_(first_pnum), next_pnum_(first_pnum) {}
 
-  // The id of the session. While wants_session(), nothing may be sent before begin_session() with a
-  // new random id.
+  // The session's id. While wants_session(), send nothing; begin_session() takes a new random id.
   SessionId session() const { return session_; }
   bool wants_session() const { return session_ == no_session; }
   void begin_session(SessionId id) { session_ = id; }
@@ -41,7 +42,6 @@ class HostLink {
   void on_heartbeat(std::uint32_t t_ms);
   // The field SAFE of the newest state or heartbeat; none without that field.
   void on_reason(SafeReason reason, std::uint32_t now_ms);
-  // Any datagram of the board.
   void on_heard(std::uint32_t now_ms);
   // The board reports that it is booting, so it knows no session.
   void on_booting(SafeReason reason, std::uint32_t now_ms);
@@ -49,8 +49,7 @@ class HostLink {
   // because the host's own clock may have stood still instead.
   void on_restart();
 
-  // This computer slept, so everything known of the board is out of date. The board counts as
-  // restarted, and a new session is needed.
+  // This computer slept: the board counts as restarted, and a new session is needed.
   void begin_anew();
 
   // If the transport is down, the link is lost at once. If it is up, a heartbeat is due at once.
@@ -87,13 +86,11 @@ class HostLink {
   std::uint32_t due_in(std::uint32_t now_ms) const;
 
   HostLinkState state() const { return state_; }
-  // True if the host has echoed a T of this boot of the board. The board executes no command
-  // before.
+  // True if the host echoed a T of this boot: before, the board executes no command of this host.
   bool echoed() const { return echoed_; }
   std::uint32_t restarts() const { return restarts_; }
   SafeReason reason() const { return reason_; }
-  // True if the board was silent for 12 days. Its T has then wrapped too far to be compared
-  // (datagram/wrapping.hpp), and begin_anew() is needed.
+  // True after 12 days of silence: the board's T has wrapped too far, and begin_anew() is needed.
   bool long_silent(std::uint32_t now_ms) const { return heard_ && now_ms - heard_ms_ > long_ago; }
 
   static constexpr std::uint32_t retry_ms = 20;

@@ -20,16 +20,14 @@ class SessionPaths {
  public:
   static constexpr int most = 4;
 
-  // A session begins, with this as its only path.
+  // Makes this the only path: for a new session, or after an outage (the host's numbers continue).
   void begin(Source at, std::uint32_t now_ms);
-  // The session resumes after an outage, with this as its only path. The host's numbers continue.
   void resume(Source at, std::uint32_t now_ms);
   // A heartbeat of the session with a fresh echo came from there. True if that made a new path.
   bool on_heartbeat(Source from, std::uint32_t now_ms);
-  // True if a path, `left`, was removed because it was silent for the timeout. Call again, because
-  // there may be another. The last path stays.
+  // True if a silent path, `left`, was removed, but never the last path. Call again for others.
   bool take_silent(std::uint32_t timeout_ms, std::uint32_t now_ms, Source& left);
-  // True if a path, `left`, was removed because its port is gone. Call again.
+  // True if a path on that port, `left`, was removed. Call again for others.
   bool take_port(std::uint8_t port, Source& left);
 
   // Counts a number of the host. True if another path has delivered it before.
@@ -50,7 +48,7 @@ class SessionPaths {
     std::uint64_t seen = 0;  // bit i: it has delivered the number numbers_.newest() - i
   };
 
-  int find(Source at) const;  // -1 if this is not a path
+  int find(Source at) const;
   bool leave(int index, Source& left);
 
   Path paths_[most];

@@ -40,7 +40,6 @@ void Watchers::tell(Source to, std::uint32_t token, std::uint32_t now_ms) {
   told.at_ms = now_ms;
 }
 
-// True if this source was sent this token within lease_ms.
 bool Watchers::is_told(Source from, std::uint64_t echo, std::uint32_t now_ms) const {
   const std::uint32_t count = tokens_ < told_count ? tokens_ : told_count;
   for (std::uint32_t i = 0; i < count; ++i) {

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The watchers' leases, up to four (docs/protocol.md "Watching").
+//
 //     free --W:rate that echoes its token--> watching --lease_ms without one, or W:0--> free
 //       |  ^                                   |  ^
 //       +--+ any other W: send a token         +--+ W:rate that echoes the token: renewed
+//
 // Nothing streams to a source before it has echoed the random token that was sent to it. So a
-// forged source cannot make the board flood a stranger. The board's clock cannot serve as token,
-// because the board reports it to any peer. Answers with a token are limited, however many are
-// requested.
-// All times are the board's clock in ms, which wraps.
+// forged source cannot make the board flood a stranger. The board's clock cannot be the token,
+// because any peer can get it. Answers with a token are limited. All times are the board's clock in
+// ms, which wraps.
 #pragma once
 
 #include <cstdint>
@@ -54,8 +55,7 @@ class Watchers {
   // source cannot be forged (a bus).
   Effect on_lease(Source from, std::uint32_t rate_hz, std::uint64_t echo, bool proven,
                   std::uint32_t now_ms);
-  // This token, which nobody else can know, was sent to that source. It is valid for lease_ms, and
-  // then as long as the lease.
+  // This secret token was sent to that source. It is valid for lease_ms, then as long as the lease.
   void tell(Source to, std::uint32_t token, std::uint32_t now_ms);
 
   void poll(std::uint32_t now_ms);
@@ -83,7 +83,7 @@ class Watchers {
 
   Watcher watchers_[places];
   Told told_[told_count];
-  std::uint32_t tokens_ = 0;  // number of tokens sent
+  std::uint32_t tokens_ = 0;
 };
 
 }  // namespace r4

@@ -17,7 +17,6 @@ constexpr Text all_fields("ALL");
 
 constexpr std::size_t most_values = sizeof CommandRow::values / sizeof(CommandValue);
 
-// `lower` must be in lower case.
 bool equal_in_any_case(Text text, Text lower) {
   if (text.size() != lower.size()) return false;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -96,7 +95,6 @@ std::int32_t number_of(const Command& command, ValueRole role) {
   }
 }
 
-// `number` must be in its range.
 void set_number(Command& command, ValueRole role, std::int32_t number) {
   switch (role) {
     case ValueRole::channel:

@@ -30,7 +30,6 @@ Command of_motor(CommandKind kind, Channel channel, Pwm pwm, Direction direction
   return command;
 }
 
-// Above the maximum of every count.
 constexpr std::uint8_t out_of_range = 0xFF;
 
 Command of_device(CommandKind kind, int address, Text bytes, int count) {

@@ -19,7 +19,6 @@ Text between(const char* from, const char* to) {
   return Text(from, static_cast<std::size_t>(to - from));
 }
 
-// The first of these bytes in [at, end); `end` if there is none.
 const char* find_any(Text bytes, const char* at, const char* end) {
   for (; at != end; ++at) {
     for (const char each : bytes) {

@@ -246,7 +246,6 @@ Refusal set(SiteSettings& settings, FoundSetting found, Text value) {
 
 bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_site_value],
          Text& value) {
-  // Single settings, then analog inputs, then keys.
   constexpr int single = static_cast<int>(Setting::network);
   constexpr int first_input = static_cast<int>(Setting::full_scale) - single;
   constexpr int first_key = first_input + analog_channels;

@@ -25,9 +25,9 @@ constexpr std::size_t board_name_max = row_of(Setting::name).max;
 constexpr std::uint16_t standard_full_scale_cv = row_of(Setting::full_scale).standard;
 
 struct SiteSettings {
-  char network[network_max + 1] = {};    // ends in NUL; empty: off
-  char password[password_max + 1] = {};  // ends in NUL; empty: off
-  std::uint32_t host = 0;                // a.b.c.d, a in the highest byte; 0: off
+  char network[network_max + 1] = {};  // ends in NUL; empty: off
+  char password[password_max + 1] = {};
+  std::uint32_t host = 0;  // a.b.c.d, a in the highest byte; 0: off
   std::uint16_t udp_port = row_of(Setting::port).standard;
   std::uint8_t can_node = row_of(Setting::node).standard;
   std::uint8_t chips = row_of(Setting::chips).standard;

@@ -16,7 +16,6 @@ namespace {
 
 using Form = FieldForm;
 
-// A field's row, prepared for the parser and the writer.
 struct Entry {
   FieldName name;
   FieldForm form = FieldForm::volts;

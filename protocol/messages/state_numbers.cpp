@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A field's numbers as doubles. The emulated board omits this file: it has no floating point.
+// A field's numbers as doubles. The emulated board omits this file: it uses no floating point.
 #include "r4link/tables/state_fields.hpp"
 #include "state_fields.hpp"
 

@@ -120,8 +120,7 @@ CanBits fd_bits(const CanFrame& frame, bool switches_rate) {
   return split(before_switch, after, switches_rate);
 }
 
-// One stuff bit after five bits, then one after every four: a stuff bit is the first of the next
-// five.
+// One after five bits, then one after every four: a stuff bit is the first of the next five.
 constexpr std::uint32_t most_stuff_bits(std::uint32_t bits) { return (bits - 1) / 4; }
 
 constexpr std::uint64_t part_ns(std::uint32_t bits, std::uint32_t rate) {

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The traffic between a board and its hosts on a CAN bus (docs/can.md), at either end: whole
 // datagrams on one side, frames on the other.
+//
 //     dialogue    host to board, and the board's answers (N, I): ISO-TP with flow control
 //     telemetry   the board's states and heartbeats: ISO-TP without, for any number of listeners
-// Three raw frames are added: the emergency stop, which a board's end turns into E:STOP; the
-// reason, sent when a heartbeat first reports that the board went safe; and a watcher's request for
-// states. Datagrams are received plain and packed, and sent packed on request. A board answers a
-// plain-text host in plain text.
+//
+// Three raw frames are added. The board's end turns an emergency stop into E:STOP. It sends the
+// reason when a heartbeat first reports that the board went safe. A watcher requests states.
+// Datagrams are received plain and packed, and sent packed on request. A board answers a plain-text
+// host in plain text.
 // Driven like its ISO-TP ends (isotp.hpp). Sans-I/O, no heap, about 4.5 KB. A queue before it
 // chooses the next datagram. Not thread-safe.
 #pragma once
@@ -26,8 +28,8 @@ enum class CanEnd : std::uint8_t { board, host };
 enum class CanLane : std::uint8_t { dialogue, telemetry };
 
 struct CanNodeCounters {
-  std::uint32_t stops = 0;     // emergency frames received
-  std::uint32_t unpacked = 0;  // packed datagrams received
+  std::uint32_t stops = 0;
+  std::uint32_t unpacked = 0;
   std::uint32_t bad_form = 0;  // packed datagrams that do not unpack, dropped
 };
 
@@ -48,39 +50,32 @@ class CanNode {
 
   // A host's datagrams go to the dialogue, a board's by their kind.
   CanLane lane_of(Text datagram) const;
-  // True if begin() may be called for that lane.
   bool idle(CanLane lane) const;
   // Copies a datagram of at most max_datagram bytes. False without effect if its lane is not idle,
   // or if it is empty or too long.
   bool begin(Text datagram, std::uint32_t now_us);
 
-  // Writes the most urgent frame to send; the same one until frame_sent(), unless a more urgent one
-  // came. False if there is none.
+  // Writes the frame to send, the same until frame_sent() or a more urgent one; false if none.
   bool offer(std::uint32_t now_us, CanFrame& frame);
   // As offer(), but only frames that may overtake all accepted ones: flow control, for which the
   // other end waits, and the reason for going safe.
   bool offer_urgent(std::uint32_t now_us, CanFrame& frame);
-  // The frame that was offered last was accepted.
   void frame_sent(std::uint32_t now_us);
   // True for a frame of this end's dialogue, which the other end answers with flow control.
   bool may_be_answered(const CanFrame& frame) const;
-  // Accepted frames of that kind reached the bus only now, or still wait, so answers may come
-  // later.
+  // Such accepted frames still wait for the bus or just reached it, so answers may come later.
   void wait_anew(std::uint32_t now_us) { dialogue_out_.wait_anew(now_us); }
-  // Returns the datagram that the frame completes, valid until the next call, or an empty text.
-  // Ignores other frames.
+  // Returns the datagram that the frame completes, valid until the next call; otherwise empty.
   Text on_frame(const CanFrame& frame, std::uint32_t now_us);
   // True if the other end sends the next frame of a transfer, possibly at once.
   bool awaits_frame() const {
     return telemetry_in_.awaits_consecutive() || dialogue_in_.awaits_consecutive() ||
            dialogue_out_.awaits_flow_control();
   }
-  // Ends timed-out transfers.
   void poll(std::uint32_t now_us);
   IsotpDeadline deadline() const;
   // Ends the transfer to the other end, because another host has begun one.
   void stop_commanding() { dialogue_out_.cancel(); }
-  // Ends all transfers, because the bus is gone.
   void cancel();
 
   const CanNodeCounters& counters() const { return counters_; }

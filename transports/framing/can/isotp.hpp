@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Datagrams on a CAN bus: ISO 15765-2:2016 with normal addressing ("ISO-TP"). Both ends share this
 // file; isotp_sender.hpp cuts a datagram into frames, isotp_receiver.hpp joins them.
+//
 //     single frame       0L data…               up to 7 bytes; 00 LL data… in a longer FD frame
 //     first frame        1L LL data…            8–4095 bytes; 10 00 LL LL LL LL data… for more
 //     consecutive frame  2S data…               S counts 1 … 15, 0, 1 …
 //     flow control       3F BS ST               F: 0 clear to send, 1 wait, 2 overflow
+//
 // Both ends are driven frame by frame and own no clock, no heap and no bus:
 //     on_frame(frame, now)   a frame arrived; frames of other ids are ignored
 //     offer(now, frame)      true if there is a frame to send; the same one is offered until …
-//     frame_sent(now)        … the bus, or the queue before it, has accepted it
+//     frame_sent(now)        … the bus, or the queue before it, has accepted it; else no effect
 //     deadline()             when to call poll() and offer() again, so that a loop needs one timer
-//     poll(now)              ends timed-out transfers; so do on_frame(), and offer() for its frame
+//     poll(now)              ends a timed-out transfer; so do on_frame(), and offer() for its frame
 // Call frame_sent() before handing in later arrivals. A full queue costs time, but never a frame
-// within a transfer.
-// Time is in us and wraps; all calls of one object use one clock. Time-outs must be below 2^31 us.
-// Not thread-safe.
+// within a transfer. Time is in us and wraps; all calls of one object use one clock. Time-outs must
+// be below 2^31 us. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -36,9 +37,9 @@ enum class IsotpError : std::uint8_t {
   overflow,               // ends: longer than the receiver's buffer (9.6.3.2, 9.6.5.1)
   invalid_flow_status,    // ends: a reserved flow status (9.6.5.2)
   too_many_waits,         // ends: more waits, received or sent, than N_WFTmax (9.7, 9.8.4)
-  cancelled,              // ends: by cancel()
-  unexpected_frame,       // ignored: an unexpected consecutive frame or flow control (9.8.3)
-  malformed,              // ignored: length or type not valid for any frame (9.6.2.2, 9.6.3.2)
+  cancelled,
+  unexpected_frame,  // ignored: an unexpected consecutive frame or flow control (9.8.3)
+  malformed,         // ignored: length or type not valid for any frame (9.6.2.2, 9.6.3.2)
 };
 
 // For a log: "no flow control in time (N_Bs)".

@@ -178,7 +178,6 @@ IsotpArrival IsotpReceiver::malformed() {
   return {false, IsotpError::malformed};
 }
 
-// Ends an unfinished transfer, because another begins.
 IsotpError IsotpReceiver::replace() {
   const IsotpError error =
       busy() ? fail(IsotpError::interrupted, counters_.interrupted) : IsotpError::none;

@@ -21,16 +21,16 @@
 //     if (receiver.offer(now, answer) && bus.push(answer)) receiver.frame_sent(now);
 //     timer.arm(receiver.deadline());
 // A delivered datagram is the sent one; any error is counted and delivers nothing. There is one
-// exception, because ISO-TP tells frames apart by four bits only: a frame 16 (32, 48 …) places
+// exception, because ISO-TP distinguishes frames by four bits only. A frame 16 (32, 48 …) places
 // later in the same stream passes for the expected one.
-// Loss alone causes this only without flow control and only across two transfers. Then the end of
-// one, the first frame of the next, and as many frames after it as the numbers need are lost, all
-// within N_Cr; the datagram is made of both. If both have n frames, n frames in a row are lost, or
-// n - 16, n - 32 …, but at least 2: 4 if both have 4, 9 if both have 25, 2 if both have 18. An N_Cr
-// below the pause between transfers excludes it.
-// With flow control, it needs a flow control that arrives after N_Bs, when the sender has given up
-// and begun another transfer whose first frame is lost. The datagram's CRC detects both cases.
-// and begun another transfer, whose first frame is lost. The CRC of the datagram finds both.
+// Loss alone causes this only without flow control and only across two transfers. The end of one,
+// the first frame of the next, and as many frames after it as the numbers need must be lost, all
+// within N_Cr. Then the datagram is made of both. If both have n frames, n frames in a row must be
+// lost, or n - 16, n - 32 …, but at least 2. Examples: 4 if both have 4, 9 if both have 25, 2 if
+// both have 18. An N_Cr below the pause between transfers excludes it.
+// With flow control, a flow control must arrive after N_Bs, after the datagram's sender has given
+// up and begun another transfer. The first frame of that transfer must also be lost. The datagram's
+// CRC detects both cases.
 #pragma once
 
 #include <cstdint>
@@ -85,23 +85,18 @@ class IsotpReceiver {
 
   // Ignores frames with another id, and flow control. Constant time.
   IsotpArrival on_frame(const CanFrame& frame, std::uint32_t now_us);
-  // Writes the flow control to send; false if there is none.
   bool offer(std::uint32_t now_us, CanFrame& frame);
-  // The offered frame was accepted. No effect without one.
   void frame_sent(std::uint32_t now_us);
-  // Ends a timed-out transfer and returns its error.
   IsotpError poll(std::uint32_t now_us) {
     return state_ == State::idle || !reached(now_us, deadline_us_) ? IsotpError::none : time_out();
   }
   // While held, sends wait instead of clear to send, max_waits times; then the transfer ends (9.7).
   // No effect on a sender that is already clear to send.
   void hold(bool held, std::uint32_t now_us);
-  // Ends a transfer, because the interface is down.
   void cancel();
 
   bool busy() const { return state_ != State::idle && !refusing(); }
   bool awaits_consecutive() const { return state_ == State::receiving; }
-  // The datagram that on_frame() reported.
   const std::uint8_t* data() const { return buffer_; }
   std::uint32_t size() const { return size_; }
   Text text() const { return Text(reinterpret_cast<const char*>(buffer_), size_); }
@@ -131,9 +126,9 @@ class IsotpReceiver {
   std::uint32_t received_ = 0;
   std::uint32_t deadline_us_ = 0;  // owing: earliest offer; otherwise: end of the wait
   std::uint8_t rx_dl_ = 0;         // size of the first frame (9.5.4)
-  std::uint8_t sequence_ = 0;      // of the next consecutive frame
-  std::uint8_t block_left_ = 0;    // frames until flow control is owed; 0: unlimited
-  std::uint16_t waits_ = 0;        // sent in a row
+  std::uint8_t sequence_ = 0;
+  std::uint8_t block_left_ = 0;  // frames until flow control is owed; 0: unlimited
+  std::uint16_t waits_ = 0;
   bool held_ = false;
   State state_ = State::idle;
   IsotpFlowStatus status_ = IsotpFlowStatus::clear_to_send;  // of the flow control that is owed

@@ -59,7 +59,6 @@ bool IsotpSender::offer(std::uint32_t now_us, CanFrame& frame) {
   return true;
 }
 
-// Writes the single or first frame; returns its size.
 std::uint32_t IsotpSender::write_start(CanFrame& frame) {
   std::uint32_t header = 0;
   if (size_ < max_classic_size) {

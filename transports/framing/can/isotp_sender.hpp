@@ -41,9 +41,9 @@ struct IsotpSenderOptions {
 
 // started == datagrams + busy() + the errors that end a transfer.
 struct IsotpSenderCounters {
-  std::uint32_t started = 0;    // accepted by begin()
+  std::uint32_t started = 0;
   std::uint32_t datagrams = 0;  // last frame accepted by the bus
-  std::uint32_t frames = 0;     // accepted by the bus
+  std::uint32_t frames = 0;
   // These end a transfer.
   std::uint32_t send_timeout = 0;
   std::uint32_t flow_control_timeout = 0;
@@ -73,14 +73,12 @@ class IsotpSender {
 
   // Writes the frame to send; false if there is none. Constant time.
   bool offer(std::uint32_t now_us, CanFrame& frame);
-  // The offered frame was accepted. No effect without one.
   void frame_sent(std::uint32_t now_us);
   // Accepted frames reached the bus only now: restarts N_Bs if flow control is awaited, or the gap
   // to the next consecutive frame.
   void wait_anew(std::uint32_t now_us);
   // Takes flow control and ignores other frames. Returns the first error.
   IsotpError on_frame(const CanFrame& frame, std::uint32_t now_us);
-  // Ends a timed-out transfer and returns its error.
   IsotpError poll(std::uint32_t now_us) {
     return state_ < State::offered || !reached(now_us, deadline_us_) ? IsotpError::none
                                                                      : time_out();
@@ -105,11 +103,11 @@ class IsotpSender {
   std::uint32_t sent_ = 0;         // bytes in accepted frames
   std::uint32_t deadline_us_ = 0;  // ready: earliest offer; otherwise: end of the wait
   std::uint32_t gap_us_ = 0;
-  std::uint32_t sent_us_ = 0;    // when the newest frame was accepted
-  std::uint8_t chunk_ = 0;       // bytes of the datagram in the offered frame
-  std::uint8_t sequence_ = 0;    // of the next consecutive frame
+  std::uint32_t sent_us_ = 0;  // when the newest frame was accepted
+  std::uint8_t chunk_ = 0;     // bytes of the datagram in the offered frame
+  std::uint8_t sequence_ = 0;
   std::uint8_t block_left_ = 0;  // frames until the next flow control; 0: unlimited
-  std::uint16_t waits_ = 0;      // in a row
+  std::uint16_t waits_ = 0;
   bool any_consecutive_ = false;
   State state_ = State::idle;
   IsotpError error_ = IsotpError::none;

@@ -10,7 +10,6 @@ namespace r4 {
 namespace packed {
 namespace {
 
-// Iterates over the fields that mark_fields() has marked.
 class Fields {
  public:
   Fields(Text fields, const std::uint64_t* ends)
@@ -88,7 +87,6 @@ bool put_steps(DigitWriter& digits, Text text) {
   return put_count(digits, negative ? 2 * value - 1 : 2 * value);
 }
 
-// Removes a whole number and its comma from the front.
 __attribute__((noinline)) bool take_plain(Text& text, std::uint64_t& out) {
   std::size_t size = 0;
   while (size < text.size() && text[size] != ',') ++size;
@@ -166,8 +164,6 @@ bool put_in_form(DigitWriter& digits, PackedForm form, Text text) {
   return false;
 }
 
-// --- text
-
 constexpr unsigned no_digit = 0xFF;
 
 unsigned digit_of(char c) {
@@ -216,8 +212,6 @@ bool put_text(DigitWriter& digits, Text values) {
     if (!digits.put(digit_comma, 1)) return false;
   }
 }
-
-// --- fields
 
 bool put_name(DigitWriter& digits, Text name, PackedForm& form) {
   const unsigned code = code_of(name);

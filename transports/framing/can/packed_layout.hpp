@@ -78,7 +78,6 @@ constexpr unsigned longest_bytes = 15;
 constexpr unsigned longest_count = 14;  // digits
 constexpr unsigned most_device_bytes = 64;
 
-// The largest values of the fixed forms.
 constexpr unsigned flag_max = 0xE;
 constexpr unsigned short3_max = 0xEFF;
 constexpr unsigned drive_max = 0xEFFF;

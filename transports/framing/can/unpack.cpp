@@ -9,8 +9,6 @@ namespace r4 {
 namespace packed {
 namespace {
 
-// --- digits in
-
 class Digits {
  public:
   Digits(const std::uint8_t* begin, const std::uint8_t* end)
@@ -42,8 +40,6 @@ class Digits {
   std::size_t size_;  // in digits
   std::size_t at_ = 0;
 };
-
-// --- characters out
 
 class Characters {
  public:
@@ -91,7 +87,7 @@ class Characters {
   bool has_room(std::size_t size) {
     if (room() >= size) return true;
     overflow_ = true;
-    end_ = at_;  // permanently
+    end_ = at_;
     return false;
   }
 
@@ -101,9 +97,6 @@ class Characters {
   bool overflow_ = false;
 };
 
-// --- fields
-
-// Copies bytes of that class.
 bool take_bytes(Digits& digits, unsigned count, std::uint8_t byte_class, Characters& out) {
   for (; count != 0; --count) {
     std::uint64_t byte = 0;
