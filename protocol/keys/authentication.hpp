@@ -45,8 +45,9 @@ class Authentication {
  public:
   static constexpr std::size_t chance_size = 32;
   static constexpr std::uint32_t age_limit_ms = 250;
-  // The newest counters of all keys are remembered; one below a forgotten one counts as used. With
-  // r datagrams a second over p paths, each with its own counters, a path may lag by 112 / (p r) s.
+  // The newest counters of all keys together are remembered. A counter below a forgotten one counts
+  // as used. Each path of a session uses its own counters. So with r datagrams a second over p
+  // paths, a path may lag by 112 / (p r) s.
   static constexpr int counters_remembered = 112;
 
   // `chance`: random bytes, different at each boot, for the nonces. If nullptr, the board sends no
@@ -82,7 +83,7 @@ class Authentication {
   struct Entry {
     Blake2sKey key;
     std::uint64_t highest = 0;
-    std::uint64_t forgotten = 0;  // highest counter that is not remembered
+    std::uint64_t forgotten = 0;  // highest forgotten counter
     std::uint8_t id = 0;
   };
   Entry* find(int id);

@@ -42,6 +42,7 @@ class HostLink {
   void on_heartbeat(std::uint32_t t_ms);
   // The field SAFE of the newest state or heartbeat; none without that field.
   void on_reason(SafeReason reason, std::uint32_t now_ms);
+  // Any datagram of the board.
   void on_heard(std::uint32_t now_ms);
   // The board reports that it is booting, so it knows no session.
   void on_booting(SafeReason reason, std::uint32_t now_ms);

@@ -46,7 +46,7 @@ constexpr std::size_t board_id_max = 64;
 bool is_board_id(Text text);
 
 bool is_site_setting(Text key);
-// True for `password` and `key`.
+// True for `password` and `key`, whose values are secret.
 bool is_secret_setting(Text key);
 
 // `number`: which of several keys, from 1. `row` is null for an unknown key.

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The traffic between a board and its hosts on a CAN bus (docs/can.md), at either end: whole
 // datagrams on one side, frames on the other.
-//
 //     dialogue    host to board, and the board's answers (N, I): ISO-TP with flow control
 //     telemetry   the board's states and heartbeats: ISO-TP without, for any number of listeners
-//
 // Three raw frames are added. The board's end turns an emergency stop into E:STOP. It sends the
 // reason when a heartbeat first reports that the board went safe. A watcher requests states.
 // Datagrams are received plain and packed, and sent packed on request. A board answers a plain-text
