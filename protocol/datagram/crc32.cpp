@@ -31,7 +31,7 @@ std::uint32_t crc32_table(Text bytes, std::uint32_t crc) {
     crc = (crc >> 8) ^ table.of[(crc ^ static_cast<unsigned char>(c)) & 0xFFU];
   };
   const char* at = bytes.begin();
-  for (; bytes.end() - at >= 4; at += 4) {  // in fours: a loop of its own would cost half as much
+  for (; bytes.end() - at >= 4; at += 4) {  // unrolled: the loop control costs about half as much
     add(at[0]);
     add(at[1]);
     add(at[2]);
@@ -43,7 +43,7 @@ std::uint32_t crc32_table(Text bytes, std::uint32_t crc) {
 
 std::uint32_t crc32(Text bytes, std::uint32_t crc) {
 #if defined(R4_CRC32_LIBDEFLATE)
-  // For a null pointer libdeflate returns its initial value, not `crc`.
+  // libdeflate returns its initial value for a null pointer, not `crc`.
   return bytes.empty() ? crc : libdeflate_crc32(crc, bytes.data(), bytes.size());
 #else
   return crc32_table(bytes, crc);

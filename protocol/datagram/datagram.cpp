@@ -24,11 +24,10 @@ Text without_line_end(Text bytes) {
   return bytes.substr(0, size);
 }
 
-// What stands behind the fields.
 struct Trailer {
-  const char* digits = nullptr;  // the checksum's first digit
+  const char* digits = nullptr;
   std::uint32_t crc = 0;
-  const char* error = nullptr;  // the byte that is not of the trailer, nullptr if all are
+  const char* error = nullptr;  // first wrong byte; nullptr if the trailer is valid
 };
 
 Trailer read_trailer(const char* at, const char* end) {
@@ -51,7 +50,7 @@ Trailer read_trailer(const char* at, const char* end) {
   return trailer;
 }
 
-// The first byte that is not of the grammar, `fields.end()` if the last field is not closed.
+// The first byte that breaks the grammar; `fields.end()` if the last field is not closed.
 const char* first_wrong_byte(Text fields) {
   const char* at = fields.begin();
   do {
@@ -64,7 +63,7 @@ const char* first_wrong_byte(Text fields) {
   return at;
 }
 
-// Reads a number that may stand once; returns where it is not one, nullptr if it is.
+// Reads a number that may occur once. Returns the wrong byte, or nullptr if there is none.
 template <class Number>
 const char* take_number(Text name, Text value, bool& has, Number& number) {
   if (has) return name.begin();
@@ -137,7 +136,7 @@ Field Datagram::find(Text name) const {
   return Field();
 }
 
-// The field's values that begin behind the colon at `bit` of word `word`.
+// The values of the field whose colon is at `bit` of word `word`.
 Text Datagram::values_at(std::size_t word, std::uint64_t bit) const {
   const char* const colon = fields_.begin() + word * 64 + lowest_bit(bit);
   std::uint64_t later = ends_[word] & ~(bit | (bit - 1));

@@ -44,8 +44,8 @@ DatagramWriter& DatagramWriter::field(Text name) {
 DatagramWriter& DatagramWriter::field(const FieldName& name) {
   if (static_cast<std::size_t>(end_ - at_) < sizeof name.text_) return field(name.name());
   if (!ok_) return *this;
-  const std::size_t skip = open_ ? 0 : 1;  // the first field has no semicolon in front
-  // All of text_, whose size is known: what is behind the name is written over.
+  const std::size_t skip = open_ ? 0 : 1;
+  // All of text_, because its size is known; later bytes overwrite the excess.
   std::memcpy(at_, name.text_ + skip, sizeof name.text_ - 1);
   at_ += name.size_ + 2 - skip;
   open_ = true;
@@ -86,7 +86,7 @@ DatagramWriter& DatagramWriter::more(Text text) {
 template <class Number>
 DatagramWriter& DatagramWriter::number(Number value, char* (*write)(char*, Number)) {
   if (static_cast<std::size_t>(end_ - at_) <= max_number_text) {
-    // Near the end of the buffer it is made beside it, to see whether it fits.
+    // Near the end of the buffer, write beside it first, to find out whether the number fits.
     char beside[max_number_text];
     return values(Text(beside, static_cast<std::size_t>(write(beside, value) - beside)));
   }

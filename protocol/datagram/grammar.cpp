@@ -13,7 +13,7 @@ const ByteClasses byte_classes;
 
 namespace {
 
-// The 16 bytes at `at` as bits `shift` and up.
+// Marks the separators among the 16 bytes at `at`, in the bits from `shift` on.
 inline void add_separators(const char* at, unsigned shift, Separators& out) {
   const __m128i bytes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(at));
   const auto equal = [&](char c) { return _mm_cmpeq_epi8(bytes, _mm_set1_epi8(c)); };
@@ -21,7 +21,7 @@ inline void add_separators(const char* at, unsigned shift, Separators& out) {
     return static_cast<std::uint64_t>(static_cast<unsigned>(_mm_movemask_epi8(mask))) << shift;
   };
   const __m128i semicolon = equal(';');
-  // Signed: also the bytes from 0x80.
+  // The comparison is signed, so bytes from 0x80 are included.
   const __m128i below_space = _mm_cmplt_epi8(bytes, _mm_set1_epi8(' '));
   const __m128i no_field = _mm_or_si128(below_space, _mm_or_si128(equal('^'), equal('\x7F')));
   const __m128i no_name =
@@ -39,7 +39,7 @@ Separators separators(Text block) {
   char copy[separators_block];
   const char* at = block.data();
   if (block.size() < separators_block) {
-    std::memset(copy, 'x', sizeof copy);  // of a name, of a value, no separator
+    std::memset(copy, 'x', sizeof copy);  // valid in a name and a value, not a separator
     std::memcpy(copy, at, block.size());
     at = copy;
   }
@@ -52,7 +52,6 @@ Separators separators(Text block) {
 
 namespace {
 
-// Bits for half a block, in words of the processor.
 struct Half {
   std::uint32_t colons = 0;
   std::uint32_t semicolons = 0;
@@ -68,7 +67,7 @@ Half half_separators(const char* at, std::size_t size) {
   Half out;
   std::uint32_t bit = 1;
   for (const char* const end = at + size; at != end; ++at, bit <<= 1) {
-    // Most bytes are of a name and of a value.
+    // Test first for the most frequent bytes.
     if (is_in(ByteClasses::in_name, *at)) continue;
     if (*at == ':') {
       out.colons |= bit;
@@ -99,9 +98,9 @@ Separators separators(Text block) {
 
 namespace {
 
-// Follows runs of set bits: for each bit of `starts`, which stands in a run of `run`, the bit
-// behind the run's end. The addition does it: a start carries through its run and no further.
-// `carry` takes a run over the end of the word, into bit 0 of the next.
+// For each bit of `starts`, which lies in a run of set bits of `run`: the bit after the end of that
+// run. The addition carries a start through its run and no further. `carry` continues a run in bit
+// 0 of the next word.
 std::uint64_t run_ends(std::uint64_t run, std::uint64_t starts, std::uint64_t& carry) {
   const std::uint64_t sum = run + (starts | carry);
   carry = sum < run ? 1 : 0;
@@ -113,7 +112,7 @@ std::uint64_t run_ends(std::uint64_t run, std::uint64_t starts, std::uint64_t& c
 bool mark_fields(Text fields, std::uint64_t* ends, std::uint64_t* short_names) {
   if (fields.empty() || *(fields.end() - 1) != ';') return false;
   std::uint64_t starts = 0;
-  std::uint64_t first = 1;  // a field begins with the word's first byte
+  std::uint64_t first = 1;  // 1 if a field begins with the word's first byte
   std::uint64_t name_carry = 0;
   std::uint64_t value_carry = 0;
   for (std::size_t at = 0, word = 0; at < fields.size(); at += separators_block, ++word) {

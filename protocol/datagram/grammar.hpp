@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which bytes the names and values of a datagram may hold (the grammar is in datagram.hpp), and where
-// its fields are. The reader and the writer ask here, so that they cannot disagree.
+// The bytes allowed in names and values (grammar: datagram.hpp), and the search for fields. Reader
+// and writer share these tables, so they cannot disagree.
 #pragma once
 
 #include <cstddef>
@@ -32,26 +32,25 @@ inline bool is_in(std::uint8_t byte_class, char byte) {
   return (byte_classes.of[static_cast<unsigned char>(byte)] & byte_class) != 0;
 }
 
-// The first byte in [at, end) that is not of the class; `end` if there is none.
+// The first byte in [at, end) outside the class; `end` if there is none.
 inline const char* skip(std::uint8_t byte_class, const char* at, const char* end) {
   while (at != end && is_in(byte_class, *at)) ++at;
   return at;
 }
 
-// Where the bytes that matter stand in a block of at most 64: bit i is byte i.
+// The separators in a block of at most 64 bytes: bit i is byte i.
 struct Separators {
   std::uint64_t colons;
   std::uint64_t semicolons;
-  std::uint64_t no_name;   // bytes that stand in no name and are no colon
-  std::uint64_t no_field;  // bytes that stand in no value and are no semicolon
+  std::uint64_t no_name;   // bytes not allowed in a name, except colons
+  std::uint64_t no_field;  // bytes not allowed in a value, except semicolons
 };
 constexpr std::size_t separators_block = 64;
 Separators separators(Text block);
 
-// Marks in `ends` the colon behind each name and the semicolon behind each field, and in
-// `short_names` those colons that stand one, three or four bytes behind the beginning of a field; 64 bytes
-// a word. False if the fields are not of the grammar. The time does not depend on how many there
-// are.
+// Marks in `ends` the colon after each name and the semicolon after each field. Marks in
+// `short_names` the colons one, three or four bytes after a field's beginning. One word holds 64
+// bytes. False if the fields break the grammar. The time does not depend on their number.
 bool mark_fields(Text fields, std::uint64_t* ends, std::uint64_t* short_names);
 
 }  // namespace r4

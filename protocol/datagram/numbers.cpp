@@ -7,14 +7,14 @@ namespace {
 constexpr std::uint64_t u32_max = 0xFFFFFFFFU;
 constexpr std::uint64_t u64_max = ~std::uint64_t{0};
 
-// Its value, above 9 for what is no digit.
+// The digit's value; above 9 if `c` is not a digit.
 constexpr unsigned digit_of(char c) { return unsigned{static_cast<unsigned char>(c)} - '0'; }
 constexpr bool is_digit(char c) { return digit_of(c) <= 9; }
 
-// One to nine digits always fit, and need no arithmetic of 64 bits.
+// One to nine digits always fit, and need no 64-bit arithmetic.
 constexpr bool fits_32_bits(std::size_t digits) { return digits - 1 < 9; }
 
-// As many digits as that; false for anything else.
+// Reads one to nine digits; false for anything else.
 inline bool parse_short(const char* at, const char* end, std::uint32_t& out) {
   std::uint32_t value = 0;
   do {
@@ -26,12 +26,11 @@ inline bool parse_short(const char* at, const char* end, std::uint32_t& out) {
   return true;
 }
 
-// Digits up to `limit`; false for anything else, and for no digits at all.
 inline bool parse_digits(const char* at, const char* end, std::uint64_t limit, std::uint64_t& out) {
   constexpr std::uint32_t e9 = 1000000000;
   if (at == end) return false;
   std::uint64_t value = 0;
-  if (end - at <= 18) {  // as many always fit 64 bits: the last nine, and those before them
+  if (end - at <= 18) {  // always fits 64 bits: the last nine digits, and those before them
     std::uint32_t high = 0;
     std::uint32_t low = 0;
     const char* const last_nine = end - at > 9 ? end - 9 : at;
@@ -57,7 +56,6 @@ bool skip_minus(Text text, const char*& at) {
   return true;
 }
 
-// The largest magnitude of a 32-bit number with that sign.
 constexpr std::uint64_t magnitude_limit(bool negative) {
   return negative ? std::uint64_t{0x80000000U} : std::uint64_t{0x7FFFFFFFU};
 }
@@ -88,7 +86,6 @@ int decimal_digits(std::uint32_t value) {
   return value < 1000000000 ? 9 : 10;
 }
 
-// Exactly 8 digits, with leading zeros.
 char* put_8_digits(char* out, std::uint32_t value) {
   for (int i = 6; i >= 0; i -= 2) {
     put_pair(out + i, value % 100);
@@ -97,7 +94,7 @@ char* put_8_digits(char* out, std::uint32_t value) {
   return out + 8;
 }
 
-// Without a branch a digit: those of a CRC cannot be predicted.
+// A table, not branches: the digits of a CRC cannot be predicted.
 struct HexDigits {
   static constexpr std::uint8_t none = 0x80;
   std::uint8_t of[256] = {};
@@ -203,7 +200,7 @@ bool parse_session_id(Text text, SessionId& out) {
   if (text.size() != session_id_size) return false;
   std::uint32_t halves[2] = {0, 0};
   std::uint32_t seen = 0;
-  unsigned all = 0x20;  // in '0' to '9' and 'a' to 'f', and not in 'A' to 'F'
+  unsigned all = 0x20;  // set in '0' to '9' and 'a' to 'f', clear in 'A' to 'F'
   const char* at = text.begin();
   for (std::uint32_t& half : halves) {
     for (const char* const end = at + session_id_size / 2; at != end; at += 2) {

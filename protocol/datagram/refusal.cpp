@@ -4,7 +4,6 @@
 namespace r4 {
 namespace {
 
-// In the order of the enumeration.
 constexpr Text names[] = {"NONE",      "UNKNOWN", "FORMAT", "RANGE", "CHANNEL", "STALE",
                           "DUPLICATE", "SAFE",    "BUSY",   "AUTH",  "FULL"};
 constexpr std::size_t name_count = sizeof names / sizeof names[0];

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Arrays compared element by element.
 #pragma once
 
 namespace r4 {

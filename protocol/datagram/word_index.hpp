@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds a word in a table of words by its hash, with no work at run time but the lookup. The index is
-// made by the compiler; a table with a word twice finds the first.
+// Finds a word in a table by its hash. The compiler builds the index. If a word is in the table
+// twice, the first is found.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +12,7 @@ namespace r4 {
 
 constexpr unsigned no_index = 0xFF;
 
-// For a table of `count` entries, of which `word_of` tells the word. The table must be constexpr and
-// outlive the index.
+// `word_of` returns the word of an entry. The table must be constexpr and outlive the index.
 template <class Entry, unsigned count, Text (*word_of)(const Entry&)>
 class WordIndex {
  public:
@@ -28,7 +27,7 @@ class WordIndex {
     }
   }
 
-  // The number of the entry with that word, or no_index. Constant time.
+  // The index of the entry with that word, or no_index. Constant time.
   unsigned find(Text word) const {
     if (word.size() > longest_) return no_index;
     for (unsigned slot = slot_of(word);; slot = (slot + 1) % slot_count) {
@@ -38,7 +37,6 @@ class WordIndex {
   }
 
  private:
-  // Open addressing.
   static constexpr unsigned slot_count = count < 128 ? 256 : 512;
   static_assert(count < slot_count / 2, "less than half full");
 

@@ -13,7 +13,7 @@ constexpr Text host_to_board("R4 host to board");
 constexpr Text field_name("A");
 constexpr std::size_t tag_bytes = 8;
 
-// Base64url without padding of 8 bytes: six bits a character, the last two bits are 0.
+// Base64url without padding: six bits a character, the last two bits are 0.
 void write_base64url(const std::uint8_t (&bytes)[tag_bytes], char (&out)[tag_size]) {
   constexpr Text digits("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_");
   std::uint64_t bits = 0;
@@ -23,7 +23,7 @@ void write_base64url(const std::uint8_t (&bytes)[tag_bytes], char (&out)[tag_siz
   for (std::size_t i = tag_size - 1; i-- != 0; bits >>= 6) out[i] = digits[bits & 0x3FU];
 }
 
-// Takes the same time wherever the two differ, so that the time tells a forger nothing.
+// Constant time, so that the time does not help a forger.
 bool same(Text tag, const char (&expected)[tag_size]) {
   if (tag.size() != tag_size) return false;
   unsigned difference = 0;
@@ -33,7 +33,6 @@ bool same(Text tag, const char (&expected)[tag_size]) {
   return difference == 0;
 }
 
-// 0: none.
 int id_of(Text digit) {
   return digit.size() == 1 && digit[0] >= '1' && digit[0] <= '0' + max_key_id ? digit[0] - '0' : 0;
 }
@@ -138,7 +137,6 @@ void Authentication::draw(Text purpose, std::uint8_t (&digest)[nonce_size / 2]) 
   hash.finish(digest);
 }
 
-// nullptr: there is no key of that id.
 Authentication::Entry* Authentication::find(int id) {
   for (Entry& entry : entries_) {
     if (id != 0 && entry.id == id) return &entry;
@@ -207,9 +205,8 @@ void Signer::on_board_time(std::uint32_t t_ms, std::uint32_t now_ms) {
   heard_ms_ = now_ms;
 }
 
-// The board's clock as we estimate it: the T that it told, and the time since by our clock. The
-// board refuses a T that is ahead of its clock, so a 32nd of that time is left out: our clock may
-// be up to 3 % faster.
+// Estimates the board's clock from its newest T. A 32nd of the time since then is left out: the
+// host's clock may be up to 3 % faster, and the board refuses a T ahead of its clock.
 std::uint32_t Signer::board_time(std::uint32_t now_ms) const {
   const std::uint32_t passed = now_ms - heard_ms_;
   return passed == 0 ? t_ms_ : t_ms_ + (passed - passed / 32 - 1);

@@ -9,7 +9,7 @@ namespace {
 constexpr std::uint32_t initial[8] = {0x6A09E667, 0xBB67AE85, 0x3C6EF372, 0xA54FF53A,
                                       0x510E527F, 0x9B05688C, 0x1F83D9AB, 0x5BE0CD19};
 
-// Which message word goes where, in each round (RFC 7693, 2.7).
+// The position of each message word, in each round (RFC 7693, 2.7).
 constexpr int rounds = 10;
 constexpr std::uint8_t schedule[rounds][16] = {
     {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15},
@@ -79,10 +79,9 @@ void Blake2s::compress(bool last) {
     v[i] = state_[i];
     v[i + 8] = initial[i];
   }
-  v[12] ^= count_;  // of a count of 64 bits, the upper half stays 0
+  v[12] ^= count_;  // the upper half of the 64-bit count stays 0
   if (last) v[14] = ~v[14];
   for (const std::uint8_t(&s)[16] : schedule) {
-    // The columns, then the diagonals.
     mix(v[0], v[4], v[8], v[12], m[s[0]], m[s[1]]);
     mix(v[1], v[5], v[9], v[13], m[s[2]], m[s[3]]);
     mix(v[2], v[6], v[10], v[14], m[s[4]], m[s[5]]);

@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// BLAKE2s (RFC 7693): a hash of 1 to 32 bytes, and with a key a message authentication code.
-//
+// BLAKE2s (RFC 7693): a hash of 1 to 32 bytes; with a key, a message authentication code.
 //     Blake2s hash(32, key, sizeof key);
 //     hash.update(Text("abc"));
 //     hash.finish(digest);              // 32 bytes
-//
-// Where one key authenticates many messages, Blake2sKey does the key's part once:
-//
+// If one key authenticates many messages, Blake2sKey processes the key once:
 //     const Blake2sKey prepared(8, key, sizeof key);
 //     Blake2s code(prepared);           // for a message of at least one byte
-//
-// Messages of up to 2^32 - 1 bytes, the key's block of 64 included. Nothing fails; the time depends
-// on the sizes only, never on the bytes.
+// Messages have up to 2^32 - 1 bytes, including the key's 64-byte block. No call fails. The time
+// depends only on the sizes, never on the bytes.
 #pragma once
 
 #include <cstddef>
@@ -25,11 +21,11 @@ constexpr std::size_t blake2s_max_digest = 32;
 constexpr std::size_t blake2s_max_key = 32;
 constexpr std::size_t blake2s_block = 64;
 
-// A key ready for use: what the hash has become behind the block that holds it.
+// The state of the hash after the key's block.
 class Blake2sKey {
  public:
   Blake2sKey() = default;
-  // Codes of `digest_size` bytes (1-32) by a key of `key_bytes` bytes (1-32).
+  // `digest_size`: 1-32; `key_bytes`: 1-32.
   Blake2sKey(std::size_t digest_size, const std::uint8_t* key, std::size_t key_bytes);
 
  private:
@@ -40,15 +36,15 @@ class Blake2sKey {
 
 class Blake2s {
  public:
-  // A digest of `digest_size` bytes (1-32), with a key of `key_bytes` bytes (0-32; 0: no key).
+  // `digest_size`: 1-32; `key_bytes`: 0-32, where 0 means no key.
   explicit Blake2s(std::size_t digest_size, const std::uint8_t* key = nullptr,
                    std::size_t key_bytes = 0);
-  // With a key made ready. The message must not be empty.
+  // The message must not be empty.
   explicit Blake2s(const Blake2sKey& key);
 
   void update(const std::uint8_t* bytes, std::size_t size);
   void update(Text text);
-  // Writes the digest; the hash is of no use then.
+  // The hash cannot be used afterwards.
   void finish(std::uint8_t* digest);
 
  private:
@@ -56,10 +52,10 @@ class Blake2s {
   void compress(bool last);
 
   std::uint32_t state_[8];
-  std::uint8_t block_[blake2s_block];  // compressed when more comes, for the last one is marked
-  std::uint8_t used_ = 0;              // of block_
+  std::uint8_t block_[blake2s_block];  // the last block is marked, so it is not compressed early
+  std::uint8_t used_ = 0;
   std::uint8_t digest_size_;
-  std::uint32_t count_ = 0;  // bytes compressed
+  std::uint32_t count_ = 0;
 };
 
 }  // namespace r4

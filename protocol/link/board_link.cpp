@@ -3,9 +3,8 @@
 
 namespace r4 {
 
-// --- whose heartbeat, and is it of now?
+// --- heartbeats of hosts
 
-// True if this is the T of one of the board's recent heartbeats.
 bool BoardLink::is_echo(std::uint64_t t) const {
   for (int i = 0; t != 0 && i < sent_used_; ++i) {
     if (sent_[i] == t) return true;
@@ -23,7 +22,7 @@ BoardLink::Freshness BoardLink::judge(const HostHeartbeat& heartbeat, std::uint3
   if (is_echo(heartbeat.t)) {
     const std::uint32_t t = static_cast<std::uint32_t>(heartbeat.t);
     const bool recent = now_ms - t <= timing_.timeout_ms;
-    // What was sent before the link was lost does not show that the host is alive now.
+    // A heartbeat sent before the loss does not prove that the host is alive after it.
     const bool since_loss = state_ != BoardLinkState::lost || reached(t, lost_ms_);
     return recent && since_loss ? Freshness::fresh : Freshness::stale;
   }
@@ -31,7 +30,7 @@ BoardLink::Freshness BoardLink::judge(const HostHeartbeat& heartbeat, std::uint3
   return must_echo ? Freshness::stale : Freshness::no_echo;
 }
 
-// True if the number of this heartbeat of the session follows its newest one. A paper host may have no numbers.
+// True if the heartbeat is newer than the session's newest. A paper host may send no numbers.
 bool BoardLink::continues(const HostHeartbeat& heartbeat) const {
   if (heartbeat.has_pnum != has_heartbeat_pnum_) return false;
   return !heartbeat.has_pnum || newer(heartbeat.pnum, newest_heartbeat_);
@@ -48,7 +47,7 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
   const bool paper = heartbeat.host.sid == no_session;
   const bool ours = is_session_of(heartbeat.host);
   const Freshness freshness = judge(heartbeat, now_ms);
-  // When it had arrived, at the earliest: after what it echoes was sent, and after the one before it.
+  // The earliest possible arrival: after the sending of its echo, and after the previous heartbeat.
   std::uint32_t waited_ms = heartbeat.waited_ms;
   if (freshness == Freshness::fresh) {
     const std::uint32_t echo_ms = now_ms - static_cast<std::uint32_t>(heartbeat.t);
@@ -68,7 +67,7 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
     return HeartbeatEffect::fed;
   }
   if (ours && !paper) {
-    if (!continues(heartbeat)) return HeartbeatEffect::stale;  // a late copy
+    if (!continues(heartbeat)) return HeartbeatEffect::stale;  // a late duplicate
     resume(heartbeat, at_ms);
     return HeartbeatEffect::resumed;
   }
@@ -96,12 +95,12 @@ void BoardLink::resume(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
   state_ = BoardLinkState::active;
   send_now_ = true;
   newest_echo_ms_ = at_ms - timing_.timeout_ms;
-  if (heartbeat.has_pnum) spend(heartbeat.pnum);  // what was sent before the outage
+  if (heartbeat.has_pnum) spend(heartbeat.pnum);  // commands sent before the outage are spent
   feed(heartbeat, at_ms);
 }
 
-// `at_ms`: when it had arrived, at the earliest. A command that it overtook is never taken for younger
-// than it is by that, and one that arrived after it, in the same backlog, has a newer number.
+// `at_ms`: the earliest possible arrival, so the age of an overtaken command is never
+// underestimated. A command that arrived later in the same backlog has a newer number.
 void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
   fed_ms_ = at_ms;
   const std::uint32_t t = static_cast<std::uint32_t>(heartbeat.t);
@@ -110,17 +109,16 @@ void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
   if (clock_ == Clock::unknown && heartbeat.t != 0) clock_ = known ? Clock::echo : Clock::own;
   if (!heartbeat.has_pnum) return;
   newest_heartbeat_ = heartbeat.pnum;
-  // The marks last for the limit at any rate of heartbeats. Between two marks a heartbeat counts as
-  // arrived at the earlier one, so a command is never taken for younger than it is. When the oldest
-  // mark is dropped, the next is past the limit itself.
+  // The marks cover late_limit_ms at any heartbeat rate; heartbeats between two marks count as
+  // arrived at the earlier one. When the oldest is dropped, the next is itself past the limit.
   constexpr std::uint32_t spacing_ms = late_limit_ms / (mark_count - 1) + 1;
   if (marks_used_ != 0 && at_ms - marks_[marks_used_ - 1].at_ms < spacing_ms) {
     marks_[marks_used_ - 1].pnum = heartbeat.pnum;
     return;
   }
   if (marks_used_ == mark_count) {
-    // Commands from before the oldest mark are late anyway. The window follows it, so that a host
-    // that commanded nothing for hours is not ahead of it.
+    // Commands from before the oldest mark are late anyway. The window follows that mark, so that a
+    // host without commands for hours stays within it.
     if (has_baseline_ && marks_[0].pnum - newest_ > command_window / 2) spend(marks_[0].pnum);
     for (int i = 1; i < mark_count; ++i) marks_[i - 1] = marks_[i];
     --marks_used_;
@@ -164,7 +162,7 @@ bool BoardLink::is_next(std::uint32_t pnum) const {
 
 Refusal BoardLink::admit(HostId host, std::uint32_t pnum, std::uint32_t now_ms) const {
   const bool ours = is_session_of(host);
-  // Whatever the link is now: the answer to a number that is spent stays the same, so that the host knows.
+  // A spent number always gets the same answer, in every link state.
   if (ours && has_baseline_ && !newer(pnum, newest_)) {
     const Refusal code = code_of_spent(pnum);
     if (code != Refusal::stale) return code;
@@ -180,7 +178,6 @@ Refusal BoardLink::admit(HostId host, std::uint32_t pnum, std::uint32_t now_ms) 
   return Refusal::none;
 }
 
-// Why a number that is spent is not executed.
 Refusal BoardLink::code_of_spent(std::uint32_t pnum) const {
   const std::uint32_t behind = newest_ - pnum;
   if (behind < memory && ((executed_bits_ >> behind) & 1U) != 0) return Refusal::duplicate;
@@ -190,7 +187,6 @@ Refusal BoardLink::code_of_spent(std::uint32_t pnum) const {
   return Refusal::stale;
 }
 
-// Commands up to `pnum` are not to be executed any more.
 void BoardLink::spend(std::uint32_t pnum) {
   if (has_baseline_ && !newer(pnum, newest_)) return;
   const std::uint32_t ahead = has_baseline_ ? pnum - newest_ : memory;
@@ -217,7 +213,7 @@ void BoardLink::executed(std::uint32_t pnum) {
 
 // --- the board's own heartbeats
 
-// True while the host has not echoed the newest heartbeat: one that is lost must not make its echoes stale.
+// True while the host has not echoed the newest heartbeat, which may have been lost.
 bool BoardLink::lacks_echo() const {
   return has_owner() && host_.sid != no_session && newer(last_sent_ms_, newest_echo_ms_);
 }

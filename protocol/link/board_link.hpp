@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's end of the link: which host controls the board, whether that host is alive, and which of
-// its commands may be executed (paper section 4.3; docs/protocol.md "The link", docs/safety.md).
+// The board's end of the link: which host controls the board, whether that host is alive, and which
+// of its commands may be executed (paper section 4.3; docs/protocol.md "The link", docs/safety.md).
 //
-//                 heartbeat that may begin a session         the host is silent for the timeout,
-//     CONNECTING ------------------------------> ACTIVE ----- says farewell, or its paths are gone -+
-//       (boot)                                     ^                                                v
-//                                                  +---- heartbeat that may begin or resume ------ LOST
+//                 heartbeat that may begin a session      the host is silent for the timeout,
+//     CONNECTING ------------------------------> ACTIVE -- leaves, or all its paths are gone ---+
+//       (boot)                                     ^                                            v
+//                                                  +---- heartbeat that may begin or resume -- LOST
 //
-// There are two kinds of host:
-//
-//     a host with a session id (SID)   each heartbeat must echo the T of a board heartbeat that was sent
-//                                      at most `timeout` ago, and in LOST since the link was lost
-//     a paper host (no SID)            is known by where it is. If its T was an echo once, it must go on
-//                                      echoing; else its T is a clock of its own, and its heartbeats
-//                                      count when they arrive. It never resumes: in LOST nothing shows
-//                                      that it is the same host
+//     host with a session id (SID)  Each heartbeat must echo the T of a board heartbeat that is at
+//                                   most `timeout` old and, in LOST, was sent after the loss.
+//     paper host (no SID)           Its source identifies it. If its T was an echo once, it must
+//                                   continue to echo. Otherwise T is its own clock, and heartbeats
+//                                   count on arrival. It never resumes a session, because in LOST
+//                                   nothing proves that it is the same host.
 //
 // All times are the board's clock in ms, which wraps; it must start at a random value at boot.
 #pragma once
@@ -27,7 +25,7 @@
 
 namespace r4 {
 
-// Where a datagram came from and where its answer goes: a port of the board and, on it, a peer.
+// Where a datagram came from and where its answer goes: a port of the board, and a peer on it.
 struct Source {
   std::uint8_t port = 0;
   std::uint32_t peer = 0;
@@ -35,7 +33,7 @@ struct Source {
   friend bool operator!=(Source a, Source b) { return !(a == b); }
 };
 
-// The host that sent a datagram: by its session id, or by where it is if it has none (a paper host).
+// The sender of a datagram: its session id, or its source if it has none (a paper host).
 struct HostId {
   Source from;
   SessionId sid = no_session;
@@ -47,15 +45,14 @@ struct HostId {
 
 enum class BoardLinkState : std::uint8_t { connecting, active, lost };
 
-// What a host's heartbeat did.
 enum class HeartbeatEffect : std::uint8_t {
-  fed,          // the controlling host is alive
-  repeated,     // its path is alive; another one has brought that heartbeat before, or a newer one
-  resumed,      // LOST -> ACTIVE, the same session goes on
-  new_session,  // the sender controls the board now; nothing of an earlier host may be restored
-  stale,        // no effect: no echo or an old one, overtaken, or read too late
-  unheard,  // the same, and its host may have no fresh T: answer it with a heartbeat that it can echo
-  busy,     // another host controls the board
+  fed,
+  repeated,     // its path is alive; another path delivered this heartbeat or a newer one before
+  resumed,      // LOST -> ACTIVE, the same session continues
+  new_session,  // the sender controls the board; nothing of an earlier host may be restored
+  stale,        // no effect: no echo, an old echo, overtaken, or read too late
+  unheard,      // no effect; the host may have no fresh T: answer with a heartbeat that it can echo
+  busy,
 };
 
 class BoardLink {
@@ -68,8 +65,8 @@ class BoardLink {
   explicit BoardLink(Timing timing) : timing_(timing) {}
   void set_timing(Timing timing) { timing_ = timing; }
 
-  // A host heartbeat. `pnum` counts only if `has_pnum`; `t` is 0 if it has none. It arrived at most `waited_ms`
-  // before it is handed over, and counts from then: one that may have waited for the timeout is stale.
+  // `t` is 0 if the heartbeat has none. It arrived at most `waited_ms` before this call, and counts
+  // from then. A heartbeat that may have waited for the timeout is stale.
   struct HostHeartbeat {
     HostId host;
     bool has_pnum = false;
@@ -79,72 +76,67 @@ class BoardLink {
   };
   HeartbeatEffect on_heartbeat(const HostHeartbeat& heartbeat, std::uint32_t now_ms);
 
-  // Why this command may not be executed: stale, duplicate, safe, busy, or the code of a refusal that is repeated;
-  // none if it may. The number is not spent until executed() or refused() is called.
+  // The reason not to execute this command: stale, duplicate, safe, busy, or a repeated refusal.
+  // Otherwise none. The number is not spent until executed() or refused() is called.
   Refusal admit(HostId host, std::uint32_t pnum, std::uint32_t now_ms) const;
-  // The session's command with this number was carried out: it and all older numbers are spent.
+  // The session's command was executed: its number and all older numbers are spent.
   void executed(std::uint32_t pnum);
-  // A command was refused, for its content or the safe state. If it is the session's, it and all older
-  // numbers are spent, so that no duplicate of it is executed later. A duplicate of one of the last
-  // refused_memory is refused with the same code.
+  // A command was refused, for its content or the safe state. If it is the session's, its number
+  // and all older numbers are spent, so that no duplicate is executed later. A duplicate of one of
+  // the last refused_memory is refused with the same code.
   void refused(HostId host, std::uint32_t pnum, Refusal code);
-  // True if this number is one of the next `memory` of the session's.
+  // True if this is one of the next `memory` numbers of the session.
   bool is_next(std::uint32_t pnum) const;
 
-  // Lets time pass. True once, when the controlling host has been silent for the timeout: ACTIVE -> LOST.
+  // True once, when the controlling host has been silent for the timeout: ACTIVE -> LOST.
   bool poll(std::uint32_t now_ms);
   // Every path of the session is gone. True if a host was in control: ACTIVE -> LOST.
   bool lose(std::uint32_t now_ms);
-  // The session's host has ended it: ACTIVE -> LOST. Its id begins no session any more.
+  // ACTIVE -> LOST. The ids of the last left_memory hosts that left cannot begin a session again.
   void leave(std::uint32_t now_ms);
 
-  // The board's own heartbeats: whether one is due, and that one was sent (its T). Besides the regular
-  // ones, an echo that stays away is asked for again every echo_retry_ms; entering ACTIVE and LOST
-  // each send one at once.
+  // The board's own heartbeats are regular. A missing echo causes another every echo_retry_ms, and
+  // entering ACTIVE or LOST sends one at once. heartbeat_sent() takes the T of a sent heartbeat.
   bool heartbeat_due(std::uint32_t now_ms) const;
   void heartbeat_sent(std::uint32_t t_ms);
-  // A heartbeat shows this T, to whomever it is sent: it can be echoed.
+  // A heartbeat with this T was sent to some peer, so the T can be echoed.
   void shown(std::uint32_t t_ms);
-  // The next one is wanted at once: it brings news.
   void send_soon() { send_now_ = true; }
-  // The T of a heartbeat that answers one peer. Answers within answer_spacing_ms share it, so that hosts
-  // which ask often do not push out of the memory what another host is about to echo.
+  // The T of a heartbeat that answers one peer. Answers within answer_spacing_ms share it, so that
+  // frequent requests do not push a T that another host will echo out of the memory.
   std::uint32_t answer_time(std::uint32_t t_ms) const;
 
-  // Milliseconds until poll() or heartbeat_due() may have something to say; 0 is now.
+  // Milliseconds until poll() or heartbeat_due() may return true; 0 is now.
   std::uint32_t due_in(std::uint32_t now_ms) const;
 
   BoardLinkState state() const { return state_; }
-  // True while a host controls the board.
   bool has_owner() const { return state_ == BoardLinkState::active; }
   // True if this host controls the board, or did when the link was lost.
   bool is_session_of(HostId host) const { return has_session_ && host == host_; }
-  // When the controlling host was last heard alive, or later than that; after the first session began.
+  // The controlling host was last heard at this time or later. Valid after the first session began.
   std::uint32_t fed_ms() const { return fed_ms_; }
-  // When the link is lost if the host stays silent; only while ACTIVE.
+  // When the link is lost if the host stays silent. Valid only while ACTIVE.
   std::uint32_t deadline_ms() const { return fed_ms_ + timing_.timeout_ms; }
-  // The number of the heartbeat with which the session of this host began. A refusal reports it, so that the host
-  // knows that every command which it has sent since is remembered. False: it is not this host's session, or its
-  // heartbeats have no numbers.
+  // The number of the heartbeat that began this host's session. A refusal reports it: later
+  // commands are remembered. False for another host, or if its heartbeats have no numbers.
   bool first_heartbeat(HostId host, std::uint32_t& pnum) const;
-  // The number of the last command executed in this session (the CMD field); 0 before the first.
+  // The last command executed in this session (the CMD field); 0 before the first.
   std::uint32_t last_executed() const { return last_executed_; }
 
   static constexpr std::uint32_t echo_retry_ms = 100;
   static constexpr std::uint32_t answer_spacing_ms = 50;
-  // A command that a heartbeat overtook this long ago is stale.
+  // A command is stale if a heartbeat overtook it longer ago than this.
   static constexpr std::uint32_t late_limit_ms = 250;
-  // How far ahead of the newest known number a command may be.
+  // The largest distance of a command from the newest known number.
   static constexpr std::uint32_t command_window = 65536;
-  // How far back it is known which numbers were executed: there DUPLICATE and STALE are exact.
+  // Executed numbers are remembered this far back; there DUPLICATE and STALE are exact.
   static constexpr std::uint32_t memory = 64;
   static constexpr int refused_memory = 16;
-  // So many sessions that were left are remembered.
   static constexpr int left_memory = 4;
 
  private:
-  enum class Clock : std::uint8_t { unknown, echo, own };  // what a paper host's T turned out to be
-  enum class Freshness : std::uint8_t { fresh, stale, no_echo };  // no_echo: none is asked for
+  enum class Clock : std::uint8_t { unknown, echo, own };         // the meaning of a paper host's T
+  enum class Freshness : std::uint8_t { fresh, stale, no_echo };  // no_echo: none is required
 
   Freshness judge(const HostHeartbeat& heartbeat, std::uint32_t now_ms) const;
   bool is_echo(std::uint64_t t) const;
@@ -161,15 +153,15 @@ class BoardLink {
   Timing timing_;
   BoardLinkState state_ = BoardLinkState::connecting;
 
-  // The session: kept while LOST, so that the same host can resume it.
+  // Kept while LOST, so that the same host can resume the session.
   bool has_session_ = false;
   HostId host_;
-  Clock clock_ = Clock::unknown;  // of a paper host
+  Clock clock_ = Clock::unknown;
   SessionId left_[left_memory] = {};
   int left_next_ = 0;
   std::uint32_t first_heartbeat_ = 0;
-  bool has_baseline_ = false;        // numbers up to newest_ are spent
-  std::uint32_t newest_ = 0;         // newest executed command, or the session's first heartbeat
+  bool has_baseline_ = false;  // numbers up to newest_ are spent
+  std::uint32_t newest_ = 0;
   std::uint64_t executed_bits_ = 0;  // bit i: newest_ - i was executed
   std::uint32_t refused_[refused_memory] = {};
   Refusal refused_codes_[refused_memory] = {};
@@ -181,7 +173,7 @@ class BoardLink {
   std::uint32_t newest_echo_ms_ = 0;
   std::uint32_t fed_ms_ = 0;
 
-  // Heartbeat numbers and when they had come at the earliest, as long back as late_limit_ms asks for.
+  // Heartbeat numbers and their earliest possible arrivals, back to late_limit_ms.
   struct Mark {
     std::uint32_t pnum;
     std::uint32_t at_ms;
@@ -197,8 +189,8 @@ class BoardLink {
   int sent_next_ = 0;
   bool any_sent_ = false;
   std::uint32_t last_sent_ms_ = 0;
-  std::uint32_t lost_ms_ = 0;  // when LOST was entered
-  bool send_now_ = true;       // boot, ACTIVE and LOST entered
+  std::uint32_t lost_ms_ = 0;
+  bool send_now_ = true;
 };
 
 }  // namespace r4

@@ -17,7 +17,7 @@ const char* to_text(HostLinkState state) {
   return "unknown";
 }
 
-// Each T is answered at once only the first time: a board that cannot use the answer sends that T again.
+// At once only the first time, because a board that cannot use the answer repeats that T.
 void HostLink::on_heartbeat(std::uint32_t t_ms) {
   if (t_ms == echo_) return;
   echo_ = t_ms;
@@ -66,8 +66,8 @@ void HostLink::begin_anew() {
   if (state_ != HostLinkState::connecting) state_ = HostLinkState::lost;
 }
 
-// The board may still hold our session with its setpoints, which nobody wants any more if our clock stood
-// still. In a virtual machine that was paused, no clock of ours shows that: only the board's does.
+// The board may still hold this session, whose setpoints are out of date if the host's clock stood
+// still. In a paused virtual machine only the board's clock shows that.
 void HostLink::end_session() {
   session_ = no_session;
   first_pnum_ = next_pnum_;

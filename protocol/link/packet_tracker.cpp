@@ -37,7 +37,7 @@ Arrival PacketTracker::on(std::uint32_t pnum) {
     --counters_.lost;
     return Arrival::late;
   }
-  if (behind < window) {  // sent before the first that came
+  if (behind < window) {  // sent before the first that arrived
     suspecting_ = false;
     ++counters_.old;
     return Arrival::old;

@@ -5,7 +5,7 @@ namespace r4 {
 
 Watchers::Effect Watchers::on_lease(Source from, std::uint32_t rate_hz, std::uint64_t echo,
                                     bool proven, std::uint32_t now_ms) {
-  poll(now_ms);  // silence counts before what ends it
+  poll(now_ms);  // a lease that has expired cannot be renewed
   Watcher* place = find(from);
   const bool renews = proven || (place != nullptr && place->token == echo);
   if (!renews && !is_told(from, echo, now_ms)) {
@@ -40,7 +40,6 @@ void Watchers::tell(Source to, std::uint32_t token, std::uint32_t now_ms) {
   told.at_ms = now_ms;
 }
 
-// Was that very place told this token, not long ago?
 bool Watchers::is_told(Source from, std::uint64_t echo, std::uint32_t now_ms) const {
   const std::uint32_t count = tokens_ < told_count ? tokens_ : told_count;
   for (std::uint32_t i = 0; i < count; ++i) {

@@ -12,12 +12,11 @@ namespace {
 constexpr Text stop_word = row_of(CommandKind::stop).word;
 constexpr Text default_fields("DEFAULT");
 constexpr Text all_fields("ALL");
-// Kept out of the loop over values, which each setpoint goes through.
+// Keeps rare cases out of the loop over values, which every setpoint goes through.
 #define R4_SELDOM __attribute__((noinline))
 
 constexpr std::size_t most_values = sizeof CommandRow::values / sizeof(CommandValue);
 
-// `lower` is in lower case.
 bool equal_in_any_case(Text text, Text lower) {
   if (text.size() != lower.size()) return false;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -27,7 +26,7 @@ bool equal_in_any_case(Text text, Text lower) {
   return true;
 }
 
-// The gravest fault of a command: its form, then its channel, then a range.
+// The most serious fault of a command: its form, then its channel, then a range.
 class Faults {
  public:
   void note(Refusal found) {
@@ -60,7 +59,7 @@ R4_SELDOM Refusal read_text(const ValueRow& value, Text text, Command& command) 
   return check_text(value, text);
 }
 
-// Reads what is not the decimal of an std::int32_t: another way to write a number, or none.
+// Reads a number that is not a decimal std::int32_t: another notation, or an error.
 R4_SELDOM Refusal read_other_number(ValueRole role, Text text, std::int32_t& number) {
   if (role == ValueRole::on_off) {
     number = equal_in_any_case(text, "on") ? 1 : 0;
@@ -76,7 +75,6 @@ R4_SELDOM Refusal read_other_number(ValueRole role, Text text, std::int32_t& num
   return role == ValueRole::channel ? Refusal::channel : Refusal::range;
 }
 
-// The member that holds a number.
 std::int32_t number_of(const Command& command, ValueRole role) {
   switch (role) {
     case ValueRole::channel:
@@ -97,7 +95,6 @@ std::int32_t number_of(const Command& command, ValueRole role) {
   }
 }
 
-// `number` is in its range.
 void set_number(Command& command, ValueRole role, std::int32_t number) {
   switch (role) {
     case ValueRole::channel:
@@ -129,7 +126,6 @@ Text text_of(const Command& command, ValueRole role) {
   return role == ValueRole::text2 ? command.text2 : command.text;
 }
 
-// True if an optional value was left out.
 bool is_missing(const Command& command, const ValueRow& value) {
   if (!value.optional) return false;
   return is_text(value.role) ? text_of(command, value.role).empty()
@@ -239,7 +235,7 @@ void write_command(DatagramWriter& writer, const Command& command) {
   if (!row.word.empty()) writer.value(row.word);
   for (const CommandValue each : row) {
     const ValueRow& value = row_of(each);
-    // One that is missing and in its range, the speed of a stepper, is written.
+    // A missing value within its range, the speed of a stepper, is written.
     if (is_missing(command, value) && (is_text(value.role) || value.missing < value.min)) continue;
     if (value.role == ValueRole::list) {
       writer.values(text_of(command, value.role));

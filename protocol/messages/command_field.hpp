@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Commands as fields of a datagram (paper section 4.2; docs/protocol.md).
-//
-// The same parser serves the board, the host's `r4 send` text and the tests, so what one side sends
-// the other side takes.
+// Commands as fields of a datagram (paper section 4.2; docs/protocol.md). The board, the host's `r4
+// send` and the tests share this parser, so each side accepts what the other sends.
 #pragma once
 
 #include <cstdint>
@@ -14,17 +12,17 @@
 
 namespace r4 {
 
-// Is there E:STOP among its fields? A stop is obeyed whatever else is in its datagram.
+// True if E:STOP is among the fields: a stop is obeyed whatever else the datagram contains.
 bool asks_to_stop(const Datagram& datagram);
 
-// By what number does a stop ask to be confirmed? Its field STOP, else its PNum. False: by none.
+// The number for confirming a stop: its field STOP, else its PNum. False if it has neither.
 constexpr Text stop_number_name("STOP");
 bool stop_number(const Datagram& datagram, std::uint32_t& out);
 
-// Reads a command field. Refusal::unknown (no such letter or word), ::format (number of values, an
-// empty one, not a whole number), ::channel, ::range (also a number too large for any type), in
-// this order; `out` is only written on Refusal::none. Its texts are views of `field`. Ranges of
-// settings and names of fields are checked by settings.hpp and parse_fields.
+// Reads a command field. Faults in this order: Refusal::unknown (no such letter or word), ::format
+// (number of values, an empty one, not a whole number), ::channel, ::range (also too large for any
+// type). `out` is written only on Refusal::none; its texts are views of `field`. settings.hpp
+// checks ranges of settings, and parse_fields() checks names of fields.
 Refusal parse_command(const Field& field, Command& out);
 // The same for a command of that row, given as its values without the word.
 Refusal read_values(const CommandRow& row, const Text* texts, std::size_t count, Command& out);

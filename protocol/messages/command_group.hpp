@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Several commands in one datagram: a group, which the board executes wholly or not at all
-// (docs/protocol.md).
-//
+// A group: several commands in one datagram, executed completely or not at all (docs/protocol.md).
 //     O:358,1,1;O:358,1,2;PNum:2147488900;T:1699276044383;^0xc5a5ff80^
 #pragma once
 
@@ -13,14 +11,13 @@
 
 namespace r4 {
 
-// The capability of a board that executes groups.
 constexpr Text group_capability("group");
 
-// What may stand side by side in a group. The same rules at both ends.
+// The rules for the commands of a group, the same at both ends.
 class GroupRules {
  public:
-  // Refusal::none if `command`, which is valid by itself, may come next. Refusal::format if there are
-  // max_group commands already, it is not an output command, or an earlier one has its channel.
+  // Refusal::none if `command`, valid by itself, may be added. Refusal::format if the group has
+  // max_group commands, it is not an output command, or an earlier command has its channel.
   Refusal add(const Command& command);
 
  private:
@@ -33,7 +30,6 @@ class GroupRules {
   std::uint16_t taken_[kinds] = {};  // bit n-1: channel n
 };
 
-// The commands of a group, in their order.
 struct CommandGroup {
   const Command* begin() const { return commands; }
   const Command* end() const { return commands + count; }
@@ -41,8 +37,8 @@ struct CommandGroup {
   Command commands[max_group];
 };
 
-// Reads the commands of a datagram. Refusal::none if they can be executed together; else `at` says which
-// of them it is that cannot: the first, counted from 1.
+// Reads the commands of a datagram. If they cannot be executed together, `at` is the first wrong
+// command, counted from 1.
 Refusal read_group(const Datagram& datagram, CommandGroup& out, std::uint8_t& at);
 
 }  // namespace r4

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands that a program makes: Command::osmc() and its like.
+// Command::osmc() and the other functions that make commands.
 #include "r4link/command.hpp"
 
 namespace r4 {
@@ -11,7 +11,7 @@ Command of_kind(CommandKind kind) {
   return command;
 }
 
-// 0, which is no channel of any kind and no period, for what does not fit.
+// 0 for a value that does not fit, because 0 is not a valid channel or period.
 template <class Number>
 Number number_of(int value) {
   return value > 0 && value <= static_cast<Number>(-1) ? static_cast<Number>(value) : Number{0};
@@ -30,7 +30,6 @@ Command of_motor(CommandKind kind, Channel channel, Pwm pwm, Direction direction
   return command;
 }
 
-// More than there may be of anything that is counted.
 constexpr std::uint8_t out_of_range = 0xFF;
 
 Command of_device(CommandKind kind, int address, Text bytes, int count) {

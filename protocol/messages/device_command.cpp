@@ -48,7 +48,7 @@ Refusal parse_poll(Text value, I2cPoll& out) {
     if (size == rest.size()) break;
     rest = rest.substr(size + 1);
   }
-  parts[count++] = Text("1");  // a slot, as X:POLL has one
+  parts[count++] = Text("1");  // a slot, which X:POLL requires
   Command command;
   const Refusal refusal = read_values(row_of(CommandKind::i2c_poll), parts, count, command);
   if (refusal == Refusal::none) out = poll_of(command);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands for what the user connects: X, the I2C bus, UARTs and DAC (docs/protocol.md, docs/devices.md).
-//
-// Bytes are written as x and two hexadecimal digits each, "x3B00", so that nobody takes them for a
-// number; "x" is none.
+// Commands for connected devices: X, the I2C bus, UARTs and DAC (docs/protocol.md,
+// docs/devices.md). Bytes are x and two hexadecimal digits each, "x3B00", to differ from numbers;
+// "x" is no bytes.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +25,6 @@ struct I2cPoll {
 bool operator==(const I2cPoll& a, const I2cPoll& b);
 inline bool operator!=(const I2cPoll& a, const I2cPoll& b) { return !(a == b); }
 
-// How a UART works.
 struct UartMode {
   std::uint32_t baud = 0;  // 0: off
   char parity = 'N';       // N, E, O
@@ -38,28 +36,28 @@ inline bool operator==(const UartMode& a, const UartMode& b) {
 }
 inline bool operator!=(const UartMode& a, const UartMode& b) { return !(a == b); }
 
-// True if the user's devices have to carry it out: it moves what is on them, or asks them.
+// True if the user's devices carry it out: it controls or reads them.
 constexpr bool is_device_command(CommandKind kind) {
   return kind >= CommandKind::i2c_write && kind <= CommandKind::i2c_poll_off;
 }
 
-// What a command X:POLL or X:OFF says, which is right.
+// The poll of a valid X:POLL or X:OFF.
 I2cPoll poll_of(const Command& command);
 
-// The value of a setting, "104:x3B:14:10" or "off". Refusal::format or ::range; `out` is only written on
+// A setting's value, "104:x3B:14:10" or "off". Refusal::format or ::range; `out` is written only on
 // Refusal::none.
 Refusal parse_poll(Text value, I2cPoll& out);
 // "255:xFFFF:32:60000"
 constexpr std::size_t max_poll_text = 24;
 Text write_poll(const I2cPoll& poll, char (&buffer)[max_poll_text]);
 
-// The same of "115200:8N1", 8 data bits always, or "off".
+// A setting's value, "115200:8N1" with always 8 data bits, or "off". Refusals as above.
 Refusal parse_uart_mode(Text value, UartMode& out);
 // "460800:8N1"
 constexpr std::size_t max_uart_text = 16;
 Text write_uart_mode(const UartMode& mode, char (&buffer)[max_uart_text]);
 
-// Bytes as text. Refusal::format for what is none, ::range for more than `most`.
+// Bytes as text. Refusal::format if not valid, ::range for more than `most`.
 Refusal parse_bytes(Text text, std::uint8_t* out, std::size_t most, std::uint8_t& size);
 void write_bytes(DatagramWriter& writer, const std::uint8_t* bytes, std::size_t size);
 

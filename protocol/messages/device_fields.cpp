@@ -13,7 +13,7 @@ bool take_values(Text values, Text (&out)[value_count]) {
   return Field(Text(), values).split(out, value_count) == value_count;
 }
 
-// A number without a meaning here, a newer board's, stays what it is: to_text() calls it unknown.
+// A number from a newer board is kept; to_text() calls it unknown.
 bool parse_outcome(Text text, I2cOutcome& out) {
   std::uint32_t number = 0;
   if (!parse_number(text, number) || number > 0xFF) return false;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state fields of what the user connects, as values: I2C1 … I2C8, I2CX, I2CBUS, UART1, UART2
-// (docs/protocol.md).
+// State fields of connected devices: I2C1 … I2C8, I2CX, I2CBUS, UART1, UART2 (docs/protocol.md).
 #pragma once
 
 #include "r4link/messages/datagram_writer.hpp"
@@ -9,7 +8,7 @@
 
 namespace r4 {
 
-// The values of the field. Reading them fails, and may have written some, where they are not of its form.
+// parse_device() returns false for invalid values; `out` may then be partly written.
 bool parse_device(Text values, I2cReading& out);
 bool parse_device(Text values, I2cAnswer& out);
 bool parse_device(Text values, I2cBusReport& out);

@@ -23,7 +23,6 @@ constexpr Text busy_name("BUSY");
 constexpr Text asked_name("ASKED");
 constexpr Text at_name("AT");
 
-// True if there is such a field, of one number.
 template <class Number>
 bool find_number(const Datagram& datagram, Text name, Number& out) {
   const Field field = datagram.find(name);

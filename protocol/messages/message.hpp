@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes the small messages that are neither state nor command: heartbeats, refusals and
-// identification. Reads heartbeats; r4link/messages/message.hpp reads the other two.
+// Heartbeats, refusals and identification. r4link/messages/message.hpp reads the last two.
 #pragma once
 
 #include <cstdint>
@@ -13,31 +12,31 @@
 
 namespace r4 {
 
-// Is it a single command, W?
+// True if the only command is W.
 bool asks_to_watch(const Datagram& datagram);
 
-// The board's heartbeat: `H:R4-ROS2;PNum:…;T:…;`, and behind the T what there is of `SAFE:n;`,
-// `CAUSE:n;`, `STOP:n;` and `AN:<nonce>;` (authentication.hpp).
+// `H:R4-ROS2;PNum:…;T:…;`, then as needed `SAFE:n;`, `CAUSE:n;`, `STOP:n;` and `AN:<nonce>;`
+// (authentication.hpp).
 Text write_board_heartbeat(char* buffer, std::size_t capacity, std::uint32_t pnum,
                            std::uint32_t t_ms, const SafeReport& safe, Text nonce = Text());
-// The reason alone of heartbeat_report(); none if there is no SAFE.
+// Only the reason of heartbeat_report(); none without SAFE.
 SafeReason heartbeat_reason(const Datagram& datagram);
-// The nonce that it carries; empty if it carries none.
+// Empty if the heartbeat carries no nonce.
 Text heartbeat_nonce(const Datagram& datagram);
 void write_nack(DatagramWriter& writer, const Nack& nack);
 
-// What the firmware can do besides, whatever the board: it obeys E:LEAVE, and serves who watches by W.
+// Firmware functions of every board: E:LEAVE, and watching by W.
 constexpr Text leave_capability("leave");
 constexpr Text watch_capability("watch");
-// It has an I2C bus for the user: X.
+// An I2C bus for the user: X.
 constexpr Text i2c_capability("i2c");
 // UARTs: X:UART. A DAC and spare inputs: X:DAC, GPIO.
 constexpr Text uart_capability("uart");
 constexpr Text dac_capability("dac");
-// Is it one of those words?
+// True if `word` is one of the words, which '+' separates.
 bool has_capability(Text capabilities, Text word);
-void write_identity(DatagramWriter& writer, const Identity& identity);  // its `I`
+void write_identity(DatagramWriter& writer, const Identity& identity);  // the field `I`
 void write_identity_fields(DatagramWriter& writer,
-                           const Identity& identity);  // and what is behind it
+                           const Identity& identity);  // the fields after it
 
 }  // namespace r4

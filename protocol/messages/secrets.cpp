@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is secret in a setting, and datagrams without it: settings.hpp.
+// Finds the secret of a setting, and removes secrets from datagrams (settings.hpp).
 #include <cstring>
 
 #include "../datagram/crc32.hpp"
@@ -19,7 +19,6 @@ Text between(const char* from, const char* to) {
   return Text(from, static_cast<std::size_t>(to - from));
 }
 
-// The first of these bytes in [at, end); `end` if there is none.
 const char* find_any(Text bytes, const char* at, const char* end) {
   for (; at != end; ++at) {
     for (const char each : bytes) {
@@ -29,7 +28,6 @@ const char* find_any(Text bytes, const char* at, const char* end) {
   return end;
 }
 
-// The next "C:" in [at, end); `end` if there is none.
 const char* next_setting(const char* at, const char* end) {
   while (end - at >= 2) {
     const void* const found =
@@ -52,13 +50,13 @@ char* append(char* out, Text text) {
 Text secret_in(Text command) {
   if (command.size() < 2 || command.substr(0, 2) != setting_start) return Text();
   const char* const name_begin = command.begin() + 2;
-  // The name ends where it can, if there is no comma.
+  // Without a comma, the name ends at the next possible separator.
   const char* const name_end = find_any(Text(", :="), name_begin, command.end());
   if (name_end == command.end()) return Text();
   const Text name = between(name_begin, name_end);
   const Text value = between(name_end + 1, command.end());
   if (name == row_of(Setting::key).key) {
-    // Which key it is, and that it is taken away, is no secret.
+    // The id of a key and its removal are not secret.
     std::uint8_t id = 0;
     Text digits;
     if (split_key(value, id, digits) != Refusal::none) return value;

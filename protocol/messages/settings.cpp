@@ -20,14 +20,12 @@ Refusal set_recovery(Settings& settings, Text value) {
   return Refusal::none;
 }
 
-// The first `c` in `text`; its size if there is none.
 std::size_t position(Text text, char c) {
   std::size_t at = 0;
   while (at < text.size() && text[at] != c) ++at;
   return at;
 }
 
-// Lines "key,value" one after the other.
 class Lines {
  public:
   Lines(char* out, std::size_t capacity) : out_(out), capacity_(capacity) {}
@@ -126,7 +124,7 @@ bool write_settings(const Settings& settings, char* out, std::size_t capacity, T
 }
 
 void read_settings(Text text, Settings& settings) {
-  // Twice: a heartbeat may have to wait for a longer timeout.
+  // Twice, because a heartbeat interval may need the longer timeout of a later line.
   for (int round = 0; round < 2; ++round) {
     for (Text rest = text; !rest.empty();) {
       const std::size_t line = position(rest, '\n');

@@ -11,7 +11,7 @@ namespace {
 
 constexpr Text off_word("off");
 
-// Decodes %XX; `out` ends in NUL. Not for an empty text, nor a NUL within.
+// Decodes %XX; `out` ends in NUL. Refuses empty text, and a NUL within it.
 Refusal decode(const SettingRow& row, Text value, char* out) {
   std::size_t size = 0;
   for (std::size_t i = 0; i < value.size(); ++i) {
@@ -40,7 +40,7 @@ bool is_plain(char c) {
   return c > ' ' && c <= '~' && c != ',' && c != ';' && c != '^' && c != '%';
 }
 
-// The text that decode() makes `bytes` of; `off` if there are none.
+// The inverse of decode(); `off` if `bytes` is empty.
 Text encode(const char* bytes, char* out) {
   if (bytes[0] == '\0') {
     std::memcpy(out, off_word.data(), off_word.size());
@@ -111,7 +111,7 @@ Refusal set_name(SiteSettings& settings, Text value) {
   return Refusal::none;
 }
 
-// `<id>:off`, or a key as parse_key() takes it.
+// `value`: `<id>:off`, or a key as in parse_key().
 Refusal set_key(Key (&keys)[max_keys], Text value) {
   Key key;
   Text rest;
@@ -246,7 +246,6 @@ Refusal set(SiteSettings& settings, FoundSetting found, Text value) {
 
 bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_site_value],
          Text& value) {
-  // The single ones, the analog inputs, the keys.
   constexpr int single = static_cast<int>(Setting::network);
   constexpr int first_input = static_cast<int>(Setting::full_scale) - single;
   constexpr int first_key = first_input + analog_channels;

@@ -16,13 +16,12 @@ namespace {
 
 using Form = FieldForm;
 
-// A row of the table of fields as the parser and the writer use it.
 struct Entry {
   FieldName name;
   FieldForm form = FieldForm::volts;
   FieldKind kind = FieldKind::count;
   std::uint8_t channel = 0;
-  std::uint16_t place = 0;  // in State
+  std::uint16_t place = 0;  // offset in State
 };
 
 struct FieldTable {
@@ -72,7 +71,7 @@ bool parse_up_to(Text text, std::uint32_t limit, std::uint32_t& out) {
   return parse_number(text, out) && out <= limit;
 }
 
-// Parses `text` into a member whose type holds 0 to `limit`.
+// `Member` must hold 0 to `limit`.
 template <class Member>
 bool parse_into(Text text, std::uint32_t limit, Member& out) {
   std::uint32_t value = 0;
@@ -81,7 +80,6 @@ bool parse_into(Text text, std::uint32_t limit, Member& out) {
   return true;
 }
 
-// Takes the first value off `rest`.
 Text next_value(Text& rest) {
   std::size_t size = 0;
   while (size < rest.size() && rest[size] != ',') ++size;
@@ -90,7 +88,7 @@ Text next_value(Text& rest) {
   return value;
 }
 
-// The last value is the whole rest: one too many leaves a comma in it, one too few leaves nothing.
+// The last value is the whole rest: a surplus value leaves a comma, a missing one leaves nothing.
 bool parse_drive(Text rest, Drive& out) {
   return parse_into(next_value(rest), pwm_max, out.pwm) && parse_into(rest, 1, out.direction);
 }
@@ -104,7 +102,7 @@ bool parse_fault(Text rest, ChipFault& out) {
   return parse_into(next_value(rest), 0x7F, out.address) && parse_into(rest, 0xFF, out.trouble);
 }
 
-// `text` is the field's values; the number parsers refuse a comma.
+// `text`: the field's values. The number parsers refuse a comma.
 bool parse_entry(Text text, const Entry& entry, State& state) {
   switch (entry.form) {
     case Form::volts:
@@ -231,8 +229,8 @@ void write_field(DatagramWriter& writer, StateField field, const State& state) {
 
 namespace {
 
-// A state as it was before a datagram was read into it. The members behind `rare_place` are half of
-// it and few datagrams carry them, so they are copied only before the first of them changes.
+// A state before a datagram is read into it. Few datagrams carry the members from `rare_place` on,
+// half of the state, so they are copied only before their first change.
 class Before {
  public:
   explicit Before(State& state) : state_(state) { std::memcpy(common_, bytes(), rare_place); }
@@ -260,7 +258,7 @@ class Before {
 
 bool read_fields(const Datagram& datagram, State& state, Before& before) {
   FieldSet present;
-  int expected = 0;  // boards send in the table's order, so the next entry is the likely one
+  int expected = 0;  // boards send fields in the table's order
   for (const Field& field : datagram) {
     int index = expected;
     if (index == state_field_count || field_table.entries[index].name.name() != field.name()) {
@@ -289,7 +287,7 @@ bool parse_safe_reason(Text text, SafeReason& out) {
 
 bool read_state(const Datagram& datagram, State& state) {
   if (datagram.has_time() && datagram.time_ms() > 0xFFFFFFFFU) return false;
-  // Written in place and taken back on failure: copying what was just written costs more.
+  // Read in place and undone on failure: copying a newly written state costs more.
   Before before(state);
   if (!read_fields(datagram, state, before)) {
     before.restore();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's state as fields of a datagram (paper section 4.1). Read: r4link/messages/message.hpp.
+// The state as fields of a datagram (paper section 4.1). Reading: r4link/messages/message.hpp.
 #pragma once
 
 #include "r4link/datagram.hpp"
@@ -8,11 +8,9 @@
 
 namespace r4 {
 
-// Appends one field with its values from `state`.
 void write_field(DatagramWriter& writer, StateField field, const State& state);
 
-// The value of SAFE. A number without a meaning here, a newer board's, is a fault. False if it is
-// no number.
+// The value of SAFE. An unknown number, from a newer board, is a fault. False if not a number.
 bool parse_safe_reason(Text text, SafeReason& out);
 
 }  // namespace r4

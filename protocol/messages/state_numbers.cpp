@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The numbers of a field as doubles. The emulated board leaves this file out: it calculates without floating point.
+// A field's numbers as doubles. The emulated board omits this file: it uses no floating point.
 #include "r4link/tables/state_fields.hpp"
 #include "state_fields.hpp"
 
@@ -13,7 +13,7 @@ StateNumbers numbers(Values... values) {
   return {sizeof...(values), {static_cast<double>(values)...}};
 }
 
-// `Member` is the type of the field's kind in State.
+// `Member` must be the type of the field's kind in State.
 template <class Member>
 const Member& member(const State& state, StateField field) {
   const FieldKindRow& kind = kind_row_of(field);
@@ -69,7 +69,7 @@ StateNumbers numbers_of(const State& state, StateField field) {
   return {};
 }
 
-// By way of a datagram, so that the parser checks the numbers.
+// Writes a datagram, so that the parser checks the numbers.
 bool set_numbers(State& state, StateField field, const StateNumbers& numbers) {
   if (field >= StateField::count || numbers.count > most_field_values) return false;
   char buffer[128];
@@ -79,7 +79,7 @@ bool set_numbers(State& state, StateField field, const StateNumbers& numbers) {
   const double most = volts ? INT32_MAX : UINT32_MAX;
   for (int i = 0; i < numbers.count; ++i) {
     const double exact = volts ? 100 * numbers[i] : numbers[i];
-    const double number = exact + (exact < 0 ? -0.5 : 0.5);  // the cast below cuts it off
+    const double number = exact + (exact < 0 ? -0.5 : 0.5);  // the cast below truncates
     if (!(number > INT32_MIN - 1.0 && number < most + 1)) return false;
     if (volts) {
       writer.hundredths(static_cast<std::int32_t>(number));

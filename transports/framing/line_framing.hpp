@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams on a byte stream: one a line (docs/protocol.md "On a byte stream").
-//
-// A line ends with CR, LF or both; empty lines are passed over. We send CR LF. A line longer than
-// max_datagram is counted and thrown away up to its terminator, so that noise, a cut or a foreign
-// speed costs the datagrams it hit and no more. No heap; memory is one line.
+// Datagrams on a byte stream, one a line (docs/protocol.md "On a byte stream").
+// A line ends with CR, LF or both; sent lines end with CR LF. Empty lines are ignored. A line
+// longer than max_datagram is counted and discarded up to its terminator. So noise, a cut or a
+// wrong baud rate costs only the datagrams that it hits. No heap; memory is one line.
 #pragma once
 
 #include <cstddef>
@@ -16,9 +15,9 @@ namespace r4 {
 
 class LineFraming {
  public:
-  // Feeds `size` bytes; calls `on_line(Text)` for each line that they complete, without terminator.
-  // A line that lies whole in `data` is passed in place, without a copy. The Text is valid in the
-  // call. `on_oversize(Text)` is called for each line that is too long, once it is, with its first max_datagram bytes.
+  // Calls `on_line(Text)` for each completed line, without terminator. The Text is valid during the
+  // call; a line that is whole in `data` is not copied. Calls `on_oversize(Text)` as soon as a line
+  // is too long, with its first max_datagram bytes.
   template <class OnLine, class OnOversize>
   void push(const char* data, std::size_t size, OnLine&& on_line, OnOversize&& on_oversize);
   template <class OnLine>
@@ -26,10 +25,10 @@ class LineFraming {
     push(data, size, on_line, [](Text) {});
   }
 
-  // Forgets an unfinished line (the stream was closed and opened again).
+  // Discards an unfinished line, because the stream was reopened.
   void reset();
 
-  std::uint32_t oversize() const { return oversize_; }  // lines thrown away
+  std::uint32_t oversize() const { return oversize_; }  // discarded lines
   std::size_t pending() const { return used_; }         // bytes of the unfinished line
 
  private:
@@ -44,7 +43,6 @@ class LineFraming {
   bool skipping_ = false;  // inside a line that is too long
 };
 
-// What ends a line that we send.
 constexpr Text line_end("\r\n");
 
 template <class OnLine, class OnOversize>

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Numbers for the hosts that send to a board over UDP, where many can.
-//
-// Whoever has sent a valid datagram gets a place; what is damaged or no datagram at all makes none.
-// The table is bounded: a new sender takes the place of the one that has been silent longest. The
-// place of the host in control is its own, whatever others send: a host whose number changed would
-// be another host to the board. It is also the audience of what is for everyone: no stranger's
-// datagram, however valid, takes that away. Nor does one who only watches ever become it, who gets all by
-// its lease. A number is never given twice.
+// Numbers for the hosts that send to a board over UDP.
+// Each sender of a valid datagram gets a place; other bytes give none. The table is bounded: a new
+// sender takes the place of the sender that was silent longest. The controlling host keeps its
+// place, because with another number it would be another host to the board. It is also the audience
+// of datagrams for all, and no other host's datagram changes that. A watcher never becomes the
+// audience, because its lease brings it everything. A number is never given twice.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +19,7 @@ class PeerTable {
   static constexpr int capacity = places;
   static constexpr std::uint32_t nobody = 0;
 
-  // The number of whoever has just sent `bytes`; nobody if they are no valid datagram.
+  // The number of the sender of `bytes`; nobody if they are not a valid datagram.
   std::uint32_t heard(const Address& from, Text bytes) {
     Datagram datagram;
     if (!read_datagram(bytes, datagram)) return nobody;
@@ -31,10 +29,10 @@ class PeerTable {
                        : one && name == "H" ? Says::heartbeat
                                             : Says::other);
   }
-  // The same of a datagram that is known to be valid, and no W.
+  // The same for a valid datagram that is not a W.
   std::uint32_t heard(const Address& from) { return heard(from, Says::other); }
 
-  // Has that one asked to watch, and sent no heartbeat since?
+  // True if that sender asked to watch, and has sent no heartbeat since.
   bool watches(std::uint32_t number) const {
     for (const Entry& entry : entries_) {
       if (number != nobody && entry.number == number) return entry.watches;
@@ -42,29 +40,29 @@ class PeerTable {
     return false;
   }
 
-  // The host of that number is in control: its place is its own until another is held. nobody: it is
-  // in control no longer, and may come back.
+  // The host of that number has control and keeps its place until another is held. With nobody, the
+  // host has lost control, and may regain it.
   void hold(std::uint32_t number) {
     in_control_ = number != nobody;
     if (!in_control_) return;
     audience_ = held_[0] = number;
     held_count_ = 1;
   }
-  // It has that place, too.
+  // The controlling host has that place, too.
   void also_hold(std::uint32_t number) {
     if (!in_control_ || number == nobody || held_count_ == most_held || is_held(number)) return;
     held_[held_count_++] = number;
   }
 
-  // Where that number sends from; null if it has lost its place.
+  // The address of that number; null if it has lost its place.
   const Address* find(std::uint32_t number) const {
     for (const Entry& entry : entries_) {
       if (number != nobody && entry.number == number) return &entry.address;
     }
     return nullptr;
   }
-  // Who gets what is for everyone: the host in control, else the one heard last; nobody before the
-  // first.
+  // The receiver of datagrams for all: the controlling host, else the newest sender that does not
+  // watch; nobody before the first.
   std::uint32_t audience() const { return audience_; }
 
  private:
@@ -72,7 +70,7 @@ class PeerTable {
     Address address = Address();
     std::uint32_t number = nobody;  // nobody: free
     bool watches = false;
-    std::uint64_t heard = 0;  // in which turn
+    std::uint64_t heard = 0;  // turn of its newest datagram
   };
   enum class Says : std::uint8_t { other, watch, heartbeat };
 
@@ -120,7 +118,7 @@ class PeerTable {
   std::uint32_t audience_ = nobody;
   std::uint32_t held_[most_held] = {};
   int held_count_ = 0;
-  bool in_control_ = false;  // is the one that is held
+  bool in_control_ = false;  // true if the held host has control
 };
 
 }  // namespace r4

@@ -14,23 +14,23 @@ constexpr std::uint32_t tail_bits = acknowledge_slot_bits + can_acknowledge_deli
 constexpr std::uint32_t classic_crc_bits = 15;
 constexpr std::uint32_t classic_crc_polynomial = 0x4599;  // x^15+x^14+x^10+x^8+x^7+x^4+x^3+1
 
-// Before the length code of a classic frame: SOF, id, RTR, IDE, r0; with 29 bits also SRR and r1.
+// Before the length code of a classic frame: SOF, id, RTR, IDE, r0; 29-bit ids add SRR and r1.
 constexpr std::uint32_t classic_header_bits(bool extended) { return extended ? 35 : 15; }
 
-// Before FDF, res and BRS of an FD frame: SOF, id, RRS, IDE; with 29 bits also SRR.
+// Before FDF, res and BRS of an FD frame: SOF, id, RRS, IDE; 29-bit ids add SRR.
 constexpr std::uint32_t fd_arbitration_bits(bool extended) { return extended ? 33 : 14; }
 constexpr std::uint32_t fd_format_bits = 3;
 constexpr std::uint32_t error_state_bits = 1;
 
-// Stuff count and CRC, with the fixed stuff bits: one before them, one after every fourth bit.
+// Stuff count and CRC with fixed stuff bits: one before them, one after every fourth bit.
 constexpr std::uint32_t stuff_count_bits = 4;
-constexpr std::uint8_t max_crc17_size = 16;  // bytes; CRC-21 for more
+constexpr std::uint8_t max_crc17_size = 16;  // bytes; CRC-21 for longer frames
 constexpr std::uint32_t fd_crc_field_bits(std::uint8_t size) {
   return size <= max_crc17_size ? (stuff_count_bits + 17) + 1 + (stuff_count_bits + 17) / 4
                                 : (stuff_count_bits + 21) + 1 + (stuff_count_bits + 21) / 4;
 }
 
-// Counts the bits of a stuffed stretch as they are sent, and computes the classic CRC over them.
+// Counts the bits of a stuffed part as sent, and computes the classic CRC.
 class StuffedBits {
  public:
   void bit(std::uint32_t value) {
@@ -47,7 +47,7 @@ class StuffedBits {
   void data(const CanFrame& frame) {
     for (std::uint32_t i = 0; i < frame.size; ++i) bits(frame.data[i], 8);
   }
-  // A stuff bit that is due behind the last bit is sent now; else only when another bit follows.
+  // Sends a stuff bit that is due after the last bit; otherwise only the next bit sends it.
   void settle() {
     if (run_ < 5) return;
     ++count_;
@@ -61,10 +61,10 @@ class StuffedBits {
   std::uint32_t count_ = 0;
   std::uint32_t crc_ = 0;
   std::uint32_t run_ = 0;
-  std::uint32_t last_ = 2;  // neither
+  std::uint32_t last_ = 2;  // neither 0 nor 1
 };
 
-// SOF, the id, and what stands between its parts; `request` is RTR, or RRS in an FD frame.
+// SOF, the id, and the bits between its parts; `request` is RTR, or RRS in an FD frame.
 void write_arbitration(StuffedBits& out, const CanFrame& frame, std::uint32_t request) {
   out.bit(0);
   if (frame.extended) {
@@ -87,7 +87,7 @@ std::uint32_t length_code(std::uint8_t size) {
                       : 15U;
 }
 
-// A request has a length code, but no data.
+// A remote frame has a length code but no data.
 CanBits classic_bits(const CanFrame& frame) {
   StuffedBits out;
   write_arbitration(out, frame, frame.remote ? 1 : 0);
@@ -104,7 +104,7 @@ CanBits split(std::uint32_t before_switch, std::uint32_t after, bool switches_ra
                        : CanBits{before_switch + after + tail_bits, 0};
 }
 
-// The stuff bit that would be due behind the data is the first fixed one of the CRC field.
+// The first fixed stuff bit of the CRC field replaces a stuff bit that is due after the data.
 CanBits fd_bits(const CanFrame& frame, bool switches_rate) {
   StuffedBits out;
   write_arbitration(out, frame, 0);
@@ -120,8 +120,7 @@ CanBits fd_bits(const CanFrame& frame, bool switches_rate) {
   return split(before_switch, after, switches_rate);
 }
 
-// The most stuff bits in so many bits: one after five, then one after every four, as a stuff bit is
-// the first of the next five.
+// One after five bits, then one after every four: a stuff bit is the first of the next five.
 constexpr std::uint32_t most_stuff_bits(std::uint32_t bits) { return (bits - 1) / 4; }
 
 constexpr std::uint64_t part_ns(std::uint32_t bits, std::uint32_t rate) {
@@ -136,8 +135,8 @@ CanBits bits_of_length(std::uint8_t size, bool fd, bool extended, bool switches_
     const std::uint32_t stuff = worst ? most_stuff_bits(stuffed) : 0;
     return {stuffed + stuff + crc_delimiter_bits + tail_bits, 0};
   }
-  // FDF is 1 and res 0, so nothing is stuffed from FDF to BRS, and BRS, perhaps with res, begins the
-  // five of the next stuff bit. The last bit of the data is followed by a fixed one.
+  // FDF is 1 and res 0, so no bit is stuffed from FDF to BRS. BRS, possibly with res, begins the
+  // five bits before the next stuff bit. A fixed stuff bit follows the data.
   const std::uint32_t arbitration = fd_arbitration_bits(extended);
   const std::uint32_t behind = error_state_bits + length_code_bits + data;
   const std::uint32_t before_switch =

@@ -12,9 +12,9 @@
 namespace r4 {
 namespace {
 
-// What an emergency frame without a number says to a board, whoever sent it.
+// The meaning of an emergency frame without a number.
 constexpr Text stop_datagram("E:STOP;^0x506f0fbe^");
-// And one that asks for states: at a rate that also a slow bus carries as text, 24 frames each.
+// The meaning of a watch frame: 5 Hz, which even a slow bus carries as text, 24 frames each.
 constexpr Text watch_datagram("W:5;^0x414648b3^");
 
 IsotpSenderOptions sender_options(std::uint32_t id, std::uint32_t flow_control_id, bool fd) {
@@ -62,7 +62,7 @@ IsotpReceiverOptions listening_to(CanIdKind lane, std::uint8_t node) {
     options.channel.id = telemetry_id(node);
   } else {
     options.channel.id = lane == CanIdKind::command ? command_id(node) : reply_id(node);
-    // The sender waits for flow control between its first frames, which this end does not see.
+    // The sender waits for flow control between its first frames; this end does not see it.
     options.n_cr_us += IsotpSenderOptions().n_bs_us;
   }
   return options;
@@ -103,12 +103,12 @@ bool CanNode::begin(Text datagram, std::uint32_t now_us) {
   return sender(lane).begin(bytes, static_cast<std::uint32_t>(size), now_us);
 }
 
-// A board that goes safe says so in its next heartbeat, which follows at once.
+// A board that goes safe reports it in its next heartbeat, which is sent at once.
 void CanNode::note_reason(Text heartbeat) {
   Datagram datagram;
   if (!read_datagram(heartbeat, datagram)) return;
   const SafeReason reason = heartbeat_reason(datagram);
-  if (reason == reason_) return;  // told, or still to be told
+  if (reason == reason_) return;  // reported, or due to be reported
   reason_due_ = reason != SafeReason::none;
   reason_ = reason;
 }
@@ -181,11 +181,11 @@ Text CanNode::on_frame(const CanFrame& frame, std::uint32_t now_us) {
   if (end_ == CanEnd::host && meaning.kind == CanIdKind::telemetry) {
     return telemetry_in_.on_frame(frame, now_us).datagram ? plain(telemetry_in_) : Text();
   }
-  // Both directions of the dialogue share the two ids; each end passes over what is not for it.
+  // The dialogue's directions share the two ids; each machine ignores frames for the other.
   dialogue_out_.on_frame(frame, now_us);
   if (!dialogue_in_.on_frame(frame, now_us).datagram) return Text();
   const Text datagram = plain(dialogue_in_);
-  // What is neither tells nothing of the form that the host writes.
+  // An empty datagram does not show the form that the host uses.
   if (end_ == CanEnd::board && datagram.size() != 0) {
     host_is_plain_ = !is_packed(dialogue_in_.data()[0]);
   }

@@ -6,7 +6,6 @@
 namespace r4 {
 namespace {
 
-// In the order of the enumeration.
 constexpr Text texts[] = {
     "none",
     "the bus did not accept a frame in time (N_As)",

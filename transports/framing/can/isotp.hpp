@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams on a CAN bus: ISO 15765-2:2016 with normal addressing ("ISO-TP"). This file holds what
-// both ends share; isotp_sender.hpp cuts a datagram into frames, isotp_receiver.hpp joins them.
+// Datagrams on a CAN bus: ISO 15765-2:2016 with normal addressing ("ISO-TP"). Both ends share this
+// file; isotp_sender.hpp cuts a datagram into frames, isotp_receiver.hpp joins them.
 //
 //     single frame       0L data…               up to 7 bytes; 00 LL data… in a longer FD frame
 //     first frame        1L LL data…            8–4095 bytes; 10 00 LL LL LL LL data… for more
@@ -8,18 +8,14 @@
 //     flow control       3F BS ST               F: 0 clear to send, 1 wait, 2 overflow
 //
 // Both ends are driven frame by frame and own no clock, no heap and no bus:
-//
-//     on_frame(frame, now)   a frame came in; frames of other ids are passed over
-//     offer(now, frame)      is there a frame to send? The same one is offered until …
-//     frame_sent(now)        … the bus, or the queue before it, has accepted it
+//     on_frame(frame, now)   a frame arrived; frames of other ids are ignored
+//     offer(now, frame)      true if there is a frame to send; the same one is offered until …
+//     frame_sent(now)        … the bus, or the queue before it, has accepted it; else no effect
 //     deadline()             when to call poll() and offer() again, so that a loop needs one timer
-//     poll(now)              ends what has timed out (on_frame() does so too, offer() if it is its frame)
-//
-// frame_sent() means accepted, and is called before what arrives after that is handed in. A queue
-// that is full costs time, never a frame in the middle.
-//
-// Time is in microseconds and wraps; all calls of one object use one clock. Time-outs must be below
-// 2^31 us. Not for use by several threads at once.
+//     poll(now)              ends a timed-out transfer; so do on_frame(), and offer() for its frame
+// Call frame_sent() before handing in later arrivals. A full queue costs time, but never a frame
+// within a transfer. Time is in us and wraps; all calls of one object use one clock. Time-outs must
+// be below 2^31 us. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -30,49 +26,49 @@
 
 namespace r4 {
 
-// What went wrong. "Ends" is about a transfer, "ignored" about a frame that changes nothing.
+// "Ends" concerns a transfer, "ignored" a frame without effect.
 enum class IsotpError : std::uint8_t {
   none,
-  send_timeout,           // ends: the bus did not accept our frame within N_As or N_Ar (9.8.2)
+  send_timeout,           // ends: the bus did not accept the frame within N_As or N_Ar (9.8.2)
   flow_control_timeout,   // ends: no flow control within N_Bs (9.8.2)
   consecutive_timeout,    // ends: no consecutive frame within N_Cr (9.8.2)
-  wrong_sequence_number,  // ends: a consecutive frame was lost, doubled or overtaken (9.6.4.4)
-  interrupted,            // ends: another single or first frame came; it is taken (9.8.3)
+  wrong_sequence_number,  // ends: a consecutive frame was lost, duplicated or overtaken (9.6.4.4)
+  interrupted,            // ends: another single or first frame arrived; it is accepted (9.8.3)
   overflow,               // ends: longer than the receiver's buffer (9.6.3.2, 9.6.5.1)
   invalid_flow_status,    // ends: a reserved flow status (9.6.5.2)
-  too_many_waits,         // ends: told to wait, or told to, more often than N_WFTmax (9.7, 9.8.4)
-  cancelled,              // ends: by cancel()
-  unexpected_frame,       // ignored: a consecutive frame or flow control nobody waits for (9.8.3)
-  malformed,              // ignored: lengths or type that no frame can have (9.6.2.2, 9.6.3.2)
+  too_many_waits,         // ends: more waits, received or sent, than N_WFTmax (9.7, 9.8.4)
+  cancelled,
+  unexpected_frame,  // ignored: an unexpected consecutive frame or flow control (9.8.3)
+  malformed,         // ignored: length or type not valid for any frame (9.6.2.2, 9.6.3.2)
 };
 
-// In words, for a log: "no flow control in time (N_Bs)".
+// For a log: "no flow control in time (N_Bs)".
 Text to_text(IsotpError error);
 
-// The two ids of a transfer, the same at both ends, and how the frames look that we send.
+// The ids of a transfer, the same at both ends, and the format of sent frames.
 struct IsotpChannel {
   std::uint32_t id = 0;               // single, first and consecutive frames; 11 bits
   std::uint32_t flow_control_id = 0;  // the receiver's flow control; 11 bits
-  bool fd = false;                    // FD frames. Received are both formats.
+  bool fd = false;                    // send FD frames; both formats are received
   bool padding = false;               // fill short frames up to 8 bytes (10.4.2.1)
   std::uint8_t padding_byte = 0xCC;   // also between 8 and the next FD size (10.4.2.3)
 };
 
-// When to call poll() and offer() again. Not armed: only when something else happens.
+// When to call poll() and offer() again. If not armed, only another event needs them.
 struct IsotpDeadline {
   bool armed;
   std::uint32_t at_us;
 };
 
-// The gap between two consecutive frames that a byte STmin asks for (9.6.5.4): 0–127 ms, or
-// 100–900 us for 0xF1–0xF9. Reserved values are the longest gap, 127 ms (9.6.5.5).
+// The gap between consecutive frames for an STmin byte (9.6.5.4): 0–127 ms, or 100–900 us for
+// 0xF1–0xF9. Reserved values mean the longest gap, 127 ms (9.6.5.5).
 constexpr std::uint32_t stmin_to_us(std::uint8_t stmin) {
   return stmin <= 0x7F                    ? stmin * 1000U
          : stmin >= 0xF1 && stmin <= 0xF9 ? (stmin - 0xF0U) * 100U
                                           : 127000U;
 }
 
-// The byte STmin for a gap of at least that long; 127 ms for more.
+// The STmin byte for a gap of at least `us`; 127 ms for longer gaps.
 constexpr std::uint8_t stmin_from_us(std::uint32_t us) {
   return us == 0        ? 0
          : us <= 900    ? static_cast<std::uint8_t>(0xF0U + (us + 99) / 100)
@@ -80,19 +76,19 @@ constexpr std::uint8_t stmin_from_us(std::uint32_t us) {
                         : 0x7F;
 }
 
-// On the wire (9.6.1, 9.6.5.1).
+// Values in frames (9.6.1, 9.6.5.1).
 enum class IsotpFrameType : std::uint8_t { single, first, consecutive, flow_control };
 enum class IsotpFlowStatus : std::uint8_t { clear_to_send, wait, overflow };
 constexpr std::uint32_t max_short_first_frame = 4095;  // FF_DL in 12 bits; 32 bits for more
 
 namespace isotp_frame {
 
-// Has the frame the format of ours and that id?
+// True for a data frame with that 11-bit id.
 constexpr bool is_for(const CanFrame& frame, std::uint32_t id) {
   return frame.id == id && !frame.extended && !frame.remote;
 }
 
-// Byte 0: the type, and four bits that it gives a meaning.
+// Byte 0: the type, and four bits whose meaning depends on it.
 constexpr std::uint8_t control(IsotpFrameType type, std::uint32_t low) {
   return static_cast<std::uint8_t>(static_cast<std::uint32_t>(type) << 4 | (low & 0xF));
 }
@@ -101,7 +97,7 @@ constexpr bool is_flow_control(const CanFrame& frame) {
   return frame.size != 0 && frame.data[0] >> 4 == static_cast<int>(IsotpFrameType::flow_control);
 }
 
-// Ends a frame of ours that has `used` bytes of data: id, format, padding and size.
+// Completes a frame with `used` bytes of data: id, format, padding and size.
 void finish(CanFrame& frame, const IsotpChannel& channel, std::uint32_t id, std::uint32_t used);
 
 }  // namespace isotp_frame

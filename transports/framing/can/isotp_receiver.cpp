@@ -6,8 +6,7 @@
 namespace r4 {
 namespace {
 
-// Shortest datagram for which a first frame of that size is right (9.6.3.1, table 14): what a
-// single frame cannot hold.
+// The shortest datagram that needs a first frame of that size (9.6.3.1, table 14).
 constexpr std::uint32_t min_segmented(std::uint8_t rx_dl) {
   return rx_dl == max_classic_size ? max_classic_size : rx_dl - 1U;
 }
@@ -46,7 +45,7 @@ IsotpArrival IsotpReceiver::on_frame(const CanFrame& frame, std::uint32_t now_us
   return arrival;
 }
 
-// An escaped length that would have fitted in four bits is taken: it leaves no doubt.
+// Accepts an escaped length that fits in four bits, because it is unambiguous.
 IsotpArrival IsotpReceiver::on_single(const CanFrame& frame) {
   const bool escaped = frame.size > max_classic_size;
   const std::uint32_t header = escaped ? 2 : 1;
@@ -102,14 +101,14 @@ IsotpArrival IsotpReceiver::on_consecutive(const CanFrame& frame, std::uint32_t 
   const std::uint32_t room = rx_dl_ - 1U;
   const std::uint32_t chunk = left < room ? left : room;
   const bool follows = (frame.data[0] & 0xF) == sequence_;
-  // Only the last one may be shorter than the first frame (9.6.4.1).
+  // Only the last frame may be shorter than the first frame (9.6.4.1).
   if (frame.size > rx_dl_ || frame.size <= chunk || !follows) {
-    // Its number comes before its length: one in the place of another tells of a loss whatever its
-    // length is. If it were passed over, a frame of the next transfer could take the lost one's place.
+    // A wrong number proves a loss, whatever the length. If the frame were ignored, a frame of the
+    // next transfer could take the place of the lost one.
     if (follows) return malformed();
     return {false, fail(IsotpError::wrong_sequence_number, counters_.wrong_sequence_number)};
   }
-  if (chunk == max_classic_size - 1) {  // nearly always: a copy of known size needs no call
+  if (chunk == max_classic_size - 1) {  // usual case: a copy of known size needs no call
     std::memcpy(buffer_ + received_, frame.data + 1, max_classic_size - 1);
   } else {
     std::memcpy(buffer_ + received_, frame.data + 1, chunk);
@@ -179,7 +178,6 @@ IsotpArrival IsotpReceiver::malformed() {
   return {false, IsotpError::malformed};
 }
 
-// Another transfer begins: what is unfinished ends.
 IsotpError IsotpReceiver::replace() {
   const IsotpError error =
       busy() ? fail(IsotpError::interrupted, counters_.interrupted) : IsotpError::none;
@@ -187,13 +185,12 @@ IsotpError IsotpReceiver::replace() {
   return error;
 }
 
-// A datagram is too long; `error` is what came before.
+// A datagram is too long; `error` is the earlier error.
 IsotpError IsotpReceiver::refuse(IsotpError error) {
   ++counters_.overflow;
   return error != IsotpError::none ? error : IsotpError::overflow;
 }
 
-// The time of the state has come.
 IsotpError IsotpReceiver::time_out() {
   switch (state_) {
     case State::owing:
@@ -221,7 +218,7 @@ IsotpError IsotpReceiver::fail(IsotpError error, std::uint32_t& counter) {
   return error;
 }
 
-// Nothing is unfinished, no flow control is owed.
+// No transfer is unfinished, and no flow control is owed.
 void IsotpReceiver::rest() {
   state_ = State::idle;
   status_ = IsotpFlowStatus::clear_to_send;

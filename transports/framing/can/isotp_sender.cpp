@@ -48,7 +48,7 @@ bool IsotpSender::offer(std::uint32_t now_us, CanFrame& frame) {
     const std::uint32_t left = size_ - sent_;
     const std::uint32_t room = options_.tx_dl - 1U;
     chunk_ = static_cast<std::uint8_t>(left < room ? left : room);
-    if (chunk_ == max_classic_size - 1) {  // nearly always: a copy of known size needs no call
+    if (chunk_ == max_classic_size - 1) {  // usual case: a copy of known size needs no call
       std::memcpy(frame.data + 1, data_ + sent_, max_classic_size - 1);
     } else {
       std::memcpy(frame.data + 1, data_ + sent_, chunk_);
@@ -59,7 +59,6 @@ bool IsotpSender::offer(std::uint32_t now_us, CanFrame& frame) {
   return true;
 }
 
-// Writes the single or the first frame; returns how many bytes it has.
 std::uint32_t IsotpSender::write_start(CanFrame& frame) {
   std::uint32_t header = 0;
   if (size_ < max_classic_size) {
@@ -144,8 +143,8 @@ IsotpError IsotpSender::on_flow_control(const CanFrame& frame, std::uint32_t now
       block_left_ = frame.data[1];
       waits_ = 0;
       state_ = State::ready;
-      // The gap holds over the border of two blocks, too. The frame may have been accepted after
-      // this flow control came: then the time of sending is the later one.
+      // The gap also holds between two blocks. If the frame was accepted after this flow control
+      // arrived, the time of sending is the later one.
       const std::uint32_t due_us = sent_us_ + gap_us_;
       deadline_us_ = any_consecutive_ && !reached(now_us, due_us) ? due_us : now_us;
       return IsotpError::none;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Cuts one datagram after the other into ISO-TP frames (ISO 15765-2:2016, 9.2 and 9.3).
+// Cuts datagrams, one after the other, into ISO-TP frames (ISO 15765-2:2016, 9.2 and 9.3).
 //
 //              begin()             its time comes           N_As: send_timeout
 //      idle ------------> ready ------------------> offered ------------------> idle
@@ -9,19 +9,18 @@
 //        clear to send     |                           | frame_sent() of the first frame or the
 //                          |                           v last of a block, with flow control
 //                          '------------------- waiting --.
-//                                                |   ^    | wait: N_Bs begins anew
+//                                                |   ^    | wait: N_Bs restarts
 //        overflow, reserved flow status,         |   '----'
 //        N_WFTmax, N_Bs                          v
 //                                               idle
 //
-// The bytes are the caller's and must stay as they are while busy(); nothing is copied but into the
-// frames. Frames leave in their order, and none is skipped. Without flow control (telemetry for any
-// number of listeners) the frames follow each other at `separation_us`.
-//
+// The caller's bytes must not change while busy(); they are copied only into frames. Frames leave
+// in order, and none is skipped. Without flow control (telemetry for any number of listeners), the
+// frames follow each other at `separation_us`.
 //     sender.begin(bytes, size, now);
 //     sender.poll(now);
 //     while (sender.offer(now, frame) && bus.push(frame)) sender.frame_sent(now);
-//     timer.arm(sender.deadline());  // and from poll() on when a frame arrives or the bus has room
+//     timer.arm(sender.deadline());  // repeat from poll() when a frame arrives or the bus has room
 #pragma once
 
 #include <cstdint>
@@ -35,58 +34,56 @@ struct IsotpSenderOptions {
   std::uint8_t tx_dl = 8;  // longest frame, TX_DL (9.5.1): 8, with FD also 12 … 64
   bool flow_control = true;
   std::uint32_t separation_us = 0;  // least gap between consecutive frames; a receiver may ask more
-  std::uint32_t n_as_us = 20000;    // a frame is offered at most that long
+  std::uint32_t n_as_us = 20000;    // the longest offer of a frame
   std::uint32_t n_bs_us = 20000;    // wait for flow control
-  std::uint16_t max_waits = 10;     // waits in a row that are obeyed
+  std::uint16_t max_waits = 10;     // waits in a row that are accepted
 };
 
 // started == datagrams + busy() + the errors that end a transfer.
 struct IsotpSenderCounters {
-  std::uint32_t started = 0;    // accepted by begin()
-  std::uint32_t datagrams = 0;  // accepted by the bus to the last frame
-  std::uint32_t frames = 0;     // accepted by the bus
-  // What ended a transfer.
+  std::uint32_t started = 0;
+  std::uint32_t datagrams = 0;  // last frame accepted by the bus
+  std::uint32_t frames = 0;
+  // These end a transfer.
   std::uint32_t send_timeout = 0;
   std::uint32_t flow_control_timeout = 0;
   std::uint32_t overflow = 0;
   std::uint32_t invalid_flow_status = 0;
   std::uint32_t too_many_waits = 0;
   std::uint32_t cancelled = 0;
-  // What was ignored.
-  std::uint32_t unexpected_frame = 0;  // flow control while none was waited for
+  // These are ignored.
+  std::uint32_t unexpected_frame = 0;  // flow control while not waiting for it
   std::uint32_t malformed = 0;         // flow control of fewer than 3 bytes
 };
 
 class IsotpSender {
  public:
-  // A tx_dl that no frame can have is rounded up; without FD it is 8.
+  // tx_dl is rounded up to a valid size; without FD it is 8.
   explicit IsotpSender(const IsotpSenderOptions& options);
 
-  // Begins a transfer of 1 to 2^32 - 1 bytes. False, and nothing happens: busy, or size 0.
+  // Begins a transfer of 1 to 2^32 - 1 bytes. False without effect if busy, or if size is 0.
   bool begin(const void* data, std::uint32_t size, std::uint32_t now_us);
   bool begin(Text datagram, std::uint32_t now_us) {
     return begin(datagram.data(), static_cast<std::uint32_t>(datagram.size()), now_us);
   }
   bool busy() const { return state_ != State::idle; }
   bool awaits_flow_control() const { return state_ == State::waiting; }
-  // What ended the last transfer; `none` while one is on its way and when all frames were accepted.
+  // The error that ended the last transfer; `none` during a transfer and after a complete one.
   IsotpError error() const { return error_; }
 
-  // Writes the frame to send now; false: none. Constant time.
+  // Writes the frame to send; false if there is none. Constant time.
   bool offer(std::uint32_t now_us, CanFrame& frame);
-  // The offered frame was accepted. Without one: nothing happens.
   void frame_sent(std::uint32_t now_us);
-  // What was accepted has only now got to the bus: N_Bs begins anew, if flow control is waited for,
-  // and so does the gap to the next consecutive frame.
+  // Accepted frames reached the bus only now: restarts N_Bs if flow control is awaited, or the gap
+  // to the next consecutive frame.
   void wait_anew(std::uint32_t now_us);
-  // Takes flow control; other frames are passed over. What was wrong, the first of several.
+  // Takes flow control and ignores other frames. Returns the first error.
   IsotpError on_frame(const CanFrame& frame, std::uint32_t now_us);
-  // Ends a transfer that has timed out, and tells of it.
   IsotpError poll(std::uint32_t now_us) {
     return state_ < State::offered || !reached(now_us, deadline_us_) ? IsotpError::none
                                                                      : time_out();
   }
-  // Ends a transfer (the interface went down). Not sent is: the offered frame and all after it.
+  // Ends a transfer, because the interface is down. The offered frame and later ones are not sent.
   void cancel();
 
   IsotpDeadline deadline() const { return {busy(), deadline_us_}; }
@@ -104,14 +101,14 @@ class IsotpSender {
   const std::uint8_t* data_ = nullptr;
   std::uint32_t size_ = 0;
   std::uint32_t sent_ = 0;         // bytes in accepted frames
-  std::uint32_t deadline_us_ = 0;  // ready: when it may be offered; else: when the wait ends
-  std::uint32_t gap_us_ = 0;       // between consecutive frames
-  std::uint32_t sent_us_ = 0;      // when the newest frame was accepted
-  std::uint8_t chunk_ = 0;         // bytes of the datagram in the offered frame
-  std::uint8_t sequence_ = 0;      // of the next consecutive frame
-  std::uint8_t block_left_ = 0;    // frames before the next flow control; 0: no end
-  std::uint16_t waits_ = 0;        // in a row
-  bool any_consecutive_ = false;   // accepted so far
+  std::uint32_t deadline_us_ = 0;  // ready: earliest offer; otherwise: end of the wait
+  std::uint32_t gap_us_ = 0;
+  std::uint32_t sent_us_ = 0;  // when the newest frame was accepted
+  std::uint8_t chunk_ = 0;     // bytes of the datagram in the offered frame
+  std::uint8_t sequence_ = 0;
+  std::uint8_t block_left_ = 0;  // frames until the next flow control; 0: unlimited
+  std::uint16_t waits_ = 0;
+  bool any_consecutive_ = false;
   State state_ = State::idle;
   IsotpError error_ = IsotpError::none;
   IsotpSenderCounters counters_;

@@ -10,7 +10,6 @@ namespace r4 {
 namespace packed {
 namespace {
 
-// Goes over the fields that mark_fields() has marked.
 class Fields {
  public:
   Fields(Text fields, const std::uint64_t* ends)
@@ -46,12 +45,12 @@ unsigned digits_of(std::uint64_t value) {
   return value == 0 ? 0 : (67 - static_cast<unsigned>(__builtin_clzll(value))) / 4;
 }
 
-// A whole number as writers print it: no leading zeros.
+// A whole number without leading zeros, as writers print it.
 bool parse_plain(Text text, std::uint64_t& out) {
   return !text.empty() && (text[0] != '0' || text.size() == 1) && parse_number(text, out);
 }
 
-// Takes ",0" or ",1" off the end.
+// Removes ",0" or ",1" from the end.
 bool take_bit(Text& text, std::uint64_t& value, unsigned weight) {
   if (text.size() < 3) return false;
   const char* const last = text.end() - 1;
@@ -72,7 +71,7 @@ bool put_count(DigitWriter& digits, std::uint64_t value) {
 
 bool put_hundredths(DigitWriter& digits, Text text) {
   std::int32_t value = 0;
-  // Exactly two decimals, no sign, no leading zero but the one before the point.
+  // Exactly two decimals, no sign, no leading zero except the one before the point.
   return text.size() >= 4 && *(text.end() - 3) == '.' && (text[0] != '0' || text.size() == 4) &&
          parse_hundredths(text, value) && value >= 0 && text[0] != '-' &&
          put_fixed(digits, static_cast<std::uint64_t>(value), short3_max, 3);
@@ -88,7 +87,6 @@ bool put_steps(DigitWriter& digits, Text text) {
   return put_count(digits, negative ? 2 * value - 1 : 2 * value);
 }
 
-// Takes a whole number and the comma behind it off the front.
 __attribute__((noinline)) bool take_plain(Text& text, std::uint64_t& out) {
   std::size_t size = 0;
   while (size < text.size() && text[size] != ',') ++size;
@@ -102,7 +100,7 @@ unsigned hex_digit_of(char c) {
   return c >= 'a' && c <= 'f' ? static_cast<unsigned>(c - 'a') + 10 : 16;
 }
 
-// Of what is rare one copy is enough.
+// Not inlined: one copy is enough for rare values.
 __attribute__((noinline)) bool put_seldom(DigitWriter& digits, std::uint64_t value,
                                           unsigned count) {
   return digits.put(value, count);
@@ -117,7 +115,6 @@ __attribute__((noinline)) bool put_device_bytes(DigitWriter& digits, Text text) 
     if (hex_digit_of(text[i]) > 15) return false;
   }
   if ((first | second) > 0xFFFFFFFFU) return false;
-  // The counts, and how many bytes follow.
   const unsigned first_digits = digits_of(first);
   const unsigned second_digits = digits_of(second);
   std::uint64_t head = std::uint64_t{first_digits} << 4 * first_digits | first;
@@ -136,7 +133,7 @@ bool put_session(DigitWriter& digits, SessionId sid) {
          digits.put(sid & 0xFFFFFFFFU, session_id_size / 2);
 }
 
-// In the form of the field; false if its text is not one that the form would be written as.
+// In the form of the field; false if the form would write a different text.
 bool put_in_form(DigitWriter& digits, PackedForm form, Text text) {
   std::uint64_t value = 0;
   std::uint64_t bits = 0;
@@ -167,8 +164,6 @@ bool put_in_form(DigitWriter& digits, PackedForm form, Text text) {
   return false;
 }
 
-// --- text
-
 constexpr unsigned no_digit = 0xFF;
 
 unsigned digit_of(char c) {
@@ -176,8 +171,8 @@ unsigned digit_of(char c) {
   return c == '.' ? digit_point : c == '-' ? digit_minus : no_digit;
 }
 
-// Where bytes that have no digit end: at digits that go on for three or to the end, which cost less
-// than what a new run of bytes costs.
+// The end of bytes without digits: where three digits follow, or digits to the end. Those cost less
+// than a new run of bytes.
 const char* end_of_bytes(const char* at, const char* end) {
   const char* const limit =
       end - at > static_cast<std::ptrdiff_t>(longest_bytes) ? at + longest_bytes : end;
@@ -218,8 +213,6 @@ bool put_text(DigitWriter& digits, Text values) {
   }
 }
 
-// --- fields
-
 bool put_name(DigitWriter& digits, Text name, PackedForm& form) {
   const unsigned code = code_of(name);
   if (code != no_word) {
@@ -238,14 +231,13 @@ bool put_values(DigitWriter& digits, PackedForm form, Text values) {
          (digits.put(digit_escape, 1) && put_text(digits, values));
 }
 
-// SID, PNum and T, and how they are written.
 struct Numbers {
   SessionId sid = no_session;
   std::uint64_t pnum = 0;
   std::uint64_t time = 0;
   unsigned size = 0;  // index of `sizes`
 
-  // False if these are not the two, in the form and of a size that a layout has.
+  // False if these are not PNum and T in a form and size that a layout has.
   bool take(const Field& first, const Field& second) {
     if (first.name() != Text("PNum") || second.name() != Text("T") ||
         !parse_plain(first.values(), pnum) || !parse_plain(second.values(), time)) {
@@ -258,7 +250,7 @@ struct Numbers {
     }
     return false;
   }
-  // PNum alone, of a command.
+  // PNum alone, for a command.
   bool take(const Field& only) {
     size = 0;
     return only.name() == Text("PNum") && parse_plain(only.values(), pnum) &&
@@ -270,7 +262,7 @@ bool is_session(const Field& field, Numbers& numbers) {
   return field.name() == Text("SID") && parse_session_id(field.values(), numbers.sid);
 }
 
-// The last field before `end`, which is behind its semicolon; none before `begin`.
+// The last field in [begin, end), where `end` is after its semicolon.
 Field last_field(const char* begin, const char* end) {
   const char* at = end - 1;
   const char* colon = at;
@@ -302,7 +294,7 @@ bool is_heartbeat_of(const Field& field, unsigned code) {
   return field.name() == Text("H") && field.values() == words[code].word();
 }
 
-// The datagram's layout. Takes the fields that the packed head holds off [fields, end), and reads their numbers.
+// Removes the fields of the packed head from [fields, end), and reads their numbers.
 Layout choose_layout(Fields& fields, const char*& end, Numbers& numbers) {
   Fields after = fields;
   const Field first = after.next();
@@ -330,9 +322,9 @@ Layout choose_layout(Fields& fields, const char*& end, Numbers& numbers) {
   return Layout::of_session;
 }
 
-// Parts the datagram before its "^0x"; false if its checksum is not as writers print it.
+// Splits the datagram before "^0x"; false if its checksum is not as writers print it.
 bool take_checksum(Text datagram, Text& fields, std::uint32_t& checksum) {
-  if (datagram.size() < 8 || datagram.size() > max_datagram) return false;  // "A:;^0x0^" at least
+  if (datagram.size() < 8 || datagram.size() > max_datagram) return false;  // at least "A:;^0x0^"
   const char* const last = datagram.end() - 1;
   const char* first = last;
   while (last - first < 9 && first[-1] != 'x' && first - 4 != datagram.begin()) --first;

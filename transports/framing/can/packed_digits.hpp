@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes the digits of a packed datagram, 4 bits each, the more significant half of a byte first.
+// Writes the digits of a packed datagram, 4 bits each, the upper half of a byte first.
 #pragma once
 
 #include <cstddef>
@@ -14,12 +14,12 @@ class DigitWriter {
 
   // The last `digits` hexadecimal digits of `value`; at most 14.
   bool put(std::uint64_t value, unsigned digits) {
-    // In variables of its own: bytes written may alias any member.
+    // Local variables, because the written bytes may alias any member.
     const std::uint64_t pending = pending_ << 4 * digits | value;
     unsigned count = count_ + digits;
     std::uint8_t* at = at_;
     if (end_ - at < static_cast<std::ptrdiff_t>((count + 1) / 2)) {
-      end_ = at;  // for good: what follows must not fit either
+      end_ = at;  // permanently: later digits must not fit either
       count_ = 1;
       return false;
     }
@@ -38,7 +38,7 @@ class DigitWriter {
     }
     return true;
   }
-  // Fills the last byte; where the digits end.
+  // Fills the last byte; returns the end of the digits.
   std::uint8_t* finish() {
     if (count_ != 0) put(0xF, 1);
     return at_;
@@ -47,7 +47,7 @@ class DigitWriter {
  private:
   std::uint8_t* at_;
   std::uint8_t* end_;
-  std::uint64_t pending_ = 0;  // its last `count_` digits are still to be written
+  std::uint64_t pending_ = 0;  // its last `count_` digits are not yet written
   unsigned count_ = 0;
 };
 

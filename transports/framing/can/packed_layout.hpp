@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the first byte of a packed datagram says: which fields need no name, and how long PNum and T
-// are (docs/packed.md).
+// The first byte of a packed datagram: fields without names, sizes of PNum and T (docs/packed.md).
 #pragma once
 
 #include <cstddef>
@@ -11,7 +10,7 @@
 namespace r4 {
 namespace packed {
 
-// The fields in the order of the datagram; "more" is any number of fields with their names.
+// Fields in the order of the datagram; "more" is any number of fields with names.
 enum class Layout : std::uint8_t {
   plain_fields,     // more: PNum and T, if any, are among them
   fields,           // more, PNum, T
@@ -28,7 +27,6 @@ constexpr std::uint8_t version_mask = 0xC0;
 
 constexpr unsigned default_fields = code_servo1pos + 1;
 
-// How many fields of a layout have no name.
 constexpr unsigned nameless_fields(Layout layout) {
   return layout == Layout::state            ? default_fields
          : layout == Layout::state_safe_cmd ? default_fields + 2
@@ -36,7 +34,7 @@ constexpr unsigned nameless_fields(Layout layout) {
                                             : 0;
 }
 
-// The code of the field at `index` below nameless_fields().
+// `index` must be below nameless_fields().
 constexpr unsigned nameless_code(Layout layout, unsigned index) {
   return layout == Layout::state_safe_cmd && index >= default_fields
              ? code_safe + (index - default_fields)
@@ -47,13 +45,12 @@ constexpr bool is_heartbeat(Layout layout) {
   return layout == Layout::board_heartbeat || layout == Layout::host_heartbeat;
 }
 
-// True if SID stands in front of PNum, without its name.
+// True if SID is before PNum, without its name.
 constexpr bool has_session(Layout layout) {
   return layout == Layout::host_heartbeat || layout == Layout::of_session;
 }
 
-// How many digits PNum and T have, by the head's last three bits; a writer takes the first that is
-// enough.
+// Digits of PNum and T, by the head's last three bits; a writer uses the first sufficient entry.
 struct Sizes {
   std::uint8_t pnum;
   std::uint8_t time;
@@ -66,22 +63,21 @@ constexpr Sizes sizes_of(Layout layout, unsigned size) {
 
 // --- digits with a meaning
 
-constexpr unsigned digit_escape = 0xF;  // in place of a value: it follows as text
+constexpr unsigned digit_escape = 0xF;  // in place of a value: text follows
 // Text: 0-9 are themselves.
 constexpr unsigned digit_point = 0xA;
 constexpr unsigned digit_minus = 0xB;
 constexpr unsigned digit_comma = 0xC;
 constexpr unsigned digit_end = 0xD;    // of the field
-constexpr unsigned digit_bytes = 0xE;  // how many (1-15), then as many bytes
+constexpr unsigned digit_bytes = 0xE;  // a count (1-15), then that many bytes
 constexpr unsigned digit_word = 0xF;   // then a code of two digits
-// A name: a code of two digits, the first at most D; or E, how many bytes (1-14), those bytes.
+// A name: a code of two digits, the first at most D; or E, a count (1-14), that many bytes.
 constexpr unsigned digit_name = 0xE;
 constexpr unsigned longest_name = 14;
 constexpr unsigned longest_bytes = 15;
 constexpr unsigned longest_count = 14;  // digits
 constexpr unsigned most_device_bytes = 64;
 
-// Fixed forms: how many digits, and the largest value.
 constexpr unsigned flag_max = 0xE;
 constexpr unsigned short3_max = 0xEFF;
 constexpr unsigned drive_max = 0xEFFF;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The words that the packed form has a number for, and in which form it writes each field's values.
-// docs/packed.md has the same tables; they are of version 1 and change only with the version.
+// The words with a code in the packed form, and the form of each field's values. docs/packed.md has
+// the same tables. They belong to version 1 and change only with the version.
 #pragma once
 
 #include <cstdint>
@@ -9,24 +9,24 @@
 
 namespace r4 {
 
-// How the values of a field lie in the packed form. A text that is not exactly what the form would
-// be written as travels as text, behind an F.
+// The packed form of a field's values. A text that differs from what the form writes is sent as
+// text, after an F.
 enum class PackedForm : std::uint8_t {
   text,
   flag,        // 0-14 in 1 digit
-  short3,      // 0-3839 in 3
-  hundredths,  // "0.00"-"38.39" in 3
-  drive,       // "a,b", b 0 or 1: 2a + b in 4, up to EFFF
-  bldc,        // "a,b,c", b and c 0 or 1: 4a + 2b + c in 4, up to EFFF
-  count,       // how many digits (0-14), then those
-  steps,       // a count of 2v for v >= 0, of -2v - 1 below
-  bytes,       // "a,b,x3f…": two counts, how many bytes in 2, those in 2 each
-  session,     // 16 lower-case hexadecimal digits: a 0, then those
+  short3,      // 0-3839 in 3 digits
+  hundredths,  // "0.00"-"38.39" in 3 digits
+  drive,       // "a,b", b 0 or 1: 2a + b in 4 digits, up to EFFF
+  bldc,        // "a,b,c", b and c 0 or 1: 4a + 2b + c in 4 digits, up to EFFF
+  count,       // the number of digits (0-14), then the digits
+  steps,       // a count of 2v if v >= 0, otherwise of -2v - 1
+  bytes,       // "a,b,x3f…": two counts, the number of bytes in 2 digits, 2 digits a byte
+  session,     // 16 lower-case hexadecimal digits: a 0, then the digits
 };
 
 struct PackedWord {
-  char text[14] = {};  // with a colon behind it, as a field has
-  std::uint8_t size;   // of the word alone
+  char text[14] = {};  // followed by a colon, as in a field
+  std::uint8_t size;   // of the word without the colon
   PackedForm form;
 
   template <std::size_t N>
@@ -42,7 +42,7 @@ struct PackedWord {
 
 namespace packed {
 
-// Codes that the layouts name; the first are state fields, in the order of the wire.
+// Codes that the layouts name; state fields come first, in the order of a datagram.
 constexpr unsigned code_servo1pos = 0x09;
 constexpr unsigned code_safe = 0x30;
 constexpr unsigned code_cmd = 0x31;
@@ -54,7 +54,7 @@ constexpr unsigned no_word = 0xFF;
 
 extern const PackedWord words[word_count];
 
-// The code of a word; no_word if it has none. Constant time.
+// no_word if the word has no code. Constant time.
 unsigned code_of(Text word);
 
 }  // namespace packed

@@ -9,15 +9,13 @@ namespace r4 {
 namespace packed {
 namespace {
 
-// --- digits in
-
 class Digits {
  public:
   Digits(const std::uint8_t* begin, const std::uint8_t* end)
       : bytes_(begin), size_(2 * static_cast<std::size_t>(end - begin)) {}
 
   std::size_t left() const { return size_ - at_; }
-  // Takes the next digits as a number, at most 14; false if there are not so many.
+  // Reads at most 14 digits as a number; false if fewer are left.
   bool take(unsigned digits, std::uint64_t& value) {
     if (left() < digits) return false;
     value = 0;
@@ -43,8 +41,6 @@ class Digits {
   std::size_t at_ = 0;
 };
 
-// --- characters out
-
 class Characters {
  public:
   Characters(char* out, std::size_t capacity) : begin_(out), at_(out), end_(out + capacity) {}
@@ -57,10 +53,10 @@ class Characters {
     std::memcpy(at_, begin, size);
     at_ += size;
   }
-  // The word, and `colon` bytes (0 or 1) of the colon behind it.
+  // The word; if `colon` is 1, also its colon.
   void put(const PackedWord& word, std::size_t colon) {
     const std::size_t size = word.size + colon;
-    if (room() >= sizeof word.text) {  // the usual case: one copy of a fixed size
+    if (room() >= sizeof word.text) {  // usual case: one copy of a fixed size
       std::memcpy(at_, word.text, sizeof word.text);
       at_ += size;
     } else {
@@ -91,7 +87,7 @@ class Characters {
   bool has_room(std::size_t size) {
     if (room() >= size) return true;
     overflow_ = true;
-    end_ = at_;  // for good
+    end_ = at_;
     return false;
   }
 
@@ -101,9 +97,6 @@ class Characters {
   bool overflow_ = false;
 };
 
-// --- fields
-
-// Bytes of the class as they are.
 bool take_bytes(Digits& digits, unsigned count, std::uint8_t byte_class, Characters& out) {
   for (; count != 0; --count) {
     std::uint64_t byte = 0;
@@ -153,7 +146,7 @@ bool take_text(Digits& digits, Characters& out) {
   return false;
 }
 
-// A count and the digits that it announces, of which the first was taken. Of what is rare one copy is enough.
+// A count, whose first digit was taken. Not inlined: one copy is enough for rare values.
 __attribute__((noinline)) bool take_count(Digits& digits, unsigned first, Characters& out) {
   std::uint64_t value = 0;
   if (first > longest_count || !digits.take(first, value)) return false;
@@ -187,7 +180,7 @@ bool take_session(Digits& digits, SessionId& sid) {
   return sid != no_session;
 }
 
-// A form of as many digits, of which the first is not F.
+// A value in its form, or as text after an F.
 bool take_value(Digits& digits, PackedForm form, Characters& out) {
   unsigned first = 0;
   std::uint64_t value = 0;
@@ -239,7 +232,6 @@ bool take_value(Digits& digits, PackedForm form, Characters& out) {
   return false;
 }
 
-// A name with its colon.
 bool take_name(Digits& digits, PackedForm& form, Characters& out) {
   unsigned first = 0;
   std::uint64_t code = 0;
@@ -285,7 +277,7 @@ struct Numbers {
   SessionId sid = no_session;
 };
 
-// SID and T where the layout has them, and PNum.
+// SID and T if the layout has them, and PNum.
 void put_numbers(Layout layout, const Numbers& numbers, Characters& out) {
   if (has_session(layout)) {
     out.put("SID:", 4);
