@@ -82,7 +82,7 @@ CanBus::CanBus(asio::io_context& io, std::unique_ptr<CanMedium> medium)
 
 CanBus::~CanBus() {
   writable_.stop();
-  if (readable_.is_open()) readable_.release();  // the socket owns it
+  if (readable_.is_open()) readable_.release();  // the medium owns the descriptor
 }
 
 void CanBus::join(Member& member, std::vector<std::uint32_t> ids) {
@@ -108,14 +108,14 @@ bool CanBus::has(const Member* member) const {
                      [member](const Place& place) { return place.member == member; });
 }
 
-// Not while a loop over them runs.
+// No effect while a loop over the members runs.
 void CanBus::clear_places() {
   if (calling_ != 0 || sending_) return;
   if (std::erase_if(members_, [](const Place& place) { return place.member == nullptr; }) != 0)
     hear();
 }
 
-// A bus that hears less than its members asked for is down. The loop reports that later, because a
+// If the kernel refuses the filters, the bus goes down. The loop reports that later, because a
 // member may just be joining or leaving.
 void CanBus::hear() {
   if (medium_->number() < 0 || set_filters()) return;
@@ -124,7 +124,7 @@ void CanBus::hear() {
   }));
 }
 
-// False, with errno, if the kernel does not take them.
+// False, with errno, if the kernel refuses the filters.
 bool CanBus::set_filters() {
   std::vector<std::uint32_t> ids;
   for (const Place& place : members_) {
@@ -229,7 +229,7 @@ void CanBus::on_error_frame(const CanMedium::Received& received) {
   }
 }
 
-// Error frames report changes of the state only, so a new socket asks for it.
+// Error frames report only changes, so a new socket must ask for the state.
 void CanBus::look_at_controller() {
   const std::string state = medium_->state();
   if (state == "bus-off") return go_bus_off();
@@ -278,7 +278,7 @@ void CanBus::go_down(Problem problem, bool reopen) {
   be_down(std::move(problem));
 }
 
-// The reason may change while the bus is down: it was bus-off, and now its adapter is gone.
+// The reason may change while the bus is down, for example from bus-off to a missing adapter.
 void CanBus::be_down(Problem problem) {
   const bool was_up = std::exchange(trouble_, Trouble::down) != Trouble::down;
   if (!was_up && standing_ && standing_->problem.reason == problem.reason) return;
@@ -302,7 +302,7 @@ void CanBus::look_later() {
   look_timer_.async_wait(looking_.handler([this] { look(); }));
 }
 
-// Opens a new socket: the interface may be another one of the same name.
+// Opens a new socket, because a new interface may have the same name.
 void CanBus::look() {
   const std::shared_ptr<CanBus> alive = shared_from_this();
   try {

@@ -98,7 +98,7 @@ void CanSurvey::take(std::uint8_t node, Text bytes, std::uint32_t at_us) {
     return;
   }
   board.heard_us = at_us;
-  // Answers to hosts that do not control the board have numbers of their own.
+  // Answers to hosts that do not control the board have separate packet numbers.
   bool is_answer = false;
   switch (kind_of(datagram)) {
     case MessageKind::state:

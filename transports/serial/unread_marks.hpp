@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Knows when the oldest unread bytes of a byte stream were written, from the numbers of written and
+// Computes when the oldest unread byte of a stream was written, from the numbers of written and
 // unread bytes. Times are exact to `grain`, and never too late. No heap.
 #pragma once
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The messages between programs that share a transport (docs/sharing.md). Each is one packet of a
-// local socket: a letter, then its content. Without I/O.
+// local socket: a letter, then the content. No I/O.
 //
 //     hello     h VERSION     to the holder: asks for copies of all datagrams, or if it is alive
 //     ask       c VERSION     to the holder: a program that controls wants the transport. The

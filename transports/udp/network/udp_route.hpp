@@ -8,7 +8,6 @@
 
 namespace r4 {
 
-// An address of this computer.
 struct OwnAddress {
   asio::ip::address address;
   unsigned interface = 0;  // index of its interface
@@ -22,8 +21,8 @@ std::vector<OwnAddress> own_addresses();
 int probe_route(const asio::ip::udp::endpoint& to, const asio::ip::address& from,
                 const std::vector<OwnAddress>& own);
 
-// Lets the socket send to that board by the interface of that address, also if another interface
-// leads there, too. It receives by any interface. Has no effect for a board on this computer.
+// Makes the socket send to that board by the interface of `from`, even if another interface leads
+// there. It receives by any interface. No effect for a board on this computer.
 void send_by_interface_of(const asio::ip::address& from, int socket,
                           const asio::ip::udp::endpoint& to, const std::vector<OwnAddress>& own);
 
