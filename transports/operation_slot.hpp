@@ -83,7 +83,6 @@ class OperationSlot {
     void operator()(const asio::error_code& error) {
       if (!error) (*this)();
     }
-    // A transfer reports how it ended.
     void operator()(const asio::error_code& error, std::size_t size) {
       if (memory_->started == number_) function_(error, size);
     }

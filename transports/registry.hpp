@@ -25,8 +25,7 @@ class Registry {
  public:
   struct Entry : TransportHelp {
     CarrierFactory make;
-    // The name under which programs share a URL's transport. Null: not shared. Throws Error if the
-    // transport cannot be found.
+    // The name under which programs share it. Null: not shared. Throws Error if it is not found.
     std::function<ShareName(const Url& url)> share_name = nullptr;
     // True if the transport of this URL belongs to its program alone. Null: never.
     std::function<bool(const Url& url)> own = nullptr;

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Datagrams that the system cannot take yet, in the order of sending:
-//
 //     stop    first; never expires; the ninth replaces the oldest
 //     normal  in order; refused when the lane is full
 //     state   last; newest wins: when the lane is full, a new state replaces the oldest
-//
 // Entries other than stops expire after 100 ms. A lane allocates its memory for its first entry,
 // because each board has a queue and most queues stay empty.
 #pragma once

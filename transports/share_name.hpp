@@ -26,8 +26,7 @@ struct ShareName {
 // Throws Error if the transport cannot be found.
 using FindShareName = std::function<ShareName()>;
 
-// How to open a device that one program can have at a time: a serial port, the UDP port of hosts.
-// The sharing carrier sets this before each open().
+// How to open an exclusive device: a serial port or the UDP port of hosts. Set before each open().
 struct DeviceClaim {
   // For a watching program: another program may take the device; then this program neither reads
   // nor sends. The port of hosts is left to controlling programs.

@@ -50,7 +50,6 @@ void brace(std::string& text, std::size_t at) {
   text.insert(at, "{");
 }
 
-// Adds the optional braces.
 std::string with_braces(std::string_view pattern) {
   std::string text(pattern);
   for (const char* key : {"?node=", "&node="}) {

@@ -36,7 +36,6 @@ class WritableWait {
     }
   }
 
-  // Cancels the call.
   void stop() {
     waiting_ = false;
     slot_.cancel();

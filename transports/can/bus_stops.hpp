@@ -25,8 +25,7 @@ class BusStops {
 
   BusStops(asio::io_context& io, CanMedium& medium);
 
-  // Sends the frame without a number, which boards of every version of the id plan obey. Each such
-  // frame is a new stop.
+  // Sends the frame without a number. Boards of all versions obey it, each time as a new stop.
   SendResult send_bare();
   // Sends the bare frame of a stop that needs confirmation, and sets `number` for repeat(). Stops
   // announced in one turn of the loop, within `together`, share one frame and number. If `own` has
@@ -41,11 +40,11 @@ class BusStops {
 
   asio::io_context& io_;
   CanMedium& medium_;
-  std::uint32_t announced_;  // the newest number
+  std::uint32_t announced_;
   Clock::time_point announced_at_;
   bool announcing_ = false;  // in this turn of the loop
   OperationSlot announcement_;
-  std::optional<std::uint32_t> repeated_;  // the number that was sent last
+  std::optional<std::uint32_t> repeated_;
   Clock::time_point repeated_at_;
 };
 

@@ -36,7 +36,6 @@ Problem filter_problem(Problem problem) {
   return problem;
 }
 
-// The buses of one event loop.
 class Buses : public asio::execution_context::service {
  public:
   using key_type = Buses;
@@ -136,8 +135,6 @@ bool CanBus::set_filters() {
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   return medium_->hear(ids);
 }
-
-// --- receiving
 
 // Throws Error if the system does not let the loop wait for the socket.
 void CanBus::watch_socket() {
@@ -246,7 +243,6 @@ void CanBus::go_bus_off() {
           false);
 }
 
-// Reports a trouble once until it changes.
 void CanBus::warn_of(Trouble trouble) {
   if (!up() || trouble_ == trouble) return;
   trouble_ = trouble;
@@ -260,8 +256,6 @@ void CanBus::warn_of(Trouble trouble) {
   standing_ = {CarrierEvent::Kind::warning, std::move(problem)};
   tell(*standing_);
 }
-
-// --- the interface
 
 void CanBus::go_down(Problem problem, bool reopen) {
   const std::shared_ptr<CanBus> alive = shared_from_this();

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One CAN medium, for example an interface, which all its users in an event loop share: one socket
-// with kernel filters for the ids in use, frames in batches, and the state of the bus as events.
+// One CAN medium, which its users in an event loop share: one socket with kernel filters for the
+// ids in use, frames in batches, and the state of the bus as events.
 //
 // Each member hears every frame that any member asked for, except frames that members send. Frames
-// leave in the order of the offers, and no transfer interrupts the transfer of another member. The
-// bus takes at most `ahead` frames, and more when the interface has taken all of these. After 100
-// ms without progress it drops them. Without a wire (vcan, vxcan) it polls briefly before it
-// sleeps.
+// leave in the order of the offers, and no transfer interrupts another member's transfer. The bus
+// takes at most `ahead` frames, and more when the interface has taken all of these. After 100 ms
+// without progress it drops them. Without a wire (vcan, vxcan) it polls briefly before it sleeps.
 #pragma once
 
 #include <algorithm>
@@ -29,8 +28,7 @@
 
 namespace r4 {
 
-// More than 15 members and 40 functions: the socket, its timers, the waiting frames and the members
-// change together with every frame.
+// More than 15 members: socket, timers, waiting frames and members all change with every frame.
 class CanBus : public std::enable_shared_from_this<CanBus> {
  public:
   using Clock = CanMedium::Clock;
@@ -78,14 +76,13 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   CanBus(const CanBus&) = delete;
   CanBus& operator=(const CanBus&) = delete;
 
-  // Until it leaves, a member hears the frames with `ids` (11 bits), or with join_all() every
-  // frame, also extended and remote frames.
+  // Until it leaves, a member hears the 11-bit `ids`, or with join_all() all frames of every kind.
   void join(Member& member, std::vector<std::uint32_t> ids);
   void join_all(Member& member);
   void leave(Member& member) noexcept;
   bool has(const Member* member) const;
 
-  // Sends the frames that members offer.
+  // To be called when a member has a frame to offer.
   void send();
   // Hands over the frames that have arrived; true if there were any. Call it before acting on a
   // time-out: a delayed loop may find the time-out and the frame together.
@@ -159,7 +156,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   bool sending_ = false;
   bool receiving_ = false;
   AdaptivePolling polling_;
-  Clock::time_point woken_;  // when the loop last woke it
+  Clock::time_point woken_;
   std::array<CanFrame, ahead> out_;
   std::array<Member*, ahead> out_of_{};  // the member that offered the frame; null: has left
   bool late_ = false;                    // the interface has refused these frames once

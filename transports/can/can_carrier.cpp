@@ -28,7 +28,7 @@ namespace r4 {
 namespace {
 
 constexpr std::size_t normal_entries = 32;
-constexpr std::size_t state_entries = 1;  // newest wins
+constexpr std::size_t state_entries = 1;
 constexpr std::uint32_t look_again_us = 20000;
 
 // More than 15 members: four are its timer.
@@ -222,8 +222,7 @@ SendResult CanCarrier::send_lease() {
 }
 
 // Notes frames of this board and commands of other hosts. Ignores flow control, which looks the
-// same from all hosts, and frames of other boards, which come because a program's hosts share the
-// bus.
+// same from all hosts, and frames of other boards, which the shared bus brings.
 void CanCarrier::listen_for_others(const CanFrame& frame) {
   const CanIdMeaning meaning = classify(frame);
   if (is_.role != Role::host || meaning.node != is_.node) return;

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // can://INTERFACE[?node=1&fd=0&pack=1]: datagrams of one board on a CAN bus (docs/can.md), by
 // ISO-TP on SocketCAN. Several carriers may share an interface.
-//
 //     node=N   the board's number on the bus, 0-31 (default 1)
 //     fd=1     sends CAN FD frames; receives classic and FD frames
 //     pack=0   a host sends and gets text, not the packed form; both forms are received. A board
 //              uses its setting instead: C:pack,0
-//
-// A host sends Priority::stop as the emergency frame, which stops every board on the bus and
-// overtakes all waiting frames. A watcher's lease (W) is a separate frame, sent only while the
-// board is heard and no host is.
+// A host's Priority::stop is the emergency frame, which stops every board and overtakes all frames.
+// A watcher's lease (W) is a separate frame, sent only while the board, but no host, is heard.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The medium of a CanBus: a SocketCAN socket or a program's own bus. For the thread of one event
-// loop. No function waits, except open().
+// A CanBus's medium: a SocketCAN socket or a program's own bus. For one thread; only open() waits.
 #pragma once
 
 #include <array>
@@ -28,7 +27,7 @@ class CanMedium {
   };
 
   enum class Outcome : std::uint8_t {
-    done,    // everything was taken
+    done,
     busy,    // the socket's share of the queue is used up: wait until it is writable
     full,    // the interface's queue is full: the system does not report when it has room
     failed,  // with errno
@@ -55,9 +54,8 @@ class CanMedium {
   // `error`: errno.
   virtual Problem problem(int error) const = 0;
 
-  // Hears these 11-bit ids, or all frames, also extended and remote frames. The emergency stop's id
-  // includes numbered stops. More frames may be heard. False, with errno, if the kernel refuses;
-  // the old filters stay.
+  // Hears these 11-bit ids (the emergency stop's id includes numbered stops), or frames of every
+  // kind. More may be heard. False, with errno, if the kernel refuses; the old filters stay.
   [[nodiscard]] virtual bool hear(const std::vector<std::uint32_t>&) { return true; }
   [[nodiscard]] virtual bool hear_everything() { return true; }
 

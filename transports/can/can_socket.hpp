@@ -52,7 +52,7 @@ class CanSocket final : public CanMedium {
   FileDescriptor first_;  // has its own priority and queue
   bool simulated_ = false;
   bool heard_rate_switch_ = false;
-  std::uint32_t overflows_ = 0;         // of this opening
+  std::uint32_t overflows_ = 0;
   std::uint32_t overflows_before_ = 0;  // of earlier openings
   const std::unique_ptr<Inbox> inbox_;
 };

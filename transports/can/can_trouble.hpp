@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reports to a host whether its board and other hosts are heard on a CAN bus, and why datagrams do
 // not pass although the bus is up. No I/O.
-//
-//     foreign frames   frames came on the board's command id for host_completes without ending a
-//                      datagram: another protocol uses the id. A host sends ten heartbeats a
-//                      second, and a paused host sends no frames
+//     foreign frames   frames came on the board's command id for host_completes, but no whole
+//                      datagram. A host sends ten heartbeats a second: another protocol uses the id
 //     late frames      the board is heard, but late_transfers transfers within late_within were not
 //                      answered in time (N_Bs, N_Cr): frames are held back, or lost
 #pragma once

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Decides which host sends on a board's command id (docs/can.md, "Several hosts"). All hosts answer
-// a board's heartbeat at once: on one id they would mix their frames and, on real wires, drive each
-// other bus-off. So a host listens before it sends, and the later host is silent until it has not
-// heard the other host for a second. The emergency stop needs no turn: all hosts send the same
-// frame.
+// a heartbeat at once: on one id their frames would mix and, on real wires, drive hosts bus-off. So
+// a host listens before it sends, and the later host is silent until it has not heard the other
+// host for a second. The emergency stop needs no turn: all hosts send the same frame.
 #pragma once
 
 #include <chrono>
@@ -27,7 +26,6 @@ class CanTurn {
 
   explicit CanTurn(std::uint32_t seed) : chance_(seed) {}
 
-  // The bus has come up.
   void listen(Time now) {
     state_ = State::listening;
     until_ = now + listening;
@@ -40,7 +38,6 @@ class CanTurn {
     }
     return state_ == State::ours;
   }
-  // True if another host has the turn.
   bool others() const { return state_ == State::others; }
   // A datagram of this host has begun.
   void on_own(Time now) {

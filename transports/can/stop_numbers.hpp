@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The numbers of one host's stops on a bus. A stop is confirmed by its packet number of 32 bits.
-// The frame on the bus has a number of 18 bits, which a board reports in the heartbeat field STOP.
-// in_full() restores the packet number in such a heartbeat. Keeps the newest 16 stops, as many as a
-// session repeats at a time.
+// The numbers of one host's stops on a bus. A stop is confirmed by its packet number of 32 bits. On
+// the bus it has a number of 18 bits, which a board reports in the heartbeat field STOP. Keeps the
+// newest 16 stops, as many as a session repeats at a time.
 #pragma once
 
 #include <cstddef>

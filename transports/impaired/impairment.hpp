@@ -57,7 +57,6 @@ class ImpairedDirection {
   void put(Time now, Item item);
   // When the next datagram arrives.
   std::optional<Time> due() const;
-  // The next datagram, if it has arrived.
   std::optional<Item> take(Time now);
   const ImpairmentCounters& counters() const { return counters_; }
 

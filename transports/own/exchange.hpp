@@ -28,9 +28,8 @@
 
 namespace r4 {
 
-// `Own`: open(received), send(item) and close(), which may throw. `Outbox`: the type Item, of which
-// one is sent or received at a time; std::optional<Item> next(Time), which takes the next item to
-// send; and clear().
+// `Own`: open(received), send(item) and close(), which may throw. `Outbox`: the type Item, clear()
+// and std::optional<Item> next(Time), which takes the next item to send.
 template <class Own, class Outbox>
 class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
  public:
@@ -87,7 +86,6 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
     const std::lock_guard lock(mutex_);
     return state_ == State::up;
   }
-  // The reason why the transport is down.
   Problem problem() const {
     const std::lock_guard lock(mutex_);
     return problem_;

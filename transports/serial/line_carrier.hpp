@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Datagrams as lines on a tty: the common part of serial_carrier.cpp and pty_carrier.cpp. Each line
-// is one write. A line that the system takes in part is completed before the next line. Waiting
-// lines keep the order of SendQueue. Reads at most 4096 bytes a turn. It is up while the stream is
-// open.
+// is one write; a line taken in part is completed first. Waiting lines keep the order of SendQueue.
+// Reads at most 4096 bytes a turn. It is up while the stream is open.
 #pragma once
 
 #include <array>
@@ -53,7 +52,6 @@ class LineCarrier : public Carrier {
   // Begins to receive from the descriptor, which must not block. `asks`: may_read() is called
   // before each read. Throws Error about `thing` if the loop cannot wait for the stream.
   void start(FileDescriptor descriptor, const std::string& thing, bool asks = false);
-  // Notifies the handler that the stream is open.
   void report_up();
   void look_later();
   // Written bytes were discarded on their way, so the next line begins with a terminator.

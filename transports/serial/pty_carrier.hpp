@@ -2,7 +2,6 @@
 // The board's end of a pseudo-terminal: `pty:` or `pty:PATH`. A host opens the other end as
 // serial:///dev/pts/N. PATH is a link to that, which open() makes and close() removes; it replaces
 // only a link. name() is "pty:PATH" or "pty:/dev/pts/N".
-//
 // It is up while a host has the other end open. Without a host nothing is written, so the next host
 // reads nothing stale. Bytes that a stalled host leaves unread for 30 ms are discarded before a new
 // state is written. So the first state that the host then reads is younger than 50 ms.

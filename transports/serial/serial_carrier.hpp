@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Datagrams as lines on a serial port: the board's USB, or the pty of a simulated board.
-//
 //     serial:///dev/ttyACM0[?baud=1000000]   that device, or a link to one
 //     serial:auto                            the one R4 board on USB (2341:0266)
 //     serial:?sn=SERIAL                      the USB device with that serial number
-//
 // 8N1, raw, no flow control, locked. Rates below 9600 are refused, because 1200 baud orders an
 // Arduino to erase its program. An unplugged or hung-up port is `down` at once. The carrier looks
 // for it by serial number, or by path if it has none.

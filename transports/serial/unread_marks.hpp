@@ -20,7 +20,6 @@ class UnreadMarks {
   void unread_at_most(std::size_t bytes);
   void clear() { count_ = 0; }
 
-  // True if bytes may be unread.
   bool any() const { return count_ != 0; }
   // When the oldest unread byte was written. Only if any().
   Time oldest() const { return marks_[first_].time; }

@@ -45,7 +45,6 @@ class ShareClient {
   // problems. Throws std::system_error if the loop cannot wait for the connection.
   Joined join(const ShareName& name, BoardRole role, ShareMessage::Kind greeting,
               const std::string& thing);
-  // Sends an E:STOP for the board to the holder.
   SendResult send_stop(std::string_view datagram);
   void leave() noexcept;
 

@@ -30,7 +30,6 @@ bool is_stop(std::string_view bytes) {
 
 }  // namespace
 
-// A connected program.
 class ShareHolder::Sharer : public std::enable_shared_from_this<Sharer> {
  public:
   Sharer(ShareHolder& holder, LoopDescriptor connection)

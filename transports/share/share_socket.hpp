@@ -23,18 +23,15 @@ namespace r4 {
 
 // Takes the holder's name of that role. None, with errno: EADDRINUSE if another program has it.
 FileDescriptor take_share_name(const ShareName& name, BoardRole role);
-// Connects to the program with that name. None, with errno: ECONNREFUSED if no program has the
-// name, would_block() if too many programs wait.
+// Connects to a holder. None, with errno: ECONNREFUSED (no holder), would_block() (too many wait).
 FileDescriptor connect_to_holder(const ShareName& name, BoardRole role);
 // The next connection that waits at a holder. None, with errno.
 FileDescriptor accept_sharer(int holder);
 
 inline bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK; }
 
-// True if the program at the other end belongs to the same user or, if a group shares the
-// transport, to a member of that group or root.
+// True if the other end's user is the same or, if a group shares the transport, a member or root.
 bool is_one_of_us(int connection, const ShareName& name);
-// The process at the other end.
 pid_t process_of(int connection);
 // The program's name, as in "r4"; "another program" if it cannot be read.
 std::string program_of(pid_t process);

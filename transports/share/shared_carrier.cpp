@@ -68,7 +68,6 @@ class SharedCarrier final : public Carrier,
 
  private:
   enum class State { closed, seeking, asking, joined, holding };
-  // The search for a holder, or for the transport itself.
   struct Search {
     Clock::time_point began = Clock::now();
     std::size_t asked = 0;           // the index in `holders` of the last asked holder
@@ -108,7 +107,7 @@ class SharedCarrier final : public Carrier,
   }
   void tell(const CarrierEvent& event);
 
-  const Claim claim_;  // how own_ opens its device
+  const Claim claim_;
   const std::unique_ptr<Carrier> own_;
   const FindShareName find_;
   BoardRole role_;
@@ -124,7 +123,7 @@ class SharedCarrier final : public Carrier,
   std::optional<Problem> trouble_;  // why it is down, or the warning that stands
   Carrier::Handler* handler_ = nullptr;
   CarrierCounters shared_counters_;  // of datagrams by way of another holder
-  mutable CarrierCounters counted_;  // the sum of these and of own_
+  mutable CarrierCounters counted_;
 };
 
 void SharedCarrier::open(Carrier::Handler& handler) {
@@ -251,7 +250,6 @@ void SharedCarrier::open_own() {
   if (state_ == State::holding && !holder_.holds()) look_later(look_again_slowly);
 }
 
-// The holder that was asked does not answer.
 void SharedCarrier::pass_over(const Problem& why) {
   client_.leave();
   search_.passed = search_.asked + 1;
@@ -264,7 +262,6 @@ void SharedCarrier::lose() {
   holder_.release();  // after seek(): the transport is free before other programs look for a holder
 }
 
-// Restarts the search.
 void SharedCarrier::seek() {
   client_.leave();
   own_->close();

@@ -11,11 +11,10 @@
 //
 // The controlling program holds the transport, so its datagrams never wait for another program. It
 // also holds a separate name, so a second controlling program is refused at once. Watching programs
-// hear all datagrams, and send stops.
-//
-// A program that takes control first takes that name. If it is refused, nothing changes. Else it
-// reopens the transport, because a controlling program opens it differently (DeviceClaim). The
-// programs that it served seek the holder again, as after the end of any holder.
+// hear all datagrams, and send stops. A program that takes control first takes that name. If it is
+// refused, nothing changes. Else it reopens the transport, because a controlling program opens it
+// differently (DeviceClaim). The programs that it served seek the holder again, as after any
+// holder's end.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -28,8 +27,8 @@
 namespace r4 {
 
 // Reports the same as `own`, whichever program holds the transport. `claim`: how `own` opens its
-// device. open() waits for no program. It throws Error{refused} if another program controls the
-// board, and the errors of `own`.
+// device. open() does not wait; it throws Error{refused} if another program controls the board, or
+// an error of `own`.
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
                                              Claim claim, FindShareName find, BoardRole role);
 

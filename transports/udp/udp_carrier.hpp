@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Datagrams over UDP, one a packet, on the ports of the paper.
-//
 //     host   udp://HOST[:2018]                      sends to HOST:2018, hears all ports of HOST
 //            udp:auto                               the only board on this computer's networks
 //            udp:?id=NAME                           the board of that name or board id
 //     board  udp://BIND[:2018][?peer=HOST[:2390]]   port 0: any free port, which name() shows
-//
-// Options of a host: listen=2390 is its own port, which the boards of one program share
-// (udp_host_socket.hpp); 0 is any free port. With udp://HOST, local=ADDRESS sends from that address
-// of this computer, by its interface. In a search (board_search.hpp), port=2018 is the boards'
-// port.
+// Options of a host: listen=2390 is its port, which the boards of one program share
+// (udp_host_socket.hpp); 0: any free port. With HOST, local=ADDRESS sends from that address of this
+// computer, by its interface. In a search (board_search.hpp), port=2018 is the boards' port.
 //
 // A board knows the last 16 hosts that sent a valid datagram, and always the controlling host.
 // Datagrams for everyone go to the peer in the URL, else to the controlling host, else to the host

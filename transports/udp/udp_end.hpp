@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The common part of udp_host.hpp and udp_board.hpp: socket, waiting datagrams, state of the
-// network.
+// The common part of udp_host.hpp and udp_board.hpp: socket, queue and state of the network.
 #pragma once
 
 #include <array>

@@ -50,7 +50,6 @@ void UdpHost::close() noexcept {
   UdpEnd::close();
 }
 
-// Opens and binds the socket that hears the board at that address.
 void UdpHost::bind(const Endpoint& board) {
   board_ = board;
   const bool any_port = claim_->yields && !url_.names_listen;
@@ -110,7 +109,6 @@ void UdpHost::remember(const FoundHost& answer) {
   watch_.ask_for(question());
 }
 
-// The answer of a lookup or a search.
 void UdpHost::found(const FoundHost& answer) {
   const auto& addresses = answer.addresses;
   const bool is_open = socket_.is_open();

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The host's end of UDP: one board, given by address, host name or its own name (board_search.hpp).
-// The board's address may change.
+// The host's end of UDP: one board, which may move, given by address, host name or board name.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -38,7 +38,6 @@ class UdpHostSocket {
   // If connected, lets the kernel choose again. 0, or errno.
   int reconnect();
 
-  // True if `sender` is the board.
   bool hears(const Endpoint& sender) const {
     return sender.address() == board_.address() &&
            (!neighbours_.load(std::memory_order_relaxed) || sender.port() == board_.port());

@@ -19,12 +19,12 @@ struct UdpUrl {
   UdpUrl(const Url& url, Role role);
 
   std::string text;
-  bool search = false;   // udp:auto, udp:?id=NAME: a search finds the board
-  std::string called;    // its name or board id; empty: the only board
-  std::string host;      // of the board; at a board: where it listens
-  std::uint16_t port;    // of the board
-  std::uint16_t listen;  // of the host
-  bool names_listen;     // the URL has the option `listen`
+  bool search = false;  // udp:auto, udp:?id=NAME: a search finds the board
+  std::string called;   // its name or board id; empty: the only board
+  std::string host;     // of the board; at a board: where it listens
+  std::uint16_t port;
+  std::uint16_t listen;
+  bool names_listen;
   // The host sends by the interface with that address; unspecified: by any interface.
   asio::ip::address local;
   std::string peer;  // HOST or HOST:PORT; empty: none

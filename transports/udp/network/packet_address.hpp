@@ -19,8 +19,7 @@ bool note_addresses(int socket, const asio::ip::udp& protocol);
 std::optional<std::size_t> receive_packet(int socket, char* out, std::size_t room,
                                           asio::ip::udp::endpoint& from, asio::ip::address& at);
 
-// Sends a packet from that address of this computer; from any address if it is unspecified or gone.
-// 0 if the system has taken it, else errno.
+// Sends a packet from `from`, or any address if that is unspecified or gone. 0 if sent, else errno.
 int send_packet(int socket, std::string_view bytes, const asio::ip::udp::endpoint& to,
                 const asio::ip::address& from);
 

@@ -10,14 +10,13 @@ namespace r4 {
 
 struct OwnAddress {
   asio::ip::address address;
-  unsigned interface = 0;  // index of its interface
-  bool works = false;      // the interface is up and has a carrier (a plugged cable, a joined WiFi)
+  unsigned interface = 0;
+  bool works = false;  // the interface is up and has a carrier (a plugged cable, a joined WiFi)
 };
 // Empty if the system does not report them.
 std::vector<OwnAddress> own_addresses();
 
-// 0 if there is a route to that board, else errno. `from`: by the interface of that address;
-// unspecified: by any interface.
+// 0 if there is a route to `to`, else errno. `from`, if specified: only by its interface.
 int probe_route(const asio::ip::udp::endpoint& to, const asio::ip::address& from,
                 const std::vector<OwnAddress>& own);
 

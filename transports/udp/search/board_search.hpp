@@ -35,16 +35,16 @@ struct BoardSearch {
   // A network of this computer, by one of its addresses.
   struct Network {
     std::string interface;
-    unsigned index = 0;         // of the interface; 0: as the system routes it
-    asio::ip::address_v4 from;  // the address of this computer
-    asio::ip::address_v4 to;    // the broadcast address
-    std::string trouble = {};   // why the question could not be sent
+    unsigned index = 0;  // of the interface; 0: as the system routes it
+    asio::ip::address_v4 from;
+    asio::ip::address_v4 to;   // the broadcast address
+    std::string trouble = {};  // why the question could not be sent
   };
   // The networks whose interface is up, 64 at most.
   static std::vector<Network> networks_of_this_computer();
 
   struct Result {
-    std::vector<Network> networks;  // where the question was sent
+    std::vector<Network> networks;
     std::vector<AnsweredBoard> boards;
     std::size_t others = 0;  // boards of another id and name
     bool more = false;       // more boards have answered than are kept
@@ -71,8 +71,7 @@ struct WantedBoard {
 std::vector<AnsweredBoard> called(const std::vector<AnsweredBoard>& boards,
                                   std::string_view id_or_name);
 
-// The URL that finds one of `boards` again: by name, by id, or by address if another board has the
-// same name and id. `port`: of the search.
+// The URL that finds `board` again: by name or id if unique, else by address. `port`: searched.
 std::string url_of(const AnsweredBoard& board, const std::vector<AnsweredBoard>& boards,
                    std::uint16_t port);
 

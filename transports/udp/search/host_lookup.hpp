@@ -22,11 +22,10 @@ struct FoundHost {
   std::vector<asio::ip::address> addresses;
   std::string reason;  // why there are no addresses
   // Of a search for boards (board_search.hpp):
-  std::string board_id = {};            // of the board that was found
+  std::string board_id = {};
   std::optional<Problem> problem = {};  // why no board can be chosen; its thing is empty
 };
 
-// How and when to look up a host.
 struct HostLookup {
   // Blocks; called in a separate thread.
   using Resolve = std::function<FoundHost(const std::string& host)>;
@@ -37,8 +36,7 @@ struct HostLookup {
   std::chrono::milliseconds retry{1000};     // from a failed question to the next
   std::chrono::milliseconds silence{3000};   // of a board, after which it is looked up again
 
-  // The address of `host`, a name or an address. Blocks, at most for `patience`. Throws Error about
-  // `thing` if no answer comes.
+  // `host`: a name or an address. Blocks, at most for `patience`. Throws Error about `thing`.
   asio::ip::address find(const std::string& host, const std::string& thing) const;
 };
 
@@ -46,7 +44,6 @@ struct HostLookup {
 asio::ip::address address_of(const FoundHost& found, const std::string& host,
                              const std::string& thing);
 
-// True if `host` is an address, not a name.
 bool is_address(const std::string& host);
 
 // Asks for a board's address until it is known, and again when the board is silent.
@@ -57,7 +54,7 @@ class HostWatch {
   HostWatch& operator=(const HostWatch&) = delete;
   ~HostWatch() { stop(); }
 
-  using Question = std::function<FoundHost()>;  // blocks; asked in threads of their own
+  using Question = std::function<FoundHost()>;  // blocks; called in a separate thread
   using OnFound = std::function<void(const FoundHost&)>;
   // Calls `on_found`, on the loop, with each answer. Asks at once unless the address is `known`.
   // Without a question, `on_found` gets an empty answer when the board is silent.
