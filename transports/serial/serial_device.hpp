@@ -17,7 +17,7 @@ namespace r4 {
 // A second opening fails: `lock` excludes other r4 programs, TIOCEXCL all programs. TIOCEXCL is not
 // set for a pty, because the simulated board could not count its host's unread bytes. Nor is it set
 // if this program yields the port or took it from another program, because it outlasts the program.
-// Throws Error: open (missing, in use, not a tty), permission, usage (a rate that it refuses).
+// Throws Error: open (missing, in use, not a tty), permission, usage (refused rate).
 FileDescriptor open_serial_device(asio::io_context& io, const std::string& path, unsigned baud,
                                   const DeviceClaim& claim, PortLock& lock);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A program's connection to the program that holds the transport. A holder that is silent for
-// answer_within is asked to answer within the same time, because only the board may be silent.
+// answer_within is asked to answer within the same time, because perhaps only the board is silent.
 #pragma once
 
 #include <array>

@@ -26,7 +26,7 @@ class ShareHolder {
  public:
   static constexpr std::size_t most_served = 16;
   static constexpr std::size_t most_served_after_a_stop = 20;
-  // Limits the loop's time for programs that connect repeatedly to a few percent.
+  // Programs of any user that connect repeatedly take at most a few percent of the loop's time.
   static constexpr std::chrono::microseconds between_arrivals{300};
 
   // Called on the loop's thread. Any of these may release the holder.
