@@ -19,7 +19,7 @@ struct CodePoints {
 };
 
 // Code points that are invisible or change adjacent text: the control and format characters of
-// Unicode 15 (categories Cc, Cf, Zl, Zp), fillers, variation selectors, surrogates and noncharacters.
+// Unicode 15 (Cc, Cf, Zl, Zp), fillers, variation selectors, and code points without a character.
 constexpr std::array<CodePoints, 29> unprintable{{
     {0x0000, 0x001F},   {0x007F, 0x009F},   {0x00AD, 0x00AD},   {0x034F, 0x034F},
     {0x0600, 0x0605},   {0x061C, 0x061C},   {0x06DD, 0x06DD},   {0x070F, 0x070F},

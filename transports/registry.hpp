@@ -25,7 +25,7 @@ class Registry {
  public:
   struct Entry : TransportHelp {
     CarrierFactory make;
-    // The transport's name for sharing. Null: not shared. Throws Error if the transport is not found.
+    // The transport's name for sharing. Null: not shared. Throws Error if there is no transport.
     std::function<ShareName(const Url& url)> share_name = nullptr;
     // True if the transport of this URL belongs to its program alone. Null: never.
     std::function<bool(const Url& url)> own = nullptr;
