@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Functions of a transport that only boards use. A carrier with such a function is also a BoardEnd.
-// For any other carrier board_end_of() returns an end whose functions do nothing.
-//
-//     UDP     hosts send from many peers: which peers are in control
-//     CAN     datagrams have a packed form
-//     pty     is the board's own cable
+// Functions of a transport that only boards use: the peers in control (UDP), the packed form (CAN)
+// and the board's own cable (pty). For a carrier that is not a BoardEnd, board_end_of() returns an
+// end whose functions do nothing.
 #pragma once
 
 #include "r4link/carrier.hpp"
@@ -13,15 +10,14 @@ namespace r4 {
 
 class BoardEnd {
  public:
-  // That peer is in control: it keeps its number, however many other peers send, until another peer
-  // is held. On UDP, datagrams for `everyone` go to it. `everyone`: no peer is in control.
+  // Puts `peer` in control; `everyone`: no peer is in control. The peer keeps its number until
+  // another peer is held. On UDP, datagrams for `everyone` go to this peer.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
-  // The host in control is also heard from that peer, which is held besides the first until hold()
-  // is called.
+  // Also holds this peer of the controlling host, until hold() is called.
   virtual void also_hold(Peer peer) { static_cast<void>(peer); }
-  // True if that peer gets the datagrams for `everyone`.
+  // True if `peer` gets the datagrams for `everyone`.
   virtual bool reaches(Peer peer) const { return peer == everyone; }
-  // Sends the packed form from now on, or text. Both forms are always received.
+  // Chooses packed form or text for sent datagrams. Both forms are always received.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
   // True for the board's own cable, over which the board takes keys, passwords and its node.
   virtual bool is_own_cable() const { return false; }

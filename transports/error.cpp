@@ -18,9 +18,8 @@ struct CodePoints {
   std::uint32_t first, last;
 };
 
-// Code points that show nothing, or change how the text beside them is shown: the control and
-// format characters of Unicode 15 (categories Cc, Cf, Zl, Zp), fillers and variation selectors, and
-// code points that are not characters.
+// Code points that are invisible or change adjacent text: the control and format characters of
+// Unicode 15 (Cc, Cf, Zl, Zp), fillers, variation selectors, and code points without a character.
 constexpr std::array<CodePoints, 29> unprintable{{
     {0x0000, 0x001F},   {0x007F, 0x009F},   {0x00AD, 0x00AD},   {0x034F, 0x034F},
     {0x0600, 0x0605},   {0x061C, 0x061C},   {0x06DD, 0x06DD},   {0x070F, 0x070F},
@@ -39,7 +38,7 @@ bool is_printable(std::uint32_t code) {
   return at == unprintable.end() || code < at->first;
 }
 
-// The size of the printable character in UTF-8 (RFC 3629) at the front of `text`; 0: there is none.
+// The size of the printable UTF-8 character (RFC 3629) at the front of `text`; 0 if there is none.
 std::size_t printable_size(std::string_view text) {
   const auto byte = [text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   if (byte(0) < 0x80) return is_printable(byte(0)) ? 1 : 0;

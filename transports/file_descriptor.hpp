@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A file descriptor with an owner; what to do if the system has no descriptor, memory or thread
-// left; and sockets of Asio that child processes do not inherit: a child would keep the port while
-// it runs.
+// An owned file descriptor, the problem when the system has no resources left, and sockets of Asio
+// that a child process does not inherit. A child would keep the port while it runs.
 #pragma once
 
 #include <fcntl.h>
@@ -44,8 +43,7 @@ class FileDescriptor {
   int number_ = -1;
 };
 
-// Why `thing` cannot be opened, if `error` (errno) says that the program, the user or the computer
-// has used up its files, its memory, or what epoll may wait for.
+// The problem if `error` (errno) means that files, memory or epoll watches are used up.
 inline std::optional<Problem> out_of_resources(const std::string& thing, int error) {
   if (error == ENFILE) {
     return Problem{ErrorKind::open, thing, "this computer has no file left", "end some programs"};
@@ -70,9 +68,8 @@ inline std::optional<Problem> out_of_resources(const std::string& thing, int err
           std::to_string(4 * limit.rlim_cur)};
 }
 
-// Throws std::system_error if an event loop that is made now could not be woken. Asio does not
-// check that the system lets a loop wait for its timers and for calls: such a loop would sleep for
-// ever.
+// Throws std::system_error if a new event loop could not be woken. Asio does not check that the
+// system lets a loop wait for timers and calls; such a loop would sleep for ever.
 inline void require_watches() {
   const FileDescriptor epoll(::epoll_create1(EPOLL_CLOEXEC));
   const FileDescriptor events[] = {FileDescriptor(::eventfd(0, EFD_CLOEXEC)),
@@ -86,7 +83,7 @@ inline void require_watches() {
   }
 }
 
-// The result of `action`. A std::system_error becomes an Error about `thing`.
+// Returns the result of `action`. A std::system_error becomes an Error about `thing`.
 template <class Action>
 auto with_system_errors(const std::string& thing, Action action) {
   try {

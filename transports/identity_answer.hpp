@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The answer of a board to `Q:ID`, which it gives to every host.
+// A board's answer to `Q:ID`, which it gives to every host.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 namespace r4 {
 
 struct IdentityAnswer : BoardIdentity {
-  // True if another host than the one that asked controls it; none: the board does not report it.
+  // True if a host other than the asking host controls the board; none: not reported.
   std::optional<bool> busy;
 };
 

@@ -120,7 +120,7 @@ class MemoryCarrier final : public Carrier {
   OperationSlot delivery_;
   OperationSlot reporting_;
   CarrierCounters counters_;
-  std::uint64_t dropped_ = 0;  // from the inbox
+  std::uint64_t dropped_ = 0;
   SendQueue inbox_;
   std::array<char, max_datagram> datagram_;
 };

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Two carriers joined inside one process: the other end receives a datagram on the next turn of the
-// event loop, in order, stop first. Each end is up while both are open. Bounded: when the receiver
-// lags by 128 datagrams, or 32 states, the rules of Priority apply. Both ends live on the same
-// io_context.
+// Two carriers joined inside one process, on one io_context. A datagram arrives on the next turn of
+// the event loop, in order, stops first. Each end is up while both are open. If 128 datagrams or 32
+// states wait for the receiver, the rules of Priority apply.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -14,7 +13,6 @@
 
 namespace r4 {
 
-// `name` is the name() of both ends.
 std::pair<std::unique_ptr<Carrier>, std::unique_ptr<Carrier>> make_memory_pair(
     asio::io_context& io, std::string name = "memory:");
 

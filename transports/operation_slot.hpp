@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Memory and cancellation for one asynchronous operation that is started repeatedly.
-//
-// A carrier has a slot for each thing it waits for (readable, writable, a time). The operation
-// lives in the slot's memory, so that waiting costs no heap. After cancel(), or when the slot is
-// gone, the handler is never called, whatever the event loop still holds. For one thread, like a
-// carrier.
+// Memory and cancellation for one asynchronous operation that is started repeatedly. A carrier has
+// one slot for each kind of wait: readable, writable, timer. The operation lives in the slot's
+// memory, so waiting uses no heap. After cancel() or the slot's destruction, the handler is never
+// called. For one thread, like a carrier.
 #pragma once
 
 #include <asio/basic_waitable_timer.hpp>
@@ -20,8 +18,7 @@
 
 namespace r4 {
 
-// Asio's objects with the event loop's own executor: the default, any_io_executor, costs 0.1 us an
-// operation.
+// Asio's objects with the loop's own executor: any_io_executor costs 0.1 us more per operation.
 using LoopExecutor = asio::io_context::executor_type;
 using LoopDescriptor = asio::posix::basic_stream_descriptor<LoopExecutor>;
 using LoopTimer =
@@ -86,7 +83,6 @@ class OperationSlot {
     void operator()(const asio::error_code& error) {
       if (!error) (*this)();
     }
-    // A transfer reports how it ended.
     void operator()(const asio::error_code& error, std::size_t size) {
       if (memory_->started == number_) function_(error, size);
     }
@@ -103,7 +99,7 @@ class OperationSlot {
   OperationSlot& operator=(const OperationSlot&) = delete;
   ~OperationSlot() { cancel(); }
 
-  // A completion handler for Asio that calls `function()`, or `function(error, size)` for a
+  // A completion handler for Asio that calls `function()`, or `function(error, size)` after a
   // transfer. Cancels the previous operation.
   template <class Function>
   Operation<Function> handler(Function function) {

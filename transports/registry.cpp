@@ -34,9 +34,8 @@ bool is_ours(gid_t group) {
   return std::find(groups.begin(), groups.end(), group) != groups.end();
 }
 
-// Takes ?share=GROUP out of the URL: the group (group(5)) whose members share the transport with
-// the programs of the same user. Without it the group is empty. Throws Error{usage} for an unknown
-// group, and Error{permission} if the user of this program is not a member.
+// Removes ?share=GROUP from the URL, and returns that group (group(5)) or an empty group. Throws
+// Error{usage} for an unknown group, Error{permission} if this program's user is not a member.
 ShareGroup take_share_group(Url& url) {
   const std::optional<std::string> name = url.take("share");
   if (!name) return {};

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Makes the carrier of a URL: one table of schemes serves the library, the simulated board and
-// `r4`.
+// Makes the carrier of a URL, from one table of schemes for all programs.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -18,8 +17,7 @@
 
 namespace r4 {
 
-// `claim`: how a transport opens a device that one program can have at a time. It is read at each
-// opening.
+// `claim`: how to open a device that only one program can have open. Read at each opening.
 using CarrierFactory = std::function<std::unique_ptr<Carrier>(asio::io_context& io, const Url& url,
                                                               Role role, Claim claim)>;
 
@@ -27,22 +25,20 @@ class Registry {
  public:
   struct Entry : TransportHelp {
     CarrierFactory make;
-    // The name under which programs share the transport of a URL. Null: programs do not share it.
-    // Throws Error if the transport cannot be found.
+    // The transport's name for sharing. Null: not shared. Throws Error if there is no transport.
     std::function<ShareName(const Url& url)> share_name = nullptr;
     // True if the transport of this URL belongs to its program alone. Null: never.
     std::function<bool(const Url& url)> own = nullptr;
   };
 
-  // A registry with the transports of this folder: udp, serial, pty, can.
+  // The registry of udp, serial, pty and can.
   static Registry standard();
 
   void add(Entry entry);
   const std::vector<Entry>& entries() const { return entries_; }
 
-  // The carrier for a URL, not yet opened. Throws Error{usage} for an unknown scheme, with the
-  // schemes that exist, and for a URL that its scheme does not take. A host does not share the
-  // transport: `share` is ignored.
+  // The carrier of a URL, not yet opened and not shared: a host's `share` option is ignored. Throws
+  // Error{usage} for an unknown scheme, or a URL that the scheme does not accept.
   std::unique_ptr<Carrier> make(asio::io_context& io, std::string_view url, Role role) const;
   // The carrier of a host that shares the transport with other programs of this computer.
   std::unique_ptr<Carrier> make_shared(asio::io_context& io, std::string_view url,

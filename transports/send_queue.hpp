@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams that the system does not take at the moment, in the order in which to send them.
-//
-//     stop    first; never expires; when 8 wait, the oldest makes room
+// Datagrams that the system cannot take yet, in the order of sending:
+//     stop    first; never expires; the ninth replaces the oldest
 //     normal  in order; refused when the lane is full
-//     state   last; newest wins: when the lane is full, the oldest makes room
-//
-// Each entry but a stop expires 100 ms after it came. Bounded. Most queues stay empty, and each
-// board has one, so a lane allocates its memory when its first entry comes.
+//     state   last; newest wins: when the lane is full, a new state replaces the oldest
+// Entries other than stops expire after 100 ms. A lane allocates its memory for its first entry,
+// because each board has a queue and most queues stay empty.
 #pragma once
 
 #include <chrono>
@@ -35,10 +33,10 @@ class SendQueue {
     std::string_view text() const { return {bytes, size}; }
   };
 
-  // Datagrams that are dropped are added to `dropped`.
+  // Adds the number of dropped datagrams to `dropped`.
   SendQueue(std::size_t normal, std::size_t states, std::uint64_t& dropped);
 
-  // `sent` if it waits now, else `full`. `bytes` must be at most max_datagram long.
+  // Returns `sent` if the datagram waits now, else `full`. `bytes`: at most max_datagram long.
   SendResult push(std::string_view bytes, Priority priority, Peer to, Time now);
 
   // The entry to send next, or null. Drops expired entries.
@@ -47,7 +45,6 @@ class SendQueue {
   void pop();
 
   bool empty() const;
-  // Drops everything.
   void clear();
 
  private:

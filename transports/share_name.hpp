@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The name by which the programs of this computer share a transport (share/shared_carrier.hpp), and
-// how its device is opened.
+// The name under which programs share a transport (share/shared_carrier.hpp), and how to open it.
 #pragma once
 
 #include <sys/types.h>
@@ -18,22 +17,21 @@ struct ShareGroup {
 };
 
 struct ShareName {
-  // Each transport has one text, however its URL is written.
+  // The same for every spelling of a URL.
   std::string text;
   ShareGroup group{};
-  // The text is a path, such as that of a pty: once the device is gone, another device may get it.
+  // True for a path, such as a pty's: after the device is gone, another device may get the path.
   bool is_path = false;
 };
 // Throws Error if the transport cannot be found.
 using FindShareName = std::function<ShareName()>;
 
-// How a transport opens a device that one program can have at a time: a serial port, the UDP port
-// of hosts. The carrier that shares the transport sets it before each open().
+// How to open an exclusive device: a serial port or the UDP port of hosts. Set before each open().
 struct DeviceClaim {
-  // For a program that watches. Another program may take the device, after which this program reads
-  // and sends nothing more. The port of hosts is left to programs that control.
+  // For a watching program: another program may take the device; then this program neither reads
+  // nor sends. The port of hosts is left to controlling programs.
   bool yields = false;
-  // Takes the device also from a program that yields: at the next opening only.
+  // The next opening takes the device from a program that yields.
   bool takes = false;
   // Another program has taken the device, and the transport has closed it.
   std::function<void()> on_taken = nullptr;

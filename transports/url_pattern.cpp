@@ -41,7 +41,7 @@ std::size_t range_size(std::string_view text) {
   return end == dash + 1 ? 0 : end;
 }
 
-// Puts braces around the range at that place, if the value there is a range.
+// Puts braces around the value at `at` if that is a range.
 void brace(std::string& text, std::size_t at) {
   const std::size_t size = range_size(std::string_view(text).substr(at));
   const std::size_t end = at + size;
@@ -50,7 +50,6 @@ void brace(std::string& text, std::size_t at) {
   text.insert(at, "{");
 }
 
-// Adds the braces that may be left out.
 std::string with_braces(std::string_view pattern) {
   std::string text(pattern);
   for (const char* key : {"?node=", "&node="}) {

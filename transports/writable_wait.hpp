@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Waits until a descriptor takes bytes again.
-//
-// It waits on a duplicate that is open only during the wait. Once asked, Asio's reactor reports
-// "writable" for a descriptor for ever, which would cost a wake-up with each datagram that is
-// received. A process without a free descriptor polls instead.
+// Waits until a descriptor is writable, on a duplicate that is open only during the wait. For a
+// descriptor once asked about, Asio's reactor reports "writable" for ever, which costs a wake-up
+// with each received datagram. A process without a free descriptor polls instead.
 #pragma once
 
 #include <fcntl.h>
@@ -21,8 +19,7 @@ class WritableWait {
  public:
   explicit WritableWait(asio::io_context& io) : duplicate_(io), timer_(io) {}
 
-  // Calls `function()` once, when `descriptor` is or may be writable. Does nothing if a call is
-  // due.
+  // Calls `function()` once, when `descriptor` may be writable. No effect while a call is due.
   template <class Function>
   void start(int descriptor, Function function) {
     if (waiting_) return;
@@ -39,7 +36,6 @@ class WritableWait {
     }
   }
 
-  // Cancels the call.
   void stop() {
     waiting_ = false;
     slot_.cancel();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The emergency stop of a CAN bus, which every board of the bus obeys. Its frames overtake all
-// frames that wait in the queue of the interface. CanBus owns one object, so that several members
-// press one stop.
+// The emergency stop of a CAN bus, which every board obeys. Its frames overtake all waiting frames.
+// CanBus owns one object, so that several members send one stop.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -20,20 +19,19 @@ class BusStops {
  public:
   // The shortest time between two frames with the same number.
   static constexpr std::chrono::milliseconds spacing{10};
-  // Announcements within this time share a number. It is shorter than the time for which a host
-  // repeats a confirmed stop, so a host that clears the stop meanwhile finds it pressed again.
+  // Announcements within this time share a number. A host repeats a confirmed stop for longer, so a
+  // stop that a host clears meanwhile takes effect again.
   static constexpr std::chrono::milliseconds together{100};
 
   BusStops(asio::io_context& io, CanMedium& medium);
 
-  // Sends the frame without a number, which boards of every version of the id plan obey. A board
-  // takes each such frame for a new stop.
+  // Sends the frame without a number. Boards of all versions obey it, each time as a new stop.
   SendResult send_bare();
-  // Sends the bare frame of a stop that is to be confirmed, and sets `number` for repeat(). Members
-  // that announce a stop in one turn of the loop, within `together`, get one number, and one bare
-  // frame is sent. A member whose own earlier stop (`own`) has that number gets a new number.
+  // Sends the bare frame of a stop that needs confirmation, and sets `number` for repeat(). Stops
+  // announced in one turn of the loop, within `together`, share one frame and number. If `own` has
+  // an earlier stop with this number, a new number is used.
   SendResult announce(const StopNumbers& own, std::uint32_t& number);
-  // Sends the frame with that number, if it was not sent within `spacing`.
+  // Sends the frame with that number, unless it was sent within `spacing`.
   SendResult repeat(std::uint32_t number);
 
  private:
@@ -42,11 +40,11 @@ class BusStops {
 
   asio::io_context& io_;
   CanMedium& medium_;
-  std::uint32_t announced_;  // the newest number
+  std::uint32_t announced_;
   Clock::time_point announced_at_;
   bool announcing_ = false;  // in this turn of the loop
   OperationSlot announcement_;
-  std::optional<std::uint32_t> repeated_;  // the number that was sent last
+  std::optional<std::uint32_t> repeated_;
   Clock::time_point repeated_at_;
 };
 

@@ -36,7 +36,6 @@ Problem filter_problem(Problem problem) {
   return problem;
 }
 
-// The buses of one event loop.
 class Buses : public asio::execution_context::service {
  public:
   using key_type = Buses;
@@ -82,7 +81,7 @@ CanBus::CanBus(asio::io_context& io, std::unique_ptr<CanMedium> medium)
 
 CanBus::~CanBus() {
   writable_.stop();
-  if (readable_.is_open()) readable_.release();  // the socket owns it
+  if (readable_.is_open()) readable_.release();  // the medium owns the descriptor
 }
 
 void CanBus::join(Member& member, std::vector<std::uint32_t> ids) {
@@ -108,14 +107,14 @@ bool CanBus::has(const Member* member) const {
                      [member](const Place& place) { return place.member == member; });
 }
 
-// Not while a loop over them runs.
+// No effect while a loop over the members runs.
 void CanBus::clear_places() {
   if (calling_ != 0 || sending_) return;
   if (std::erase_if(members_, [](const Place& place) { return place.member == nullptr; }) != 0)
     hear();
 }
 
-// A bus that hears less than its members asked for is down. The loop reports that later, because a
+// If the kernel refuses the filters, the bus goes down. The loop reports that later, because a
 // member may just be joining or leaving.
 void CanBus::hear() {
   if (medium_->number() < 0 || set_filters()) return;
@@ -124,7 +123,7 @@ void CanBus::hear() {
   }));
 }
 
-// False, with errno, if the kernel does not take them.
+// False, with errno, if the kernel refuses the filters.
 bool CanBus::set_filters() {
   std::vector<std::uint32_t> ids;
   for (const Place& place : members_) {
@@ -136,8 +135,6 @@ bool CanBus::set_filters() {
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   return medium_->hear(ids);
 }
-
-// --- receiving
 
 // Throws Error if the system does not let the loop wait for the socket.
 void CanBus::watch_socket() {
@@ -229,7 +226,7 @@ void CanBus::on_error_frame(const CanMedium::Received& received) {
   }
 }
 
-// Error frames report changes of the state only, so a new socket asks for it.
+// Error frames report only changes, so a new socket must ask for the state.
 void CanBus::look_at_controller() {
   const std::string state = medium_->state();
   if (state == "bus-off") return go_bus_off();
@@ -246,7 +243,6 @@ void CanBus::go_bus_off() {
           false);
 }
 
-// Reports a trouble once until it changes.
 void CanBus::warn_of(Trouble trouble) {
   if (!up() || trouble_ == trouble) return;
   trouble_ = trouble;
@@ -260,8 +256,6 @@ void CanBus::warn_of(Trouble trouble) {
   standing_ = {CarrierEvent::Kind::warning, std::move(problem)};
   tell(*standing_);
 }
-
-// --- the interface
 
 void CanBus::go_down(Problem problem, bool reopen) {
   const std::shared_ptr<CanBus> alive = shared_from_this();
@@ -278,7 +272,7 @@ void CanBus::go_down(Problem problem, bool reopen) {
   be_down(std::move(problem));
 }
 
-// The reason may change while the bus is down: it was bus-off, and now its adapter is gone.
+// The reason may change while the bus is down, for example from bus-off to a missing adapter.
 void CanBus::be_down(Problem problem) {
   const bool was_up = std::exchange(trouble_, Trouble::down) != Trouble::down;
   if (!was_up && standing_ && standing_->problem.reason == problem.reason) return;
@@ -302,7 +296,7 @@ void CanBus::look_later() {
   look_timer_.async_wait(looking_.handler([this] { look(); }));
 }
 
-// Opens a new socket: the interface may be another one of the same name.
+// Opens a new socket, because a new interface may have the same name.
 void CanBus::look() {
   const std::shared_ptr<CanBus> alive = shared_from_this();
   try {

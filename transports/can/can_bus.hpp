@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One CAN medium, for example an interface, shared by everything in an event loop that uses it: one
-// socket with kernel filters for the ids in use, frames read and written in batches, and its state
-// as events.
+// One CAN medium, which its users in an event loop share: one socket with kernel filters for the
+// ids in use, frames in batches, and the state of the bus as events.
 //
-// Each member hears every frame that any member asked for, except the frames that members send.
-// Frames leave in the order in which members offer them; a member's transfer is not interrupted by
-// the transfer of another member. At most `ahead` frames are taken from members at a time, and the
-// next ones when the interface has taken these. After 100 ms without progress they are dropped.
-//
-// On a bus without a wire (vcan, vxcan) it polls for a short time instead of sleeping.
+// Each member hears every frame that any member asked for, except frames that members send. Frames
+// leave in the order of the offers, and no transfer interrupts another member's transfer. The bus
+// takes at most `ahead` frames, and more when the interface has taken all of these. After 100 ms
+// without progress it drops them. Without a wire (vcan, vxcan) it polls briefly before it sleeps.
 #pragma once
 
 #include <algorithm>
@@ -31,8 +28,7 @@
 
 namespace r4 {
 
-// It has more than 15 members and 40 functions: one socket with its timers and waits, the frames
-// that wait for it, and the members change together with every frame.
+// More than 15 members: socket, timers, waiting frames and members all change with every frame.
 class CanBus : public std::enable_shared_from_this<CanBus> {
  public:
   using Clock = CanMedium::Clock;
@@ -43,19 +39,19 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
    public:
     virtual void on_frame(const CanFrame& frame, std::uint32_t at_us) = 0;
     virtual void on_drained() {}  // all frames that had arrived were handed over
-    // True in the middle of a transfer whose next frame comes from the other end, perhaps at once.
+    // True during a transfer whose next frame comes from the other end.
     virtual bool awaits_frame() const { return false; }
     // True if there is a frame to send now. The bus accepts it with frame_sent().
     virtual bool offer(std::uint32_t, CanFrame&) { return false; }
-    // The same for a frame that may overtake the frames that were accepted before.
+    // The same for a frame that may overtake accepted frames.
     virtual bool offer_urgent(std::uint32_t, CanFrame&) { return false; }
     virtual void frame_sent(std::uint32_t) {}
-    // A frame of this member had to wait, and the interface has taken it now.
+    // The interface has taken a frame of this member that had to wait.
     virtual void on_late_frame(const CanFrame&, std::uint32_t) {}
     virtual void on_sent() {}  // all members were asked for frames: time to set a timer
     // The bus came up or went down (transfers are over), or the controller is in trouble.
     virtual void on_bus(const CarrierEvent& event) = 0;
-    // The bus took nothing for too long: the frames that waited are lost.
+    // The bus took no frame for `patience`: the waiting frames are lost.
     virtual void on_stuck() {}
 
    protected:
@@ -72,7 +68,7 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   // The bus of that interface in this event loop; opens it if it is not open. Throws Error.
   static std::shared_ptr<CanBus> of(asio::io_context& io, const std::string& interface, bool fd);
 
-  // A bus of its own on that medium, which it opens. Throws Error.
+  // A separate bus on `medium`, which is opened. Throws Error.
   static std::shared_ptr<CanBus> on(asio::io_context& io, std::unique_ptr<CanMedium> medium);
 
   CanBus(asio::io_context& io, std::unique_ptr<CanMedium> medium);
@@ -80,34 +76,32 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   CanBus(const CanBus&) = delete;
   CanBus& operator=(const CanBus&) = delete;
 
-  // A member hears the frames of `ids` (11 bits) until it leaves, or with join_all() every frame
-  // that is on the bus, extended and remote ones too.
+  // Until it leaves, a member hears the 11-bit `ids`, or with join_all() all frames of every kind.
   void join(Member& member, std::vector<std::uint32_t> ids);
   void join_all(Member& member);
   void leave(Member& member) noexcept;
   bool has(const Member* member) const;
 
-  // Members have something to offer.
+  // To be called when a member has a frame to offer.
   void send();
-  // Hands over the frames that have arrived. To be called before a time-out has an effect: a loop
-  // that was held up may find the time-out and the frame together. True if there were any.
+  // Hands over the frames that have arrived; true if there were any. Call it before acting on a
+  // time-out: a delayed loop may find the time-out and the frame together.
   bool take();
   BusStops& stops() { return stops_; }
 
   bool up() const { return trouble_ != Trouble::down; }
-  // The newest event while it is still true: for a member that has joined since.
+  // The newest event while it is still true, for a new member.
   const std::optional<CarrierEvent>& standing() const { return standing_; }
   // True if frames wait for the interface. Members are asked again when it has taken all of them.
   bool full() const { return out_count_ != 0; }
-  // True if one of these frames fulfils it.
+  // True if a waiting frame fulfils `predicate`.
   template <class Predicate>
   bool holds(Predicate predicate) const {
     const auto end = out_.begin() + static_cast<std::ptrdiff_t>(out_count_);
     return std::any_of(out_.begin(), end, predicate);
   }
   bool heard_rate_switch() const { return medium_->heard_rate_switch(); }
-  // Frames that the kernel dropped because this program did not take them in time, plus the number
-  // of overflows that the controller reported.
+  // Frames that the kernel dropped because this program was late, plus the controller's overflows.
   std::uint32_t overflows() const { return medium_->overflows() + controller_overflows_; }
 
  private:
@@ -162,20 +156,20 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   bool sending_ = false;
   bool receiving_ = false;
   AdaptivePolling polling_;
-  Clock::time_point woken_;  // when the loop last woke it
+  Clock::time_point woken_;
   std::array<CanFrame, ahead> out_;
   std::array<Member*, ahead> out_of_{};  // the member that offered the frame; null: has left
-  bool late_ = false;                    // the interface has refused them once
+  bool late_ = false;                    // the interface has refused these frames once
   std::size_t out_count_ = 0;
   Clock::time_point progress_;
 
   Trouble trouble_ = Trouble::none;
-  std::optional<CarrierEvent> standing_;  // what was reported of the trouble
+  std::optional<CarrierEvent> standing_;
   std::uint32_t controller_overflows_ = 0;
   std::array<CanMedium::Received, CanMedium::batch> in_;
 };
 
-// Members may leave and join in any call. A member that joins is not called with this event.
+// Members may join and leave during a call. A new member does not get this event.
 template <class Action>
 void CanBus::for_each_member(Action action) {
   ++calling_;

@@ -14,7 +14,7 @@ constexpr std::chrono::milliseconds retry_interval{1};
 
 }  // namespace
 
-// On a slow bus, flow control that waits for a whole datagram of telemetry would come too late. A
+// Flow control must not wait for a whole datagram of telemetry: on a slow bus it would be late. A
 // frame that finds no room is offered again by offer().
 void CanBus::send_urgent(std::uint32_t now_us) {
   CanFrame frame;
@@ -26,9 +26,8 @@ void CanBus::send_urgent(std::uint32_t now_us) {
   }
 }
 
-// Takes frames from members, one member's transfer after the other. True if there are any. Not
-// called while frames are left: the longer a member keeps its datagrams, the newer is the one that
-// it sends.
+// Takes frames from members, one member's transfer after another. True if there are any. Called
+// only when no frame is left: the longer a member keeps its datagrams, the newer they are.
 bool CanBus::refill(std::uint32_t now_us) {
   std::size_t quiet = 0;
   while (out_count_ < ahead && quiet < members_.size()) {
@@ -90,8 +89,7 @@ void CanBus::send() {
   for_each_member([](Member& member) { member.on_sent(); });
 }
 
-// The system reports a writable socket, but not room in the queue of the interface: hence the
-// timer.
+// The timer is needed because the system does not report room in the interface's queue.
 void CanBus::send_later(CanMedium::Outcome outcome) {
   if (Clock::now() - progress_ > patience) {
     drop_queue();

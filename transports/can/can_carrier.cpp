@@ -28,10 +28,10 @@ namespace r4 {
 namespace {
 
 constexpr std::size_t normal_entries = 32;
-constexpr std::size_t state_entries = 1;  // newest wins
+constexpr std::size_t state_entries = 1;
 constexpr std::uint32_t look_again_us = 20000;
 
-// It has more than 15 members: four are its timer.
+// More than 15 members: four are its timer.
 class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member {
  public:
   CanCarrier(asio::io_context& io, CanCarrierOptions options,
@@ -97,7 +97,7 @@ class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member
   std::uint32_t armed_for_us_ = 0;
 };
 
-// A board packs by its setting, not by its URL.
+// A board's packing is a setting, not a URL option.
 std::uint8_t node_of(const Url& url, Role role) {
   url.allow_only(role == Role::host ? "node fd pack" : "node fd");
   can_interface_of(url);
@@ -187,8 +187,7 @@ SendResult CanCarrier::send(std::string_view bytes, Priority priority, Peer) {
   return result;
 }
 
-// Only the frame with its number is repeated. To a board each bare frame is a new stop, so a host
-// could not clear the stop that it has seen.
+// Repeats only the numbered frame. Each bare frame is a new stop, which would undo a clear.
 SendResult CanCarrier::send_stop(std::string_view bytes) {
   Datagram stop;
   std::uint32_t pnum = 0;
@@ -212,7 +211,7 @@ bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
   return true;
 }
 
-// All watchers send the same frame, so that it does not collide. Without a board a lease has no
+// All watchers send the same frame, so it does not collide. Without a board the lease has no
 // effect, and for a host the board streams anyway.
 SendResult CanCarrier::send_lease() {
   const Clock::time_point now = Clock::now();
@@ -222,9 +221,8 @@ SendResult CanCarrier::send_lease() {
   return SendResult::sent;
 }
 
-// Notes frames of this board, and commands of other hosts to it. The flow control of another host
-// looks the same as that of this host, so it is ignored. Frames of other boards come because the
-// hosts of a program share the bus.
+// Notes frames of this board and commands of other hosts. Ignores flow control, which looks the
+// same from all hosts, and frames of other boards, which the shared bus brings.
 void CanCarrier::listen_for_others(const CanFrame& frame) {
   const CanIdMeaning meaning = classify(frame);
   if (is_.role != Role::host || meaning.node != is_.node) return;
@@ -251,7 +249,7 @@ TransportTrouble CanCarrier::trouble() const {
   return is_.role == Role::host && up() ? trouble_.now(Clock::now()) : TransportTrouble::none;
 }
 
-// Begins the next datagram of each lane that has become idle. True if there was one.
+// Begins the next datagram of each idle lane. True if there was one.
 bool CanCarrier::begin_waiting(std::uint32_t now_us) {
   bool any = false;
   for (Lane& each : lanes_) {
@@ -296,8 +294,7 @@ void CanCarrier::arm() {
   IsotpDeadline deadline = node_.deadline();
   if (handler_ == nullptr || !deadline.armed) return;
   const std::uint32_t now_us = CanBus::now_us();
-  // A frame that is due waits for the bus, which will ask for it. A later deadline may be a
-  // time-out.
+  // A due frame waits until the bus asks for it. A later deadline may be a time-out.
   if (bus_->full() && reached(now_us, deadline.at_us)) deadline.at_us = now_us + look_again_us;
   if (armed_ && reached(deadline.at_us, armed_for_us_)) return;
   armed_ = true;

@@ -105,7 +105,7 @@ std::vector<CanInterface> list_can_interfaces() {
   }
   const Links links(all, nl_cache_free);
   for (nl_object* each = nl_cache_get_first(all); each != nullptr; each = nl_cache_get_next(each)) {
-    auto* const link = reinterpret_cast<rtnl_link*>(each);  // as libnl has it
+    auto* const link = reinterpret_cast<rtnl_link*>(each);  // as libnl does
     if (rtnl_link_get_arptype(link) == ARPHRD_CAN) result.push_back(describe(link));
   }
   std::sort(result.begin(), result.end(),

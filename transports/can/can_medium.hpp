@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a CanBus sends and receives frames on: a socket of SocketCAN, or a bus of a program's own. For
-// the thread of one event loop. No function waits, except open().
+// A CanBus's medium: a SocketCAN socket or a program's own bus. For one thread; only open() waits.
 #pragma once
 
 #include <array>
@@ -21,14 +20,14 @@ class CanMedium {
   static constexpr std::size_t batch = 64;
 
   struct Received {
-    CanFrame frame;           // of an error frame, the data hold its details
+    CanFrame frame;           // in an error frame, the data hold the details
     std::uint32_t error = 0;  // the error classes of <linux/can/error.h>; 0 in a data frame
     bool local = false;       // sent on this computer: it proves nothing about the wire
-    Clock::time_point at;     // when the kernel got it
+    Clock::time_point at;     // when the kernel received the frame
   };
 
   enum class Outcome : std::uint8_t {
-    done,    // everything was taken
+    done,
     busy,    // the socket's share of the queue is used up: wait until it is writable
     full,    // the interface's queue is full: the system does not report when it has room
     failed,  // with errno
@@ -39,36 +38,35 @@ class CanMedium {
   CanMedium(const CanMedium&) = delete;
   CanMedium& operator=(const CanMedium&) = delete;
 
-  // For people: "can://can0".
+  // As shown to users: "can://can0".
   virtual const std::string& name() const = 0;
-  // Opens it, also again; it hears nothing yet. Throws Error.
+  // Opens or reopens the medium, which hears nothing yet. Throws Error.
   virtual void open() = 0;
   virtual void close() noexcept = 0;
-  // Readable when frames have come, or it has failed; -1 while it is closed.
+  // The descriptor, readable after frames have come or the medium has failed; -1 while closed.
   virtual int number() const = 0;
-  // True without a controller and a wire: frames come as fast as programs make them.
+  // True without a controller and a wire: frames come as fast as programs send them.
   virtual bool simulated() const { return false; }
-  // True if a CAN FD frame came whose data have a bit rate of their own (BRS).
+  // True if a CAN FD frame with bit rate switching (BRS) was received.
   virtual bool heard_rate_switch() const { return false; }
-  // The state of its controller, as far as it is known: CanInterface::state.
+  // The controller's state, if known: CanInterface::state.
   virtual std::string state() const { return ""; }
-  // The meaning of that errno.
+  // `error`: errno.
   virtual Problem problem(int error) const = 0;
 
-  // Hears the frames with exactly these 11-bit ids (the id of the emergency stop includes the stops
-  // with a number), or everything, extended and remote frames too. It may hear more. False, with
-  // errno, if the kernel does not take that; then it hears what it heard before.
+  // Hears these 11-bit ids (the emergency stop's id includes numbered stops), or frames of every
+  // kind. More may be heard. False, with errno, if the kernel refuses; the old filters stay.
   [[nodiscard]] virtual bool hear(const std::vector<std::uint32_t>&) { return true; }
   [[nodiscard]] virtual bool hear_everything() { return true; }
 
-  // Takes up to `batch` frames; returns how many, or -errno (EAGAIN: none is there).
+  // Takes up to `batch` frames. Returns their number or -errno (EAGAIN: no frame).
   virtual int receive(std::array<Received, batch>& frames) = 0;
-  // Hands frames over in order. Sets `sent` to the number of frames that were taken.
+  // Hands over frames in order. Sets `sent` to the number of accepted frames.
   virtual Outcome send(const CanFrame* frames, std::size_t count, std::size_t& sent) = 0;
-  // Hands one frame over ahead of everything that waits.
+  // Hands over one frame ahead of all waiting frames.
   virtual Outcome send_first(const CanFrame& frame) = 0;
 
-  // Frames that were lost because nobody took them in time, over all openings.
+  // Frames lost because they were not received in time, over all openings.
   virtual std::uint32_t overflows() const = 0;
 };
 

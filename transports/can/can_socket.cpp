@@ -118,7 +118,7 @@ Problem CanSocket::problem(int error) const { return can_problem(interface_, err
 
 void CanSocket::open() {
   close();
-  // Tells a kernel without CAN from a missing interface.
+  // Distinguishes a kernel without CAN from a missing interface.
   FileDescriptor probe(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW));
   if (!probe) fail(interface_, errno);
   const CanInterface state = can_interface(interface_);
@@ -193,8 +193,7 @@ int CanSocket::receive(std::array<Received, batch>& frames) {
   const int count = ::recvmmsg(descriptor_.get(), messages.data(), batch, MSG_DONTWAIT, nullptr);
   if (count < 0) return -errno;
 
-  // The steady clock is read first. If this thread is held up between the two readings, frames
-  // appear older than they are, never younger.
+  // Read the steady clock first: a delay between the readings makes frames older, never younger.
   const Clock::time_point now = Clock::now();
   timespec real{};
   ::clock_gettime(CLOCK_REALTIME, &real);
@@ -217,7 +216,7 @@ int CanSocket::receive(std::array<Received, batch>& frames) {
         std::memcpy(&overflows_, CMSG_DATA(item), sizeof overflows_);
       }
     }
-    messages[i].msg_hdr.msg_controllen = control_size;  // the kernel wrote what it used
+    messages[i].msg_hdr.msg_controllen = control_size;  // the kernel has overwritten it
     received.error = (raw[i].can_id & CAN_ERR_FLAG) != 0 ? raw[i].can_id & CAN_ERR_MASK : 0;
     received.local = (messages[i].msg_hdr.msg_flags & MSG_DONTROUTE) != 0;
     received.frame = from_kernel(raw[i], messages[i].msg_len == CANFD_MTU);
@@ -245,7 +244,7 @@ CanSocket::Outcome CanSocket::send(const CanFrame* frames, std::size_t count, st
         ::sendmmsg(descriptor_.get(), messages.data(), static_cast<unsigned>(now), MSG_DONTWAIT);
     if (taken < 0) return outcome_of(errno);
     sent += static_cast<std::size_t>(taken);
-    // If it took only a part, the next call reports why.
+    // After a partial send, the next call reports the reason.
   }
   return Outcome::done;
 }

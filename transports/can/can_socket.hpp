@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A raw SocketCAN socket on one interface: frames in batches with the time at which they came, the
-// controller's error frames apart, and sends that never wait. The kernel filters what it hears.
+// A raw SocketCAN socket on one interface: batches of frames with arrival times, error frames of
+// the controller, sends that never wait, and filters in the kernel.
 #pragma once
 
 #include <array>
@@ -17,18 +17,18 @@
 
 namespace r4 {
 
-// The meaning of an errno of a socket on that interface, with the fix if there is one.
+// The problem, and the fix if known, for an errno of a socket on that interface.
 Problem can_problem(const std::string& interface, int error);
 
 class CanSocket final : public CanMedium {
  public:
-  // On `interface`. With `fd`, CAN FD frames can be sent.
+  // `fd`: CAN FD frames can be sent.
   CanSocket(std::string interface, bool fd);
   ~CanSocket() override;
 
   const std::string& name() const override { return name_; }
-  // Throws Error: unsupported if this kernel has no CAN or there is no such interface, open if the
-  // interface is down, is not CAN or does not do CAN FD, permission.
+  // Throws Error: unsupported (no CAN in the kernel, no such interface), usage (not a CAN
+  // interface), open (interface down, or without CAN FD), permission.
   void open() override;
   void close() noexcept override;
   int number() const override { return descriptor_.get(); }
@@ -49,10 +49,10 @@ class CanSocket final : public CanMedium {
   const std::string name_;
   const bool fd_;
   FileDescriptor descriptor_;
-  FileDescriptor first_;  // with a priority and a queue of its own
+  FileDescriptor first_;  // has its own priority and queue
   bool simulated_ = false;
   bool heard_rate_switch_ = false;
-  std::uint32_t overflows_ = 0;         // of this opening
+  std::uint32_t overflows_ = 0;
   std::uint32_t overflows_before_ = 0;  // of earlier openings
   const std::unique_ptr<Inbox> inbox_;
 };

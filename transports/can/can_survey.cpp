@@ -98,13 +98,12 @@ void CanSurvey::take(std::uint8_t node, Text bytes, std::uint32_t at_us) {
     return;
   }
   board.heard_us = at_us;
-  // Answers to hosts that do not control the board have numbers of their own.
+  // Answers to hosts that do not control the board have separate packet numbers.
   bool is_answer = false;
   switch (kind_of(datagram)) {
     case MessageKind::state:
       ++board.states;
-      // A watcher lets a board without a host stream states, too. Then its heartbeats are not
-      // numbered.
+      // For a watcher, a board without a host streams states, but does not number its heartbeats.
       if (board.heartbeats == 0) board.connected = true;
       break;
     case MessageKind::board_heartbeat:

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a host hears on a CAN bus besides its own transfers: its board, other hosts, and why
-// datagrams do not pass although the bus is up. Without I/O.
-//
-//     foreign frames   frames have come on the board's command id for host_completes, and none of
-//                      them has ended a datagram. A host sends ten heartbeats a second, so another
-//                      protocol uses the id. A host that pauses or ends sends no frames meanwhile
-//     late frames      late_transfers transfers within late_within were not answered in time (N_Bs,
-//                      N_Cr), while the board is heard: frames are held back, or lost
+// Reports to a host whether its board and other hosts are heard on a CAN bus, and why datagrams do
+// not pass although the bus is up. No I/O.
+//     foreign frames   frames came on the board's command id for host_completes, but no whole
+//                      datagram. A host sends ten heartbeats a second: another protocol uses the id
+//     late frames      the board is heard, but late_transfers transfers within late_within were not
+//                      answered in time (N_Bs, N_Cr): frames are held back, or lost
 #pragma once
 
 #include <array>
@@ -23,9 +21,9 @@ class CanTrouble {
   using Time = std::chrono::steady_clock::time_point;
   using Duration = std::chrono::milliseconds;
   static constexpr Duration board_silence{3000};  // six heartbeats of a board
-  static constexpr Duration host_silence{300};    // three of a host
+  static constexpr Duration host_silence{300};    // three heartbeats of a host
   static constexpr Duration host_completes{500};  // five heartbeats of a host
-  static constexpr Duration frames_over{1000};    // the pause after which frames are new ones
+  static constexpr Duration frames_over{1000};    // frames after a longer pause are new
   static constexpr std::size_t late_transfers = 3;
   static constexpr Duration late_within{2000};
 
@@ -35,9 +33,9 @@ class CanTrouble {
     if (now - host_heard_ > frames_over || !incomplete()) frames_since_ = now;
     host_heard_ = now;
   }
-  // Such frames have made a datagram.
+  // Such frames have completed a datagram.
   void on_host_datagram(Time now) { host_completed_ = now; }
-  // `count`: all transfers that were not answered in time.
+  // `count`: the total of transfers that were not answered in time.
   void on_late(std::uint64_t count, Time now) {
     for (; late_count_ < count; ++late_count_) late_[place(late_count_)] = now;
   }
@@ -59,18 +57,18 @@ class CanTrouble {
   static std::size_t place(std::uint64_t count) {
     return static_cast<std::size_t>(count % late_transfers);
   }
-  // Frames have come since the newest datagram.
+  // True if frames have come since the newest datagram.
   bool incomplete() const { return frames_since_ > host_completed_; }
   bool hears_foreign_frames(Time now) const {
     return now - host_heard_ < frames_over && incomplete() &&
            host_heard_ - frames_since_ >= host_completes;
   }
 
-  // The newest times; at first long ago.
+  // The newest times; initially long ago.
   Time board_heard_;
   Time host_heard_;
   Time host_completed_;
-  Time frames_since_;  // the first that no datagram and no pause has followed
+  Time frames_since_;  // the first frame after the last datagram or pause
   std::uint64_t late_count_ = 0;
   std::array<Time, late_transfers> late_;  // the newest, in a ring
 };

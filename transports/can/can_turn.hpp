@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decides which of several hosts sends on a board's command id of a CAN bus (docs/can.md, "Several
-// hosts"). Two hosts that send on one id mix their frames, and on real wires drive each other
-// bus-off. As all hosts answer a board's heartbeat at once, they would collide each time. So a host
-// listens before it sends, and the host that came later is silent until it has heard nothing of the
-// other host for a second. The emergency stop needs no turn: all hosts send the same frame.
+// Decides which host sends on a board's command id (docs/can.md, "Several hosts"). All hosts answer
+// a heartbeat at once: on one id their frames would mix and, on real wires, drive hosts bus-off. So
+// a host listens before it sends, and the later host is silent until it has not heard the other
+// host for a second. The emergency stop needs no turn: all hosts send the same frame.
 #pragma once
 
 #include <chrono>
@@ -21,13 +20,12 @@ class CanTurn {
   static constexpr Duration listening{120};
   // Two hosts that begin within this time have not heard each other, and both fall silent.
   static constexpr Duration settling{50};
-  // As long as a board waits for its host, plus a random time: one of two hosts is back first.
+  // As long as a board waits for its host, plus a random time, so one of two hosts is back first.
   static constexpr Duration silence{1000};
   static constexpr Duration most_chance{250};
 
   explicit CanTurn(std::uint32_t seed) : chance_(seed) {}
 
-  // The bus has come up.
   void listen(Time now) {
     state_ = State::listening;
     until_ = now + listening;
@@ -40,7 +38,6 @@ class CanTurn {
     }
     return state_ == State::ours;
   }
-  // True if another host has the turn.
   bool others() const { return state_ == State::others; }
   // A datagram of this host has begun.
   void on_own(Time now) {
@@ -58,8 +55,7 @@ class CanTurn {
  private:
   enum class State : std::uint8_t { listening, ours, others };
 
-  // False if this host was silent for long, for example because it was held up: another host may
-  // have taken its turn.
+  // False after a long silence of this host, in which another host may have taken the turn.
   bool speaking(Time now) const { return speaking_ && now - last_ < silence; }
 
   std::minstd_rand chance_;

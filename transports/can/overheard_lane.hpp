@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The datagrams of one CAN id, joined from its frames by a receiver that never answers.
+// Joins the frames of one CAN id to datagrams, and never answers.
 #pragma once
 
 #include <array>
@@ -17,8 +17,7 @@ class OverheardLane {
   OverheardLane(CanIdKind kind, std::uint8_t node)
       : receiver_(listening_to(kind, node), bytes_.data(), max_datagram) {}
 
-  // The datagram that the frame completes, if any, in plain form and valid up to the next call; empty
-  // if it cannot be unpacked.
+  // The completed datagram in plain form, valid until the next call; empty: it cannot be unpacked.
   std::optional<Text> on_frame(const CanFrame& frame, std::uint32_t at_us) {
     if (!receiver_.on_frame(frame, at_us).datagram) return std::nullopt;
     if (!is_packed(receiver_.data()[0])) return receiver_.text();

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The numbers by which a bus carries the stops of one host. A stop is confirmed by its packet
-// number, which has 32 bits. The frame on the bus carries a number of 18 bits, which a board
-// reports in the field STOP of its heartbeats. in_full() puts the packet number back into such a
-// heartbeat.
-//
-// The newest 16 stops are known, as many as a session repeats at a time.
+// The numbers of one host's stops on a bus. A stop is confirmed by its packet number of 32 bits. On
+// the bus it has a number of 18 bits, which a board reports in the heartbeat field STOP. Keeps the
+// newest 16 stops, as many as a session repeats at a time.
 #pragma once
 
 #include <cstddef>
@@ -21,14 +18,13 @@ class StopNumbers {
 
   // The bus carries the stop `pnum` under the number `carried`.
   void add(std::uint32_t pnum, std::uint32_t carried);
-  // Sets `carried` to the number under which the bus carries that stop. False if the stop is not
-  // known.
+  // Sets `carried` to the stop's number on the bus. False if the stop is not known.
   bool find(std::uint32_t pnum, std::uint32_t& carried) const;
   // True if the bus carries a stop of this host under that number.
   bool carries(std::uint32_t carried) const { return stop_of(carried) != nullptr; }
 
-  // A heartbeat that reports one of these stops, with its packet number, written to `room` of
-  // max_datagram bytes. Any other datagram is returned as it is.
+  // A heartbeat that reports one of these stops, with its packet number, written to `room`
+  // (max_datagram bytes). Any other datagram is returned unchanged.
   Text in_full(Text datagram, char* room) const;
 
  private:

@@ -105,7 +105,7 @@ class Impaired final : public ImpairedCarrier, public BoardEnd, private Carrier:
   }
 
   const std::unique_ptr<Carrier> below_;
-  BoardEnd& end_;  // of it
+  BoardEnd& end_;
   const Impairment impairment_;
   LoopTimer timer_;
   OperationSlot waiting_;

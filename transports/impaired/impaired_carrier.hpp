@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A transport with a bad link: datagrams of both directions are lost, delayed, duplicated, damaged
-// and cut off, as Impairment says. For either end of any transport. On CAN it affects whole
-// datagrams, not frames.
+// A transport with a bad link: Impairment applies to the datagrams of both directions, at either
+// end of any transport. On CAN it affects whole datagrams, not frames.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -14,7 +13,7 @@ namespace r4 {
 
 class ImpairedCarrier : public Carrier {
  public:
-  // Counts of each direction since the last open().
+  // Counts since the last open().
   virtual const ImpairmentCounters& received() const = 0;
   virtual const ImpairmentCounters& sent() const = 0;
 };

@@ -16,7 +16,7 @@ namespace {
       "write a link as in loss=5%,delay=20ms±10,duplicate=1%,corrupt=0.1%,cut=10s+2s,seed=7");
 }
 
-// Takes a number off the beginning of `text`.
+// Removes a number from the beginning of `text`.
 double number(std::string_view part, std::string_view& text, double most) {
   double value = 0;
   const auto [end, error] =
@@ -95,7 +95,7 @@ ImpairedDirection::ImpairedDirection(const Impairment& impairment, std::uint64_t
       opened_(opened),
       random_(impairment.seed * 0x9E3779B97F4A7C15U + stream) {}
 
-// Always draws a number, so that another impairment does not change the effects of the rest.
+// Always draws a number, so that a change of one impairment leaves the other effects unchanged.
 bool ImpairedDirection::happens(double chance) {
   return static_cast<double>(random_() >> 11) * 0x1p-53 < chance;
 }

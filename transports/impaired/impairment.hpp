@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A link that is bad on purpose, and what happens to the datagrams of one of its directions. No
-// I/O, no clock. The same seed does the same to the same datagrams at the same times.
+// A deliberately bad link, and its effect on the datagrams of one direction. No I/O, no clock. The
+// effects depend only on the seed, the datagrams and their times.
 #pragma once
 
 #include <cstddef>
@@ -20,8 +20,7 @@ struct Impairment {
   double loss = 0;
   double duplicate = 0;
   double corrupt = 0;  // a bit is flipped
-  // Each datagram takes `delay`, plus or minus up to `jitter`, evenly distributed: they overtake
-  // each other.
+  // A datagram takes `delay` ± `jitter`, evenly distributed, so datagrams overtake each other.
   Time delay{0};
   Time jitter{0};
   // Nothing passes for `cut_for`, from `cut_at` after the link was opened.
@@ -43,7 +42,6 @@ struct ImpairmentCounters {
   std::uint64_t overflow = 0;  // dropped because too many were on their way
 };
 
-// One direction.
 class ImpairedDirection {
  public:
   static constexpr std::size_t most_on_their_way = 4096;
@@ -53,13 +51,12 @@ class ImpairedDirection {
     std::uint8_t priority = 0;
   };
 
-  // `stream`: another number for each direction. `opened`: when the link was opened.
+  // `stream`: different for each direction. `opened`: when the link was opened.
   ImpairedDirection(const Impairment& impairment, std::uint64_t stream, Time opened);
 
   void put(Time now, Item item);
   // When the next datagram arrives.
   std::optional<Time> due() const;
-  // The next datagram, if it has arrived.
   std::optional<Item> take(Time now);
   const ImpairmentCounters& counters() const { return counters_; }
 

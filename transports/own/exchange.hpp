@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Between a transport of a program's own, whose calls may wait, and the loop of a link: the thread
-// that makes the calls, what waits to be sent, and what has come.
+// Connects a program's own transport, whose calls may wait, to the loop of a link: a thread makes
+// the calls, and items wait in both directions.
 //
 //                     open() returns           a call throws
 //     opening ──────────────────────────▶ up ───────────────▶ down
@@ -28,11 +28,8 @@
 
 namespace r4 {
 
-// `Own` has open(received), send(item) and close(), which may throw. `Outbox` has
-//
-//     Item                              what is sent and received, one at a time
-//     std::optional<Item> next(Time)    takes what to send next
-//     void clear()
+// `Own`: open(received), send(item) and close(), which may throw. `Outbox`: the type Item, clear()
+// and std::optional<Item> next(Time), which takes the next item to send.
 template <class Own, class Outbox>
 class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
  public:
@@ -42,7 +39,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
   static constexpr std::chrono::milliseconds pause{200};  // between two attempts to open it
   static constexpr std::chrono::seconds end_patience{1};
 
-  // `news()`: something has come, or it went up or down. On any thread, under the lock.
+  // `news()`: an item has come, or the transport went up or down. On any thread, under the lock.
   Exchange(std::string name, std::unique_ptr<Own> own, std::unique_ptr<Outbox> outbox,
            std::function<void()> news)
       : name_(std::move(name)),
@@ -52,14 +49,14 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
 
   // --- on the loop
 
-  // Opens it, for which it waits. Throws Error.
+  // Opens the transport, and waits for that. Throws Error.
   void start() {
     std::unique_lock lock(mutex_);
     thread_ = std::thread([self = this->shared_from_this()] { self->run(); });
     changed_.wait(lock, [this] { return state_ != State::opening; });
     if (state_ == State::ended) throw Error(problem_);
   }
-  // Sends what waits and closes it. A call that does not return is left to its thread.
+  // Sends the waiting items and closes the transport. A call that hangs is left to its thread.
   void end() noexcept {
     if (!thread_.joinable()) return;
     std::unique_lock lock(mutex_);
@@ -71,7 +68,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
     lock.unlock();
     ended ? thread_.join() : thread_.detach();
   }
-  // Calls `put(outbox)` if it is up. True if it was.
+  // Calls `put(outbox)` if the transport is up, and returns whether it is.
   template <class Put>
   bool send(Put put) {
     const std::lock_guard lock(mutex_);
@@ -80,7 +77,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
     changed_.notify_all();
     return true;
   }
-  // What has come since the last call, oldest first.
+  // The items received since the last call, oldest first.
   std::vector<Item> take() {
     const std::lock_guard lock(mutex_);
     return std::exchange(inbox_, {});
@@ -89,7 +86,6 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
     const std::lock_guard lock(mutex_);
     return state_ == State::up;
   }
-  // Why it is down.
   Problem problem() const {
     const std::lock_guard lock(mutex_);
     return problem_;
@@ -98,7 +94,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
     const std::lock_guard lock(mutex_);
     return sent_;
   }
-  // Of what has come, found no room.
+  // The number of received items that found no room.
   std::uint64_t overflows() const {
     const std::lock_guard lock(mutex_);
     return overflows_;
@@ -153,7 +149,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
       if (const auto self = weak.lock()) self->received(std::move(item));
     });
   }
-  // Without the lock. False if it throws.
+  // Calls `function` without the lock. False if it throws.
   template <class Function>
   bool call(std::unique_lock<std::mutex>& lock, Function function) {
     lock.unlock();
@@ -178,7 +174,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
   const std::string name_;
   const std::unique_ptr<Own> own_;
   const std::unique_ptr<Outbox> outbox_;
-  mutable std::mutex mutex_;  // what follows, and the outbox
+  mutable std::mutex mutex_;  // protects the outbox and the members below
   std::function<void()> news_;
   std::condition_variable changed_;
   State state_ = State::opening;

@@ -84,8 +84,7 @@ struct FrameCalls {
   std::shared_ptr<OwnCanBus> bus;
 };
 
-// Its exchange opens the bus again by itself. After the first time, open() only finds out whether it
-// has.
+// The exchange reopens the bus by itself: a later open() only checks whether the bus is open.
 class OwnCanMedium final : public CanMedium {
  public:
   explicit OwnCanMedium(std::shared_ptr<OwnCanBus> bus)

@@ -15,7 +15,7 @@ namespace r4 {
 namespace {
 
 constexpr std::size_t normal_entries = 32;
-constexpr std::size_t state_entries = 1;  // newest wins
+constexpr std::size_t state_entries = 1;
 
 struct DatagramOutbox {
   using Item = std::string;
@@ -141,9 +141,9 @@ class OwnCarrier final : public Carrier {
   std::shared_ptr<int> opening_;  // null: closed
   std::shared_ptr<Exchange<DatagramCalls, DatagramOutbox>> exchange_;
   bool reported_up_ = false;
-  std::uint64_t dropped_ = 0;         // by the outbox of this opening
-  CarrierCounters before_;            // all but what the exchange counts
-  mutable CarrierCounters counters_;  // the sum
+  std::uint64_t dropped_ = 0;  // by the outbox of this opening
+  CarrierCounters before_;     // without the counts of exchange_
+  mutable CarrierCounters counters_;
 };
 
 }  // namespace

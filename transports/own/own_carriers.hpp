@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The carriers on transports of a program's own (r4link/transports/own_transport.hpp).
+// The carriers on a program's own transports (r4link/transports/own_transport.hpp).
 #pragma once
 
 #include <asio/io_context.hpp>

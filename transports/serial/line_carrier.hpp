@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams as lines on an open byte stream (a tty): the common part of both ends of a serial line.
-// serial_carrier.cpp and pty_carrier.cpp are the ends.
-//
-// Each line is one write. A line that the system takes in part is continued and never interleaved.
-// Lines that must wait keep the order of SendQueue: stop after the line in progress, then normal,
-// then the newest state. Reads at most 4096 bytes a turn. It is up while the stream is open.
+// Datagrams as lines on a tty: the common part of serial_carrier.cpp and pty_carrier.cpp. Each line
+// is one write; a line taken in part is completed first. Waiting lines keep the order of SendQueue.
+// Reads at most 4096 bytes a turn. It is up while the stream is open.
 #pragma once
 
 #include <array>
@@ -24,8 +21,7 @@
 
 namespace r4 {
 
-// It has more than 15 members: the stream with its waits, the line in progress, and the timer that
-// looks for the device.
+// More than 15 members: the stream with its waits, the line in progress, and the search timer.
 class LineCarrier : public Carrier {
  public:
   void close() noexcept override;
@@ -35,18 +31,16 @@ class LineCarrier : public Carrier {
   const CarrierCounters& counters() const override { return counters_; }
 
  protected:
-  // Without a stream, look() is called each `look_interval` after look_later().
+  // look_later() calls look() after `look_interval`.
   LineCarrier(asio::io_context& io, std::string name, std::chrono::milliseconds look_interval);
 
   // --- implemented by the ends
 
   // Looks for the device, and starts the stream if the device is there.
   virtual void look() = 0;
-  // The stream has ended and is closed: errno, or 0 for an end of file. Returns the problem to
-  // report.
+  // The stream has ended: errno, or 0 for an end of file. Returns the problem to report.
   virtual Problem on_lost(int error) = 0;
-  // For a stream that asks: true if this program may read the bytes that have come. If not, the end
-  // closes the carrier.
+  // For a stream that `asks`: true if this program may read. Otherwise the end closes the carrier.
   virtual bool may_read() { return true; }
   // A state is about to be sent. Called within send().
   virtual void before_state() {}
@@ -55,10 +49,9 @@ class LineCarrier : public Carrier {
 
   // --- for the ends
 
-  // Begins to receive. The descriptor must not block. `asks`: may_read() is called before each
-  // reading. Throws Error about `thing` if the system does not let the loop wait for the stream.
+  // Begins to receive from the descriptor, which must not block. `asks`: may_read() is called
+  // before each read. Throws Error about `thing` if the loop cannot wait for the stream.
   void start(FileDescriptor descriptor, const std::string& thing, bool asks = false);
-  // Notifies the handler that the stream is open.
   void report_up();
   void look_later();
   // Written bytes were discarded on their way, so the next line begins with a terminator.

@@ -17,10 +17,10 @@ struct SerialPort {
   bool is_r4 = false;  // an Arduino Giga R1 with a sketch running, by vid and pid
 };
 
-// In the order of their names. Throws nothing but for memory.
+// Sorted by path. Throws only if memory is used up.
 std::vector<SerialPort> list_serial_ports();
 
-// The URL that opens the port again under any path: by serial number if it has one.
+// The URL of the port: by serial number, which stays valid under any path, else by path.
 std::string url_of(const SerialPort& port);
 
 }  // namespace r4

@@ -34,8 +34,7 @@ bool PortLock::lock(int device, const DeviceClaim& claim) {
   while (true) {
     const struct flock other = other_from(device, place);
     if (other.l_type == F_UNLCK) break;
-    // A program that yields takes the port from one program at most. Two such programs would take
-    // it from each other for ever.
+    // A yielding program takes the port from one program only, or two of them would alternate.
     if (!claim.takes || other.l_len == 0 || (claim.yields && place != 0)) {
       errno = EWOULDBLOCK;
       return false;

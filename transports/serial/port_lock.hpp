@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The lock of a serial port: file locks on the bytes of its device, so that a program can take the
-// port from a program that hangs. They end with the last descriptor of the opening.
-//
+// The lock of a serial port: file locks on bytes of its device, so that a program can take the port
+// from a hanging program. The locks end with the last descriptor of the opening.
 //     bytes   0    1    2    3 …
 //     A       A                   yields: it has one byte
 //     B            B              has taken the port from A; yields, but not to one that yields
 //     C                 C C C …   has taken the port from B; does not yield, so it has the rest
-//
 // A program has lost the port if a byte after its own is locked: A and B here.
 #pragma once
 

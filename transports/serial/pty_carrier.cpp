@@ -26,7 +26,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// The system reports that a host closes its end, and not that one opens it.
+// The system reports when a host closes its end, but not when a host opens it.
 constexpr std::chrono::milliseconds look_for_host{20};
 constexpr std::chrono::milliseconds stale{30};
 // The kernel counts up to 4095 unread bytes of a pty; further bytes wait in an earlier buffer.

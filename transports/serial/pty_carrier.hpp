@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's end of a pseudo-terminal: `pty:` or `pty:PATH`.
-//
-// A host opens the other end as serial:///dev/pts/N; name() is "pty:/dev/pts/N". With a PATH, that
-// is a link to it, made in open() and removed in close(); it replaces a link, and nothing else.
-//
+// The board's end of a pseudo-terminal: `pty:` or `pty:PATH`. A host opens the other end as
+// serial:///dev/pts/N. PATH is a link to that, which open() makes and close() removes; it replaces
+// only a link. name() is "pty:PATH" or "pty:/dev/pts/N".
 // It is up while a host has the other end open. Without a host nothing is written, so the next host
-// finds nothing stale. If a stalled host has left something unread for 30 ms, that is thrown away
-// before a new state is written. So the first state that it reads when it wakes is younger than
-// 50 ms.
+// reads nothing stale. Bytes that a stalled host leaves unread for 30 ms are discarded before a new
+// state is written. So the first state that the host then reads is younger than 50 ms.
 #pragma once
 
 #include <asio/io_context.hpp>

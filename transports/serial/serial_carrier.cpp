@@ -23,7 +23,7 @@ constexpr long max_baud = 12'000'000;
 constexpr std::chrono::milliseconds look_again{100};
 constexpr int looks_before_warning = 5;
 
-// The path to open. Throws Error if it is not there, or not the only one.
+// The path to open. Throws Error if a search finds no device or several.
 std::string find_device(const Url& url) {
   const std::string number = url.get("sn").value_or("");
   if (number.empty() && url.path() != "auto") return url.path();
@@ -161,7 +161,7 @@ void SerialCarrier::look() {
     open_device(path);
   } catch (const Error& error) {
     look_later();
-    // A missing device was reported. A device that is there and cannot be opened needs help.
+    // A missing device was reported. A device that is there but cannot be opened needs help.
     const bool there = !path.empty() && ::access(path.c_str(), F_OK) == 0;
     if (!there || error.what() != obstacle_) obstructed_ = 0;
     obstacle_ = error.what();

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Datagrams as lines on a serial port: the board's USB, or the pty of a simulated board.
-//
 //     serial:///dev/ttyACM0[?baud=1000000]   that device, or a link to one
 //     serial:auto                            the one R4 board on USB (2341:0266)
 //     serial:?sn=SERIAL                      the USB device with that serial number
-//
-// 8N1, raw, no flow control, locked. Rates below 9600 are refused: an Arduino takes 1200 baud as
-// the order to erase its program. An unplugged or hung-up port is `down` at once. The carrier looks
-// for it until it is back, by serial number where it has one, else by its path.
+// 8N1, raw, no flow control, locked. Rates below 9600 are refused, because 1200 baud orders an
+// Arduino to erase its program. An unplugged or hung-up port is `down` at once. The carrier looks
+// for it by serial number, or by path if it has none.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -23,9 +21,8 @@ namespace r4 {
 std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& url, Role role,
                                              Claim claim);
 
-// The name by which programs share the port: that of a board is its serial number, so that it may
-// be plugged into another socket; that of any other device is its path. Throws Error where there is
-// no device, or more than one.
+// The name under which programs share the port: a board's serial number, so that the USB socket
+// does not matter, or the path of another device. Throws Error if there is no device or several.
 ShareName serial_share_name(const Url& url);
 
 }  // namespace r4

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Knows when the oldest unread bytes of a byte stream were written, from the numbers of written and
+// Computes when the oldest unread byte of a stream was written, from the numbers of written and
 // unread bytes. Times are exact to `grain`, and never too late. No heap.
 #pragma once
 
@@ -20,7 +20,6 @@ class UnreadMarks {
   void unread_at_most(std::size_t bytes);
   void clear() { count_ = 0; }
 
-  // True if bytes may be unread.
   bool any() const { return count_ != 0; }
   // When the oldest unread byte was written. Only if any().
   Time oldest() const { return marks_[first_].time; }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The connection of a program to the program that holds the transport. If the holder is silent for
-// answer_within, it is asked whether it is alive, and has the same time to answer: the board may be
-// silent, and the holder well.
+// A program's connection to the program that holds the transport. A holder that is silent for
+// answer_within is asked to answer within the same time, because perhaps only the board is silent.
 #pragma once
 
 #include <array>
@@ -27,10 +26,8 @@ class ShareClient {
    public:
     virtual void on_message(const ShareMessage& message) = 0;
     virtual void on_all_heard() = 0;  // all messages that had arrived were handed over
-    // The holder does not answer, or is of another version of R4 link. Called repeatedly until it
-    // answers.
+    // The holder does not answer, or has another version of R4 link. Repeated until it answers.
     virtual void on_no_help(const Problem& why) = 0;
-    // The connection has ended.
     virtual void on_closed() = 0;
 
    protected:
@@ -43,13 +40,11 @@ class ShareClient {
   ShareClient& operator=(const ShareClient&) = delete;
 
   enum class Joined { holder, nobody, stranger, crowd };
-  // Connects to the holder with that role, and sends `greeting`. `stranger`: a program of another
-  // user has taken the name. `crowd`: so many programs wait for the holder that no other one can.
-  // Throws std::system_error if the system does not let the loop wait for the connection. `thing`:
-  // the transport, for problems.
+  // Connects to the holder with that role, and sends `greeting`. `stranger`: another user's program
+  // has the name. `crowd`: too many programs wait for the holder. `thing`: the transport, for
+  // problems. Throws std::system_error if the loop cannot wait for the connection.
   Joined join(const ShareName& name, BoardRole role, ShareMessage::Kind greeting,
               const std::string& thing);
-  // An E:STOP for the board.
   SendResult send_stop(std::string_view datagram);
   void leave() noexcept;
 

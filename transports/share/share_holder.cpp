@@ -30,7 +30,6 @@ bool is_stop(std::string_view bytes) {
 
 }  // namespace
 
-// A program that has connected.
 class ShareHolder::Sharer : public std::enable_shared_from_this<Sharer> {
  public:
   Sharer(ShareHolder& holder, LoopDescriptor connection)
@@ -40,8 +39,7 @@ class ShareHolder::Sharer : public std::enable_shared_from_this<Sharer> {
   bool is_served() const { return is_here() && served_; }
   void set_served() { served_ = true; }
 
-  // A copy may be lost, as on any transport. A program that would miss another message is
-  // disconnected and has to reconnect.
+  // Copies may be lost. A program that would miss any other message is disconnected.
   void tell(Kind kind, std::string_view text) {
     if (!is_here()) return;
     const int error = send_message(connection_.native_handle(), kind, text);
@@ -90,8 +88,7 @@ bool ShareHolder::hold(const ShareName& name, BoardRole role) {
   return true;
 }
 
-// The result is closed, with errno, if the loop cannot wait for it. An exception could end the
-// program, which may be driving.
+// Closed, with errno, if the loop cannot wait for it: an exception could end a driving program.
 LoopDescriptor ShareHolder::on_loop(FileDescriptor descriptor) {
   LoopDescriptor waited_for(io_);
   if (!descriptor) return waited_for;

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The end of a shared transport at the program that holds it. It sends the other programs a copy of
-// every datagram, and takes stops from them. It obeys the stop of any program. The first
-// most_served programs that say hello are served. A program that has stopped the board is served
-// beyond that, so that it hears whether the board obeys. A copy that a slow program does not take
-// is lost to that program.
+// The end of a shared transport in the program that holds it. It sends a copy of every datagram to
+// the other programs, and obeys a stop of any program. It serves the first most_served programs
+// that say hello. A program that has stopped the board is served beyond that limit, so that it
+// hears whether the board obeys. A slow program loses copies.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -27,7 +26,7 @@ class ShareHolder {
  public:
   static constexpr std::size_t most_served = 16;
   static constexpr std::size_t most_served_after_a_stop = 20;
-  // Programs of any user that connect repeatedly take a few percent of the loop's time at most.
+  // Programs of any user that connect repeatedly take at most a few percent of the loop's time.
   static constexpr std::chrono::microseconds between_arrivals{300};
 
   // Called on the loop's thread. Any of these may release the holder.
@@ -35,9 +34,9 @@ class ShareHolder {
    public:
     // The events that a new program must know: whether the transport is up, and its trouble.
     virtual std::vector<CarrierEvent> standing() const = 0;
-    // The E:STOP of another program. `datagram` is a valid one.
+    // Another program has sent this valid E:STOP.
     virtual void on_stop_of_another(std::string_view datagram) = 0;
-    // A program that controls the board asks for the transport.
+    // A controlling program asks for the transport.
     virtual void on_asked() = 0;
 
    protected:
@@ -50,8 +49,7 @@ class ShareHolder {
   ShareHolder(const ShareHolder&) = delete;
   ShareHolder& operator=(const ShareHolder&) = delete;
 
-  // Takes the name of that role. False, with errno, if that fails: EADDRINUSE if another program
-  // has it.
+  // Takes the name of that role. False, with errno: EADDRINUSE if another program has the name.
   bool hold(const ShareName& name, BoardRole role);
   void release() noexcept;
 

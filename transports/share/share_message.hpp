@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The messages between programs that share a transport (docs/sharing.md). Each is one packet of a
-// local socket: a letter, then its content. Without I/O.
-//
+// local socket: a letter, then the content. No I/O.
 //     hello     h VERSION     to the holder: asks for copies of all datagrams, or if it is alive
-//     ask       c VERSION     to the holder: a program that controls wants the transport. The
-//                             answer is the end of the connection
+//     ask       c VERSION     to the holder: asks for the transport, to control; answer: disconnect
 //     welcome   w VERSION     the answer to hello, and to an invalid message
-//     event     e u|d|! KIND THING 0 REASON 0 FIX
-//                             the transport is up, is down, has a warning
+//     event     e u|d|! KIND THING 0 REASON 0 FIX    the transport is up, down, has a warning
 //     received  r DATAGRAM    from the board
 //     sent      s DATAGRAM    to the board, by any program
 //     oversize  o BEGINNING   from the board: too long for a datagram

@@ -16,10 +16,10 @@
 namespace r4 {
 namespace {
 
-// Connections that wait to be accepted, each for some 0.4 ms (ShareHolder::between_arrivals). The
-// last one must wait for less time than a program waits for its answer.
+// Connections that wait to be accepted, each for about 0.4 ms (ShareHolder::between_arrivals). The
+// last program must be accepted before it stops waiting for an answer.
 constexpr int most_waiting = 24;
-// About eighty states, so a program that wakes up hears nothing much older than a second.
+// About 80 states, so a program that wakes up reads nothing much older than a second.
 constexpr int buffer_bytes = 32 * 1024;
 
 struct Address {
@@ -74,9 +74,8 @@ FileDescriptor take_share_name(const ShareName& name, BoardRole role) {
   });
 }
 
-// Another user's programs may keep the holder's queue full. A place in it is free for some
-// microseconds after each accept(). So this tries for about as long as the holder waits between two
-// of them.
+// Another user's programs may keep the holder's queue full: a place is free for microseconds after
+// each accept(). So this tries for about the holder's time between two accept() calls.
 FileDescriptor connect_to_holder(const ShareName& name, BoardRole role) {
   return local_socket(name, role, [](int local, const sockaddr* address, socklen_t size) {
     constexpr int most_tries = 300;

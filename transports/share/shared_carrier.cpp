@@ -26,14 +26,13 @@ using Kind = ShareMessage::Kind;
 using Joined = ShareClient::Joined;
 using std::chrono::milliseconds;
 
-// The names by which the holder is sought, in this order.
+// The roles of a holder, in the order of the search.
 constexpr std::array holders{BoardRole::control, BoardRole::watch};
 constexpr milliseconds look_again{5}, look_again_slowly{100};
-// If no program holds the transport for longer, that is reported.
+// A longer time without a holder is reported.
 constexpr milliseconds take_over_within{100};
 
-// It has more than 15 members, which belong to one state machine: the carrier, the search, and the
-// two ends of sharing.
+// More than 15 members: the carrier, the search and both ends of sharing are one state machine.
 class SharedCarrier final : public Carrier,
                             private Carrier::Handler,
                             private ShareHolder::Owner,
@@ -58,7 +57,7 @@ class SharedCarrier final : public Carrier,
   SendResult send(std::string_view bytes, Priority priority, Peer to) override;
   bool up() const override { return up_; }
   TransportTrouble trouble() const override { return own_->trouble(); }
-  // The board cannot tell this program's datagrams from those of the holder.
+  // The board cannot distinguish the datagrams of this program and of the holder.
   bool is_shared() const override { return is_served() || own_->is_shared(); }
   void change_role(BoardRole role) override;
   const std::string& name() const override { return name_; }
@@ -69,12 +68,11 @@ class SharedCarrier final : public Carrier,
 
  private:
   enum class State { closed, seeking, asking, joined, holding };
-  // The search for a holder, or for the transport itself.
   struct Search {
     Clock::time_point began = Clock::now();
-    std::size_t asked = 0;           // the place in `holders` of the holder that was asked
+    std::size_t asked = 0;           // the index in `holders` of the last asked holder
     std::size_t passed = 0;          // how many of `holders` were passed over
-    std::optional<Problem> no_help;  // why the first of them was passed over
+    std::optional<Problem> no_help;  // why the first holder was passed over
   };
 
   void on_datagram(std::string_view bytes, Peer from) override;
@@ -82,7 +80,7 @@ class SharedCarrier final : public Carrier,
   void on_drained() override { handler_->on_drained(); }
   void on_overheard(std::string_view bytes) override;
   void on_oversize(std::string_view beginning) override;
-  // For the programs that this one serves as holder.
+  // Called for the programs that this holder serves.
   std::vector<CarrierEvent> standing() const override;
   void on_stop_of_another(std::string_view datagram) override;
   void on_asked() override;
@@ -103,13 +101,13 @@ class SharedCarrier final : public Carrier,
   void look();
   void look_later(milliseconds delay);
   bool late() const { return Clock::now() - search_.began >= take_over_within; }
-  // Another program holds the transport, and takes stops from this one.
+  // True if another program holds the transport, and takes this program's stops.
   bool is_served() const {
     return state_ == State::joined || (state_ == State::asking && role_ == BoardRole::watch);
   }
   void tell(const CarrierEvent& event);
 
-  const Claim claim_;  // how own_ opens its device
+  const Claim claim_;
   const std::unique_ptr<Carrier> own_;
   const FindShareName find_;
   BoardRole role_;
@@ -125,7 +123,7 @@ class SharedCarrier final : public Carrier,
   std::optional<Problem> trouble_;  // why it is down, or the warning that stands
   Carrier::Handler* handler_ = nullptr;
   CarrierCounters shared_counters_;  // of datagrams by way of another holder
-  mutable CarrierCounters counted_;  // the sum of these and of own_
+  mutable CarrierCounters counted_;
 };
 
 void SharedCarrier::open(Carrier::Handler& handler) {
@@ -152,8 +150,7 @@ void SharedCarrier::close() noexcept {
   holder_.release();
 }
 
-// Joins the holder, or becomes it. False: look again soon. Throws Error if the transport cannot be
-// opened.
+// Joins or becomes the holder. False: look again soon. Throws Error if the transport fails to open.
 bool SharedCarrier::take_part() {
   if (!holder_.holds()) share_ = find_();
   const bool controls = role_ == BoardRole::control;
@@ -181,7 +178,7 @@ bool SharedCarrier::take_part() {
   return true;
 }
 
-// Takes the name of the program that controls. Throws Error{refused} if another program has it.
+// Takes the name of the controlling program. Throws Error{refused} if another program has it.
 void SharedCarrier::require_control() {
   FileDescriptor other;
   for (int i = 0; !other && i < 2; ++i) {  // the other program may have ended in between
@@ -189,7 +186,7 @@ void SharedCarrier::require_control() {
     if (const auto problem = out_of_resources(name_, errno)) throw Error(*problem);
     other = connect_to_holder(share_, BoardRole::control);
   }
-  // A stranger that has taken the name prevents nothing.
+  // A stranger with this name prevents nothing.
   if (other && !is_one_of_us(other.get(), share_)) return holder_.release();
   const pid_t process = other ? process_of(other.get()) : 0;
   const bool stopped = is_stopped(process);
@@ -213,7 +210,7 @@ void SharedCarrier::change_role(BoardRole role) {
   if (is_open) controls ? seek() : lose();
 }
 
-// The name of a transport that is not found yet is taken when it is found.
+// If the transport is not found yet, its name is taken when it is found.
 bool SharedCarrier::is_found() {
   try {
     if (state_ == State::seeking) share_ = find_();
@@ -223,9 +220,8 @@ bool SharedCarrier::is_found() {
   }
 }
 
-// Takes the name of the program that watches and holds the transport. False if another program was
-// faster. A program that wants control takes the other name before it looks for this name, so one
-// of the two programs sees the other.
+// Takes the name of the watching holder. False if another program was faster. A program that wants
+// control takes its name before it looks for this one, so one of the two sees the other.
 bool SharedCarrier::hold_to_watch() {
   if (!holder_.hold(share_, BoardRole::watch)) {
     if (const auto problem = out_of_resources(name_, errno)) throw Error(*problem);
@@ -238,8 +234,7 @@ bool SharedCarrier::hold_to_watch() {
   return false;
 }
 
-// If a holder that only watches was passed over, a device that one program can have open is taken
-// from that holder.
+// If a watching holder was passed over, a device for one program is taken from that holder.
 void SharedCarrier::open_own() {
   state_ = State::holding;
   try {
@@ -255,20 +250,18 @@ void SharedCarrier::open_own() {
   if (state_ == State::holding && !holder_.holds()) look_later(look_again_slowly);
 }
 
-// The holder that was asked does not answer.
 void SharedCarrier::pass_over(const Problem& why) {
   client_.leave();
   search_.passed = search_.asked + 1;
   if (!search_.no_help) search_.no_help = why;
 }
 
-// This program neither holds nor shares the transport any more.
+// Stops holding or sharing the transport.
 void SharedCarrier::lose() {
   seek();
   holder_.release();  // after seek(): the transport is free before other programs look for a holder
 }
 
-// Restarts the search.
 void SharedCarrier::seek() {
   client_.leave();
   own_->close();
@@ -306,7 +299,7 @@ SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer t
     if (result == SendResult::sent) holder_.tell(Kind::sent, bytes);
     return result;
   }
-  // The holder passes on stops only: the board would take any other datagram for one of the holder.
+  // The holder passes on only stops: the board would attribute other datagrams to the holder.
   if (!is_served() || priority != Priority::stop) return SendResult::down;
   ++shared_counters_.tx_datagrams;
   shared_counters_.tx_bytes += bytes.size();
@@ -316,7 +309,7 @@ SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer t
 // --- this program holds the transport
 
 void SharedCarrier::on_datagram(std::string_view bytes, Peer from) {
-  // This program first: it may be driving.
+  // This program first, because it may be driving.
   handler_->on_datagram(bytes, from);
   if (state_ == State::holding) holder_.tell(Kind::received, bytes);
 }

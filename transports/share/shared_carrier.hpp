@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A transport that the programs of a user share (docs/sharing.md): a carrier that wraps the carrier
-// of a URL.
+// A transport that a user's programs share (docs/sharing.md). Wraps the carrier of a URL.
 //
 //     seeking ----a program holds it----> asking ----welcome----> joined
 //      |   ^                                |                       |
@@ -10,13 +9,12 @@
 //      |   |
 //      +-> holding, with the carrier open: no program holds it, or the holder was passed over
 //
-// The program that controls the board holds the transport itself: its datagrams never wait for
-// another program. It also holds a name of its own, so a second one is refused at once. Programs
-// that watch hear all datagrams, and send stops.
-//
-// A program that takes control takes that name first. If it is refused, nothing changes. Else the
-// transport is opened again, because a program that controls opens it in another way (DeviceClaim).
-// The programs that it served look for the holder again, as they do whenever a holder ends.
+// The controlling program holds the transport, so its datagrams never wait for another program. It
+// also holds a separate name, so a second controlling program is refused at once. Watching programs
+// hear all datagrams, and send stops. A program that takes control first takes that name. If it is
+// refused, nothing changes. Else it reopens the transport, because a controlling program opens it
+// differently (DeviceClaim). The programs that it served seek the holder again, as after any
+// holder's end.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -28,9 +26,9 @@
 
 namespace r4 {
 
-// The carrier reports the same as `own`, whichever program holds the transport. `claim`: how `own`
-// opens its device. open() does not wait for another program. It throws Error{refused} if another
-// program controls the board, and what `own` throws.
+// Reports the same as `own`, whichever program holds the transport. `claim`: how `own` opens its
+// device. open() does not wait; it throws Error{refused} if another program controls the board, or
+// an error of `own`.
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
                                              Claim claim, FindShareName find, BoardRole role);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's end of UDP: it has several hosts, and one of them is in control. At 0.0.0.0 or [::]
-// an answer leaves from the address that the host has asked.
+// The board's end of UDP, with several hosts, of which one is in control. At 0.0.0.0 or [::] an
+// answer leaves from the address to which the host has sent.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -149,8 +149,7 @@ void UdpEnd::close() noexcept {
   close_socket();
 }
 
-// Asio first tries to receive at once. It fills in the sender then, which shows at no cost that
-// there is another packet.
+// Asio first tries to receive at once. If it fills in the sender, there is another packet.
 bool UdpEnd::begin_to_receive() {
   sender_.port(0);
   socket_.async_receive_from(asio::buffer(received_), sender_, MSG_TRUNC,
@@ -297,7 +296,7 @@ Problem UdpEnd::no_route(const std::string& subject, int error) const {
           "check the WiFi or cable and the address"};
 }
 
-// The interface may come back while nothing is sent.
+// The interface may work again while nothing is sent.
 void UdpEnd::probe_later() {
   probe_timer_.expires_after(probe_interval);
   probe_timer_.async_wait(probe_.handler([this] {

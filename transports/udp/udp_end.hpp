@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The common part of both ends of UDP: a socket, the datagrams that wait, and the state of the
-// network. udp_host.hpp and udp_board.hpp are the ends.
+// The common part of udp_host.hpp and udp_board.hpp: socket, queue and state of the network.
 #pragma once
 
 #include <array>
@@ -21,8 +20,7 @@
 
 namespace r4 {
 
-// It has more than 15 members: the socket with its timers and waits, the queue, and the state of
-// the network.
+// More than 15 members: the socket with its timers and waits, the queue, the state of the network.
 class UdpEnd : public Carrier {
  public:
   void close() noexcept override;
@@ -52,20 +50,18 @@ class UdpEnd : public Carrier {
 
   // Opens the socket without binding it. Throws Error.
   void open_socket(const Endpoint& local, bool v6_only);
-  // Closes the socket and throws the reason why it cannot be bound. `fix`: for a port that another
-  // program has.
+  // Closes the socket and throws why it cannot be bound. `fix`: if another program has the port.
   [[noreturn]] void refuse(const asio::error_code& error, const Endpoint& local,
                            const std::string& fix);
   // The socket is bound: begins to receive, and is up.
   void begin(Handler& handler);
   void hand_over(std::string_view bytes, Peer from);
-  // `standing`: `to` is the destination of datagrams for everyone, which shows whether the network
-  // is there. `from`: an address of this computer; unspecified: any.
+  // `standing`: `to` is the destination for everyone, so a failed packet shows a lost network.
+  // `from`: an address of this computer; unspecified: any.
   Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing,
                       const asio::ip::address& from = {});
   void set_up(bool up);
-  // Goes up or down by `error`, the result of probe(). Errors that are not about the network have
-  // no effect.
+  // Goes up or down by `error`, the result of probe(). Ignores errors other than of the network.
   void judge_route(int error);
   void report();
   void warn(const std::string& reason, const std::string& fix);
@@ -101,13 +97,13 @@ class UdpEnd : public Carrier {
   bool cut_ = false;  // its interface does not work, though the system may take packets
   bool reported_up_ = false;
   int down_error_ = 0;
-  int refused_error_ = 0;  // why the system refused the last packet; 0 once one has passed
+  int refused_error_ = 0;  // why the system refused the last packet; 0 after a success
   int reported_refusal_ = 0;
   OperationSlot reporting_;
   SendQueue queue_;
 };
 
-// "[::1]" for an IPv6 address, as in a URL.
+// The host as in a URL: "[::1]" for an IPv6 address.
 std::string bracketed(const std::string& host);
 
 }  // namespace r4

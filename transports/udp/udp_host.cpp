@@ -19,7 +19,7 @@ UdpHost::UdpHost(asio::io_context& io, const Url& url, HostLookup lookup, BoardS
   search_.port = url_.port;
 }
 
-// In a handler of the loop the lookup of a name must not block the other work of the loop.
+// In a handler of the loop, the lookup of a name must not block the loop.
 void UdpHost::open(Handler& handler) {
   close();
   wanted_ = {url_.called, ""};
@@ -50,7 +50,6 @@ void UdpHost::close() noexcept {
   UdpEnd::close();
 }
 
-// Opens and binds the socket that hears the board at that address.
 void UdpHost::bind(const Endpoint& board) {
   board_ = board;
   const bool any_port = claim_->yields && !url_.names_listen;
@@ -89,13 +88,13 @@ void UdpHost::bind(const Endpoint& board) {
 }
 
 void UdpHost::watch() {
-  // Without a name, the address of this computer may have changed.
+  // Without a name, only a connected socket needs a watch: this computer's address may change.
   if (!named_ && !host_socket_.connected()) return;
   watch_.start(named_ ? question() : nullptr, socket_.is_open(),
                [this](const FoundHost& answer) { found(answer); });
 }
 
-// Asks where the board is. It does not use this object, which may be gone before the answer comes.
+// The question does not use this object, which may be gone before the answer comes.
 HostWatch::Question UdpHost::question() const {
   if (url_.search) {
     return [search = search_, wanted = wanted_] { return find_board(search, wanted); };
@@ -103,14 +102,13 @@ HostWatch::Question UdpHost::question() const {
   return [resolve = lookup_.resolve, host = url_.host] { return resolve(host); };
 }
 
-// The next search is for the same board, whatever other boards are there by then.
+// The next search is for the same board, even if other boards answer.
 void UdpHost::remember(const FoundHost& answer) {
   if (!url_.search) return;
   wanted_.board_id = answer.board_id;
   watch_.ask_for(question());
 }
 
-// The answer of a lookup or a search.
 void UdpHost::found(const FoundHost& answer) {
   const auto& addresses = answer.addresses;
   const bool is_open = socket_.is_open();

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The host's end of UDP: one board, given by its address, by a host name, or by its own name
-// (board_search.hpp). It may move.
+// The host's end of UDP: one board, which may move, given by address, host name or board name.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The socket at which a host hears one board. The boards of a program share the port of hosts.
-//
-// The first socket at a port has it alone, so that another program at that port is noticed. It is
-// not connected, so it hears its board from any of the board's ports. A further socket is bound
-// beside it and connected to its board, so the kernel gives it the packets from the board's port
-// only. A packet that comes in the microseconds between bind and connect may be lost.
+// The socket with which a host hears one board. The boards of a program share the port of hosts.
+// The first socket has the port alone, so that another program at that port is noticed. It is not
+// connected, and hears all ports of its board. A further socket is bound to the same port and
+// connected to its board, so the kernel gives it packets from that board's port only. A packet in
+// the microseconds between bind and connect may be lost.
 #pragma once
 
 #include <asio/error_code.hpp>
@@ -34,12 +33,11 @@ class UdpHostSocket {
   // Closes the socket. Can be called twice.
   void close() noexcept;
 
-  // True if the kernel has chosen the address from which it sends. That address may go.
+  // True if the kernel has chosen the sending address, which may become invalid.
   bool connected() const { return connected_; }
-  // Lets the kernel choose again, if it is connected. 0, or errno.
+  // If connected, lets the kernel choose again. 0, or errno.
   int reconnect();
 
-  // True if `sender` is the board.
   bool hears(const Endpoint& sender) const {
     return sender.address() == board_.address() &&
            (!neighbours_.load(std::memory_order_relaxed) || sender.port() == board_.port());
@@ -51,7 +49,7 @@ class UdpHostSocket {
   Endpoint local_;
   Endpoint board_;
   bool connected_ = false;
-  // Another board of this program is, or was, at the same address: the port tells them apart.
+  // Another board of this program is, or was, at the same address, so the port distinguishes them.
   std::atomic<bool> neighbours_{false};
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The URL of a UDP carrier, taken apart (udp_carrier.hpp).
+// The parts of a UDP carrier's URL (udp_carrier.hpp).
 #pragma once
 
 #include <asio/ip/address.hpp>
@@ -15,16 +15,16 @@ struct UdpUrl {
   static constexpr std::uint16_t board_port = 2018;
   static constexpr std::uint16_t host_port = 2390;
 
-  // Throws Error{usage} for one that UDP does not take.
+  // Throws Error{usage} for a URL that UDP does not take.
   UdpUrl(const Url& url, Role role);
 
   std::string text;
-  bool search = false;   // udp:auto, udp:?id=NAME: a search finds the board
-  std::string called;    // its name or board id; empty: the only board
-  std::string host;      // of the board; at a board: where it listens
-  std::uint16_t port;    // of the board
-  std::uint16_t listen;  // of the host
-  bool names_listen;     // the URL has the option `listen`
+  bool search = false;  // udp:auto, udp:?id=NAME: a search finds the board
+  std::string called;   // its name or board id; empty: the only board
+  std::string host;     // of the board; at a board: where it listens
+  std::uint16_t port;
+  std::uint16_t listen;
+  bool names_listen;
   // The host sends by the interface with that address; unspecified: by any interface.
   asio::ip::address local;
   std::string peer;  // HOST or HOST:PORT; empty: none
@@ -32,7 +32,7 @@ struct UdpUrl {
   std::uint16_t peer_port = host_port;
 };
 
-// The URL of a host, with `listen=0` (any free port) if it is one of UDP and has no `listen`.
+// The URL of a host. A UDP URL without `listen` gets `listen=0` (any free port).
 std::string with_own_port(std::string url);
 // The same; also replaces the port of `listen`.
 std::string with_any_port(std::string url);

@@ -56,15 +56,15 @@ void NetworkWatch::wait() {
   waits_.async_wait(asio::posix::descriptor_base::wait_read, waiting_.handler([this] { tell(); }));
 }
 
-// Looks up all addresses: reports may have been lost, and one cause may bring many reports. Reports
-// that come faster than they are read are left for the next turn.
+// Looks up all addresses, because reports may be lost, and one change may cause many reports.
+// Unread reports wait for the next turn.
 void NetworkWatch::tell() {
   std::array<char, 4096> report;
   for (int i = 0; i < most_in_a_turn; ++i) {
     if (::recv(changes_.get(), report.data(), report.size(), MSG_TRUNC) <= 0) break;
   }
   const std::vector<OwnAddress> own = own_addresses();
-  std::size_t next = 0;  // they may enter and leave meanwhile
+  std::size_t next = 0;  // members may enter and leave meanwhile
   while (next < members_.size()) {
     Member* const member = members_[next++];
     if (member != nullptr) member->on_network_change(own);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Notifies the hosts of a loop when an interface of this computer, its carrier or an address has
-// changed. So a pulled cable is known at once, though nothing is sent. One object a loop. If
-// rtnetlink(7) is not available, members are not called, and a failing datagram shows the change
-// later.
+// changed. So a pulled cable is noticed even if nothing is sent. One object per loop. Without
+// rtnetlink(7), members are not called, and a failing datagram shows the change later.
 #pragma once
 
 #include <asio/execution_context.hpp>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The address of this computer to which a packet was sent, and from which its answer leaves. A
-// socket that is bound to all addresses would answer from the address that the route prefers, but a
-// host hears only the address that it asked.
+// The own address to which a packet was sent and from which its answer leaves. A host hears only
+// that address; a socket bound to all addresses would answer from the route's address.
 #pragma once
 
 #include <asio/ip/address.hpp>
@@ -12,18 +11,15 @@
 
 namespace r4 {
 
-// Lets the kernel report the destination address of each packet of that socket. False if it does
-// not.
+// Makes the kernel report the destination address of each packet. False if it refuses.
 bool note_addresses(int socket, const asio::ip::udp& protocol);
 
-// Takes the next packet. Returns its size, which may be larger than `room`; none if there is no
-// packet. Sets `at` to the address to which it was sent; unspecified if that is not known, or not
-// an address of this computer (multicast).
+// Takes the next packet. Returns its size, which may exceed `room`; none: no packet. Sets `at` to
+// its destination; unspecified if unknown or not of this computer (multicast).
 std::optional<std::size_t> receive_packet(int socket, char* out, std::size_t room,
                                           asio::ip::udp::endpoint& from, asio::ip::address& at);
 
-// Sends a packet from that address of this computer; from any address if it is unspecified or gone.
-// 0 if the system has taken it, else errno.
+// Sends a packet from `from`, or any address if that is unspecified or gone. 0 if sent, else errno.
 int send_packet(int socket, std::string_view bytes, const asio::ip::udp::endpoint& to,
                 const asio::ip::address& from);
 

@@ -8,22 +8,20 @@
 
 namespace r4 {
 
-// An address of this computer.
 struct OwnAddress {
   asio::ip::address address;
-  unsigned interface = 0;  // index of its interface
-  bool works = false;      // the interface is up and has a carrier (a plugged cable, a joined WiFi)
+  unsigned interface = 0;
+  bool works = false;  // the interface is up and has a carrier (a plugged cable, a joined WiFi)
 };
 // Empty if the system does not report them.
 std::vector<OwnAddress> own_addresses();
 
-// 0 if there is a route to that board, else errno. `from`: by the interface of that address;
-// unspecified: by any interface.
+// 0 if there is a route to `to`, else errno. `from`, if specified: only by its interface.
 int probe_route(const asio::ip::udp::endpoint& to, const asio::ip::address& from,
                 const std::vector<OwnAddress>& own);
 
-// Lets the socket send to that board by the interface of that address, also if another interface
-// leads there, too. It receives by any interface. Has no effect for a board on this computer.
+// Makes the socket send to that board by the interface of `from`, even if another interface leads
+// there. It receives by any interface. No effect for a board on this computer.
 void send_by_interface_of(const asio::ip::address& from, int socket,
                           const asio::ip::udp::endpoint& to, const std::vector<OwnAddress>& own);
 

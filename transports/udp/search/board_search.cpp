@@ -70,7 +70,6 @@ void ask(int socket, Network& network, std::uint16_t port, const std::string& te
   network.trouble = sent ? "" : std::strerror(errno);
 }
 
-// One search: its sockets and the answers.
 class Round {
  public:
   Round(const BoardSearch& search, std::string_view called) : search_(search), called_(called) {

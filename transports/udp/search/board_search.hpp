@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds the boards on the networks of this computer: sends `Q:ID` by IPv4 broadcast. A board
-// answers every host.
+// Finds the boards on this computer's networks by IPv4 broadcast. A board answers every host.
 //
 //     on each network:  socket at our address, any free port --- Q:ID, 3 times ---> broadcast:2018
 //                                     <--- I:R4,…;NAME:…;BUSY:… --- each board, from its :2018
 //
-// One search takes half a second and sends three packets a network, and nothing else. At most
-// `most_boards` answers are kept. The answers are not signed: any program on the network can answer
-// as any board. The link and its keys decide what may be commanded, not the search.
-//
-// Broadcast passes no router, and often no VPN, container network or WiFi with client isolation. A
-// board behind one of these is reached by its address. The loopback has no broadcast: the question
-// goes to each of its addresses.
+// One search takes half a second, sends three packets a network, and keeps at most `most_boards`
+// answers. The answers are not signed: any program on the network can answer as any board. Not the
+// search but the link and its keys decide which commands are accepted. Broadcast does not pass a
+// router, and often not a VPN, container network or WiFi with client isolation: a board there is
+// reached by its address. The loopback has no broadcast, so each of its addresses is asked.
 #pragma once
 
 #include <asio/ip/address_v4.hpp>
@@ -29,7 +26,6 @@
 
 namespace r4 {
 
-// A board that has answered.
 struct AnsweredBoard : IdentityAnswer {
   asio::ip::address_v4 address;
   asio::ip::address_v4 heard_at;  // the address of this computer in its network
@@ -39,22 +35,22 @@ struct BoardSearch {
   // A network of this computer, by one of its addresses.
   struct Network {
     std::string interface;
-    unsigned index = 0;         // of the interface; 0: as the system routes it
-    asio::ip::address_v4 from;  // the address of this computer
-    asio::ip::address_v4 to;    // the broadcast address
-    std::string trouble = {};   // why the question could not be sent
+    unsigned index = 0;  // of the interface; 0: as the system routes it
+    asio::ip::address_v4 from;
+    asio::ip::address_v4 to;   // the broadcast address
+    std::string trouble = {};  // why the question could not be sent
   };
   // The networks whose interface is up, 64 at most.
   static std::vector<Network> networks_of_this_computer();
 
   struct Result {
-    std::vector<Network> networks;  // where the question was sent
+    std::vector<Network> networks;
     std::vector<AnsweredBoard> boards;
     std::size_t others = 0;  // boards of another id and name
     bool more = false;       // more boards have answered than are kept
   };
-  // Blocks for `patience`. Throws nothing but for memory. `called`: keeps only the boards of that
-  // board id or name, however many others answer; empty: all boards.
+  // Blocks for `patience`. Throws only if memory is used up. `called`: keeps only the boards with
+  // that id or name; empty: all boards.
   Result run(std::string_view called = {}) const;
 
   static constexpr std::size_t most_boards = Discovery::most_answers;
@@ -75,12 +71,11 @@ struct WantedBoard {
 std::vector<AnsweredBoard> called(const std::vector<AnsweredBoard>& boards,
                                   std::string_view id_or_name);
 
-// The URL that finds one of `boards` again: by name, by id, or by address if another board has the
-// same name and id. `port`: of the search.
+// The URL that finds `board` again: by name or id if unique, else by address. `port`: searched.
 std::string url_of(const AnsweredBoard& board, const std::vector<AnsweredBoard>& boards,
                    std::uint16_t port);
 
-// Searches. Returns the addresses of the board, or the reason why no answer can be taken for it.
+// Searches. Returns the board's addresses, or the problem if no board or several answered.
 FoundHost find_board(const BoardSearch& search, const WantedBoard& wanted);
 
 }  // namespace r4

@@ -16,7 +16,7 @@
 namespace r4 {
 namespace {
 
-// Calls `done(answer)` in a thread of its own, which may outlive everything but the arguments.
+// Calls `done(answer)` in a detached thread, which may outlive everything but the arguments.
 template <class Question, class Done>
 void ask_in_a_thread(Question question, Done done) {
   // An exception that leaves the thread would end the program, which may be driving.

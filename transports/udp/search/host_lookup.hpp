@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Looks up the address of a host name without blocking the event loop.
-//
-// The system's resolver blocks, for 10 s if no name server answers. So each question has a detached
-// thread. Asio's resolver would join its thread when the loop is destroyed, and the program could
-// not end before the system gives up.
+// Looks up the address of a host name without blocking the event loop. The system's resolver may
+// block for 10 s, so each question has a detached thread. Asio's resolver would join its thread
+// with the loop's destruction, and so delay the end of the program.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -24,36 +22,31 @@ struct FoundHost {
   std::vector<asio::ip::address> addresses;
   std::string reason;  // why there are no addresses
   // Of a search for boards (board_search.hpp):
-  std::string board_id = {};            // of the board that was found
+  std::string board_id = {};
   std::optional<Problem> problem = {};  // why no board can be chosen; its thing is empty
 };
 
-// How to look up a host, and the times of that.
 struct HostLookup {
-  // Blocks; called in threads of their own.
+  // Blocks; called in a separate thread.
   using Resolve = std::function<FoundHost(const std::string& host)>;
   static FoundHost ask_system(const std::string& host);
 
   Resolve resolve = ask_system;
   std::chrono::milliseconds patience{5000};  // find() waits that long for an answer
   std::chrono::milliseconds retry{1000};     // from a failed question to the next
-  std::chrono::milliseconds silence{
-      3000};  // a board that is not heard for so long is looked up again
+  std::chrono::milliseconds silence{3000};   // of a board, after which it is looked up again
 
-  // The address of `host`, a name or an address. Blocks until the answer comes. Throws Error about
-  // `thing` if none comes in time.
+  // `host`: a name or an address. Blocks, at most for `patience`. Throws Error about `thing`.
   asio::ip::address find(const std::string& host, const std::string& thing) const;
 };
 
-// The address to use, IPv4 first, because the board's WiFi uses it. Throws Error about `thing` if
-// there is none.
+// The address to use: IPv4 first, as on the board's WiFi. Throws Error about `thing` if none.
 asio::ip::address address_of(const FoundHost& found, const std::string& host,
                              const std::string& thing);
 
-// True if `host` is an address, not a name.
 bool is_address(const std::string& host);
 
-// Asks where a board is until that is known, and again when the board is silent.
+// Asks for a board's address until it is known, and again when the board is silent.
 class HostWatch {
  public:
   HostWatch(asio::io_context& io, HostLookup lookup);
@@ -61,12 +54,11 @@ class HostWatch {
   HostWatch& operator=(const HostWatch&) = delete;
   ~HostWatch() { stop(); }
 
-  using Question = std::function<FoundHost()>;  // blocks; asked in threads of their own
+  using Question = std::function<FoundHost()>;  // blocks; called in a separate thread
   using OnFound = std::function<void(const FoundHost&)>;
   // Calls `on_found`, on the loop, with each answer. Asks at once unless the address is `known`.
   // Without a question, `on_found` gets an empty answer when the board is silent.
   void start(Question question, bool known, OnFound on_found);
-  // Replaces the question.
   void ask_for(Question question) { what_to_ask_ = std::move(question); }
   // No call follows. An open question goes on in its thread, and its answer is dropped.
   void stop();
