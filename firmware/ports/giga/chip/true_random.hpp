@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The chip's generator of true random numbers.
+// The chip's true random number generator.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 namespace r4 {
 namespace giga {
 
-// Fills `out`. False: the generator does not work, and what is in `out` is not random.
+// Fills `out`. False: the generator does not work, and `out` is not random.
 bool true_random(std::uint8_t* out, std::size_t size);
 
 }  // namespace giga
