@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The text of a device description, line by line. The first word of a line is its kind:
+// Reads a device description line by line. The first word of a line is its kind:
 //
 //     device NAME                                             once, first
 //     title TEXT
@@ -13,7 +13,7 @@
 //           [only VALUE NUMBER]
 //     ready VALUE [NUMBER]
 //
-// '#' begins a comment. Bytes are x and two hexadecimal digits each; S and O are numbers and pi,
+// '#' starts a comment. BYTES are x and two hexadecimal digits each. S and O are numbers and pi,
 // joined by * and /.
 #pragma once
 
@@ -61,7 +61,7 @@ class DescriptionParser {
   [[noreturn]] void fail(const std::string& reason, const std::string& fix) const;
 
   std::string source_;
-  int line_ = 0;  // 0: something is missing in all lines
+  int line_ = 0;  // 0: the error is in no single line
   DeviceDescription result_;
 };
 

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the board's pins do, as they change, on a UART of its own (`tools/m7 --pins`): what tests look
-// at instead of believing what the board says of itself.
+// Reports each change of the pins on a UART (`tools/m7 --pins`), so that tests need not trust the
+// board's own states.
 //
-// A line is numbers with a blank between: the board's time in ms and in us, when the last datagram
-// had come (us), the time in ms of the heartbeat that fed last, 1 if the chips' pins are safe; then
-// the outputs in the order of sim::Pins.
-//
-// Changes are noted at the end of the transfer that made them, also in interrupts, and told when the
-// loop has time. When notes_max wait, later ones are left out.
+// A line has numbers and spaces: the board's time in ms and in us, time of the last datagram in us,
+// time of the last feeding heartbeat in ms, 1 if the chips' pins are safe, then the outputs as in
+// sim::Pins. A change is noted after its transfer, also in interrupts, and sent by the loop. If
+// notes_max notes wait, later changes are left out.
 #pragma once
 
 #include <cstddef>
@@ -30,10 +28,10 @@ class PinsReport final : public sim::I2cObserver {
   void start();
 
   void on_transfer(const sim::I2cTransfer&) override { look(); }
-  // To be called in each turn of the loop.
+  // Call in each turn of the loop.
   void poll();
 
-  // A datagram came at `ticks` of the board's clock; of several the newest counts. In interrupts.
+  // In interrupts: a datagram came at `ticks` of the board's clock. The newest counts.
   static void on_datagram(std::uint32_t ticks) {
     if (static_cast<std::int32_t>(ticks - datagram_ticks_) > 0) datagram_ticks_ = ticks;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Words and an exit status for whoever emulates the processor (ARM semihosting). Only for programs
-// that are run under an emulator or a debugger which listens: without one it is a fault.
+// Text and exit status for the emulator (ARM semihosting). Without an emulator or debugger that
+// listens, a call is a fault.
 #pragma once
 
 #include <cstdint>
