@@ -111,7 +111,7 @@ class Recorder {
   std::vector<RecordedDevice> undeclared_devices_;
   bool closing_ = false;
   std::optional<Problem> problem_;
-  std::optional<Problem> news_;  // the newest
+  std::optional<Problem> news_;
 
   std::mutex joining_;
   std::thread thread_;

@@ -27,8 +27,6 @@ std::string to_text(const RecordingDamage& damage) {
   return line + "byte " + std::to_string(damage.offset) + ": " + std::string(damage.reason);
 }
 
-// --- lines
-
 const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream) {
   // In a record CR is written as \xNN, so this CR belongs to the line's end.
   while (line.ends_with('\r')) line.remove_suffix(1);
@@ -104,8 +102,6 @@ void RecordingLines::on_sign_of_mixture() {
   if (damage_ == Damage::here) visitor_.on_comment(damage_line);
   damage_ = Damage::reported;
 }
-
-// --- a file
 
 RecordingReader::RecordingReader(RecordingVisitor& visitor, std::string name)
     : lines_(visitor, name), visitor_(visitor), name_(std::move(name)) {

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The six analog inputs. Each poll starts one conversion, of one input after the other. Never
-// waits; from the loop only.
-//
-// The core sets up the pins and the converter and reads each input once. Then this class works with
-// the registers of ADC1 (RM0399, chapter ADC), because the core waits up to 10 ms for a conversion
-// and ends the boot (error()) if the converter does not switch on. Here a dead converter reads 0,
-// and the motors can still be driven.
+// waits; from the loop only. The core sets up the pins and the converter and reads each input once.
+// Then this class works with the registers of ADC1 (RM0399, chapter ADC), because the core waits up
+// to 10 ms for a conversion and ends the boot (error()) if the converter does not switch on. Here a
+// dead converter reads 0, and the motors can still be driven.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +21,6 @@ static_assert(pin_name({'A', 0}) == PA_0 && pin_name({'C', 5}) == PC_5 &&
                   pin_name({'K', 7}) == PK_7,
               "the core numbers its pins otherwise");
 
-// The newest conversion of one input.
 class AnalogValue final : public firmware::AnalogPin {
  public:
   std::uint16_t read() override { return newest; }

@@ -109,7 +109,6 @@ Text BootReport::chip(char (&out)[max_line]) {
   return line.done();
 }
 
-// The highest use of the interrupt stacks, in bytes.
 Text BootReport::stacks(char (&out)[max_line]) {
   LineWriter line(out);
   const StackUse cores = use_of_core_stack();

@@ -29,7 +29,6 @@ class Machine final : public StepTick {
 
   firmware::BoardHardware& hardware() { return hardware_; }
   I2cController& bus() { return bus_; }
-  // Adds the user's I2C bus and UARTs.
   void add_devices(firmware::Application::Config& config);
 
   void step_tick() override;

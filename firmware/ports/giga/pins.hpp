@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The only table of which pin of the Giga serves which channel.
-//
-// The paper does not name the pins, so this plan is ours. Compare it with the schematic of the
-// board before you power a motor. Element n-1 is channel n; comments give the names printed on the
-// Giga.
-//
-// Pin number n of every port uses interrupt line n, so two pins with the same number cannot both
-// interrupt (RM0399, chapter EXTI). Line 8 belongs to WiFi (PI8). Encoder pins A and B and the echo
-// pins interrupt; index pins are sampled.
+// The only table of which pin of the Giga serves which channel. The paper does not name the pins,
+// so this plan is ours. Compare it with the schematic of the board before you power a motor.
+// Element n-1 is channel n; comments give the names printed on the Giga. Pin number n of every port
+// uses interrupt line n, so two pins with the same number cannot both interrupt (RM0399, chapter
+// EXTI). Line 8 belongs to WiFi (PI8). Encoder pins A and B and the echo pins interrupt; index pins
+// are sampled.
 #pragma once
 
 #include <cstdint>
@@ -39,7 +36,6 @@ constexpr Pin handle_pin = {'I', 15};  // D42
 // In the order of r4link/state.hpp: AIN24 AIN12 AIN5 AINDMH AINSTEER AIN6.
 constexpr Pin analog_pins[analog_channels] = {{'C', 4}, {'C', 5}, {'B', 0},
                                               {'B', 1}, {'C', 3}, {'C', 2}};  // A0-A5
-// Inputs of ADC1 on these pins.
 constexpr std::uint32_t adc_inputs[analog_channels] = {4, 8, 9, 5, 13, 12};
 
 // I2C2 for the chips: SCL and SDA (D21, D20), alternate function 4.
@@ -60,9 +56,8 @@ constexpr std::uint32_t uart_functions[uart_channels] = {7, 8};
 
 constexpr Pin dac_pins[dac_channels] = {{'A', 4}, {'A', 5}};  // A12 A13
 
-// Pulled up.
-constexpr Pin gpio_pins[gpio_channels] = {{'D', 13}, {'B', 4},  {'B', 8},  {'B', 9},
-                                          {'K', 1},  {'J', 10}, {'J', 11}, {'H', 6}};  // D6-D13
+constexpr Pin gpio_pins[gpio_channels] = {{'D', 13}, {'B', 4},  {'B', 8}, {'B', 9}, {'K', 1},
+                                          {'J', 10}, {'J', 11}, {'H', 6}};  // D6-D13, pulled up
 
 // FDCAN2, alternate function 9. The Giga has no transceiver: wire the SN65HVD230 of the R4 board
 // (paper, section 2) to these pins (docs/can.md).

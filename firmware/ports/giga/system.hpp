@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The whole firmware.
-//
 //     System()   starts the watchdog; every output off
 //     boot()     guards against faults, reads the settings (at most 2 s), starts everything else
 //     poll()     one turn of the loop
@@ -28,17 +27,16 @@ class System {
   BoardProgram& board() { return *board_; }  // only after boot()
 
  private:
-  // After this the board starts with default settings.
-  static constexpr std::uint32_t settings_limit_us = 2000000;
+  static constexpr std::uint32_t settings_limit_us = 2000000;  // then the defaults
   struct WatchdogOn {
     WatchdogOn() { Watchdog::start(); }
   };
 
   WatchdogOn watchdog_on_;  // must be first
-  Machine machine_;         // constructed with all outputs off
+  Machine machine_;
   SettingsStore store_;
   alignas(BoardProgram) unsigned char board_place_[sizeof(BoardProgram)];
-  BoardProgram* board_ = nullptr;  // constructed when the settings are known
+  BoardProgram* board_ = nullptr;
 };
 
 }  // namespace giga

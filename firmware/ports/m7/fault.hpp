@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // After a fault the board switches every output off, stores a note and resets.
-//
 //     bus, memory or usage fault; stack overflow    -> Kind::fault
 //     the loop has not fed the watchdog (NMI)       -> Kind::watchdog
 //     halt() after a broken invariant               -> Kind::fault
@@ -30,11 +29,9 @@ void guard(firmware::Hal& hal);
 
 // Returns and deletes the note of the last boot.
 FaultNote take_note();
-// Since power-up.
-std::uint32_t boots();
+std::uint32_t boots();  // since power-up
 
-// Switches all outputs off and resets.
-[[noreturn]] void halt();
+[[noreturn]] void halt();  // switches all outputs off and resets
 
 // Ends the boot `ms` after the last feed_watchdog().
 void start_watchdog(std::uint32_t ms);

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reports each change of the pins on a UART (`tools/m7 --pins`), so that tests need not trust the
-// board's own states.
-//
-// A line has numbers and spaces: the board's time in ms and in us, time of the last datagram in us,
-// time of the last feeding heartbeat in ms, 1 if the chips' pins are safe, then the outputs as in
-// sim::Pins. A change is noted after its transfer, also in interrupts, and sent by the loop. If
-// notes_max notes wait, later changes are left out.
+// board's own states. A line has numbers and spaces: the board's time in ms and in us, time of the
+// last datagram in us, time of the last feeding heartbeat in ms, 1 if the chips' pins are safe,
+// then the outputs as in sim::Pins. A change is noted after its transfer, also in interrupts, and
+// sent by the loop. If notes_max notes wait, later changes are left out.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +21,6 @@ class PinsReport final : public sim::I2cObserver {
  public:
   static constexpr int notes_max = 16;
 
-  // `base` is the UART's address.
   PinsReport(sim::BoardModel& board, BoardClock& clock, const BoardLink& link, std::uint32_t base);
   void start();
 

@@ -10,7 +10,7 @@ namespace {
 
 std::atomic<std::uint32_t> shown_ms{0};  // NOLINT(cppcoreguidelines-avoid-non-const-*)
 // Used by advance() only.
-std::uint32_t counted_us = 0;  // until here shown_ms has counted  NOLINT
+std::uint32_t counted_us = 0;  // shown_ms counts up to this time  NOLINT
 
 }  // namespace
 

@@ -58,8 +58,7 @@ void switch_off_and_reset() {
   reset();
 }
 
-// Exception frame on the stack: r0-r3, r12, lr, pc, psr.
-constexpr int frame_pc = 6;
+constexpr int frame_pc = 6;  // in the exception frame r0-r3, r12, lr, pc, psr
 
 bool is_stack(const std::uint32_t* frame) {
   const auto at = reinterpret_cast<std::uintptr_t>(frame);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // After a fault the board switches every output off, stores a note and resets.
-//
 //     bus, memory or usage fault, hard fault          -> Kind::fault, where and why
 //     the core gives up (mbed error, failed assert)   -> Kind::fault, its status
 //     a stack of the interrupts is full               -> Kind::stack

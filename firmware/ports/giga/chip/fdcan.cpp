@@ -6,7 +6,6 @@ namespace giga {
 
 namespace {
 
-// RM0399, chapter FDCAN: registers.
 constexpr std::uint32_t cccr_init = 1U << 0;
 constexpr std::uint32_t cccr_change =
     1U << 1;  // CCE: settings may change; also discards waiting frames
@@ -49,7 +48,6 @@ constexpr std::uint32_t extended_element(std::uint32_t id, std::uint32_t fifo) {
 }
 constexpr std::uint32_t extended_mask(std::uint32_t mask) { return 2U << 30 | mask; }
 
-// Rx FIFO and Tx buffer elements.
 constexpr std::uint32_t element_extended = 1U << 30;
 constexpr std::uint32_t element_remote = 1U << 29;
 constexpr std::uint32_t element_id_shift = 18;
@@ -206,7 +204,7 @@ Fdcan::Event Fdcan::poll(std::uint32_t now_us) {
   }
   if (bus_off_) {
     if (now_us - bus_off_since_us_ >= bus_off_us) {
-      registers_.CCCR = registers_.CCCR | cccr_change;  // discards waiting frames
+      registers_.CCCR = registers_.CCCR | cccr_change;
       bus_off_ = !set_init(false);
       bus_off_since_us_ = now_us;
       moved_us_ = now_us;

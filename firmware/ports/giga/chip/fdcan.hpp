@@ -60,7 +60,6 @@ class Fdcan {
 
   // Takes the oldest frame, stops first. False: none.
   bool receive(CanFrame& frame);
-  // False: no room.
   bool send(const CanFrame& frame);
   bool send_urgent(const CanFrame& frame);
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Single pins of the STM32H747's ports (RM0399, chapter GPIO).
-//
-// Reads and writes are one access, safe in any interrupt and fault handler. Set-up changes
-// registers that pins share, with interrupts off.
+// Single pins of the STM32H747's ports (RM0399, chapter GPIO). Reads and writes are one access,
+// safe in any interrupt and fault handler. Set-up changes registers that pins share, with
+// interrupts off.
 #pragma once
 
 #include <cstdint>

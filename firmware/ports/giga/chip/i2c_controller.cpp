@@ -8,7 +8,6 @@ using firmware::I2cResult;
 
 namespace {
 
-// RM0399, chapter I2C: registers.
 constexpr std::uint32_t cr1_on = 1U << 0;  // PE; off releases the lines and ends the transfer
 constexpr std::uint32_t cr2_read = 1U << 10;
 constexpr std::uint32_t cr2_start = 1U << 13;

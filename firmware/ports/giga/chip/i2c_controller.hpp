@@ -2,9 +2,7 @@
 // An I2C peripheral of the STM32H747 as master at up to 400 kHz (RM0399, chapter I2C). Fulfils
 // drivers/i2c_bus.hpp: a call waits at most its time on the wire plus i2c_timeout_us. recover() or
 // another transfer may interrupt a transfer, also from a fault handler: the interrupted transfer
-// then returns timeout.
-//
-// The core's library (Wire) waits 36 ms for each byte on a hung bus.
+// then returns timeout. The core's library (Wire) waits 36 ms for each byte on a hung bus.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Work on time, even while the loop waits.
-//
 //     1 kHz    mbed::Ticker   clock, guard, watchdog if the guard allows it; wakes the loop
 //     40 kHz   TIM7           stepper steps, encoder index pins
 //     a stop   MDIOS_IRQn     the guard; uses the interrupt of an unused peripheral
@@ -20,8 +19,7 @@ namespace giga {
 constexpr std::uint32_t step_tick_hz = 40000;
 constexpr std::uint32_t starve_ms = 400;
 
-// The 40 kHz work, in the interrupt.
-class StepTick {
+class StepTick {  // called in the 40 kHz interrupt
  public:
   virtual void step_tick() = 0;
 
@@ -37,13 +35,10 @@ void start_guard_timer(firmware::Guard& guard);
 // after start_guard_timer().
 void stop_at_once();
 
-// TIM7's input clock in Hz.
-std::uint32_t timer_input_hz();
+std::uint32_t timer_input_hz();  // TIM7's input clock
 
-// From any interrupt or thread.
-void wake_loop();
-// Waits until the loop is woken, at most 2 ms.
-void rest();
+void wake_loop();  // from any interrupt or thread
+void rest();       // until the loop is woken, at most 2 ms
 
 }  // namespace giga
 }  // namespace r4

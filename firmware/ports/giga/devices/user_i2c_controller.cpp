@@ -6,7 +6,6 @@ namespace giga {
 
 namespace {
 
-// RM0399, chapter I2C: registers.
 constexpr std::uint32_t cr1_on = 1U << 0;
 constexpr std::uint32_t cr2_read = 1U << 10;
 constexpr std::uint32_t cr2_start = 1U << 13;

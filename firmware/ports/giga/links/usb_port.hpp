@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // USB serial as a port of the application: one datagram a line, and the line `report` for the
-// board.
-//
-// The core's Serial.write() waits for ever if a program opens the port and does not read. So lines
-// go out by send_nb(), one packet at a time, whole or not at all, and the newest state wins
-// (transmit_lines.hpp).
-//
-// An interrupt of low priority takes input from the core and detects a stop while the loop is busy.
-// When its ring is full, more input waits at the host. Only take_in() and listen() may be called
-// outside the loop.
+// board. The core's Serial.write() waits for ever if a program opens the port and does not read. So
+// lines go out by send_nb(), one packet at a time, whole or not at all, and the newest state wins
+// (transmit_lines.hpp). An interrupt of low priority takes input from the core and detects a stop
+// while the loop is busy. When its ring is full, more input waits at the host. Only take_in() and
+// listen() may be called outside the loop.
 #pragma once
 
 #include <cstdint>

@@ -10,7 +10,6 @@ namespace m7 {
 
 namespace {
 
-// CMSDK UART.
 constexpr std::uint32_t data = 0x00;
 constexpr std::uint32_t state = 0x04;
 constexpr std::uint32_t control = 0x08;

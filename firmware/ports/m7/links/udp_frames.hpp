@@ -17,7 +17,6 @@ struct Mac {
   std::uint8_t bytes[6] = {};
 };
 
-// Sender of a datagram.
 struct UdpAddress {
   Mac mac;
   std::uint16_t host = 0;  // host part of the IP address; 0: none
