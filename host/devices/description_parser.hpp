@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads a device description line by line. The first word of a line is its kind:
-//
 //     device NAME                                             once, first
 //     title TEXT
 //     role imu|power|range|angle
@@ -13,8 +12,7 @@
 //           [only VALUE NUMBER]
 //     ready VALUE [NUMBER]
 //
-// '#' starts a comment. BYTES are x and two hexadecimal digits each. S and O are numbers and pi,
-// joined by * and /.
+// '#' starts a comment. BYTES: x and two hex digits for each. S, O: numbers and pi with * and /.
 #pragma once
 
 #include <cstddef>

@@ -33,8 +33,7 @@ struct DeviceStep {
   int slot = 0;                              // i2c_poll, whose count 0 empties it
   std::chrono::milliseconds poll_period{0};  // i2c_poll
   bool is_answered() const { return kind != CommandKind::i2c_poll; }  // by I2CX
-  // Refers to `bytes`.
-  Command command() const;
+  Command command() const;                                            // refers to `bytes`
 };
 
 std::vector<DeviceStep> steps_of(const Device& device);
@@ -42,7 +41,6 @@ std::vector<DeviceStep> steps_of(const Device& device);
 // The longest time of all steps, if each has `timeout`.
 std::chrono::milliseconds longest(const Device& device, std::chrono::milliseconds timeout);
 
-// The problem if the device does not answer, or is another device.
 std::optional<Problem> trouble_with(const Device& device, const DeviceStep& step,
                                     const I2cAnswer& answer);
 

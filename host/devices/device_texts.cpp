@@ -16,8 +16,7 @@ namespace r4 {
 
 namespace {
 
-// "NAME[@ADDRESS[:SLOT]]".
-struct DevicePlace {
+struct DevicePlace {  // NAME[@ADDRESS[:SLOT]]
   std::string name;
   std::optional<int> address;
   std::optional<int> slot;

@@ -12,7 +12,6 @@ struct ShippedDescription {
   std::string_view text;
 };
 
-// Sorted by name.
-extern const std::span<const ShippedDescription> shipped_descriptions;
+extern const std::span<const ShippedDescription> shipped_descriptions;  // sorted by name
 
 }  // namespace r4

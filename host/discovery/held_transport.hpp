@@ -27,8 +27,7 @@ class HeldTransport final : private ShareClient::Owner {
   HeldTransport(asio::io_context& io, FoundBoard& board, std::function<void()> on_news)
       : board_(board), on_news_(std::move(on_news)), client_(io, *this) {}
 
-  // False: no program holds the transport.
-  bool join(const ShareName& name);
+  bool join(const ShareName& name);  // false: no program holds the transport
 
  private:
   void on_message(const ShareMessage& message) override;

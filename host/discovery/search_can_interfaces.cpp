@@ -61,8 +61,7 @@ class NodeQuestion final : private Carrier::Handler {
   bool answered() const { return is_known(board_); }
 
  private:
-  // The carrier sends only after it has heard no other host for the listening time of a new host.
-  // A host is recognised by its datagrams, not by frames.
+  // Busy: another host was heard in the listening time of a new host. Frames alone are no host.
   void ask() {
     if (board_.identity) return;
     const SendResult result = carrier_->send(identity_question(), Priority::normal);
@@ -142,7 +141,7 @@ class BusQuestion {
   asio::io_context& io_;
   SearchedBus bus_;
   std::unique_ptr<CanListener> listener_;
-  std::map<std::uint8_t, FoundBoard> boards_;  // by node
+  std::map<std::uint8_t, FoundBoard> boards_;
   std::map<std::uint8_t, std::unique_ptr<NodeQuestion>> questions_;
 };
 

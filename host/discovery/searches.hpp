@@ -11,7 +11,6 @@
 
 namespace r4 {
 
-// Identity questions on a serial port or CAN bus.
 constexpr std::chrono::milliseconds between_questions{150};
 constexpr int most_questions = 3;
 
@@ -19,7 +18,6 @@ constexpr int most_questions = 3;
 Discovery search_serial_ports(const std::vector<std::string>& besides);
 // Takes 0.7 s, or 1.3 s if a board that was heard does not answer.
 Discovery search_can_interfaces();
-// Takes 0.5 s.
-Discovery search_networks(std::uint16_t port);
+Discovery search_networks(std::uint16_t port);  // takes 0.5 s
 
 }  // namespace r4

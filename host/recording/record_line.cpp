@@ -128,7 +128,6 @@ LineKind read_comment(std::string_view line, RecordLine& out) {
     // A person's comment may begin with the same words.
     if (line.empty() || line[0] < '0' || line[0] > '9') return LineKind::comment;
     RecordedDevice& device = out.device;
-    // The place must be printable.
     return read_of_path(line, device.path, device.place, device.description) &&
                    std::all_of(device.place.begin(), device.place.end(), is_plain)
                ? LineKind::device

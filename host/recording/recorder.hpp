@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The implementation of a Recording. Boards add records from any thread without waiting for the
-// disk; the recorder's thread writes the records.
-//
+// Implements Recording. Boards add records from any thread without waiting for the disk.
 //     record() -- at most 4 MiB --> the writer's thread --> RecordingWriter --> the disk
 //
 // The threads share a lock while a datagram is copied. Times are those of the steady clock, started
@@ -35,7 +33,6 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  // Returns the number of the new path.
   std::uint16_t add_path(std::string url);
   // `name` is that of the path's board.
   void name_path(std::uint16_t path, std::string name);

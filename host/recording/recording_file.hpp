@@ -16,9 +16,8 @@ class RecordingFile {
   // Changes by another program since the file was opened.
   enum class Fate : std::uint8_t { here, moved, removed, truncated };
 
-  // Opens or creates the file and continues an existing recording. Until destruction no other
-  // program can record into it. Throws Error for a file that cannot be written or is not a
-  // recording.
+  // Opens or creates the file and locks it against other programs. Continues a recording. Throws
+  // Error for a file that cannot be written or is not a recording.
   explicit RecordingFile(std::string path);
 
   // Writes all bytes to the disk. If it throws Error, the file is unchanged.

@@ -32,7 +32,7 @@ class RecordingParts {
   };
   std::vector<Part> found() const;  // oldest first
 
-  std::string stem_, ending_;  // of the path
+  std::string stem_, ending_;
   RecordingOptions options_;
   std::uint64_t most_bytes_ = 0;
   std::uint64_t number_ = 0;

@@ -34,8 +34,7 @@ class RecordingWriter {
   // Writes all appended records to the disk. Throws Error. If another program has moved, removed or
   // truncated the file, starts a new file first.
   void flush();
-  // As flush(), and ends the compressed frame.
-  void close();
+  void close();  // as flush(), and ends the compressed frame
 
   const std::string& path() const { return path_; }
   // Why the file was restarted since the last call, if it was. Kind `data`: its content is lost.
@@ -55,9 +54,9 @@ class RecordingWriter {
   std::optional<ZstdWriter> zstd_;
   std::map<std::uint16_t, RecordedPath> paths_;
   std::vector<RecordedDevice> devices_;
-  RecordRoom room_;            // a member to save allocations
-  std::string text_;           // not written yet
-  std::string compressed_;     // a member to save allocations
+  RecordRoom room_;   // a member to save allocations
+  std::string text_;  // not written yet
+  std::string compressed_;
   std::size_t frame_ = 0;      // text in the frame so far
   std::optional<Time> begun_;  // time of this file's first record
 };

@@ -39,7 +39,6 @@ firmware::Application::Config config_of(const Settings& settings, Machine& machi
   return config;
 }
 
-// Sets up FDCAN2. False: the controller does not start.
 bool start_can(Fdcan& fdcan, std::uint8_t node) {
   constexpr std::uint32_t rcc_fdcan_on = 1U << 8;
   constexpr std::uint32_t clock_field = 3U << 28;

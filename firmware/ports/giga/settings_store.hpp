@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Keeps the settings over a restart, as text (settings.hpp) in the core's key-value store on
 // partition 3 of the QSPI flash. Has its own thread, because an erase takes 0.1 s or more.
-//
 //     loading ---> ready     the store works; loaded() returns the settings, if there are any
 //             ---> absent    partition 3 is missing or does not hold a store
 //     avoided                the store ended the last boot, because the core gives up for good

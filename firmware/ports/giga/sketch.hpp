@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The firmware of the R4 board, for a sketch on the Arduino Giga R1 WiFi:
-//
 //     #include <R4Link.h>
 //     void setup() { R4Link.begin(); }
 //     void loop() { R4Link.poll(); }
@@ -22,8 +21,7 @@ namespace giga {
 
 class Sketch {
  public:
-  // Call first in setup(). Returns after about half a second with all outputs off.
-  void begin();
+  void begin();  // first in setup(); takes about 0.5 s, then all outputs are off
   // Call in loop(). One turn of the board, then rests until there is work, at most 2 ms.
   void poll();
 };

@@ -34,8 +34,7 @@ class BoardProgram {
     model_.chips().bus.set_processor(&wire_);
   }
 
-  // Switches the outputs off. Call first.
-  void power_up() {
+  void power_up() {  // first: switches the outputs off
     clock_.start();
     hardware_.power_up();
   }

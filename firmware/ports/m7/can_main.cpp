@@ -21,7 +21,6 @@ Uart link(uart0_base);
 firmware::Guard* watching = nullptr;
 BoardClock* watch = nullptr;
 
-// Instead of a CAN controller.
 struct Controller {
   volatile bool has_received = false;
   CanFrame received;

@@ -43,8 +43,7 @@ Kept& kept_data() {
   return kept;
 }
 
-// Exception frame on the stack.
-struct Frame {
+struct Frame {  // on the stack after an exception
   std::uint32_t r0, r1, r2, r3, r12, lr, pc, psr;
 };
 
@@ -132,7 +131,6 @@ void start_watchdog(std::uint32_t ms) {
 
 void feed_watchdog() { at(watchdog_clear) = 1; }
 
-// Called by r4_exception.
 extern "C" [[noreturn, gnu::used]] void r4_on_exception(const Frame* frame) {
   std::uint32_t exception = 0;
   asm volatile("mrs %0, ipsr" : "=r"(exception));

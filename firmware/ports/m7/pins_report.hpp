@@ -25,8 +25,7 @@ class PinsReport final : public sim::I2cObserver {
   void start();
 
   void on_transfer(const sim::I2cTransfer&) override { look(); }
-  // Call in each turn of the loop.
-  void poll();
+  void poll();  // in each turn of the loop
 
   // In interrupts: a datagram came at `ticks` of the board's clock. The newest counts.
   static void on_datagram(std::uint32_t ticks) {
@@ -58,8 +57,7 @@ class PinsReport final : public sim::I2cObserver {
   Note notes_[notes_max];
   volatile std::uint32_t noted_ = 0;  // so far
   volatile std::uint32_t told_ = 0;
-  // Up to 58 numbers.
-  char line_[58 * (max_number_text + 1)];
+  char line_[58 * (max_number_text + 1)];  // up to 58 numbers
   std::size_t size_ = 0;
   std::size_t sent_ = 0;
 };

@@ -26,8 +26,7 @@ void r4_ethernet();
 namespace r4 {
 namespace m7 {
 
-// Content of unused stack.
-constexpr std::uint32_t untouched = 0xC0FFEE55;
+constexpr std::uint32_t untouched = 0xC0FFEE55;  // in unused stack
 
 // The highest use of the stack from `begin` to `end`, in bytes.
 inline std::uint32_t used_at_most(const std::uint32_t* begin, const std::uint32_t* end) {

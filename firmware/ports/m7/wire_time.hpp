@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Gives the simulated bus real time: a byte takes as long as on a wire, and interrupts come only
-// between bytes.
+// The simulated bus in real time: a byte takes as long as on a wire; no interrupt comes within it.
 #pragma once
 
 #include <cstdint>

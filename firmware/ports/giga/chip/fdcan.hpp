@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // An FDCAN controller of the STM32H747 for classic frames (RM0399, chapter FDCAN). The core's
 // library has no filters, no error state, no recovery from bus-off, and loses frames between polls.
-//
 //     received    emergency stop            -> FIFO 1,  8 frames, the newest stay
 //                 commands to this board,
 //                 watchers' requests        -> FIFO 0, 64 frames: 7 ms of a full bus

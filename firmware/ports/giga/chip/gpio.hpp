@@ -13,8 +13,7 @@
 namespace r4 {
 namespace giga {
 
-// As in the data sheet: PJ8 is {'J', 8}.
-struct Pin {
+struct Pin {  // as in the data sheet: PJ8 is {'J', 8}
   char port;
   std::uint8_t number;
 };
@@ -43,8 +42,7 @@ void make_output(Line line, bool high);
 void make_input(Line line, LinePull pull);
 // Open drain, released, with alternate function `function`. Does not change the mode.
 void prepare_open_drain(Line line, std::uint32_t function);
-// Push-pull for a peripheral.
-void make_alternate(Line line, std::uint32_t function, LinePull pull);
+void make_alternate(Line line, std::uint32_t function, LinePull pull);  // push-pull
 
 class GpioOutput final : public firmware::OutputPin {
  public:

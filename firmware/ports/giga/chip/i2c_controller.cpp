@@ -102,7 +102,6 @@ I2cResult I2cController::wait_until_free(const Transfer& transfer) {
   return I2cResult::ok;
 }
 
-// Ends with STOP, or ready for a repeated START.
 I2cResult I2cController::send(const Transfer& transfer, std::uint8_t address,
                               const std::uint8_t* bytes, std::size_t size, bool then_stop) {
   if (!request(transfer, cr2_for(address, size) | (then_stop ? cr2_then_stop : 0))) {

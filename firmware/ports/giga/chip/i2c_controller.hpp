@@ -32,11 +32,9 @@ class I2cController final : public firmware::I2cBus {
 
   I2cController(const Wiring& wiring, Clock clock);
 
-  // `kernel_hz`: the peripheral's clock, which must be on.
-  void start(std::uint32_t kernel_hz);
+  void start(std::uint32_t kernel_hz);  // the peripheral's clock, already on
 
-  // At most 255 bytes each way; longer transfers return no_acknowledge. An empty write probes the
-  // address.
+  // At most 255 bytes each way, else no_acknowledge. An empty write probes the address.
   firmware::I2cResult write(std::uint8_t address, const std::uint8_t* bytes,
                             std::size_t size) override;
   firmware::I2cResult write_read(std::uint8_t address, const std::uint8_t* out,

@@ -100,8 +100,7 @@ void UserI2cController::receive_step(std::uint32_t status) {
 void UserI2cController::end(Progress result) {
   registers_.ICR = icr_all;
   if (result != Progress::done) {
-    // Off and on, so that a byte left in TXDR is not sent first in the next transfer. Must stay off
-    // for three APB clocks.
+    // Off for three APB clocks, so that a byte left in TXDR is not sent in the next transfer.
     registers_.CR1 = 0;
     for (int i = 0; i < 3; ++i) static_cast<void>(static_cast<std::uint32_t>(registers_.CR1));
     registers_.CR1 = cr1_on;

@@ -23,10 +23,8 @@ class UserI2cController final : public firmware::UserI2cPort {
  public:
   explicit UserI2cController(const I2cController::Wiring& wiring);
 
-  // `kernel_hz`: the peripheral's clock, which must be on.
-  void start(std::uint32_t kernel_hz);
-  // In the step timer's interrupt.
-  void tick() {
+  void start(std::uint32_t kernel_hz);  // the peripheral's clock, already on
+  void tick() {                         // in the step timer's interrupt
     if (stage_ != Stage::idle) step();
   }
 

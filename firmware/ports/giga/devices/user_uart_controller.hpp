@@ -36,10 +36,8 @@ class UserUartController final : public firmware::UserUartPort {
         rx_(line_of(wiring.rx)),
         function_(wiring.function) {}
 
-  // `kernel_hz`: the peripheral's clock, which must be on.
-  void start(std::uint32_t kernel_hz);
-  // In the step timer's interrupt. `sends`: false from the safe state until the loop has handled
-  // it.
+  void start(std::uint32_t kernel_hz);  // the peripheral's clock, already on
+  // In the step timer's interrupt. `sends`: false until the loop has handled a safe state.
   void tick(bool sends) {
     if (runs_) move(sends);
   }

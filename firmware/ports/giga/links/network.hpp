@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // WiFi and UDP on their own thread: joins the network of the settings and carries datagrams between
 // a socket and a UdpLink. Rejoins when the network is lost or the settings change.
-//
 //          settings name a network       joined            lost, or other settings
 //     idle -----------------------> joining -----> up ---------------------------> joining or idle
 //                                      ^   | not joined: again after retry_ms
 //                                      +---+
 //
-// Joining takes up to 7 s. Without WiFi firmware in the flash the library never returns. Its
-// connection status may be wrong for long, so the network is also rejoined after hosts have been
-// silent for quiet_ms. The thread has the lowest priority: if the library spins, it delays no other
-// thread.
+// Joining takes up to 7 s. Without WiFi firmware in the flash the library spins for ever, so the
+// thread has the lowest priority. The library's status may be wrong for long, so the network is
+// also rejoined after hosts have been silent for quiet_ms.
 #pragma once
 
 #include <atomic>
@@ -39,10 +37,8 @@ class Network {
 
   explicit Network(UdpLink& link) : link_(link) {}
 
-  // Call once, from the loop.
-  void start();
-  // Network to join, and port. From the loop, at any time.
-  void use(const SiteSettings& settings);
+  void start();                            // once, from the loop
+  void use(const SiteSettings& settings);  // from the loop, at any time
 
   NetworkState state() const { return state_.load(std::memory_order_relaxed); }
   std::uint32_t ip() const { return ip_.load(std::memory_order_relaxed); }  // the board's; 0: none

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // UDP as a port of the application. WiFi may block its thread for seconds, so loop and thread
 // exchange datagrams through rings without locks.
-//
 //     loop                         network thread
 //     UdpPort::send()     ----->   UdpLink::take()     skips states older than stale_ms
 //     UdpPort::receive()  <-----   UdpLink::give()
@@ -51,7 +50,7 @@ class UdpLink {
   void set_up(bool up) { up_.store(up, std::memory_order_release); }
 
   bool up() const { return up_.load(std::memory_order_acquire); }
-  std::uint32_t lost() const { return lost_.load(std::memory_order_relaxed); }
+  std::uint32_t lost() const { return lost_.load(std::memory_order_relaxed); }  // received
 
  private:
   friend class UdpPort;

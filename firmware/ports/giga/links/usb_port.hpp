@@ -30,8 +30,7 @@ class UsbPort final : public firmware::Port {
 
   // Makes the core call listen() for each packet.
   static void start();
-  // Requests the interrupt that calls take_in() (SWPMI1_IRQn, of an unused peripheral). From
-  // anywhere.
+  // Requests the interrupt for take_in(): SWPMI1_IRQn, otherwise unused. From anywhere.
   static void listen();
   // In that interrupt. True: E:STOP was received.
   bool take_in();

@@ -37,14 +37,12 @@ class BoardClock {
     advance();
     return ms_;
   }
-  // Wraps after 71 minutes.
-  std::uint32_t now_us() {
+  std::uint32_t now_us() {  // wraps after 71 minutes
     const InterruptsHeld held;
     advance();
     return ms_ * 1000 + rest_ / ticks_per_us;
   }
-  // Counts up and wraps.
-  static std::uint32_t ticks() { return ~at(timer0_base + value); }
+  static std::uint32_t ticks() { return ~at(timer0_base + value); }  // counts up, wraps
   static constexpr std::uint32_t ticks_per_us = clock_hz / 1000000;
 
  private:

@@ -46,7 +46,6 @@ inline void disable(Irq irq) {
   at(nvic_disable) = 1U << static_cast<unsigned>(irq);
   at(nvic_forget) = 1U << static_cast<unsigned>(irq);
 }
-// Makes the interrupt happen.
 inline void pend(Irq irq) { at(nvic_pend) = 1U << static_cast<unsigned>(irq); }
 // Lowest priority: all other interrupts may interrupt this handler.
 inline void give_way(Irq irq) {

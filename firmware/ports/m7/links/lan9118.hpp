@@ -18,15 +18,12 @@ class Lan9118 {
   bool start();
   Mac mac();
 
-  // Acknowledges the interrupt.
-  static void on_interrupt();
+  static void on_interrupt();  // acknowledges the interrupt
 
   bool has_received() const;
-  // Stores the next frame without its check sequence into `frame` of max_frame bytes. 0: none, or
-  // damaged.
+  // Reads a frame without check sequence into `frame` of max_frame bytes. 0: none, or damaged.
   std::size_t receive(std::uint32_t* frame);
-  // False: no room.
-  bool send(const std::uint32_t* frame, std::size_t size);
+  bool send(const std::uint32_t* frame, std::size_t size);  // false: no room
 
  private:
   bool on_ = false;

@@ -32,8 +32,7 @@ class Uart final : public firmware::Port {
     return stop;
   }
 
-  // Calls `on_datagram(Text)` for each line. At most receive_capacity bytes, so that a flood of
-  // input does not delay the loop.
+  // Calls `on_datagram(Text)` for each line. Takes at most receive_capacity bytes of a flood.
   template <class OnDatagram>
   void receive(OnDatagram&& on_datagram) {
     char chunk[64];

@@ -43,8 +43,7 @@ class UdpPort final : public firmware::Port {
     return stop;
   }
 
-  // Calls `on_datagram(peer, Text)` for each datagram, at most frames_max, so that a flood of input
-  // does not delay the loop.
+  // Calls `on_datagram(peer, Text)` for each datagram. Takes at most frames_max of a flood.
   template <class OnDatagram>
   void receive(OnDatagram&& on_datagram) {
     for (std::uint32_t i = 0; i < frames_max && has_received(); ++i) {
