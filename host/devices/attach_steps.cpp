@@ -93,7 +93,7 @@ class AsyncBoard::AttachSteps final : public Impl::Sequence {
   const std::vector<DeviceStep> steps_;
   const Time timeout_;  // of each step
   const std::uint32_t boots_ = impl_.boots;
-  Time deadline_{0};  // of the current step
+  Time deadline_{0};
   std::size_t done_ = 0;
   Stage stage_ = Stage::command;
   std::string fields_;

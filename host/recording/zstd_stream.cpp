@@ -24,8 +24,7 @@ constexpr int frame_window_log = 20;
 // Bytes read at once. Damage may also cost the undamaged bytes of a slice.
 constexpr std::size_t slice = 512;
 
-// The bytes before a possible next frame, at least one, because a frame without an end is read
-// whole.
+// The bytes before a possible next frame; at least one, because an endless frame is read whole.
 std::string_view until_a_frame(std::string_view bytes) {
   std::size_t size = std::min(bytes.size(), bytes.find(magic, 1));
   for (std::size_t left = 1; left < magic.size() && size == bytes.size() && left < size; ++left) {

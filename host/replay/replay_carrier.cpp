@@ -89,7 +89,6 @@ class ReplayCarrier final : public Carrier {
     timer_.async_wait(playing_.handler([this] { play(); }));
   }
 
-  // Plays due records for one turn of the loop.
   void play() {
     const SteadyTime now = std::chrono::steady_clock::now();
     for (int i = 0; i < steps_in_a_turn && handler_ != nullptr; ++i) {

@@ -16,8 +16,7 @@
 
 namespace r4 {
 
-// Throws Error{usage} for a wrong URL. open() throws Error for a file that is not a recording, or
-// does not have the path.
+// Throws Error{usage} for a wrong URL. open() throws Error for an invalid file or a missing path.
 std::unique_ptr<Carrier> make_replay_carrier(asio::io_context& io, const Url& url, Role role);
 
 }  // namespace r4

@@ -16,8 +16,7 @@ struct ReplayStart {
   Time time{0};           // after the first record, or
   bool absolute = false;  // by the clock of the recording
 
-  // Seconds such as "12.5", or UTC such as "2026-11-23T21:20:00". Throws Error{usage} about
-  // `thing`.
+  // Seconds "12.5", or UTC "2026-11-23T21:20:00". Throws Error{usage} about `thing`.
   static ReplayStart of(const std::string& thing, const std::string& text);
 };
 

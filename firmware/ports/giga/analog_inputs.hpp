@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The six analog inputs. Each poll starts one conversion, of one input after the other. Never
-// waits; from the loop only. The core sets up the pins and the converter and reads each input once.
-// Then this class works with the registers of ADC1 (RM0399, chapter ADC), because the core waits up
-// to 10 ms for a conversion and ends the boot (error()) if the converter does not switch on. Here a
-// dead converter reads 0, and the motors can still be driven.
+// The six analog inputs, converted in turn, one per poll. Never waits; from the loop only. The core
+// sets up pins and converter and reads each input once. Then this class uses the registers of ADC1
+// (RM0399, chapter ADC). The core would wait up to 10 ms for a conversion, and end the boot if the
+// converter does not switch on. Here a dead converter reads 0, and motors can still be driven.
 #pragma once
 
 #include <cstdint>

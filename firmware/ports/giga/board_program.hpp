@@ -58,7 +58,7 @@ class BoardProgram {
   std::uint32_t changed_ms_ = 0;
   SafeReason last_boot_;
   char report_line_[BootReport::max_line];
-  Text waiting_line_;  // of the report; waits until USB has room
+  Text waiting_line_;
   std::uint8_t usb_number_ = 0;
   std::uint8_t udp_number_ = 0;
   std::uint8_t can_number_ = 0;

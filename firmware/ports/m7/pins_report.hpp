@@ -55,7 +55,7 @@ class PinsReport final : public sim::I2cObserver {
   const std::uint32_t base_;
   sim::Pins last_;
   Note notes_[notes_max];
-  volatile std::uint32_t noted_ = 0;  // so far
+  volatile std::uint32_t noted_ = 0;
   volatile std::uint32_t told_ = 0;
   char line_[58 * (max_number_text + 1)];  // up to 58 numbers
   std::size_t size_ = 0;

@@ -16,7 +16,7 @@ namespace giga {
 
 struct DatagramNote {
   std::uint32_t peer = everyone;
-  std::uint32_t time_ms = 0;  // when it was put
+  std::uint32_t time_ms = 0;
   Priority priority = Priority::normal;
 };
 

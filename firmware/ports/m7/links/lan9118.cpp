@@ -34,7 +34,7 @@ constexpr std::uint32_t receive_error = 1U << 15;
 constexpr std::uint32_t mac_control = 1;
 constexpr std::uint32_t mac_high = 2;
 constexpr std::uint32_t mac_low = 3;
-constexpr std::uint32_t mac_on = 0xC;  // both directions
+constexpr std::uint32_t mac_on = 0xC;
 constexpr std::uint32_t busy = 1U << 31;
 constexpr std::uint32_t reading = 1U << 30;
 
