@@ -5,7 +5,6 @@
 //     r4 send serial:auto C:password,MyPassword
 //
 // Send the line `report` in the serial monitor to see the board's condition (docs/firmware.md).
-// and the line `report` in the serial monitor tells how the board is. See docs/firmware.md.
 #include <R4Link.h>
 
 void setup() { R4Link.begin(); }
