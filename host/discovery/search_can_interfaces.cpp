@@ -61,7 +61,7 @@ class NodeQuestion final : private Carrier::Handler {
   bool answered() const { return is_known(board_); }
 
  private:
-  // Busy: another host was heard in the listening time of a new host. Frames alone do not show a host.
+  // Busy: another host was heard in the listening time of a new host, by its datagrams.
   void ask() {
     if (board_.identity) return;
     const SendResult result = carrier_->send(identity_question(), Priority::normal);
