@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// AsyncBoard::async_attach(): sets a device up, one step after the other.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,12 +12,11 @@
 
 namespace r4 {
 
-// The steps of a device, then its fields. The user's handler gets the result of the last one. A
-// failure ends it:
-//
-//     command --confirmed--> answer --comes, as described--> pause --over--> the next command
-//        |                                                                       ^
-//        +---- confirmed, of one without an answer (X:POLL, F) ------------------+
+// Sends the steps of a device, then its fields. The user's handler gets the last result, or the
+// first failure:
+//     command --confirmed--> answer --as described--> pause --over--> next command
+//        |                                                                ^
+//        +---- confirmed, without an answer (X:POLL, F) ------------------+
 class AsyncBoard::AttachSteps final : public Impl::Sequence {
  public:
   AttachSteps(Impl& impl, Device device, Time timeout, CompletionPtr completion)
@@ -30,7 +28,6 @@ class AsyncBoard::AttachSteps final : public Impl::Sequence {
   }
   ~AttachSteps() override { std::erase(impl_.attaching, &device_); }
 
-  // Sends the command of the current step.
   void begin() {
     stage_ = Stage::command;
     const auto send = [this] {
@@ -43,7 +40,7 @@ class AsyncBoard::AttachSteps final : public Impl::Sequence {
   void complete(const CommandResult& result, How how) override {
     if (result.outcome != Outcome::confirmed) return fail(result, how);
     CommandResult failure = result;
-    if (impl_.boots != boots_) {  // it has forgotten the steps that were done
+    if (impl_.boots != boots_) {  // the board has lost the steps before
       failure.outcome = Outcome::cancelled;
       return fail(failure, how);
     }
@@ -67,7 +64,7 @@ class AsyncBoard::AttachSteps final : public Impl::Sequence {
       case Stage::pause:
         break;
     }
-    if (!has_step()) return end(result, how);  // the fields were the last
+    if (!has_step()) return end(result, how);  // after the fields
     if (++done_ == steps_.size()) {
       impl_.describe(device_);
       fields_ = fields_with(impl_.session.fields(), device_);
@@ -94,9 +91,9 @@ class AsyncBoard::AttachSteps final : public Impl::Sequence {
 
   const Device device_;
   const std::vector<DeviceStep> steps_;
-  const Time timeout_;  // of each
+  const Time timeout_;  // of each step
   const std::uint32_t boots_ = impl_.boots;
-  Time deadline_{0};  // of the current step
+  Time deadline_{0};
   std::size_t done_ = 0;
   Stage stage_ = Stage::command;
   std::string fields_;
@@ -105,8 +102,6 @@ class AsyncBoard::AttachSteps final : public Impl::Sequence {
 void AsyncBoard::start_attach(const Device& device, Duration timeout, CompletionPtr completion) {
   (new AttachSteps(*impl_, device, Impl::time_of(timeout), std::move(completion)))->begin();
 }
-
-// --- the slots
 
 namespace {
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The sources of descriptions: the library itself, and files of the user.
 #include <fmt/format.h>
 
 #include <cerrno>
@@ -17,7 +16,7 @@ namespace r4 {
 namespace {
 
 std::string read_description(const std::string& path) {
-  // One byte more than the limit, so that parse() refuses a longer or endless file.
+  // One byte more than the limit, so that parse() rejects a longer or endless file.
   std::string text(DeviceDescription::max_text + 1, '\0');
   errno = 0;
   std::ifstream file(path, std::ios::binary);

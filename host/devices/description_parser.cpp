@@ -22,7 +22,7 @@ constexpr std::size_t longest_name = 32;
 constexpr std::size_t longest_unit = 16;
 constexpr std::size_t most_addresses = 16;
 constexpr int longest_wait_ms = 5000;
-constexpr double largest_factor = 1e30;  // and the inverse of the smallest: within a float's range
+constexpr double largest_factor = 1e30;  // its inverse is the smallest; both fit a float
 
 std::string_view trimmed(std::string_view line) {
   constexpr std::string_view blanks = " \t\r";
@@ -45,7 +45,7 @@ bool is_printable(std::string_view text) {
   return std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c <= '~'; });
 }
 
-// Reads "u8", "i16be". False if there is no such type.
+// Reads "u8", "i16be". False: not a valid type.
 bool read_type(std::string_view word, DeviceValue& value) {
   if (word.size() < 2 || (word[0] != 'u' && word[0] != 'i')) return false;
   value.is_signed = word[0] == 'i';

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The text of a device description, line by line. The first word of a line is its kind:
-//
+// Reads a device description line by line. The first word of a line is its kind:
 //     device NAME                                             once, first
 //     title TEXT
 //     role imu|power|range|angle
@@ -13,8 +12,7 @@
 //           [only VALUE NUMBER]
 //     ready VALUE [NUMBER]
 //
-// '#' begins a comment. Bytes are x and two hexadecimal digits each; S and O are numbers and pi,
-// joined by * and /.
+// '#' starts a comment. BYTES: x and two hex digits for each. S, O: numbers and pi with * and /.
 #pragma once
 
 #include <cstddef>
@@ -61,7 +59,7 @@ class DescriptionParser {
   [[noreturn]] void fail(const std::string& reason, const std::string& fix) const;
 
   std::string source_;
-  int line_ = 0;  // 0: something is missing in all lines
+  int line_ = 0;  // 0: the error is in no single line
   DeviceDescription result_;
 };
 

@@ -15,13 +15,12 @@ namespace r4 {
 
 namespace {
 
-// The reading of the slot that has the value.
 const I2cReading& read_for(const Device& device, const State& state, std::size_t value) {
   const std::size_t poll = device.description().values[value].poll;
   return state.raw.i2c[static_cast<std::size_t>(device.first_slot() - 1) + poll];
 }
 
-// True if the value is `number`, but for the rounding of its scale.
+// True if the value is `number` within rounding of its scale.
 bool is_number(const Device& device, const State& state, std::size_t value, double number) {
   const auto is = device.reading(state, value).number;
   const double step = std::abs(device.description().values[value].scale);
@@ -92,7 +91,7 @@ bool Device::counts(const State& state, std::size_t value) const {
 DeviceReading Device::reading(const State& state, std::size_t value) const {
   const DeviceValue& each = description_.values[value];
   const I2cReading& read = read_for(*this, state, value);
-  // A reading of another length is of another device.
+  // A reading of another length belongs to another device.
   const bool whole = read.data.size == description_.polls[each.poll].count;
   return {
       whole && counts(state, value) ? each.decode(read.data.bytes, read.data.size) : std::nullopt,

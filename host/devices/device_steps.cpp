@@ -38,8 +38,8 @@ std::vector<DeviceStep> steps_of(const Device& device) {
   for (const DeviceWrite& write : description.writes) {
     add(CommandKind::i2c_write, write.bytes).wait = write.wait;
     if (&write != &description.writes.front()) continue;
-    // A reading during the set-up is not a measurement, so the slots are empty until its end. They
-    // are emptied after the first write, which shows that the device may be set up.
+    // Empty the slots until the set-up ends, because a reading during it is not a measurement. The
+    // first write has shown that the device may be set up.
     for (int slot = device.first_slot(); slot <= device.last_slot(); ++slot) {
       add(CommandKind::i2c_poll, {}).slot = slot;
     }

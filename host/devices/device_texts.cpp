@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Devices in text form: NAME@ADDRESS:SLOT.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,8 +16,7 @@ namespace r4 {
 
 namespace {
 
-// The parts of "NAME[@ADDRESS[:SLOT]]".
-struct DevicePlace {
+struct DevicePlace {  // NAME[@ADDRESS[:SLOT]]
   std::string name;
   std::optional<int> address;
   std::optional<int> slot;

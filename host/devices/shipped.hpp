@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The descriptions that are shipped: host/devices/*.device, which CMake puts into the library.
+// The shipped descriptions: CMake puts host/devices/*.device into the library.
 #pragma once
 
 #include <span>
@@ -12,7 +12,6 @@ struct ShippedDescription {
   std::string_view text;
 };
 
-// In the order of their names.
-extern const std::span<const ShippedDescription> shipped_descriptions;
+extern const std::span<const ShippedDescription> shipped_descriptions;  // sorted by name
 
 }  // namespace r4

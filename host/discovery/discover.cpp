@@ -28,7 +28,7 @@ std::string_view scheme_of(const FoundBoard& board) {
   return std::string_view(board.url).substr(0, board.url.find(':'));
 }
 
-// True if all of them are one board, which each transport has found once.
+// True if all are one board, found once by each transport.
 bool are_one(const std::vector<FoundBoard>& boards) {
   std::set<std::string_view> schemes;
   return std::all_of(boards.begin(), boards.end(), [&](const FoundBoard& each) {

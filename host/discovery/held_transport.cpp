@@ -8,7 +8,7 @@
 namespace r4 {
 
 void take(FoundBoard& board, IdentityAnswer answer) {
-  // The answer to the holder's question says that no other host controls the board.
+  // An answer to the holder says that no other host is in control.
   if (!board.holder_controls) board.busy = answer.busy;
   board.identity = std::move(answer);
 }

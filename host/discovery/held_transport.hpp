@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Listens beside a program of this computer that holds a transport, as a program that watches. It
-// sends nothing to the board (docs/sharing.md).
+// Watches a board through another program of this computer that holds the transport. Sends nothing
+// to the board (docs/sharing.md).
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -14,22 +14,20 @@
 
 namespace r4 {
 
-// Puts the board's answer into `board`.
 void take(FoundBoard& board, IdentityAnswer answer);
 
-// True if the board and the program that holds the transport have answered.
+// True if the board and the holder of the transport have answered.
 inline bool is_known(const FoundBoard& board) {
   return board.identity && (!board.holder || !board.holder->name.empty());
 }
 
 class HeldTransport final : private ShareClient::Owner {
  public:
-  // `board` gets its holder, and its identity when the board reports it: then `on_news` is called.
+  // Fills in the holder and the identity of `board`. Calls `on_news` when the identity arrives.
   HeldTransport(asio::io_context& io, FoundBoard& board, std::function<void()> on_news)
       : board_(board), on_news_(std::move(on_news)), client_(io, *this) {}
 
-  // False: no program holds it.
-  bool join(const ShareName& name);
+  bool join(const ShareName& name);  // false: no program holds the transport
 
  private:
   void on_message(const ShareMessage& message) override;

@@ -27,13 +27,13 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// A board without a host sends a heartbeat twice a second, a board with a host its states.
+// A board sends heartbeats twice a second without a host, states with a host.
 constexpr milliseconds listening{700};
-// A host asks each second who its board is.
+// A host asks for its board's identity each second.
 constexpr milliseconds longest{1300};
 constexpr milliseconds look_again{20};
 
-// One board that was heard: asked who it is, unless a host controls it.
+// Asks one board for its identity, unless a host controls it.
 class NodeQuestion final : private Carrier::Handler {
  public:
   NodeQuestion(asio::io_context& io, FoundBoard& board)
@@ -45,25 +45,23 @@ class NodeQuestion final : private Carrier::Handler {
       carrier_->open(*this);
       ask();
     } catch (const Error&) {
-      carrier_.reset();  // the interface has gone, which its listener reports
+      carrier_.reset();  // the interface is gone; its listener reports that
     }
   }
   ~NodeQuestion() {
     if (carrier_) carrier_->close();
   }
-  // What was heard on the bus counts for more than what the board answered.
+  // Frames on the bus outweigh the board's answer.
   void end() {
     if (other_host_) board_.busy = true;
   }
-  // What the board sends to any host.
   void hear(Text bytes) {
     if (auto answer = read_identity_answer(bytes)) take(board_, std::move(*answer));
   }
   bool answered() const { return is_known(board_); }
 
  private:
-  // The carrier sends when it has heard no other host for as long as a new host listens.
-  // Whether the frames are a host's is seen by the datagrams that they make.
+  // Busy: another host was heard in the listening time of a new host, by its datagrams.
   void ask() {
     if (board_.identity) return;
     const SendResult result = carrier_->send(identity_question(), Priority::normal);
@@ -76,7 +74,7 @@ class NodeQuestion final : private Carrier::Handler {
       if (!error) ask();
     });
   }
-  void on_datagram(std::string_view, Peer) override {}  // the bus's listener hears it, too
+  void on_datagram(std::string_view, Peer) override {}  // the listener of the bus hears it too
   void on_carrier_event(const CarrierEvent&) override {}
 
   FoundBoard& board_;
@@ -84,10 +82,9 @@ class NodeQuestion final : private Carrier::Handler {
   std::unique_ptr<Carrier> carrier_;
   asio::steady_timer timer_;
   int asked_ = 0;
-  bool other_host_ = false;  // a host that is not the holder was heard
+  bool other_host_ = false;  // other than the holder
 };
 
-// One interface, while it is listened to.
 class BusQuestion {
  public:
   BusQuestion(asio::io_context& io, const CanInterface& interface) : io_(io) {
@@ -109,7 +106,7 @@ class BusQuestion {
     listener_->survey().on_datagram(
         [this](std::uint8_t node, const Datagram& datagram) { hear(node, datagram.bytes()); });
   }
-  // A board of which only damaged datagrams were heard is a board, too.
+  // Also adds boards of which only damaged datagrams were heard.
   void put_into(Discovery& found) {
     for (const auto& [node, question] : questions_) question->end();
     for (std::uint8_t node = 0; listener_ && node < can_nodes; ++node) {
@@ -144,7 +141,7 @@ class BusQuestion {
   asio::io_context& io_;
   SearchedBus bus_;
   std::unique_ptr<CanListener> listener_;
-  std::map<std::uint8_t, FoundBoard> boards_;  // by their nodes
+  std::map<std::uint8_t, FoundBoard> boards_;
   std::map<std::uint8_t, std::unique_ptr<NodeQuestion>> questions_;
 };
 

@@ -26,7 +26,6 @@ namespace {
 // A program that has the port open asks each second.
 constexpr std::chrono::milliseconds patience{1300};
 
-// One port, while it is asked.
 class PortQuestion final : private Carrier::Handler {
  public:
   PortQuestion(asio::io_context& io, const SerialPort& port, std::function<void()> on_done)
@@ -64,8 +63,7 @@ class PortQuestion final : private Carrier::Handler {
   }
   bool done() const { return done_; }
 
-  // A port without the USB id of a board has a board if that says so, or if a program of R4 link
-  // holds it.
+  // A port without a board's USB id has a board if the board answers or a program holds the port.
   void put_into(Discovery& found) const {
     found.ports.push_back(port_);
     if (port_.is_r4 || board_.identity || board_.holder) found.boards.push_back(board_);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The search of each transport, for discover() (r4link/discovery/discover.hpp). Each blocks, and
-// returns the boards and the places of its transport.
+// The search of each transport for discover(). Each blocks, then returns boards and places.
 #pragma once
 
 #include <chrono>
@@ -12,15 +11,13 @@
 
 namespace r4 {
 
-// How a board on a serial port or a CAN bus is asked who it is.
 constexpr std::chrono::milliseconds between_questions{150};
 constexpr int most_questions = 3;
 
-// `besides`: the paths of ports to ask whatever their USB id is. Takes 1.3 s at most.
+// Asks ports with a board's USB id, and `besides` whatever their USB id is. Takes at most 1.3 s.
 Discovery search_serial_ports(const std::vector<std::string>& besides);
-// Takes 0.7 s, and 1.3 s if a board that was heard has not said who it is.
+// Takes 0.7 s, or 1.3 s if a board that was heard does not answer.
 Discovery search_can_interfaces();
-// Takes 0.5 s.
-Discovery search_networks(std::uint16_t port);
+Discovery search_networks(std::uint16_t port);  // takes 0.5 s
 
 }  // namespace r4

@@ -25,7 +25,7 @@ constexpr std::string_view header_words = "# r4log ";
 constexpr std::string_view path_words = "# path ";
 constexpr std::string_view device_words = "# device ";
 constexpr std::string_view hex_digits = "0123456789abcdef";
-constexpr std::string_view kind_marks = "<>!";  // of each RecordKind
+constexpr std::string_view kind_marks = "<>!";  // in the order of RecordKind
 
 constexpr Time end_of_time =
     sys_days{year_month_day{std::chrono::year{9999}, std::chrono::month{12}, std::chrono::day{31}}}
@@ -45,7 +45,7 @@ void append(std::string& out, std::string_view bytes, bool escapes_blanks) {
   }
 }
 
-// "# path 1 WORD". A blank separates words, so a blank in a word is escaped.
+// "# path 1 WORD". Escapes spaces, which separate words.
 void append_of_path(std::string& out, std::string_view words, std::uint16_t path,
                     std::string_view word) {
   out.append(words).append(std::to_string(path)) += ' ';
@@ -119,15 +119,15 @@ LineKind read_comment(std::string_view line, RecordLine& out) {
     if (!read_of_path(line, out.path.number, out.path.url, out.path.name)) {
       return damaged(out, "no path is written so");
     }
-    // A name becomes a cell, a topic or a label elsewhere, so only a valid board name is kept.
+    // Keeps only a valid board name, because names become cells, topics or labels elsewhere.
     if (!is_board_id(Text(out.path.name))) out.path.name.clear();
     return LineKind::path;
   }
   if (line.starts_with(device_words)) {
     line.remove_prefix(device_words.size());
-    if (line.empty() || line[0] < '0' || line[0] > '9') return LineKind::comment;  // of a person
+    // A person's comment may begin with the same words.
+    if (line.empty() || line[0] < '0' || line[0] > '9') return LineKind::comment;
     RecordedDevice& device = out.device;
-    // The place is shown as it is.
     return read_of_path(line, device.path, device.place, device.description) &&
                    std::all_of(device.place.begin(), device.place.end(), is_plain)
                ? LineKind::device
@@ -248,8 +248,7 @@ std::string record_time_text(Time time) {
                      clock.minutes().count(), clock.seconds().count(), clock.subseconds().count());
 }
 
-// The time that is read is written again, and must give the same text: so every wrong character and
-// every number out of range is found.
+// Writes the result again and compares, which finds every invalid character and number.
 std::optional<Time> read_record_time(std::string_view text) {
   constexpr std::string_view form = "0000-00-00T00:00:00.000000Z";
   constexpr std::size_t whole_seconds = 19;

@@ -16,13 +16,13 @@
 namespace r4 {
 namespace {
 
-// A crash loses less than a second: the records of this time, and of the time that the disk takes.
+// A crash loses the records of this time and of the disk's delay: less than a second.
 constexpr std::chrono::milliseconds interval{250};
-// The smallest change of the wall clock that is recorded; smaller ones are added up.
+// The smallest change of the wall clock to record. Smaller changes add up.
 constexpr Time clock_step{std::chrono::milliseconds{100}};
 
-// Blocks all signals in this thread: they are for the program's own threads. SIGXFSZ, of a file
-// that reaches the limit of its size, comes to the thread that writes, and would end the program.
+// Blocks all signals in this thread, because they are for the program's threads. SIGXFSZ (file size
+// limit) comes to the writing thread and would end the program.
 class NoSignals {
  public:
   NoSignals() {
@@ -172,8 +172,7 @@ void Recorder::report(const Problem& trouble, bool is_problem) {
   ++news_count_;
 }
 
-// Writes the records of times up to written_until_. The others wait, because records of earlier
-// times may still come.
+// Writes records up to written_until_. Newer records wait, because earlier ones may still come.
 void Recorder::write() {
   order_.clear();
   put_in_order(unsettled_);
@@ -212,7 +211,7 @@ void Recorder::record_dropped() {
   recorded_dropped_ = all;
 }
 
-// A moved file is no problem(): nothing of it is lost.
+// A moved file is not a problem(), because nothing is lost.
 void Recorder::record_new_file() {
   const std::optional<Problem> trouble = writer_.take_trouble();
   if (!trouble) return;

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The implementation of a Recording. Boards add records from any thread and without waiting; a
-// thread of the recorder writes them.
+// Implements Recording. Boards add records from any thread without waiting for the disk.
+//     record() -- at most 4 MiB --> the writer's thread --> RecordingWriter --> the disk
 //
-//     record() -- 4 MiB at most --> the writer's thread --> RecordingWriter --> the disk
-//
-// The threads share a lock for as long as it takes to copy a datagram. Times are those of the
-// steady clock, which starts at the wall clock's time. So no record moves when the wall clock is
-// set; the recording has an event about that.
+// The threads share a lock while a datagram is copied. Times are those of the steady clock, started
+// at the wall clock's time. If the wall clock is set, no record moves; an event reports the change.
 #pragma once
 
 #include <atomic>
@@ -27,7 +24,7 @@
 
 namespace r4 {
 
-// It has more than 15 members: they are grouped by the thread that may touch them.
+// More than 15 members, grouped by the thread that may touch them.
 class Recorder {
  public:
   // Opens the file. Throws Error.
@@ -36,15 +33,12 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  // Returns the number of the new path.
   std::uint16_t add_path(std::string url);
-  // The name of the board of that path.
+  // `name` is that of the path's board.
   void name_path(std::uint16_t path, std::string name);
-  // A described device of the board of a path.
   void add_device(RecordedDevice device);
-  // Copies `bytes`, at most max_record_bytes. Allocates nothing. `at`: the record's time by the
-  // steady clock. Records are written in the order of their times if each comes at most `settled`
-  // after its time.
+  // Copies `bytes`, at most max_record_bytes, without allocating. `at` is by the steady clock.
+  // Records are written in order of time if each arrives at most `settled` after its time.
   void record(std::uint16_t path, RecordKind kind, std::string_view bytes, Time at);
   void record(std::uint16_t path, RecordKind kind, std::string_view bytes) {
     record(path, kind, bytes, steady_now());
@@ -53,11 +47,11 @@ class Recorder {
   // Writes all waiting records and ends the file.
   void close();
 
-  // True if it records no longer. Takes no lock, because it is asked for every datagram.
+  // True if the recording has ended. Takes no lock, because it is called for every datagram.
   bool ended() const { return ended_.load(std::memory_order_acquire); }
   std::optional<Problem> problem() const;
-  // Reports that the file was begun anew, or that the recording has ended by itself. `known`: the
-  // count of news that the caller knows already; it is updated.
+  // Reports that the file was restarted, or that the recording has ended by itself. `known`: the
+  // news count that the caller has seen; updated.
   std::optional<Problem> news(unsigned& known) const;
   unsigned news_count() const { return news_count_.load(std::memory_order_acquire); }
   std::uint64_t records() const { return records_; }
@@ -67,7 +61,7 @@ class Recorder {
   static constexpr std::chrono::milliseconds settled{50};
 
  private:
-  // Stands before each record's bytes in the buffer.
+  // Precedes each record's bytes in the buffer.
   struct Head {
     Time time;
     std::uint32_t size;
@@ -92,13 +86,13 @@ class Recorder {
   void record_new_file();
   void report(const Problem& trouble, bool is_problem);
 
-  // Of the writer's thread.
+  // Used by the writer's thread.
   RecordingWriter writer_;
   std::vector<char> batch_;
-  std::vector<char> unsettled_;  // records so new that earlier ones may follow
+  std::vector<char> unsettled_;  // so new that earlier records may follow
   std::vector<Place> order_;
   Time written_until_{0};
-  Time recorded_clock_{0};  // by how much the wall clock was set, as the recording has it
+  Time recorded_clock_{0};  // recorded change of the wall clock
   std::uint64_t recorded_dropped_ = 0;
   const Time began_;  // by the wall clock
   const Time began_steady_ = steady_now();
@@ -106,7 +100,7 @@ class Recorder {
   std::atomic<bool> ended_{false};
   std::atomic<unsigned> news_count_{0};
   std::atomic<std::uint64_t> records_{0}, dropped_{0};
-  mutable std::mutex mutex_;  // of the members below, to joining_
+  mutable std::mutex mutex_;  // for the members down to joining_
   std::condition_variable wanted_;
   std::vector<char> waiting_;
   std::vector<RecordedPath> paths_;
@@ -114,7 +108,7 @@ class Recorder {
   std::vector<RecordedDevice> undeclared_devices_;
   bool closing_ = false;
   std::optional<Problem> problem_;
-  std::optional<Problem> news_;  // the newest
+  std::optional<Problem> news_;
 
   std::mutex joining_;
   std::thread thread_;

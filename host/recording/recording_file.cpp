@@ -37,8 +37,8 @@ Error cannot_be_read(const std::string& path, int error) {
           denied ? "allow reading it: chmod +r" : "name a recording, or - for standard input"};
 }
 
-// False if another program has locked the file. A file system without locks, such as some network
-// file systems, always grants the lock.
+// False if another program has locked the file. Always true on a file system without locks, such as
+// some network file systems.
 bool lock_alone(int file) {
   while (::flock(file, LOCK_EX | LOCK_NB) != 0) {
     if (errno != EINTR) return errno != EWOULDBLOCK;
@@ -50,7 +50,7 @@ bool lock_alone(int file) {
 
 RecordingFile::RecordingFile(std::string path) : path_(std::move(path)) {
   struct stat status {};
-  // A device is not even opened: a terminal may lead to a board.
+  // Do not even open a device: a terminal may lead to a board.
   if (::stat(path_.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
     throw Error(ErrorKind::open, path_, S_ISDIR(status.st_mode) ? "is a directory" : "is no file",
                 "name a file that can be written");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes and reads the files of recordings. The calls block while the disk is slow.
+// Writes and reads recordings. Calls block while the disk is slow.
 #pragma once
 
 #include <array>
@@ -11,25 +11,23 @@
 
 namespace r4 {
 
-// The file that a recording is written to.
 class RecordingFile {
  public:
-  // What another program has done to the file since it was opened.
+  // Changes by another program since the file was opened.
   enum class Fate : std::uint8_t { here, moved, removed, truncated };
 
-  // Opens or creates the file; an existing recording is continued at its end. No other program can
-  // record into it until this object is destroyed. Throws Error for a file that cannot be written,
-  // or that holds something else.
+  // Opens or creates the file and locks it against other programs. Continues a recording. Throws
+  // Error for a file that cannot be written or is not a recording.
   explicit RecordingFile(std::string path);
 
-  // Writes all bytes to the disk. If it throws Error, the file is as it was before.
+  // Writes all bytes to the disk. If it throws Error, the file is unchanged.
   void append(std::string_view bytes);
 
-  // moved: its path leads to another file, or to none.
+  // moved: the path leads to another file, or to none.
   Fate fate() const;
 
   std::uint64_t size() const { return size_; }
-  // True if its last line had no end when it was opened.
+  // True if the last line had no end when the file was opened.
   bool torn() const { return torn_; }
 
  private:
@@ -41,12 +39,11 @@ class RecordingFile {
   bool torn_ = false;
 };
 
-// The file that a recording is read from.
 class RecordingInput {
  public:
   // "-" is the standard input. Throws Error.
   explicit RecordingInput(const std::string& path);
-  // The next bytes; empty at the end. Valid until the next call. Throws Error.
+  // The next bytes, valid until the next call; empty at the end. Throws Error.
   std::string_view read();
 
  private:

@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint64_t least_kept = 1 << 20;
 constexpr std::uint64_t least_parts = 4;  // files within keep_bytes
 
-// Where the number is inserted: before the endings that name the form of the file.
+// Position of the number: before the endings that name the format.
 std::size_t ending_of(std::string_view path) {
   for (const std::string_view ending : {".r4log.zst", ".r4log", ".zst"}) {
     if (path.ends_with(ending)) return path.size() - ending.size();
@@ -72,7 +72,7 @@ std::string RecordingParts::next() {
 std::vector<RecordingParts::Part> RecordingParts::found() const {
   namespace fs = std::filesystem;
   std::vector<Part> parts;
-  // A folder that cannot be listed has no files. Opening a file there reports why.
+  // A folder that cannot be listed counts as empty. Opening a file there reports the reason.
   std::error_code error;
   const fs::path stem(stem_);
   const std::string prefix = stem.filename().string() + "-";
@@ -96,7 +96,7 @@ std::vector<RecordingParts::Part> RecordingParts::found() const {
 void RecordingParts::make_room() {
   if (options_.keep_bytes == 0) return;
   const std::vector<Part> parts = found();
-  std::uint64_t sum = most_bytes_;  // the next file's
+  std::uint64_t sum = most_bytes_;  // of the next file
   for (const Part& part : parts) sum += part.size;
   for (const Part& part : parts) {
     if (sum <= options_.keep_bytes) return;

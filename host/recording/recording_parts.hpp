@@ -12,16 +12,16 @@ namespace r4 {
 
 class RecordingParts {
  public:
-  // Throws Error{usage} for limits that cannot be kept. The path is made absolute, so that it leads
-  // to the same file when the program changes its working directory.
+  // Makes the path absolute, so that a changed working directory does not matter. Throws
+  // Error{usage} for limits that cannot be kept.
   RecordingParts(const std::string& path, RecordingOptions options);
 
   // The path of the next file: `path` itself if there are no limits.
   std::string next();
-  // Removes the oldest files until there is room for another one. Throws Error.
+  // Removes the oldest files until there is room for another. Throws Error.
   void make_room();
 
-  // The limit of one file: as given, or chosen if only keep_bytes is given; 0: none.
+  // Limit of one file, given or derived from keep_bytes; 0: none.
   std::uint64_t most_bytes() const { return most_bytes_; }
 
  private:
@@ -32,7 +32,7 @@ class RecordingParts {
   };
   std::vector<Part> found() const;  // oldest first
 
-  std::string stem_, ending_;  // of the path
+  std::string stem_, ending_;
   RecordingOptions options_;
   std::uint64_t most_bytes_ = 0;
   std::uint64_t number_ = 0;

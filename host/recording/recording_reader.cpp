@@ -12,8 +12,7 @@ namespace {
 
 constexpr std::size_t magic_size = 4;  // of zstd
 
-// Moves bytes from the front of `bytes` to `beginning`, until that is `wanted` bytes long. True if
-// it is.
+// Moves bytes from the front of `bytes` to `beginning`. True if `beginning` has `wanted` bytes.
 bool complete(std::string& beginning, std::string_view& bytes, std::size_t wanted) {
   const std::size_t taken = std::min(bytes.size(), wanted - beginning.size());
   beginning += bytes.substr(0, taken);
@@ -27,8 +26,6 @@ std::string to_text(const RecordingDamage& damage) {
   const std::string line = damage.line == 0 ? "" : "line " + std::to_string(damage.line) + ", ";
   return line + "byte " + std::to_string(damage.offset) + ": " + std::string(damage.reason);
 }
-
-// --- lines
 
 const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream) {
   // In a record CR is written as \xNN, so this CR belongs to the line's end.
@@ -106,8 +103,6 @@ void RecordingLines::on_sign_of_mixture() {
   damage_ = Damage::reported;
 }
 
-// --- a file
-
 RecordingReader::RecordingReader(RecordingVisitor& visitor, std::string name)
     : lines_(visitor, name), visitor_(visitor), name_(std::move(name)) {
   part_.reserve(max_record_line + 1);
@@ -127,7 +122,7 @@ void RecordingReader::on_compressed(std::string_view bytes) {
     const std::size_t before = bytes.size();
     const ZstdReader::Step step = zstd_->step(bytes);
     if (step == ZstdReader::Step::damaged) {
-      // The next text is not the rest of this line.
+      // The next text does not continue this line.
       if (part_size_ != 0) end_line({});
       if (zstd_->window_too_large() && !lines_.recognised()) {
         throw Error(ErrorKind::data, name_, ZstdReader::window_problem,
@@ -143,7 +138,7 @@ void RecordingReader::on_compressed(std::string_view bytes) {
   if (!lines_.recognised() && taken_ > patience) fail_as_none();
 }
 
-// The text from its beginning, which shows whether it may be a recording.
+// Checks at the beginning whether the text may be a recording.
 void RecordingReader::on_text(std::string_view text) {
   if (text_beginning_.size() < form_bytes) {
     if (!complete(text_beginning_, text, form_bytes)) return;
@@ -174,7 +169,6 @@ void RecordingReader::on_lines(std::string_view text) {
   }
 }
 
-// Ends a line with its last bytes.
 void RecordingReader::end_line(std::string_view rest) {
   const std::uint64_t size = part_size_ + rest.size();
   const bool cr = rest.empty() ? part_.ends_with('\r') : rest.ends_with('\r');

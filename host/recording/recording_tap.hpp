@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Taps a board's link for a recording: between the transport and the session, so that every
-// datagram is recorded before it is judged.
+// Records a board's link between transport and session: every datagram, before it is checked.
 #pragma once
 
 #include <memory>
@@ -16,19 +15,18 @@ namespace r4 {
 
 class RecordingTap {
  public:
-  // Records into that recording from now on, and no longer into another. `url`: how the board is
-  // reached.
+  // Records into `recorder` instead of an earlier one. `url` is that of the path.
   void attach(std::shared_ptr<Recorder> recorder, const std::string& url);
   void detach() { recorder_.reset(); }
   bool attached() const { return recorder_ != nullptr; }
-  // Why the recording has ended, or was begun anew; once for each. Detaches an ended recording.
+  // Returns once why the recording has ended or was restarted. Detaches an ended recording.
   std::optional<Problem> take_news();
 
   // `at`: when the datagram came, by the steady clock.
   void on_received(std::string_view bytes, Time at) {
     if (recorder_) recorder_->record(path_, RecordKind::from_board, bytes, at);
   }
-  // Sent by this program, or by another one on the same path.
+  // Sent by this program, or by another program on the same path.
   void on_sent(std::string_view bytes) { record(RecordKind::to_board, bytes); }
   void on_oversize(std::string_view beginning);
   void on_carrier_event(const CarrierEvent& event);

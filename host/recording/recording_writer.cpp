@@ -10,9 +10,9 @@
 namespace r4 {
 namespace {
 
-// The most text that waits to be written.
+// Limit of waiting text.
 constexpr std::size_t most_text = 65536;
-// The text of one frame, all of which is lost if the beginning of the frame is damaged.
+// Text of one frame. If the frame's beginning is damaged, the whole frame is lost.
 constexpr std::size_t frame_text = 1 << 20;
 
 }  // namespace
@@ -31,7 +31,7 @@ void RecordingWriter::begin_file() {
   if (path_.ends_with(".zst")) zstd_.emplace();
   frame_ = 0;
   begun_.reset();
-  // The program that wrote the last line was ended meanwhile; the line stays a line of its own.
+  // The last writer ended within a line; that line stays separate.
   if (file_->torn()) text_ += '\n';
   write_record_header(text_);
   for (const auto& [number, path] : paths_) write_path(text_, path);
@@ -81,7 +81,7 @@ void RecordingWriter::close() {
   write_out(true);
 }
 
-// A file that was moved (logrotate) is completed; a file that was removed or truncated is lost.
+// Completes a moved file (logrotate). A removed or truncated file is lost.
 void RecordingWriter::look_after_file() {
   using Fate = RecordingFile::Fate;
   const Fate fate = file_->fate();

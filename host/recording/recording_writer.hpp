@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes records to files: compressed if their name ends in .zst, and one after the other if there
-// are limits. Blocks while the disk is slow. Has no clock: time is that of the records.
+// Writes records to files: compressed for names in .zst, several files if there are limits. Blocks
+// while the disk is slow. Has no clock: time is that of the records.
 #pragma once
 
 #include <cstdint>
@@ -25,20 +25,19 @@ class RecordingWriter {
   // Opens the file. Throws Error.
   RecordingWriter(const std::string& path, const RecordingOptions& options);
 
-  // A path, before its first record, and again when its name is known.
+  // Call before a path's first record, and again when its name is known.
   void declare(const RecordedPath& path);
-  // A device: in this file and in later ones. It replaces the device at that place of that path.
+  // For this file and later files. Replaces the device at that place of that path.
   void declare(const RecordedDevice& device);
-  // Appends a record without the secrets in it. Throws Error if the file cannot be written.
+  // Appends a record without its secrets. Throws Error if the file cannot be written.
   void append(const Record& record);
-  // Writes everything that was appended to the disk. Throws Error. If another program has moved,
-  // removed or truncated the file, it is begun anew first.
+  // Writes all appended records to the disk. Throws Error. If another program has moved, removed or
+  // truncated the file, starts a new file first.
   void flush();
-  // The same, and ends the compressed frame.
-  void close();
+  void close();  // as flush(), and ends the compressed frame
 
   const std::string& path() const { return path_; }
-  // Why the file was begun anew since the last call, if it was. Kind `data`: its content is lost.
+  // Why the file was restarted since the last call, if it was. Kind `data`: its content is lost.
   std::optional<Problem> take_trouble() { return std::exchange(trouble_, std::nullopt); }
 
  private:
@@ -55,11 +54,11 @@ class RecordingWriter {
   std::optional<ZstdWriter> zstd_;
   std::map<std::uint16_t, RecordedPath> paths_;
   std::vector<RecordedDevice> devices_;
-  RecordRoom room_;            // a member to save allocations
-  std::string text_;           // not written yet
-  std::string compressed_;     // a member to save allocations
+  RecordRoom room_;   // a member to save allocations
+  std::string text_;  // not written yet
+  std::string compressed_;
   std::size_t frame_ = 0;      // text in the frame so far
-  std::optional<Time> begun_;  // the time of the first record of this file
+  std::optional<Time> begun_;  // time of this file's first record
 };
 
 }  // namespace r4

@@ -10,21 +10,21 @@
 namespace r4 {
 namespace {
 
-// The first bytes of a frame (RFC 8878, 3.1.1).
+// First bytes of a frame (RFC 8878, 3.1.1).
 constexpr std::string_view magic = "\x28\xb5\x2f\xfd";
-// The last three bytes of the magic number of a skippable frame, whose first byte is 0x50 to 0x5F
-// (RFC 8878, 3.1.2). Files of pzstd and seekable archives begin with one.
+// Last three bytes of a skippable frame's magic number; the first is 0x50 to 0x5F (RFC 8878,
+// 3.1.2). Files of pzstd and seekable archives start with one.
 constexpr std::string_view skippable = "\x2a\x4d\x18";
-// The largest window that is read: 128 MiB, as `zstd -d` reads without an option. zstd --long and
-// --ultra ask for it. A small frame takes less memory.
+// The largest window to read: 128 MiB, as `zstd -d` without options. Only zstd --long and --ultra
+// need it. A small frame takes less memory.
 constexpr int window_log = 27;
 constexpr int level = 3;
-// The window of the frames that are written here; a longer window gains nothing.
+// Window of written frames; a longer window gains nothing.
 constexpr int frame_window_log = 20;
-// The bytes that are read at once: undamaged bytes of a slice may be lost with damaged ones.
+// Bytes read at once. Damage may also cost the undamaged bytes of a slice.
 constexpr std::size_t slice = 512;
 
-// The bytes before a possible next frame, at least one: if a frame has no end, all of it is read.
+// The bytes before a possible next frame; at least one, because an endless frame is read whole.
 std::string_view until_a_frame(std::string_view bytes) {
   std::size_t size = std::min(bytes.size(), bytes.find(magic, 1));
   for (std::size_t left = 1; left < magic.size() && size == bytes.size() && left < size; ++left) {
@@ -55,7 +55,7 @@ void ZstdWriter::write(std::string_view bytes, bool end_frame, std::string& out)
     ZSTD_outBuffer output{out.data() + before, out.size() - before, 0};
     left = ZSTD_compressStream2(context_.get(), &output, &input, how);
     out.resize(before + output.pos);
-    // These calls fail only if there is no memory.
+    // These calls fail only without memory.
     if (ZSTD_isError(left) != 0) throw std::bad_alloc();
   } while (left != 0);
 }
@@ -93,18 +93,18 @@ ZstdReader::Step ZstdReader::step(std::string_view& bytes) {
   return Step::text;
 }
 
-// If the frame has no end, the next one may begin in bytes that were taken already.
+// If the frame has no end, the next frame may start in bytes that were already taken.
 void ZstdReader::search(std::string_view& bytes, bool from_found) {
   ZSTD_DCtx_reset(context_.get(), ZSTD_reset_session_only);
   searching_ = true;
   found_ = !from_found && in_frame_ ? last_ : "";
   while (!magic.starts_with(found_)) found_.erase(0, 1);
-  if (!from_found && !in_frame_) bytes.remove_prefix(1);  // not the same damaged beginning again
+  if (!from_found && !in_frame_) bytes.remove_prefix(1);  // skips the damaged beginning
   in_frame_ = false;
   last_.clear();
 }
 
-// Takes the bytes before the next frame, and its first bytes. False if there is no frame yet.
+// Takes the bytes before the next frame, and its magic number. False: no frame yet.
 bool ZstdReader::find_frame(std::string_view& bytes) {
   while (!bytes.empty()) {
     found_ += bytes.front();

@@ -19,7 +19,7 @@ namespace {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 
-// After so many records, or pieces of the file, other users of the loop have their turn.
+// Records or file pieces per turn of the loop.
 constexpr int steps_in_a_turn = 32;
 
 double speed_of(const Url& url) {
@@ -89,7 +89,6 @@ class ReplayCarrier final : public Carrier {
     timer_.async_wait(playing_.handler([this] { play(); }));
   }
 
-  // Plays records that are due, for one turn of the loop.
   void play() {
     const SteadyTime now = std::chrono::steady_clock::now();
     for (int i = 0; i < steps_in_a_turn && handler_ != nullptr; ++i) {
@@ -106,7 +105,7 @@ class ReplayCarrier final : public Carrier {
     if (handler_ != nullptr) wait();
   }
 
-  // False at the end, which it reports.
+  // False: reported the end.
   bool continue_reading() {
     Problem end{ErrorKind::open, name_, "the recording has ended", "open it again"};
     try {
@@ -154,7 +153,7 @@ class ReplayCarrier final : public Carrier {
   CarrierCounters counters_;
 
   std::optional<ReplayRecords> records_;
-  Time first_{0};  // of the records that are played
+  Time first_{0};  // of the played records
   SteadyTime began_;
 };
 

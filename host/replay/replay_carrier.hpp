@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A recording as a transport: `replay:FILE[?speed=1&path=1&from=0]`.
+//     speed   speed factor, 0.01-1000
+//     path    number of the path in the recording
+//     from    seconds of the recording to skip, or a UTC time: 2026-11-23T21:20:00
 //
-//     speed   how many times as fast as recorded, 0.01-1000
-//     path    the number of the path in the recording
-//     from    how many seconds of the recording are skipped; or the UTC time at which the replay
-//             begins: 2026-11-23T21:20:00
-//
-// Replays the datagrams of the board, also damaged ones, and the ups and downs of its transport.
-// What is sent is dropped: a recording obeys no command. After the end of the recording the
-// transport is down, and stays down. The file is read on the loop, 16 KiB at a time.
+// Replays the board's datagrams, also damaged ones, and its transport's ups and downs. Drops sent
+// datagrams. After the end the transport stays down. Reads the file on the loop, 16 KiB at a time.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -19,8 +16,7 @@
 
 namespace r4 {
 
-// Throws Error{usage} for a wrong URL. open() throws Error for a file that is not a recording, or
-// has no such path.
+// Throws Error{usage} for a wrong URL. open() throws Error for an invalid file or a missing path.
 std::unique_ptr<Carrier> make_replay_carrier(asio::io_context& io, const Url& url, Role role);
 
 }  // namespace r4

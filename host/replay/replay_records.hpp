@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The datagrams of one board of a recording, and the events of its transport, in their order.
+// The datagrams of one board of a recording, and the events of its transport, in order.
 #pragma once
 
 #include <cstdint>
@@ -12,13 +12,11 @@
 
 namespace r4 {
 
-// Where in a recording a replay begins.
 struct ReplayStart {
-  Time time{0};           // after its first record, or
+  Time time{0};           // after the first record, or
   bool absolute = false;  // by the clock of the recording
 
-  // Seconds such as "12.5", or a time in UTC such as "2026-11-23T21:20:00". Throws Error{usage}
-  // about `thing`.
+  // Seconds "12.5", or UTC "2026-11-23T21:20:00". Throws Error{usage} about `thing`.
   static ReplayStart of(const std::string& thing, const std::string& text);
 };
 
@@ -27,20 +25,19 @@ class ReplayRecords final : private RecordingVisitor {
   struct Item {
     Time time;  // as recorded
     RecordKind kind = RecordKind::event;
-    // A datagram of the board, or an event: "up …", "down …", "warning …", also for damage of the
-    // file.
+    // A datagram, or an event: "up …", "down …", "warning …" (also for a damaged file).
     std::string bytes;
   };
 
-  // Takes only regular files, because reading must not wait. Reads to the first record of that path
-  // from `start` on. Throws Error about `thing`.
+  // Reads to the first record of that path from `start` on. Takes only regular files, because
+  // reading must not wait. Throws Error about `thing`.
   ReplayRecords(const std::string& thing, const std::string& file, std::uint16_t path,
                 const ReplayStart& start);
 
-  // The next item, if the file has been read so far: then take() it.
+  // The next item, if it has been read: then call take().
   const Item* next() const { return waiting_.empty() ? nullptr : &waiting_.front(); }
   Item take();
-  // Reads on, 16 KiB at most; false at the end of the file. Throws Error.
+  // Reads at most 16 KiB more. False: end of the file. Throws Error.
   bool read_on();
 
  private:
@@ -53,7 +50,7 @@ class ReplayRecords final : private RecordingVisitor {
   RecordingInput input_;
   RecordingReader reader_;
   bool ended_ = false;
-  std::optional<Time> passed_over_;  // the latest record of that path before the start
+  std::optional<Time> passed_over_;  // latest skipped record of that path
   std::optional<Time> latest_;       // of the items so far
   std::deque<Item> waiting_;
 };

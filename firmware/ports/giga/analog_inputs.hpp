@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The six analog inputs: one conversion a poll, in turn; each is read from its newest. From the loop
-// only; nothing waits.
-//
-// The core sets up the pins and the converter, and reads each input once. From then on it is done by
-// the registers of ADC1 (RM0399, chapter ADC): the core's reading waits for the converter, up to 10 ms
-// for one that does not convert, and one that does not switch on ends the boot (error()). Here such a
-// converter reads 0, and the motors can still be driven.
+// The six analog inputs, converted in turn, one per poll. Never waits; from the loop only. The core
+// sets up pins and converter and reads each input once. Then this class uses the registers of ADC1
+// (RM0399, chapter ADC). The core would wait up to 10 ms for a conversion, and end the boot if the
+// converter does not switch on. Here a dead converter reads 0, and motors can still be driven.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +20,6 @@ static_assert(pin_name({'A', 0}) == PA_0 && pin_name({'C', 5}) == PC_5 &&
                   pin_name({'K', 7}) == PK_7,
               "the core numbers its pins otherwise");
 
-// What a driver reads: the newest conversion of one input.
 class AnalogValue final : public firmware::AnalogPin {
  public:
   std::uint16_t read() override { return newest; }
@@ -32,7 +28,7 @@ class AnalogValue final : public firmware::AnalogPin {
 
 class AnalogInputs {
  public:
-  // Before there are interrupts that must come in time.
+  // Construct before any interrupt that must be in time is enabled.
   explicit AnalogInputs(AnalogValue (&values)[analog_channels]) : values_(values) {
     for (int i = 0; i < analog_channels; ++i) values_[i].newest = converters_[i].read_u16();
     for (const std::uint32_t input : adc_inputs) {
@@ -45,8 +41,8 @@ class AnalogInputs {
     }
   }
 
-  // Takes what has been converted since the last call, and has the next input converted. All inputs
-  // are 0 while the converter does nothing: an old voltage would pass for a measured one.
+  // Takes the finished conversion and starts the next. If the converter stops, all inputs read 0,
+  // because an old voltage would pass for a measured one.
   void poll() {
     if (convert()) {
       late_ = 0;
@@ -57,10 +53,10 @@ class AnalogInputs {
   }
 
  private:
-  // Was there a value?
+  // True if a conversion was finished.
   bool convert() {
     const std::uint32_t control = ADC1->CR;
-    if ((control & cr_on) == 0) {  // the core switches it off when it has read
+    if ((control & cr_on) == 0) {  // the core switches the converter off after a reading
       ADC1->ISR = isr_ready;
       command(cr_on);
       step_ = Step::switching_on;
@@ -75,7 +71,7 @@ class AnalogInputs {
       values_[next_].newest = static_cast<std::uint16_t>(ADC1->DR);
       next_ = (next_ + 1) % analog_channels;
     }
-    ADC1->SQR1 = adc_inputs[next_] << 6;  // one conversion, of this input
+    ADC1->SQR1 = adc_inputs[next_] << 6;
     command(cr_convert);
     step_ = Step::converting;
     return converted;
@@ -85,10 +81,10 @@ class AnalogInputs {
 
   static constexpr std::uint32_t cr_on = 1U << 0;           // ADEN
   static constexpr std::uint32_t cr_convert = 1U << 2;      // ADSTART
-  static constexpr std::uint32_t cr_commands = 0x8000003F;  // do something when a 1 is written
+  static constexpr std::uint32_t cr_commands = 0x8000003F;  // bits that act when a 1 is written
   static constexpr std::uint32_t isr_ready = 1U << 0;       // ADRDY
   static constexpr std::uint32_t isr_converted = 1U << 2;   // EOC
-  static constexpr std::uint32_t sampling_time = 5;         // 64.5 clocks, as the core's
+  static constexpr std::uint32_t sampling_time = 5;         // 64.5 clocks, as the core sets
   static constexpr int patience = 10;                       // polls; a conversion takes 2 us
 
   static void command(std::uint32_t bit_to_set) {

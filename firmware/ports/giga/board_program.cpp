@@ -12,11 +12,11 @@ namespace giga {
 
 namespace {
 
-// Settings are kept when they have been left alone for so long.
+// Settings are stored after they have not changed for this time.
 constexpr std::uint32_t settle_ms = 1000;
 constexpr std::uint32_t can_bit_rate = 1000000;
 
-// Hexadecimal, 24 digits: the chip's own number.
+// The chip's unique number in 24 hexadecimal digits.
 Text board_id() {
   static char text[24];
   const std::uint32_t words[] = {HAL_GetUIDw0(), HAL_GetUIDw1(), HAL_GetUIDw2()};
@@ -39,7 +39,6 @@ firmware::Application::Config config_of(const Settings& settings, Machine& machi
   return config;
 }
 
-// Pins, clock and bit timing of FDCAN2. False: it does not run.
 bool start_can(Fdcan& fdcan, std::uint8_t node) {
   constexpr std::uint32_t rcc_fdcan_on = 1U << 8;
   constexpr std::uint32_t clock_field = 3U << 28;
@@ -58,12 +57,12 @@ bool start_can(Fdcan& fdcan, std::uint8_t node) {
                      command_id(node), watch_id(node));
 }
 
-// What the interrupts need. NOLINTBEGIN(cppcoreguidelines-avoid-non-const-global-variables)
+// Used by interrupt handlers. NOLINTBEGIN(cppcoreguidelines-avoid-non-const-global-variables)
 Fdcan* interrupting = nullptr;
 UsbPort* listening = nullptr;
 // NOLINTEND(cppcoreguidelines-avoid-non-const-global-variables)
 
-// A stop is obeyed also if the loop hangs.
+// In an interrupt, so that a stop works even if the loop hangs.
 void hear_can() {
   if (interrupting->on_interrupt()) stop_at_once();
   wake_loop();
@@ -77,7 +76,7 @@ void hear_usb_now() {
 void on_usb() { on_own_stack(&hear_usb_now); }
 
 void start_listening(UsbPort& usb) {
-  constexpr std::uint32_t gives_way = 13;  // to all but the core's scheduler
+  constexpr std::uint32_t gives_way = 13;  // to all interrupts but the core's scheduler
   listening = &usb;
   NVIC_SetVector(SWPMI1_IRQn, reinterpret_cast<std::uintptr_t>(&on_usb));
   NVIC_SetPriority(SWPMI1_IRQn, gives_way);
@@ -85,7 +84,7 @@ void start_listening(UsbPort& usb) {
   UsbPort::start();
 }
 
-// What a person asks of the board itself; no datagram is so short.
+// Asks the board for its report. No datagram is so short.
 constexpr Text report_word("report");
 
 SafeReason reason_of(const FaultNote& note) {
@@ -107,7 +106,7 @@ BoardProgram::BoardProgram(Machine& machine, SettingsStore& store, const Setting
                            const FaultNote& last_boot)
     : machine_(machine),
       store_(store),
-      // NOLINTNEXTLINE(performance-no-int-to-ptr): where the message RAM is
+      // NOLINTNEXTLINE(performance-no-int-to-ptr): address of the message RAM
       fdcan_(*FDCAN2, reinterpret_cast<volatile std::uint32_t*>(SRAMCAN_BASE)),
       can_(fdcan_, settings.site.can_node, &BoardClock::now_us),
       application_(machine.hardware(), config_of(settings, machine)),
@@ -163,18 +162,16 @@ void BoardProgram::poll() {
   light_.show(application_.state(), application_.reason(), now_ms);
 }
 
-// The boot loader knows nothing of the chips: what they drive when the core resets, they drive for
-// ever.
+// The boot loader does not know the chips: after the reset they would keep driving their outputs.
 void BoardProgram::stay_safe_for_upload() {
   if (usb_.upload_asked()) application_.fail(SafeReason::fault, BoardClock::now_ms());
 }
 
 void BoardProgram::receive(std::uint8_t port, std::uint32_t peer, Text datagram) {
   application_.receive(port, peer, datagram, BoardClock::now_ms());
-  stay_safe_for_upload();  // it may have been E:CLEAR
+  stay_safe_for_upload();  // the datagram may have been E:CLEAR
 }
 
-// All that has arrived, and what became of the transports.
 void BoardProgram::hear() {
   const bool can_lost =
       can_.receive([this](Text datagram) { receive(can_number_, everyone, datagram); });
@@ -196,7 +193,7 @@ void BoardProgram::hear_usb(Text line) {
   }
 }
 
-// A line of the report a turn, each as soon as USB has room for it.
+// One line a turn, when USB has room for it.
 void BoardProgram::tell_report() {
   if (!usb_.open() || (waiting_line_.empty() && !report_.running())) return;
   if (waiting_line_.empty()) waiting_line_ = report_.next(report_line_);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board: the application between its transports and its hardware. There is one; it is made when
-// the settings are known.
+// The application between its transports and its hardware. Constructed once, when the settings are
+// known.
 #pragma once
 
 #include <cstdint>
@@ -23,9 +23,9 @@ class BoardProgram {
   BoardProgram(Machine& machine, SettingsStore& store, const Settings& settings,
                const FaultNote& last_boot);
 
-  // Transports, application, timers: from now on the guard decides over the watchdog.
+  // Starts transports, application and timers. Then the guard decides when the watchdog is fed.
   void start();
-  // A turn of the loop. Never waits for anything outside the board.
+  // One turn of the loop. Never waits for anything outside the board.
   void poll();
 
   firmware::Application& application() { return application_; }
@@ -52,13 +52,13 @@ class BoardProgram {
   BootReport report_;
   StatusLight light_;
 
-  Settings used_;  // as the hardware and the network have them
-  Settings kept_;  // as the store has them
+  Settings used_;  // in use by hardware and network
+  Settings kept_;  // in the store
   bool changed_ = false;
   std::uint32_t changed_ms_ = 0;
   SafeReason last_boot_;
   char report_line_[BootReport::max_line];
-  Text waiting_line_;  // of the report, until USB has room
+  Text waiting_line_;
   std::uint8_t usb_number_ = 0;
   std::uint8_t udp_number_ = 0;
   std::uint8_t can_number_ = 0;

@@ -10,7 +10,7 @@ namespace giga {
 
 namespace {
 
-// A line being written; what does not fit is cut off.
+// One line; text beyond its end is cut off.
 class LineWriter {
  public:
   explicit LineWriter(char (&out)[BootReport::max_line]) : out_(out) {}
@@ -30,7 +30,7 @@ class LineWriter {
     char* const end = write_hundredths(digits, static_cast<std::int32_t>(value));
     return text(Text(digits, static_cast<std::size_t>(end - digits)));
   }
-  // At least two digits, as the paper writes addresses.
+  // At least two digits, as in the paper.
   LineWriter& hex(std::uint32_t value) {
     char digits[max_number_text];
     const char* const end = write_hex(digits, value);
@@ -84,7 +84,7 @@ void write_last_boot(LineWriter& line, const FaultNote& note) {
 
 }  // namespace
 
-// One address of the scan; nothing to say while nobody answers.
+// Asks one address. Empty if no chip answers.
 Text BootReport::scan(char (&out)[max_line]) {
   const std::uint8_t address = address_++;
   if (sources_.bus->write(address, nullptr, 0) != firmware::I2cResult::ok) return Text();
@@ -109,7 +109,6 @@ Text BootReport::chip(char (&out)[max_line]) {
   return line.done();
 }
 
-// The most that the interrupts' stacks have held, in bytes.
 Text BootReport::stacks(char (&out)[max_line]) {
   LineWriter line(out);
   const StackUse cores = use_of_core_stack();
@@ -118,7 +117,7 @@ Text BootReport::stacks(char (&out)[max_line]) {
   return line.text(", ours ").number(own.most).text(" of ").number(own.size).done();
 }
 
-// Which keys there are, and what was dropped for its signature; nothing to say without a key.
+// The key numbers, and how many datagrams were dropped for each reason. Empty without a key.
 Text BootReport::keys(char (&out)[max_line]) const {
   const Authentication& authentication = *sources_.authentication;
   if (!authentication.required()) return Text();
@@ -138,7 +137,7 @@ Text BootReport::keys(char (&out)[max_line]) const {
   return line.done();
 }
 
-// How many paths the session has; empty while there was never more than one.
+// Empty if the session never had more than one path.
 Text BootReport::paths(char (&out)[max_line]) const {
   const SessionPaths& paths = *sources_.paths;
   if (paths.joins() == 0) return Text();

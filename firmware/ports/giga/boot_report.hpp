@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report of the paper's Figure 3, on request, a line a turn: rates, the scan of the I2C bus,
-// the timer, the network; then what the paper's firmware did not know: chips, CAN, settings, keys
-// if there are any, how the last boot ended. Labels are spelled as in the paper.
-//
-// The scan asks one address a turn, so the loop waits for no more than one transfer.
+// The report of the paper's Figure 3, sent on request, one line a turn. After the paper's lines
+// come chips, CAN, settings, keys, paths and how the last boot ended. Labels are spelled as in the
+// paper. The scan of the I2C bus asks one address a turn, so the loop waits for at most one
+// transfer.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +22,7 @@ namespace giga {
 
 class BootReport {
  public:
-  // What is told. All of it outlives the report.
+  // All pointers must outlive the report.
   struct Sources {
     const Settings* settings;
     firmware::I2cBus* bus;
@@ -41,17 +40,16 @@ class BootReport {
 
   explicit BootReport(const Sources& sources) : sources_(sources) {}
 
-  // From the beginning.
   void begin() {
     step_ = 1;
     address_ = first_address;
   }
   bool running() const { return step_ != 0; }
-  // The next line, or nothing this turn; to be called while running().
+  // The next line; empty if this turn has none. Only while running().
   Text next(char (&out)[max_line]);
 
  private:
-  static constexpr std::uint8_t first_address = 0x08;  // below and above: reserved (UM10204 3.1.12)
+  static constexpr std::uint8_t first_address = 0x08;  // others are reserved (UM10204 3.1.12)
   static constexpr std::uint8_t last_address = 0x77;
 
   Text scan(char (&out)[max_line]);
@@ -61,7 +59,7 @@ class BootReport {
   Text paths(char (&out)[max_line]) const;
 
   Sources sources_;
-  int step_ = 0;  // of the list in next(); 0: not running
+  int step_ = 0;  // case of the switch in next(); 0: not running
   std::uint8_t address_ = 0;
   int chip_ = 0;
 };

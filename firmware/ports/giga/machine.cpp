@@ -10,7 +10,7 @@ namespace {
 
 firmware::BoardHardware::Config hardware_config() {
   firmware::BoardHardware::Config config;
-  config.ultrasonic_fitted = (1U << ultrasonic_channels) - 1;  // one that is not there is blind
+  config.ultrasonic_fitted = (1U << ultrasonic_channels) - 1;  // a missing sensor reads nothing
   config.step_tick_hz = static_cast<std::int32_t>(step_tick_hz);
   return config;
 }
@@ -42,7 +42,7 @@ void start_user_bus(UserI2cController& bus) {
     RCC->APB4ENR |= rcc_i2c4_on;
     static_cast<void>(static_cast<std::uint32_t>(RCC->APB4ENR));
   }
-  bus.start(HAL_RCCEx_GetD3PCLK1Freq());  // the clock of I2C4 after a reset (RCC_D3CCIPR)
+  bus.start(HAL_RCCEx_GetD3PCLK1Freq());  // default clock of I2C4 (RCC_D3CCIPR)
 }
 
 UserUartController::Wiring uart_wiring(int channel) {
@@ -61,7 +61,7 @@ void start_uarts(UserUartController& first, UserUartController& second) {
     RCC->APB1LENR |= rcc_usart2_and_uart4_on;
     static_cast<void>(static_cast<std::uint32_t>(RCC->APB1LENR));
   }
-  // The clock of both after a reset (RCC_D2CCIP2R).
+  // Default clock of both (RCC_D2CCIP2R).
   first.start(HAL_RCC_GetPCLK1Freq());
   second.start(HAL_RCC_GetPCLK1Freq());
 }
@@ -77,7 +77,7 @@ void start_bus(I2cController& bus) {
     RCC->APB1LENR |= rcc_i2c2_on;
     static_cast<void>(static_cast<std::uint32_t>(RCC->APB1LENR));
   }
-  bus.start(HAL_RCC_GetPCLK1Freq());  // the clock of I2C1-3 after a reset (RCC_D2CCIP2R)
+  bus.start(HAL_RCC_GetPCLK1Freq());  // default clock of I2C1-3 (RCC_D2CCIP2R)
 }
 
 }  // namespace
@@ -89,7 +89,7 @@ Machine::Encoder::Encoder(Pin a_pin, Pin b_pin, Pin index_pin)
       a_edge(pin_name(a_pin), PullUp),
       b_edge(pin_name(b_pin), PullUp) {}
 
-// Methods as the core calls them back. NOLINTBEGIN(readability-make-member-function-const)
+// The core calls non-const methods. NOLINTBEGIN(readability-make-member-function-const)
 void Machine::Encoder::on_edge() { counter->sample(read(a), read(b)); }
 
 Machine::Echo::Echo(Pin pin) : line(line_of(pin)), edge(pin_name(pin), PullDown) {}
@@ -130,7 +130,7 @@ Machine::Machine()
       echo2_(echo_pins[1]),
       echo3_(echo_pins[2]),
       echo4_(echo_pins[3]) {
-  // Before the application, which begins with the readings that are kept as settings.
+  // Before the application starts: readings that are kept as settings need both.
   start_user_bus(user_bus_);
   start_uarts(uart1_, uart2_);
 }

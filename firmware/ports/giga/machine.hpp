@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hardware of the board as the firmware sees it: the chips on the I2C bus, the pins, the
-// converters, and the interrupts that feed them. There is one.
+// The board's hardware: chips on the I2C bus, pins, converters, and the interrupts that read them.
 #pragma once
 
 #include <cstdint>
@@ -21,22 +20,20 @@ namespace giga {
 
 class Machine final : public StepTick {
  public:
-  // Sets up bus and pins; every output of the board is off when it returns.
+  // Sets up bus and pins. Every output of the board is off when it returns.
   Machine();
-  // The interrupts: edges of encoders and echoes, the step timer, which is a duty of the guard's.
+  // Starts the edge interrupts and the step timer, which becomes a duty of the guard.
   void start(firmware::Guard& guard);
-  // A turn of the loop: at most bus_bytes_per_poll bytes on the bus, one conversion.
+  // One turn of the loop: at most bus_bytes_per_poll bytes on the bus, and one conversion.
   void poll();
 
   firmware::BoardHardware& hardware() { return hardware_; }
   I2cController& bus() { return bus_; }
-  // What the application has to know of the user's devices.
   void add_devices(firmware::Application::Config& config);
 
   void step_tick() override;
 
  private:
-  // Both edges of two lines, or of one.
   struct Encoder {
     Encoder(Pin a, Pin b, Pin index);
     Line a;
@@ -55,11 +52,10 @@ class Machine final : public StepTick {
     int sensor = 0;
     void on_edge();
   };
-  // The guard counts the 40 kHz interrupt as missed after this. As long as the loop's: a moment in
-  // which the core keeps interrupts off is none.
+  // A 40 kHz interrupt that is later than this counts as missed. As long as the loop's limit, so
+  // that the core may keep interrupts off for a moment.
   static constexpr std::uint32_t step_limit_ms = 20;
 
-  // Steps of the construction.
   struct PortsOn {
     PortsOn() {
       start_ports();
@@ -71,8 +67,8 @@ class Machine final : public StepTick {
   };
   firmware::BoardPins pins();
 
-  // The order is that of the power-up: the clock of the ports, the bus, the pins at rest, the
-  // chips' outputs off; then what may take its time.
+  // Members are constructed in the order of power-up: clock of the ports, bus, pins at rest, chips'
+  // outputs off; then everything that takes longer.
   PortsOn ports_on_;
   I2cController bus_;
   GpioOutput step_[stepper_channels];
@@ -91,8 +87,8 @@ class Machine final : public StepTick {
   firmware::UserUart uarts_[uart_channels];
   firmware::Guard* guard_ = nullptr;
   firmware::Guard::Duty step_duty_ = 0;
-  // GCC 7 and 8 would copy the elements of an array that a constructor makes (GCC bug 63707), and
-  // these cannot be copied: each by itself, and their addresses.
+  // Single members, because GCC 7 and 8 copy the elements of an array that a constructor makes (GCC
+  // bug 63707), and these types cannot be copied.
   Encoder encoder1_, encoder2_, encoder3_, encoder4_;
   Encoder* const encoders_[encoder_channels] = {&encoder1_, &encoder2_, &encoder3_, &encoder4_};
   Echo echo1_, echo2_, echo3_, echo4_;

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which pin of the Giga serves which channel: the one place where it is said.
-//
-// The paper does not say it; this is our plan. Compare it with the schematic of the board in hand
-// before power is applied to a motor. Element n-1 is channel n; the names in comments are those
-// printed on the Giga.
-//
-// An edge on pin number n of any port comes in by interrupt line n: two pins with the same number
-// cannot both interrupt (RM0399, chapter EXTI). Line 8 is WiFi's (PI8). The other pins with edges are
-// A and B of the encoders and the echoes; the index lines are sampled, the handle is read.
+// The only table of which pin of the Giga serves which channel. The paper does not name the pins,
+// so this plan is ours. Compare it with the schematic of the board before you power a motor.
+// Element n-1 is channel n; comments give the names printed on the Giga. Pin number n of every port
+// uses interrupt line n, so two pins with the same number cannot both interrupt (RM0399, chapter
+// EXTI). Line 8 belongs to WiFi (PI8). Encoder pins A and B and the echo pins interrupt; index pins
+// are sampled.
 #pragma once
 
 #include <cstdint>
@@ -17,18 +14,15 @@
 namespace r4 {
 namespace giga {
 
-// Stepper drivers.
 constexpr Pin step_pins[stepper_channels] = {{'A', 3}, {'A', 2}, {'J', 8}, {'A', 7}};  // D2-D5
 constexpr Pin direction_pins[stepper_channels] = {
     {'K', 5}, {'K', 6}, {'E', 6}, {'K', 7}};  // D34 D36 D40 D41
 
-// Ultrasonic sensors.
 constexpr Pin trigger_pins[ultrasonic_channels] = {
     {'I', 14}, {'H', 15}, {'G', 12}, {'I', 13}};  // D39 D46 D24 D45
 constexpr Pin echo_pins[ultrasonic_channels] = {
     {'I', 10}, {'I', 11}, {'J', 12}, {'G', 13}};  // D43 D50 D22 D23
 
-// Encoders.
 constexpr Pin encoder_a_pins[encoder_channels] = {
     {'J', 0}, {'J', 2}, {'J', 4}, {'J', 6}};  // D25 D29 D33 D37
 constexpr Pin encoder_b_pins[encoder_channels] = {
@@ -36,45 +30,42 @@ constexpr Pin encoder_b_pins[encoder_channels] = {
 constexpr Pin index_pins[encoder_channels] = {
     {'J', 14}, {'J', 15}, {'K', 3}, {'K', 4}};  // D26 D28 D30 D32
 
-// The dead-man's handle: high while held; a broken wire is a released handle.
+// Dead-man's handle: high while held. A broken wire reads as released.
 constexpr Pin handle_pin = {'I', 15};  // D42
 
-// Analog inputs in the order of r4link/state.hpp: AIN24 AIN12 AIN5 AINDMH AINSTEER AIN6.
+// In the order of r4link/state.hpp: AIN24 AIN12 AIN5 AINDMH AINSTEER AIN6.
 constexpr Pin analog_pins[analog_channels] = {{'C', 4}, {'C', 5}, {'B', 0},
                                               {'B', 1}, {'C', 3}, {'C', 2}};  // A0-A5
-// Which inputs of ADC1 these are.
 constexpr std::uint32_t adc_inputs[analog_channels] = {4, 8, 9, 5, 13, 12};
 
-// The I2C bus of the chips: SCL and SDA (D21, D20), I2C2, alternate function 4.
+// I2C2 for the chips: SCL and SDA (D21, D20), alternate function 4.
 constexpr Pin i2c_scl_pin = {'H', 4};
 constexpr Pin i2c_sda_pin = {'B', 11};
 constexpr std::uint32_t i2c_function = 4;
 
-// The user's I2C bus, the core's Wire1: SCL1 and SDA1, I2C4. It has no pins in common with anything else here.
+// I2C4 for the user (the core's Wire1): SCL1 and SDA1.
 constexpr Pin user_scl_pin = {'B', 6};
 constexpr Pin user_sda_pin = {'H', 12};
 constexpr std::uint32_t user_scl_function = 6;
 constexpr std::uint32_t user_sda_function = 4;
 
-// The user's UARTs, the core's Serial2 and Serial3: TX and RX of USART2 and UART4.
+// USART2 and UART4 for the user (the core's Serial2 and Serial3).
 constexpr Pin uart_tx_pins[uart_channels] = {{'D', 5}, {'H', 13}};  // D18 D16
 constexpr Pin uart_rx_pins[uart_channels] = {{'D', 6}, {'I', 9}};   // D19 D17
 constexpr std::uint32_t uart_functions[uart_channels] = {7, 8};
 
-// The user's voltages: DAC1.
 constexpr Pin dac_pins[dac_channels] = {{'A', 4}, {'A', 5}};  // A12 A13
 
-// Spare inputs, pulled up.
-constexpr Pin gpio_pins[gpio_channels] = {{'D', 13}, {'B', 4},  {'B', 8},  {'B', 9},
-                                          {'K', 1},  {'J', 10}, {'J', 11}, {'H', 6}};  // D6-D13
+constexpr Pin gpio_pins[gpio_channels] = {{'D', 13}, {'B', 4},  {'B', 8}, {'B', 9}, {'K', 1},
+                                          {'J', 10}, {'J', 11}, {'H', 6}};  // D6-D13, pulled up
 
-// CAN: FDCAN2, alternate function 9. The Giga has no transceiver: an SN65HVD230 of the R4 board (paper,
-// section 2) is wired to these two (docs/can.md).
+// FDCAN2, alternate function 9. The Giga has no transceiver: wire the SN65HVD230 of the R4 board
+// (paper, section 2) to these pins (docs/can.md).
 constexpr Pin can_tx_pin = {'B', 13};
 constexpr Pin can_rx_pin = {'B', 5};
 constexpr std::uint32_t can_function = 9;
 
-// The Giga's own light; low is on.
+// Lit when low.
 constexpr Pin red_led_pin = {'I', 12};
 constexpr Pin green_led_pin = {'J', 13};
 constexpr Pin blue_led_pin = {'E', 3};

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The settings over a restart: a text (settings.hpp) in the core's key-value store on partition 3 of
-// the QSPI flash, by a thread of its own, for an erase takes a tenth of a second and more.
+// Keeps the settings over a restart, as text (settings.hpp) in the core's key-value store on
+// partition 3 of the QSPI flash. Has its own thread, because an erase takes 0.1 s or more.
+//     loading ---> ready     the store works; loaded() returns the settings, if there are any
+//             ---> absent    partition 3 is missing or does not hold a store
+//     avoided                the store ended the last boot, because the core gives up for good
+//                            when worn-out flash cannot be erased
 //
-//     loading ---> ready     the store is there; the settings, if any were kept, wait in loaded()
-//             ---> absent    no partition 3, or one that is not the store's
-//     avoided                it has ended the last boot: the core gives up for good where a flash that
-//                            is worn out cannot be erased
-//
-// Nothing is ever written outside that partition (partition 1 holds the WiFi firmware), nor to one
-// larger than partition_max: older layouts have a user's files there.
+// Never writes outside that partition (partition 1 holds the WiFi firmware), nor to a partition
+// larger than partition_max: in older layouts it holds the user's files.
 #pragma once
 
 #include <atomic>
@@ -27,20 +26,18 @@ class SettingsStore {
  public:
   static constexpr std::uint64_t partition_max = 2 * 1024 * 1024;
 
-  // One of them, once, from the loop.
+  // Call start() or avoid() once, from the loop.
   void start();
   void avoid() { state_.store(StoreState::avoided, std::memory_order_relaxed); }
   StoreState state() const { return state_.load(std::memory_order_acquire); }
-  // What was kept, into `settings`; once, when the state is no longer loading. False: nothing was. Who
-  // does not wait that long gets nothing, and nothing will be kept: it would overwrite what was.
+  // Reads the stored settings. Call once, after loading. False: there are none. If the caller
+  // does not wait until then, nothing is stored later either: it would overwrite the old settings.
   bool loaded(Settings& settings);
-  // To be kept, soon.
+  // Stores them soon, on the thread.
   void keep(const Settings& settings);
   bool keeps() const { return keeps_; }
 
-  std::uint32_t failures() const {
-    return failures_.load(std::memory_order_relaxed);
-  }  // of writing
+  std::uint32_t failures() const { return failures_.load(std::memory_order_relaxed); }  // of writes
 
  private:
   struct Record {

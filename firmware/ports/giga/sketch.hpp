@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The firmware of the R4 board, for a sketch on the Arduino Giga R1 WiFi:
-//
 //     #include <R4Link.h>
 //     void setup() { R4Link.begin(); }
 //     void loop() { R4Link.poll(); }
 //
-// That is the whole sketch: what the board is to do is said over USB, WiFi or CAN, and how it is wired
-// and reached is set over USB (docs/firmware.md). What a sketch does besides must be done within
-// milliseconds: a loop that stays away for 20 ms counts as a missed deadline, one that stays away
-// longer makes the outputs safe, and 400 ms end in a reset.
+// The board is commanded over USB, WiFi or CAN and configured over USB (docs/firmware.md). Other
+// code in the sketch must finish within milliseconds: a loop later than 20 ms misses a deadline, a
+// longer one makes the outputs safe, and after 400 ms the board resets.
 #pragma once
 
 #if !defined(ARDUINO_GIGA) && !defined(TARGET_GIGA)
 #error "R4 Link is for the Arduino Giga R1 WiFi: choose it as the board"
 #endif
-#ifdef CORE_CM4  // ARDUINO_GIGA is defined for either
+#ifdef CORE_CM4  // ARDUINO_GIGA is defined for both cores
 #error "R4 Link is for the main core of the Giga (Tools > Target core)"
 #endif
 
@@ -23,13 +21,12 @@ namespace giga {
 
 class Sketch {
  public:
-  // First of all in setup(). All outputs are off when it returns, after half a second or so.
-  void begin();
-  // In loop(): a turn of the board; rests until there is work, two milliseconds at most.
+  void begin();  // first in setup(); takes about 0.5 s, then all outputs are off
+  // Call in loop(). One turn of the board, then rests until there is work, at most 2 ms.
   void poll();
 };
 
 }  // namespace giga
 }  // namespace r4
 
-extern r4::giga::Sketch R4Link;  // NOLINT(readability-identifier-naming): as libraries are named
+extern r4::giga::Sketch R4Link;  // NOLINT(readability-identifier-naming): usual for libraries

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the Giga's light tells (docs/firmware.md):
-//
-//     green, flashing   no host yet                blue               the host is gone
-//     green             a host drives the board    red, flashing      handle or proximity
-//                                                  red                stop, fault or watchdog
+// Colours of the Giga's light (docs/firmware.md):
+//     green, flashing   no host yet                blue            the host is silent
+//     green             a host drives the board    red, flashing   handle or proximity
+//                                                  red             stop, fault or watchdog
 #pragma once
 
 #include <cstdint>

@@ -48,7 +48,7 @@ void System::boot() {
   store_.loaded(settings);
   machine_.hardware().fit(settings.site.chips);
 
-  // Above the network's thread: it cannot keep the loop waiting.
+  // Above the network's thread, which then cannot delay the loop.
   osThreadSetPriority(osThreadGetId(), osPriorityAboveNormal);
   board_ = new (board_place_) BoardProgram(machine_, store_, settings, last_boot);
   board_->start();

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole firmware from power-up on. There is one.
-//
-//     System()   watchdog on; every output off
-//     boot()     faults guarded; settings read (2 s at most); transports, application, timers
-//     poll()     a turn of the loop
+// The whole firmware.
+//     System()   starts the watchdog; every output off
+//     boot()     guards against faults, reads the settings (at most 2 s), starts everything else
+//     poll()     one turn of the loop
 #pragma once
 
 #include <cstdint>
@@ -25,20 +24,19 @@ class System {
 
   void boot();
   void poll() { board_->poll(); }
-  BoardProgram& board() { return *board_; }  // after boot()
+  BoardProgram& board() { return *board_; }  // only after boot()
 
  private:
-  // How long the settings may take; without them the board starts with the defaults.
-  static constexpr std::uint32_t settings_limit_us = 2000000;
+  static constexpr std::uint32_t settings_limit_us = 2000000;  // then the defaults
   struct WatchdogOn {
     WatchdogOn() { Watchdog::start(); }
   };
 
-  WatchdogOn watchdog_on_;  // the first of all
-  Machine machine_;         // all outputs are off
+  WatchdogOn watchdog_on_;  // must be first
+  Machine machine_;
   SettingsStore store_;
   alignas(BoardProgram) unsigned char board_place_[sizeof(BoardProgram)];
-  BoardProgram* board_ = nullptr;  // made when the settings are known
+  BoardProgram* board_ = nullptr;
 };
 
 }  // namespace giga

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board: the application on simulated hardware, between a UART and UDP, and a turn of its loop.
+// The application on simulated hardware, between a UART and UDP.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ class BoardProgram {
   static_assert(firmware::Application::max_ports >= 2, "each port has a place");
 
  public:
-  // The seed's low half is where the clock of this boot begins.
+  // The boot's clock starts at the seed's low half.
   BoardProgram(std::uint64_t seed, Uart& link, UdpPort& udp,
                const firmware::Application::Config& config)
       : clock_(static_cast<std::uint32_t>(seed)),
@@ -34,12 +34,11 @@ class BoardProgram {
     model_.chips().bus.set_processor(&wire_);
   }
 
-  // The outputs off, before anything else.
-  void power_up() {
+  void power_up() {  // first: switches the outputs off
     clock_.start();
     hardware_.power_up();
   }
-  // `cause`: what ended the last boot, none if that was not a fault.
+  // `cause` of the end of the last boot; none if it was not a fault.
   void start(SafeReason cause) {
     application_.start(clock_.now_ms());
     if (cause != SafeReason::none) application_.fail(cause, clock_.now_ms());
@@ -50,7 +49,7 @@ class BoardProgram {
     for (; passed_ms_ != clock_.now_ms(); ++passed_ms_) hardware_.pass_millisecond();
     link_.receive([this](Text datagram) {
       application_.receive(link_number_, everyone, datagram, clock_.now_ms());
-      hal().calibrate(application_.settings().site.full_scale_cv);  // it may have been C:AIN24,…
+      hal().calibrate(application_.settings().site.full_scale_cv);  // the datagram may be C:AIN24,…
     });
     if (!link_.has_received()) application_.drained(link_number_);
     udp_.receive([this](std::uint32_t peer, Text datagram) {
@@ -61,21 +60,21 @@ class BoardProgram {
     application_.poll(now_ms);
     link_.poll(now_ms);
   }
-  // Sleeps until an interrupt, unless there is work. With interrupts off nothing comes between.
+  // Sleeps until an interrupt, unless there is work. Interrupts stay off, so that none is missed.
   void rest() {
     const InterruptsHeld held;
     if (!link_.has_received() && !udp_.has_received()) wait_for_interrupt();
   }
 
-  // Each millisecond, in the interrupt of timer 1. True: the watchdog may be fed. Ends the boot if the
-  // handlers' stack is full, whatever the loop does.
+  // In timer 1's interrupt, each millisecond. True: the watchdog may be fed. Ends the boot if the
+  // handlers' stack is full.
   bool on_wake() {
     if (!canary_alive()) halt();
     BoardClock::on_wake_interrupt();
     return started_ && application_.guard().tick(clock_.now_ms());
   }
 
-  // A stop has come, in an interrupt: the timer's follows at once.
+  // For a received stop. In an interrupt: timer 1's follows at once.
   void on_stop() {
     application_.guard().stop();
     pend(Irq::timer1);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Not a board: what one with CAN, a UART and all chip drivers would link, for `tools/m7 --size`. No
-// machine that QEMU has with a Cortex-M has a CAN controller, and this one has no chips: frames and
-// transfers go nowhere.
+// Links a board with CAN, UART and all chip drivers for `tools/m7 --size`. Cannot run as a board:
+// no Cortex-M machine of QEMU has a CAN controller or the chips.
 #include "../../../transports/framing/can/can_node.hpp"
 #include "../../application/application.hpp"
 #include "../../board_hardware.hpp"
@@ -22,7 +21,6 @@ Uart link(uart0_base);
 firmware::Guard* watching = nullptr;
 BoardClock* watch = nullptr;
 
-// The place of a controller: two mailboxes.
 struct Controller {
   volatile bool has_received = false;
   CanFrame received;
@@ -55,7 +53,6 @@ class CanPort final : public firmware::Port {
   CanNode node_{CanEnd::board, 1, false};
 };
 
-// The places of the I2C bus and the pins.
 class Bus final : public firmware::I2cBus {
  public:
   firmware::I2cResult write(std::uint8_t address, const std::uint8_t* bytes,
@@ -77,7 +74,6 @@ class Bus final : public firmware::I2cBus {
   volatile std::uint32_t wire_ = 0;
 };
 
-// The place of the user's bus.
 class UserBus final : public firmware::UserI2cPort {
  public:
   void begin(const firmware::UserTransfer& transfer) override { wire_ = transfer.address; }
@@ -92,7 +88,6 @@ class UserBus final : public firmware::UserI2cPort {
   volatile std::uint32_t wire_ = 1;
 };
 
-// The places of the UARTs.
 class UserUartPlace final : public firmware::UserUartPort {
  public:
   void set_up(const UartMode& mode) override { wire_ = mode.baud; }
@@ -140,7 +135,6 @@ class Converter final : public firmware::AnalogPin {
   volatile std::uint16_t value_ = 0;
 };
 
-// All channels of the board on them.
 struct Hardware {
   Bus bus;
   Output pin;

@@ -9,8 +9,8 @@ namespace m7 {
 
 namespace {
 
-// Over a reset it stays; when the power comes it is anything, so it counts only with both marks.
-// Nothing may initialize it.
+// Survives a reset, so nothing may initialize it. After power-up its content is random and counts
+// only with both marks.
 struct Kept {
   std::uint32_t mark;
   std::uint32_t boots;
@@ -43,8 +43,7 @@ Kept& kept_data() {
   return kept;
 }
 
-// What the processor puts on the stack for an exception.
-struct Frame {
+struct Frame {  // on the stack after an exception
   std::uint32_t r0, r1, r2, r3, r12, lr, pc, psr;
 };
 
@@ -54,7 +53,6 @@ bool in_stacks(const Frame* frame) {
              reinterpret_cast<std::uintptr_t>(r4_handler_stack_end);
 }
 
-// Registers of the CMSDK watchdog.
 constexpr std::uint32_t watchdog_load = watchdog_base + 0x0;
 constexpr std::uint32_t watchdog_control = watchdog_base + 0x8;
 constexpr std::uint32_t watchdog_clear = watchdog_base + 0xC;
@@ -68,11 +66,10 @@ constexpr std::uint32_t watchdog_lock = watchdog_base + 0xC00;
   reset();
 }
 
-// Exceptions of the Cortex-M7.
 constexpr std::uint32_t nmi = 2;
 constexpr std::uint32_t memory_fault = 4;
 
-// Region `number` of the memory protection unit: 2^`log_size` bytes from `base`.
+// Protects 2^`log_size` bytes from `base` as region `number`.
 void protect(std::uint32_t number, std::uint32_t base, std::uint32_t log_size,
              std::uint32_t attributes) {
   constexpr std::uint32_t valid = 0x10;
@@ -81,10 +78,10 @@ void protect(std::uint32_t number, std::uint32_t base, std::uint32_t log_size,
   at(mpu_rasr) = attributes | (log_size - 1) << 1 | on;
 }
 
-// The code cannot be written, and nothing is below the loop's stack.
+// Forbids writes to the code, and any access below the loop's stack.
 void protect_memory() {
   constexpr std::uint32_t no_access = 0;
-  constexpr std::uint32_t read_only = 6U << 24 | 2U << 16;  // normal memory, with write-through
+  constexpr std::uint32_t read_only = 6U << 24 | 2U << 16;  // normal memory, write-through
   constexpr std::uint32_t one_mb = 20;
   constexpr std::uint32_t on_and_rest_as_ever = 5;
   protect(0, 0, one_mb, read_only);
@@ -97,7 +94,7 @@ void protect_memory() {
 }  // namespace
 
 void guard(firmware::Hal& hal) {
-  // Exceptions of their own: a hard fault is then left for a fault on the way to one.
+  // Enables separate exceptions, so that a hard fault is only a fault during another.
   constexpr std::uint32_t memory_bus_and_usage = 7U << 16;
   at(scb_shcsr) = memory_bus_and_usage;
   protect_memory();
@@ -134,7 +131,6 @@ void start_watchdog(std::uint32_t ms) {
 
 void feed_watchdog() { at(watchdog_clear) = 1; }
 
-// From the vector table, by way of r4_exception.
 extern "C" [[noreturn, gnu::used]] void r4_on_exception(const Frame* frame) {
   std::uint32_t exception = 0;
   asm volatile("mrs %0, ipsr" : "=r"(exception));

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the board does when it finds itself broken: every output off, at once; note what it was; reset.
+// After a fault the board switches every output off, stores a note and resets.
+//     bus, memory or usage fault; stack overflow    -> Kind::fault
+//     the loop has not fed the watchdog (NMI)       -> Kind::watchdog
+//     halt() after a broken invariant               -> Kind::fault
 //
-//     bus fault, memory fault (a stack overflow too), usage fault ... -> Kind::fault
-//     the loop has not fed the watchdog (NMI)                         -> Kind::watchdog
-//     a broken invariant: halt()                                      -> Kind::fault
-//
-// The next boot finds the note with take_note() and reports it; E:CLEAR releases the outputs.
+// After the next boot the board reports the note and keeps its outputs off until E:CLEAR.
 #pragma once
 
 #include <cstdint>
@@ -18,25 +17,23 @@ namespace m7 {
 struct FaultNote {
   enum class Kind : std::uint32_t { none, fault, watchdog };
   Kind kind = Kind::none;
-  std::uint32_t exception = 0;  // the Cortex-M7's number of it; 0: none, halt()
-  std::uint32_t pc = 0;         // where it was; 0: unknown
-  std::uint32_t cfsr = 0;       // why, as the Cortex-M7 tells
-  std::uint32_t address = 0;    // the address that did not work, for a bus or memory fault
+  std::uint32_t exception = 0;  // number in the Cortex-M7; 0: halt()
+  std::uint32_t pc = 0;         // 0: unknown
+  std::uint32_t cfsr = 0;       // cause, from CFSR
+  std::uint32_t address = 0;    // invalid address of a bus or memory fault
 };
 
-// Whose outputs a fault switches off, and faults for what the memory must not be used for: writing
-// code, and what is below the loop's stack. To be called before any output is switched on.
+// Call before any output is switched on. A fault then switches off the outputs of `hal`. Also
+// makes writes to code and accesses below the loop's stack faults.
 void guard(firmware::Hal& hal);
 
-// What ended the last boot; once.
+// Returns and deletes the note of the last boot.
 FaultNote take_note();
-// Boots since the power came.
-std::uint32_t boots();
+std::uint32_t boots();  // since power-up
 
-// Switches everything off, and the board off and on again.
-[[noreturn]] void halt();
+[[noreturn]] void halt();  // switches all outputs off and resets
 
-// The watchdog: after `ms` without feed() it ends the boot.
+// Ends the boot `ms` after the last feed_watchdog().
 void start_watchdog(std::uint32_t ms);
 void feed_watchdog();
 

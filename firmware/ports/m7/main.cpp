@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board on an M7 with AN500: the application between a UART, UDP and the hardware.
+// The board on QEMU's mps2-an500: the application between UART, UDP and simulated hardware.
 #include "../sim/robot/random.hpp"
 #include "board_program.hpp"
 #include "chip/registers.hpp"
@@ -18,7 +18,7 @@ constexpr std::uint16_t udp_port = 2018;
 // Longer than any turn of the loop, shorter than the board's timeout.
 constexpr std::uint32_t watchdog_ms = 500;
 
-// What interrupt handlers need lives here, and only here.
+// Used by interrupt handlers.
 Uart link(uart0_base);
 UdpPort udp(address, udp_port);
 BoardProgram* board = nullptr;
@@ -77,7 +77,7 @@ int main() {
   config.identity.board_id = Text("m7-1");
   config.identity.capabilities = Text("udp+serial");
   const std::uint64_t seed = sim::scramble(std::uint64_t{boots()} << 32 | r4_chance);
-  // As random as the 32 bits that tools/m7 has put there: enough for tests.
+  // As random as the 32 bits of tools/m7: enough for tests.
   std::uint8_t chance[Authentication::chance_size];
   for (std::size_t i = 0; i < sizeof chance; ++i) {
     chance[i] = static_cast<std::uint8_t>(sim::scramble(seed + i));

@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the board's pins do, as they change, on a UART of its own (`tools/m7 --pins`): what tests look
-// at instead of believing what the board says of itself.
-//
-// A line is numbers with a blank between: the board's time in ms and in us, when the last datagram
-// had come (us), the time in ms of the heartbeat that fed last, 1 if the chips' pins are safe; then
-// the outputs in the order of sim::Pins.
-//
-// Changes are noted at the end of the transfer that made them, also in interrupts, and told when the
-// loop has time. When notes_max wait, later ones are left out.
+// Reports each change of the pins on a UART (`tools/m7 --pins`), so that tests need not trust the
+// board's own states. A line has numbers and spaces: the board's time in ms and in us, time of the
+// last datagram in us, time of the last feeding heartbeat in ms, 1 if the chips' pins are safe,
+// then the outputs as in sim::Pins. A change is noted after its transfer, also in interrupts, and
+// sent by the loop. If notes_max notes wait, later changes are left out.
 #pragma once
 
 #include <cstddef>
@@ -25,15 +21,13 @@ class PinsReport final : public sim::I2cObserver {
  public:
   static constexpr int notes_max = 16;
 
-  // `base` is the UART's address.
   PinsReport(sim::BoardModel& board, BoardClock& clock, const BoardLink& link, std::uint32_t base);
   void start();
 
   void on_transfer(const sim::I2cTransfer&) override { look(); }
-  // To be called in each turn of the loop.
-  void poll();
+  void poll();  // in each turn of the loop
 
-  // A datagram came at `ticks` of the board's clock; of several the newest counts. In interrupts.
+  // In interrupts: a datagram came at `ticks` of the board's clock. The newest counts.
   static void on_datagram(std::uint32_t ticks) {
     if (static_cast<std::int32_t>(ticks - datagram_ticks_) > 0) datagram_ticks_ = ticks;
   }
@@ -61,10 +55,9 @@ class PinsReport final : public sim::I2cObserver {
   const std::uint32_t base_;
   sim::Pins last_;
   Note notes_[notes_max];
-  volatile std::uint32_t noted_ = 0;  // so far
+  volatile std::uint32_t noted_ = 0;
   volatile std::uint32_t told_ = 0;
-  // Up to 58 numbers.
-  char line_[58 * (max_number_text + 1)];
+  char line_[58 * (max_number_text + 1)];  // up to 58 numbers
   std::size_t size_ = 0;
   std::size_t sent_ = 0;
 };

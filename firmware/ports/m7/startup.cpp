@@ -17,7 +17,7 @@ extern const Constructor r4_constructors_end[];
 
 void r4_count_boot();
 
-// The first code. The loop gets a stack of its own, so that its overflow leaves the handlers theirs.
+// First code after reset. The loop has its own stack, so its overflow spares the handlers' stack.
 __attribute__((naked, noreturn, used)) void r4_reset() {
   asm volatile(
       "ldr r0, =r4_stack_end\n\t"
@@ -29,7 +29,7 @@ __attribute__((naked, noreturn, used)) void r4_reset() {
       ".ltorg");
 }
 
-// Any fault, and the watchdog: finds what the processor has put on the stack that was in use.
+// All faults and the watchdog. Passes the exception frame on the stack in use.
 __attribute__((naked, noreturn, used)) void r4_exception() {
   asm volatile(
       "tst lr, #4\n\t"
@@ -40,7 +40,7 @@ __attribute__((naked, noreturn, used)) void r4_exception() {
 }
 
 [[noreturn, gnu::used]] void r4_start() {
-  // Volatile: the compiler must not make calls of it that use the stack beneath.
+  // Volatile, so that the compiler emits no calls, which would use the stack below.
   volatile std::uint32_t* const top = static_cast<std::uint32_t*>(__builtin_frame_address(0)) - 32;
   for (volatile std::uint32_t* at = r4_stack; at < top; ++at) *at = r4::m7::untouched;
   for (volatile std::uint32_t* at = r4_handler_stack; at < r4_handler_stack_end; ++at) {
@@ -55,10 +55,10 @@ __attribute__((naked, noreturn, used)) void r4_exception() {
   r4::m7::halt();
 }
 
-// What the compiler refers to, and the C++ library would bring the heap along with.
+// The compiler needs it, and the C++ library's version would link the heap.
 [[noreturn]] void __cxa_pure_virtual() { r4::m7::halt(); }  // NOLINT(bugprone-reserved-identifier)
 
-// Of an interrupt that the image does not use.
+// For images that do not use the interrupt.
 [[gnu::weak]] void r4_uart0_receive() { r4::m7::halt(); }
 [[gnu::weak]] void r4_uart0_transmit() { r4::m7::halt(); }
 [[gnu::weak]] void r4_wake() { r4::m7::halt(); }

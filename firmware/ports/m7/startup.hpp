@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From the reset to main(), and what the linker script says about the memory.
-//
-// The image defines main() and the handlers of the interrupts that it enables.
+// From reset to main(), and the linker script's symbols. The image defines main() and the handlers
+// of the interrupts that it enables.
 #pragma once
 
 #include <cstdint>
 
 extern "C" {
-// The loop's stack, at the bottom of the RAM, and that of the handlers.
+// The loop's stack, at the bottom of the RAM, and the handlers' stack.
 extern std::uint32_t r4_stack[];
 extern std::uint32_t r4_stack_end[];
 extern std::uint32_t r4_handler_stack[];
 extern std::uint32_t r4_handler_stack_end[];
 
-// What chance has put there before the board was started.
+// Set before the board starts: a random number, and 1 to switch on the pins report.
 extern std::uint32_t r4_chance;
 extern std::uint32_t r4_wants_pins;
 
@@ -27,17 +26,16 @@ void r4_ethernet();
 namespace r4 {
 namespace m7 {
 
-// What the stacks hold where nobody has been yet.
-constexpr std::uint32_t untouched = 0xC0FFEE55;
+constexpr std::uint32_t untouched = 0xC0FFEE55;  // in unused stack
 
-// The most that the stack from `begin` to `end` has held so far, in bytes.
+// The highest use of the stack from `begin` to `end`, in bytes.
 inline std::uint32_t used_at_most(const std::uint32_t* begin, const std::uint32_t* end) {
   const std::uint32_t* at = begin;
   while (at != end && *at == untouched) ++at;
   return static_cast<std::uint32_t>((end - at) * 4);
 }
 
-// Is the word between the stacks whole? The handlers' stack grows towards it.
+// True if the word between the stacks is whole. The handlers' stack grows towards it.
 inline bool canary_alive() { return *r4_handler_stack == untouched; }
 
 }  // namespace m7

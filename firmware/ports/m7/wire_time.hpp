@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The simulated bus in the time of the board: a byte on it takes as long as on a wire, and interrupts
-// come between two bytes, not within one.
+// The simulated bus in real time: a byte takes as long as on a wire; no interrupt comes within it.
 #pragma once
 
 #include <cstdint>

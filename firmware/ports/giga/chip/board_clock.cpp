@@ -9,8 +9,8 @@ namespace giga {
 namespace {
 
 std::atomic<std::uint32_t> shown_ms{0};  // NOLINT(cppcoreguidelines-avoid-non-const-*)
-// Of advance() alone.
-std::uint32_t counted_us = 0;  // up to when shown_ms has counted  NOLINT
+// Used by advance() only.
+std::uint32_t counted_us = 0;  // shown_ms counts up to this time  NOLINT
 
 }  // namespace
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The Giga's core: Mbed OS, and the registers of the STM32H747 by the names of its maker (CMSIS).
-// Included here, and only here and below, after the standard's headers: it defines common names as
-// macros. Those that are functions elsewhere are taken back.
+// The Giga's core: Mbed OS, and the STM32H747's registers (CMSIS). Only the Giga port includes it,
+// after the standard headers, because it defines macros with common names.
 #pragma once
 
 #include <atomic>

@@ -17,11 +17,11 @@ FaultNote last_note;
 std::atomic<bool> store_starting{false};
 // NOLINTEND(cppcoreguidelines-avoid-non-const-global-variables)
 
-constexpr std::uint32_t mark = 0x52344700;  // with the kind in its lowest byte
+constexpr std::uint32_t mark = 0x52344700;  // the lowest byte holds the kind
 constexpr std::uint32_t in_store_mark = 0x80;
 
-// RM0399: backup domain writable (PWR_CR1), the clock of the RTC's registers (RCC_APB4ENR), what
-// reset the chip (RCC_RSR).
+// RM0399: backup domain writable (PWR_CR1), clock of the RTC registers (RCC_APB4ENR), cause of the
+// reset (RCC_RSR).
 constexpr std::uint32_t pwr_backup_writable = 1U << 8;
 constexpr std::uint32_t rcc_rtc_on = 1U << 16;
 constexpr std::uint32_t rsr_forget = 1U << 16;
@@ -33,7 +33,7 @@ void open_backup_registers() {
   static_cast<void>(static_cast<std::uint32_t>(RCC->APB4ENR));
 }
 
-// The core and its boot loader use the first ones.
+// The first backup registers belong to the core and its boot loader.
 void keep(const FaultNote& note) {
   open_backup_registers();
   RTC->BKP21R = note.exception;
@@ -58,8 +58,7 @@ void switch_off_and_reset() {
   reset();
 }
 
-// What the processor puts on the stack for an exception: r0-r3, r12, lr, pc, psr.
-constexpr int frame_pc = 6;
+constexpr int frame_pc = 6;  // in the exception frame r0-r3, r12, lr, pc, psr
 
 bool is_stack(const std::uint32_t* frame) {
   const auto at = reinterpret_cast<std::uintptr_t>(frame);
@@ -68,7 +67,7 @@ bool is_stack(const std::uint32_t* frame) {
   return in_dtcm || in_ram;
 }
 
-// Comes for warnings, too. The way from here to mbed_die() prints and may wait, so it is not taken.
+// Called for warnings too. Does not continue to mbed_die(), because the core prints first.
 void on_core_error(const mbed_error_ctx* context) {
   if (!mbed_get_error_in_progress()) return;
   FaultNote note;
@@ -92,7 +91,7 @@ extern "C" {
 }
 
 #ifdef __arm__
-// From the vector table: with the stack that was in use, on the last one, for it may be what is full.
+// Passes the stack in use, and runs on the last stack, because the stack in use may be full.
 [[gnu::naked]] void r4_giga_fault_entry() {
   asm volatile(
       "tst lr, #4\n"
@@ -109,7 +108,7 @@ extern "C" {
 void r4_giga_fault_entry() { r4_giga_on_fault(nullptr); }
 #endif
 
-// The core's last word, instead of blinking for ever with the motors on.
+// Replaces the core's function, which blinks for ever with the motors on.
 void mbed_die() {
   FaultNote note;
   note.kind = FaultNote::Kind::fault;

@@ -6,10 +6,9 @@ namespace giga {
 
 namespace {
 
-// RM0399, chapter FDCAN: registers.
 constexpr std::uint32_t cccr_init = 1U << 0;
 constexpr std::uint32_t cccr_change =
-    1U << 1;  // CCE: settings may change; forgets what waits to be sent
+    1U << 1;  // CCE: settings may change; also discards waiting frames
 constexpr std::uint32_t psr_passive = 1U << 5;
 constexpr std::uint32_t psr_warning = 1U << 6;
 constexpr std::uint32_t psr_bus_off = 1U << 7;
@@ -22,7 +21,7 @@ constexpr std::uint32_t gfc_reject_everything_else = 0x3F;  // unmatched ids and
 constexpr std::uint32_t overwrite = 1U << 31;               // F1OM
 constexpr std::uint32_t txfqs_full = 1U << 21;
 
-// The message RAM, in words. Elements for 8 bytes of data take four.
+// Message RAM in words. An element with 8 data bytes takes four.
 constexpr std::uint32_t element_words = 4;
 constexpr std::uint32_t filters = 2;
 constexpr std::uint32_t extended_filters = 1;
@@ -38,19 +37,17 @@ constexpr std::uint32_t urgent_word = fifo1_word + fifo1_size * element_words;
 constexpr std::uint32_t end_word = urgent_word + (1 + transmit_size) * element_words;
 static_assert(end_word == Fdcan::words_used, "the layout of the message RAM");
 
-// A standard message ID filter element: two ids; to FIFO 0 or 1.
+// A standard message ID filter element: matches two ids, stores into FIFO 0 or 1.
 constexpr std::uint32_t filter_element(std::uint32_t id, std::uint32_t other, std::uint32_t fifo) {
   return 1U << 30 | (fifo + 1) << 27 | id << 16 | other;
 }
 
-// The two words of an extended message ID filter element: an id and which of its bits count; to FIFO 0
-// or 1.
+// An extended message ID filter element: id and mask, stores into FIFO 0 or 1.
 constexpr std::uint32_t extended_element(std::uint32_t id, std::uint32_t fifo) {
   return (fifo + 1) << 29 | id;
 }
 constexpr std::uint32_t extended_mask(std::uint32_t mask) { return 2U << 30 | mask; }
 
-// Bits of an Rx FIFO or Tx buffer element.
 constexpr std::uint32_t element_extended = 1U << 30;
 constexpr std::uint32_t element_remote = 1U << 29;
 constexpr std::uint32_t element_id_shift = 18;
@@ -94,7 +91,7 @@ const char* to_text(CanState state) {
   return "unknown";
 }
 
-// Waits until the controller has taken INIT over into its other clock, which takes a few periods of that.
+// Waits a few clock periods until the controller has copied INIT into its other clock domain.
 bool Fdcan::set_init(bool wanted) {
   constexpr int patience = 1000;
   const std::uint32_t others = registers_.CCCR & ~cccr_init;
@@ -110,14 +107,14 @@ bool Fdcan::start(const CanBitTiming& timing, std::uint32_t stop_id, std::uint32
   started_ = false;
   if (!timing.valid || !set_init(true)) return false;
   registers_.CCCR =
-      cccr_init | cccr_change;  // and all else 0: classic frames, sent until acknowledged
+      cccr_init | cccr_change;  // all other bits 0: classic frames, repeated until acknowledged
   registers_.NBTP = (timing.jump - 1) << 25 | (timing.prescaler - 1) << 16 |
                     (timing.before_sample - 1) << 8 | (timing.after_sample - 1);
 
   for (std::uint32_t i = 0; i < words_used; ++i) ram_[i] = 0;
   ram_[filter_word] = filter_element(stop_id, stop_id, 1);
   ram_[filter_word + 1] = filter_element(command_id, watch_id, 0);
-  ram_[extended_word] = extended_element(stop_id << element_id_shift, 1);  // with a number
+  ram_[extended_word] = extended_element(stop_id << element_id_shift, 1);  // stops with a number
   ram_[extended_word + 1] = extended_mask(max_can_id << element_id_shift);
   registers_.GFC = gfc_reject_everything_else;
   registers_.SIDFC = filters << 16 | filter_word << 2;
@@ -207,7 +204,7 @@ Fdcan::Event Fdcan::poll(std::uint32_t now_us) {
   }
   if (bus_off_) {
     if (now_us - bus_off_since_us_ >= bus_off_us) {
-      registers_.CCCR = registers_.CCCR | cccr_change;  // what waited is forgotten
+      registers_.CCCR = registers_.CCCR | cccr_change;
       bus_off_ = !set_init(false);
       bus_off_since_us_ = now_us;
       moved_us_ = now_us;

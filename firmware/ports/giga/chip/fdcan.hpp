@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An FDCAN controller of the STM32H747 for classic frames, by its registers and its message RAM
-// (RM0399, chapter FDCAN). The core's own library has no filters, no error state and no way out of
-// bus-off, and loses frames between polls.
+// An FDCAN controller of the STM32H747 for classic frames (RM0399, chapter FDCAN). The core's
+// library has no filters, no error state, no recovery from bus-off, and loses frames between polls.
+//     received    emergency stop            -> FIFO 1,  8 frames, the newest stay
+//                 commands to this board,
+//                 watchers' requests        -> FIFO 0, 64 frames: 7 ms of a full bus
+//                 everything else           -> rejected
+//     to send     urgent frames             -> own buffer; a lower id overtakes the queue
+//                 other frames, in order    -> FIFO of 8 frames
 //
-//     received    the emergency stop   -> FIFO 1,  8 frames, the newest stay
-//                 commands to us, and
-//                 who watches us       -> FIFO 0, 64 frames: 7 ms of a full bus
-//                 all else             -> nowhere
-//     to send     what is urgent       -> a buffer of its own, which overtakes the queue by its id
-//                 the rest, in order   -> FIFO of 8 frames
-//
-// An interrupt wakes the loop and tells of a stop: the hardware keeps the frames. Times are
-// microseconds of a clock that wraps. Nothing waits for the bus.
+// An interrupt wakes the loop and reports a stop; the frames stay in the hardware. Times are in
+// microseconds and wrap. Never waits for the bus.
 #pragma once
 
 #include <cstdint>
@@ -22,57 +20,53 @@
 namespace r4 {
 namespace giga {
 
-// Where the bit is sampled: at 86.7 %, as near as the clock allows.
+// Sample point at 86.7 %, as near as the clock allows.
 struct CanBitTiming {
   std::uint32_t prescaler = 1;
-  std::uint32_t before_sample = 0;  // quanta, without the one of synchronisation
+  std::uint32_t before_sample = 0;  // quanta without the synchronisation quantum
   std::uint32_t after_sample = 0;
   std::uint32_t jump = 0;
   bool valid = false;
 };
-// For `kernel_hz` / `bit_rate` quanta a bit, which must be a whole number of 15 to 255.
+// `kernel_hz` / `bit_rate`, the quanta per bit, must be a whole number from 15 to 255.
 CanBitTiming can_bit_timing(std::uint32_t kernel_hz, std::uint32_t bit_rate);
 
 enum class CanState : std::uint8_t { off, active, warning, passive, bus_off };
-// "off", "active", "warning", "passive", "bus-off".
 const char* to_text(CanState state);
 
 struct FdcanCounters {
   std::uint32_t received = 0;
-  std::uint32_t sent = 0;  // handed to the controller
+  std::uint32_t sent = 0;  // frames given to the controller
   std::uint32_t lost = 0;  // times that FIFO 0 was full
   std::uint32_t bus_offs = 0;
-  std::uint32_t stale = 0;  // times that what nobody acknowledged was thrown away
+  std::uint32_t stale = 0;  // times that unacknowledged frames were dropped
 };
 
 class Fdcan {
  public:
-  // How long bus-off lasts at least, before 128 times 11 recessive bits let the controller return.
+  // Shortest time in bus-off. Then 128 times 11 recessive bits let the controller return.
   static constexpr std::uint32_t bus_off_us = 100000;
-  // What has not left for this long is thrown away: it is old.
+  // Frames that could not leave for this time are dropped as old.
   static constexpr std::uint32_t stale_us = 50000;
 
-  // `message_ram`: the first word of the RAM, of which words_used are this controller's.
+  // `message_ram` points to the words_used words of this controller.
   Fdcan(FDCAN_GlobalTypeDef& registers, volatile std::uint32_t* message_ram)
       : registers_(registers), ram_(message_ram) {}
 
-  // False: the clock does not fit, or the controller does not follow. Its clock must be on.
+  // The controller's clock must be on. False: invalid timing, or the controller does not respond.
   bool start(const CanBitTiming& timing, std::uint32_t stop_id, std::uint32_t command_id,
              std::uint32_t watch_id);
 
-  // The oldest frame that was received, stops first. False: none.
+  // Takes the oldest frame, stops first. False: none.
   bool receive(CanFrame& frame);
-  // False: no room now.
   bool send(const CanFrame& frame);
   bool send_urgent(const CanFrame& frame);
 
-  // What a turn of the loop finds.
   enum class Event : std::uint8_t { none, bus_off, stale };
-  // Looks after the controller. bus_off: it has just left the bus; stale: nothing went out for
-  // stale_us. In both cases whatever waited is gone.
+  // bus_off: the controller has left the bus; stale: nothing was sent for stale_us. Both drop all
+  // waiting frames.
   Event poll(std::uint32_t now_us);
-  // In its interrupt: takes it back. True: an emergency stop has come in; it waits to be received,
-  // too.
+  // In the controller's interrupt, which it clears. True: an emergency stop waits in FIFO 1.
   bool on_interrupt();
 
   CanState state() const;
@@ -94,10 +88,10 @@ class Fdcan {
   bool started_ = false;
   bool bus_off_ = false;
   std::uint32_t bus_off_since_us_ = 0;
-  // At the last poll; what is refilled must have left.
+  // At the last poll. If `sent` rose, a refilled queue has moved.
   std::uint32_t pending_before_ = 0;
   std::uint32_t sent_before_ = 0;
-  std::uint32_t moved_us_ = 0;  // when something left last
+  std::uint32_t moved_us_ = 0;  // when a frame left last
   FdcanCounters counters_;
 };
 

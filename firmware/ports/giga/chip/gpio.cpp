@@ -29,7 +29,7 @@ void set_function(Line line, std::uint32_t function) {
 void start_ports() {
   const InterruptLock lock;
   RCC->AHB4ENR |= all_ports;
-  static_cast<void>(static_cast<std::uint32_t>(RCC->AHB4ENR));  // it is on when this is read
+  static_cast<void>(static_cast<std::uint32_t>(RCC->AHB4ENR));  // waits until the clock is on
 }
 
 Line line_of(Pin pin) {
@@ -57,7 +57,7 @@ void make_input(Line line, LinePull pull) {
 void prepare_open_drain(Line line, std::uint32_t function) {
   write(line, true);
   set_field(line.port->OTYPER, line.number, 1, 1);
-  set_pull(line, LinePull::up);  // beside the resistors of the board
+  set_pull(line, LinePull::up);  // parallel to the board's resistors
   set_function(line, function);
 }
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Single lines of the STM32H747's ports, by their registers (RM0399, chapter GPIO).
-//
-// Reading and writing are one access each, right in any interrupt and in a fault handler. Setting a
-// line up changes registers that it shares with its neighbours: interrupts are off for that moment.
+// Single pins of the STM32H747's ports (RM0399, chapter GPIO). Reads and writes are one access,
+// safe in any interrupt and fault handler. Set-up changes registers that pins share, with
+// interrupts off.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +13,7 @@
 namespace r4 {
 namespace giga {
 
-// A pin as the data sheet calls it: PJ8 is {'J', 8}.
-struct Pin {
+struct Pin {  // as in the data sheet: PJ8 is {'J', 8}
   char port;
   std::uint8_t number;
 };
@@ -29,7 +27,7 @@ struct Line {
 enum class LineMode : std::uint32_t { input = 0, output = 1, alternate = 2, analog = 3 };
 enum class LinePull : std::uint32_t { none = 0, up = 1, down = 2 };
 
-// Switches on the clock of all ports; before anything else here.
+// Switches on the clock of all ports. Call first.
 void start_ports();
 Line line_of(Pin pin);
 
@@ -39,13 +37,12 @@ inline void write(Line line, bool high) {
 inline bool read(Line line) { return (line.port->IDR >> line.number & 1U) != 0; }
 
 void set_mode(Line line, LineMode mode);
-// An output that stands at `high` from the moment on at which it drives.
+// An output that drives `high` from its first moment.
 void make_output(Line line, bool high);
 void make_input(Line line, LinePull pull);
-// Open drain, its level released, for alternate function `function`; the mode stays what it is.
+// Open drain, released, with alternate function `function`. Does not change the mode.
 void prepare_open_drain(Line line, std::uint32_t function);
-// Push-pull for a peripheral.
-void make_alternate(Line line, std::uint32_t function, LinePull pull);
+void make_alternate(Line line, std::uint32_t function, LinePull pull);  // push-pull
 
 class GpioOutput final : public firmware::OutputPin {
  public:

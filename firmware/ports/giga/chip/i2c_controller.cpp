@@ -8,8 +8,7 @@ using firmware::I2cResult;
 
 namespace {
 
-// RM0399, chapter I2C: registers.
-constexpr std::uint32_t cr1_on = 1U << 0;  // PE; off releases the lines and forgets the transfer
+constexpr std::uint32_t cr1_on = 1U << 0;  // PE; off releases the lines and ends the transfer
 constexpr std::uint32_t cr2_read = 1U << 10;
 constexpr std::uint32_t cr2_start = 1U << 13;
 constexpr std::uint32_t cr2_then_stop = 1U << 25;  // AUTOEND
@@ -19,7 +18,7 @@ constexpr std::uint32_t isr_refused = 1U << 4;     // NACKF
 constexpr std::uint32_t isr_stopped = 1U << 5;     // STOPF
 constexpr std::uint32_t isr_complete = 1U << 6;    // TC
 constexpr std::uint32_t isr_bus_error = 1U << 8;   // BERR
-constexpr std::uint32_t isr_lost = 1U << 9;        // ARLO: somebody else pulls SDA down
+constexpr std::uint32_t isr_lost = 1U << 9;        // ARLO: another device pulls SDA down
 constexpr std::uint32_t isr_busy = 1U << 15;
 constexpr std::uint32_t icr_all = 0x3F38;
 
@@ -27,7 +26,7 @@ constexpr std::uint32_t cr2_for(std::uint8_t address, std::size_t size) {
   return std::uint32_t{address} << 1 | static_cast<std::uint32_t>(size) << 16;
 }
 
-// Of a recovery: half a clock of 100 kHz, and how long a chip may stretch it.
+// For recovery: half a clock at 100 kHz, and the longest stretch by a chip.
 constexpr std::uint32_t half_clock_us = 5;
 constexpr std::uint32_t stretch_us = 20;
 constexpr int recovery_clocks = 9;
@@ -79,8 +78,8 @@ bool I2cController::alive(const Transfer& transfer) const {
   return transfer.recovery == recoveries_ && clock_() - transfer.began_us < transfer.limit_us;
 }
 
-// The next two touch the wire only if nobody has taken it over meanwhile: what was cut off must not
-// begin again, nor leave a byte for the next transfer.
+// request() and put() do nothing if another transfer took over the bus: an interrupted transfer
+// must not restart, nor leave a byte for the next transfer.
 bool I2cController::request(const Transfer& transfer, std::uint32_t cr2) {
   const InterruptLock lock;
   if (transfer.recovery != recoveries_) return false;
@@ -103,7 +102,6 @@ I2cResult I2cController::wait_until_free(const Transfer& transfer) {
   return I2cResult::ok;
 }
 
-// Sends the address and `size` bytes. Ends with STOP, or ready for a repeated START.
 I2cResult I2cController::send(const Transfer& transfer, std::uint8_t address,
                               const std::uint8_t* bytes, std::size_t size, bool then_stop) {
   if (!request(transfer, cr2_for(address, size) | (then_stop ? cr2_then_stop : 0))) {
@@ -153,11 +151,11 @@ I2cResult I2cController::finish(const Transfer& transfer, I2cResult result) {
   return result;
 }
 
-// Off and on: the lines are released and the state of the transfer is gone (software reset). So is the byte that
-// waited in TXDR behind one that was refused, which the next transfer would send first.
+// Software reset: releases the lines and ends the transfer. It also deletes the byte in TXDR after
+// a refused byte, which the next transfer would otherwise send first.
 void I2cController::restart() {
   registers_.CR1 = 0;
-  for (int i = 0; i < 3; ++i) {  // PE must be low for three clocks of the peripherals' bus
+  for (int i = 0; i < 3; ++i) {  // PE must be low for three APB clocks
     static_cast<void>(static_cast<std::uint32_t>(registers_.CR1));
   }
   registers_.CR1 = cr1_on;
@@ -200,8 +198,8 @@ bool I2cController::release_scl() {
   return true;
 }
 
-// By the pins' own levels: the peripheral would not drive lines that it takes for busy. SCL is clocked only as long as
-// somebody holds SDA (UM10204 3.1.16): a chip that was being written to would take a clock for a bit of a byte.
+// Drives the pins, because the peripheral does not drive a busy bus. Clocks SCL only while SDA is
+// held (UM10204 3.1.16): a chip that was being written to would read a clock as a bit.
 bool I2cController::recover() {
   recoveries_ = recoveries_ + 1;
   registers_.CR1 = 0;
@@ -214,7 +212,6 @@ bool I2cController::recover() {
   for (int clocks = 0; released && !stopped && clocks <= recovery_clocks; ++clocks) {
     const bool held = !read(sda_);
     giga::write(scl_, false);
-    // STOP: SDA rises while SCL is high.
     if (!held) giga::write(sda_, false);
     pause_us(half_clock_us);
     released = release_scl();

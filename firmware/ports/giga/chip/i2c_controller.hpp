@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An I2C peripheral of the STM32H747 as master, by its registers (RM0399, chapter I2C), at no more
-// than 400 kHz. It keeps what drivers/i2c_bus.hpp promises: no call waits longer than its time on the
-// wire plus i2c_timeout_us, and recover() may come in an interrupt or a fault handler in the middle
-// of a transfer. So may a transfer: it takes the bus over, and the one that it interrupted returns
-// timeout.
-//
-// The core's own library (Wire) cannot be used: on a hung bus it waits 36 ms for each byte.
+// An I2C peripheral of the STM32H747 as master at up to 400 kHz (RM0399, chapter I2C). Fulfils
+// drivers/i2c_bus.hpp: a call waits at most its time on the wire plus i2c_timeout_us. recover() or
+// another transfer may interrupt a transfer, also from a fault handler: the interrupted transfer
+// then returns timeout. The core's library (Wire) waits 36 ms for each byte on a hung bus.
 #pragma once
 
 #include <cstddef>
@@ -17,9 +14,8 @@
 namespace r4 {
 namespace giga {
 
-// TIMINGR for a kernel clock of 4 to 250 MHz: SCL low 1.5 us, high 1.0 us, data held 0.25 us and set
-// up 0.4 us before the edge, rounded up. The peripheral adds the time in which it sees its own edges,
-// so the bus runs a little below 400 kHz.
+// TIMINGR for a kernel clock of 4 to 250 MHz, rounded up: SCL low 1.5 us, high 1.0 us, data hold
+// 0.25 us, set-up 0.4 us. The peripheral's edge detection keeps the bus a little below 400 kHz.
 std::uint32_t i2c_timing(std::uint32_t kernel_hz);
 
 class I2cController final : public firmware::I2cBus {
@@ -31,16 +27,14 @@ class I2cController final : public firmware::I2cBus {
     std::uint32_t scl_function;  // alternate function of the pin
     std::uint32_t sda_function;
   };
-  // Microseconds that wrap; must go on in an interrupt and in a fault handler.
+  // In microseconds that wrap. Must also run in interrupts and fault handlers.
   using Clock = std::uint32_t (*)();
 
   I2cController(const Wiring& wiring, Clock clock);
 
-  // `kernel_hz`: the peripheral's clock, which must be on.
-  void start(std::uint32_t kernel_hz);
+  void start(std::uint32_t kernel_hz);  // the peripheral's clock, already on
 
-  // At most 255 bytes each way; more is refused as not acknowledged. Without bytes: does anybody
-  // answer to the address?
+  // At most 255 bytes each way, else no_acknowledge. An empty write probes the address.
   firmware::I2cResult write(std::uint8_t address, const std::uint8_t* bytes,
                             std::size_t size) override;
   firmware::I2cResult write_read(std::uint8_t address, const std::uint8_t* out,
@@ -51,9 +45,8 @@ class I2cController final : public firmware::I2cBus {
   static constexpr std::size_t max_size = 255;
 
  private:
-  // One transfer as long as nobody interrupts it.
   struct Transfer {
-    std::uint32_t recovery;  // recoveries_ when it began
+    std::uint32_t recovery;  // recoveries_ at its start
     std::uint32_t began_us;
     std::uint32_t limit_us;
   };
@@ -76,7 +69,7 @@ class I2cController final : public firmware::I2cBus {
   const Line sda_;
   const Clock clock_;
   volatile std::uint32_t recoveries_ = 0;
-  volatile bool under_way_ = false;  // a transfer, or one that was taken over
+  volatile bool under_way_ = false;  // also until an interrupted transfer has returned
 };
 
 }  // namespace giga

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An InterruptLock keeps interrupts off while it exists. It is for a few instructions; locks may
-// be nested.
+// Keeps interrupts off during its life, for a few instructions. Locks may be nested.
 #pragma once
 
 #include "chip.hpp"

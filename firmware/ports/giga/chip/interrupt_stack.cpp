@@ -7,15 +7,15 @@
 #include "interrupt_lock.hpp"
 
 extern "C" {
-// Where the core's stack ends, by its linker script.
-extern std::uint32_t __StackLimit[];  // NOLINT: as it is called
+// End of the core's stack, from its linker script.
+extern std::uint32_t __StackLimit[];  // NOLINT: the linker script's name
 
 // NOLINTBEGIN(cppcoreguidelines-avoid-non-const-global-variables)
 alignas(8) std::uint32_t r4_giga_own_stack[1024];
 alignas(8) std::uint32_t r4_giga_last_stack[192];
 // NOLINTEND(cppcoreguidelines-avoid-non-const-global-variables)
 
-// For the entry of faults (fault.cpp).
+// For the fault entry (fault.cpp).
 extern std::uint32_t* const r4_giga_last_stack_top;
 [[gnu::used]] std::uint32_t* const r4_giga_last_stack_top = std::end(r4_giga_last_stack);
 }
@@ -81,7 +81,7 @@ void on_own_stack(void (*work)()) {
 void on_last_stack(void (*work)()) { go_on_at(work, r4_giga_last_stack_top); }
 
 void mark_interrupt_stacks() {
-  constexpr std::uint32_t kept_words = 16;  // below what is in use now
+  constexpr std::uint32_t kept_words = 16;  // below the part in use
   for (std::uint32_t& word : r4_giga_own_stack) word = unused;
   const InterruptLock lock;
   volatile std::uint32_t* const end = stack_pointer() - kept_words;

@@ -14,7 +14,7 @@ namespace giga {
 
 namespace {
 
-// What interrupt handlers need lives here, and only here. NOLINTBEGIN
+// Used by interrupt handlers. NOLINTBEGIN
 StepTick* stepping = nullptr;
 firmware::Guard* guarding = nullptr;
 std::uint32_t fed_ms = 0;
@@ -59,7 +59,7 @@ void on_millisecond() { on_own_stack(&pass_millisecond); }
 
 }  // namespace
 
-// The timers' clock is twice their bus's, unless that runs undivided (RM0399, chapter RCC).
+// Twice the bus clock, unless the bus runs undivided (RM0399, chapter RCC).
 std::uint32_t timer_input_hz() {
   const std::uint32_t bus_hz = HAL_RCC_GetPCLK1Freq();
   return bus_hz == HAL_RCC_GetHCLKFreq() ? bus_hz : 2 * bus_hz;
@@ -74,7 +74,7 @@ void start_step_timer(StepTick& tick) {
   static_cast<void>(static_cast<std::uint32_t>(RCC->APB1LENR));
   TIM7->PSC = 0;
   TIM7->ARR = timer_input_hz() / step_tick_hz - 1;
-  TIM7->EGR = 1;  // takes both over now
+  TIM7->EGR = 1;  // loads prescaler and period
   TIM7->SR = 0;
   TIM7->DIER = update_interrupt;
   NVIC_SetVector(TIM7_IRQn, reinterpret_cast<std::uintptr_t>(&on_step_timer));
@@ -89,7 +89,7 @@ void start_guard_timer(firmware::Guard& guard) {
   awake = false;
   loop_flags();
   NVIC_SetVector(MDIOS_IRQn, reinterpret_cast<std::uintptr_t>(&on_stop));
-  NVIC_SetPriority(MDIOS_IRQn, 0);  // as the ticker's: neither interrupts the other
+  NVIC_SetPriority(MDIOS_IRQn, 0);  // as the ticker: neither interrupts the other
   NVIC_EnableIRQ(MDIOS_IRQn);
   ticker.attach(mbed::callback(&on_millisecond), std::chrono::microseconds(1000));
 }
@@ -99,8 +99,8 @@ void stop_at_once() {
   NVIC_SetPendingIRQ(MDIOS_IRQn);
 }
 
-// Once is enough, and more than 16 times in one interrupt is an error of the core: its ticker makes up
-// for late ticks in a single one.
+// Sets the flag only once: the core's ticker makes up for late ticks in one interrupt, and more
+// than 16 flags in one interrupt are an error.
 void wake_loop() {
   if (!awake.exchange(true)) loop_flags().set(woken);
 }

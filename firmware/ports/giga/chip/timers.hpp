@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the board does on time, whatever its loop is waiting for.
+// Work on time, even while the loop waits.
+//     1 kHz    mbed::Ticker   clock, guard, watchdog if the guard allows it; wakes the loop
+//     40 kHz   TIM7           stepper steps, encoder index pins
+//     a stop   MDIOS_IRQn     the guard; uses the interrupt of an unused peripheral
 //
-//     1 kHz    mbed::Ticker   the clock; the guard, and with its leave the watchdog is fed;
-//                             wakes the loop
-//     40 kHz   TIM7           steps of the steppers, index lines of the encoders
-//     a stop   MDIOS_IRQn     the guard; the line of a peripheral that nobody uses
-//
-// All on the stack of their own (interrupt_stack.hpp), which the guard's interrupt looks at, too.
-// (A Ticker at 40 kHz would spend most of the time in the core's timer queue.) If the guard keeps its
-// leave back for starve_ms, the board ends its boot by itself and leaves a note why, before the
-// watchdog would without one.
+// All run on the stack of interrupt_stack.hpp. A Ticker at 40 kHz would spend most time in the
+// core's timer queue. If the guard withholds permission for starve_ms, the board ends its boot with
+// a note, before the watchdog would reset it without a note.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +19,7 @@ namespace giga {
 constexpr std::uint32_t step_tick_hz = 40000;
 constexpr std::uint32_t starve_ms = 400;
 
-// What the 40 kHz tick does; in the interrupt.
-class StepTick {
+class StepTick {  // called in the 40 kHz interrupt
  public:
   virtual void step_tick() = 0;
 
@@ -32,20 +28,17 @@ class StepTick {
 };
 
 void start_step_timer(StepTick& tick);
-// From now on the watchdog is fed by the guard.
+// Then the guard feeds the watchdog.
 void start_guard_timer(firmware::Guard& guard);
 
-// E:STOP has come in: the guard makes the outputs safe at once. From any interrupt or thread, once
-// the guard's timer has been started.
+// For a received E:STOP: the guard makes the outputs safe at once. From any interrupt or thread,
+// after start_guard_timer().
 void stop_at_once();
 
-// Hz that TIM7 counts before its divider.
-std::uint32_t timer_input_hz();
+std::uint32_t timer_input_hz();  // TIM7's input clock
 
-// Wakes the loop; from any interrupt or thread.
-void wake_loop();
-// Until the loop is woken, two milliseconds at most.
-void rest();
+void wake_loop();  // from any interrupt or thread
+void rest();       // until the loop is woken, at most 2 ms
 
 }  // namespace giga
 }  // namespace r4

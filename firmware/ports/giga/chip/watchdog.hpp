@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The independent watchdog IWDG1 (RM0399, chapter IWDG): runs on a clock of its own, cannot be stopped,
-// resets the whole chip limit_ms after the last feed(). That clock is 32 kHz within 7 %.
+// Independent watchdog IWDG1 (RM0399, chapter IWDG). Cannot be stopped; resets the chip limit_ms
+// after the last feed(). Its own clock is 32 kHz within 7 %.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,8 @@ class Watchdog {
     constexpr std::uint32_t clock_hz = 32000;
     constexpr std::uint32_t divider = 16;
     constexpr std::uint32_t divide_by_16 = 2;
-    IWDG1->KR = 0xCCCC;  // on
-    IWDG1->KR = 0x5555;  // the next two may be written
+    IWDG1->KR = 0xCCCC;  // start
+    IWDG1->KR = 0x5555;  // unlocks the next two registers
     IWDG1->PR = divide_by_16;
     IWDG1->RLR = clock_hz / divider * limit_ms / 1000;
     feed();

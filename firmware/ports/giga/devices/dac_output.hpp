@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A channel of DAC1 by its registers (RM0399, chapter DAC), without its buffer, which does not reach 0 V.
+// A channel of DAC1 (RM0399, chapter DAC). Unbuffered, because the buffer does not reach 0 V.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +12,10 @@
 namespace r4 {
 namespace giga {
 
-// The clock of DAC1, and both channels at 0 V, then at their pins.
+// Sets both channels to 0 V before they reach their pins.
 inline void start_dac(const Pin (&pins)[2]) {
   constexpr std::uint32_t rcc_dac_on = 1U << 29;
-  constexpr std::uint32_t no_buffer = 2U | 2U << 16;  // of channels 1 and 2, to the pin
+  constexpr std::uint32_t no_buffer = 2U | 2U << 16;  // channels 1 and 2, connected to the pin
   constexpr std::uint32_t on = 1U | 1U << 16;
   {
     const InterruptLock lock;
@@ -36,7 +36,7 @@ inline void start_dac(const Pin (&pins)[2]) {
 class DacOutput final : public firmware::AnalogOutputPin {
  public:
   explicit DacOutput(int channel) : second_(channel == 2) {}
-  // One access, right in any interrupt and in a fault handler.
+  // One access, safe in any interrupt and fault handler.
   void write(std::uint16_t millivolts) override {
     constexpr std::uint32_t full_scale = 4095;
     constexpr std::uint32_t reference_mv = 3300;

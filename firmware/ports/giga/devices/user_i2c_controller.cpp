@@ -6,7 +6,6 @@ namespace giga {
 
 namespace {
 
-// RM0399, chapter I2C: registers.
 constexpr std::uint32_t cr1_on = 1U << 0;
 constexpr std::uint32_t cr2_read = 1U << 10;
 constexpr std::uint32_t cr2_start = 1U << 13;
@@ -27,7 +26,7 @@ std::uint32_t user_i2c_timing(std::uint32_t kernel_hz) {
   constexpr std::uint32_t low_ns = 5000;
   constexpr std::uint32_t high_ns = 4700;
   constexpr std::uint32_t hold_ns = 250;
-  constexpr std::uint32_t setup_ns = 1250;  // 250, and the longest rise time
+  constexpr std::uint32_t setup_ns = 1250;  // 250, plus the longest rise time
   const std::uint32_t prescaler = (kernel_hz + fastest_tick_hz - 1) / fastest_tick_hz;
   const std::uint32_t tick_khz = kernel_hz / prescaler / 1000;
   const auto ticks = [tick_khz](std::uint32_t ns) { return (ns * tick_khz + 999999) / 1000000; };
@@ -58,7 +57,7 @@ void UserI2cController::begin(const firmware::UserTransfer& transfer) {
   }
 }
 
-// START, or a repeated one. On a bus that is busy the peripheral waits with it.
+// START or repeated START. On a busy bus the peripheral delays it.
 void UserI2cController::request(Stage stage, std::size_t size, std::uint32_t flags) {
   done_ = 0;
   registers_.ICR = icr_all;
@@ -101,8 +100,7 @@ void UserI2cController::receive_step(std::uint32_t status) {
 void UserI2cController::end(Progress result) {
   registers_.ICR = icr_all;
   if (result != Progress::done) {
-    // Off and on: so a byte that waited in TXDR behind one that was refused is not the first of the next transfer. It
-    // must be off for three clocks of the peripherals' bus.
+    // Off for three APB clocks, so that a byte left in TXDR is not sent in the next transfer.
     registers_.CR1 = 0;
     for (int i = 0; i < 3; ++i) static_cast<void>(static_cast<std::uint32_t>(registers_.CR1));
     registers_.CR1 = cr1_on;
@@ -111,19 +109,19 @@ void UserI2cController::end(Progress result) {
   stage_ = Stage::idle;
 }
 
-// By the pins' own levels: the peripheral would not drive lines that it takes for busy.
+// Drives the pins, because the peripheral does not drive a busy bus.
 void UserI2cController::release() {
   const InterruptLock lock;
   stage_ = Stage::idle;
   result_ = Progress::lost;
-  registers_.CR1 = 0;  // it forgets the transfer
+  registers_.CR1 = 0;  // ends the transfer
   drive(true, true);
   set_mode(scl_, LineMode::output);
   set_mode(sda_, LineMode::output);
 }
 
 void UserI2cController::drive(bool scl, bool sda) {
-  // SDA changes while SCL is low, but for STOP.
+  // SDA changes while SCL is low, except for STOP.
   if (!scl) giga::write(scl_, false);
   giga::write(sda_, sda);
   if (scl) giga::write(scl_, true);

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The I2C peripheral of the user's bus as master, by its registers (RM0399, chapter I2C), at no more than
-// 100 kHz, which every device can.
-//
-// It has no interrupt of its own, so that no noise on its wires can make a storm of them: the step timer's,
-// each 25 us, moves a byte if one is due, and a byte takes 90 us on the wire. What runs there looks at one
-// register, or at none while nothing is under way. A peripheral that gets no byte in time waits, SCL low.
+// The user's I2C peripheral as master at up to 100 kHz (RM0399, chapter I2C). Uses no interrupt of
+// its own, so noise on the wires cannot cause a storm of interrupts. The step timer's interrupt
+// moves at most one byte each 25 us; a byte takes 90 us on the wire. It reads one register, or none
+// when idle. A peripheral without its next byte waits with SCL low.
 #pragma once
 
 #include <cstddef>
@@ -17,18 +15,16 @@
 namespace r4 {
 namespace giga {
 
-// TIMINGR for a kernel clock of 8 to 250 MHz: SCL low 5.0 us, high 4.7 us, data held 0.25 us and set up
-// 1.25 us before the edge, rounded up.
+// TIMINGR for a kernel clock of 8 to 250 MHz, rounded up: SCL low 5.0 us, high 4.7 us, data hold
+// 0.25 us, set-up 1.25 us.
 std::uint32_t user_i2c_timing(std::uint32_t kernel_hz);
 
 class UserI2cController final : public firmware::UserI2cPort {
  public:
   explicit UserI2cController(const I2cController::Wiring& wiring);
 
-  // `kernel_hz`: the peripheral's clock, which must be on.
-  void start(std::uint32_t kernel_hz);
-  // In the interrupt of the step timer.
-  void tick() {
+  void start(std::uint32_t kernel_hz);  // the peripheral's clock, already on
+  void tick() {                         // in the step timer's interrupt
     if (stage_ != Stage::idle) step();
   }
 
@@ -52,7 +48,7 @@ class UserI2cController final : public firmware::UserI2cPort {
   const Line scl_;
   const Line sda_;
   firmware::UserTransfer transfer_;
-  std::size_t done_ = 0;  // bytes, in this direction
+  std::size_t done_ = 0;  // bytes in this direction
   volatile Stage stage_ = Stage::idle;
   volatile Progress result_ = Progress::done;
 };

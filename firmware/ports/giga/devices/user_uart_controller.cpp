@@ -11,15 +11,15 @@ constexpr std::uint32_t cr1_receives = 1U << 2;
 constexpr std::uint32_t cr1_sends = 1U << 3;
 constexpr std::uint32_t cr1_odd = 1U << 9;
 constexpr std::uint32_t cr1_parity = 1U << 10;
-constexpr std::uint32_t cr1_nine_bits = 1U << 12;  // the ninth is the parity's
+constexpr std::uint32_t cr1_nine_bits = 1U << 12;  // the ninth is parity
 constexpr std::uint32_t cr1_fifo = 1U << 29;
 constexpr std::uint32_t cr2_two_stop_bits = 2U << 12;
-constexpr std::uint32_t damaged = 7;  // parity, framing, noise: of the byte in RDR
+constexpr std::uint32_t damaged = 7;  // parity, framing or noise error of the byte in RDR
 constexpr std::uint32_t overrun = 1U << 3;
 constexpr std::uint32_t has_byte = 1U << 5;
 constexpr std::uint32_t has_room = 1U << 7;
-constexpr std::uint32_t rqr_empty_fifo = 1U << 4;  // TXFRQ: of what is to be sent
-constexpr int bytes_in = 2;                        // of one tick
+constexpr std::uint32_t rqr_empty_fifo = 1U << 4;  // TXFRQ: the transmit FIFO
+constexpr int bytes_in = 2;                        // per tick
 
 }  // namespace
 
@@ -44,7 +44,6 @@ void UserUartController::set_up(const UartMode& mode) {
   begin();
 }
 
-// As the mode says, if the clock is there.
 void UserUartController::begin() {
   runs_ = false;
   if (kernel_hz_ == 0) return;
@@ -73,14 +72,14 @@ void UserUartController::begin() {
 void UserUartController::move(bool sends) {
   std::uint32_t status = registers_.ISR;
   for (int i = 0; i < bytes_in && (status & has_byte) != 0; ++i) {
-    // Before the byte is read, for then the flags are those of the next one.
+    // Clear before the byte is read: then the flags belong to the next byte.
     if ((status & damaged) != 0) registers_.ICR = damaged;
     const char byte = static_cast<char>(registers_.RDR & 0xFFU);
     if ((status & damaged) != 0 || !received_.put(byte)) lost_ = lost_ + 1;
     status = (status & overrun) | registers_.ISR;
   }
   if ((status & overrun) != 0) {
-    lost_ = lost_ + 1;  // one at least
+    lost_ = lost_ + 1;  // at least one
     registers_.ICR = overrun;
   }
   char next = 0;

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A USART of the user's by its registers (RM0399, chapter USART), with its FIFOs of 16 bytes.
-//
-// It has no interrupt of its own, so that no noise on its wire can make a storm of them: the step timer's, each
-// 25 us, moves up to two bytes in and one out, as many as 460800 baud bring. While the UART is off, what runs
-// there looks at no register.
+// A USART for the user (RM0399, chapter USART), with its FIFOs of 16 bytes. Uses no interrupt of
+// its own, so noise on the wire cannot cause a storm of interrupts. The step timer's interrupt
+// moves up to two bytes in and one out each 25 us, enough for 460800 baud. While the UART is off,
+// it reads no register.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +15,7 @@
 namespace r4 {
 namespace giga {
 
-// Prescaler (PRESC) and divider (BRR) for a kernel clock of 16 to 250 MHz.
+// PRESC and BRR for a kernel clock of 16 to 250 MHz.
 struct UartTiming {
   std::uint32_t prescaler;
   std::uint32_t divider;
@@ -37,9 +36,8 @@ class UserUartController final : public firmware::UserUartPort {
         rx_(line_of(wiring.rx)),
         function_(wiring.function) {}
 
-  // `kernel_hz`: the peripheral's clock, which must be on.
-  void start(std::uint32_t kernel_hz);
-  // In the interrupt of the step timer. Nothing is sent while the board is safe and its loop has not seen to it yet.
+  void start(std::uint32_t kernel_hz);  // the peripheral's clock, already on
+  // In the step timer's interrupt. `sends`: false until the loop has handled a safe state.
   void tick(bool sends) {
     if (runs_) move(sends);
   }

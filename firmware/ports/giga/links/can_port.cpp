@@ -22,7 +22,7 @@ void CanPort::send(Text datagram, Priority priority, std::uint32_t) {
   pump();
 }
 
-// Begins the oldest datagram of `queue`. False: none, or its lane is not idle.
+// Starts the oldest datagram of `queue`. False: none, or the lane is busy.
 bool CanPort::begin_next(CanLane lane, DatagramRing<queue_bytes>& queue) {
   if (!node_.idle(lane)) return false;
   DatagramNote note;
@@ -31,7 +31,6 @@ bool CanPort::begin_next(CanLane lane, DatagramRing<queue_bytes>& queue) {
   return queue.take(note, buffer, datagram) && node_.begin(datagram, clock_());
 }
 
-// Gives the controller what it takes now.
 void CanPort::pump() {
   CanFrame frame;
   for (;;) {
@@ -44,7 +43,7 @@ void CanPort::pump() {
     const std::uint32_t now_us = clock_();
     const bool urgent = node_.offer_urgent(now_us, frame);
     if (!urgent && !node_.offer(now_us, frame)) return;
-    // A full buffer for what is urgent: the other one will do.
+    // If the urgent buffer is full, use the queue.
     const bool accepted = (urgent && controller_.send_urgent(frame)) || controller_.send(frame);
     if (!accepted) return;
     node_.frame_sent(now_us);

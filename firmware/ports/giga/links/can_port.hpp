@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The CAN bus as a port of the application (docs/can.md): datagrams by ISO-TP through an Fdcan.
-//
-// Two lanes, dialogue and telemetry, each with one transfer under way. What waits for telemetry: one
-// state, which a newer one replaces, and before it heartbeats, in order. A full queue drops what is
-// new and counts it. When the bus is lost, or nobody takes our frames for Fdcan::stale_us, all that
-// waits is dropped: whoever comes back hears the present.
-//
-// From the loop only; nothing waits.
+// The CAN bus as a port of the application (docs/can.md): datagrams over ISO-TP through an Fdcan.
+// Two lanes, dialogue and telemetry, each with one transfer at a time. In telemetry, heartbeats
+// come first, in order, then one state, which a newer state replaces. A full queue drops and counts
+// new datagrams. When the bus is lost, or no frame leaves for Fdcan::stale_us, all waiting
+// datagrams are dropped. Never waits; from the loop only.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +22,7 @@ class CanPort final : public firmware::Port {
   CanPort(Fdcan& controller, std::uint8_t node, Clock clock)
       : controller_(controller), clock_(clock), node_(CanEnd::board, node, false) {}
 
-  // Calls `on_datagram(Text)` for each that has arrived; true: the bus was lost since the last call.
+  // Calls `on_datagram(Text)` for each datagram. True: the bus was lost since the last call.
   template <class OnDatagram>
   bool receive(OnDatagram&& on_datagram) {
     const Fdcan::Event event = controller_.poll(clock_());
@@ -33,7 +30,7 @@ class CanPort final : public firmware::Port {
     CanFrame frame;
     for (int i = 0; i < frames_per_turn && controller_.receive(frame); ++i) {
       const Text datagram = node_.on_frame(frame, clock_());
-      pump();  // flow control is waited for
+      pump();  // the sender waits for flow control
       if (!datagram.empty()) on_datagram(datagram);
     }
     node_.poll(clock_());
@@ -46,12 +43,12 @@ class CanPort final : public firmware::Port {
   void use_packed_form(bool wanted) override { node_.use_packed_form(wanted); }
   bool is_bus() const override { return true; }
 
-  std::uint32_t dropped() const { return dropped_; }  // datagrams
+  std::uint32_t dropped() const { return dropped_; }
   const CanNode& node() const { return node_; }
 
  private:
   static constexpr std::uint32_t queue_bytes = 1024;
-  static constexpr int frames_per_turn = 32;  // a full bus brings eight in a millisecond
+  static constexpr int frames_per_turn = 32;  // a full bus carries eight per millisecond
 
   void pump();
   bool begin_next(CanLane lane, DatagramRing<queue_bytes>& queue);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whole datagrams from one context to another, with what is to be known of each: one side puts, one
-// side takes, in two threads or in one. No locks; neither side waits.
+// A queue of whole datagrams with a note for each. One thread puts, the same or another takes.
+// Without locks; neither side waits.
 #pragma once
 
 #include <cstddef>
@@ -16,16 +16,16 @@ namespace giga {
 
 struct DatagramNote {
   std::uint32_t peer = everyone;
-  std::uint32_t time_ms = 0;  // when it was put
+  std::uint32_t time_ms = 0;
   Priority priority = Priority::normal;
 };
 
 template <std::uint32_t capacity>
 class DatagramRing {
  public:
-  static constexpr std::uint32_t overhead = 12;  // bytes a datagram takes beside its own
+  static constexpr std::uint32_t overhead = 12;  // bytes beside the datagram's text
 
-  // False, and nothing happens: less than `keep_free` bytes would stay, or it is too long.
+  // False: too long, or less than `keep_free` bytes would stay free.
   bool put(const DatagramNote& note, Text datagram, std::uint32_t keep_free = 0) {
     if (datagram.size() > max_datagram) return false;
     const std::uint32_t size = overhead + static_cast<std::uint32_t>(datagram.size());
@@ -41,11 +41,11 @@ class DatagramRing {
     return bytes_.put(flat, size);
   }
 
-  // The oldest; its text is in `buffer`. False: there is none.
+  // Takes the oldest datagram; its text is in `buffer`. False: none.
   bool take(DatagramNote& note, char (&buffer)[max_datagram], Text& datagram) {
     Head head;
     char flat[sizeof head];
-    if (bytes_.take(flat, sizeof flat) == 0) return false;  // what is put, is put as a whole
+    if (bytes_.take(flat, sizeof flat) == 0) return false;  // a datagram is put as a whole
     std::memcpy(&head, flat, sizeof head);
     bytes_.take(buffer, head.size);
     note.peer = head.peer;

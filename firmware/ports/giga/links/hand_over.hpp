@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A value that one thread hands to another: the newest wins, neither waits. A seqlock: the taker
-// tries again when it was being written. T is copied byte by byte.
+// Hands the newest value from one thread to another; neither waits. A seqlock: take() fails while
+// the value is written.
 #pragma once
 
 #include <atomic>
@@ -22,13 +22,12 @@ class HandOver {
     unsigned char flat[sizeof(T)];
     std::memcpy(flat, &value, sizeof flat);
     for (std::size_t i = 0; i < sizeof flat; ++i) {
-      bytes_[i].store(flat[i], std::memory_order_release);  // who sees it sees the odd version, too
+      bytes_[i].store(flat[i], std::memory_order_release);  // a reader also sees the odd version
     }
     version_.store(before + 2, std::memory_order_release);
   }
 
-  // The newest, if it is another than that of version `known` (0: none yet), which is updated.
-  // False: there is no newer one, or it is being written just now.
+  // Takes a value newer than version `known` (0: none); updates `known`. False: none, or not whole.
   bool take(std::uint32_t& known, T& value) const {
     const std::uint32_t before = version_.load(std::memory_order_acquire);
     if (before == known || before % 2 != 0) return false;

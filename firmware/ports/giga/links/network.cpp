@@ -45,7 +45,7 @@ void Network::run(Network* network) {
   }
 }
 
-// Only another network, password or port is a reason to join anew.
+// Rejoins only for another network, password or port.
 void Network::take_settings() {
   const Wanted before = wanted_;
   if (!handed_over_.take(version_, wanted_)) return;
@@ -128,7 +128,7 @@ bool Network::receive_next() {
   return true;
 }
 
-// What the stack does not take now is lost, as on any network.
+// The datagram is lost if the stack has no room.
 bool Network::send_next() {
   std::uint32_t peer = everyone;
   char buffer[max_datagram];

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// WiFi and UDP on a thread of their own: joins the network of the settings, joins again when it is
-// lost or the settings change, and carries datagrams between a socket and a UdpLink.
-//
-//          settings name a network       joined            gone, or other settings
-//     idle -----------------------> joining -----> up -----------------------------> joining or idle
+// WiFi and UDP on their own thread: joins the network of the settings and carries datagrams between
+// a socket and a UdpLink. Rejoins when the network is lost or the settings change.
+//          settings name a network       joined            lost, or other settings
+//     idle -----------------------> joining -----> up ---------------------------> joining or idle
 //                                      ^   | not joined: again after retry_ms
 //                                      +---+
 //
-// Joining scans first and takes up to 7 s, and without WiFi firmware in the flash the library never
-// returns: all of that is this thread's alone. What the library says of the
-// connection may be wrong for long: only heartbeats decide whether the host is there, and when hosts
-// that were there have been silent for quiet_ms the network is joined anew. The thread has the lowest
-// priority: where the library spins, it spins alone.
+// Joining takes up to 7 s. Without WiFi firmware in the flash the library spins for ever, so the
+// thread has the lowest priority. The library's status may be wrong for long, so the network is
+// also rejoined after hosts have been silent for quiet_ms.
 #pragma once
 
 #include <atomic>
@@ -40,19 +37,16 @@ class Network {
 
   explicit Network(UdpLink& link) : link_(link) {}
 
-  // Once, from the loop.
-  void start();
-  // What to join, and at which port to listen; from the loop, at any time.
-  void use(const SiteSettings& settings);
+  void start();                            // once, from the loop
+  void use(const SiteSettings& settings);  // from the loop, at any time
 
   NetworkState state() const { return state_.load(std::memory_order_relaxed); }
-  std::uint32_t ip() const { return ip_.load(std::memory_order_relaxed); }  // ours; 0: none
+  std::uint32_t ip() const { return ip_.load(std::memory_order_relaxed); }  // the board's; 0: none
 
-  // One turn of the thread; true: it has done something, and may have more to do.
+  // One turn of the thread. True: there may be more to do.
   bool turn();
 
  private:
-  // What of the settings is this thread's.
   struct Wanted {
     char network[network_max + 1];
     char password[password_max + 1];
@@ -74,15 +68,15 @@ class Network {
   HandOver<Wanted> handed_over_;
   std::atomic<NetworkState> state_{NetworkState::idle};
   std::atomic<std::uint32_t> ip_{0};
-  // Of the thread alone.
+  // Used by the thread only.
   std::uint32_t version_ = 0;
   Wanted wanted_ = {};
   UdpPeers peers_;
   bool tried_ = false;
   std::uint32_t tried_ms_ = 0;
-  bool heard_ = false;  // somebody, since we joined
+  bool heard_ = false;  // a datagram came since the network was joined
   std::uint32_t heard_ms_ = 0;
-  UDPSocket socket_;  // never blocks: the core's WiFiUDP can wait a second in either direction
+  UDPSocket socket_;  // non-blocking: the core's WiFiUDP can wait a second either way
 
   alignas(8) unsigned char stack_[stack_size];
   rtos::Thread thread_{osPriorityBelowNormal, stack_size, stack_, "r4-network"};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hosts that have sent to the board's socket, and where what is for everyone goes
-// (docs/transports.md, as udp://BIND?peer=HOST does it). Of the network thread alone.
+// The hosts that have sent datagrams, and the receivers of a datagram to everyone, as in
+// udp://BIND?peer=HOST (docs/transports.md). From the network thread only.
 #pragma once
 
 #include <cstdint>
@@ -22,16 +22,16 @@ class UdpPeers {
   static constexpr int capacity = 16;
   static constexpr std::uint16_t host_port = 2390;  // where the paper's client listens
 
-  // A host that gets what is for everyone, at host_port; 0: none.
+  // This host also gets datagrams to everyone, at host_port; 0: none.
   void set_host(std::uint32_t ip) { host_ = ip; }
 
-  // The number of whoever has just sent `bytes`; everyone if they are no valid datagram.
+  // Returns the number of the sender; everyone if `bytes` is not a valid datagram.
   std::uint32_t heard(UdpAddress from, Text bytes) { return hosts_.heard(from, bytes); }
-  // That one is in control, and keeps its number; everyone: none is any more.
+  // The controlling host keeps its number; everyone: no host is in control.
   void hold(std::uint32_t peer) { hosts_.hold(peer); }
   void also_hold(std::uint32_t peer) { hosts_.also_hold(peer); }
 
-  // Where to send what is for `peer`; how many places that are.
+  // Fills `to` with the addresses of `peer`. Returns their number.
   static constexpr int most_places = 2;
   int find(std::uint32_t peer, UdpAddress (&to)[most_places]) const {
     to[1].ip = host_;
@@ -43,7 +43,7 @@ class UdpPeers {
     const UdpAddress* const at = hosts_.find(peer == everyone ? hosts_.audience() : peer);
     if (at == nullptr) return 0;
     to[0] = *at;
-    // The paper's client asks from another port than it listens at.
+    // The paper's client sends from another port than it listens on.
     return at->ip == host_ && at->port != host_port && !hosts_.watches(peer) ? 2 : 1;
   }
 

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// UDP as a port of the application, and its other side for the thread that has the sockets. WiFi may
-// block that thread for seconds; the loop never notices: datagrams cross in rings without locks.
-//
+// UDP as a port of the application. WiFi may block its thread for seconds, so loop and thread
+// exchange datagrams through rings without locks.
 //     loop                         network thread
-//     UdpPort::send()     ----->   UdpLink::take()     states older than stale_ms are left out
+//     UdpPort::send()     ----->   UdpLink::take()     skips states older than stale_ms
 //     UdpPort::receive()  <-----   UdpLink::give()
 //     true from receive() <-----   UdpLink::set_up(false)
 //
-// When the ring is full, what is new is dropped and counted; states leave room for answers, and those to
-// who is not in control room for those to the host that is. So a
-// thread that comes back to work sends the present: what is left of the past are answers.
+// A full ring drops and counts new datagrams. States leave room for answers. States to hosts that
+// are not in control also leave room for states to the controlling host.
 #pragma once
 
 #include <atomic>
@@ -20,16 +18,16 @@
 namespace r4 {
 namespace giga {
 
-// What the Giga's library can carry at once (WIFI_UDP_BUFFER_SIZE).
+// Limit of the Giga's library (WIFI_UDP_BUFFER_SIZE).
 constexpr std::size_t udp_max_size = 508;
 
 class UdpLink {
  public:
   static constexpr std::uint32_t stale_ms = 50;
 
-  // --- the network thread's
+  // --- For the network thread.
 
-  // The oldest datagram to send, and to whom. False: none.
+  // Takes the oldest datagram to send. False: none.
   bool take(std::uint32_t now_ms, std::uint32_t& peer, char (&buffer)[max_datagram],
             Text& datagram) {
     DatagramNote note;
@@ -46,14 +44,13 @@ class UdpLink {
     note.peer = peer;
     if (!from_network_.put(note, datagram)) lost_.fetch_add(1, std::memory_order_relaxed);
   }
-  // Who keeps its number: the host in control, and its other places; everyone: nobody.
+  // Peers that keep their numbers: the controlling host on all its paths. everyone: unused.
   static constexpr int most_held = 4;
   std::uint32_t held(int i) const { return held_[i].load(std::memory_order_relaxed); }
-  // Is the network there?
   void set_up(bool up) { up_.store(up, std::memory_order_release); }
 
   bool up() const { return up_.load(std::memory_order_acquire); }
-  std::uint32_t lost() const { return lost_.load(std::memory_order_relaxed); }  // on the way in
+  std::uint32_t lost() const { return lost_.load(std::memory_order_relaxed); }  // received
 
  private:
   friend class UdpPort;
@@ -74,7 +71,7 @@ class UdpPort final : public firmware::Port {
 
   UdpPort(UdpLink& link, Clock now_ms) : link_(link), now_ms_(now_ms) {}
 
-  // Calls `on_datagram(peer, Text)` for each that has arrived; true: the network has gone.
+  // Calls `on_datagram(peer, Text)` for each datagram. True: the network was lost.
   template <class OnDatagram>
   bool receive(OnDatagram&& on_datagram) {
     DatagramNote note;
@@ -90,7 +87,7 @@ class UdpPort final : public firmware::Port {
   }
 
   void send(Text datagram, Priority priority, std::uint32_t peer) override {
-    if (!up_) return;  // nobody is there to hear it
+    if (!up_) return;
     DatagramNote note;
     note.peer = peer;
     note.time_ms = now_ms_();

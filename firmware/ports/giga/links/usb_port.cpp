@@ -40,7 +40,7 @@ void UsbPort::send_packet() {
   if (packet_sent_ == packet_used_) fill_packet();
   std::uint32_t size = packet_used_ - packet_sent_;
   if (size == 0) return;
-  // The host's driver passes on what it has at a packet that is not full.
+  // A packet that is not full makes the host's driver deliver the data.
   if (size == packet_size && lines_.empty()) --size;
   std::uint32_t taken = 0;
   _SerialUSB.send_nb(packet_ + packet_sent_, size, &taken, true);
@@ -50,7 +50,7 @@ void UsbPort::send_packet() {
 bool UsbPort::poll(std::uint32_t now_ms) {
   const bool open = _SerialUSB.connected();
   const bool closed = open_ && !open;
-  if (open != open_) {  // what was for one program is nothing for the next
+  if (open != open_) {  // old data is not for the next program
     framing_.reset();
     lines_.clear();
     packet_sent_ = packet_used_;
@@ -62,7 +62,7 @@ bool UsbPort::poll(std::uint32_t now_ms) {
 }
 
 void UsbPort::send(Text datagram, Priority priority, std::uint32_t) {
-  if (!open_) return;  // nobody is there to hear it
+  if (!open_) return;
   if (priority == Priority::state) {
     lines_.put_state(datagram);
   } else {

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// USB serial as a port of the application: one datagram a line, and a few words for people.
-//
-// Nothing here waits for the host. The core's Serial.write() would, for ever, when a program has
-// the port open and does not read; so lines go out by send_nb(), a packet at a time, whole or not
-// at all, and the newest state wins (transmit_lines.hpp).
-//
-// Input is taken from the core, and a stop among it heard, in an interrupt that gives way to all
-// others: whatever the loop is busy with. When its ring is full, the rest waits at the host.
-//
-// The line `report` is for the board itself. All but take_in() and listen(): from the loop only.
+// USB serial as a port of the application: one datagram a line, and the line `report` for the
+// board. The core's Serial.write() waits for ever if a program opens the port and does not read. So
+// lines go out by send_nb(), one packet at a time, whole or not at all, and the newest state wins
+// (transmit_lines.hpp). An interrupt of low priority takes input from the core and detects a stop
+// while the loop is busy. When its ring is full, more input waits at the host. Only take_in() and
+// listen() may be called outside the loop.
 #pragma once
 
 #include <cstdint>
@@ -24,25 +20,23 @@ namespace giga {
 
 class UsbPort final : public firmware::Port {
  public:
-  // A full packet: more is to come. The core takes no more at a time.
+  // A full packet, the most that the core takes at a time. More must follow.
   static constexpr std::uint32_t packet_size = 64;
 
-  // In one receive(); the rest waits at the host, so that a flood of input takes no time from the
-  // rest of the board.
+  // Per receive(), so that a flood of input does not delay the board.
   static constexpr int packets_per_turn = 8;
 
   static constexpr std::uint32_t receive_capacity = 1024;
 
-  // Has listen() called for each packet that comes.
+  // Makes the core call listen() for each packet.
   static void start();
-  // Asks for the interrupt (SWPMI1_IRQn, whose peripheral nobody uses) that calls take_in(); from
-  // anywhere.
+  // Requests the interrupt for take_in(): SWPMI1_IRQn, otherwise unused. From anywhere.
   static void listen();
-  // In that interrupt: takes what has come. True: E:STOP is among it.
+  // In that interrupt. True: E:STOP was received.
   bool take_in();
   bool has_received() const { return !received_.empty(); }
 
-  // Calls `on_line(Text)` for each line that has arrived.
+  // Calls `on_line(Text)` for each line.
   template <class OnLine>
   void receive(OnLine&& on_line) {
     char chunk[packet_size];
@@ -54,20 +48,18 @@ class UsbPort final : public firmware::Port {
     listen();  // there is room again
   }
 
-  // Lets time pass and sends what the host takes now. True: the host has just closed the port, or
-  // the cable is out.
+  // Sends as much as the host takes. True: the host closed the port, or the cable was unplugged.
   bool poll(std::uint32_t now_ms);
 
   void send(Text datagram, Priority priority, std::uint32_t peer) override;
   std::size_t max_size() const override { return max_datagram; }
   bool may_configure() const override { return true; }
 
-  // Has the host asked for new firmware, by 1200 baud? From then on the core resets the chip into
-  // its boot loader as soon as the port is closed, 200 ms later at the earliest, whatever the speed
-  // is then.
+  // True if the host has requested new firmware by 1200 baud. From then on the core resets into its
+  // boot loader when the port closes, at least 200 ms later, at any speed.
   bool upload_asked();
 
-  // A line of a report. False: no room now.
+  // Sends a line of the report. False: no room.
   bool say(Text line);
 
   bool open() const { return open_; }
@@ -80,7 +72,7 @@ class UsbPort final : public firmware::Port {
   firmware::TransmitLines lines_;
   LineFraming framing_;
   firmware::ByteRing<receive_capacity> received_;
-  // Of take_in() alone.
+  // Used by take_in() only.
   firmware::StopDetector detector_;
   bool heard_open_ = false;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Time from the free-running timer 0 at 25 MHz; and timer 1, which wakes the loop each millisecond.
-// (SysTick is no clock under QEMU: counting its interrupts loses ticks when the host is busy.)
+// Timer 0 gives the time at 25 MHz; timer 1 wakes the loop each millisecond. SysTick cannot be used
+// under QEMU: its interrupts are lost while the host is busy.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,6 @@ namespace m7 {
 
 class BoardClock {
  public:
-  // `first_ms`: what it shows now.
   explicit BoardClock(std::uint32_t first_ms) : ms_(first_ms) {}
 
   void start() {
@@ -22,7 +21,7 @@ class BoardClock {
     last_ = at(timer0_base + value);
     wake_every(1000, 1000);
   }
-  // Timer 1 interrupts each `us`, for the first time after `first_us`.
+  // Timer 1 interrupts after `first_us`, then each `us`.
   static void wake_every(std::uint32_t us, std::uint32_t first_us) {
     at(timer1_base + control) = 0;
     at(timer1_base + reload) = us * ticks_per_us - 1;
@@ -32,24 +31,22 @@ class BoardClock {
   }
   static void on_wake_interrupt() { at(timer1_base + interrupt) = 1; }
 
-  // May be asked in interrupts, too. To be called more often than the timer wraps: every 171 s.
+  // Also in interrupts. Call more often than every 171 s, before the timer wraps.
   std::uint32_t now_ms() {
     const InterruptsHeld held;
     advance();
     return ms_;
   }
-  // Wraps after 71 minutes.
-  std::uint32_t now_us() {
+  std::uint32_t now_us() {  // wraps after 71 minutes
     const InterruptsHeld held;
     advance();
     return ms_ * 1000 + rest_ / ticks_per_us;
   }
-  // The timer itself; counts up, and wraps.
-  static std::uint32_t ticks() { return ~at(timer0_base + value); }
+  static std::uint32_t ticks() { return ~at(timer0_base + value); }  // counts up, wraps
   static constexpr std::uint32_t ticks_per_us = clock_hz / 1000000;
 
  private:
-  // Registers of the CMSDK timer. It counts down.
+  // Registers of the CMSDK timer, which counts down.
   static constexpr std::uint32_t control = 0x0;
   static constexpr std::uint32_t value = 0x4;
   static constexpr std::uint32_t reload = 0x8;
@@ -72,7 +69,7 @@ class BoardClock {
   }
 
   std::uint32_t last_ = 0;
-  std::uint32_t rest_ = 0;  // ticks that are no whole millisecond yet
+  std::uint32_t rest_ = 0;  // ticks of the unfinished millisecond
   std::uint32_t ms_;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The registers of the M7 board with the AN500 image (a Cortex-M7) that this port uses, as QEMU's
-// `mps2-an500` has them. Sources: ARM DAI 0500 (AN500), ARM DDI 0479 (CMSDK), the LAN9118 data sheet.
+// The registers of QEMU's `mps2-an500` (Cortex-M7) that this port uses. Sources: ARM DAI 0500
+// (AN500), ARM DDI 0479 (CMSDK), the LAN9118 data sheet.
 #pragma once
 
 #include <cstdint>
@@ -14,20 +14,18 @@ inline volatile std::uint32_t& at(std::uint32_t address) {
 
 constexpr std::uint32_t clock_hz = 25000000;
 
-// Base addresses.
 constexpr std::uint32_t timer0_base = 0x40000000;  // CMSDK timer: time
 constexpr std::uint32_t timer1_base = 0x40001000;  // CMSDK timer: wakes the loop
 constexpr std::uint32_t uart0_base = 0x40004000;   // CMSDK UART: the link
 constexpr std::uint32_t uart1_base = 0x40005000;   // CMSDK UART: the board's log
-constexpr std::uint32_t uart2_base = 0x40006000;   // CMSDK UART: what the pins do
+constexpr std::uint32_t uart2_base = 0x40006000;   // CMSDK UART: pins report
 constexpr std::uint32_t watchdog_base = 0x40008000;
 constexpr std::uint32_t ethernet_base = 0xA0000000;  // LAN9118
 
-// Numbers of the interrupts.
 enum class Irq : std::uint8_t { uart0_rx = 0, uart0_tx = 1, timer1 = 9, ethernet = 13 };
 constexpr int irq_count = 16;
 
-// The Cortex-M7's own registers (ARM DDI 0403).
+// Cortex-M7 (ARM DDI 0403).
 constexpr std::uint32_t nvic_enable = 0xE000E100;
 constexpr std::uint32_t nvic_disable = 0xE000E180;
 constexpr std::uint32_t nvic_pend = 0xE000E200;
@@ -48,9 +46,8 @@ inline void disable(Irq irq) {
   at(nvic_disable) = 1U << static_cast<unsigned>(irq);
   at(nvic_forget) = 1U << static_cast<unsigned>(irq);
 }
-// As if it had come.
 inline void pend(Irq irq) { at(nvic_pend) = 1U << static_cast<unsigned>(irq); }
-// All others come also while this one is being handled.
+// Lowest priority: all other interrupts may interrupt this handler.
 inline void give_way(Irq irq) {
   constexpr std::uint32_t lowest = 0xFF;
   const std::uint32_t shift = static_cast<unsigned>(irq) % 4 * 8;
@@ -60,7 +57,7 @@ inline void give_way(Irq irq) {
 
 inline void interrupts_off() { asm volatile("cpsid i" ::: "memory"); }
 inline void interrupts_on() { asm volatile("cpsie i" ::: "memory"); }
-// Interrupts off while one lives; then as before.
+// Keeps interrupts off during its life. May be nested.
 class InterruptsHeld {
  public:
   InterruptsHeld() : before_(hold()) {}
@@ -80,10 +77,9 @@ class InterruptsHeld {
  private:
   std::uint32_t before_;
 };
-// Until an interrupt is pending; also with interrupts off.
+// Returns when an interrupt is pending, also with interrupts off.
 inline void wait_for_interrupt() { asm volatile("dsb\n\twfi" ::: "memory"); }
 
-// Switches everything off and on again.
 [[noreturn]] inline void reset() {
   asm volatile("dsb" ::: "memory");
   at(scb_aircr) = 0x05FA0004;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Words and an exit status for whoever emulates the processor (ARM semihosting). Only for programs
-// that are run under an emulator or a debugger which listens: without one it is a fault.
+// ARM semihosting, for an emulator or debugger that listens. Without one, a call is a fault.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +13,7 @@ inline void semihost(std::uint32_t operation, const void* argument) {
   asm volatile("bkpt 0xAB" : "+r"(r0) : "r"(r1) : "memory");
 }
 
-// `text` ends in NUL.
-inline void say(const char* text) {
+inline void say(const char* text) {  // ends in NUL
   constexpr std::uint32_t write0 = 0x04;
   semihost(write0, text);
 }

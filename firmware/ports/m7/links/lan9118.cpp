@@ -8,7 +8,6 @@ namespace m7 {
 
 namespace {
 
-// Registers, and the bits of them that are used.
 constexpr std::uint32_t receive_data = ethernet_base + 0x00;
 constexpr std::uint32_t transmit_data = ethernet_base + 0x20;
 constexpr std::uint32_t receive_status = ethernet_base + 0x40;
@@ -31,11 +30,11 @@ constexpr std::uint32_t interrupts_enabled = 0x100;
 constexpr std::uint32_t transmitter_on = 1U << 1;
 constexpr std::uint32_t receive_error = 1U << 15;
 
-// Registers behind mac_command.
+// Reached through mac_command.
 constexpr std::uint32_t mac_control = 1;
 constexpr std::uint32_t mac_high = 2;
 constexpr std::uint32_t mac_low = 3;
-constexpr std::uint32_t mac_on = 0xC;  // both ways
+constexpr std::uint32_t mac_on = 0xC;
 constexpr std::uint32_t busy = 1U << 31;
 constexpr std::uint32_t reading = 1U << 30;
 
@@ -99,7 +98,7 @@ std::size_t Lan9118::receive(std::uint32_t* frame) {
 
 bool Lan9118::send(const std::uint32_t* frame, std::size_t size) {
   if (!on_) return false;
-  // What became of earlier frames nobody asks, but it must make room.
+  // Discards the status of sent frames to make room.
   for (std::uint32_t left = at(transmit_fifo) >> 16 & 0xFF; left != 0; --left) {
     const std::uint32_t status = at(transmit_status);
     static_cast<void>(status);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The LAN9118 Ethernet controller: whole frames through its FIFOs, nothing waited for.
+// The LAN9118 Ethernet controller: whole frames through its FIFOs. Never waits.
 #pragma once
 
 #include <cstddef>
@@ -14,19 +14,16 @@ class Lan9118 {
  public:
   static constexpr std::size_t max_frame = 1536;
 
-  // False: there is no such chip, or it is not ready. Then nothing comes and nothing goes.
+  // False: the chip is missing or not ready. Then nothing is received or sent.
   bool start();
   Mac mac();
 
-  // In its interrupt: it is heard.
-  static void on_interrupt();
+  static void on_interrupt();  // acknowledges the interrupt
 
   bool has_received() const;
-  // The next frame without its check sequence, up to max_frame bytes, into `frame`, which is of whole
-  // words. 0: none, or it was damaged.
+  // Reads a frame without check sequence into `frame` of max_frame bytes. 0: none, or damaged.
   std::size_t receive(std::uint32_t* frame);
-  // False: there is no room for it now.
-  bool send(const std::uint32_t* frame, std::size_t size);
+  bool send(const std::uint32_t* frame, std::size_t size);  // false: no room
 
  private:
   bool on_ = false;

@@ -10,7 +10,6 @@ namespace m7 {
 
 namespace {
 
-// Registers of the CMSDK UART.
 constexpr std::uint32_t data = 0x00;
 constexpr std::uint32_t state = 0x04;
 constexpr std::uint32_t control = 0x08;
@@ -58,7 +57,7 @@ void Uart::on_transmit_interrupt() {
   fill();
 }
 
-// Gives the UART what it takes now. In its interrupt, or with interrupts off.
+// In the UART's interrupt, or with interrupts off.
 void Uart::fill() {
   char byte = 0;
   while ((at(base_ + state) & transmit_full) == 0 && lines_.take(byte)) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The CMSDK UART as a port of the application: one datagram a line, both ways by interrupts.
-//
-// The handlers are called from the interrupts of the same number; everything else from the loop.
-// Nothing here ever waits for the other side.
+// The CMSDK UART as a port of the application: one datagram a line. The handlers run in the UART's
+// interrupts, other functions in the loop. Never waits.
 #pragma once
 
 #include <cstdint>
@@ -20,23 +18,21 @@ class Uart final : public firmware::Port {
  public:
   static constexpr std::uint32_t receive_capacity = 2048;
 
-  // `base` is the UART's address. 1 Mbit/s.
+  // `base` is the UART's address. Runs at 1 Mbit/s.
   explicit Uart(std::uint32_t base) : base_(base) {}
   void start();
 
   void on_receive_interrupt();
   void on_transmit_interrupt();
-  // A byte has come.
   void on_byte(char byte);
-  // Has a stop come since it was asked last? In the same interrupt.
+  // True if a stop came since the last call. In the receive interrupt.
   bool take_stop() {
     const bool stop = stop_;
     stop_ = false;
     return stop;
   }
 
-  // Calls `on_datagram(Text)` for each line that has arrived, of as many bytes as have room: the interrupt brings more
-  // meanwhile, and a flood must not keep the loop from its other work.
+  // Calls `on_datagram(Text)` for each line. Takes at most receive_capacity bytes of a flood.
   template <class OnDatagram>
   void receive(OnDatagram&& on_datagram) {
     char chunk[64];
@@ -51,12 +47,11 @@ class Uart final : public firmware::Port {
   void send(Text datagram, Priority priority, std::uint32_t peer) override;
   std::size_t max_size() const override { return max_datagram; }
   bool may_configure() const override { return true; }
-  // Lets time pass.
   void poll(std::uint32_t now_ms);
 
-  // When, by BoardClock::ticks(), the end of a line came last.
+  // BoardClock::ticks() at the end of the last line.
   std::uint32_t last_line_ticks() const { return last_line_ticks_; }
-  std::uint32_t overruns() const { return overruns_; }  // bytes that were lost on the way in
+  std::uint32_t overruns() const { return overruns_; }  // received bytes that were lost
   std::uint32_t dropped() const { return lines_.dropped(); }
 
  private:
@@ -72,8 +67,7 @@ class Uart final : public firmware::Port {
   volatile std::uint32_t overruns_ = 0;
 };
 
-// For the board's log: writes and waits for the UART, though not for ever; a fault handler may call
-// it at any time.
+// The board's log. Waits for the UART for a limited time. A fault handler may call it at any time.
 class Log {
  public:
   explicit Log(std::uint32_t base);

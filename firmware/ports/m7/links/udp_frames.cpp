@@ -6,7 +6,7 @@ namespace m7 {
 
 namespace {
 
-// Where things are in a frame.
+// Offsets and sizes in a frame.
 constexpr std::size_t ethernet_type = 12;
 constexpr std::size_t ip = 14;
 constexpr std::size_t arp = 14;
@@ -32,7 +32,7 @@ void put32(std::uint8_t* at, std::uint32_t value) {
   put16(at + 2, value & 0xFFFF);
 }
 
-// The sum of 16-bit words that internet checksums are made of (RFC 1071).
+// Sum of 16-bit words (RFC 1071).
 std::uint32_t sum(const std::uint8_t* at, std::size_t size, std::uint32_t start) {
   std::uint32_t total = start;
   for (; size > 1; size -= 2, at += 2) total += get16(at);
@@ -44,7 +44,7 @@ std::uint32_t fold(std::uint32_t total) {
   return ~total & 0xFFFF;
 }
 
-// Over the UDP header and data, and what stands for the IP header (RFC 768).
+// Over UDP header, data and IP pseudo header (RFC 768).
 std::uint32_t udp_checksum(const std::uint8_t* ip_header, const std::uint8_t* udp,
                            std::size_t size) {
   const std::uint32_t pseudo =
@@ -99,7 +99,7 @@ UdpFrames::Arrival UdpFrames::take(const std::uint8_t* frame, std::size_t size,
     ++bad_;
     return arrival;
   }
-  constexpr std::uint32_t fragment = 0x3FFF;  // more of them, or not the first
+  constexpr std::uint32_t fragment = 0x3FFF;  // more fragments, or not the first
   const std::uint32_t from = get32(header + 12);
   if (header[9] != protocol_udp || (get16(header + 6) & fragment) != 0 ||
       get32(header + 16) != address_ || !is_neighbour(from) || (from & 0xFFFF) == 0) {
@@ -130,7 +130,7 @@ std::size_t UdpFrames::write(const UdpAddress& to, Text datagram, std::uint8_t* 
   put16(header, 0x4500);
   put16(header + 2, ip_size + udp_length);
   put16(header + 4, identification_++);
-  put16(header + 6, 0x4000);  // not to be cut
+  put16(header + 6, 0x4000);  // don't fragment
   put16(header + 8, 64 << 8 | protocol_udp);
   put16(header + 10, 0);
   put32(header + 12, address_);

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// As much of Ethernet, ARP, IPv4 and UDP as a board with one port and a static address needs
-// (RFC 826, 791, 768). No I/O: frames come in, frames go out.
-//
-// Answers ARP for its address; takes UDP datagrams to its port, whole ones with right checksums
-// only; writes datagrams to those who have asked. No fragments, no options to send, no routing:
-// everybody is on its /16.
+// Ethernet, ARP, IPv4 and UDP for one port and a static address (RFC 826, 791, 768). No I/O: frames
+// in, frames out. Answers ARP, takes whole UDP datagrams with correct checksums, and writes
+// datagrams. No fragments, no sent options, no routing: all hosts are in the board's /16.
 #pragma once
 
 #include <cstddef>
@@ -20,10 +17,9 @@ struct Mac {
   std::uint8_t bytes[6] = {};
 };
 
-// Who sends a datagram.
 struct UdpAddress {
   Mac mac;
-  std::uint16_t host = 0;  // the host part of its IP address; 0: nobody
+  std::uint16_t host = 0;  // host part of the IP address; 0: none
   std::uint16_t port = 0;
   friend bool operator==(const UdpAddress& a, const UdpAddress& b) {
     return a.host == b.host && a.port == b.port &&
@@ -33,29 +29,28 @@ struct UdpAddress {
 
 class UdpFrames {
  public:
-  // What a frame carries if it is UDP; nothing is checked.
+  // The UDP data of a frame, unchecked; empty if the frame is not UDP.
   static Text peek(const std::uint8_t* frame, std::size_t size);
-  // Ethernet, IPv4 and UDP in front of a datagram.
   static constexpr std::size_t head_size = 14 + 20 + 8;
   static constexpr std::size_t max_frame = head_size + max_datagram;
   static constexpr std::size_t min_frame = 60;
 
-  // `address` as a number: 10.0.2.15 is 0x0A00020F.
+  // 10.0.2.15 is `address` 0x0A00020F.
   UdpFrames(std::uint32_t address, std::uint16_t port) : address_(address), port_(port) {}
   void set_mac(const Mac& mac) { mac_ = mac; }
 
   struct Arrival {
-    UdpAddress from;             // who sent the datagram; nobody: there is none
+    UdpAddress from;             // host 0: no datagram
     Text datagram;               // in the frame
-    std::size_t reply_size = 0;  // what is to be sent back at once
+    std::size_t reply_size = 0;  // of a frame to send back at once
   };
-  // Takes a frame, without its check sequence. `reply` has room for min_frame bytes.
+  // `frame` without its check sequence. `reply` has room for min_frame bytes.
   Arrival take(const std::uint8_t* frame, std::size_t size, std::uint8_t* reply);
 
-  // Writes the frame that brings `datagram` to `to`. Returns its size; 0: the datagram is too long.
+  // Writes the frame with `datagram` for `to` and returns its size; 0: the datagram is too long.
   std::size_t write(const UdpAddress& to, Text datagram, std::uint8_t* frame);
 
-  std::uint32_t bad() const { return bad_; }  // packets with a wrong checksum or length
+  std::uint32_t bad() const { return bad_; }  // wrong checksum or length
 
  private:
   std::size_t answer_arp(const std::uint8_t* frame, std::size_t size, std::uint8_t* reply);

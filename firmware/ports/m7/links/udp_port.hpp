@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// UDP over the LAN9118 as a port of the application. What is for everyone goes to the host in control,
-// else to the one heard last; before one was heard, nowhere.
+// UDP over the LAN9118 as a port of the application. Datagrams to everyone go to the controlling
+// host, or without one to the host that was heard last.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ class UdpPort final : public firmware::Port {
     return true;
   }
 
-  // Takes the frames that have come. In the interrupt, or with interrupts off.
+  // Takes received frames. In the interrupt, or with interrupts off.
   void on_interrupt() {
     Lan9118::on_interrupt();
     while (put_ - taken_ < frames_max && chip_.has_received()) {
@@ -36,15 +36,14 @@ class UdpPort final : public firmware::Port {
       put_ = put_ + 1;
     }
   }
-  // Has a stop come since it was asked last? In the interrupt.
+  // True if a stop came since the last call. In the interrupt.
   bool take_stop() {
     const bool stop = stop_;
     stop_ = false;
     return stop;
   }
 
-  // Calls `on_datagram(peer, Text)` for those that have arrived, at most frames_max: the interrupt brings more meanwhile,
-  // and a flood must not keep the loop from its other work.
+  // Calls `on_datagram(peer, Text)` for each datagram. Takes at most frames_max of a flood.
   template <class OnDatagram>
   void receive(OnDatagram&& on_datagram) {
     for (std::uint32_t i = 0; i < frames_max && has_received(); ++i) {
@@ -58,7 +57,7 @@ class UdpPort final : public firmware::Port {
       }
       taken_ = taken_ + 1;
       const InterruptsHeld held;
-      on_interrupt();  // there is room for another
+      on_interrupt();  // there is room for another frame
     }
   }
   bool has_received() const { return put_ != taken_; }
