@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 devices: the descriptions that are shipped, and whether one of the user's is right.
+// r4 devices: lists the shipped device descriptions, and checks a description of the user's.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -54,7 +54,7 @@ int give(const KeyOptions& options) {
   std::array<char, key_text_size> text;
   write_key(text.data(), key);
   Board board(options.url);
-  // It need not be active: a board that is stopped takes a key, too.
+  // A board in the safe state also accepts a key.
   board.setting("key", {text.data(), text.size()}, std::chrono::seconds{5});
   print_text(
       "the board has key {} now: from networks and buses it obeys only who has it, stops "
