@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What happened, newest first: what the server tells of, and what this page itself saw.
+// The event log, newest first: events of the server and of this page.
 import {clock_text, element} from './text.js';
 
 const KEPT = 500;
