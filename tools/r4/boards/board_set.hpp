@@ -33,8 +33,7 @@ struct SetBoard {
       : index(board_index), url(std::move(board_url)), board(io, url, options) {}
 
   const std::size_t index;  // from 0, in the order of the URLs
-  const std::string url;    // as the user gave it, so it stays the same across restarts of the
-                            // program
+  const std::string url;    // as given by the user
   AsyncBoard board;
 };
 
@@ -57,7 +56,6 @@ class BoardSet {
 
   // Throws Error for the first board that cannot be opened.
   void open();
-  // A signal, or the end of `duration`, ends run(). See RunEnd.
   void end_by_signal(const std::optional<std::chrono::milliseconds>& duration = std::nullopt) {
     end_.watch(duration);
   }
@@ -78,8 +76,7 @@ class BoardSet {
   std::deque<SetBoard> boards_;
 };
 
-// Options of a watcher that asks for `fields` and for the fields of `devices`. Empty `fields`:
-// DEFAULT.
+// Options of a watcher. Empty `fields`: DEFAULT. The fields of `devices` are added.
 BoardOptions watching(const std::string& key, const std::string& fields = {},
                       const std::vector<Device>& devices = {});
 void ask_for(BoardOptions& options, const std::string& fields, const std::vector<Device>& devices);

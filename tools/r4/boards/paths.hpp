@@ -41,8 +41,7 @@ inline Json path_json(const PathStatus& path) {
           {"age_ms", milliseconds(path.age_us)}};
 }
 
-// With several paths, calls `report` when a path starts or stops carrying. For a single path the
-// link already reports this.
+// With several paths, reports path changes; for a single path the link reports them.
 template <class Board, class Report>
 void on_paths(Board& board, Report report) {
   if (board.paths().size() > 1) board.on_path(std::move(report));

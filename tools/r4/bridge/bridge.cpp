@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 bridge: a gateway between hosts and a board.
 #include <fmt/format.h>
 
 #include <array>

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 bus: computes whether a planned CAN bus can carry its boards. bus_live.hpp measures a real
-// one.
 #include <fmt/format.h>
 
 #include <memory>
@@ -54,7 +52,7 @@ BusPlan plan_of(const Options& options) {
   plan.boards = static_cast<std::uint32_t>(options.boards);
   plan.states_hz = static_cast<std::uint32_t>(options.rate);
   plan.commands_hz = static_cast<std::uint32_t>(options.commands);
-  parse_fields(Text(options.fields), plan.fields);  // already validated
+  parse_fields(Text(options.fields), plan.fields);
   plan.bit_rate.nominal = static_cast<std::uint32_t>(bit_rate);
   plan.bit_rate.data = options.fd ? static_cast<std::uint32_t>(data_rate) : 0;
   plan.packed = !options.plain;

@@ -18,8 +18,7 @@ struct PlainForm {
 };
 using UnpackRoom = std::array<char, max_datagram>;
 
-// The plain form of a plain or packed datagram; the first byte decides. Refers to `bytes` or
-// `room`.
+// The plain form of a datagram; its first byte decides. Refers to `bytes` or `room`.
 PlainForm plain_form(const std::uint8_t* bytes, std::size_t size, UnpackRoom& room);
 
 // Like add_datagram_json() for a packed datagram; adds `packed`, its packed size in bytes.

@@ -53,7 +53,6 @@ std::string meaning_of_id(const CanSurvey& survey, std::uint32_t id) {
   return "";
 }
 
-// Traffic since the last look.
 struct Window {
   std::map<std::uint32_t, CanTraffic> traffic;
   CanTraffic total;

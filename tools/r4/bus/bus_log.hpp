@@ -25,7 +25,6 @@ class BusLog final : BusTransfers::Handler {
   void on_line(std::uint64_t number, std::string_view text);
   // A line too long for candump.
   void on_long_line(std::uint64_t number, std::uint64_t size);
-  // Call at the end of the log: prints the summary.
   void finish();
 
   // True if a line was damaged, a transfer failed, or a datagram was not valid.
@@ -44,10 +43,10 @@ class BusLog final : BusTransfers::Handler {
   BusTransfers transfers_{*this};
   std::uint64_t frames_ = 0;
   std::uint64_t datagrams_ = 0;  // complete, valid or not
-  std::uint64_t bad_ = 0;        // datagrams that are not valid
-  std::uint64_t failed_ = 0;     // failed transfers, and frames that fit no transfer
-  std::uint64_t raw_ = 0;        // emergency stops and went-safe frames
-  std::uint64_t other_ = 0;      // frames of other protocols
+  std::uint64_t bad_ = 0;
+  std::uint64_t failed_ = 0;  // failed transfers, and frames that fit no transfer
+  std::uint64_t raw_ = 0;     // emergency stops and went-safe frames
+  std::uint64_t other_ = 0;   // frames of other protocols
   std::uint64_t error_frames_ = 0;
   std::uint64_t damaged_ = 0;
 };

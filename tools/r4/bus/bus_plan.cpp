@@ -23,9 +23,8 @@ constexpr double second_ns = 1e9;
 
 using Datagrams = std::vector<std::string>;
 
-// Generates datagrams of boards and hosts: of a driving machine, or the longest possible. Each
-// random number is drawn in its own statement, because compilers evaluate arguments in different
-// orders.
+// Generates datagrams of a driving machine, or the longest possible. Draws each random number in
+// its own statement, because compilers evaluate arguments in different orders.
 class Speaker {
  public:
   explicit Speaker(bool longest) : longest_(longest) {}
@@ -77,7 +76,7 @@ class Speaker {
   }
 
  private:
-  static constexpr SessionId session_id = 0x0123456789abcdef;  // every session id has this length
+  static constexpr SessionId session_id = 0x0123456789abcdef;
 
   static std::string text(Text bytes) { return {bytes.data(), bytes.size()}; }
 
@@ -138,7 +137,6 @@ struct Kind {
   Datagrams (*next)(Speaker&, const BusPlan&);
 };
 
-// Sums the bus capacity that datagrams need.
 struct Sum {
   double datagrams = 0, bytes = 0, frames = 0, bits = 0, ns = 0;
 

@@ -27,7 +27,6 @@ struct BusPlan {
 constexpr std::uint32_t board_heartbeats_hz = 2;
 constexpr std::uint32_t host_heartbeats_hz = 10;
 
-// One kind of traffic, summed over all boards.
 struct BusTraffic {
   const char* name;
   double datagrams = 0;  // per second

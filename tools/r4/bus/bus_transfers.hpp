@@ -26,7 +26,7 @@ class BusTransfers {
   static constexpr std::size_t max_interfaces = 32;
 
   struct Place {
-    std::uint64_t line = 0;    // for a text
+    std::uint64_t line = 0;
     std::uint64_t offset = 0;  // byte in the file
     std::optional<std::uint64_t> time_us;
     std::string date;  // as written, if the log has dates instead of times
@@ -37,7 +37,7 @@ class BusTransfers {
     Lane& operator=(const Lane&) = delete;
 
     const std::string interface;
-    const CanIdMeaning meaning;  // command, reply or telemetry of a node
+    const CanIdMeaning meaning;
     std::array<std::uint8_t, max_datagram> bytes;
     IsotpReceiver receiver;
     bool answered = false;     // the other end has sent flow control

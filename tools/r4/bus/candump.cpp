@@ -16,7 +16,6 @@ constexpr std::uint32_t max_extended_id = 0x1FFFFFFF;
 constexpr std::size_t max_interface_name = 64;
 constexpr std::uint64_t max_seconds = 1'000'000'000'000;
 
-// In the order of CandumpError.
 constexpr std::array texts{
     "none",
     "a detail of the frame before",
@@ -114,8 +113,7 @@ bool read_byte(std::string_view text, std::uint8_t& out) {
   return true;
 }
 
-// The text after the first # of a CAN XL frame: flags, type and address, then bytes:
-// "81:00:12345678#112233".
+// A CAN XL frame after the first #: flags, type, address, bytes: "81:00:12345678#112233".
 bool is_xl_frame(std::string_view data) {
   constexpr std::string_view form = "hh:hh:hhhhhhhh#";
   if (data.size() < form.size()) return false;
@@ -151,8 +149,7 @@ CandumpError read_log_frame(std::string_view data, CanFrame& frame) {
   return has_valid_size(frame) ? CandumpError::none : CandumpError::size;
 }
 
-// The bytes in the screen format, after "[4]" or, for CAN FD, "[04]". "{B}", a length code above 8,
-// means 8 bytes.
+// The bytes after "[4]", or "[04]" for CAN FD. "{B}", a length code above 8, means 8 bytes.
 CandumpError read_screen_frame(std::string_view size, std::string_view& line, CanFrame& frame) {
   if (size.size() == 3 && size.front() == '{' && size.back() == '}') {
     if (size[1] < '9' || size[1] > 'F' || (size[1] > '9' && size[1] < 'A'))
@@ -229,7 +226,7 @@ CandumpError read_candump_line(std::string_view line, CandumpLine& out) {
     return take_word(line).empty() ? CandumpError::none : CandumpError::rest;
   }
 
-  if (one_of(word, "TX", "RX")) {  // -x
+  if (one_of(word, "TX", "RX")) {
     if (!one_of(take_word(line), "B", "-") || !one_of(take_word(line), "E", "-")) {
       return CandumpError::no_frame;
     }

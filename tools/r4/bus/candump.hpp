@@ -30,26 +30,24 @@ struct CandumpLine {
 
 enum class CandumpError : std::uint8_t {
   none,
-  detail,    // no frame: explains the previous line (candump -e)
-  dropped,   // no frame: candump -d was too slow
-  no_frame,  // not in either format
-  time,      // the text in parentheses is not a time
+  detail,   // no frame: explains the previous line (candump -e)
+  dropped,  // no frame: candump -d was too slow
+  no_frame,
+  time,
   interface,
-  id,     // not 3 or 8 hexadecimal digits, or out of range
-  size,   // not a possible size of a frame
-  cut,    // fewer bytes than stated, or half a byte
-  bytes,  // not two hexadecimal digits
-  rest,   // extra text after the frame
+  id,  // not 3 or 8 hexadecimal digits, or out of range
+  size,
+  cut,  // fewer bytes than stated, or half a byte
+  bytes,
+  rest,
 };
 
-// True for a name that candump or python-can may write: 1 to 64 printable ASCII characters without
-// blanks.
+// True for 1 to 64 printable ASCII characters without blanks, as candump and python-can use.
 bool is_interface_name(std::string_view name);
 
 const char* to_text(CandumpError error);
 
-// Reads a line without its end. Views in `out` refer to `line`. `out` is complete only if the
-// result is `none`.
+// `line` is without its end; `out` refers to it and is complete only if the result is `none`.
 CandumpError read_candump_line(std::string_view line, CandumpLine& out);
 
 }  // namespace r4::tool

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Meaning of an 11-bit CAN id in other protocols that are common on a robot's bus.
 #pragma once
 
 #include <cstdint>

@@ -33,7 +33,6 @@ void DeviceSetup::look_later() {
   timer_.after(look_interval, [this] { look(); });
 }
 
-// Starts to set up the devices that are due.
 void DeviceSetup::look() {
   look_for_resets();
   if (!board_.in_control()) {

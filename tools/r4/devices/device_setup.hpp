@@ -22,8 +22,7 @@ namespace r4::tool {
 
 class DeviceSetup {
  public:
-  // `told` receives problems. The board and the devices must outlive this object, which belongs to
-  // their loop.
+  // `told` gets problems. The board and devices, whose loop this object uses, must outlive it.
   DeviceSetup(asio::io_context& io, AsyncBoard& board, const std::vector<Device>& devices,
               std::function<void(const Problem&)> told);
   ~DeviceSetup() { give_up(); }
@@ -32,11 +31,10 @@ class DeviceSetup {
 
  private:
   using Clock = std::chrono::steady_clock;
-  // Independent for each device.
   struct Progress {
     bool done = false;
-    Clock::time_point again{};    // after a failure: earliest time of the next attempt
-    std::string told;             // reported failure
+    Clock::time_point again{};  // after a failure: earliest time of the next attempt
+    std::string told;
     Clock::time_point settled{};  // after setup: by then the device has measured
     bool reset = false;           // the reset of the device has been reported
   };
@@ -54,7 +52,7 @@ class DeviceSetup {
   std::function<void(const Problem&)> told_;
   Timer timer_;
   std::vector<Progress> progress_;
-  std::size_t next_ = 0;  // the device being set up
+  std::size_t next_ = 0;
   ScopedSubscription restarts_;
   std::shared_ptr<asio::cancellation_signal> attempt_;  // results of earlier attempts are ignored
   const std::shared_ptr<DeviceSetup*> here_ = std::make_shared<DeviceSetup*>(this);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 devices: lists the shipped device descriptions, and checks a description of the user's.
 #include <fmt/format.h>
 
 #include <algorithm>

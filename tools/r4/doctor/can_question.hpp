@@ -29,7 +29,6 @@ class CanQuestion final : private Carrier::Handler {
   double answer_us() const { return answer_us_; }
   // Seconds since the first question; 0: none was sent.
   double asked_since_s() const;
-  // The worst problem so far.
   TransportTrouble trouble() const { return trouble_; }
 
  private:
@@ -41,7 +40,7 @@ class CanQuestion final : private Carrier::Handler {
   std::unique_ptr<Carrier> carrier_;
   Timer timer_;
   std::optional<Clock::time_point> first_asked_;
-  std::optional<Clock::time_point> asked_;  // newest unanswered question
+  std::optional<Clock::time_point> asked_;
   double answer_us_ = 0;
   TransportTrouble trouble_ = TransportTrouble::none;
 };

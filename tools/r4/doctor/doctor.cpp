@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 doctor: finds problems of this machine and its links, with a command that fixes each.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A finding of r4 doctor: the thing concerned, the reason, and the command that fixes it.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +11,9 @@ namespace r4::tool {
 
 enum class Severity : std::uint8_t {
   ok,
-  note,     // for information only
+  note,
   warning,  // the link works, but not as well as it could
-  error,    // the link cannot work
+  error,
 };
 const char* to_text(Severity severity);
 
@@ -23,10 +22,10 @@ enum class Mending : std::uint8_t { by_hand, automatic };
 
 struct Finding {
   Severity severity = Severity::ok;
-  std::string check;   // "serial.permission"
-  std::string thing;   // "/dev/ttyACM0"
-  std::string reason;  // the problem or condition
-  std::string fix;     // a shell command; empty if there is none
+  std::string check;  // "serial.permission"
+  std::string thing;  // "/dev/ttyACM0"
+  std::string reason;
+  std::string fix;  // a shell command; empty if there is none
   Mending mending = Mending::by_hand;
   ErrorKind kind = ErrorKind::data;  // for an error: the exit code that r4 would return
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measures a link by listening for some seconds as a watcher, which commands nothing. The board is
-// asked for its identity to test both directions. If another host uses the CAN bus, its questions
-// and the board's answers are heard instead.
+// Measures a link as a watcher, for some seconds. The board is asked for its identity, to test both
+// directions; on a CAN bus with another host, that host's questions are used.
 #pragma once
 
 #include <chrono>
@@ -30,7 +29,7 @@ struct LinkSample {
   Answered answered = Answered::not_asked;
   double answer_us = 0;  // fastest time from question to answer; 0: not measured
   TransportTrouble trouble = TransportTrouble::none;
-  Problem link;  // explain() of the link
+  Problem link;
 };
 
 // The result is "ok" only if states and a timely answer arrived.

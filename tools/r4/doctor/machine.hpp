@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The machine as r4 doctor sees it: files below a root, the user, and the output of programs. Tests
-// replace all three.
+// The machine for r4 doctor: files below a root, user, output of programs. Tests replace them.
 #pragma once
 
 #include <sys/types.h>
@@ -17,13 +16,12 @@ namespace r4::tool {
 struct User {
   std::string name;
   uid_t id = 0;
-  std::set<gid_t> groups;  // groups of this process
+  std::set<gid_t> groups;
   bool is_root() const { return id == 0; }
 };
 User this_user();
 
-// The shell command with / as its working directory. If PATH contains "." or an empty entry, no
-// program from the user's folder runs.
+// Runs the command in /, so that a "." in PATH finds no program in the user's folder.
 std::string from_root(const std::string& command);
 
 struct Machine {

@@ -31,7 +31,6 @@ struct Group {
   std::vector<std::string> members;
 };
 
-// From /etc/group.
 std::optional<Group> group_of(const Machine& machine, const std::string& name) {
   std::istringstream lines(machine.read("/etc/group").value_or(""));
   for (std::string line; std::getline(lines, line);) {
@@ -78,7 +77,6 @@ std::optional<std::string> installed_rules(const Machine& machine, const std::st
   return std::nullopt;
 }
 
-// A USB serial chip, with its id as udev rules write it.
 struct Adapter {
   const char* id;
   const char* chip;
@@ -86,8 +84,7 @@ struct Adapter {
 constexpr std::array<Adapter, 4> adapters{
     {{"1a86/7523", "CH340"}, {"10c4/ea60", "CP210x"}, {"403/6001", "FT232"}, {"403/6015", "FT-X"}}};
 
-// True if the rules match every adapter with that id: the line has no other condition, such as a
-// manufacturer.
+// True if a rule matches every adapter with that id, without conditions (manufacturer).
 bool take(const std::string& rules, const Adapter& adapter) {
   std::istringstream lines(rules);
   for (std::string line; std::getline(lines, line);) {
@@ -99,8 +96,7 @@ bool take(const std::string& rules, const Adapter& adapter) {
   return false;
 }
 
-// "1a86/7523"; empty if not a USB device. A usb-serial tty is one level further below the
-// interface.
+// "1a86/7523"; empty if not USB. The path to a usb-serial tty has one level more.
 std::string usb_id_of(const Machine& machine, const std::string& port) {
   for (const char* up : {"/../", "/../../"}) {
     const std::string folder = "/sys/class/tty/" + port + "/device" + up;

@@ -55,8 +55,7 @@ bool lets_in(std::string_view rules) {
          rules.find(board_port) != std::string_view::npos;
 }
 
-// The words between the last `keyword` before `at` and the brace: "inet filter" for "table inet
-// filter {".
+// The words between `keyword` and the brace: "inet filter" of "table inet filter {".
 std::string last_named(std::string_view rules, std::string_view keyword, std::size_t at) {
   const std::size_t begin = rules.rfind(keyword, at);
   if (begin == std::string_view::npos) return "";
@@ -65,8 +64,7 @@ std::string last_named(std::string_view rules, std::string_view keyword, std::si
   return std::string(rest.substr(0, end));
 }
 
-// Recognizes simple rule sets only: an input chain that drops by default, without a rule for R4's
-// ports.
+// Recognizes only an input chain that drops by default and has no rule for R4's ports.
 void check_firewall(const Machine& machine, Findings& findings) {
   const bool there =
       machine.exists("/proc/sys/net/netfilter") || machine.exists("/proc/net/ip_tables_names");

@@ -15,7 +15,6 @@ bool clock_is_synchronized();
 // `seconds`: how far the wall clock was set while listening.
 Findings check_clock_steps(double seconds);
 
-// Processor frequencies and load.
 Findings check_processors(const Machine& machine);
 
 }  // namespace r4::tool

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 key: makes a key, and gives it to a board over a cable.
 #include <fmt/format.h>
 
 #include <array>

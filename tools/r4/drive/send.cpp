@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 send: sends commands in order; the board's state confirms each before the next.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -46,7 +45,6 @@ std::string shown(const Order& order) {
   return std::visit([](const auto& each) { return r4::shown(each); }, order);
 }
 
-// Empty for a group.
 std::optional<Command> command_of(const Order& order) {
   const auto* const own = std::get_if<OwnCommand>(&order);
   return own == nullptr ? std::nullopt : std::optional<Command>(*own);
@@ -92,16 +90,14 @@ bool needs_motor_supply(const Order& order) {
   return std::visit([](const auto& each) { return turns_a_motor(each); }, order);
 }
 
-// The value in milliseconds, if `order` sets that key.
 std::optional<Milliseconds> setting_of(const Order& order, std::string_view key) {
   if (!is(CommandKind::setting, order) || command_of(order)->text != Text(key)) return {};
   std::uint32_t ms = 0;
-  parse_number(command_of(order)->text2, ms);  // already validated with the command
+  parse_number(command_of(order)->text2, ms);
   return Milliseconds(ms);
 }
 
-// Timeout and heartbeat interval, adjacent in any order: sent as one step because the board may
-// refuse either alone.
+// Timeout and heartbeat interval in any order: one step, as the board may refuse either alone.
 struct LinkTiming {
   Milliseconds timeout{0};
   Milliseconds heartbeat{0};

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 stop: switches all outputs off.
 #include <fmt/format.h>
 
 #include <asio/io_context.hpp>
@@ -31,8 +30,7 @@ struct StopOptions {
   bool json = false;
 };
 
-// Works beside the program that controls the board, which may hang. So it uses its own transport
-// where possible.
+// Uses its own transport if possible, because the controlling program may hang.
 std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
   BoardOptions options;
   auto paths = make_host_carriers(io, {url}, BoardRole::watch);

@@ -20,7 +20,6 @@ namespace r4::tool {
 // The URL of that board. A name that a URL cannot hold, such as python-can's /dev/ttyACM0 or
 // ff15::1, is put in brackets: can://[%2Fdev%2FttyACM0]?node=3.
 std::string bus_url(std::string_view interface, std::uint8_t node);
-// The interface from the host part of such a URL.
 std::string bus_interface(const std::string& host);
 
 class BusRecords final : BusTransfers::Handler {
@@ -30,7 +29,6 @@ class BusRecords final : BusTransfers::Handler {
   // `place` must have a time. Ignores frames of other protocols.
   void on_frame(std::string_view interface, const CanFrame& frame,
                 const BusTransfers::Place& place);
-  // Call after the last frame.
   void finish();
   // True if a record or damage was reported.
   bool told() const { return told_; }

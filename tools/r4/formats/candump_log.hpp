@@ -44,7 +44,7 @@ class CandumpSource final : public Source {
   const std::optional<Time> start_;
   NumberedLines lines_;
   bool recognised_ = false;
-  bool undated_ = false;  // a frame without a time was reported
+  bool undated_ = false;
   std::uint64_t frames_ = 0;
   std::uint64_t first_us_ = 0;  // in the log's own time
   std::uint64_t latest_us_ = 0;
@@ -74,8 +74,7 @@ class CandumpSink final : public Sink {
   std::string elsewhere_;  // URL of a path that is not a CAN bus
   std::string text_;
   std::uint64_t written_ = 0;
-  std::uint64_t others_ = 0;  // events, datagrams that fit no transfer, and datagrams of other
-                              // paths
+  std::uint64_t others_ = 0;  // events, and datagrams that cannot be written
 };
 
 }  // namespace r4::tool

@@ -40,14 +40,12 @@ class Output {
 class Sink {
  public:
   virtual ~Sink() = default;
-  // True if survey() should get all paths and records first. Not possible if the input can be read
-  // only once.
+  // True if survey() should get everything first, if the input can be read twice.
   virtual bool wants_survey() const { return false; }
   virtual void survey(const RecordedPath& path) { static_cast<void>(path); }
   virtual void survey(const RecordedDevice& device) { static_cast<void>(device); }
   virtual void survey(const Record& record) { static_cast<void>(record); }
-  // A line that begins with #. Its `time` is that of the previous record, or of the first record
-  // for lines at the beginning.
+  // A line that begins with #. `time`: of the previous record, else of the first record.
   virtual void on_comment(std::string_view line, Time time) = 0;
   virtual void on_path(const RecordedPath& path, Time time) = 0;
   // Precedes on_comment() for the same line; so does on_header().
@@ -103,7 +101,7 @@ class Conversion final : public RecordingVisitor {
 
   Sink& sink_;
   const TellDamage tell_;
-  std::vector<Waiting> waiting_;  // until begun_
+  std::vector<Waiting> waiting_;
   RecordRoom room_;
   bool begun_ = false;
   Time time_{0};

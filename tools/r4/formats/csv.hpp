@@ -39,7 +39,7 @@ class CsvSink final : public Sink {
   void write_header();
   // Shared by all paths.
   struct DeviceColumn {
-    std::string device;  // "bno055@0x28"
+    std::string device;
     std::string value;
     std::string unit;
   };
@@ -55,8 +55,8 @@ class CsvSink final : public Sink {
   FieldSet columns_;
   bool begun_ = false;
   std::string row_;
-  std::uint64_t others_ = 0;  // records that are not states
-  std::string late_;          // a device reported after the columns were written
+  std::uint64_t others_ = 0;
+  std::string late_;  // a device reported after the columns were written
 };
 
 }  // namespace r4::tool

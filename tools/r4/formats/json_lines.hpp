@@ -22,12 +22,10 @@ namespace r4::tool {
 // or an event's `type` and `event`. Bytes that are not printable ASCII become \xNN.
 void add_record_json(Json& object, const Record& record);
 
-// Adds the device values in a state: "devices":{"bno055@0x28":{"accel_x":0.02,…}}; null for an
-// invalid measurement.
+// Adds device values: "devices":{"bno055@0x28":{"accel_x":0.02,…}}; null: not valid.
 class MeasuredJson {
  public:
   void add_to(Json& object, const Record& record, const RecordedDevices& devices);
-  // Starts another recording, with new paths.
   void on_header() { states_.clear(); }
 
  private:

@@ -39,7 +39,7 @@ class NativeSink final : public Sink {
   bool begun_ = false;
   bool ours_ = false;       // the header is r4's own
   bool told_when_ = false;  // the start time has been written
-  bool ended_ = false;      // the newest record is an end
+  bool ended_ = false;
   Time time_{0};
   std::string text_, compressed_;
 };

@@ -20,7 +20,6 @@ class PathNames {
   // Name and URL of the path's board; empty if unknown.
   const std::string& name_of(std::uint16_t number) const { return path_of(number).name; }
   const std::string& url_of(std::uint16_t number) const { return path_of(number).url; }
-  // The name, else the URL.
   const std::string& of(std::uint16_t number) const {
     const Path& path = path_of(number);
     return path.name.empty() ? path.url : path.name;

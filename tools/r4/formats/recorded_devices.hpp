@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Assigns bytes in a recording to devices: those described by the recording, for each path, or else
-// those named by the user, for every path.
+// Assigns bytes in a recording to its own devices, by path, or to the user's, for every path.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +18,6 @@ class RecordedDevices {
 
   // Replaces devices with the same address or slots. Returns null if the device is not accepted.
   const Device* on_device(const RecordedDevice& told);
-  // Starts another recording, with new paths.
   void on_header();
 
   struct Known {

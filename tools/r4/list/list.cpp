@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 list: prints the boards found by r4::discover(), and the known URL schemes.
 #include <fmt/format.h>
 
 #include <cstdint>

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 completion: scripts for bash, zsh and fish, generated from the option tree.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 man: writes the manual pages, generated from the same source as --help.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>

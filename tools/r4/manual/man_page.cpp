@@ -80,7 +80,7 @@ std::string today() {
 std::string body_of(const std::vector<std::string>& lines) {
   std::string out;
   bool verbatim = false;
-  bool apart = false;  // text above needs a separation
+  bool apart = false;
   const auto end_verbatim = [&] {
     if (verbatim) out += ".EE\n";
     apart = apart || verbatim;
@@ -117,7 +117,7 @@ struct Footer {
 Footer footer_of(const CLI::App& command) {
   Footer parts;
   std::vector<std::string>* section = &parts.description;
-  bool begins = true;  // at the start of a paragraph
+  bool begins = true;
   for (std::string line : CLI::detail::split(command.get_footer(), '\n')) {
     if (begins) {
       section = &parts.description;

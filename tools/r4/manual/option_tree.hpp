@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The subcommands and options, as used for the shell completion and the man pages.
 #pragma once
 
 #include <string>
@@ -11,7 +10,6 @@ namespace r4::tool {
 
 bool takes_value(const CLI::Option& option);
 
-// All names of an option: "-h", "--help".
 std::vector<std::string> names_of(const CLI::Option& option);
 
 std::vector<const CLI::Option*> options_of(const CLI::App& command);

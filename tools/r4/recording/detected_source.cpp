@@ -74,7 +74,6 @@ void DetectedSource::take(std::string_view text) {
   if (const std::optional<Format> format = detect(false)) decide(*format);
 }
 
-// The format of the text; empty if more text is needed.
 std::optional<DetectedSource::Format> DetectedSource::detect(bool at_end) {
   if (text_.size() < form_bytes && !at_end) return std::nullopt;
   const FileForm form = form_of(text_);

@@ -39,7 +39,7 @@ class DetectedSource final : public Source {
   std::string text_;  // file_, decompressed
   std::size_t looked_at_ = 0;
   std::unique_ptr<ZstdReader> zstd_;  // null if the source decompresses by itself
-  std::uint64_t taken_ = 0;           // bytes of the file passed to zstd_
+  std::uint64_t taken_ = 0;
   RecordLine line_;
 };
 

@@ -30,9 +30,8 @@ struct SourceOptions {
 std::unique_ptr<Source> make_source(const std::string& path, RecordingVisitor& visitor,
                                     const SourceOptions& options = {});
 
-// Writes the file at `path`. Throws Error{usage} for an unknown ending. .csv, .jsonl and .mcap show
-// the values of `devices` instead of the recording's own devices; other formats throw Error{usage}
-// for `devices`.
+// Throws Error{usage} for an unknown ending, and for `devices` with a format other than .csv,
+// .jsonl and .mcap. These show the values of `devices` instead of the recording's own devices.
 std::unique_ptr<Sink> make_sink(const std::string& path, Output& output,
                                 std::vector<Device> devices = {});
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 info: shows what a recording contains and which parts cannot be read.
 #include <memory>
 #include <string>
 #include <vector>

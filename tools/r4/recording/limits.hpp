@@ -8,8 +8,7 @@
 
 namespace r4::tool {
 
-// Parses the value of --rotate: a size such as 500K, 100M or 2G (powers of 1000), or a time such as
-// 30s, 10min or 1h. Throws Error{usage}.
+// Parses --rotate: 500K, 100M, 2G (powers of 1000) or 30s, 10min, 1h. Throws Error{usage}.
 void take_rotation(const std::string& text, RecordingOptions& out);
 
 // Parses a size as above. Throws Error{usage} that names `option`.

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 plot: draws curves of a recording with Python's matplotlib.
 #include <fmt/format.h>
 #include <spawn.h>
 #include <sys/mman.h>
@@ -90,7 +89,7 @@ struct PlottedPath {
   std::vector<Span> spans;
   SafeReason safe = SafeReason::none;
   Time safe_since{0};
-  Time last{0};  // last time heard
+  Time last{0};
   bool heard = false;
 };
 
@@ -187,7 +186,6 @@ std::string unit_of(StateField field) {
               "free some memory, or plot fewer fields");
 }
 
-// An anonymous file, read or written by another program.
 FilePointer make_memory(const char* name) {
   const int descriptor = ::memfd_create(name, MFD_CLOEXEC);
   FilePointer memory(descriptor < 0 ? nullptr : ::fdopen(descriptor, "w+b"));
@@ -272,7 +270,7 @@ std::optional<int> run_python(const char* python, const FilePointer& plan,
 
 // Runs plot.py. If the user's own Python has no matplotlib, tries the system's Python.
 FilePointer draw(const FilePointer& plan) {
-  constexpr int no_matplotlib = 3;  // exit code of plot.py
+  constexpr int no_matplotlib = 3;
   FilePointer picture = make_memory("picture");
   std::optional<int> code = run_python("python3", plan, picture);
   if (!code || *code == no_matplotlib) code = run_python("/usr/bin/python3", plan, picture);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 record: watches boards and records their datagrams.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -26,15 +26,15 @@ struct PathSummary {
   std::uint64_t damaged = 0;
   std::uint64_t oversize = 0;  // longer than a datagram may be
   PacketTracker packets;
-  Time first{0}, last{0};  // first and last time heard
+  Time first{0}, last{0};
   // To the board:
   std::uint64_t sent = 0;
   std::uint64_t heartbeats = 0;
   std::uint64_t stops = 0;
   // The board's safe states:
-  SafeReason safe = SafeReason::none;  // current
+  SafeReason safe = SafeReason::none;
   Time safe_since{0};
-  Time safe_for{0};  // total
+  Time safe_for{0};
   std::array<std::uint64_t, safe_reason_count> safe_times{};
   std::uint64_t downs = 0;  // transport down
   std::uint64_t gaps = 0;
@@ -78,7 +78,7 @@ class RecordingSummary final : public RecordingVisitor {
   std::uint64_t unended_ = 0;  // recordings without an end
   bool ended_ = true;
   std::uint64_t damage_count_ = 0;
-  std::vector<Damage> damage_;  // the first most_damage
+  std::vector<Damage> damage_;
 };
 
 }  // namespace r4::tool

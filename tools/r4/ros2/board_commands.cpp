@@ -50,8 +50,7 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
   });
   board_.on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) return;
-    // If only the motors' supply is lost, the board is not safe yet and accepts only a stop from
-    // us.
+    // Without motor supply the board is not safe yet, but accepts only a stop.
     if (cause == DisarmCause::supply && drivers_.any()) stop([](bool, const std::string&) {});
     wanted_.clear();
     drivers_.forget();

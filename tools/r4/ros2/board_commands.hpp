@@ -77,7 +77,6 @@ class BoardCommands {
   void subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox);
 
   using Left = std::function<void(const std::vector<std::uint64_t>&)>;
-  // Also logs the number of publishers.
   template <class Message, class Value>
   void add(Inbox& inbox, const std::string& topic,
            Inbox::Subscription<Message, Value> subscription);
@@ -106,7 +105,6 @@ class BoardCommands {
   void tell(const std::string& what, PostResult result);
   // True if there is no link. Reports it, because nothing is kept for later.
   bool is_without_link(const std::string& what, const Done& done) const;
-  // Remaining time until the command is too old.
   static AsyncBoard::Duration left_of(const Origin& origin);
   void stop(Done done);
   void repeat_stop();
@@ -124,7 +122,7 @@ class BoardCommands {
   bool resting_ = false;    // a stop of outputs without a publisher is being sent
   bool arming_ = false;
   asio::cancellation_signal give_up_arming_;
-  std::vector<Done> stops_;  // callbacks of the current stop
+  std::vector<Done> stops_;
   bool stopping_ = false;
   Clock::time_point stopped_{};  // newest stop: commands written before it are ignored
   Pressed pressed_;              // on `arm`

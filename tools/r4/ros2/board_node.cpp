@@ -195,8 +195,7 @@ Health BoardNode::health() const {
   add("commands too old", fmt::format("{}", commands_.stale()));
   add("samples malformed", fmt::format("{}", inbox_.malformed()));
   add("samples dropped", fmt::format("{}", inbox_.dropped()));
-  constexpr std::size_t most_mismatches = 8;  // limit on reports, because a graph may have any
-                                              // number
+  constexpr std::size_t most_mismatches = 8;  // a graph may have any number
   add("mismatches", fmt::format("{}", mismatches_.size()));
   for (std::size_t i = 0; const auto& each : mismatches_) {
     if (++i > most_mismatches) break;

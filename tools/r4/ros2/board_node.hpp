@@ -36,11 +36,9 @@ class BoardNode {
 
   // Call when the board is open.
   void start();
-  // Call when the inbox is drained.
   void flush() { commands_.flush(); }
   void warn(const std::string& text) { log(LogLevel::warning, text); }
-  // A foreign reader or writer does not match ours. Without `mismatch` it matches again or has
-  // gone.
+  // A foreign reader or writer does not match ours; no `mismatch`: it matches or has gone.
   void on_mismatch(const EntityId& who, const std::optional<Mismatch>& mismatch);
   AsyncBoard& board() { return board_; }
   const std::string& name() const { return name_; }
@@ -73,7 +71,7 @@ class BoardNode {
   bool armed_once_ = false;
   bool heard_ = false;
   bool in_control_ = false;
-  std::map<std::string, Clock::time_point> said_;  // recently logged
+  std::map<std::string, Clock::time_point> said_;
 };
 
 }  // namespace r4::tool::ros2

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The services of a board. Each answers after the board's confirmation, or with the reason for a
-// failure.
+// Services of a board. Each answers after the board's confirmation, or with a failure's reason.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,7 +15,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto arm_patience = 3000ms;  // for all steps of arming
+constexpr auto arm_patience = 3000ms;
 constexpr auto stop_patience = 5000ms;
 constexpr const char* overtaken = ": a stop came after it; ask again when the danger is over";
 

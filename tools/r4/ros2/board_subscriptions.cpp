@@ -19,8 +19,7 @@ constexpr std::size_t most_others = 4;  // in one turn
 // NOLINTBEGIN(clang-analyzer-cplusplus.NewDeleteLeaks): it loses sight of a std::function that is moved from a
 // designated initializer.
 
-// Subscribe twice, reliable and best effort: a duplicate stop is harmless, and a best-effort button
-// of micro-ROS is not missed.
+// Subscribe twice, reliable and best effort: a duplicate stop is harmless, and none is missed.
 void BoardCommands::subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox) {
   for (const bool reliable : {true, false}) {
     Qos qos;
@@ -52,13 +51,11 @@ void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) 
           .urgent = {},
           .take =
               [this](bool pressed, const Origin& origin) {
-                if (origin.writer == EntityId{}) {  // unknown writer: the button may have been
-                                                    // pressed before
+                if (origin.writer == EntityId{}) {  // may be an old press
                   if (!pressed) return;
                   return warn("arm: dropped: its publisher has gone; let it stay for a second");
                 }
-                // Only a change to true arms: a publisher that repeats itself must not arm again
-                // after a stop.
+                // Repeated presses must not arm again after a stop.
                 const bool edge = pressed_.on(origin.writer, pressed);
                 if (!edge || is_stale("arm", origin)) return;
                 if (is_overtaken(origin)) {
@@ -220,8 +217,7 @@ void BoardCommands::subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox
   subscribe_speed<TwistMessage>(graph, node, inbox, source, [](const TwistMessage& twist) {
     return Speed{twist.linear.x, twist.angular.z, {}};
   });
-  // Subscribes to TwistStamped only if it is published, because `ros2 topic echo` cannot show a
-  // topic of two types.
+  // `ros2 topic echo` cannot show a topic of two types: subscribe to this one on demand.
   const auto subscribe_stamped = [this, &graph, node, &inbox, stamped_source] {
     subscribe_speed<TwistStampedMessage>(
         graph, node, inbox, stamped_source, [](const TwistStampedMessage& message) {

@@ -23,7 +23,6 @@
 
 namespace r4::tool::ros2 {
 
-// A diagnostics status, with the levels of ROS.
 struct Health {
   enum Level : std::uint8_t { ok = 0, warning = 1, error = 2, stale = 3 };
   Level level = stale;
@@ -48,7 +47,6 @@ class BoardTopics {
   void log(LogLevel level, const std::string& text, WallTime now) const;
 
  private:
-  // A value that is published when it changes.
   template <class Value>
   struct Changing {
     dds_entity_t writer = 0;
@@ -83,11 +81,11 @@ class BoardTopics {
   dds_entity_t diagnostics_ = 0;
   dds_entity_t rosout_ = 0;
   dds_entity_t joints_ = 0;
-  FieldSet joint_fields_;  // state fields used for joint_states
+  FieldSet joint_fields_;
   // A state may arrive as several datagrams with one T, which form one sample.
   struct Joints {
     State state;
-    FieldSet present;  // received joint_fields_
+    FieldSet present;
     WallTime sampled;
     std::uint32_t boot = 0;
   };

@@ -75,8 +75,7 @@ struct NamedUrl {
   NodeName name;
 };
 
-// A single board is in the namespace itself. Several boards are in namespaces below it: board1,
-// board2 …, or the numbers of a pattern.
+// One board is in the namespace itself; several are below it: board1 …, or a pattern's numbers.
 std::vector<NamedUrl> named_urls(const BridgeOptions& options) {
   const std::vector<PatternUrl> urls = expand_urls(options.urls);
   const bool numbered = options.urls.size() == 1;

@@ -14,7 +14,6 @@ constexpr std::string_view blank = " \t\r\n";
 
 bool is_ascii(char c) { return (c >= ' ' && c <= '~') || blank.find(c) != std::string_view::npos; }
 
-// Calls part(text) for each part that is not empty.
 template <class Part>
 void each_part(std::string_view text, Part part) {
   while (!text.empty()) {

@@ -12,16 +12,14 @@
 
 namespace r4::tool::ros2 {
 
-// The text of a string in a sample. Empty if it has no NUL at its end, a NUL within, or more bytes
-// than a datagram.
+// Empty if the string has no NUL at its end, a NUL within, or more bytes than a datagram.
 std::optional<std::string> text_of(std::string_view bytes);
 
 // True if the text contains E:STOP, which is obeyed whatever else the text contains.
 bool asks_to_stop(std::string_view text);
 
-// The commands, all valid. Throws Error{usage} naming the first one that is wrong or not allowed
-// from a topic: settings, choices of fields, heartbeats and farewells. A text that is not ASCII is
-// not quoted.
+// Throws Error{usage} naming the first command that is wrong or not allowed from a topic: settings,
+// choices of fields, heartbeats, farewells. A text that is not ASCII is not quoted.
 std::vector<OwnCommand> commands_of(std::string_view text);
 
 // Replaces the library's advice, which names its own call and r4 send: the board refuses those

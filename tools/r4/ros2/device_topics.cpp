@@ -117,8 +117,7 @@ void DeviceTopics::publish_imu(const Topic& topic, const State& state, TimeMessa
   message.angular_velocity = {get("gyro_x"), get("gyro_y"), get("gyro_z")};
   if (topic.device.description().find("quat_w")) {
     message.orientation = {get("quat_x"), get("quat_y"), get("quat_z"), get("quat_w")};
-    // A BNO055 in configuration mode reports 0 for all values (BST-BNO055-DS000, 3.3.1), which is
-    // not a valid orientation.
+    // A BNO055 in configuration mode reports 0 for all (BST-BNO055-DS000, 3.3.1).
     const auto& [x, y, z, w] = message.orientation;
     if (x * x + y * y + z * z + w * w < 0.5) return;
   } else {
@@ -158,8 +157,7 @@ void DeviceTopics::publish_range(const Topic& topic, const State& state, TimeMes
   message.radiation_type = infrared;
   message.min_range = static_cast<float>(distance.minimum);
   message.max_range = static_cast<float>(distance.maximum);
-  // REP 117: too near is -Inf, nothing within reach is +Inf, a value that the device rejects is
-  // NaN.
+  // REP 117: too near is -Inf, nothing within reach +Inf, rejected by the device NaN.
   constexpr float infinity = std::numeric_limits<float>::infinity();
   const double measured = any_number_of(topic.device, state, topic.value).value();
   if (measured > distance.maximum) {

@@ -28,8 +28,8 @@ class DeviceTopics {
     Device device;
     std::string name;  // device name, with its address if several; also the frame and joint
     dds_entity_t writer = 0;
-    std::size_t value = 0;              // always present
-    std::optional<std::uint32_t> t_ms;  // of the last one
+    std::size_t value = 0;  // always present
+    std::optional<std::uint32_t> t_ms;
   };
   void publish(const Topic& topic, const State& state, TimeMessage time) const;
   void publish_imu(const Topic& topic, const State& state, TimeMessage time) const;

@@ -6,12 +6,11 @@
 //      |                                 +---------------- a command that drives --------------------+
 //      +---------------------------------- stopped, the board has confirmed it -----------------------+
 //
-// A single stop might be lost, so it is repeated until the board confirms it. A stopped output is
-// as in the safe state: motors at 0, brushless drivers at 0 with brakes on, servos without pulses,
-// relays open, steppers at their position, voltages at 0. Relay 1 is not an output here: arming
-// uses it as the motors' supply. A stepper's position stays valid for a while, because only one of
-// a state's datagrams contains it. The caller passes in the time, which continues while this
-// computer sleeps.
+// A stop might be lost, so it is repeated until confirmed. A stopped output is as in the safe
+// state: motors at 0, brushless drivers at 0 with brakes on, servos without pulses, relays open,
+// steppers standing, voltages at 0. Relay 1, the motors' supply, belongs to arming. A stepper's
+// position is kept for a while, because only one of a state's datagrams has it. The caller passes
+// in the time, which continues while this computer sleeps.
 #pragma once
 
 #include <array>
@@ -49,7 +48,6 @@ class Drivers {
   static bool rests(const Command& command);
   // `source`: the topic; `publisher`: of that topic.
   void on_sent(const Command& command, const void* source, std::uint64_t publisher, Time now);
-  // Reads the steppers' positions from a state.
   void on_state(const State& state, Time sampled);
   // The remaining publishers of a topic.
   void on_publishers(const void* source, const std::vector<std::uint64_t>& there);
@@ -58,9 +56,8 @@ class Drivers {
   // Call when the board has no such output.
   void forget(const Command& command);
 
-  // Commands that stop outputs now, repeated until stopped() or a command that drives them. At most
-  // max_group. A stepper waits for its position. Voltages, which not every board has, wait for the
-  // other outputs.
+  // Commands that stop outputs now, at most max_group, repeated until stopped() or a driving
+  // command. A stepper waits for its position; voltages, not on every board, for the other outputs.
   struct Stop {
     std::vector<Command> commands;
     std::uint64_t sent = 0;  // number of commands sent before

@@ -22,8 +22,8 @@ struct NodeOptions {
   std::optional<double> steps_per_turn;      // for stepper joints
   std::optional<DifferentialDrive> drive;    // none: no cmd_vel
   std::chrono::milliseconds deadline{1000};  // of a publisher that drives
-  std::vector<Device> devices;               // on the user's I2C bus
-  bool arm = false;                          // once, when the board is connected
+  std::vector<Device> devices;
+  bool arm = false;        // once, when the board is connected
   bool one_clock = false;  // all publishers are on this computer, so stamps use its clock
 };
 

@@ -21,8 +21,7 @@ double to_duty(int pwm, Direction direction);
 
 // Unit of servo topics: radians by a calibration; none: pulses in microseconds.
 using ServoUnit = std::optional<ServoCalibration>;
-// "us", or two pulses and the angle between them, with 0 in the middle: "500,2500,3.14". Throws
-// Error{usage}.
+// "us", or two pulses and the angle between them: "500,2500,3.14". Throws Error{usage}.
 ServoUnit servo_unit(std::string_view text);
 std::optional<Microseconds> to_pulse(const ServoUnit& unit, double value);
 // In radians: NaN for a disabled servo.
@@ -36,7 +35,6 @@ struct MotorChannel {
   std::optional<Command> command(double duty) const;
 };
 
-// A robot with a wheel on either side, for cmd_vel.
 struct DifferentialDrive {
   MotorChannel left;
   MotorChannel right;
@@ -49,9 +47,8 @@ struct DifferentialDrive {
 DifferentialDrive differential_drive(std::string_view channels, double separation_m,
                                      double full_speed_mps);
 
-// Converts a 32-bit counter of the board to a position without jumps. The counter wraps, and
-// restarts at 0 with the board; the position continues. Counts before the first state after a
-// restart are lost.
+// A 32-bit counter of the board as a position without jumps. The counter wraps and restarts at 0
+// with the board. Counts before the first state after a restart are lost.
 class Position {
  public:
   // `boot` changes when the board has restarted.

@@ -59,7 +59,6 @@ std::string without(std::string text, std::string_view ending) {
   return text;
 }
 
-// Converts an error of CLI11 into a Problem.
 Problem usage_problem(const CLI::App& root, const CLI::ParseError& error) {
   Problem problem{ErrorKind::usage, "", "", ""};
   const std::vector<CLI::App*> used = root.get_subcommands();
@@ -139,12 +138,12 @@ int run(int argc, const char* const* argv) {
     try {
       root.parse(argc, argv);
       code = chosen();
-    } catch (const CLI::Success& success) {  // --help, --version
+    } catch (const CLI::Success& success) {
       std::ostringstream text;
       code = root.exit(success, text);
       print_raw(text.str());
     }
-    require_output();  // a full disk is an error
+    require_output();
     return code;
   } catch (const CLI::ParseError& error) {
     return report(usage_problem(root, error), json);

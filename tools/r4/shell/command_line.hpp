@@ -3,9 +3,8 @@
 
 namespace r4::tool {
 
-// Runs `r4` with these arguments. Returns the exit code: 0 for success, else the ErrorKind
-// (r4link/error.hpp). An error is one line on stderr, "r4: thing: reason; fix", and with --json
-// also an object on stdout.
+// Returns the exit code: 0 for success, else the ErrorKind (r4link/error.hpp). An error is one line
+// on stderr, "r4: thing: reason; fix", and with --json also an object on stdout.
 int run(int argc, const char* const* argv);
 
 }  // namespace r4::tool

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `r4 --help` prints besides the options: first steps, URLs, board commands, exit codes.
 #pragma once
 
 #include <string>
@@ -10,12 +9,9 @@ namespace r4::tool {
 
 std::string root_footer();
 
-// The URL schemes from the registry of transports, one a line.
 std::string url_table();
-// Prints each URL scheme as JSON: {"type":"scheme"…}.
 void print_url_schemes();
 
-// The board commands with their ranges, one a line.
 std::string command_table();
 
 void set_help_layout(CLI::App& root);

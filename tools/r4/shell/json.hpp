@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams, problems and bytes as JSON, as printed by `--json`.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -46,12 +45,10 @@ Json counters_json(const CarrierCounters& counters);
 // Bytes as printable ASCII: a backslash and every other byte become \xNN.
 std::string escaped(std::string_view bytes);
 
-// Bytes that are not UTF-8, for example in a command line or a board's name, are replaced.
-// line_of() is ASCII.
+// Bytes that are not UTF-8 are replaced. line_of() is ASCII.
 std::string text_of(const Json& value);
 std::string line_of(const Json& object);
 
-// Prints an object on its own line to standard output.
 void print_line(const Json& object);
 
 }  // namespace r4::tool

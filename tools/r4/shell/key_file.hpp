@@ -16,7 +16,6 @@ void make_key_file(const std::string& path, std::uint8_t id);
 
 // --key FILE, or R4_KEY in the environment.
 CLI::Option* add_key(CLI::App& command, std::string& path);
-// The same for a command that takes several keys.
 CLI::Option* add_keys(CLI::App& command, std::vector<std::string>& paths);
 
 // Sets the key from the file at `path`; an empty `path` means no key.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Numbers the lines of an input from 1. A line ends with CR, LF or both. A UTF-8 byte order mark
-// before the first line is skipped. At most max_datagram characters are stored: a longer line is
-// only measured.
+// Numbers lines from 1. A line ends with CR, LF or both. A UTF-8 byte order mark at the beginning
+// is skipped. At most max_datagram characters are stored: a longer line is only measured.
 #pragma once
 
 #include <algorithm>
@@ -17,8 +16,7 @@ namespace r4::tool {
 
 class NumberedLines {
  public:
-  // Calls line(number, text) for each complete line that is not empty, and too_long(number, size)
-  // for each line longer than max_datagram.
+  // Calls line() for each complete line that is not empty, too_long() above max_datagram.
   template <class Line, class TooLong>
   void push(std::string_view bytes, Line line, TooLong too_long) {
     while (!bytes.empty()) {
@@ -38,7 +36,7 @@ class NumberedLines {
         if (!text.empty()) line(number_, text);
       }
       line_.clear();
-      const bool second_half = bytes[end] == '\n' && end == 0 && after_cr_;  // the LF of CR LF
+      const bool second_half = bytes[end] == '\n' && end == 0 && after_cr_;
       if (!second_half) ++number_;
       begin_ += size_ + 1;
       size_ = 0;
@@ -55,10 +53,10 @@ class NumberedLines {
   }
 
  private:
-  std::string line_;  // the line so far, unless it is too long
+  std::string line_;
   std::uint64_t number_ = 1;
   std::uint64_t begin_ = 0;
-  std::uint64_t size_ = 0;  // of the line so far
+  std::uint64_t size_ = 0;
   bool after_cr_ = false;
 };
 

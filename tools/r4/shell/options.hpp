@@ -45,10 +45,8 @@ void add_repeated(CLI::App& command, const std::string& name, std::vector<std::s
 
 void add_flag(CLI::App& command, const std::string& name, bool& out, const std::string& meaning);
 
-// `name` excludes each of `others`.
 void exclude(CLI::App& command, const std::string& name, std::initializer_list<const char*> others);
 
-// A whole number from `min` to `max`.
 CLI::Option* add_number(CLI::App& command, const std::string& name, std::uint64_t& out,
                         std::uint64_t min, std::uint64_t max, const std::string& meaning);
 CLI::Option* add_number(CLI::App& command, const std::string& name,
@@ -57,13 +55,10 @@ CLI::Option* add_number(CLI::App& command, const std::string& name,
 
 CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning);
 
-// URLs of boards. '+' joins the URLs of several paths to one board
-// (r4link/discovery/url_pattern.hpp). A command for one board (add_paths) also takes each URL as a
-// path:
+// '+' joins the URLs of several paths to one board (r4link/discovery/url_pattern.hpp). For
+// add_paths(), which takes one board, each URL is a path; for add_boards() each URL is a board:
 //
 //     r4 stop serial:auto udp://192.168.0.125   =   r4 stop serial:auto+udp://192.168.0.125
-//
-// For a command for several boards (add_boards) each URL is a board.
 CLI::Option* add_paths(CLI::App& command, std::vector<std::string>& out);
 CLI::Option* add_boards(CLI::App& command, std::vector<std::string>& out);
 
@@ -72,10 +67,8 @@ CLI::Option* add_boards(CLI::App& command, std::vector<std::string>& out);
 CLI::Option* add_url(CLI::App& command, std::string& out);
 void take_paths(std::string& url, std::vector<std::string>& words, const std::string& what);
 
-// True if the text begins like the URL of a transport.
 bool is_url(std::string_view text);
 
-// Checked state fields for `F`.
 CLI::Option* add_fields(
     CLI::App& command, std::string& out,
     const std::string& meaning = "state fields to ask for, such as DEFAULT,ENC1,US1 or ALL");

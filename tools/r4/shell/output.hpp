@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Standard output. All output of r4 goes through here without buffering. A failed write does not
-// end a command, because a stop must reach the board even if the disk is full. require_output()
-// reports the failure at the end.
+// All output of r4 goes through here, without buffering. A failed write does not end a command: a
+// stop must reach the board even if the disk is full. require_output() reports it at the end.
 #pragma once
 
 #include <fmt/format.h>
@@ -53,7 +52,6 @@ class LineWriter {
   // Never blocks. `line` includes its end and is printed as printable_lines().
   void write(std::string_view line);
 
-  // Number of dropped lines.
   std::uint64_t lost() const;
 
  private:

@@ -16,13 +16,12 @@ class Screen {
 
   // False while the terminal is stopped (Ctrl-S): drawing would block and delay the heartbeats.
   static bool has_room();
-  // Cuts the lines to the terminal's size.
   void draw(std::vector<std::string> lines);
   static std::size_t columns();
 
  private:
   bool begun_ = false;
-  std::size_t drawn_ = 0;  // lines on the screen
+  std::size_t drawn_ = 0;
 };
 
 }  // namespace r4::tool

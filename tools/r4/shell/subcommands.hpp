@@ -38,8 +38,6 @@ void add_demo(CLI::App& root, Action& chosen);
 void add_completion(CLI::App& root, Action& chosen);
 void add_man(CLI::App& root, Action& chosen);
 
-// Adds a subcommand with its one-line meaning and the footer of its --help. `on_chosen` runs when
-// the command line names the subcommand.
 CLI::App* add_subcommand(CLI::App& root, const char* name, const char* meaning,
                          const std::string& footer, std::function<void()> on_chosen);
 

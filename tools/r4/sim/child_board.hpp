@@ -20,8 +20,7 @@ class ChildBoard {
  public:
   using OnEvent = std::function<void(const Json&)>;
 
-  // Starts the process. `on_event` gets each printed object, on the io_context's thread. Throws
-  // Error.
+  // `on_event` gets each printed object, on the io_context's thread. Throws Error.
   ChildBoard(asio::io_context& io, const std::string& url, OnEvent on_event);
   // Ends the process and waits for its end.
   ~ChildBoard();

@@ -60,7 +60,6 @@ constexpr std::array<Captured, 4> captured{{
 
 void print(const std::string& text) { print_text(text + "\n"); }
 
-// True if each captured datagram is read as expected.
 bool decode_capture(bool json) {
   bool good = true;
   for (const Captured& each : captured) {
@@ -82,7 +81,6 @@ bool decode_capture(bool json) {
   return good;
 }
 
-// A board in another process, with its URL for a host.
 class SeparateBoard {
  public:
   SeparateBoard(asio::io_context& io, const std::string& url)

@@ -17,7 +17,7 @@ constexpr int questions = 25;
 constexpr int shown_states = 3;
 constexpr std::chrono::milliseconds streaming{600};
 constexpr std::chrono::milliseconds patience{5000};
-constexpr double timeout_ms = 1000;  // of the board
+constexpr double timeout_ms = 1000;
 // How long a busy computer may delay a simulated board. A real board is safe 20 ms after its
 // timeout (docs/safety.md). The story reports the measured time.
 constexpr double held_up_ms = 1000;
@@ -26,7 +26,6 @@ const Drive commanded{358, Direction::forward};
 // Encoder counts that prove a motor with supply: more than a motor without supply can reach.
 constexpr std::int32_t turned = 100;
 
-// A step of the story failed.
 class NotSo : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -220,8 +219,7 @@ void Story::fall_silent() {
   teller_.say(fmt::format("          SAFE:1, every output off, {:.0f} ms after the last heartbeat.",
                           result_.safe_ms));
   require(result_.safe_ms <= timeout_ms + held_up_ms, "the board went safe too late");
-  // Without the log the time may seem too short, if this computer was delayed after the last
-  // heartbeat.
+  // Without the log the time may be too short, if this computer was delayed.
   require(!result_.safe_by_event || result_.safe_ms >= timeout_ms, "the board went safe too early");
 }
 

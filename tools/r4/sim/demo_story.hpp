@@ -29,10 +29,9 @@ struct StoryResult {
   double recovered_ms = 0;
   double stop_ms = 0;
   bool good = false;
-  std::string trouble;  // the step that failed
+  std::string trouble;
 };
 
-// The log of a board in another process.
 struct BoardLog {
   std::optional<std::uint32_t> silence_ms;  // of the newest SAFE (link)
   bool outputs_off = false;
@@ -83,7 +82,7 @@ class Story {
   // The board's newest heartbeat that reported a safe state.
   std::string safe_bytes_;
   std::uint32_t safe_t_ms_ = 0;
-  std::optional<CommandResult> ended_;  // result of the current command
+  std::optional<CommandResult> ended_;
 };
 
 }  // namespace r4::tool

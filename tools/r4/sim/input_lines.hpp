@@ -14,9 +14,8 @@ namespace r4::tool {
 
 class InputLines {
  public:
-  // Both callbacks run on the io_context's thread. `on_line` gets each line without its end.
-  // `on_end` is called once, with a problem if a line was too long. Throws Error if there is no
-  // standard input.
+  // On the io_context's thread: `on_line` gets each line without its end, `on_end` a problem if a
+  // line was too long. Throws Error if there is no standard input.
   InputLines(asio::io_context& io, std::function<void(const std::string&)> on_line,
              std::function<void(const Problem*)> on_end);
 

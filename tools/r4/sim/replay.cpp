@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 replay: serves a recording as a listening board.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -46,8 +45,7 @@ constexpr int steps_in_a_turn = 32;
 constexpr std::chrono::seconds audience_for{2};
 constexpr std::size_t most_peers = 8;
 
-// Sends the recorded datagrams to every peer that has sent something. Received datagrams have no
-// effect.
+// Sends the recorded datagrams to each peer that has sent something. Commands have no effect.
 class Replay : private Carrier::Handler {
  public:
   explicit Replay(const ReplayOptions& options)
@@ -114,7 +112,6 @@ class Replay : private Carrier::Handler {
     });
   }
 
-  // Plays up to the next datagram.
   void step() {
     while (records_.next() != nullptr || read_on()) {
       if (records_.next() == nullptr) continue;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 sim: runs simulated boards and prints their events on stdout.
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -51,7 +50,6 @@ void check_id(const std::string& id) {
               fmt::format("use 1 to {} letters, digits, _ and -", board_id_max));
 }
 
-// The script step that connects a device to the user's bus.
 sim::ScriptStep connection_of(const std::string& name) {
   try {
     return sim::Script::parse_now("device " + name + " on", "--device").value();

@@ -20,7 +20,6 @@ namespace {
 
 constexpr std::size_t room = std::size_t{1} << 20;  // bytes that wait for a reader
 
-// True if a motor is commanded to turn.
 bool drives(const sim::Pins& pins) {
   const auto has_duty = [](const Drive& drive) { return drive.pwm != 0; };
   const auto has_speed = [](const Bldc& bldc) { return bldc.speed != 0; };

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The output of `r4 sim`: where the boards listen and their events, as text or JSON. A slow reader
-// does not delay a board.
+// Output of `r4 sim`, as text or JSON. A slow reader does not delay a board.
 #pragma once
 
 #include <string>
@@ -30,7 +29,7 @@ class SimOutput {
  private:
   const bool json_;
   bool started_ = false;
-  std::vector<std::string> held_;  // lines printed before listening()
+  std::vector<std::string> held_;
   LineWriter writer_;
 };
 
@@ -44,7 +43,6 @@ class SimLog {
   sim::SimulatedBoard::Events events();
   // Call before the board's start().
   void watch(const sim::SimulatedBoard& board) { board_ = &board; }
-  // Prints the current sensor values.
   void tell_sensors();
   // Call at the end for each transport: prints its counters.
   void on_end(const Carrier& carrier);

@@ -32,8 +32,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr Milliseconds connect_timeout{3000};
 constexpr Milliseconds answer_timeout{1000};
-// Pauses between bursts: the board rejects a packet number that is too far ahead of the newest
-// heartbeat's (BoardLink::command_window).
+// Pauses, because the board rejects packet numbers too far ahead (BoardLink::command_window).
 constexpr std::size_t burst = 100;
 constexpr Milliseconds pause{10};
 
@@ -44,7 +43,6 @@ struct BenchOptions {
   bool json = false;
 };
 
-// Durations in microseconds, with their quantiles.
 class Durations {
  public:
   void add(Time duration) { values_.push_back(static_cast<double>(duration.count())); }
@@ -246,7 +244,7 @@ class Bench {
   std::uint64_t damaged_ = 0;
   double state_hz_ = 0;
   double jitter_us_ = 0;
-  bool running_ = false;  // send the next question or command after each answer
+  bool running_ = false;
   Durations round_trips_;
   std::uint64_t unanswered_ = 0;
   Durations confirmations_;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Metrics of boards for Prometheus, used by r4 metrics and r4 web.
 #pragma once
 
 #include <map>

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The table of `r4 monitor` for several boards: one row for each board.
 #pragma once
 
 #include <memory>
@@ -30,7 +29,7 @@ class BoardTable {
   const bool live_;
   LineWriter& lines_;
   Screen screen_;
-  std::vector<std::string> notes_;  // transport problem of each board
+  std::vector<std::string> notes_;
 };
 
 }  // namespace r4::tool

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 decode: reads datagrams, one a line or as CAN frames, and prints JSON. Memory is bounded for
-// any input.
+// r4 decode. Memory is bounded for any input.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -144,7 +143,7 @@ int decode_lines(Input& input, Reader& reader, std::string& printed) {
 
 int decode(const DecodeOptions& options) {
   Input input(options.file);
-  std::string printed;  // output of one block of input
+  std::string printed;
   const BusLog::Print print = [&printed](const Json& object) { printed += line_of(object); };
   if (options.candump) {
     BusLog log(print);

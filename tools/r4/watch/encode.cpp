@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 encode: turns fields into a datagram with packet number, time and checksum.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -70,7 +70,7 @@ class LiveView final : public MonitorView {
   }
 
   void on_tick() override {
-    if (!Screen::has_room()) return;  // Ctrl-S
+    if (!Screen::has_room()) return;
     std::vector<std::string> lines = status_lines();
     add_fields(lines, std::max<std::size_t>(1, Screen::columns() / cell_width));
     for (const auto& [device, values] : readings_) {
@@ -118,7 +118,6 @@ class LiveView final : public MonitorView {
     return lines;
   }
 
-  // One line for each path, if there are several.
   void add_paths(std::vector<std::string>& lines) const {
     const std::vector<PathStatus> paths = board_.paths();
     if (paths.size() < 2) return;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 metrics: exports boards and their links to Prometheus.
 #include <fmt/format.h>
 
 #include <asio/post.hpp>
@@ -43,7 +42,6 @@ web::ServerOptions server_options(const MetricsOptions& options) {
   return server;
 }
 
-// How long a CAN interface was busy, and for which boards.
 class BusMetrics {
  public:
   BusMetrics(asio::io_context& io, const CanInterface& interface)

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 monitor: shows the datagrams of boards.
 #include <unistd.h>
 
 #include <algorithm>
@@ -35,8 +34,7 @@ constexpr Milliseconds tick{100};
 constexpr Milliseconds table_interval{1000};
 // With --count only: the longest silence of the boards after the start.
 constexpr Milliseconds patience{5000};
-// With --device: after busy_patience of control by another host, leave the board to that host. The
-// board has release_time to confirm this.
+// With --device: when to leave the board to another host, and the time to confirm that.
 constexpr Milliseconds busy_patience{1500}, release_time{200};
 // Bytes that wait for a reader. For one board: about half a second of states.
 constexpr std::size_t unread_of_board = 32768, most_unread = std::size_t{1} << 18;
@@ -192,11 +190,11 @@ class Monitor {
   BoardSet boards_;
   std::optional<LineWriter> lines_;
   std::optional<BoardTable> table_;
-  std::vector<std::unique_ptr<MonitorView>> views_;  // one for each board
+  std::vector<std::unique_ptr<MonitorView>> views_;
   Timer tick_;
   Timer table_tick_;
   Timer patience_;
-  std::uint64_t states_ = 0;  // of all boards together
+  std::uint64_t states_ = 0;
   std::optional<DeviceSetup> setup_;
   std::array<std::optional<std::uint32_t>, i2c_slots> told_ms_;
   int busy_ticks_ = 0;

@@ -16,10 +16,9 @@ namespace r4::tool {
 
 class LineWriter;
 
-// Values of a device from one reading.
 struct DeviceNews {
   const Device& device;
-  std::uint32_t pnum = 0;  // of the state
+  std::uint32_t pnum = 0;
   std::uint32_t t_ms = 0;  // time of the reading on the board
   struct Value {
     const DeviceValue* meaning = nullptr;
@@ -39,7 +38,6 @@ class MonitorView {
   virtual void on_heartbeat(const Datagram&) {}
   // New values of a described device, from one of its polls.
   virtual void on_reading(const DeviceNews&) {}
-  // A problem while setting up a device.
   virtual void on_device_trouble(const Problem&) {}
   virtual void on_end() {}
   virtual void on_nack(const Nack&, const Datagram&) {}

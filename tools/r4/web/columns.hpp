@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A state as a row of numbers: the field, value and unit of each column, and the columns of each
-// output channel.
+// A state as a row of numbers, with the field and unit of each column.
 #pragma once
 
 #include <array>
@@ -23,8 +22,7 @@ class Columns {
   // "AIN24", "OSMC1.pwm"; units() has the same size: "V".
   const std::vector<std::string>& names() const { return names_; }
   const std::vector<std::string>& units() const { return units_; }
-  // Copies the datagram's values to their columns of `row`, which has size() elements. Other
-  // elements stay unchanged.
+  // Copies values to their columns of `row`, which has size() elements; others stay.
   void fill(const Datagram& state, std::vector<double>& row) const;
 
  private:

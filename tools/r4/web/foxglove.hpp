@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The Foxglove WebSocket protocol (foxglove.websocket.v1, github.com/foxglove/ws-protocol),
-// read-only. Each board has topics for its records, as in an MCAP file of r4 convert, for its link
-// and for events: JSON with schemas. Uses no sockets. Only wanted() may be called outside the
-// server's thread.
+// read-only. A board has topics for records (as in MCAP files of r4 convert), link and events: JSON
+// with schemas. Uses no sockets. Only wanted() may be called outside the server's thread.
 #pragma once
 
 #include <array>

@@ -30,8 +30,7 @@ Unit wall_time() {
 }
 std::int64_t wall_ms() { return wall_time<std::chrono::milliseconds>().count(); }
 
-// Throws for commands not allowed from a page: setup is for `r4 send`, link commands for r4 web
-// itself.
+// Throws for commands that only r4 send (setup) or r4 web itself (link) may send.
 void require_allowed(const Command& command) {
   switch (command.kind) {
     case CommandKind::setting:
@@ -134,8 +133,6 @@ void Hub::on_metrics() {
   });
 }
 
-// --- datagrams of boards
-
 void Hub::on_state(std::size_t board, const ReceivedState&, const Datagram& datagram) {
   if (!pages_.empty()) rows_[board].add(datagram, wall_ms());
   on_datagram(board, datagram);
@@ -229,15 +226,13 @@ void Hub::watch_holder() {
   });
 }
 
-// The timer stops while this computer sleeps, so the holder may have expired when a browser is
-// first heard after waking up.
+// The timer stops while this computer sleeps, so check before the first message after waking.
 void Hub::look_at_holder() {
   if (!control_.expired(now())) return;
   control_.release(*control_.holder());
   end_control(fmt::format("nothing was heard of the browser for {} ms", Control::limit.count()));
 }
 
-// All boards are left, and go safe.
 void Hub::end_control(const std::string& why) {
   deadline_.cancel();
   const auto left = std::make_shared<std::size_t>(boards_.size());

@@ -31,14 +31,12 @@ struct HubOptions {
 
 class Hub final : ServerEvents, WebBoard::Events {
  public:
-  // The boards are watched, not yet open, and must outlive the hub. Throws Error if it cannot
-  // listen.
+  // The boards, not yet open, must outlive the hub. Throws Error if it cannot listen.
   Hub(BoardSet& boards, const HubOptions& options);
   ~Hub();
 
   void start();
   const ListenAddress& address() const { return server_.address(); }
-  // Ends the server.
   void end();
 
  private:

@@ -15,7 +15,7 @@ struct PageRequest {
   std::uint64_t request = 0;  // the page's number, repeated in the result
   std::size_t board = 0;      // command, arm, clear
   std::uint64_t now = 0;      // alive: newest server time received by the page
-  std::string command;        // "O:358,1,1"
+  std::string command;
 };
 
 // Empty unless the text is a valid message with all members in range.

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 web: shows and controls boards in a browser.
 #include <fmt/format.h>
 
 #include <memory>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A recording started from a page. Disk access uses its own thread, so that the boards' loop never
-// waits for it.
+// A recording started from a page. A thread of its own waits for the disk.
 //
 //     off --begin()--> opening --opened--> on --end(), or the disk is full--> off
 //                         |                     end() during opening: as soon as it is on
@@ -54,7 +53,7 @@ class WebRecording {
   const std::function<void(const Told&)> tell_;
   std::shared_ptr<Recording> recording_;
   Stage stage_ = Stage::off;
-  Client client_ = 0;          // the client that started it
+  Client client_ = 0;
   bool ends_at_once_ = false;  // end() was called during opening
   Told told_;
   asio::thread_pool disk_{1};

@@ -55,8 +55,7 @@ inline void append_record(std::string& out, Op op, std::string_view content) {
   out += content;
 }
 
-// Reads numbers and strings from the front of a record. After a read beyond the end, values are 0
-// and good() is false.
+// Reads from the front of a record. After a read beyond the end, values are 0, good() false.
 class Fields {
  public:
   explicit Fields(std::string_view bytes) : rest_(bytes) {}

@@ -21,7 +21,6 @@ using mcap::Op;
 constexpr std::uint16_t record_schema_id = 1;
 constexpr std::uint16_t line_schema_id = 2;
 constexpr std::string_view chunk_compression = "zstd";
-// More paths than any recording has.
 constexpr std::size_t most_channels = 1000;
 
 std::uint64_t nanoseconds(Time time) {
@@ -91,7 +90,6 @@ void McapSink::on_path(const RecordedPath& path, Time time) {
   current_.erase(path.number);
 }
 
-// Starts another recording, with new paths.
 void McapSink::on_header() {
   devices_.on_header();
   measured_.on_header();
@@ -142,7 +140,6 @@ void McapSink::write_message(Channel& channel, Time time, std::string_view json)
   if (chunk_.size() >= chunk_size) write_chunk();
 }
 
-// Writes the chunk, then its message indexes for each channel.
 void McapSink::write_chunk() {
   compressed_.clear();
   zstd_.write(chunk_, true, compressed_);

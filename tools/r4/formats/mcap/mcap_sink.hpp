@@ -22,7 +22,6 @@ namespace r4::tool {
 
 class McapSink final : public Sink {
  public:
-  // Adds values of `devices`, or else of the recording's devices.
   explicit McapSink(Output& output, std::vector<Device> devices = {})
       : output_(output), devices_(std::move(devices)) {}
   bool wants_survey() const override { return true; }
@@ -42,9 +41,8 @@ class McapSink final : public Sink {
   struct Channel {
     std::uint16_t id = 0;
     std::uint64_t messages = 0;
-    std::string record;  // repeated in each chunk with its messages, so that each chunk is readable
-                         // alone
-    std::string index;   // of the current chunk
+    std::string record;  // repeated in each chunk, to make it readable alone
+    std::string index;
   };
   struct ChannelKey {
     std::uint16_t path;
@@ -76,9 +74,9 @@ class McapSink final : public Sink {
   Channel* lines_ = nullptr;
 
   std::uint64_t offset_ = 0;
-  std::uint32_t crc_ = 0;                   // of the file so far
-  std::string chunk_;                       // uncompressed records
-  std::string record_, text_, compressed_;  // reused buffers
+  std::uint32_t crc_ = 0;  // of the file so far
+  std::string chunk_;
+  std::string record_, text_, compressed_;
   std::uint64_t chunk_first_ns_ = 0, chunk_last_ns_ = 0;
   bool chunk_has_messages_ = false;
 

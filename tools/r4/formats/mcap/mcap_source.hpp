@@ -47,11 +47,11 @@ class McapSource final : public Source {
   RecordingVisitor& visitor_;
   const std::string name_;
   Part part_ = Part::magic;
-  std::string waiting_;       // bytes not yet taken
+  std::string waiting_;
   std::uint64_t offset_ = 0;  // position of waiting_ in the file
   std::uint32_t crc_ = 0;     // of all bytes before waiting_
   bool any_damage_ = false;
-  bool ours_ = false;       // r4's profile
+  bool ours_ = false;
   bool searching_ = false;  // for the next chunk after damage
   std::map<std::uint16_t, Channel> channels_;
   std::string chunk_, bytes_;

@@ -9,7 +9,6 @@ namespace r4::tool::mcap {
 // Records of a board: names every state field, with its unit.
 std::string record_schema_text();
 std::string line_schema_text();
-// The link of a board and its events, from r4 web.
 std::string link_schema_text();
 std::string event_schema_text();
 

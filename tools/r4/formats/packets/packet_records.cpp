@@ -23,7 +23,6 @@ constexpr std::uint16_t ether_ipv4 = 0x0800;
 constexpr std::uint16_t ether_ipv6 = 0x86DD;
 constexpr std::uint16_t ether_can = 0x000C;  // in Linux "cooked" captures
 constexpr std::uint16_t ether_can_fd = 0x000D;
-// More boards than any network has.
 constexpr std::size_t most_paths = 1000;
 
 // Flags of an id in SocketCAN (linux/can.h), in network byte order.
@@ -170,10 +169,9 @@ void PacketRecords::on_cooked(std::uint16_t protocol, std::string_view bytes,
   on_can(interface, cooked_id(bytes), bytes, packet);
 }
 
-// In cooked captures libpcap up to 1.10.4 leaves the id in the byte order of the capturing
-// computer; later versions use network order. If only one order gives a possible id, it is used;
-// else the order of the previous frame. The first frame prefers an 11-bit id, as all frames but
-// numbered stops have.
+// Byte order of the id in cooked captures: the capturing computer's up to libpcap 1.10.4, network
+// order later. If only one order gives a possible id, it is used; else that of the previous frame.
+// The first frame prefers an 11-bit id, as all frames but numbered stops have.
 std::uint32_t PacketRecords::cooked_id(std::string_view bytes) {
   const auto big = read_number<std::uint32_t>(bytes, ByteOrder::big);
   const auto little = read_number<std::uint32_t>(bytes, ByteOrder::little);
@@ -264,9 +262,8 @@ void PacketRecords::on_ip(std::string_view bytes, const Packet& packet) {
                       without_end(udp.payload)});
 }
 
-// True if the same packet was already reported. Different packets differ in the IP id, or in the
-// packet number and time of the datagram. A host that sends the same text again takes longer than
-// the limits.
+// True if the same packet was already reported. Different packets differ in the IP id, or in number
+// and time of the datagram. A host that repeats a text takes longer than the limits.
 bool PacketRecords::is_repeated(const Udp& udp, Time time) {
   constexpr Time of_an_id{500'000};
   constexpr Time without{5'000};

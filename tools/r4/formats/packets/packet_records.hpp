@@ -47,10 +47,8 @@ class PacketRecords {
 
   // Throws Error{data} for mixed recordings.
   void on_packet(const PacketInterface& interface, const Packet& packet);
-  // Call for an unreadable packet.
   void on_damage() { lines_.on_damage(); }
-  // Call after the last packet. Throws Error{data} if no data of a board was found, unless damage
-  // may be the reason.
+  // Throws Error{data} if no data of a board was found, unless damage may be the reason.
   void finish(bool any_damage);
 
  private:
@@ -88,13 +86,13 @@ class PacketRecords {
   const std::uint16_t port_;
   std::map<std::string, std::uint16_t> paths_;
   std::optional<ByteOrder> cooked_order_;  // byte order of CAN ids in cooked captures, if known
-  std::array<Seen, 64> seen_;              // newest datagrams, to find repeated ones
+  std::array<Seen, 64> seen_;
   std::size_t next_seen_ = 0;
   // For the error if no data of a board is found:
   bool told_ = false;
   Kind kind_ = Kind::none;
   std::uint64_t packets_ = 0;
-  std::map<std::uint16_t, std::uint64_t> unread_links_, ports_;  // number of packets of each
+  std::map<std::uint16_t, std::uint64_t> unread_links_, ports_;
 };
 
 }  // namespace r4::tool

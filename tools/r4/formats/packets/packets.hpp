@@ -10,7 +10,6 @@ namespace r4::tool {
 // The boards' UDP port in the paper.
 constexpr std::uint16_t board_port = 2018;
 
-// Blocks of pcapng, and options of an interface.
 constexpr std::uint32_t pcapng_section = 0x0A0D0D0A;
 constexpr std::uint32_t pcapng_magic = 0x1A2B3C4D;
 constexpr std::uint32_t pcapng_interface = 1;

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads .pcapng and .pcap, detected by their beginning: captures of UDP or SocketCAN by tcpdump and
-// Wireshark, and recordings converted by PcapngSink.
-//
-// After a damaged pcapng block, reading continues with the next block. After damage in a pcap file
-// the rest cannot be read.
+// Reads .pcapng and .pcap: captures of UDP or SocketCAN by tcpdump and Wireshark, and recordings
+// converted by PcapngSink. After damage, pcapng continues with the next block; the rest of a pcap
+// file cannot be read.
 #pragma once
 
 #include <cstdint>
@@ -58,7 +56,7 @@ class PcapSource final : public Source {
   const std::string name_;
   Form form_ = Form::unknown;
   ByteOrder order_ = ByteOrder::little;
-  std::string waiting_;                // bytes not yet taken
+  std::string waiting_;
   std::uint64_t offset_ = 0;           // position of waiting_ in the file
   bool searching_ = false;             // for the next block after damage
   std::vector<Interface> interfaces_;  // of this section

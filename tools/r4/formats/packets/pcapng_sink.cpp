@@ -26,8 +26,7 @@ constexpr std::uint32_t made_up_host = 0xC6130001;   // 198.19.0.1
 constexpr std::uint16_t host_port = 2390;
 constexpr std::size_t ip_header = 20;
 
-// Makes Wireshark show a packet of LINKTYPE_WIRESHARK_UPPER_PDU as syslog: tag, size, dissector;
-// end.
+// Makes Wireshark show a LINKTYPE_WIRESHARK_UPPER_PDU as syslog: tag, size, dissector; end.
 constexpr std::string_view shown_as_syslog{
     "\0\x0C\0\x08"
     "syslog\0\0"
@@ -49,7 +48,6 @@ void begin_block(std::string& out, std::uint32_t type) {
   append_number(out, std::uint32_t{0});
 }
 
-// Writes the block's size at both of its ends.
 void end_block(std::string& out) {
   std::string size;
   append_number(size, static_cast<std::uint32_t>(out.size() + 4));

@@ -16,8 +16,7 @@
 
 namespace r4::tool {
 
-// Interface descriptions (if_description) that identify r4's own interfaces. The path's number
-// follows the second.
+// Descriptions (if_description) of r4's own interfaces. The path's number follows the second.
 inline constexpr std::string_view lines_interface = "r4log 1 lines";
 inline constexpr std::string_view path_interface = "r4log 1 path ";
 inline constexpr std::string_view made_up_host_text = "198.19.0.1";
@@ -48,7 +47,7 @@ class PcapngSink final : public Sink {
 
   Output& output_;
   std::map<std::uint16_t, Path> paths_;
-  std::uint32_t interfaces_ = 0;  // number of interfaces written
+  std::uint32_t interfaces_ = 0;
   std::string block_, head_, text_;
 };
 

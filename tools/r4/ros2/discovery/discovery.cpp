@@ -11,7 +11,7 @@
 namespace r4::tool::ros2 {
 namespace {
 
-constexpr std::size_t most = 64;  // samples at once
+constexpr std::size_t most = 64;
 // Participants are examined before readers and writers, which need their names. Remaining samples
 // wait for the next look, because stops are read on the same thread.
 constexpr int most_rounds = 16;

@@ -13,7 +13,6 @@ namespace {
 
 using Weight = Mismatch::Weight;
 
-// Our endpoints of the opposite kind.
 std::vector<const OwnEndpoint*> counterparts(const Graph::OwnTopic& own, const Announced& other) {
   std::vector<const OwnEndpoint*> found;
   for (const OwnEndpoint& each : own.endpoints) {
@@ -52,8 +51,7 @@ std::optional<Mismatch> wrong_policy(const OwnEndpoint& ours, const Announced& o
                   ours.name, policy, other.owner_text())};
 }
 
-// True if the client writes requests as rmw_fastrtps does, without its identity (docs/ros2.md,
-// Services).
+// True for requests in the form of rmw_fastrtps, without a client id (docs/ros2.md, Services).
 bool cannot_be_answered(const OwnEndpoint& ours, const Announced& other) {
   return other.kind == EndpointKind::writer && ours.name.starts_with("~/") &&
          other.user_data.find("clientid=") == std::string::npos;

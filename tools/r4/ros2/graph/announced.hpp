@@ -16,7 +16,6 @@ namespace r4::tool::ros2 {
 
 enum class EndpointKind : std::uint8_t { reader, writer };
 
-// The policies that DDS compares and ROS users can choose.
 struct Policies {
   bool reliable = true;
   dds_durability_kind_t durability = DDS_DURABILITY_VOLATILE;
@@ -26,8 +25,7 @@ struct Policies {
   bool xcdr1 = true;  // the writer uses XCDR1, or the reader accepts it
 };
 Policies policies_of(EndpointKind kind, const dds_qos_t* qos);
-// The first policy for which the writer offers less than the reader requests, in words; nullptr if
-// they match.
+// The first policy of which less is offered than requested, in words; nullptr if they match.
 const char* unmatched_policy(const Policies& offered, const Policies& requested);
 
 struct Announced {
@@ -42,7 +40,6 @@ struct Announced {
   std::string owner_text() const { return owner.empty() ? "see ros2 topic info -v" : owner; }
 };
 
-// Mismatch between a foreign endpoint and ours.
 struct Mismatch {
   enum class Weight : std::uint8_t {
     note,     // nothing is lost
@@ -52,8 +49,7 @@ struct Mismatch {
   Weight weight = Weight::warning;
   std::string text;  // begins with the node's name of the topic
 };
-// Handles a writer with a type that our readers of its topic lack; may create a reader for it.
-// Returns nothing if the type is simply wrong.
+// Handles a writer of another type; may create a reader. Nothing if the type is simply wrong.
 using OtherType = std::function<std::optional<Mismatch>(const Announced& writer)>;
 
 // "std_msgs/msg/String" for "std_msgs::msg::dds_::String_". Any name becomes printable.

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// RAII for Cyclone DDS, and the quality of service that ROS uses.
 #pragma once
 
 #include <dds/dds.h>

@@ -79,8 +79,7 @@ std::string configuration(const std::string& general, const std::vector<std::str
   constexpr std::string_view index =
       "<ParticipantIndex>auto</ParticipantIndex>"
       "<MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>";
-  // Fast DDS identifies a leaving participant by the key hash only. Without it our participants
-  // would disappear only after their lease.
+  // Fast DDS needs the key hash to notice that our participants leave before their lease ends.
   constexpr std::string_view internal =
       "<Internal><GenerateKeyhash>true</GenerateKeyhash></Internal>";
   return fmt::format(

@@ -21,7 +21,6 @@ struct Domain {
   bool one_computer = false;  // limited to this computer
 };
 
-// The value of a variable; empty if not set.
 using Environment = std::function<std::string(const char* name)>;
 std::string process_environment(const char* name);
 

@@ -24,7 +24,6 @@
 
 namespace r4::tool::ros2 {
 
-// An endpoint, for the startup output.
 struct Endpoint {
   std::string name;  // "/R4"
   const char* type;  // "std_msgs/msg/String"
@@ -49,7 +48,6 @@ class Graph {
   Graph(const Graph&) = delete;
   Graph& operator=(const Graph&) = delete;
 
-  // Returns the node's number.
   std::size_t add_node(const NodeName& name);
   const NodeName& node(std::size_t node) const { return nodes_[node].name; }
 
@@ -75,7 +73,6 @@ class Graph {
   // Sets the reaction to writers of another type, for a topic that the node reads or may read.
   void on_other_type(std::size_t node, std::string_view topic, OtherType act);
 
-  // The first participant.
   dds_entity_t participant() const { return members_.front().participant.get(); }
   std::vector<dds_entity_t> participants() const;
   // Lists our nodes from now on, in the format of the other participants.
@@ -87,7 +84,7 @@ class Graph {
   const std::vector<Node>& nodes() const { return nodes_; }
   struct OwnTopic {
     std::vector<OwnEndpoint> endpoints;
-    std::size_t node = 0;  // of other_type
+    std::size_t node = 0;
     std::string name;
     OtherType other_type;
   };

@@ -39,8 +39,7 @@ struct Origin {
 
 class Inbox {
  public:
-  // `clocks`: relation of our clock to the writers'. `on_drained` is called on the loop when the
-  // queue is empty. A participant must exist.
+  // Calls `on_drained` on the loop when the queue is empty. A participant must exist.
   Inbox(asio::io_context& io, Transit::Clocks clocks, std::function<void()> on_drained);
   ~Inbox() { stop(); }
   Inbox(const Inbox&) = delete;
@@ -104,7 +103,6 @@ class Inbox {
                           const std::function<void(const std::vector<std::uint64_t>&)>& left);
   void put(Source& source, Kind kind, std::function<void()> deliver);
   Source& add_source();
-  // To the newest source.
   void attach(dds_entity_t entity);
   void run();
   void on_posted();

@@ -82,12 +82,10 @@ const MessageType& message_type<NodesBeforeIronMessage>();
 // A text for a message, whose strings are not const. Valid while `string` lives.
 inline char* borrowed(const std::string& string) { return const_cast<char*>(string.c_str()); }
 
-// The bytes of a string in a sample.
 inline std::string_view bytes_of(const dds_sequence_octet& string) {
   return {reinterpret_cast<const char*>(string._buffer), string._length};
 }
 
-// The user data of a reader or writer of that type.
 std::string user_data_of(const MessageType& type);
 
 }  // namespace r4::tool::ros2

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Names of nodes and topics in ROS 2 and in DDS.
 #pragma once
 
 #include <string>
@@ -20,8 +19,7 @@ NodeName node_name(std::string_view space, std::string_view name);
 // "/robot" and "board1" give "/robot/board1".
 std::string below(std::string_view space, std::string_view part);
 
-// Resolves a node's topic: "osmc1/state" in its namespace, "~/stop" below its name, "/rosout"
-// absolute.
+// "osmc1/state" is in the node's namespace, "~/stop" below its name, "/rosout" absolute.
 std::string full_name(const NodeName& node, std::string_view topic);
 
 // "/R4" gives "rt/R4"; for a service "rq/…Request" and "rr/…Reply".

@@ -52,7 +52,7 @@ class NodeListing {
   const EntityId id_;
   std::vector<Node> nodes_;
   const std::optional<Release> fixed_;
-  std::map<EntityId, Release> others_;  // other participants that list nodes
+  std::map<EntityId, Release> others_;
   std::optional<Release> spoken_;
   Entity topic_;
   Entity writer_;

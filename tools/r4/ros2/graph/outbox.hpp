@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Publishes on its own thread, so that a blocking subscriber or a full network never delays the
-// boards' links.
+// Publishes on its own thread: a blocked subscriber or network does not delay the boards.
 #pragma once
 
 #include <chrono>
@@ -32,7 +31,6 @@ class Outbox {
   void push_attempt(Attempt attempt);
   // Ends after the current job and drops waiting jobs. Idempotent.
   void stop();
-  // Jobs dropped because of a full queue.
   std::uint64_t lost() const;
 
  private:

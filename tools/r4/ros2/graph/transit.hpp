@@ -21,8 +21,7 @@ class Transit {
 
   explicit Transit(Clocks clocks) : clocks_(clocks) {}
 
-  // `written` and `received` are wall clock times of the two computers. Returns the delay; 0 for
-  // the fastest sample of two clocks.
+  // `written`, `received`: wall clocks. Returns the delay; of two clocks 0 for the fastest.
   Duration delay(Duration written, Duration received) {
     const Duration difference = received - written;
     if (clocks_ == Clocks::one) return std::max(difference, Duration(0));

@@ -7,7 +7,6 @@ const SAFE_WORDS = {
   proximity: 'an obstacle is near', watchdog: 'its watchdog struck', fault: 'it has a fault',
 };
 
-// The state of the card as a word and a sentence.
 function verdict(health) {
   if (!health) return ['lost', 'Unknown', 'nothing is known of it at the moment'];
   if (health.link === 'lost') return ['lost', 'Lost', health.why || 'the board does not answer'];
@@ -96,7 +95,6 @@ export class Boards {
     for (const card of this.#cards) card.show(null);
   }
 
-  // A sentence for each board that does not answer.
   missing() {
     return this.boards.filter((board) => this.health[board.board]?.link === 'lost')
       .map((board) => `${board_name(board)} does not answer: ${this.health[board.board].why || 'its link is lost'}. ` +

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// All fields, live, a column for each board; and the choice of plotted fields, which the browser
-// stores.
+// All fields, live, a column for each board; and the stored choice of plotted fields.
 import {board_name, element, put, value_text} from './text.js';
 
 const FIRST_CHOICE = ['AIN24', 'AIN12', 'OSMC1.pwm', 'OSMC2.pwm', 'ENC1'];

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// States of one board over the last minutes, a column for each field, oldest first; missing values
-// are NaN. Columns are contiguous, so plots draw slices without copying. When full, the newer half
-// moves to the front.
+// States of one board, a column for each field, oldest first; missing values are NaN. Columns are
+// contiguous, so plots draw slices without copying. When full, the newer half moves to the front.
 
 const KEPT = 32768;  // states: five minutes at 100 Hz
 
@@ -26,7 +25,6 @@ export class History {
   get newest_ms() { return this.#end ? this.#times[this.#end - 1] : NaN; }
   newest(field) { return this.#end ? this.#columns[field][this.#end - 1] : NaN; }
 
-  // Index of the first state at or after this time.
   #find(time) {
     let low = 0;
     let high = this.#end;

@@ -8,8 +8,7 @@ const SILENCE_MS = 1500;  // the server sends every 100 ms
 const FIRST_RETRY_MS = 200;
 const LONGEST_RETRY_MS = 2000;
 
-// The token of an address such as http://robot:8080/#token=…, stored for this tab and removed from
-// the address.
+// Takes the token of http://robot:8080/#token=… for this tab; removes it from the address.
 function token_of_address() {
   const given = new URLSearchParams(location.hash.slice(1)).get('token');
   if (given) {

@@ -139,7 +139,6 @@ at('stop').onclick = (click) => { if (click.detail === 0) stop(); };  // keyboar
 listen_for_stop(stop, () => link.controls);
 
 let recording_is_ours = false;
-// The controlling browser may start and end any recording. A browser may always end its own.
 function allow_recording() { at('record').disabled = !link.controls && !recording_is_ours; }
 
 function show_recording(recording) {

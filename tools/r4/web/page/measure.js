@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measures the time from receiving to display, and the time of the first plot, for the footer and
-// for `r4_measured` in the browser's console.
+// Times from receiving to display and to the first plot: `r4_measured` in the console.
 
 const KEPT = 1000;
 const latencies = new Float64Array(KEPT);
@@ -26,7 +25,6 @@ export const measured = {
 };
 globalThis.r4_measured = measured;
 
-// Keeps the oldest time that the next frame shows.
 export function was_received() { received_ms ||= performance.now(); }
 
 // Call at the end of a frame's work: the channel's message arrives after the frame was handed over.

@@ -116,7 +116,6 @@ class Chart {
     this.#plot.over.ondblclick = () => this.#plots.go_on();
   }
 
-  // Redraws with new colours at the next draw.
   restyle() { this.#plot?.destroy(); this.#plot = null; }
 
   draw(history, from_ms, to_ms) {
@@ -151,7 +150,7 @@ export class Plots {
   #hello;
   #histories;
   #charts = [];
-  #from_ms = 0;  // the range shown while paused
+  #from_ms = 0;
   #to_ms = 0;
   #clock_ahead_ms;
   paused = false;
@@ -217,7 +216,6 @@ export class Plots {
     document.getElementById('plots').classList.toggle('paused', on);
   }
 
-  // True if there was something to draw.
   draw() {
     const [from_ms, to_ms] = this.#stretch();
     return this.#charts.map((chart) => chart.draw(this.#histories[chart.board], from_ms, to_ms)).some(Boolean);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Messages that wait for one client. A slow client loses its oldest states and gets their number.
-// Other messages are never lost: with too many of them the client is dropped. The caller passes in
-// the time.
+// Messages that wait for one client. A slow client loses its oldest states, and gets their number.
+// With too many other messages the client is dropped. The caller passes in the time.
 #pragma once
 
 #include <chrono>
@@ -15,8 +14,8 @@ namespace r4::tool::web {
 
 struct Outgoing {
   enum class Kind : std::uint8_t { state, other };
-  std::shared_ptr<const std::string> body;  // shared by all clients
-  std::string head;                         // prefix for this client; empty: a text message
+  std::shared_ptr<const std::string> body;
+  std::string head;  // prefix for this client; empty: a text message
   Kind kind = Kind::other;
   std::size_t size() const { return head.size() + (body ? body->size() : 0); }
 };
@@ -29,7 +28,6 @@ class ClientQueue {
   static constexpr std::size_t most_state_bytes = std::size_t{512} << 10;
   static constexpr std::size_t most_other_bytes = std::size_t{256} << 10;
 
-  // False if there is no room.
   bool push(Outgoing message, Time now);
   std::optional<Outgoing> pop();
   bool empty() const { return states_.empty() && others_.empty(); }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page's files, embedded by the build, and how they are served.
 #pragma once
 
 #include <map>

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The HTTP and WebSocket server of r4 web and r4 metrics, on its own thread, independent of boards.
-// Memory is bounded for any number and behaviour of clients, and the server never waits for the
-// caller.
-//
-// A client's next message is read after the caller has handled the previous one, so at most one
-// waits.
+// The HTTP and WebSocket server of r4 web and r4 metrics, on its own thread, without knowledge of
+// boards. Memory is bounded for any clients, and the server never waits for the caller. A client's
+// next message is read after read_on(), so at most one waits.
 #pragma once
 
 #include <chrono>
@@ -39,8 +36,7 @@ class ServerEvents {
   // A text message. The client's next one arrives after Server::read_on().
   virtual void on_message(ClientId client, Protocol protocol, std::string text) = 0;
   virtual void on_closed(ClientId client, Protocol protocol) = 0;
-  // A request for /metrics waits for Server::set_metrics(). Not called again before that, nor
-  // within `metrics_age` after it.
+  // Reply by Server::set_metrics(). Not called again before, nor within `metrics_age` after it.
   virtual void on_metrics() = 0;
 
  protected:
@@ -75,7 +71,6 @@ class Server {
   void send(ClientId client, Outgoing message);
   void broadcast(Protocol protocol, Outgoing message);
   void read_on(ClientId client);
-  // Sends the reason and closes the connection.
   void drop(ClientId client, std::string why);
   void set_metrics(std::string text);
   void run(std::function<void()> task);

@@ -17,7 +17,6 @@ namespace r4::tool::web {
 constexpr auto stall_time = 10s;
 constexpr auto idle_time = 20s;
 
-// Rate limit for a client's messages.
 class Allowance {
  public:
   bool take() {
