@@ -28,7 +28,7 @@ struct Options {
   Milliseconds every{10'000};
   Milliseconds timeout{1000};
   std::optional<Milliseconds> duration;
-  std::vector<std::string> keys;  // key files
+  std::vector<std::string> keys;
   bool open = false;
 };
 

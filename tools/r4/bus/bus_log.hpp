@@ -23,7 +23,6 @@ class BusLog final : BusTransfers::Handler {
 
   // A line that is not empty. Prints everything that it completes or ends.
   void on_line(std::uint64_t number, std::string_view text);
-  // A line too long for candump.
   void on_long_line(std::uint64_t number, std::uint64_t size);
   void finish();
 

@@ -133,7 +133,7 @@ class Speaker {
 struct Kind {
   const char* name;
   std::uint32_t hz;
-  bool to_board;  // uses flow control
+  bool to_board;
   Datagrams (*next)(Speaker&, const BusPlan&);
 };
 
@@ -176,7 +176,6 @@ struct Sum {
   }
 };
 
-// Average over `count` transmissions of one board.
 Sum each(const BusPlan& plan, const Kind& kind, std::uint32_t count, bool worst) {
   Speaker speaker(worst);
   Sum sum;

@@ -31,7 +31,6 @@ constexpr std::array texts{
 };
 static_assert(texts.size() == static_cast<std::size_t>(CandumpError::rest) + 1);
 
-// Removes the next word from `text`; empty at the end.
 std::string_view take_word(std::string_view& text) {
   text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
   const std::string_view word = text.substr(0, text.find(' '));

@@ -12,7 +12,7 @@
 namespace r4::tool {
 namespace {
 
-constexpr std::chrono::milliseconds ask_again{300};   // longer than a timely answer takes
+constexpr std::chrono::milliseconds ask_again{300};
 constexpr std::chrono::milliseconds look_at_bus{20};  // while another host uses the bus
 
 }  // namespace

@@ -23,7 +23,6 @@ class CanQuestion final : private Carrier::Handler {
   CanQuestion(const CanQuestion&) = delete;
   CanQuestion& operator=(const CanQuestion&) = delete;
 
-  // Pass in each datagram of the board.
   void hear(const Datagram& datagram);
   // From question to answer; 0: no answer yet.
   double answer_us() const { return answer_us_; }

@@ -42,7 +42,6 @@ void append(Findings& to, Findings more) {
   for (Finding& each : more) to.push_back(std::move(each));
 }
 
-// The device behind a symbolic link such as /dev/serial/by-id/….
 std::string device_of(const std::string& path) {
   std::error_code error;
   const std::filesystem::path device = std::filesystem::canonical(path, error);
@@ -232,7 +231,6 @@ void print_summary(const Findings& findings, bool json) {
   }
 }
 
-// Checks each path as a separate link.
 int doctor(const Options& given) {
   Options options = given;
   options.urls = split_paths(join_paths(given.urls));

@@ -35,9 +35,7 @@ struct Machine {
   // The file's text without the last line end; empty if it cannot be read.
   std::optional<std::string> read(const std::string& path) const;
   bool exists(const std::string& path) const;
-  // Sorted.
   std::vector<std::string> list(const std::string& path) const;
-  // The unresolved target of a symbolic link.
   std::optional<std::string> link(const std::string& path) const;
   // The command with sudo, if this user is not root.
   std::string as_root(const std::string& command) const;

@@ -57,7 +57,6 @@ class Sink {
   virtual std::string left_out() const { return {}; }
 };
 
-// First pass over a recording for a sink.
 class Survey final : public RecordingVisitor {
  public:
   explicit Survey(Sink& sink) : sink_(sink) {}

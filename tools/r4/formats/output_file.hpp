@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The output file of a conversion. It appears complete or not at all.
+// The file appears complete or not at all.
 #pragma once
 
 #include <cstdio>

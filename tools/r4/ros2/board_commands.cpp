@@ -50,7 +50,7 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
   });
   board_.on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) return;
-    // Without motor supply the board is not safe yet, but accepts only a stop.
+    // Without the motors' supply the board accepts only a stop, but is not safe yet.
     if (cause == DisarmCause::supply && drivers_.any()) stop([](bool, const std::string&) {});
     wanted_.clear();
     drivers_.forget();

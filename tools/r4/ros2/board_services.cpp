@@ -206,7 +206,7 @@ void BoardCommands::send(const std::optional<std::string>& text, const void* sou
       done(false, explain(*text, link).text());
       return;
     }
-    post_wanted();  // earlier commands first
+    post_wanted();
     // Repeated until the command is too old.
     const auto left = left_of(origin);
     if (commands.size() == 1 && !joins_groups(Command(commands[0]).kind)) {

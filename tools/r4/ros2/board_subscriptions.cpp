@@ -12,7 +12,7 @@ namespace r4::tool::ros2 {
 namespace {
 
 constexpr std::size_t most_texts = 16;  // waiting R4_Command texts
-constexpr std::size_t most_others = 4;  // in one turn
+constexpr std::size_t most_others = 4;
 
 }  // namespace
 
@@ -51,7 +51,7 @@ void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) 
           .urgent = {},
           .take =
               [this](bool pressed, const Origin& origin) {
-                if (origin.writer == EntityId{}) {  // may be an old press
+                if (origin.writer == EntityId{}) {  // the button may have been pressed before
                   if (!pressed) return;
                   return warn("arm: dropped: its publisher has gone; let it stay for a second");
                 }
@@ -70,7 +70,7 @@ void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) 
 
 void BoardCommands::subscribe_text(Graph& graph, std::size_t node, Inbox& inbox) {
   Qos qos;
-  qos.depth = static_cast<int>(most_texts);  // each text may be for another channel
+  qos.depth = static_cast<int>(most_texts);
   const void* const source = sources_.emplace_back(std::make_unique<int>()).get();
   add<StringMessage, std::string>(
       inbox, "R4_Command",

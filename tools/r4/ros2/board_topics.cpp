@@ -202,7 +202,7 @@ void BoardTopics::gather_joints(const State& state, WallTime sampled, std::uint3
   if (joints_ == 0) return;
   if (gathered_ && gathered_->state.t_ms != state.t_ms) publish_joints();  // a part was lost
   if (!gathered_) gathered_ = Joints{{}, {}, sampled, boot};
-  gathered_->state = state;  // keeps the values of earlier parts
+  gathered_->state = state;
   bool all = true;
   for (const StateField field : joint_fields_) {
     if (state.present.has(field)) gathered_->present.add(field);

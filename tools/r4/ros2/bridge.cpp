@@ -145,7 +145,7 @@ class Bridge {
     inbox_.stop();
     boards_.leave();
     outbox_.stop();
-    graph_.leave();  // may take some time
+    graph_.leave();
     return 0;
   }
 

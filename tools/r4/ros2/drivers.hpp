@@ -44,7 +44,6 @@ class Drivers {
   // Deadline 0: only departed publishers are missed.
   explicit Drivers(Duration deadline) : deadline_(deadline) {}
 
-  // True if the output rests after the command.
   static bool rests(const Command& command);
   // `source`: the topic; `publisher`: of that topic.
   void on_sent(const Command& command, const void* source, std::uint64_t publisher, Time now);
@@ -75,8 +74,8 @@ class Drivers {
     const void* source = nullptr;
     std::uint64_t publisher = 0;
     Time last{};
-    std::uint64_t sent = 0;  // number of its last command
-    bool asked = false;      // stopped by a command
+    std::uint64_t sent = 0;
+    bool asked = false;
   };
   struct Position {
     std::int32_t steps = 0;

@@ -12,7 +12,6 @@
 
 namespace r4::tool::ros2 {
 
-// Values of rcl_interfaces/Log.
 enum class LogLevel : std::uint8_t { info = 20, warning = 30, error = 40 };
 
 struct NodeOptions {

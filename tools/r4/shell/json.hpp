@@ -17,7 +17,6 @@ using Json = nlohmann::ordered_json;
 // One value of a field: a number if JSON's grammar allows it ("24.28", "-100"), else a string.
 Json value_json(Text value);
 
-// A single value as it is, several values as an array.
 Json field_json(const Field& field);
 
 // All fields but PNum and T, by name, in order. A name that occurs twice gets an array of both.

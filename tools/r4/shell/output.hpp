@@ -63,7 +63,7 @@ class LineWriter {
   std::condition_variable changed_;
   std::string waiting_;
   std::uint64_t lost_ = 0;
-  std::uint64_t noted_ = 0;  // dropped lines already reported by `note`
+  std::uint64_t noted_ = 0;
   bool ending_ = false;
   std::thread thread_;
 };

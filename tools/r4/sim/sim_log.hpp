@@ -14,7 +14,6 @@
 
 namespace r4::tool {
 
-// Lines of all boards of the process, in order.
 class SimOutput {
  public:
   explicit SimOutput(bool json);
@@ -39,7 +38,7 @@ class SimLog {
   SimLog(SimOutput& output, bool quiet, std::string name)
       : output_(output), quiet_(quiet), name_(std::move(name)) {}
 
-  // Callbacks for the board's options. The log must outlive the board.
+  // The log must outlive the board.
   sim::SimulatedBoard::Events events();
   // Call before the board's start().
   void watch(const sim::SimulatedBoard& board) { board_ = &board; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 decode. Memory is bounded for any input.
+// Memory is bounded for any input.
 #include <fcntl.h>
 #include <unistd.h>
 

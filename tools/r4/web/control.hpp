@@ -16,7 +16,7 @@ namespace r4::tool::web {
 
 class Control {
  public:
-  using Time = std::chrono::milliseconds;  // any start
+  using Time = std::chrono::milliseconds;
   using Client = std::uint32_t;
   static constexpr std::chrono::milliseconds limit{500};
 
@@ -28,7 +28,6 @@ class Control {
   bool take(Client client, Time now);
   // False if the client was not the holder.
   bool release(Client client);
-  // Call when all boards have been left.
   void left() { leaving_ = false; }
   // False if `echoed` is not newer than before.
   bool alive(Client client, Time echoed, Time now);

@@ -26,7 +26,7 @@ namespace r4::tool::web {
 struct HubOptions {
   ServerOptions server;
   std::string record_folder;
-  std::vector<Device> devices;  // on each board's user I2C bus
+  std::vector<Device> devices;
 };
 
 class Hub final : ServerEvents, WebBoard::Events {

@@ -33,7 +33,6 @@ struct Options {
   bool json = false;
 };
 
-// Enough for a radio link.
 constexpr Milliseconds farewell_time{200};
 
 int serve_web(const Options& options) {

@@ -21,7 +21,7 @@ class WebRecording {
  public:
   using Client = std::uint32_t;
   struct Told {
-    std::string path;  // empty: not recording
+    std::string path;
     std::uint64_t bytes = 0;
     std::string why;  // why recording failed or ended
   };
@@ -54,7 +54,7 @@ class WebRecording {
   std::shared_ptr<Recording> recording_;
   Stage stage_ = Stage::off;
   Client client_ = 0;
-  bool ends_at_once_ = false;  // end() was called during opening
+  bool ends_at_once_ = false;
   Told told_;
   asio::thread_pool disk_{1};
 };

@@ -127,7 +127,7 @@ void McapSink::write_message(Channel& channel, Time time, std::string_view json)
   append_number(chunk_, std::uint64_t{mcap::message_head + json.size()});
   append_number(chunk_, channel.id);
   append_number(chunk_, static_cast<std::uint32_t>(channel.messages));
-  append_number(chunk_, ns);  // log time, then publish time
+  append_number(chunk_, ns);
   append_number(chunk_, ns);
   chunk_ += json;
   ++channel.messages;
@@ -212,8 +212,8 @@ void McapSink::write_summary() {
   append_number(record_, messages_);
   append_number(record_, std::uint16_t{2});
   append_number(record_, static_cast<std::uint32_t>(channels_.size()));
-  append_number(record_, std::uint32_t{0});  // attachments
-  append_number(record_, std::uint32_t{0});  // metadata
+  append_number(record_, std::uint32_t{0});
+  append_number(record_, std::uint32_t{0});
   append_number(record_, chunks_);
   append_number(record_, first_ns_);
   append_number(record_, last_ns_);

@@ -214,7 +214,6 @@ void PacketRecords::on_own(const PacketInterface& interface, const Packet& packe
       interface.number, interface.name);
 }
 
-// IPv4 or IPv6 with UDP, complete or its first fragment.
 bool PacketRecords::read_ip(std::string_view bytes, Udp& out) {
   if (bytes.empty()) return false;
   const int version = byte(bytes, 0) >> 4;

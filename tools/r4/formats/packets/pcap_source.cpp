@@ -12,8 +12,8 @@ constexpr std::uint32_t pcap_us = 0xA1B2C3D4;
 constexpr std::uint32_t pcap_ns = 0xA1B23C4D;
 constexpr std::size_t pcap_header = 24;
 constexpr std::size_t pcap_packet_header = 16;
-constexpr std::size_t block_ends = 12;   // type, size, and the repeated size
-constexpr std::size_t packet_head = 20;  // head of a packet block
+constexpr std::size_t block_ends = 12;  // type, size, and the repeated size
+constexpr std::size_t packet_head = 20;
 constexpr std::size_t most_interfaces = 70'000;
 
 // True for the block types at which reading continues after a damaged block.
@@ -219,7 +219,7 @@ void PcapSource::on_packet_of(std::uint32_t index, std::string_view body) {
 
 // Clamps to the range of times in recordings.
 Time PcapSource::time_of(const Interface& interface, std::uint64_t ticks) {
-  constexpr std::int64_t last_s = 253'402'300'799;  // year 9999
+  constexpr std::int64_t last_s = 253'402'300'799;
   constexpr std::uint64_t second_us = 1'000'000;
   const std::uint64_t whole = ticks / interface.ticks;
   const std::uint64_t part = ticks % interface.ticks;

@@ -57,10 +57,10 @@ class PcapSource final : public Source {
   Form form_ = Form::unknown;
   ByteOrder order_ = ByteOrder::little;
   std::string waiting_;
-  std::uint64_t offset_ = 0;           // position of waiting_ in the file
-  bool searching_ = false;             // for the next block after damage
-  std::vector<Interface> interfaces_;  // of this section
-  std::uint32_t interface_count_ = 0;  // of all sections
+  std::uint64_t offset_ = 0;  // position of waiting_ in the file
+  bool searching_ = false;    // for the next block after damage
+  std::vector<Interface> interfaces_;
+  std::uint32_t interface_count_ = 0;
   bool any_damage_ = false;
 };
 

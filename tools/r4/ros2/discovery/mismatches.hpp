@@ -24,7 +24,7 @@ class Mismatches {
  private:
   const Graph& graph_;
   const Tell tell_;
-  std::map<EntityId, std::size_t> told_;  // node of each current mismatch
+  std::map<EntityId, std::size_t> told_;
 };
 
 // The mismatch of a foreign endpoint with our topic. May call the topic's `other_type`.

@@ -16,7 +16,6 @@ namespace r4::tool::ros2 {
 class Namesakes {
  public:
   explicit Namesakes(const std::vector<Node>& nodes);
-  // The number of our node with the name of the endpoint's owner.
   std::optional<std::size_t> node_of(const Announced& announced) const;
 
  private:

@@ -11,7 +11,6 @@
 
 namespace r4::tool::ros2 {
 
-// Owns an entity and all entities created below it.
 class Entity {
  public:
   Entity() = default;
@@ -42,7 +41,7 @@ EntityId id_from(const dds_guid_t& guid);
 EntityId id_of(dds_entity_t entity);
 
 struct Qos {
-  int depth = 10;                // samples kept
+  int depth = 10;
   bool reliable = true;          // the default of ROS; an unreliable reader accepts all writers
   bool transient_local = false;  // late readers get the kept samples
   dds_duration_t lifespan = DDS_INFINITY;

@@ -33,7 +33,7 @@ struct OwnEndpoint {
   EndpointKind kind = EndpointKind::writer;
   std::size_t node = 0;
   std::string name;  // the node's name of the topic or service: "osmc1/state", "~/stop"
-  std::string type;  // DDS name
+  std::string type;
   Policies policies;
   bool is_declared = true;  // false: created for a writer of another type
 };
@@ -105,8 +105,8 @@ class Graph {
   dds_entity_t topic(std::size_t node, const std::string& name, const MessageType& type);
   struct Place {
     std::size_t node;
-    std::string name;   // the node's name
-    std::string topic;  // DDS name
+    std::string name;
+    std::string topic;
   };
   dds_entity_t add(EndpointKind kind, const Place& place, const MessageType& type, Qos qos);
   void add_participant();

@@ -35,7 +35,6 @@ class NodeListing {
  public:
   NodeListing(dds_entity_t participant, std::vector<Node> nodes, const std::string& distro);
 
-  // An endpoint of another participant has come or gone.
   void on_announced(const Announced& announced);
   // The readers or writers of node `index` have changed.
   void change(std::size_t index, const Node& node);

@@ -25,7 +25,7 @@ class Pressed {
   static constexpr std::size_t most = 256;
 
  private:
-  std::vector<EntityId> pressed_;  // newest last
+  std::vector<EntityId> pressed_;
 };
 
 }  // namespace r4::tool::ros2

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The event log, newest first: events of the server and of this page.
 import {clock_text, element} from './text.js';
 
 const KEPT = 500;

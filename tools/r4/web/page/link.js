@@ -25,7 +25,7 @@ export class Link extends EventTarget {
   #now = 0;
   #heard_ms = 0;
   #alive_timer = 0;
-  #waiting = new Map();  // request number: handler of its result
+  #waiting = new Map();
   #stop_waits = false;
   #token = token_of_address();
   up = false;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A panel for each board, with a group for each kind of output channel.
 import {Channel} from './channel.js';
 import {board_name, element} from './text.js';
 

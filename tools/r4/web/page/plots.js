@@ -133,7 +133,6 @@ class Chart {
     return data[0].length > 1;
   }
 
-  // Shows the values under the cursor, else the newest values.
   read() {
     if (!this.#plot) return;
     const times = this.#plot.data[0];

@@ -18,7 +18,7 @@ extern const int embedded_file_count;
 
 struct PageFile {
   std::string type;
-  std::string etag;  // with quotation marks
+  std::string etag;
   std::string content;
   std::string gzip;
 };

@@ -65,7 +65,7 @@ struct Server::Impl {
   tcp::acceptor acceptor{io};
   net::steady_timer retry{io};
   std::map<ClientId, std::shared_ptr<Client>> clients;
-  std::map<std::uint32_t, std::shared_ptr<Exchange>> exchanges;  // oldest first
+  std::map<std::uint32_t, std::shared_ptr<Exchange>> exchanges;
   std::uint32_t next_number = 1;
   std::string metrics;
   Clock::time_point metrics_made{};
