@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One line of candump output, in either format:
 //
-//     candump -L    (1436509052.249713) vcan0 244#2A366C2B       ## and a digit of flags for CAN FD,
-//                                                                #R for a remote request
+//     candump -L    (1436509052.249713) vcan0 244#2A366C2B     ## and a digit of flags for CAN FD,
+//                                                              #R for a remote request
 //     candump        (1436509052.249713)  vcan0  244   [4]  2A 36 6C 2B
 //
 // The extras of options -a, -x, -8 and -t are read. On screen the time may be missing, relative or

@@ -59,7 +59,7 @@ void DeviceSetup::look_for_resets() {
                  : "the program that controls the board sets it up: give it this device, too",
              Outcome::refused});
     }
-    progress.reset = !in_control;  // the next reset is reported after a new setup
+    progress.reset = !in_control;  // after a new setup the next reset is reported
     progress.done = false;
   }
 }

@@ -21,7 +21,7 @@ struct User {
 };
 User this_user();
 
-// Runs the command in /, so that a "." in PATH finds no program in the user's folder.
+// Makes `command` run in /, so that a "." in PATH finds no program in the user's folder.
 std::string from_root(const std::string& command);
 
 struct Machine {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // .jsonl: one JSON object for each record, its datagram as in `r4 decode`.
 //
-//     {"time":1795468293.405588,"path":1,"board":"left-arm","from":"board","ok":true,"type":"state",…}
-//     {"time":1795468293.404765,"path":1,"board":"left-arm","type":"event","event":"up udp://192.168.0.125"}
+//     {"time":1795468293.405588,"path":1,"board":"arm","from":"board","ok":true,"type":"state",…}
+//     {"time":1795468293.404765,"path":1,"board":"arm","type":"event","event":"up udp://10.0.0.7"}
 #pragma once
 
 #include <string>

@@ -22,7 +22,7 @@ std::string fish_quoted(std::string_view text) {
   return out + "'";
 }
 
-// What fish offers for a value; empty for a free value.
+// The values that fish offers; empty for a free value.
 std::string value_of(const CLI::Option& option) {
   const std::string type = option.get_type_name();
   if (type == file_type) return " -F";

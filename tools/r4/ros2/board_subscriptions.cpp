@@ -16,8 +16,8 @@ constexpr std::size_t most_others = 4;
 
 }  // namespace
 
-// NOLINTBEGIN(clang-analyzer-cplusplus.NewDeleteLeaks): it loses sight of a std::function that is moved from a
-// designated initializer.
+// NOLINTBEGIN(clang-analyzer-cplusplus.NewDeleteLeaks): does not follow a std::function that is
+// moved from a designated initializer.
 
 // Subscribe twice, reliable and best effort: a duplicate stop is harmless, and none is missed.
 void BoardCommands::subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which publisher drives which output, and which publishers have gone.
+// Tracks the publisher that drives each output, and publishers that have disappeared.
 //
-//     free --a command that drives--> driven --a command that stops, its publisher has gone, or--> stopping
-//      ^                                 ^     is silent for the deadline                            |
-//      |                                 +---------------- a command that drives --------------------+
-//      +---------------------------------- stopped, the board has confirmed it -----------------------+
+//     free --a command that drives--> driven --a command that stops, or its publisher--> stopping
+//      ^                                 ^     has gone or is silent for the deadline        |
+//      |                                 +----------- a command that drives -----------------+
+//      +----------------------------- stopped, the board has confirmed it -------------------+
 //
 // A stop might be lost, so it is repeated until confirmed. A stopped output is as in the safe
 // state: motors at 0, brushless drivers at 0 with brakes on, servos without pulses, relays open,
@@ -60,7 +60,7 @@ class Drivers {
   struct Stop {
     std::vector<Command> commands;
     std::uint64_t sent = 0;  // number of commands sent before
-    bool missed = false;     // a publisher has gone or is silent
+    bool missed = false;     // a publisher has disappeared or is silent
   };
   Stop to_stop(Time now);
   // The board has confirmed `stop`. Outputs driven since then are not affected.

@@ -22,7 +22,7 @@ class Columns {
   // "AIN24", "OSMC1.pwm"; units() has the same size: "V".
   const std::vector<std::string>& names() const { return names_; }
   const std::vector<std::string>& units() const { return units_; }
-  // Copies values to their columns of `row`, which has size() elements; others stay.
+  // Copies values to their columns of `row`, which has size() elements; other elements stay.
   void fill(const Datagram& state, std::vector<double>& row) const;
 
  private:

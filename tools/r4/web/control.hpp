@@ -28,6 +28,7 @@ class Control {
   bool take(Client client, Time now);
   // False if the client was not the holder.
   bool release(Client client);
+  // Call when all boards have been left.
   void left() { leaving_ = false; }
   // False if `echoed` is not newer than before.
   bool alive(Client client, Time echoed, Time now);

@@ -14,7 +14,7 @@ namespace r4::tool::ros2 {
 
 class Mismatches {
  public:
-  // `who` does not match an endpoint of `node`. Without `mismatch` it matches again or has gone.
+  // `who` does not match an endpoint of `node`. Without `mismatch` it matches again or has left.
   using Tell = std::function<void(std::size_t node, const EntityId& who,
                                   const std::optional<Mismatch>& mismatch)>;
   Mismatches(const Graph& graph, Tell tell) : graph_(graph), tell_(std::move(tell)) {}

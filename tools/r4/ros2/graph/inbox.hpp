@@ -33,7 +33,7 @@ namespace r4::tool::ros2 {
 
 struct Origin {
   std::uint64_t publisher = 0;  // unique
-  EntityId writer{};            // the same after a reconnect; 0: unknown because it has gone
+  EntityId writer{};            // the same after a reconnect; 0: unknown because it has left
   std::chrono::steady_clock::time_point written;  // by our clock, as far as known (Transit)
 };
 
@@ -55,7 +55,7 @@ class Inbox {
     std::function<bool(const Value&)> urgent;
     // On the loop.
     std::function<void(const Value&, const Origin&)> take;
-    // On the loop, after a publisher has gone: the remaining publishers.
+    // On the loop, after a publisher has left: the remaining publishers.
     std::function<void(const std::vector<std::uint64_t>&)> left;
   };
   // Before start(), or on the reading thread.
