@@ -50,7 +50,7 @@ BoardOptions watching(const std::string& key, const std::string& fields,
                       const std::vector<Device>& devices) {
   BoardOptions options = with_key(key);
   options.role = BoardRole::watch;
-  options.session.arming = Arming::off;  // it drives nothing
+  options.session.arming = Arming::off;
   ask_for(options, fields, devices);
   return options;
 }

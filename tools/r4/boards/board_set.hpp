@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The boards of a command, one or many, on one loop:
+// The boards of a command on one event loop:
 //
 //     BoardSet boards(options.urls, watching(options.key));
 //     for (SetBoard& each : boards) each.board.on_state(…);
 //     boards.open();
 //     boards.end_by_signal(options.duration);
-//     boards.run();            // until then, or until boards.stop()
-//     boards.leave();          // all say farewell at once
+//     boards.run();            // until a signal, the duration, or boards.stop()
+//     boards.leave();
 //     boards.require_heard();
 #pragma once
 
@@ -33,7 +33,7 @@ struct SetBoard {
       : index(board_index), url(std::move(board_url)), board(io, url, options) {}
 
   const std::size_t index;  // from 0, in the order of the URLs
-  const std::string url;    // that the user gave: the same whenever the program is started
+  const std::string url;    // as given by the user
   AsyncBoard board;
 };
 
@@ -43,7 +43,7 @@ class BoardSet {
   // Throws Error{usage} for a wrong URL or pattern.
   BoardSet(const std::vector<std::string>& patterns, const BoardOptions& options);
 
-  // The board is not opened, also where the others are open.
+  // Does not open the board, even if the boards of the set are already open.
   SetBoard& add(const std::string& url, const BoardOptions& options);
 
   asio::io_context& io() { return io_; }
@@ -56,19 +56,18 @@ class BoardSet {
 
   // Throws Error for the first board that cannot be opened.
   void open();
-  // A signal ends run(), or the end of that time: RunEnd.
   void end_by_signal(const std::optional<std::chrono::milliseconds>& duration = std::nullopt) {
     end_.watch(duration);
   }
   void run() { io_.run(); }
-  // Ends run(). Callbacks for datagrams that were read together may still follow.
+  // Ends run(). Callbacks for datagrams from the same read may still follow.
   void stop() { io_.stop(); }
   bool stopped() const { return io_.stopped(); }
-  // After run(): all boards say farewell at once, until each has answered, but not for longer than `limit`. So the
-  // next command need not wait for their timeouts.
+  // Call after run(). Disconnects all boards at once and waits up to `limit` for their answers. The
+  // next command then need not wait until the boards time out.
   void leave(std::chrono::milliseconds limit = std::chrono::milliseconds{100});
 
-  // Throws Error{refused} for the first board that was not heard, or whose paths lead to two boards.
+  // Throws Error{refused} for the first board that was not heard or whose paths lead to two boards.
   void require_heard() const;
 
  private:
@@ -77,12 +76,12 @@ class BoardSet {
   std::deque<SetBoard> boards_;
 };
 
-// The options of a board that is watched, and asked for those fields and the ones of `devices`. No `fields`: DEFAULT.
+// Options of a watcher. Empty `fields`: DEFAULT. The fields of `devices` are added.
 BoardOptions watching(const std::string& key, const std::string& fields = {},
                       const std::vector<Device>& devices = {});
 void ask_for(BoardOptions& options, const std::string& fields, const std::vector<Device>& devices);
 
-// The interface of can://can0 without a node: all boards that are heard on it. Empty for any other URL.
+// "can0" for can://can0 without a node, which means every board heard there; else empty.
 std::string whole_bus(std::string_view url);
 
 }  // namespace r4::tool

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What commands tell of boards to which several paths lead.
 #pragma once
 
 #include <fmt/format.h>
@@ -14,20 +13,20 @@
 
 namespace r4::tool {
 
-// ["busy","key needed"]: the gravest first.
+// ["busy","key needed"], the most serious cause first.
 inline Json causes_json(LinkCauses causes) {
   Json all = Json::array();
   for (const LinkCause cause : causes) all.push_back(to_text(cause));
   return all;
 }
 
-// Throws Error{refused} that names both if the URLs lead to two boards, so that nothing began.
+// Throws Error{refused} that names both boards if the URLs lead to two boards.
 inline void require_one_board(const AsyncBoard& board) {
   if (board.link().causes.has(LinkCause::two_boards)) throw Error(explain(board.paths()));
 }
 
-// {"name":…,"state":"carrying","busy":…,"board_id":…,"received":…,"lost":…,"loss":…,"copies":…,"round_trip_ms":…,
-//  "age_ms":…}; the last two null where nothing is known.
+// {"name":…,"state":"carrying","busy":…,"board_id":…,"received":…,"lost":…,"loss":…,"copies":…,
+//  "round_trip_ms":…,"age_ms":…}; a time that is not known is null.
 inline Json path_json(const PathStatus& path) {
   const auto milliseconds = [](double us) { return us > 0 ? Json(us / 1e3) : Json(); };
   return {{"name", path.name},
@@ -42,13 +41,13 @@ inline Json path_json(const PathStatus& path) {
           {"age_ms", milliseconds(path.age_us)}};
 }
 
-// Calls `report` when a path begins to carry, or ceases to. The link reports as much of a board's only path.
+// With several paths, reports path changes; for a single path the link reports them.
 template <class Board, class Report>
 void on_paths(Board& board, Report report) {
   if (board.paths().size() > 1) board.on_path(std::move(report));
 }
 
-// All paths. Null for the only path, of which the link reports as much.
+// All paths; null for a single path, because the link already reports it.
 inline Json paths_json(const AsyncBoard& board) {
   const std::vector<PathStatus> paths = board.paths();
   if (paths.size() < 2) return nullptr;
@@ -57,7 +56,7 @@ inline Json paths_json(const AsyncBoard& board) {
   return all;
 }
 
-// Of several: those that are not there, of which a command that was carried by another one would say nothing.
+// Reports each path that is down, because a command carried by another path would not mention it.
 inline void tell_paths_down(const std::vector<PathStatus>& paths, bool json) {
   for (const PathStatus& path : paths) {
     if (paths.size() < 2 || path.state != PathState::down) continue;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a command ends that runs until it is ended.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -13,13 +12,13 @@
 
 namespace r4::tool {
 
-// SIGINT, SIGTERM and SIGHUP stop `io`, so that the command ends in good order. A signal that was
-// ignored when the program started stays ignored: nohup and the & of a shell script ask for that.
+// SIGINT, SIGTERM and SIGHUP stop `io`, so the command ends in good order. A signal that was
+// ignored when the program started stays ignored: nohup and `&` in a shell script rely on it.
 class RunEnd {
  public:
   explicit RunEnd(asio::io_context& io) : io_(io), signals_(io), limit_(io) {}
 
-  // Before this call a signal ends the program at once. `duration`: the longest run, if it has a limit.
+  // Before this call a signal ends the program at once. `duration` is the longest run, if limited.
   void watch(const std::optional<std::chrono::milliseconds>& duration = std::nullopt) {
     for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
       if (!is_ignored(number)) signals_.add(number);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A timer of a loop, for what is done later, again and again, or tried again.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -12,8 +11,8 @@
 
 namespace r4::tool {
 
-// One task at a time. A task that was cancelled or replaced, or whose timer is gone, never runs: also not when its
-// time had come already, and the loop was about to call it.
+// One task at a time. A cancelled or replaced task never runs, and neither does the task of a
+// destroyed timer, even if its time had already come.
 class Timer {
  public:
   using Clock = std::chrono::steady_clock;
@@ -36,7 +35,7 @@ class Timer {
   void after(Clock::duration time, Task task) {
     at(Clock::now() + time, std::move(task));
   }
-  // One `period` after the call, and after each end of the task.
+  // Runs the task one `period` after the call and one `period` after each end of the task.
   void every(Clock::duration period, std::function<void()> task) {
     after(period, [this, period, task = std::move(task)]() mutable {
       const std::weak_ptr turn(turn_);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 bridge: a gateway between hosts and a board.
 #include <fmt/format.h>
 
 #include <array>
@@ -29,7 +28,7 @@ struct Options {
   Milliseconds every{10'000};
   Milliseconds timeout{1000};
   std::optional<Milliseconds> duration;
-  std::vector<std::string> keys;  // their files
+  std::vector<std::string> keys;
   bool open = false;
 };
 
@@ -51,7 +50,7 @@ constexpr std::array<NamedCounter, 9> named_counters{{
 
 const char* to_text(BridgeSide side) { return side == BridgeSide::hosts ? "hosts" : "board"; }
 
-// What it tells, on its own thread: the bridge must not wait for a reader of the output.
+// Prints on a thread of its own, so that the bridge never waits for a reader of the output.
 class Report {
  public:
   explicit Report(bool json) : json_(json) {}
@@ -84,7 +83,7 @@ class Report {
     }
   }
 
-  // Of those that have changed since they were told.
+  // Prints only ends with changed counters.
   void counters(const std::vector<BridgeStatus>& all) {
     for (std::size_t i = 0; i < all.size(); ++i) {
       tell_counters(BridgeSide::hosts, all[i].hosts, told_[i].hosts);
@@ -142,7 +141,7 @@ int bridge(const Options& options) {
   io.run();
   bridge.close();
   io.restart();
-  io.poll();  // what happened last
+  io.poll();  // handles the last events
   report.counters(bridge.status());
   return 0;
 }

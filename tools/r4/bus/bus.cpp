@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 bus: does a planned CAN bus carry its boards? And how full is a real one (bus_live.hpp)?
 #include <fmt/format.h>
 
 #include <memory>
@@ -20,7 +19,7 @@ namespace r4::tool {
 namespace {
 
 constexpr double full = 1.0;
-constexpr double nearly_full_bus = 0.8;  // room for retransmissions, and for what was forgotten
+constexpr double nearly_full_bus = 0.8;  // leaves room for retransmissions and unplanned traffic
 constexpr std::uint64_t usual_data_rate = 5000000;
 
 struct Options {
@@ -53,7 +52,7 @@ BusPlan plan_of(const Options& options) {
   plan.boards = static_cast<std::uint32_t>(options.boards);
   plan.states_hz = static_cast<std::uint32_t>(options.rate);
   plan.commands_hz = static_cast<std::uint32_t>(options.commands);
-  parse_fields(Text(options.fields), plan.fields);  // checked when it was read
+  parse_fields(Text(options.fields), plan.fields);
   plan.bit_rate.nominal = static_cast<std::uint32_t>(bit_rate);
   plan.bit_rate.data = options.fd ? static_cast<std::uint32_t>(data_rate) : 0;
   plan.packed = !options.plain;
@@ -117,7 +116,6 @@ void print_json(const BusPlan& plan, const BusLoad& load) {
   print_line(bus);
 }
 
-// What would make room.
 std::string remedy(const BusPlan& plan) {
   if (!plan.packed) return "leave out --plain, or fewer boards, fields or states";
   if (plan.bit_rate.data == 0) return "fewer boards, fields or states, or CAN FD (--fd)";

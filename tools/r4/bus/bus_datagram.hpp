@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams as a CAN bus carries them: plain, or packed (docs/packed.md).
+// Datagrams on a CAN bus: plain, or packed (docs/packed.md).
 #pragma once
 
 #include <array>
@@ -18,12 +18,12 @@ struct PlainForm {
 };
 using UnpackRoom = std::array<char, max_datagram>;
 
-// The plain form of such a datagram, by its first byte. It is in `bytes` or in `room`.
+// The plain form of a datagram; its first byte decides. Refers to `bytes` or `room`.
 PlainForm plain_form(const std::uint8_t* bytes, std::size_t size, UnpackRoom& room);
 
-// As add_datagram_json(), of a packed datagram; adds `packed`, its size in that form.
+// Like add_datagram_json() for a packed datagram; adds `packed`, its packed size in bytes.
 bool add_packed_json(Json& object, const std::uint8_t* bytes, std::size_t size);
-// The same of a plain or a packed datagram, by its first byte.
+// The same for a plain or packed datagram; the first byte decides.
 bool add_bus_json(Json& object, const std::uint8_t* bytes, std::size_t size);
 
 }  // namespace r4::tool

@@ -53,7 +53,6 @@ std::string meaning_of_id(const CanSurvey& survey, std::uint32_t id) {
   return "";
 }
 
-// What passed since the last look.
 struct Window {
   std::map<std::uint32_t, CanTraffic> traffic;
   CanTraffic total;
@@ -78,7 +77,7 @@ class LiveBus {
         live_(!options.json && !options.duration && ::isatty(STDOUT_FILENO) != 0) {}
 
   void run() {
-    // A table of what is shows what is; a report of a while also what was.
+    // A live table shows only a current problem; a report also shows a past one.
     listener_.on_event([this](const CarrierEvent& event) {
       if (listener_.in_trouble()) {
         problem_ = event.problem.text();

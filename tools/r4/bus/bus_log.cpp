@@ -39,7 +39,6 @@ const char* lane_name(CanIdKind kind) {
   }
 }
 
-// Which line, when, and whose: the beginning of an object about a lane.
 Json beginning(const BusTransfers::Lane& lane, const BusTransfers::Place& place) {
   const CanIdKind kind = lane.meaning.kind;
   return {{"line", place.line},

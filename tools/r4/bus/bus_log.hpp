@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What was said on the CAN buses of a dump by candump: the datagrams of every node, joined by the
-// ISO-TP receivers that boards and hosts have, and the raw frames, as JSON objects
-// (`r4 decode --candump`, docs/can.md).
+// Decodes a candump log: joins the frames of each node to datagrams with the ISO-TP receivers of
+// boards and hosts, and emits them and raw frames as JSON (`r4 decode --candump`, docs/can.md).
 #pragma once
 
 #include <cstdint>
@@ -22,14 +21,12 @@ class BusLog final : BusTransfers::Handler {
 
   explicit BusLog(Print print) : print_(std::move(print)) {}
 
-  // A line of the dump, not empty. Prints what it completes or ends.
+  // A line that is not empty. Prints everything that it completes or ends.
   void on_line(std::uint64_t number, std::string_view text);
-  // A line that is too long to be one of candump.
   void on_long_line(std::uint64_t number, std::uint64_t size);
-  // The dump is over: prints the summary.
   void finish();
 
-  // Was there a damaged line, a transfer that failed, or a datagram that is none?
+  // True if a line was damaged, a transfer failed, or a datagram was not valid.
   bool any_bad() const { return damaged_ + failed_ + bad_ != 0; }
 
  private:
@@ -44,13 +41,13 @@ class BusLog final : BusTransfers::Handler {
   Print print_;
   BusTransfers transfers_{*this};
   std::uint64_t frames_ = 0;
-  std::uint64_t datagrams_ = 0;     // whole ones, good or bad
-  std::uint64_t bad_ = 0;           // of those
-  std::uint64_t failed_ = 0;        // transfers, and frames that no transfer can have
-  std::uint64_t raw_ = 0;           // emergency stops and boards that went safe
-  std::uint64_t other_ = 0;         // frames that are none of ours
-  std::uint64_t error_frames_ = 0;  // of the controller
-  std::uint64_t damaged_ = 0;       // lines
+  std::uint64_t datagrams_ = 0;  // complete, valid or not
+  std::uint64_t bad_ = 0;
+  std::uint64_t failed_ = 0;  // failed transfers, and frames that fit no transfer
+  std::uint64_t raw_ = 0;     // emergency stops and went-safe frames
+  std::uint64_t other_ = 0;   // frames of other protocols
+  std::uint64_t error_frames_ = 0;
+  std::uint64_t damaged_ = 0;
 };
 
 }  // namespace r4::tool

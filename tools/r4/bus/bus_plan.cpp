@@ -16,20 +16,20 @@
 namespace r4::tool {
 namespace {
 
-constexpr std::uint32_t samples = 64;  // of every kind of datagram
+constexpr std::uint32_t samples = 64;  // of each kind of datagram
 constexpr std::uint32_t fastest_states_hz = 1000;
 constexpr std::uint32_t widest = std::numeric_limits<std::uint32_t>::max();
 constexpr double second_ns = 1e9;
 
 using Datagrams = std::vector<std::string>;
 
-// Writes what boards and hosts say: of a machine that drives, or the longest that there is. Random numbers are drawn in
-// statements of their own: compilers differ in which argument they evaluate first.
+// Generates datagrams of a driving machine, or the longest possible. Draws each random number in
+// its own statement, because compilers evaluate arguments in different orders.
 class Speaker {
  public:
   explicit Speaker(bool longest) : longest_(longest) {}
 
-  // One state: more than one datagram if it is longer than a datagram can be.
+  // One state, split into several datagrams if it does not fit into one.
   Datagrams state(FieldSet fields) {
     State state;
     fill(state);
@@ -60,7 +60,7 @@ class Speaker {
     const std::uint32_t t_ms = any();
     return {text(writer.session(session_id).finish(any(), t_ms))};
   }
-  // Motors and servos in turn; the longest command is the stepper's.
+  // Alternates motors and servos; the longest command is the stepper's.
   Datagrams command() {
     DatagramWriter writer(buffer_.data(), buffer_.size());
     if (longest_) {
@@ -76,7 +76,7 @@ class Speaker {
   }
 
  private:
-  static constexpr SessionId session_id = 0x0123456789abcdef;  // each is as long
+  static constexpr SessionId session_id = 0x0123456789abcdef;
 
   static std::string text(Text bytes) { return {bytes.data(), bytes.size()}; }
 
@@ -84,7 +84,7 @@ class Speaker {
     return longest_ ? high : low + static_cast<std::uint32_t>(random_() % (high - low + 1));
   }
   std::uint32_t any() { return longest_ ? widest : static_cast<std::uint32_t>(random_()); }
-  // A board that has sent for some hours; a host's numbers begin at random.
+  // A packet number after some hours; a host's numbers start at random.
   std::uint32_t board_pnum() { return longest_ ? widest : between(100000, 999999); }
   std::int32_t position(std::uint32_t range) {
     return longest_ ? std::numeric_limits<std::int32_t>::min()
@@ -125,7 +125,7 @@ class Speaker {
   }
 
   std::array<char, max_datagram> buffer_;
-  std::mt19937 random_{1};  // the same numbers on every machine
+  std::mt19937 random_{1};  // fixed seed: same results on every machine
   bool longest_;
   bool servo_next_ = false;
 };
@@ -133,11 +133,10 @@ class Speaker {
 struct Kind {
   const char* name;
   std::uint32_t hz;
-  bool to_board;  // with flow control
+  bool to_board;
   Datagrams (*next)(Speaker&, const BusPlan&);
 };
 
-// Adds up what datagrams need of the bus.
 struct Sum {
   double datagrams = 0, bytes = 0, frames = 0, bits = 0, ns = 0;
 
@@ -159,7 +158,7 @@ struct Sum {
     options.channel.id = kind.to_board ? command_id(node) : telemetry_id(node);
     options.channel.fd = plan.bit_rate.data != 0;
     options.tx_dl = options.channel.fd ? max_fd_size : max_classic_size;
-    options.flow_control = false;  // nobody answers here
+    options.flow_control = false;  // no receiver answers here
     IsotpSender sender(options);
     sender.begin(Text(path), 0);
     std::uint32_t count = 0;
@@ -177,7 +176,6 @@ struct Sum {
   }
 };
 
-// Of one board's one, on average over `count` of them.
 Sum each(const BusPlan& plan, const Kind& kind, std::uint32_t count, bool worst) {
   Speaker speaker(worst);
   Sum sum;
@@ -242,7 +240,7 @@ std::uint32_t most_boards(BusPlan plan, double limit) {
   return plan.boards;
 }
 
-// All but the states is the same at any rate.
+// Only the load of the states depends on their rate.
 std::uint32_t highest_rate(BusPlan plan, double limit) {
   plan.states_hz = 1;
   const BusLoad load = load_of(plan);

@@ -9,7 +9,7 @@
 namespace r4::tool {
 namespace {
 
-// A longer pause is as good as this: nothing is under way after it.
+// Limit on a pause: by then every transfer has ended.
 constexpr std::uint64_t longest_pause_us = 10'000'000;
 
 constexpr std::size_t index_of(CanIdKind kind) {
@@ -43,7 +43,7 @@ void BusTransfers::on_lane_frame(Interface& interface, const CanIdMeaning& meani
                                  const CanFrame& frame, const Place& place) {
   if (isotp_frame::is_flow_control(frame) && meaning.kind != CanIdKind::telemetry) {
     ++flow_control_;
-    // Each end has its flow control on the id of its own datagrams.
+    // A receiver sends flow control on the id of its own datagrams, so this answers the other lane.
     const bool of_board = meaning.kind == CanIdKind::reply;
     lane_of(interface, {of_board ? CanIdKind::command : CanIdKind::reply, meaning.node}).answered =
         true;
@@ -74,7 +74,7 @@ void BusTransfers::on_lane_frame(Interface& interface, const CanIdMeaning& meani
     lane.frames = 1;
     handler_.on_failure(lane, place, IsotpError::malformed);
   } else {
-    ++orphans_;  // of no transfer, or flow control where there is none
+    ++orphans_;  // a frame outside any transfer, or unexpected flow control
   }
   if (arrival.datagram) handler_.on_datagram(lane);
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Joins the recorded frames of CAN buses to datagrams, by the ISO-TP receivers that boards and hosts have
+// Joins recorded CAN frames to datagrams with the ISO-TP receivers of boards and hosts
 // (docs/can.md).
 //
-// Receivers only listen: one for each interface, node and lane that occurs. Time is the recording's. Memory is bounded
-// by max_interfaces, whatever comes in.
+// Only listens: one receiver for each interface, node and lane that occurs. Uses the recording's
+// time. Memory is bounded by max_interfaces for any input.
 #pragma once
 
 #include <array>
@@ -25,12 +25,11 @@ class BusTransfers {
  public:
   static constexpr std::size_t max_interfaces = 32;
 
-  // Where and when a frame was.
   struct Place {
-    std::uint64_t line = 0;    // of a text
-    std::uint64_t offset = 0;  // in the file
+    std::uint64_t line = 0;
+    std::uint64_t offset = 0;  // byte in the file
     std::optional<std::uint64_t> time_us;
-    std::string date;  // in the place of a time: as it stood there
+    std::string date;  // as written, if the log has dates instead of times
   };
   struct Lane {
     Lane(std::string name, const CanIdMeaning& what);
@@ -38,7 +37,7 @@ class BusTransfers {
     Lane& operator=(const Lane&) = delete;
 
     const std::string interface;
-    const CanIdMeaning meaning;  // command, reply or telemetry of a node
+    const CanIdMeaning meaning;
     std::array<std::uint8_t, max_datagram> bytes;
     IsotpReceiver receiver;
     bool answered = false;     // the other end has sent flow control
@@ -47,10 +46,10 @@ class BusTransfers {
   };
   class Handler {
    public:
-    // The bytes that lane.receiver has are whole: plain or packed.
+    // lane.receiver holds a complete datagram, plain or packed.
     virtual void on_datagram(const Lane& lane) = 0;
     virtual void on_failure(const Lane& lane, const Place& place, IsotpError error) = 0;
-    // An emergency stop, a board that went safe, or somebody who watches one.
+    // An emergency stop, a went-safe frame, or a watch frame.
     virtual void on_raw_frame(const std::string& interface, const CanIdMeaning& meaning,
                               const CanFrame& frame, const Place& place) = 0;
 
@@ -61,21 +60,20 @@ class BusTransfers {
   explicit BusTransfers(Handler& handler) : handler_(handler) {}
 
   enum class Frame : std::uint8_t { taken, other, too_many_interfaces };
-  // A frame of the bus; `other` is none of ours.
+  // `other`: a frame of another protocol.
   Frame on_frame(std::string_view interface, const CanFrame& frame, const Place& place);
-  // So late is it.
+  // Advances the time, which may end transfers.
   void pass_time(const std::optional<std::uint64_t>& time_us);
 
-  // Transfers that have not ended yet.
   std::vector<const Lane*> unfinished() const;
   std::uint64_t flow_control() const { return flow_control_; }
-  // Frames of transfers that were not heard from their beginning.
+  // Frames of transfers whose beginning was not heard.
   std::uint64_t orphans() const { return orphans_; }
 
  private:
   struct Interface {
     std::string name;
-    // By node: command, reply, telemetry; made when they are first used.
+    // By node and kind (command, reply, telemetry); created at first use.
     std::array<std::array<std::unique_ptr<Lane>, 3>, can_nodes> lanes;
   };
 
@@ -87,10 +85,10 @@ class BusTransfers {
 
   Handler& handler_;
   std::list<Interface> interfaces_;
-  std::vector<Lane*> lanes_;  // all of them
+  std::vector<Lane*> lanes_;
   std::uint32_t now_us_ = 0;
   std::optional<std::uint64_t> last_time_us_;
-  IsotpDeadline earliest_{false, 0};  // no transfer times out before
+  IsotpDeadline earliest_{false, 0};  // earliest timeout of a transfer
   std::uint64_t flow_control_ = 0;
   std::uint64_t orphans_ = 0;
 };

@@ -10,13 +10,12 @@
 namespace r4::tool {
 namespace {
 
-constexpr std::uint32_t error_flag = 0x20000000;  // of ids of 8 digits: an error frame
+constexpr std::uint32_t error_flag = 0x20000000;  // in an 8-digit id: an error frame
 constexpr std::uint32_t max_extended_id = 0x1FFFFFFF;
-// Linux has at most 15, python-can names a channel also by an address, a path or a number of a device.
+// Linux allows 15 characters, but python-can also uses an address, a path or a device number.
 constexpr std::size_t max_interface_name = 64;
 constexpr std::uint64_t max_seconds = 1'000'000'000'000;
 
-// In the order of the enumeration.
 constexpr std::array texts{
     "none",
     "a detail of the frame before",
@@ -32,7 +31,6 @@ constexpr std::array texts{
 };
 static_assert(texts.size() == static_cast<std::size_t>(CandumpError::rest) + 1);
 
-// The next word, taken off `text`; empty at the end.
 std::string_view take_word(std::string_view& text) {
   text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
   const std::string_view word = text.substr(0, text.find(' '));
@@ -46,7 +44,7 @@ bool read_digits(std::string_view text, Number& out) {
          parse_number(Text(text), out);
 }
 
-// "249713" or up to nine digits, as microseconds.
+// Converts up to nine digits after the decimal point, "249713", to microseconds.
 bool read_fraction(std::string_view text, std::uint32_t& out_us) {
   if (text.size() > 9) return false;
   std::array<char, 6> digits{'0', '0', '0', '0', '0', '0'};
@@ -55,7 +53,7 @@ bool read_fraction(std::string_view text, std::uint32_t& out_us) {
   return read_digits(text, all) && read_digits({digits.data(), digits.size()}, out_us);
 }
 
-// "2015-07-10 08:57:32" as seconds, as if it were UTC.
+// Converts "2015-07-10 08:57:32" to seconds, assuming UTC.
 bool read_date(std::string_view text, std::uint64_t& out_s) {
   constexpr std::string_view form = "dddd-dd-dd dd:dd:dd";
   if (text.size() != form.size()) return false;
@@ -94,7 +92,7 @@ bool read_time(std::string_view text, CandumpLine& out) {
 
 bool read_id(std::string_view text, CandumpLine& out) {
   std::uint32_t id = 0;
-  // Of CAN XL a priority, alone or behind two digits of a virtual network.
+  // CAN XL: a priority, optionally after two digits of a virtual network id.
   if (out.xl) return (text.size() == 3 || text.size() == 5) && parse_hex(Text(text), id);
   if ((text.size() != 3 && text.size() != 8) || !parse_hex(Text(text), id)) return false;
   out.frame.extended = text.size() == 8;
@@ -114,7 +112,7 @@ bool read_byte(std::string_view text, std::uint8_t& out) {
   return true;
 }
 
-// What follows the first # of a frame of CAN XL: flags, type and address, then its bytes: "81:00:12345678#112233".
+// A CAN XL frame after the first #: flags, type, address, bytes: "81:00:12345678#112233".
 bool is_xl_frame(std::string_view data) {
   constexpr std::string_view form = "hh:hh:hhhhhhhh#";
   if (data.size() < form.size()) return false;
@@ -125,11 +123,11 @@ bool is_xl_frame(std::string_view data) {
   return true;
 }
 
-// What follows the first # of the log's format: "2A366C2B", "#12A36", "R", "R4", "R8_B".
+// The text after the first # in the log format: "2A366C2B", "#12A36", "R", "R4", "R8_B".
 CandumpError read_log_frame(std::string_view data, CanFrame& frame) {
   if (data.starts_with('R')) {
     frame.remote = true;
-    data = data.substr(0, data.find('_'));  // a length code of more than 8
+    data = data.substr(0, data.find('_'));  // skips a length code above 8
     return data.size() <= 2 ? CandumpError::none : CandumpError::rest;
   }
   if (data.starts_with('#')) {
@@ -139,7 +137,7 @@ CandumpError read_log_frame(std::string_view data, CanFrame& frame) {
     if (!parse_hex(Text(data.substr(1, 1)), flags)) return CandumpError::bytes;
     data.remove_prefix(2);
   } else if (const std::size_t mark = data.find('_'); mark != std::string_view::npos) {
-    data = data.substr(0, mark);  // a length code of more than 8
+    data = data.substr(0, mark);  // skips a length code above 8
   }
   if (data.size() / 2 > max_fd_size) return CandumpError::size;
   frame.size = static_cast<std::uint8_t>(data.size() / 2);
@@ -150,8 +148,7 @@ CandumpError read_log_frame(std::string_view data, CanFrame& frame) {
   return has_valid_size(frame) ? CandumpError::none : CandumpError::size;
 }
 
-// The bytes of the format on screen, behind "[4]" or, for CAN FD, "[04]"; behind "{B}", a length code of more than 8,
-// there are 8.
+// The bytes after "[4]", or "[04]" for CAN FD. "{B}", a length code above 8, means 8 bytes.
 CandumpError read_screen_frame(std::string_view size, std::string_view& line, CanFrame& frame) {
   if (size.size() == 3 && size.front() == '{' && size.back() == '}') {
     if (size[1] < '9' || size[1] > 'F' || (size[1] > '9' && size[1] < 'A'))
@@ -223,12 +220,12 @@ CandumpError read_candump_line(std::string_view line, CandumpLine& out) {
     const CandumpError error =
         out.xl ? CandumpError::none : read_log_frame(word.substr(mark + 1), out.frame);
     if (error != CandumpError::none) return error;
-    word = take_word(line);  // -x: T of the own machine, R of others
+    word = take_word(line);  // -x: T sent by this machine, R received
     if (!word.empty() && !one_of(word, "T", "R")) return CandumpError::rest;
     return take_word(line).empty() ? CandumpError::none : CandumpError::rest;
   }
 
-  if (one_of(word, "TX", "RX")) {  // -x
+  if (one_of(word, "TX", "RX")) {
     if (!one_of(take_word(line), "B", "-") || !one_of(take_word(line), "E", "-")) {
       return CandumpError::no_frame;
     }

@@ -8,7 +8,7 @@
 namespace r4::tool {
 namespace {
 
-// The upper four bits of an id are CANopen's function, the lower seven the node; 0 is no node.
+// CANopen: the upper four bits of an id are the function, the lower seven the node (not 0).
 constexpr std::uint32_t canopen_node_bits = 7;
 constexpr std::array<const char*, 16> canopen_functions{
     nullptr, "EMCY",  nullptr, "TPDO1",      "RPDO1",       "TPDO2", "RPDO2",     "TPDO3",
@@ -31,7 +31,7 @@ std::string canopen_name(std::uint32_t id) {
   return fmt::format("CANopen {} of node {}", function, node);
 }
 
-// The upper six bits are ODrive's axis, the lower five its command.
+// ODrive: the upper six bits of an id are the axis, the lower five the command.
 std::string odrive_name(std::uint32_t id) {
   const char* command = "";
   switch (id & 0x1F) {

@@ -12,8 +12,7 @@ namespace {
 constexpr AsyncBoard::Duration step_timeout{1000};
 constexpr AsyncBoard::Duration look_interval{50};
 constexpr std::chrono::milliseconds retry_interval{2000};
-constexpr std::chrono::milliseconds settle_time{
-    500};  // after which a device that was set up measures
+constexpr std::chrono::milliseconds settle_time{500};  // until a device that was set up measures
 
 }  // namespace
 
@@ -34,7 +33,6 @@ void DeviceSetup::look_later() {
   timer_.after(look_interval, [this] { look(); });
 }
 
-// Begins to set up the devices that are due.
 void DeviceSetup::look() {
   look_for_resets();
   if (!board_.in_control()) {
@@ -61,7 +59,7 @@ void DeviceSetup::look_for_resets() {
                  : "the program that controls the board sets it up: give it this device, too",
              Outcome::refused});
     }
-    progress.reset = !in_control;  // set up again, it may be reset again
+    progress.reset = !in_control;  // after a new setup the next reset is reported
     progress.done = false;
   }
 }
@@ -76,7 +74,7 @@ void DeviceSetup::give_up() {
   if (const auto attempt = std::move(attempt_)) attempt->emit(asio::cancellation_type::terminal);
 }
 
-// The first from that one on whose turn it is. False: there is none.
+// Starts with the first due device at or after `from`. False if there is none.
 bool DeviceSetup::begin_next(std::size_t from) {
   const Clock::time_point now = Clock::now();
   const auto is_due = [now](const Progress& each) { return !each.done && now >= each.again; };

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sets described devices up for as long as a command runs: as soon as the board takes our commands, and again when it
-// has begun anew, when the link was lost, or when a device was reset. What fails is told once, and
-// tried again every two seconds. A command that only watches tells which device was reset, and sets
-// none up.
+// Keeps described devices set up while a command runs: after taking control, and again after a
+// restart of the board, a lost link or a device reset. A failure is reported once and retried every
+// two seconds. A watcher only reports which device was reset.
 #pragma once
 
 #include <asio/cancellation_signal.hpp>
@@ -23,7 +22,7 @@ namespace r4::tool {
 
 class DeviceSetup {
  public:
-  // `told`: what stands in the way. The board and the devices outlive it, and it lives on their loop.
+  // `told` gets problems. The board and devices, whose loop this object uses, must outlive it.
   DeviceSetup(asio::io_context& io, AsyncBoard& board, const std::vector<Device>& devices,
               std::function<void(const Problem&)> told);
   ~DeviceSetup() { give_up(); }
@@ -32,13 +31,12 @@ class DeviceSetup {
 
  private:
   using Clock = std::chrono::steady_clock;
-  // Of each device, whatever becomes of the others.
   struct Progress {
     bool done = false;
-    Clock::time_point again{};    // it has failed, and is not tried before
-    std::string told;             // why
-    Clock::time_point settled{};  // it was set up, and has measured by then
-    bool reset = false;           // it was told that the device is not set up any more
+    Clock::time_point again{};  // after a failure: earliest time of the next attempt
+    std::string told;
+    Clock::time_point settled{};  // after setup: by then the device has measured
+    bool reset = false;           // the reset of the device has been reported
   };
   void look_later();
   void look();
@@ -54,9 +52,9 @@ class DeviceSetup {
   std::function<void(const Problem&)> told_;
   Timer timer_;
   std::vector<Progress> progress_;
-  std::size_t next_ = 0;  // that is set up now
+  std::size_t next_ = 0;
   ScopedSubscription restarts_;
-  std::shared_ptr<asio::cancellation_signal> attempt_;  // results of earlier ones do not count
+  std::shared_ptr<asio::cancellation_signal> attempt_;  // results of earlier attempts are ignored
   const std::shared_ptr<DeviceSetup*> here_ = std::make_shared<DeviceSetup*>(this);
 };
 

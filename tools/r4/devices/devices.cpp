@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 devices: the descriptions that are shipped, and whether one of the user's is right.
 #include <fmt/format.h>
 
 #include <algorithm>

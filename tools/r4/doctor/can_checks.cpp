@@ -10,9 +10,9 @@
 namespace r4::tool {
 namespace {
 
-// Less than this, and programs lose frames of a state that is plain text.
+// With a shorter transmit queue, programs lose frames of a plain state.
 constexpr std::uint32_t least_queue = 100;
-// From here on a controller only listens where it should speak (ISO 11898-1: error-warning).
+// ISO 11898-1: error-warning limit. At 128 the controller becomes error-passive.
 constexpr int many_errors = 96;
 constexpr double nearly_full = 0.8;
 
@@ -20,7 +20,7 @@ Finding about(const CanInterface& interface, Severity severity, const char* chec
   return {severity, check, interface.name, "", "", Mending::by_hand, ErrorKind::open};
 }
 
-// A bit rate that is not that of the others destroys their frames, so it is nobody's to choose but the owner's.
+// A wrong bit rate destroys the frames of all other nodes, so only the owner may choose it.
 Finding down(const Machine& machine, const CanInterface& interface) {
   Finding finding = about(interface, Severity::error, "can.down");
   finding.reason = "the interface is down";
@@ -67,7 +67,7 @@ void check_controller(const Machine& machine, const CanInterface& interface, Fin
     finding.fix = fmt::format("candump -e {},0:0,#FFFFFFFF", interface.name);
     findings.push_back(finding);
   }
-  // A kernel's slcan tells no bit rate, and cannot restart.
+  // The kernel's slcan driver reports no bit rate and cannot restart.
   if (interface.restart_ms == 0 && interface.bit_rate != 0) {
     Finding finding = about(interface, Severity::warning, "can.restart");
     finding.reason = "restart-ms is 0: a bus-off lasts until somebody restarts the controller";

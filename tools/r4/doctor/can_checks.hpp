@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CAN: does the kernel have it, and are the interfaces as docs/can.md wants them.
+// CAN checks: kernel support, and interfaces set up as in docs/can.md.
 #pragma once
 
 #include <string>
@@ -12,14 +12,13 @@
 
 namespace r4::tool {
 
-// Whether the kernel has SocketCAN, or a module for it.
 Findings check_can_kernel(const Machine& machine);
-// One interface, as the system tells of it; also one that is not there.
+// The interface may be missing.
 Findings check_can_interface(const Machine& machine, const CanInterface& interface);
-// Whether frames that are not R4's come on an id of that board.
+// Frames of other protocols on an id of that board.
 Findings check_foreign_frames(const CanSurvey& survey, const std::string& interface,
                               std::uint8_t node);
-// How full the bus is, 0 to 1 of what its bit rate carries.
+// `load`: bus load, 0 to 1 of the bit rate.
 Findings check_can_load(const std::string& interface, double load);
 
 }  // namespace r4::tool

@@ -12,8 +12,8 @@
 namespace r4::tool {
 namespace {
 
-constexpr std::chrono::milliseconds ask_again{300};   // longer than an answer that is in time
-constexpr std::chrono::milliseconds look_at_bus{20};  // while the bus is not ours
+constexpr std::chrono::milliseconds ask_again{300};
+constexpr std::chrono::milliseconds look_at_bus{20};  // while another host uses the bus
 
 }  // namespace
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Asks one board on a CAN bus who it is, as a host that comes to the bus does: only while no other
-// host is heard. What it answers everyone on the bus hears.
+// Asks one board on a CAN bus for its identity, only while no other host is heard there. All
+// listeners on the bus receive the answer.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -17,19 +17,17 @@ namespace r4::tool {
 
 class CanQuestion final : private Carrier::Handler {
  public:
-  // Asks until the board has answered. Throws Error if the bus cannot be opened.
+  // Repeats the question until an answer arrives. Throws Error if the bus cannot be opened.
   CanQuestion(asio::io_context& io, std::string_view url);
   ~CanQuestion() { carrier_->close(); }
   CanQuestion(const CanQuestion&) = delete;
   CanQuestion& operator=(const CanQuestion&) = delete;
 
-  // A datagram of the board.
   void hear(const Datagram& datagram);
-  // Question to answer; 0: there was none.
+  // From question to answer; 0: no answer yet.
   double answer_us() const { return answer_us_; }
-  // How long ago the first question went out; 0: none did.
+  // Seconds since the first question; 0: none was sent.
   double asked_since_s() const;
-  // What stands in the way, at its worst.
   TransportTrouble trouble() const { return trouble_; }
 
  private:
@@ -41,7 +39,7 @@ class CanQuestion final : private Carrier::Handler {
   std::unique_ptr<Carrier> carrier_;
   Timer timer_;
   std::optional<Clock::time_point> first_asked_;
-  std::optional<Clock::time_point> asked_;  // the newest question that is not answered
+  std::optional<Clock::time_point> asked_;
   double answer_us_ = 0;
   TransportTrouble trouble_ = TransportTrouble::none;
 };

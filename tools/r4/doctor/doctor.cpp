@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 doctor: what is wrong with this machine and this link, and the command that mends each.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -43,14 +42,13 @@ void append(Findings& to, Findings more) {
   for (Finding& each : more) to.push_back(std::move(each));
 }
 
-// The device behind a symbolic link such as /dev/serial/by-id/….
 std::string device_of(const std::string& path) {
   std::error_code error;
   const std::filesystem::path device = std::filesystem::canonical(path, error);
   return error ? path : device.string();
 }
 
-// The program that has it open, and lets the other programs of its user share it; 0: none.
+// Process id of the program that holds the port and shares it with its user's programs; 0: none.
 int sharing(const Discovery& found, const std::string& device) {
   for (const FoundBoard& board : found.boards) {
     if (board.holder && device_of(board.place) == device) return board.holder->pid;
@@ -69,13 +67,13 @@ std::vector<std::string> ports_of(const Machine& machine, const Discovery& found
   return ports.empty() ? likely_ports(machine) : ports;
 }
 
-// The serial ports of this computer, with the programs that share them. The boards at `urls`, and
-// at ports with the USB id of a board, are asked who they are.
+// The serial ports of this computer and the programs that share them. Asks the boards at `urls`,
+// and at ports with a board's USB id, for their identity.
 Discovery search_ports(const std::vector<Url>& urls) {
   DiscoveryOptions options;
   options.can = options.udp = false;
   for (const Url& url : urls) {
-    // At the wrong baud rate the question would be noise.
+    // A question at the wrong baud rate would be noise.
     const bool named = url.scheme() == "serial" && url.path().starts_with('/') && !url.get("baud");
     if (named) options.serial_ports.push_back(device_of(url.path()));
   }
@@ -98,7 +96,7 @@ Findings check_ports(const Machine& machine, const Discovery& found,
   return findings;
 }
 
-// Of one transport, or, without URLs, of all that this machine has.
+// Checks the transports of `urls`, or all of them if there are no URLs.
 Findings check_machine(const Machine& machine, const std::vector<Url>& urls) {
   Findings findings;
   std::vector<std::string> ports;
@@ -151,7 +149,7 @@ void print(const Findings& findings, bool json) {
   }
 }
 
-// Runs what mends without a choice, each command once, and says what for; returns how many did.
+// Runs each automatic fix once, and prints its reason. Returns how many succeeded.
 int mend(const Findings& findings, bool json) {
   std::vector<std::string> done;
   int mended = 0;
@@ -163,7 +161,7 @@ int mend(const Findings& findings, bool json) {
       print_text("{}: {}\n$ {}\n", printable(each.thing), printable(each.reason),
                  printable(each.fix));
     }
-    // What it says is for people: with --json it must not get between the objects.
+    // With --json the output of the command must not mix with the objects on stdout.
     const std::string command = json ? "{ " + each.fix + "; } >&2" : each.fix;
     const bool worked = std::system(from_root(command).c_str()) == 0;
     if (json) {
@@ -177,7 +175,7 @@ int mend(const Findings& findings, bool json) {
   return mended;
 }
 
-// By its own name, r4 may not be found.
+// Fixes call r4 by its name, which PATH may not contain.
 void put_r4_into_the_path() {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
@@ -233,7 +231,6 @@ void print_summary(const Findings& findings, bool json) {
   }
 }
 
-// Each path is a link of its own here.
 int doctor(const Options& given) {
   Options options = given;
   options.urls = split_paths(join_paths(given.urls));

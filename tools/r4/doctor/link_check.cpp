@@ -19,16 +19,16 @@
 namespace r4::tool {
 namespace {
 
-// More, and a board whose host is silent for a timeout may go safe by chance; less is what WiFi does now and then.
+// More loss than much_loss may make a board time out. Less than some_loss is normal for WiFi.
 constexpr double much_loss = 0.10;
 constexpr double some_loss = 0.005;
-// A state of 100 Hz, and a half.
+// 1.5 periods of a state at 100 Hz.
 constexpr double much_jitter_us = 15000;
-// Where nobody tells the rate, as of a virtual bus.
+// For a virtual bus without a bit rate.
 constexpr std::uint32_t doctor_bit_rate = 1'000'000;
-// A board does not execute what is older.
+// A board does not execute older commands.
 constexpr double slow_answer_us = 250'000;
-// A board that was asked all that time had time to answer.
+// A board asked for this long had time to answer.
 constexpr double asked_for_s = 1;
 
 Finding found(const std::string& url, Severity severity, const char* check, std::string reason,
@@ -40,7 +40,6 @@ Finding trouble(const std::string& url, const Problem& problem) {
   return found(url, Severity::error, "link.open", problem.reason, problem.fix, problem.kind);
 }
 
-// One link, while it is listened to.
 class Listening {
  public:
   Listening(asio::io_context& io, const std::string& url) : url_(url) {
@@ -89,7 +88,7 @@ class Listening {
       const double load = static_cast<double>(bus_->survey().busy_ns()) / 1e9 / seconds;
       for (Finding& each : check_can_load(interface_, load))
         result.findings.push_back(std::move(each));
-      // Frames that come too late make no datagram, whosever they are.
+      // Late frames form no datagram, so their origin is unknown.
       if (result.sample.trouble != TransportTrouble::late_frames) {
         for (Finding& each : check_foreign_frames(bus_->survey(), interface_, node_))
           result.findings.push_back(std::move(each));
@@ -99,7 +98,7 @@ class Listening {
   }
 
  private:
-  // As the question on the bus sees it, too, where this program only watches.
+  // Adds the trouble that the question sees on the bus; the board itself is only watched.
   LinkStatus link() const {
     LinkStatus link = board_->link();
     if (!question_) return link;
@@ -138,7 +137,7 @@ class Listening {
   bool is_recording_ = false;
   Findings findings_;
   std::unique_ptr<AsyncBoard> board_;
-  // Before the first state a stream is joined somewhere in its numbers, which is no loss.
+  // Statistics begin at the first state: missing earlier packet numbers are not lost datagrams.
   Subscription first_state_;
   Statistics begun_;
   std::unique_ptr<CanQuestion> question_;

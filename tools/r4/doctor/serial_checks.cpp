@@ -31,7 +31,6 @@ struct Group {
   std::vector<std::string> members;
 };
 
-// Of /etc/group.
 std::optional<Group> group_of(const Machine& machine, const std::string& name) {
   std::istringstream lines(machine.read("/etc/group").value_or(""));
   for (std::string line; std::getline(lines, line);) {
@@ -66,7 +65,7 @@ bool may_open(const struct stat& file, const User& user) {
   return (bits & read_write) == read_write;
 }
 
-// The first that has a file counts (man udev).
+// The first folder that contains the file takes precedence (man udev).
 constexpr std::array<const char*, 5> rules_folders{"/etc/udev/rules.d/", "/run/udev/rules.d/",
                                                    "/usr/local/lib/udev/rules.d/",
                                                    "/usr/lib/udev/rules.d/", "/lib/udev/rules.d/"};
@@ -78,7 +77,6 @@ std::optional<std::string> installed_rules(const Machine& machine, const std::st
   return std::nullopt;
 }
 
-// A chip of USB serial adapters, by the id that rules of udev have: "1a86/7523".
 struct Adapter {
   const char* id;
   const char* chip;
@@ -86,7 +84,7 @@ struct Adapter {
 constexpr std::array<Adapter, 4> adapters{
     {{"1a86/7523", "CH340"}, {"10c4/ea60", "CP210x"}, {"403/6001", "FT232"}, {"403/6015", "FT-X"}}};
 
-// True if the rules take every adapter of that id: no further condition, such as a manufacturer, is in the line.
+// True if a rule matches every adapter with that id, without conditions (manufacturer).
 bool take(const std::string& rules, const Adapter& adapter) {
   std::istringstream lines(rules);
   for (std::string line; std::getline(lines, line);) {
@@ -98,7 +96,7 @@ bool take(const std::string& rules, const Adapter& adapter) {
   return false;
 }
 
-// "1a86/7523"; empty where it is no device of USB. A tty is below the interface, or, of usb-serial, one further.
+// "1a86/7523"; empty if not USB. The path to a usb-serial tty has one level more.
 std::string usb_id_of(const Machine& machine, const std::string& port) {
   for (const char* up : {"/../", "/../../"}) {
     const std::string folder = "/sys/class/tty/" + port + "/device" + up;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Serial ports: may they be opened, who has them, what gets in the way.
 #pragma once
 
 #include <string>
@@ -11,18 +10,17 @@
 
 namespace r4::tool {
 
-// The ports of boards, by their USB ids, and those of FTDI adapters: "/dev/ttyACM0".
+// "/dev/ttyACM0": the ports with a board's USB id, and FTDI adapters.
 std::vector<std::string> likely_ports(const Machine& machine);
 
-// Whether this user may open it: its mode and groups.
 Findings check_port_permission(const Machine& machine, const std::string& path);
-// Programs that have it open, as far as this user may see. `sharing`: the one that lets others share it, 0: none.
+// Programs visible to this user. `sharing`: the program that shares the port; 0: none.
 Findings check_port_holders(const Machine& machine, const std::string& path, pid_t sharing);
-// How long an FTDI adapter keeps what has come.
+// How long an FTDI adapter holds received bytes back.
 Findings check_latency_timer(const Machine& machine, const std::string& path);
-// Whether the rules of udev are there, and are `rules`; and whether ModemManager, if it runs, keeps off by them.
+// Checks that the installed udev rules equal `rules`, and that ModemManager ignores boards.
 Findings check_udev_rules(const Machine& machine, std::string_view rules);
-// Whether a rule of brltty, which is for braille displays, takes the USB serial adapters that `ports` are or may be.
+// Reports a brltty rule (braille displays) that claims USB serial adapters of `ports`.
 Findings check_brltty(const Machine& machine, const std::vector<std::string>& ports);
 
 }  // namespace r4::tool

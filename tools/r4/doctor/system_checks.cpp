@@ -13,7 +13,7 @@
 namespace r4::tool {
 namespace {
 
-// What Linux has by default: 200 states. A CAN socket asks for more, and does with less.
+// The default of Linux: 200 states. A CAN socket requests more and accepts less.
 constexpr long least_receive_buffer = 212992;
 constexpr double noticeable_step_s = 0.010;
 constexpr const char* host_port = "2390";
@@ -55,7 +55,7 @@ bool lets_in(std::string_view rules) {
          rules.find(board_port) != std::string_view::npos;
 }
 
-// The words behind the last `keyword` before `at`, up to the brace: "inet filter" of "table inet filter {".
+// The words between `keyword` and the brace: "inet filter" of "table inet filter {".
 std::string last_named(std::string_view rules, std::string_view keyword, std::size_t at) {
   const std::size_t begin = rules.rfind(keyword, at);
   if (begin == std::string_view::npos) return "";
@@ -64,7 +64,7 @@ std::string last_named(std::string_view rules, std::string_view keyword, std::si
   return std::string(rest.substr(0, end));
 }
 
-// Only what is plain: a chain for input that drops by default, and no rule that names our ports.
+// Recognizes only an input chain that drops by default and has no rule for R4's ports.
 void check_firewall(const Machine& machine, Findings& findings) {
   const bool there =
       machine.exists("/proc/sys/net/netfilter") || machine.exists("/proc/net/ip_tables_names");
@@ -142,7 +142,7 @@ Findings check_processors(const Machine& machine) {
     ++processors;
     const std::string frequency = fmt::format("{}/{}/cpufreq/", folder, name);
     const std::string driver = machine.read(frequency + "scaling_driver").value_or("");
-    // With drivers that choose themselves, "powersave" is a name and no lowest frequency.
+    // Drivers that choose the frequency themselves use "powersave" only as a name.
     const bool chooses = driver == "intel_pstate" || driver == "amd-pstate-epp";
     if (!chooses && machine.read(frequency + "scaling_governor") == "powersave") slow = name;
   }

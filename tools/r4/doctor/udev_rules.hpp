@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// tools/udev/70-r4.rules, which the build puts into the program.
+// tools/udev/70-r4.rules, embedded by the build.
 #pragma once
 
 namespace r4::tool {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 key: makes a key, and gives it to a board over a cable.
 #include <fmt/format.h>
 
 #include <array>
@@ -54,7 +53,7 @@ int give(const KeyOptions& options) {
   std::array<char, key_text_size> text;
   write_key(text.data(), key);
   Board board(options.url);
-  // It need not be active: a board that is stopped takes a key, too.
+  // A board in the safe state also accepts a key.
   board.setting("key", {text.data(), text.size()}, std::chrono::seconds{5});
   print_text(
       "the board has key {} now: from networks and buses it obeys only who has it, stops "

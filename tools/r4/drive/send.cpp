@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 send: commands in order, each confirmed by the board's own state before the next.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -40,14 +39,12 @@ struct SendOptions {
   bool json = false;
 };
 
-// What one argument says.
 using Order = CommandOrGroup;
 
 std::string shown(const Order& order) {
   return std::visit([](const auto& each) { return r4::shown(each); }, order);
 }
 
-// Nothing for a group.
 std::optional<Command> command_of(const Order& order) {
   const auto* const own = std::get_if<OwnCommand>(&order);
   return own == nullptr ? std::nullopt : std::optional<Command>(*own);
@@ -58,7 +55,7 @@ bool is(CommandKind kind, const Order& order) {
   return command && command->kind == kind;
 }
 
-// Throws Error{usage} for a command that is wrong, or that may not be sent to `url`.
+// Throws Error{usage} if the command is wrong or not allowed at `url`.
 Order order_of(const std::string& text, const std::string& url) {
   Order order = parse_text(text);
   if (is(CommandKind::heartbeat, order)) {
@@ -93,16 +90,14 @@ bool needs_motor_supply(const Order& order) {
   return std::visit([](const auto& each) { return turns_a_motor(each); }, order);
 }
 
-// The value in milliseconds, if `order` sets that key.
 std::optional<Milliseconds> setting_of(const Order& order, std::string_view key) {
   if (!is(CommandKind::setting, order) || command_of(order)->text != Text(key)) return {};
   std::uint32_t ms = 0;
-  parse_number(command_of(order)->text2, ms);  // checked with the command
+  parse_number(command_of(order)->text2, ms);
   return Milliseconds(ms);
 }
 
-// The board's timeout and heartbeat interval, given side by side in any order: one step, since the board
-// may refuse either alone.
+// Timeout and heartbeat interval in any order: one step, as the board may refuse either alone.
 struct LinkTiming {
   Milliseconds timeout{0};
   Milliseconds heartbeat{0};
@@ -119,9 +114,8 @@ std::optional<LinkTiming> link_timing_at(const std::vector<Order>& orders, std::
   return in_order ? in_order : timing(orders[i + 1], orders[i]);
 }
 
-// What a person types is deliberate: it is sent without being armed. Where a motor is to turn, the
-// board is to tell whether relay 1 is closed. Our heartbeats come so often that the shortest timeout
-// among the commands can live on them.
+// No arming is needed, because a typed command is deliberate. If a motor is to turn, ask for the
+// state of relay 1. Heartbeats are sent often enough for the shortest timeout among the commands.
 BoardOptions board_options(const SendOptions& options, const std::vector<Order>& orders) {
   BoardOptions board_options = with_key(options.key);
   board_options.session.arming = Arming::off;
@@ -181,7 +175,7 @@ class Sender {
     }
   }
 
-  // A transfer on the user's bus is begun when it is confirmed; a state tells how it ended.
+  // Confirmation only means that an I2C transfer has started; a later state reports its end.
   bool is_transfer() const {
     const Order& order = orders_[next_];
     return is(CommandKind::i2c_read, order) || is(CommandKind::i2c_write, order) ||
@@ -252,7 +246,7 @@ class Sender {
                       orders_[next_]);
   }
 
-  // Was the command to turn a motor that has no supply?
+  // True if the command turns a motor while relay 1, its supply, is open.
   bool supply_is_missing() const {
     const State& state = board_.state();
     return needs_motor_supply(orders_[next_]) && state.present.has(StateField::relays) &&
@@ -262,7 +256,7 @@ class Sender {
   bool shows_bytes(const I2cAnswer& transfer) const {
     return transfer.data.size != 0 || is(CommandKind::i2c_scan, orders_[next_]);
   }
-  // A scan's are addresses.
+  // The bytes of a scan are addresses.
   std::string shown_bytes(const I2cAnswer& transfer) const {
     if (is(CommandKind::i2c_scan, orders_[next_])) {
       return transfer.data.size == 0
@@ -323,10 +317,10 @@ class Sender {
   AsyncBoard& board_;
   Timer hold_;
   Timer answer_limit_;
-  std::optional<CommandResult> waiting_;  // for the end of a transfer
+  std::optional<CommandResult> waiting_;  // waits for the end of an I2C transfer
   std::size_t next_ = 0;
   std::optional<Problem> failure_;
-  std::optional<Problem> down_;  // why the transport was down last
+  std::optional<Problem> down_;  // the latest reason why the transport was down
 };
 
 int send(const SendOptions& given) {

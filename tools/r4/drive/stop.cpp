@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 stop: every output off, now.
 #include <fmt/format.h>
 
 #include <asio/io_context.hpp>
@@ -27,11 +26,11 @@ namespace {
 struct StopOptions {
   std::vector<std::string> urls;
   Milliseconds timeout{2000};
-  std::string key;  // not needed, and so not read: nothing may keep a stop back
+  std::string key;  // not read: a key is not needed, and a bad key file must not delay a stop
   bool json = false;
 };
 
-// Beside whatever program controls the board, and on ways of its own where there are any: that may hang.
+// Uses its own transport if possible, because the controlling program may hang.
 std::unique_ptr<AsyncBoard> open(asio::io_context& io, const std::string& url) {
   BoardOptions options;
   auto paths = make_host_carriers(io, {url}, BoardRole::watch);
@@ -76,7 +75,7 @@ int stop(const StopOptions& options) {
     result = r;
     if (r.outcome != Outcome::confirmed) return io.stop();
     print_confirmed(options, r);
-    // The library repeats it for a while longer.
+    // Meanwhile the library repeats the stop.
     repeating.after(SessionOptions().stop_linger, [&] { io.stop(); });
   });
   io.run();
@@ -89,7 +88,7 @@ int stop(const StopOptions& options) {
     problem.thing = fmt::format("E:STOP to {}", board->name());
     throw Error(problem);
   }
-  // The stop went to both, and one has confirmed it.
+  // Both boards got the stop, and one has confirmed it.
   if (link.causes.has_any({LinkCause::two_boards, LinkCause::other_board})) {
     throw Error(explain(paths));
   }

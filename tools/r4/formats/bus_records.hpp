@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The frames of CAN buses as records: a path for each node of each interface, can://can0?node=3, in the order in which
-// they are first heard. A datagram has the time of its last frame.
+// Converts frames of CAN buses to records. Each node of each interface is a path,
+// can://can0?node=3, numbered as first heard. A datagram gets the time of its last frame.
 //
-// An emergency stop is an event of no path, "stop can0"; a board that goes safe one of its own, "link safe stop".
+// An emergency stop is an event without a path, "stop can0". A board that goes safe is an event of
+// its path, "link safe stop".
 #pragma once
 
 #include <cstdint>
@@ -16,24 +17,22 @@
 
 namespace r4::tool {
 
-// The URL of that board. A name that a URL cannot hold, such as python-can's /dev/ttyACM0 or ff15::1, stands in brackets:
-// can://[%2Fdev%2FttyACM0]?node=3.
+// The URL of that board. A name that a URL cannot hold, such as python-can's /dev/ttyACM0 or
+// ff15::1, is put in brackets: can://[%2Fdev%2FttyACM0]?node=3.
 std::string bus_url(std::string_view interface, std::uint8_t node);
-// The interface in the host of such a URL.
 std::string bus_interface(const std::string& host);
 
 class BusRecords final : BusTransfers::Handler {
  public:
   explicit BusRecords(RecordingVisitor& visitor) : visitor_(visitor) {}
 
-  // `place` has a time. A frame that is none of ours is passed over.
+  // `place` must have a time. Ignores frames of other protocols.
   void on_frame(std::string_view interface, const CanFrame& frame,
                 const BusTransfers::Place& place);
-  // No more frames come.
   void finish();
-  // True if a record or damage was told.
+  // True if a record or damage was reported.
   bool told() const { return told_; }
-  // The number of a path that is told of now; those of other sources of the same recording count on.
+  // Reports a path and returns its number. Other sources of the same recording use it too.
   std::uint16_t add_path(const std::string& url);
 
  private:

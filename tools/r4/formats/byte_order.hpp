@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whole numbers as the bytes of a file.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +10,7 @@ namespace r4::tool {
 
 enum class ByteOrder : std::uint8_t { little, big };
 
-// The number at the front of `bytes`, which has as many as it takes.
+// Reads the number at the front of `bytes`, which must hold at least sizeof(Number).
 template <class Number>
 Number read_number(std::string_view bytes, ByteOrder order = ByteOrder::little) {
   std::uint64_t number = 0;

@@ -13,11 +13,11 @@
 namespace r4::tool {
 namespace {
 
-// How much without a frame makes it no log.
+// Bytes without a frame after which the file is not accepted as a log.
 constexpr std::uint64_t patience = 65536;
-// Times before September 2001 count from something else than 1970: SocketCAN is younger.
+// SocketCAN is younger than September 2001: earlier times are not relative to 1970.
 constexpr std::uint64_t earliest_us = 1'000'000'000'000'000;
-// Frames of several interfaces may be so much out of order.
+// Largest disorder between frames of several interfaces.
 constexpr std::uint64_t disorder_us = 1000;
 
 }  // namespace
@@ -71,11 +71,10 @@ void CandumpSource::on_line(std::uint64_t number, std::string_view text) {
   const std::uint64_t time_us = dated(*line.time_us);
   recognised_ = true;
   ++frames_;
-  if (line.error_frame) return;  // of the controller, not of the bus
+  if (line.error_frame) return;  // from the controller, not the bus
   records_.on_frame(line.interface, line.frame, {number, lines_.begin(), time_us, {}});
 }
 
-// The time since 1970.
 std::uint64_t CandumpSource::dated(std::uint64_t time_us) {
   if (frames_ == 0) first_us_ = latest_us_ = time_us;
   const bool goes_back = time_us + disorder_us < latest_us_;
@@ -129,7 +128,7 @@ void CandumpSink::on_record(const Record& record) {
   ++(written ? written_ : others_);
 }
 
-// The two ends as they are on a bus. What does not come out as it went in is not written.
+// Simulates both ends of the bus. A datagram that does not arrive unchanged is not written.
 bool CandumpSink::write_frames(const Place& place, const Record& record) {
   CanNode board(CanEnd::board, place.node, place.fd);
   CanNode host(CanEnd::host, place.node, place.fd);
@@ -155,7 +154,7 @@ bool CandumpSink::write_frames(const Place& place, const Record& record) {
       continue;
     }
     (forth ? sender : receiver).frame_sent(now_us);
-    if (classify(frame).kind == CanIdKind::went_safe) continue;  // once in a while only
+    if (classify(frame).kind == CanIdKind::went_safe) continue;  // sent only occasionally
     const Text whole = (forth ? receiver : sender).on_frame(frame, now_us);
     arrived = arrived || (forth && whole == Text(record.bytes));
     const auto us = record.time.count();

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .log: what `candump -L` prints, a frame a line, as a source and a sink.
+// .log, the output of `candump -L`, one frame a line, as a source and a sink:
 //
 //     (1436509052.249713) vcan0 244#2A366C2B
 //
-// Times count from 1970. Those of candump -tz count from the first frame, which the user may date.
+// Times are relative to 1970; with candump -tz to the first frame, which the user may date.
 //
-// A recording has datagrams, not frames. The sink makes the frames of them that boards and hosts send, flow control
-// included, all at the record's time: by the CanNode of both ends.
+// A recording holds datagrams, not frames. The sink creates the frames that boards and hosts would
+// send, with flow control, using a CanNode for each end. All frames get the record's time.
 #pragma once
 
 #include <cstdint>
@@ -22,11 +22,11 @@ namespace r4::tool {
 
 class CandumpSource final : public Source {
  public:
-  // `start`: when the first frame was, where times do not count from 1970.
+  // `start`: time of the first frame, if times are not relative to 1970.
   CandumpSource(RecordingVisitor& visitor, std::string name,
                 std::optional<Time> start = std::nullopt)
       : visitor_(visitor), records_(visitor), name_(std::move(name)), start_(start) {}
-  // True if a log of frames may have that line.
+  // True if the line is a valid line of a log.
   static bool recognises(std::string_view line);
   void feed(std::string_view bytes) override;
   void finish() override;
@@ -44,9 +44,9 @@ class CandumpSource final : public Source {
   const std::optional<Time> start_;
   NumberedLines lines_;
   bool recognised_ = false;
-  bool undated_ = false;  // a frame without a time was told
+  bool undated_ = false;
   std::uint64_t frames_ = 0;
-  std::uint64_t first_us_ = 0;  // as the log counts
+  std::uint64_t first_us_ = 0;  // in the log's own time
   std::uint64_t latest_us_ = 0;
 };
 
@@ -54,7 +54,7 @@ class CandumpSink final : public Sink {
  public:
   explicit CandumpSink(Output& output) : output_(output) {}
   void on_comment(std::string_view, Time) override {}
-  // Throws Error{data} where the recording has nothing that went over a CAN bus.
+  // Throws Error{data} if the recording has no path over a CAN bus.
   void on_path(const RecordedPath& path, Time time) override;
   void on_record(const Record& record) override;
   void finish() override;
@@ -71,10 +71,10 @@ class CandumpSink final : public Sink {
 
   Output& output_;
   std::map<std::uint16_t, Place> paths_;
-  std::string elsewhere_;  // the URL of a path that is no CAN bus
+  std::string elsewhere_;  // URL of a path that is not a CAN bus
   std::string text_;
   std::uint64_t written_ = 0;
-  std::uint64_t others_ = 0;  // events, and datagrams that no transfer holds or of other paths
+  std::uint64_t others_ = 0;  // events, and datagrams that cannot be written
 };
 
 }  // namespace r4::tool

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What every format of recordings is to `r4 convert`: a source that tells what is in a file, or a sink that makes a
-// file of it, in constant memory however long the recording is.
+// Interfaces of `r4 convert` to every format: a source reads a file, a sink writes one. Memory is
+// constant for any length of recording.
 //
 //     file --> Source --(RecordingVisitor)--> Conversion --> Sink --> Output
 #pragma once
@@ -17,51 +17,46 @@
 
 namespace r4::tool {
 
-// Tells a RecordingVisitor what is in a file. What cannot be read is told as damage, with the line 0 where
-// the format has none, and the rest is read.
+// Reports the content of a file to a RecordingVisitor. Unreadable parts are reported as damage
+// (line 0 if the format has no lines), and reading continues.
 class Source {
  public:
   virtual ~Source() = default;
-  // Takes the next bytes. Throws Error{data} for a file of another kind.
+  // Takes the next bytes. Throws Error{data} if the file has another format.
   virtual void feed(std::string_view bytes) = 0;
-  // The file has ended. Throws Error{data} if it was of another kind.
+  // Call at the end of the file. Throws Error{data} if the file had another format.
   virtual void finish() = 0;
 };
 
-// Where a sink writes to.
 class Output {
  public:
-  // Throws Error.
   virtual void write(std::string_view bytes) = 0;
 
  protected:
   ~Output() = default;
 };
 
-// Makes a file of what it is told. Each throws Error when the file cannot be written, or cannot hold that.
+// Writes a file. Each function throws Error if the file cannot be written or cannot hold the data.
 class Sink {
  public:
   virtual ~Sink() = default;
-  // Does it want to be told of all paths and records by survey() first? Where a file can be read once only, it is not.
+  // True if survey() should get everything first, if the input can be read twice.
   virtual bool wants_survey() const { return false; }
   virtual void survey(const RecordedPath& path) { static_cast<void>(path); }
   virtual void survey(const RecordedDevice& device) { static_cast<void>(device); }
   virtual void survey(const Record& record) { static_cast<void>(record); }
-  // A line that begins with #; such lines have no time of their own, so it is that of the record before, and of the
-  // first one for those at the beginning.
+  // A line that begins with #. `time`: of the previous record, else of the first record.
   virtual void on_comment(std::string_view line, Time time) = 0;
   virtual void on_path(const RecordedPath& path, Time time) = 0;
-  // Comes before its line does by on_comment(); that of a header, too.
+  // Precedes on_comment() for the same line; so does on_header().
   virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
   virtual void on_header() {}
   virtual void on_record(const Record& record) = 0;
-  // All was told.
   virtual void finish() = 0;
-  // What of it the file does not hold, for people: "12 that are no state"; empty: it holds everything.
+  // The missing part, for people: "12 that are no state"; empty: nothing is missing.
   virtual std::string left_out() const { return {}; }
 };
 
-// A first look at a recording for a sink.
 class Survey final : public RecordingVisitor {
  public:
   explicit Survey(Sink& sink) : sink_(sink) {}
@@ -74,28 +69,26 @@ class Survey final : public RecordingVisitor {
   Sink& sink_;
 };
 
-// From a source to a sink.
 class Conversion final : public RecordingVisitor {
  public:
   using TellDamage = std::function<void(const RecordingDamage&)>;
 
   Conversion(Sink& sink, TellDamage tell) : sink_(sink), tell_(std::move(tell)) {}
 
-  // Whatever the source is, no secret gets into another file.
+  // Removes secrets, whatever the source.
   void on_record(const Record& record) override;
   void on_path(const RecordedPath& path) override;
   void on_comment(std::string_view line) override;
   void on_header() override { sink_.on_header(); }
   void on_device(const RecordedDevice& device) override { sink_.on_device(device); }
   void on_damage(const RecordingDamage& damage) override;
-  // The source has ended.
   void finish();
 
   std::uint64_t records() const { return records_; }
   std::uint64_t damage() const { return damage_; }
 
  private:
-  // So many lines wait for the first record's time; a file that has more is none that r4 wrote.
+  // Lines that may wait for the first record's time. r4 writes no file with more.
   static constexpr std::size_t most_waiting = 1000;
   struct Waiting {
     bool is_path;
@@ -107,10 +100,10 @@ class Conversion final : public RecordingVisitor {
 
   Sink& sink_;
   const TellDamage tell_;
-  std::vector<Waiting> waiting_;  // until begun_
+  std::vector<Waiting> waiting_;
   RecordRoom room_;
   bool begun_ = false;
-  Time time_{0};  // of the newest record
+  Time time_{0};
   std::uint64_t records_ = 0;
   std::uint64_t damage_ = 0;
 };

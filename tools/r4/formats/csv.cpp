@@ -15,9 +15,8 @@ namespace {
 
 std::string_view view(Text text) { return {text.data(), text.size()}; }
 
-// A text of others as a cell (RFC 4180), in which a spreadsheet finds no formula: an apostrophe
-// stands before each character that begins one, at the start and after what may separate cells
-// elsewhere.
+// Appends foreign text as a cell (RFC 4180) in which no spreadsheet finds a formula. An apostrophe
+// precedes each character that starts a formula, at the start and after possible separators.
 void append_cell(std::string& out, std::string_view others) {
   static constexpr std::string_view formula = "=+-@";
   static constexpr std::string_view separators = " ,;|\"'";
@@ -40,7 +39,7 @@ void append_cell(std::string& out, std::string_view others) {
   out += '"';
 }
 
-// Of devices; what a table can have is less.
+// Columns of devices; spreadsheets allow fewer.
 constexpr std::size_t most_columns = 4096;
 
 }  // namespace
@@ -79,7 +78,7 @@ void CsvSink::on_header() {
   states_.clear();
 }
 
-// Nothing for a record that has no state's fields.
+// Null for a record without state fields.
 const State* CsvSink::read(const Record& record) {
   const State* const state = states_.take(record);
   return state != nullptr && !state->present.empty() ? state : nullptr;
@@ -122,7 +121,7 @@ void CsvSink::on_record(const Record& record) {
     return;
   }
   const Datagram& datagram = states_.datagram();
-  // A field's values as they came: take() has found that they are numbers, and how many.
+  // The original text of the values: take() has checked their form and number.
   std::array<std::string_view, state_field_count + 1> values;
   for (const Field& field : datagram) {
     values[static_cast<std::size_t>(state_field(field.name()))] = view(field.values());

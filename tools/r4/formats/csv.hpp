@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .csv: the states of a recording, a row each, a column a value with its unit in the header (RFC 4180).
+// .csv: one row for each state, one column for each value, with its unit in the header (RFC 4180).
 //
 //     time [s],path,board,PNum,T [ms],AIN24 [V],OSMC1 pwm [0-4095],OSMC1 direction [0/1]
 //     1795468293.405588,1,left-arm,7434,79090,24.28,400,1
@@ -19,9 +19,9 @@ namespace r4::tool {
 
 class CsvSink final : public Sink {
  public:
-  // What devices have measured has columns, too: those named, or else those of the recording.
+  // Device values get columns too: of `devices`, or else of the recording's devices.
   explicit CsvSink(Output& output, std::vector<Device> devices = {});
-  // The columns are those of the fields that were there; of all fields if nothing was surveyed.
+  // Columns are the surveyed fields, or all fields if nothing was surveyed.
   bool wants_survey() const override { return true; }
   void survey(const RecordedPath& path) override { names_.on_path(path); }
   void survey(const RecordedDevice& device) override;
@@ -37,9 +37,9 @@ class CsvSink final : public Sink {
  private:
   const State* read(const Record& record);
   void write_header();
-  // A value of a device, whichever path's.
+  // Shared by all paths.
   struct DeviceColumn {
-    std::string device;  // "bno055@0x28"
+    std::string device;
     std::string value;
     std::string unit;
   };
@@ -55,8 +55,8 @@ class CsvSink final : public Sink {
   FieldSet columns_;
   bool begun_ = false;
   std::string row_;
-  std::uint64_t others_ = 0;  // records that are no state
-  std::string late_;          // a device that is told when the columns are written
+  std::uint64_t others_ = 0;
+  std::string late_;  // a device reported after the columns were written
 };
 
 }  // namespace r4::tool

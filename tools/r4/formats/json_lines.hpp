@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .jsonl: every record of a recording, one JSON object a line, its datagram as `r4 decode` shows it.
+// .jsonl: one JSON object for each record, its datagram as in `r4 decode`.
 //
-//     {"time":1795468293.405588,"path":1,"board":"left-arm","from":"board","ok":true,"type":"state",…}
-//     {"time":1795468293.404765,"path":1,"board":"left-arm","type":"event","event":"up udp://192.168.0.125"}
+//     {"time":1795468293.405588,"path":1,"board":"arm","from":"board","ok":true,"type":"state",…}
+//     {"time":1795468293.404765,"path":1,"board":"arm","type":"event","event":"up udp://10.0.0.7"}
 #pragma once
 
 #include <string>
@@ -18,16 +18,14 @@
 
 namespace r4::tool {
 
-// What a record is, as JSON, appended to `object`: a datagram's `from`, `ok`, `type`, `pnum`, `t`, `fields`, `text`, or
-// an event's `type` and `event`. Bytes that are no printable ASCII are \xNN in `text` and `event`.
+// Appends a record to `object`: a datagram's `from`, `ok`, `type`, `pnum`, `t`, `fields`, `text`,
+// or an event's `type` and `event`. Bytes that are not printable ASCII become \xNN.
 void add_record_json(Json& object, const Record& record);
 
-// Adds what devices have measured in a record that is a state:
-// "devices":{"bno055@0x28":{"accel_x":0.02,…}}; null is no measurement.
+// Adds device values: "devices":{"bno055@0x28":{"accel_x":0.02,…}}; null: not valid.
 class MeasuredJson {
  public:
   void add_to(Json& object, const Record& record, const RecordedDevices& devices);
-  // Another recording begins, whose paths may be others.
   void on_header() { states_.clear(); }
 
  private:
@@ -36,7 +34,7 @@ class MeasuredJson {
 
 class JsonLinesSink final : public Sink {
  public:
-  // What devices have measured is told, too: those named, or else those of the recording.
+  // Adds values of `devices`, or else of the recording's devices.
   explicit JsonLinesSink(Output& output, std::vector<Device> devices = {})
       : output_(output), devices_(std::move(devices)) {}
   bool wants_survey() const override { return true; }

@@ -6,7 +6,7 @@
 namespace r4::tool {
 namespace {
 
-// A frame of zstd holds so much text: what is damaged costs no more.
+// Bytes of text in a zstd frame: damage costs at most one frame.
 constexpr std::size_t frame_text = 1 << 20;
 
 }  // namespace

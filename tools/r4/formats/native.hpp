@@ -21,7 +21,7 @@ class NativeSource final : public Source {
   RecordingReader reader_;
 };
 
-// Writes the lines that it is told as they were. What comes from another format gets a header and an end of its own.
+// Writes lines unchanged. Data from another format gets its own header and end.
 class NativeSink final : public Sink {
  public:
   NativeSink(Output& output, bool compressed);
@@ -37,10 +37,10 @@ class NativeSink final : public Sink {
   Output& output_;
   std::optional<ZstdWriter> zstd_;
   bool begun_ = false;
-  bool ours_ = false;       // the header
-  bool told_when_ = false;  // it begins
-  bool ended_ = false;      // the newest record says so
-  Time time_{0};            // of the newest record
+  bool ours_ = false;       // the header is r4's own
+  bool told_when_ = false;  // the start time has been written
+  bool ended_ = false;
+  Time time_{0};
   std::string text_, compressed_;
 };
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A whole number in a text.
 #pragma once
 
 #include <charconv>
@@ -9,7 +8,7 @@
 
 namespace r4::tool {
 
-// Nothing unless the whole text is a number that the type can hold.
+// Empty unless the whole text is a number within the type's range.
 template <class Number>
 std::optional<Number> number_in(std::string_view text, int base = 10) {
   Number number = 0;

@@ -26,7 +26,7 @@ OutputFile::OutputFile(std::string path, bool replace)
                   "name another file, or replace it: --force");
     }
   }
-  // Without a name, so that nothing is left of it whatever ends this program. Not every file system has that.
+  // An unnamed file disappears if the program ends early. Not every file system supports O_TMPFILE.
   const std::size_t slash = path_.rfind('/');
   const std::string folder = slash == std::string::npos ? "." : path_.substr(0, slash + 1);
   int file = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
@@ -58,7 +58,7 @@ void OutputFile::finish() {
   }
   const unsigned flags = replace_ ? 0 : RENAME_NOREPLACE;
   if (::renameat2(AT_FDCWD, part_.c_str(), AT_FDCWD, path_.c_str(), flags) != 0) {
-    // Not every file system knows that flag.
+    // Not every file system supports RENAME_NOREPLACE.
     if (errno != EINVAL || ::rename(part_.c_str(), path_.c_str()) != 0) fail(errno);
   }
   file_.reset();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The file that a conversion makes. It is there as a whole or not at all.
+// The file appears complete or not at all.
 #pragma once
 
 #include <cstdio>
@@ -18,15 +18,15 @@ using FilePointer = std::unique_ptr<std::FILE, CloseFile>;
 
 class OutputFile final : public Output {
  public:
-  // Makes it. Throws Error if there is such a file, unless `replace`.
+  // Throws Error if the file exists and `replace` is false.
   OutputFile(std::string path, bool replace);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  // Throws Error when the disk is full.
+  // Throws Error, for example if the disk is full.
   void write(std::string_view bytes) override;
-  // All is written. Throws Error.
+  // Completes the file and gives it its name. Throws Error.
   void finish();
   const std::string& path() const { return path_; }
 
@@ -34,7 +34,7 @@ class OutputFile final : public Output {
   [[noreturn]] void fail(int error) const;
 
   const std::string path_;
-  std::string part_;  // its name before that, if it has one
+  std::string part_;  // temporary name, if O_TMPFILE is not supported
   FilePointer file_;
   bool named_ = false;
   const bool replace_;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What people call the paths of a recording.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +11,15 @@ namespace r4::tool {
 
 class PathNames {
  public:
-  // A path tells the board's name once that is known, which is not forgotten then.
+  // Once known, the name of a path's board is kept.
   void on_path(const RecordedPath& path) {
     Path& known = paths_[path.number];
     if (known.url == path.url && path.name.empty()) return;
     known = {path.url, path.name};
   }
-  // The name of the board there, and how it is reached; empty if that was not told.
+  // Name and URL of the path's board; empty if unknown.
   const std::string& name_of(std::uint16_t number) const { return path_of(number).name; }
   const std::string& url_of(std::uint16_t number) const { return path_of(number).url; }
-  // The one, or else the other.
   const std::string& of(std::uint16_t number) const {
     const Path& path = path_of(number);
     return path.name.empty() ? path.url : path.name;

@@ -9,7 +9,7 @@
 namespace r4::tool {
 namespace {
 
-// What a recording of a thousand boards tells, and of whatever else it is made up.
+// Enough for a recording of a thousand boards; limits memory for damaged or malicious files.
 constexpr std::size_t most_devices = 8000;
 constexpr std::size_t most_problems = 1000;  // bytes
 

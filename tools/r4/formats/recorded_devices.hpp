@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whose bytes are whose in a recording: the devices that it describes, of each path, or instead of them those that the
-// user has named, of every path.
+// Assigns bytes in a recording to its own devices, by path, or to the user's, for every path.
 #pragma once
 
 #include <cstdint>
@@ -17,18 +16,17 @@ class RecordedDevices {
  public:
   explicit RecordedDevices(std::vector<Device> named);
 
-  // The recording tells of one, instead of what has had its address or slots. Nothing if it is not taken.
+  // Replaces devices with the same address or slots. Returns null if the device is not accepted.
   const Device* on_device(const RecordedDevice& told);
-  // Another recording begins, whose paths may be others.
   void on_header();
 
   struct Known {
-    std::uint16_t path;  // no_path: each
+    std::uint16_t path;  // no_path: every path
     Device device;
     bool is_of(std::uint16_t number) const { return path == no_path || path == number; }
   };
   const std::vector<Known>& all() const { return all_; }
-  // Why some are none, for people; empty: all are understood.
+  // Why some devices were not accepted, for people; empty: all were.
   const std::string& problems() const { return problems_; }
 
  private:

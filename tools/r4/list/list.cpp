@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 list: prints what r4::discover() finds, and the URLs that r4 knows.
 #include <fmt/format.h>
 
 #include <cstdint>
@@ -31,8 +30,6 @@ std::vector<FoundBoard> boards_at(const Discovery& all, const std::string& place
   }
   return boards;
 }
-
-// --- as text
 
 std::string text_of(const FoundBoard& board) {
   std::string text = "it does not tell who it is";
@@ -108,8 +105,6 @@ void print_networks(const Discovery& all) {
   }
   if (all.more) print_text("  more than {} answered\n", Discovery::most_answers);
 }
-
-// --- as JSON
 
 void describe(const FoundBoard& board, Json& object) {
   if (board.identity) {

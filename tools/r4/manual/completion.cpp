@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 completion: scripts for bash, zsh and fish, made from the option tree so that they cannot lag
-// behind. That for fish is in fish_completion.cpp.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -35,8 +33,6 @@ std::string shell_quoted(std::string_view text) {
   }
   return out + "'";
 }
-
-// --- bash
 
 std::string joined_option_names(const CLI::App& command) {
   std::vector<std::string> words;
@@ -119,9 +115,7 @@ complete -F _r4 r4
   return script;
 }
 
-// --- zsh
-
-// Text inside the brackets or the colon-separated parts of an _arguments specification.
+// Escapes text in brackets or between colons of an _arguments specification.
 std::string zsh_text(std::string_view text) {
   std::string out;
   for (const char c : text) {

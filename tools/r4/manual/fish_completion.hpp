@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The completion script of fish.
 #pragma once
 
 #include <string>

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 man: the manual pages, made of what --help prints from.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>

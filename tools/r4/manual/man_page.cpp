@@ -17,7 +17,7 @@
 namespace r4::tool {
 namespace {
 
-// Words as they are: nothing in them is a request, a hyphen can be copied and searched for.
+// Escapes words for troff. Hyphens stay searchable and can be copied.
 std::string escaped(std::string_view text) {
   std::string out;
   for (const char c : text) {
@@ -53,7 +53,7 @@ std::string escaped(std::string_view text) {
 std::string bold(std::string_view text) { return "\\fB" + escaped(text) + "\\fR"; }
 std::string italic(std::string_view text) { return "\\fI" + escaped(text) + "\\fR"; }
 
-// Text that is filled. Checkers want 80 bytes a line, of which some take several for a character.
+// Filled text. Checkers want at most 80 bytes a line, and a character may take several bytes.
 std::string filled(std::string_view text) {
   constexpr std::size_t longest = 66;
   std::string out;
@@ -76,11 +76,11 @@ std::string today() {
   return fmt::format("{:%Y-%m-%d}", fmt::gmtime(now));
 }
 
-// Lines that are indented stay as they are, the others are text that is filled.
+// Keeps indented lines as they are and fills the other lines.
 std::string body_of(const std::vector<std::string>& lines) {
   std::string out;
   bool verbatim = false;
-  bool apart = false;  // something is above, from which what follows is set apart
+  bool apart = false;
   const auto end_verbatim = [&] {
     if (verbatim) out += ".EE\n";
     apart = apart || verbatim;
@@ -107,7 +107,7 @@ std::string body_of(const std::vector<std::string>& lines) {
   return out;
 }
 
-// The footer of the help, taken apart into what has a section of its own and the rest.
+// The footer of the help, split into man page sections.
 struct Footer {
   std::vector<std::string> description;
   std::vector<std::string> examples;
@@ -117,7 +117,7 @@ struct Footer {
 Footer footer_of(const CLI::App& command) {
   Footer parts;
   std::vector<std::string>* section = &parts.description;
-  bool begins = true;  // a paragraph
+  bool begins = true;
   for (std::string line : CLI::detail::split(command.get_footer(), '\n')) {
     if (begins) {
       section = &parts.description;

@@ -8,11 +8,11 @@
 
 namespace r4::tool {
 
-// "r4", or "r4-send" of a subcommand.
+// "r4", or "r4-send" for a subcommand.
 std::string page_name(const CLI::App& root, const CLI::App& command);
 
-// The page of `command`, which is `root` or a subcommand of it: its arguments, its options and the footer of its help,
-// whose examples and exit codes become sections. Dated by SOURCE_DATE_EPOCH, else today.
+// The page of `command`, which is `root` or its subcommand. Examples and exit codes of the help's
+// footer become sections. Dated by SOURCE_DATE_EPOCH, else today.
 std::string man_page(const CLI::App& root, const CLI::App& command);
 
 }  // namespace r4::tool

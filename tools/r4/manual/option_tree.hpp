@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The tree of subcommands and options as those read it who write it down: the completion of a shell, the man pages.
 #pragma once
 
 #include <string>
@@ -11,7 +10,6 @@ namespace r4::tool {
 
 bool takes_value(const CLI::Option& option);
 
-// "-h", "--help": all the names of an option.
 std::vector<std::string> names_of(const CLI::Option& option);
 
 std::vector<const CLI::Option*> options_of(const CLI::App& command);
@@ -20,7 +18,7 @@ std::vector<const CLI::Option*> positionals_of(const CLI::App& command);
 // The choices of a value, as words ("bash zsh"); empty for a free value.
 std::string choices_of(const CLI::Option& option);
 
-// What may begin a URL: the fixed start of each usage, "udp://", "serial:".
+// The fixed starts of URLs: "udp://", "serial:".
 std::vector<std::string> url_beginnings();
 
 }  // namespace r4::tool

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 convert: a recording in another format.
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -34,7 +33,6 @@ struct ConvertOptions {
   std::vector<std::string> devices;
 };
 
-// How far it is, on a terminal.
 class Progress {
  public:
   explicit Progress(const std::string& path) : shown_(::isatty(STDERR_FILENO) != 0) {

@@ -14,9 +14,9 @@
 namespace r4::tool {
 namespace {
 
-// How much text without a line of any format is looked at.
+// Bytes of text searched for a line of a known format.
 constexpr std::size_t patience = 65536;
-// How much of a file without text is kept: a skippable frame may be as long as it likes.
+// Limit on the stored beginning of a file: a skippable zstd frame may have any length.
 constexpr std::size_t most_kept = 1 << 20;
 
 }  // namespace
@@ -46,8 +46,8 @@ void DetectedSource::finish() {
   source_->finish();
 }
 
-// Until the format is known, the file is kept: a native recording is read from its beginning, for it tells where damaged
-// compression is in its lines.
+// Keeps the file until its format is known: a native recording is read from its beginning, because
+// it reports the line numbers of damaged compression.
 void DetectedSource::take_compressed(std::string_view bytes) {
   while (zstd_) {
     const std::size_t before = bytes.size();
@@ -74,7 +74,6 @@ void DetectedSource::take(std::string_view text) {
   if (const std::optional<Format> format = detect(false)) decide(*format);
 }
 
-// What the text is; nothing if more of it is needed.
 std::optional<DetectedSource::Format> DetectedSource::detect(bool at_end) {
   if (text_.size() < form_bytes && !at_end) return std::nullopt;
   const FileForm form = form_of(text_);
@@ -105,7 +104,7 @@ std::optional<DetectedSource::Format> DetectedSource::detect(bool at_end) {
   return text.size() == patience ? std::optional(named()) : std::nullopt;
 }
 
-// Whatever else is in the file: the errors of that format are those that the user expects.
+// Decides by the file's name, so that errors refer to the format that the user expects.
 DetectedSource::Format DetectedSource::named() const {
   const std::string_view name = name_;
   if (name.ends_with(".log")) return Format::candump;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A file of whatever form, told by what it holds: a native recording, a log of candump, a capture or an MCAP file; each
-// also compressed by zstd. Its name decides only where nothing in its first 64 KiB does.
+// Detects a file's format by its content: native recording, candump log, capture or MCAP, each also
+// compressed by zstd. The name decides only if the first 64 KiB do not.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ class DetectedSource final : public Source {
  public:
   DetectedSource(RecordingVisitor& visitor, std::string name, const SourceOptions& options)
       : visitor_(visitor), name_(std::move(name)), options_(options) {}
-  // Throws Error{data} for a form that is not read.
+  // Throws Error{data} for a format that cannot be read.
   void feed(std::string_view bytes) override;
   void finish() override;
 
@@ -34,12 +34,12 @@ class DetectedSource final : public Source {
   RecordingVisitor& visitor_;
   const std::string name_;
   const SourceOptions options_;
-  std::unique_ptr<Source> source_;    // once the format is known
-  std::string file_;                  // what has come until then
-  std::string text_;                  // the same, not compressed
-  std::size_t looked_at_ = 0;         // of the text
-  std::unique_ptr<ZstdReader> zstd_;  // unless the source does it
-  std::uint64_t taken_ = 0;           // bytes of the file that zstd_ has had
+  std::unique_ptr<Source> source_;
+  std::string file_;  // the file until the format is known
+  std::string text_;  // file_, decompressed
+  std::size_t looked_at_ = 0;
+  std::unique_ptr<ZstdReader> zstd_;  // null if the source decompresses by itself
+  std::uint64_t taken_ = 0;
   RecordLine line_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The formats of recordings that r4 reads, by what is in a file, and writes, by the ending of its name.
+// Formats of recordings: detected by content for reading, by the name's ending for writing.
 #pragma once
 
 #include <cstddef>
@@ -15,25 +15,23 @@
 
 namespace r4::tool {
 
-// So many places of damage are told; of more than that, how many.
+// Damaged places reported one by one; more are only counted.
 constexpr std::size_t most_damage = 20;
 
-// What people call the file of that name: "-" is the standard input.
+// The name for messages; "-" is standard input.
 std::string called(const std::string& path);
 
 struct SourceOptions {
-  std::uint16_t port = board_port;  // of boards in a capture of UDP
-  std::optional<Time> start;        // of a log of candump whose times count from its first frame
+  std::uint16_t port = board_port;  // UDP port of boards in a capture
+  std::optional<Time> start;        // time of the first frame of a candump log with relative times
 };
 
-// Reads the file of that name, "-" being the standard input, whatever its format. Throws Error{usage} for a format that
-// is only written.
+// Reads a file of any format; "-" is standard input. Throws Error{usage} for a write-only format.
 std::unique_ptr<Source> make_source(const std::string& path, RecordingVisitor& visitor,
                                     const SourceOptions& options = {});
 
-// Writes the file of that name. Throws Error{usage} where its ending is none that is written.
-// Of `devices` .csv, .jsonl and .mcap tell what they have measured, instead of those of the recording; Error{usage} for
-// them with another.
+// Throws Error{usage} for an unknown ending, and for `devices` with a format other than .csv,
+// .jsonl and .mcap. These show the values of `devices` instead of the recording's own devices.
 std::unique_ptr<Sink> make_sink(const std::string& path, Output& output,
                                 std::vector<Device> devices = {});
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 info: what is in a recording, and what of it cannot be read.
 #include <memory>
 #include <string>
 #include <vector>

@@ -18,10 +18,8 @@ struct Unit {
 };
 constexpr std::array<Unit, 3> sizes{{{"K", 1000}, {"M", 1'000'000}, {"G", 1'000'000'000}}};
 constexpr std::array<Unit, 3> times{{{"s", 1}, {"min", 60}, {"h", 3600}}};
-// A million gigabytes, or hours, are more than anybody has.
 constexpr std::uint64_t most = 1'000'000;
 
-// A whole number with one of the units; nothing if it is not that.
 template <std::size_t n>
 std::optional<std::uint64_t> read(std::string_view text, const std::array<Unit, n>& units) {
   const std::size_t digits = std::min(text.find_first_not_of("0123456789"), text.size());

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 plot: curves of a recording as a picture, which Python's matplotlib draws.
 #include <fmt/format.h>
 #include <spawn.h>
 #include <sys/mman.h>
@@ -41,9 +40,9 @@ struct PlotOptions {
   bool force = false;
 };
 
-// A field as it was asked for: "AIN24", "left-arm:AIN24".
+// A requested field: "AIN24", "left-arm:AIN24".
 struct Wanted {
-  std::string board;  // its name, URL or number of path; empty: all
+  std::string board;  // name, URL or path number; empty: all boards
   StateField field;
 };
 
@@ -74,13 +73,13 @@ bool has_direction(StateField field) {
   return form == FieldForm::drive || form == FieldForm::bldc;
 }
 
-// What a curve is drawn of: seconds and values.
+// times in seconds
 struct Curve {
   std::vector<double> times, values;
 };
 
 struct Span {
-  int reason;  // SafeReason; -1: the board said nothing
+  int reason;  // SafeReason; -1: the board was silent
   Time from, to;
 };
 
@@ -90,7 +89,7 @@ struct PlottedPath {
   std::vector<Span> spans;
   SafeReason safe = SafeReason::none;
   Time safe_since{0};
-  Time last{0};  // that it was heard
+  Time last{0};
   bool heard = false;
 };
 
@@ -123,7 +122,6 @@ class Curves final : public RecordingVisitor {
     be_safe(path, heartbeat_report(datagram).reason, record.time);
     if (kind == MessageKind::state) take(path, state, record.time);
   }
-  // All is read.
   void finish() {
     for (auto& [number, path] : paths_) end_safe(path, path.last);
   }
@@ -164,7 +162,7 @@ class Curves final : public RecordingVisitor {
       const double value = has_direction(each.field) && numbers[1] == 0 ? -numbers[0] : numbers[0];
       Curve& curve = path.curves[each.field];
       const double at = seconds_of(now);
-      if (!curve.times.empty() && curve.times.back() == at) continue;  // it was asked for twice
+      if (!curve.times.empty() && curve.times.back() == at) continue;  // requested twice
       curve.times.push_back(at);
       curve.values.push_back(value);
     }
@@ -177,7 +175,6 @@ class Curves final : public RecordingVisitor {
   std::uint64_t damage_ = 0;
 };
 
-// "V", "t [ms]", "pwm [±4095]".
 std::string unit_of(StateField field) {
   const auto& [name, unit] = kind_row_of(field).values[0];
   if (has_direction(field)) return fmt::format("{} [±{}]", name, pwm_max);
@@ -189,7 +186,6 @@ std::string unit_of(StateField field) {
               "free some memory, or plot fewer fields");
 }
 
-// A file without a name, which another program reads or writes.
 FilePointer make_memory(const char* name) {
   const int descriptor = ::memfd_create(name, MFD_CLOEXEC);
   FilePointer memory(descriptor < 0 ? nullptr : ::fdopen(descriptor, "w+b"));
@@ -201,7 +197,7 @@ void write_all(const FilePointer& memory, const void* bytes, std::size_t size) {
   if (std::fwrite(bytes, 1, size, memory.get()) != size) fail_for_memory();
 }
 
-// What Python is told (plot.py); the spans are those of the boards that have curves.
+// The input of plot.py. Spans are those of boards with curves.
 FilePointer make_plan(const Curves& curves, const std::vector<Wanted>& wanted,
                       const std::string& title, const std::string& format) {
   Json plan{{"title", printable(title)},
@@ -249,8 +245,9 @@ FilePointer make_plan(const Curves& curves, const std::vector<Wanted>& wanted,
   return input;
 }
 
-// Runs plot.py; its exit code, or nothing if there is no such Python. It runs in the root directory: Python imports what
-// is in the working directory, matplotlib reads its settings there, and files that were downloaded may lie there.
+// Runs plot.py and returns its exit code; empty if that Python does not exist. Runs in the root
+// directory: Python imports modules from the working directory, and matplotlib reads its settings
+// there, so downloaded files could be executed.
 std::optional<int> run_python(const char* python, const FilePointer& plan,
                               const FilePointer& picture) {
   std::rewind(plan.get());
@@ -271,9 +268,9 @@ std::optional<int> run_python(const char* python, const FilePointer& plan,
   return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
 }
 
-// What plot.py draws. Who has a Python of their own, in which there is no matplotlib, may have the system's.
+// Runs plot.py. If the user's own Python has no matplotlib, tries the system's Python.
 FilePointer draw(const FilePointer& plan) {
-  constexpr int no_matplotlib = 3;  // of plot.py
+  constexpr int no_matplotlib = 3;
   FilePointer picture = make_memory("picture");
   std::optional<int> code = run_python("python3", plan, picture);
   if (!code || *code == no_matplotlib) code = run_python("/usr/bin/python3", plan, picture);

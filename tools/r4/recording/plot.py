@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws what r4 plot has read. Standard input: a line of JSON, then the numbers, little-endian doubles, of the
-curves in their order: all times, then all values; seconds since the beginning. Standard output: the picture.
+"""Draws the curves of r4 plot. Standard input: a line of JSON, then little-endian doubles: for each
+curve all times (seconds since the beginning), then all values. Standard output: the picture.
 
 {"title": …, "format": "svg", "seconds": 12.5,
  "curves": [{"label": …, "unit": …, "count": …}],
- "spans": [{"label": "safe: stop", "reason": 2, "from": 1.0, "to": 2.5}],     reason -1: the board said nothing
- "step": 1.0}                                        curves are broken where they have no number for longer
+ "spans": [{"label": "safe: stop", "reason": 2, "from": 1.0, "to": 2.5}],     reason -1: the board was silent
+ "step": 1.0}                             a longer time without a value interrupts a curve
 
-Exit code 3: there is no matplotlib.
+Exit code 3: matplotlib is not installed.
 """
 import json
 import sys
@@ -20,12 +20,12 @@ try:
 except ImportError:
     sys.exit(3)
 
-# By reason: link, stop, handle, proximity, watchdog, fault; and no datagram at all.
+# By reason: link, stop, handle, proximity, watchdog, fault; -1: no datagram.
 COLOURS = {1: '#ffe08a', 2: '#f4a6a0', 3: '#f7c59f', 4: '#cdb4db', 5: '#a8c5da', 6: '#e78ac3', -1: '#d9d9d9'}
 
 
 def broken(times, values, longest):
-    """With a NaN in each gap, so that no line is drawn through it."""
+    """Inserts NaN into each gap, so that no line is drawn across it."""
     gaps = numpy.flatnonzero(numpy.diff(times) > longest) + 1
     return numpy.insert(times, gaps, numpy.nan), numpy.insert(values, gaps, numpy.nan)
 
@@ -34,7 +34,7 @@ def main():
     data = sys.stdin.buffer
     plan = json.loads(data.readline())
     matplotlib.rcParams.update({'svg.fonttype': 'none', 'svg.hashsalt': 'r4', 'agg.path.chunksize': 20000})
-    if 'text.parse_math' in matplotlib.rcParams:  # a dollar in a name is a dollar
+    if 'text.parse_math' in matplotlib.rcParams:  # show a dollar sign in a name unchanged
         matplotlib.rcParams['text.parse_math'] = False
     units = list(dict.fromkeys(curve['unit'] for curve in plan['curves']))
     figure, axes = pyplot.subplots(len(units), sharex=True, squeeze=False, layout='constrained',

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// plot.py, which the build puts into the program.
+// plot.py, embedded by the build.
 #pragma once
 
 namespace r4::tool {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reading a file of any of the formats.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +9,8 @@
 
 namespace r4::tool {
 
-// Tells the visitor what is in the file of that name, "-" being the standard input. `advance` is told how many bytes were
-// read. Throws Error if it cannot be read, or is of another kind.
+// Reads a file of any format; "-" is standard input. Calls `advance` with the number of bytes of
+// each read. Throws Error if the file cannot be read or has an unknown format.
 void read_file(const std::string& path, RecordingVisitor& visitor,
                const SourceOptions& options = {},
                const std::function<void(std::size_t)>& advance = {});

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 record: watches boards, and writes down what is said.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -47,7 +46,7 @@ RecordingOptions limits_of(const RecordOptions& options) {
   return limits;
 }
 
-// Tells the nodes of the boards on a bus, when they are heard first.
+// Calls on_board() for each board when it is first heard on a bus.
 class BusListener {
  public:
   BusListener(asio::io_context& io, const std::string& interface,
@@ -66,7 +65,7 @@ class BusListener {
   }
 
  private:
-  // The load of the bus is not asked here.
+  // Any rate will do, because the bus load is not used here.
   static constexpr CanBitRate any_rate{1000000, 0};
 
   const std::string url_;
@@ -115,7 +114,7 @@ class Recorders {
   }
 
  private:
-  // A recording that was removed or truncated goes on; one that cannot be written has ended.
+  // A removed or truncated recording continues in a new file; one that cannot be written has ended.
   bool has_ended() const {
     const std::optional<Problem> problem = recording_->problem();
     return problem && problem->kind != ErrorKind::data;
@@ -141,7 +140,7 @@ class Recorders {
   std::optional<Recording> recording_;
   BoardSet boards_;
   std::vector<std::unique_ptr<BusListener>> buses_;
-  bool lost_ = false;  // what was recorded is, and that is told
+  bool lost_ = false;  // a loss of recorded data has been reported
 };
 
 int record(const RecordOptions& options) { return Recorders(options).run(options); }

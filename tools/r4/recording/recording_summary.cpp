@@ -13,9 +13,9 @@
 namespace r4::tool {
 namespace {
 
-// Of a file so damaged that it seems to have more paths, they are counted as one.
+// A badly damaged file may appear to have more paths: they are counted as one.
 constexpr std::size_t most_paths = 1000;
-// More than a board has slots are in no recording but one of many parts.
+// More devices than a board has slots, for recordings of many parts.
 constexpr std::size_t most_devices = 64;
 
 double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
@@ -50,7 +50,7 @@ void RecordingSummary::on_header() {
   ended_ = false;
 }
 
-// What the files of one program have in common is one path.
+// Files of one program may share a path: the number and the URL identify it.
 void RecordingSummary::on_path(const RecordedPath& path) {
   const auto known = std::find_if(paths_.begin(), paths_.end(), [&path](const PathSummary& each) {
     return each.recorded.number == path.number &&

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is in a recording, as `r4 info` tells it. In memory that does not grow with it.
+// Contents of a recording for `r4 info`. Memory does not grow with the recording.
 #pragma once
 
 #include <array>
@@ -14,29 +14,29 @@
 
 namespace r4::tool {
 
-// A board that says nothing for longer than this has a gap: it speaks at least twice a second.
+// A board sends at least twice a second: a longer silence is a gap.
 constexpr Time shortest_gap{std::chrono::seconds{1}};
 
 struct PathSummary {
   RecordedPath recorded;
   std::vector<std::string> devices;  // "bno055@0x28:1"
-  // From the board.
-  std::uint64_t received = 0;  // valid ones
+  // From the board:
+  std::uint64_t received = 0;  // valid datagrams
   std::uint64_t states = 0;
   std::uint64_t damaged = 0;
-  std::uint64_t oversize = 0;  // too long for a datagram
+  std::uint64_t oversize = 0;  // longer than a datagram may be
   PacketTracker packets;
-  Time first{0}, last{0};  // that it was heard
-  // To the board.
+  Time first{0}, last{0};
+  // To the board:
   std::uint64_t sent = 0;
   std::uint64_t heartbeats = 0;
   std::uint64_t stops = 0;
-  // What the board was.
-  SafeReason safe = SafeReason::none;  // now
+  // The board's safe states:
+  SafeReason safe = SafeReason::none;
   Time safe_since{0};
-  Time safe_for{0};  // in all
+  Time safe_for{0};
   std::array<std::uint64_t, safe_reason_count> safe_times{};
-  std::uint64_t downs = 0;  // of the transport
+  std::uint64_t downs = 0;  // transport down
   std::uint64_t gaps = 0;
   Time longest_gap{0};
   Time longest_gap_at{0};
@@ -50,7 +50,6 @@ class RecordingSummary final : public RecordingVisitor {
   void on_record(const Record& record) override;
   void on_damage(const RecordingDamage& damage) override;
 
-  // What people read, and what programs do.
   std::string text(const std::string& name) const;
   Json json(const std::string& name) const;
   bool damaged() const { return damage_count_ != 0; }
@@ -69,17 +68,17 @@ class RecordingSummary final : public RecordingVisitor {
   static void on_sent(PathSummary& path, const Record& record);
   static void be_safe(PathSummary& path, SafeReason reason, Time now);
 
-  // By the number that a path has since the last header, and all of them, by number and URL.
+  // Indexes of paths_ by number since the last header; paths_ is by number and URL.
   std::map<std::uint16_t, std::size_t> numbers_;
   std::vector<PathSummary> paths_;
   bool any_ = false;
   Time first_{0}, last_{0};
   std::uint64_t records_ = 0;
-  std::uint64_t dropped_ = 0;  // by a disk that was too slow
-  std::uint64_t unended_ = 0;  // recordings in the file that have no end
+  std::uint64_t dropped_ = 0;  // dropped because the disk was too slow
+  std::uint64_t unended_ = 0;  // recordings without an end
   bool ended_ = true;
   std::uint64_t damage_count_ = 0;
-  std::vector<Damage> damage_;  // the first of it
+  std::vector<Damage> damage_;
 };
 
 }  // namespace r4::tool

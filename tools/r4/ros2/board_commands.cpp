@@ -18,7 +18,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// The same output?
 bool is_same_output(const Command& a, const Command& b) {
   return a.kind == b.kind && a.channel == b.channel;
 }
@@ -51,7 +50,7 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
   });
   board_.on_arming([this](DisarmCause cause) {
     if (cause == DisarmCause::none) return;
-    // Without the motors' supply the board is not safe yet, and takes nothing but a stop from us now.
+    // Without the motors' supply the board accepts only a stop, but is not safe yet.
     if (cause == DisarmCause::supply && drivers_.any()) stop([](bool, const std::string&) {});
     wanted_.clear();
     drivers_.forget();
@@ -68,12 +67,10 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
   });
 }
 
-// --- setpoints
-
 BoardCommands::Left BoardCommands::on_publishers(const std::string& topic, Left left) {
   return [this, topic, left = std::move(left)](const std::vector<std::uint64_t>& there) {
     say_(LogLevel::info, fmt::format("{}: {} publishers", topic, there.size()));
-    post_wanted();  // what they said last goes out before they are missed
+    post_wanted();  // send the last commands of a publisher before it counts as missing
     if (left) left(there);
   };
 }
@@ -136,7 +133,7 @@ void BoardCommands::post(std::size_t first, std::size_t count) {
   const Drivers::Time now = BootClock::now();
   for (std::size_t i = first; i < first + count; ++i) {
     const Setpoint& each = wanted_[i];
-    // What is to rest is repeated until it does, also if it could not be sent.
+    // A stop is repeated until the output rests, even if it could not be sent.
     if (!result && !Drivers::rests(each.command)) continue;
     drivers_.on_sent(each.command, each.source, each.publisher, now);
   }

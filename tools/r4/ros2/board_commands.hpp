@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What ROS tells a board: R4_Command, a topic for each output component, cmd_vel, stop, arm, and the services.
+// Subscriptions and services of a board: R4_Command, a topic for each output component, cmd_vel,
+// stop, arm.
 //
-// All of it runs on the loop of the boards. What drives an output is gathered until the inbox is drained, the
-// newest of a channel, and leaves in as few datagrams as there can be. A sample older than 250 ms is dropped, as is
-// what comes while there is no link: nothing is kept for later, and an arm() that is under way ends when the link
-// does. A stop is never too old.
+// Runs on the boards' loop. Setpoints are collected until the inbox is drained, the newest of each
+// channel, and sent in as few datagrams as possible. A sample older than 250 ms is dropped, and so
+// is every sample without a link: nothing is kept for later. A lost link ends a running arm(). A
+// stop is never too old.
 #pragma once
 
 #include <asio/cancellation_signal.hpp>
@@ -30,26 +31,27 @@ namespace r4::tool::ros2 {
 
 class BoardCommands {
  public:
-  // What a person should know; called on the loop.
+  // Logs a message for people; called on the loop.
   using Say = std::function<void(LogLevel level, const std::string& text)>;
 
   BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, Inbox& inbox, Outbox& outbox,
                 const NodeOptions& options, Say say);
 
-  // The inbox is drained.
+  // Call when the inbox is drained.
   void flush();
-  // Every 20 ms or so: stops what nobody drives any more.
+  // Call about every 20 ms: stops outputs without a publisher.
   void on_tick();
   using Done = std::function<void(bool done, const std::string& text)>;
   void arm(Done done);
-  // Where it is to be armed as soon as it is there: unless it was stopped before.
+  // Arms once the board is connected, unless it was stopped before.
   void arm_at_first();
 
   std::uint64_t stale() const { return stale_; }
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::milliseconds oldest{250};  // of a command, as it leaves
+  // maximum age of a command when it is sent
+  static constexpr std::chrono::milliseconds oldest{250};
   struct Setpoint {
     Command command;
     const void* source = nullptr;
@@ -75,11 +77,10 @@ class BoardCommands {
   void subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox);
 
   using Left = std::function<void(const std::vector<std::uint64_t>&)>;
-  // Logs how many publishers there are, too.
   template <class Message, class Value>
   void add(Inbox& inbox, const std::string& topic,
            Inbox::Subscription<Message, Value> subscription);
-  // What a service does for a request with that text.
+  // The action of a service; `text` is the text of the request.
   using Act =
       std::function<void(const std::optional<std::string>& text, const Origin&, const Done&)>;
   struct Room {
@@ -95,16 +96,15 @@ class BoardCommands {
   void warn(const std::string& text) const { say_(LogLevel::warning, text); }
   bool is_stale(const std::string& what, const Origin& origin);
   bool is_overtaken(const Origin& origin) const { return origin.written <= stopped_; }
-  // Why the board is not to be told that, in words; empty: nothing is in the way.
+  // The reason not to send that command; empty: none.
   std::string objection_to(const Command& command) const;
   void on_text(const std::string& text, const void* source, const Origin& origin);
   void want(const Command& command, const void* source, const Origin& origin);
   void post_wanted();
   void post(std::size_t first, std::size_t count);
   void tell(const std::string& what, PostResult result);
-  // Is there no link for it? Then that is said: nothing is kept for later.
+  // True if there is no link. Reports it, because nothing is kept for later.
   bool is_without_link(const std::string& what, const Done& done) const;
-  // How long it may still be on its way.
   static AsyncBoard::Duration left_of(const Origin& origin);
   void stop(Done done);
   void repeat_stop();
@@ -118,16 +118,16 @@ class BoardCommands {
   const Say say_;
   Drivers drivers_;
   std::vector<Setpoint> wanted_;
-  std::size_t others_ = 0;  // commands since the last flush() that drive nothing
-  bool resting_ = false;    // what nobody drives is on its way to rest
+  std::size_t others_ = 0;  // commands since the last flush() that drive no output
+  bool resting_ = false;    // a stop of outputs without a publisher is being sent
   bool arming_ = false;
   asio::cancellation_signal give_up_arming_;
-  std::vector<Done> stops_;      // who waits for the stop that is under way
-  bool stopping_ = false;        // one is
-  Clock::time_point stopped_{};  // the newest stop: what was written before does not undo it
+  std::vector<Done> stops_;
+  bool stopping_ = false;
+  Clock::time_point stopped_{};  // newest stop: commands written before it are ignored
   Pressed pressed_;              // on `arm`
   std::uint64_t stale_ = 0;
-  std::vector<std::unique_ptr<int>> sources_;  // what tells the topics apart
+  std::vector<std::unique_ptr<int>> sources_;  // each address identifies a topic
 };
 
 template <class Message, class Value>

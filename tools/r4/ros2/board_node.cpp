@@ -149,7 +149,7 @@ Health BoardNode::health() const {
     health.level = Health::ok;
     health.message = "armed";
   }
-  // One fault more, and the board is lost.
+  // One more failed path may disconnect the board.
   const std::vector<PathStatus> paths = board_.paths();
   for (const PathStatus& path : paths) {
     if (paths.size() < 2 || path.state == PathState::carrying || health.level > Health::warning)
@@ -195,7 +195,7 @@ Health BoardNode::health() const {
   add("commands too old", fmt::format("{}", commands_.stale()));
   add("samples malformed", fmt::format("{}", inbox_.malformed()));
   add("samples dropped", fmt::format("{}", inbox_.dropped()));
-  constexpr std::size_t most_mismatches = 8;  // that are told; a graph may have any number
+  constexpr std::size_t most_mismatches = 8;  // a graph may have any number
   add("mismatches", fmt::format("{}", mismatches_.size()));
   for (std::size_t i = 0; const auto& each : mismatches_) {
     if (++i > most_mismatches) break;
@@ -205,8 +205,8 @@ Health BoardNode::health() const {
 }
 
 void BoardNode::log(LogLevel level, const std::string& told) {
-  const std::string text = printable(told);  // names of other nodes and computers may be in it
-  // The same trouble again and again is told once a second.
+  const std::string text = printable(told);  // may contain names of foreign nodes and computers
+  // Repeated trouble is logged once a second.
   constexpr std::size_t most_kept = 64;
   const Clock::time_point now = Clock::now();
   if (level == LogLevel::info) {
@@ -219,7 +219,7 @@ void BoardNode::log(LogLevel level, const std::string& told) {
   if (said_.size() > most_kept) {
     std::erase_if(said_, [now](const auto& each) { return now - each.second >= 1s; });
   }
-  if (said_.size() > most_kept) return;  // a flood of different ones
+  if (said_.size() > most_kept) return;  // too many different messages
   say(level, text);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One board as one node of ROS 2: what it says goes to the outbox, what is commanded comes from the inbox.
+// One board as a ROS 2 node: publishes through the outbox, gets commands from the inbox.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -27,20 +27,18 @@ namespace r4::tool::ros2 {
 
 class BoardNode {
  public:
-  // What is logged is also told to `logged`, on the loop.
+  // `logged` also gets each log message, on the loop.
   using Logged =
       std::function<void(LogLevel level, const std::string& node, const std::string& text)>;
 
   BoardNode(asio::io_context& io, AsyncBoard& board, Graph& graph, std::size_t node, Inbox& inbox,
             Outbox& outbox, const NodeOptions& options, Logged logged);
 
-  // When the board is open.
+  // Call when the board is open.
   void start();
-  // The inbox is drained.
   void flush() { commands_.flush(); }
   void warn(const std::string& text) { log(LogLevel::warning, text); }
-  // A reader or writer of another participant does not match ours; without a `mismatch` it does, or
-  // has gone.
+  // A foreign reader or writer does not match ours; no `mismatch`: it matches or has left.
   void on_mismatch(const EntityId& who, const std::optional<Mismatch>& mismatch);
   AsyncBoard& board() { return board_; }
   const std::string& name() const { return name_; }
@@ -73,7 +71,7 @@ class BoardNode {
   bool armed_once_ = false;
   bool heard_ = false;
   bool in_control_ = false;
-  std::map<std::string, Clock::time_point> said_;  // what was logged lately
+  std::map<std::string, Clock::time_point> said_;
 };
 
 }  // namespace r4::tool::ros2

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The services of a board: each answers when the board has confirmed what was asked, or with why it has not.
+// Services of a board. Each answers after the board's confirmation, or with a failure's reason.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto arm_patience = 3000ms;  // for its steps
+constexpr auto arm_patience = 3000ms;
 constexpr auto stop_patience = 5000ms;
 constexpr const char* overtaken = ": a stop came after it; ask again when the danger is over";
 
@@ -34,7 +34,7 @@ std::function<void(const CommandResult&)> in_words(const AsyncBoard& board, What
   };
 }
 
-// Whose request it is, and its text: none where it is no string, or the service takes none.
+// A request's client and text; no text if it is malformed or the service takes none.
 struct Request {
   std::uint64_t client = 0;
   std::int64_t number = 0;
@@ -45,7 +45,7 @@ Request request_of(const AddDiagnosticsRequest& request) {
   return {request.client, request.number, text_of(bytes_of(request.load_namespace))};
 }
 
-// The reader of a client that has just come may not be known yet. False: it is not, and nothing was written.
+// Returns false and writes nothing if the reader of a new client is not known yet.
 template <class Response>
 bool answer(dds_entity_t replies, const Request& request, bool done, const std::string& text,
             bool last) {
@@ -132,7 +132,7 @@ void BoardCommands::stop(Done done) {
   if (!stopping_) repeat_stop();
 }
 
-// Until the board confirms it: after an outage it would do again what it did before.
+// Repeats until confirmed: after an outage the board would otherwise resume its previous outputs.
 void BoardCommands::repeat_stop() {
   stopping_ = true;
   board_.async_send(Command::stop(), stop_patience, [this](const CommandResult& result) {
@@ -202,12 +202,12 @@ void BoardCommands::send(const std::optional<std::string>& text, const void* sou
   try {
     const std::vector<OwnCommand> commands = commands_of(*text);
     const LinkStatus& link = board_.link();
-    if (!link.in_control) {  // nothing is kept for later
+    if (!link.in_control) {
       done(false, explain(*text, link).text());
       return;
     }
-    post_wanted();  // what came before goes before
-    // It is repeated until it is too old to be executed.
+    post_wanted();
+    // Repeated until the command is too old.
     const auto left = left_of(origin);
     if (commands.size() == 1 && !joins_groups(Command(commands[0]).kind)) {
       const Command command = commands[0];

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The topics that a board takes commands from.
 #include <fmt/format.h>
 
 #include <utility>
@@ -12,16 +11,15 @@
 namespace r4::tool::ros2 {
 namespace {
 
-constexpr std::size_t most_texts = 16;  // of R4_Command, that wait
-constexpr std::size_t most_others = 4;  // in one turn
+constexpr std::size_t most_texts = 16;  // waiting R4_Command texts
+constexpr std::size_t most_others = 4;
 
 }  // namespace
 
-// NOLINTBEGIN(clang-analyzer-cplusplus.NewDeleteLeaks): it loses sight of a std::function that is moved from a
-// designated initializer.
+// NOLINTBEGIN(clang-analyzer-cplusplus.NewDeleteLeaks): does not follow a std::function that is
+// moved from a designated initializer.
 
-// Subscribe twice, reliable and best effort: a duplicate stop is harmless, and a button of micro-ROS
-// is not missed.
+// Subscribe twice, reliable and best effort: a duplicate stop is harmless, and none is missed.
 void BoardCommands::subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox) {
   for (const bool reliable : {true, false}) {
     Qos qos;
@@ -53,12 +51,11 @@ void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) 
           .urgent = {},
           .take =
               [this](bool pressed, const Origin& origin) {
-                if (origin.writer == EntityId{}) {  // it may have been pressed all along
+                if (origin.writer == EntityId{}) {  // the button may have been pressed before
                   if (!pressed) return;
                   return warn("arm: dropped: its publisher has gone; let it stay for a second");
                 }
-                // Who repeats itself does not arm again what has been stopped since: the edge
-                // counts.
+                // Repeated presses must not arm again after a stop.
                 const bool edge = pressed_.on(origin.writer, pressed);
                 if (!edge || is_stale("arm", origin)) return;
                 if (is_overtaken(origin)) {
@@ -73,7 +70,7 @@ void BoardCommands::subscribe_arm(Graph& graph, std::size_t node, Inbox& inbox) 
 
 void BoardCommands::subscribe_text(Graph& graph, std::size_t node, Inbox& inbox) {
   Qos qos;
-  qos.depth = static_cast<int>(most_texts);  // each may be for another channel
+  qos.depth = static_cast<int>(most_texts);
   const void* const source = sources_.emplace_back(std::make_unique<int>()).get();
   add<StringMessage, std::string>(
       inbox, "R4_Command",
@@ -120,7 +117,7 @@ void BoardCommands::on_text(const std::string& text, const void* source, const O
       }
     } else if (others_ < most_others) {
       ++others_;
-      post_wanted();  // a transfer goes alone, behind what came before it
+      post_wanted();  // a transfer is sent alone, after earlier commands
       if (const PostResult result = board_.post(command); !result) tell(shown(command), result);
     } else {
       warn(fmt::format("a command was dropped: more than {} at once that drive no output ({})",
@@ -189,7 +186,7 @@ void BoardCommands::subscribe_outputs(Graph& graph, std::size_t node, Inbox& inb
                 return Command::servo(n, *pulse);
               });
   }
-  for (int n = 2; n <= relay_channels; ++n) {  // relay 1 is arming's
+  for (int n = 2; n <= relay_channels; ++n) {  // relay 1 is reserved for arming
     subscribe(BoolMessage(), fmt::format("relay{}/command", n), [n](double on) {
       return on == 0 || on == 1 ? std::optional(Command::relay(n, on == 1)) : std::nullopt;
     });
@@ -220,8 +217,7 @@ void BoardCommands::subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox
   subscribe_speed<TwistMessage>(graph, node, inbox, source, [](const TwistMessage& twist) {
     return Speed{twist.linear.x, twist.angular.z, {}};
   });
-  // `ros2 topic echo` does not show a topic of two types, so the second is there when somebody
-  // publishes it.
+  // `ros2 topic echo` cannot show a topic of two types: subscribe to this one on demand.
   const auto subscribe_stamped = [this, &graph, node, &inbox, stamped_source] {
     subscribe_speed<TwistStampedMessage>(
         graph, node, inbox, stamped_source, [](const TwistStampedMessage& message) {
@@ -258,7 +254,7 @@ void BoardCommands::on_speed(const Speed& speed, const void* source, const Origi
   for (std::size_t i = 0; i < setpoints->size(); ++i) want((*setpoints)[i], source, origin);
 }
 
-// What ROS users publish, and what would drive nothing without a word.
+// Warns about topics that ROS users often publish but that would have no effect.
 void BoardCommands::decline(Graph& graph, std::size_t node, const char* topic, const char* why) {
   graph.on_other_type(node, topic, [topic, why](const Announced& writer) {
     return Mismatch{Mismatch::Weight::lost, fmt::format("{}: a publisher ({}) is not heard: {}",

@@ -58,7 +58,7 @@ BoardTopics::BoardTopics(Graph& graph, std::size_t node, const NodeOptions& opti
   }
 }
 
-// The topic of a component; 0 if the field is of none.
+// The topic of a component; 0 if the field has none.
 dds_entity_t BoardTopics::make_topic(Graph& graph, std::size_t node, const StateFieldRow& row) {
   const char* const kind = row_of(row.kind).name;
   switch (row.kind) {
@@ -152,7 +152,7 @@ void BoardTopics::on_state(const State& state, WallTime sampled, std::uint32_t b
   gather_joints(state, sampled, boot);
 }
 
-// Compared as a pulse: the position of a servo that is off is NaN, which never equals itself.
+// Compares pulses: the position of a disabled servo is NaN, which never equals itself.
 void BoardTopics::publish_pulse(StateField servo, int pulse_us, Clock::time_point now) {
   Changing<double>& topic = components_[static_cast<std::size_t>(servo)];
   if (!topic.is_due(pulse_us, now)) return;
@@ -192,7 +192,7 @@ void BoardTopics::publish_range(StateField sensor, double cm, WallTime sampled,
   message.field_of_view = 0.26F;  // the HC-SR04's 15 degrees
   message.min_range = 0.02F;
   message.max_range = proximity_max_cm / 100.0F;
-  // No echo is nothing within reach: REP 117.
+  // No echo means nothing within reach (REP 117).
   message.range =
       cm == 0 ? std::numeric_limits<float>::infinity() : static_cast<float>(cm) / 100.0F;
   (void)dds_write(topic.writer, &message);
@@ -202,7 +202,7 @@ void BoardTopics::gather_joints(const State& state, WallTime sampled, std::uint3
   if (joints_ == 0) return;
   if (gathered_ && gathered_->state.t_ms != state.t_ms) publish_joints();  // a part was lost
   if (!gathered_) gathered_ = Joints{{}, {}, sampled, boot};
-  gathered_->state = state;  // the values of its other parts are still there
+  gathered_->state = state;
   bool all = true;
   for (const StateField field : joint_fields_) {
     if (state.present.has(field)) gathered_->present.add(field);
@@ -274,7 +274,7 @@ void BoardTopics::on_health(const Health& health, WallTime now) const {
 
 void BoardTopics::log(LogLevel level, const std::string& text, WallTime now) const {
   std::string none;
-  // A logger is called as its node, with dots.
+  // A logger has its node's name, with dots.
   std::string logger = node_name_.substr(1);
   std::replace(logger.begin(), logger.end(), '/', '.');
   LogMessage message{};

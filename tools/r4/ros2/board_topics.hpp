@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a board says, on the topics of its node: the paper's three strings (section 8.8), one topic a component in
-// the units of ROS, joints, battery, ranges and diagnostics. Used by the outbox's thread alone, but for its making.
+// The topics of a board: the paper's three strings (section 8.8), one topic for each component in
+// ROS units, joints, battery, ranges and diagnostics. After construction only the outbox's thread
+// uses it.
 //
-// The paper's strings are published with every datagram, the joints with every state; a component when it has changed, and once
-// a second, so that who comes later is told. What is not heard of any more is not repeated.
+// The strings are published with every datagram, joints with every state. A component is published
+// when it changes and once a second, for late subscribers. Missing fields are not repeated.
 #pragma once
 
 #include <array>
@@ -22,7 +23,6 @@
 
 namespace r4::tool::ros2 {
 
-// A status of diagnostics; the levels are ROS's.
 struct Health {
   enum Level : std::uint8_t { ok = 0, warning = 1, error = 2, stale = 3 };
   Level level = stale;
@@ -41,19 +41,18 @@ class BoardTopics {
   void on_datagram(const std::string& line) const;
   void on_heartbeat();
   void on_active(bool active) const;
-  // `boot`: how often the board has restarted.
+  // `boot`: number of restarts of the board.
   void on_state(const State& state, WallTime sampled, std::uint32_t boot);
   void on_health(const Health& health, WallTime now) const;
   void log(LogLevel level, const std::string& text, WallTime now) const;
 
  private:
-  // A value that is published when it changes.
   template <class Value>
   struct Changing {
     dds_entity_t writer = 0;
     std::optional<Value> last;
     Clock::time_point sent{};
-    // Is it time to publish this one?
+    // True if the value must be published now.
     bool is_due(const Value& value, Clock::time_point now) {
       if (writer == 0 || (last == value && now - sent < std::chrono::seconds(1))) return false;
       last = value;
@@ -82,11 +81,11 @@ class BoardTopics {
   dds_entity_t diagnostics_ = 0;
   dds_entity_t rosout_ = 0;
   dds_entity_t joints_ = 0;
-  FieldSet joint_fields_;  // of the state, that joint_states is made of
-  // A state may come in several datagrams of one T, and is one sample.
+  FieldSet joint_fields_;
+  // A state may arrive as several datagrams with one T, which form one sample.
   struct Joints {
     State state;
-    FieldSet present;  // of joint_fields_
+    FieldSet present;
     WallTime sampled;
     std::uint32_t boot = 0;
   };

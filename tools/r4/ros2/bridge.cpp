@@ -29,7 +29,7 @@
 namespace r4::tool::ros2 {
 namespace {
 
-// What all the topics need. On a CAN bus the paper's fields: others have to fit beside them.
+// The fields that all topics need. On a CAN bus only the paper's fields fit.
 std::string component_fields() {
   std::string fields = "DEFAULT";
   const FieldSet paper = FieldSet::paper_default();
@@ -75,8 +75,7 @@ struct NamedUrl {
   NodeName name;
 };
 
-// One board is in the namespace itself, several are each in one below it: board1, board2 …, or the numbers of a
-// pattern.
+// One board is in the namespace itself; several are below it: board1 …, or a pattern's numbers.
 std::vector<NamedUrl> named_urls(const BridgeOptions& options) {
   const std::vector<PatternUrl> urls = expand_urls(options.urls);
   const bool numbered = options.urls.size() == 1;
@@ -143,10 +142,10 @@ class Bridge {
     inbox_.start();
     boards_.end_by_signal(options_.duration);
     boards_.run();
-    inbox_.stop();  // no sample is taken any more
+    inbox_.stop();
     boards_.leave();
     outbox_.stop();
-    graph_.leave();  // which may take its time
+    graph_.leave();
     return 0;
   }
 
@@ -157,7 +156,7 @@ class Bridge {
     shown.devices = Device::from(options_.devices);
     ask_for(board_options, options_.fields.empty() ? usual : options_.fields, shown.devices);
     parse_fields(Text(board_options.session.fields), shown.fields);
-    shown.fields.add(StateField::relays);  // arming asks for it
+    shown.fields.add(StateField::relays);  // needed for arming
     nodes_.push_back(
         std::make_unique<BoardNode>(boards_.io(), boards_.add(named.url, board_options).board,
                                     graph_, graph_.add_node(named.name), inbox_, outbox_, shown,
@@ -165,7 +164,7 @@ class Bridge {
                                            const std::string& text) { say(level, node, text); }));
   }
 
-  // Publishers often forget the namespace.
+  // Users often forget the namespace.
   void decline_root() {
     for (const std::string topic : {"stop", "arm", "R4_Command", "cmd_vel"}) {
       const std::string ours = full_name(urls_.front().name, topic);
@@ -178,7 +177,7 @@ class Bridge {
     }
   }
 
-  // What others have in the graph is looked at on the thread that reads.
+  // The graph is examined on the reading thread.
   void discover() {
     graph_.list_nodes(process_environment("ROS_DISTRO"));
     namesakes_.emplace(graph_.nodes());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What r4 ros2 does: boards as nodes of a ROS 2 graph, by Cyclone DDS. A part of r4-services.
+// r4 ros2: boards as nodes of a ROS 2 graph, using Cyclone DDS. Part of r4-services.
 #pragma once
 
 #include <optional>
@@ -29,7 +29,7 @@ struct BridgeOptions {
   bool json = false;
 };
 
-// Returns the exit code once it is ended by a signal or by `duration`.
+// Runs until a signal or the end of `duration`; returns the exit code.
 int run_bridge(const BridgeOptions& options);
 
 }  // namespace r4::tool::ros2

@@ -14,7 +14,6 @@ constexpr std::string_view blank = " \t\r\n";
 
 bool is_ascii(char c) { return (c >= ' ' && c <= '~') || blank.find(c) != std::string_view::npos; }
 
-// Calls part(text) for each that is not empty.
 template <class Part>
 void each_part(std::string_view text, Part part) {
   while (!text.empty()) {
@@ -34,7 +33,7 @@ void require_allowed(std::string_view text, const Command& command) {
     case CommandKind::setting:
       throw Error(ErrorKind::usage, shown(text), "settings are not taken from a topic",
                   "r4 send URL " + shown(text) + " sets it");
-    case CommandKind::fields:  // a stepper whose position is not told cannot be stopped
+    case CommandKind::fields:  // a stepper without a reported position cannot be stopped
       throw Error(ErrorKind::usage, shown(text), "fields are not chosen from a topic",
                   "name them by --fields");
     case CommandKind::heartbeat:
@@ -62,7 +61,7 @@ bool asks_to_stop(std::string_view text) {
 }
 
 std::vector<OwnCommand> commands_of(std::string_view text) {
-  if (!std::all_of(text.begin(), text.end(), is_ascii)) {  // nobody who reads /rosout would read on
+  if (!std::all_of(text.begin(), text.end(), is_ascii)) {  // unreadable in /rosout
     throw Error(ErrorKind::usage, "a command", "has characters that no command has",
                 "write it in ASCII");
   }

@@ -12,13 +12,13 @@
 namespace r4::tool::ros2 {
 namespace {
 
-// NaN for what is no measurement.
+// NaN for an invalid measurement.
 double number_of(const Device& device, const State& state, std::string_view value) {
   return device.reading(state, value).number.value_or(std::numeric_limits<double>::quiet_NaN());
 }
 
-// As it was read, also where it is beyond what the device can measure. Nothing before the first reading, and of another
-// length, which is somebody else's in that slot.
+// The raw value, even outside the device's range. Empty before the first reading, and if the length
+// differs because another device uses the slot.
 std::optional<double> any_number_of(const Device& device, const State& state, std::size_t value) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   DeviceValue any = device.description().values[value];
@@ -68,7 +68,7 @@ DeviceTopics::DeviceTopics(Graph& graph, std::size_t node, const std::vector<Dev
         add(std::in_place_type<JointStateMessage>, "/joint_states", "angle");
         break;
       case DeviceRole::none:
-        continue;  // ROS has no word for it
+        continue;  // ROS has no message for it
     }
     topics_.push_back(std::move(topic));
   }
@@ -78,8 +78,8 @@ void DeviceTopics::on_state(const State& state, WallTime sampled) {
   for (Topic& topic : topics_) {
     if (!state.present.has(topic.device.field(topic.value))) continue;
     const DeviceReading reading = topic.device.reading(state, topic.value);
-    // A range that is none is told, too: nothing within reach, or something too near.
-    // Of a device that is not set up nothing is a measurement.
+    // For a range, values outside the device's range are published too: nothing within reach, or
+    // too near. A device that is not set up has no valid measurement.
     const bool told = topic.device.description().role == DeviceRole::range
                           ? topic.device.is_set_up(state).value_or(true) &&
                                 any_number_of(topic.device, state, topic.value).has_value()
@@ -117,12 +117,12 @@ void DeviceTopics::publish_imu(const Topic& topic, const State& state, TimeMessa
   message.angular_velocity = {get("gyro_x"), get("gyro_y"), get("gyro_z")};
   if (topic.device.description().find("quat_w")) {
     message.orientation = {get("quat_x"), get("quat_y"), get("quat_z"), get("quat_w")};
-    // A BNO055 that is being configured says 0 for all (BST-BNO055-DS000, 3.3.1); no orientation has that length.
+    // A BNO055 in configuration mode reports 0 for all (BST-BNO055-DS000, 3.3.1).
     const auto& [x, y, z, w] = message.orientation;
     if (x * x + y * y + z * z + w * w < 0.5) return;
   } else {
     message.orientation.w = 1;
-    message.orientation_covariance[0] = -1;  // it has none
+    message.orientation_covariance[0] = -1;  // no orientation
   }
   (void)dds_write(topic.writer, &message);
 }
@@ -135,7 +135,7 @@ void DeviceTopics::publish_battery(const Topic& topic, const State& state, TimeM
   message.header.stamp = time;
   message.header.frame_id = borrowed(frame);
   message.voltage = static_cast<float>(number_of(topic.device, state, "voltage"));
-  // ROS counts what is drawn as negative.
+  // In ROS a discharge current is negative.
   message.current = -static_cast<float>(number_of(topic.device, state, "current"));
   for (float* value : {&message.temperature, &message.charge, &message.capacity,
                        &message.design_capacity, &message.percentage}) {
@@ -151,13 +151,13 @@ void DeviceTopics::publish_range(const Topic& topic, const State& state, TimeMes
   constexpr std::uint8_t infrared = 1;
   const DeviceValue& distance = topic.device.description().values[topic.value];
   const std::string frame = frame_prefix_ + topic.name;
-  RangeMessage message{};  // a field of view of 0: it is not described
+  RangeMessage message{};  // field of view 0: unknown
   message.header.stamp = time;
   message.header.frame_id = borrowed(frame);
   message.radiation_type = infrared;
   message.min_range = static_cast<float>(distance.minimum);
   message.max_range = static_cast<float>(distance.maximum);
-  // REP 117: what is too near is -Inf, nothing within reach +Inf, what the device itself does not count NaN.
+  // REP 117: too near is -Inf, nothing within reach +Inf, rejected by the device NaN.
   constexpr float infinity = std::numeric_limits<float>::infinity();
   const double measured = any_number_of(topic.device, state, topic.value).value();
   if (measured > distance.maximum) {

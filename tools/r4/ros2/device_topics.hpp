@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What described devices measure, on topics of their own: imu, battery, range or joint_states below the device's name,
-// by its role, each reading once, with the time at which the board read it. Used by the outbox's thread alone, but for
-// its making.
+// Measurements of described devices as imu, battery, range or joint_states below the device's name,
+// depending on its role. Each reading is published once, with the board's time of reading. After
+// construction only the outbox's thread uses it.
 #pragma once
 
 #include <chrono>
@@ -26,11 +26,10 @@ class DeviceTopics {
  private:
   struct Topic {
     Device device;
-    std::string
-        name;  // the device's, with its address where there are several; of the frame and the joint, too
+    std::string name;  // device name, with its address if several; also the frame and joint
     dds_entity_t writer = 0;
-    std::size_t value = 0;              // that is there in each message
-    std::optional<std::uint32_t> t_ms;  // of the last
+    std::size_t value = 0;  // always present
+    std::optional<std::uint32_t> t_ms;
   };
   void publish(const Topic& topic, const State& state, TimeMessage time) const;
   void publish_imu(const Topic& topic, const State& state, TimeMessage time) const;

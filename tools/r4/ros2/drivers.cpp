@@ -45,7 +45,7 @@ std::optional<Command> Drivers::stop_of(std::size_t index, Time now) const {
   for (; !is_driven(*row) || i >= row->channels; ++row) {
     if (is_driven(*row)) i -= row->channels;
   }
-  Command stop;  // a value of 0, or off
+  Command stop;
   stop.kind = row->kind;
   stop.channel = static_cast<std::uint8_t>(i + 1);
   stop.direction = Direction::forward;
@@ -67,7 +67,7 @@ void Drivers::on_sent(const Command& command, const void* source, std::uint64_t 
   if (!index) return;
   Output& output = outputs_[*index];
   const bool rest = rests(command);
-  if (rest && output.stage != Stage::driven) return;  // it rests, or is on its way there
+  if (rest && output.stage != Stage::driven) return;
   output = {rest ? Stage::stopping : Stage::driven, source, publisher, now, ++sent_, rest};
 }
 

@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which publisher drives which output, and which of them have gone.
+// Tracks the publisher that drives each output, and publishers that have disappeared.
 //
-//     free --a command that drives--> driven --a command that stops, its publisher has gone, or--> stopping
-//      ^                                 ^     is silent for the deadline                            |
-//      |                                 +---------------- a command that drives --------------------+
-//      +---------------------------------- stopped, the board has confirmed it -----------------------+
+//     free --a command that drives--> driven --a command that stops, or its publisher--> stopping
+//      ^                                 ^     has gone or is silent for the deadline        |
+//      |                                 +----------- a command that drives -----------------+
+//      +----------------------------- stopped, the board has confirmed it -------------------+
 //
-// A command that stops goes out once like the others, and might be lost: so it, too, is repeated until the board has
-// confirmed it. What is stopped goes where the board's safe state puts it: motors to 0, brushless drivers to 0 with
-// their brakes on, servos without pulses, relays open, steppers standing where they are, voltages to 0. Relay 1 is no
-// output here: it is the motors' supply, and arming's. Where a stepper is, is known for a while, for a state may come in
-// several datagrams, of which one has it. No clock: the time is passed in. It goes on while this
-// computer sleeps.
+// A stop might be lost, so it is repeated until confirmed. A stopped output is as in the safe
+// state: motors at 0, brushless drivers at 0 with brakes on, servos without pulses, relays open,
+// steppers standing, voltages at 0. Relay 1, the motors' supply, belongs to arming. A stepper's
+// position is kept for a while, because only one of a state's datagrams has it. The caller passes
+// in the time, which continues while this computer sleeps.
 #pragma once
 
 #include <array>
@@ -27,7 +26,7 @@
 
 namespace r4::tool::ros2 {
 
-// True for the kinds whose channels are driven. Z moves nothing.
+// True for kinds with driven channels. Z moves nothing.
 constexpr bool is_driven(const CommandRow& row) {
   return joins_groups(row.kind) && row.kind != CommandKind::zero;
 }
@@ -42,31 +41,29 @@ class Drivers {
   using Time = BootClock::time_point;
   using Duration = std::chrono::milliseconds;
 
-  // A deadline of 0: only who has gone is missed.
+  // Deadline 0: only departed publishers are missed.
   explicit Drivers(Duration deadline) : deadline_(deadline) {}
 
-  // Does an output rest after it?
   static bool rests(const Command& command);
   // `source`: the topic; `publisher`: of that topic.
   void on_sent(const Command& command, const void* source, std::uint64_t publisher, Time now);
-  // A datagram of the board, sampled then: where its steppers are.
   void on_state(const State& state, Time sampled);
-  // Those of a topic that are left.
+  // The remaining publishers of a topic.
   void on_publishers(const void* source, const std::vector<std::uint64_t>& there);
-  // Somebody else has made the outputs safe.
+  // Call when the outputs were made safe otherwise.
   void forget();
-  // The board does not know such a command: there is no such output.
+  // Call when the board has no such output.
   void forget(const Command& command);
 
-  // Commands for what is to be stopped now, for each output until stopped() or a command that drives it. At most
-  // max_group. A stepper waits for its position; voltages, which not every board has, for the others.
+  // Commands that stop outputs now, at most max_group, repeated until stopped() or a driving
+  // command. A stepper waits for its position; voltages, not on every board, for the other outputs.
   struct Stop {
     std::vector<Command> commands;
-    std::uint64_t sent = 0;  // commands before it
-    bool missed = false;     // who drove one of them has gone or is silent
+    std::uint64_t sent = 0;  // number of commands sent before
+    bool missed = false;     // a publisher has disappeared or is silent
   };
   Stop to_stop(Time now);
-  // The board has confirmed it. What was driven again since is not stopped by that.
+  // The board has confirmed `stop`. Outputs driven since then are not affected.
   void stopped(const Stop& stop);
   bool any() const;
 
@@ -77,17 +74,17 @@ class Drivers {
     const void* source = nullptr;
     std::uint64_t publisher = 0;
     Time last{};
-    std::uint64_t sent = 0;  // which command it was
-    bool asked = false;      // to stop
+    std::uint64_t sent = 0;
+    bool asked = false;
   };
   struct Position {
     std::int32_t steps = 0;
     std::optional<Time> sampled;
-    Time counts_from{};  // what was sampled before is counted from another zero
+    Time counts_from{};  // older samples count from another zero
   };
-  // A stepper that was sent to an older position would move, not stop.
+  // With an older position a stepper would move instead of stop.
   static constexpr Duration oldest_position{250};
-  // Of Z to the board: a state of meanwhile may still be of before.
+  // Longest delay of Z: a state within this time may be older than Z.
   static constexpr Duration longest_way{100};
   static constexpr std::size_t outputs = number_of_outputs();
   static std::optional<std::size_t> index_of(const Command& command);

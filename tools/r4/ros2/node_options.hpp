@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a board is shown to ROS.
 #pragma once
 
 #include <chrono>
@@ -13,19 +12,18 @@
 
 namespace r4::tool::ros2 {
 
-// As rcl_interfaces/Log has them.
 enum class LogLevel : std::uint8_t { info = 20, warning = 30, error = 40 };
 
 struct NodeOptions {
-  FieldSet fields;  // those that the board is asked for
+  FieldSet fields;  // requested from the board
   ServoUnit servo;
-  std::optional<double> counts_per_turn;     // of the encoders' joints; none: they are no joints
-  std::optional<double> steps_per_turn;      // of the steppers'
-  std::optional<DifferentialDrive> drive;    // none: there is no cmd_vel
+  std::optional<double> counts_per_turn;     // for encoder joints; none: no joints
+  std::optional<double> steps_per_turn;      // for stepper joints
+  std::optional<DifferentialDrive> drive;    // none: no cmd_vel
   std::chrono::milliseconds deadline{1000};  // of a publisher that drives
-  std::vector<Device> devices;               // on the user's I2C bus
-  bool arm = false;                          // as soon as the board is there, once
-  bool one_clock = false;  // all publishers are on this computer, so their stamps are of its clock
+  std::vector<Device> devices;
+  bool arm = false;        // once, when the board is connected
+  bool one_clock = false;  // all publishers are on this computer, so stamps use its clock
 };
 
 }  // namespace r4::tool::ros2

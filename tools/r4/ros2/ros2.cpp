@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 ros2: its command line.
 #include <memory>
 
 #include "../shell/key_file.hpp"

@@ -79,7 +79,7 @@ ServoUnit servo_unit(std::string_view text) {
 std::optional<Microseconds> to_pulse(const ServoUnit& unit, double value) {
   if (!unit) {
     const double us = std::round(value);
-    if (!(us >= 0 && us <= servo_max_us)) return std::nullopt;  // NaN, too
+    if (!(us >= 0 && us <= servo_max_us)) return std::nullopt;  // also rejects NaN
     return Microseconds(static_cast<std::int32_t>(us));
   }
   const double degrees = value * degrees_a_radian;

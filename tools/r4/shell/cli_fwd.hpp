@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Names of CLI11, for those who do not need its headers: they take longer to compile than most of
-// the subcommands themselves.
+// Forward declarations of CLI11: its headers take longer to compile than most subcommands.
 #pragma once
 
 namespace CLI {  // NOLINT(readability-identifier-naming): not our name

@@ -44,8 +44,8 @@ constexpr std::array subcommands = std::to_array<Subcommand>({
     {"man", add_man},         {"devices", add_devices},
 });
 
-// The one that the first argument names, with its options, else all. Those of all of them take longer to declare than
-// a stop takes.
+// Adds only the subcommand that the first argument names, else all: declaring the options of all
+// subcommands takes longer than a stop. completion and man describe all subcommands.
 void add_subcommands(CLI::App& root, Action& chosen, std::string_view first) {
   const bool tells_of_all = first == "completion" || first == "man";
   for (const Subcommand& each : subcommands) {
@@ -54,13 +54,11 @@ void add_subcommands(CLI::App& root, Action& chosen, std::string_view first) {
   for (const Subcommand& each : subcommands) each.add(root, chosen);
 }
 
-// The text without the ending, if it has it.
 std::string without(std::string text, std::string_view ending) {
   if (text.ends_with(ending)) text.resize(text.size() - ending.size());
   return text;
 }
 
-// What CLI11 found wrong, in the shape of our errors.
 Problem usage_problem(const CLI::App& root, const CLI::ParseError& error) {
   Problem problem{ErrorKind::usage, "", "", ""};
   const std::vector<CLI::App*> used = root.get_subcommands();
@@ -113,8 +111,8 @@ int report(Problem problem, bool json) {
   return static_cast<int>(problem.kind);
 }
 
-// In the place of a closed standard stream the first port to be opened would be found, and what is
-// printed would go to a board. /dev/null, opened the wrong way round, fails instead.
+// If a standard stream is closed, the next opened port would get its number, and printed text would
+// go to a board. /dev/null opened in the wrong direction makes such output fail instead.
 void occupy_standard_streams() {
   for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; ++fd) {
     if (::fcntl(fd, F_GETFD) < 0) (void)::open("/dev/null", fd == 0 ? O_WRONLY : O_RDONLY);
@@ -140,12 +138,12 @@ int run(int argc, const char* const* argv) {
     try {
       root.parse(argc, argv);
       code = chosen();
-    } catch (const CLI::Success& success) {  // --help, --version
+    } catch (const CLI::Success& success) {
       std::ostringstream text;
       code = root.exit(success, text);
       print_raw(text.str());
     }
-    require_output();  // a full disk is no success
+    require_output();
     return code;
   } catch (const CLI::ParseError& error) {
     return report(usage_problem(root, error), json);

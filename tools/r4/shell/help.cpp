@@ -17,7 +17,7 @@
 namespace r4::tool {
 namespace {
 
-// How many single characters must be changed, added or taken away to make `b` of `a` (Levenshtein).
+// Levenshtein distance: how many characters must be changed, added or removed to turn `a` into `b`.
 std::size_t distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
@@ -45,7 +45,7 @@ class Layout : public CLI::Formatter {
   std::string make_usage(const CLI::App* app, std::string name) const override {
     return "\n" + CLI::Formatter::make_usage(app, std::move(name));
   }
-  // A positional is named after its type already.
+  // The name of a positional already states its type.
   std::string make_option_opts(const CLI::Option* option) const override {
     return option->get_positional() ? "" : CLI::Formatter::make_option_opts(option);
   }

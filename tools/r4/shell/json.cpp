@@ -43,7 +43,7 @@ Json value_json(Text value) {
       !text.empty() && text.find_first_not_of("-.0123456789") == std::string_view::npos;
   if (plain) {
     Json number = Json::parse(text, nullptr, false);
-    // A whole number beyond 64 bits would come out rounded.
+    // A double would round an integer that does not fit into 64 bits.
     const bool exact = number.is_number_integer() || text.find('.') != std::string_view::npos;
     if (number.is_number() && exact) return number;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The file with a board's key (load_key() reads it), for its owner alone: how it is made and named.
+// The key file of a board, readable by its owner only. load_key() reads it.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,14 @@
 
 namespace r4::tool {
 
-// Makes a file with a new random key. Throws Error: open if it cannot be made; one that is there is
-// never overwritten.
+// Creates a file with a new random key. Never overwrites a file. Throws Error{open} on failure.
 void make_key_file(const std::string& path, std::uint8_t id);
 
-// --key FILE, or R4_KEY in the environment, for a command that opens a board.
+// --key FILE, or R4_KEY in the environment.
 CLI::Option* add_key(CLI::App& command, std::string& path);
-// The same, of which a command takes several.
 CLI::Option* add_keys(CLI::App& command, std::vector<std::string>& paths);
 
-// The options of a session with the key of that file; without one if `path` is empty.
+// Sets the key from the file at `path`; an empty `path` means no key.
 BoardOptions with_key(const std::string& path, BoardOptions options = {});
 
 }  // namespace r4::tool

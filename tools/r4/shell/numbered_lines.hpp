@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The lines of an input, with their numbers from 1, whatever ends them: CR, LF or both. UTF-8's mark in front of the
-// first line is left out. Memory is one line of max_datagram characters: a longer one is measured, not kept.
+// Numbers lines from 1. A line ends with CR, LF or both. A UTF-8 byte order mark at the beginning
+// is skipped. At most max_datagram characters are stored: a longer line is only measured.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,7 @@ namespace r4::tool {
 
 class NumberedLines {
  public:
-  // Calls line(number, text) for each line that is complete and not empty, and too_long(number,
-  // size) for each that is longer than max_datagram.
+  // Calls line() for each complete line that is not empty, too_long() above max_datagram.
   template <class Line, class TooLong>
   void push(std::string_view bytes, Line line, TooLong too_long) {
     while (!bytes.empty()) {
@@ -37,7 +36,7 @@ class NumberedLines {
         if (!text.empty()) line(number_, text);
       }
       line_.clear();
-      const bool second_half = bytes[end] == '\n' && end == 0 && after_cr_;  // of CR LF
+      const bool second_half = bytes[end] == '\n' && end == 0 && after_cr_;
       if (!second_half) ++number_;
       begin_ += size_ + 1;
       size_ = 0;
@@ -45,19 +44,19 @@ class NumberedLines {
       bytes.remove_prefix(end + 1);
     }
   }
-  // The byte of the input, from 0, where the line begins that is told of.
+  // Offset in bytes, from 0, of the line that is being reported.
   std::uint64_t begin() const { return begin_; }
-  // The input has ended, perhaps within a line.
+  // Call at the end of the input, which may lie within a line.
   template <class Line, class TooLong>
   void finish(Line line, TooLong too_long) {
     if (size_ != 0) push("\n", line, too_long);
   }
 
  private:
-  std::string line_;  // what has come of it, unless it is too long
+  std::string line_;
   std::uint64_t number_ = 1;
   std::uint64_t begin_ = 0;
-  std::uint64_t size_ = 0;  // of the line so far
+  std::uint64_t size_ = 0;
   bool after_cr_ = false;
 };
 

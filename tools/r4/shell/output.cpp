@@ -22,10 +22,10 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::seconds last_wait{1};
 
-std::atomic<int> first_error{0};  // the errno of the first write that failed
+std::atomic<int> first_error{0};  // errno of the first failed write
 
-// False if `give_up` says so while the reader takes nothing, or if a write has failed. What poll() calls writable
-// takes PIPE_BUF bytes without waiting.
+// Returns false if a write failed, or if `give_up` is true while the reader takes nothing. After
+// poll() reports writable, a write of PIPE_BUF bytes does not block.
 template <class GiveUp>
 bool write_out(std::string_view text, GiveUp give_up) {
   while (!text.empty() && first_error == 0) {

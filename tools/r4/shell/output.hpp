@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Standard output: all that r4 prints goes through here, and to the system at once. An output that cannot be written
-// stops no command: a stop must reach the board although the disk is full. require_output() reports it at the end.
+// All output of r4 goes through here, without buffering. A failed write does not end a command: a
+// stop must reach the board even if the disk is full. require_output() reports it at the end.
 #pragma once
 
 #include <fmt/format.h>
@@ -17,42 +17,41 @@
 
 namespace r4::tool {
 
-// Each line of it printable(): for a text for people in which names of others may be.
+// Applies printable() to each line, because text for people may contain foreign names.
 std::string printable_lines(std::string_view text);
 
-// Text for people, by printable_lines(). Waits for the reader.
+// Prints printable_lines(text). Blocks until the reader takes it.
 void print_text(std::string_view text);
 template <class First, class... Rest>
 void print_text(fmt::format_string<First, Rest...> format, First&& first, Rest&&... rest) {
   print_text(fmt::format(format, std::forward<First>(first), std::forward<Rest>(rest)...));
 }
-// The same bytes: text of our own, which may move the cursor, and bytes for programs.
+// Prints the bytes unchanged: our own text with cursor control, and bytes for programs.
 void print_raw(std::string_view text);
-// A line for people on standard error, printable().
+// A printable() line for people on standard error.
 void print_trouble(std::string_view text);
 template <class First, class... Rest>
 void print_trouble(fmt::format_string<First, Rest...> format, First&& first, Rest&&... rest) {
   print_trouble(fmt::format(format, std::forward<First>(first), std::forward<Rest>(rest)...));
 }
 
-// Throws Error if something printed could not be written, once no LineWriter is left.
+// Throws Error if a write failed. Call it when no LineWriter is left.
 void require_output();
 
-// Lines from a loop that must not wait for the reader: a pipe that nobody empties, a terminal that is held. A thread
-// writes them; a line that does not fit into the room is lost and counted.
+// Writes lines in a thread, for a loop that must not wait for the reader: a full pipe or a stopped
+// terminal. A line that does not fit into the room is dropped and counted.
 class LineWriter {
  public:
-  // `room`: for so many bytes that wait. `note` makes the line that stands where `count` lines are missing.
+  // `room`: most bytes that wait. `note` makes the line printed where `count` lines were dropped.
   explicit LineWriter(std::size_t room, std::function<std::string(std::uint64_t count)> note = {});
-  // Gives the reader a second to take what is left.
+  // Gives the reader one second to take the rest.
   ~LineWriter();
   LineWriter(const LineWriter&) = delete;
   LineWriter& operator=(const LineWriter&) = delete;
 
-  // `line` with its end, which is written as printable_lines(). Never waits.
+  // Never blocks. `line` includes its end and is printed as printable_lines().
   void write(std::string_view line);
 
-  // Lines that were left out.
   std::uint64_t lost() const;
 
  private:
@@ -64,7 +63,7 @@ class LineWriter {
   std::condition_variable changed_;
   std::string waiting_;
   std::uint64_t lost_ = 0;
-  std::uint64_t noted_ = 0;  // of them, by a line
+  std::uint64_t noted_ = 0;
   bool ending_ = false;
   std::thread thread_;
 };

@@ -13,7 +13,7 @@
 namespace r4::tool {
 namespace {
 
-// The terminal's size; that of an old one where it does not tell.
+// Defaults to 80x24 if the terminal does not report its size.
 winsize terminal_size() {
   winsize size{};
   if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) size.ws_col = 80;
@@ -43,7 +43,7 @@ void Screen::draw(std::vector<std::string> lines) {
   for (std::string& line : lines) {
     line = printable(line);
     if (line.size() > size.ws_col) line.resize(size.ws_col);
-    while (printable(line) != line) line.pop_back();  // the beginning of a character
+    while (printable(line) != line) line.pop_back();  // a truncated UTF-8 character
     frame += "\r" + line + "\x1b[K\n";
   }
   frame += "\x1b[J";

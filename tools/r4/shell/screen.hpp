@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A few lines on a terminal, redrawn in place.
 #pragma once
 
 #include <cstddef>
@@ -15,15 +14,14 @@ class Screen {
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
 
-  // False while the terminal is held (Ctrl-S): drawing would wait, and stall the heartbeats.
+  // False while the terminal is stopped (Ctrl-S): drawing would block and delay the heartbeats.
   static bool has_room();
-  // Cut to the terminal's size.
   void draw(std::vector<std::string> lines);
   static std::size_t columns();
 
  private:
   bool begun_ = false;
-  std::size_t drawn_ = 0;  // lines on the screen
+  std::size_t drawn_ = 0;
 };
 
 }  // namespace r4::tool

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The subcommands of r4, one file each. An add_… function declares its options below `root`;
-// parsing the command line puts what is to be done into `chosen`, which returns the exit code or
-// throws Error.
+// The subcommands of r4, one file each. add_…() declares a subcommand below `root`. Parsing the
+// command line stores the action in `chosen`; it returns the exit code or throws Error.
 #pragma once
 
 #include <functional>
@@ -39,12 +38,10 @@ void add_demo(CLI::App& root, Action& chosen);
 void add_completion(CLI::App& root, Action& chosen);
 void add_man(CLI::App& root, Action& chosen);
 
-// A subcommand with its one-line meaning, the footer of its --help and what is to be done when the
-// command line names it.
 CLI::App* add_subcommand(CLI::App& root, const char* name, const char* meaning,
                          const std::string& footer, std::function<void()> on_chosen);
 
-// The same, whose action is called with its options; they live as long as the command line does.
+// Calls `action` with `options`, which live as long as the command line.
 template <class Options>
 CLI::App* add_subcommand(CLI::App& root, Action& chosen, const char* name, const char* meaning,
                          const std::string& footer, std::shared_ptr<Options> options,

@@ -18,14 +18,14 @@
 namespace r4::tool {
 namespace {
 
-// It ends by itself if nobody ends it.
+// The child ends by itself if r4 cannot end it.
 constexpr const char* longest_life_s = "60";
 
 pid_t spawn(const std::string& url, int output) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
-  // It ends by this signal even if r4 was started with the signal ignored.
+  // SIGTERM ends the child even if r4 was started with SIGTERM ignored.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   sigset_t ends;

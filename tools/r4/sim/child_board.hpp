@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A simulated board in a process of its own, for the demonstration: this very program as
-// `r4 sim URL --json`, its events read through a pipe.
+// A simulated board in its own process, for the demonstration: this program run as `r4 sim URL
+// --json`, with its events read through a pipe.
 #pragma once
 
 #include <sys/types.h>
@@ -20,10 +20,9 @@ class ChildBoard {
  public:
   using OnEvent = std::function<void(const Json&)>;
 
-  // Starts it. `on_event` gets every object that it prints, on the io_context's thread. Throws
-  // Error.
+  // `on_event` gets each printed object, on the io_context's thread. Throws Error.
   ChildBoard(asio::io_context& io, const std::string& url, OnEvent on_event);
-  // Ends it and waits for its end.
+  // Ends the process and waits for its end.
   ~ChildBoard();
   ChildBoard(const ChildBoard&) = delete;
   ChildBoard& operator=(const ChildBoard&) = delete;
@@ -35,7 +34,7 @@ class ChildBoard {
   OnEvent on_event_;
   asio::posix::stream_descriptor output_;
   std::array<char, 4096> buffer_;
-  std::string line_;  // unfinished
+  std::string line_;
   pid_t pid_ = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 demo: the paper's section 4.4 played over every transport of this machine, and explained.
+// r4 demo: plays and explains section 4.4 of the paper over every transport of this machine.
 #include <fmt/format.h>
 
 #include <array>
@@ -60,7 +60,6 @@ constexpr std::array<Captured, 4> captured{{
 
 void print(const std::string& text) { print_text(text + "\n"); }
 
-// Reads the captured datagrams; true if each is what it should be.
 bool decode_capture(bool json) {
   bool good = true;
   for (const Captured& each : captured) {
@@ -82,7 +81,6 @@ bool decode_capture(bool json) {
   return good;
 }
 
-// A board in another process, and the URL at which a host finds it.
 class SeparateBoard {
  public:
   SeparateBoard(asio::io_context& io, const std::string& url)
@@ -107,7 +105,7 @@ class SeparateBoard {
     if (type == "ended") ended_ = true;
     if (type == "listening") {
       host_url_ = event.value("host_url", "");
-      if (host_url_.starts_with("udp:")) host_url_ += "?listen=0";  // 2390 may be taken
+      if (host_url_.starts_with("udp:")) host_url_ += "?listen=0";  // port 2390 may be in use
     }
     if (type != "event") return;
     if (event.contains("silence")) log_.silence_ms = event["silence"].get<std::uint32_t>();
@@ -117,16 +115,16 @@ class SeparateBoard {
   std::string host_url_;
   BoardLog log_;
   bool ended_ = false;
-  ChildBoard child_;  // last: it calls on_event()
+  ChildBoard child_;  // last member, because it calls on_event()
 };
 
 struct Stage {
-  const char* name;  // in the table
+  const char* name;
   const char* title;
-  std::string board_url;  // where the separate process listens; empty: no other process
+  std::string board_url;  // where the other process listens; empty: none
 };
 
-// Only an interface that cannot be anything but virtual by its name: there may be motors on others.
+// Only an interface with a virtual name: other buses may have motors.
 std::string virtual_can() {
   for (const CanInterface& each : list_can_interfaces()) {
     if (each.up && !each.has_controller && each.name.starts_with("vcan")) return each.name;
@@ -134,7 +132,7 @@ std::string virtual_can() {
   return {};
 }
 
-// What this machine has. `missing` tells why CAN is not among them.
+// The stages possible on this machine. `missing`: why CAN is left out.
 std::vector<Stage> stages(std::optional<Problem>& missing) {
   std::vector<Stage> all{
       {"in process", "Within this program (sim:)", ""},

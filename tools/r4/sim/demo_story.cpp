@@ -17,16 +17,15 @@ constexpr int questions = 25;
 constexpr int shown_states = 3;
 constexpr std::chrono::milliseconds streaming{600};
 constexpr std::chrono::milliseconds patience{5000};
-constexpr double timeout_ms = 1000;  // of the board
-// How far a busy computer may hold up a simulated board; a real one is safe 20 ms after its timeout
-// (docs/safety.md). The story tells what was measured.
+constexpr double timeout_ms = 1000;
+// How long a busy computer may delay a simulated board. A real board is safe 20 ms after its
+// timeout (docs/safety.md). The story reports the measured time.
 constexpr double held_up_ms = 1000;
 
 const Drive commanded{358, Direction::forward};
-// Counts of the encoder that a motor without supply would not turn, not even running out.
+// Encoder counts that prove a motor with supply: more than a motor without supply can reach.
 constexpr std::int32_t turned = 100;
 
-// A step was not true.
 class NotSo : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -39,7 +38,6 @@ double milliseconds_of(const CommandResult& result) {
   return std::chrono::duration<double, std::milli>(result.elapsed).count();
 }
 
-// The story is of the link alone.
 BoardOptions without_arming() {
   BoardOptions options;
   options.session.arming = Arming::off;
@@ -87,7 +85,7 @@ StoryResult Story::run() {
   return result_;
 }
 
-// Lets the program run until something is so; false if it never was.
+// Runs the loop until is_so() is true; returns false on timeout.
 bool Story::wait_until(const std::function<bool()>& is_so, Milliseconds at_most) {
   const Clock::time_point end = Clock::now() + at_most;
   while (!is_so()) {
@@ -138,11 +136,11 @@ void Story::stream() {
     teller_.show(state_bytes_);
   }
   wait_until([&] { return Clock::now() - start > streaming; }, streaming);
-  // By the board's clock: a busy computer may take them late, and several at once.
+  // Uses the board's clock: a busy computer may receive states late and in groups.
   result_.rate_hz = static_cast<double>(states_ - first) / (state_.t_ms - start_t_ms) * 1000;
   teller_.say(fmt::format("          {:.1f} states a second, packet numbers (PNum) without a gap.",
                           result_.rate_hz));
-  // A simulated board on a busy computer leaves some out.
+  // No lower limit: a simulated board on a busy computer skips states.
   require(result_.rate_hz < 110, "the board streams faster than 100 Hz");
 }
 
@@ -184,7 +182,7 @@ void Story::require_that_the_motor_turns() {
           "the motor does not turn");
 }
 
-// Gates the heartbeats as the watchdog of a hung application does.
+// Stops the heartbeats through the watchdog, as a hung application would.
 void Story::fall_silent() {
   std::uint64_t heartbeats = board_.statistics().heartbeats;
   Clock::time_point last = Clock::now();
@@ -210,7 +208,7 @@ void Story::fall_silent() {
     result_.safe_ms = *log_->silence_ms;
     result_.safe_by_event = true;
   } else {
-    // The board's clock when the last heartbeat left, from the T of the newest state.
+    // Board time of the last heartbeat, derived from T of the newest state.
     const double age_ms = milliseconds(state_came_ - last);
     result_.safe_ms = static_cast<double>(safe_t_ms_ - last_state.t_ms) + age_ms;
   }
@@ -221,7 +219,7 @@ void Story::fall_silent() {
   teller_.say(fmt::format("          SAFE:1, every output off, {:.0f} ms after the last heartbeat.",
                           result_.safe_ms));
   require(result_.safe_ms <= timeout_ms + held_up_ms, "the board went safe too late");
-  // Without the log it seems shorter where this computer was held up after the last heartbeat.
+  // Without the log the time may be too short, if this computer was delayed.
   require(!result_.safe_by_event || result_.safe_ms >= timeout_ms, "the board went safe too early");
 }
 

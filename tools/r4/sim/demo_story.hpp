@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One board's part of the demonstration: connect, stream, command, silence, safe state, recovery,
-// stop, clear (paper sections 4.3 and 4.4). Each step is checked; the first that is not true ends
-// it.
+// The demonstration on one board: connect, stream, command, silence, safe state, recovery, stop,
+// clear (paper sections 4.3 and 4.4). The first step that fails ends it.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -17,7 +16,7 @@
 
 namespace r4::tool {
 
-// What was measured on one transport; 0 where it did not come to that.
+// Measurements on one transport; 0: step not reached.
 struct StoryResult {
   std::string transport;
   double connect_ms = 0;
@@ -25,15 +24,14 @@ struct StoryResult {
   std::uint64_t lost = 0;
   double round_trip_us = 0;
   double confirmed_ms = 0;
-  double safe_ms = 0;          // from the last heartbeat of the host to the safe state
-  bool safe_by_event = false;  // timed by the board's own log, else by the T of its datagrams
+  double safe_ms = 0;          // from the host's last heartbeat to the safe state
+  bool safe_by_event = false;  // measured by the board's own log, else by T of its datagrams
   double recovered_ms = 0;
   double stop_ms = 0;
   bool good = false;
-  std::string trouble;  // what was not true
+  std::string trouble;
 };
 
-// What the board's own log says, where it is another process.
 struct BoardLog {
   std::optional<std::uint32_t> silence_ms;  // of the newest SAFE (link)
   bool outputs_off = false;
@@ -41,13 +39,13 @@ struct BoardLog {
 
 class Story {
  public:
-  // How it tells what happens: a line of explanation, and a line that was on the wire.
+  // `say` prints an explanation, `show` a datagram.
   struct Teller {
     std::function<void(std::string_view)> say;
     std::function<void(std::string_view)> show;
   };
 
-  // `log` is empty for a board without one; else it must be kept up to date by handlers of `io`.
+  // `log` may be null; else handlers of `io` must update it.
   Story(asio::io_context& io, const std::string& url, const BoardLog* log, Teller teller);
 
   StoryResult run();
@@ -77,15 +75,14 @@ class Story {
   AsyncBoard board_;
   StoryResult result_;
 
-  // The newest state, its bytes and when it came.
   State state_;
   std::string state_bytes_;
   Clock::time_point state_came_;
   std::uint64_t states_ = 0;
-  // The newest heartbeat of the board that told of a safe state.
+  // The board's newest heartbeat that reported a safe state.
   std::string safe_bytes_;
   std::uint32_t safe_t_ms_ = 0;
-  std::optional<CommandResult> ended_;  // the command under way
+  std::optional<CommandResult> ended_;
 };
 
 }  // namespace r4::tool

@@ -17,8 +17,7 @@ namespace {
 
 constexpr std::size_t longest_line = 4096;
 
-// Opened anew where that is possible: it becomes non-blocking, which those who share standard input
-// with us, such as the shell, need not learn. A socket cannot be opened anew.
+// Reopened, so that it is non-blocking for this program only. A socket cannot be reopened.
 int open_input() {
   const int own = ::open("/proc/self/fd/0", O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   return own >= 0 ? own : ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);

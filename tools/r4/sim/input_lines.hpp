@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The lines of standard input, as they come: a terminal, a pipe or a file.
+// Reads lines from standard input: a terminal, a pipe or a file.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -14,8 +14,8 @@ namespace r4::tool {
 
 class InputLines {
  public:
-  // Called on the io_context's thread: `on_line` for each, without its end; `on_end` when no more come, with the
-  // reason where a line was too long. Throws Error if there is no standard input.
+  // On the io_context's thread: `on_line` gets each line without its end, `on_end` a problem if a
+  // line was too long. Throws Error if there is no standard input.
   InputLines(asio::io_context& io, std::function<void(const std::string&)> on_line,
              std::function<void(const Problem*)> on_end);
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 replay: a recording as a board that listens.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -40,13 +39,13 @@ struct ReplayOptions {
   bool json = false;
 };
 
-// The loop has other work, too: after so many records, or pieces of the file, it is its turn.
+// Records or file pieces handled before other work of the loop gets its turn.
 constexpr int steps_in_a_turn = 32;
-// Who has said nothing for so long gets nothing more, and so many get something at a time.
+// Limits of the audience: a peer silent for that long is removed.
 constexpr std::chrono::seconds audience_for{2};
 constexpr std::size_t most_peers = 8;
 
-// Says what the board said, to whoever has said something. Nothing that it hears does anything.
+// Sends the recorded datagrams to each peer that has sent something. Commands have no effect.
 class Replay : private Carrier::Handler {
  public:
   explicit Replay(const ReplayOptions& options)
@@ -82,18 +81,14 @@ class Replay : private Carrier::Handler {
   }
 
  private:
-  // --- Carrier::Handler
-
   void on_datagram(std::string_view, Peer from) override {
     if (from == everyone || (!audience_.contains(from) && audience_.size() == most_peers)) return;
     audience_[from] = Clock::now();
   }
   void on_carrier_event(const CarrierEvent& event) override {
-    // That nobody listens yet is no trouble.
+    // The absence of listeners is not reported.
     if (event.kind == CarrierEvent::Kind::warning) print_trouble("r4: " + event.problem.text());
   }
-
-  // --- playing
 
   Clock::time_point due() const {
     const ReplayRecords::Item* const next = records_.next();
@@ -117,7 +112,6 @@ class Replay : private Carrier::Handler {
     });
   }
 
-  // As far as the next datagram.
   void step() {
     while (records_.next() != nullptr || read_on()) {
       if (records_.next() == nullptr) continue;

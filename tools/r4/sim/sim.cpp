@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 sim: the simulated board as a process, its events on stdout.
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -51,7 +50,6 @@ void check_id(const std::string& id) {
               fmt::format("use 1 to {} letters, digits, _ and -", board_id_max));
 }
 
-// What connects a device to the user's bus.
 sim::ScriptStep connection_of(const std::string& name) {
   try {
     return sim::Script::parse_now("device " + name + " on", "--device").value();
@@ -76,11 +74,11 @@ Settings read_settings(const std::vector<std::string>& texts) {
   return settings;
 }
 
-// A board of the process: what it listens on, and what it answers to Q:ID.
+// A board of this process: its URLs and its answer to Q:ID.
 struct Plan {
   std::vector<std::string> urls;
   std::string id;
-  std::uint64_t number = 0;  // of the boards, from 0
+  std::uint64_t number = 0;
 };
 
 std::vector<Plan> plans_of(const SimOptions& options) {
@@ -103,7 +101,7 @@ std::vector<Plan> plans_of(const SimOptions& options) {
            options.board_id.empty() ? "sim-1" : options.board_id, 0}};
 }
 
-// Each board has files of the system open, and by default a program may have 1024.
+// Each board needs open files, and the default limit of a program may be 1024.
 void allow_files_for(std::size_t boards) {
   constexpr std::size_t of_the_program = 64;
   constexpr std::size_t of_a_board = 4;
@@ -112,10 +110,9 @@ void allow_files_for(std::size_t boards) {
   const rlim_t wanted = of_the_program + of_a_board * boards;
   if (limit.rlim_cur >= wanted) return;
   limit.rlim_cur = std::min<rlim_t>(wanted, limit.rlim_max);
-  ::setrlimit(RLIMIT_NOFILE, &limit);  // if that is too few, opening says which board has none
+  ::setrlimit(RLIMIT_NOFILE, &limit);  // if the limit is too low, opening a board reports it
 }
 
-// A board with its log, at its transports.
 class ServedBoard {
  public:
   ServedBoard(asio::io_context& io, SimOutput& output, const SimOptions& options, const Plan& plan,
@@ -150,7 +147,7 @@ class ServedBoard {
  private:
   std::unique_ptr<Carrier> impaired(asio::io_context& io, std::unique_ptr<Carrier> carrier,
                                     Impairment link) {
-    link.seed += links_.size();  // each transport of its own
+    link.seed += links_.size();  // a different seed for each transport
     auto made = make_impaired_carrier(io, std::move(carrier), link);
     links_.push_back(made.get());
     return made;

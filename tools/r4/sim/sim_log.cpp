@@ -18,9 +18,8 @@
 namespace r4::tool {
 namespace {
 
-constexpr std::size_t room = std::size_t{1} << 20;  // for bytes that wait for a reader
+constexpr std::size_t room = std::size_t{1} << 20;  // bytes that wait for a reader
 
-// Whether a motor is told to turn.
 bool drives(const sim::Pins& pins) {
   const auto has_duty = [](const Drive& drive) { return drive.pwm != 0; };
   const auto has_speed = [](const Bldc& bldc) { return bldc.speed != 0; };
@@ -153,7 +152,7 @@ std::string host_url(const std::string& board_url) {
   if (url.scheme() == "pty") return "serial://" + url.path();
   if (url.scheme() == "can") return board_url;
   const bool any = url.host() == "0.0.0.0" || url.host() == "::";
-  // GCC 12 warns falsely of find() here.
+  // count(), because GCC 12 has a false warning for find() here.
   const bool v6 = std::count(url.host().begin(), url.host().end(), ':') != 0;
   const std::string host = any ? (v6 ? "::1" : "127.0.0.1") : url.host();
   return fmt::format("{}://{}:{}", url.scheme(), v6 ? "[" + host + "]" : host,

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `r4 sim` prints: where the boards listen and their own events, in words or as JSON. A slow
-// reader does not hold a board up.
+// Output of `r4 sim`, as text or JSON. A slow reader does not delay a board.
 #pragma once
 
 #include <string>
@@ -15,15 +14,13 @@
 
 namespace r4::tool {
 
-// The lines of all boards of the process, in the order in which they were said.
 class SimOutput {
  public:
   explicit SimOutput(bool json);
 
-  // Where they listen, known once they have started; what was said before is printed behind it.
+  // Call after the boards have started. Earlier lines are printed after the URLs.
   void listening(const std::vector<std::string>& urls);
   void print(std::string line);
-  // What somebody has to mend.
   void problem(const Problem& problem);
 
   bool json() const { return json_; }
@@ -31,26 +28,24 @@ class SimOutput {
  private:
   const bool json_;
   bool started_ = false;
-  std::vector<std::string> held_;  // lines of before listening()
+  std::vector<std::string> held_;
   LineWriter writer_;
 };
 
-// One board's.
 class SimLog {
  public:
-  // `name` is told with each event if there are several boards; else it is empty.
+  // `name` is part of each event if there are several boards; else empty.
   SimLog(SimOutput& output, bool quiet, std::string name)
       : output_(output), quiet_(quiet), name_(std::move(name)) {}
 
-  // The callbacks for the board's options; the log must outlive the board.
+  // The log must outlive the board.
   sim::SimulatedBoard::Events events();
-  // The board they belong to, before its start().
+  // Call before the board's start().
   void watch(const sim::SimulatedBoard& board) { board_ = &board; }
-  // What its sensors sense now.
   void tell_sensors();
-  // What passed over one of its transports, at the end.
+  // Call at the end for each transport: prints its counters.
   void on_end(const Carrier& carrier);
-  // What became of datagrams on a link that is bad on purpose, at the end.
+  // Call at the end: prints the counters of a deliberately impaired link.
   void on_impairment(const ImpairedCarrier& link);
 
  private:
@@ -73,19 +68,18 @@ class SimLog {
   const sim::SimulatedBoard* board_ = nullptr;
 };
 
-// How a host on this machine opens what a board listens on: "serial:///tmp/r4" for "pty:/tmp/r4".
+// The host's URL for a board's URL: "serial:///tmp/r4" for "pty:/tmp/r4".
 std::string host_url(const std::string& board_url);
 
 // {"osmc":[[pwm,dir],…],"dhb":…,"servo":[us,…],"relays":bits,"bldc":[[speed,dir,brake],…],
 //  "stepper":[[position,stepping],…]}; stepping: 1 forward, -1 backward, 0 standing
 Json pins_json(const sim::Pins& pins);
 
-// "OSMC1:358,1 SERVO1:2001": what is not as in the safe state; "all off".
+// "OSMC1:358,1 SERVO1:2001": differences from the safe state; "all off".
 std::string pins_text(const sim::Pins& pins);
 
 // {"supply":true,"handle":"held","enc":[counts,…],"stepper":[steps,…],"us":[cm,…],
-//  "analog":{"AIN24":24.28,…}}: the motors' supply, and what sensors would read; "off" for an
-// ultrasonic sensor without its cable.
+//  "analog":{"AIN24":24.28,…}}: motor supply and sensor readings; "off": no sensor is connected.
 Json sensors_json(const sim::BoardModel& model);
 
 }  // namespace r4::tool

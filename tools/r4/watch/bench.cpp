@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 bench: how good the link to a board is, measured on that link.
+// r4 bench: measures the quality of the link to a board, in four phases:
 //
 //     wait for control | listen: rate, loss, jitter | ask: round trips | command: confirmations
-//                            2/5 of the time             2/5                 1/5
+//                             2/5 of the time             2/5                 1/5
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -32,8 +32,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr Milliseconds connect_timeout{3000};
 constexpr Milliseconds answer_timeout{1000};
-// Questions come in bursts with pauses between them: the board takes no packet number that is far
-// ahead of the newest heartbeat's (BoardLink::command_window).
+// Pauses, because the board rejects packet numbers too far ahead (BoardLink::command_window).
 constexpr std::size_t burst = 100;
 constexpr Milliseconds pause{10};
 
@@ -44,7 +43,6 @@ struct BenchOptions {
   bool json = false;
 };
 
-// Durations in microseconds, and the one below which a share of them lies.
 class Durations {
  public:
   void add(Time duration) { values_.push_back(static_cast<double>(duration.count())); }
@@ -62,8 +60,8 @@ class Durations {
 
 BoardOptions bench_board(const std::string& key) {
   BoardOptions options = with_key(key);
-  options.session.arming = Arming::off;                 // it drives nothing
-  options.session.identify_interval = Milliseconds(0);  // the questions are ours
+  options.session.arming = Arming::off;
+  options.session.identify_interval = Milliseconds(0);  // only the bench sends questions
   return options;
 }
 
@@ -91,14 +89,13 @@ class Bench {
   }
 
  private:
-  // Runs the loop for `time`, or until something stops it.
   void run_for(Milliseconds time) {
     timer_.after(time, [this] { boards_.stop(); });
     boards_.io().restart();
     boards_.run();
   }
 
-  // Proof of control is a state.
+  // A received state proves control.
   void connect() {
     Subscription waiting = board_.on_state([this](const State&, const Datagram&) {
       if (board_.in_control()) boards_.stop();
@@ -126,7 +123,7 @@ class Bench {
     if (states_ == 0) throw Error(explain(board_.name(), board_.link()));
   }
 
-  // In a burst, a question follows as soon as the answer to the last one is there.
+  // Within a burst, each answer triggers the next question.
   void ask() {
     running_ = true;
     ask_next(burst);
@@ -145,7 +142,7 @@ class Bench {
                       });
   }
 
-  // The session's own choice of fields again: a command that changes nothing.
+  // Requests the fields that the session has already chosen, so the command changes nothing.
   void command() {
     running_ = true;
     command_next();
@@ -159,7 +156,7 @@ class Bench {
                       });
   }
 
-  // False where going on would only fail again: the board refuses.
+  // False if the board refuses: the next command would only be refused again.
   static bool count(const CommandResult& result, Durations& durations, std::uint64_t& failed) {
     if (result.outcome == Outcome::confirmed) {
       durations.add(result.elapsed);
@@ -247,7 +244,7 @@ class Bench {
   std::uint64_t damaged_ = 0;
   double state_hz_ = 0;
   double jitter_us_ = 0;
-  bool running_ = false;  // a question or command follows the other
+  bool running_ = false;
   Durations round_trips_;
   std::uint64_t unanswered_ = 0;
   Durations confirmations_;

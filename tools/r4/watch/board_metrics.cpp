@@ -18,12 +18,11 @@ MetricLabels with(MetricLabels labels, const char* name, std::string value) {
   return labels;
 }
 
-// What counts may not go down, as what is lost does when it comes late.
+// A Prometheus counter must not decrease, but `lost` does when a datagram arrives late.
 std::uint64_t lost_in_turn(const PacketCounters& packets) {
   return std::uint64_t{packets.lost} + packets.late;
 }
 
-// Of several paths to a board each one.
 void describe_paths(const SetBoard& each, const MetricLabels& one, MetricFamilies& out) {
   const std::vector<std::string> urls = split_paths(each.url);
   const std::vector<PathStatus> paths = each.board.paths();
@@ -53,7 +52,7 @@ void describe_paths(const SetBoard& each, const MetricLabels& one, MetricFamilie
   }
 }
 
-// A value of a label may come from a board, so it is made printable. A backslash and quotes are escaped.
+// A label's value may come from a board: make it printable, escape backslashes and quotes.
 std::string label_text(const std::string& value) {
   std::string text;
   for (const char c : printable(value)) {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What Prometheus is told of boards, by r4 metrics and r4 web.
 #pragma once
 
 #include <map>
@@ -13,7 +12,7 @@ namespace r4::tool {
 
 using MetricLabels = std::vector<std::pair<std::string, std::string>>;
 
-// The answer in the text format of Prometheus (exposition format 0.0.4): its families, each with its help and type.
+// Metrics in the text format of Prometheus (exposition format 0.0.4).
 class MetricFamilies {
  public:
   template <class Integer>
@@ -32,10 +31,9 @@ class MetricFamilies {
   void add(const char* name, const char* help, const char* type, const MetricLabels& labels,
            double value);
 
-  std::map<std::string, std::string> families_;  // by name
+  std::map<std::string, std::string> families_;
 };
 
-// What is told of one board.
 void describe(const SetBoard& each, MetricFamilies& out);
 
 }  // namespace r4::tool

@@ -22,7 +22,7 @@ class NoteView final : public MonitorView {
   std::string& note_;
 };
 
-// "; udp://10.0.0.7:2018: silent", of several those that do not carry.
+// "; udp://10.0.0.7:2018: silent": with several paths, the ones that do not carry.
 std::string lost_paths(const AsyncBoard& board) {
   const std::vector<PathStatus> paths = board.paths();
   std::string text;
@@ -47,7 +47,7 @@ void BoardTable::show() {
   }
 }
 
-// A board that is not well comes first on a screen, which may be too short for all.
+// Boards with trouble come first, because the screen may be too short for all rows.
 std::vector<std::string> BoardTable::rows() const {
   std::size_t width = 5;
   std::size_t active = 0;

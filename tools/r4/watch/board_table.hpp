@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `r4 monitor` of several boards for people: a table, a row for each board.
 #pragma once
 
 #include <memory>
@@ -15,11 +14,11 @@ namespace r4::tool {
 
 class BoardTable {
  public:
-  // `live`: redrawn in place, on a terminal. Else its rows go to `lines`, again and again.
+  // `live`: redraw the table in place on a terminal; else print its rows to `lines` repeatedly.
   BoardTable(const BoardSet& boards, bool live, LineWriter& lines)
       : boards_(boards), live_(live), lines_(lines), notes_(boards.size()) {}
 
-  // Keeps in the table what is wrong with the transport of that board. The table outlives it.
+  // Records transport problems of that board in the table, which must outlive the view.
   std::unique_ptr<MonitorView> view(std::size_t board);
   void show();
 
@@ -30,7 +29,7 @@ class BoardTable {
   const bool live_;
   LineWriter& lines_;
   Screen screen_;
-  std::vector<std::string> notes_;  // of the boards' transports
+  std::vector<std::string> notes_;
 };
 
 }  // namespace r4::tool

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 decode: datagrams in, one a line or as the frames of a CAN bus, JSON out. Whatever the input,
-// memory stays bounded.
+// Memory is bounded for any input.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -43,7 +42,7 @@ class Input {
   Input(const Input&) = delete;
   Input& operator=(const Input&) = delete;
 
-  // What has arrived, at least one byte; empty at the end. Valid until the next call.
+  // The bytes that have arrived; empty at the end of the input. Valid until the next call.
   std::string_view read() {
     for (;;) {
       const ssize_t count = ::read(fd_, buffer_.data(), buffer_.size());
@@ -65,14 +64,13 @@ class Input {
   std::array<char, 65536> buffer_;
 };
 
-// A line packed:HEX, as r4 encode --packed writes it. No datagram looks so: it has a semicolon.
+// A line packed:HEX from r4 encode --packed. A plain datagram contains a semicolon.
 constexpr std::string_view packed_prefix = "packed:";
 
 bool is_packed_line(std::string_view line) {
   return line.starts_with(packed_prefix) && line.find(';') == std::string_view::npos;
 }
 
-// Datagrams, one a line.
 class DatagramLines {
  public:
   explicit DatagramLines(const BusLog::Print& print) : print_(print) {}
@@ -103,7 +101,7 @@ class DatagramLines {
   }
   static bool add_packed(Json& object, std::string_view line) {
     const std::string_view hex = line.substr(packed_prefix.size());
-    std::array<std::uint8_t, max_datagram> bytes;  // a line holds no more characters
+    std::array<std::uint8_t, max_datagram> bytes;  // NumberedLines limits the line to max_datagram
     const std::size_t size = hex.size() / 2;
     bool good = hex.size() % 2 == 0;
     for (std::size_t i = 0; good && i < size; ++i) {
@@ -145,7 +143,7 @@ int decode_lines(Input& input, Reader& reader, std::string& printed) {
 
 int decode(const DecodeOptions& options) {
   Input input(options.file);
-  std::string printed;  // of a block of input at once
+  std::string printed;
   const BusLog::Print print = [&printed](const Json& object) { printed += line_of(object); };
   if (options.candump) {
     BusLog log(print);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 encode: fields in, a datagram with packet number, time and checksum out.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -36,7 +35,6 @@ struct EncodeOptions {
   throw Error(ErrorKind::usage, std::string(thing), std::move(reason), std::move(fix));
 }
 
-// Writes the fields of `text`, which are separated by semicolons.
 void write_fields(DatagramWriter& writer, std::string_view text) {
   if (text.ends_with(';')) text.remove_suffix(1);
   for (bool more = true; more;) {
@@ -62,7 +60,7 @@ std::string text_of(const Field& field) {
                      std::string_view(field.values().data(), field.values().size()));
 }
 
-// Would a board execute these commands together?
+// Throws if a board would not execute these commands together.
 void check_all(const Datagram& datagram) {
   Setpoints group;
   for (const Field& field : datagram) {
@@ -72,7 +70,7 @@ void check_all(const Datagram& datagram) {
   }
 }
 
-// Would a board or a host take it for what its letter says? Letters that nobody knows may pass.
+// Throws if a board or a host would not accept the datagram. Unknown letters may pass.
 void check(const Datagram& datagram) {
   const int count = datagram.command_count();
   const Field& field = datagram.command();

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The status that `r4 monitor` redraws on a terminal.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,7 +19,7 @@ namespace r4::tool {
 namespace {
 
 constexpr std::size_t most_notes = 4;
-// More than a board has: what else a state names is not kept.
+// A board has fewer fields: further names in a state are ignored.
 constexpr std::size_t most_fields = 128;
 constexpr std::size_t cell_width = 24;  // "SERVO16POS          2000"
 
@@ -31,7 +30,7 @@ class LiveView final : public MonitorView {
   void on_state(const ReceivedState&, const Datagram& datagram) override {
     for (const Field& field : datagram) {
       if (field.name() == Text("PNum") || field.name() == Text("T")) continue;
-      if (field.name() == name_of(StateField::fault)) continue;  // the first lines tell
+      if (field.name() == name_of(StateField::fault)) continue;  // shown by the first lines
       std::string name(field.name().data(), field.name().size());
       const auto known = std::find_if(fields_.begin(), fields_.end(),
                                       [&](const auto& each) { return each.first == name; });
@@ -54,7 +53,7 @@ class LiveView final : public MonitorView {
   }
   void on_device_trouble(const Problem& problem) override { note(problem.text()); }
   void on_nack(const Nack& nack, const Datagram&) override {
-    if (nack.code == Refusal::busy) return;  // the first line says so
+    if (nack.code == Refusal::busy) return;  // shown by the first line
     note(fmt::format("refused PNum {}: {}", nack.pnum, meaning_of(nack.code)));
   }
   void on_bad_datagram(const ReadResult& result, std::string_view) override {
@@ -71,7 +70,7 @@ class LiveView final : public MonitorView {
   }
 
   void on_tick() override {
-    if (!Screen::has_room()) return;  // Ctrl-S
+    if (!Screen::has_room()) return;
     std::vector<std::string> lines = status_lines();
     add_fields(lines, std::max<std::size_t>(1, Screen::columns() / cell_width));
     for (const auto& [device, values] : readings_) {
@@ -119,7 +118,6 @@ class LiveView final : public MonitorView {
     return lines;
   }
 
-  // A line each, where there are several.
   void add_paths(std::vector<std::string>& lines) const {
     const std::vector<PathStatus> paths = board_.paths();
     if (paths.size() < 2) return;
@@ -135,7 +133,7 @@ class LiveView final : public MonitorView {
     }
   }
 
-  // The fields in columns, read downwards.
+  // In columns, read downwards.
   void add_fields(std::vector<std::string>& lines, std::size_t columns) const {
     const std::size_t rows = (fields_.size() + columns - 1) / columns;
     for (std::size_t row = 0; row < rows; ++row) {
@@ -150,7 +148,7 @@ class LiveView final : public MonitorView {
   const AsyncBoard& board_;
   const Clock::time_point start_ = Clock::now();
   std::vector<std::pair<std::string, std::string>> fields_;
-  // By its slot and what it is called, its values by their names.
+  // By slot and name of the device; values by name.
   std::map<std::pair<int, std::string>, std::map<std::string, std::string>> readings_;
   std::deque<std::string> notes_;
   ChipFault fault_;

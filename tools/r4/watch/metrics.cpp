@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 metrics: boards and their links for Prometheus.
 #include <fmt/format.h>
 
 #include <asio/post.hpp>
@@ -43,7 +42,6 @@ web::ServerOptions server_options(const MetricsOptions& options) {
   return server;
 }
 
-// A CAN interface: how long it was busy, and for which boards.
 class BusMetrics {
  public:
   BusMetrics(asio::io_context& io, const CanInterface& interface)
@@ -66,7 +64,7 @@ class BusMetrics {
   }
 
  private:
-  // A vcan has no bit rate: it counts as the one that R4 is built for.
+  // A vcan has no bit rate: assume R4's usual one.
   static CanBitRate rate_of(const CanInterface& interface) {
     constexpr std::uint32_t usual = 1'000'000;
     return {interface.bit_rate != 0 ? interface.bit_rate : usual, interface.data_bit_rate};
@@ -106,7 +104,7 @@ class MetricsCommand final : web::ServerEvents {
   }
 
  private:
-  // On the server's thread. There are no other clients than those that ask for the metrics.
+  // Called on the server's thread. All clients are HTTP requests for the metrics.
   void on_open(web::ClientId, web::Protocol) override {}
   void on_message(web::ClientId, web::Protocol, std::string) override {}
   void on_closed(web::ClientId, web::Protocol) override {}

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 monitor: shows what a board says, and keeps its link alive meanwhile.
 #include <unistd.h>
 
 #include <algorithm>
@@ -33,19 +32,18 @@ namespace {
 
 constexpr Milliseconds tick{100};
 constexpr Milliseconds table_interval{1000};
-// With --count alone: how long the boards may stay silent from the start.
+// With --count only: the longest silence of the boards after the start.
 constexpr Milliseconds patience{5000};
-// With --device: for how long another host must control the board until it is left to that one, and
-// how long the board has to confirm that.
+// With --device: when to leave the board to another host, and the time to confirm that.
 constexpr Milliseconds busy_patience{1500}, release_time{200};
-// Bytes that wait for a reader: of a board half a second of states.
+// Bytes that wait for a reader. For one board: about half a second of states.
 constexpr std::size_t unread_of_board = 32768, most_unread = std::size_t{1} << 18;
 
 struct MonitorOptions {
   std::vector<std::string> urls;
   bool json = false;
   bool control = false;
-  std::uint64_t count = 0;  // 0: no end
+  std::uint64_t count = 0;  // 0: unlimited
   std::optional<Milliseconds> duration;
   std::string fields;
   std::vector<std::string> devices;
@@ -117,14 +115,14 @@ class Monitor {
  private:
   void listen(AsyncBoard& board, MonitorView& view) {
     board.on_state([this, &view](const ReceivedState& state, const Datagram& datagram) {
-      if (boards_.stopped()) return;  // what came together with the last one
+      if (boards_.stopped()) return;  // received together with the last one
       view.on_state(state, datagram);
       tell_readings(state);
       if (++states_ == options_.count) boards_.stop();
     });
     board.on_board_heartbeat([&view](const Datagram& datagram) { view.on_heartbeat(datagram); });
     board.on_nack([&board, &view](const Nack& nack, const Datagram& datagram) {
-      // A path that is about to join is answered so, while another one carries.
+      // While one path carries, another path that is joining may be refused as busy.
       const LinkStatus link = board.link();
       const bool busy = link.causes.has(LinkCause::busy);
       if (nack.code == Refusal::busy && link.carrying != 0 && !busy) return;
@@ -141,8 +139,8 @@ class Monitor {
     on_paths(board, [&view](const PathStatus& path) { view.on_path(path); });
   }
 
-  // The program that controls the board sets devices up: this one, where no other does. Else what
-  // that program has set up is shown.
+  // Devices are set up by the host in control: this program, if no other host controls the board.
+  // Otherwise show the devices that the other host has set up.
   void set_devices_up() {
     AsyncBoard& board = boards_[0].board;
     setup_.emplace(boards_.io(), board, devices_,
@@ -154,7 +152,7 @@ class Monitor {
     }
   }
 
-  // A host that was killed keeps its board until the board's timeout.
+  // A killed host keeps control of its board until the board's timeout.
   void look_who_controls() {
     if (!setup_) return;
     AsyncBoard& board = boards_[0].board;
@@ -163,7 +161,7 @@ class Monitor {
     board.async_release_control(release_time, [](const CommandResult&) {});
   }
 
-  // Each reading once, and again when the board has begun anew.
+  // Reports each reading once, and again after a restart of the board.
   void tell_readings(const ReceivedState& state) {
     for (const Device& device : devices_) {
       const std::vector<DeviceValue>& values = device.description().values;
@@ -192,11 +190,11 @@ class Monitor {
   BoardSet boards_;
   std::optional<LineWriter> lines_;
   std::optional<BoardTable> table_;
-  std::vector<std::unique_ptr<MonitorView>> views_;  // of each board
+  std::vector<std::unique_ptr<MonitorView>> views_;
   Timer tick_;
   Timer table_tick_;
   Timer patience_;
-  std::uint64_t states_ = 0;  // of all boards together
+  std::uint64_t states_ = 0;
   std::optional<DeviceSetup> setup_;
   std::array<std::optional<std::uint32_t>, i2c_slots> told_ms_;
   int busy_ticks_ = 0;

@@ -25,9 +25,9 @@ using Clock = std::chrono::steady_clock;
 constexpr std::size_t unread_of_bus = 65536;  // bytes that wait for a reader
 constexpr Milliseconds bus_tick{100};
 constexpr Milliseconds plain_interval{1000};
-// Boards without a host say so twice a second.
+// A board without a host sends twice a second.
 constexpr Milliseconds bus_patience{5000};
-// The load of the bus is not asked here: `r4 bus` is for that.
+// Any rate will do, because the bus load is not used here (see `r4 bus`).
 constexpr CanBitRate any_rate{1000000, 0};
 
 class BusMonitor {
@@ -71,7 +71,7 @@ class BusMonitor {
   }
 
   void on_datagram(std::uint8_t node, const Datagram& datagram) {
-    if (io_.stopped()) return;  // frames that came together with the last one
+    if (io_.stopped()) return;  // received together with the last one
     if (options_.json) {
       Json object{{"type", to_text(kind_of(datagram))},
                   {"transport", fmt::format("{}?node={}", name(), node)},

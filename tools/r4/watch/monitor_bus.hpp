@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `r4 monitor can://can0`, without a node: every board that is heard on the bus, by listening only.
+// `r4 monitor can://can0` without a node: listens to every board on the bus.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,11 @@ namespace r4::tool {
 struct BusMonitorOptions {
   std::string interface;
   bool json = false;
-  std::uint64_t count = 0;  // states of all boards together; 0: no end
+  std::uint64_t count = 0;  // states of all boards together; 0: unlimited
   std::optional<Milliseconds> duration;
 };
 
-// Runs until its end or a signal. Throws Error, refused if no board was heard.
+// Runs until its end or a signal. Throws Error{refused} if no board was heard.
 void monitor_bus(const BusMonitorOptions& options);
 
 }  // namespace r4::tool

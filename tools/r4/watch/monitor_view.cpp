@@ -22,7 +22,7 @@ namespace {
 
 std::string_view view(Text text) { return {text.data(), text.size()}; }
 
-constexpr std::size_t most_shown = 600;  // of a damaged datagram
+constexpr std::size_t most_shown = 600;
 
 std::string shown(std::string_view bytes) {
   std::array<char, most_shown + masking_room> room;

@@ -17,15 +17,13 @@ namespace {
 
 std::string_view view(Text text) { return {text.data(), text.size()}; }
 
-// The column of a value: "AIN24", "OSMC1.pwm".
 std::string column_of(const StateFieldRow& field, const FieldValue& value) {
   std::string name(view(field.name));
   if (*value.name != '\0') name.append(".").append(value.name);
   return name;
 }
 
-// The command of an output with the values that the page fills in, "O:{value},{direction},1", and
-// their ranges.
+// Adds an output's command with placeholders, "O:{value},{direction},1", and ranges.
 void add_command(Json& output, const CommandRow& row, int channel) {
   std::string command = fmt::format("{}:{}", row.letter, view(row.word));
   for (const CommandValue each : row) {

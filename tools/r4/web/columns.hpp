@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A state as a row of numbers: which column has which value of which field, with its unit; and which columns belong to
-// which output channel.
+// A state as a row of numbers, with the field and unit of each column.
 #pragma once
 
 #include <array>
@@ -17,14 +16,13 @@ namespace r4::tool::web {
 
 class Columns {
  public:
-  // The fields of a state, and behind them what `devices` measure: "bno055@0x28.accel_x".
+  // Columns of all state fields, then of the values of `devices`: "bno055@0x28.accel_x".
   explicit Columns(std::vector<Device> devices = {});
   std::size_t size() const { return names_.size(); }
-  // "AIN24", "OSMC1.pwm"; and as wide as that the units, "V".
+  // "AIN24", "OSMC1.pwm"; units() has the same size: "V".
   const std::vector<std::string>& names() const { return names_; }
   const std::vector<std::string>& units() const { return units_; }
-  // What a state's datagram carries goes to its columns of `row`, which has size() of them; a value that is there
-  // for none stays as it was.
+  // Copies values to their columns of `row`, which has size() elements; other elements stay.
   void fill(const Datagram& state, std::vector<double>& row) const;
 
  private:
@@ -35,7 +33,6 @@ class Columns {
   std::size_t first_of_devices_ = 0;
 };
 
-// The output channels of a board, for the page.
 Json channels_json();
 
 }  // namespace r4::tool::web

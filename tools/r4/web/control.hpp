@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which browser controls the boards, and for how long: no browser, no motor.
+// Decides which browser controls the boards, and for how long: without a browser no motor turns.
 //
 //      free --take()--> held --release() of its holder, or expired()--> leaving --left()--> free
 //
-// While it is held, its holder says that it is alive, ten times a second, with the newest time that it was told. It is
-// over when the newest of these echoes is `limit` old: so neither silence nor words that were held up on the way keep
-// it, and since words come in order, no command is taken that was sent before something that old. Time is passed in.
+// The holder sends alive() ten times a second, with the newest server time it has received. Control
+// expires when the newest echoed time is `limit` old, so neither silence nor delayed messages keep
+// it. Messages arrive in order, so no older command is accepted. The caller passes in the time.
 #pragma once
 
 #include <chrono>
@@ -16,7 +16,7 @@ namespace r4::tool::web {
 
 class Control {
  public:
-  using Time = std::chrono::milliseconds;  // any start
+  using Time = std::chrono::milliseconds;
   using Client = std::uint32_t;
   static constexpr std::chrono::milliseconds limit{500};
 
@@ -24,15 +24,15 @@ class Control {
   bool is_held_by(Client client) const { return holder_ == client; }
   bool leaving() const { return leaving_; }
 
-  // False: another has it, or has not quite left it.
+  // False if another client holds control or is still leaving it.
   bool take(Client client, Time now);
-  // False: it was not the holder.
+  // False if the client was not the holder.
   bool release(Client client);
-  // Everybody has heard that it is over.
+  // Call when all boards have been left.
   void left() { leaving_ = false; }
-  // False where it tells nothing newer.
+  // False if `echoed` is not newer than before.
   bool alive(Client client, Time echoed, Time now);
-  // When it ends unless alive() counts before.
+  // When control expires, unless alive() extends it.
   std::optional<Time> deadline() const;
   bool expired(Time now) const { return holder_ && now >= *deadline(); }
 

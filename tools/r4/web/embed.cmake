@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# cmake -D FOLDER=… -D OUTPUT=… -P embed.cmake: the page's files as C++.
+# cmake -D FOLDER=… -D OUTPUT=… -P embed.cmake: converts the page's files to C++.
 file(GLOB files ${FOLDER}/*.html ${FOLDER}/*.js ${FOLDER}/*.css ${FOLDER}/*.svg)
 set(arrays "")
 set(table "")

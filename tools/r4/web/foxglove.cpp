@@ -142,7 +142,7 @@ void Foxglove::on_closed(ClientId client) {
   clients_.erase(found);
 }
 
-// Who is subscribed by the old name is so no more, as the protocol has it.
+// In the protocol, clients that subscribed to the old name lose their subscription.
 void Foxglove::name(std::size_t board, const std::string& name) {
   if (name.empty() || std::exchange(names_[board], name) == name) return;
   const bool taken = std::count(names_.begin(), names_.end(), name) > 1;

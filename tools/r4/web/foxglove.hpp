@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The Foxglove WebSocket protocol (foxglove.websocket.v1, github.com/foxglove/ws-protocol), which reads only: each
-// board has a topic of its records, as an MCAP file of r4 convert has, one of its link and one of events, as JSON with
-// schemas. It knows no sockets; but for wanted(), it is used on the server's thread.
+// The Foxglove WebSocket protocol (foxglove.websocket.v1, github.com/foxglove/ws-protocol),
+// read-only. A board has topics for records (as in MCAP files of r4 convert), link and events: JSON
+// with schemas. Uses no sockets. Only wanted() may be called outside the server's thread.
 #pragma once
 
 #include <array>
@@ -27,13 +27,13 @@ class Foxglove {
   Foxglove(std::size_t boards, std::string session, Send send);
 
   void on_open(ClientId client);
-  // False for what is no message of the protocol.
+  // False if the text is not a message of the protocol.
   bool on_message(ClientId client, const std::string& text);
   void on_closed(ClientId client);
 
-  // The board's name is known, or is another: its topics are advertised anew.
+  // Sets a board's name, new or changed, and advertises its topics again.
   void name(std::size_t board, const std::string& name);
-  // Is anybody subscribed? From any thread.
+  // True if a client is subscribed. From any thread.
   bool wanted(std::size_t board, Topic topic) const {
     return channel(board, topic).subscribers > 0;
   }

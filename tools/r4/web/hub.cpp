@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 
 constexpr auto tick_time = 25ms;
 constexpr auto command_time = 1s, arm_time = 2s;
-// A page that echoes what it has heard needs to hear something.
+// Pages echo received times, so the server must send this often.
 constexpr auto longest_silence = 100ms;
 
 template <class Unit>
@@ -30,7 +30,7 @@ Unit wall_time() {
 }
 std::int64_t wall_ms() { return wall_time<std::chrono::milliseconds>().count(); }
 
-// What pages may not say: it is for who sets the robot up, or is said by r4 web itself.
+// Throws for commands that only r4 send (setup) or r4 web itself (link) may send.
 void require_allowed(const Command& command) {
   switch (command.kind) {
     case CommandKind::setting:
@@ -133,8 +133,6 @@ void Hub::on_metrics() {
   });
 }
 
-// --- what boards say
-
 void Hub::on_state(std::size_t board, const ReceivedState&, const Datagram& datagram) {
   if (!pages_.empty()) rows_[board].add(datagram, wall_ms());
   on_datagram(board, datagram);
@@ -164,8 +162,6 @@ void Hub::on_event(std::size_t board, WebBoard::Level level, const std::string& 
   }
   tell_all(std::move(message));
 }
-
-// --- clients come and go
 
 void Hub::greet(ClientId client) {
   pages_.insert(client);
@@ -201,8 +197,6 @@ void Hub::obey(ClientId client, const PageRequest& request) {
   }
 }
 
-// --- control
-
 void Hub::want_control(ClientId client, bool wanted) {
   if (!wanted) {
     if (control_.release(client)) end_control("it was given back");
@@ -232,15 +226,13 @@ void Hub::watch_holder() {
   });
 }
 
-// The timer stands still while this computer sleeps: a browser that is heard first when it wakes
-// may have lost control.
+// The timer stops while this computer sleeps, so check before the first message after waking.
 void Hub::look_at_holder() {
   if (!control_.expired(now())) return;
   control_.release(*control_.holder());
   end_control(fmt::format("nothing was heard of the browser for {} ms", Control::limit.count()));
 }
 
-// Nobody has it: the boards hear a farewell, and are safe.
 void Hub::end_control(const std::string& why) {
   deadline_.cancel();
   const auto left = std::make_shared<std::size_t>(boards_.size());
@@ -264,7 +256,7 @@ void Hub::tell_control(ClientId client, const std::string& why) {
   tell(client, text_of(object));
 }
 
-// Whoever has control may record, and end any recording. Whoever has begun one may end it, too.
+// The controlling browser may start and end any recording. A browser may always end its own.
 void Hub::record(ClientId client, bool on) {
   if (!control_.is_held_by(client) && (on || !recording_.is_of(client))) {
     return tell_recording(client, "this browser has no control; take it first");
@@ -272,8 +264,6 @@ void Hub::record(ClientId client, bool on) {
   if (on) return recording_.begin(client);
   recording_.end();
 }
-
-// --- commands
 
 void Hub::answer(ClientId client, const PageRequest& request, std::size_t board, bool ok, double ms,
                  const std::string& text) {
@@ -329,8 +319,6 @@ void Hub::send(ClientId client, const PageRequest& request, AsyncBoard& board,
       },
       what);
 }
-
-// --- what pages hear
 
 void Hub::tell(ClientId client, std::string text) {
   server_.send(client,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What r4 web does: the boards on one side, the clients of the server on the other. It lives on the boards' loop; what
-// clients say comes there message by message, checked, and costs it little.
+// Connects the boards with the clients of the server. Runs on the boards' loop. Client messages
+// arrive there one by one, already parsed, so they cost little.
 #pragma once
 
 #include <chrono>
@@ -26,28 +26,27 @@ namespace r4::tool::web {
 struct HubOptions {
   ServerOptions server;
   std::string record_folder;
-  std::vector<Device> devices;  // on the user's I2C bus of each board
+  std::vector<Device> devices;
 };
 
 class Hub final : ServerEvents, WebBoard::Events {
  public:
-  // The boards are watched, not yet open, and outlive it. Throws Error if it cannot listen.
+  // The boards, not yet open, must outlive the hub. Throws Error if it cannot listen.
   Hub(BoardSet& boards, const HubOptions& options);
   ~Hub();
 
   void start();
   const ListenAddress& address() const { return server_.address(); }
-  // Nobody is served any more.
   void end();
 
  private:
-  // On the server's thread.
+  // On the server's thread:
   void on_open(ClientId client, Protocol protocol) override;
   void on_message(ClientId client, Protocol protocol, std::string text) override;
   void on_closed(ClientId client, Protocol protocol) override;
   void on_metrics() override;
 
-  // On the loop.
+  // On the loop:
   void on_state(std::size_t board, const ReceivedState& state, const Datagram& datagram) override;
   void on_datagram(std::size_t board, const Datagram& datagram) override;
   void on_change(std::size_t board) override;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What r4 web tells pages, as JSON (docs/web.md).
+// JSON messages from r4 web to pages (docs/web.md).
 #pragma once
 
 #include <cstdint>
@@ -11,20 +11,19 @@
 
 namespace r4::tool::web {
 
-// One state, as it came.
 struct Row {
   std::int64_t time_ms = 0;    // since 1970
-  std::uint64_t board_ms = 0;  // T: parts of one state have the same
+  std::uint64_t board_ms = 0;  // T; equal for all parts of one state
   std::vector<double> values;
 };
 
-// Rows of a board that no page has yet, the newest 64.
+// The newest 64 rows of a board that have not been sent to pages.
 class Rows {
  public:
   explicit Rows(const Columns& columns) : columns_(columns) {}
   void add(const Datagram& state, std::int64_t time_ms);
   bool empty() const { return rows_.empty(); }
-  // Appends [[time,value,…],…], and is empty then. What is not known is null.
+  // Appends [[time,value,…],…] and clears the rows. Unknown values are null.
   void take(std::string& out);
 
  private:

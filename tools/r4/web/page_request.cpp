@@ -78,7 +78,7 @@ std::optional<PageRequest> page_request(const std::string& text) {
       good = read_number(object, "request", request.request) &&
              read_number(object, "board", request.board);
       break;
-    case Kind::stop:  // it is obeyed whatever else is there
+    case Kind::stop:  // a stop is obeyed even if other members are wrong
       read_number(object, "request", request.request);
       good = true;
       break;

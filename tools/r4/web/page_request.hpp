@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a page asks r4 web for, read from its JSON. Nothing that it sends is trusted.
+// A request of a page, parsed from JSON. The input is not trusted.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,14 @@ namespace r4::tool::web {
 struct PageRequest {
   enum class Kind : std::uint8_t { control, alive, command, arm, clear, stop, record };
   Kind kind = Kind::alive;
-  bool on = false;            // control: wanted; record
-  std::uint64_t request = 0;  // the page's number of it, for the result
+  bool on = false;            // control and record
+  std::uint64_t request = 0;  // the page's number, repeated in the result
   std::size_t board = 0;      // command, arm, clear
-  std::uint64_t now = 0;      // alive: the newest that the page has heard
-  std::string command;        // "O:358,1,1"
+  std::uint64_t now = 0;      // alive: newest server time received by the page
+  std::string command;
 };
 
-// None for what is not one of these messages, with all of its members and in their ranges.
+// Empty unless the text is a valid message with all members in range.
 std::optional<PageRequest> page_request(const std::string& text);
 
 }  // namespace r4::tool::web

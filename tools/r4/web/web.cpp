@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 web: boards in a browser.
 #include <fmt/format.h>
 
 #include <memory>
@@ -34,7 +33,6 @@ struct Options {
   bool json = false;
 };
 
-// As long as a radio may need.
 constexpr Milliseconds farewell_time{200};
 
 int serve_web(const Options& options) {
@@ -45,7 +43,7 @@ int serve_web(const Options& options) {
   }
   hub_options.server.origins = options.origins;
   hub_options.server.page_folder = options.page;
-  // A name is for other computers, though a proxy in front asks from this one.
+  // --host means access from other computers, even if a proxy on this computer forwards it.
   const bool secret =
       options.token || !options.hosts.empty() || !web::is_loopback(hub_options.server.address.host);
   if (secret) hub_options.server.token = web::random_token();

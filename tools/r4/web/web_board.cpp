@@ -85,7 +85,7 @@ void WebBoard::on_link(const LinkStatus& link) {
   if (heard && !heard_) say(Level::info, "the board is there");
   const bool lost = link.state == HostLinkState::lost;
   if (lost && heard_) say(Level::warning, explain(url(), link).reason);
-  heard_ = heard || (heard_ && !lost);  // that it begins anew is told already
+  heard_ = heard || (heard_ && !lost);  // a restart has already been reported
   if (heard && link.reason != link_.reason) {
     const bool safe = link.reason != SafeReason::none;
     say(safe ? Level::warning : Level::info,

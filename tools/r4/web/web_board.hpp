@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One board as r4 web has it: watched, and controlled while a browser wants to.
+// A board in r4 web: watched, and controlled while a browser wants to.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -22,7 +22,7 @@ class WebBoard {
    public:
     virtual void on_state(std::size_t board, const ReceivedState& state,
                           const Datagram& datagram) = 0;
-    // Of what else comes from the board.
+    // All other datagrams of the board.
     virtual void on_datagram(std::size_t board, const Datagram& datagram) = 0;
     virtual void on_change(std::size_t board) = 0;
     virtual void on_event(std::size_t board, Level level, const std::string& text) = 0;
@@ -33,13 +33,13 @@ class WebBoard {
   using Done = std::function<void()>;
   using OnResult = std::function<void(const CommandResult&)>;
 
-  // While it is controlled, it sets `devices` up, which outlive it.
+  // Sets `devices` up while in control. They must outlive it.
   WebBoard(asio::io_context& io, SetBoard& board, const std::vector<Device>& devices,
            Events& events);
 
-  // Throws Error where it cannot: then it is watched on.
+  // Throws Error on failure; the board is then still watched.
   void take_control();
-  // Its heartbeats end now. `done` when the board is free, or does not answer.
+  // Stops the heartbeats. Calls `done` when the board is free or does not answer.
   void leave_control(Done done);
   void stop(OnResult done);
 

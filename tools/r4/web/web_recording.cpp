@@ -73,7 +73,7 @@ void WebRecording::look() {
   if (!recording_) return;
   if (const std::optional<Problem> problem = recording_->problem()) {
     if (problem->kind != ErrorKind::data) return close(problem->text());
-    told_.why = problem->text();  // it was removed or truncated, and goes on
+    told_.why = problem->text();  // the file was removed or truncated; recording continues
   }
   asio::post(disk_, [this, path = told_.path] {
     std::error_code none;

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The recording that a page of r4 web begins. Disks may take their time: a thread of its own waits for them, and the
-// boards' loop never does.
+// A recording started from a page. A thread of its own waits for the disk.
 //
 //     off --begin()--> opening --opened--> on --end(), or the disk is full--> off
-//                         |                     end() while it is opened: as soon as it is on
+//                         |                     end() during opening: as soon as it is on
 //                         +--it cannot be opened--> off
 #pragma once
 
@@ -22,23 +21,22 @@ class WebRecording {
  public:
   using Client = std::uint32_t;
   struct Told {
-    std::string path;  // empty: nothing is recorded
+    std::string path;
     std::uint64_t bytes = 0;
-    std::string why;  // it is not, or not any more
+    std::string why;  // why recording failed or ended
   };
-  // `use` hands the recording to the boards; `tell` is told what has changed. Both are called on
-  // the loop.
+  // `use` passes the recording to the boards; `tell` gets each change. Both run on the loop.
   WebRecording(asio::io_context& io, std::string folder, std::function<void(Recording&)> use,
                std::function<void(const Told&)> tell);
-  // Waits for the disk.
+  // Blocks until the disk is done.
   ~WebRecording();
 
-  // Nothing happens if something is recorded already.
+  // No effect while recording.
   void begin(Client client);
   void end();
-  // True if this client has begun what is recorded.
+  // True if this client started the current recording.
   bool is_of(Client client) const { return stage_ != Stage::off && client_ == client; }
-  // Once a second: how large it is, and whether it has ended by itself, for the disk is full.
+  // Call once a second: updates the size, and detects the end after a full disk.
   void look();
   const Told& told() const { return told_; }
 
@@ -55,8 +53,8 @@ class WebRecording {
   const std::function<void(const Told&)> tell_;
   std::shared_ptr<Recording> recording_;
   Stage stage_ = Stage::off;
-  Client client_ = 0;          // that has begun it
-  bool ends_at_once_ = false;  // it was ended while it was opened
+  Client client_ = 0;
+  bool ends_at_once_ = false;
   Told told_;
   asio::thread_pool disk_{1};
 };

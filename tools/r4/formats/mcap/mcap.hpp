@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The records of an MCAP file (mcap.dev/spec, version 0), and what r4 puts into them.
+// Records of an MCAP file (mcap.dev/spec, version 0), and r4's use of them.
 //
-// A recording is a topic a board, /left-arm or /board1, whose messages are its records as JSON, as .jsonl has them; and
-// the topic /r4log, whose messages are those lines of the native format that belong to no board. In their order in the
-// file these are all of the recording: it can be had back byte by byte.
+// Each board has a topic, /left-arm or /board1, whose messages are its records as JSON, as in
+// .jsonl. Topic /r4log holds the lines of the native format that belong to no board. In file order
+// the two contain the whole recording, so the native file can be restored byte by byte.
 #pragma once
 
 #include <cstdint>
@@ -30,18 +30,17 @@ enum class Op : std::uint8_t {
   summary_offset = 0x0E,
 };
 
-// A record's opcode and size.
+// Opcode and size of a record, in bytes.
 constexpr std::size_t record_head = 9;
-// In front of a message's data.
+// Bytes before a message's data.
 constexpr std::size_t message_head = 22;
 
-// The file's profile.
 constexpr std::string_view profile = "r4log";
 constexpr std::string_view record_schema = "r4.Record";
 constexpr std::string_view line_schema = "r4.Line";
-// The key of a channel's metadata that has the number of its path; 0: it is that of lines.
+// Metadata key of a channel: the path's number; 0 is the channel of lines.
 constexpr std::string_view path_key = "path";
-// And how its board is reached and is called, escaped as in the native format.
+// Metadata keys: the board's URL and name, escaped as in the native format.
 constexpr std::string_view url_key = "url";
 constexpr std::string_view name_key = "name";
 
@@ -56,7 +55,7 @@ inline void append_record(std::string& out, Op op, std::string_view content) {
   out += content;
 }
 
-// Takes numbers and strings off the front of a record's content; what is not there reads 0 and is told by good().
+// Reads from the front of a record. After a read beyond the end, values are 0, good() false.
 class Fields {
  public:
   explicit Fields(std::string_view bytes) : rest_(bytes) {}

@@ -21,7 +21,6 @@ using mcap::Op;
 constexpr std::uint16_t record_schema_id = 1;
 constexpr std::uint16_t line_schema_id = 2;
 constexpr std::string_view chunk_compression = "zstd";
-// More paths than that are in no recording.
 constexpr std::size_t most_channels = 1000;
 
 std::uint64_t nanoseconds(Time time) {
@@ -38,7 +37,7 @@ void append_pair(std::string& out, std::string_view key, std::string_view value)
   append_string(out, value);
 }
 
-// What a string of MCAP can be: UTF-8, here ASCII.
+// MCAP strings are UTF-8; the result is ASCII.
 std::string plain(std::string_view bytes) {
   std::string text;
   append_escaped(text, bytes);
@@ -91,7 +90,6 @@ void McapSink::on_path(const RecordedPath& path, Time time) {
   current_.erase(path.number);
 }
 
-// The paths of the recording that begins may be others.
 void McapSink::on_header() {
   devices_.on_header();
   measured_.on_header();
@@ -129,7 +127,7 @@ void McapSink::write_message(Channel& channel, Time time, std::string_view json)
   append_number(chunk_, std::uint64_t{mcap::message_head + json.size()});
   append_number(chunk_, channel.id);
   append_number(chunk_, static_cast<std::uint32_t>(channel.messages));
-  append_number(chunk_, ns);  // when it was recorded, and published
+  append_number(chunk_, ns);
   append_number(chunk_, ns);
   chunk_ += json;
   ++channel.messages;
@@ -142,7 +140,6 @@ void McapSink::write_message(Channel& channel, Time time, std::string_view json)
   if (chunk_.size() >= chunk_size) write_chunk();
 }
 
-// The chunk, and behind it where each channel's messages are in it.
 void McapSink::write_chunk() {
   compressed_.clear();
   zstd_.write(chunk_, true, compressed_);
@@ -215,8 +212,8 @@ void McapSink::write_summary() {
   append_number(record_, messages_);
   append_number(record_, std::uint16_t{2});
   append_number(record_, static_cast<std::uint32_t>(channels_.size()));
-  append_number(record_, std::uint32_t{0});  // attachments
-  append_number(record_, std::uint32_t{0});  // metadata
+  append_number(record_, std::uint32_t{0});
+  append_number(record_, std::uint32_t{0});
   append_number(record_, chunks_);
   append_number(record_, first_ns_);
   append_number(record_, last_ns_);
@@ -227,7 +224,7 @@ void McapSink::write_summary() {
   write_group(Op::chunk_index, chunk_indexes_);
   const std::uint64_t offsets_begin = offset_;
   write(offsets_);
-  // The checksum is also of the footer before it.
+  // The checksum includes the beginning of the footer.
   record_.clear();
   append_number(record_, static_cast<std::uint8_t>(Op::footer));
   append_number(record_, std::uint64_t{20});
@@ -250,7 +247,7 @@ void McapSink::write_group(Op op, std::string_view records) {
   write(records);
 }
 
-// A name that two paths have, for a board has two links, gets the number behind it.
+// If two paths have the same name, because a board has two links, the path's number is appended.
 std::string McapSink::topic_of(std::uint16_t path) {
   const std::string& name = names_.name_of(path);
   if (name.empty()) return fmt::format("/board{}", path);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .mcap: a recording that Foxglove, Lichtblick, PlotJuggler and `mcap` open, in chunks compressed by zstd, with every
-// index and checksum. The index of the chunks, which the end of the file has, is all that grows: a few hundred bytes
-// for each MiB of JSON.
+// .mcap: a recording for Foxglove, Lichtblick, PlotJuggler and `mcap`, in chunks compressed by
+// zstd, with all indexes and checksums. Only the chunk index at the end of the file grows in
+// memory: a few hundred bytes for each MiB of JSON.
 #pragma once
 
 #include <compare>
@@ -22,7 +22,6 @@ namespace r4::tool {
 
 class McapSink final : public Sink {
  public:
-  // What devices have measured is told, too: those named, or else those of the recording.
   explicit McapSink(Output& output, std::vector<Device> devices = {})
       : output_(output), devices_(std::move(devices)) {}
   bool wants_survey() const override { return true; }
@@ -32,7 +31,7 @@ class McapSink final : public Sink {
   void on_path(const RecordedPath& path, Time time) override;
   void on_device(const RecordedDevice& device) override { devices_.on_device(device); }
   void on_header() override;
-  // Throws Error{data} for a time beyond the year 2554, which MCAP cannot write.
+  // Throws Error{data} for a time beyond the year 2554, the limit of MCAP.
   void on_record(const Record& record) override;
   void finish() override;
   std::string left_out() const override { return devices_.problems(); }
@@ -42,9 +41,8 @@ class McapSink final : public Sink {
   struct Channel {
     std::uint16_t id = 0;
     std::uint64_t messages = 0;
-    std::string
-        record;         // is in every chunk that has messages of it, so that each can be read alone
-    std::string index;  // of the chunk that is being made
+    std::string record;  // repeated in each chunk, to make it readable alone
+    std::string index;
   };
   struct ChannelKey {
     std::uint16_t path;
@@ -71,18 +69,18 @@ class McapSink final : public Sink {
   ZstdWriter zstd_;
   bool begun_ = false;
   std::map<ChannelKey, Channel> channels_;
-  std::map<std::uint16_t, Channel*> current_;  // by path
+  std::map<std::uint16_t, Channel*> current_;
   std::map<std::uint16_t, std::string> urls_;  // by path, of this recording
   Channel* lines_ = nullptr;
 
-  std::uint64_t offset_ = 0;                // in the file
-  std::uint32_t crc_ = 0;                   // of all of it so far
-  std::string chunk_;                       // records, not compressed yet
-  std::string record_, text_, compressed_;  // used again and again
+  std::uint64_t offset_ = 0;
+  std::uint32_t crc_ = 0;  // of the file so far
+  std::string chunk_;
+  std::string record_, text_, compressed_;
   std::uint64_t chunk_first_ns_ = 0, chunk_last_ns_ = 0;
   bool chunk_has_messages_ = false;
 
-  // The summary.
+  // For the summary section:
   std::string schemas_, channel_records_, chunk_indexes_, offsets_;
   std::uint64_t messages_ = 0;
   std::uint32_t chunks_ = 0;

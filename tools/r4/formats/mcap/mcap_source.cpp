@@ -18,14 +18,14 @@ namespace {
 using mcap::Fields;
 using mcap::Op;
 
-// The longest record, and chunk when it is unpacked: ours have a MiB, other tools are told any size by their users.
+// Largest record and unpacked chunk. Ours have 1 MiB; users of other tools may choose any size.
 constexpr std::uint64_t max_record = 256 << 20;
-// Where the name of its compression is in a chunk's record; so a chunk is found behind damage.
+// Offset of the compression's name in a chunk record. The search after damage finds chunks by it.
 constexpr std::size_t compression_at = mcap::record_head + 28;
 constexpr std::string_view zstd_mark{"\x04\0\0\0zstd", 8};
 constexpr std::string_view lz4_mark{"\x03\0\0\0lz4", 7};
 
-// Into `out`; false if the bytes are not frames of LZ4 that give `size` bytes.
+// Unpacks into `out`. False if the bytes are not LZ4 frames of `size` unpacked bytes.
 bool unpack_lz4(std::string_view bytes, std::uint64_t size, std::string& out) {
   LZ4F_dctx* context = nullptr;
   if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) {
@@ -77,7 +77,7 @@ void McapSource::take() {
   waiting_.erase(0, waiting_.size() - rest.size());
 }
 
-// Takes the next record; how many bytes that were, 0: more are needed.
+// Takes the next record and returns its size in bytes; 0: more bytes are needed.
 std::size_t McapSource::take_next(std::string_view bytes) {
   if (part_ == Part::magic) {
     if (!mcap::magic.starts_with(bytes.substr(0, mcap::magic.size()))) fail_as_none();
@@ -104,7 +104,7 @@ std::size_t McapSource::take_next(std::string_view bytes) {
   const std::string_view content = bytes.substr(mcap::record_head, static_cast<std::size_t>(size));
   if (part_ == Part::header) {
     if (op != Op::header) fail_as_none();
-    // Another profile is not the end: other tools write their own when they copy a file.
+    // Accept another profile: other tools write their own when they copy a file.
     ours_ = Fields(content).string() == mcap::profile;
     part_ = Part::data;
   } else if (op == Op::footer) {
@@ -119,7 +119,7 @@ std::size_t McapSource::take_next(std::string_view bytes) {
   return mcap::record_head + content.size();
 }
 
-// To the next chunk that is compressed.
+// Skips to the next compressed chunk.
 std::size_t McapSource::search(std::string_view bytes) {
   const std::size_t mark = std::min(bytes.find(zstd_mark), bytes.find(lz4_mark));
   if (mark == std::string_view::npos) {
@@ -143,8 +143,8 @@ void McapSource::on_data_record(Op op, std::string_view content) {
 void McapSource::on_channel(std::string_view content) {
   Fields fields(content);
   const auto id = fields.number<std::uint16_t>();
-  static_cast<void>(fields.number<std::uint16_t>());  // its schema
-  static_cast<void>(fields.string());                 // the topic
+  static_cast<void>(fields.number<std::uint16_t>());  // schema id
+  static_cast<void>(fields.string());                 // topic
   const std::string_view encoding = fields.string();
   Fields metadata(fields.string());
   Channel channel;
@@ -167,7 +167,7 @@ void McapSource::on_channel(std::string_view content) {
 
 void McapSource::on_chunk(std::string_view content) {
   Fields fields(content);
-  static_cast<void>(fields.take(16));  // its times
+  static_cast<void>(fields.take(16));  // start and end time
   const auto size = fields.number<std::uint64_t>();
   const auto crc = fields.number<std::uint32_t>();
   const std::string_view compression = fields.string();
@@ -187,7 +187,7 @@ void McapSource::on_chunk(std::string_view content) {
   }
 }
 
-// Into chunk_. False: it is not what it says.
+// Unpacks into chunk_. False if the chunk is not valid.
 bool McapSource::unpack(std::string_view compression, std::string_view bytes, std::uint64_t size) {
   chunk_.clear();
   if (compression.empty()) {
@@ -210,11 +210,11 @@ bool McapSource::unpack(std::string_view compression, std::string_view bytes, st
 void McapSource::on_message(std::string_view content) {
   Fields fields(content);
   const auto channel = channels_.find(fields.number<std::uint16_t>());
-  static_cast<void>(fields.number<std::uint32_t>());  // its place in the channel
+  static_cast<void>(fields.number<std::uint32_t>());  // sequence number
   const auto time_ns = fields.number<std::uint64_t>();
   static_cast<void>(fields.number<std::uint64_t>());
   if (!fields.good() || channel == channels_.end()) return damage("a message of no channel");
-  if (!channel->second.path) return;  // of another program, in the same file
+  if (!channel->second.path) return;  // from another program
   const Json object = Json::parse(fields.rest(), nullptr, false);
   const auto text_of = [&object](const char* key) {
     const auto found = object.find(key);
@@ -241,7 +241,7 @@ void McapSource::on_message(std::string_view content) {
   const RecordKind kind = event != nullptr   ? RecordKind::event
                           : *from == "board" ? RecordKind::from_board
                                              : RecordKind::to_board;
-  // A filter may have left out the topic of the lines, which declare the paths.
+  // A filter may have removed the topic of the lines, which declare the paths.
   if (!channel->second.told && !lines_.recognised() && !channel->second.url.empty()) {
     visitor_.on_path({path, channel->second.url, channel->second.name});
   }

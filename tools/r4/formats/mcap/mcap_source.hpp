@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .mcap that McapSink has made, from its beginning to its end: the index is not needed. A chunk that is damaged is
-// told, and it goes on with the next one.
+// Reads .mcap files of McapSink sequentially, without the index. A damaged chunk is reported, and
+// reading continues with the next chunk.
 //
-// Other tools may have copied the file since: with chunks of another size or compression or none, with another profile,
-// without some of the topics, or with topics of other programs, which are passed over.
+// Other tools may have copied the file: with another chunk size, compression or profile, without
+// some topics, or with foreign topics, which are ignored.
 #pragma once
 
 #include <cstdint>
@@ -28,9 +28,9 @@ class McapSource final : public Source {
 
  private:
   struct Channel {
-    std::optional<std::uint16_t> path;  // none: it is of another program
-    std::string url, name;              // of the path; empty: not told
-    bool told = false;                  // a record of it was
+    std::optional<std::uint16_t> path;  // none: a channel of another program
+    std::string url, name;              // of the path; empty: unknown
+    bool told = false;                  // the path has been reported
   };
   enum class Part : std::uint8_t { magic, header, data, summary, end };
   void take();
@@ -47,12 +47,12 @@ class McapSource final : public Source {
   RecordingVisitor& visitor_;
   const std::string name_;
   Part part_ = Part::magic;
-  std::string waiting_;       // what is not taken yet
-  std::uint64_t offset_ = 0;  // where that begins in the file
-  std::uint32_t crc_ = 0;     // of all before that
+  std::string waiting_;
+  std::uint64_t offset_ = 0;  // position of waiting_ in the file
+  std::uint32_t crc_ = 0;     // of all bytes before waiting_
   bool any_damage_ = false;
-  bool ours_ = false;       // by its profile
-  bool searching_ = false;  // for the next chunk behind a damaged record
+  bool ours_ = false;
+  bool searching_ = false;  // for the next chunk after damage
   std::map<std::uint16_t, Channel> channels_;
   std::string chunk_, bytes_;
   RecordingLines lines_;

@@ -21,12 +21,11 @@ namespace {
 
 constexpr std::uint16_t ether_ipv4 = 0x0800;
 constexpr std::uint16_t ether_ipv6 = 0x86DD;
-constexpr std::uint16_t ether_can = 0x000C;  // as Linux has it in "cooked" captures
+constexpr std::uint16_t ether_can = 0x000C;  // in Linux "cooked" captures
 constexpr std::uint16_t ether_can_fd = 0x000D;
-// More boards than that are on no network.
 constexpr std::size_t most_paths = 1000;
 
-// SocketCAN (linux/can.h), in the order of the network.
+// Flags of an id in SocketCAN (linux/can.h), in network byte order.
 constexpr std::uint32_t can_extended = 0x80000000;
 constexpr std::uint32_t can_remote = 0x40000000;
 constexpr std::uint32_t can_error = 0x20000000;
@@ -48,7 +47,7 @@ std::string address_text(int family, std::string_view bytes) {
 
 bool is_vlan_tag(std::uint16_t type) { return type == 0x8100 || type == 0x88A8 || type == 0x9100; }
 
-// True if a frame may have that id: 11 bits unless it is extended, few classes of errors.
+// True for a possible id: 11 bits unless extended; few classes of errors.
 bool can_be_id(std::uint32_t id) {
   constexpr std::uint32_t flags = can_extended | can_remote | can_error;
   if ((id & can_error) != 0) return (id & ~flags) < 0x400;
@@ -70,7 +69,7 @@ std::string link_name(std::uint16_t link) {
   }
 }
 
-// The most frequent of them, at most five: "3018, 2390 and 4 more".
+// The most frequent ones, at most five: "3018, 2390 and 4 more".
 template <class Name>
 std::string listed(const std::map<std::uint16_t, std::uint64_t>& counts, Name name) {
   constexpr std::size_t most = 5;
@@ -133,7 +132,7 @@ void PacketRecords::on_packet(const PacketInterface& interface, const Packet& pa
   }
 }
 
-// The file is a recording, or a capture. A mixture of the two has the numbers of paths twice.
+// Decides between recording and capture. A mixture would use path numbers twice.
 void PacketRecords::be(Kind kind) {
   told_ = true;
   const bool other = kind_ != Kind::none ? kind_ != kind : kind == Kind::recorded && bus_.told();
@@ -170,9 +169,9 @@ void PacketRecords::on_cooked(std::uint16_t protocol, std::string_view bytes,
   on_can(interface, cooked_id(bytes), bytes, packet);
 }
 
-// In cooked captures libpcap up to 1.10.4 leaves a frame's id in the order of the capturing computer; later ones have
-// the order of the network. Often only one of them gives an id that can be; else it is the order of the frame before.
-// At first it is that which gives an id of 11 bits, as all but stops with a number have.
+// Byte order of the id in cooked captures: the capturing computer's up to libpcap 1.10.4, network
+// order later. If only one order gives a possible id, it is used; else that of the previous frame.
+// The first frame prefers an 11-bit id, as all frames but numbered stops have.
 std::uint32_t PacketRecords::cooked_id(std::string_view bytes) {
   const auto big = read_number<std::uint32_t>(bytes, ByteOrder::big);
   const auto little = read_number<std::uint32_t>(bytes, ByteOrder::little);
@@ -185,7 +184,7 @@ std::uint32_t PacketRecords::cooked_id(std::string_view bytes) {
   return cooked_order_ == ByteOrder::big ? big : little;
 }
 
-// A line of the native format, as PcapngSink writes it: behind the tags, of which a zero is the last.
+// A line of the native format from PcapngSink, after the tags; tag 0 is the last.
 void PacketRecords::on_line(const PacketInterface& interface, const Packet& packet) {
   std::string_view bytes = packet.bytes;
   while (bytes.size() >= 4) {
@@ -199,7 +198,7 @@ void PacketRecords::on_line(const PacketInterface& interface, const Packet& pack
   if (problem != nullptr) damage(packet, problem);
 }
 
-// A datagram of that path, as PcapngSink writes it.
+// A datagram of that path from PcapngSink.
 void PacketRecords::on_own(const PacketInterface& interface, const Packet& packet) {
   const auto path = std::string_view(interface.description).substr(path_interface.size());
   Udp udp;
@@ -215,7 +214,6 @@ void PacketRecords::on_own(const PacketInterface& interface, const Packet& packe
       interface.number, interface.name);
 }
 
-// IPv4 or IPv6 with UDP in it, whole or the first of its fragments.
 bool PacketRecords::read_ip(std::string_view bytes, Udp& out) {
   if (bytes.empty()) return false;
   const int version = byte(bytes, 0) >> 4;
@@ -263,8 +261,8 @@ void PacketRecords::on_ip(std::string_view bytes, const Packet& packet) {
                       without_end(udp.payload)});
 }
 
-// True if the same packet was told before. Two that are not the same differ in the id of IP, or in the number and time
-// in the datagram; a host that sends the same text again takes its time.
+// True if the same packet was already reported. Different packets differ in the IP id, or in number
+// and time of the datagram. A host that repeats a text takes longer than the limits.
 bool PacketRecords::is_repeated(const Udp& udp, Time time) {
   constexpr Time of_an_id{500'000};
   constexpr Time without{5'000};

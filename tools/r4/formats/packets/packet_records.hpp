@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Packets of a network, or of a CAN bus, as records: UDP datagrams to and from a board's port, frames of boards on a
-// bus, and what PcapngSink has made. Whatever else is in a capture is passed over, but a capture in which nothing is
-// found is refused with what there is instead.
+// Converts packets of a network or a CAN bus to records: UDP datagrams to and from a board's port,
+// CAN frames of boards, and PcapngSink's output. Other packets are ignored. A capture without any
+// record is refused, with a summary of its content.
 //
-// A packet that passed two interfaces of the capturing computer (tcpdump -i any) is told once.
+// A packet captured on two interfaces of the computer (tcpdump -i any) is reported once.
 #pragma once
 
 #include <array>
@@ -21,24 +21,23 @@
 
 namespace r4::tool {
 
-// What a capture tells of an interface.
 struct PacketInterface {
-  std::uint32_t number = 0;  // in the file, whatever its section
+  std::uint32_t number = 0;  // in the file, across sections
   std::uint16_t link_type = 0;
-  std::string name;         // "can0"; empty: not told
-  std::string description;  // by which r4 knows its own
+  std::string name;         // "can0"; empty: unknown
+  std::string description;  // identifies r4's own interfaces
 };
 
 struct Packet {
   Time time{0};
-  std::uint64_t offset = 0;  // in the file
+  std::uint64_t offset = 0;
   std::string_view bytes;
-  bool cut = false;  // more of it was there than was captured
+  bool cut = false;  // the packet was longer than its captured part
 };
 
 class PacketRecords {
  public:
-  // `name`: what errors are about; `port`: of the boards.
+  // `name` is used in errors; `port` is the boards' UDP port.
   PacketRecords(RecordingVisitor& visitor, std::string name, std::uint16_t port)
       : visitor_(visitor),
         name_(std::move(name)),
@@ -46,18 +45,17 @@ class PacketRecords {
         bus_(visitor),
         port_(port) {}
 
-  // Throws Error{data} for recordings that are mixed.
+  // Throws Error{data} for mixed recordings.
   void on_packet(const PacketInterface& interface, const Packet& packet);
-  // A packet could not be read.
   void on_damage() { lines_.on_damage(); }
-  // No more packets come. Throws Error{data} if nothing of a board was found, unless damage may be why.
+  // Throws Error{data} if no data of a board was found, unless damage may be the reason.
   void finish(bool any_damage);
 
  private:
   struct Udp {
     std::string from, to;  // addresses as in a URL
     std::uint16_t from_port = 0, to_port = 0;
-    std::uint16_t id = 0;  // of the IPv4 packet; 0: it has none
+    std::uint16_t id = 0;  // IPv4 id; 0: none
     std::string_view payload;
     bool cut = false;
   };
@@ -87,15 +85,14 @@ class PacketRecords {
   BusRecords bus_;
   const std::uint16_t port_;
   std::map<std::string, std::uint16_t> paths_;
-  std::optional<ByteOrder>
-      cooked_order_;           // of the ids of CAN frames in cooked captures, as far as is known
-  std::array<Seen, 64> seen_;  // the newest datagrams, to find repeated ones
+  std::optional<ByteOrder> cooked_order_;  // byte order of CAN ids in cooked captures, if known
+  std::array<Seen, 64> seen_;
   std::size_t next_seen_ = 0;
-  // What there is, for the error when nothing is found.
+  // For the error if no data of a board is found:
   bool told_ = false;
   Kind kind_ = Kind::none;
   std::uint64_t packets_ = 0;
-  std::map<std::uint16_t, std::uint64_t> unread_links_, ports_;  // and how many packets each has
+  std::map<std::uint16_t, std::uint64_t> unread_links_, ports_;
 };
 
 }  // namespace r4::tool

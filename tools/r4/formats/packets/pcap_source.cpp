@@ -12,11 +12,11 @@ constexpr std::uint32_t pcap_us = 0xA1B2C3D4;
 constexpr std::uint32_t pcap_ns = 0xA1B23C4D;
 constexpr std::size_t pcap_header = 24;
 constexpr std::size_t pcap_packet_header = 16;
-constexpr std::size_t block_ends = 12;   // type and size, and the size again
-constexpr std::size_t packet_head = 20;  // of a packet's block
+constexpr std::size_t block_ends = 12;  // type, size, and the repeated size
+constexpr std::size_t packet_head = 20;
 constexpr std::size_t most_interfaces = 70'000;
 
-// Those blocks that begin anew behind a damaged one.
+// True for the block types at which reading continues after a damaged block.
 bool is_known_block(std::uint32_t type) {
   return type == pcapng_section || (type >= pcapng_interface && type <= 0x0A);
 }
@@ -59,7 +59,7 @@ void PcapSource::take(bool at_end) {
   waiting_.erase(0, waiting_.size() - rest.size());
 }
 
-// What the file is. Throws Error if it is neither.
+// Detects the format. Throws Error for any other format.
 void PcapSource::begin(std::string_view bytes) {
   for (const ByteOrder order : {ByteOrder::little, ByteOrder::big}) {
     order_ = order;
@@ -67,7 +67,7 @@ void PcapSource::begin(std::string_view bytes) {
     if (magic == pcap_us || magic == pcap_ns) {
       form_ = Form::pcap;
       Interface interface;
-      // Of four bytes; what is above says how long a frame's checksum is.
+      // The upper two of the four bytes are the length of the frame checksum.
       interface.link_type = static_cast<std::uint16_t>(number<std::uint32_t>(bytes, 20));
       if (magic == pcap_ns) interface.ticks = 1'000'000'000;
       interfaces_.push_back(interface);
@@ -82,7 +82,7 @@ void PcapSource::begin(std::string_view bytes) {
               "tcpdump -w FILE udp port 2018 makes one");
 }
 
-// Each of these returns how many bytes it took; 0: more are needed.
+// Each take_…() returns the number of bytes taken; 0: more bytes are needed.
 std::size_t PcapSource::take_pcap_packet(std::string_view bytes, bool at_end) {
   const bool head = bytes.size() >= pcap_packet_header;
   const std::uint32_t size = head ? number<std::uint32_t>(bytes, 8) : 0;
@@ -143,7 +143,7 @@ std::size_t PcapSource::take_block(std::string_view bytes, bool at_end) {
   return size;
 }
 
-// Told once for all that is passed over. Blocks begin at every fourth byte.
+// Reports once for all skipped bytes. Blocks are aligned to four bytes.
 std::size_t PcapSource::damaged_block(std::string_view reason) {
   if (!searching_) damage(reason);
   searching_ = true;
@@ -177,7 +177,7 @@ void PcapSource::on_interface(std::string_view body) {
     if (code == 0 || size > body.size() - 4) break;
     const std::string_view value = body.substr(4, size);
     if (code == pcapng_if_name && size <= max_interface_text) interface.name = value;
-    // Our own are shorter than that.
+    // r4's own descriptions are shorter.
     if (code == pcapng_if_description) interface.description = value.substr(0, 64);
     if (code == pcapng_if_tsoffset && size == 8)
       interface.offset_s = number<std::int64_t>(value, 0);
@@ -200,7 +200,7 @@ void PcapSource::on_pcapng_packet(std::string_view body) {
   on_packet_of(number<std::uint32_t>(body, 0), body);
 }
 
-// Its interface has 16 bits; a count of lost packets follows.
+// An obsolete packet block has a 16-bit interface, then a count of dropped packets.
 void PcapSource::on_old_packet(std::string_view body) {
   if (body.size() < packet_head) return damage("a packet that is not whole");
   on_packet_of(number<std::uint16_t>(body, 0), body);
@@ -217,9 +217,9 @@ void PcapSource::on_packet_of(std::uint32_t index, std::string_view body) {
                       number<std::uint32_t>(body, 16) > size});
 }
 
-// A time that no recording can have is the next that it can.
+// Clamps to the range of times in recordings.
 Time PcapSource::time_of(const Interface& interface, std::uint64_t ticks) {
-  constexpr std::int64_t last_s = 253'402'300'799;  // of the year 9999
+  constexpr std::int64_t last_s = 253'402'300'799;
   constexpr std::uint64_t second_us = 1'000'000;
   const std::uint64_t whole = ticks / interface.ticks;
   const std::uint64_t part = ticks % interface.ticks;

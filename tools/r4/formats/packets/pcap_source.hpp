@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .pcapng and .pcap, told apart by their beginning: captures of tcpdump and Wireshark of UDP or of SocketCAN, and what
-// PcapngSink has made of a recording.
-//
-// Where a block of pcapng is damaged, it goes on with the next one that there is; a damaged pcap has no more to tell.
+// Reads .pcapng and .pcap: captures of UDP or SocketCAN by tcpdump and Wireshark, and recordings
+// converted by PcapngSink. After damage, pcapng continues with the next block; the rest of a pcap
+// file cannot be read.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +17,6 @@ namespace r4::tool {
 
 class PcapSource final : public Source {
  public:
-  // `port`: of the boards.
   PcapSource(RecordingVisitor& visitor, std::string name, std::uint16_t port = board_port)
       : visitor_(visitor), records_(visitor, name, port), name_(std::move(name)) {}
   void feed(std::string_view bytes) override;
@@ -32,7 +30,7 @@ class PcapSource final : public Source {
     broken
   };  // broken: the rest cannot be read
   struct Interface : PacketInterface {
-    std::uint64_t ticks = 1'000'000;  // of its times a second
+    std::uint64_t ticks = 1'000'000;  // ticks per second
     std::int64_t offset_s = 0;
   };
 
@@ -58,11 +56,11 @@ class PcapSource final : public Source {
   const std::string name_;
   Form form_ = Form::unknown;
   ByteOrder order_ = ByteOrder::little;
-  std::string waiting_;                // what is not taken yet
-  std::uint64_t offset_ = 0;           // where that begins in the file
-  bool searching_ = false;             // for the next block behind a damaged one
-  std::vector<Interface> interfaces_;  // of this section
-  std::uint32_t interface_count_ = 0;  // of all sections
+  std::string waiting_;
+  std::uint64_t offset_ = 0;  // position of waiting_ in the file
+  bool searching_ = false;    // for the next block after damage
+  std::vector<Interface> interfaces_;
+  std::uint32_t interface_count_ = 0;
   bool any_damage_ = false;
 };
 

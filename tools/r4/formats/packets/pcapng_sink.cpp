@@ -26,7 +26,7 @@ constexpr std::uint32_t made_up_host = 0xC6130001;   // 198.19.0.1
 constexpr std::uint16_t host_port = 2390;
 constexpr std::size_t ip_header = 20;
 
-// What tells Wireshark how to show a packet of LINKTYPE_WIRESHARK_UPPER_PDU: tag, size, dissector; the end.
+// Makes Wireshark show a LINKTYPE_WIRESHARK_UPPER_PDU as syslog: tag, size, dissector; end.
 constexpr std::string_view shown_as_syslog{
     "\0\x0C\0\x08"
     "syslog\0\0"
@@ -48,7 +48,6 @@ void begin_block(std::string& out, std::uint32_t type) {
   append_number(out, std::uint32_t{0});
 }
 
-// Writes the block's size into both ends of it.
 void end_block(std::string& out) {
   std::string size;
   append_number(size, static_cast<std::uint32_t>(out.size() + 4));
@@ -65,14 +64,14 @@ std::uint16_t ip_checksum(std::string_view header) {
   return static_cast<std::uint16_t>(~sum);
 }
 
-// IPv4 and UDP without a checksum, which a packet need not have.
+// IPv4 and UDP; the UDP checksum is optional and left out.
 void write_head(std::string& out, std::uint32_t from, std::uint16_t from_port, std::uint32_t to,
                 std::uint16_t to_port, std::size_t payload) {
   constexpr auto big = ByteOrder::big;
   out.clear();
   append_number(out, std::uint16_t{0x4500}, big);
   append_number(out, static_cast<std::uint16_t>(ip_header + udp_header + payload), big);
-  append_number(out, std::uint32_t{0x00004000}, big);  // not to be fragmented
+  append_number(out, std::uint32_t{0x00004000}, big);  // don't fragment
   append_number(out, static_cast<std::uint16_t>(64 << 8 | udp_protocol), big);
   append_number(out, std::uint16_t{0}, big);
   append_number(out, from, big);
@@ -94,7 +93,7 @@ void PcapngSink::begin() {
   append_number(block_, pcapng_magic);
   append_number(block_, std::uint16_t{1});  // version 1.0
   append_number(block_, std::uint16_t{0});
-  append_number(block_, ~std::uint64_t{0});  // nobody knows yet how long it gets
+  append_number(block_, ~std::uint64_t{0});  // section length: unknown
   append_option(block_, opt_comment,
                 "Made of a recording by r4 convert: headers of packets, and addresses of "
                 "198.18.0.0/15, are made up.");
@@ -110,7 +109,7 @@ void PcapngSink::add_interface(std::uint16_t link_type, std::string_view name,
   begin_block(block_, pcapng_interface);
   append_number(block_, link_type);
   append_number(block_, std::uint16_t{0});
-  append_number(block_, std::uint32_t{0});  // packets are whole
+  append_number(block_, std::uint32_t{0});  // no snapshot limit
   append_option(block_, pcapng_if_name, name);
   append_option(block_, pcapng_if_description, description);
   append_number(block_, std::uint32_t{0});
@@ -163,7 +162,7 @@ PcapngSink::Path& PcapngSink::path_of(std::uint16_t number) {
       path.address = ntohl(address.s_addr);
       path.port = url.port().value_or(board_port);
     }
-  } catch (const Error&) {  // no URL, or none that we know: the address is made up
+  } catch (const Error&) {  // unknown or not a valid URL: invent the address
   }
   add_interface(link_ipv4,
                 path.url.size() <= max_interface_text ? printable(path.url) : std::string(),

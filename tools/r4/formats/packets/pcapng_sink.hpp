@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .pcapng: a recording that Wireshark opens (draft-ietf-opsawg-pcapng). It holds all of the recording, so that the
-// native one can be had back byte by byte.
+// .pcapng: a recording for Wireshark (draft-ietf-opsawg-pcapng). It contains the whole recording,
+// so the native file can be restored byte by byte.
 //
-// A datagram is a UDP packet on an interface for its path, "r4log 1 path N", whatever it came by. Addresses are the
-// board's, where its URL has them, else made up: 198.18.0.0 + N for the board, 198.19.0.1 for the host (RFC 2544).
-// All else is a line of the native format on the interface "r4log 1 lines", which Wireshark shows as a line of syslog.
+// A datagram becomes a UDP packet on its path's interface, "r4log 1 path N", whatever its
+// transport. The board's address comes from its URL, else it is invented: 198.18.0.0 + N for the
+// board, 198.19.0.1 for the host (RFC 2544). Everything else is a native line on the interface
+// "r4log 1 lines", shown by Wireshark as syslog.
 #pragma once
 
 #include <cstdint>
@@ -15,10 +16,9 @@
 
 namespace r4::tool {
 
-// Descriptions of interfaces (if_description), by which r4 knows its own; a path's number follows the second.
+// Descriptions (if_description) of r4's own interfaces. The path's number follows the second.
 inline constexpr std::string_view lines_interface = "r4log 1 lines";
 inline constexpr std::string_view path_interface = "r4log 1 path ";
-// The host's address there.
 inline constexpr std::string_view made_up_host_text = "198.19.0.1";
 
 class PcapngSink final : public Sink {
@@ -32,8 +32,8 @@ class PcapngSink final : public Sink {
  private:
   struct Path {
     std::string url;
-    std::uint32_t interface = 0;  // 0: it has none yet
-    std::uint32_t address = 0;    // of the board
+    std::uint32_t interface = 0;  // 0: none yet
+    std::uint32_t address = 0;
     std::uint16_t port = 0;
   };
 
@@ -47,7 +47,7 @@ class PcapngSink final : public Sink {
 
   Output& output_;
   std::map<std::uint16_t, Path> paths_;
-  std::uint32_t interfaces_ = 0;  // so many there are
+  std::uint32_t interfaces_ = 0;
   std::string block_, head_, text_;
 };
 

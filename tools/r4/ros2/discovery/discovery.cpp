@@ -11,12 +11,12 @@
 namespace r4::tool::ros2 {
 namespace {
 
-constexpr std::size_t most = 64;  // samples at once
-// Looks at participants before each look at readers and writers, because the names of participants are
-// reported with these. More samples wait for the next look: stops are read on the same thread.
+constexpr std::size_t most = 64;
+// Participants are examined before readers and writers, which need their names. Remaining samples
+// wait for the next look, because stops are read on the same thread.
 constexpr int most_rounds = 16;
 
-// Takes samples of a built-in topic: take(sample, whether its subject is there).
+// Takes samples of a built-in topic: take(sample, whether its subject exists).
 template <class Sample, class Take>
 void take_some(dds_entity_t reader, int rounds, Take take) {
   std::array<void*, most> samples{};
@@ -32,7 +32,7 @@ void take_some(dds_entity_t reader, int rounds, Take take) {
   }
 }
 
-// What Cyclone DDS says of the process of a participant; other middlewares do not.
+// A property of a participant's process, set by Cyclone DDS only.
 std::string property(const dds_qos_t* qos, const char* name) {
   char* value = nullptr;
   if (qos == nullptr || !dds_qget_prop(qos, name, &value) || value == nullptr) return {};
@@ -56,7 +56,7 @@ Discovery::Discovery(const std::vector<dds_entity_t>& own, Tell tell)
 }
 
 void Discovery::look() {
-  look_at_participants();  // each comes before its readers and writers
+  look_at_participants();  // before its readers and writers
   look_at(EndpointKind::writer, writers_.get());
   look_at(EndpointKind::reader, readers_.get());
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The readers and writers that other participants of the graph announce, as they come, change and
-// go.
+// Reports readers and writers of other participants when they come, change or go.
 #pragma once
 
 #include <array>
@@ -17,12 +16,11 @@ namespace r4::tool::ros2 {
 class Discovery {
  public:
   using Tell = std::function<void(const Announced& announced)>;
-  // `own`: our participants, of which nothing is reported.
+  // `own`: our participants, which are not reported.
   Discovery(const std::vector<dds_entity_t>& own, Tell tell);
 
-  // When one of these has something to be read, call look().
+  // Call look() when one of these has data.
   std::array<dds_entity_t, 2> entities() const { return {writers_.get(), readers_.get()}; }
-  // Calls `tell` for each change.
   void look();
 
  private:
@@ -31,7 +29,7 @@ class Discovery {
 
   std::vector<EntityId> own_;
   const Tell tell_;
-  std::map<EntityId, std::string> owners_;  // of the participants that name their process
+  std::map<EntityId, std::string> owners_;  // participants that name their process
   Entity participants_;
   Entity writers_;
   Entity readers_;

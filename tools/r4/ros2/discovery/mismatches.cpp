@@ -13,7 +13,6 @@ namespace {
 
 using Weight = Mismatch::Weight;
 
-// Our endpoints at the other end.
 std::vector<const OwnEndpoint*> counterparts(const Graph::OwnTopic& own, const Announced& other) {
   std::vector<const OwnEndpoint*> found;
   for (const OwnEndpoint& each : own.endpoints) {
@@ -52,8 +51,7 @@ std::optional<Mismatch> wrong_policy(const OwnEndpoint& ours, const Announced& o
                   ours.name, policy, other.owner_text())};
 }
 
-// True if it writes requests as rmw_fastrtps does, without saying in them whose they are
-// (docs/ros2.md, Services).
+// True for requests in the form of rmw_fastrtps, without a client id (docs/ros2.md, Services).
 bool cannot_be_answered(const OwnEndpoint& ours, const Announced& other) {
   return other.kind == EndpointKind::writer && ours.name.starts_with("~/") &&
          other.user_data.find("clientid=") == std::string::npos;
@@ -80,13 +78,13 @@ std::optional<Mismatch> mismatch_of(const Graph::OwnTopic& own, const Announced&
       std::none_of(declared.begin(), declared.end(), is_declared)) {
     try {
       of_type = own.other_type(other);
-    } catch (const Error& error) {  // Cyclone DDS cannot make a reader for that type
+    } catch (const Error& error) {  // Cyclone DDS cannot create a reader for that type
       of_type =
           Mismatch{Weight::lost, fmt::format("{}: a publisher ({}) is not heard: {}", own.name,
                                              other.owner_text(), error.problem().text())};
     }
   }
-  const auto ours = counterparts(own, other);  // it may have made one
+  const auto ours = counterparts(own, other);  // other_type() may have added one
   std::optional<Mismatch> of_policy;
   for (const OwnEndpoint* const each : ours) {
     if (each->type != other.type) continue;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds readers and writers of other participants that belong to our topics and do not match: of
-// another type, of another quality of service, or service clients that cannot be answered. DDS
-// ignores these silently.
+// Finds foreign readers and writers of our topics that do not match: wrong type, wrong quality of
+// service, or a service client that cannot be answered. DDS ignores these silently.
 #pragma once
 
 #include <functional>
@@ -15,7 +14,7 @@ namespace r4::tool::ros2 {
 
 class Mismatches {
  public:
-  // `who` does not match an endpoint of `node`; without a `mismatch` it does, or has gone.
+  // `who` does not match an endpoint of `node`. Without `mismatch` it matches again or has left.
   using Tell = std::function<void(std::size_t node, const EntityId& who,
                                   const std::optional<Mismatch>& mismatch)>;
   Mismatches(const Graph& graph, Tell tell) : graph_(graph), tell_(std::move(tell)) {}
@@ -25,10 +24,10 @@ class Mismatches {
  private:
   const Graph& graph_;
   const Tell tell_;
-  std::map<EntityId, std::size_t> told_;  // the node of each mismatch that is there
+  std::map<EntityId, std::size_t> told_;
 };
 
-// What is wrong with an endpoint for a topic of ours. May call the topic's `other_type`.
+// The mismatch of a foreign endpoint with our topic. May call the topic's `other_type`.
 std::optional<Mismatch> mismatch_of(const Graph::OwnTopic& own, const Announced& other);
 
 }  // namespace r4::tool::ros2

@@ -20,7 +20,7 @@ Policies policies_of(EndpointKind kind, const dds_qos_t* qos) {
   std::uint32_t count = 0;
   dds_data_representation_id_t* ids = nullptr;
   if (dds_qget_data_representation(qos, &count, &ids) && count != 0) {
-    if (kind == EndpointKind::writer) count = 1;  // a writer writes the first
+    if (kind == EndpointKind::writer) count = 1;  // a writer uses only the first
     policies.xcdr1 = std::find(ids, ids + count, DDS_DATA_REPRESENTATION_XCDR1) != ids + count;
   }
   dds_free(ids);

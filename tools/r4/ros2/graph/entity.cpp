@@ -44,7 +44,7 @@ QosPtr make_qos(const Qos& qos) {
   dds_qset_history(made.get(), DDS_HISTORY_KEEP_LAST, qos.depth);
   if (qos.transient_local) {
     dds_qset_durability(made.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
-    // Who comes later gets as many as are kept: by default it would be one.
+    // By default a late reader would get one sample only.
     dds_qset_durability_service(made.get(), 0, DDS_HISTORY_KEEP_LAST, qos.depth,
                                 DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   }

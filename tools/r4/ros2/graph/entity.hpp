@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What Cyclone DDS made, and what ROS asks of it: an entity that is deleted with its owner, and its quality of
-// service.
 #pragma once
 
 #include <dds/dds.h>
@@ -13,11 +11,10 @@
 
 namespace r4::tool::ros2 {
 
-// Owns an entity. What was made below it goes with it.
 class Entity {
  public:
   Entity() = default;
-  // Throws Error{open} naming `what` if it could not be made.
+  // Throws Error{open} naming `what` if creation failed.
   Entity(dds_entity_t made, const std::string& what);
   ~Entity() { reset(); }
   Entity(Entity&& other) noexcept : entity_(std::exchange(other.entity_, 0)) {}
@@ -38,15 +35,15 @@ class Entity {
   dds_entity_t entity_ = 0;
 };
 
-// What DDS tells a participant, a reader or a writer by, wherever it is.
+// Global identity of a participant, reader or writer.
 using EntityId = std::array<std::uint8_t, 16>;
 EntityId id_from(const dds_guid_t& guid);
 EntityId id_of(dds_entity_t entity);
 
 struct Qos {
-  int depth = 10;        // samples that are kept
-  bool reliable = true;  // as ROS is by default; a reader that is not takes from every writer
-  bool transient_local = false;  // who comes later is told those, too
+  int depth = 10;
+  bool reliable = true;          // the default of ROS; an unreliable reader accepts all writers
+  bool transient_local = false;  // late readers get the kept samples
   dds_duration_t lifespan = DDS_INFINITY;
   std::string user_data;
 };
@@ -56,10 +53,9 @@ struct DeleteQos {
 };
 using QosPtr = std::unique_ptr<dds_qos_t, DeleteQos>;
 
-// A write waits for a slow reader for 100 ms at most.
+// A write waits for a slow reader for at most 100 ms.
 QosPtr make_qos(const Qos& qos);
 
-// A sample or value of Cyclone's that has to be given back.
 std::string user_data_of(const dds_qos_t* qos);
 
 }  // namespace r4::tool::ros2

@@ -14,7 +14,7 @@
 namespace r4::tool::ros2 {
 namespace {
 
-constexpr std::uint32_t last_domain = 232;  // the ports of a higher one would not be ports
+constexpr std::uint32_t last_domain = 232;  // higher domains have no valid ports
 
 enum class Range { localhost, subnet, off, system };
 
@@ -75,11 +75,11 @@ std::string configuration(const std::string& general, const std::vector<std::str
   std::string list;
   for (const std::string& peer : peers) list += fmt::format("<Peer Address=\"{}\"/>", peer);
   if (!list.empty()) list = "<Peers>" + list + "</Peers>";
-  // Participants on one computer take turns at ports; without multicast each asks at all of them.
+  // Participants on one computer use successive ports; without multicast each port must be tried.
   constexpr std::string_view index =
       "<ParticipantIndex>auto</ParticipantIndex>"
       "<MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>";
-  // Fast DDS reads who is leaving from the hash of the key alone: without it we leave with our lease only.
+  // Fast DDS needs the key hash to notice that our participants leave before their lease ends.
   constexpr std::string_view internal =
       "<Internal><GenerateKeyhash>true</GenerateKeyhash></Internal>";
   return fmt::format(

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which ROS 2 graph is joined, and how far it reaches, by the environment variables of ROS. Loopback, unless they say
-// otherwise.
+// Selects the ROS 2 graph and its reach by the environment variables of ROS. Default: loopback.
 //
 //     ROS_DOMAIN_ID                   0-232; 0
 //     ROS_AUTOMATIC_DISCOVERY_RANGE   LOCALHOST (ours by default), SUBNET, OFF, SYSTEM_DEFAULT
-//     ROS_LOCALHOST_ONLY              1: LOCALHOST; 0: SUBNET; of older releases, and before the range
-//     ROS_STATIC_PEERS                addresses, separated by semicolons: those computers, too
-//     CYCLONEDDS_URI                  Cyclone's own configuration: then it alone counts, but for the domain
+//     ROS_LOCALHOST_ONLY              1: LOCALHOST; 0: SUBNET; older releases; overrides the range
+//     ROS_STATIC_PEERS                addresses of further computers, separated by semicolons
+//     CYCLONEDDS_URI                  Cyclone's own configuration: overrides all but the domain
 #pragma once
 
 #include <cstdint>
@@ -17,17 +16,15 @@ namespace r4::tool::ros2 {
 
 struct Domain {
   std::uint32_t id = 0;
-  std::string
-      configuration;  // Cyclone's, as XML; empty: what it finds in CYCLONEDDS_URI, or its own
-  std::string reach;  // in words, "this computer"
-  bool one_computer = false;  // nobody else's can be in it
+  std::string configuration;  // Cyclone's XML; empty: CYCLONEDDS_URI or Cyclone's default
+  std::string reach;          // in words, "this computer"
+  bool one_computer = false;  // limited to this computer
 };
 
-// The value of a variable; empty where it is not set.
 using Environment = std::function<std::string(const char* name)>;
 std::string process_environment(const char* name);
 
-// Throws Error{usage} naming the variable whose value cannot be.
+// Throws Error{usage} naming a variable with a wrong value.
 Domain domain_of(const Environment& environment);
 
 }  // namespace r4::tool::ros2

@@ -16,12 +16,12 @@
 namespace r4::tool::ros2 {
 namespace {
 
-// So long others take to hear that the nodes are gone, before the participant is.
+// Time for the nodes' farewell to arrive before the participant leaves.
 constexpr std::chrono::milliseconds farewell{100};
 
-// Cyclone DDS waits by select(), which ends the process at a descriptor of FD_SETSIZE or more.
+// Cyclone DDS uses select(), which aborts the process for a descriptor of FD_SETSIZE or more.
 void require_low_descriptors(const std::string& what) {
-  constexpr int needed = 32;  // more than a domain takes
+  constexpr int needed = 32;  // more than a domain uses
   std::vector<int> low;
   int newest = 0;
   while (static_cast<int>(low.size()) < needed && newest >= 0 && newest < FD_SETSIZE) {
@@ -53,7 +53,7 @@ Entity participant_of(const Domain& domain) {
           fmt::format("ROS domain {}", domain.id)};
 }
 
-// Who pairs the two halves of a service does it by this; as the middleware of ROS writes it.
+// Identifies the two halves of a service, in the format of the ROS middleware.
 std::string service_id(dds_entity_t participant, std::size_t number) {
   EntityId id = id_of(participant);
   id[14] = static_cast<std::uint8_t>(number >> 8);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Our part of the ROS 2 graph: nodes with their topics and services.
 //
-// Cyclone DDS counts what a participant has made with 14 bits, so 64 nodes share a participant.
-// Nodes are made before list_nodes(). A reader may be made later, on the thread that reads. leave()
-// takes the nodes out of all lists at once, and the destructor waits until that has been sent. A
-// killed process stays in those lists for 10 s.
+// Cyclone DDS numbers a participant's entities with 14 bits, so 64 nodes share a participant.
+// Create nodes before list_nodes(). Readers may be created later, on the reading thread. leave()
+// removes the nodes from all lists at once; the destructor waits until that has been sent. A killed
+// process stays listed for 10 s.
 #pragma once
 
 #include <chrono>
@@ -24,20 +24,18 @@
 
 namespace r4::tool::ros2 {
 
-// What is on the graph, in words, for who asks what this program does.
 struct Endpoint {
   std::string name;  // "/R4"
   const char* type;  // "std_msgs/msg/String"
 };
 
-// A reader or writer of ours, and of which node.
 struct OwnEndpoint {
   EndpointKind kind = EndpointKind::writer;
   std::size_t node = 0;
-  std::string name;  // of its topic or service, as the node names it: "osmc1/state", "~/stop"
-  std::string type;  // as DDS names it
+  std::string name;  // the node's name of the topic or service: "osmc1/state", "~/stop"
+  std::string type;
   Policies policies;
-  bool is_declared = true;  // false: made for a writer of another type
+  bool is_declared = true;  // false: created for a writer of another type
 };
 
 class Graph {
@@ -50,11 +48,10 @@ class Graph {
   Graph(const Graph&) = delete;
   Graph& operator=(const Graph&) = delete;
 
-  // Returns its number.
   std::size_t add_node(const NodeName& name);
   const NodeName& node(std::size_t node) const { return nodes_[node].name; }
 
-  // `topic` as a node names it (names.hpp). A sample is read or written by its type alone.
+  // `topic` is the node's name for it (names.hpp). Use the entity only for samples of type Message.
   template <class Message>
   dds_entity_t publish(std::size_t node, std::string_view topic, const Qos& qos = {}) {
     return make_writer(node, topic, message_type<Message>(), qos);
@@ -67,32 +64,31 @@ class Graph {
     dds_entity_t requests = 0;
     dds_entity_t replies = 0;
   };
-  // `type` in words: "std_srvs/srv/Trigger".
+  // `type`: "std_srvs/srv/Trigger".
   template <class Request, class Response>
   Service serve(std::size_t node, std::string_view name, const char* type) {
     return make_service(node, name, type, message_type<Request>(), message_type<Response>());
   }
 
-  // A topic that the node reads, or might read: what is to be done for writers of another type.
+  // Sets the reaction to writers of another type, for a topic that the node reads or may read.
   void on_other_type(std::size_t node, std::string_view topic, OtherType act);
 
-  // The first of them.
   dds_entity_t participant() const { return members_.front().participant.get(); }
   std::vector<dds_entity_t> participants() const;
-  // From now on our nodes are listed, in the form that others read.
+  // Lists our nodes from now on, in the format of the other participants.
   void list_nodes(const std::string& distro);
-  // On the thread that reads.
+  // On the reading thread.
   void on_announced(const Announced& announced);
   void leave();
 
   const std::vector<Node>& nodes() const { return nodes_; }
   struct OwnTopic {
     std::vector<OwnEndpoint> endpoints;
-    std::size_t node = 0;  // of other_type
+    std::size_t node = 0;
     std::string name;
     OtherType other_type;
   };
-  // By its name in DDS. nullptr: none of our nodes has to do with it.
+  // By DDS name. nullptr: not used by our nodes.
   const OwnTopic* own_topic(const std::string& topic) const;
 
   const std::vector<Endpoint>& publishers() const { return publishers_; }
@@ -109,8 +105,8 @@ class Graph {
   dds_entity_t topic(std::size_t node, const std::string& name, const MessageType& type);
   struct Place {
     std::size_t node;
-    std::string name;   // as the node names it
-    std::string topic;  // as DDS names it
+    std::string name;
+    std::string topic;
   };
   dds_entity_t add(EndpointKind kind, const Place& place, const MessageType& type, Qos qos);
   void add_participant();

@@ -8,8 +8,8 @@ namespace r4::tool::ros2 {
 namespace {
 
 constexpr std::chrono::milliseconds turn{10};
-constexpr int turns_saved = 3;                // by who was quiet
-constexpr std::size_t most_publishers = 256;  // of one topic, that are told apart
+constexpr int turns_saved = 3;                // saved while quiet
+constexpr std::size_t most_publishers = 256;  // distinguished publishers of a topic
 
 EntityId writer_of(dds_entity_t reader, dds_instance_handle_t publication) {
   dds_builtintopic_endpoint_t* const data = dds_get_matched_publication_data(reader, publication);
@@ -71,7 +71,7 @@ void Inbox::run() {
     if (end || count < 0) return;
     const std::size_t told = std::min(static_cast<std::size_t>(count), triggered.size());
     for (std::size_t i = 0; i < told; ++i) {
-      const auto number = static_cast<std::size_t>(triggered[i]);  // from 1; 0 is the end's
+      const auto number = static_cast<std::size_t>(triggered[i]);  // from 1; 0 ends the thread
       if (number != 0) sources_[number - 1]->look();
     }
   }
@@ -106,7 +106,7 @@ void Inbox::look_at_publishers(dds_entity_t reader, Source& source,
   const dds_return_t count = dds_get_matched_publications(reader, there.data(), there.size());
   there.resize(
       std::clamp<std::size_t>(count < 0 ? 0 : static_cast<std::size_t>(count), 0, most_publishers));
-  // Who has gone may have left a sample that is yet to be read.
+  // A departed publisher may have left an unread sample.
   for (const dds_instance_handle_t each : there) publisher_of(reader, source, each);
   if (source.publishers.size() > most_publishers) {
     std::erase_if(source.publishers, [&there](const auto& each) {
@@ -168,7 +168,7 @@ void Inbox::drain() {
     }
   }
   if (all.empty()) return;
-  // What is urgent does not wait for its turn, and makes nothing else wait longer than for one.
+  // Urgent samples are taken immediately and delay other samples by at most one turn.
   const Clock::time_point now = Clock::now();
   next_ = std::min(std::max(next_, now - turns_saved * turn), now) + turn;
   std::sort(all.begin(), all.end(), [](const Waiting& a, const Waiting& b) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What comes from the graph, read by a thread of its own and handed to the loop of the boards.
+// Reads samples from the graph on its own thread and passes them to the boards' loop.
 //
-// The thread waits for samples, judges their form, and puts them into a queue with little room, in which the newest
-// of a subscription wins. The loop takes them out at once, but on average not more often than every 10 ms: however
-// many flood in, a board's heartbeats wait for no more than a few such turns. What is urgent, a stop, is always
-// taken at once.
+// The thread waits for samples, validates them and queues a few, where newer samples of a
+// subscription replace older ones. The loop takes them at once, but on average at most every 10 ms,
+// so a flood delays heartbeats by only a few turns. Urgent samples, which are stops, are taken
+// immediately.
 #pragma once
 
 #include <dds/dds.h>
@@ -31,17 +31,15 @@
 
 namespace r4::tool::ros2 {
 
-// Who wrote a sample, and when.
 struct Origin {
-  std::uint64_t publisher = 0;  // never the same for two
-  EntityId writer{};            // the same when it is back; 0: unknown, it has gone
-  std::chrono::steady_clock::time_point written;  // by our clock, as far as it is known (Transit)
+  std::uint64_t publisher = 0;  // unique
+  EntityId writer{};            // the same after a reconnect; 0: unknown because it has left
+  std::chrono::steady_clock::time_point written;  // by our clock, as far as known (Transit)
 };
 
 class Inbox {
  public:
-  // `clocks`: ours and that of who writes. `on_drained`: called on the loop when it has taken what
-  // there was. There is a participant already.
+  // Calls `on_drained` on the loop when the queue is empty. A participant must exist.
   Inbox(asio::io_context& io, Transit::Clocks clocks, std::function<void()> on_drained);
   ~Inbox() { stop(); }
   Inbox(const Inbox&) = delete;
@@ -50,26 +48,25 @@ class Inbox {
   template <class Message, class Value>
   struct Subscription {
     dds_entity_t reader = 0;
-    std::size_t room = 1;  // samples that may wait; the oldest goes
-    // On the reading thread: none for a sample that is not well formed.
+    std::size_t room = 1;  // samples that may wait; the oldest is dropped
+    // On the reading thread: empty for a malformed sample.
     std::function<std::optional<Value>(const Message&)> read;
-    // On the reading thread: is it to be taken at once?
+    // On the reading thread: true if it must be taken immediately.
     std::function<bool(const Value&)> urgent;
     // On the loop.
     std::function<void(const Value&, const Origin&)> take;
-    // On the loop, when a publisher has gone: those that are left.
+    // On the loop, after a publisher has left: the remaining publishers.
     std::function<void(const std::vector<std::uint64_t>&)> left;
   };
   // Before start(), or on the reading thread.
   template <class Message, class Value>
   void add(Subscription<Message, Value> subscription);
-  // `look` is called on the reading thread while `entity` has something to be read.
+  // Calls `look` on the reading thread while `entity` has data.
   void watch(dds_entity_t entity, std::function<void()> look);
 
   void start();
-  // Ends the thread; nothing is handed over after that. Idempotent.
+  // Ends the thread; no callback follows. Idempotent.
   void stop();
-  // Samples that were not well formed, or found no room.
   std::uint64_t malformed() const { return malformed_; }
   std::uint64_t dropped() const { return dropped_; }
 
@@ -78,7 +75,7 @@ class Inbox {
   enum class Kind : std::uint8_t {
     sample,
     urgent,      // never dropped for another sample
-    publishers,  // the newest of a subscription counts, behind the samples of who has gone
+    publishers,  // newest list of publishers, after the samples of departed ones
   };
   struct Waiting {
     std::uint64_t order = 0;
@@ -106,7 +103,6 @@ class Inbox {
                           const std::function<void(const std::vector<std::uint64_t>&)>& left);
   void put(Source& source, Kind kind, std::function<void()> deliver);
   Source& add_source();
-  // To the newest source.
   void attach(dds_entity_t entity);
   void run();
   void on_posted();
@@ -119,18 +115,18 @@ class Inbox {
   const std::function<void()> on_drained_;
   Entity waitset_;
   Entity end_;
-  std::vector<std::unique_ptr<Source>> sources_;  // the reading thread adds to it under the mutex
+  std::vector<std::unique_ptr<Source>> sources_;  // the reading thread adds sources under the mutex
   std::thread thread_;
   std::atomic<std::uint64_t> malformed_{0};
   std::atomic<std::uint64_t> dropped_{0};
 
-  std::mutex mutex_;  // of what waits
+  std::mutex mutex_;  // protects the waiting samples
   std::uint64_t order_ = 0;
   bool posted_ = false;
   bool urgent_ = false;
   bool ended_ = false;
 
-  // Of the loop's thread.
+  // Used on the loop's thread:
   Timer timer_;
   Clock::time_point next_{};
 };

@@ -12,7 +12,7 @@ dds_topic_descriptor_t renamed(const dds_topic_descriptor_t& type, const char* n
           type.m_meta, {nullptr, 0}, {nullptr, 0},   type.restrict_data_representation};
 }
 
-// The same messages under the name that they have in every release.
+// The older messages, under the name used in every release.
 const dds_topic_descriptor_t nodes_before_iron =
     renamed(rmw_dds_common_before_iron_msg_dds__ParticipantEntitiesInfo__desc,
             rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc.m_typename);

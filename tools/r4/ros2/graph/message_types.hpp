@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The types of ros2_messages.idl by the names of C++, each with what DDS and ROS know it by.
+// C++ names of the types in ros2_messages.idl, with their identification in DDS and ROS.
 #pragma once
 
 #include <dds/dds.h>
@@ -33,7 +33,7 @@ using NodesBeforeIronMessage = rmw_dds_common_before_iron_msg_dds__ParticipantEn
 
 struct MessageType {
   const char* name;  // "std_msgs/msg/String"
-  const char* hash;  // what releases since Iron compare (REP 2011)
+  const char* hash;  // compared since Iron (REP 2011)
   const dds_topic_descriptor_t* descriptor;
 };
 
@@ -79,15 +79,13 @@ const MessageType& message_type<NodesMessage>();
 template <>
 const MessageType& message_type<NodesBeforeIronMessage>();
 
-// A text as the messages want it, whose strings are not const: for as long as `string` lives.
+// A text for a message, whose strings are not const. Valid while `string` lives.
 inline char* borrowed(const std::string& string) { return const_cast<char*>(string.c_str()); }
 
-// The bytes of a string of a sample, as the IDL has it.
 inline std::string_view bytes_of(const dds_sequence_octet& string) {
   return {reinterpret_cast<const char*>(string._buffer), string._length};
 }
 
-// What a reader or writer of that type carries as its user data.
 std::string user_data_of(const MessageType& type);
 
 }  // namespace r4::tool::ros2

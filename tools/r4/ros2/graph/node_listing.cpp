@@ -16,7 +16,7 @@ constexpr const char* listing_topic = "ros_discovery_info";
 
 template <class Gid>
 Gid gid_from(const EntityId& id) {
-  Gid gid{};  // the rest of a longer one is zero
+  Gid gid{};  // the rest of a longer id stays zero
   std::memcpy(gid.data, id.data(), id.size());
   return gid;
 }
@@ -53,7 +53,7 @@ void write(dds_entity_t writer, const EntityId& participant, const std::vector<N
 
 std::optional<Release> release_of(const std::string& distro) {
   if (distro.empty()) return std::nullopt;
-  // The names of ROS 2's releases are in the order of the alphabet.
+  // Release names are in alphabetical order.
   return distro < "iron" ? Release::before_iron : Release::since_iron;
 }
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `ros2 node list` reads: on ros_discovery_info each participant says which nodes it has, and which readers and
-// writers are whose.
+// Supports `ros2 node list`: on ros_discovery_info each participant publishes its nodes with their
+// readers and writers.
 //
-// Up to Humble an id has 24 bytes there and since Iron 16, under one type name, and who is told the other size
-// throws. So nothing is said until somebody else is there to read it, whose own writer tells by its type hash which
-// it is. Of two releases in one graph the first counts; ROS itself does not mix them either.
+// An id has 24 bytes up to Humble and 16 since Iron, under the same type name, and the wrong size
+// makes a receiver throw. So nothing is published until another participant appears, whose writer's
+// type hash shows its release. With two releases in one graph the first one counts; ROS does not
+// mix them either.
 #pragma once
 
 #include <cstddef>
@@ -27,19 +28,18 @@ struct Node {
 };
 
 enum class Release : std::uint8_t { before_iron, since_iron };
-// That of ROS_DISTRO; none for an empty value.
+// The release of ROS_DISTRO; empty for an empty value.
 std::optional<Release> release_of(const std::string& distro);
 
 class NodeListing {
  public:
   NodeListing(dds_entity_t participant, std::vector<Node> nodes, const std::string& distro);
 
-  // An endpoint of another participant has come or gone.
   void on_announced(const Announced& announced);
-  // Node `index` has other readers or writers.
+  // The readers or writers of node `index` have changed.
   void change(std::size_t index, const Node& node);
 
-  // There are no nodes any more.
+  // Publishes an empty list.
   void leave();
 
  private:
@@ -51,7 +51,7 @@ class NodeListing {
   const EntityId id_;
   std::vector<Node> nodes_;
   const std::optional<Release> fixed_;
-  std::map<EntityId, Release> others_;  // who else lists its nodes
+  std::map<EntityId, Release> others_;
   std::optional<Release> spoken_;
   Entity topic_;
   Entity writer_;

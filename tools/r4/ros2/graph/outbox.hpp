@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is published, on a thread of its own: a subscriber that blocks, or a network that is full, holds up this
-// thread alone, never the boards' links.
+// Publishes on its own thread: a blocked subscriber or network does not delay the boards.
 #pragma once
 
 #include <chrono>
@@ -17,22 +16,21 @@ namespace r4::tool::ros2 {
 class Outbox {
  public:
   using Job = std::function<void()>;
-  // Returns false to be tried again; `last`: it will not be.
+  // Returns false to be repeated, unless `last` is true.
   using Attempt = std::function<bool(bool last)>;
 
-  // For so many jobs that wait; the oldest goes where there is no room.
+  // `room`: most waiting jobs; the oldest is dropped.
   explicit Outbox(std::size_t room = 256);
   ~Outbox() { stop(); }
   Outbox(const Outbox&) = delete;
   Outbox& operator=(const Outbox&) = delete;
 
-  // Never waits.
+  // Never blocks.
   void push(Job job);
-  // Tried every few milliseconds, for a tenth of a second; the jobs go on meanwhile.
+  // Repeated every few milliseconds for up to 100 ms; other jobs continue meanwhile.
   void push_attempt(Attempt attempt);
-  // Ends behind the job that runs; what waits is dropped. Idempotent.
+  // Ends after the current job and drops waiting jobs. Idempotent.
   void stop();
-  // Jobs that were dropped for want of room.
   std::uint64_t lost() const;
 
  private:
@@ -52,7 +50,7 @@ class Outbox {
   std::deque<Job> waiting_;
   std::uint64_t lost_ = 0;
   bool ending_ = false;
-  // Of the thread.
+  // Used by the thread only:
   std::deque<Retry> retries_;
   Clock::time_point next_try_{};
   std::thread thread_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who has said `true` and not `false` since: a button that is pressed counts once, however often it is said. Whoever
-// is out of reach for a while and comes back has not let go. The newest 256 are remembered.
+// Publishers whose last message was `true`. A pressed button counts once, even if repeated. A
+// publisher that was unreachable has not released it. Remembers the newest 256.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace r4::tool::ros2 {
 
 class Pressed {
  public:
-  // True if it is pressed now and was not before.
+  // True if newly pressed.
   bool on(const EntityId& who, bool pressed) {
     const bool was = std::erase(pressed_, who) != 0;
     if (!pressed) return false;
@@ -25,7 +25,7 @@ class Pressed {
   static constexpr std::size_t most = 256;
 
  private:
-  std::vector<EntityId> pressed_;  // the newest last
+  std::vector<EntityId> pressed_;
 };
 
 }  // namespace r4::tool::ros2

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How long a sample was under way, as far as that can be known. In a graph of one computer the clock tells: there is
-// one. The clocks of two computers differ, so what counts is by how much it was slower than the fastest of its
-// publisher. They may drift apart by 0.02 %, but never by more than half a second between two samples: of who is silent
-// for long, one that a network held back would pass for fresh. A clock that was set makes all samples look slow: where
-// none is fast of those that come in ten seconds or more, and ten of them are a second apart, that is believed. The
-// first sample of a publisher has nothing to be compared with.
+// Estimates the transit time of samples. In a graph of one computer the common clock measures it.
+// The clocks of two computers differ, so the delay is relative to the publisher's fastest sample.
+// Clocks may drift by 0.02 %, but by at most 0.5 s between two samples: otherwise a sample held
+// back after a long silence would seem fresh. After a clock was set, all samples seem slow. The new
+// offset is accepted when, for at least ten seconds, ten samples a second apart were all slow. A
+// publisher's first sample has no reference.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ class Transit {
 
   explicit Transit(Clocks clocks) : clocks_(clocks) {}
 
-  // `written` and `received`: by the wall clocks of the two. Returns the delay; of two clocks 0 for the fastest.
+  // `written`, `received`: wall clocks. Returns the delay; of two clocks 0 for the fastest.
   Duration delay(Duration written, Duration received) {
     const Duration difference = received - written;
     if (clocks_ == Clocks::one) return std::max(difference, Duration(0));
@@ -50,9 +50,9 @@ class Transit {
  private:
   struct Slow {
     Duration since;
-    Duration counted;  // the newest of them that was
+    Duration counted;  // newest counted sample
     Duration least;
-    int samples;  // a second apart: what a network held back comes at once
+    int samples;  // a second apart, because delayed samples arrive together
   };
   static constexpr int drift = 5000;
   static constexpr std::chrono::milliseconds most_drifted{500};
@@ -63,7 +63,7 @@ class Transit {
   const Clocks clocks_;
   Duration last_{0};
   std::optional<Duration> least_;
-  std::optional<Slow> slow_;  // samples of which none was fast
+  std::optional<Slow> slow_;  // samples since the last fast one
 };
 
 }  // namespace r4::tool::ros2

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A card for each board: is it there, why its outputs are safe, how good the link is; and what brings it back.
+// A card for each board: its link, its safe state and the reason, and buttons to recover.
 import {board_name, element, put} from './text.js';
 
 const SAFE_WORDS = {
@@ -7,7 +7,6 @@ const SAFE_WORDS = {
   proximity: 'an obstacle is near', watchdog: 'its watchdog struck', fault: 'it has a fault',
 };
 
-// The state of the card in a word, and the sentence beside it.
 function verdict(health) {
   if (!health) return ['lost', 'Unknown', 'nothing is known of it at the moment'];
   if (health.link === 'lost') return ['lost', 'Lost', health.why || 'the board does not answer'];
@@ -96,7 +95,6 @@ export class Boards {
     for (const card of this.#cards) card.show(null);
   }
 
-  // Those that do not answer, in words.
   missing() {
     return this.boards.filter((board) => this.health[board.board]?.link === 'lost')
       .map((board) => `${board_name(board)} does not answer: ${this.health[board.board].why || 'its link is lost'}. ` +

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The control of one output. A slider streams: while one command waits for the board's confirmation the newest value
-// waits behind it. What is shown follows the board's report whenever nobody is setting it, so after a stop no
-// old setpoint stands in a slider.
+// The control of one output. A slider streams: while a command waits for its confirmation, only the
+// newest value is queued. The slider follows the board's report unless the user is setting it, so
+// no old setpoint remains after a stop.
 import {kind_of} from './channel_kinds.js';
 import {element, put} from './text.js';
 
-const SETTLE_MS = 200;  // the report may come behind the confirmation
+const SETTLE_MS = 200;  // the report may arrive after the confirmation
 
 export class Channel {
   #kind;
@@ -68,7 +68,7 @@ export class Channel {
     return [this.#range, element('span', {className: 'set'}, ...parts)];
   }
 
-  // What turns is stopped before it turns the other way.
+  // A turning motor is stopped before it changes direction.
   #make_choice(label, what, words, value) {
     const button = element('button', {type: 'button', className: 'choice', 'aria-label': `${label} ${what}`});
     const show = (chosen) => {
@@ -111,7 +111,7 @@ export class Channel {
       if (result.ok) {
         this.#say('good', `✓ ${result.ms === undefined ? '' : `${result.ms.toFixed(1)} ms`}`, `${asked}: ${result.text}`);
       } else {
-        this.#next = null;  // what was to follow was set before the person could know
+        this.#next = null;  // the queued value predates the refusal
         this.#say('bad', `✗ ${result.text}`, asked);
       }
     }
@@ -125,7 +125,7 @@ export class Channel {
     put(this.#answer, text);
   }
 
-  // What was asked for is over: a stop.
+  // After a stop: discards queued values.
   forget() { this.#next = null; this.#follow_after_ms = 0; this.#typing = false; }
 
   draw(history) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the control of an output has, by what the server says of it: its command with the values to fill in, and their
-// ranges. `set` is what the person chose; `of` reads that back from what the board reports.
+// The controls of an output, derived from the server's description: its command with placeholders,
+// and ranges. `set` holds the user's choice; `of` extracts the same values from the board's report.
 
 export function kind_of({channel, name, command, min, max, speed}) {
   const has = (value) => command.includes(`{${value}}`);
-  const wide = max - min > 0xFFFF;  // a position: the slider has the middle of it
+  const wide = max - min > 0xFFFF;  // a position: the slider covers only its middle
   return {
     value: {name, step: 1, min: wide ? -10000 : min, max: wide ? 10000 : max, any: wide},
     direction: has('direction'), brake: has('brake'), toggle: has('switch'), zero: Boolean(speed),

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What happened, newest first: what the server tells of, and what this page itself saw.
 import {clock_text, element} from './text.js';
 
 const KEPT = 500;

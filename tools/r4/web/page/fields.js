@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every field of every board, live, a column for each board; and the choice of what is plotted, which the browser
-// remembers.
+// All fields, live, a column for each board; and the stored choice of plotted fields.
 import {board_name, element, put, value_text} from './text.js';
 
 const FIRST_CHOICE = ['AIN24', 'AIN12', 'OSMC1.pwm', 'OSMC2.pwm', 'ENC1'];
@@ -29,7 +28,7 @@ export class Fields {
       return {name, field, box, cells, node};
     });
     document.getElementById('fields-body').replaceChildren(...this.#rows.map((row) => row.node));
-    // What is out of sight is not written.
+    // Rows that are not visible are not updated.
     const observer = new IntersectionObserver((seen) => {
       for (const each of seen) {
         const row = this.#rows[each.target.rowIndex - 1];

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The states of one board over the last minutes, a column for each field, oldest first. What a board does not report
-// is NaN. Columns are contiguous, so that a plot draws parts of them without a copy: when the buffers are full, their
-// newer half moves to the front.
+// States of one board, a column for each field, oldest first; missing values are NaN. Columns are
+// contiguous, so plots draw slices without copying. When full, the newer half moves to the front.
 
 const KEPT = 32768;  // states: five minutes at 100 Hz
 
@@ -26,7 +25,6 @@ export class History {
   get newest_ms() { return this.#end ? this.#times[this.#end - 1] : NaN; }
   newest(field) { return this.#end ? this.#columns[field][this.#end - 1] : NaN; }
 
-  // The first state that is not before this time, or the end.
   #find(time) {
     let low = 0;
     let high = this.#end;
@@ -37,7 +35,7 @@ export class History {
     return low;
   }
 
-  // Columns of the states between two times, with one more at each side: the times first.
+  // Columns between two times, with one more state at each side; times first.
   between(from_ms, to_ms, fields) {
     const first = Math.max(0, this.#find(from_ms) - 1);
     const end = Math.min(this.#end, this.#find(to_ms) + 1);

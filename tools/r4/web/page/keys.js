@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Escape stops, wherever the focus is. Space does, too: everywhere while this page controls, else wherever Space means
-// nothing. Whoever has just clicked a button and hits Space means the robot, not the button: Enter presses buttons,
-// and ticks boxes.
+// Escape always stops. Space stops everywhere while this page controls, else where it has no other
+// meaning; after a click on a button it is meant for the robot. Enter presses buttons.
 
 const takes_space = (target) => target.closest('button, input, select, a, [role=group], [role=log]') !== null;
 
@@ -18,6 +17,6 @@ export function listen_for_stop(stop, controls) {
     }
   };
   addEventListener('keydown', down, {capture: true});
-  // A button is pressed when Space comes up.
+  // Browsers press a button when Space is released.
   addEventListener('keyup', (key) => { if (is_stop(key)) key.preventDefault(); }, {capture: true});
 }

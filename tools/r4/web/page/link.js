@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The WebSocket to r4 web: opens it, and again when it is lost, and tells in words what became of it.
-// While this page controls and is visible it says `alive` every 100 ms. Each echoes the newest `now` of the server, so
-// none that waited in the network counts. The timer is this page's own thread: a page that hangs says nothing.
+// The WebSocket to r4 web, reopened when lost. While this page controls and is visible, it sends
+// `alive` every 100 ms. Each message echoes the newest `now` of the server, so delayed messages do
+// not count. The timer runs in the page's own thread: a hung page sends nothing.
 
 const ALIVE_MS = 100;
-const SILENCE_MS = 1500;  // the server says something every 100 ms
+const SILENCE_MS = 1500;  // the server sends every 100 ms
 const FIRST_RETRY_MS = 200;
 const LONGEST_RETRY_MS = 2000;
 
-// The token of an address such as http://robot:8080/#token=…; it is kept for this tab, and does not stay in the address.
+// Takes the token of http://robot:8080/#token=… for this tab; removes it from the address.
 function token_of_address() {
   const given = new URLSearchParams(location.hash.slice(1)).get('token');
   if (given) {
@@ -25,7 +25,7 @@ export class Link extends EventTarget {
   #now = 0;
   #heard_ms = 0;
   #alive_timer = 0;
-  #waiting = new Map();  // request: what is done with its result
+  #waiting = new Map();
   #stop_waits = false;
   #token = token_of_address();
   up = false;
@@ -51,7 +51,7 @@ export class Link extends EventTarget {
 
   get controls() { return this.#alive_timer !== 0; }
 
-  // What the board answered, or why there is no answer: {ok, ms, text}.
+  // Resolves to the board's answer, or to the reason for none: {ok, ms, text}.
   send(message) {
     if (!this.up) return Promise.resolve({ok: false, text: 'not sent: no connection to r4 web'});
     const request = ++this.#request;
@@ -59,7 +59,7 @@ export class Link extends EventTarget {
     return new Promise((resolve) => this.#waiting.set(request, resolve));
   }
 
-  // False: there is no connection. It is sent as soon as there is one again.
+  // False if not connected: the stop is then sent after reconnecting.
   stop() {
     this.#stop_waits = !this.up;
     if (this.up) this.#socket.send(JSON.stringify({type: 'stop', request: ++this.#request}));
@@ -122,7 +122,7 @@ export class Link extends EventTarget {
     this.#say('lost-server', {was_up, refused: !was_up && await this.#answers()});
   }
 
-  // Does r4 web answer, though it refuses the socket?
+  // True if r4 web answers HTTP although it refuses the socket.
   async #answers() {
     try {
       return (await fetch('/', {method: 'HEAD', cache: 'no-store', signal: AbortSignal.timeout(SILENCE_MS)})).ok;

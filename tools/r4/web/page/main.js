@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page of r4 web: what comes from the server goes to its parts, and is drawn once a frame.
+// The page of r4 web: passes server messages to its parts, and draws once per frame.
 import {Boards} from './boards.js';
 import {add_event} from './events.js';
 import {Fields} from './fields.js';
@@ -18,8 +18,6 @@ let boards, fields, plots, outputs, histories;
 let frame_asked = false;
 let stopped_ms = 0;
 
-// --- what is drawn, at most once a frame
-
 function ask_frame() {
   if (frame_asked) return;
   frame_asked = true;
@@ -37,8 +35,6 @@ function show_alarm() {
   put(at('alarm'), lost.join(' '));
 }
 let server_lost = '';
-
-// --- the server
 
 link.addEventListener('hello', ({detail}) => {
   const same = hello && JSON.stringify([hello.boards, hello.fields, hello.channels]) ===
@@ -105,8 +101,6 @@ link.addEventListener('event', ({detail}) => {
 });
 link.addEventListener('error', ({detail}) => add_event('error', detail.text));
 
-// --- control
-
 let released_why = '';
 function show_control(control) {
   const words = control.you ? 'You control' : control.holder !== null ? `Browser ${control.holder} controls; you watch` :
@@ -139,15 +133,12 @@ function stop() {
   at('stop').classList.remove('pressed');
   requestAnimationFrame(() => at('stop').classList.add('pressed'));
 }
-// Down, not up again: a finger that slips off has pressed.
+// Reacts to the press, not the release: a finger may slip off.
 at('stop').onpointerdown = stop;
-at('stop').onclick = (click) => { if (click.detail === 0) stop(); };  // by the keyboard, or by what reads the screen
+at('stop').onclick = (click) => { if (click.detail === 0) stop(); };  // keyboard or screen reader
 listen_for_stop(stop, () => link.controls);
 
-// --- recording
-
 let recording_is_ours = false;
-// Recordings belong to whoever has control; whoever has begun one may end it, too.
 function allow_recording() { at('record').disabled = !link.controls && !recording_is_ours; }
 
 function show_recording(recording) {
@@ -161,8 +152,6 @@ function show_recording(recording) {
 }
 link.addEventListener('recording', ({detail}) => show_recording(detail));
 at('record').onclick = () => link.tell({type: 'record', on: at('record').getAttribute('aria-pressed') !== 'true'});
-
-// --- how fast this page is
 
 let states_before = 0;
 setInterval(() => {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How long it takes until what was received is on screen, and when the first plot was. For the footer, and for
-// who measures: `r4_measured` in the browser's console.
+// Times from receiving to display and to the first plot: `r4_measured` in the console.
 
 const KEPT = 1000;
 const latencies = new Float64Array(KEPT);
@@ -26,10 +25,9 @@ export const measured = {
 };
 globalThis.r4_measured = measured;
 
-// The oldest that the next frame shows.
 export function was_received() { received_ms ||= performance.now(); }
 
-// Called at the end of a frame's work: the channel's message comes when the frame is handed over.
+// Call at the end of a frame's work: the channel's message arrives after the frame was handed over.
 export function was_drawn(plotted) {
   if (plotted && !measured.first_plot_ms) {
     performance.mark('r4-first-plot');

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The outputs of all boards: a panel for each, and in it a group for each kind of channel.
 import {Channel} from './channel.js';
 import {board_name, element} from './text.js';
 

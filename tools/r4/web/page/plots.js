@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The chosen fields over the last minutes: a row of charts for each unit, a chart in it for each board. All share the
-// same stretch of time. Dragging zooms, which pauses what is shown (what is received is kept all the same).
+// The chosen fields over the last minutes: a row of charts for each unit, with a chart for each
+// board, all with the same time range. Dragging zooms and pauses the display; receiving continues.
 import {board_name, clock_text, element, put, value_text} from './text.js';
 
 const GAP_MS = 500;  // states further apart are not joined
-const COLOURS = 8;   // --line0 … of the style; then they begin again, dashed
+const COLOURS = 8;   // --line0 … of the style; further lines are dashed
 const MOST_ZOOM_MS = 50;
 const {uPlot} = globalThis;
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-// One axis for what is of one kind.
+// Fields of the same kind share an axis.
 function kind_of(hello, field) {
   const part = hello.fields[field].split('.')[1];
   return part ? `${part} ${hello.units[field]}` : hello.units[field];
 }
 
-// Where the values of a column are too far apart, as uPlot wants them: pairs of pixels.
+// Gaps in a column for uPlot, as pairs of pixels.
 function gaps_of(plot, series, first, last) {
   const [times, values] = [plot.data[0], plot.data[series]];
   const gaps = [];
@@ -116,7 +116,6 @@ class Chart {
     this.#plot.over.ondblclick = () => this.#plots.go_on();
   }
 
-  // Anew at the next draw: other colours.
   restyle() { this.#plot?.destroy(); this.#plot = null; }
 
   draw(history, from_ms, to_ms) {
@@ -134,7 +133,6 @@ class Chart {
     return data[0].length > 1;
   }
 
-  // The values under the cursor, else the newest.
   read() {
     if (!this.#plot) return;
     const times = this.#plot.data[0];
@@ -151,7 +149,7 @@ export class Plots {
   #hello;
   #histories;
   #charts = [];
-  #from_ms = 0;  // what is shown while paused
+  #from_ms = 0;
   #to_ms = 0;
   #clock_ahead_ms;
   paused = false;
@@ -182,7 +180,7 @@ export class Plots {
 
   set_clock(server_ms) { this.#clock_ahead_ms = server_ms - performance.now(); }
 
-  // The server's clock, which goes on when a board is silent.
+  // Uses the server's clock, which continues while a board is silent.
   #stretch() {
     if (this.paused) return [this.#from_ms, this.#to_ms];
     const now_ms = this.#clock_ahead_ms + performance.now();
@@ -217,7 +215,6 @@ export class Plots {
     document.getElementById('plots').classList.toggle('paused', on);
   }
 
-  // True: there was something to draw.
   draw() {
     const [from_ms, to_ms] = this.#stretch();
     return this.#charts.map((chart) => chart.draw(this.#histories[chart.board], from_ms, to_ms)).some(Boolean);

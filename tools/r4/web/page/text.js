@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Elements and words that several parts of the page need.
 
 export function element(tag, properties = {}, ...children) {
   const made = document.createElement(tag);
@@ -10,7 +9,7 @@ export function element(tag, properties = {}, ...children) {
   return made;
 }
 
-// Only what differs is written: the browser then has nothing to do for the rest.
+// Writes only changes, to save work for the browser.
 export function put(node, text) { if (node.textContent !== text) node.textContent = text; }
 
 export function value_text(value, unit) {
@@ -26,5 +25,5 @@ export function clock_text(time_ms, digits = 0) {
   return digits ? `${text}.${String(time.getMilliseconds()).padStart(3, '0').slice(0, digits)}` : text;
 }
 
-// What its owner calls it, else where it is; its card has the whole URL.
+// The board's name, else its address.
 export const board_name = (board) => board.name || board.url.replace(/^\w+:\/\//, '').replace(/\?listen=\d+$/, '');

@@ -35,7 +35,7 @@ bool is_ip(const std::string& host) {
          ::inet_pton(AF_INET6, host.c_str(), &address) == 1;
 }
 
-// "[::1]:8080" is "::1"; empty where it is no HOST or HOST:PORT.
+// "[::1]:8080" gives "::1"; empty if not HOST or HOST:PORT.
 std::string name_in(std::string_view authority) {
   if (authority.starts_with('[')) {
     const std::size_t end = authority.find(']');
@@ -122,7 +122,7 @@ const char* to_text(Verdict verdict) {
   }
 }
 
-// An address cannot be made to point elsewhere, as a name can.
+// Unlike a name, an IP address cannot be redirected to another computer.
 bool Access::is_ours(std::string_view host) const {
   const std::string name = name_in(host);
   if (name.empty()) return false;
@@ -132,7 +132,7 @@ bool Access::is_ours(std::string_view host) const {
                      [&name](const std::string& each) { return name == name_in(each); });
 }
 
-// A proxy in front may ask by another name, and its pages may come encrypted.
+// A proxy in front may use another name, and serve its pages encrypted.
 bool Access::is_our_page(std::string_view origin) const {
   return std::any_of(hosts_.begin(), hosts_.end(), [&origin](const std::string& each) {
     return origin == "http://" + each || origin == "https://" + each;

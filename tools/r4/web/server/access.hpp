@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who may ask the HTTP server. A browser tells which name its user typed (Host) and which page asks (Origin); that keeps
-// away pages of other sites, also those whose name was made to point here (DNS rebinding). Where there is a token, it is
-// needed as well.
+// Access control of the HTTP server. A browser reports the name typed by its user (Host) and the
+// requesting page (Origin). This keeps out pages of other sites, also with DNS rebinding. A token,
+// if set, is required as well.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace r4::tool::web {
 
-// ADDRESS:PORT as --listen has it, "[::1]:8080" too. Throws Error{usage}.
+// ADDRESS:PORT of --listen, also "[::1]:8080". Throws Error{usage}.
 struct ListenAddress {
   std::string host;  // without brackets
   std::uint16_t port = 0;
@@ -19,16 +19,16 @@ struct ListenAddress {
 };
 ListenAddress listen_address(const std::string& text);
 
-// NAME or NAME:PORT as --host has it. Throws Error{usage}.
+// NAME or NAME:PORT of --host. Throws Error{usage}.
 std::string host_name(const std::string& text);
 
-// 127.0.0.1, ::1, localhost: nobody on another computer gets there.
+// True for 127.0.0.1, ::1 and localhost, which other computers cannot reach.
 bool is_loopback(std::string_view host);
 
-// 128 random bits as hexadecimal digits.
+// 128 random bits in hexadecimal.
 std::string random_token();
 
-// In a time that does not tell where they differ.
+// Compares in constant time.
 bool same_secret(std::string_view a, std::string_view b);
 
 enum class Verdict : std::uint8_t { allowed, wrong_host, wrong_origin, wrong_token };
@@ -36,9 +36,9 @@ const char* to_text(Verdict verdict);
 
 class Access {
  public:
-  // `hosts`: NAME or NAME:PORT by which the server is asked besides the address that it listens at, `host`: names of
-  // this computer, and that of a proxy in front. An empty token: none is needed. `origins`: pages of others that may
-  // read by the Foxglove protocol.
+  // `hosts`: NAME or NAME:PORT accepted besides the listening address `host`, for names of this
+  // computer or of a proxy. Empty `token`: not required. `origins`: foreign pages that may read by
+  // the Foxglove protocol.
   Access(std::string host, std::vector<std::string> hosts, std::string token,
          std::vector<std::string> origins)
       : host_(std::move(host)),
@@ -46,12 +46,12 @@ class Access {
         token_(std::move(token)),
         origins_(std::move(origins)) {}
 
-  // Of any request. An empty origin: there is none, for no browser sends a foreign page's request without it.
+  // For every request. An empty origin is allowed: for a foreign page browsers always send it.
   Verdict check(std::string_view host, std::string_view origin) const;
-  // The same for who only reads, by the Foxglove protocol.
+  // The same for read-only clients of the Foxglove protocol.
   Verdict check_reader(std::string_view host, std::string_view origin) const;
-  // Of what tells something of the robot: `authorization` is that header, `target` the path with its query,
-  // `protocols` the subprotocols that a WebSocket asks for. One of them has the token.
+  // For requests about the robot. The token may be in the header `authorization`, in the query of
+  // `target`, or in the WebSocket subprotocols `protocols`.
   Verdict check_token(std::string_view authorization, std::string_view target,
                       const std::vector<std::string>& protocols) const;
 

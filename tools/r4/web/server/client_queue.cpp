@@ -32,7 +32,6 @@ void ClientQueue::drop_oldest() {
   ++lost_;
 }
 
-// In the order in which they came.
 std::optional<Outgoing> ClientQueue::pop() {
   if (empty()) return std::nullopt;
   const bool state =

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What waits for one client of r4 web. One that is slow loses its oldest states, and hears how many messages of them;
-// what is no state is never lost: a client for which too much of that waits cannot be served. Time is passed in.
+// Messages that wait for one client. A slow client loses its oldest states, and gets their number.
+// With too many other messages the client is dropped. The caller passes in the time.
 #pragma once
 
 #include <chrono>
@@ -14,8 +14,8 @@ namespace r4::tool::web {
 
 struct Outgoing {
   enum class Kind : std::uint8_t { state, other };
-  std::shared_ptr<const std::string> body;  // the same for all clients
-  std::string head;                         // in front of it, of this client; none: it is text
+  std::shared_ptr<const std::string> body;
+  std::string head;  // prefix for this client; empty: a text message
   Kind kind = Kind::other;
   std::size_t size() const { return head.size() + (body ? body->size() : 0); }
 };
@@ -23,17 +23,16 @@ struct Outgoing {
 class ClientQueue {
  public:
   using Time = std::chrono::steady_clock::time_point;
-  // A state that has waited for longer is not worth sending.
+  // Older states are not worth sending.
   static constexpr std::chrono::milliseconds oldest_state{250};
   static constexpr std::size_t most_state_bytes = std::size_t{512} << 10;
   static constexpr std::size_t most_other_bytes = std::size_t{256} << 10;
 
-  // False: there is no room for it.
   bool push(Outgoing message, Time now);
   std::optional<Outgoing> pop();
   bool empty() const { return states_.empty() && others_.empty(); }
   std::size_t bytes() const { return state_bytes_ + other_bytes_; }
-  // States that were lost since the last call.
+  // States lost since the last call.
   std::uint64_t take_lost();
 
  private:

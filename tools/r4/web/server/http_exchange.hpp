@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One connection, until it has become a WebSocket; for server.cpp alone.
+// One connection until it becomes a WebSocket; included by server.cpp only.
 #pragma once
 
 #include <algorithm>

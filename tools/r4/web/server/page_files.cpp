@@ -49,7 +49,7 @@ std::optional<PageFile> page_file_in(const std::string& folder, std::string_view
   }
   const std::filesystem::path file = folder + std::string(path);
   std::error_code error;
-  // A named pipe would wait for a program that writes into it.
+  // Reading a named pipe would block.
   if (!is_regular_file(file, error) || file_size(file, error) > largest) return std::nullopt;
   std::ifstream stream(file, std::ios::binary);
   std::string content(std::istreambuf_iterator<char>(stream), {});

@@ -16,10 +16,10 @@
 namespace r4::tool::web {
 namespace {
 
-// What is in the kernel cannot be taken back for newer states.
+// Small, because data in the kernel cannot be replaced by newer states.
 constexpr int send_buffer = 64 << 10;
 
-// A child process would keep the port while it runs.
+// Otherwise a child process would keep the port open.
 void close_on_exec(int descriptor) { ::fcntl(descriptor, F_SETFD, FD_CLOEXEC); }
 
 }  // namespace
@@ -58,7 +58,7 @@ void Server::Impl::listen() {
 void Server::Impl::accept() {
   acceptor.async_accept([this](error_code error, tcp::socket socket) {
     if (error == net::error::operation_aborted) return;
-    if (error) {  // out of files, for one: those that end give some back
+    if (error) {  // for example too many open files: wait until some are closed
       retry.expires_after(100ms);
       retry.async_wait([this](error_code cancelled) {
         if (!cancelled) accept();
@@ -69,7 +69,7 @@ void Server::Impl::accept() {
     error_code ignored;
     socket.set_option(tcp::no_delay(true), ignored);
     socket.set_option(net::socket_base::send_buffer_size(send_buffer), ignored);
-    // Who comes is served; who has kept a place for longest without getting on gives it up.
+    // A new connection replaces the oldest unfinished request.
     if (exchanges.size() >= most_requests) exchanges.begin()->second->end();
     const std::uint32_t number = next_number++;
     const auto exchange = std::make_shared<Exchange>(*this, std::move(socket), number);
@@ -89,7 +89,7 @@ void Server::Impl::ask_metrics(Exchange& exchange) {
 }
 
 void Server::Impl::answer_metrics() const {
-  const auto all = exchanges;  // one may end meanwhile
+  const auto all = exchanges;  // a copy, because an exchange may end meanwhile
   for (const auto& [number, exchange] : all) {
     if (exchange->waits_for_metrics()) exchange->answer_metrics(metrics);
   }
@@ -129,7 +129,7 @@ void Server::send(ClientId client, Outgoing message) {
 
 void Server::broadcast(Protocol protocol, Outgoing message) {
   net::dispatch(impl_->io, [this, protocol, message = std::move(message)] {
-    const auto all = impl_->clients;  // one may end meanwhile
+    const auto all = impl_->clients;  // a copy, because a client may end meanwhile
     for (const auto& [id, client] : all) {
       if (client->protocol == protocol) client->send_with_all(message);
     }

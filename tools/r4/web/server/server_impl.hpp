@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The inside of the server, for server.cpp alone: the one file that compiles Boost.Beast. Its event loop is Boost's, the
-// boards' is that of Asio alone, and no source can include both: they meet in closures that each hands to the other.
+// The inside of the server, for server.cpp only, which compiles Boost.Beast. Beast uses Boost.Asio,
+// the boards' loop standalone Asio, and no source can include both. The two exchange closures.
 #pragma once
 
 #include <array>
@@ -33,7 +33,7 @@ using namespace std::chrono_literals;
 
 constexpr auto header_time = 5s;
 constexpr std::string_view page_protocol = "r4.web.v1";
-// Two names of one protocol: that of the older servers, and that of Foxglove's own SDK.
+// Names of one protocol: of older servers, and of Foxglove's SDK.
 constexpr std::array<std::string_view, 2> foxglove_protocols{"foxglove.websocket.v1",
                                                              "foxglove.sdk.v1"};
 using Request = http::request<http::empty_body>;
@@ -65,7 +65,7 @@ struct Server::Impl {
   tcp::acceptor acceptor{io};
   net::steady_timer retry{io};
   std::map<ClientId, std::shared_ptr<Client>> clients;
-  std::map<std::uint32_t, std::shared_ptr<Exchange>> exchanges;  // the oldest first
+  std::map<std::uint32_t, std::shared_ptr<Exchange>> exchanges;
   std::uint32_t next_number = 1;
   std::string metrics;
   Clock::time_point metrics_made{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One WebSocket of a browser or of Foxglove; for server.cpp alone.
+// One WebSocket of a browser or of Foxglove; included by server.cpp only.
 #pragma once
 
 #include <fmt/format.h>
@@ -13,11 +13,10 @@
 
 namespace r4::tool::web {
 
-// Nothing has gone out to a client for that long although something waits.
+// A client is dropped if a write takes longer.
 constexpr auto stall_time = 10s;
 constexpr auto idle_time = 20s;
 
-// How many messages a client may still send.
 class Allowance {
  public:
   bool take() {
@@ -38,7 +37,7 @@ class Allowance {
 
 class Server::Impl::Client : public std::enable_shared_from_this<Client> {
  public:
-  // `name`: the subprotocol by which the client asked for the protocol.
+  // `name` is the subprotocol that the client requested.
   Client(Impl& server, beast::tcp_stream&& stream, ClientId id, Protocol spoken,
          std::string_view name)
       : protocol(spoken), server_(server), id_(id), name_(name), stream_(std::move(stream)) {
@@ -66,7 +65,7 @@ class Server::Impl::Client : public std::enable_shared_from_this<Client> {
     });
   }
 
-  // What all get comes after the first that is for this one alone.
+  // Broadcasts begin after the first message for this client alone.
   void send_with_all(const Outgoing& message) {
     if (greeted_) send(message);
   }
@@ -96,7 +95,7 @@ class Server::Impl::Client : public std::enable_shared_from_this<Client> {
     stream_.async_close(reason, [self = shared_from_this()](error_code) { self->end(); });
   }
 
-  // At once, without a farewell.
+  // Closes immediately, without a closing handshake.
   void end() {
     ending_ = true;
     error_code ignored;
