@@ -9,8 +9,7 @@
 //     when arming is impossible, or a cause has come that is newer than the call; timed_out,
 //     cancelled and closed like a command.
 //
-// Several calls share their steps, and end together. Output commands that follow an arm() wait for
-// it.
+// Several calls share their steps, and end together. Later output commands wait for it.
 #pragma once
 
 #include <cstddef>
@@ -44,14 +43,13 @@ class ArmRequests {
 
   // --- requests
 
-  // One call of arm(). `cause`: the number of the newest known cause, or unnamed_cause. False if
-  // max_requests wait already.
+  // `cause`: the number of the newest known cause, or unnamed_cause. False if max_requests wait
+  // already.
   bool add(Ticket ticket, std::int32_t cause, Time deadline, Time now);
   bool any() const { return !requests_.empty(); }
   // The ticket of the oldest call; greater than any ticket if there is none.
   Ticket first() const { return requests_.empty() ? no_ticket : requests_.front().ticket; }
-  // Ends all calls, or the call with that ticket (false if there is none), or those past their
-  // deadline.
+  // End all calls, the call with that ticket (false: none), or those past their deadline.
   void end(Outcome outcome, Refusal code, Time now);
   bool cancel(Ticket ticket, Time now);
   void expire(Time now);
@@ -61,8 +59,7 @@ class ArmRequests {
 
   // --- steps
 
-  // True, once, if all requests have ended while their step may be under way. The caller then drops
-  // the step.
+  // True, once, if all requests ended during a step. The caller then drops the step.
   bool take_abandoned() { return std::exchange(abandoned_, false); }
   // The next step to be sent, if there is one. To be called while the board obeys and no step is
   // under way. `reason`: why the outputs are off.

@@ -3,8 +3,7 @@
 //
 // The cause of a safe state may end by itself (a handle is held again, an obstacle is gone, a board
 // has restarted), or by another program's E:CLEAR. A program that streams setpoints would then
-// drive off without intention. So output commands are refused here until the program calls arm() on
-// purpose:
+// drive off without intention. So output commands are refused until the program calls arm():
 //
 //     cause_      any -------------- R:1,On of an arm() is confirmed ------------> none: armed
 //                  ^                                                                 |

@@ -19,8 +19,7 @@ SessionOptions with_clock(SessionOptions options, Time now) {
   return options;
 }
 
-// After this time outside the event loop, waiting datagrams are a backlog: of its states only the
-// newest is reported.
+// After this time outside the event loop, only the newest of the waiting states is reported.
 constexpr Time held_up{std::chrono::milliseconds{50}};
 // From this delay on there is a warning, because two heartbeats were late.
 constexpr Time very_late{std::chrono::milliseconds{200}};

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The implementation of an AsyncBoard: a session, its paths, its timer, and the waits of handlers.
 //
-// Every call of the session is made inside enter(), which then does the session's sendings. The
-// outermost enter() also reports events and results, and sets the timer. on_datagram() reports at
-// once.
+// Every call of the session is made inside enter(), which then sends. The outermost enter() also
+// reports, and sets the timer. on_datagram() reports at once.
 #pragma once
 
 #include <algorithm>

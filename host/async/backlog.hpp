@@ -47,8 +47,7 @@ class Backlog {
     rings_ = size_ == 0 ? 0 : rings_ + 1;
     return rings_ >= 2;
   }
-  // The newest state that was kept, which is forgotten; empty if there is none. Valid until the
-  // next keep().
+  // Takes the kept state; empty if there is none. Valid until the next keep().
   Text take() { return {state_.data(), std::exchange(size_, 0)}; }
 
  private:

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The thread on which the links of a Board or a Fleet run, and the calls of other threads that wait
-// for it.
+// The thread on which the links of a Board or a Fleet run, and the calls that wait for it.
 //
 //     a thread of the program           the loop's thread
 //     run(call) ---- posted ---->       begin(): each board starts its part, with the time left
@@ -98,8 +97,7 @@ class BlockingLoop {
   // Waits until all parts of the call have ended. Throws if they do not end in time, or if the loop
   // is closed. Passes on what on_wait() throws.
   void run(const CallPtr& call, Duration timeout);
-  // Begins the call, with Board::default_timeout, and does not wait. Does nothing if the loop is
-  // closed.
+  // Begins the call, with Board::default_timeout, and does not wait. No effect if closed.
   void run_unawaited(const CallPtr& call);
   // Runs `action` on the loop, and does not wait. False if the loop is closed.
   bool post_to_loop(std::function<void()> action);
@@ -153,8 +151,7 @@ class BlockingLoop {
 
   // --- on the loop
 
-  // `shut` begins with this: nothing is put on the loop afterwards. False if it was closed before.
-  // Calls `last` under the lock.
+  // `shut` begins with this: closes the loop for new work. False: closed before. Locks for `last`.
   template <class Last>
   bool mark_closed(Last last) {
     {

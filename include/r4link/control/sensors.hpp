@@ -31,8 +31,7 @@ class R4LINK_API Wheel {
   double advance(const State& state);
   // Its speed by the counts of the last window: new in each state, and half a window old. It needs ENCn.
   double speed_m_s() const { return speed_m_s_; }
-  // Its speed as the board measures it, by ENCnHZ: new ten times a second, and 50 to 150 ms old. It needs no states
-  // before, and no ENCn.
+  // The speed by ENCnHZ: updated ten times a second, 50 to 150 ms old. Needs this state only.
   double measured_m_s(const State& state) const;
   double metres_a_count() const { return metres_a_count_; }
   int encoder() const { return geometry_.encoder; }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::discover(): the boards that this computer reaches, each with the URL that opens it. `r4 list`
-// prints what it returns.
+// r4::discover(): the boards that this computer reaches, with their URLs. `r4 list` prints them.
 //
 //     const r4::Discovery found = r4::discover();
 //     for (const r4::FoundBoard& board : found.boards) fmt::print("{}\n", board.url);
@@ -20,9 +19,8 @@
 //           half a second, from any free port. Broadcast passes no router, and often no VPN,
 //           container network or WiFi with client isolation.
 //
-// The answers are not signed: any program on a network or a bus can answer as any board. The link
-// and its keys decide what may be commanded. Texts are as they came from boards and devices: print
-// them by printable() (error.hpp).
+// The answers are not signed: any program can answer as any board. The link and its keys decide
+// what may be commanded. Texts are as received: print them by printable() (error.hpp).
 #pragma once
 
 #include <cstddef>
@@ -42,8 +40,7 @@ struct DiscoveryOptions {
   bool serial = true;
   bool can = true;
   bool udp = true;
-  // Serial ports to ask whatever their USB id is, by path: an adapter's, or the pty of a simulated
-  // board.
+  // More serial ports to ask, by path: an adapter, or a simulated board's pty.
   std::vector<std::string> serial_ports = {};
   // The UDP port at which boards listen, 1-65535.
   std::uint16_t udp_port = 2018;
@@ -54,15 +51,14 @@ struct FoundBoard {
   std::string place;  // SearchedPort::path, SearchedBus::interface or SearchedNetwork::address
   std::string address = {};  // UDP: its IPv4 address
   std::uint8_t node = 0;     // CAN: its number on the bus, 0-31
-  // None: it did not say who it is.
+  // Empty: it did not report its identity.
   std::optional<BoardIdentity> identity = {};
-  // True if a host controls it; none: that is not known.
+  // True if a host controls it; empty: not known.
   std::optional<bool> busy = {};
-  // Serial and CAN: the program of this computer that holds the transport. Its name is empty if it
-  // did not answer.
+  // Serial and CAN: the program here that holds the transport; its name may be empty.
   std::optional<Program> holder = {};
   bool holder_controls = false;  // false: the holder watches
-  // CAN: another protocol uses the board's command id. So the board was not asked.
+  // CAN: another protocol uses the board's command id, so the board was not asked.
   bool foreign_frames = false;
 };
 
@@ -108,9 +104,8 @@ struct Discovery {
   R4LINK_API FoundBoard only() const;
 };
 
-// Searches. Without a board the lists of the result are empty, and a transport that cannot be
-// searched has a `trouble` there. Throws Error{usage} for UDP port 0, and std::system_error if the
-// system gives no thread.
+// Without a board the lists are empty. A transport that cannot be searched has a `trouble`. Throws
+// Error{usage} for UDP port 0, and std::system_error.
 R4LINK_API Discovery discover(const DiscoveryOptions& options = {});
 
 }  // namespace r4

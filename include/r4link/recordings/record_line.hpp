@@ -7,8 +7,7 @@
 //     # from 2026-11-23T21:11:33.404765Z
 //     1795468293.404765 1< AIN24:24.28;PNum:7434;T:79090;^0xf07cfd9a^
 //
-// Any bytes come back as they were: a backslash, and a byte that is not printable ASCII, is written
-// as \xNN.
+// Lossless: a backslash, and a byte that is not printable ASCII, is written as \xNN.
 #pragma once
 
 #include <array>
@@ -41,8 +40,7 @@ R4LINK_API void write_beginning(std::string& out, Time time);
 R4LINK_API void write_path(std::string& out, const RecordedPath& path);
 // At most max_record_bytes of description.
 R4LINK_API void write_device(std::string& out, const RecordedDevice& device);
-// Bytes beyond max_record_bytes are left out. A time outside of the years 1970 to 9999 is written
-// as the nearest time inside.
+// Bytes beyond max_record_bytes are left out. Times are limited to the years 1970 to 9999.
 R4LINK_API void write_record(std::string& out, const Record& record);
 
 // --- reading
@@ -79,8 +77,7 @@ R4LINK_API bool append_unescaped(std::string& out, std::string_view text);
 
 // "2026-11-23T21:11:33.404765Z"
 R4LINK_API std::string record_time_text(Time time);
-// The reverse, also with fewer decimals or none, and without the Z. Empty if the text is not a
-// time.
+// The reverse, also with fewer decimals and without the Z. Empty if invalid.
 R4LINK_API std::optional<Time> read_record_time(std::string_view text);
 
 }  // namespace r4

@@ -41,8 +41,7 @@ class RecordingVisitor {
   virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
   // A recording begins or continues here: one file may hold several.
   virtual void on_header() {}
-  // Any other line that begins with #. The lines of headers and devices follow on_header() and
-  // on_device().
+  // Any # line; those of headers and devices follow on_header() and on_device().
   virtual void on_comment(std::string_view line) { static_cast<void>(line); }
 };
 

@@ -45,8 +45,7 @@ class R4LINK_API ZstdReader {
   std::string_view text() const { return {output_.data(), size_}; }
   // Why step() returned damaged.
   const char* problem() const;
-  // True if the frame is not damaged, but needs more memory than this reader takes. zstd --long=31
-  // unpacks it.
+  // True if the frame needs more memory than this reader takes: zstd --long=31 unpacks it.
   bool window_too_large() const { return window_too_large_; }
   // True between two frames: the last one is complete.
   bool between_frames() const { return !in_frame_; }
