@@ -33,18 +33,13 @@ class ArmRequests {
  public:
   static constexpr std::size_t max_requests = 64;
 
-  // `mode`: whether a program must be armed.
   ArmRequests(Arming mode, Effects& effects, CommandEnds& ends)
       : mode_(mode), effects_(effects), ends_(ends) {}
 
-  // True if commands may drive outputs.
   bool may_drive() const { return mode_ == Arming::off || machine_.armed(); }
   DisarmCause cause() const { return machine_.cause(); }
 
-  // --- requests
-
-  // `cause`: the number of the newest known cause, or unnamed_cause. False if max_requests wait
-  // already.
+  // `cause`: of the newest known cause, or unnamed_cause. False if max_requests wait already.
   bool add(Ticket ticket, std::int32_t cause, Time deadline, Time now);
   bool any() const { return !requests_.empty(); }
   // The ticket of the oldest call; greater than any ticket if there is none.
@@ -57,28 +52,19 @@ class ArmRequests {
   // The number of the newest cause that only E:CLEAR ends; 0 if there is none.
   void on_cause(std::int32_t newest, Time now);
 
-  // --- steps
-
   // True, once, if all requests ended during a step. The caller then drops the step.
   bool take_abandoned() { return std::exchange(abandoned_, false); }
-  // The next step to be sent, if there is one. To be called while the board obeys and no step is
-  // under way. `reason`: why the outputs are off.
+  // Call it while the board obeys and no step is under way. `reason`: why the outputs are off.
   std::optional<Command> next_step(SafeReason reason, Time now);
   // The step has ended. `supply_open`: the board's states show that relay 1 is open.
   void on_step(CommandKind kind, const CommandResult& result, SafeReason reason, bool supply_open,
                Time now);
 
-  // --- events that disarm
-
   void disarm(DisarmCause cause);
   void on_sleep() { machine_.on_sleep(); }
-  // A session begins disarmed.
   void begin_anew();
-  // The state of the link: whether it is up, whether the board obeys, whether it is safe, and why.
   void on_link(bool up, bool in_control, bool safe, SafeReason reason);
-  // A state shows whether relay 1 is closed.
   void on_supply(bool closed) { machine_.on_supply(closed); }
-  // Reports the cause if it has changed.
   void report();
 
  private:

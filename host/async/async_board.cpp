@@ -203,8 +203,6 @@ void AsyncBoard::start_close(Duration timeout, CompletionPtr completion) {
              [&] { return impl.leave(Impl::time_of(timeout)); });
 }
 
-// --- the role
-
 BoardRole AsyncBoard::role() const { return impl_->role; }
 
 // The role must not change while control is being released: the board is not known to be safe yet.
@@ -289,8 +287,6 @@ const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->path
 const std::string& AsyncBoard::name() const { return impl_->paths.name(); }
 std::vector<PathStatus> AsyncBoard::paths() const { return impl_->statuses(); }
 
-// --- the paths
-
 PathStatus AsyncBoard::Impl::status_of(std::size_t path) const {
   PathStatus made = session.path(path, steady_now());
   made.name = carrier(path).name();
@@ -314,7 +310,6 @@ void AsyncBoard::Impl::describe(const Device& device) {
   describe_in_recording(device);
 }
 
-// The recording begins with what is known already.
 void AsyncBoard::record(Recording& recording) {
   Impl& impl = *impl_;
   for (const auto& path : impl.paths) {

@@ -25,7 +25,6 @@ class Backlog {
   // The kept state is of an earlier boot of the board, or from before a sleep.
   void forget() { size_ = 0; }
 
-  // True if datagrams are to be dropped, because they are from before a sleep.
   bool drops() const { return waking_ != 0; }
   // True if states are to be kept, not reported.
   bool keeps_states() const { return behind_; }
@@ -34,7 +33,6 @@ class Backlog {
     std::copy_n(state.data(), size_, state_.data());
   }
 
-  // Everything that had arrived was handed over.
   void on_drained() {
     behind_ = false;
     waking_ = 0;

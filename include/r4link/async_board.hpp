@@ -90,13 +90,11 @@ class AsyncBoard {
   // Throws Error if no path can be opened. Can be called once only.
   void open();
   // Cancels commands under way (outcome closed), sends one farewell and closes the transports. The
-  // board goes safe when it hears the farewell, or by its timeout. No callback follows. Idempotent,
-  // final.
+  // board goes safe when it hears the farewell, or by its timeout. No callback follows. Idempotent.
   void close();
-  // void(CommandResult). As close(), but repeats the farewell until the board has answered it, so
-  // that the board is free for another host. Confirmed: the outputs are safe and no host controls
-  // the board. Closed: this program did not control the board, or the board does not know
-  // farewells. No callback runs after the call; a stop under way continues until the end.
+  // void(CommandResult). As close(), but repeats the farewell until the board answers, so that it
+  // is free for another host. Confirmed: the outputs are safe and no host controls it. Closed: this
+  // program did not control it, or it knows no farewells. No callback follows; a stop continues.
   template <class Token>
   auto async_close(Duration timeout, Token&& token) {
     require_timeout("async_close()", timeout);
@@ -108,10 +106,9 @@ class AsyncBoard {
   // released, as async_release_control() does.
   void take_control();
   // void(CommandResult). Disarms, cancels all commands except stops, and says farewell as
-  // async_close() does. The program is always a watcher afterwards. Confirmed: the board is safe
-  // and no host controls it, or the program was a watcher. Refused: another host controlled the
-  // board. Timed out, and none (no link, or no farewells known): the board goes safe by its
-  // timeout.
+  // async_close(). The program is always a watcher afterwards. Confirmed: the board is safe and
+  // free, or the program was a watcher. Refused: another host controlled the board. Timed out, and
+  // none (no link, or no farewells known): the board goes safe by its timeout.
   template <class Token>
   auto async_release_control(Duration timeout, Token&& token) {
     require_timeout("async_release_control()", timeout);
@@ -119,7 +116,7 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_release_control, Token>(token, timeout);
   }
 
-  // Throws Error{usage} for a value out of range, and for a key or password on a shared medium.
+  // Throws Error{usage} for a value out of range, and for a secret that others would see.
   void require_sendable(const Command& command) const;
   void require_sendable(const Setpoints& setpoints) const;
 
@@ -135,7 +132,7 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_send<Command>, Token>(token, command, timeout);
   }
   // void(CommandResult). As Board::send() of a group: CommandResult::at, executed. Throws
-  // Error{usage} for an empty group, and for a timeout that is not longer than 0.
+  // Error{usage} for an empty group, and for a timeout that is not above 0.
   template <class Token>
   auto async_send(const Setpoints& setpoints, Duration timeout, Token&& token) {
     require_sendable(setpoints);
@@ -176,9 +173,8 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_link_timing, Token>(token, board_timeout, heartbeat,
                                                            timeout);
   }
-  // void(CommandResult). Sets up a described device as Board::attach() does, and calls describe().
-  // `timeout` is for each step. Confirmed: device.reading(state()) has its values. Otherwise
-  // explain(device, result, link()) says why.
+  // void(CommandResult). As Board::attach(), then describe(). Confirmed: device.reading(state())
+  // has its values. Otherwise explain(device, result, link()) says why.
   template <class Token>
   auto async_attach(const Device& device, Duration timeout, Token&& token) {
     require_timeout("async_attach()", timeout);
@@ -209,15 +205,14 @@ class AsyncBoard {
   // The state of each path, in the order of the URLs.
   std::vector<PathStatus> paths() const;
 
-  // Callbacks as those of Board. If the event loop was held up for more than 50 ms, on_state gets
-  // only the newest of the states that came meanwhile. on_nack gets each refusal of a command once,
-  // and not that a repeated command was a duplicate.
+  // As those of Board. After the event loop was held up for more than 50 ms, on_state gets only the
+  // newest waiting state. on_nack gets each refusal once, none of repeats.
   Subscription on_state(std::function<void(const ReceivedState&, const Datagram&)> callback);
   Subscription on_board_heartbeat(std::function<void(const Datagram&)> callback);
   Subscription on_nack(std::function<void(const Nack&, const Datagram&)> callback);
   Subscription on_bad_datagram(std::function<void(const ReadResult&, std::string_view)> callback);
-  // Datagrams that other programs send to the board on a shared transport (docs/sharing.md):
-  // heartbeats and commands of the controlling host, all stops. Secrets are dots.
+  // Datagrams of other programs to the board on a shared transport (docs/sharing.md): heartbeats
+  // and commands of the controlling host, all stops. Dots replace secrets.
   Subscription on_overheard(std::function<void(std::string_view)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
   // A path has started or stopped carrying. If a transport reports that it is down, this comes at
@@ -225,11 +220,9 @@ class AsyncBoard {
   Subscription on_path(std::function<void(const PathStatus&)> callback);
   // Events of the transport, and a warning if a busy event loop made heartbeats late.
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
-  // As Board::on_restart().
+  // As Board::on_restart(), on_arming() and on_refused().
   Subscription on_restart(std::function<void()> callback);
-  // The session is armed (none) or disarmed.
   Subscription on_arming(std::function<void(DisarmCause)> callback);
-  // The board refused a posted command.
   Subscription on_refused(std::function<void(const RefusedPost&)> callback);
 
   // As Board::record() of a recording.
@@ -247,7 +240,6 @@ class AsyncBoard {
   friend class Fleet;  // one CAN frame stops its boards on a bus
   struct Impl;
 
-  // Cancels a command under way.
   class Cancel {
    public:
     Cancel(std::weak_ptr<Impl> impl, std::uint64_t command)
@@ -321,8 +313,6 @@ class AsyncBoard {
 
 // The loop of a Board's thread, for a transport made of Asio objects.
 asio::io_context& context_of(Loop& loop);
-
-// --- implementation of the templates
 
 // A handler with its argument, as Asio needs it.
 template <class Handler>

@@ -411,8 +411,7 @@ class R4LINK_API Board {
   // the thread of the link with the AsyncBoard there, and returns at once. False if the Board is
   // closed: then `action` is never called. `action` and the handlers of the operations that it
   // starts must return at once, because heartbeats wait for them. They must not throw, call
-  // functions that wait here, or open or close the AsyncBoard. close() returns after the last
-  // handler.
+  // functions that wait here, or open or close the AsyncBoard. close() waits for handlers.
   bool post_to_loop(std::function<void(AsyncBoard&)> action);
 
  private:

@@ -2,9 +2,9 @@
 // How whole datagrams travel: the interface that every transport implements.
 //
 // A carrier moves datagrams as UDP does: it may lose and reorder them, never blocks and never
-// corrupts them silently (the receiver checks their CRC). It lives on one event loop (Loop or
-// io_context) and is used on that loop's thread only. The first open() throws if the transport
-// cannot be opened. Later trouble is an event, and the carrier reopens by itself.
+// corrupts them silently (the receiver checks their CRC). It is used on the thread of its event
+// loop (Loop or io_context) only. The first open() throws if the transport cannot be opened. Later
+// trouble is an event, and the carrier reopens when the device is back.
 #pragma once
 
 #include <cstdint>
@@ -123,7 +123,6 @@ constexpr const char* to_text(CarrierEvent::Kind kind) {
   return "unknown";
 }
 
-// The loop of a board's thread, on which its carrier lives.
 class Loop {
  public:
   // Calls `function()` on the loop's thread, after earlier posts. May be called from any thread.
@@ -141,9 +140,8 @@ class R4LINK_API Carrier {
     // `bytes` are valid during the call. A host has one board: there `from` is `everyone`.
     virtual void on_datagram(std::string_view bytes, Peer from) = 0;
     virtual void on_carrier_event(const CarrierEvent& event) = 0;
-    // All datagrams that have arrived were passed on; called each time that is so. After a delay, a
-    // handler knows by it which state of a backlog is the newest. After a long burst on a byte
-    // stream it may come only with the next datagram.
+    // All datagrams that have arrived were passed on. After a delay, a handler knows by it which
+    // state is the newest. After a long burst on a byte stream, it may come late.
     virtual void on_drained() {}
     // A datagram that another program sent to the board, if the transport can hear it.
     virtual void on_overheard(std::string_view bytes) { static_cast<void>(bytes); }
@@ -173,14 +171,12 @@ class R4LINK_API Carrier {
   // True if the board cannot tell one host from another: on a bus, or through a program that shares
   // its transport. A watcher sends only stops and leases there.
   virtual bool is_shared() const { return false; }
-  // Changes to control or watch. If programs of this computer share the transport, only one of them
-  // can control. If another program does, throws Error{refused} with its holder() and changes
-  // nothing. Otherwise the transport may be closed and reopened within the next turns of the loop;
-  // trouble with that is an event. A transport that is not shared has nothing to do.
+  // Changes to control or watch. If programs of this computer share the transport, one can control:
+  // if another does, throws Error{refused} with its holder() and changes nothing. Otherwise the
+  // transport may be reopened within the next turns of the loop; trouble with that is an event.
   virtual void change_role(BoardRole role) { static_cast<void>(role); }
 
   virtual bool up() const = 0;
-  // Why datagrams do not pass although the transport is up, as far as it can tell.
   virtual TransportTrouble trouble() const { return TransportTrouble::none; }
   // For people: the URL, with the device that `auto` found.
   virtual const std::string& name() const = 0;

@@ -57,8 +57,7 @@ struct Duty {
   double value;
 };
 
-// One command. `kind` determines which members are used; the factories set them. `text` and `text2`
-// are views: they must outlive the command.
+// `kind` determines the members in use; the factories set them. Texts are views.
 struct R4LINK_API Command {
   Command() {}  // NOLINT(modernize-use-equals-default): else GCC calls memset for it
   CommandKind kind = CommandKind::heartbeat;

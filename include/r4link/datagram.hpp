@@ -32,8 +32,7 @@ enum class ReadError : std::uint8_t {
 // "length", "syntax", "crc"; "" for none.
 R4LINK_API const char* to_text(ReadError error);
 
-// The outcome of reading: where the error is (a byte offset; for crc that of the checksum's first
-// digit) and, for crc, both checksums.
+// The outcome; `position`: byte offset of the error (crc: of the checksum's first digit).
 struct ReadResult {
   ReadError error = ReadError::none;
   std::size_t position = 0;
@@ -66,8 +65,7 @@ inline bool is_command(const Field& field) {
   return field.name().size() == 1 && is_command_letter(field.name()[0]);
 }
 
-// Reads one field without its semicolon: "O:358,1,1". False if invalid; `out` is only written on
-// success.
+// Reads a field without semicolon: "O:358,1,1". False if invalid; `out` is written on success only.
 R4LINK_API bool read_field(Text text, Field& out);
 
 class R4LINK_API Datagram {
@@ -108,7 +106,6 @@ class R4LINK_API Datagram {
   Iterator begin() const { return fields_.empty() ? end() : Iterator(*this); }
   Iterator end() const { return Iterator(fields_.end()); }
 
-  // The datagram's bytes without the line terminator.
   Text bytes() const { return bytes_; }
   // The first field of that name; a Field with an empty name if the datagram has none.
   Field find(Text name) const;

@@ -25,7 +25,6 @@ enum class ErrorKind : int {
   unsupported = 6,  // kernel support or an interface is missing
 };
 
-// How a command ended.
 enum class Outcome : std::uint8_t {
   none,       // not about a command
   confirmed,  // by the board's state
@@ -41,12 +40,10 @@ enum class Outcome : std::uint8_t {
 // "confirmed", "refused", "timed out" …
 R4LINK_API const char* to_text(Outcome outcome);
 
-// Foreign text (a name, a host name, a line of a file) as one line that is safe for a terminal or a
-// log. Writes as \xNN, byte by byte: control characters, line feed and tab included; invalid UTF-8;
-// characters without a width or with a direction of their own. All other text stays. Idempotent.
+// Foreign text (a name, a line of a file) as one line that is safe for a terminal or a log. Writes
+// as \xNN: control characters, invalid UTF-8, text without width or with direction. Idempotent.
 R4LINK_API std::string printable(std::string_view text);
 
-// A program on this computer.
 struct Program {
   int pid = 0;  // 0: not known
   std::string name;
@@ -86,8 +83,7 @@ class R4LINK_API Error : public std::runtime_error {
   Problem problem_;
 };
 
-// The problem of an Asio or standard library error: the system refuses `thing` a thread, a
-// descriptor or a watch. Its kind is open.
+// An Asio or library error as a problem of kind open: no thread, descriptor or watch for `thing`.
 R4LINK_API Problem problem_of(const std::string& thing, const std::system_error& error);
 
 }  // namespace r4

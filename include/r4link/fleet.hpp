@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Fleet: many boards on one thread, opened by URLs and URL patterns. r4::Bridge, below: passes
-// the datagrams of hosts on another transport to a board.
+// r4::Fleet: many boards on one thread. r4::Bridge, below: joins two transports.
 //
 //     r4::Fleet fleet({"can://can0?node=0-7", "udp://10.0.0.{1-250}?listen=0"});
 //     fleet.wait_active();
@@ -16,11 +15,9 @@
 // not disturb another. ReceivedState::sampled is comparable across boards.
 //
 // Thread-safe; no call blocks the links. As with Board: if this object is destroyed or its process
-// hangs, all boards go safe. A command that was not sent by its timeout is never sent; only a stop
-// is sent in any case. If your thread may hang, use watchdog() and feed().
-//
-// A problem of the whole call throws r4::Error: usage for an invalid command, refused if the fleet
-// was closed. A problem of one board is its entry in the result.
+// hangs, all boards go safe. A command that was not sent by its timeout is never sent, except a
+// stop. If your thread may hang, use watchdog() and feed(). A problem of the whole call throws
+// r4::Error: usage, or refused after close(). A problem of one board is its entry in the result.
 #pragma once
 
 #include <chrono>
@@ -44,7 +41,6 @@
 
 namespace r4 {
 
-// The health of one board of a fleet.
 struct BoardHealth {
   std::size_t board = 0;
   std::string url;         // as given to Fleet
@@ -58,7 +54,6 @@ struct BoardHealth {
   bool well() const { return in_control && link.state == HostLinkState::active && !link.gated(); }
 };
 
-// The result of a command at one board.
 struct FleetResult {
   std::size_t board = 0;
   CommandResult result;
@@ -121,7 +116,6 @@ constexpr const char* to_text(FleetEvent::Kind kind) {
   return "unknown";
 }
 
-// Output commands that one board executes together.
 struct BoardSetpoints {
   std::size_t board = 0;
   Setpoints setpoints;
@@ -135,9 +129,9 @@ class R4LINK_API Fleet {
   using Boards = std::vector<std::size_t>;
   static constexpr Duration default_timeout{1000};
 
-  // Opens all transports and starts the links; returns without waiting for the boards. `options`
-  // are for each board; callback_limit has no effect, on_wait is called by waiting calls. Throws
-  // Error for a wrong URL or pattern, a duplicate, and the first transport that cannot be opened.
+  // Opens all transports and starts the links, without waiting for the boards. callback_limit has
+  // no effect; waiting calls call on_wait. Throws Error for a wrong URL or pattern, a duplicate,
+  // and the first transport that cannot be opened.
   explicit Fleet(const std::vector<std::string>& patterns, BoardOptions options = {});
   ~Fleet();
   Fleet(const Fleet&) = delete;
@@ -175,9 +169,9 @@ class R4LINK_API Fleet {
   FleetResults arm(const Boards& boards, Duration timeout = default_timeout);
 
   // Sends E:STOP to all boards in one pass before it waits, and repeats it until each has
-  // confirmed. On each CAN bus one frame stops all boards of the bus, also foreign ones. Does not
-  // throw if boards do not confirm: their results say to cut the power, and the stop is repeated to
-  // them for default_timeout after the call, which stops all boards of a CAN bus again.
+  // confirmed. One frame on each CAN bus stops all boards there, also foreign ones. Does not throw
+  // if boards do not confirm: their results say to cut the power, and the stop is repeated to them
+  // (and their buses) for default_timeout more.
   FleetResults stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
 
@@ -253,7 +247,6 @@ struct BridgeEnd {
   BridgeCounters from;
 };
 
-// One board and its hosts.
 struct BridgeStatus {
   BridgeEnd hosts;
   BridgeEnd board;
@@ -269,9 +262,8 @@ struct BridgeOptions {
   // The board's keys, at most four (load_key()). With a key, only heartbeats and commands signed
   // with it pass, as on a radio; stops and questions always do.
   std::vector<Key> keys;
-  // A board obeys its own cable without a signature. So by default a bridge to a cable passes
-  // nothing unsigned to a board that has a key, and is refused on a network without `keys`. True:
-  // any program that reaches the hosts' side may drive the board.
+  // A board obeys its own cable unsigned. So by default a bridge to a cable passes nothing unsigned
+  // to a board with a key, and is refused on a network without `keys`. True: any host may drive.
   bool open = false;
   // How long a served host may be silent before another is served; at least the board's timeout.
   std::chrono::milliseconds timeout{1000};
@@ -285,12 +277,12 @@ struct BridgeOptions {
 //     r4::Bridge bus("udp://0.0.0.0:2100-2107", "can://can0?node=0-7");
 //
 // It makes no heartbeats: if the host dies, the board goes safe. One host at a time is served, but
-// E:STOP of any host passes. A missing device is waited for. Settings for a cable only (C:key,
-// C:network …) never pass. Thread-safe.
+// any E:STOP passes. Waits for a missing device. Cable-only settings (C:key …) never pass.
+// Thread-safe.
 class R4LINK_API Bridge {
  public:
   // `hosts`: the URL to listen on, as for r4 sim; `board`: the board's URL. Patterns of equal size
-  // (docs/fleet.md) are paired in order. Throws Error: usage, permission, open.
+  // (docs/fleet.md) are paired in order. Throws Error: usage, permission, and as the transports do.
   Bridge(std::string_view hosts, std::string_view board, BridgeOptions options = {});
   ~Bridge();
   Bridge(const Bridge&) = delete;

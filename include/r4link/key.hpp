@@ -26,8 +26,7 @@ struct Key {
 R4LINK_API bool operator==(const Key& a, const Key& b);
 inline bool operator!=(const Key& a, const Key& b) { return !(a == b); }
 
-// Reads a key's text. Refusal::format: not of the form above; Refusal::range: the id is not 1-9.
-// `out` is only written on Refusal::none.
+// Reads a key. Refusal::format: not as above; ::range: the id is not 1-9. `out`: only if none.
 R4LINK_API Refusal parse_key(Text text, Key& out);
 // Splits "<id>:<rest>", with the refusals of parse_key().
 R4LINK_API Refusal split_key(Text text, std::uint8_t& id, Text& rest);

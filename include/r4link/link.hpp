@@ -42,7 +42,7 @@ enum class LinkCause : std::uint8_t {
   late_frames,       // the board's flow control comes too late (CAN)
   other_board,       // a path leads to another board and is not used; the link is up
 };
-// "transport down", "two boards", "watchdog" …
+// "transport down", "two boards" …: the names above, with spaces.
 R4LINK_API const char* to_text(LinkCause cause);
 
 // A set of causes. A loop over it starts with the gravest.
@@ -74,7 +74,6 @@ class LinkCauses {
     rest.bits_ = bits_ & ~others.bits_;
     return rest;
   }
-  // The gravest.
   constexpr std::optional<LinkCause> first() const {
     return empty() ? std::nullopt : std::optional(*begin());
   }
@@ -107,7 +106,6 @@ struct LinkStatus {
   std::uint8_t carrying = 0;  // which paths carry: bit 0 is the first
   ChipFault chip{};           // for SafeReason::fault: the chip that caused it, if any
 
-  // The gravest.
   std::optional<LinkCause> cause() const { return causes.first(); }
   // True if heartbeats and commands are held back because the program seems to hang.
   bool gated() const { return causes.has_any({LinkCause::watchdog, LinkCause::callback}); }
@@ -122,7 +120,6 @@ enum class Arming : std::uint8_t {
   off,  // output commands are sent whenever the link is up
 };
 
-// Why a program is not armed.
 enum class DisarmCause : std::uint8_t {
   none,     // armed
   not_yet,  // arm() was not called yet
@@ -147,14 +144,13 @@ constexpr bool is_earlier(DisarmCause cause) { return cause >= DisarmCause::earl
 
 // --- the ends of commands
 
-// The end of a command that was waited for.
 struct CommandResult {
   Outcome outcome = Outcome::timed_out;
   Refusal code = Refusal::none;              // for refused
   Time elapsed{0};                           // from the call to its end
   DisarmCause disarmed = DisarmCause::none;  // for not_armed
-  // For a group: the refused command, or the one under way if sent one by one, from 1; 0: no
-  // particular one. `executed`: how many commands before it were executed.
+  // Group: the refused or current command, from 1, or 0. `executed`: how many before it were
+  // executed.
   std::uint8_t at = 0;
   std::uint8_t executed = 0;
   // Packet number of the command, for example in I2CX of the state. 0: not sent.
@@ -188,21 +184,17 @@ class PostResult {
 // "sent", "not armed", "no link", "queue full".
 R4LINK_API const char* to_text(PostResult result);
 
-// A posted command that was not executed.
 struct RefusedPost {
   Command command;               // without its texts
   Refusal code = Refusal::none;  // the board's refusal; none if it was not sent: see `why`
   PostResult why = PostResult::sent;
-  // No command of a group was executed. `command` is the one that the board could not execute,
-  // number `at`; at 0: no particular one, and `command` is the first.
+  // Number of `command`, which failed, in its group; 0: no particular one, it is the first.
   std::uint8_t at = 0;
   std::uint8_t group = 1;  // number of commands in the group
 };
 
 // --- what the board reports
 
-// The board's newest state, with the time of its arrival.
-//
 // A field that a datagram lacks keeps its value, until the board restarts: then all values are
 // forgotten. Heartbeats update `safe` too. Every other value is as old as age().
 struct ReceivedState : State {
@@ -238,7 +230,6 @@ struct BoardIdentity {
   std::string name;          // set by its owner; may be empty
 };
 
-// How well a link works.
 struct Statistics {
   // Datagrams from the board
   std::uint64_t received = 0;  // valid
@@ -272,7 +263,6 @@ struct Statistics {
   }
 };
 
-// One path to a board, and how well it works.
 struct PathStatus {
   std::string name;  // of its transport, for people
   PathState state = PathState::down;
@@ -282,7 +272,6 @@ struct PathStatus {
   std::uint64_t copies = 0;  // of these, already received on another path
   double round_trip_us = 0;  // us, of the newest question and answer; 0: none yet
   double age_us = 0;         // us since the newest datagram; 0: none yet
-  // Lost share of the board's datagrams, 0-1.
   double loss() const {
     const double all = static_cast<double>(packets.received) + packets.lost;
     return all > 0 ? packets.lost / all : 0;
@@ -294,14 +283,13 @@ struct PathStatus {
 // Advice if a stop is not confirmed.
 inline constexpr std::string_view stop_last_resort = "CUT THE POWER if it must stop now";
 
-// The state of the link and, if something is wrong, the fix: "another host controls the board" and
-// "stop it, or …". `name` is the board's. Its kind is refused, as for all explain() below.
+// The state of the link and the fix: "another host controls the board", "stop it, or …". `name`:
+// the board's. Of kind refused, as all explain() below.
 R4LINK_API Problem explain(std::string_view name, const LinkStatus& link);
 
 // Which path leads to another board, and the fix.
 R4LINK_API Problem explain(const std::vector<PathStatus>& paths);
 
-// What is wrong with a link, and the fix.
 R4LINK_API Problem explain(LinkCause cause);
 
 // Why the session is not armed, and the fix. Not for none. `what`: the request that failed.

@@ -37,19 +37,16 @@ struct SessionOptions {
   LinkTiming timing;
   // Whether a program must call arm() before it drives, and after most safe states (Board::arm()).
   Arming arming = Arming::required;
-  // The state fields to request, as in F. SAFE and CMD, and RELAYS for arming, are added to these
-  // and to any F that is sent. Empty: F is neither sent nor changed. A watcher gets the fields that
-  // the controlling host has chosen, unless it names others than "DEFAULT" here.
+  // The state fields to request, as F; SAFE and CMD, and RELAYS for arming, are added to any F.
+  // Empty: F is neither sent nor changed. "DEFAULT" for a watcher: the controlling host's.
   std::string fields = "DEFAULT";
   std::chrono::milliseconds command_retry{50};
   std::chrono::milliseconds stop_retry{20};
   // How long a stop is repeated after it is confirmed.
   std::chrono::milliseconds stop_linger{200};
-  // Period of Q:ID, for identity and round-trip time; 0: never. Then a farewell is only sent after
-  // an explicit identify(), because the host does not know whether the board takes one.
+  // Period of Q:ID, for identity and round-trip time; 0: never. Then farewells need identify().
   std::chrono::milliseconds identify_interval{1000};
-  // The board's key. Each host needs its own id: of two that share one, the slower looks like a
-  // replay.
+  // The board's key. Each host needs an id of its own: a shared one makes the slower host a replay.
   std::optional<Key> key;
   // Start of the session's clock, us since 1970. A restarted host must continue above used values.
   Time clock_start{0};
@@ -58,9 +55,8 @@ struct SessionOptions {
 struct BoardOptions {
   BoardRole role = BoardRole::control;
   SessionOptions session;
-  // Board only: after this time in the callbacks of one event the heartbeats stop, and the board
-  // goes safe, because nothing supervises the robot. They resume afterwards. At most one hour; 0:
-  // off.
+  // Board only: after this time in the callbacks of one event the heartbeats stop and the board
+  // goes safe, as nothing supervises the robot. They resume afterwards. At most one hour; 0: off.
   std::chrono::milliseconds callback_limit{500};
   // Board only: each waiting call calls it on its own thread every 50 ms. An exception from it ends
   // the call like a timeout: an unsent command is never sent, except a stop.

@@ -8,12 +8,12 @@
 //     left.record(recording);
 //     right.record(recording);
 //
-// It holds datagrams in both directions, damaged ones too, with the host's time, and events of the
-// transports and links. A thread writes to the disk four times a second, so a crash costs at most
-// the last second. The link never waits: 4 MiB are buffered for a slow disk, and the recording
-// counts what is lost beyond that. If the disk is full, the recording ends, on_event() of the board
-// reports it (kind open), and the link continues. If another program moves, removes or truncates
-// the file, a new one is started under its name, and on_event() reports that.
+// It holds datagrams in both directions, damaged ones too, with the host's time, and events of
+// transports and links. A thread writes to the disk four times a second: a crash costs at most the
+// last second. The link never waits: 4 MiB are buffered for a slow disk, and further losses are
+// counted. If the disk is full, the recording ends, on_event() reports it (kind open), and the link
+// continues. If another program moves, removes or truncates the file, a new one is started under
+// its name, and on_event() reports that.
 #pragma once
 
 #include <chrono>
@@ -55,11 +55,11 @@ class R4LINK_API Recording {
   Recording(const Recording&) = delete;
   Recording& operator=(const Recording&) = delete;
 
-  // Writes the buffer and ends the file; waits for the disk. Any thread; idempotent.
+  // Writes the buffer and ends the file; waits for the disk. Ignores later datagrams. Idempotent.
   void close();
 
-  // Why the recording ended before close(). Kind `data`: it continues, but the file was removed or
-  // truncated, and its content is lost. Empty if there was no problem.
+  // Why the recording ended early; empty: no problem. Kind `data`: it continues, but the file was
+  // removed or truncated, and its content is lost.
   std::optional<Problem> problem() const;
   // Datagrams and events so far; those that were lost because the disk was too slow.
   std::uint64_t records() const;

@@ -26,7 +26,6 @@ struct R4LINK_API ChipPins {
 R4LINK_API bool operator==(const ChipPins& a, const ChipPins& b);
 inline bool operator!=(const ChipPins& a, const ChipPins& b) { return !(a == b); }
 
-// All outputs of the board.
 struct R4LINK_API Pins : ChipPins {
   struct Stepper {
     std::int32_t position = 0;  // pulses since power-on, forward minus backward

@@ -13,8 +13,8 @@ namespace r4 {
 
 class Datagram;
 
-// Every state field in wire order. The first ten are the paper's default set. I2C1 and later are
-// fields of the user's devices (docs/devices.md) and of faults.
+// Every state field in wire order: first the paper's ten; from I2C1 on, devices (docs/devices.md)
+// and faults.
 enum class StateField : std::uint8_t {
 #define R4_STATE_FIELD(field, ...) field,
 #include "tables/board.def"
@@ -158,7 +158,7 @@ struct State {
   }
 };
 
-// The field's name on the wire, "AIN24".
+// The name on the wire, "AIN24".
 R4LINK_API Text name_of(StateField field);
 // The field of that name; StateField::count if there is none. Constant time.
 R4LINK_API StateField state_field(Text name);

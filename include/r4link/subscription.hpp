@@ -16,15 +16,14 @@ class R4LINK_API Subscription {
   Subscription() = default;  // an ended one
   explicit Subscription(const std::shared_ptr<Subscriber>& subscriber) : subscriber_(subscriber) {}
 
-  // Ends the callback. After the return it is not running, unless it called cancel() itself, and is
-  // not called again. Idempotent; any thread; also after the board is destroyed.
+  // Ends the callback: after the return it does not run, except if it called cancel() itself.
+  // Idempotent; any thread; also after the board is destroyed.
   void cancel();
 
  private:
   std::weak_ptr<Subscriber> subscriber_;
 };
 
-// Ends its subscription when it is destroyed.
 class ScopedSubscription {
  public:
   ScopedSubscription() = default;

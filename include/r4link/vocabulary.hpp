@@ -28,7 +28,6 @@ constexpr std::int32_t proximity_max_cm = 400;  // HC-SR04 range; a threshold of
 
 enum class Direction : std::uint8_t { reverse = 0, forward = 1 };
 
-// One H-bridge channel (OSMC or DHB12).
 struct Drive {
   std::uint16_t pwm = 0;  // 0-4095
   Direction direction = Direction::reverse;
@@ -38,7 +37,6 @@ struct Drive {
   friend bool operator!=(Drive a, Drive b) { return !(a == b); }
 };
 
-// One brushless driver channel.
 struct Bldc {
   std::uint16_t speed = 0;  // 0-4095
   Direction direction = Direction::reverse;
@@ -146,7 +144,6 @@ struct I2cAnswer {
   DeviceBytes<i2c_max_bytes> data;  // the bytes read; for a scan, the addresses that answer
 };
 
-// The state of the bus.
 struct I2cBusReport {
   I2cOutcome newest = I2cOutcome::done;  // of all transfers
   std::uint32_t errors = 0;              // failed transfers since the board started
@@ -174,15 +171,11 @@ struct UartBytes {
   DeviceBytes<uart_max_bytes> data;
 };
 
-// --- sessions
-
 // Identifies a host's session (SID): 64 random bits that only the host and its board know. Chosen
 // anew for each session, so it is worthless afterwards.
 using SessionId = std::uint64_t;
 // For watchers, hosts of the paper, and datagrams for everyone.
 constexpr SessionId no_session = 0;
-
-// --- refusals
 
 // Why a board refuses a command: the code in `N:<PNum>,<code>` (docs/protocol.md).
 enum class Refusal : std::uint8_t {
@@ -205,7 +198,7 @@ R4LINK_API Text name_of(Refusal refusal);
 R4LINK_API Refusal refusal_from(Text name);
 
 // A refusal as the board answers it. SESSION, for the session's host: the heartbeat that started
-// the session; a new number means that the board forgot what it executed.
+// it, so that the host knows whether the board remembers executed commands.
 struct Nack {
   std::uint32_t pnum = 0;
   Refusal code = Refusal::none;
@@ -232,7 +225,6 @@ constexpr bool is_heard(HostLinkState state) {
 // "connecting", "active", "safe", "lost".
 R4LINK_API const char* to_text(HostLinkState state);
 
-// Timing of the host.
 struct LinkTiming {
   std::uint32_t heartbeat_ms = 100;  // 10 Hz: one lost packet must not race the timeout
   std::uint32_t timeout_ms = 1000;   // silence of the board until `lost`

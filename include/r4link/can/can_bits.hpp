@@ -8,14 +8,10 @@
 //
 // After five equal bits a complementary bit is stuffed (10.5). The CRC field of an FD frame instead
 // has a stuff bit at its start and after every fourth bit, and a count of the other stuff bits: its
-// length is fixed. A classic CRC is stuffed, so it is computed.
-//
-// An FD frame switches its bit rate at the sample points of BRS and of the CRC delimiter. Here BRS
-// counts as nominal and the delimiter as data: exact in the sum if both sample points are equal
-// parts of a bit. ESI is that of an error-active sender. Every count includes the 3 bits of
-// intermission.
-//
-// No allocation, no state. Time is linear in the size of the frame.
+// length is fixed. A classic CRC is stuffed, so it is computed. An FD frame switches its bit rate
+// at the sample points of BRS and of the CRC delimiter. Here BRS counts as nominal and the
+// delimiter as data: exact in the sum if both sample points are equal parts of a bit. ESI is that
+// of an error-active sender. Every count includes the 3 bits of intermission. Linear time.
 #pragma once
 
 #include <cstdint>

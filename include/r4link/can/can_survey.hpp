@@ -26,7 +26,6 @@
 
 namespace r4 {
 
-// Counts and newest values of a node.
 struct HeardNode {
   std::uint64_t states = 0;
   std::uint64_t heartbeats = 0;
@@ -44,7 +43,6 @@ struct HeardNode {
   bool heard() const { return states + heartbeats + answers + damaged != 0; }
 };
 
-// The frames of one id.
 struct CanTraffic {
   std::uint64_t frames = 0;
   std::uint64_t bits = 0;     // stuff bits and intermission included

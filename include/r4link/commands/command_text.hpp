@@ -46,7 +46,6 @@ class OwnCommand {
 // Parses "O:358,1,1" (with or without the final ';'). Throws Error{usage} that names the fault.
 R4LINK_API OwnCommand parse_command_text(std::string_view text);
 
-// A command, or a group of several.
 using CommandOrGroup = std::variant<OwnCommand, Setpoints>;
 // Parses "O:358,1,1", or a group: "O:358,1,1;O:358,1,2". Throws Error{usage} that names the command
 // that is wrong, or that cannot be in a group.
@@ -85,7 +84,6 @@ struct CommandHelp {
   std::string ranges;        // "pwm 0-4095, dir 0 or 1, ch 1-4"
 };
 R4LINK_API const CommandHelp& command_help(CommandKind kind);
-// All kinds, in the order of CommandKind.
 R4LINK_API std::span<const CommandHelp> all_command_help();
 
 }  // namespace r4

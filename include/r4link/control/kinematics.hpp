@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The wheel speeds for a motion of a robot, and the motion for wheel speeds: differential drive,
-// four-wheel skid steering, and Ackermann.
+// Wheel speeds for a motion, and the reverse: differential drive, skid steering, Ackermann.
 //
 // Units: metres, radians, seconds. x is forward, y to the left, left turns are positive (REP 103).
 // Wheel speeds are rim speeds. A motion too fast for the wheels is slowed: same path, longer time.
@@ -21,7 +20,6 @@ struct Twist {
 
 inline constexpr double no_limit = std::numeric_limits<double>::infinity();
 
-// Two driven wheels and a castor.
 class R4LINK_API DifferentialDrive {
  public:
   struct Geometry {

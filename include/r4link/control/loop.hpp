@@ -5,7 +5,7 @@
 //     options.fields = "ENC1";
 //     options.rest.add(r4::Command::osmc(1, r4::Duty(0)));
 //     options.standstill = {{.encoder = 1, .channel = 1}};
-//     const auto end = r4::control::run_loop(board, options, [&](const r4::control::LoopStep& step) {
+//     const auto end = r4::control::run_loop(board, options, [&](const auto& step) {
 //       const double duty = pid.step(1.2, wheel.speed_m_s(), step.dt_s);
 //       return std::optional(r4::Setpoints{r4::Command::osmc(1, r4::Duty(duty))});
 //     });
@@ -37,7 +37,6 @@
 
 namespace r4::control {
 
-// Why a loop ended.
 enum class LoopEnd : std::uint8_t { none, asked, late, not_active, disarmed, standstill };
 // "none", "asked", "late", "not active", "disarmed", "standstill"; "unknown" for other numbers.
 R4LINK_API const char* to_text(LoopEnd end);
@@ -134,10 +133,9 @@ struct LoopReport {
   std::uint64_t steps = 0;
 };
 
-// Runs the loop on this thread until it ends. The step returns the setpoints to post, or nothing to
-// end the loop. Sets the board's recovery to `rearm`, so that outputs do not come back after a lost
-// link without a loop. Throws what the step throws, after the outputs are at rest, and Error for
-// wrong options or a board that does not answer.
+// Runs the loop on this thread until it ends. The step returns setpoints to post, or nothing to end
+// it. Sets the board's recovery to `rearm`: outputs do not come back after a lost link without a
+// loop. Throws what the step throws, after the outputs are at rest, and Error.
 R4LINK_API LoopReport
 run_loop(Board& board, const LoopOptions& options,
          const std::function<std::optional<Setpoints>(const LoopStep&)>& step);

@@ -2,10 +2,9 @@
 // r4::control::Odometry: the pose of a robot from the motion of its wheels, and its uncertainty.
 //
 // Each step is an arc of a circle with independent errors in length and angle, whose variances grow
-// with them. The covariance of the pose grows by first-order propagation (Siegwart et al.,
-// Introduction to Autonomous Mobile Robots, 2nd ed., 5.2.4), with errors in length and angle
-// instead of in two wheels, so that steered robots fit too. Metres and radians; x forward, y and
-// positive angles to the left (REP 103).
+// with them, so that steered robots fit too. The covariance grows by first-order propagation
+// (Siegwart et al., Introduction to Autonomous Mobile Robots, 2nd ed., 5.2.4). Metres and radians;
+// x forward, y and positive angles to the left (REP 103).
 #pragma once
 
 #include <array>

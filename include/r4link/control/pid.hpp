@@ -34,7 +34,7 @@ struct PidOptions {
 
 class R4LINK_API Pid {
  public:
-  // Throws Error{usage} for NaN, a minimum above the maximum, and a negative rate or filter.
+  // Throws Error{usage} for NaN, minimum >= maximum, a rate not above 0, and a negative filter.
   explicit Pid(const PidOptions& options);
 
   // The output, `dt_s` seconds after the last step; unchanged if dt_s is not above 0. Throws
@@ -45,9 +45,9 @@ class R4LINK_API Pid {
   // Its integral term, in units of the output.
   double integral() const { return integral_; }
 
-  // Forgets all: the output is 0, or the limit next to it.
+  // Resets all: the output is 0, or the limit nearest to it.
   void reset();
-  // Goes on from an output that something else has made so far: without a jump, for its integral explains it.
+  // Continues without a jump from an output that another controller has set, through the integral.
   void take_over(double output, double setpoint, double measured);
 
  private:

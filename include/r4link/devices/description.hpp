@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::DeviceDescription: the meaning of the bytes of a device on the user's I2C bus, from a small
-// text file (docs/described-devices.md lists its words).
+// r4::DeviceDescription: an I2C device as a text file (docs/described-devices.md).
 //
-//     const auto imu = r4::DeviceDescription::load("mpu6050");   // shipped; or a path: "./mine.device"
+//     const auto imu = r4::DeviceDescription::load("mpu6050");   // shipped, or "./mine.device"
 //     imu.values[0].decode(bytes, count);                        // "accel_x", m/s2
 //
 // With an address on a board it is a Device (device.hpp).
@@ -58,7 +57,6 @@ struct DevicePoll {
   std::chrono::milliseconds period{0};       // 5 to 60000
 };
 
-// A number in the bytes of a poll.
 struct R4LINK_API DeviceValue {
   std::string name;
   std::size_t poll = 0;  // index in DeviceDescription::polls
@@ -81,13 +79,11 @@ struct R4LINK_API DeviceValue {
   };
   std::optional<Only> only;
 
-  // Decodes the bytes of its poll. Empty if there are too few, or if the value is beyond its range.
-  // Does not check `only`; Device::reading() does.
+  // Decodes the bytes of its poll. Empty if too few or out of range. `only`: see Device::reading().
   std::optional<double> decode(const std::uint8_t* bytes, std::size_t count) const;
 };
 
-// A sign that the device is still set up: `value` is a measurement and equals `number`, if there is
-// one. False after a reset of the device.
+// True while the device is set up: `value` is a measurement, and equals `number` if there is one.
 struct DeviceReady {
   std::size_t value = 0;  // index in DeviceDescription::values
   std::optional<double> number;

@@ -6,7 +6,7 @@
 //     board.attach(imu);      // checks and sets it up; the board reads it from now on
 //     for (;;) {
 //       const r4::State state = board.next_state();
-//       const r4::DeviceReading turn = imu.reading(state, "gyro_z");   // turn.number in rad/s, turn.t_ms
+//       const r4::DeviceReading turn = imu.reading(state, "gyro_z");   // turn.number in rad/s
 //     }
 //
 // A reading needs only a state, so watchers and recordings can use it too.
@@ -36,14 +36,14 @@ struct DeviceReading {
 
 class R4LINK_API Device {
  public:
-  // The readings use `first_slot` and the following slots, of 1 to 8. Throws Error{usage} for an
-  // address that the description lacks, and if there are too few slots.
+  // The readings use the slots from `first_slot`, 1-8. Throws Error{usage} for an address that the
+  // description lacks, and for too few slots.
   Device(DeviceDescription description, int address, int first_slot = 1);
   // "NAME[@ADDRESS[:SLOT]]", with NAME as for DeviceDescription::load(): "bno055", "bno055@0x28:3",
   // "./mine.device@64". Defaults: the usual address, and `first_slot`. Throws Error as load() does.
   static Device from(std::string_view text, int first_slot = 1);
-  // From a place, "bno055@0x28:1", and the text of a description, as in a recording. Throws Error
-  // as DeviceDescription::parse() and the constructor do.
+  // From the place and description in a recording: "bno055@0x28:1". Throws Error as
+  // DeviceDescription::parse() and the constructor.
   static Device parse(std::string_view place, std::string_view description);
   // Several devices in successive slots, except those with a slot in their text. Throws
   // Error{usage} if two devices share a slot.
@@ -69,7 +69,6 @@ class R4LINK_API Device {
   DeviceReading reading(const State& state, std::size_t value) const;
   // Throws Error{usage} if the device has no value of that name.
   DeviceReading reading(const State& state, std::string_view value) const;
-  // The readings of all its values.
   std::vector<DeviceReading> readings(const State& state) const;
 
  private:

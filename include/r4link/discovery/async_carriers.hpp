@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Carriers for URLs, for programs that choose how each path is opened. Most programs give the URLs
-// to AsyncBoard instead. With r4link::asio only.
+// Carriers for programs that open each path themselves. With r4link::asio only.
 #pragma once
 
 #include <asio/io_context.hpp>

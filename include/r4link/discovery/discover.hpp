@@ -5,8 +5,8 @@
 //     for (const r4::FoundBoard& board : found.boards) fmt::print("{}\n", board.url);
 //     r4::Board board(found.only().url);   // or, shorter, r4::Board board = r4::Board::first();
 //
-// The transports are searched at the same time. discover() blocks for up to 1.3 s. So do
-// not call it in a control loop or on the loop of an AsyncBoard: async_discover() is for these.
+// The transports are searched at the same time. Blocks for up to 1.3 s: not for a control loop or
+// the loop of an AsyncBoard, which use async_discover().
 //
 //   serial  A port with the USB id of a board (2341:0266, Arduino Giga R1), and each port of
 //           `serial_ports`, is opened as a watcher opens it. The board there is asked who it is
@@ -36,7 +36,6 @@
 namespace r4 {
 
 struct DiscoveryOptions {
-  // The transports to search.
   bool serial = true;
   bool can = true;
   bool udp = true;
@@ -98,14 +97,13 @@ struct Discovery {
   std::vector<SearchedNetwork> networks;
   bool more = false;  // more than `most_answers` boards have answered by UDP
 
-  // The only board. A board that is found by several transports, known by its board id, is one
-  // board: its first URL. Throws Error: open if there is no board, with what was searched; usage if
-  // there are several, with their URLs.
+  // The only board; several URLs with one board id are one board, the first URL. Throws Error: open
+  // if there is no board, with what was searched; usage with the URLs of several.
   R4LINK_API FoundBoard only() const;
 };
 
 // Without a board the lists are empty. A transport that cannot be searched has a `trouble`. Throws
-// Error{usage} for UDP port 0, and std::system_error.
+// Error{usage} for UDP port 0, and std::system_error if the system gives no thread.
 R4LINK_API Discovery discover(const DiscoveryOptions& options = {});
 
 }  // namespace r4

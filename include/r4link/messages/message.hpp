@@ -48,7 +48,6 @@ struct Identity {
 // False if the datagram's I field is not of that form; `out` is only written on success.
 R4LINK_API bool read_identity(const Datagram& datagram, Identity& out);
 
-// The board's safe reason, as its heartbeats report it.
 struct SafeReport {
   SafeReport() = default;
   SafeReport(SafeReason why) : reason(why) {}  // NOLINT(google-explicit-constructor)

@@ -30,7 +30,6 @@ struct Record {
   std::string_view bytes;  // the datagram without its terminator, or the event's words
 };
 
-// How a board is reached.
 struct RecordedPath {
   std::uint16_t number = 1;
   std::string url;

@@ -46,7 +46,7 @@ R4LINK_API void write_record(std::string& out, const Record& record);
 // --- reading
 
 enum class LineKind : std::uint8_t {
-  damaged,  // not a line of a recording: `problem` says why
+  damaged,
   record,
   header,
   path,

@@ -15,7 +15,6 @@
 
 namespace r4 {
 
-// The value of a host's heartbeat.
 constexpr Text host_heartbeat_word("ROS2-R4");
 
 enum class CommandKind : std::uint8_t {
@@ -24,7 +23,6 @@ enum class CommandKind : std::uint8_t {
 };
 constexpr std::size_t command_kinds = static_cast<std::size_t>(CommandKind::watch) + 1;
 
-// The effect of a command.
 enum class CommandEffect : std::uint8_t {
   none,
   device,  // may move a device on a bus or UART of the user. Refused in the safe state
