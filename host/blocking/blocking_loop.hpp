@@ -100,8 +100,8 @@ class BlockingLoop {
   // Waits until `action` has ended. False if the loop is closed. Throws if it does not begin in
   // time: then it never runs. Passes on what it throws.
   bool run_on_loop(std::string_view what, const std::function<void()>& action);
-  // False if `arrived()` is not true in time; a sleep of this computer counts, though the deadline
-  // stands still. If the loop is closed, throws an error about `what()`. Both run locked.
+  // False at the deadline; a sleep of this computer counts, though the deadline stands still. If
+  // the loop is closed, throws an error about `what()`. Both run under the lock.
   template <class What, class Predicate>
   bool wait_for_news(What what, Duration timeout, Predicate arrived) {
     const SleepWatch slept;

@@ -206,7 +206,7 @@ class AsyncBoard {
   std::vector<PathStatus> paths() const;
 
   // As those of Board. After the event loop was held up for more than 50 ms, on_state gets only the
-  // newest waiting state. on_nack gets each refusal once, none of repeats.
+  // newest waiting state. on_nack gets each refusal once, but no DUPLICATE for a retry.
   Subscription on_state(std::function<void(const ReceivedState&, const Datagram&)> callback);
   Subscription on_board_heartbeat(std::function<void(const Datagram&)> callback);
   Subscription on_nack(std::function<void(const Nack&, const Datagram&)> callback);

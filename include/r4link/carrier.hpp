@@ -177,6 +177,7 @@ class R4LINK_API Carrier {
   virtual void change_role(BoardRole role) { static_cast<void>(role); }
 
   virtual bool up() const = 0;
+  // Why datagrams do not pass although the transport is up, as far as it can tell.
   virtual TransportTrouble trouble() const { return TransportTrouble::none; }
   // For people: the URL, with the device that `auto` found.
   virtual const std::string& name() const = 0;

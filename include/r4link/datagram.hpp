@@ -106,6 +106,7 @@ class R4LINK_API Datagram {
   Iterator begin() const { return fields_.empty() ? end() : Iterator(*this); }
   Iterator end() const { return Iterator(fields_.end()); }
 
+  // The datagram's bytes without the line terminator.
   Text bytes() const { return bytes_; }
   // The first field of that name; a Field with an empty name if the datagram has none.
   Field find(Text name) const;

@@ -271,14 +271,13 @@ struct BridgeOptions {
   std::function<void(const BridgeEvent&)> on_event;
 };
 
-// Passes the datagrams of hosts to a board and back, unchanged, on a thread of its own:
+// Passes the datagrams of hosts to a board and back, unchanged, on its own thread. Thread-safe.
 //
 //     r4::Bridge bridge("udp://0.0.0.0:2018", "can://can0?node=3");
 //     r4::Bridge bus("udp://0.0.0.0:2100-2107", "can://can0?node=0-7");
 //
 // It makes no heartbeats: if the host dies, the board goes safe. One host at a time is served, but
 // any E:STOP passes. Waits for a missing device. Cable-only settings (C:key …) never pass.
-// Thread-safe.
 class R4LINK_API Bridge {
  public:
   // `hosts`: the URL to listen on, as for r4 sim; `board`: the board's URL. Patterns of equal size

@@ -37,7 +37,7 @@ enum class LinkCause : std::uint8_t {
   board_has_no_key,  // this program has a key, and the board needs no signature
   key_needed,        // the board needs a signature, and this program has no key
   key_not_taken,     // the board rejects this program's signature, or does not hear it
-  watchers_full,     // the board streams to the most watchers that it can
+  watchers_full,     // the board already streams to as many watchers as it can
   not_watchable,     // the board's firmware streams only to the controlling host
   late_frames,       // the board's flow control comes too late (CAN)
   other_board,       // a path leads to another board and is not used; the link is up
@@ -74,6 +74,7 @@ class LinkCauses {
     rest.bits_ = bits_ & ~others.bits_;
     return rest;
   }
+  // The gravest cause; none if the set is empty.
   constexpr std::optional<LinkCause> first() const {
     return empty() ? std::nullopt : std::optional(*begin());
   }
@@ -106,6 +107,7 @@ struct LinkStatus {
   std::uint8_t carrying = 0;  // which paths carry: bit 0 is the first
   ChipFault chip{};           // for SafeReason::fault: the chip that caused it, if any
 
+  // The gravest cause.
   std::optional<LinkCause> cause() const { return causes.first(); }
   // True if heartbeats and commands are held back because the program seems to hang.
   bool gated() const { return causes.has_any({LinkCause::watchdog, LinkCause::callback}); }
@@ -149,8 +151,7 @@ struct CommandResult {
   Refusal code = Refusal::none;              // for refused
   Time elapsed{0};                           // from the call to its end
   DisarmCause disarmed = DisarmCause::none;  // for not_armed
-  // Group: the refused or current command, from 1, or 0. `executed`: how many before it were
-  // executed.
+  // For a group: the command refused or under way, from 1, or 0; number of commands done before it.
   std::uint8_t at = 0;
   std::uint8_t executed = 0;
   // Packet number of the command, for example in I2CX of the state. 0: not sent.
@@ -272,6 +273,7 @@ struct PathStatus {
   std::uint64_t copies = 0;  // of these, already received on another path
   double round_trip_us = 0;  // us, of the newest question and answer; 0: none yet
   double age_us = 0;         // us since the newest datagram; 0: none yet
+  // Lost share of the board's datagrams, 0-1.
   double loss() const {
     const double all = static_cast<double>(packets.received) + packets.lost;
     return all > 0 ? packets.lost / all : 0;
@@ -290,6 +292,7 @@ R4LINK_API Problem explain(std::string_view name, const LinkStatus& link);
 // Which path leads to another board, and the fix.
 R4LINK_API Problem explain(const std::vector<PathStatus>& paths);
 
+// What is wrong with a link, and the fix.
 R4LINK_API Problem explain(LinkCause cause);
 
 // Why the session is not armed, and the fix. Not for none. `what`: the request that failed.

@@ -13,8 +13,7 @@ namespace r4 {
 
 class Datagram;
 
-// Every state field in wire order: first the paper's ten; from I2C1 on, devices (docs/devices.md)
-// and faults.
+// In wire order: the paper's ten first; from I2C1 on, devices (docs/devices.md) and faults.
 enum class StateField : std::uint8_t {
 #define R4_STATE_FIELD(field, ...) field,
 #include "tables/board.def"
@@ -98,7 +97,7 @@ struct ChannelValues {
 #include "tables/board.def"
   std::int32_t stepper_steps[stepper_channels] = {};
   std::int32_t encoder_counts[encoder_channels] = {};
-  std::int32_t encoder_hz[encoder_channels] = {};
+  std::int32_t encoder_hz[encoder_channels] = {};            // counts per second
   std::int32_t encoder_index_counts[encoder_channels] = {};  // where the index line rose last
   std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};
   I2cReading i2c[i2c_slots];

@@ -24,6 +24,7 @@ class R4LINK_API Subscription {
   std::weak_ptr<Subscriber> subscriber_;
 };
 
+// Ends its subscription when it is destroyed.
 class ScopedSubscription {
  public:
   ScopedSubscription() = default;

@@ -84,6 +84,7 @@ struct CommandHelp {
   std::string ranges;        // "pwm 0-4095, dir 0 or 1, ch 1-4"
 };
 R4LINK_API const CommandHelp& command_help(CommandKind kind);
+// All kinds, in the order of CommandKind.
 R4LINK_API std::span<const CommandHelp> all_command_help();
 
 }  // namespace r4

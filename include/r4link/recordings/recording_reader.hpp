@@ -47,6 +47,7 @@ class R4LINK_API RecordingLines {
 
   // A sign of a mixture. Throws Error{data}, unless damage may explain it.
   void on_sign_of_mixture();
+  // A part could not be read here.
   void on_damage() {
     if (damage_ == Damage::none) damage_ = Damage::here;
   }

@@ -31,6 +31,7 @@ class RecordingVisitor {
   virtual ~RecordingVisitor() = default;
   // A datagram, also a damaged one, or an event. A path that no path line has named is possible.
   virtual void on_record(const Record& record) = 0;
+  // Reading continues after the damage.
   virtual void on_damage(const RecordingDamage& damage) = 0;
   // Comes before the first record of that path, and again when its name is known. After a new
   // header a path number may mean another path.
