@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether a program may drive outputs, and how arm() allows it. Without I/O, part of a session.
-//
-// The cause of a safe state may end by itself (a handle is held again, an obstacle is gone, a board
-// has restarted), or by another program's E:CLEAR. A program that streams setpoints would then
-// drive off without intention. So output commands are refused until the program calls arm():
+// Whether a program may drive outputs, and how arm() allows it. Without I/O. The cause of a safe
+// state may end by itself (a handle is held again, an obstacle is gone, a board has restarted), or
+// by another program's E:CLEAR. A program that streams setpoints would then drive off without
+// intention. So output commands are refused until the program calls arm():
 //
 //     cause_      any -------------- R:1,On of an arm() is confirmed ------------> none: armed
 //                  ^                                                                 |
@@ -16,13 +15,11 @@
 //                   a cause that cannot be cleared, or is new; the deadline; R:1,On confirmed
 //
 // A lost link does not disarm. Whether the board brings its outputs back (`recovery`) is shown by
-// relay 1, the motor supply (docs/safety.md), in every state.
-//
-// arm() clears the cause that it finds first, and each cause hidden by that one, once. A stop that
-// is pressed meanwhile stays, and ends the arm(), as do a released handle and an obstacle. It never
-// clears a stop, a watchdog or a fault that may be older than the session, because a restarted
-// program would drive off again. A cause may be older until the controlled board was heard without
-// it.
+// relay 1, the motor supply (docs/safety.md), in every state. arm() clears the cause that it finds
+// first, and each cause hidden by that one, once. A stop that is pressed meanwhile stays, and ends
+// the arm(), as do a released handle and an obstacle. It never clears a stop, a watchdog or a fault
+// that may be older than the session, because a restarted program would drive off again. A cause
+// may be older until the controlled board was heard without it.
 #pragma once
 
 #include <cstdint>

@@ -129,7 +129,7 @@ void AsyncBoard::Impl::cancel(Ticket id) {
     if (ticket == 0) return;
     session.cancel(ticket, now);
     notify_all();                             // its end, with what is known of the command
-    waits.end(ticket, {Outcome::cancelled});  // a stop goes on: only the wait ends
+    waits.end(ticket, {Outcome::cancelled});  // a stop continues: only the wait ends
     poll_wanted = true;
   });
 }
@@ -211,7 +211,7 @@ void AsyncBoard::Impl::cancel_waits() {
                        now);
 }
 
-// Taken on all paths or none; watching cannot be refused. The transports may be reopened elsewhere.
+// Control is taken on all paths or none; watching cannot be refused. Transports may reopen.
 void AsyncBoard::Impl::become(BoardRole fresh) {
   std::size_t changed = 0;
   try {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The implementation of an AsyncBoard: a session, its paths, its timer, and the waits of handlers.
-//
-// Every call of the session is made inside enter(), which then sends. The outermost enter() also
-// reports, and sets the timer. on_datagram() reports at once.
+// The implementation of an AsyncBoard: a session, its paths, its timer, and the waits. Every call
+// of the session is made inside enter(), which then sends. The outermost enter() also reports, and
+// sets the timer. on_datagram() reports at once.
 #pragma once
 
 #include <algorithm>
@@ -164,7 +163,6 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   Ticket leave(Time timeout);
   void close();
   void become(BoardRole fresh);
-  // Ends the conditions that a program waits for.
   void cancel_waits();
 
   void name_in_recording();

@@ -26,7 +26,6 @@ class Backlog {
   void forget() { size_ = 0; }
 
   bool drops() const { return waking_ != 0; }
-  // True if states are to be kept, not reported.
   bool keeps_states() const { return behind_; }
   void keep(Text state) {
     size_ = state.size();

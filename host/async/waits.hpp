@@ -22,7 +22,6 @@ class Waits {
     answer,  // the state has the end of the I2C transfer `pnum`
     time,    // the deadline
   };
-  // `id`: cancels it.
   struct Condition {
     For what = For::active;
     Ticket id = 0;

@@ -116,13 +116,12 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_release_control, Token>(token, timeout);
   }
 
-  // Throws Error{usage} for a value out of range, and for a secret that others would see.
+  // Throws Error{usage} for a value out of range, and for a secret that other programs would see.
   void require_sendable(const Command& command) const;
   void require_sendable(const Setpoints& setpoints) const;
 
-  // void(CommandResult). Throws as require_sendable(), and for a timeout that is not above 0.
-  //
-  // A stop overtakes and cancels all commands, also before the link is up. It is sent with any
+  // void(CommandResult). Throws as require_sendable(), and for a timeout that is not above 0. A
+  // stop overtakes and cancels all commands, also before the link is up. It is sent with any
   // timeout, by watchers too. Command::identify() is confirmed by the board's answer, which
   // identity() returns. Command::clear() clears the stop, watchdog or fault that the board reports.
   template <class Token>
@@ -277,7 +276,6 @@ class AsyncBoard {
   template <class Handler>
   CompletionPtr make_completion(Handler handler);
 
-  // Starts an operation that ends with a result for the token's handler.
   template <auto Start, class Token, class... Arguments>
   auto initiate(std::remove_reference_t<Token>& token, const Arguments&... arguments) {
     auto start = [this](auto handler, const Arguments&... each) {
@@ -314,7 +312,6 @@ class AsyncBoard {
 // The loop of a Board's thread, for a transport made of Asio objects.
 asio::io_context& context_of(Loop& loop);
 
-// A handler with its argument, as Asio needs it.
 template <class Handler>
 struct AsyncBoard::Bound {
   using allocator_type = asio::associated_allocator_t<Handler, asio::recycling_allocator<void>>;

@@ -8,9 +8,8 @@
 //     board.on_state([](const r4::State& s) { … });
 //     board.stop();                                    // every output safe, at once
 //
-// A board with a key obeys only hosts that have it: BoardOptions::session.key.
-//
-// If this object is destroyed or its process hangs, the heartbeats stop and the board goes safe.
+// A board with a key obeys only hosts that have it: BoardOptions::session.key. If this object is
+// destroyed or its process hangs, the heartbeats stop and the board goes safe.
 //
 // Errors are thrown as r4::Error with the thing, the reason and the fix. open and permission: the
 // transport cannot be opened. usage: a wrong URL or a value outside its range. refused: the board
@@ -356,8 +355,6 @@ class R4LINK_API Board {
   // for a timeout that our heartbeats (SessionOptions::timing) cannot keep.
   void link_timing(Duration board_timeout, Duration heartbeat, Duration timeout = default_timeout);
 
-  // --- what the board reports
-
   BoardIdentity identify(Duration timeout = default_timeout);
   // The newest state, fields merged over all datagrams since the board started. state().age() is
   // its age, also while the link is lost.
@@ -399,11 +396,10 @@ class R4LINK_API Board {
   void record(Recording& recording);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
-  // Error{usage} for a period below 0 or above one hour. feed() costs no system call.
-  //
-  // A blocking call does not feed, because its thread supervises nothing while it waits. If a call
-  // outlasts the period, the heartbeats stop, only a stop is sent, and the call throws at its
-  // timeout. So give the calls of the feeding thread timeouts below the period.
+  // Error{usage} for a period below 0 or above one hour. feed() costs no system call. A blocking
+  // call does not feed, because its thread supervises nothing while it waits. If a call outlasts
+  // the period, the heartbeats stop, only a stop is sent, and the call throws at its timeout. So
+  // give the calls of the feeding thread timeouts below the period.
   void watchdog(Duration period);
   void feed();
 

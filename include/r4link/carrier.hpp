@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How whole datagrams travel: the interface that every transport implements.
-//
-// A carrier moves datagrams as UDP does: it may lose and reorder them, never blocks and never
-// corrupts them silently (the receiver checks their CRC). It is used on the thread of its event
-// loop (Loop or io_context) only. The first open() throws if the transport cannot be opened. Later
-// trouble is an event, and the carrier reopens when the device is back.
+// How whole datagrams travel: the interface that every transport implements. A carrier moves
+// datagrams as UDP does: it may lose and reorder them, never blocks and never corrupts them
+// silently (the receiver checks their CRC). It is used on the thread of its event loop (Loop or
+// io_context) only. The first open() throws if the transport cannot be opened. Later trouble is an
+// event, and the carrier reopens when the device is back.
 #pragma once
 
 #include <cstdint>

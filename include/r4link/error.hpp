@@ -40,9 +40,8 @@ enum class Outcome : std::uint8_t {
 // "confirmed", "refused", "timed out" …
 R4LINK_API const char* to_text(Outcome outcome);
 
-// Foreign text (a name, a line of a file) as one line that is safe for a terminal or a log. Writes
-// as \xNN: control characters (also line feed and tab), invalid UTF-8, text without width or with
-// direction. Idempotent.
+// Foreign text as one line that is safe for a terminal or a log. Writes as \xNN: control characters
+// (also line feed and tab), invalid UTF-8, text without width or with direction. Idempotent.
 R4LINK_API std::string printable(std::string_view text);
 
 struct Program {

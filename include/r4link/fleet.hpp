@@ -67,7 +67,7 @@ class R4LINK_API FleetResults {
   explicit FleetResults(std::vector<FleetResult> results) : results_(std::move(results)) {}
   bool all_confirmed() const;
   std::vector<std::size_t> failed() const;  // the numbers of the boards
-  // Throws Error{refused} if one is not confirmed: names the first, and counts the others.
+  // Throws Error{refused} if one is not confirmed: names the first one, and counts the rest.
   void require() const;
 
   std::size_t size() const { return results_.size(); }
@@ -146,8 +146,6 @@ class R4LINK_API Fleet {
   std::size_t find(std::string_view url_or_name) const;
   FleetBoard operator[](std::size_t board);
   FleetBoard operator[](std::string_view url_or_name);
-
-  // --- all boards, or the named ones
 
   // Waits until all are ACTIVE under our control (watcher: heard). Returns those that are not.
   Boards wait_active(Duration timeout = Duration{3000});

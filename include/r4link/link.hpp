@@ -24,8 +24,6 @@ namespace r4 {
 // Time of the host's steady clock, in microseconds since any start.
 using Time = std::chrono::microseconds;
 
-// --- the state of the link
-
 // What is wrong with a link, the gravest first.
 enum class LinkCause : std::uint8_t {
   transport_down,  // the transports of all paths are down: unplugged, or switched off
@@ -114,8 +112,6 @@ struct LinkStatus {
   friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
 };
 
-// --- whether the program may drive
-
 // Whether a program must call arm() before it drives.
 enum class Arming : std::uint8_t {
   required,
@@ -143,8 +139,6 @@ enum class DisarmCause : std::uint8_t {
 R4LINK_API const char* to_text(DisarmCause cause);
 // True if the cause may be older than the program.
 constexpr bool is_earlier(DisarmCause cause) { return cause >= DisarmCause::earlier_stop; }
-
-// --- the ends of commands
 
 struct CommandResult {
   Outcome outcome = Outcome::timed_out;
@@ -193,8 +187,6 @@ struct RefusedPost {
   std::uint8_t at = 0;
   std::uint8_t group = 1;  // number of commands in the group
 };
-
-// --- what the board reports
 
 // A field that a datagram lacks keeps its value, until the board restarts: then all values are
 // forgotten. Heartbeats update `safe` too. Every other value is as old as age().
@@ -279,8 +271,6 @@ struct PathStatus {
     return all > 0 ? packets.lost / all : 0;
   }
 };
-
-// --- in words
 
 // Advice if a stop is not confirmed.
 inline constexpr std::string_view stop_last_resort = "CUT THE POWER if it must stop now";

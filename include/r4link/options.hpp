@@ -32,7 +32,7 @@ constexpr const char* to_text(BoardRole role) {
 
 struct SessionOptions {
   // States per second for a watcher, 1-1000; limited by the board's `rate`. On a CAN bus, a watcher
-  // also gets states that are sent for others.
+  // also gets states that are sent for other programs.
   int watch_rate_hz = 100;
   LinkTiming timing;
   // Whether a program must call arm() before it drives, and after most safe states (Board::arm()).

@@ -104,7 +104,7 @@ struct ChannelValues {
   UartBytes uart[uart_channels];
 };
 
-// On a host, `present` has the fields of the datagram; the others keep earlier values.
+// On a host, `present` has the fields of the datagram; other fields keep earlier values.
 struct State {
   FieldSet present;
   std::uint32_t pnum = 0;

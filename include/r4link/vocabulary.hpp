@@ -209,8 +209,6 @@ struct Nack {
   SessionId sid = no_session;
 };
 
-// --- the link, from the host's side
-
 enum class HostLinkState : std::uint8_t {
   connecting,  // nothing heard yet, or the board is booting
   active,      // the board streams its state and reports no reason to be safe

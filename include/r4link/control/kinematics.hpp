@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Wheel speeds for a motion, and the reverse: differential drive, skid steering, Ackermann.
-//
-// Units: metres, radians, seconds. x is forward, y to the left, left turns are positive (REP 103).
-// Wheel speeds are rim speeds. A motion too fast for the wheels is slowed: same path, longer time.
+// Wheel speeds for a motion, and the reverse: differential drive, skid steering, Ackermann. Units:
+// metres, radians, seconds. x is forward, y to the left, left turns are positive (REP 103). Wheel
+// speeds are rim speeds. A motion too fast for the wheels is slowed: same path, longer time.
 #pragma once
 
 #include <limits>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::control::Odometry: the pose of a robot from the motion of its wheels, and its uncertainty.
-//
 // Each step is an arc of a circle with independent errors in length and angle, whose variances grow
 // with them, so that steered robots fit too. The covariance grows by first-order propagation
 // (Siegwart et al., Introduction to Autonomous Mobile Robots, 2nd ed., 5.2.4). Metres and radians;

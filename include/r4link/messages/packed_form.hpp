@@ -12,7 +12,6 @@
 // Stateless and lossless: unpack() returns exactly the bytes that pack() took. A datagram that does
 // not pack, or would not become shorter, travels plain. A plain datagram starts with a byte below
 // 0x80, so every reader accepts both. No heap; about 600 bytes of stack; linear in the size.
-//
 // Damage: neither function checks the checksum; the reader above does. A damaged packed form is
 // refused, or unpacks to the same bytes (a number with superfluous digits: harmless), or to other
 // bytes of the grammar, whose checksum is right once in 2^32. CRC-32's guarantee for a few wrong

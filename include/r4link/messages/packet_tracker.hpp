@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Distinguishes lost, duplicate, reordered and restarted packet numbers (paper section 4.1: PNum).
-//
 // Packet numbers are unsigned, 32 bit, and wrap (RFC 1982). The last 64 are remembered, so a late
 // packet differs from a duplicate, and is subtracted from the lost ones. A number further back is
 // old. If two old numbers in a row rise, the sender has restarted (as in RFC 3550 A.1).
@@ -18,7 +17,7 @@ enum class Arrival : std::uint8_t {
   next,       // the expected number
   gap,        // newer than expected: the numbers between count as lost
   duplicate,  // seen before
-  late,       // counted as lost before, and no longer
+  late,       // counted as lost before; subtracted from it
   old,        // too far back to be late or duplicate, or from before the first
   restart,    // the sender restarted
 };

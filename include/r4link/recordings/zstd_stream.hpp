@@ -28,7 +28,7 @@ class R4LINK_API ZstdWriter {
   std::unique_ptr<ZSTD_CCtx_s, Free> context_;
 };
 
-// Reads frames one after the other. After damage it goes on with the next frame.
+// Reads frames one after the other. After damage it continues with the next frame.
 class R4LINK_API ZstdReader {
  public:
   static constexpr const char* window_problem =
