@@ -145,7 +145,8 @@ struct CommandResult {
   Refusal code = Refusal::none;              // for refused
   Time elapsed{0};                           // from the call to its end
   DisarmCause disarmed = DisarmCause::none;  // for not_armed
-  // For a group: the command refused or under way, from 1, or 0; number of commands done before it.
+  // For a group: number of the command that was refused or, sent one by one, under way, from 1; 0:
+  // no particular one. `executed`: how many commands before it were executed.
   std::uint8_t at = 0;
   std::uint8_t executed = 0;
   // Packet number of the command, for example in I2CX of the state. 0: not sent.
@@ -183,7 +184,8 @@ struct RefusedPost {
   Command command;               // without its texts
   Refusal code = Refusal::none;  // the board's refusal; none if it was not sent: see `why`
   PostResult why = PostResult::sent;
-  // Number of `command`, which failed, in its group; 0: no particular one, it is the first.
+  // Of a group no command was executed. `command` is the one that the board could not execute, the
+  // `at`th from 1; at 0: no particular one, and `command` is the first.
   std::uint8_t at = 0;
   std::uint8_t group = 1;  // number of commands in the group
 };
