@@ -310,6 +310,7 @@ void AsyncBoard::Impl::describe(const Device& device) {
   describe_in_recording(device);
 }
 
+// The recording begins with what is known already.
 void AsyncBoard::record(Recording& recording) {
   Impl& impl = *impl_;
   for (const auto& path : impl.paths) {

@@ -84,6 +84,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
       if (is_open()) guarded([&] { one(arguments...); });
     });
   }
+  // Also while the board is being opened.
   void report(const CarrierEvent& event) {
     callbacks.event.each([&](auto& one) {
       if (is_open() || phase == Phase::made) guarded([&] { one(event); });

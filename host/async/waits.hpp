@@ -40,6 +40,7 @@ class Waits {
     commands_.push_back({ticket, id, std::move(completion)});
   }
   void add(Condition condition) { conditions_.push_back(std::move(condition)); }
+  // An id that is not a ticket of a session.
   Ticket next_id() { return next_id_++; }
 
   // The command has ended. Ignored if no handler waits for it.

@@ -161,6 +161,7 @@ class BlockingLoop {
 
   const std::function<void()> on_wait;
   asio::io_context io;
+  // Both threads use these.
   std::mutex mutex;
   std::condition_variable news;  // `closed`, or what wait_for_news() waits for, has changed
   bool closed = false;

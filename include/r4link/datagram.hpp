@@ -61,6 +61,7 @@ constexpr bool is_command_letter(char c) {
   return ((c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z')) && c != 'T' && c != 'A';
 }
 
+// True if the name of the field is a command letter.
 inline bool is_command(const Field& field) {
   return field.name().size() == 1 && is_command_letter(field.name()[0]);
 }

@@ -27,9 +27,8 @@
 namespace r4 {
 
 struct DeviceReading {
-  std::optional<double>
-      // in the value's unit; empty before the first reading, and if it is not a measurement
-      number;
+  // In the unit of the value; empty before the first reading, and if it is not a measurement.
+  std::optional<double> number;
   std::uint32_t t_ms = 0;    // the board's clock at the reading
   std::uint32_t errors = 0;  // failed readings since its setup
 };

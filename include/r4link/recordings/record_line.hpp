@@ -44,7 +44,7 @@ R4LINK_API void write_device(std::string& out, const RecordedDevice& device);
 R4LINK_API void write_record(std::string& out, const Record& record);
 
 enum class LineKind : std::uint8_t {
-  damaged,
+  damaged,  // not a line of a recording: `problem` says why
   record,
   header,
   path,

@@ -33,6 +33,7 @@ class R4LINK_API OwnTransport {
   using Received = std::function<void(std::string_view datagram)>;
 
   virtual ~OwnTransport() = default;
+  // For people.
   virtual std::string name() const = 0;
   virtual void open(Received received) = 0;
   virtual void send(std::string_view datagram) = 0;
