@@ -78,8 +78,7 @@ std::optional<Command> ArmRequests::next_step(SafeReason reason, Time now) {
   return {};
 }
 
-// After E:CLEAR the board's next reason decides the next step. A cancelled step was cancelled
-// together with its requests.
+// After E:CLEAR the board's next reason decides. A cancelled step ends with its requests.
 void ArmRequests::on_step(CommandKind kind, const CommandResult& result, SafeReason reason,
                           bool supply_open, Time now) {
   if (requests_.empty()) return;

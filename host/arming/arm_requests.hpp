@@ -9,8 +9,7 @@
 //     when arming is impossible, or a cause has come that is newer than the call; timed_out,
 //     cancelled and closed like a command.
 //
-// Several calls share their steps, and end together. Output commands that follow an arm() wait for
-// it.
+// Several calls share their steps, and end together. Later output commands wait for it.
 #pragma once
 
 #include <cstddef>
@@ -34,24 +33,18 @@ class ArmRequests {
  public:
   static constexpr std::size_t max_requests = 64;
 
-  // `mode`: whether a program must be armed.
   ArmRequests(Arming mode, Effects& effects, CommandEnds& ends)
       : mode_(mode), effects_(effects), ends_(ends) {}
 
-  // True if commands may drive outputs.
   bool may_drive() const { return mode_ == Arming::off || machine_.armed(); }
   DisarmCause cause() const { return machine_.cause(); }
 
-  // --- requests
-
-  // One call of arm(). `cause`: the number of the newest known cause, or unnamed_cause. False if
-  // max_requests wait already.
+  // `cause`: of the newest known cause, or unnamed_cause. False if max_requests wait already.
   bool add(Ticket ticket, std::int32_t cause, Time deadline, Time now);
   bool any() const { return !requests_.empty(); }
   // The ticket of the oldest call; greater than any ticket if there is none.
   Ticket first() const { return requests_.empty() ? no_ticket : requests_.front().ticket; }
-  // Ends all calls, or the call with that ticket (false if there is none), or those past their
-  // deadline.
+  // End all calls, the call with that ticket (false: none), or those past their deadline.
   void end(Outcome outcome, Refusal code, Time now);
   bool cancel(Ticket ticket, Time now);
   void expire(Time now);
@@ -59,29 +52,20 @@ class ArmRequests {
   // The number of the newest cause that only E:CLEAR ends; 0 if there is none.
   void on_cause(std::int32_t newest, Time now);
 
-  // --- steps
-
-  // True, once, if all requests have ended while their step may be under way. The caller then drops
-  // the step.
+  // True, once, if all requests ended during a step. The caller then drops the step.
   bool take_abandoned() { return std::exchange(abandoned_, false); }
-  // The next step to be sent, if there is one. To be called while the board obeys and no step is
-  // under way. `reason`: why the outputs are off.
+  // Call it while the board obeys and no step is under way. `reason`: why the outputs are off.
   std::optional<Command> next_step(SafeReason reason, Time now);
   // The step has ended. `supply_open`: the board's states show that relay 1 is open.
   void on_step(CommandKind kind, const CommandResult& result, SafeReason reason, bool supply_open,
                Time now);
 
-  // --- events that disarm
-
   void disarm(DisarmCause cause);
   void on_sleep() { machine_.on_sleep(); }
   // A session begins disarmed.
   void begin_anew();
-  // The state of the link: whether it is up, whether the board obeys, whether it is safe, and why.
   void on_link(bool up, bool in_control, bool safe, SafeReason reason);
-  // A state shows whether relay 1 is closed.
   void on_supply(bool closed) { machine_.on_supply(closed); }
-  // Reports the cause if it has changed.
   void report();
 
  private:

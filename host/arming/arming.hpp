@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether a program may drive outputs, and how arm() allows it. Without I/O, part of a session.
-//
-// The cause of a safe state may end by itself (a handle is held again, an obstacle is gone, a board
-// has restarted), or by another program's E:CLEAR. A program that streams setpoints would then
-// drive off without intention. So output commands are refused here until the program calls arm() on
-// purpose:
+// Whether a program may drive outputs, and how arm() allows it. Without I/O. The cause of a safe
+// state may end by itself (a handle is held again, an obstacle is gone, a board has restarted), or
+// by another program's E:CLEAR. A program that streams setpoints would then drive off without
+// intention. So output commands are refused until the program calls arm():
 //
 //     cause_      any -------------- R:1,On of an arm() is confirmed ------------> none: armed
 //                  ^                                                                 |
@@ -17,15 +15,11 @@
 //                   a cause that cannot be cleared, or is new; the deadline; R:1,On confirmed
 //
 // A lost link does not disarm. Whether the board brings its outputs back (`recovery`) is shown by
-// relay 1, the motor supply (docs/safety.md), in every state.
-//
-// arm() clears the cause that it finds when it begins, and each cause that was hidden by that one,
-// once. A stop that is pressed meanwhile stays, and ends the arm(). A released handle and an
-// obstacle cannot be cleared, and end it too.
-//
-// arm() never clears a stop, a watchdog or a fault that may be older than the session, because a
-// program that a supervisor restarts would drive off again by itself. A cause may be older until
-// the board was heard without it under this session's control.
+// relay 1, the motor supply (docs/safety.md), in every state. arm() clears the cause that it finds
+// first, and each cause hidden by that one, once. A stop that is pressed meanwhile stays, and ends
+// the arm(), as do a released handle and an obstacle. It never clears a stop, a watchdog or a fault
+// that may be older than the session, because a restarted program would drive off again. A cause
+// may be older until the controlled board was heard without it.
 #pragma once
 
 #include <cstdint>
@@ -36,7 +30,6 @@ namespace r4 {
 
 class ArmingMachine {
  public:
-  // The next step of arm().
   enum class Step : std::uint8_t {
     wait,   // for the link
     clear,  // E:CLEAR
@@ -47,8 +40,6 @@ class ArmingMachine {
   bool armed() const { return cause_ == DisarmCause::none; }
   DisarmCause cause() const { return cause_; }
 
-  // --- events that disarm
-
   void disarm(DisarmCause cause);
   // The board's reason to be safe, as heard last.
   void on_reason(SafeReason reason);
@@ -56,18 +47,13 @@ class ArmingMachine {
   void on_heard(SafeReason reason);
   // This computer slept: a new session begins, for which any cause may be an earlier one.
   void on_sleep();
-  // The link is not up.
   void on_outage() { outage_ = true; }
   // A state of a board that is not safe shows relay 1.
   void on_supply(bool closed);
 
-  // --- arm()
-
   void begin();
   bool under_way() const { return attempt_ != Attempt::none; }
-  // arm() ends without success.
   void give_up() { attempt_ = Attempt::none; }
-  // `reason`: the board's, as heard last.
   Step next(SafeReason reason);
   // R:1,On is confirmed, and the board's state does not contradict it.
   void on_closed();

@@ -203,8 +203,6 @@ void AsyncBoard::start_close(Duration timeout, CompletionPtr completion) {
              [&] { return impl.leave(Impl::time_of(timeout)); });
 }
 
-// --- the role
-
 BoardRole AsyncBoard::role() const { return impl_->role; }
 
 // The role must not change while control is being released: the board is not known to be safe yet.
@@ -288,8 +286,6 @@ Statistics AsyncBoard::statistics() const { return impl_->session.statistics(Imp
 const CarrierCounters& AsyncBoard::carrier_counters() const { return impl_->paths.counters(); }
 const std::string& AsyncBoard::name() const { return impl_->paths.name(); }
 std::vector<PathStatus> AsyncBoard::paths() const { return impl_->statuses(); }
-
-// --- the paths
 
 PathStatus AsyncBoard::Impl::status_of(std::size_t path) const {
   PathStatus made = session.path(path, steady_now());

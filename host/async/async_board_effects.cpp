@@ -86,7 +86,6 @@ void AsyncBoard::Impl::on_identity(const Identity& fresh) {
   if (paths[0].tap.attached()) name_in_recording();
 }
 
-// Reports paths that began to carry or ceased to, and that a path leads to another board.
 void AsyncBoard::Impl::notify_paths(const LinkStatus& status) {
   const LinkStatus before = std::exchange(reported, status);
   for (std::size_t i = 0; i < paths.size(); ++i) {

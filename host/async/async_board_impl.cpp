@@ -19,12 +19,10 @@ SessionOptions with_clock(SessionOptions options, Time now) {
   return options;
 }
 
-// After this time outside the event loop, waiting datagrams are a backlog: of its states only the
-// newest is reported.
+// After this time outside the event loop, only the newest of the waiting states is reported.
 constexpr Time held_up{std::chrono::milliseconds{50}};
 // From this delay on there is a warning, because two heartbeats were late.
 constexpr Time very_late{std::chrono::milliseconds{200}};
-// Between two attempts to open a path.
 constexpr std::chrono::seconds open_interval{1};
 
 }  // namespace
@@ -39,8 +37,6 @@ AsyncBoard::Impl::Impl(asio::io_context& context, std::vector<std::unique_ptr<Ca
       role(options.role),
       timer(context),
       reopening(context) {}
-
-// --- entering the session
 
 // Returns the delay of what was due; 0 inside another entry.
 Time AsyncBoard::Impl::begin_entry(Completion::How way) {
@@ -111,7 +107,6 @@ bool AsyncBoard::Impl::has_come(const Waits::Condition& condition) const {
   return false;
 }
 
-// Ends the waits that are over. False if there are none.
 bool AsyncBoard::Impl::end_waits() {
   return waits.end_conditions(
       [this](const Waits::Condition& each) -> std::optional<Outcome> {
@@ -128,15 +123,13 @@ bool AsyncBoard::Impl::end_waits() {
       now);
 }
 
-// --- what the user starts
-
 void AsyncBoard::Impl::cancel(Ticket id) {
   enter(Completion::How::post, [&] {
     const Ticket ticket = waits.cancel(id, now);
     if (ticket == 0) return;
     session.cancel(ticket, now);
     notify_all();                             // its end, with what is known of the command
-    waits.end(ticket, {Outcome::cancelled});  // a stop goes on: only the wait ends
+    waits.end(ticket, {Outcome::cancelled});  // a stop continues: only the wait ends
     poll_wanted = true;
   });
 }
@@ -164,8 +157,7 @@ void AsyncBoard::Impl::open() {
   if (problem) open_again();
 }
 
-// If at least one path is open, paths that failed are tried again later, and trouble with one path
-// does not touch the other paths. `problem`: set to the first error of all paths.
+// If one path is open, failed paths are tried again later. `problem`: the first error.
 void AsyncBoard::Impl::open_path(BoardPath& path, std::optional<Problem>& problem) {
   path.opened = false;
   try {
@@ -219,8 +211,7 @@ void AsyncBoard::Impl::cancel_waits() {
                        now);
 }
 
-// Control is taken on all paths or on none, but watching cannot be refused. Each path restarts: its
-// transport may be opened again, at another port.
+// Control is taken on all paths or none; watching cannot be refused. Transports may reopen.
 void AsyncBoard::Impl::become(BoardRole fresh) {
   std::size_t changed = 0;
   try {
@@ -245,8 +236,6 @@ void AsyncBoard::Impl::become(BoardRole fresh) {
   });
 }
 
-// --- time
-
 // The timer is set only if it must ring earlier; ringing early costs one poll.
 void AsyncBoard::Impl::arm() {
   const Time next = waits.next(due);
@@ -269,8 +258,6 @@ void AsyncBoard::Impl::on_timer() {
   });
   if (notifies_backlog) notify_backlog();
 }
-
-// --- BoardPath::Owner
 
 void AsyncBoard::Impl::on_datagram(BoardPath& path, std::string_view bytes) {
   enter(Completion::How::dispatch, [&] {

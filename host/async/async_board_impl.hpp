@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The implementation of an AsyncBoard: a session, its paths, its timer, and the waits of handlers.
-//
-// Every call of the session is made inside enter(), which then does the session's sendings. The
-// outermost enter() also reports events and results, and sets the timer. on_datagram() reports at
-// once.
+// The implementation of an AsyncBoard: a session, its paths, its timer, and the waits. Every call
+// of the session is made inside enter(), which then sends. The outermost enter() also reports, and
+// sets the timer. on_datagram() reports at once.
 #pragma once
 
 #include <algorithm>
@@ -30,10 +28,8 @@
 
 namespace r4 {
 
-// Outlives the AsyncBoard if a callback or handler destroys the AsyncBoard.
-//
-// It has more than 15 members and 40 functions, because every function of AsyncBoard ends here. A
-// job of its own has a class: Session, BoardPaths, Waits, Backlog.
+// Outlives an AsyncBoard that a callback destroys. It has more than 15 members and 40 functions,
+// because every function of AsyncBoard ends here.
 struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<AsyncBoard::Impl> {
   using Waits = r4::Waits<CompletionPtr>;
   class Sequence;
@@ -70,8 +66,6 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   static Time time_of(Duration timeout) {
     return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
   }
-
-  // --- entering the session
 
   // Runs the user's code. An exception leaves io.run() in a handler of its own: if it passed
   // through the transport, whose handler may have called us, it would end reception for ever.
@@ -128,10 +122,7 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void settle();
   bool end_waits();
 
-  // --- what the user starts
-
-  // `start` gives the command to the session and returns its ticket. If that is 0, the command ends
-  // as `not_taken`. `id`: of the first step, if this is a later step.
+  // `start` returns the ticket, or 0: it ends as `not_taken`. `id`: of the first step.
   template <class Start>
   void begin(CompletionPtr completion, Start start, Ticket id = 0,
              Outcome not_taken = Outcome::full) {
@@ -153,7 +144,6 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
       }
     });
   }
-  // A command, or a group.
   template <class What>
   PostResult post(const What& what) {
     PostResult result = PostResult::no_link;
@@ -174,7 +164,6 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   Ticket leave(Time timeout);
   void close();
   void become(BoardRole fresh);
-  // Ends the conditions that a program waits for.
   void cancel_waits();
 
   void name_in_recording();
@@ -185,12 +174,8 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void give_up_slot(const Setpoints&) {}
   void warn_of_recordings();
 
-  // --- time
-
   void arm();
   void on_timer();
-
-  // --- BoardPath::Owner
 
   void on_datagram(BoardPath& path, std::string_view bytes) override;
   void on_drained() override;
@@ -198,12 +183,8 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void on_carrier_event(BoardPath& path, const CarrierEvent& event) override;
   void on_overheard(BoardPath& path, std::string_view bytes) override;
 
-  // --- the session's effects
-
   SendResult transmit(const Sending& sending) const;
   void on_identity(const Identity& fresh);
-
-  // --- the paths
 
   Carrier& carrier(std::size_t path) const { return *paths[path].carrier; }
   bool only_listens(std::size_t path) const;

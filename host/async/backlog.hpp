@@ -25,16 +25,13 @@ class Backlog {
   // The kept state is of an earlier boot of the board, or from before a sleep.
   void forget() { size_ = 0; }
 
-  // True if datagrams are to be dropped, because they are from before a sleep.
   bool drops() const { return waking_ != 0; }
-  // True if states are to be kept, not reported.
   bool keeps_states() const { return behind_; }
   void keep(Text state) {
     size_ = state.size();
     std::copy_n(state.data(), size_, state_.data());
   }
 
-  // Everything that had arrived was handed over.
   void on_drained() {
     behind_ = false;
     waking_ = 0;
@@ -47,8 +44,7 @@ class Backlog {
     rings_ = size_ == 0 ? 0 : rings_ + 1;
     return rings_ >= 2;
   }
-  // The newest state that was kept, which is forgotten; empty if there is none. Valid until the
-  // next keep().
+  // Takes the kept state; empty if there is none. Valid until the next keep().
   Text take() { return {state_.data(), std::exchange(size_, 0)}; }
 
  private:

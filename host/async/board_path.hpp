@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The paths of a board: each has a transport, the number by which the session knows it, and a tap
-// for recordings.
+// The paths of a board: a transport, its number in the session, and a tap for recordings.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The waits of handlers: for the end of a command, or for a condition. Each wait ends once: its
-// result is among the ended waits until it is taken out and given to its handler.
+// Waits of handlers for the end of a command or a condition. Ended waits are kept until taken out.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +14,6 @@
 
 namespace r4 {
 
-// `CompletionPtr` owns the handler.
 template <class CompletionPtr>
 class Waits {
  public:
@@ -24,7 +22,6 @@ class Waits {
     answer,  // the state has the end of the I2C transfer `pnum`
     time,    // the deadline
   };
-  // A wait for a condition. `id`: cancels it.
   struct Condition {
     For what = For::active;
     Ticket id = 0;
@@ -66,8 +63,7 @@ class Waits {
     });
     return conditions_.size() != before;
   }
-  // Ends the condition with that id as cancelled. Returns the ticket of the command with that id,
-  // which the session has to cancel; 0 if there is none.
+  // Cancels that condition. Returns the ticket of that command, to be cancelled, or 0.
   Ticket cancel(Ticket id, Time now) {
     end_conditions(
         [id](const Condition& each) {
@@ -78,14 +74,12 @@ class Waits {
                                     [&](const Command& each) { return each.id == id; });
     return found == commands_.end() ? 0 : found->ticket;
   }
-  // The oldest of the ended waits.
   std::optional<Ended> take_ended() {
     if (ended_.empty()) return std::nullopt;
     std::optional<Ended> first(std::move(ended_.front()));
     ended_.erase(ended_.begin());
     return first;
   }
-  // The first deadline of a condition; `latest` if there is no earlier one.
   Time next(Time latest) const {
     for (const Condition& each : conditions_) latest = std::min(latest, each.deadline);
     return latest;

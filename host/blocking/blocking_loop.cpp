@@ -16,7 +16,6 @@ namespace {
 // ended by this time after its deadline, the loop is held up.
 constexpr BlockingLoop::Duration grace{500};
 
-// For calls without a deadline.
 constexpr BlockingLoop::Duration patience{1000};
 static_assert(patience == Board::default_timeout);
 

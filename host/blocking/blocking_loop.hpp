@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The thread on which the links of a Board or a Fleet run, and the calls of other threads that wait
-// for it.
+// The thread on which the links of a Board or a Fleet run, and the calls that wait for it.
 //
 //     a thread of the program           the loop's thread
 //     run(call) ---- posted ---->       begin(): each board starts its part, with the time left
@@ -56,7 +55,6 @@ class BlockingLoop {
   // Begins a board's part, on the loop, with the time that is left.
   using Start =
       std::function<void(AsyncBoard& board, std::size_t part, Duration left, BoundEnd end)>;
-  // The part of one board.
   struct Part {
     AsyncBoard* board = nullptr;
     CommandResult result{};
@@ -93,22 +91,17 @@ class BlockingLoop {
   BlockingLoop(const BlockingLoop&) = delete;
   BlockingLoop& operator=(const BlockingLoop&) = delete;
 
-  // --- on any thread
-
-  // Waits until all parts of the call have ended. Throws if they do not end in time, or if the loop
-  // is closed. Passes on what on_wait() throws.
+  // Waits until all parts have ended. Throws if late or closed, and what on_wait() throws.
   void run(const CallPtr& call, Duration timeout);
-  // Begins the call, with Board::default_timeout, and does not wait. Does nothing if the loop is
-  // closed.
+  // Begins the call, with Board::default_timeout, and does not wait. No effect if closed.
   void run_unawaited(const CallPtr& call);
-  // Runs `action` on the loop, and does not wait. False if the loop is closed.
+  // Does not wait. False if the loop is closed.
   bool post_to_loop(std::function<void()> action);
-  // Runs `action` on the loop and waits until it has ended. False if the loop is closed. Throws if
-  // the loop does not begin it in time: then it never runs. Passes on what `action` throws.
+  // Waits until `action` has ended. False if the loop is closed. Throws if it does not begin in
+  // time: then it never runs. Passes on what it throws.
   bool run_on_loop(std::string_view what, const std::function<void()>& action);
-  // Waits until `arrived()` is true; false if it is not true in time. A sleep of this computer is
-  // part of the time, though the deadline stands still meanwhile. If the loop is closed, throws an
-  // error about `what()`. Both are called under the lock.
+  // False at the deadline; a sleep of this computer counts, though the deadline stands still. If
+  // the loop is closed, throws an error about `what()`. Both run under the lock.
   template <class What, class Predicate>
   bool wait_for_news(What what, Duration timeout, Predicate arrived) {
     const SleepWatch slept;
@@ -138,7 +131,6 @@ class BlockingLoop {
   static Duration bounded(Duration timeout) {
     return std::clamp<Duration>(timeout, Duration{0}, std::chrono::hours{24});
   }
-  // A copy of a value that both threads use.
   template <class Value>
   Value read(const Value& value) {
     const std::lock_guard lock(mutex);
@@ -148,13 +140,11 @@ class BlockingLoop {
 
   // Throws std::system_error if the system has no thread left.
   void start(std::function<void()> loop) { thread_ = std::thread(std::move(loop)); }
-  // Runs `shut` on the loop unless it is closed, and waits for the end of the thread. Idempotent.
+  // Runs `shut` on the loop unless it is closed, and joins the thread. Idempotent.
   void close(std::function<void()> shut);
 
-  // --- on the loop
-
-  // `shut` begins with this: nothing is put on the loop afterwards. False if it was closed before.
-  // Calls `last` under the lock.
+  // `shut` begins with this: nothing is put on the loop afterwards. False: closed before. Calls
+  // `last` under the lock.
   template <class Last>
   bool mark_closed(Last last) {
     {
@@ -178,7 +168,7 @@ class BlockingLoop {
 
  protected:
   ~BlockingLoop() = default;
-  // A part has ended. Called under the lock.
+  // Called under the lock.
   virtual void on_end() {}
 
  private:

@@ -8,16 +8,15 @@
 //                      [](const r4::CommandResult& result) { … });
 //     io.run();
 //
-// Everything happens on the io_context's thread: call it there, or before it runs; the callbacks
-// come there. Completion tokens work: callbacks, asio::use_future, asio::use_awaitable; a handler
-// runs on its associated executor, never inside the call that started it. A failure to execute a
-// command is a result, not an exception: explain() (link.hpp) puts it into words. A handler's cancellation
-// slot gives the command up: it ends as cancelled and is sent no more, though it may have been executed. A
-// stop goes on all the same; only the wait for it ends.
+// Nothing here blocks. Call every function on the thread of the io_context, or before it runs.
+// Completion tokens work: callbacks, asio::use_future, asio::use_awaitable. A handler runs on its
+// associated executor, never inside the call that started it. A failed command is a result, not an
+// exception: explain() (link.hpp) puts it into words. A handler's cancellation slot cancels the
+// command: it is not sent again, but may have been executed. A stop continues; only the wait ends.
 //
-// Callbacks and completion handlers may call anything here, destroy the board included. What one
-// throws leaves io.run(), as from any handler of Asio, but never by way of the transport: reception
-// and timers go on when run() is called again. The steady state allocates nothing.
+// Callbacks and handlers may call any function here and may destroy the board. An exception from
+// one leaves io.run(), as from any Asio handler. Reception and timers continue when run() is called
+// again. The steady state allocates nothing.
 #pragma once
 
 #include <asio/associated_allocator.hpp>
@@ -55,12 +54,12 @@ class AsyncBoard {
   using Duration = std::chrono::milliseconds;
   using executor_type = asio::io_context::executor_type;
 
-  // Throws Error{usage} for a wrong URL. The io_context must outlive the board. '+' joins several paths to it.
+  // Throws Error{usage} for a wrong URL. The io_context must outlive the board. '+' joins paths.
   AsyncBoard(const executor_type& executor, std::string_view url, BoardOptions options = {});
   AsyncBoard(asio::io_context& io, std::string_view url, BoardOptions options = {})
       : AsyncBoard(io.get_executor(), url, std::move(options)) {}
-  // Over several paths at once, up to four, all to the same board (docs/redundancy.md). Throws Error{usage} also
-  // for one that is there twice, and for sim: and replay:, which are boards of their own.
+  // Over one to four paths to the same board (docs/redundancy.md). Throws Error{usage} also for a
+  // duplicate, and for sim: and replay:, which are boards of their own.
   AsyncBoard(const executor_type& executor, const std::vector<std::string>& urls,
              BoardOptions options = {});
   AsyncBoard(asio::io_context& io, const std::vector<std::string>& urls, BoardOptions options = {})
@@ -69,52 +68,47 @@ class AsyncBoard {
              BoardOptions options = {})
       : AsyncBoard(io.get_executor(), std::vector<std::string>(urls.begin(), urls.end()),
                    std::move(options)) {}
-  // The same on a transport of your own, not yet open.
+  // On a transport of your own, not yet open.
   AsyncBoard(const executor_type& executor, std::unique_ptr<Carrier> carrier,
              BoardOptions options = {});
   AsyncBoard(asio::io_context& io, std::unique_ptr<Carrier> carrier, BoardOptions options = {})
       : AsyncBoard(io.get_executor(), std::move(carrier), std::move(options)) {}
-  // On several.
   AsyncBoard(const executor_type& executor, std::vector<std::unique_ptr<Carrier>> carriers,
              BoardOptions options = {});
   AsyncBoard(asio::io_context& io, std::vector<std::unique_ptr<Carrier>> carriers,
              BoardOptions options = {})
       : AsyncBoard(io.get_executor(), std::move(carriers), std::move(options)) {}
-  // Does what close() does.
+  // Calls close().
   ~AsyncBoard();
   AsyncBoard(const AsyncBoard&) = delete;
   AsyncBoard& operator=(const AsyncBoard&) = delete;
 
   executor_type get_executor() const noexcept;
 
-  // Opens the transport and begins the link: the first heartbeat goes out at once. Throws Error;
-  // once only. Of several, one that cannot be opened yet is tried again every second, and on_event() tells why;
-  // it throws if none can be.
+  // Opens the transports and starts the link: the first heartbeat is sent at once. If one of
+  // several paths cannot be opened, on_event() reports why, and it is tried again every second.
+  // Throws Error if no path can be opened. Can be called once only.
   void open();
-  // Cancels what is under way (outcome closed), says farewell once and closes the transport: the board
-  // goes safe, when it has heard that or by its timeout. No callback follows. Idempotent; the board cannot
-  // be opened again.
+  // Cancels commands under way (outcome closed), sends one farewell and closes the transports. The
+  // board goes safe when it hears the farewell, or by its timeout. No callback follows. Idempotent.
   void close();
-  // void(CommandResult). The same, but repeats the farewell until the board has answered it, so that
-  // another host finds the board free. Confirmed: its outputs are safe and nobody controls it. Closed: it
-  // was not ours to leave, or does not know of farewells. No callback follows from the call on; stops that
-  // are under way go on until then.
+  // void(CommandResult). As close(), but repeats the farewell until the board answers, so that it
+  // is free for another host. Confirmed: the outputs are safe and no host controls it. Closed: this
+  // program did not control it, or it knows no farewells. No callback follows; a stop continues.
   template <class Token>
   auto async_close(Duration timeout, Token&& token) {
     require_timeout("async_close()", timeout);
     return initiate<&AsyncBoard::start_close, Token>(token, timeout);
   }
 
-  BoardRole role() const;  // BoardOptions::role at first; may be called from any thread
-  // Controls the board from now on, disarmed, as if it had been opened so. Callbacks, recordings
-  // and what is known of the board stay. Throws Error{refused} if another program of this computer,
-  // its holder(), controls the board: then this one watches on. Throws Error{usage} while the board
-  // is not open, and, as async_release_control() does, while control is being released.
+  BoardRole role() const;  // Can be called from any thread.
+  // As Board::take_control(). Throws Error{usage} also if the board is not open or control is being
+  // released, as async_release_control() does.
   void take_control();
-  // void(CommandResult). Disarms, cancels all but stops, and says farewell as async_close() does.
-  // However that ends, the program watches then. Confirmed: the board is safe and nobody controls
-  // it, or the program watched already. Refused: another host had it. Timed out, and none (there
-  // was no link, or the board knows no farewells): it goes safe by its timeout.
+  // void(CommandResult). Disarms, cancels all commands except stops, and says farewell as
+  // async_close(). The program is always a watcher afterwards. Confirmed: the board is safe and
+  // free, or the program was a watcher. Refused: another host controlled the board. Timed out, and
+  // none (no link, or no farewells known): the board goes safe by its timeout.
   template <class Token>
   auto async_release_control(Duration timeout, Token&& token) {
     require_timeout("async_release_control()", timeout);
@@ -122,44 +116,38 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_release_control, Token>(token, timeout);
   }
 
-  // Throws Error{usage} for a command outside its ranges, and for a key or password where others
-  // would see it.
+  // Throws Error{usage} for a value out of range, and for a secret that other programs would see.
   void require_sendable(const Command& command) const;
   void require_sendable(const Setpoints& setpoints) const;
 
-  // void(CommandResult). Throws as require_sendable() does, and for a timeout of nothing.
-  //
-  // A stop overtakes and cancels everything, also before the link is up. It is sent whatever the
-  // timeout, and by a watcher, too. Command::identify() is confirmed by the board's answer, which
-  // identity() has. Command::clear() takes away the stop, watchdog or fault that the board reports.
+  // void(CommandResult). Throws as require_sendable(), and for a timeout that is not above 0. A
+  // stop overtakes and cancels all commands, also before the link is up. It is sent with any
+  // timeout, by watchers too. Command::identify() is confirmed by the board's answer, which
+  // identity() returns. Command::clear() clears the stop, watchdog or fault that the board reports.
   template <class Token>
   auto async_send(const Command& command, Duration timeout, Token&& token) {
     require_sendable(command);
     if (command.kind != CommandKind::stop) require_timeout("async_send()", timeout);
     return initiate<&AsyncBoard::start_send<Command>, Token>(token, command, timeout);
   }
-  // void(CommandResult). Several output commands that the board executes together, in one pass over its chips,
-  // or not at all; a board that knows no groups is sent one after the other, up to the first that fails:
-  // CommandResult::at, executed. Throws Error{usage} for none, and for a timeout of nothing.
+  // void(CommandResult). As Board::send() of a group: CommandResult::at, executed. Throws
+  // Error{usage} for an empty group, and for a timeout that is not above 0.
   template <class Token>
   auto async_send(const Setpoints& setpoints, Duration timeout, Token&& token) {
     require_sendable(setpoints);
     require_timeout("async_send()", timeout);
     return initiate<&AsyncBoard::start_send<Setpoints>, Token>(token, setpoints, timeout);
   }
-  // void(CommandResult). Clears a stop, a watchdog or a fault that came while this program controlled
-  // the board, and closes relay 1, the motor supply. Confirmed by the board's state: output commands
-  // go out from then on. Not armed: what stands against it cannot be cleared, or may have come before
-  // the program began, which Command::clear() clears.
+  // void(CommandResult). As Board::arm(). Confirmed: output commands are sent from then on. Not
+  // armed: the cause cannot be cleared, or may be older than the program.
   template <class Token>
   auto async_arm(Duration timeout, Token&& token) {
     require_timeout("async_arm()", timeout);
     require_control("async_arm()");
     return initiate<&AsyncBoard::start_arm, Token>(token, timeout);
   }
-  // void(CommandResult). Sends a transfer on the user's I2C bus (Command::i2c_read(), i2c_write(),
-  // i2c_scan()), and ends with the answer of the device: CommandResult::transfer. Refused also if
-  // the transfer failed.
+  // void(CommandResult). Sends a Command::i2c_read(), i2c_write() or i2c_scan() and ends with the
+  // device's answer: CommandResult::transfer. Refused also if the transfer failed.
   template <class Token>
   auto async_transfer(const Command& command, Duration timeout, Token&& token) {
     require_sendable(command);
@@ -167,18 +155,14 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_transfer, Token>(token, command, timeout);
   }
 
-  // void(CommandResult). Confirmed as soon as the board is ACTIVE and takes our commands, so that the
-  // first post() goes out, or, where the program only watches, as soon as it is heard; timed out, if it does not
-  // come to that; refused, if the paths lead to two boards. A timeout of 0 only looks.
+  // void(CommandResult). Confirmed when the board is ACTIVE and takes our commands; for a watcher,
+  // when it is heard. Refused if the paths lead to two boards. A timeout of 0 only looks.
   template <class Token>
   auto async_wait_active(Duration timeout, Token&& token) {
     require_wait("async_wait_active()", timeout);
     return initiate<&AsyncBoard::start_wait_active, Token>(token, timeout);
   }
-  // void(CommandResult). Sets the board's timeout and heartbeat interval together, whatever they are
-  // now; one of them alone may be refused, for the interval must stay below the timeout. Throws
-  // Error{usage} for values outside their ranges, and for a timeout that our own heartbeats
-  // (SessionOptions::timing) cannot keep.
+  // void(CommandResult). As Board::link_timing(), and throws as it does.
   template <class Token>
   auto async_link_timing(Duration board_timeout, Duration heartbeat, Duration timeout,
                          Token&& token) {
@@ -188,9 +172,8 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_link_timing, Token>(token, board_timeout, heartbeat,
                                                            timeout);
   }
-  // void(CommandResult). Sets a described device up as Board::attach() does, and describe()s it.
-  // `timeout`: for each step. Confirmed: device.reading(state()) has its values from now on.
-  // Otherwise explain(device, result, link()) says why.
+  // void(CommandResult). As Board::attach(), then describe(). Confirmed: device.reading(state())
+  // has its values. Otherwise explain(device, result, link()) says why.
   template <class Token>
   auto async_attach(const Device& device, Duration timeout, Token&& token) {
     require_timeout("async_attach()", timeout);
@@ -198,74 +181,64 @@ class AsyncBoard {
     require_slots(device);
     return initiate<&AsyncBoard::start_attach, Token>(token, device, timeout);
   }
-  // Throws Error{usage} for what async_link_timing() cannot set.
+  // Throws Error{usage} for values that async_link_timing() cannot set.
   void require_link_timing(Duration board_timeout, Duration heartbeat) const;
 
-  // Sends once, without confirmation, and says why it did not; on_refused() tells if the board refuses
-  // it. A stop is sent as by async_send(), for a second. Throws Error{usage}.
+  // Sends once, without confirmation, and returns why it was not sent. If the board refuses it,
+  // on_refused() reports it. A stop is sent as by async_send(), for 1 s. Throws Error{usage}.
   PostResult post(const Command& command);
-  // The same of several that are executed together; where the board knows no groups, they are posted one by one,
-  // up to the first that is not sent.
+  // If the board knows no groups, posts one by one, up to the first that is not sent.
   PostResult post(const Setpoints& setpoints);
 
-  // What is known now; after close(), what was known last.
+  // The newest values; after close(), the last ones.
   const ReceivedState& state() const;
   const LinkStatus& link() const;
-  // The link is up and the board takes our commands: they go out at once.
+  // True if the link is up and the board takes our commands: they are sent at once.
   bool in_control() const;
-  // Why the session is not armed; none if it is.
+  // Why the session is not armed; none if it is armed.
   DisarmCause disarmed_by() const;
   const BoardIdentity& identity() const;
   Statistics statistics() const;
-  const CarrierCounters& carrier_counters() const;  // of several paths: of all together
-  const std::string& name() const;                  // of several: all names
-  // How each of its paths does, in the order of the URLs.
+  const CarrierCounters& carrier_counters() const;  // the sum over all paths
+  const std::string& name() const;                  // of all transports
+  // The state of each path, in the order of the URLs.
   std::vector<PathStatus> paths() const;
 
-  // Any number of callbacks of each kind, called in the order in which they were added; the handle ends
-  // one (subscription.hpp). Of the states that came while the event loop was held up for more than
-  // 50 ms, on_state is told the newest alone. on_nack is told each refusal of a command once, and
-  // not that a repeated command was a duplicate.
+  // As those of Board. After the event loop was held up for more than 50 ms, on_state gets only the
+  // newest waiting state. on_nack gets each refusal once, but no DUPLICATE for a retry.
   Subscription on_state(std::function<void(const ReceivedState&, const Datagram&)> callback);
   Subscription on_board_heartbeat(std::function<void(const Datagram&)> callback);
   Subscription on_nack(std::function<void(const Nack&, const Datagram&)> callback);
   Subscription on_bad_datagram(std::function<void(const ReadResult&, std::string_view)> callback);
-  // What other programs send to the board on a shared transport (docs/sharing.md): heartbeats and commands
-  // of the controlling host, stops of any. Dots stand for a key or a password.
+  // Datagrams of other programs to the board on a shared transport (docs/sharing.md): heartbeats
+  // and commands of the controlling host, all stops. Dots replace secrets.
   Subscription on_overheard(std::function<void(std::string_view)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
-  // A path has begun to carry, or ceased to. A transport that tells that it is gone is told of at
-  // once, any other after SessionOptions::timing's timeout.
+  // A path has started or stopped carrying. If a transport reports that it is down, this comes at
+  // once, otherwise after the timeout of SessionOptions::timing.
   Subscription on_path(std::function<void(const PathStatus&)> callback);
-  // The transport, and a warning where the event loop was held up for so long that heartbeats were late.
+  // Events of the transport, and a warning if a busy event loop made heartbeats late.
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
-  // The board has begun again, or this computer slept for longer than the board waits for its host:
-  // what it was told is gone, thresholds of U too. Comes before its new state.
+  // As Board::on_restart(), on_arming() and on_refused().
   Subscription on_restart(std::function<void()> callback);
-  // The session is armed (none), or not any more.
   Subscription on_arming(std::function<void(DisarmCause)> callback);
-  // The board refused a command that was posted.
   Subscription on_refused(std::function<void(const RefusedPost&)> callback);
 
-  // Every datagram from now on, in both directions, goes into that recording too, until it is closed or gone, or
-  // another one is named. Where it ends by itself on_event() tells, and the link goes on.
+  // As Board::record() of a recording.
   void record(Recording& recording);
-  // What the bytes of a device of this board mean, for recordings from now on: r4 convert tells its values.
+  // Names a device of this board in later recordings, so that r4 convert can decode it.
   void describe(const Device& device);
 
-  // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
-  // Error{usage} for less than nothing and more than an hour. feed() may be called from any thread,
-  // costs no system call and counts from the next time the loop runs.
+  // As Board::watchdog(). feed(): any thread; counts from the loop's next turn.
   void watchdog(Duration period);
   void feed();
   // Stops heartbeats and commands, so that the board goes safe, until it is called with false.
   void hold_heartbeats(bool held);
 
  private:
-  friend class Fleet;  // its boards on a bus are stopped by one frame
+  friend class Fleet;  // one CAN frame stops its boards on a bus
   struct Impl;
 
-  // Gives a command up that is under way, unless it has ended.
   class Cancel {
    public:
     Cancel(std::weak_ptr<Impl> impl, std::uint64_t command)
@@ -282,9 +255,9 @@ class AsyncBoard {
   class Completion {
    public:
     enum class How : std::uint8_t { dispatch, post };
-    // Has the handler's cancellation slot give the command up.
+    // Connects the handler's cancellation slot to `cancel`.
     virtual void listen(const Cancel& cancel) = 0;
-    // Frees the memory, then hands the result to the handler's executor.
+    // Frees the memory, then passes the result to the handler's executor.
     virtual void complete(const CommandResult& result, How how) = 0;
     virtual void destroy() noexcept = 0;
 
@@ -303,7 +276,6 @@ class AsyncBoard {
   template <class Handler>
   CompletionPtr make_completion(Handler handler);
 
-  // Starts what ends with a result for the token's handler.
   template <auto Start, class Token, class... Arguments>
   auto initiate(std::remove_reference_t<Token>& token, const Arguments&... arguments) {
     auto start = [this](auto handler, const Arguments&... each) {
@@ -312,10 +284,10 @@ class AsyncBoard {
     return asio::async_initiate<Token, void(CommandResult)>(start, token, arguments...);
   }
 
-  // Throw Error{usage} for a time that none can be.
+  // Throw Error{usage} for a time outside the valid range.
   static void require_timeout(std::string_view what, Duration timeout);
   static void require_wait(std::string_view what, Duration timeout);
-  // Throws Error{usage} for a program that only watches.
+  // Throws Error{usage} if the program is a watcher.
   void require_control(std::string_view what) const;
   template <class What>  // Command, Setpoints
   void start_send(const What& what, Duration timeout, CompletionPtr completion);
@@ -337,12 +309,9 @@ class AsyncBoard {
   std::shared_ptr<Impl> impl_;
 };
 
-// The loop of a Board's thread, for a transport that is made of Asio's objects.
+// The loop of a Board's thread, for a transport made of Asio objects.
 asio::io_context& context_of(Loop& loop);
 
-// --- implementation of the templates
-
-// A handler with its argument, as Asio wants it.
 template <class Handler>
 struct AsyncBoard::Bound {
   using allocator_type = asio::associated_allocator_t<Handler, asio::recycling_allocator<void>>;

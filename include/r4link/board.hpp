@@ -8,21 +8,21 @@
 //     board.on_state([](const r4::State& s) { … });
 //     board.stop();                                    // every output safe, at once
 //
-// A board with a key obeys only who has it: BoardOptions options; options.session.key = key;
+// A board with a key obeys only hosts that have it: BoardOptions::session.key. If this object is
+// destroyed or its process hangs, the heartbeats stop and the board goes safe.
 //
-// The board goes safe by itself when this object is gone or its process hangs: the heartbeats stop.
-// Errors are thrown as r4::Error with the thing, the reason and the fix: open and permission when
-// the transport cannot be opened, usage for a wrong URL or a value outside its range, refused when
-// the board refuses a command or does not confirm it in time, or when the Board was closed.
+// Errors are thrown as r4::Error with the thing, the reason and the fix. open and permission: the
+// transport cannot be opened. usage: a wrong URL or a value outside its range. refused: the board
+// refuses a command or does not confirm it in time, or the Board was closed.
 //
-// A timeout counts from the call. What has not been sent by then is never sent; where a command may
-// have been sent, the error says that it may have been executed. Only a stop goes out in any case.
+// A timeout counts from the call. A command that was not sent by then is never sent. If it may have
+// been sent, the error says that it may have been executed. Only a stop is sent in any case.
 //
-// Callbacks run on a thread of their own, one at a time, beside the thread of the link: they may call
-// anything here, and what they wait for costs no heartbeat. But a callback that does not return within
-// BoardOptions::callback_limit stops the heartbeats, so that the board goes safe, and on_event() tells of
-// it. States that come while a callback runs are told as one, the newest; states() has each of them. An
-// exception out of a callback ends the program, as it does out of any thread.
+// Callbacks run on a thread of their own, one at a time, beside the thread of the link. They may
+// call any function here, and waiting in them delays no heartbeat. But if a callback does not
+// return within BoardOptions::callback_limit, the heartbeats stop, the board goes safe, and
+// on_event() reports it. Of the states that come while a callback runs, only the newest is passed
+// on; states() has all of them. An exception from a callback ends the program, as from any thread.
 #pragma once
 
 #include <chrono>
@@ -53,7 +53,7 @@ namespace r4 {
 
 class AsyncBoard;
 
-// Callbacks that are there before the transport is opened, so that they are told everything.
+// Callbacks that are added before the transport is opened, so that they miss nothing.
 struct BoardCallbacks {
   std::function<void(const ReceivedState&)> on_state;
   std::function<void(const LinkStatus&)> on_link;
@@ -64,34 +64,32 @@ struct BoardCallbacks {
   std::function<void(const RefusedPost&)> on_refused;
 };
 
-// What becomes of states that come faster than they are taken.
+// What happens to states that come faster than they are taken.
 struct StatesOptions {
-  // None is lost: where no more can wait, take() throws behind the last one that could. Otherwise the oldest gives way.
+  // True: no state is dropped silently. When the queue overflows, take() returns the queued states
+  // and then throws once. False: the oldest queued state is dropped.
   bool lossless = false;
-  // So many wait, of some 900 bytes each. 0: the newest alone or, of those of which none is lost, 65536: eleven minutes
-  // at 100 Hz.
+  // Queue size in states, 900 bytes each. 0: 1, or if lossless 65536 (11 minutes at 100 Hz).
   std::size_t most = 0;
 };
 
-// From Board::states(): the states of a board, one after the other, for a loop of the program's own.
+// From Board::states(): the states of a board, one after the other, for a loop of your own.
 //
 //     r4::States states = board.states({.lossless = true});
 //     while (const auto state = states.take(1s)) …
 //
-// Callbacks are told of the newest state where several have come meanwhile. Here the link's thread leaves each, one
-// for each datagram, whatever callbacks do. AsyncBoard::on_state() is called for each anyway. May be moved; may
-// outlive its board. One thread takes.
+// One state for each datagram, however slow the callbacks are. (AsyncBoard::on_state() gets each.)
+// Movable; may outlive its board. Only one thread may call take().
 class R4LINK_API States {
  public:
   using Duration = std::chrono::milliseconds;
 
-  // The next one; waits for it. Nothing if none came in time, or the board was closed and what waited has been
-  // taken. Throws Error{data} where states were lost of which none should be, once for each such gap, and goes on behind
-  // it.
+  // Waits for the next state. Empty if none came in time, or if the board was closed and the queue
+  // is empty. If lossless, throws Error{data} once for each gap, then continues after the gap.
   std::optional<ReceivedState> take(Duration timeout);
-  // None will come any more, and none waits.
+  // True if the queue is empty and no more states will come.
   bool ended() const;
-  // Those that were not taken, and gave way or found no room.
+  // How many states were dropped from the queue, or found no room.
   std::uint64_t missed() const;
 
   class R4LINK_PRIVATE Queue;
@@ -107,99 +105,92 @@ class R4LINK_API Board {
   using Duration = std::chrono::milliseconds;
   static constexpr Duration default_timeout{1000};
 
-  // Opens the transport and begins the link; returns without waiting for the board. Throws Error.
+  // Opens the transport and starts the link; returns without waiting for the board. Throws Error.
   explicit Board(std::string_view url, BoardOptions options = {}, BoardCallbacks callbacks = {});
-  // Over several paths at once, up to four, all to the same board: {"serial:auto", "udp://192.168.0.125"}
-  // (docs/redundancy.md); in one text, wherever that is opened as a board, '+' joins them. Throws Error{usage} also
-  // for one that is there twice, and for sim: and replay:, which are boards of their own. A path that cannot be
-  // opened yet is tried again every second, and on_event tells why; it throws if none can be opened.
+  // Over one to four paths to the same board: {"serial:auto", "udp://192.168.0.125"}
+  // (docs/redundancy.md). In one text, '+' joins them. Throws Error{usage} also for a duplicate,
+  // and for sim: and replay:, which are boards of their own. If a path cannot be opened, on_event
+  // reports why, and it is tried again every second. Throws if no path can be opened.
   explicit Board(const std::vector<std::string>& urls, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
   Board(std::initializer_list<std::string_view> urls, BoardOptions options = {},
         BoardCallbacks callbacks = {})
       : Board(std::vector<std::string>(urls.begin(), urls.end()), std::move(options),
               std::move(callbacks)) {}
-  // On transports of your own.
+  // On transports of your own. Throws Error.
   explicit Board(const CarrierMaker& make, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
   explicit Board(const std::vector<CarrierMaker>& makers, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
-  // Opens the only board that discover() finds (discovery/discover.hpp), which takes 1.3 s at most.
-  // Throws Error as Discovery::only() does: open if there is no board, usage with the URLs of
-  // several.
+  // Opens the only board that discover() finds (discovery/discover.hpp). Blocks for at most 1.3 s.
+  // Throws Error{open} if there is no board, Error{usage} with the URLs of several.
   static Board first(BoardOptions options = {}, const DiscoveryOptions& where = {});
   ~Board();
   Board(const Board&) = delete;
   Board& operator=(const Board&) = delete;
 
-  // Ends heartbeats, says farewell and closes the transport: the board goes safe at once and is free for
-  // another host; one that does not answer, or does not know of farewells, goes safe within its timeout.
-  // Takes at most 100 ms for that. Calls that wait in other threads throw Error{refused}. When it has
-  // returned, no callback runs or will run, except the one that called it. Idempotent. The destructor does it,
-  // too, and may run while other threads wait.
+  // Stops the heartbeats, says farewell and closes the transport. The board goes safe at once and
+  // is free for another host. If it does not answer, or does not know farewells, it goes safe by
+  // its timeout. Blocks for at most 100 ms. Calls that wait in other threads throw Error{refused}.
+  // After the return no callback runs, except the one that called close(). Idempotent. The
+  // destructor calls it, and may run while other threads wait.
   void close();
 
-  // What this program is to its board: BoardOptions::role at first.
+  // The role of this program: BoardOptions::role at first.
   BoardRole role() const;
-  // Controls the board from now on, disarmed, as if it had been opened so: wait_active() waits
-  // until the board takes commands of this program. Callbacks, recordings and what is known of the
-  // board stay. Throws Error{refused} if another program of this computer, its holder(), controls
-  // the board: then this one watches on.
+  // Controls the board, disarmed: wait_active() waits until the board takes commands of this
+  // program. Callbacks, recordings and what is known of the board stay. Throws Error{refused} if
+  // another program here, its holder(), controls the board: then this one stays a watcher.
   void take_control();
-  // Disarms, says farewell until the board has answered, so that it is safe and free, and watches
-  // from then on. Calls that wait in other threads throw Error{refused}; nothing of them is sent
-  // any more. Throws Error{refused} if the board does not answer in time. Then, as without a link,
-  // and where the board knows no farewells, it goes safe by its timeout; the program watches all
-  // the same.
+  // Disarms and says farewell until the board has answered, so that it is safe and free. The
+  // program is always a watcher afterwards. Calls that wait in other threads throw Error{refused},
+  // and send nothing more. Throws Error{refused} if the board does not answer in time. Then, and
+  // also without a link or if the board knows no farewells, the board goes safe by its timeout.
   void release_control(Duration timeout = default_timeout);
 
-  // Waits until the board is ACTIVE under our control, or, where the program only watches, until it is heard;
-  // throws Error{refused} saying what it is instead.
+  // Waits until the board is ACTIVE under our control; for a watcher, until the board is heard.
+  // Otherwise throws Error{refused} with the state of the link.
   void wait_active(Duration timeout = Duration{3000});
 
-  // --- commands: each returns when the board's own state confirms it, throws Error{refused}
-  // otherwise
+  // --- commands: each returns when the board's state confirms it, or throws Error{refused}
 
-  // Command::clear() takes away the stop, the watchdog or the fault that the board reports; it moves
-  // nothing.
+  // Command::clear() clears the stop, watchdog or fault that the board reports; moves nothing.
   void send(const Command& command, Duration timeout = default_timeout);
-  // Several output commands that the board executes together, in one pass over its chips, or not at all:
-  // all wheels of a robot, say. They are confirmed as one, and the Error names the command that was
-  // in the way: Error::at(), from 1. A board that knows no groups (without `group` in BoardIdentity::capabilities)
-  // is sent one after the other: then those before it were executed, and the Error says so. It is asked when
-  // the link comes up; until it has answered, what is posted is not sent (no_link).
+  // Output commands that the board executes together, in one pass over its chips, or not at all,
+  // such as all wheels of a robot. If one fails, the Error names it: Error::at(), from 1. If the
+  // board knows no groups (no `group` in BoardIdentity::capabilities), they are sent one after the
+  // other: those before the failed one were executed, and the Error says so. The board is asked for
+  // this when the link comes up; until it answers, post() of a group returns no_link.
   void send(const Setpoints& setpoints, Duration timeout = default_timeout);
-  // The same from the text of design: "O:358,1,1"; "O:358,1,1;O:358,1,2" is a group.
+  // The same from text: "O:358,1,1"; "O:358,1,1;O:358,1,2" is a group.
   void send(std::string_view text, Duration timeout = default_timeout);
-  // Sends once, without waiting or confirmation, and says why it did not: also when 256 wait to be
-  // sent. For streams of setpoints where the next one replaces this one; on_refused() tells of those
-  // that the board refuses. A stop is repeated as by stop_async(). Allocates nothing.
+  // Sends once, without confirmation, and returns why it was not sent: also if 256 commands wait.
+  // For streams of setpoints. on_refused() reports commands that the board refuses. A stop is
+  // repeated as by stop_async(). Allocates nothing.
   PostResult post(const Command& command);
   PostResult post(const Setpoints& setpoints);
 
-  // Before the first output command (O D S R P B Z), and again after whatever made the outputs safe but
-  // a lost link: until then they are refused here, so that a program that goes on commanding drives off
-  // only when it means to. Clears what can be cleared (a stop, a watchdog or a fault that came
-  // while this program controlled the board), then closes relay 1, the motor supply. Throws
-  // Error{refused} if the handle is released or something is in the way, when a stop comes
-  // meanwhile, and for a stop, a watchdog or a fault that may have come before this program began:
-  // Command::clear() clears that, on purpose, so that a program which is restarted does not drive
-  // off again.
-  // BoardOptions: options.session.arming = Arming::off does without.
+  // Call it before the first output command (O D S R P B Z), and after every safe state except a
+  // lost link. Until then output commands are refused here, so that a program drives only on
+  // purpose. Clears a stop, a watchdog or a fault that came while this program controlled the
+  // board, then closes relay 1, the motor supply. Throws Error{refused} if the handle is released,
+  // a cause cannot be cleared or a stop comes meanwhile. Throws it also if the cause may be older
+  // than this program: clear it on purpose with Command::clear(), so that a restarted program does
+  // not drive off. Not needed with BoardOptions::session.arming = Arming::off.
   void arm(Duration timeout = default_timeout);
-  // Why output commands are refused; none when armed.
+  // Why output commands are refused; none if armed.
   DisarmCause disarmed_by() const;
 
-  // Every output safe, at once, repeated until the board confirms it; latched until Command::clear().
-  // Where it is not confirmed, the error says to cut the power.
+  // Makes every output safe at once, and repeats until the board confirms. Latched until
+  // Command::clear(). If it is not confirmed, the error says to cut the power.
   void stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
 
-  // Each channel: set() is send(), confirmed; post() sends once and does not wait.
+  // For each channel: set() waits as send() does; post() sends once and does not wait.
   class DriveChannel {
    public:
-    // `duty`: from -1 (full reverse) to 1 (full forward); others throw Error{usage}. A bool, which
-    // would be full speed, does not compile.
+    // `duty`: from -1 (full reverse) to 1 (full forward). Other values throw Error{usage}. A bool,
+    // which would be full speed, does not compile.
     void set(double duty, Duration timeout = default_timeout) const;
     PostResult post(double duty) const;
     template <std::same_as<bool> Bool>
@@ -224,12 +215,12 @@ class R4LINK_API Board {
    public:
     void set(Microseconds pulse, Duration timeout = default_timeout) const;  // 0 (off) to 2500
     PostResult post(Microseconds pulse) const;
-    // Once, before this servo is driven in degrees. The Board keeps it until it is destroyed, also
-    // while the link is lost; the board on the other side does not know it.
+    // Call it once before this servo is driven in degrees. The Board keeps the calibration until it
+    // is destroyed, also while the link is lost; it is not sent to the R4 board.
     void calibrate(const ServoCalibration& calibration) const;
     // Throws Error{usage} if the servo was not calibrated.
     ServoCalibration calibration() const;
-    // Throw Error{usage} also for an angle outside of the calibration's range.
+    // Throw Error{usage} also for an angle outside the calibration's range.
     void set(Degrees angle, Duration timeout = default_timeout) const;
     PostResult post(Degrees angle) const;
 
@@ -285,22 +276,22 @@ class R4LINK_API Board {
     int channel_;
   };
 
-  // The devices on the user's I2C bus (docs/devices.md): of 7-bit addresses, at most 32 bytes each way. read(),
-  // write() and scan() return when the device has answered, and throw Error{refused} where none does.
+  // The devices on the user's I2C bus (docs/devices.md): 7-bit addresses, at most 32 bytes each
+  // way. Calls return when the device has answered. Error{refused}: no answer.
   class I2c {
    public:
     using Bytes = std::vector<std::uint8_t>;
-    // Of a register, of one or two bytes; {}: none is named.
+    // Reads a register, named by one or two bytes; {}: no register is named.
     Bytes read(int address, const Bytes& register_bytes, int count,
                Duration timeout = default_timeout) const;
-    // May move something, so that it takes arm(). Then reads `count` bytes.
+    // Writes, then reads `count` bytes. Needs arm(), because it may move something.
     Bytes write(int address, const Bytes& bytes, int count = 0,
                 Duration timeout = default_timeout) const;
     // The addresses that answer, at most 32.
     Bytes scan(Duration timeout = Duration{2000}) const;
-    // The same of Command::i2c_read(), i2c_write() or i2c_scan().
+    // Sends a Command::i2c_read(), i2c_write() or i2c_scan().
     Bytes transfer(const Command& command, Duration timeout = default_timeout) const;
-    // From now on, and until our session ends, the board reads every 5 to 60000 ms by itself, into slot 1-8:
+    // The board repeats the reading every 5 to 60000 ms, until our session ends, into slot 1-8:
     // State::i2c and fields("DEFAULT,I2C1").
     void poll(int slot, int address, const Bytes& register_bytes, int count, Duration period,
               Duration timeout = default_timeout) const;
@@ -312,29 +303,29 @@ class R4LINK_API Board {
     Board& board_;
   };
   I2c i2c() { return I2c(*this); }
-  // Sets a described device up (devices/device.hpp, docs/described-devices.md): is it the one? Then what is to be
-  // written, which takes arm(), and the board's readings, until our session ends; fields() is asked for their fields
-  // beside those that were chosen. Throws Error{refused} if it does not answer, or is another device; what was
-  // begun stays so. After on_restart() and a lost link it is to be set up again. `timeout`: for each step. Throws
-  // Error{usage} if another device, of another address or name, has one of its slots: its readings would become this
-  // one's. i2c().poll_off() of that slot gives the other up.
+  // Sets up a described device (devices/device.hpp, docs/described-devices.md): checks its
+  // identity, writes its registers, which needs arm(), and starts the board's readings, until our
+  // session ends. Adds their fields to those of fields(). Call it again after on_restart() and a
+  // lost link. `timeout` is for each step. Throws Error{refused} if the device does not answer or
+  // is another device; finished steps stay. Throws Error{usage} if a device of another address or
+  // name has one of its slots: i2c().poll_off() of that slot frees it.
   void attach(const Device& device, Duration timeout = default_timeout);
 
-  // A UART of the user's, 1 or 2 (docs/devices.md): setting("uart1", "115200:8N1") turns it on,
-  // fields("DEFAULT,UART1") has the board tell what comes in. That is put together here from the states: in its
-  // order, each byte once, and what is missing is counted.
+  // One of the user's UARTs, 1 or 2 (docs/devices.md): setting("uart1", "115200:8N1") turns it on,
+  // fields("DEFAULT,UART1") requests its bytes. They are put together here from the states: in
+  // order, each byte once. Missing bytes are counted.
   struct UartData {
     std::vector<std::uint8_t> bytes;
-    std::uint64_t lost = 0;  // bytes that are missing in front of these or among them
+    std::uint64_t lost = 0;  // bytes that are missing before or among these
   };
   class Uart {
    public:
-    // 1 to 48 bytes; confirmed when the board has taken them all. May move something, so that it takes arm().
+    // 1 to 48 bytes; confirmed when the board has taken all. Needs arm(): it may move something.
     void write(const std::vector<std::uint8_t>& bytes, Duration timeout = default_timeout) const;
-    // What has come since the last read(), at most 64 KB: older bytes count as lost. Waits until there is
-    // something; nothing where it does not come in time.
+    // The bytes since the last read(), at most 64 KB: older bytes count as lost. Waits until there
+    // are some; empty if none come in time.
     UartData read(Duration timeout = Duration{0}) const;
-    // The same for each state that brings some, on the thread of the callbacks; from now on.
+    // Calls `callback` for each state with new bytes, on the thread of the callbacks.
     Subscription on_bytes(std::function<void(const UartData&)> callback) const;
 
    private:
@@ -343,83 +334,80 @@ class R4LINK_API Board {
     Board& board_;
     int channel_;
   };
-  // Throws Error{usage} where there is none.
+  // Throws Error{usage} for a channel other than 1 and 2.
   Uart uart(int channel);
-  // A voltage of the board's, channel 1 or 2, 0-3300 mV; 0 in the safe state.
+  // Sets an output voltage, channel 1 or 2, 0-3300 mV; 0 in the safe state.
   void dac(Channel channel, Millivolts voltage, Duration timeout = default_timeout);
 
-  // Channels count from 1, as on the board. A channel that does not exist throws when it is used.
+  // Channels count from 1, as on the board. A channel that the board lacks throws when it is used.
   DriveChannel osmc(int channel) { return {*this, CommandKind::osmc, channel}; }
   DriveChannel dhb12(int channel) { return {*this, CommandKind::dhb12, channel}; }
   ServoChannel servo(int channel) { return {*this, channel}; }
   RelayChannel relay(int channel) { return {*this, channel}; }
   StepperChannel stepper(int channel) { return {*this, channel}; }
   BldcChannel bldc(int channel) { return {*this, channel}; }
-  // The board goes safe when the sensor sees something nearer; 0: off.
+  // The board goes safe if the sensor sees something nearer than `threshold`, 1-400 cm; 0: off.
   void proximity(Channel channel, Centimetres threshold, Duration timeout = default_timeout);
   void fields(std::string_view names, Duration timeout = default_timeout);  // "DEFAULT,ENC1"
   void setting(std::string_view key, std::string_view value, Duration timeout = default_timeout);
-  // The board's timeout and heartbeat interval together, whatever they are now: one of them alone may
-  // be refused, for the interval must stay below the timeout. Throws Error{usage} for what cannot be,
-  // and for a timeout that our own heartbeats (SessionOptions::timing) cannot keep.
+  // Sets the board's timeout and heartbeat interval together. One alone may be refused, because the
+  // interval must stay below the timeout. Throws Error{usage} for values outside their ranges, and
+  // for a timeout that our heartbeats (SessionOptions::timing) cannot keep.
   void link_timing(Duration board_timeout, Duration heartbeat, Duration timeout = default_timeout);
 
-  // --- what the board says
-
   BoardIdentity identify(Duration timeout = default_timeout);
-  // The newest state, fields merged over all datagrams since the board began: state().age() tells
-  // how old it is, also while the link is lost.
+  // The newest state, fields merged over all datagrams since the board started. state().age() is
+  // its age, also while the link is lost.
   ReceivedState state() const;
-  // Waits for a state newer than now; throws Error{refused} when none comes in time.
+  // Waits for a state newer than now. Throws Error{refused} if none comes in time.
   ReceivedState next_state(Duration timeout = default_timeout);
-  // The states from now on, for a loop: the newest at a time, or each of them.
+  // A queue of the states from now on: the newest state, or all.
   States states(StatesOptions options = {});
   LinkStatus link() const;
   Statistics statistics() const;
-  // What the transport has carried; of several paths all together.
+  // The counters of the transport, summed over all paths.
   CarrierCounters carrier_counters() const;
-  // The transport, for people; of several paths all of them. A USB board that is plugged in again may have another.
+  // The transports' names for people. One may change when a USB board is plugged in again.
   std::string name() const;
-  // How each of its paths does, in the order of the URLs; after close() as it was then.
+  // The state of each path, in the order of the URLs; after close(), the last one.
   std::vector<PathStatus> paths() const;
 
-  // Any number of callbacks of each kind, called in the order in which they were added. Each is told
-  // first what there is already: the newest state, the link, the newest up or down of the transport and
-  // the warning since. The handle ends it (subscription.hpp); without one it lasts as long as the board.
+  // Any number of callbacks of each kind, called in the order of adding. Each first gets what is
+  // known: the newest state, the link, the transport's newest up or down and a later warning. The
+  // handle ends it (subscription.hpp); otherwise it lasts as long as the board.
   Subscription on_state(std::function<void(const ReceivedState&)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
-  // A path has begun to carry, or ceased to.
+  // A path has started or stopped carrying.
   Subscription on_path(std::function<void(const PathStatus&)> callback);
-  // The board has begun again, or this computer slept for longer than the board waits for its host:
-  // what it was told is gone, thresholds of U too. Comes before its new state.
+  // The board restarted, or this computer slept for longer than the board's timeout: its settings,
+  // also the thresholds of U, are lost. Comes before the board's new state.
   Subscription on_restart(std::function<void()> callback);
-  // Armed (none), or not any more, and why.
+  // Armed (none), or disarmed and why.
   Subscription on_arming(std::function<void(DisarmCause)> callback);
-  // A command that post() took was refused: by the board, or on its way there.
+  // A posted command was refused by the board, or not sent.
   Subscription on_refused(std::function<void(const RefusedPost&)> callback);
 
-  // Every datagram from now on, in both directions, goes into a file, too (recording.hpp, docs/recordings.md), or
-  // into a recording that other boards have as well: until close(), until that is closed or gone, or until another is
-  // named. Where it ends by itself, because the disk is full, on_event() tells, and the link goes on. Throws Error if
-  // the file cannot be written.
+  // Records every datagram in both directions to a file (recording.hpp, docs/recordings.md), or to
+  // a recording that other boards share. It lasts until close(), until the recording is closed or
+  // destroyed, or until another one is named. If it ends by itself because the disk is full,
+  // on_event() reports it, and the link continues. Throws Error if the file cannot be written.
   void record(const std::string& path, RecordingOptions options = {});
   void record(Recording& recording);
 
   // Without feed() for `period` our heartbeats stop and the board goes safe; 0 turns it off. Throws
-  // Error{usage} for less than nothing and more than an hour. feed() costs no system call.
-  //
-  // A blocking call does not feed: nobody looks after the robot while its thread waits. If it outlasts
-  // the period, nothing of it is sent any more but a stop, the heartbeats stop with it, and it throws at
-  // its timeout. So give the calls of the thread that feeds timeouts below the period.
+  // Error{usage} for a period below 0 or above one hour. feed() costs no system call. A blocking
+  // call does not feed, because its thread supervises nothing while it waits. If a call outlasts
+  // the period, the heartbeats stop, only a stop is sent, and the call throws at its timeout. So
+  // give the calls of the feeding thread timeouts below the period.
   void watchdog(Duration period);
   void feed();
 
-  // For programs with an event loop of their own (async_board.hpp, with r4link::asio only). Calls
-  // `action` on the thread of the link with the AsyncBoard there, and returns at once. False if the
-  // Board is closed: then it is never called. `action`, and the handlers of what it starts there,
-  // must return at once, for heartbeats wait for them, and must not throw, nor call what waits
-  // here, nor open or close the AsyncBoard. Every handler has been called when close() returns.
+  // For programs with an event loop (async_board.hpp, with r4link::asio only). Calls `action` on
+  // the thread of the link with the AsyncBoard there, and returns at once. False if the Board is
+  // closed: then `action` is never called. `action` and the handlers of the operations that it
+  // starts must return at once, because heartbeats wait for them. They must not throw, call
+  // functions that wait here, or open or close the AsyncBoard. close() waits for handlers.
   bool post_to_loop(std::function<void(AsyncBoard&)> action);
 
  private:

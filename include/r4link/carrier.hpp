@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How whole datagrams travel: the interface that every transport implements.
-//
-// A carrier moves datagrams like UDP does: it may lose and reorder them, it never blocks, and it
-// never corrupts silently (the datagram's CRC is checked above it). It lives on one event loop (Loop, or
-// an io_context of Asio's) and is used from that loop's thread only. The first open() throws when the
-// transport cannot be opened; after that, trouble is an event, and the carrier comes back by itself when the
-// device does.
+// How whole datagrams travel: the interface that every transport implements. A carrier moves
+// datagrams as UDP does: it may lose and reorder them, never blocks and never corrupts them
+// silently (the receiver checks their CRC). It is used on the thread of its event loop (Loop or
+// io_context) only. The first open() throws if the transport cannot be opened. Later trouble is an
+// event, and the carrier reopens when the device is back.
 #pragma once
 
 #include <cstdint>
@@ -23,55 +21,54 @@ namespace r4 {
 
 enum class BoardRole : std::uint8_t;
 
-// Which end of the link a carrier serves: a host calls out to a board, a board listens for hosts.
+// Which end of the link a carrier serves: a host connects to a board, a board listens for hosts.
 enum class Role : std::uint8_t { host, board };
 
 enum class SendResult : std::uint8_t {
-  sent,  // handed to the system, or waiting for it
+  sent,  // handed to the system, or queued
   full,  // the queue is full: try again later
-  down,  // the transport is down at the moment, or nobody is known at the other end
-  busy,  // not sent, for another host commands the board from the same place (CAN)
+  down,  // the transport is down, or the peer is not known
+  busy,  // not sent, because another host controls the board through the same interface (CAN)
 };
 
 // Why datagrams do not pass although the transport is up (CAN).
 enum class TransportTrouble : std::uint8_t {
   none,
-  // frames that make no R4 datagram come on the board's command id: another protocol uses it
+  // frames on the board's command id are not R4 datagrams: another protocol uses it
   foreign_frames,
-  late_frames,  // flow control does not come in time: frames are held back, or lost
+  late_frames,  // flow control comes too late: frames wait, or are lost
 };
 // "none", "foreign frames", "late frames".
 R4LINK_API const char* to_text(TransportTrouble trouble);
 
-// Where a datagram travels in several frames (CAN): what became of the transfers, of both directions.
+// Counters of the transfers in both directions, if a datagram travels in several frames (CAN).
 struct TransferCounters {
-  // Ended a transfer, whose datagram is lost.
-  std::uint64_t wrong_sequence = 0;  // a frame was lost, doubled or overtaken
-  std::uint64_t timed_out = 0;       // a frame, or leave to send one, did not come in time
-  std::uint64_t overflow = 0;        // longer than a datagram may be
-  std::uint64_t interrupted = 0;     // another began in its place
-  std::uint64_t cancelled = 0;       // the bus went down or took nothing, or another host is there
-  // Frames that were passed over.
-  std::uint64_t unexpected = 0;  // of no transfer
+  // Failed transfers, whose datagrams are lost:
+  std::uint64_t wrong_sequence = 0;  // a frame was lost, duplicated or overtaken
+  std::uint64_t timed_out = 0;       // a frame, or the flow control for it, did not come in time
+  std::uint64_t overflow = 0;        // longer than max_datagram
+  std::uint64_t interrupted = 0;     // another transfer began before the end
+  std::uint64_t cancelled = 0;       // the bus was down or took no frames, or there is another host
+  // Ignored frames:
+  std::uint64_t unexpected = 0;  // not part of a transfer
   std::uint64_t malformed = 0;
-  // Packed datagrams that came.
-  std::uint64_t packed = 0;    // taken
-  std::uint64_t bad_form = 0;  // not what can be unpacked
+  // Received packed datagrams:
+  std::uint64_t packed = 0;    // accepted
+  std::uint64_t bad_form = 0;  // cannot be unpacked
 };
 
 struct CarrierCounters {
   std::uint64_t rx_datagrams = 0;
   std::uint64_t rx_bytes = 0;
-  std::uint64_t rx_oversize = 0;   // lines or packets that were too long, thrown away
-  std::uint64_t rx_foreign = 0;    // packets from an address that is not the board's, thrown away
-  std::uint64_t rx_overflows = 0;  // frames that the system or the controller dropped, for nobody
-                                   // took them in time (CAN)
+  std::uint64_t rx_oversize = 0;   // lines or packets that were too long and were dropped
+  std::uint64_t rx_foreign = 0;    // packets from another address than the board's, dropped
+  std::uint64_t rx_overflows = 0;  // frames that the system or controller dropped unread (CAN)
   std::uint64_t tx_datagrams = 0;
   std::uint64_t tx_bytes = 0;
-  std::uint64_t tx_dropped = 0;  // replaced by newer state, expired or refused
+  std::uint64_t tx_dropped = 0;  // replaced by a newer state, expired or refused
   std::uint64_t tx_errors = 0;
-  std::uint64_t downs = 0;                    // times the transport was lost
-  std::uint64_t ups = 0;                      // times it came (back) up
+  std::uint64_t downs = 0;                    // how often the transport went down
+  std::uint64_t ups = 0;                      // how often it came up, the first time included
   std::optional<TransferCounters> transfers;  // none: a datagram is one packet or line
 };
 
@@ -125,10 +122,9 @@ constexpr const char* to_text(CarrierEvent::Kind kind) {
   return "unknown";
 }
 
-// The loop of a board's thread, on which its carrier lives.
 class Loop {
  public:
-  // Calls `function()` there, after what was posted before it. From any thread, also from there.
+  // Calls `function()` on the loop's thread, after earlier posts. May be called from any thread.
   virtual void post(std::function<void()> function) = 0;
 
  protected:
@@ -137,20 +133,18 @@ class Loop {
 
 class R4LINK_API Carrier {
  public:
-  // Called on the loop's thread, never from within send(); may call anything of the carrier,
-  // but must not destroy it.
+  // Called on the loop's thread, never within send(). May call the carrier, not destroy it.
   class Handler {
    public:
-    // `bytes` are valid in the call. A host has one board: there `from` is `everyone`.
+    // `bytes` are valid during the call. A host has one board: there `from` is `everyone`.
     virtual void on_datagram(std::string_view bytes, Peer from) = 0;
     virtual void on_carrier_event(const CarrierEvent& event) = 0;
-    // All datagrams that had arrived have been handed over: to be called whenever that is so. A
-    // handler that was held up can tell by it which state of a backlog is the newest. After a long
-    // burst on a byte stream it may come with the next datagram only.
+    // All datagrams that have arrived were passed on. After a delay, a handler knows by it which
+    // state is the newest. After a long burst on a byte stream, it may come late.
     virtual void on_drained() {}
-    // What another program sent to the board, where that can be heard.
+    // A datagram that another program sent to the board, if the transport can hear it.
     virtual void on_overheard(std::string_view bytes) { static_cast<void>(bytes); }
-    // The first 1024 bytes of what was longer, and so is not a datagram. The rest is thrown away.
+    // The first 1024 bytes of input that is too long for a datagram. The rest is dropped.
     virtual void on_oversize(std::string_view beginning) { static_cast<void>(beginning); }
 
    protected:
@@ -162,38 +156,35 @@ class R4LINK_API Carrier {
   Carrier(const Carrier&) = delete;
   Carrier& operator=(const Carrier&) = delete;
 
-  // Opens and begins to receive. `handler` must outlive the carrier or its close(). Throws Error.
-  // A transport that is up at once reports `up` before this returns.
+  // Opens and starts to receive. `handler` must outlive the carrier or its close(). Throws Error. A
+  // transport that is up at once reports `up` before this returns.
   virtual void open(Handler& handler) = 0;
-  // Stops at once; no call of the handler follows. Can be called twice.
+  // Stops at once; no call of the handler follows. Idempotent.
   virtual void close() noexcept = 0;
 
   // Sends one datagram of at most max_datagram (1024) bytes, without a terminator. Never blocks;
-  // `bytes` are copied if they must wait. A datagram that could not be written within 100 ms is
-  // dropped and counted. A host has one board, to which it sends: `everyone`.
+  // copies `bytes` if they must wait. A datagram not written within 100 ms is dropped and counted.
+  // A host sends to its only board: `everyone`.
   virtual SendResult send(std::string_view bytes, Priority priority, Peer to = everyone) = 0;
 
-  // True where the board cannot tell one host from another: on a bus, which all hosts send to from
-  // one place, or through a program that shares its transport. A program that only watches sends
-  // nothing there but stops and leases.
+  // True if the board cannot tell one host from another: on a bus, or through a program that shares
+  // its transport. A watcher sends only stops and leases there.
   virtual bool is_shared() const { return false; }
-  // The program controls its board from now on, or watches it. Where programs of this computer
-  // share the transport, only one of them can control: throws Error{refused} with its holder() if
-  // another program does, and changes nothing then. Else the transport may be closed and opened
-  // again, within the loop's next turns; trouble with that is an event. A transport of one program
-  // has nothing to do.
+  // Changes to control or watch. If programs of this computer share the transport, one can control:
+  // if another does, throws Error{refused} with its holder() and changes nothing. Otherwise the
+  // transport may be reopened within the next turns of the loop; trouble with that is an event.
   virtual void change_role(BoardRole role) { static_cast<void>(role); }
 
   virtual bool up() const = 0;
   // Why datagrams do not pass although the transport is up, as far as it can tell.
   virtual TransportTrouble trouble() const { return TransportTrouble::none; }
-  // For people: the URL, with what `auto` found.
+  // For people: the URL, with the device that `auto` found.
   virtual const std::string& name() const = 0;
   virtual const CarrierCounters& counters() const = 0;
 };
 
-// Makes a transport of your own for the loop of a board's thread, not yet open. What it does there must
-// not block: while it does, nothing is sent. `loop` outlives it.
+// Makes a transport of your own, not yet open, for the loop of a board's thread. It must not block
+// there: nothing is sent meanwhile. `loop` outlives it.
 using CarrierMaker = std::function<std::unique_ptr<Carrier>(Loop& loop)>;
 
 }  // namespace r4

@@ -11,17 +11,15 @@
 
 namespace r4 {
 
-// --- channels and values of outputs. Each has a type of its own, so that swapped arguments do not
-// compile.
+// --- outputs: a type for each channel and value, so that swapped arguments do not compile
 
-// The number of a channel on the board, from 1. A command of a channel that the board lacks is
-// refused.
+// The number of a channel on the board, from 1. The board refuses a channel that it lacks.
 struct Channel {
   template <class Integer, class = std::enable_if_t<std::is_integral<Integer>::value &&
                                                     !std::is_same<Integer, bool>::value>>
   constexpr Channel(Integer channel)  // NOLINT(google-explicit-constructor)
       : number(in_range(static_cast<std::int64_t>(channel))) {}
-  std::uint8_t number;  // 0, which no board has, for numbers outside 1-255
+  std::uint8_t number;  // 0, which is never a channel, for numbers outside 1-255
 
  private:
   static constexpr std::uint8_t in_range(std::int64_t channel) {
@@ -29,26 +27,26 @@ struct Channel {
   }
 };
 
-// A number of one unit. A command with a value outside its range is refused.
+// A number with a unit. A value outside its range is refused.
 template <class Unit>
 struct Quantity {
   constexpr explicit Quantity(std::int32_t number) : value(number) {}
   std::int32_t value;
 };
-using Pwm = Quantity<struct PwmUnit>;                        // 0-4095 (pwm_max), the full drive
-using Microseconds = Quantity<struct MicrosecondsUnit>;      // a servo's pulse, 0 (off) to 2500
-using Steps = Quantity<struct StepsUnit>;                    // a stepper's position, of 32 bits
+using Pwm = Quantity<struct PwmUnit>;                    // 0-4095 (pwm_max), the full drive
+using Microseconds = Quantity<struct MicrosecondsUnit>;  // a servo's pulse, 0 (off) to 2500
+using Steps = Quantity<struct StepsUnit>;                // a stepper's position, any 32-bit value
 using StepsPerSecond = Quantity<struct StepsPerSecondUnit>;  // 1-20000
 using Millivolts = Quantity<struct MillivoltsUnit>;          // 0-3300
 using Centimetres = Quantity<struct CentimetresUnit>;        // 0 (off) to 400
 
-// How hard a motor is driven: from -1 (full reverse) to 1 (full forward).
+// The drive of a motor: from -1 (full reverse) to 1 (full forward).
 struct Duty {
   template <class Number, class = std::enable_if_t<std::is_arithmetic<Number>::value &&
                                                    !std::is_same<Number, bool>::value>>
   constexpr explicit Duty(Number duty) : value(static_cast<double>(duty)) {}
   constexpr bool is_in_range() const { return value >= -1 && value <= 1; }
-  // Rounded to the nearest; outside its range if the duty is.
+  // Rounded to the nearest; outside the range of Pwm if the duty is outside its range.
   constexpr Pwm pwm() const {
     const double twice = 2 * pwm_max * (value < 0 ? -value : value);
     return Pwm(is_in_range() ? (static_cast<std::int32_t>(twice) + 1) / 2 : pwm_max + 1);
@@ -59,20 +57,19 @@ struct Duty {
   double value;
 };
 
-// One command. Which members count depends on `kind`; the factories set them. `text` and `text2`
-// are views: they must outlive the command.
+// `kind` determines the members in use; the factories set them. Texts are views.
 struct R4LINK_API Command {
   Command() {}  // NOLINT(modernize-use-equals-default): else GCC calls memset for it
   CommandKind kind = CommandKind::heartbeat;
-  std::uint8_t channel = 0;     // 1 … the kind's channel count; i2c_poll: the slot
-  std::uint16_t period_ms = 0;  // i2c_poll
-  // pwm, us, cm, BLDC speed, stepper target, Hz, mV; clear: the cause it names; i2c: the device's address
+  std::uint8_t channel = 0;     // from 1 to the kind's channel count; i2c_poll: the slot
+  std::uint16_t period_ms = 0;  // i2c_poll: 5-60000
+  // pwm, us, cm, BLDC speed, stepper target, Hz, mV; clear: the cause; i2c: the device's address
   std::int32_t value = 0;
   std::int32_t speed = stepper_speed_default;  // stepper, steps per second
   Direction direction = Direction::reverse;    // osmc, dhb12, bldc
   bool on = false;                             // relay; bldc: brake
-  std::uint8_t count = 0;                      // i2c: how many bytes to read
-  // fields, watch: the list; setting: the key; i2c: the register or what is written, as "x3B"; uart: bytes
+  std::uint8_t count = 0;                      // i2c: number of bytes to read
+  // fields, watch: the list; setting: the key; i2c, uart: the register or the bytes, as "x3B"
   Text text;
   Text text2;  // setting: the value
 
@@ -88,49 +85,48 @@ struct R4LINK_API Command {
   static Command servo(Channel channel, Microseconds pulse);
   static Command relay(Channel channel, bool on);
   static Command stop();
-  // `cause`: the number of the cause to be cleared, as the board's heartbeats tell it (CAUSE); 0 if
-  // they tell none. unnamed_cause: a host that does not know of such numbers, or Session, which puts
-  // the number in.
+  // `cause`: the number of the cause to clear, from CAUSE in the board's heartbeats; 0 if they have
+  // none. unnamed_cause: the host does not know cause numbers, or Session fills the number in.
   static constexpr std::int32_t unnamed_cause = -1;
   static Command clear(std::int32_t cause = unnamed_cause);
-  // The controlling host ends: the board is safe at once, and whoever comes next may control it.
+  // Ends control: the board is safe at once, and any host may control it.
   static Command leave();
   static Command stepper(Channel channel, Steps position,
                          StepsPerSecond speed = StepsPerSecond(stepper_speed_default));
-  // The stepper's position and the encoder's count become 0.
+  // Sets the stepper's position and the encoder's count to 0.
   static Command zero(Channel channel);
   static Command bldc(Channel channel, Pwm speed, Direction direction, bool brake = false);
   static Command bldc(Channel channel, Duty duty, bool brake = false) {
     return bldc(channel, duty.pwm(), duty.direction(), brake);
   }
-  // The board goes safe when the sensor sees something nearer.
+  // The board goes safe if the sensor sees something nearer than `threshold`, 1-400 cm; 0: off.
   static Command proximity(Channel channel, Centimetres threshold);
   static Command fields(Text list);
   static Command setting(Text key, Text value);
   static Command identify();
-  // For two seconds the board streams to whoever sends it, without control; 0: no more. `list`: the fields;
-  // empty: those that the host in control has chosen.
+  // The board streams its states to the sender for two seconds, without control; 0 Hz ends that.
+  // `list`: the fields; empty: those that the controlling host has chosen.
   static Command watch(std::int32_t rate_hz, Text list = Text());
-  // On the user's I2C bus (docs/devices.md). Addresses have 7 bits; bytes are written as x and two hexadecimal
-  // digits each: "x75", and "x" for none. The answer comes as I2CX in the state.
+  // On the user's I2C bus (docs/devices.md): 7-bit addresses; bytes as x and two hexadecimal digits
+  // each, "x75", and "x" for none. The answer comes as I2CX in the state.
   static Command i2c_read(int address, Text register_bytes, int count);
-  static Command i2c_write(int address, Text bytes, int count = 0);  // then reads so many
+  static Command i2c_write(int address, Text bytes, int count = 0);  // then reads `count` bytes
   static Command i2c_scan();
-  // The board reads by itself, every `period_ms`; the state tells it as I2C1 … I2C8.
+  // The board reads every `period_ms` (5-60000) by itself; I2C1 … I2C8 of the state have the bytes.
   static Command i2c_poll(int slot, int address, Text register_bytes, int count, int period_ms);
   static Command i2c_poll_off(int slot);
-  // On a UART of the user's: at most uart_max_write bytes.
+  // On one of the user's UARTs: at most uart_max_write bytes.
   static Command uart_write(Channel channel, Text bytes);
-  // A voltage of the microcontroller's; 0 in the safe state.
+  // One of the user's output voltages, 0-3300 mV; 0 in the safe state.
   static Command dac(Channel channel, Millivolts voltage);
 };
 
-// The most commands of one datagram. Several are a group: output commands, no two of them for the same
-// channel, that are executed together, or none of them (docs/protocol.md; setpoints.hpp).
+// The most commands in one datagram. Several are a group: output commands for different channels,
+// which are executed together or not at all (docs/protocol.md; setpoints.hpp).
 constexpr int max_group = 16;
 
-// Is every value of a command, made by a factory, in its range? Refusal::format, ::channel or ::range if
-// not; settings and names of fields are not looked at.
+// Checks the ranges of a command that a factory has made: Refusal::format, ::channel or ::range if
+// a value is wrong. Settings and names of fields are not checked.
 R4LINK_API Refusal check_command(const Command& command);
 
 }  // namespace r4

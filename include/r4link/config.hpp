@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The version, which is written here and nowhere else, and what the shared library exports.
+// The version, which is written only here, and what the shared library exports.
 #pragma once
 
 #define R4LINK_VERSION "0.1.0"
 
-// Everything else is hidden; tests/install/exports.txt lists what this is on.
+// Every other symbol is hidden; tests/install/exports.txt lists the exported ones.
 #define R4LINK_API __attribute__((visibility("default")))
 #define R4LINK_PRIVATE __attribute__((visibility("hidden")))

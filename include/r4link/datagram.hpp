@@ -6,9 +6,8 @@
 //     name     = 1*(%x21-7E except ":" ";" "," "^")
 //     value    = *(%x20-7E except ";" "," "^")
 //
-// read_datagram() accepts a datagram whole or not at all. What it accepts is a view: it holds no copy and is
-// valid as long as the bytes are. Reading costs no heap and one pass over the bytes besides the
-// CRC; going over the fields costs no second one.
+// read_datagram() accepts a whole datagram or nothing. A Datagram is a view: valid as long as the
+// bytes. Reading allocates nothing and takes one pass over the bytes besides the CRC.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +19,7 @@
 
 namespace r4 {
 
-// The longest datagram, terminator not counted (docs/protocol.md).
+// The longest datagram in bytes, without the terminator (docs/protocol.md).
 constexpr std::size_t max_datagram = 1024;
 
 enum class ReadError : std::uint8_t {
@@ -33,17 +32,15 @@ enum class ReadError : std::uint8_t {
 // "length", "syntax", "crc"; "" for none.
 R4LINK_API const char* to_text(ReadError error);
 
-// The outcome of reading: where it went wrong (a byte offset; for crc that of the claimed
-// checksum's first digit) and, for crc, both checksums.
+// The outcome; `position`: byte offset of the error (crc: of the checksum's first digit).
 struct ReadResult {
   ReadError error = ReadError::none;
   std::size_t position = 0;
-  std::uint32_t crc_expected = 0;  // of the bytes that are there
-  std::uint32_t crc_found = 0;     // what the datagram claims
+  std::uint32_t crc_expected = 0;  // computed from the bytes
+  std::uint32_t crc_found = 0;     // from the end of the datagram
   explicit operator bool() const { return error == ReadError::none; }
 };
 
-// One field: its name and its comma-separated values.
 class R4LINK_API Field {
  public:
   Field() = default;
@@ -51,7 +48,7 @@ class R4LINK_API Field {
   Text name() const { return name_; }
   Text values() const { return values_; }  // all, commas included
   std::size_t count() const;               // number of values, at least 1
-  // Splits the first `max` values into `out`; returns count(), which may be larger than `max`.
+  // Writes the first `max` values to `out`; returns count(), which may be larger than `max`.
   std::size_t split(Text* out, std::size_t max) const;
 
  private:
@@ -59,24 +56,22 @@ class R4LINK_API Field {
   Text values_;
 };
 
-// True if a field with this letter for its name is a command. T (time) and A (authentication) are
-// not.
+// True if a field of this name is a command. T (time) and A (authentication) are not.
 constexpr bool is_command_letter(char c) {
   return ((c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z')) && c != 'T' && c != 'A';
 }
 
-// True if the field is a command, by its name.
+// True if the name of the field is a command letter.
 inline bool is_command(const Field& field) {
   return field.name().size() == 1 && is_command_letter(field.name()[0]);
 }
 
-// Reads one field that stands alone, without its semicolon: "O:358,1,1". False if it is not of the
-// grammar above; `out` is only written on success.
+// Reads a field without semicolon: "O:358,1,1". False if invalid; `out` is written on success only.
 R4LINK_API bool read_field(Text text, Field& out);
 
 class R4LINK_API Datagram {
  public:
-  // Forward iteration over the fields in the order of the wire. Valid as long as the Datagram is.
+  // Forward iteration over the fields in wire order. Valid as long as the Datagram.
   class Iterator {
    public:
     const Field& operator*() const { return field_; }
@@ -98,7 +93,7 @@ class R4LINK_API Datagram {
 
     const char* at_;
     const char* end_;
-    // The ends of names and fields that are not yet passed, in the current word.
+    // The ends of names and fields ahead, in the current word.
     const std::uint64_t* word_ = nullptr;
     std::uint64_t ends_ = 0;
     const char* word_begin_ = nullptr;
@@ -114,27 +109,26 @@ class R4LINK_API Datagram {
 
   // The datagram's bytes without the line terminator.
   Text bytes() const { return bytes_; }
-  // The first field of that name; a Field with an empty name if there is none.
+  // The first field of that name; a Field with an empty name if the datagram has none.
   Field find(Text name) const;
 
-  // Of all bytes up to and including the first `^`; as the datagram says itself.
+  // Of all bytes up to and including the first `^`, as the datagram gives it.
   std::uint32_t checksum() const { return checksum_; }
-  // PNum and T, where the datagram has them as whole numbers. A host heartbeat may lack PNum.
+  // PNum and T, if they are there. A host heartbeat may lack PNum.
   bool has_pnum() const { return has_pnum_; }
   std::uint32_t pnum() const { return pnum_; }
   bool has_time() const { return has_time_; }
   std::uint64_t time_ms() const { return time_ms_; }
-  // The id of the session that it belongs to (SID); no_session if it names none.
+  // The id of its session (SID); no_session if it has none.
   SessionId session_id() const { return sid_; }
-  // The fields that are commands by their name: how many there are (none or several are no command),
-  // and the first.
+  // The number of fields whose names are command letters (none or several may be), and the first.
   int command_count() const { return command_count_; }
   const Field& command() const { return command_; }
 
  private:
   friend ReadResult read_datagram(Text bytes, Datagram& out);
-  // Reads PNum, T and SID, and finds the letters, which are among the names whose ends are in
-  // `short_names`; where a number is wrong, nullptr if none is.
+  // Reads PNum, T and SID, and finds the command letters among the names whose ends are in
+  // `short_names`. Returns the place of an invalid number, or nullptr.
   const char* read_short_names(const std::uint64_t* short_names);
   Text values_at(std::size_t word, std::uint64_t bit) const;
 
@@ -148,14 +142,13 @@ class R4LINK_API Datagram {
   bool has_time_ = false;
   int command_count_ = 0;
   Field command_;
-  // Where names and fields end, in turn: bit i of word k is byte 64 k + i of fields_. Only the
-  // words of fields_ are ever written or read.
+  // Where names and fields end, alternately: bit i of word k is byte 64 k + i of fields_. Only the
+  // words that fields_ needs are written or read.
   static constexpr std::size_t words = max_datagram / 64;
   std::uint64_t ends_[words];
 };
 
-// The number of the lowest bit that is set; there is one. On a 32-bit processor the compiler would
-// call a function.
+// Index of the lowest set bit; `bits` is not 0. A 32-bit processor's builtin would call a function.
 inline int lowest_bit(std::uint64_t bits) {
 #if UINTPTR_MAX > 0xFFFFFFFFU
   return __builtin_ctzll(bits);
@@ -191,10 +184,9 @@ inline void Datagram::Iterator::load() {
                  Text(colon + 1, static_cast<std::size_t>(semicolon - colon - 1)));
 }
 
-// Checks `bytes` (one datagram, with or without its line terminator) and makes `out` a view of it.
-// Never fails but by its result; `out` is only written on success. A PNum or T that is not a whole
-// number in range (32 bit, 64 bit), a SID that is not 16 hexadecimal digits, or is 0, and one of
-// them that is there twice, is `syntax`. Linear in the size.
+// Checks one datagram, with or without terminator, and on success makes `out` a view of it.
+// `syntax` also for a PNum (32 bit) or T (64 bit) that is not a whole number in range, for a SID
+// that is 0 or not 16 hexadecimal digits, and for a duplicate of these.
 R4LINK_API ReadResult read_datagram(Text bytes, Datagram& out);
 
 }  // namespace r4

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The one error type of the host: what went wrong, why, and what to do about it.
+// The one error type of the host: what is wrong, why, and how to fix it.
 #pragma once
 
 #include <cstdint>
@@ -15,41 +15,35 @@
 
 namespace r4 {
 
-// What kind of trouble; the value is the exit code of `r4` (docs/transports.md).
+// The value is the exit code of `r4` (docs/transports.md).
 enum class ErrorKind : int {
-  data = 1,         // a datagram, a recording or a file is bad
-  usage = 2,        // a URL, an option or a command is wrong
+  data = 1,         // an invalid datagram, recording or file
+  usage = 2,        // a wrong URL, option or command
   refused = 3,      // the board refused, or did not confirm in time
-  open = 4,         // the transport cannot be opened or is gone
-  permission = 5,   // the system denies it
-  unsupported = 6,  // kernel support or interface missing
+  open = 4,         // the transport cannot be opened or is down
+  permission = 5,   // the system denies access
+  unsupported = 6,  // kernel support or an interface is missing
 };
 
-// How a command ended.
 enum class Outcome : std::uint8_t {
-  none,       // no command is concerned
-  confirmed,  // the board's own state says so
-  refused,    // the board refused it, and did not execute it: the Refusal
-  timed_out,  // no confirmation until the deadline; it may or may not have been executed
-  cancelled,  // given up: a stop, a newer cause to be safe or another clock of the board came first, or the program did
-  closed,     // given up: the board was closed
+  none,       // not about a command
+  confirmed,  // by the board's state
+  refused,    // the board refused it and did not execute it: see the Refusal
+  timed_out,  // not confirmed by the deadline; the board may have executed it
+  cancelled,  // ended by a stop, a newer safe cause, another clock of the board, or the program
+  closed,     // ended because the board was closed
   blocked,    // the board's thread does not answer: not sent, or not confirmed
-  full,       // not taken: 64 commands are under way already
-  not_armed,  // not sent: it drives an output and the session is not armed, because of `disarmed`;
-              // arm() itself: it cannot be armed while that is so
+  full,       // not accepted: 64 commands are under way
+  not_armed,  // not sent: output commands, or arm() itself, are blocked by the cause in `disarmed`
 };
 
 // "confirmed", "refused", "timed out" …
 R4LINK_API const char* to_text(Outcome outcome);
 
-// Text of others (a name, a host name, a line of a file) as one line that a terminal or a log may
-// show. What would move the cursor, colour, hide or reorder text is written as \xNN, a byte each:
-// control characters, also line feed and tab; what is not UTF-8; characters without a width, or with
-// a direction of their own. Everything else stays, so that printable() of such a line changes
-// nothing.
+// Foreign text as one line that is safe for a terminal or a log. Writes as \xNN: control characters
+// (also line feed and tab), invalid UTF-8, text without width or with direction. Idempotent.
 R4LINK_API std::string printable(std::string_view text);
 
-// A program of this computer.
 struct Program {
   int pid = 0;  // 0: not known
   std::string name;
@@ -58,17 +52,17 @@ struct Program {
 // A problem in words: "/dev/ttyACM0: permission denied; add yourself to the group dialout: …".
 struct Problem {
   ErrorKind kind = ErrorKind::open;
-  std::string thing;   // what it is about: a URL, a device, a command
-  std::string reason;  // why
-  std::string fix;     // what to do; empty where nobody can know
-  // For programs, where it is about a command.
+  std::string thing;  // the subject: a URL, a device, a command
+  std::string reason;
+  std::string fix;  // how to fix it; may be empty
+  // If it is about a command:
   Outcome outcome = Outcome::none;
   Refusal refusal = Refusal::none;  // for Outcome::refused
-  std::uint8_t at = 0;              // which command of a group, from 1; 0: none in particular
-  // The program that controls the transport already, where that is the reason.
+  std::uint8_t at = 0;              // which command of a group, from 1; 0: no particular one
+  // The program that controls the transport already, if that is the reason.
   std::optional<Program> holder{};
 
-  // "thing: reason; fix", printable: one line, whatever the parts hold.
+  // "thing: reason; fix" as one printable() line.
   R4LINK_API std::string text() const;
 };
 
@@ -89,8 +83,7 @@ class R4LINK_API Error : public std::runtime_error {
   Problem problem_;
 };
 
-// The problem behind an error of Asio or of the standard library: the system refuses `thing` a
-// thread, a descriptor, a watch. Of kind open.
+// An Asio or library error as a problem of kind open: no thread, descriptor or watch for `thing`.
 R4LINK_API Problem problem_of(const std::string& thing, const std::system_error& error);
 
 }  // namespace r4

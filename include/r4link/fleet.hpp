@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Fleet: many boards on one thread, opened by URLs and by patterns of URLs. r4::Bridge: the same boards for hosts on
-// another transport, at the end.
+// r4::Fleet: many boards on one thread. r4::Bridge, below: joins two transports.
 //
 //     r4::Fleet fleet({"can://can0?node=0-7", "udp://10.0.0.{1-250}?listen=0"});
 //     fleet.wait_active();
@@ -10,17 +9,15 @@
 //     fleet["can://can0?node=3"].send("S:1500,1");  // one of them
 //     fleet.stop();                                // all of them, at once
 //
-// Boards count from 0, in the order of the URLs; a pattern stands for its boards in order (docs/fleet.md), and '+' joins
-// several paths to a board: "can://can0?node=0-7+can://can1?node=0-7". Their links live on one thread and one loop; those
-// on a CAN bus share one socket. Each is a link of its own: a board that is silent disturbs no other one, and every
-// state has its time on this computer's clock (ReceivedState::sampled).
+// Boards count from 0, in the order of the URLs. A pattern stands for its boards in order
+// (docs/fleet.md). '+' joins the paths to one board: "can://can0?node=0-7+can://can1?node=0-7". All
+// links live on one thread and one loop; boards on one CAN bus share a socket. A silent board does
+// not disturb another. ReceivedState::sampled is comparable across boards.
 //
-// Thread-safe, and nothing here blocks the links. As with a Board, each board goes safe by itself when this object
-// is gone or its process hangs, what has not been sent by its timeout never is, and only a stop goes out in any
-// case. A program whose own thread may hang says watchdog() and feed().
-//
-// What concerns the whole call throws r4::Error: usage for what cannot be sent, refused when the fleet was closed.
-// What concerns one board of many is its entry in the result.
+// Thread-safe; no call blocks the links. As with Board: if this object is destroyed or its process
+// hangs, all boards go safe. A command that was not sent by its timeout is never sent, except a
+// stop. If your thread may hang, use watchdog() and feed(). A problem of the whole call throws
+// r4::Error: usage, or refused after close(). A problem of one board is its entry in the result.
 #pragma once
 
 #include <chrono>
@@ -44,35 +41,33 @@
 
 namespace r4 {
 
-// How a board of a fleet is.
 struct BoardHealth {
   std::size_t board = 0;
-  std::string url;         // that it was opened by
-  BoardIdentity identity;  // empty until it has answered
+  std::string url;         // as given to Fleet
+  BoardIdentity identity;  // empty until the board has answered
   LinkStatus link;
-  bool in_control = false;  // commands go out at once
+  bool in_control = false;  // the board takes our commands: they are sent at once
   DisarmCause disarmed_by = DisarmCause::not_yet;
   Statistics statistics;
-  std::vector<PathStatus> paths;  // of several; of one alone it is empty
-  // Its commands go out and nothing is wrong: ACTIVE and in control.
+  std::vector<PathStatus> paths;  // empty if the board has one path only
+  // True if the board is ACTIVE, in control and its commands are sent.
   bool well() const { return in_control && link.state == HostLinkState::active && !link.gated(); }
 };
 
-// What became of a command at one board.
 struct FleetResult {
   std::size_t board = 0;
   CommandResult result;
-  Problem problem;  // in words, with the board's URL; of a confirmed one empty
+  Problem problem;  // in words, with the board's URL; empty if confirmed
   bool confirmed() const { return result.outcome == Outcome::confirmed; }
 };
 
-// What became of a command at several boards, in the order in which they were named.
+// The results of a command, in the order in which the boards were named.
 class R4LINK_API FleetResults {
  public:
   explicit FleetResults(std::vector<FleetResult> results) : results_(std::move(results)) {}
   bool all_confirmed() const;
-  std::vector<std::size_t> failed() const;  // the boards
-  // Throws Error{refused} if not all are confirmed: the first that is not, and how many others.
+  std::vector<std::size_t> failed() const;  // the numbers of the boards
+  // Throws Error{refused} if one is not confirmed: names the first one, and counts the rest.
   void require() const;
 
   std::size_t size() const { return results_.size(); }
@@ -84,15 +79,15 @@ class R4LINK_API FleetResults {
   std::vector<FleetResult> results_;
 };
 
-// Something that happened to a board.
 struct FleetEvent {
   enum class Kind : std::uint8_t {
-    link,       // `link` is another
-    transport,  // `transport` tells
-    arming,     // `disarmed_by` is another; none: armed
-    restart,    // the board has begun again: what it was told is gone
-    refused,    // a command that post() took was refused: `refused`
-    missed,     // this many events were dropped before this one, for nobody took them: `count`
+    link,       // `link` has changed
+    transport,  // `transport` is an event of the transport
+    arming,     // `disarmed_by` has changed; none: armed
+    restart,    // the board restarted: its settings are lost
+    refused,    // the board refused a posted command: `refused`
+    // `count` events were dropped before this one, because next_event() was not called in time
+    missed,
   };
   Kind kind = Kind::link;
   std::size_t board = 0;
@@ -121,7 +116,6 @@ constexpr const char* to_text(FleetEvent::Kind kind) {
   return "unknown";
 }
 
-// Output commands for one board, executed together there.
 struct BoardSetpoints {
   std::size_t board = 0;
   Setpoints setpoints;
@@ -135,32 +129,28 @@ class R4LINK_API Fleet {
   using Boards = std::vector<std::size_t>;
   static constexpr Duration default_timeout{1000};
 
-  // Opens all transports and begins the links; returns without waiting for the boards. Options are those of each
-  // board (callback_limit is of no use here; on_wait is called by calls that wait). Throws Error: for a wrong URL
-  // or pattern, for one that stands twice, and for the first transport that cannot be opened.
+  // Opens all transports and starts the links, without waiting for the boards. callback_limit has
+  // no effect; waiting calls call on_wait. Throws Error for a wrong URL or pattern, a duplicate,
+  // and the first transport that cannot be opened.
   explicit Fleet(const std::vector<std::string>& patterns, BoardOptions options = {});
   ~Fleet();
   Fleet(const Fleet&) = delete;
   Fleet& operator=(const Fleet&) = delete;
 
-  // As Board::close(), of all at once. At most 100 ms.
+  // As Board::close(), for all boards at once. Blocks for at most 100 ms.
   void close();
 
   std::size_t size() const;
   const std::string& url(std::size_t board) const;
-  // The board of that URL, name or board id, as far as it has told them. Throws Error{usage} if there is none, or
-  // more than one.
+  // The board of that URL, reported name or board id. Throws Error{usage} unless it is exactly one.
   std::size_t find(std::string_view url_or_name) const;
   FleetBoard operator[](std::size_t board);
   FleetBoard operator[](std::string_view url_or_name);
 
-  // --- all of them, or those that are named
-
-  // Waits until all are ACTIVE under our control (where the program only watches: are heard). Returns those that
-  // are not by then.
+  // Waits until all are ACTIVE under our control (watcher: heard). Returns those that are not.
   Boards wait_active(Duration timeout = Duration{3000});
   std::vector<BoardHealth> health() const;
-  // The newest state of each, at one instant.
+  // The newest state of each board, all read at one instant.
   std::vector<ReceivedState> states() const;
 
   FleetResults send(const Command& command, Duration timeout = default_timeout);
@@ -170,30 +160,29 @@ class R4LINK_API Fleet {
   FleetResults send(std::string_view text, Duration timeout = default_timeout);
   FleetResults send(const Boards& boards, std::string_view text,
                     Duration timeout = default_timeout);
-  // Setpoints of several boards, each confirmed by its own.
+  // Setpoints of several boards; each board confirms its own.
   FleetResults send(const std::vector<BoardSetpoints>& setpoints,
                     Duration timeout = default_timeout);
   FleetResults arm(Duration timeout = default_timeout);
   FleetResults arm(const Boards& boards, Duration timeout = default_timeout);
 
-  // E:STOP to all in one pass, before this waits for anything: by one frame on each CAN bus, which stops all its
-  // boards, ours or not; repeated until each has confirmed it. Does not throw where boards do not confirm: their
-  // results say to cut the power, and it is repeated to them for default_timeout behind the call. On a CAN bus that
-  // stops all its boards again.
+  // Sends E:STOP to all boards in one pass before it waits, and repeats it until each has
+  // confirmed. One frame on each CAN bus stops all boards there, also foreign ones. Does not throw
+  // if boards do not confirm: their results say to cut the power, and the stop is repeated to them
+  // (and their buses) for default_timeout more.
   FleetResults stop(Duration timeout = default_timeout);
   void stop_async();  // does not wait; repeated for default_timeout
 
-  // Setpoints sent once, in one pass of the loop, and not confirmed: which were sent, in their
-  // order. For streams.
+  // Sends once, in one pass of the loop, without confirmation; outcomes in order. For streams.
   std::vector<PostResult> post(const std::vector<BoardSetpoints>& setpoints);
 
-  // The next thing that has happened, oldest first; none if there is nothing in time. The newest 4096 are kept.
+  // Waits for the next event, oldest first; empty if none comes. Keeps the newest 4096.
   std::optional<FleetEvent> next_event(Duration timeout = Duration{0});
 
-  // Every datagram of every board from now on goes into that recording, too.
+  // Records every datagram of every board, from now on.
   void record(Recording& recording);
 
-  // As of Board, for all boards: without feed() for `period` the heartbeats stop, and all go safe.
+  // As Board::watchdog(): without feed() for `period`, all boards go safe.
   void watchdog(Duration period);
   void feed();
 
@@ -203,7 +192,7 @@ class R4LINK_API Fleet {
   std::unique_ptr<Impl> impl_;
 };
 
-// One board of a fleet, which must outlive it. Calls throw as those of Board do.
+// One board of a fleet; the fleet must outlive it. Calls throw as those of Board do.
 class R4LINK_API FleetBoard {
  public:
   using Duration = Fleet::Duration;
@@ -234,20 +223,19 @@ class R4LINK_API FleetBoard {
 
 enum class BridgeSide : std::uint8_t { hosts, board };
 
-// What came from one side of a bridge, in datagrams, and what became of it.
+// Counts of the datagrams from one side of a bridge.
 struct BridgeCounters {
-  std::uint64_t passed = 0;  // to the other side
-  std::uint64_t stops = 0;   // of those: emergency stops
+  std::uint64_t passed = 0;  // sent to the other side
+  std::uint64_t stops = 0;   // emergency stops among them
   // Dropped:
-  std::uint64_t damaged = 0;  // a wrong checksum, too long, or no datagram at all
-  std::uint64_t misdirected =
-      0;  // what only a board says from the hosts' side, or the other way round
-  std::uint64_t kept_out = 0;  // of hosts that are not served: docs/bridge.md
+  std::uint64_t damaged = 0;      // a wrong checksum, too long, or not a datagram
+  std::uint64_t misdirected = 0;  // only a board sends it but a host did, or the reverse
+  std::uint64_t kept_out = 0;     // from hosts that are not served: docs/bridge.md
   std::uint64_t refused =
-      0;  // not signed though it must be, or a setting that only a cable may change
-  std::uint64_t late = 0;         // may have waited for more than 100 ms: the bridge was held up
-  std::uint64_t undelivered = 0;  // the other side is away, takes no more, or nobody is known there
-  // Of what passed: a newer state took its place in front of the other side, or it waited there for 100 ms.
+      0;                   // an unsigned command that must be signed, or a setting for a cable only
+  std::uint64_t late = 0;  // the bridge was held up: may have waited for more than 100 ms
+  std::uint64_t undelivered = 0;  // the other side is down or full, or its peer is not known
+  // Of `passed`: replaced by a newer state while it waited, or dropped after 100 ms.
   std::uint64_t outdated = 0;
 };
 
@@ -257,13 +245,11 @@ struct BridgeEnd {
   BridgeCounters from;
 };
 
-// One board and its hosts.
 struct BridgeStatus {
   BridgeEnd hosts;
   BridgeEnd board;
 };
 
-// A transport went down, came up or has a warning.
 struct BridgeEvent {
   std::size_t pair = 0;  // which board, from 0
   BridgeSide side = BridgeSide::hosts;
@@ -271,43 +257,39 @@ struct BridgeEvent {
 };
 
 struct BridgeOptions {
-  // The board's keys, at most four (load_key()). With one the bridge passes only heartbeats and
-  // commands that are signed with it, as a board does that is reached by radio; stops and questions
-  // pass without.
+  // The board's keys, at most four (load_key()). With a key, only heartbeats and commands signed
+  // with it pass, as on a radio; stops and questions always do.
   std::vector<Key> keys;
-  // A board obeys its own cable without a signature. Unless this is set, a bridge to a cable
-  // therefore passes nothing unsigned to a board that has a key, and is refused on a network
-  // without `keys`. Set it, and everyone who reaches the hosts' side may drive the board.
+  // A board obeys its own cable unsigned. So by default a bridge to a cable passes nothing unsigned
+  // to a board with a key, and is refused on a network without `keys`. True: any host may drive.
   bool open = false;
-  // After so long without a heartbeat of the host that has the place another one gets it: no shorter than the
-  // board's timeout.
+  // How long a served host may be silent before another is served; at least the board's timeout.
   std::chrono::milliseconds timeout{1000};
-  // Called on the bridge's thread, which it must not hold up.
+  // Called on the bridge's thread; must not block.
   std::function<void(const BridgeEvent&)> on_event;
 };
 
-// Carries the datagrams of hosts to a board and back, as they are, on a thread of its own:
+// Passes the datagrams of hosts to a board and back, unchanged, on its own thread. Thread-safe.
 //
 //     r4::Bridge bridge("udp://0.0.0.0:2018", "can://can0?node=3");
 //     r4::Bridge bus("udp://0.0.0.0:2100-2107", "can://can0?node=0-7");
 //
-// It makes no heartbeat: a board whose host has died goes safe. Of several hosts one at a time is let through, and
-// E:STOP of any. A device that is not there, or goes, is waited for. What only a cable may set
-// (C:key, C:network …) never passes. Thread-safe.
+// It makes no heartbeats: if the host dies, the board goes safe. One host at a time is served, but
+// any E:STOP passes. Waits for a missing device. Cable-only settings (C:key …) never pass.
 class R4LINK_API Bridge {
  public:
-  // `hosts`: where hosts are heard, as r4 sim takes it; `board`: as a host takes it. Patterns of as many boards
-  // (docs/fleet.md) are joined in order. Throws Error: usage, permission, and what a port cannot be opened for.
+  // `hosts`: the URL to listen on, as for r4 sim; `board`: the board's URL. Patterns of equal size
+  // (docs/fleet.md) are paired in order. Throws Error: usage, permission, and as the transports do.
   Bridge(std::string_view hosts, std::string_view board, BridgeOptions options = {});
   ~Bridge();
   Bridge(const Bridge&) = delete;
   Bridge& operator=(const Bridge&) = delete;
 
-  // Ends it at once; the boards go safe after their timeout. Can be called twice.
+  // Stops at once; the boards go safe by their timeouts. Idempotent.
   void close();
 
-  std::size_t size() const;  // boards
-  // Of each, in order; after close(), how it was then.
+  std::size_t size() const;  // number of boards
+  // The status of each pair, in order; after close(), the last one.
   std::vector<BridgeStatus> status() const;
 
  private:

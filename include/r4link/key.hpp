@@ -26,14 +26,13 @@ struct Key {
 R4LINK_API bool operator==(const Key& a, const Key& b);
 inline bool operator!=(const Key& a, const Key& b) { return !(a == b); }
 
-// Reads a key's text. Refusal::format: it is not of the form above; Refusal::range: the id is not 1-9. `out`
-// changes only on Refusal::none.
+// Reads a key. Refusal::format: not as above; ::range: the id is not 1-9. `out`: only if none.
 R4LINK_API Refusal parse_key(Text text, Key& out);
-// Splits a text "<id>:<rest>" whose id is in range; as parse_key.
+// Splits "<id>:<rest>", with the refusals of parse_key().
 R4LINK_API Refusal split_key(Text text, std::uint8_t& id, Text& rest);
 
 constexpr std::size_t key_text_size = 2 + 2 * key_size;
-// Writes the text of a key and returns the position behind it.
+// Writes key_text_size characters without a NUL, and returns the position after them.
 R4LINK_API char* write_key(char* out, const Key& key);
 
 }  // namespace r4

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What both forms of the board, blocking (board.hpp) and asynchronous (async_board.hpp), take.
+// Options of the blocking board (board.hpp) and the asynchronous one (async_board.hpp).
 #pragma once
 
 #include <chrono>
@@ -14,10 +14,10 @@
 
 namespace r4 {
 
-// What a program is to its board. take_control() and release_control() change it at run time.
+// What a program is to its board; take_control() and release_control() change it.
 enum class BoardRole : std::uint8_t {
-  control,  // sends heartbeats, and commands the board as soon as no other host does
-  watch,  // gets what the board says, and takes no control: it may stop the board, and nothing else
+  control,  // sends heartbeats, and commands when no other host controls the board
+  watch,    // reads states without control; may only stop the board
 };
 // "control", "watch"; "unknown" for other numbers.
 constexpr const char* to_text(BoardRole role) {
@@ -31,50 +31,46 @@ constexpr const char* to_text(BoardRole role) {
 }
 
 struct SessionOptions {
-  // States a second for a program that watches, 1-1000; the board sends no more than its own `rate`. What else is
-  // carried to the same place, as on a CAN bus, comes as well.
+  // States per second for a watcher, 1-1000; limited by the board's `rate`. On a CAN bus, a watcher
+  // also gets states that are sent for other programs.
   int watch_rate_hz = 100;
   LinkTiming timing;
-  // Must a program call arm() before it drives, and again after whatever made the outputs safe?
+  // Whether a program must call arm() before it drives, and after most safe states (Board::arm()).
   Arming arming = Arming::required;
-  // The state fields to ask for, as in F; SAFE and CMD, and RELAYS for arming, are added, to these and
-  // to those of any F that is sent. Empty: leave the board's choice, and every F, alone. One that watches gets
-  // the fields that the host in control has chosen, but for others than "DEFAULT" here.
+  // The state fields to request, as F; SAFE and CMD, and RELAYS for arming, are added to any F.
+  // Empty: F is neither sent nor changed. "DEFAULT" for a watcher: the controlling host's.
   std::string fields = "DEFAULT";
   std::chrono::milliseconds command_retry{50};
   std::chrono::milliseconds stop_retry{20};
-  // For how long a stop is repeated after it was confirmed.
+  // How long a stop is repeated after it is confirmed.
   std::chrono::milliseconds stop_linger{200};
-  // Q:ID, for identity and round-trip time; 0: never. Then it is not known either that the board takes a
-  // farewell, and none is said, unless the program asks who it is.
+  // Period of Q:ID, for identity and round-trip time; 0: never. Then farewells need identify().
   std::chrono::milliseconds identify_interval{1000};
-  // The board's key. Each host has its own, by its id: of two that share one, the slower is taken for
-  // a replay.
+  // The board's key. Each host needs an id of its own: a shared one makes the slower host a replay.
   std::optional<Key> key;
-  // When the session's clock began, in microseconds since 1970: a host that begins again must go on
-  // counting above what it has used.
+  // Start of the session's clock, us since 1970. A restarted host must continue above used values.
   Time clock_start{0};
 };
 
 struct BoardOptions {
   BoardRole role = BoardRole::control;
   SessionOptions session;
-  // Of Board only: after so long in the callbacks of one event the heartbeats stop, and the board goes safe, for
-  // nobody looks after the robot; up to an hour, 0 turns it off. They go on when it returns.
+  // Board only: after this time in the callbacks of one event the heartbeats stop and the board
+  // goes safe, as nothing supervises the robot. They resume afterwards. At most one hour; 0: off.
   std::chrono::milliseconds callback_limit{500};
-  // Of Board only: called by each call that waits, on its thread, every 50 ms. What it throws ends that call, as
-  // its timeout does: what has not been sent by then never is, but for a stop. None: it just waits.
+  // Board only: each waiting call calls it on its own thread every 50 ms. An exception from it ends
+  // the call like a timeout: an unsent command is never sent, except a stop.
   std::function<void()> on_wait;
 };
 
-// A board's key from a file: one line, `<id>:<64 hexadecimal digits>`, as `r4 key new` makes it.
+// Reads a key file: one line, `<id>:<64 hexadecimal digits>`, as `r4 key new` makes it.
 //
 //     r4::BoardOptions options;
 //     options.session.key = r4::load_key("/home/me/.r4-key");
 //     r4::Board board("udp://192.168.0.125", options);
 //
-// Throws Error: open if it cannot be read, permission if others than its owner may read or write
-// it, data if it holds no key. A file of root's may also be read by its group, as a service's is.
+// Throws Error: open if it cannot be read, permission if other users than its owner may read or
+// write it, data if it holds no key. The group of a file of root's may read it, as for a service.
 R4LINK_API Key load_key(const std::string& path);
 
 }  // namespace r4

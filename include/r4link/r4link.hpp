@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Everything of r4link::r4link. For programs with Asio (r4link::asio), AsyncBoard is in
-// async_board.hpp, async_discover() in discovery/async_discover.hpp, CanListener in
-// can/async_listener.hpp.
+// Everything of r4link::r4link. Only with Asio (r4link::asio): async_board.hpp,
+// discovery/async_discover.hpp, can/async_listener.hpp.
 #pragma once
 
 #include "board.hpp"

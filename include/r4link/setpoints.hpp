@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Setpoints: output commands that a board executes together, in one pass over its chips, or none of
-// them.
+// r4::Setpoints: output commands that a board executes in one pass over its chips, or not at all.
 //
 //     board.send({r4::Command::osmc(1, r4::Duty(0.1)), r4::Command::osmc(2, r4::Duty(0.1)),
 //                 r4::Command::servo(3, r4::Microseconds(1500))});
 //
-// Their effect is that of the commands one after the other, in the order in which they were added,
-// with nothing in between: relay 1, closed after a motor's command, takes that back
-// (docs/safety.md). All of them can be sent: a command that drives no output, a value outside its
-// range, a second command for the same channel, and more than max_group of them throw Error{usage}
-// as they are added.
+// The effect is that of the commands one after the other, in the order of add(), with nothing in
+// between: closing relay 1 after a motor's command cancels that command (docs/safety.md).
 #pragma once
 
 #include <array>
@@ -22,7 +18,7 @@
 
 namespace r4 {
 
-// `duty`: from -1 (full reverse) to 1 (full forward). Throws Error{usage} for others.
+// `duty`: from -1 (full reverse) to 1 (full forward). Throws Error{usage} for other values.
 R4LINK_API Duty checked_duty(double duty);
 
 class R4LINK_API Setpoints {
@@ -31,16 +27,16 @@ class R4LINK_API Setpoints {
   Setpoints(std::initializer_list<Command> commands) {
     for (const Command& command : commands) add(command);
   }
-  // An output command: O D S R P B Z, X:DAC.
+  // Adds an output command: O D S R P B Z, X:DAC. Throws Error{usage} for another command, a value
+  // outside its range, a second command for a channel, and more than max_group commands.
   Setpoints& add(const Command& command);
 
   std::size_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
-  // From 0.
+  // The i-th command, from 0.
   Command operator[](std::size_t i) const;
 
  private:
-  // A command without texts.
   struct Setpoint {
     CommandKind kind = CommandKind::heartbeat;
     std::uint8_t channel = 0;

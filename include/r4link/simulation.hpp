@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The world around a simulated board of this program, for tests of what drives it:
+// The world around a simulated board in this program, for tests of control programs:
 //
 //     r4::sim::SimulatedRobot robot;
 //     r4::Board board(robot.url());              // or what your program does with a URL
@@ -7,8 +7,8 @@
 //     robot.happen("handle released");           // a line of a scenario, without its time
 //     robot.look().pins.osmc[0].pwm              // what the chips do, whatever the state says
 //
-// Each time its URL is opened the board is switched on afresh, on the bench, and then what has been
-// said since it was last open happens. May be used from any thread, also from callbacks of the board.
+// Each time the URL is opened, the board is switched on anew on the bench. Then the events that
+// were requested while it was closed happen. Thread-safe, also in callbacks of the board.
 #pragma once
 
 #include <cstdint>
@@ -26,30 +26,30 @@ namespace r4::sim {
 class R4LINK_API SimulatedRobot {
  public:
   SimulatedRobot();
-  // With a robot of the program's own in place of the vehicle on the bench: it is called on the board's thread, a
-  // millisecond at a time, and must outlive every link to it.
+  // With a robot model in place of the bench vehicle. It is called on the board's thread, once a
+  // simulated millisecond, and must outlive every link.
   explicit SimulatedRobot(RobotModel& robot);
   ~SimulatedRobot();
   SimulatedRobot(const SimulatedRobot&) = delete;
   SimulatedRobot& operator=(const SimulatedRobot&) = delete;
 
-  // "sim:?robot=1": a board that is in this world, for one link at a time while this object lives.
+  // "sim:?robot=1": the board in this world, for one link at a time while this object lives.
   const std::string& url() const;
 
-  // Something happens, "us 1 15" (docs/simulation.md has all of them): at once while the board is open, which
-  // does not mean before this returns. Throws Error{data} for words that say nothing of the kind.
+  // Makes an event happen, "us 1 15" (docs/simulation.md lists all): soon, if the board is open,
+  // perhaps after the return. Throws Error{data} for an unknown event.
   void happen(std::string_view words);
 
   struct Look {
-    bool open = false;  // a link to the board is open; if not, this is what was last
+    bool open = false;  // a link to the board is open; false: the values are the last ones
     Pins pins;
     bool motors_have_supply = false;
     bool handle_held = true;
-    std::int32_t encoder[encoder_channels] = {};   // counts since power came, whatever Z says
-    std::int32_t stepper[stepper_channels] = {};   // steps that the motors took since then
+    std::int32_t encoder[encoder_channels] = {};   // counts since power-on, not affected by Z
+    std::int32_t stepper[stepper_channels] = {};   // steps of the motors since power-on
     std::int32_t analog_cv[analog_channels] = {};  // hundredths of a volt
   };
-  // No older than 10 ms.
+  // Not older than 10 ms.
   Look look() const;
 
   class R4LINK_PRIVATE World;
@@ -60,12 +60,12 @@ class R4LINK_API SimulatedRobot {
   std::string url_;
 };
 
-// A board behind a bad link, whatever transport it is on:
+// A board behind a bad link, on any transport:
 //
 //     r4::Board board(r4::sim::with_link(robot.url(), "loss=5%,delay=20ms±10,seed=7"));
 //
-// docs/simulation.md has the words; the same seed does the same to the same datagrams at the same times. Throws
-// Error{usage} for others. A board that only watches needs a URL of its own for that: `?listen=0` on UDP.
+// docs/simulation.md lists the words; unknown words throw Error{usage}. The same seed does the same
+// to the same datagrams at the same times. A watcher needs its own URL: `?listen=0` on UDP.
 R4LINK_API CarrierMaker with_link(std::string_view url, std::string_view link);
 
 }  // namespace r4::sim

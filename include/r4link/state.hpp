@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The board's state as typed values, and the fields that carry it (paper section 4.1).
-//
-// tables/board.def names every field, its unit and its place in State. The board writes with that
-// table, the host reads with it, and the `F` command selects from it.
+// tables/board.def names every field, its unit and its member in State.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +13,7 @@ namespace r4 {
 
 class Datagram;
 
-// Every state field, in the order in which the board sends them. The first ten are the paper's
-// default set; from I2C1 on they are of the user's devices (docs/devices.md) and of faults.
+// In wire order: the paper's ten first; from I2C1 on, devices (docs/devices.md) and faults.
 enum class StateField : std::uint8_t {
 #define R4_STATE_FIELD(field, ...) field,
 #include "tables/board.def"
@@ -24,11 +21,11 @@ enum class StateField : std::uint8_t {
 };
 constexpr int state_field_count = static_cast<int>(StateField::count);
 
-// A set of state fields: the preamble's selection, or what a datagram brought.
+// A set of state fields: the selection to send, or the fields of a datagram.
 class R4LINK_API FieldSet {
  public:
   constexpr FieldSet() = default;
-  // No set has StateField::count.
+  // False for StateField::count.
   constexpr bool has(StateField f) const { return (words_[word_of(f)] & bit_of(f)) != 0; }
   void add(StateField f) { words_[word_of(f)] |= bit_of(f); }
   void remove(StateField f) { words_[word_of(f)] &= ~bit_of(f); }
@@ -36,7 +33,7 @@ class R4LINK_API FieldSet {
     for (int i = 0; i < word_count; ++i) words_[i] |= other.words_[i];
   }
   bool empty() const { return *this == FieldSet(); }
-  // Its fields in the order of the table: `for (StateField field : set)`.
+  // The fields in wire order: `for (StateField field : set)`.
   class Iterator {
    public:
     Iterator(const std::uint32_t* words, int first)
@@ -61,7 +58,7 @@ class R4LINK_API FieldSet {
     }
     const std::uint32_t* words_;
     int word_;
-    std::uint32_t bits_;  // of that word, those that are still to come
+    std::uint32_t bits_;  // of that word, the bits that are still to come
   };
   Iterator begin() const { return Iterator(words_, 0); }
   Iterator end() const { return Iterator(words_, word_count); }
@@ -75,7 +72,7 @@ class R4LINK_API FieldSet {
   friend bool operator!=(const FieldSet& a, const FieldSet& b) { return !(a == b); }
 
   static FieldSet paper_default();  // AIN24 … SERVO1POS
-  // But FAULT, which is sent where there is one, and what the user connects, I2C1 to GPIO.
+  // Without I2C1 to GPIO (the user's devices) and FAULT (sent while there is a fault).
   static FieldSet all();
 
  private:
@@ -93,22 +90,21 @@ class R4LINK_API FieldSet {
 enum class Analog : std::uint8_t { ain24, ain12, ain5, aindmh, ainsteer, ain6, count };
 constexpr int analog_channels = static_cast<int>(Analog::count);
 
-// The board's own numbers: channel n of the board is element n-1.
+// Channel n of the board is element n-1.
 struct ChannelValues {
   std::int32_t analog_cv[analog_channels] = {};  // hundredths of a volt
 #define R4_OUTPUT(kind, Value, member, channels, ...) Value member[channels] = {};
 #include "tables/board.def"
   std::int32_t stepper_steps[stepper_channels] = {};
   std::int32_t encoder_counts[encoder_channels] = {};
-  std::int32_t encoder_hz[encoder_channels] = {};            // counts a second
+  std::int32_t encoder_hz[encoder_channels] = {};            // counts per second
   std::int32_t encoder_index_counts[encoder_channels] = {};  // where the index line rose last
   std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};
   I2cReading i2c[i2c_slots];
   UartBytes uart[uart_channels];
 };
 
-// What the board reports. On the host, `present` tells which fields the datagram carried; the
-// others keep the value of earlier datagrams.
+// On a host, `present` has the fields of the datagram; other fields keep earlier values.
 struct State {
   FieldSet present;
   std::uint32_t pnum = 0;
@@ -129,20 +125,20 @@ struct State {
   I2cAnswer i2c_answer;
   I2cBusReport i2c_bus;
 
-  // By the board's names of channels, from 1. A channel that is not there reads 0.
+  // By channel, from 1. A channel that does not exist reads 0.
   double volts(Analog input) const {
     const int i = static_cast<int>(input);
     return i < analog_channels ? raw.analog_cv[i] / 100.0 : 0.0;
   }
-  // dhb12(), osmc(), servo_us(), bldc(), dac_mv(): what each channel is set to.
+  // dhb12(), osmc(), servo_us(), bldc(), dac_mv(): the setpoint of a channel.
 #define R4_OUTPUT(kind, Value, member, channels, ...) \
   Value member(int channel) const { return reading(raw.member, channel); }
 #include "tables/board.def"
   std::int32_t steps(int channel) const { return reading(raw.stepper_steps, channel); }
   std::int32_t encoder(int channel) const { return reading(raw.encoder_counts, channel); }
-  // Counts a second; negative backwards.
+  // Counts per second; negative backwards.
   std::int32_t encoder_hz(int channel) const { return reading(raw.encoder_hz, channel); }
-  // What the encoder counted where its index line rose last.
+  // The count when the index line rose last.
   std::int32_t encoder_index(int channel) const {
     return reading(raw.encoder_index_counts, channel);
   }
@@ -161,18 +157,16 @@ struct State {
   }
 };
 
-// The field's name on the wire, "AIN24".
+// The name on the wire, "AIN24".
 R4LINK_API Text name_of(StateField field);
 // The field of that name; StateField::count if there is none. Constant time.
 R4LINK_API StateField state_field(Text name);
 
-// Reads the values of `F`: "DEFAULT", "ALL" or names of fields, separated by commas.
-// Refusal::unknown for another name.
+// Reads `F`: "DEFAULT", "ALL" or names of fields, with commas. Refusal::unknown otherwise.
 R4LINK_API Refusal parse_fields(Text list, FieldSet& out);
 
-// Reads the state fields of `datagram` into `state` and sets `present`, `pnum` and `t_ms`. Unknown
-// fields are passed over (they stay reachable through the datagram). Returns false, with `state`
-// untouched, if a known field has values that are not of its form or range, or is there twice.
+// Reads the state fields of `datagram` into `state` and sets `present`, `pnum` and `t_ms`. Ignores
+// unknown fields. False, with `state` unchanged, if a known field is invalid or a duplicate.
 R4LINK_API bool read_state(const Datagram& datagram, State& state);
 
 }  // namespace r4

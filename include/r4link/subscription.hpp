@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The handle of a callback, by which it is ended.
 #pragma once
 
 #include <memory>
@@ -11,21 +10,21 @@ namespace r4 {
 
 class Subscriber;
 
-// One callback. Letting go of this handle leaves the callback where it is.
+// The handle of one callback. Destroying it does not end the callback.
 class R4LINK_API Subscription {
  public:
-  Subscription() = default;  // one that has ended
+  Subscription() = default;  // an ended one
   explicit Subscription(const std::shared_ptr<Subscriber>& subscriber) : subscriber_(subscriber) {}
 
-  // Ends it. When this returns, the callback will not be called again and, unless this is called
-  // within it, is not running. Idempotent, from any thread, also when the board is gone.
+  // Ends the callback: after the return it does not run, except if it called cancel() itself.
+  // Idempotent; any thread; also after the board is destroyed.
   void cancel();
 
  private:
   std::weak_ptr<Subscriber> subscriber_;
 };
 
-// Ends its subscription with its own end.
+// Ends its subscription when it is destroyed.
 class ScopedSubscription {
  public:
   ScopedSubscription() = default;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A view of characters that somebody else owns: the portable core's string_view (C++14 has none).
-//
-// A Text never owns, never ends in NUL and may hold any byte. It is valid as long as the buffer
-// that it points into.
+// A view of characters: string_view for the portable core, which is C++14. It owns nothing, has no
+// NUL at its end and may hold any byte. Valid as long as the buffer.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +17,7 @@ class Text {
   // NOLINTBEGIN(google-explicit-constructor)
   template <std::size_t N>
   constexpr Text(const char (&literal)[N]) : data_(literal), size_(N - 1) {}
-  // Anything contiguous with data() and size(): std::string, std::string_view on the host.
+  // Any contiguous container with data() and size(), such as std::string and std::string_view.
   template <class Container, class = decltype(static_cast<const char*>(
                                  static_cast<const Container*>(nullptr)->data()))>
   constexpr Text(const Container& c) : data_(c.data()), size_(c.size()) {}
@@ -31,7 +29,7 @@ class Text {
   constexpr const char* begin() const { return data_; }
   constexpr const char* end() const { return data_ + size_; }
   constexpr char operator[](std::size_t i) const { return data_[i]; }
-  // From `from` to the end, or `count` characters of it; `from` must be at most size().
+  // `count` characters from `from`, or all to the end; `from` is at most size().
   constexpr Text substr(std::size_t from, std::size_t count = ~std::size_t{0}) const {
     return Text(data_ + from, count < size_ - from ? count : size_ - from);
   }
@@ -42,7 +40,7 @@ class Text {
   friend bool operator!=(Text a, Text b) { return !(a == b); }
 
  private:
-  // memcmp() of names and words, without the call: the ends of both, which may overlap.
+  // memcmp() of short texts without a call: compares both ends, which may overlap.
   template <class Word>
   static bool same_ends(const char* a, const char* b, std::size_t size) {
     Word words[4];

@@ -10,17 +10,17 @@ constexpr std::uint8_t max_classic_size = 8;  // bytes of data in a classic fram
 constexpr std::uint8_t max_fd_size = 64;      // and in an FD frame
 constexpr std::uint32_t max_can_id = 0x7FF;   // 11 bits; lower wins the bus
 
-// An aggregate without initialisers: making one costs nothing, `CanFrame frame{}` is all zero.
+// Without initialisers, so that making one costs nothing; `CanFrame frame{}` is all zero.
 struct CanFrame {
   std::uint32_t id;   // 11 bits, or 29 if `extended`
   std::uint8_t size;  // bytes of data: 0–8, in an FD frame also 12, 16, 20, 24, 32, 48, 64
   bool fd;            // FD format
-  bool extended;      // 29-bit id: not one of ours
-  bool remote;        // remote transmission request, without data: not one of ours
+  bool extended;      // 29-bit id
+  bool remote;        // remote transmission request, without data
   std::uint8_t data[max_fd_size];
 };
 
-// The smallest size that a frame can have and that holds `size` bytes; 64 for more than 64.
+// The smallest valid data size that holds `size` bytes; 64 if more than 64.
 constexpr std::uint8_t can_frame_size(std::uint32_t size) {
   return size <= 8    ? static_cast<std::uint8_t>(size)
          : size <= 12 ? 12
@@ -32,7 +32,7 @@ constexpr std::uint8_t can_frame_size(std::uint32_t size) {
                       : 64;
 }
 
-// Can a frame of its format have its size?
+// True if the size is valid in the frame's format.
 constexpr bool has_valid_size(const CanFrame& frame) {
   return frame.size <= max_classic_size || (frame.fd && can_frame_size(frame.size) == frame.size);
 }

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who says what on the bus: the plan of 11-bit ids (docs/can.md). Lower wins.
+// The 11-bit ids on the bus (docs/can.md). The lower id wins.
 //
-//     0x010    emergency stop from a host   one raw frame, any content, obeyed by every board; with 29
-//                                           bits, the same with a number by which it is confirmed
+//     0x010    emergency stop from a host   one raw frame, any content, obeyed by every board; with
+//                                           29 bits, the same with a number for its confirmation
 //     0x020+n  board n went safe            one raw frame: the reason
 //     0x180+n  host to board n              ISO-TP; the board's flow control on 0x200+n
 //     0x200+n  board n's replies            ISO-TP; the host's flow control on 0x180+n
 //     0x400+n  board n's telemetry          ISO-TP without flow control: any number may listen
-//     0x600+n  somebody watches board n     one raw frame, any content; all who watch send the same
+//     0x600+n  a watcher of board n         one raw frame, any content, the same from every watcher
 //
-// n, the node, is 0–31. Whatever else is on the bus is `other` and none of ours.
+// n, the node, is 0–31. Every other id is `other`.
 #pragma once
 
 #include <cstdint>
@@ -20,10 +20,10 @@ namespace r4 {
 
 constexpr std::uint32_t can_nodes = 32;
 
-// `node` must be below can_nodes: what is above is cut off.
+// `node` must be below can_nodes; higher bits are ignored.
 constexpr std::uint32_t emergency_stop_id = 0x010;
-// A stop with a number has it in the 18 low bits of a 29-bit id, behind 0x010. In the content it would
-// be wrong: two that begin at once would differ behind their ids, and destroy each other for ever.
+// A stop with a number has it in the 18 low bits of a 29-bit id, after 0x010. It must not be in the
+// data: two stops that start at once would differ after their ids, and destroy each other for ever.
 constexpr std::uint32_t short_stop_number(std::uint32_t number) { return number & 0x3FFFF; }
 constexpr std::uint32_t numbered_stop_id(std::uint32_t number) {
   return emergency_stop_id << 18 | short_stop_number(number);
@@ -32,7 +32,7 @@ constexpr std::uint32_t went_safe_id(std::uint32_t node) { return 0x020 | (node 
 constexpr std::uint32_t command_id(std::uint32_t node) { return 0x180 | (node % can_nodes); }
 constexpr std::uint32_t reply_id(std::uint32_t node) { return 0x200 | (node % can_nodes); }
 constexpr std::uint32_t telemetry_id(std::uint32_t node) { return 0x400 | (node % can_nodes); }
-// Of its own, for a host sends on command_id(): two that begin at once would destroy each other's frames there.
+// Not command_id(): a host that sends at the same time would lose its frames to the watcher's.
 constexpr std::uint32_t watch_id(std::uint32_t node) { return 0x600 | (node % can_nodes); }
 
 enum class CanIdKind : std::uint8_t {
@@ -47,10 +47,10 @@ enum class CanIdKind : std::uint8_t {
 
 struct CanIdMeaning {
   CanIdKind kind = CanIdKind::other;
-  std::uint8_t node = 0;  // 0 where the kind has none
+  std::uint8_t node = 0;  // 0 if the kind has none
 };
 
-// What an 11-bit id means: the inverse of the functions above.
+// The meaning of an 11-bit id.
 constexpr CanIdMeaning classify(std::uint32_t id) {
   CanIdMeaning meaning;
   const std::uint32_t node = id % can_nodes;
@@ -73,7 +73,7 @@ constexpr CanIdMeaning classify(std::uint32_t id) {
   return meaning;
 }
 
-// The same for a frame. A remote request is none of ours, and of those with a 29-bit id only a stop.
+// Remote requests, and 29-bit ids except stops, are `other`.
 constexpr CanIdMeaning classify(const CanFrame& frame) {
   if (frame.remote) return CanIdMeaning();
   if (!frame.extended) return classify(frame.id);

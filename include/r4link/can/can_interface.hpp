@@ -32,7 +32,7 @@ struct CanInterface {
 
 R4LINK_API CanInterface can_interface(const std::string& name);
 
-// The interface that can://INTERFACE names. Throws Error{usage} if the URL is of another form.
+// The interface of can://INTERFACE. Throws Error{usage} if the URL has another form.
 R4LINK_API const std::string& can_interface_of(const Url& url);
 
 // All CAN interfaces of this computer, by name; none if the system does not report them.

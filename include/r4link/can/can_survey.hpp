@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The boards on a CAN bus, their datagrams, and the load of the bus: from its frames alone. Nothing
-// is ever sent, so it may be used beside hosts that drive.
+// The boards on a CAN bus, their datagrams and the load of the bus, from its frames only. It never
+// sends, so it may be used beside hosts that drive.
 //
 //     CanSurvey survey({1000000, 0});
 //     survey.on_datagram([](std::uint8_t node, const Datagram& datagram) { … });
 //     survey.on_frame(frame, at_us);         // every frame of the bus, see CanListener
 //     survey.board(3).states; survey.traffic(); survey.busy_ns();
 //
-// No I/O, no clock. Memory is bounded: 32 nodes, at most 2048 ids of 11 bits, and all longer ids as
-// one.
+// No I/O, no clock. Memory is bounded: 32 nodes, 2048 11-bit ids, and one for all 29-bit ids.
 #pragma once
 
 #include <array>
@@ -27,7 +26,6 @@
 
 namespace r4 {
 
-// Counts of a node, and its newest values.
 struct HeardNode {
   std::uint64_t states = 0;
   std::uint64_t heartbeats = 0;
@@ -45,7 +43,6 @@ struct HeardNode {
   bool heard() const { return states + heartbeats + answers + damaged != 0; }
 };
 
-// The frames of one id.
 struct CanTraffic {
   std::uint64_t frames = 0;
   std::uint64_t bits = 0;     // stuff bits and intermission included
@@ -54,10 +51,10 @@ struct CanTraffic {
 
 class CanSurvey {
  public:
-  // All ids of 29 bits count as this one.
+  // All 29-bit ids count as this one.
   static constexpr std::uint32_t extended_ids = max_can_id + 1;
 
-  // With rate.data 0, FD frames count as not switching their rate.
+  // With rate.data 0, FD frames count as if they did not switch their rate.
   R4LINK_API explicit CanSurvey(CanBitRate rate);
   R4LINK_API ~CanSurvey();
   CanSurvey(const CanSurvey&) = delete;
@@ -69,8 +66,7 @@ class CanSurvey {
 
   R4LINK_API void on_frame(const CanFrame& frame, std::uint32_t at_us);
 
-  // True if the id is one of R4's, and frames with it make R4's datagrams. False: another protocol
-  // uses it.
+  // True if frames with this id make R4 datagrams. False: another protocol uses it.
   R4LINK_API bool is_r4(std::uint32_t id) const;
   const HeardNode& board(std::uint8_t node) const { return boards_[node % can_nodes]; }
   const std::map<std::uint32_t, CanTraffic>& traffic() const { return traffic_; }

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Commands as text: parsed, written and described. The text is the one that a board reads
-// (docs/protocol.md).
+// Commands as the text that a board reads (docs/protocol.md): parsed, written, described.
 //
 //     const r4::OwnCommand command = r4::parse_command_text("O:358,1,1");
 //     r4::to_text(command);   // "O:358,1,1"
 //     r4::describe(command);  // "OSMC 1 forward, duty 0.087"
 //
-// A command may hold a secret: a key, or the network's password. to_text() writes it; shown() and
-// describe() write "..." instead.
+// A secret in a command (a key, a password): to_text() writes it, shown() and describe() do not.
 #pragma once
 
 #include <span>
@@ -48,7 +46,6 @@ class OwnCommand {
 // Parses "O:358,1,1" (with or without the final ';'). Throws Error{usage} that names the fault.
 R4LINK_API OwnCommand parse_command_text(std::string_view text);
 
-// A command, or a group of several.
 using CommandOrGroup = std::variant<OwnCommand, Setpoints>;
 // Parses "O:358,1,1", or a group: "O:358,1,1;O:358,1,2". Throws Error{usage} that names the command
 // that is wrong, or that cannot be in a group.
@@ -64,16 +61,13 @@ R4LINK_API std::string shown(const Command& command);
 R4LINK_API std::string shown(const Setpoints& group);
 R4LINK_API std::string shown(std::string_view text);
 
-// The command in words, with units and without a secret: "servo 3 at 1500 us", "relay 1 on",
-// "setting rate 50".
+// The command in words, with units and without a secret: "servo 3 at 1500 us", "relay 1 on".
 R4LINK_API std::string describe(const Command& command);
 
-// Throws Error{usage} unless every path of `url` is a board's own cable. On a network or a bus
-// others would see the secret, and the board does not accept it there. `secret` is its name in the
-// error.
+// Throws Error{usage} unless every path of `url` is a board's own cable. Elsewhere others would see
+// the secret, and boards do not accept it. `secret`: its name.
 R4LINK_API void require_cable(std::string_view url, std::string_view secret);
-// The same for a command that holds a secret. Other commands may go anywhere. The boards call it
-// before they send.
+// The same if the command holds a secret. The boards call it before they send.
 R4LINK_API void require_cable(std::string_view url, const Command& command);
 
 // What a board's refusal means: "no such channel".

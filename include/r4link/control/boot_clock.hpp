@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A clock that goes on while this computer sleeps, and a watch that notices a sleep.
-//
-// In a suspended computer the steady clock (CLOCK_MONOTONIC) stands still, and every timer and
-// deadline with it. The boot clock (CLOCK_BOOTTIME) goes on. It measures periods that must end in a
-// human's time.
+// A clock that runs while this computer sleeps, and a watch that notices a sleep. In a suspended
+// computer the steady clock (CLOCK_MONOTONIC) stands still, with every timer and deadline. The boot
+// clock (CLOCK_BOOTTIME) runs: it measures periods in a human's time.
 #pragma once
 
 #include <algorithm>
@@ -28,9 +26,8 @@ struct BootClock {
   }
 };
 
-// How long this computer has slept since it was switched on: the boot clock is ahead of the steady
-// clock by that. The two are read one after the other, and a thread may lose its processor in
-// between.
+// How long this computer has slept since power-on: the boot clock's lead over the steady clock. The
+// clocks are read one after the other, and the thread may be preempted in between.
 inline Time slept_at_most(Time steady) {
   return std::chrono::duration_cast<Time>(BootClock::now().time_since_epoch()) - steady;
 }
@@ -40,11 +37,10 @@ inline Time slept_at_least() {
                                           std::chrono::steady_clock::now().time_since_epoch());
 }
 
-// A thread without a processor and a stopped process are not mistaken for a sleep.
+// Does not mistake a thread without a processor or a stopped process for a sleep.
 class SleepWatch {
  public:
-  // `steady` is the steady clock now. True if the computer slept for longer than `limit` since this
-  // was made, or since it was last true.
+  // True if the computer slept longer than `limit` since construction or the last true.
   bool slept(Time steady, Time limit) {
     const Time most = slept_at_most(steady);
     if (most - before_ <= limit) {
@@ -55,7 +51,7 @@ class SleepWatch {
     before_ = most;
     return true;
   }
-  // How long it has slept since then, at least.
+  // The least time that it slept since then.
   Time time() const { return std::max(slept_at_least() - before_, Time{0}); }
 
  private:

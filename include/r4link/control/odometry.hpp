@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::control::Odometry: where a robot is, by what its wheels have done, and how far that may be wrong.
-//
-// Each step is an arc of a circle. Its length and its angle are wrong by independent amounts whose variances grow with
-// them, and the covariance of the pose grows by first-order propagation: Siegwart et al., Introduction to Autonomous
-// Mobile Robots, 2nd ed., 5.2.4, with the error in length and angle instead of in two wheels, so that it serves steered
-// robots as well. Metres and radians, x forward, y to the left, the angle to the left (REP 103).
+// r4::control::Odometry: the pose of a robot from the motion of its wheels, and its uncertainty.
+// Each step is an arc of a circle with independent errors in length and angle, whose variances grow
+// with them, so that steered robots fit too. The covariance grows by first-order propagation
+// (Siegwart et al., Introduction to Autonomous Mobile Robots, 2nd ed., 5.2.4). Metres and radians;
+// x forward, y and positive angles to the left (REP 103).
 #pragma once
 
 #include <array>
@@ -16,34 +15,32 @@ namespace r4::control {
 struct Pose {
   double x_m = 0;
   double y_m = 0;
-  double yaw_rad = 0;  // within -pi and pi
+  double yaw_rad = 0;  // from -pi to pi
   friend bool operator==(const Pose&, const Pose&) = default;
 };
 
-// The defaults are those of wheels with tyres on a hard floor; measure yours.
+// The defaults suit tyres on a hard floor; measure yours.
 struct OdometryNoise {
-  double length_per_m =
-      0.0004;  // m^2 a metre of the way: 2 cm after one metre, one standard deviation
-  double turn_per_m = 0.0004;    // rad^2 a metre of the way
-  double turn_per_rad = 0.0025;  // rad^2 a radian turned
+  double length_per_m = 0.0004;  // m^2 per metre: a standard deviation of 2 cm after one metre
+  double turn_per_m = 0.0004;    // rad^2 per metre
+  double turn_per_rad = 0.0025;  // rad^2 per radian turned
 };
 
 class R4LINK_API Odometry {
  public:
   using Covariance = std::array<double, 9>;  // of x, y, yaw; row by row
 
-  // Throws Error{usage} for a variance below 0 or that is no number.
+  // Throws Error{usage} for a variance that is negative or not a number.
   explicit Odometry(const OdometryNoise& noise = {});
 
-  // The robot has gone so far (backwards: below 0), and turned so much meanwhile.
+  // The robot has moved by this length (negative: backwards) and turned by this angle meanwhile.
   void advance(double length_m, double turn_rad);
-  // It is known to be there.
+  // Sets a known pose.
   void reset(const Pose& pose = {}, const Covariance& covariance = {});
 
   const Pose& pose() const { return pose_; }
   const Covariance& covariance() const { return covariance_; }
-  // The same for geometry_msgs/PoseWithCovariance: of x, y, z and the rotations about them. What moves on the ground
-  // knows nothing of the other three, and says so with `unknown`.
+  // For geometry_msgs/PoseWithCovariance. `unknown`: the variance of z, roll and pitch.
   std::array<double, 36> ros_covariance(double unknown = 1e6) const;
 
  private:
@@ -52,7 +49,7 @@ class R4LINK_API Odometry {
   Covariance covariance_{};
 };
 
-// The angle within -pi and pi.
+// The angle from -pi to pi.
 R4LINK_API double wrapped(double angle_rad);
 
 }  // namespace r4::control

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::control::Pid: proportional, integral and derivative control of one value, with the time passed in.
+// r4::control::Pid: PID control of one value, with the time as an argument.
 //
 //     r4::control::Pid speed({.kp = 0.4, .ki = 1.6, .feed_forward = 0.5, .rate = 8});
 //     const double duty = speed.step(wanted_m_s, is_m_s, dt_s);
 //
 // The output is the sum of
 //
-//     feed_forward * setpoint       what would be right if the robot were as its model is
+//     feed_forward * setpoint       the right output for a perfect model
 //     kp * error                    error = setpoint - measured
-//     ki * integral of the error    which stands still while the output cannot follow the error (anti-windup)
-//     -kd * d(measured)/dt          of the measured value, so that a new setpoint gives no kick; low-passed
+//     ki * integral of the error    held while the output cannot follow the error (anti-windup)
+//     -kd * d(measured)/dt          low-passed; of the measured value: a new setpoint gives no kick
 //
-// limited in its value and in how fast it changes (Astrom and Murray, Feedback Systems, 2nd ed., chapter 11). Setpoint
-// and measured value have one unit, any; the output another, say -1 to 1 of the duty. No clock, no heap.
+// limited in value and rate (Astrom and Murray, Feedback Systems, 2nd ed., chapter 11). Setpoint
+// and measured value have one unit, the output may have another. No clock, no heap.
 #pragma once
 
 #include <limits>
@@ -22,33 +22,32 @@
 namespace r4::control {
 
 struct PidOptions {
-  double kp = 0;            // output a unit of error
-  double ki = 0;            // output a unit of error and second
-  double kd = 0;            // output a unit a second
-  double feed_forward = 0;  // output a unit of setpoint
+  double kp = 0;            // output per unit of error
+  double ki = 0;            // output per unit of error and second
+  double kd = 0;            // output per unit per second
+  double feed_forward = 0;  // output per unit of setpoint
   double minimum = -1;      // of the output
   double maximum = 1;
-  double rate = std::numeric_limits<double>::infinity();  // of the output a second, up and down
-  double derivative_filter_s = 0;  // time constant of the derivative's low pass; 0: none
+  double rate = std::numeric_limits<double>::infinity();  // of the output, per second, up and down
+  double derivative_filter_s = 0;  // time constant of the derivative's low-pass filter; 0: none
 };
 
 class R4LINK_API Pid {
  public:
-  // Throws Error{usage} for what is no number, limits of which none lies between, and a rate or a filter of less than
-  // nothing.
+  // Throws Error{usage} for NaN, minimum >= maximum, a rate not above 0, and a negative filter.
   explicit Pid(const PidOptions& options);
 
-  // The output, `dt_s` seconds after the last step. Without time (0, or less) nothing changes, and it is the output of
-  // before. Throws Error{data} for a setpoint or a measured value that is no finite number.
+  // The output, `dt_s` seconds after the last step; unchanged if dt_s is not above 0. Throws
+  // Error{data} for a value that is not finite.
   double step(double setpoint, double measured, double dt_s);
   // The newest output.
   double output() const { return output_; }
   // Its integral term, in units of the output.
   double integral() const { return integral_; }
 
-  // Forgets all: the output is 0, or the limit next to it.
+  // Resets all: the output is 0, or the limit nearest to it.
   void reset();
-  // Goes on from an output that something else has made so far: without a jump, for its integral explains it.
+  // Continues without a jump from an output that another controller has set, through the integral.
   void take_over(double output, double setpoint, double measured);
 
  private:

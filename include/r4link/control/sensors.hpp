@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a robot's encoders and its steering sensor say, in metres, metres a second and radians.
+// Encoders and the steering sensor of a robot, in metres, metres per second and radians.
 #pragma once
 
 #include <array>
@@ -22,17 +22,17 @@ struct WheelGeometry {
 // A wheel with an encoder. Give it each state, in order.
 class R4LINK_API Wheel {
  public:
-  // `window_ms`: speed_m_s() is the mean of at least so much time. `max_speed_m_s`: what is faster is no movement, but an
-  // encoder that was set to zero or a board that began again. Throws Error{usage} for what cannot be.
+  // `window_ms`: averaging time of speed_m_s(), above 0. A speed above `max_speed_m_s` is not a
+  // motion, but a restarted board or an encoder set to zero. Throws Error{usage} for an encoder
+  // outside 1-4, and for a radius, counts, limit or window that are not above 0.
   explicit Wheel(const WheelGeometry& geometry, std::uint32_t window_ms = 50,
                  double max_speed_m_s = 20);
 
-  // How far it has rolled since the state before, m, by ENCn; 0 at first.
+  // The distance since the previous state, m, by ENCn; 0 at first.
   double advance(const State& state);
-  // Its speed by the counts of the last window: new in each state, and half a window old. It needs ENCn.
+  // The speed by the counts of the last window, half a window old. Needs ENCn in each state.
   double speed_m_s() const { return speed_m_s_; }
-  // Its speed as the board measures it, by ENCnHZ: new ten times a second, and 50 to 150 ms old. It needs no states
-  // before, and no ENCn.
+  // The speed by ENCnHZ: updated ten times a second, 50 to 150 ms old. Needs this state only.
   double measured_m_s(const State& state) const;
   double metres_a_count() const { return metres_a_count_; }
   int encoder() const { return geometry_.encoder; }
@@ -55,7 +55,7 @@ class R4LINK_API Wheel {
   double speed_m_s_ = 0;
 };
 
-// Where the steering stands, by AINSTEER: linear between two angles whose voltages were measured.
+// The steering angle by AINSTEER: linear between two angles with measured voltages.
 class R4LINK_API SteeringSensor {
  public:
   struct Calibration {
@@ -63,15 +63,15 @@ class R4LINK_API SteeringSensor {
     double left_rad = 0;     // above 0
     double right_volts = 0;  // at right_rad
     double right_rad = 0;    // below 0
-    // As far beyond these ends it is believed; what is farther is a cable that is off or a sensor that is broken.
+    // A voltage farther beyond the ends means an unplugged cable or a broken sensor.
     double margin_volts = 0.3;
   };
-  // Throws Error{usage} if the ends are one.
+  // Throws Error{usage} unless the voltages differ and left_rad is above right_rad.
   explicit SteeringSensor(const Calibration& calibration);
 
-  // Nothing where the voltage cannot be: then do not steer by it, and do not drive.
+  // Empty if the voltage is not possible: then do not steer by it, and do not drive.
   std::optional<double> angle_rad(const State& state) const;
-  // The voltage of an angle.
+  // The voltage at an angle.
   double volts(double angle_rad) const;
 
  private:

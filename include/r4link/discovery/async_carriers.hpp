@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The carriers that URLs name, for programs that choose how each path to a board is opened. Most
-// programs give the URLs to AsyncBoard, which makes them so. With r4link::asio only.
+// Carriers for programs that open each path themselves. With r4link::asio only.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -20,16 +19,15 @@ std::unique_ptr<Carrier> make_host_carrier(asio::io_context& io, std::string_vie
                                            BoardRole role);
 
 // The carriers of all paths to one board. A text may join URLs (url_pattern.hpp). Throws
-// Error{usage} for no URL, for more URLs than a session has paths, for a duplicate, and if one of
-// several is a board of its own (sim:, replay:). Only the first udp: URL has the port of hosts,
-// unless the URLs name ports.
+// Error{usage} for no URL, too many, a duplicate, and a sim: or replay: among several. Only the
+// first udp: URL has the port of hosts, unless the URLs name ports.
 std::vector<std::unique_ptr<Carrier>> make_host_carriers(asio::io_context& io,
                                                          const std::vector<std::string>& urls,
                                                          BoardRole role);
 
-// A host's carrier that is not shared with other programs of this computer, not yet opened. It works
-// while a program that holds the transport hangs: on a network it takes any free port, on a bus it
-// sends beside that program. Only one program can have a serial port. Throws Error{usage}.
+// A host's carrier that is not shared with other programs of this computer, not yet opened. It
+// works while a program that holds the transport hangs: on a network it takes any free port, on a
+// bus it sends beside that program. Only one program can have a serial port. Throws Error{usage}.
 std::unique_ptr<Carrier> make_own_carrier(asio::io_context& io, std::string_view url);
 
 }  // namespace r4

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::discover(): the boards that this computer reaches, each with the URL that opens it. `r4 list`
-// prints what it returns.
+// r4::discover(): the boards that this computer reaches, with their URLs. `r4 list` prints them.
 //
 //     const r4::Discovery found = r4::discover();
 //     for (const r4::FoundBoard& board : found.boards) fmt::print("{}\n", board.url);
 //     r4::Board board(found.only().url);   // or, shorter, r4::Board board = r4::Board::first();
 //
-// The transports are searched at the same time. discover() blocks for up to 1.3 s. So do
-// not call it in a control loop or on the loop of an AsyncBoard: async_discover() is for these.
+// The transports are searched at the same time. Blocks for up to 1.3 s: not for a control loop or
+// the loop of an AsyncBoard, which use async_discover().
 //
 //   serial  A port with the USB id of a board (2341:0266, Arduino Giga R1), and each port of
 //           `serial_ports`, is opened as a watcher opens it. The board there is asked who it is
@@ -20,9 +19,8 @@
 //           half a second, from any free port. Broadcast passes no router, and often no VPN,
 //           container network or WiFi with client isolation.
 //
-// The answers are not signed: any program on a network or a bus can answer as any board. The link
-// and its keys decide what may be commanded. Texts are as they came from boards and devices: print
-// them by printable() (error.hpp).
+// The answers are not signed: any program can answer as any board. The link and its keys decide
+// what may be commanded. Texts are as received: print them by printable() (error.hpp).
 #pragma once
 
 #include <cstddef>
@@ -38,12 +36,10 @@
 namespace r4 {
 
 struct DiscoveryOptions {
-  // The transports to search.
   bool serial = true;
   bool can = true;
   bool udp = true;
-  // Serial ports to ask whatever their USB id is, by path: an adapter's, or the pty of a simulated
-  // board.
+  // More serial ports to ask, by path: an adapter, or a simulated board's pty.
   std::vector<std::string> serial_ports = {};
   // The UDP port at which boards listen, 1-65535.
   std::uint16_t udp_port = 2018;
@@ -54,15 +50,14 @@ struct FoundBoard {
   std::string place;  // SearchedPort::path, SearchedBus::interface or SearchedNetwork::address
   std::string address = {};  // UDP: its IPv4 address
   std::uint8_t node = 0;     // CAN: its number on the bus, 0-31
-  // None: it did not say who it is.
+  // Empty: it did not report its identity.
   std::optional<BoardIdentity> identity = {};
-  // True if a host controls it; none: that is not known.
+  // True if a host controls it; empty: not known.
   std::optional<bool> busy = {};
-  // Serial and CAN: the program of this computer that holds the transport. Its name is empty if it
-  // did not answer.
+  // Serial and CAN: the program here that holds the transport; its name may be empty.
   std::optional<Program> holder = {};
   bool holder_controls = false;  // false: the holder watches
-  // CAN: another protocol uses the board's command id. So the board was not asked.
+  // CAN: another protocol uses the board's command id, so the board was not asked.
   bool foreign_frames = false;
 };
 
@@ -102,15 +97,13 @@ struct Discovery {
   std::vector<SearchedNetwork> networks;
   bool more = false;  // more than `most_answers` boards have answered by UDP
 
-  // The only board. A board that is found by several transports, known by its board id, is one
-  // board: its first URL. Throws Error: open if there is no board, with what was searched; usage if
-  // there are several, with their URLs.
+  // The only board; several URLs with one board id are one board, the first URL. Throws Error: open
+  // if there is no board, with what was searched; usage with the URLs of several.
   R4LINK_API FoundBoard only() const;
 };
 
-// Searches. Without a board the lists of the result are empty, and a transport that cannot be
-// searched has a `trouble` there. Throws Error{usage} for UDP port 0, and std::system_error if the
-// system gives no thread.
+// Without a board the lists are empty. A transport that cannot be searched has a `trouble`. Throws
+// Error{usage} for UDP port 0, and std::system_error if the system gives no thread.
 R4LINK_API Discovery discover(const DiscoveryOptions& options = {});
 
 }  // namespace r4

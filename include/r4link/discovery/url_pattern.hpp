@@ -12,9 +12,8 @@
 //     serial:auto+udp://192.168.0.125          can://can0?node=0-7+can://can1?node=0-7
 //
 // A '+' joins only if the scheme of a URL and its colon follow. Elsewhere it is an ordinary
-// character, and %2B is one everywhere. All patterns of a text stand for equally many URLs: the
-// first board has the first URL of each, and so on. A part without a pattern cannot lead to several
-// boards.
+// character, as %2B always is. All patterns of a text stand for equally many URLs: the first board
+// has the first URL of each, and so on. A part without a pattern names one board.
 #pragma once
 
 #include <cstddef>

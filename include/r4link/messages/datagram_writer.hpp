@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes one datagram into a buffer that the caller owns.
+// Writes one datagram into a buffer of the caller.
 //
 //     char buffer[max_datagram];
 //     DatagramWriter w(buffer, sizeof buffer);
 //     w.field("O").value(358).value(1).value(1);
 //     Text datagram = w.finish(pnum, t_ms);   // "O:358,1,1;PNum:66;T:79146;^0x…^"
 //
-// What does not fit is refused as a whole: finish() returns an empty Text. Names and texts with
-// bytes that the grammar does not allow (datagram.hpp) refuse it too, so no writer can forge a
-// field.
+// If anything does not fit, or a name or text has bytes that the grammar (datagram.hpp) does not
+// allow, finish() returns an empty Text. So no text can forge a field.
 #pragma once
 
 #include <cstddef>
@@ -20,9 +19,8 @@
 
 namespace r4 {
 
-// A name that is known when the program is compiled, as the wire has it in front of a value:
-// ";OSMC1:". Made at compile time, so that writing it takes no check and no loop. At most 12
-// characters: the compiler refuses a longer one.
+// A name that is a compile-time constant, in wire form ";OSMC1:", so that writing needs no check
+// and no loop. At most 12 characters: longer names do not compile.
 class FieldName {
  public:
   constexpr FieldName() = default;
@@ -30,10 +28,10 @@ class FieldName {
     text_[0] = ';';
     for (std::size_t i = 0; i < name.size(); ++i) text_[i + 1] = name[i];
     text_[name.size() + 1] = ':';
-    text_[name.size() + 2] = '\0';  // outside of text_ for a longer one
+    text_[name.size() + 2] = '\0';  // outside of text_ if the name is longer
   }
   constexpr Text name() const { return Text(text_ + 1, size_); }
-  // True if it is of the grammar. For a static_assert beside the names.
+  // True if the name is of the grammar; for a static_assert.
   constexpr bool allowed() const {
     if (size_ == 0 || size_ > 12) return false;
     for (int i = 1; i <= size_; ++i) {
@@ -46,12 +44,12 @@ class FieldName {
  private:
   friend class DatagramWriter;
   char text_[15] = {};
-  std::uint8_t size_ = 0;  // of the name alone
+  std::uint8_t size_ = 0;  // of the name only
 };
 
 class R4LINK_API DatagramWriter {
  public:
-  // Goes on behind the first `used` bytes of the buffer: size() of a writer that wrote them there.
+  // Continues after the first `used` bytes of the buffer: size() of an earlier writer.
   DatagramWriter(char* buffer, std::size_t capacity, std::size_t used = 0)
       : begin_(buffer),
         at_(buffer + used),
@@ -65,36 +63,34 @@ class R4LINK_API DatagramWriter {
   DatagramWriter& value(std::uint32_t value);
   DatagramWriter& value(std::int32_t value);
   DatagramWriter& value(std::uint64_t value);
-  DatagramWriter& hundredths(std::int32_t value);  // 2428 is written 24.28
-  // A text that may hold commas: "ROS2-R4", "a,b". Copied as it is.
+  DatagramWriter& hundredths(std::int32_t value);  // 2428 is written as 24.28
+  // Writes a text as it is; it may hold commas: "ROS2-R4", "a,b".
   DatagramWriter& values(Text text);
 
-  // Goes on in the value that was written last.
+  // Continues the last value.
   DatagramWriter& more(Text text);
 
-  // Bytes written so far, and whether all of them did fit and were allowed.
+  // The bytes written so far; ok(): all of them fitted and were allowed.
   std::size_t size() const { return static_cast<std::size_t>(at_ - begin_); }
   Text written() const { return Text(begin_, size()); }
   bool ok() const { return ok_; }
 
-  // Takes everything after `size` back (a field that turned out too long for a split datagram).
-  // `size` is what size() was before a field(), while ok() was true; it is true again.
+  // Removes everything after `size`, a size() before a field() while ok(); restores ok().
   void truncate(std::size_t size);
 
-  // Writes SID, in front of PNum; nothing if it is no_session.
+  // Writes SID, before PNum; nothing for no_session.
   DatagramWriter& session(SessionId sid);
-  // Writes PNum: the last field of a session's command, but for a signature (authentication.hpp).
+  // Writes PNum: the last field of a session's command, except a signature (authentication.hpp).
   DatagramWriter& packet(std::uint32_t pnum);
-  // Writes PNum and T: the last fields of any other datagram, likewise.
+  // Writes PNum and T: the last fields of any other datagram, except a signature.
   DatagramWriter& stamp(std::uint32_t pnum, std::uint64_t t_ms);
-  // Closes with PNum, T and the CRC. An empty Text if anything did not fit or was not allowed, or
-  // if the datagram is longer than max_datagram.
+  // Ends the datagram with PNum, T and the CRC. Empty if anything did not fit or was not allowed,
+  // or if the datagram is longer than max_datagram.
   Text finish(std::uint32_t pnum, std::uint64_t t_ms);
-  // Closes with the CRC alone: the fields, PNum and T among them, are as the caller wrote them.
+  // Ends the datagram with the CRC only: the caller has written PNum and T.
   Text finish();
 
-  // Room that finish(pnum, t) needs at most:
-  // ";PNum:4294967295;T:18446744073709551615;^0xffffffff^".
+  // Most bytes of finish(pnum, t): ";PNum:4294967295;T:18446744073709551615;^0xffffffff^".
   static constexpr std::size_t trailer_max = 52;
 
  private:
@@ -107,8 +103,8 @@ class R4LINK_API DatagramWriter {
   char* at_;
   char* end_;
   bool ok_ = true;
-  bool open_;       // a field is being written
-  bool has_value_;  // it has a value already
+  bool open_;
+  bool has_value_;  // the open field has a value
 };
 
 }  // namespace r4

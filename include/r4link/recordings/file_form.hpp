@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The form of a file, by its first bytes and not by its name.
+// The form of a file, by its first bytes.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@
 namespace r4 {
 
 enum class FileForm : std::uint8_t {
-  text,  // and every file that begins as no other form does
+  text,  // text, and every unknown form
   zstd,  // also with skippable frames at the front
   pcap,  // or pcapng
   mcap,

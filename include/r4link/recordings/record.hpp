@@ -30,15 +30,13 @@ struct Record {
   std::string_view bytes;  // the datagram without its terminator, or the event's words
 };
 
-// How a board is reached.
 struct RecordedPath {
   std::uint16_t number = 1;
   std::string url;
   std::string name;  // the board's name, or its id; empty until the board has reported it
 };
 
-// A described device of the board of a path, and the text of its description
-// (docs/described-devices.md).
+// A device on a path's board, with its description (docs/described-devices.md).
 struct RecordedDevice {
   std::uint16_t path = 1;
   std::string place;  // "bno055@0x28:1"

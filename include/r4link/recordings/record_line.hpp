@@ -7,8 +7,7 @@
 //     # from 2026-11-23T21:11:33.404765Z
 //     1795468293.404765 1< AIN24:24.28;PNum:7434;T:79090;^0xf07cfd9a^
 //
-// Any bytes come back as they were: a backslash, and a byte that is not printable ASCII, is written
-// as \xNN.
+// Lossless: a backslash, and a byte that is not printable ASCII, is written as \xNN.
 #pragma once
 
 #include <array>
@@ -41,11 +40,8 @@ R4LINK_API void write_beginning(std::string& out, Time time);
 R4LINK_API void write_path(std::string& out, const RecordedPath& path);
 // At most max_record_bytes of description.
 R4LINK_API void write_device(std::string& out, const RecordedDevice& device);
-// Bytes beyond max_record_bytes are left out. A time outside of the years 1970 to 9999 is written
-// as the nearest time inside.
+// Bytes beyond max_record_bytes are left out. Times are limited to the years 1970 to 9999.
 R4LINK_API void write_record(std::string& out, const Record& record);
-
-// --- reading
 
 enum class LineKind : std::uint8_t {
   damaged,  // not a line of a recording: `problem` says why
@@ -70,8 +66,6 @@ struct RecordLine {
 // Reads a line without its end. False if it is damaged.
 R4LINK_API bool read_record_line(std::string_view line, RecordLine& out);
 
-// --- bytes as a record has them
-
 // Appends bytes; a backslash, and a byte that is not printable ASCII, as \xNN.
 R4LINK_API void append_escaped(std::string& out, std::string_view bytes);
 // The reverse. False if the text is not written so.
@@ -79,8 +73,7 @@ R4LINK_API bool append_unescaped(std::string& out, std::string_view text);
 
 // "2026-11-23T21:11:33.404765Z"
 R4LINK_API std::string record_time_text(Time time);
-// The reverse, also with fewer decimals or none, and without the Z. Empty if the text is not a
-// time.
+// The reverse, also with fewer decimals and without the Z. Empty if invalid.
 R4LINK_API std::optional<Time> read_record_time(std::string_view text);
 
 }  // namespace r4

@@ -14,12 +14,11 @@ namespace r4 {
 
 class R4LINK_API RecordedStates {
  public:
-  // The state that the record is, merged over the earlier states of its path; nullptr if it is not
-  // a state. Valid until the next call.
+  // The record's state, merged with its path's; nullptr: not a state. Valid until the next call.
   const State* take(const Record& record);
-  // The datagram of the record that take() has read as a state. Valid as long as the record.
+  // The datagram of the state from take(). Valid as long as the record.
   const Datagram& datagram() const { return datagram_; }
-  // For on_header(): the paths may be other ones.
+  // For on_header(): path numbers may have another meaning.
   void clear() { states_.clear(); }
 
  private:

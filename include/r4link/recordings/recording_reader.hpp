@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads a recording in pieces and in constant memory, however long and however damaged it is.
-// Damage is reported with its place, and the rest is read.
+// Reads a recording in pieces and in constant memory, also a long or damaged one. Damage is
+// reported with its place, and reading continues.
 #pragma once
 
 #include <cstdint>
@@ -20,18 +20,16 @@
 
 namespace r4 {
 
-// Reads the lines of the native format, in a native file or in a file of another format.
-//
-// One file may hold several recordings one after the other, each after its header. Recordings may
-// not be mixed, as `sort -m`, `mergecap` and `mcap merge` do it: a path number means another board
-// in each recording, so the states of one board would be shown as those of another. Such a file is
-// refused. Its signs are
+// Reads the lines of the native format, in a file of any format. Successive recordings in one file,
+// each after its header, are accepted. Mixed ones, as `sort -m`, `mergecap` and `mcap merge` make
+// them, are refused: a path number means another board in each, so states would be shown for the
+// wrong board. The signs of a mixture are
 // - a header that follows a header, or a record that follows the end of the recording,
 // - a path whose URL changes without a header,
-// - lines, or datagrams of one path, that come from another stream (an interface of a capture, a
-//   channel of MCAP) without a new header or path.
-// After damage, the missing part may explain such a sign. Then the file is read on, and the visitor
-// gets the line damage_line, so that a copy of the file can be read, too.
+// - lines, or datagrams of one path, from another stream (an interface of a capture, a channel of
+//   MCAP) without a new header or path.
+// After damage, which may explain such a sign, reading continues, and the visitor gets damage_line,
+// so that a copy of the file can be read too.
 class R4LINK_API RecordingLines {
  public:
   static constexpr std::string_view damage_line = "# damage: a part before this could not be read";
@@ -43,12 +41,11 @@ class R4LINK_API RecordingLines {
   // Gives the content of a line to the visitor. Returns why it is not a line of a recording, or
   // nullptr. Throws Error{data} for a later version of the format, and for mixed recordings.
   const char* on_line(std::string_view line, std::uint32_t stream = 0);
-  // Gives a record of that stream to the visitor which is not written as a line. `url`: how the
-  // stream says that its board is reached; empty if it does not say. Throws Error{data} for mixed
-  // recordings.
+  // Gives a record of that stream, which is not written as a line, to the visitor. `url`: of the
+  // board, from the stream; may be empty. Throws Error{data} for mixed recordings.
   void on_record(const Record& record, std::uint32_t stream, std::string_view url);
 
-  // Recordings seem to be mixed here. Throws Error{data}, unless damage may explain that.
+  // A sign of a mixture. Throws Error{data}, unless damage may explain it.
   void on_sign_of_mixture();
   // A part could not be read here.
   void on_damage() {
@@ -79,7 +76,6 @@ class R4LINK_API RecordingLines {
 
 class R4LINK_API RecordingReader {
  public:
-  // `name`: the subject of errors.
   RecordingReader(RecordingVisitor& visitor, std::string name);
 
   // Takes the next bytes. Lines may end in CR LF, and the UTF-8 mark may precede them. Throws
@@ -112,8 +108,7 @@ class R4LINK_API RecordingReader {
   std::uint64_t part_size_ = 0;  // the size of that line so far; more than part_ if it is too long
 };
 
-// Gives the bytes of the file of that name to `take`, in pieces; "-" is the standard input. Throws
-// Error: open, permission.
+// Passes a file to `take` in pieces; "-": standard input. Blocks. Throws Error: open, permission.
 R4LINK_API void read_in_pieces(const std::string& path,
                                const std::function<void(std::string_view)>& take);
 

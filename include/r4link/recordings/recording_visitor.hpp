@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What receives the content of a recording while it is read.
+// The receiver of a recording's content.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,6 @@
 
 namespace r4 {
 
-// A part of a recording that cannot be read.
 struct RecordingDamage {
   enum class Kind : std::uint8_t {
     line,  // not a line of a recording
@@ -32,7 +31,7 @@ class RecordingVisitor {
   virtual ~RecordingVisitor() = default;
   // A datagram, also a damaged one, or an event. A path that no path line has named is possible.
   virtual void on_record(const Record& record) = 0;
-  // What follows the damage is read.
+  // Reading continues after the damage.
   virtual void on_damage(const RecordingDamage& damage) = 0;
   // Comes before the first record of that path, and again when its name is known. After a new
   // header a path number may mean another path.
@@ -41,8 +40,7 @@ class RecordingVisitor {
   virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
   // A recording begins or continues here: one file may hold several.
   virtual void on_header() {}
-  // Any other line that begins with #. The lines of headers and devices follow on_header() and
-  // on_device().
+  // Any # line; those of headers and devices follow on_header() and on_device().
   virtual void on_comment(std::string_view line) { static_cast<void>(line); }
 };
 

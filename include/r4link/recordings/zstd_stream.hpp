@@ -28,7 +28,7 @@ class R4LINK_API ZstdWriter {
   std::unique_ptr<ZSTD_CCtx_s, Free> context_;
 };
 
-// Reads frames one after the other. After damage it goes on with the next frame.
+// Reads frames one after the other. After damage it continues with the next frame.
 class R4LINK_API ZstdReader {
  public:
   static constexpr const char* window_problem =
@@ -45,8 +45,7 @@ class R4LINK_API ZstdReader {
   std::string_view text() const { return {output_.data(), size_}; }
   // Why step() returned damaged.
   const char* problem() const;
-  // True if the frame is not damaged, but needs more memory than this reader takes. zstd --long=31
-  // unpacks it.
+  // True if the frame needs more memory than this reader takes: zstd --long=31 unpacks it.
   bool window_too_large() const { return window_too_large_; }
   // True between two frames: the last one is complete.
   bool between_frames() const { return !in_frame_; }

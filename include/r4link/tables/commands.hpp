@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands of the board (docs/protocol.md, section 3): a row for each kind, made of values that
-// have a row each, all of board.def. Parsing, range checks and writing (protocol/messages/command.cpp)
-// read these tables, and so do help and descriptions (host/commands/).
+// The commands of the board (docs/protocol.md, section 3): a row for each kind, with values that
+// have rows of their own, from board.def. Read by protocol/messages/command.cpp and host/commands/.
 //
 //     r4::row_of(r4::CommandKind::servo).channels                // 16
 //     r4::row_of(r4::CommandValue::pulse).max                    // 2500, microseconds
@@ -16,7 +15,6 @@
 
 namespace r4 {
 
-// The value of a host's heartbeat.
 constexpr Text host_heartbeat_word("ROS2-R4");
 
 enum class CommandKind : std::uint8_t {
@@ -25,7 +23,6 @@ enum class CommandKind : std::uint8_t {
 };
 constexpr std::size_t command_kinds = static_cast<std::size_t>(CommandKind::watch) + 1;
 
-// The effect of a command.
 enum class CommandEffect : std::uint8_t {
   none,
   device,  // may move a device on a bus or UART of the user. Refused in the safe state
@@ -61,7 +58,7 @@ constexpr std::size_t command_values = static_cast<std::size_t>(CommandValue::en
 struct ValueRow {
   constexpr ValueRow(CommandValue of, ValueRole in, std::int32_t least, std::int32_t most)
       : value(of), role(in), min(least), max(most) {}
-  // An optional value. The member is `none` if the value is left out.
+  // An optional value: the member is `none` if the value is left out.
   constexpr ValueRow(CommandValue of, ValueRole in, std::int32_t least, std::int32_t most,
                      std::int32_t none)
       : value(of), role(in), optional(true), min(least), max(most), missing(none) {}
@@ -162,7 +159,7 @@ static_assert(has_values_that_fit(),
               "a value fits into its member; one may be left out; a list is the last");
 static_assert(encoder_channels == stepper_channels, "Z sets both");
 
-// A bit for each kind that moves at least so much, so that asking needs no table at run time.
+// A bit for each kind with at least that effect, so that no table is needed at run time.
 constexpr std::uint32_t kinds_that_move(CommandEffect least) {
   std::uint32_t kinds = 0;
   for (const CommandRow& row : command_rows) {
@@ -175,8 +172,7 @@ constexpr bool joins_groups(CommandKind kind) {
   constexpr std::uint32_t kinds = kinds_that_move(CommandEffect::output);
   return (kinds >> static_cast<unsigned>(kind) & 1U) != 0;
 }
-// True if the command may move something: an output, or an actuator on a bus or UART of the user's.
-// Such commands are refused in the safe state.
+// True if the command may move an output or a device. Such commands are refused in the safe state.
 constexpr bool drives_output(CommandKind kind) {
   constexpr std::uint32_t kinds = kinds_that_move(CommandEffect::device);
   return (kinds >> static_cast<unsigned>(kind) & 1U) != 0;

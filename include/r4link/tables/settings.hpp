@@ -12,7 +12,7 @@
 
 namespace r4 {
 
-// From `network` on: of the place where the board stands.
+// From `network` on: settings of the place where the board stands.
 enum class Setting : std::uint8_t {
 #define R4_SETTING(setting, ...) setting,
 #include "board.def"
@@ -20,10 +20,10 @@ enum class Setting : std::uint8_t {
 constexpr std::size_t setting_kinds = static_cast<std::size_t>(Setting::key) + 1;
 
 struct SettingRow {
-  Text key;  // where there are several: that of the first
+  Text key;  // if there are several keys, the first
   Setting setting;
-  std::uint8_t keys;  // how many there are
-  // Of a number in a value; of a text, how many bytes. Both 0: a word.
+  std::uint8_t keys;  // number of keys
+  // Range of a number; of a text, its bytes. Both 0: a word.
   std::uint32_t min;
   std::uint32_t max;
   std::uint32_t standard;  // the default of a number; of another setting, `off` or its first word

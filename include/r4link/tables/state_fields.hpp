@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state fields (docs/protocol.md) in two tables, made of the rows of board.def. A row of the first
-// says what a field is of: a kind and a channel. A row of the second says what the values of that kind
-// are: their form, units and place in State.
+// The state fields (docs/protocol.md), made of the rows of board.def in two tables: for each field
+// its kind and channel, and for each kind the form, units and State member of its values.
 //
 //     for (const StateFieldRow& row : state_fields) …   in the order of the wire
 //     state_field(FieldKind::osmc, 2)                   StateField::osmc2
 //     numbers_of(state, StateField::osmc2)[0]           its duty cycle, 0-4095
 //     kind_row_of(StateField::osmc2).values[0].unit     "0-4095"
 //
-// Both tables are constants. A program that reads them only while it is compiled, as the firmware
-// does, carries none of their texts.
+// A program that reads these only at compile time, as the firmware, carries no texts.
 #pragma once
 
 #include <cstddef>
@@ -32,7 +30,7 @@ enum class FieldKind : std::uint8_t {
 };
 constexpr int field_kind_count = static_cast<int>(FieldKind::count);
 
-// How the values of a field look on the wire, and which type of State's they are.
+// The form of a field's values on the wire, and their type in State.
 enum class FieldForm : std::uint8_t {
   volts,   // int32 in hundredths: "24.28"
   flag,    // bool: 0 or 1
@@ -65,10 +63,9 @@ constexpr StateFieldRow state_fields[] = {
 #include "board.def"
 };
 
-// One of the values of a field.
 struct FieldValue {
   const char* name;  // "pwm"; "" if the field has one value only
-  const char* unit;  // "V"; where there is none, the range: "0-4095"
+  const char* unit;  // "V"; without a unit the range: "0-4095"
 };
 constexpr int most_field_values = 3;
 
@@ -78,7 +75,7 @@ struct FieldKindRow {
   FieldForm form;
   std::uint16_t place;                   // of channel 1 in State; channel n is n-1 sizes after it
   std::uint16_t size;                    // of the value of a channel in State
-  FieldValue values[most_field_values];  // those that are not there have no unit
+  FieldValue values[most_field_values];  // unused ones have no unit
   const char* help;                      // one sentence
 
   // True if the last value is not a number but the bytes of a device: "x3b00".
@@ -110,7 +107,7 @@ constexpr const StateFieldRow& row_of(StateField field) {
 constexpr const FieldKindRow& row_of(FieldKind kind) { return field_kinds[static_cast<int>(kind)]; }
 constexpr const FieldKindRow& kind_row_of(StateField field) { return row_of(row_of(field).kind); }
 
-// The kind of field that shows what a command has set; FieldKind::count if there is none.
+// The kind of field that shows a command's setpoint; FieldKind::count if there is none.
 constexpr FieldKind shown_by(CommandKind command) {
   switch (command) {
 #define R4_OUTPUT(kind, ...) \
@@ -129,17 +126,16 @@ constexpr FieldKind shown_by(CommandKind command) {
 // The field of a channel, from 1. StateField::count if there is none.
 R4LINK_API StateField state_field(FieldKind kind, int channel);
 
-// The numbers of a field in the order and units of its kind. Bytes of a device are no numbers: the
-// values of FieldForm::reading, answer and uart are the first two.
+// The numbers of a field, in the order and units of its kind. For FieldForm::reading, answer and
+// uart: the first two values, because the bytes of a device are not numbers.
 struct StateNumbers {
   int count;
   double values[most_field_values];
   double operator[](int i) const { return values[i]; }
 };
 R4LINK_API StateNumbers numbers_of(const State& state, StateField field);
-// Writes what numbers_of() reads, rounded to what the field can hold. `present` stays. False, with
-// the state unchanged, if a number is outside the range of the field, if the field has not so many
-// numbers, or if it has bytes.
+// Writes what numbers_of() reads, rounded to the field's type. `present` stays. False, with `state`
+// unchanged, for a number out of range, a wrong count, or bytes.
 R4LINK_API bool set_numbers(State& state, StateField field, const StateNumbers& numbers);
 
 }  // namespace r4
