@@ -31,11 +31,10 @@ class Mcp23017Model final : public I2cChipModel {
 
   explicit Mcp23017Model(std::uint8_t address) : address_(address) {}
 
-  // What the pins do; bit n is pin n.
+  // Bit n is pin n.
   std::uint8_t driven(int port) const;  // 1: the chip drives the pin
-  std::uint8_t level(int port) const;   // of the driven pins; others as outside
+  std::uint8_t level(int port) const;   // of driven pins; others as outside
   std::uint8_t reg(int port, Register number) const;
-  // The levels that come from outside.
   void set_outside(int port, std::uint8_t levels);
 
   void power_on() override;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An ultrasonic sensor HC-SR04 (data sheet): after a trigger pulse its echo line is high for 58 us a
-// centimetre, or 38 ms if nothing is there.
+// An ultrasonic sensor HC-SR04 (data sheet): after a trigger pulse its echo line is high for 58 us
+// per centimetre, or 38 ms if nothing is there.
 #pragma once
 
 #include <cstdint>
@@ -21,12 +21,11 @@ class UltrasonicModel {
   // 0: nothing is in sight.
   void set_distance(std::uint16_t cm) { cm_ = cm; }
   std::uint16_t distance() const { return cm_; }
-  // A sensor without its cable says nothing.
+  // A disconnected sensor never answers.
   void connect(bool connected) { connected_ = connected; }
   bool connected() const { return connected_; }
 
-  // It is `now_us`. Reports the edges of the echo line since the last call, with their times:
-  // on_edge(bool high, std::uint32_t at_us).
+  // Reports the echo line's edges since the last call: on_edge(bool high, std::uint32_t at_us).
   template <class OnEdge>
   void pass(std::uint32_t now_us, OnEdge&& on_edge) {
     const bool fell = triggered_ && !trigger_.high();
