@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's wiring: which chip and line serves which channel. Element n-1 is channel n.
-//
-// The addresses are those of the boot report (paper Figure 3). Paper section 2 assigns the chips:
-// three PCA9685 to OSMC, DHB12 and servos; MCP23017 port A to direction and brake of the BLDC
-// channels, port B to the relays; MCP4728 to the BLDC speeds. The paper does not give lines and
+// The board's wiring. Element n-1 is channel n. The addresses are those of the boot report (paper
+// Figure 3); paper section 2 assigns the chips to the channels. The paper does not give lines and
 // levels: those below are our plan. Compare them with your board's schematic before you power a
 // motor.
 #pragma once
@@ -28,8 +25,7 @@ constexpr int chip_count = static_cast<int>(Chip::count);
 constexpr std::uint32_t drive_hz = 1000;
 constexpr std::uint32_t servo_hz = 50;
 
-// Outputs of an H-bridge's PCA9685. Duty and direction are neighbours, so one transfer changes
-// both. Direction: high is forward.
+// Duty and direction are neighbours, so one transfer changes both. Direction: high is forward.
 template <Chip chip>
 struct DriveLines {
   std::uint8_t pwm;
@@ -43,8 +39,7 @@ constexpr DriveLines<Chip::dhb12_pwm> dhb12_lines[] = {{0, 1}, {2, 3}, {4, 5}, {
 constexpr std::uint8_t servo_lines[servo_channels] = {0, 1, 2,  3,  4,  5,  6,  7,
                                                       8, 9, 10, 11, 12, 13, 14, 15};
 
-// Output of the MCP4728 (0-3 for A-D) and bits of port A. Direction: high is forward; brake: high
-// brakes.
+// Output of the MCP4728 (0-3: A-D), bits of port A. Direction: high is forward; brake: high is on.
 struct BldcLines {
   std::uint8_t speed;
   std::uint8_t direction;

@@ -15,8 +15,7 @@ constexpr std::uint8_t pca9685_chips = 1U << static_cast<int>(Chip::osmc_pwm) |
                                        1U << static_cast<int>(Chip::dhb12_pwm) |
                                        1U << static_cast<int>(Chip::servo_pwm);
 
-// The all-call has switched the PWM outputs off. First come the brushless motors and the relays,
-// which it does not reach.
+// First the brushless motors and the relays, which the all-call does not reach.
 constexpr Chip safe_order[chip_count] = {Chip::dac, Chip::expander, Chip::osmc_pwm, Chip::dhb12_pwm,
                                          Chip::servo_pwm};
 
@@ -77,16 +76,15 @@ void BoardHardware::drive_safe() {
   modes_to_check_ = sizeof pwm_chips / sizeof *pwm_chips;
   for (Stepper& stepper : steppers_) stepper.stop();
   for (AnalogOutputPin* pin : pins_.dac) pin->write(0);
-  // Each driver forgets its pending writes, even if a held bus keeps its chip from being written
-  // now.
+  // Drivers forget pending writes, even if a held bus keeps their chips from being written now.
   for (ChipDriver* chip : chips_) chip->want_safe();
   // If a held bus can be freed, the chip that held it comes last.
   const int held_at = drive_chips_safe(nowhere);
   if (held_at != nowhere && bus_.recover()) drive_chips_safe(held_at);
 }
 
-// Makes the chips safe as far as the bus allows. Returns the chip at which the bus was held,
-// all_chips for the all-call, or nowhere. `held_before`: the result of the try before.
+// Returns the chip at which the bus was held, all_chips for the all-call, or nowhere.
+// `held_before`: the result of the try before.
 int BoardHardware::drive_chips_safe(int held_before) {
   if ((config_.chips_fitted & pca9685_chips) != 0 && held_before != all_chips &&
       Pca9685::all_off(bus_) == I2cResult::timeout) {
@@ -95,8 +93,7 @@ int BoardHardware::drive_chips_safe(int held_before) {
     }
     return all_chips;
   }
-  // One chip's acknowledge of the all-call hides two chips that did not hear it, so each chip is
-  // addressed by itself, too.
+  // One acknowledge of the all-call hides chips that did not hear it: each is addressed, too.
   for (const Chip chip : safe_order) {
     const int i = static_cast<int>(chip);
     if (i != held_before && !drive_chip_safe(i)) return i;
@@ -162,8 +159,7 @@ void BoardHardware::set_outputs(const Outputs& outputs) {
   for (int i = 0; i < dac_channels; ++i) pins_.dac[i]->write(outputs.dac_mv[i]);
 }
 
-// Begins at the chip where the budget ran out last time, so that none is left out. Ends at a held
-// bus: one timeout is enough.
+// Begins where the budget ran out last time. Ends at a held bus: one timeout is enough.
 void BoardHardware::for_each_chip(BusBudget& budget, bool set_up) {
   for (int n = 0; n < chip_count; ++n) {
     const int i = (first_chip_ + n) % chip_count;
@@ -214,7 +210,6 @@ void BoardHardware::poll(std::uint32_t now_us) {
   leave();
 }
 
-// Restarts the set-up of chips in trouble, if the bus is free.
 void BoardHardware::set_up_again() {
   bool tried = false;
   bool free = false;
@@ -229,8 +224,7 @@ void BoardHardware::set_up_again() {
   }
 }
 
-// A chip with changed modes may drive although commanded off. It is reset, and the chips reset with
-// it are set up again.
+// A chip with changed modes may drive although commanded off. Its reset reaches other chips, too.
 void BoardHardware::reset_lost_modes() {
   const bool lost = osmc_.lost_mode() || dhb12_.lost_mode() || servo_.lost_mode();
   if (!lost || Pca9685::reset_all(bus_) != I2cResult::ok) return;
@@ -239,8 +233,8 @@ void BoardHardware::reset_lost_modes() {
   }
 }
 
-// make_safe() may interrupt a transfer, or write registers while a driver compares them. The
-// trouble found then says nothing about the chip, so the chip is set up again without a fault.
+// Trouble that a driver finds during a make_safe() says nothing about its chip, so the chip is set
+// up again without a fault.
 void BoardHardware::set_up_what_was_cut_off() {
   for (int i = 0; i < chip_count; ++i) {
     if (chips_[i]->trouble() != ChipTrouble::none && !failed_[i]) chips_[i]->begin();
@@ -268,9 +262,8 @@ bool BoardHardware::look_for_trouble() {
   return found;
 }
 
-// Each function that uses the bus ends with this. New trouble makes everything safe. If make_safe()
-// interrupted the function, its last write may have undone the safe state: everything is made safe
-// once more.
+// Each function that uses the bus ends with this. New trouble makes everything safe. An
+// interrupting make_safe() may have been undone by the function's last write, so it is repeated.
 void BoardHardware::leave() {
   if (!interrupted_ && look_for_trouble()) {
     reset_lost_modes();

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The R4 board's hardware made of the chip drivers. Outputs go to chips and pins by the table of
-// board_channels.hpp; inputs come from pins, converters and interrupts.
+// The R4 board's hardware made of the chip drivers, wired by the table of board_channels.hpp.
 //
-// Power-up: call power_up() before anything else. Its first transfer resets the PWM chips, which
-// turns every PWM output off in any mode. Its last transfer leaves every output in its safe value.
-// poll() sets the chips up, and ready() is true when all are. Outputs applied earlier wait until
-// then, so that no motor runs before the chip that brakes another is there.
+// Power-up: call power_up() first. It resets the PWM chips, which turns every PWM output off in any
+// mode, and leaves every output in its safe value. poll() then sets the chips up, and ready() is
+// true when all are. Outputs applied earlier wait until then, so that no motor runs before its
+// brake works.
 //
 // Safe state (make_safe()): steppers stand, PWM outputs off, DAC codes and outputs 0, brakes on,
 // relays off. It may be called at any time, also in an interrupt or a fault handler during a
@@ -16,12 +15,9 @@
 // outputs off first. If a disturbance changed the modes of a PCA9685, all chips that hear the
 // general call are reset first. Until then its outputs may be on.
 //
-// One chip is verified at a time, so a reset chip is noticed within chip_count x verify_us plus one
-// poll. After a safe state the modes of the PCA9685 are verified first.
-//
-// Each poll() and each apply() sends at most bus_bytes_per_poll bytes; the rest follows in the next
-// polls. Nothing waits.
-// fit follows in the next polls. Nothing waits.
+// A reset chip is noticed within chip_count x verify_us plus one poll; the PCA9685 are verified
+// first after a safe state. Each poll() and each apply() sends at most bus_bytes_per_poll bytes;
+// the rest follows in the next polls. Nothing waits.
 #pragma once
 
 #include <cstddef>
@@ -80,14 +76,12 @@ class BoardHardware final : public Hal {
   void zero(int channel) override;
   bool clear_fault() override;  // false while a chip is not ready
 
-  // Leaves chips alone that are not in `chips` (bit: Chip), and forgets faults; those that persist
-  // are found again. Call before anything is applied.
+  // Ignores chips not in `chips` (bit: Chip) and forgets faults. Call before anything is applied.
   void fit(std::uint8_t chips);
   // Full scale in hundredths of a volt, in the order of BoardPins::analog.
   void calibrate(const std::uint16_t (&full_scale_cv)[analog_channels]);
 
   bool ready() const;
-  // The first fault since the last clear_fault().
   ChipFault fault() const { return fault_; }
   ChipTrouble trouble(Chip chip) const { return chips_[static_cast<int>(chip)]->trouble(); }
 
@@ -132,7 +126,7 @@ class BoardHardware final : public Hal {
   QuadratureEncoder encoders_[encoder_channels];
   UltrasonicSensors ultrasonic_;
 
-  Outputs waiting_outputs_;  // applied before every chip was ready
+  Outputs waiting_outputs_;  // before every chip was ready
   bool waiting_ = false;
   ChipFault fault_;
   bool failed_[chip_count] = {};
@@ -141,7 +135,7 @@ class BoardHardware final : public Hal {
   int verified_chip_ = 0;                     // next to verify
   volatile std::uint8_t modes_to_check_ = 0;  // PWM chips left to check after a safe state
   std::uint32_t verified_us_ = 0;
-  std::uint32_t now_us_ = 0;  // of the last poll
+  std::uint32_t now_us_ = 0;
   std::uint32_t held_since_us_ = 0;
   bool handle_seen_ = false;           // the pin read held at the last poll
   bool handle_held_ = false;           // the handle has settled

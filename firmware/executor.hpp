@@ -20,8 +20,7 @@ struct Setpoints {
 };
 
 // Carries out `command` completely, or changes nothing and returns the reason. The caller has used
-// check_command(), so only names of fields and settings, and channels, are refused here. Commands
-// that change no setpoint are left to the application.
+// check_command(), so only names of fields and settings, and channels, are refused here.
 Refusal carry_out(const Command& command, Setpoints& setpoints);
 
 }  // namespace firmware

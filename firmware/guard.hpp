@@ -7,15 +7,12 @@
 //     E:STOP has arrived        stop() was called                  outputs safe, cause stop
 //     a duty hangs              5 deadlines missed in a row        outputs safe, cause watchdog
 //     a duty is often late      2 missed a second for long         outputs safe, cause watchdog
-//     a duty stays away         tick() does not return true        the hardware watchdog is not fed
-//                                                                  and resets the board
-//     too many duties           add_duty()                         both, again after each clear:
-//                                                                  that duty is not watched
+//     a duty stays away         tick() does not return true        hardware watchdog resets board
+//     too many duties           add_duty()                         both, again after each clear
 //
 // A duty is work that must repeat: a turn of the loop, of a thread, of another interrupt. It checks
-// in each time. The application learns of the guard's reaction at its next turn (take()).
-//
-// tick() runs in an interrupt, on the core that it interrupts; check_in() may run in any thread.
+// in each time. tick() runs in an interrupt, on the core that it interrupts; check_in() in any
+// thread.
 #pragma once
 
 #include <atomic>
@@ -51,8 +48,7 @@ class Guard {
   // Calls of stop() since boot; wraps. The application must find as many datagrams.
   std::uint32_t stops_heard() const { return stops_heard_.load(std::memory_order_acquire); }
 
-  // Call every millisecond. True if every duty has checked in since tick() last returned true: the
-  // hardware watchdog may be fed.
+  // True if every duty has checked in since the last true: the hardware watchdog may be fed.
   bool tick(std::uint32_t now_ms);
 
   // True if the guard has made the outputs safe since the last take().
@@ -60,7 +56,6 @@ class Guard {
   // Returns none, link, watchdog or stop. Afterwards the guard may trip again.
   SafeReason take() { return tripped_.exchange(SafeReason::none, std::memory_order_relaxed); }
 
-  // Deadlines that duties missed since boot.
   std::uint32_t missed() const { return missed_.load(std::memory_order_relaxed); }
 
   // Each miss adds miss_cost to a debt, and each millisecond takes 1 off. A debt above the credit
@@ -73,8 +68,8 @@ class Guard {
     std::atomic<bool> seen{false};
     // Used by tick() only.
     std::uint32_t limit_ms = 0;
-    std::uint32_t seen_ms = 0;  // or counted as missed
-    bool due = true;            // has not checked in since tick() last returned true
+    std::uint32_t seen_ms = 0;
+    bool due = true;  // has not checked in since tick() last returned true
   };
 
   void trip(SafeReason cause);

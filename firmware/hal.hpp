@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hardware as the application needs it: channel values. Each port (firmware/ports/…) implements
-// it; chips, registers and pins are below it.
+// The hardware as the application needs it: channel values. Each port implements it. Nothing waits.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +20,7 @@ struct StepperTarget {
   friend bool operator!=(const StepperTarget& a, const StepperTarget& b) { return !(a == b); }
 };
 
-// All outputs as commanded. Default: the safe state, all off and the brakes on.
+// Default: the safe state, all off and the brakes on.
 struct Outputs {
   Outputs() {
     for (Bldc& channel : bldc) channel.brake = true;
@@ -37,7 +36,7 @@ inline bool operator!=(const Outputs& a, const Outputs& b) { return !(a == b); }
 struct Inputs {
   std::int32_t analog_cv[analog_channels] = {};  // hundredths of a volt
   bool handle_held = false;
-  std::int32_t stepper_steps[stepper_channels] = {};  // position
+  std::int32_t stepper_steps[stepper_channels] = {};
   std::int32_t encoder_counts[encoder_channels] = {};
   std::int32_t encoder_hz[encoder_channels] = {};  // counts per second; negative backwards
   std::int32_t encoder_index_counts[encoder_channels] = {};  // at the index's last rising edge
@@ -49,11 +48,10 @@ struct Inputs {
 
 class Hal {
  public:
-  // Called when a setpoint changed. Writes only differences and does not wait.
+  // Called when a setpoint changed. Writes only differences.
   virtual void apply(const Outputs& outputs) = 0;
   // Every output off, at once; a fault handler may call it at any time.
   virtual void make_safe() = 0;
-  // Does not wait.
   virtual void sample(Inputs& inputs) = 0;
   // Encoder and stepper `channel` (1 …) restart at zero; the stepper holds.
   virtual void zero(int channel) = 0;

@@ -21,19 +21,15 @@ class Port {
   // If the transport cannot reach everyone at once (UDP), datagrams for everyone go to `peer`.
   // `everyone`: no peer on this port is in control.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
-  // Holds one more peer until hold() is called: a session may have several paths on this port
-  // (session_paths.hpp).
+  // Also holds `peer`, until hold(): a session may have several paths here (session_paths.hpp).
   virtual void also_hold(Peer peer) { static_cast<void>(peer); }
   // True if `peer` receives datagrams for everyone.
   virtual bool reaches(Peer peer) const { return peer == everyone; }
-  // Sends the packed form from now on if port (CAN) and host have one: the setting `pack`, while a
-  // host is in control.
+  // Where port (CAN) and host have the packed form: setting `pack`, while a host is in control.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
-  // True for a bus (CAN): exactly the programs on it hear what the port sends. A watcher there need
-  // not prove its peer.
+  // True for a bus (CAN): only the programs on it hear it, so a watcher need not prove its peer.
   virtual bool is_bus() const { return false; }
-  // True for a cable of the board's own. Settings of wiring and addresses are accepted only there
-  // (site_settings.hpp).
+  // True for a cable of the board's own, from which site settings are accepted (site_settings.hpp).
   virtual bool may_configure() const { return false; }
 
  protected:

@@ -10,9 +10,9 @@
 //     fault      a chip or the firmware failed            E:CLEAR                     cleared
 //     watchdog   a duty missed its deadline               E:CLEAR                     cleared
 //
-// The board reports the gravest cause: stop, fault, watchdog, handle, proximity, link. E:CLEAR ends
-// only the reported cause, so that no host clears a cause that it has not seen. E:CLEAR also names
-// the number of the newest cause, so that no host clears a later cause.
+// The outputs are safe while there is a cause. The board reports the gravest: stop, fault,
+// watchdog, handle, proximity, link. E:CLEAR ends only the reported cause, which the host has seen,
+// and names the number of the newest cause, so that no host clears a later cause.
 #pragma once
 
 #include <cstdint>
@@ -43,7 +43,6 @@ class Safety {
   }
   // The number of the newest cause that only E:CLEAR ends.
   std::int32_t newest() const { return newest_; }
-  // True if there is a cause that only E:CLEAR ends.
   bool latched() const;
 
  private:

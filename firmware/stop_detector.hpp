@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Detects E:STOP in an interrupt where datagrams arrive. Guard::stop() then makes the outputs safe
-// without waiting for the loop. The datagram itself goes its usual way.
+// Detects E:STOP in an interrupt where datagrams arrive, so that Guard::stop() makes the outputs
+// safe without waiting for the loop. The datagram itself goes its usual way.
 #pragma once
 
 #include <cstddef>

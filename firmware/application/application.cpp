@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How the application handles datagrams and time.
 #include "application.hpp"
 
 namespace r4 {
@@ -38,7 +37,7 @@ Application::Application(Hal& hal, const Config& config, Observer* observer)
   }
   setpoints_.settings = config.settings;
   authentication_.use(config.settings.site.keys);
-  guard_.add_duty(loop_limit_ms);  // loop_duty
+  guard_.add_duty(loop_limit_ms);
 }
 
 std::uint8_t Application::add_port(Port& port) {
@@ -119,8 +118,7 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
 void Application::turn(std::uint32_t now_ms) {
   if (now_ms - turned_ms_ > standstill_ms) {
     for (PortSlot& slot : ports_) {
-      if (!slot.behind)
-        slot.waiting_ms = turned_ms_;  // if behind, earlier datagrams may still wait
+      if (!slot.behind) slot.waiting_ms = turned_ms_;  // else earlier datagrams may still wait
       slot.behind = true;
     }
     any_behind_ = true;
@@ -136,13 +134,11 @@ void Application::drained(std::uint8_t port) {
   if (port < port_count_) ports_[port].behind = false;
 }
 
-// How long a datagram from that port may have waited.
 std::uint32_t Application::waited_ms(std::uint8_t port, std::uint32_t now_ms) const {
   return ports_[port].behind ? now_ms - ports_[port].waiting_ms : 0;
 }
 
-// A datagram is authentic without a key, and on a cable of the board's own, because a host on that
-// cable can set the key.
+// Authentic without a key, or on a cable of the board's own, because a host there can set the key.
 Verdict Application::judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
                            std::uint32_t now_ms) {
   if (!authentication_.required() || ports_[port].port->may_configure()) return Verdict::authentic;
@@ -169,7 +165,6 @@ void Application::hold_paths() {
   }
 }
 
-// A heartbeat of the session came from `from`, which may be a new path.
 void Application::on_path_heard(Source from, std::uint32_t now_ms) {
   if (!paths_.on_heartbeat(from, now_ms)) return;
   watchers_.end_of(from);

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The R4 board's application: datagrams in, outputs and datagrams out (paper sections 2-4).
-//
-// It owns no thread, clock or socket. The port calls receive() for each datagram, poll() as time
-// passes, port_down() when a transport fails, and guard().tick() in a timer interrupt. The
-// application answers through Hal and Port. Outputs change only in update_outputs(); Safety holds
-// the causes of the safe state.
+// The R4 board's application: datagrams in, outputs and datagrams out (paper sections 2-4). It owns
+// no thread, clock or socket. The port calls receive() for each datagram, poll() as time passes,
+// port_down() when a transport fails, and guard().tick() in a timer interrupt.
 //
 //     CONNECTING   no host yet: outputs safe, `H:R4-ROS2;PNum:0;T:0;` each heartbeat interval
 //     ACTIVE       a host is in control and there is no cause: outputs follow the setpoints
@@ -13,7 +10,6 @@
 // A session has one to four paths (session_paths.hpp), and each gets states and heartbeats. Packet
 // numbers count per port; answers to hosts not in control have separate numbers. All times are ms
 // of the board's clock, which wraps.
-// the board's clock, which wraps.
 #pragma once
 
 #include <cstddef>
@@ -46,9 +42,9 @@ class Application {
     // Authentication::chance_size random bytes, different at each boot. Without them, a board with
     // a key obeys only a host on a cable of its own.
     const std::uint8_t* chance = nullptr;
-    // Must outlive the application. nullptr: the commands of the user's bus are unknown.
+    // The user's devices must outlive the application; UARTs all or none. nullptr: commands
+    // unknown.
     UserI2c* i2c = nullptr;
-    // The user's UARTs, all or none; likewise.
     UserUart* uarts[uart_channels] = {};
   };
   static constexpr int max_ports = 4;
@@ -56,20 +52,17 @@ class Application {
 
   Application(Hal& hal, const Config& config, Observer* observer = nullptr);
 
-  // Call before start(). Returns the port's number, or no_port if there are max_ports already; such
-  // a port is not served. A board with a fixed set of ports asserts this at compile time.
+  // Call before start(). Returns the port's number, or no_port if there are max_ports already.
   std::uint8_t add_port(Port& port);
   // Makes the outputs safe and sends the first heartbeat.
   void start(std::uint32_t now_ms);
 
-  // Takes a datagram of any content from `peer` on `port`. Ignores a port that was not added.
-  //
-  // Each call of this or poll() is a turn of the loop. After a pause longer than standstill_ms, a
-  // datagram may have waited since the turn before. A heartbeat then counts from that turn, until
-  // the port is drained or the loop has turned for catch_up_ms.
+  // Takes a datagram of any content from `peer`; ignores a port that was not added. After a pause
+  // longer than standstill_ms, the datagram may have waited since the last turn of the loop (a call
+  // of this or poll()). A heartbeat then counts from that turn, until the port is drained or the
+  // loop has turned for catch_up_ms.
   void receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms);
-  // All that had arrived on `port` is handed over, so its next heartbeat has not waited. Optional:
-  // for ports that can tell.
+  // All that had arrived on `port` is handed over, so its next heartbeat has not waited.
   void drained(std::uint8_t port);
   // The transport of `port` has failed.
   void port_down(std::uint8_t port, std::uint32_t now_ms);
@@ -78,8 +71,7 @@ class Application {
   // Does everything that is due. Returns the milliseconds until the next call, at most 10.
   std::uint32_t poll(std::uint32_t now_ms);
 
-  // A turn of the user's devices; part of poll(). Call at least once per millisecond, so that a
-  // transfer can begin in each.
+  // Part of poll(). Call at least once per millisecond, so that a transfer can begin in each.
   void poll_devices(std::uint32_t now_ms);
 
   // For the timer interrupt. poll() checks in the first duty, loop_duty.
@@ -103,10 +95,9 @@ class Application {
   static constexpr std::uint32_t standstill_ms = 15;
   // Ports hold no more datagrams than are read in this time.
   static constexpr std::uint32_t catch_up_ms = 50;
-  // How far beyond the threshold an obstacle must be to end the cause proximity …
+  // The cause proximity ends when the obstacle is this far beyond the threshold for this long: two
+  // turns of each sensor (drivers/ultrasonic.hpp), because one turn may miss an echo.
   static constexpr int proximity_hysteresis_cm = 5;
-  // … and for how long: two turns of each sensor (drivers/ultrasonic.hpp), because one may miss an
-  // echo.
   static constexpr std::uint32_t proximity_clear_ms = 500;
   // How long states include the answer to a single transfer on the user's bus, selected or not.
   static constexpr std::uint32_t answer_shown_ms = 1000;
@@ -206,14 +197,14 @@ class Application {
   Safety safety_;
   StateSchedule schedule_;
   Setpoints setpoints_;
-  Outputs outputs_;  // as last sent to the hardware
+  Outputs outputs_;
   Inputs inputs_;
   PortSlot ports_[max_ports];
   std::uint8_t port_count_ = 0;
-  bool any_behind_ = false;  // perhaps one of the slots
+  bool any_behind_ = false;
   BoardState reported_state_ = BoardState::connecting;
   SafeReason reported_reason_ = SafeReason::none;
-  std::uint32_t turned_ms_ = 0;    // the last turn of the loop
+  std::uint32_t turned_ms_ = 0;
   std::uint32_t went_on_ms_ = 0;   // the first turn after a standstill
   std::uint32_t obstacle_ms_ = 0;  // when an obstacle was last seen
   std::uint32_t caused_ms_ = 0;    // when a cause other than link last came
@@ -231,7 +222,7 @@ class Application {
   std::uint32_t unread_stops_ = 0;
   std::uint32_t unread_ms_ = 0;
   std::uint32_t answered_ms_ = 0;
-  bool has_answer_ = false;  // of the user's bus, still shown in states
+  bool has_answer_ = false;  // still shown in states
   UserI2c* i2c_;
   UserUart* uarts_[uart_channels];
   std::uint32_t rx_ok_ = 0;

@@ -113,8 +113,7 @@ void Application::on_watch(Source from, const Datagram& datagram, const Command&
     const Refusal refusal = parse_fields(command.text, fields);
     if (refusal != Refusal::none) return refuse(from, datagram, refusal, now_ms);
   }
-  if (link_.has_owner() && paths_.has(from))
-    return;  // a path of the session gets every state anyway
+  if (link_.has_owner() && paths_.has(from)) return;  // a path of the session gets all states
   const std::uint32_t rate_hz = static_cast<std::uint32_t>(command.value);
   switch (watchers_.on_lease(from, rate_hz, datagram.time_ms(), proven, now_ms)) {
     case Watchers::Effect::watching: {
@@ -139,20 +138,17 @@ void Application::on_watch(Source from, const Datagram& datagram, const Command&
   }
 }
 
-// True if the command is allowed on this port.
 bool Application::may_set(std::uint8_t port, const Command& command) const {
   return command.kind != CommandKind::setting || !is_site_setting(command.text) ||
          ports_[port].port->may_configure();
 }
 
-// Completes a command that has changed the setpoints.
 void Application::execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms) {
   link_.executed(pnum);
   take_effect(pnum, command, now_ms);
   bring_about(now_ms);
 }
 
-// Effects other than setpoints, and the observer's notification.
 void Application::take_effect(std::uint32_t pnum, const Command& command, std::uint32_t now_ms) {
   switch (command.kind) {
     case CommandKind::zero:
@@ -189,21 +185,19 @@ void Application::bring_about(std::uint32_t now_ms) {
 }
 
 // A stop that is not authentic uses up no number: CMD would then confirm what was not executed.
-// Neither does a stop whose number is not the next. Another program at the owner's peer (a bus, or
-// a shared port) takes random numbers, and the board must not lose the owner's number because of
-// them.
+// Neither does a stop whose number is not the next: another program at the owner's peer (a bus, or
+// a shared port) has random numbers, which must not replace the owner's.
 void Application::emergency_stop(Source from, const Datagram& datagram, Verdict verdict,
                                  std::uint32_t now_ms) {
   const bool repeated = safety_.has(SafeReason::stop);
   std::uint32_t number = 0;
   const bool has_number = stop_number(datagram, number);
-  // A sender without a key may have used the owner's number. The owner's own stop is then not a
-  // repetition.
+  // The owner's own stop does not repeat a stop that was sent without a key under its number.
   const bool of_a_key =
       verdict == Verdict::authentic || verdict == Verdict::replayed || verdict == Verdict::old;
   const bool same = has_number && has_stop_number_ && number == stop_number_ &&
                     speaker_ == stop_from_ && (stop_of_a_key_ || !of_a_key);
-  // An E:CLEAR under way does not know of this stop, so the stop gets a new number.
+  // An E:CLEAR under way does not know of this stop.
   if (repeated && !same) safety_.again();
   if (unread_stops_ != 0) --unread_stops_;
   if (!repeated || !same) stop_of_a_key_ = of_a_key;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's devices: their commands, and their part of the state.
 #include <cstring>
 
 #include "../../protocol/messages/device_command.hpp"

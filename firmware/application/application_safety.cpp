@@ -54,10 +54,9 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   report_state(now_ms);
 }
 
-// A host must not clear a cause that came while E:CLEAR was on its way. So E:CLEAR names the newest
-// cause, or says that there is none. An E:CLEAR that names none comes from a host that does not
-// know such numbers. It must come later than the timeout after the cause, because no earlier
-// datagram is held back for longer.
+// A host must not clear a cause that came while E:CLEAR was on its way, so E:CLEAR names the newest
+// cause. An E:CLEAR without that number must come later than the timeout after the cause, because
+// no earlier datagram is held back for longer.
 Refusal Application::judge_clear(const Command& command, std::uint32_t waited_ms,
                                  std::uint32_t now_ms) const {
   if (unread_stops_ != 0) return Refusal::stale;  // the sender cannot know their numbers
@@ -69,7 +68,7 @@ Refusal Application::judge_clear(const Command& command, std::uint32_t waited_ms
   return settled || !safety_.latched() ? Refusal::none : Refusal::stale;
 }
 
-// E:CLEAR. A fault that persists stays.
+// A fault that persists stays.
 void Application::clear() {
   if (safety_.reason() != SafeReason::fault || hal_.clear_fault()) safety_.clear();
 }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Outgoing datagrams: heartbeats, states, answers.
 #include <cstring>
 
 #include "../../protocol/messages/command_group.hpp"
@@ -11,7 +10,6 @@ namespace firmware {
 
 namespace {
 
-// Room for a heartbeat or a refusal.
 constexpr std::size_t short_datagram = 160;
 
 // ";SAFE:6;FAULT:127,255" after the last field of a state.
@@ -41,12 +39,10 @@ void Application::transmit(Source to, const std::uint32_t& number, Text datagram
   if (!sent) slot.port->send(datagram, priority, to.peer);
 }
 
-// True if the datagram being read is from the controlling host.
 bool Application::is_of_owner() const { return link_.has_owner() && link_.is_session_of(speaker_); }
 
-// The packet number for an answer to the datagram being read. A watcher has its own numbers. A
-// sender that hears everything on the port gets the port's. Other hosts have separate numbers,
-// because they may be behind the same bridge.
+// A watcher has its own numbers. A sender that hears everything on the port gets the port's. Other
+// hosts have separate numbers, because they may be behind the same bridge.
 std::uint32_t& Application::number_for(Source to) {
   Watcher* const watcher = watchers_.find(to);
   if (watcher != nullptr && !hears_all(to)) return watcher->pnum;
@@ -234,7 +230,6 @@ void Application::send_state(Source to, std::uint32_t& pnum, FieldSet fields, co
   send_part(to, pnum, writer, state, t_ms);
 }
 
-// Each part reports whether the outputs are safe, and why.
 void Application::send_part(Source to, std::uint32_t& pnum, DatagramWriter& writer,
                             const State& state, std::uint32_t t_ms) {
   if (state.safe != SafeReason::none) write_field(writer, StateField::safe, state);

@@ -23,8 +23,7 @@ class StateSchedule {
   // Takes effect after the next state.
   void set_period(std::uint32_t period_ms) { period_ms_ = period_ms; }
 
-  // If a state is due, returns true and its time on the grid in `t_ms`. Periods that have passed
-  // completely are skipped and counted.
+  // True if a state is due, at `t_ms` on the grid. Skips and counts periods that have passed.
   bool take(std::uint32_t now_ms, std::uint32_t& t_ms) {
     if (!running_ || !reached(now_ms, next_ms_)) return false;
     const std::uint32_t missed = (now_ms - next_ms_) / period_ms_;
@@ -34,7 +33,7 @@ class StateSchedule {
     return true;
   }
 
-  // Milliseconds until the next state; call only while running.
+  // Call only while running.
   std::uint32_t due_in(std::uint32_t now_ms) const {
     return reached(now_ms, next_ms_) ? 0 : next_ms_ - now_ms;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus: single transfers, a scan, and repeated readings (docs/devices.md). It is not
-// the bus of the board's chips. Nothing waits: poll() begins what is due and looks how far it is.
+// The user's I2C bus, not that of the board's chips (docs/devices.md). Nothing waits: poll() begins
+// what is due and looks how far it is.
 //
 //            begins a transfer              it has ended
 //     idle --------------------> transfer ----------------> idle
@@ -41,7 +41,6 @@ class UserI2c {
 
   void poll(std::uint32_t now_ms);
 
-  // In the order of the slots.
   const I2cReading (&readings() const)[i2c_slots] { return readings_; }
   const I2cReading& reading(int slot) const { return readings_[slot - 1]; }
   const I2cAnswer& answer() const { return answer_; }
@@ -84,7 +83,7 @@ class UserI2c {
 
   UserI2cPort& port_;
   Stage stage_ = Stage::idle;
-  int slot_ = no_slot;           // of the transfer under way
+  int slot_ = no_slot;
   std::uint8_t first_slot_ = 0;  // looked at first next time
   bool abandoned_ = false;       // the result of the transfer is not wanted
   std::uint8_t half_clock_ = 0;
@@ -93,7 +92,7 @@ class UserI2c {
   std::uint8_t sent_[i2c_max_bytes];
   std::uint8_t received_[i2c_max_bytes];
 
-  Single single_ = Single::none;  // requested, and not ended
+  Single single_ = Single::none;
   bool single_begun_ = false;
   bool writes_ = false;
   std::uint8_t address_ = 0;
@@ -103,7 +102,7 @@ class UserI2c {
   std::uint32_t pnum_ = 0;
   bool answered_ = false;
   I2cAnswer answer_;
-  DeviceBytes<i2c_max_bytes> found_;  // by the scan so far
+  DeviceBytes<i2c_max_bytes> found_;
   I2cBusReport report_;
   Slot slots_[i2c_slots];
   I2cReading readings_[i2c_slots];

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus as its driver needs it: a controller that transfers by itself, and the two
-// lines, to clock a device free. Nothing waits.
+// The user's I2C bus as its driver needs it. Nothing waits.
 #pragma once
 
 #include <cstddef>

@@ -28,9 +28,8 @@ class UserUart {
   // The same setting again changes nothing.
   void set_up(const UartMode& mode);
   bool on() const { return mode_.on(); }
-  // Queues all bytes or none. False if there is no room now.
   bool write(const std::uint8_t* bytes, std::size_t size) { return port_.send(bytes, size); }
-  // The board is safe: drops queued bytes.
+  // Drops queued bytes, because the board is safe.
   void drop_writes() { port_.drop(); }
   // A session begins or resumes: drops bytes received before.
   void forget();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A UART of the user's as its driver needs it: it receives and sends by itself. Nothing waits.
+// A UART of the user's as its driver needs it. Nothing waits.
 #pragma once
 
 #include <cstddef>
@@ -14,11 +14,10 @@ class UserUartPort {
  public:
   // Drops received and queued bytes. Off: releases the pins.
   virtual void set_up(const UartMode& mode) = 0;
-  // Takes up to `size` received bytes; returns their number.
   virtual std::size_t receive(std::uint8_t* out, std::size_t size) = 0;
   // Bytes that were damaged or found no room since the last call.
   virtual std::uint32_t take_lost() = 0;
-  // Queues all bytes or none. False if there is no room now.
+  // All or nothing. False if there is no room now.
   virtual bool send(const std::uint8_t* bytes, std::size_t size) = 0;
   // Drops queued bytes; the byte on the wire is completed.
   virtual void drop() = 0;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Base of the I2C chip drivers: set-up without waiting, writes of changes only, register checks now
-// and then, and trouble as a value.
+// Base of the I2C chip drivers: set-up without waiting, writes of changes, and register checks.
 //
 //           begin()             poll(), over and over
 //     new ----------> setting up ----------------------> ready
@@ -61,14 +60,12 @@ class ChipDriver {
   void begin();
   // Does the next steps of the set-up; once ready, writes the registers that change.
   void poll(std::uint32_t now_us, BusBudget& budget);
-  // If ready, writes the registers that change.
   void write_changes(BusBudget& budget);
-  // If ready, compares the chip's registers with what was written.
+  // Compares the chip's registers with what was written.
   void verify(BusBudget& budget);
   // All outputs are off from the next write on. Sends nothing.
   virtual void want_safe() = 0;
-  // All outputs off at once, in any state of chip and driver. Leaves trouble() alone: the caller
-  // decides with note().
+  // All outputs off at once, in any state. Leaves trouble() alone: the caller decides with note().
   virtual I2cResult make_safe() = 0;
   // Takes the result of a transfer that was made for this driver.
   bool note(I2cResult result);

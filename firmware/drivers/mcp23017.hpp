@@ -22,7 +22,6 @@ namespace firmware {
 
 class Mcp23017 final : public ChipDriver {
  public:
-  // The levels of the ports in the safe state.
   Mcp23017(I2cBus& bus, std::uint8_t address, std::uint8_t safe_a, std::uint8_t safe_b)
       : ChipDriver(bus, address), safe_{safe_a, safe_b}, wanted_{safe_a, safe_b} {}
 

@@ -14,9 +14,8 @@
 // low. They include reference, power-down and gain, so a changed channel is right even after an
 // unnoticed reset. The fast write is a third shorter but depends on both.
 //
-// Set-up: zeros to all outputs, then a look at the EEPROM. Unless it holds zeros with the supply as
-// reference, it is written, once; new chips have other values. The outputs stay at zero meanwhile,
-// because the chip ignores writes.
+// Set-up: zeros to all outputs. Unless the EEPROM holds zeros with the supply as reference, it is
+// written, once; new chips have other values, and a chip ignores other writes meanwhile.
 #pragma once
 
 #include <cstdint>

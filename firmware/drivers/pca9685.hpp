@@ -15,9 +15,8 @@
 // (7.3.1.1), all sixteen off again (undefined after an orderly shutdown), then a check of the
 // registers. The 500 us pass between polls.
 //
-// All outputs of one transfer change together on STOP. Changed registers are written, neighbours in
-// one auto-increment burst. A short budget splits a burst only between groups of channels, so a
-// motor's duty and direction never part.
+// All outputs of one transfer change together on STOP. A short budget splits a burst of changed
+// registers only between groups of channels, so a motor's duty and direction never part.
 //
 // The chip has no timeout: it keeps driving when the microcontroller fails. all_off() makes all
 // three chips safe in three bytes, but a disturbance can set bits that defeat it: INVRT turns "off"

@@ -20,7 +20,6 @@ class QuadratureEncoder {
   static constexpr std::uint32_t frequency_window_us = 100000;
 
   void sample(bool a, bool b);
-  // The index is at the rising edge of its line.
   void index(bool active);
   // Counts from here on, the index's count too.
   void zero() { zero_at_ = travelled_.load(std::memory_order_relaxed); }
@@ -47,7 +46,7 @@ class QuadratureEncoder {
   std::atomic<std::uint32_t> travelled_{0};  // counts since power-up
   std::atomic<std::uint32_t> index_at_{0};   // likewise, at the last rising edge of the index line
   std::atomic<bool> index_seen_{false};
-  std::uint32_t zero_at_ = 0;  // not used in the interrupt
+  std::uint32_t zero_at_ = 0;
   // Used by sample() and index() only.
   std::uint8_t levels_ = unknown;
   bool index_active_ = false;

@@ -31,7 +31,6 @@ class Stepper {
   void go(std::int32_t position, std::int32_t speed);
   // A pulse that has begun ends with the next tick.
   void stop() { speed_.store(0, std::memory_order_relaxed); }
-  // The position becomes 0, and the motor stays there.
   void zero();
   void tick();
 

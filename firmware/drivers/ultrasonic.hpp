@@ -8,8 +8,8 @@
 //        ^                                                              |
 //        +---------------- 60 ms after the trigger: next sensor --------+
 //
-// Each of four sensors is read about four times per second. Nothing waits: an interrupt brings the
-// edges of the echo lines by echo(). A poll each millisecond is enough.
+// Each of four sensors is read about four times per second. Nothing waits: an interrupt calls
+// echo(). Poll about every millisecond.
 #pragma once
 
 #include <atomic>
@@ -65,10 +65,9 @@ class UltrasonicSensors {
   std::uint8_t fitted_;
   Phase phase_ = Phase::waiting;
   int sensor_ = count - 1;
-  std::uint32_t began_us_ = 0;  // of the turn
+  std::uint32_t began_us_ = 0;
   std::uint16_t distance_cm_[count] = {};
   EchoResult result_[count] = {};
-  // Shared by echo() and poll().
   std::atomic<bool> high_[count] = {};
   std::atomic<bool> rose_{false};
   std::atomic<bool> fell_{false};

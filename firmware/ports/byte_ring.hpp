@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Bytes from one context to another, of which one may be an interrupt handler. One side puts, the
-// other takes. Lock-free, because each index has one writer.
+// Bytes from one context to another, of which one may be an interrupt handler. Lock-free, because
+// each index has one writer.
 #pragma once
 
 #include <atomic>
@@ -36,7 +36,6 @@ class ByteRing {
     return true;
   }
 
-  // False if the ring is empty.
   bool take(char& byte) {
     if (empty()) return false;
     const std::uint32_t at = load(taken_);
@@ -44,7 +43,6 @@ class ByteRing {
     taken_.store(at + 1, std::memory_order_release);
     return true;
   }
-  // Takes up to `size` bytes; returns their number.
   std::uint32_t take(char* data, std::uint32_t size) {
     std::uint32_t count = 0;
     while (count < size && take(data[count])) ++count;
@@ -60,8 +58,8 @@ class ByteRing {
   using Index = std::atomic<std::uint32_t>;
   static std::uint32_t load(const Index& index) { return index.load(std::memory_order_acquire); }
 
-  Index put_{0};    // bytes so far; wraps
-  Index taken_{0};  // likewise
+  Index put_{0};  // bytes so far; wraps
+  Index taken_{0};
   char bytes_[capacity];
 };
 

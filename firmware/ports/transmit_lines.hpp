@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The send queue of a serial port: it never waits, and the newest state wins.
-//
-// Each line enters the ring whole or not at all. A state without room waits outside, where a newer
-// state replaces it; the last part of the ring is reserved for heartbeats and answers. If no byte
-// leaves for `stale_ms` (the host does not read), it drops lines not begun and then keeps only the
-// newest state. A host that reads again gets current data.
+// The send queue of a serial port: it never waits, and the newest state wins. Each line enters the
+// ring whole or not at all. A state without room waits outside, where a newer state replaces it. The
+// last part of the ring is for heartbeats and answers. If no byte leaves for `stale_ms` (the host
+// does not read), lines not begun are dropped and only the newest state is kept.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +21,7 @@ class TransmitLines {
   static constexpr std::uint32_t kept_for_answers = 512;
   static constexpr std::uint32_t stale_ms = 100;
 
-  // A heartbeat or an answer; dropped if there is no room.
+  // Dropped if there is no room.
   void put(Text datagram) {
     if (stalled_ || !put_line(datagram)) ++dropped_;
   }
@@ -64,13 +62,12 @@ class TransmitLines {
   }
 
   bool empty() const { return ring_.empty(); }
-  std::uint32_t dropped() const { return dropped_; }  // lines
+  std::uint32_t dropped() const { return dropped_; }
 
  private:
   bool put_line(Text datagram) {
     const std::uint32_t size = static_cast<std::uint32_t>(datagram.size() + line_end.size());
     if (ring_.room() < size) return false;
-    // Neither fails: there is room for both.
     ring_.put(datagram.data(), static_cast<std::uint32_t>(datagram.size()));
     ring_.put(line_end.data(), static_cast<std::uint32_t>(line_end.size()));
     return true;

@@ -47,7 +47,7 @@ class CarrierPort final : public firmware::Port, private Carrier::Handler {
   void on_carrier_event(const CarrierEvent& event) override;
 
   std::unique_ptr<Carrier> carrier_;
-  BoardEnd& end_;  // of *carrier_
+  BoardEnd& end_;
   Owner& owner_;
 };
 

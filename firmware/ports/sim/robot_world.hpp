@@ -17,7 +17,6 @@ class SimulatedRobot::World : public std::enable_shared_from_this<World> {
   explicit World(RobotModel* robot) : robot_(robot) {}
   // The world of `robot=N` in this process; empty if its robot is destroyed.
   static std::shared_ptr<World> find(long number);
-  // Adds `world` under an unused number.
   static long enter(const std::shared_ptr<World>& world);
 
   // --- from any thread
@@ -28,7 +27,6 @@ class SimulatedRobot::World : public std::enable_shared_from_this<World> {
   // Throws Error{open} if another board has the robot.
   void attach(asio::io_context& io, SimulatedBoard& board);
   void detach() noexcept;
-  // Updates look().
   void note();
   // Carries out the steps of happen(), if the board is on `io`, whose thread calls.
   void settle(const asio::io_context& io);

@@ -56,12 +56,11 @@ struct ScriptStep {
 
   Kind kind = Kind::handle;
   std::uint32_t at_ms = 0;
-  // ultrasonic, encoder, motor, uart, gpio: 1 …; analog: an Analog; chip: a Chip; device: first
-  // UserDevice, then OptionalDevices
+  // ultrasonic, encoder, motor, uart, gpio: 1 …; analog: an Analog; chip: a Chip; device: a
+  // UserDevice, then an index into OptionalDevices
   int channel = 0;
-  // handle, i2c, motor, gpio: 1 is held, stalled or high; ultrasonic: cm or off; encoder: counts;
-  // analog: hundredths of a volt; chip, device: a Supply; hang: ms; user_bus: a
-  // UserBusModel::Fault; uart: a UartPeer
+  // 1: held, stalled or high; ultrasonic: cm or off; encoder: counts; analog: hundredths of a volt;
+  // chip, device: a Supply; hang: ms; user_bus: a UserBusModel::Fault; uart: a UartPeer
   std::int32_t value = 0;
   std::string text;  // the line without its time, "handle released"
 };
@@ -74,8 +73,7 @@ class Script {
   static Script parse(std::string_view text, const std::string& name);
   // Throws Error{usage} if the file cannot be read, Error{data} if it is longer than 1 MB.
   static Script load(const std::string& path);
-  // A step for now, from a line without its time, "handle released"; empty for an empty line or a
-  // comment. Throws Error{data} as "NAME: reason; fix".
+  // A step for now, from a line without its time. Throws Error{data} as "NAME: reason; fix".
   static std::optional<ScriptStep> parse_now(std::string_view text, const std::string& name);
 
   const std::vector<ScriptStep>& steps() const { return steps_; }  // in order of time

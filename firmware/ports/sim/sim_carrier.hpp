@@ -15,8 +15,7 @@
 
 namespace r4::sim {
 
-// The board runs on `io`: open() switches it on, close() off. Throws Error for a wrong URL or
-// script.
+// open() switches the board on, close() off. Throws Error for a wrong URL or script.
 std::unique_ptr<Carrier> make_sim_carrier(asio::io_context& io, const Url& url);
 
 }  // namespace r4::sim

@@ -242,7 +242,6 @@ void SimulatedBoard::take(const ScriptStep& step) {
   }
 }
 
-// Reports changes of pins and chip faults.
 void SimulatedBoard::tell_pins() {
   const ChipFault fault = hardware_->hal().fault();
   if (fault.any() != told_fault_) {
@@ -267,7 +266,6 @@ void SimulatedBoard::settle_downs(std::uint32_t t_ms) {
   }
 }
 
-// Ensures that poll() is called at `at` or before.
 void SimulatedBoard::arm(Milliseconds at) {
   if (armed_ && armed_for_ <= at) return;
   armed_ = true;

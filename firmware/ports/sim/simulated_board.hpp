@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A whole R4 board in a process: the firmware's application and chip drivers on a model of the
-// board, reached through any carriers. One timer drives it: it sleeps until the application needs
-// time, then runs the milliseconds that have passed, one by one.
+// board, reached through any carriers. Its one timer sleeps until the application needs time; then
+// the milliseconds that have passed are run, one by one.
 //
-// If the guard stops its feeding for watchdog_ms, a hardware watchdog resets the microcontroller,
-// not the chips. A slow computer is not a slow board: only a script's `hang` stops the loop's
-// check-in.
+// If the guard prevents feeding for watchdog_ms, a hardware watchdog resets the microcontroller,
+// not the chips. On a slow computer the loop still checks in; only a script's `hang` prevents that.
 //
 // Used from the thread of its io_context only. A datagram allocates no heap memory.
 #pragma once
@@ -34,8 +33,7 @@ namespace r4::sim {
 
 class SimulatedBoard final : private firmware::Observer, private CarrierPort::Owner {
  public:
-  // Each may be empty; none may stop the board. `t_ms` is the board's clock, the T of its
-  // datagrams.
+  // Each may be empty; none may stop the board. `t_ms`: the board's clock, the T of its datagrams.
   struct Events {
     std::function<void(std::uint32_t t_ms, firmware::BoardState, SafeReason)> on_state;
     std::function<void(std::uint32_t t_ms, const Pins&)> on_pins;
@@ -74,7 +72,6 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   // Outputs off, carriers closed.
   void stop() noexcept;
 
-  // Does everything that is due. Returns the milliseconds until the next call.
   std::uint32_t poll();
 
   // A step happens now, as if in the script. Only between start() and stop(), and not in an event.
@@ -92,7 +89,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   using Clock = std::chrono::steady_clock;
   using Milliseconds = std::chrono::milliseconds;
 
-  Milliseconds elapsed() const;  // since start()
+  Milliseconds elapsed() const;
   std::uint32_t board_ms(Milliseconds elapsed) const {
     return static_cast<std::uint32_t>(elapsed.count()) + clock_offset_ms_;
   }
@@ -123,7 +120,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   std::uint64_t seed_;
   BoardModel model_;
   OptionalDevices optional_devices_{model_.devices().bus};
-  std::optional<SimulatedHardware> hardware_;  // of this boot
+  std::optional<SimulatedHardware> hardware_;
   std::vector<std::unique_ptr<CarrierPort>> ports_;
   std::optional<firmware::Application> application_;
 

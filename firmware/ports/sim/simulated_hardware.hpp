@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The microcontroller on the model of the board: the firmware's chip drivers, their timers and
-// interrupts.
+// The firmware's chip drivers on the model of the board, with their timers and interrupts.
 #pragma once
 
 #include <cstdint>

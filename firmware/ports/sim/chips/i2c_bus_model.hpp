@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A simulated I2C bus at 400 kHz: chip models behind the drivers' interface, the time of each
-// transfer, errors on request, and an observer of every transfer.
-//
-// Transfers and advance() let time pass. Only an I2cProcessor really waits.
+// transfer, and errors on request. Transfers and advance() let time pass. Only an I2cProcessor
+// really waits.
 //
 // An interrupt may make transfers during a transfer. That transfer then ends with `timeout` and
 // touches no chip any more. An I2cProcessor keeps each byte whole, as the wire does.
@@ -41,7 +40,6 @@ class I2cObserver {
   ~I2cObserver() = default;
 };
 
-// Runs the program that makes the transfers.
 class I2cProcessor {
  public:
   // The result goes to the matching release_interrupts().
@@ -62,7 +60,6 @@ class I2cBusModel final : public firmware::I2cBus {
 
   // Powers the chip on; it must outlive the bus. False if there are max_chips already.
   bool attach(I2cChipModel& chip);
-  // A disconnected chip ignores every address.
   void connect(const I2cChipModel& chip, bool connected);
   void set_observer(I2cObserver* observer) { observer_ = observer; }
   void set_processor(I2cProcessor* processor) { processor_ = processor; }
@@ -131,7 +128,7 @@ class I2cBusModel final : public firmware::I2cBus {
   int hold_recoveries_ = 0;
   int held_ = 0;  // calls of recover() still needed
   std::uint64_t now_ns_ = 0;
-  volatile std::uint32_t transfers_ = 0;  // begun so far
+  volatile std::uint32_t transfers_ = 0;
   I2cObserver* observer_ = nullptr;
   I2cProcessor* processor_ = nullptr;
 };

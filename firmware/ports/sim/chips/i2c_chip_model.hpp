@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A chip on the simulated I2C bus, as the bus sees it.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +12,6 @@ class I2cChipModel {
   virtual void power_on() = 0;
   // START (or repeated START). True if the chip acknowledges and takes part.
   virtual bool start(std::uint8_t address, bool read) = 0;
-  // True if the chip acknowledges.
   virtual bool write(std::uint8_t byte) = 0;
   virtual std::uint8_t read() = 0;
   // The end of a transfer in which the chip took part.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The MCP23017 by its data sheet (DS20001952): both register layouts (IOCON.BANK), sequential and
-// byte mode, latches, directions, polarity. Not modelled: interrupts (their registers store values,
-// INTF and INTCAP read 0).
+// The MCP23017 by its data sheet (DS20001952). Not modelled: interrupts (their registers store
+// values, INTF and INTCAP read 0).
 #pragma once
 
 #include <cstdint>
@@ -13,7 +12,6 @@ namespace sim {
 
 class Mcp23017Model final : public I2cChipModel {
  public:
-  // The registers of a port, in the data sheet's order.
   enum class Register : std::uint8_t {
     iodir,
     ipol,

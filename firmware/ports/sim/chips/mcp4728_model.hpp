@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The MCP4728 by its data sheet (DS22187): input and output registers, EEPROM and its write time,
-// every write command but the change of the address, reading, general calls.
-//
-// During a write of the EEPROM, write commands are ignored: the strictest reading of the data
-// sheet.
+// The MCP4728 by its data sheet (DS22187), without the change of the address. Write commands during
+// a write of the EEPROM are ignored: the strictest reading of the data sheet.
 #pragma once
 
 #include <cstddef>
@@ -66,9 +63,9 @@ class Mcp4728Model final : public I2cChipModel {
   bool has_command_ = false;
   std::uint8_t command_ = 0;    // the first byte of the transfer
   std::uint8_t bytes_[3] = {};  // since the last channel was complete
-  std::size_t size_ = 0;        // of bytes_
-  int channel_ = 0;             // the next of a fast or sequential write
-  int first_channel_ = 0;       // of a sequential write
+  std::size_t size_ = 0;
+  int channel_ = 0;        // the next of a fast or sequential write
+  int first_channel_ = 0;  // of a sequential write
   bool general_ = false;
   bool ignoring_ = false;
   int read_at_ = 0;

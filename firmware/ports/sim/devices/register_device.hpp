@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Base of most I2C devices: one address, one-byte registers, and a pointer that a write's first
-// byte sets and each byte advances.
+// One address, one-byte registers, and a pointer that a write's first byte sets and each byte moves.
 #pragma once
 
 #include <cstdint>

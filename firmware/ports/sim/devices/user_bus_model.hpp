@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus of the simulated board: a controller at 100 kHz
-// (firmware/devices/user_i2c_port.hpp), the devices on its two lines, and their faults. A transfer
-// takes its time on the wire; it reads what the devices held when it began.
+// The user's I2C bus of the simulated board: a controller at 100 kHz, the devices on its two lines,
+// and their faults. A transfer takes its time on the wire; it reads what the devices held when it
+// began.
 #pragma once
 
 #include <cstdint>
@@ -26,12 +26,10 @@ class UserBusModel final : public firmware::UserI2cPort {
 
   // The device must outlive the bus. False if there are max_devices already.
   bool attach(I2cChipModel& device);
-  // A disconnected device takes no part.
   void connect(const I2cChipModel& device, bool connected);
   void set_fault(Fault fault);
   Fault fault() const { return fault_; }
   void advance(std::uint64_t us) { now_ns_ += us * 1000; }
-  // The microcontroller restarts.
   void reset();
   std::uint32_t transfers() const { return transfers_; }  // begun so far; wraps
 
@@ -51,15 +49,15 @@ class UserBusModel final : public firmware::UserI2cPort {
   I2cChipModel* devices_[max_devices] = {};
   int device_count_ = 0;
   unsigned disconnected_ = 0;  // bit: device
-  unsigned addressed_ = 0;     // by the last START
+  unsigned addressed_ = 0;
   Fault fault_ = Fault::none;
   int clocks_left_ = 0;  // until a device that was cut off releases SDA
-  bool scl_ = true;      // as the microcontroller drives them
+  bool scl_ = true;
   bool sda_ = true;
   std::uint64_t now_ns_ = 0;
   std::uint64_t ends_ns_ = 0;
   std::uint32_t transfers_ = 0;
-  int clocks_ = 0;      // of the transfer, on the wire
+  int clocks_ = 0;
   bool waits_ = false;  // for lines that are not free
   Progress result_ = Progress::done;
 };

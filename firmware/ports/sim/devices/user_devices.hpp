@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The devices on the user's bus and UARTs of the simulated board.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +31,6 @@ struct UserDevices {
     for (int i = 0; i < user_device_count; ++i) (*this)[static_cast<UserDevice>(i)].power_on();
   }
 
-  // The microcontroller restarts.
   void reset() {
     bus.reset();
     for (UserUartModel& uart : uarts) uart.reset();

@@ -46,7 +46,7 @@ void UserUartModel::pass_millisecond() {
   const bool talks = peer_ == UartPeer::gnss || peer_ == UartPeer::lidar;
   if (talks && !has_byte()) say_more();
   if (!mode_.on()) {
-    at_ = size_ = 0;  // the board does not listen
+    at_ = size_ = 0;
     return;
   }
   const std::uint32_t byte = bits_of_byte() * thousand;

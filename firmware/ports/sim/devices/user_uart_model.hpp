@@ -26,7 +26,6 @@ class UserUartModel final : public firmware::UserUartPort {
   void connect(UartPeer peer);
   UartPeer peer() const { return peer_; }
   void pass_millisecond();
-  // The microcontroller restarts.
   void reset() { set_up(UartMode()); }
 
   void set_up(const UartMode& mode) override;
@@ -60,7 +59,6 @@ class UserUartModel final : public firmware::UserUartPort {
   std::uint32_t lost_ = 0;
   std::uint32_t sent_ = 0;
   std::uint32_t said_ = 0;
-  // What the peer sends next.
   char text_[longest_text];
   std::size_t size_ = 0;
   std::size_t at_ = 0;

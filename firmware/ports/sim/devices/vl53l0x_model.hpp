@@ -17,7 +17,6 @@ class Vl53l0xModel final : public RegisterDevice {
 
   Vl53l0xModel() : RegisterDevice(address) { power_on(); }
   void power_on() override;
-  // Millimetres; no_target.
   void see(std::int32_t mm) { mm_ = mm; }
 
  private:

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The chips of the R4 board on their bus, and their pins.
 #pragma once
 
 #include <cstdint>

@@ -10,7 +10,6 @@ namespace {
 
 static_assert(osmc_channels == encoder_channels, "each of these motors turns an encoder");
 
-// A value of an analog input and its frequency.
 struct Level {
   std::int16_t centivolts;
   std::uint8_t count;

@@ -2,7 +2,8 @@
 // The R4 board around its microcontroller: the chips on their bus, the pins, the connected devices,
 // and their time. Portable and in integers, because the image for the Cortex-M7 runs it too.
 //
-// Connected is the vehicle of the paper's capture (section 4.4), standing on the bench:
+// Connected is the vehicle of the paper's capture (section 4.4) on the bench, or a RobotModel with
+// the bench's supply, handle and steppers:
 //
 //     supply      of the motors: on while the dead-man's handle is held and relay 1 is closed
 //                 (docs/safety.md). Without it no motor turns.
@@ -14,11 +15,8 @@
 //     US 1-4      ultrasonic sensors with nothing in sight
 //     steppers    a motor each that takes a step at each pulse
 //
-// A RobotModel can replace it, except for supply, handle and steppers.
-//
 // Analog inputs take the values of the capture as often as they occur there. The choice depends on
 // seed and time only, so the same seed gives the same trace.
-// depends on the seed and the time alone, so the same seed gives the same trace.
 #pragma once
 
 #include <cstdint>
@@ -53,7 +51,7 @@ class BoardModel {
 
   // Motors stand, counters are at 0. The surroundings stay.
   void power_on();
-  // Reports the encoders' levels, as if they had just changed.
+  // Reports the levels of the encoders, as if they had just changed.
   void tell_levels(Interrupts& interrupts);
   // The millisecond ends at `now_us` of the microcontroller's clock.
   void pass_millisecond(std::uint32_t now_us, Interrupts& interrupts);
@@ -62,13 +60,12 @@ class BoardModel {
   UserDevices& devices() { return devices_; }
   firmware::BoardPins microcontroller_pins();
   Pins pins() const;
-  // False if pins() cannot differ from the last call's: the bus is idle and all steppers stand.
-  // This saves time in a process of many boards.
+  // False if pins() cannot have changed: the bus is idle and all steppers stand. This saves time.
   bool pins_may_differ();
   // The chips were changed without a transfer.
   void disturb_pins() { disturbed_ms_ = time_ms_; }
   bool motors_have_supply() const { return handle_held_ && chips_.relay_closed(supply_relay); }
-  // Turns of an encoder's shaft since power came, in the encoder's counts.
+  // Counts of an encoder's shaft since power came.
   std::int32_t shaft_count(int channel) const { return shafts_[channel - 1].count; }
 
   // Steps of the motor since power came, forward less backward.
@@ -80,7 +77,6 @@ class BoardModel {
   // The surroundings. Channels count from 1. A RobotModel decides on its motors and encoders.
   void hold_handle(bool held);
   bool handle_held() const { return handle_held_; }
-  // low: pulled down; high: released.
   void set_gpio(int channel, bool high) { gpio_[channel - 1].set(high); }
   std::uint16_t dac_mv(int channel) const { return dac_[channel - 1].millivolts(); }
   // `cm`: distance; 0: nothing.
@@ -88,11 +84,8 @@ class BoardModel {
   void connect_ultrasonic(int channel, bool connected) { sensors_[channel - 1].connect(connected); }
   // A hand turns the shaft to `counts` since power came.
   void turn_encoder(int channel, std::int32_t counts);
-  // The motor of that OSMC channel is held fast.
   void stall_motor(int channel, bool stalled) { shafts_[channel - 1].stalled = stalled; }
-  // Hundredths of a volt, from now on.
   void pin_analog(Analog input, std::int32_t centivolts);
-  // The present inputs: hundredths of a volt, and the sensor with its distance.
   std::int32_t analog_cv(Analog input) const;
   const UltrasonicModel& ultrasonic(int channel) const { return sensors_[channel - 1]; }
 
@@ -109,10 +102,9 @@ class BoardModel {
   };
   struct Stepper {
     StepperDriverModel driver;
-    std::uint32_t pulses = 0;  // seen so far
+    std::uint32_t pulses = 0;
     std::uint32_t pause_ms = stepper_pause_ms;
   };
-  // Asks the model for the voltage once per millisecond.
   struct Converter final : firmware::AnalogPin {
     std::uint16_t read() override;
     const BoardModel* model = nullptr;
@@ -131,7 +123,7 @@ class BoardModel {
 
   std::uint64_t seed_;
   RobotModel* robot_ = nullptr;
-  RobotModel::Senses senses_;  // of *robot_
+  RobotModel::Senses senses_;
   std::uint32_t time_ms_ = 0;
   BoardChips chips_;
   UserDevices devices_;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Single pins of the microcontroller, seen and set from outside.
 #pragma once
 
 #include <cstdint>
@@ -41,8 +40,7 @@ class AnalogOutputPinModel final : public firmware::AnalogOutputPin {
   std::uint16_t millivolts_ = 0;
 };
 
-// A stepper motor and its driver: a step at each rising edge, which the motor takes if it has
-// supply.
+// A step at each rising edge, which the motor takes if it has supply.
 class StepperDriverModel {
  public:
   StepperDriverModel() { step_.driver = this; }

@@ -21,7 +21,6 @@ class UltrasonicModel {
   // 0: nothing is in sight.
   void set_distance(std::uint16_t cm) { cm_ = cm; }
   std::uint16_t distance() const { return cm_; }
-  // A disconnected sensor never answers.
   void connect(bool connected) { connected_ = connected; }
   bool connected() const { return connected_; }
 
@@ -53,7 +52,7 @@ class UltrasonicModel {
   bool connected_ = true;
   bool triggered_ = false;
   Phase phase_ = Phase::quiet;
-  std::uint32_t next_us_ = 0;  // the next edge
+  std::uint32_t next_us_ = 0;
 };
 
 }  // namespace sim
