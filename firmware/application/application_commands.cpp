@@ -113,7 +113,7 @@ void Application::on_watch(Source from, const Datagram& datagram, const Command&
     const Refusal refusal = parse_fields(command.text, fields);
     if (refusal != Refusal::none) return refuse(from, datagram, refusal, now_ms);
   }
-  if (link_.has_owner() && paths_.has(from)) return;  // a path of the session gets all states
+  if (link_.has_owner() && paths_.has(from)) return;  // the path gets all states anyway
   const std::uint32_t rate_hz = static_cast<std::uint32_t>(command.value);
   switch (watchers_.on_lease(from, rate_hz, datagram.time_ms(), proven, now_ms)) {
     case Watchers::Effect::watching: {

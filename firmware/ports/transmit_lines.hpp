@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The send queue of a serial port: it never waits, and the newest state wins. Each line enters the
-// ring whole or not at all. A state without room waits outside, where a newer state replaces it. The
-// last part of the ring is for heartbeats and answers. If no byte leaves for `stale_ms` (the host
-// does not read), lines not begun are dropped and only the newest state is kept.
+// ring whole or not at all. A state without room waits outside, where a newer state replaces it.
+// The last part of the ring is for heartbeats and answers. If no byte leaves for `stale_ms` (the
+// host does not read), lines not begun are dropped and only the newest state is kept.
 #pragma once
 
 #include <cstdint>

@@ -43,7 +43,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, const Command&)> on_executed;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, Refusal)> on_refused;
     std::function<void(std::uint32_t t_ms, Verdict)> on_rejected;
-    // A carrier became a path of the session, or is no path any more.
+    // A carrier became a path of the session, or left the session.
     std::function<void(std::uint32_t t_ms, const Carrier&, bool joined)> on_path;
     std::function<void(std::uint32_t t_ms, const Carrier&, const CarrierEvent&)> on_carrier;
   };

@@ -4,7 +4,7 @@
 // really waits.
 //
 // An interrupt may make transfers during a transfer. That transfer then ends with `timeout` and
-// touches no chip any more. An I2cProcessor keeps each byte whole, as the wire does.
+// leaves the chips alone. An I2cProcessor keeps each byte whole, as the wire does.
 #pragma once
 
 #include <cstddef>

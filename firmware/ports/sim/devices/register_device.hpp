@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One address, one-byte registers, and a pointer that a write's first byte sets and each byte moves.
+// One address, one-byte registers, and a pointer: a write's first byte sets it, each byte moves it.
 #pragma once
 
 #include <cstdint>
