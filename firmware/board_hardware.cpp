@@ -15,8 +15,7 @@ constexpr std::uint8_t pca9685_chips = 1U << static_cast<int>(Chip::osmc_pwm) |
                                        1U << static_cast<int>(Chip::dhb12_pwm) |
                                        1U << static_cast<int>(Chip::servo_pwm);
 
-// In which order the chips are made safe, after the all-call, which has switched the PWM outputs
-// off: first the brushless motors and the relays, which it does not reach.
+// First the brushless motors and the relays, which the all-call does not reach.
 constexpr Chip safe_order[chip_count] = {Chip::dac, Chip::expander, Chip::osmc_pwm, Chip::dhb12_pwm,
                                          Chip::servo_pwm};
 
@@ -50,7 +49,7 @@ void BoardHardware::power_up(std::uint32_t now_us) {
   verified_us_ = now_us;
   if ((config_.chips_fitted & pca9685_chips) != 0) {
     busy_ = true;
-    (void)Pca9685::reset_all(bus_);  // the set-up looks at the modes
+    (void)Pca9685::reset_all(bus_);  // the set-up checks the modes
     busy_ = false;
   }
   make_safe();
@@ -67,7 +66,7 @@ void BoardHardware::make_safe() {
   }
   busy_ = true;
   drive_safe();
-  if (nested) return;  // the call that this one interrupted looks for trouble
+  if (nested) return;  // the interrupted call looks for trouble
   if (!interrupted_) look_for_trouble();
   leave();
 }
@@ -77,16 +76,15 @@ void BoardHardware::drive_safe() {
   modes_to_check_ = sizeof pwm_chips / sizeof *pwm_chips;
   for (Stepper& stepper : steppers_) stepper.stop();
   for (AnalogOutputPin* pin : pins_.dac) pin->write(0);
-  // Each driver forgets what it was to write, also where a held bus keeps its chip from being told
-  // now.
+  // Drivers forget pending writes, even if a held bus keeps their chips from being written now.
   for (ChipDriver* chip : chips_) chip->want_safe();
-  // A held bus fails at a transfer. If it can be freed, who held it comes last.
+  // If a held bus can be freed, the chip that held it comes last.
   const int held_at = drive_chips_safe(nowhere);
   if (held_at != nowhere && bus_.recover()) drive_chips_safe(held_at);
 }
 
-// Every chip into its safe state, as far as the bus lets it: the chip at which it was held, all_chips
-// if that was the all-call, or nowhere. `held_before`: the same of the try before.
+// Returns the chip at which the bus was held, all_chips for the all-call, or nowhere.
+// `held_before`: the result of the try before.
 int BoardHardware::drive_chips_safe(int held_before) {
   if ((config_.chips_fitted & pca9685_chips) != 0 && held_before != all_chips &&
       Pca9685::all_off(bus_) == I2cResult::timeout) {
@@ -95,8 +93,7 @@ int BoardHardware::drive_chips_safe(int held_before) {
     }
     return all_chips;
   }
-  // If one of the three chips acknowledges the all-call, that hides two that do not: each is told
-  // by its own address, too.
+  // One acknowledge of the all-call hides chips that did not hear it: each is addressed, too.
   for (const Chip chip : safe_order) {
     const int i = static_cast<int>(chip);
     if (i != held_before && !drive_chip_safe(i)) return i;
@@ -105,7 +102,7 @@ int BoardHardware::drive_chips_safe(int held_before) {
   return one_left && !drive_chip_safe(held_before) ? held_before : nowhere;
 }
 
-// False: the bus is held.
+// False if the bus is held.
 bool BoardHardware::drive_chip_safe(int chip) {
   if (!fitted(chip)) return true;
   const I2cResult result = chips_[chip]->make_safe();
@@ -162,8 +159,7 @@ void BoardHardware::set_outputs(const Outputs& outputs) {
   for (int i = 0; i < dac_channels; ++i) pins_.dac[i]->write(outputs.dac_mv[i]);
 }
 
-// From the chip at which the budget ran out last time, so that none is left behind. Ends at a held
-// bus: one timeout is enough.
+// Begins where the budget ran out last time. Ends at a held bus: one timeout is enough.
 void BoardHardware::for_each_chip(BusBudget& budget, bool set_up) {
   for (int n = 0; n < chip_count; ++n) {
     const int i = (first_chip_ + n) % chip_count;
@@ -196,7 +192,7 @@ void BoardHardware::poll(std::uint32_t now_us) {
   set_up_again();
   BusBudget budget(bus_bytes_per_poll);
   if (modes_to_check_ != 0) {
-    // make_safe() may set it between the two.
+    // make_safe() may set it between these two lines.
     const int at = modes_to_check_ - 1;
     modes_to_check_ = static_cast<std::uint8_t>(at);
     const int chip = static_cast<int>(pwm_chips[at]);
@@ -214,7 +210,6 @@ void BoardHardware::poll(std::uint32_t now_us) {
   leave();
 }
 
-// Chips in trouble get another chance, if the bus is free: their set-up begins anew.
 void BoardHardware::set_up_again() {
   bool tried = false;
   bool free = false;
@@ -229,8 +224,7 @@ void BoardHardware::set_up_again() {
   }
 }
 
-// A chip whose modes are not as written may drive although it was told to be off: it is reset, and
-// the chips that were reset with it are set up anew.
+// A chip with changed modes may drive although commanded off. Its reset reaches other chips, too.
 void BoardHardware::reset_lost_modes() {
   const bool lost = osmc_.lost_mode() || dhb12_.lost_mode() || servo_.lost_mode();
   if (!lost || Pca9685::reset_all(bus_) != I2cResult::ok) return;
@@ -239,16 +233,15 @@ void BoardHardware::reset_lost_modes() {
   }
 }
 
-// make_safe() may interrupt a transfer, or write registers while a driver compares them with what
-// it wrote. The trouble that such a driver finds says nothing of its chip, so the chip is set up
-// anew instead of called faulty.
+// Trouble that a driver finds during a make_safe() says nothing about its chip, so the chip is set
+// up again without a fault.
 void BoardHardware::set_up_what_was_cut_off() {
   for (int i = 0; i < chip_count; ++i) {
     if (chips_[i]->trouble() != ChipTrouble::none && !failed_[i]) chips_[i]->begin();
   }
 }
 
-// Latches new trouble. True if there is some.
+// True if there is new trouble, which is then latched.
 bool BoardHardware::look_for_trouble() {
   bool found = false;
   for (int i = 0; i < chip_count; ++i) {
@@ -269,9 +262,8 @@ bool BoardHardware::look_for_trouble() {
   return found;
 }
 
-// Each function that uses the bus ends by this one. New trouble makes everything safe. If
-// make_safe() has interrupted the function, what that wrote last may have undone the safe state:
-// everything is made safe once more.
+// Each function that uses the bus ends with this. New trouble makes everything safe. An
+// interrupting make_safe() may have been undone by the function's last write, so it is repeated.
 void BoardHardware::leave() {
   if (!interrupted_ && look_for_trouble()) {
     reset_lost_modes();
@@ -285,14 +277,14 @@ void BoardHardware::leave() {
     if (!interrupted_) look_for_trouble();
   }
   busy_ = false;
-  interrupted_ = false;  // what came after the last look drove everything safe by itself
+  interrupted_ = false;  // a later make_safe() drove everything safe itself
 }
 
 void BoardHardware::sample(Inputs& inputs) {
   for (int i = 0; i < analog_channels; ++i) {
     inputs.analog_cv[i] = centivolts_of(pins_.analog[i]->read(), config_.calibration[i]);
   }
-  // Letting go counts at once, not at the next poll.
+  // A released handle counts at once, not at the next poll.
   if (pins_.handle->read() != handle_held_level) handle_seen_ = handle_held_ = false;
   inputs.handle_held = handle_held_;
   for (int i = 0; i < stepper_channels; ++i) inputs.stepper_steps[i] = steppers_[i].position();
@@ -330,7 +322,7 @@ void BoardHardware::fit(std::uint8_t chips) {
   fault_ = ChipFault();
   for (int i = 0; i < chip_count; ++i) {
     failed_[i] = false;
-    if (!fitted(i)) chips_[i]->begin();  // forgets its trouble
+    if (!fitted(i)) chips_[i]->begin();  // clears its trouble
   }
 }
 
@@ -353,7 +345,7 @@ bool BoardHardware::clear_fault() {
   const ChipFault before = fault_;
   fault_ = ChipFault();
   if (ready()) return true;
-  fault_ = before;  // an interrupt's make_safe() has just found new trouble
+  fault_ = before;  // make_safe() in an interrupt has just found new trouble
   return false;
 }
 

@@ -1,28 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The R4 board's hardware made of the chip drivers: outputs go to chips and pins by the table of
-// board_channels.hpp, inputs come from pins, converters and interrupts.
+// The R4 board's hardware made of the chip drivers, wired by the table of board_channels.hpp.
 //
-// Order at power-up: power_up() first, before anything else. Its first transfer resets the PWM
-// chips, which turns every PWM output off whatever their modes were, its last leaves every output
-// in its safe value; only then the chips are set up, in poll(), and ready() tells when all are.
-// What is applied before that waits until then: no motor runs while the chip that brakes another is
-// not there.
+// Power-up: call power_up() first. It resets the PWM chips, which turns every PWM output off in any
+// mode, and leaves every output in its safe value. poll() then sets the chips up, and ready() is
+// true when all are. Outputs applied earlier wait until then, so that no motor runs before its
+// brake works.
 //
-// The safe state (make_safe): steppers stand, PWM outputs off, DAC codes and outputs 0, brakes on, relays off.
-// It may be called at any time, also in an interrupt or a fault handler in the middle of a
+// Safe state (make_safe()): steppers stand, PWM outputs off, DAC codes and outputs 0, brakes on,
+// relays off. It may be called at any time, also in an interrupt or a fault handler during a
 // transfer. It makes at most two bounded attempts (a held bus is recovered once).
 //
-// A chip in trouble: the fault is latched with chip and reason, all outputs are made safe, and
-// apply() has no effect until clear_fault(). Meanwhile the chip is set up anew, outputs off first,
-// every retry_us, after a recovery of the bus. A PCA9685 whose modes a disturbance has changed is
-// reset first, and with it all chips that hear the general call: until then its outputs may be on.
+// Chip faults: the fault is latched with chip and reason, all outputs are made safe, and apply()
+// has no effect until clear_fault(). Every retry_us the bus is recovered and the chip set up again,
+// outputs off first. If a disturbance changed the modes of a PCA9685, all chips that hear the
+// general call are reset first. Until then its outputs may be on.
 //
-// Chips are looked at one after the other, so a chip that was reset is noticed within
-// chip_count x verify_us plus one poll. In the polls that follow a safe state the modes of the
-// PCA9685 are looked at first.
-//
-// The bus carries at most bus_bytes_per_poll bytes in each poll() and each apply(); what does not
-// fit follows in the next polls. Nothing waits.
+// A reset chip is noticed within chip_count x verify_us plus one poll; the PCA9685 are verified
+// first after a safe state. Each poll() and each apply() sends at most bus_bytes_per_poll bytes;
+// the rest follows in the next polls. Nothing waits.
 #pragma once
 
 #include <cstddef>
@@ -44,7 +39,7 @@ namespace firmware {
 
 std::uint8_t address_of(Chip chip);
 
-// The microcontroller's pins; all of them must be there and outlive the hardware.
+// All pins must be set and outlive the hardware.
 struct BoardPins {
   OutputPin* step[stepper_channels];
   OutputPin* direction[stepper_channels];
@@ -58,7 +53,7 @@ struct BoardPins {
 class BoardHardware final : public Hal {
  public:
   struct Config {
-    std::uint8_t chips_fitted = (1U << chip_count) - 1;  // bit: Chip; the others are left alone
+    std::uint8_t chips_fitted = (1U << chip_count) - 1;  // bit: Chip; others are left alone
     std::uint8_t ultrasonic_fitted = 0;                  // bit n-1: sensor n
     std::int32_t step_tick_hz = 40000;
     AnalogCalibration calibration[analog_channels];
@@ -72,7 +67,7 @@ class BoardHardware final : public Hal {
   BoardHardware(I2cBus& bus, const BoardPins& pins, const Config& config);
 
   void power_up(std::uint32_t now_us);
-  // To be called every millisecond or so.
+  // Call about every millisecond.
   void poll(std::uint32_t now_us);
 
   void apply(const Outputs& outputs) override;
@@ -81,15 +76,12 @@ class BoardHardware final : public Hal {
   void zero(int channel) override;
   bool clear_fault() override;  // false while a chip is not ready
 
-  // Only these chips are there (bit: Chip): the others are left alone from now on, and what was
-  // found wrong before is found again if it still is. Before anything is applied.
+  // Ignores chips not in `chips` (bit: Chip) and forgets faults. Call before anything is applied.
   void fit(std::uint8_t chips);
-  // From now on: hundredths of a volt at full scale, each analog input as in BoardPins::analog.
+  // Full scale in hundredths of a volt, in the order of BoardPins::analog.
   void calibrate(const std::uint16_t (&full_scale_cv)[analog_channels]);
 
-  // Every chip is set up and answers.
   bool ready() const;
-  // The first trouble since the last clear_fault().
   ChipFault fault() const { return fault_; }
   ChipTrouble trouble(Chip chip) const { return chips_[static_cast<int>(chip)]->trouble(); }
 
@@ -97,13 +89,13 @@ class BoardHardware final : public Hal {
   void step_tick() {
     for (Stepper& stepper : steppers_) stepper.tick();
   }
-  // Does a stepper move? If not, the ticks may rest from the next one on.
+  // True if a stepper moves. If not, the ticks may pause from the next one on.
   bool stepping() const;
   QuadratureEncoder& encoder(int channel) { return encoders_[channel - 1]; }
   UltrasonicSensors& ultrasonic() { return ultrasonic_; }
 
  private:
-  // Where the bus was held, besides the number of a chip.
+  // Where the bus was held, if not at a chip.
   static constexpr int nowhere = -1;
   static constexpr int all_chips = chip_count;
 
@@ -134,21 +126,21 @@ class BoardHardware final : public Hal {
   QuadratureEncoder encoders_[encoder_channels];
   UltrasonicSensors ultrasonic_;
 
-  Outputs waiting_outputs_;  // applied before every chip was ready
+  Outputs waiting_outputs_;  // before every chip was ready
   bool waiting_ = false;
   ChipFault fault_;
   bool failed_[chip_count] = {};
   std::uint32_t failed_us_[chip_count] = {};
-  int first_chip_ = 0;                        // of the next poll
-  int verified_chip_ = 0;                     // the next
-  volatile std::uint8_t modes_to_check_ = 0;  // of PWM chips, since the last safe state
+  int first_chip_ = 0;                        // begins the next poll
+  int verified_chip_ = 0;                     // next to verify
+  volatile std::uint8_t modes_to_check_ = 0;  // PWM chips left to check after a safe state
   std::uint32_t verified_us_ = 0;
-  std::uint32_t now_us_ = 0;  // of the last poll
+  std::uint32_t now_us_ = 0;
   std::uint32_t held_since_us_ = 0;
-  bool handle_seen_ = false;           // the pin said held at the last poll
-  bool handle_held_ = false;           // it has said so for a while
+  bool handle_seen_ = false;           // the pin read held at the last poll
+  bool handle_held_ = false;           // the handle has settled
   volatile bool busy_ = false;         // the bus is in use: in poll(), apply() or make_safe()
-  volatile bool interrupted_ = false;  // and make_safe() came between
+  volatile bool interrupted_ = false;  // make_safe() came in between
 };
 
 }  // namespace firmware

@@ -32,9 +32,8 @@ void set(Bldc& output, const Command& command) {
   output.brake = command.on;
 }
 
-// Called when the relay of the motors' supply is about to close: a motor whose command came while
-// there was no supply, or was held back by a network, must not start because of the relay. A voltage
-// may be the throttle of one.
+// Called before the relay of the motors' supply closes. A motor must not start because of the
+// relay, on a command that came without supply or was delayed. A voltage may be a motor's throttle.
 void stop_motors(Outputs& outputs) {
 #define R4_OUTPUT(kind, Value, member, channels, motor) \
   for (auto& channel : outputs.member) {                \
@@ -49,7 +48,7 @@ void stop_motors(Outputs& outputs) {
 Refusal carry_out(const Command& command, Setpoints& setpoints) {
   const int i = command.channel - 1;
   const int channels = row_of(command.kind).channels;
-  if (channels != 0 && (i < 0 || i >= channels)) return Refusal::channel;  // it is an index below
+  if (channels != 0 && (i < 0 || i >= channels)) return Refusal::channel;  // `i` is an index below
   Outputs& outputs = setpoints.outputs;
   switch (command.kind) {
 #define R4_OUTPUT(kind, Value, member, ...) \

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Carries out commands that have passed every check: setpoints, thresholds, field selection,
-// settings.
+// Carries out checked commands: setpoints, thresholds, field selection, settings.
 #pragma once
 
 #include <cstdint>
@@ -12,17 +11,16 @@
 namespace r4 {
 namespace firmware {
 
-// What commands change. The application decides whether the outputs reach the hardware.
+// The application decides whether the outputs reach the hardware.
 struct Setpoints {
   Outputs outputs;
-  std::uint16_t proximity_cm[ultrasonic_channels] = {};  // 0: that sensor stops nothing
+  std::uint16_t proximity_cm[ultrasonic_channels] = {};  // 0: the sensor stops nothing
   FieldSet fields = FieldSet::paper_default();
   Settings settings;
 };
 
-// Carries `command` out on `setpoints`: wholly, or not at all with the reason why. The caller
-// has used check_command(), so only names of fields and settings, and channels, are refused here. Stop, clear,
-// zero, heartbeat and identify change no setpoint and are left to the application.
+// Carries out `command` completely, or changes nothing and returns the reason. The caller has used
+// check_command(), so only names of fields and settings, and channels, are refused here.
 Refusal carry_out(const Command& command, Setpoints& setpoints);
 
 }  // namespace firmware

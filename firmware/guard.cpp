@@ -60,7 +60,7 @@ bool Guard::tick(std::uint32_t now_ms) {
   return all_seen;
 }
 
-// The outputs are made safe once for each cause; the graver one is remembered.
+// Makes the outputs safe once for each cause, and remembers the graver cause.
 void Guard::trip(SafeReason cause) {
   const SafeReason before = tripped_.load(std::memory_order_relaxed);
   if (before == SafeReason::stop || before == cause) return;

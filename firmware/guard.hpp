@@ -1,22 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What watches over the application from outside its loop: a timer interrupt calls tick() every
-// millisecond, and so the outputs become safe in time whatever the loop is waiting for.
+// Watches the application from outside its loop. A timer interrupt calls tick() every millisecond,
+// so the outputs become safe in time even if the loop hangs.
 //
-//     what                      seen when                          then
+//     event                     detected by                        reaction
 //     the host falls silent     the link's deadline has passed     outputs safe, cause link
-//     E:STOP has come in        stop() was called                   outputs safe, cause stop
+//     E:STOP has arrived        stop() was called                  outputs safe, cause stop
 //     a duty hangs              5 deadlines missed in a row        outputs safe, cause watchdog
 //     a duty is often late      2 missed a second for long         outputs safe, cause watchdog
-//     a duty stays away         tick() does not return true        the port starves the hardware
-//                                                                  watchdog, which resets the board
-//     a duty too many           add_duty()                         both, and again, whatever clears
-//                                                                  it: nobody would watch that duty
+//     a duty stays away         tick() does not return true        hardware watchdog resets board
+//     too many duties           add_duty()                         both, again after each clear
 //
-// A duty is what must happen again and again: a turn of the loop, of a thread, of another interrupt.
-// It checks in each time. The application learns what the guard did at its next turn (take()).
-//
-// tick() runs in an interrupt, on the core that it interrupts; check_in() may be called anywhere,
-// also in another thread.
+// A duty is work that must repeat: a turn of the loop, of a thread, of another interrupt. It checks
+// in each time. tick() runs in an interrupt, on the core that it interrupts; check_in() in any
+// thread.
 #pragma once
 
 #include <atomic>
@@ -35,48 +31,45 @@ class Guard {
 
   explicit Guard(Hal& hal) : hal_(hal) {}
 
-  // A duty that checks in at least every `limit_ms` (1 …). Before the first tick(). no_duty, and the
-  // outputs stay safe for good: there are max_duties already.
+  // A duty that checks in at least every `limit_ms` (1 …). Call before the first tick(). If there
+  // are max_duties already, returns no_duty, and the outputs stay safe for good.
   Duty add_duty(std::uint32_t limit_ms);
-  // For no_duty nothing happens.
   void check_in(Duty duty) {
     if (duty < max_duties) duties_[duty].seen.store(true, std::memory_order_relaxed);
   }
 
-  // Outputs are live until `deadline_ms` unless it is put off, or until disarm().
+  // The outputs become safe at `deadline_ms`, unless arm() puts it off or disarm() ends it.
   void arm(std::uint32_t deadline_ms);
   void disarm() { armed_.store(false, std::memory_order_relaxed); }
 
-  // E:STOP has come in, in an interrupt or a thread that need not wait for the loop
-  // (stop_detector.hpp): outputs safe at the next tick(), which may be called for it at once.
+  // E:STOP has arrived in an interrupt or a thread that does not wait for the loop
+  // (stop_detector.hpp). The next tick(), which may follow at once, makes the outputs safe.
   void stop() { stops_heard_.fetch_add(1, std::memory_order_release); }
-  // How often that was since boot; it wraps. The application has to find as many datagrams.
+  // Calls of stop() since boot; wraps. The application must find as many datagrams.
   std::uint32_t stops_heard() const { return stops_heard_.load(std::memory_order_acquire); }
 
-  // A millisecond has passed. True: every duty has checked in since it was last true, so the
-  // hardware watchdog may be fed.
+  // True if every duty has checked in since the last true: the hardware watchdog may be fed.
   bool tick(std::uint32_t now_ms);
 
-  // Has the guard made the outputs safe since the last take()?
+  // True if the guard has made the outputs safe since the last take().
   bool tripped() const { return tripped_.load(std::memory_order_relaxed) != SafeReason::none; }
-  // Why: none, link, watchdog or stop. From now on it may trip again.
+  // Returns none, link, watchdog or stop. Afterwards the guard may trip again.
   SafeReason take() { return tripped_.exchange(SafeReason::none, std::memory_order_relaxed); }
 
-  // Deadlines that duties missed since boot.
   std::uint32_t missed() const { return missed_.load(std::memory_order_relaxed); }
 
-  // A miss costs so much, a millisecond pays 1 back, and more than the credit is a trip: 5 misses at
-  // once, or more than 2 a second.
+  // Each miss adds miss_cost to a debt, and each millisecond takes 1 off. A debt above the credit
+  // trips the guard: 5 misses at once, or more than 2 a second.
   static constexpr std::uint32_t miss_cost = 500;
   static constexpr std::uint32_t credit = 4 * miss_cost;
 
  private:
   struct Watched {
     std::atomic<bool> seen{false};
-    // Of tick() alone.
+    // Used by tick() only.
     std::uint32_t limit_ms = 0;
-    std::uint32_t seen_ms = 0;  // or missed
-    bool due = true;            // has not checked in since tick() was last true
+    std::uint32_t seen_ms = 0;
+    bool due = true;  // has not checked in since tick() last returned true
   };
 
   void trip(SafeReason cause);
@@ -84,13 +77,13 @@ class Guard {
   Hal& hal_;
   Watched duties_[max_duties];
   std::uint8_t duty_count_ = 0;
-  bool unwatched_ = false;  // a duty was refused
+  bool unwatched_ = false;  // add_duty() failed
   std::atomic<bool> armed_{false};
   std::atomic<std::uint32_t> stops_heard_{0};
   std::atomic<std::uint32_t> deadline_ms_{0};
   std::atomic<SafeReason> tripped_{SafeReason::none};
   std::atomic<std::uint32_t> missed_{0};
-  // Of tick() alone.
+  // Used by tick() only.
   bool started_ = false;
   std::uint32_t stops_obeyed_ = 0;
   std::uint32_t debt_ = 0;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the board's application needs of the hardware, at the level of channel values. Each port
-// (firmware/ports/…) implements it; chips, registers and pins are below it.
+// The hardware as the application needs it: channel values. Each port implements it. Nothing waits.
 #pragma once
 
 #include <cstdint>
@@ -11,19 +10,17 @@
 namespace r4 {
 namespace firmware {
 
-// Where a stepper is to go, and how fast.
 struct StepperTarget {
   std::int32_t position = 0;                   // steps
   std::int32_t speed = stepper_speed_default;  // steps per second
-  bool enabled = false;                        // false: it stays where it is
+  bool enabled = false;                        // false: stays where it is
   friend bool operator==(const StepperTarget& a, const StepperTarget& b) {
     return a.position == b.position && a.speed == b.speed && a.enabled == b.enabled;
   }
   friend bool operator!=(const StepperTarget& a, const StepperTarget& b) { return !(a == b); }
 };
 
-// Every output of the board as commanded: the setpoints. Default-constructed: the safe state, all off
-// and the brakes on.
+// Default: the safe state, all off and the brakes on.
 struct Outputs {
   Outputs() {
     for (Bldc& channel : bldc) channel.brake = true;
@@ -36,31 +33,29 @@ struct Outputs {
 bool operator==(const Outputs& a, const Outputs& b);
 inline bool operator!=(const Outputs& a, const Outputs& b) { return !(a == b); }
 
-// Every input of the board as sampled.
 struct Inputs {
   std::int32_t analog_cv[analog_channels] = {};  // hundredths of a volt
   bool handle_held = false;
-  std::int32_t stepper_steps[stepper_channels] = {};  // where it is
+  std::int32_t stepper_steps[stepper_channels] = {};
   std::int32_t encoder_counts[encoder_channels] = {};
-  std::int32_t encoder_hz[encoder_channels] = {};            // counts a second; negative backwards
-  std::int32_t encoder_index_counts[encoder_channels] = {};  // where the index line rose last
+  std::int32_t encoder_hz[encoder_channels] = {};  // counts per second; negative backwards
+  std::int32_t encoder_index_counts[encoder_channels] = {};  // at the index's last rising edge
   std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};     // 0: no echo
-  std::uint8_t ultrasonic_blind = 0;  // bit n-1: sensor n does not answer, nothing is known
-  std::uint8_t gpio = 0;              // bit n-1: input n is high
-  ChipFault fault;                    // the first since the last clear_fault()
+  std::uint8_t ultrasonic_blind = 0;                         // bit n-1: sensor n does not answer
+  std::uint8_t gpio = 0;                                     // bit n-1: input n is high
+  ChipFault fault;  // the first since the last clear_fault()
 };
 
 class Hal {
  public:
-  // Drives the outputs. Called when a setpoint changed; writes what differs and does not wait.
+  // Called when a setpoint changed. Writes only differences.
   virtual void apply(const Outputs& outputs) = 0;
-  // Every output off, at once and unconditionally; a fault handler may call it at any time.
+  // Every output off, at once; a fault handler may call it at any time.
   virtual void make_safe() = 0;
-  // The inputs as they are now; does not wait.
   virtual void sample(Inputs& inputs) = 0;
-  // Encoder and stepper `channel` (1 …) count from zero now; the stepper holds.
+  // Encoder and stepper `channel` (1 …) restart at zero; the stepper holds.
   virtual void zero(int channel) = 0;
-  // Outputs may be driven again after a fault. False: it is still there.
+  // Allows outputs after a fault. False if the fault persists.
   virtual bool clear_fault() = 0;
 
  protected:

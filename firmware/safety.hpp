@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Why the outputs are safe: the set of causes, each latched until its own way out (docs/safety.md).
+// Why the outputs are safe: causes, each latched until its own condition ends it (docs/safety.md).
 //
 //     cause      enters                                   leaves                      setpoints
-//     link       owner silent, or its transport gone      the owner is back           kept
+//     link       owner silent, or its transport failed    the owner is back           kept
 //     handle     dead-man's handle released               it is held again            cleared
-//     proximity  something nearer than a threshold,       it is 5 cm beyond for       cleared
-//                or a sensor with one is blind            500 ms, or off
+//     proximity  obstacle nearer than a threshold, or     5 cm beyond it for 500 ms,  cleared
+//                a sensor with a threshold is blind       or threshold off
 //     stop       E:STOP                                   E:CLEAR                     cleared
 //     fault      a chip or the firmware failed            E:CLEAR                     cleared
 //     watchdog   a duty missed its deadline               E:CLEAR                     cleared
 //
-// The outputs are safe while any cause is there. The board reports the gravest one: stop, fault,
-// watchdog, handle, proximity, link. E:CLEAR takes away only the one that is reported, so that
-// nobody clears what they have not seen; and each that only E:CLEAR ends has a number, which E:CLEAR
-// names, so that nobody clears what came since.
+// The outputs are safe while there is a cause. The board reports the gravest: stop, fault,
+// watchdog, handle, proximity, link. E:CLEAR ends only the reported cause, which the host has seen,
+// and names the number of the newest cause, so that no host clears a later cause.
 #pragma once
 
 #include <cstdint>
@@ -25,26 +24,25 @@ namespace firmware {
 
 class Safety {
  public:
-  // Adds a cause. True if it was not there.
+  // True if the cause is new.
   bool enter(SafeReason cause);
-  // A latched cause that was there has come again: it has a new number.
+  // A latched cause has come again: it gets a new number.
   void again() { newest_ = newest_ == INT32_MAX ? 1 : newest_ + 1; }
-  // Takes a cause away. True if it was there.
+  // True if the cause was there.
   bool leave(SafeReason cause);
-  // E:CLEAR: takes the reported cause away if it is stop, fault or watchdog.
+  // E:CLEAR: ends the reported cause if it is stop, fault or watchdog.
   void clear();
 
   bool is_safe() const { return causes_ != 0; }
   bool has(SafeReason cause) const { return (causes_ & bit(cause)) != 0; }
   SafeReason reason() const;
 
-  // Numbers are counted from there. Another at each boot, so that no E:CLEAR from before it fits.
+  // Different at each boot, so that no E:CLEAR from before the boot fits.
   void count_from(std::uint32_t number) {
     newest_ = static_cast<std::int32_t>(number & 0x3FFFFFFFU);
   }
   // The number of the newest cause that only E:CLEAR ends.
   std::int32_t newest() const { return newest_; }
-  // Is one of those there?
   bool latched() const;
 
  private:

@@ -10,7 +10,7 @@ namespace firmware {
 
 namespace {
 
-// Does a field begin like a stop? Commands come first, so mostly the first byte decides.
+// True if a field begins like a stop. Commands come first, so usually the first byte decides.
 bool may_be_stop(Text datagram) {
   constexpr Text stop("E:S");
   for (std::size_t i = 0; i + stop.size() <= datagram.size(); ++i) {

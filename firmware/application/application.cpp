@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What comes to the application: datagrams, and time.
 #include "application.hpp"
 
 namespace r4 {
@@ -38,7 +37,7 @@ Application::Application(Hal& hal, const Config& config, Observer* observer)
   }
   setpoints_.settings = config.settings;
   authentication_.use(config.settings.site.keys);
-  guard_.add_duty(loop_limit_ms);  // loop_duty
+  guard_.add_duty(loop_limit_ms);
 }
 
 std::uint8_t Application::add_port(Port& port) {
@@ -47,7 +46,7 @@ std::uint8_t Application::add_port(Port& port) {
   return port_count_++;
 }
 
-// Who comes to a board without a host may know the text only, and wait for the board to speak first.
+// A new host may not know the packed form, so the board sends text until a host takes control.
 void Application::tell_ports() {
   const bool packed = setpoints_.settings.pack && link_.has_owner();
   for (std::uint8_t i = 0; i < port_count_; ++i) {
@@ -57,7 +56,7 @@ void Application::tell_ports() {
 
 void Application::start(std::uint32_t now_ms) {
   hal_.make_safe();
-  safety_.count_from(now_ms);  // the clock begins at random
+  safety_.count_from(now_ms);  // numbers differ at each boot: the clock starts at random
   turned_ms_ = now_ms;
   tell_ports();
   begin_devices(now_ms);
@@ -73,11 +72,9 @@ BoardState Application::state() const {
   return safety_.is_safe() ? BoardState::safe : BoardState::active;
 }
 
-// --- what comes in
-
 void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms) {
   turn(now_ms);
-  look_at_time(now_ms);  // silence counts before what ends it
+  look_at_time(now_ms);  // a silent host is noticed before its next datagram
   if (port >= port_count_) return;
   Datagram datagram;
   if (!read_datagram(bytes, datagram)) {
@@ -93,7 +90,7 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
   const bool authentic = verdict == Verdict::authentic;
   speaker_.from = from;
   speaker_.sid = datagram.session_id();
-  // A watcher on a bus may be where the paper host in control is, and has numbers of its own.
+  // A watcher on a bus may have the peer of a paper host in control, but has its own numbers.
   const bool counts = authentic && link_.is_session_of(speaker_) && datagram.has_pnum() &&
                       (speaker_.sid != no_session || !asks_to_watch(datagram));
   known_ = counts && paths_.count(from, datagram.pnum());
@@ -102,7 +99,7 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
       if (authentic) {
         on_host_heartbeat(from, datagram, now_ms);
       } else if (rejected(verdict, now_ms)) {
-        answer_heartbeat(from, now_ms);  // with the nonce
+        answer_heartbeat(from, now_ms);  // the answer carries the nonce
       }
       break;
     case MessageKind::command:
@@ -112,16 +109,16 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
     case MessageKind::nack:
     case MessageKind::identity:
     case MessageKind::state:
-      break;  // another board's talk
+      break;  // from another board
   }
 }
 
-// What arrives while the loop stands still waits in an interrupt's ring or in the system, which tell
-// nothing of when it came: only that it was not there when the loop last looked.
+// Datagrams that arrive during a standstill wait in an interrupt's ring or in the operating system.
+// Their arrival times are unknown, but they came after the last turn.
 void Application::turn(std::uint32_t now_ms) {
   if (now_ms - turned_ms_ > standstill_ms) {
     for (PortSlot& slot : ports_) {
-      if (!slot.behind) slot.waiting_ms = turned_ms_;  // else what came before may wait still
+      if (!slot.behind) slot.waiting_ms = turned_ms_;  // else earlier datagrams may still wait
       slot.behind = true;
     }
     any_behind_ = true;
@@ -137,13 +134,11 @@ void Application::drained(std::uint8_t port) {
   if (port < port_count_) ports_[port].behind = false;
 }
 
-// For how long may what comes from that port now have waited?
 std::uint32_t Application::waited_ms(std::uint8_t port, std::uint32_t now_ms) const {
   return ports_[port].behind ? now_ms - ports_[port].waiting_ms : 0;
 }
 
-// Is the datagram of a host that may command? Without a key all are, and at a cable of the board's
-// own: who is there can set a key.
+// Authentic without a key, or on a cable of the board's own, because a host there can set the key.
 Verdict Application::judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
                            std::uint32_t now_ms) {
   if (!authentication_.required() || ports_[port].port->may_configure()) return Verdict::authentic;
@@ -151,13 +146,13 @@ Verdict Application::judge(std::uint8_t port, MessageKind kind, const Datagram& 
   return of_host ? authentication_.verify(datagram, now_ms) : Verdict::missing;
 }
 
-// It is dropped. True if it is answered.
+// Reports a dropped datagram. True if it gets an answer.
 bool Application::rejected(Verdict verdict, std::uint32_t now_ms) {
   if (observer_ != nullptr) observer_->on_rejected(now_ms, verdict);
   return authentication_.rejected(verdict);
 }
 
-// The session's paths keep their peers, whatever other peers send.
+// The ports keep the peers of the session's paths, whatever other peers send.
 void Application::hold_paths() {
   for (std::uint8_t i = 0; i < port_count_; ++i) {
     bool held = false;
@@ -170,11 +165,10 @@ void Application::hold_paths() {
   }
 }
 
-// A heartbeat of the session came from there, which may be a path from now on.
 void Application::on_path_heard(Source from, std::uint32_t now_ms) {
   if (!paths_.on_heartbeat(from, now_ms)) return;
   watchers_.end_of(from);
-  link_.send_soon();  // it is to hear from us
+  link_.send_soon();  // the new path needs a heartbeat
   hold_paths();
   if (observer_ != nullptr) observer_->on_path(now_ms, from, true);
 }
@@ -184,7 +178,6 @@ void Application::on_path_left(Source path, std::uint32_t now_ms) {
   if (observer_ != nullptr) observer_->on_path(now_ms, path, false);
 }
 
-// A host controls the board from now on.
 void Application::on_host_found(Source at, std::uint32_t now_ms) {
   hold_paths();
   tell_ports();
@@ -207,7 +200,7 @@ void Application::on_host_heartbeat(Source from, const Datagram& datagram, std::
       break;
     case HeartbeatEffect::new_session:
       paths_.begin(from, now_ms);
-      // Nothing that another host, or this one before its restart, commanded may come back.
+      // Commands of another host, or of this host before its restart, must not take effect again.
       setpoints_.outputs = Outputs();
       setpoints_.fields = FieldSet::paper_default();
       begin_devices(now_ms);

@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The R4 board's application: datagrams in, outputs and datagrams out (paper sections 2-4).
-//
-// It owns no thread, clock or socket. The port feeds it: receive() for each datagram, poll() when
-// time has passed, port_down() when a transport is gone, guard().tick() in a timer interrupt; it
-// answers through Hal and Port. Every path to the outputs goes through update_outputs(), every way
-// into the safe state through Safety.
+// The R4 board's application: datagrams in, outputs and datagrams out (paper sections 2-4). It owns
+// no thread, clock or socket. The port calls receive() for each datagram, poll() as time passes,
+// port_down() when a transport fails, and guard().tick() in a timer interrupt.
 //
 //     CONNECTING   no host yet: outputs safe, `H:R4-ROS2;PNum:0;T:0;` each heartbeat interval
-//     ACTIVE       a host is alive and nothing is wrong: outputs follow the setpoints
-//     SAFE         a cause of safety.hpp is there: outputs safe; with cause `link` heartbeats only
+//     ACTIVE       a host is in control and there is no cause: outputs follow the setpoints
+//     SAFE         there is a cause (safety.hpp): outputs safe; with cause `link` heartbeats only
 //
-// A session has one to four paths (session_paths.hpp): state and heartbeats go to each of them. Packet
-// numbers count per port; answers to hosts that do not control the board count apart. All times are ms of
-// the board's clock, which wraps.
+// A session has one to four paths (session_paths.hpp), and each gets states and heartbeats. Packet
+// numbers count per port; answers to hosts not in control have separate numbers. All times are ms
+// of the board's clock, which wraps.
 #pragma once
 
 #include <cstddef>
@@ -42,12 +39,12 @@ class Application {
   struct Config {
     Identity identity;  // the texts must outlive the application
     Settings settings;
-    // Authentication::chance_size random bytes, others at each boot. Without them a board with a
-    // key obeys nobody but who is at a cable of its own.
+    // Authentication::chance_size random bytes, different at each boot. Without them, a board with
+    // a key obeys only a host on a cable of its own.
     const std::uint8_t* chance = nullptr;
-    // The user's bus, which must outlive the application; none: its commands are unknown.
+    // The user's devices must outlive the application; UARTs all or none. nullptr: commands
+    // unknown.
     UserI2c* i2c = nullptr;
-    // The user's UARTs, all or none; the same.
     UserUart* uarts[uart_channels] = {};
   };
   static constexpr int max_ports = 4;
@@ -55,69 +52,62 @@ class Application {
 
   Application(Hal& hal, const Config& config, Observer* observer = nullptr);
 
-  // Ports are added before start(); returns the port's number, or no_port: there are max_ports
-  // already, it is not served. A board whose ports are known when it is compiled asserts it then.
+  // Call before start(). Returns the port's number, or no_port if there are max_ports already.
   std::uint8_t add_port(Port& port);
   // Makes the outputs safe and sends the first heartbeat.
   void start(std::uint32_t now_ms);
 
-  // A datagram from `peer` on `port`. Anything may be in it. One of a port that was not added is
-  // passed over.
-  //
-  // The loop turns as often as this or poll() is called. If it stood still for longer than
-  // standstill_ms, what comes then may have waited all that time: a heartbeat counts from when the
-  // loop last turned, until the port is drained or the loop has turned for catch_up_ms.
+  // Takes a datagram of any content from `peer`; ignores a port that was not added. After a pause
+  // longer than standstill_ms, the datagram may have waited since the last turn of the loop (a call
+  // of this or poll()). A heartbeat then counts from that turn, until the port is drained or the
+  // loop has turned for catch_up_ms.
   void receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms);
-  // All that had arrived on `port` has been handed over. A port that can tell saves the next
-  // heartbeat from being taken for one that waited.
+  // All that had arrived on `port` is handed over, so its next heartbeat has not waited.
   void drained(std::uint8_t port);
-  // The transport under `port` is gone.
+  // The transport of `port` has failed.
   void port_down(std::uint8_t port, std::uint32_t now_ms);
-  // Something is wrong with the board itself: cause is fault or watchdog.
+  // The board itself has failed: cause is fault or watchdog.
   void fail(SafeReason cause, std::uint32_t now_ms);
-  // Does everything that is due; returns the milliseconds until the next call is needed (at most
-  // 10).
+  // Does everything that is due. Returns the milliseconds until the next call, at most 10.
   std::uint32_t poll(std::uint32_t now_ms);
 
-  // A turn of the user's devices alone; poll() has it, too. At least once a millisecond, so that a transfer
-  // can be begun in each.
+  // Part of poll(). Call at least once per millisecond, so that a transfer can begin in each.
   void poll_devices(std::uint32_t now_ms);
 
-  // For the timer interrupt. Its first duty is the loop: poll() checks in.
+  // For the timer interrupt. poll() checks in the first duty, loop_duty.
   Guard& guard() { return guard_; }
   static constexpr Guard::Duty loop_duty = 0;
 
   BoardState state() const;
   SafeReason reason() const { return safety_.reason(); }
-  SafeReport safe_report() const;                      // what heartbeats tell
-  const Outputs& outputs() const { return outputs_; }  // as the hardware has them
+  SafeReport safe_report() const;                      // as in heartbeats
+  const Outputs& outputs() const { return outputs_; }  // as last sent to the hardware
   const Settings& settings() const { return setpoints_.settings; }
   const BoardLink& link() const { return link_; }
   const SessionPaths& paths() const { return paths_; }
   const Authentication& authentication() const { return authentication_; }
 
-  // poll() is wanted at least this often, for the interlocks.
+  // Longest time between two calls of poll(), for the interlocks.
   static constexpr std::uint32_t interlock_period_ms = 10;
-  // The guard counts a turn of the loop as missed after this.
+  // The guard counts a longer turn of the loop as missed.
   static constexpr std::uint32_t loop_limit_ms = 20;
-  // A loop that turns as it should does not stand still. By so much may a heartbeat be taken for
-  // younger than it is.
+  // A longer pause between two turns is a standstill. A heartbeat may look younger by this much.
   static constexpr std::uint32_t standstill_ms = 15;
-  // No port holds more than is read in this time.
+  // Ports hold no more datagrams than are read in this time.
   static constexpr std::uint32_t catch_up_ms = 50;
-  // A proximity cause leaves when the obstacle is this much beyond the threshold.
+  // The cause proximity ends when the obstacle is this far beyond the threshold for this long: two
+  // turns of each sensor (drivers/ultrasonic.hpp), because one turn may miss an echo.
   static constexpr int proximity_hysteresis_cm = 5;
-  // … for this long: two turns of each sensor (drivers/ultrasonic.hpp), for one may miss an echo.
   static constexpr std::uint32_t proximity_clear_ms = 500;
-  // The answer to a single transfer on the user's bus is in the states of so long, chosen or not.
+  // How long states include the answer to a single transfer on the user's bus, selected or not.
   static constexpr std::uint32_t answer_shown_ms = 1000;
 
  private:
   struct PortSlot {
     Port* port = nullptr;
-    std::uint32_t next_pnum = 0;   // of the stream and of the controlling host's answers
-    std::uint32_t aside_pnum = 0;  // of answers to others
-    bool behind = false;           // what comes may have waited, since `waiting_ms`
+    std::uint32_t next_pnum = 0;   // of states, heartbeats and answers to the controlling host
+    std::uint32_t aside_pnum = 0;  // of answers to other hosts
+    bool behind = false;           // datagrams may have waited, since `waiting_ms`
     std::uint32_t waiting_ms = 0;
   };
 
@@ -202,38 +192,37 @@ class Application {
   SessionPaths paths_;
   Watchers watchers_;
   Authentication authentication_;
-  AnswerBudget questions_;  // of hosts that do not control the board
+  AnswerBudget questions_;  // of hosts not in control
   Guard guard_;
   Safety safety_;
   StateSchedule schedule_;
   Setpoints setpoints_;
-  Outputs outputs_;  // what the hardware was told last
+  Outputs outputs_;
   Inputs inputs_;
   PortSlot ports_[max_ports];
   std::uint8_t port_count_ = 0;
-  bool any_behind_ = false;  // one of them, perhaps
+  bool any_behind_ = false;
   BoardState reported_state_ = BoardState::connecting;
   SafeReason reported_reason_ = SafeReason::none;
-  std::uint32_t turned_ms_ = 0;    // when the loop last turned
-  std::uint32_t went_on_ms_ = 0;   // … and when it went on after it had stood still
-  std::uint32_t obstacle_ms_ = 0;  // when there was one last
-  std::uint32_t caused_ms_ = 0;    // when a cause other than link came last
-  // Of the datagram that is being read: its host, and whether another path has brought it before.
+  std::uint32_t turned_ms_ = 0;
+  std::uint32_t went_on_ms_ = 0;   // the first turn after a standstill
+  std::uint32_t obstacle_ms_ = 0;  // when an obstacle was last seen
+  std::uint32_t caused_ms_ = 0;    // when a cause other than link last came
+  // Of the datagram being read: its host, and whether another path brought it before.
   HostId speaker_;
   bool known_ = false;
   bool outputs_live_ = false;  // outputs_ follow the setpoints
-  // The newest stop, as long as it lasts: who asked for it, and its number if it had one.
+  // The newest stop while it lasts: its sender, and its number if it had one.
   bool has_stop_number_ = false;
   bool stop_of_a_key_ = false;
   std::uint32_t stop_number_ = 0;
   HostId stop_from_;
-  // Stops that the guard has heard, and those of them whose datagrams are still to be read; when it
-  // heard the newest.
+  // Stops that the guard heard, how many of their datagrams are unread, and when the newest came.
   std::uint32_t stops_heard_ = 0;
   std::uint32_t unread_stops_ = 0;
   std::uint32_t unread_ms_ = 0;
   std::uint32_t answered_ms_ = 0;
-  bool has_answer_ = false;  // of the user's bus, which is told for a while
+  bool has_answer_ = false;  // still shown in states
   UserI2c* i2c_;
   UserUart* uarts_[uart_channels];
   std::uint32_t rx_ok_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a command datagram comes to: whether it is executed, and what that changes.
+// Command datagrams: whether they are executed, and their effects.
 #include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/command_group.hpp"
 #include "../../protocol/messages/device_command.hpp"
@@ -8,8 +8,8 @@
 namespace r4 {
 namespace firmware {
 
-// May what a command datagram says be executed, as far as it depends on who sent it, and when? If not, it
-// is answered or dropped. `refusal`: what its content has come to, and `at` for which command of a group.
+// True if the sender and the time allow a command datagram. Otherwise it is answered or dropped.
+// `refusal`: the result of parsing it; `at`: the command of a group that caused it.
 bool Application::admit(Source from, const Datagram& datagram, Verdict verdict, Refusal refusal,
                         std::uint8_t at, std::uint32_t now_ms) {
   if (verdict != Verdict::authentic) {
@@ -20,7 +20,7 @@ bool Application::admit(Source from, const Datagram& datagram, Verdict verdict, 
     }
     return false;
   }
-  if (!datagram.has_pnum()) {  // nothing to execute it once by, and nothing to answer to
+  if (!datagram.has_pnum()) {  // without a number it cannot be executed just once, or answered
     ++rx_refused_;
     return false;
   }
@@ -39,7 +39,7 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
                              std::uint32_t now_ms) {
   const int count = datagram.command_count();
   const Field& field = datagram.command();
-  // A stop is obeyed beside other commands, too. A single one of another letter is none.
+  // A stop is obeyed even beside other commands. A single command of another letter is not a stop.
   if ((count != 1 || field.name() == "E") && asks_to_stop(datagram)) {
     emergency_stop(from, datagram, verdict, now_ms);
     return;
@@ -65,7 +65,7 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
   } else if (command.kind == CommandKind::clear) {
     outcome = judge_clear(command, waited_ms(from.port, now_ms), now_ms);
   } else if (command.kind == CommandKind::leave) {
-    if (speaker_.sid == no_session) outcome = Refusal::unknown;  // a paper host knows no sessions
+    if (speaker_.sid == no_session) outcome = Refusal::unknown;  // a paper host has no sessions
   } else if (!may_set(from.port, command)) {
     outcome = Refusal::auth;
   } else if (is_device_command(command.kind)) {
@@ -81,8 +81,7 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
   execute(datagram.pnum(), command, now_ms);
 }
 
-// Several commands in one datagram. The hardware hears of them when all have changed the setpoints, in one
-// go.
+// Several commands in one datagram: all change the setpoints, then the hardware is updated once.
 void Application::on_group(Source from, const Datagram& datagram, Verdict verdict,
                            std::uint32_t now_ms) {
   CommandGroup group;
@@ -96,13 +95,13 @@ void Application::on_group(Source from, const Datagram& datagram, Verdict verdic
   }
   link_.executed(datagram.pnum());
   for (const Command& command : group) {
-    carry_out(command, setpoints_);  // it was checked: none of them can fail
+    carry_out(command, setpoints_);  // cannot fail: read_group() has checked it
     take_effect(datagram.pnum(), command, now_ms);
   }
   bring_about(now_ms);
 }
 
-// Of anyone, also of a board with a key: what is streamed is no secret, and nothing is commanded by it.
+// Needs no key, even on a board with a key: states are not secret, and watching commands nothing.
 void Application::on_watch(Source from, const Datagram& datagram, const Command& command,
                            std::uint32_t now_ms) {
   const bool proven = ports_[from.port].port->is_bus();
@@ -114,7 +113,7 @@ void Application::on_watch(Source from, const Datagram& datagram, const Command&
     const Refusal refusal = parse_fields(command.text, fields);
     if (refusal != Refusal::none) return refuse(from, datagram, refusal, now_ms);
   }
-  if (link_.has_owner() && paths_.has(from)) return;  // all goes there
+  if (link_.has_owner() && paths_.has(from)) return;  // the path gets all states anyway
   const std::uint32_t rate_hz = static_cast<std::uint32_t>(command.value);
   switch (watchers_.on_lease(from, rate_hz, datagram.time_ms(), proven, now_ms)) {
     case Watchers::Effect::watching: {
@@ -139,20 +138,17 @@ void Application::on_watch(Source from, const Datagram& datagram, const Command&
   }
 }
 
-// May a command be given by this port?
 bool Application::may_set(std::uint8_t port, const Command& command) const {
   return command.kind != CommandKind::setting || !is_site_setting(command.text) ||
          ports_[port].port->may_configure();
 }
 
-// The command has changed the setpoints; the rest of its effect.
 void Application::execute(std::uint32_t pnum, const Command& command, std::uint32_t now_ms) {
   link_.executed(pnum);
   take_effect(pnum, command, now_ms);
   bring_about(now_ms);
 }
 
-// What is no setpoint, and who is told.
 void Application::take_effect(std::uint32_t pnum, const Command& command, std::uint32_t now_ms) {
   switch (command.kind) {
     case CommandKind::zero:
@@ -181,28 +177,27 @@ void Application::take_effect(std::uint32_t pnum, const Command& command, std::u
   if (observer_ != nullptr) observer_->on_executed(now_ms, pnum, command);
 }
 
-// The setpoints have changed.
 void Application::bring_about(std::uint32_t now_ms) {
-  look_at_time(now_ms);  // the silence may be longer already than a new timeout
+  look_at_time(now_ms);  // the silence may already exceed a new timeout
   check_interlocks(now_ms);
   update_outputs(now_ms);
   report_state(now_ms);
 }
 
-// One that is not authentic spends no number: CMD would prove to its host what was not executed. Nor
-// does one whose number is not the next: another program at the owner's place (a bus, a port that is
-// shared) takes its own at random, and the board must not forget the owner's for it.
+// A stop that is not authentic uses up no number: CMD would then confirm what was not executed.
+// Neither does a stop whose number is not the next: another program at the owner's peer (a bus, or
+// a shared port) has random numbers, which must not replace the owner's.
 void Application::emergency_stop(Source from, const Datagram& datagram, Verdict verdict,
                                  std::uint32_t now_ms) {
   const bool repeated = safety_.has(SafeReason::stop);
   std::uint32_t number = 0;
   const bool has_number = stop_number(datagram, number);
-  // The owner's is no repetition of one that somebody without a key sent under its number before.
+  // The owner's own stop does not repeat a stop that was sent without a key under its number.
   const bool of_a_key =
       verdict == Verdict::authentic || verdict == Verdict::replayed || verdict == Verdict::old;
   const bool same = has_number && has_stop_number_ && number == stop_number_ &&
                     speaker_ == stop_from_ && (stop_of_a_key_ || !of_a_key);
-  // An E:CLEAR under way knows nothing of this one.
+  // An E:CLEAR under way does not know of this stop.
   if (repeated && !same) safety_.again();
   if (unread_stops_ != 0) --unread_stops_;
   if (!repeated || !same) stop_of_a_key_ = of_a_key;
@@ -218,7 +213,7 @@ void Application::emergency_stop(Source from, const Datagram& datagram, Verdict 
     link_.executed(datagram.pnum());
   }
   if (observer_ != nullptr) observer_->on_executed(now_ms, datagram.pnum(), Command::stop());
-  // Everyone hears of it once, its sender each time.
+  // Everyone is notified once, the sender each time.
   if (!repeated) send_heartbeats(now_ms);
   if (repeated || !owner) answer_heartbeat(from, now_ms);
 }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the application has to do with the user's devices: their commands, and what the state tells of them.
 #include <cstring>
 
 #include "../../protocol/messages/device_command.hpp"
@@ -19,7 +18,7 @@ Refusal Application::carry_out_device(std::uint32_t pnum, const Command& command
   return i2c_->ask(pnum, command) ? Refusal::none : Refusal::full;
 }
 
-// One that is off is not there.
+// A UART that is switched off counts as a missing channel.
 Refusal Application::write_uart(const Command& command) {
   UserUart* const uart = uarts_[command.channel - 1];
   if (uart == nullptr) return Refusal::unknown;
@@ -30,7 +29,7 @@ Refusal Application::write_uart(const Command& command) {
   return uart->write(bytes, size) ? Refusal::none : Refusal::full;
 }
 
-// What may move something, and has not begun, is void.
+// Drops writes that have not begun, because they may move something.
 void Application::drop_device_writes() {
   if (i2c_ != nullptr) i2c_->drop_write();
   for (UserUart* uart : uarts_) {
@@ -38,14 +37,14 @@ void Application::drop_device_writes() {
   }
 }
 
-// What came while nobody heard it is old.
+// Bytes that came while no host listened are outdated.
 void Application::forget_uarts() {
   for (UserUart* uart : uarts_) {
     if (uart != nullptr) uart->forget();
   }
 }
 
-// A session begins with the readings that are kept as settings, and nothing of the one before.
+// A session begins with the readings kept as settings, and nothing of the session before.
 void Application::begin_devices(std::uint32_t now_ms) {
   has_answer_ = false;
   for (UserUart* uart : uarts_) {
@@ -80,7 +79,7 @@ void Application::poll_devices(std::uint32_t now_ms) {
   answered_ms_ = now_ms;
 }
 
-// Whoever asks must not have to choose a field first.
+// The answer is shown even if its field is not selected.
 void Application::add_device_answer(FieldSet& fields, std::uint32_t t_ms) const {
   if (has_answer_ && reached(answered_ms_ + answer_shown_ms, t_ms)) {
     fields.add(StateField::i2cx);

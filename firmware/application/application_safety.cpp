@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the application does for safety: what makes the outputs safe and ends that, and the one place
-// where outputs change.
+// Entering and leaving the safe state, and the one place where outputs change.
 #include "application.hpp"
 
 namespace r4 {
 namespace firmware {
 
-// Has the host fallen silent, or has the guard found something while the loop was elsewhere?
+// Notices a silent host, and what the guard found while the loop was busy.
 void Application::look_at_time(std::uint32_t now_ms) {
   bool lost = link_.poll(now_ms);
   if (guard_.tripped()) {
@@ -19,9 +18,8 @@ void Application::look_at_time(std::uint32_t now_ms) {
   if (lost) enter(SafeReason::link, now_ms);
 }
 
-// A stop that an interrupt has heard applies at once. Its datagram tells whether it is a
-// repetition. Where the datagram does not come, because a port had no room for it, the stop is a
-// new cause.
+// A stop that an interrupt has heard applies at once. Its datagram shows later whether it is a
+// repetition. If a port had no room for the datagram, the stop counts as a new cause.
 void Application::look_at_stops(std::uint32_t now_ms) {
   const std::uint32_t heard = guard_.stops_heard();
   if (heard != stops_heard_) {
@@ -56,13 +54,12 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   report_state(now_ms);
 }
 
-// Nobody clears what came after they asked: a stop may have been pressed, or a fault have come, while
-// E:CLEAR was on its way. So it names the newest cause, or says that there is none. One that names
-// none, of a host that does not know of such numbers, must come later than the timeout after the cause:
-// what was sent before it is held back for no longer.
+// A host must not clear a cause that came while E:CLEAR was on its way, so E:CLEAR names the newest
+// cause. An E:CLEAR without that number must come later than the timeout after the cause, because
+// no earlier datagram is held back for longer.
 Refusal Application::judge_clear(const Command& command, std::uint32_t waited_ms,
                                  std::uint32_t now_ms) const {
-  if (unread_stops_ != 0) return Refusal::stale;  // its sender cannot know their numbers
+  if (unread_stops_ != 0) return Refusal::stale;  // the sender cannot know their numbers
   if (command.value != Command::unnamed_cause) {
     const bool named = command.value == safety_.newest() || !safety_.latched();
     return named ? Refusal::none : Refusal::stale;
@@ -71,7 +68,7 @@ Refusal Application::judge_clear(const Command& command, std::uint32_t waited_ms
   return settled || !safety_.latched() ? Refusal::none : Refusal::stale;
 }
 
-// E:CLEAR. A fault that is still there stays.
+// A fault that persists stays.
 void Application::clear() {
   if (safety_.reason() != SafeReason::fault || hal_.clear_fault()) safety_.clear();
 }
@@ -83,7 +80,7 @@ bool Application::any_threshold() const {
   return false;
 }
 
-// A sensor with a threshold must see: one that does not answer is taken for an obstacle.
+// A sensor with a threshold counts as an obstacle if it does not answer.
 bool Application::obstacle() const {
   const int margin = safety_.has(SafeReason::proximity) ? proximity_hysteresis_cm : 0;
   for (int i = 0; i < ultrasonic_channels; ++i) {
@@ -112,7 +109,7 @@ void Application::check_interlocks(std::uint32_t now_ms) {
   }
 }
 
-// Until when the guard lets the outputs live without a word of the host.
+// Sets until when the guard leaves the outputs live without a heartbeat.
 void Application::expect_host() {
   if (outputs_live_) {
     guard_.arm(link_.deadline_ms());
@@ -121,7 +118,7 @@ void Application::expect_host() {
   }
 }
 
-// The one place where outputs change: safe unless the board is ACTIVE, else the setpoints.
+// The one place where outputs change: the setpoints if the board is ACTIVE, otherwise safe.
 void Application::update_outputs(std::uint32_t now_ms) {
   static const Outputs off;
   const bool live = state() == BoardState::active;
@@ -135,7 +132,7 @@ void Application::update_outputs(std::uint32_t now_ms) {
   }
   if (live && !guard_.tripped()) {
     hal_.apply(outputs_);
-    if (guard_.tripped()) hal_.make_safe();  // it may have come just before
+    if (guard_.tripped()) hal_.make_safe();  // the guard may have tripped just before
   } else {
     hal_.make_safe();
   }

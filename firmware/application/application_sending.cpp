@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the application sends: heartbeats, states, answers.
 #include <cstring>
 
 #include "../../protocol/messages/command_group.hpp"
@@ -11,15 +10,14 @@ namespace firmware {
 
 namespace {
 
-// Room for a heartbeat or a refusal.
 constexpr std::size_t short_datagram = 160;
 
-// ";SAFE:6;FAULT:127,255" behind the last field of a state.
+// ";SAFE:6;FAULT:127,255" after the last field of a state.
 constexpr std::size_t safe_fields_size = 22;
 
 }  // namespace
 
-// The controlling host where it is, else whoever the port streams to.
+// The controlling host's peer on this port, otherwise everyone.
 std::uint32_t Application::audience(std::uint8_t port) const {
   for (int i = 0; link_.has_owner() && i < paths_.size(); ++i) {
     if (paths_[i].port == port) return paths_[i].peer;
@@ -27,7 +25,7 @@ std::uint32_t Application::audience(std::uint8_t port) const {
   return everyone;
 }
 
-// The session's paths on one port share the port's numbers: each of them gets whatever has one.
+// Paths on one port share its numbers, so each of them gets every datagram that has one.
 void Application::transmit(Source to, const std::uint32_t& number, Text datagram,
                            Priority priority) {
   PortSlot& slot = ports_[to.port];
@@ -41,11 +39,10 @@ void Application::transmit(Source to, const std::uint32_t& number, Text datagram
   if (!sent) slot.port->send(datagram, priority, to.peer);
 }
 
-// True if the datagram that is being read comes from the host in control.
 bool Application::is_of_owner() const { return link_.has_owner() && link_.is_session_of(speaker_); }
 
-// Which numbers an answer to the datagram that is being read takes: those of its watcher; those of the port, if its
-// sender hears all that goes out there; else those of answers to other hosts, which may be behind the same bridge.
+// A watcher has its own numbers. A sender that hears everything on the port gets the port's. Other
+// hosts have separate numbers, because they may be behind the same bridge.
 std::uint32_t& Application::number_for(Source to) {
   Watcher* const watcher = watchers_.find(to);
   if (watcher != nullptr && !hears_all(to)) return watcher->pnum;
@@ -54,12 +51,12 @@ std::uint32_t& Application::number_for(Source to) {
   return shared ? ports_[to.port].next_pnum : ports_[to.port].aside_pnum;
 }
 
-// Does what is for everyone at its port come to it, too?
+// True if datagrams for everyone on its port reach the watcher.
 bool Application::reaches(Source watcher) const {
   return audience(watcher.port) == everyone && ports_[watcher.port].port->reaches(watcher.peer);
 }
 
-// And does that count? In CONNECTING it does not.
+// True if the watcher therefore shares the port's numbers, except in CONNECTING.
 bool Application::hears_all(Source watcher) const {
   return link_.state() != BoardLinkState::connecting && reaches(watcher);
 }
@@ -93,7 +90,7 @@ void Application::identify(Source to, const Datagram& question, std::uint32_t no
   answer(to, writer, now_ms);
 }
 
-// `at`: which command of a group it is, from 1; 0: none in particular. `lease`: what a W has to echo; 0: none.
+// `at`: the command of a group, from 1; 0: none. `lease`: what a W must echo; 0: none.
 void Application::refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
                          std::uint8_t at, std::uint32_t lease) {
   if (!known_) ++rx_refused_;
@@ -104,7 +101,7 @@ void Application::refuse(Source to, const Datagram& datagram, Refusal code, std:
   nack.sid = datagram.session_id();
   nack.code = code;
   nack.at = at;
-  // A W needs no key: what answers it must prove nothing of the command whose number it has.
+  // A W needs no key, so its answer must prove nothing about a command with the same number.
   nack.has_session = !asks_to_watch(datagram) && link_.first_heartbeat(speaker_, nack.session);
   nack.lease = lease;
   char buffer[short_datagram];
@@ -113,8 +110,7 @@ void Application::refuse(Source to, const Datagram& datagram, Refusal code, std:
   answer(to, writer, now_ms);
 }
 
-// What a heartbeat says the time is. An echo of 0 would say that its host has heard nothing: when
-// the clock wraps, that millisecond is left out.
+// The time in a heartbeat. An echo of 0 means that its host has heard nothing, so 0 is skipped.
 std::uint32_t Application::heartbeat_time(std::uint32_t now_ms) {
   return now_ms != 0 ? now_ms : 0xFFFFFFFFU;
 }
@@ -142,12 +138,12 @@ void Application::send_heartbeats(std::uint32_t now_ms) {
   link_.heartbeat_sent(heartbeat_time(now_ms));
 }
 
-// To who is speaking, who may have nothing to echo yet: it can echo this one, in CONNECTING, too.
+// For a sender that has nothing to echo yet: it can echo this heartbeat, even in CONNECTING.
 void Application::answer_heartbeat(Source to, std::uint32_t now_ms) {
   write_heartbeat(to, number_for(to), link_.answer_time(heartbeat_time(now_ms)), safe_report());
 }
 
-// In CONNECTING it says so, and packet numbers begin anew after it.
+// In CONNECTING the heartbeat has PNum 0, and packet numbers restart after it.
 void Application::send_heartbeat(Source to, std::uint32_t now_ms) {
   std::uint32_t& pnum = ports_[to.port].next_pnum;
   if (link_.state() != BoardLinkState::connecting) {
@@ -166,13 +162,13 @@ void Application::write_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t 
                                   const SafeReport& safe) {
   char buffer[short_datagram];
   const Text nonce = authentication_.nonce();
-  if (pnum == 0 && !nonce.empty()) ++pnum;  // that would say CONNECTING
+  if (pnum == 0 && !nonce.empty()) ++pnum;  // 0 would mean CONNECTING
   link_.shown(t_ms);
   transmit(to, pnum, write_board_heartbeat(buffer, sizeof buffer, pnum++, t_ms, safe, nonce),
            Priority::normal);
 }
 
-// A board that has had no host yet tells watchers `link`, as one that has lost its host does.
+// A board that has had no host reports `link` to watchers, like one that has lost its host.
 SafeReport Application::shown_to_watchers() const {
   SafeReport report = safe_report();
   if (report.reason == SafeReason::none && !link_.has_owner()) report.reason = SafeReason::link;
@@ -208,14 +204,14 @@ void Application::send_states(std::uint32_t now_ms) {
   }
 }
 
-// One state, in as many datagrams of the same T as the port's limit asks for.
+// One state, in as many datagrams of the same T as the port's limit requires.
 void Application::send_state(Source to, std::uint32_t& pnum, FieldSet fields, const State& state,
                              std::uint32_t t_ms) {
   char buffer[max_datagram];
   const std::size_t carried = ports_[to.port].port->max_size();
   const std::size_t limit = carried < sizeof buffer ? carried : sizeof buffer;
   const std::size_t room = limit - DatagramWriter::trailer_max - safe_fields_size;
-  if (state.safe != SafeReason::none) {  // these end every part
+  if (state.safe != SafeReason::none) {  // send_part() adds these to every part
     fields.remove(StateField::safe);
     fields.remove(StateField::fault);
   }
@@ -234,7 +230,6 @@ void Application::send_state(Source to, std::uint32_t& pnum, FieldSet fields, co
   send_part(to, pnum, writer, state, t_ms);
 }
 
-// Each part tells by itself whether the outputs are safe, and why.
 void Application::send_part(Source to, std::uint32_t& pnum, DatagramWriter& writer,
                             const State& state, std::uint32_t t_ms) {
   if (state.safe != SafeReason::none) write_field(writer, StateField::safe, state);

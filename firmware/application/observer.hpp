@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What happens inside the board's application, for a log, a display or a test.
+// Events inside the board's application, for a log, a display or a test.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +12,9 @@
 namespace r4 {
 namespace firmware {
 
-// What the board is doing, as people name it (docs/safety.md).
+// The states of a board as docs/safety.md names them.
 enum class BoardState : std::uint8_t { connecting, active, safe };
 
-// "CONNECTING", "ACTIVE", "SAFE".
 const char* to_text(BoardState state);
 
 class Observer {
@@ -24,9 +23,9 @@ class Observer {
   virtual void on_outputs(std::uint32_t t_ms, const Outputs& outputs) = 0;
   virtual void on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) = 0;
   virtual void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) = 0;
-  // A heartbeat or command was dropped because its signature is not right, or not there.
+  // A heartbeat or command was dropped: its signature is wrong or missing.
   virtual void on_rejected(std::uint32_t t_ms, Verdict verdict) = 0;
-  // The session has another path, or has lost this one.
+  // A path joined the session, or left it.
   virtual void on_path(std::uint32_t t_ms, Source path, bool joined) {
     static_cast<void>(t_ms);
     static_cast<void>(path);

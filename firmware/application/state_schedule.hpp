@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// When the next state datagram is due: a fixed grid in time, so that lateness never adds up.
+// When the next state is due: on a fixed time grid, so that delays do not add up.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace firmware {
 
 class StateSchedule {
  public:
-  // Begins the grid: the first state is due at once.
+  // The first state is due at once.
   void start(std::uint32_t now_ms, std::uint32_t period_ms) {
     next_ms_ = now_ms;
     period_ms_ = period_ms;
@@ -20,11 +20,10 @@ class StateSchedule {
   void stop() { running_ = false; }
   bool running() const { return running_; }
 
-  // Another period from the next state on.
+  // Takes effect after the next state.
   void set_period(std::uint32_t period_ms) { period_ms_ = period_ms; }
 
-  // Takes a due state: true, with its time on the grid in `t_ms`. Whole periods that have passed
-  // unserved are left out and counted.
+  // True if a state is due, at `t_ms` on the grid. Skips and counts periods that have passed.
   bool take(std::uint32_t now_ms, std::uint32_t& t_ms) {
     if (!running_ || !reached(now_ms, next_ms_)) return false;
     const std::uint32_t missed = (now_ms - next_ms_) / period_ms_;
@@ -34,12 +33,12 @@ class StateSchedule {
     return true;
   }
 
-  // Milliseconds until the next one; only while running.
+  // Call only while running.
   std::uint32_t due_in(std::uint32_t now_ms) const {
     return reached(now_ms, next_ms_) ? 0 : next_ms_ - now_ms;
   }
 
-  std::uint32_t late() const { return late_; }  // states left out since boot
+  std::uint32_t late() const { return late_; }  // states skipped since boot
 
  private:
   std::uint32_t next_ms_ = 0;

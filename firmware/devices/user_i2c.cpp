@@ -61,7 +61,7 @@ void UserI2c::poll(std::uint32_t now_ms) {
         break;
       case UserI2cPort::Progress::busy:
         if (now_ms - since_ms_ < transfer_limit_ms) return;
-        port_.release();  // before the buffer serves another
+        port_.release();  // before another transfer uses the buffer
         end(I2cOutcome::bus_stuck);
         recover(now_ms);
         break;
@@ -74,8 +74,6 @@ void UserI2c::poll(std::uint32_t now_ms) {
   }
   if (stage_ == Stage::idle) begin_next(now_ms);
 }
-
-// --- what is begun
 
 void UserI2c::begin_next(std::uint32_t now_ms) {
   if (single_ == Single::transfer) return begin_single(now_ms);
@@ -101,7 +99,7 @@ bool UserI2c::begin_due(std::uint32_t now_ms) {
   return false;
 }
 
-// On the grid of its period; what has passed unserved is left out.
+// Stays on the grid of its period; periods that have passed are skipped.
 void UserI2c::next_time(Slot& slot, std::uint32_t now_ms) {
   const std::uint32_t period = slot.poll.period_ms;
   slot.due_ms += (1 + (now_ms - slot.due_ms) / period) * period;
@@ -122,8 +120,6 @@ void UserI2c::begin(int slot, std::uint8_t address, const std::uint8_t* out, std
   abandoned_ = false;
   port_.begin(transfer);
 }
-
-// --- how it ends
 
 void UserI2c::end(I2cOutcome outcome) {
   const int slot = slot_;
@@ -156,7 +152,7 @@ void UserI2c::end_reading(int slot, I2cOutcome outcome) {
   std::memcpy(reading.data.bytes, received_, reading.data.size);
 }
 
-// A scan asks one address after the other; that nobody answers at one is no error, but its result.
+// A scan asks one address after the other. An address without answer is a result, not an error.
 void UserI2c::end_scan_step(I2cOutcome outcome) {
   if (outcome == I2cOutcome::bus_stuck) return answer(outcome);
   if (outcome == I2cOutcome::done) found_.bytes[found_.size++] = address_;
@@ -181,8 +177,6 @@ void UserI2c::count(I2cOutcome outcome) {
   if (outcome != I2cOutcome::done) ++report_.errors;
 }
 
-// --- a bus that is held
-
 void UserI2c::recover(std::uint32_t now_ms) {
   port_.release();
   ++report_.recoveries;
@@ -193,7 +187,7 @@ void UserI2c::recover(std::uint32_t now_ms) {
 
 void UserI2c::recover_step(std::uint32_t now_ms) {
   since_ms_ = now_ms;
-  // Nobody holds SDA: no more clocks, which a device that was being written to would take for bits of a byte.
+  // SDA is free: a device being written to would take more clocks for bits of a byte.
   const bool may_stop = half_clock_ % 2 == 0 && half_clock_ < half_clocks - 3;
   if (may_stop && port_.sda_is_high()) half_clock_ = half_clocks - 3;
   if (half_clock_ < half_clocks - 3) {

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus: single transfers, a scan, and readings that are repeated (docs/devices.md). It is not
-// the bus of the board's chips, and nothing here waits: poll() begins what is due and looks how far it is.
+// The user's I2C bus, not that of the board's chips (docs/devices.md). Nothing waits: poll() begins
+// what is due and looks how far it is.
 //
 //            begins a transfer              it has ended
 //     idle --------------------> transfer ----------------> idle
-//      ^                            | it was lost, or has not ended after transfer_limit_ms
+//      ^                            | lost, or not ended after transfer_limit_ms
 //      |  both lines are high       v
-//      +----------------------- recovering     up to nine clocks while SDA is low, and a STOP, half a clock
-//                                   |            each millisecond
-//      |                            | a line is low (UM10204 section 3.1.16)
+//      +----------------------- recovering    up to nine clocks while SDA is low, and a STOP,
+//                                   |          half a clock each millisecond (UM10204 3.1.16)
+//      |                            | a line is low
 //      |       free_after_ms        v
-//      +- - - - - - - - - - - -   held         what is asked for fails at once
+//      +- - - - - - - - - - - -   held        every request fails at once
 //
-// A single transfer goes before readings, a reading before the next address of a scan; readings that are due
-// take turns. One whose time has come while the one before it is still under way is left out.
-// All times are ms of the board's clock, which wraps.
+// Single transfers go before readings, readings before the next address of a scan. Due readings
+// take turns. A reading is skipped if it is due while its previous transfer is under way. All times
+// are ms of the board's clock, which wraps.
 #pragma once
 
 #include <cstdint>
@@ -30,33 +30,31 @@ class UserI2c {
  public:
   explicit UserI2c(UserI2cPort& port) : port_(port) {}
 
-  // The commands X:READ, X:WRITE and X:SCAN, which are right. False: one has not ended yet.
+  // The valid commands X:READ, X:WRITE and X:SCAN. False if one has not ended yet.
   bool ask(std::uint32_t pnum, const Command& command);
-  // A slot from 1; a poll that is not on ends it. What was read there before is gone.
+  // Slots count from 1; a poll that is not on ends the slot. Discards its last reading.
   void poll_slot(int slot, const I2cPoll& poll, std::uint32_t now_ms);
-  // A write that has not begun is not made any more: the board is safe.
+  // Cancels a write that has not begun, because the board is safe.
   void drop_write();
-  // A session begins: nothing of the one before is made any more, or told.
+  // A session begins: cancels requests and answers of the session before.
   void drop_all();
 
-  // A turn of the loop.
   void poll(std::uint32_t now_ms);
 
-  // Of the slots, in their order.
   const I2cReading (&readings() const)[i2c_slots] { return readings_; }
   const I2cReading& reading(int slot) const { return readings_[slot - 1]; }
   const I2cAnswer& answer() const { return answer_; }
   const I2cBusReport& report() const { return report_; }
-  // Has a transfer ended since it was asked last?
+  // True if a transfer has ended since the last call.
   bool take_answered() {
     const bool answered = answered_;
     answered_ = false;
     return answered;
   }
 
-  // Longer than any transfer of 32 bytes each way at 100 kHz, and than a device may stretch (SMBus).
+  // Longer than 32 bytes each way at 100 kHz, and than a device may stretch the clock (SMBus).
   static constexpr std::uint32_t transfer_limit_ms = 35;
-  static constexpr std::uint32_t free_after_ms = 100;  // a held bus is clocked again
+  static constexpr std::uint32_t free_after_ms = 100;  // until a held bus is clocked again
 
  private:
   enum class Stage : std::uint8_t { idle, transfer, recovering, held };
@@ -85,16 +83,16 @@ class UserI2c {
 
   UserI2cPort& port_;
   Stage stage_ = Stage::idle;
-  int slot_ = no_slot;           // whose transfer is under way
-  std::uint8_t first_slot_ = 0;  // that is looked at next
-  bool abandoned_ = false;       // nobody wants to know how the transfer under way ends
+  int slot_ = no_slot;
+  std::uint8_t first_slot_ = 0;  // looked at first next time
+  bool abandoned_ = false;       // the result of the transfer is not wanted
   std::uint8_t half_clock_ = 0;
-  std::uint32_t since_ms_ = 0;  // in this stage; recovering: the last half clock
-  // Of the transfer under way, whatever is asked for meanwhile.
+  std::uint32_t since_ms_ = 0;  // start of the stage; recovering: last half clock
+  // Of the transfer under way, independent of new requests.
   std::uint8_t sent_[i2c_max_bytes];
   std::uint8_t received_[i2c_max_bytes];
 
-  Single single_ = Single::none;  // asked for, and not ended
+  Single single_ = Single::none;
   bool single_begun_ = false;
   bool writes_ = false;
   std::uint8_t address_ = 0;
@@ -104,7 +102,7 @@ class UserI2c {
   std::uint32_t pnum_ = 0;
   bool answered_ = false;
   I2cAnswer answer_;
-  DeviceBytes<i2c_max_bytes> found_;  // by a scan, so far
+  DeviceBytes<i2c_max_bytes> found_;
   I2cBusReport report_;
   Slot slots_[i2c_slots];
   I2cReading readings_[i2c_slots];

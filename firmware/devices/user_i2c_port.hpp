@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus as its driver needs it: a controller of its own that transfers by itself, and the two
-// lines when a device has to be clocked free. Nothing here waits.
+// The user's I2C bus as its driver needs it. Nothing waits.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +8,8 @@
 namespace r4 {
 namespace firmware {
 
-// One transfer: `out` is sent, then `in` is read after a repeated START. Either may be empty; with both
-// empty it asks whether anybody answers to the address.
+// Sends `out`, then reads `in` after a repeated START. Either may be empty; with both empty it
+// tests whether a device answers.
 struct UserTransfer {
   std::uint8_t address = 0;
   const std::uint8_t* out = nullptr;
@@ -24,17 +23,17 @@ class UserI2cPort {
   enum class Progress : std::uint8_t {
     busy,
     done,
-    refused,  // nobody answered to the address, or a byte was refused; the bus is free again
-    lost,     // the wire did not do what was sent
+    refused,  // no device answered, or a byte was refused; the bus is free
+    lost,     // the wire did not follow what was sent
   };
 
-  // Begins a transfer. Its buffers are in use until progress() says something else than busy, or release().
+  // The buffers are in use until progress() is not busy, or until release().
   virtual void begin(const UserTransfer& transfer) = 0;
   virtual Progress progress() = 0;
 
-  // Gives up what is under way. From now on drive() sets the lines, both high first, until resume().
+  // Gives up the transfer. Until resume(), drive() sets the lines, which are high first.
   virtual void release() = 0;
-  // Open drain: high lets go of a line, and a device may hold it down.
+  // Open drain: high releases a line, and a device may hold it low.
   virtual void drive(bool scl, bool sda) = 0;
   virtual bool scl_is_high() = 0;
   virtual bool sda_is_high() = 0;

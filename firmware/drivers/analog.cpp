@@ -6,7 +6,7 @@ namespace firmware {
 
 namespace {
 
-// `value` / 2^shift to the nearest, also for negative values.
+// Rounds to the nearest, also for negative values.
 std::int64_t shifted(std::int64_t value, int shift) {
   const std::int64_t half = std::int64_t{1} << (shift - 1);
   const std::int64_t unit = std::int64_t{1} << shift;

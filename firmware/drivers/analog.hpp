@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From the converter's counts to volts at the board's input: a divider set by a potentiometer lies
-// between, so each input has a calibration (paper sections 2 and 8.5).
-//
-// volts = counts x gain + offset, in integers: the result is within one hundredth of a volt of the
-// exact line for counts of 0-65535 and up to 50 V.
+// Volts at the board's input from the converter's counts: counts x gain + offset, calibrated for
+// each input's divider (paper sections 2 and 8.5). Within 0.01 V of the exact line for counts of
+// 0-65535 and up to 50 V.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +10,15 @@ namespace r4 {
 namespace firmware {
 
 struct AnalogCalibration {
-  std::int32_t gain_q24 = 1280019;  // hundredths of a volt a count, times 2^24: 50.00 V at 65535
+  std::int32_t gain_q24 = 1280019;  // hundredths of a volt per count, times 2^24: 50.00 V at 65535
   std::int32_t offset_q8 = 0;       // hundredths of a volt, times 256
 
-  // The line through two readings. False, and nothing changed, if it is none that a divider can
-  // have: no distance, falling, or steeper than 650 V of full range.
+  // The line through two readings. False, with nothing changed, if no divider has such a line: no
+  // distance, falling, or steeper than 650 V of full range.
   bool set(std::uint16_t counts_1, std::int32_t centivolts_1, std::uint16_t counts_2,
            std::int32_t centivolts_2);
 };
 
-// Hundredths of a volt, to the nearest.
 std::int32_t centivolts_of(std::uint16_t counts, const AnalogCalibration& calibration);
 
 }  // namespace firmware

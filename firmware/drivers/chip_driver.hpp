@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the drivers of the I2C chips have in common: set-up without waiting, changes only, a look at
-// the chip's registers now and then, and trouble as a value.
+// Base of the I2C chip drivers: set-up without waiting, writes of changes, and register checks.
 //
 //           begin()             poll(), over and over
 //     new ----------> setting up ----------------------> ready
@@ -24,7 +23,7 @@ namespace firmware {
 
 using r4::ChipTrouble;
 
-// How many bytes the bus may still carry in this poll; addresses count.
+// Bytes that the bus may still carry in this poll, addresses included.
 class BusBudget {
  public:
   explicit BusBudget(std::size_t bytes) : left_(bytes) {}
@@ -37,7 +36,7 @@ class BusBudget {
     left_ -= bytes;
     return true;
   }
-  // Something had to wait for the next poll.
+  // True if a transfer had to wait for the next poll.
   bool exhausted() const { return exhausted_; }
 
  private:
@@ -45,7 +44,7 @@ class BusBudget {
   bool exhausted_ = false;
 };
 
-// No budget of a poll may be smaller: some steps of a set-up need that much at once.
+// The smallest budget of a poll: some steps of a set-up need that much at once.
 constexpr std::size_t bus_budget_min = 36;
 
 class ChipDriver {
@@ -57,20 +56,18 @@ class ChipDriver {
   bool ready() const { return ready_; }
   ChipTrouble trouble() const { return trouble_; }
 
-  // Starts the set-up anew, from whatever the chip is in; all outputs are to be off.
+  // Restarts the set-up from any state of the chip, with all outputs off.
   void begin();
-  // The next steps of the set-up; once ready, the registers that are to change.
+  // Does the next steps of the set-up; once ready, writes the registers that change.
   void poll(std::uint32_t now_us, BusBudget& budget);
-  // Writes the registers that are to change, if ready. Nothing is written when nothing changed.
   void write_changes(BusBudget& budget);
-  // Compares the chip's registers with what was written, if ready.
+  // Compares the chip's registers with what was written.
   void verify(BusBudget& budget);
-  // All outputs are to be off from the next write on. Nothing is sent.
+  // All outputs are off from the next write on. Sends nothing.
   virtual void want_safe() = 0;
-  // The same, and sent at once, in whatever state the chip or the driver is. Does not touch
-  // trouble(): the caller decides with note().
+  // All outputs off at once, in any state. Leaves trouble() alone: the caller decides with note().
   virtual I2cResult make_safe() = 0;
-  // Takes the result of a transfer that somebody made for this driver.
+  // Takes the result of a transfer that was made for this driver.
   bool note(I2cResult result);
 
  protected:
@@ -78,12 +75,12 @@ class ChipDriver {
   ~ChipDriver() = default;
 
   virtual void on_begin() = 0;
-  // One step of the set-up. True if another may follow at once.
+  // True if another step may follow at once.
   virtual bool set_up(std::uint32_t now_us, BusBudget& budget) = 0;
   virtual void on_write_changes(BusBudget& budget) = 0;
   virtual void on_verify(BusBudget& budget) = 0;
 
-  // Transfers; false if the budget does not allow it now, or it failed (then there is trouble).
+  // False if the budget is too small now, or the transfer failed (then there is trouble).
   bool send(const std::uint8_t* bytes, std::size_t size, BusBudget& budget);
   bool fetch(std::uint8_t first_register, std::uint8_t* bytes, std::size_t size, BusBudget& budget);
   void fail(ChipTrouble trouble);

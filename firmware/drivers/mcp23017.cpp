@@ -7,7 +7,7 @@ namespace firmware {
 namespace {
 
 constexpr std::uint8_t iodir_a = 0x00;
-constexpr std::uint8_t iocon_if_bank_1 = 0x05;  // GPINTENB if BANK is 0, where 0 does no harm
+constexpr std::uint8_t iocon_if_bank_1 = 0x05;  // GPINTENB if BANK is 0: writing 0 is harmless
 constexpr std::uint8_t iocon = 0x0A;
 constexpr std::uint8_t olat_a = 0x14;
 
@@ -49,7 +49,7 @@ bool Mcp23017::set_up(std::uint32_t now_us, BusBudget& budget) {
       return true;
     }
     case Step::directions: {
-      const std::uint8_t bytes[] = {iodir_a, 0, 0, 0, 0};  // IPOL follows
+      const std::uint8_t bytes[] = {iodir_a, 0, 0, 0, 0};  // then IPOL
       if (!send(bytes, sizeof bytes, budget)) return false;
       step_ = Step::mode;
       return true;

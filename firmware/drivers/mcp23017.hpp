@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Microchip MCP23017: sixteen pins on two ports, here all outputs (data sheet DS20001952, IOCON.BANK
-// = 0).
+// Microchip MCP23017: sixteen outputs on two ports (data sheet DS20001952, IOCON.BANK = 0).
 //
 //     register       value                                        section
 //     00 01 IODIR    1: input; reset FF                            3.5.1
@@ -9,10 +8,9 @@
 //     0A 0B IOCON    BANK 80, SEQOP 20 …; reset 0                  3.5.6
 //     14 15 OLAT     output latches; reset 0                       3.5.11
 //
-// Set-up: the latches first, with the values that are safe, then the directions: a pin is never
-// driven to a value that nobody meant. Until then the pins float, as after power-up; what hangs on
-// them needs a pull to its safe side. Pins change at the acknowledge of their port's byte. Only a
-// latch that differs is written; both in one transfer.
+// Set-up: first the latches with the safe values, then the directions, so that no pin is driven to
+// an unintended value. Until then the pins float, so their circuits need a pull to the safe side.
+// Pins change at the acknowledge of their port's byte. One transfer writes all changed latches.
 #pragma once
 
 #include <cstdint>
@@ -24,15 +22,14 @@ namespace firmware {
 
 class Mcp23017 final : public ChipDriver {
  public:
-  // `safe_a` and `safe_b`: the levels of the ports in the safe state.
   Mcp23017(I2cBus& bus, std::uint8_t address, std::uint8_t safe_a, std::uint8_t safe_b)
       : ChipDriver(bus, address), safe_{safe_a, safe_b}, wanted_{safe_a, safe_b} {}
 
-  // The levels of ports A and B from the next write on; bit n is pin n.
+  // From the next write on; bit n is pin n.
   void set_ports(std::uint8_t a, std::uint8_t b);
 
   void want_safe() override { set_ports(safe_[0], safe_[1]); }
-  // Latches, then directions: right also for a chip that was reset.
+  // Latches, then directions: right even for a chip that was reset.
   I2cResult make_safe() override;
 
  private:

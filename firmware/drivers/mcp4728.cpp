@@ -16,7 +16,7 @@ constexpr std::uint8_t zeros[] = {multi_write | 0, 0, 0, multi_write | 2, 0, 0,
 
 bool is_ready(const std::uint8_t* bytes) { return (bytes[0] & ready_bit) != 0; }
 
-// The EEPROM's half of each channel: reference the supply, normal mode, gain 1, code 0.
+// True if every channel in the EEPROM has the supply as reference, normal mode, gain 1, code 0.
 bool eeprom_is_zero(const std::uint8_t* bytes) {
   for (int i = 0; i < Mcp4728::channels; ++i) {
     if (bytes[6 * i + 4] != 0 || bytes[6 * i + 5] != 0) return false;
@@ -64,7 +64,7 @@ bool Mcp4728::set_up(std::uint32_t now_us, BusBudget& budget) {
     case Step::look: {
       if (budget.left() < read_size + 1 + 10) return budget.take(read_size + 11);
       if (!read_all(bytes, budget)) return false;
-      if (!is_ready(bytes)) {  // a write from before this boot is still under way
+      if (!is_ready(bytes)) {  // a write from before this boot is under way
         looked_us_ = now_us;
         step_ = Step::wait;
         return true;
@@ -73,7 +73,7 @@ bool Mcp4728::set_up(std::uint32_t now_us, BusBudget& budget) {
         set_ready();
         return true;
       }
-      if (eeprom_writes_ != 0) {  // it does not keep what it is told: do not wear it out
+      if (eeprom_writes_ != 0) {  // it does not keep its contents: do not wear it out
         fail(ChipTrouble::not_ready);
         return false;
       }
@@ -90,7 +90,7 @@ bool Mcp4728::set_up(std::uint32_t now_us, BusBudget& budget) {
       if (!read_all(bytes, budget)) return false;
       looked_us_ = now_us;
       if (is_ready(bytes)) {
-        step_ = Step::zero;  // what was written meanwhile was ignored
+        step_ = Step::zero;  // writes meanwhile were ignored
         return true;
       }
       if (now_us - since_us_ > eeprom_limit_us) fail(ChipTrouble::not_ready);

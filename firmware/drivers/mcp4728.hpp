@@ -10,13 +10,12 @@
 //                          two bytes of the input register, then the same of the
 //                          EEPROM
 //
-// Multi-writes with UDAC = 0 only: the output changes whether or not the LDAC pin is wired low, and
-// reference, power-down and gain bits are written along, so that a changed channel is right even
-// after a reset nobody noticed. The fast write is shorter by a third but depends on both.
+// Only multi-writes with UDAC = 0 are used, so the output changes even if the LDAC pin is not wired
+// low. They include reference, power-down and gain, so a changed channel is right even after an
+// unnoticed reset. The fast write is a third shorter but depends on both.
 //
-// Set-up: zeros to all outputs, then a look at the EEPROM: unless it holds zeros with the supply as
-// reference, it is written, once; new chips come with other values. Outputs stay at zero while it
-// is, for the chip ignores writes meanwhile.
+// Set-up: zeros to all outputs. Unless the EEPROM holds zeros with the supply as reference, it is
+// written, once; new chips have other values, and a chip ignores other writes meanwhile.
 #pragma once
 
 #include <cstdint>
@@ -35,9 +34,9 @@ class Mcp4728 final : public ChipDriver {
 
   Mcp4728(I2cBus& bus, std::uint8_t address) : ChipDriver(bus, address) {}
 
-  // The code of a channel (0-3 for A-D) from the next write on; more than 4095 is 4095.
+  // From the next write on. Channels 0-3 are A-D; codes above 4095 become 4095.
   void set_code(int channel, std::uint16_t code);
-  // How often the EEPROM was written since power-up: 0 or 1.
+  // Since power-up: 0 or 1.
   int eeprom_writes() const { return eeprom_writes_; }
 
   void want_safe() override;
@@ -54,8 +53,8 @@ class Mcp4728 final : public ChipDriver {
   bool read_all(std::uint8_t (&bytes)[read_size], BusBudget& budget);
 
   Step step_ = Step::zero;
-  std::uint32_t since_us_ = 0;   // the EEPROM is being written
-  std::uint32_t looked_us_ = 0;  // last look at it
+  std::uint32_t since_us_ = 0;   // when the EEPROM's write began
+  std::uint32_t looked_us_ = 0;  // when it was last read
   int eeprom_writes_ = 0;
   std::uint16_t wanted_[channels] = {};
   std::uint16_t written_[channels] = {};

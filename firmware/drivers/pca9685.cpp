@@ -23,12 +23,11 @@ constexpr std::uint8_t mode1_running = mode1_auto_increment | mode1_all_call;
 constexpr std::uint8_t mode2_totem_pole = 0x04;
 constexpr std::uint8_t full = 0x10;  // full on in ON_H, full off in OFF_H
 
-// Offsets in a channel.
 constexpr int on_h = 1;
 constexpr int off_l = 2;
 constexpr int off_h = 3;
 
-// A burst goes on over this many unchanged registers: a new one would cost as much.
+// A burst includes at most so many unchanged registers, because a new burst would cost as much.
 constexpr int bridged = 2;
 
 }  // namespace
@@ -134,8 +133,8 @@ bool Pca9685::set_up(std::uint32_t now_us, BusBudget& budget) {
   return false;
 }
 
-// The value that a register must have for the channel to do as told; false if any will do: of a
-// channel that is off only full off matters, of one that is on the two full bits.
+// The value that a register must have. False if any value will do: off needs only the full-off bit,
+// on the two full bits.
 bool Pca9685::wanted(int index, std::uint8_t& value) const {
   const std::uint16_t duty = duty_[index / 4];
   const int offset = index % 4;
@@ -164,8 +163,6 @@ void Pca9685::on_write_changes(BusBudget& budget) {
   const unsigned group_bits = (1U << group_) - 1;
   int at = 0;
   while (at < registers) {
-    // One burst: from `first` up to `end`; it takes up group after group while the gap is small
-    // and the budget lasts.
     int first = -1;
     int end = -1;
     for (; at < registers; at += step) {
@@ -209,7 +206,6 @@ bool Pca9685::check_mode(BusBudget& budget) {
   return false;
 }
 
-// The modes, and one channel after the other.
 void Pca9685::on_verify(BusBudget& budget) {
   if (budget.left() < 12) {
     budget.take(12);

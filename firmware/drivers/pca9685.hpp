@@ -11,19 +11,17 @@
 //     FE PRE_SCALE      25 MHz / (4096 f), rounded, - 1; at least 3; written     7.3.5
 //                       only in SLEEP
 //
-// Set-up: all outputs off, SLEEP with AI and ALLCALL, PRE_SCALE, awake, and 500 us later RESTART
-// (7.3.1.1), all sixteen off again (after an orderly shutdown their contents are undefined), then
-// a look at what was written. Nothing waits: the 500 us pass between polls.
+// Set-up: all outputs off, SLEEP with AI and ALLCALL, PRE_SCALE, awake, RESTART 500 us later
+// (7.3.1.1), all sixteen off again (undefined after an orderly shutdown), then a check of the
+// registers. The 500 us pass between polls.
 //
-// The outputs change together on STOP, so what one transfer writes comes at once. Registers that
-// differ are written, neighbours in one auto-increment burst; a burst is cut, when the budget is
-// short, only between groups of channels: a motor's duty and direction never part.
+// All outputs of one transfer change together on STOP. A short budget splits a burst of changed
+// registers only between groups of channels, so a motor's duty and direction never part.
 //
-// The chip has no timeout of its own: it keeps driving when the microcontroller dies. Safe state of
-// all three in three bytes: all_off(). A disturbance can set bits that make this useless: INVRT
-// turns "off" into "on", and with EXTCLK the outputs wait for a clock that is not there. EXTCLK can
-// be cleared by a reset only. So the modes are read back after a safe state, and where they are not
-// as written, lost_mode() asks for reset_all().
+// The chip has no timeout: it keeps driving when the microcontroller fails. all_off() makes all
+// three chips safe in three bytes, but a disturbance can set bits that defeat it: INVRT turns "off"
+// into "on", and with EXTCLK the outputs wait for a missing clock. Only a reset clears EXTCLK. So
+// the modes are read back after a safe state; lost_mode() then asks for reset_all().
 #pragma once
 
 #include <cstdint>
@@ -38,33 +36,33 @@ class Pca9685 final : public ChipDriver {
   static constexpr int channels = 16;
   static constexpr std::uint8_t all_call_address = 0x70;
   static constexpr std::uint32_t oscillator_us = 500;
-  // Counted from the beginning of the poll that woke it, which may have spent this much on the bus.
+  // Counted from the beginning of the poll that woke the chip, which may use the bus for 1500 us.
   static constexpr std::uint32_t wake_wait_us = oscillator_us + 1500;
 
   static constexpr std::uint8_t prescale_for(std::uint32_t hz) {
     return static_cast<std::uint8_t>((25000000U + 2048U * hz) / (4096U * hz) - 1U);
   }
 
-  // `frequency_hz` 24-1526. `group`: that many channels, from channel 0 on, change together; a
+  // `frequency_hz`: 24-1526. `group`: so many channels, from channel 0 on, change together; a
   // divisor of 16, at most 4.
   Pca9685(I2cBus& bus, std::uint8_t address, std::uint32_t frequency_hz, int group = 1)
       : ChipDriver(bus, address), prescale_(prescale_for(frequency_hz)), group_(group) {}
 
-  // What a channel (0-15) is to do from the next write on.
-  void set_duty(int channel, std::uint16_t duty);  // 0: off, 4095 and more: on, else n/4096
+  // Channels 0-15, from the next write on.
+  void set_duty(int channel, std::uint16_t duty);  // 0: off; 4095 and more: on; otherwise n/4096
   void set_level(int channel, bool high) { set_duty(channel, high ? duty_on : 0); }
-  // Pulses of `us` microseconds, to the nearest count (4.88 us at 50 Hz); 0: none.
+  // `us`: microseconds, to the nearest count (4.88 us at 50 Hz); 0: no pulses.
   void set_pulse_us(int channel, std::uint16_t us);
 
   void want_safe() override;
   I2cResult make_safe() override;
-  // Every output of every PCA9685 on the bus off, by the all-call address: 70 <- FD 10. Its
-  // acknowledge says that at least one of them heard it.
+  // Every output of every PCA9685 off by the all-call address: 70 <- FD 10. An acknowledge means
+  // that at least one chip heard it.
   static I2cResult all_off(I2cBus& bus);
-  // The software reset (7.6): 00 <- 06. Resets every chip on the bus that knows the general call,
-  // the MCP4728 too: all need their set-up. Every output of every PCA9685 is off then.
+  // Software reset (7.6): 00 <- 06. Turns all outputs of every PCA9685 off. Resets every chip that
+  // knows the general call, the MCP4728 too: all need their set-up.
   static I2cResult reset_all(I2cBus& bus);
-  // True if the modes were found with bits that change what "off" means. Ends with begin().
+  // True if the modes had bits that change what "off" means. Ends with begin().
   bool lost_mode() const { return lost_mode_; }
 
  private:
@@ -87,7 +85,7 @@ class Pca9685 final : public ChipDriver {
   std::uint8_t verified_channel_ = 0;
   bool lost_mode_ = false;
   static constexpr std::uint16_t all_channels = 0xFFFF;
-  std::uint16_t changed_ = all_channels;  // bit: duty_ may ask for another value than is written
+  std::uint16_t changed_ = all_channels;  // bit: duty_ may differ from written_
   std::uint16_t duty_[channels] = {};
   std::uint8_t written_[registers] = {};  // LED0_ON_L … as the chip has them
 };

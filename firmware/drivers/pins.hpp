@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Single pins and converters of the microcontroller, as the drivers need them. No call waits;
-// all may be made in an interrupt.
+// The microcontroller's pins and converters. No call waits; all may be made in an interrupt.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +23,7 @@ class InputPin {
   ~InputPin() = default;
 };
 
-// An analog input: the newest conversion, 0-65535 for 0 V to the reference (paper section 8.5).
+// The newest conversion, 0-65535 for 0 V to the reference (paper section 8.5).
 class AnalogPin {
  public:
   virtual std::uint16_t read() = 0;
@@ -33,7 +32,7 @@ class AnalogPin {
   ~AnalogPin() = default;
 };
 
-// An analog output: millivolts, 0 to dac_max_mv.
+// 0 to dac_max_mv.
 class AnalogOutputPin {
  public:
   virtual void write(std::uint16_t millivolts) = 0;

@@ -6,8 +6,7 @@ namespace firmware {
 
 namespace {
 
-// What a change from levels AB (row) to AB (column) counts; of both at once nothing, for nobody knows
-// which way.
+// Counts from levels AB (row) to AB (column). If both change, the direction is unknown: 0.
 constexpr std::int8_t steps[4][4] = {
     // 00 01 10 11
     {0, -1, 1, 0},

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Ultrasonic sensors HC-SR04, up to four, one after the other so that none hears another's burst
-// (data sheet: trigger at least 10 us, echo pulse of 58 us a centimetre, about 38 ms without one,
-// at least 60 ms from trigger to trigger).
+// Up to four ultrasonic sensors HC-SR04, in turn so that no sensor hears another's burst (data
+// sheet: trigger at least 10 us, echo pulse of 58 us per centimetre, about 38 ms without echo, at
+// least 60 ms between triggers).
 //
 //           poll()                 10 us later           echo fell, or 40 ms passed
 //     waiting ----------> trigger ------------> listening ----------> done
 //        ^                                                              |
 //        +---------------- 60 ms after the trigger: next sensor --------+
 //
-// A sensor is heard about four times a second. Nothing waits: edges of the echo lines come by
-// echo(), from an interrupt that knows the time; a millisecond between polls is enough.
+// Each of four sensors is read about four times per second. Nothing waits: an interrupt calls
+// echo(). Poll about every millisecond.
 #pragma once
 
 #include <atomic>
@@ -20,10 +20,9 @@
 namespace r4 {
 namespace firmware {
 
-// What the last turn of a sensor brought.
 enum class EchoResult : std::uint8_t {
   none_yet,
-  distance,    // distance_cm() holds
+  distance,    // distance_cm() is valid
   no_echo,     // nothing within range
   no_answer,   // the echo line never rose: no sensor, or a broken one
   line_stuck,  // the echo line was high before the trigger
@@ -39,19 +38,19 @@ class UltrasonicSensors {
   static constexpr std::uint32_t us_per_cm = 58;
   static constexpr std::uint16_t range_cm = 400;
 
-  // Bit n of `fitted`: sensor n is there; the others have no turn.
+  // Bit n of `fitted`: sensor n is there; a missing sensor has no turn.
   UltrasonicSensors(OutputPin& trigger_0, OutputPin& trigger_1, OutputPin& trigger_2,
                     OutputPin& trigger_3, std::uint8_t fitted)
       : trigger_{&trigger_0, &trigger_1, &trigger_2, &trigger_3}, fitted_(fitted) {}
 
   void poll(std::uint32_t now_us);
-  // The echo line of sensor 0-3 is `high` since `at_us`.
+  // The echo line of sensor 0-3 changed to `high` at `at_us`.
   void echo(int sensor, bool high, std::uint32_t at_us);
 
-  // Centimetres, 1-400; 0: nothing in range, or nothing known.
+  // Centimetres, 1-400; 0: nothing in range, or unknown.
   std::uint16_t distance_cm(int sensor) const { return distance_cm_[sensor]; }
   EchoResult result(int sensor) const { return result_[sensor]; }
-  // Does distance_cm() tell what is before the sensor?
+  // True if distance_cm() reports what is before the sensor.
   bool sees(int sensor) const {
     return result_[sensor] == EchoResult::distance || result_[sensor] == EchoResult::no_echo;
   }
@@ -66,10 +65,9 @@ class UltrasonicSensors {
   std::uint8_t fitted_;
   Phase phase_ = Phase::waiting;
   int sensor_ = count - 1;
-  std::uint32_t began_us_ = 0;  // the turn
+  std::uint32_t began_us_ = 0;
   std::uint16_t distance_cm_[count] = {};
   EchoResult result_[count] = {};
-  // Between echo() and poll().
   std::atomic<bool> high_[count] = {};
   std::atomic<bool> rose_{false};
   std::atomic<bool> fell_{false};

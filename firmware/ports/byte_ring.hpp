@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Bytes from one context to another, the one an interrupt handler: one side puts, one side takes.
-// No locks: each index has one writer.
+// Bytes from one context to another, of which one may be an interrupt handler. Lock-free, because
+// each index has one writer.
 #pragma once
 
 #include <atomic>
@@ -19,7 +19,7 @@ class ByteRing {
   std::uint32_t room() const { return capacity - size(); }
   bool empty() const { return size() == 0; }
 
-  // False, and nothing happens: it is full.
+  // False if the ring is full; nothing is put.
   bool put(char byte) {
     if (room() == 0) return false;
     const std::uint32_t at = load(put_);
@@ -27,7 +27,7 @@ class ByteRing {
     put_.store(at + 1, std::memory_order_release);
     return true;
   }
-  // All of it or nothing. What is put becomes visible to the taker as a whole.
+  // All or nothing. The taker sees all bytes at once.
   bool put(const char* data, std::uint32_t size) {
     if (room() < size) return false;
     const std::uint32_t at = load(put_);
@@ -36,7 +36,6 @@ class ByteRing {
     return true;
   }
 
-  // False: it is empty.
   bool take(char& byte) {
     if (empty()) return false;
     const std::uint32_t at = load(taken_);
@@ -44,24 +43,23 @@ class ByteRing {
     taken_.store(at + 1, std::memory_order_release);
     return true;
   }
-  // Up to `size` bytes; returns how many.
   std::uint32_t take(char* data, std::uint32_t size) {
     std::uint32_t count = 0;
     while (count < size && take(data[count])) ++count;
     return count;
   }
 
-  // The byte that take() gives after `offset` others; offset < size().
+  // The byte that take() returns after `offset` others; offset < size().
   char peek(std::uint32_t offset) const { return bytes_[(load(taken_) + offset) % capacity]; }
-  // Takes the newest back until `size` are left. While the taker does not run.
+  // Removes the newest bytes until `size` are left. Only while the taker does not run.
   void cut(std::uint32_t size) { put_.store(load(taken_) + size, std::memory_order_release); }
 
  private:
   using Index = std::atomic<std::uint32_t>;
   static std::uint32_t load(const Index& index) { return index.load(std::memory_order_acquire); }
 
-  Index put_{0};    // bytes since the beginning; wraps
-  Index taken_{0};  // likewise
+  Index put_{0};  // bytes so far; wraps
+  Index taken_{0};
   char bytes_[capacity];
 };
 

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Lines on their way out of a serial port: never waits, and the newest state wins.
-//
-// Lines go through a ring, each whole or not at all. A state that finds no room waits outside of it,
-// where a newer one replaces it; the last part of the ring is kept for heartbeats and answers. If
-// nothing has left for `stale_ms` (the host does not read), the lines that have not begun are thrown
-// away and none are taken but the newest state, so that a host which reads again hears the present.
+// The send queue of a serial port: it never waits, and the newest state wins. Each line enters the
+// ring whole or not at all. A state without room waits outside, where a newer state replaces it.
+// The last part of the ring is for heartbeats and answers. If no byte leaves for `stale_ms` (the
+// host does not read), lines not begun are dropped and only the newest state is kept.
 #pragma once
 
 #include <cstdint>
@@ -23,11 +21,11 @@ class TransmitLines {
   static constexpr std::uint32_t kept_for_answers = 512;
   static constexpr std::uint32_t stale_ms = 100;
 
-  // A heartbeat or an answer. What finds no room is dropped.
+  // Dropped if there is no room.
   void put(Text datagram) {
     if (stalled_ || !put_line(datagram)) ++dropped_;
   }
-  // A state. Later ones may replace it.
+  // A later state may replace it.
   void put_state(Text datagram) {
     if (waiting_size_ != 0) ++dropped_;
     waiting_size_ = 0;
@@ -35,7 +33,7 @@ class TransmitLines {
     std::memcpy(waiting_, datagram.data(), datagram.size());
     waiting_size_ = datagram.size();
   }
-  // Lets time pass: what waits goes into the ring if there is room. With the taker's interrupt off.
+  // Moves the waiting state into the ring if there is room. With the taker's interrupt off.
   void poll(std::uint32_t now_ms) {
     if (ring_.size() == 0 || taken_ != taken_before_) {
       taken_before_ = taken_;
@@ -48,7 +46,7 @@ class TransmitLines {
     if (waiting_size_ != 0 && put_state_line(Text(waiting_, waiting_size_))) waiting_size_ = 0;
   }
 
-  // Forgets all that waits: whoever was at the other end has gone. While the taker does not run.
+  // Drops all lines, because the host has disconnected. Only while the taker does not run.
   void clear() {
     if (!ring_.empty() || waiting_size_ != 0) ++dropped_;
     ring_.cut(0);
@@ -56,7 +54,7 @@ class TransmitLines {
     stalled_ = false;
   }
 
-  // The next byte for the port, from its interrupt or with that off. False: there is none.
+  // Next byte for the port, in its interrupt or with that off. False if there is none.
   bool take(char& byte) {
     if (!ring_.take(byte)) return false;
     taken_ = taken_ + 1;
@@ -64,13 +62,12 @@ class TransmitLines {
   }
 
   bool empty() const { return ring_.empty(); }
-  std::uint32_t dropped() const { return dropped_; }  // lines
+  std::uint32_t dropped() const { return dropped_; }
 
  private:
   bool put_line(Text datagram) {
     const std::uint32_t size = static_cast<std::uint32_t>(datagram.size() + line_end.size());
     if (ring_.room() < size) return false;
-    // The ring takes either whole: there is room for both.
     ring_.put(datagram.data(), static_cast<std::uint32_t>(datagram.size()));
     ring_.put(line_end.data(), static_cast<std::uint32_t>(line_end.size()));
     return true;
@@ -79,7 +76,7 @@ class TransmitLines {
     return !stalled_ && ring_.room() >= datagram.size() + line_end.size() + kept_for_answers &&
            put_line(datagram);
   }
-  // Throws away what has not begun: all behind the end of the first line.
+  // Drops all lines after the first, which has begun.
   void cut() {
     std::uint32_t size = 0;
     while (size < ring_.size() && ring_.peek(size) != line_end[line_end.size() - 1]) ++size;

@@ -9,7 +9,7 @@ CarrierPort::CarrierPort(std::unique_ptr<Carrier> carrier, Owner& owner)
     : carrier_(std::move(carrier)), end_(board_end_of(*carrier_)), owner_(owner) {}
 
 void CarrierPort::send(Text datagram, Priority priority, Peer peer) {
-  carrier_->send({datagram.data(), datagram.size()}, priority, peer);  // it counts what it drops
+  carrier_->send({datagram.data(), datagram.size()}, priority, peer);  // the carrier counts drops
 }
 
 void CarrierPort::on_datagram(std::string_view bytes, Peer from) {

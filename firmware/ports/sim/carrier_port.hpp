@@ -14,7 +14,6 @@ namespace r4::sim {
 
 class CarrierPort final : public firmware::Port, private Carrier::Handler {
  public:
-  // Whoever takes what arrives.
   class Owner {
    public:
     virtual void on_datagram(CarrierPort& port, Peer from, std::string_view bytes) = 0;
@@ -31,7 +30,6 @@ class CarrierPort final : public firmware::Port, private Carrier::Handler {
   void close() noexcept { carrier_->close(); }
   const Carrier& carrier() const { return *carrier_; }
 
-  // The application's number for this port.
   std::uint8_t number = 0;
 
   void send(Text datagram, Priority priority, std::uint32_t peer) override;
@@ -49,7 +47,7 @@ class CarrierPort final : public firmware::Port, private Carrier::Handler {
   void on_carrier_event(const CarrierEvent& event) override;
 
   std::unique_ptr<Carrier> carrier_;
-  BoardEnd& end_;  // of it
+  BoardEnd& end_;
   Owner& owner_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a SimulatedRobot shares with the board of its URL, which lives on another thread.
+// What a SimulatedRobot shares with the board of its URL, which runs on another thread.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -15,9 +15,8 @@ namespace r4::sim {
 class SimulatedRobot::World : public std::enable_shared_from_this<World> {
  public:
   explicit World(RobotModel* robot) : robot_(robot) {}
-  // The world of a robot=N of this process; empty if it is gone.
+  // The world of `robot=N` in this process; empty if its robot is destroyed.
   static std::shared_ptr<World> find(long number);
-  // Takes a number that nobody has.
   static long enter(const std::shared_ptr<World>& world);
 
   // --- from any thread
@@ -25,12 +24,11 @@ class SimulatedRobot::World : public std::enable_shared_from_this<World> {
   Look look() const;
 
   // --- from the board's thread
-  // Throws Error{open} if another link has the robot.
+  // Throws Error{open} if another board has the robot.
   void attach(asio::io_context& io, SimulatedBoard& board);
   void detach() noexcept;
-  // Looks at the board.
   void note();
-  // Lets happen what has been said, if the board is on `io`, whose thread calls.
+  // Carries out the steps of happen(), if the board is on `io`, whose thread calls.
   void settle(const asio::io_context& io);
 
  private:

@@ -22,7 +22,6 @@ namespace r4::sim {
 
 namespace {
 
-// One line on its way to a step.
 struct Line {
   std::string where;                    // FILE:LINE
   std::vector<std::string_view> words;  // without the time
@@ -121,7 +120,6 @@ void read_motor(const Line& line, ScriptStep& step) {
   step.value = line.words[2] == "stalled" ? 1 : 0;
 }
 
-// A ScriptStep::Supply.
 std::int32_t supply_of(const Line& line, const char* what) {
   static constexpr std::string_view supplies[] = {"off", "on", "reset"};
   const auto* const supply = std::find(std::begin(supplies), std::end(supplies), line.words[2]);
@@ -230,7 +228,6 @@ std::string words_of_forms() {
   return words;
 }
 
-// "handle released", from the words of the line.
 std::string text_of(const Line& line) {
   std::string text;
   for (const std::string_view word : line.words) text.append(text.empty() ? "" : " ").append(word);

@@ -4,26 +4,25 @@
 //     # TIME_S what args        '#' begins a comment; seconds since the start, to the millisecond
 //     0.5 handle released       the dead-man's handle: held | released
 //     1   us 1 15               ultrasonic sensor 1 sees something at 15 cm; 0: nothing
-//     1   us 1 off              its cable is off: no answer, until there is a distance again
-//     1   enc 2 100             encoder 2 is turned to 100 counts, 1000 counts a millisecond
+//     1   us 1 off              its cable is off: no answer, until a line gives a distance
+//     1   enc 2 100             encoder 2 is turned to 100 counts, 1000 counts per millisecond
 //     1   analog AIN24 21.5     that input stays at 21.5 V
-//     1   motor 1 stalled       the motor of OSMC 1 is held fast, until it is free
-//     2   chip dac off          that chip acknowledges nothing, until it is on; reset: it loses its
-//                               supply for a moment. osmc, dhb, servo, expander, dac
-//     2   i2c held              a chip holds the bus until it is free
-//     2   userbus held          a device of the user's holds SDA until the bus is free; cut: until it has
-//                               seen nine clocks; stretched: it holds SCL
-//     2   device ina219 off     that device of the user's answers nothing, until it is on; reset: it loses
-//                               its supply for a moment. mpu6050, ina219
-//     2   uart 1 noise          who is at the other end of that UART of the user's: gnss, lidar, loop (TX joined
-//                               to RX), noise, off
-//     2   gpio 3 low            that spare input is pulled down, until it is high
-//     2   hang 0.3              the firmware's loop stands still for 0.3 s; what arrives is lost
-//     3   fault                 the board finds itself broken
+//     1   motor 1 stalled       the motor of OSMC 1 is held fast, until free
+//     2   chip dac off          the chip (osmc, dhb, servo, expander, dac) acknowledges nothing,
+//                               until on; reset: it loses its supply for a moment
+//     2   i2c held              a chip holds the bus, until free
+//     2   userbus held          a user's device holds SDA, until free; cut: for nine clocks;
+//                               stretched: it holds SCL
+//     2   device ina219 off     the user's device does not answer, until on; reset: as for a chip
+//     2   uart 1 noise          the peer of that user's UART: gnss, lidar, loop (TX joined to RX),
+//                               noise, off
+//     2   gpio 3 low            that spare input is pulled down, until high
+//     2   hang 0.3              the firmware's loop stands still for 0.3 s; arriving data is lost
+//     3   fault                 the board itself fails
 //     3   watchdog              a duty of the board missed its deadline
 //     4   reboot                power off and on again
 //
-// Lines may stand in any order; those of the same time happen in theirs.
+// Lines may be in any order; lines of the same time happen in their order.
 #pragma once
 
 #include <cstdint>
@@ -57,11 +56,11 @@ struct ScriptStep {
 
   Kind kind = Kind::handle;
   std::uint32_t at_ms = 0;
-  // ultrasonic, encoder, motor, uart, gpio: 1 …; analog: an Analog; chip: a Chip; device: a UserDevice,
-  // then those of OptionalDevices
+  // ultrasonic, encoder, motor, uart, gpio: 1 …; analog: an Analog; chip: a Chip; device: a
+  // UserDevice, then an index into OptionalDevices
   int channel = 0;
-  // 1 held (handle, i2c), stalled or high; cm or off; counts; hundredths of a volt; a Supply; ms;
-  // user_bus: a UserBusModel::Fault; uart: a UartPeer
+  // 1: held, stalled or high; ultrasonic: cm or off; encoder: counts; analog: hundredths of a volt;
+  // chip, device: a Supply; hang: ms; user_bus: a UserBusModel::Fault; uart: a UartPeer
   std::int32_t value = 0;
   std::string text;  // the line without its time, "handle released"
 };
@@ -74,11 +73,10 @@ class Script {
   static Script parse(std::string_view text, const std::string& name);
   // Throws Error{usage} if the file cannot be read, Error{data} if it is longer than 1 MB.
   static Script load(const std::string& path);
-  // What happens now: a line without its time, "handle released"; nothing if it is empty or a
-  // comment. Throws Error{data} as "NAME: reason; fix".
+  // A step for now, from a line without its time. Throws Error{data} as "NAME: reason; fix".
   static std::optional<ScriptStep> parse_now(std::string_view text, const std::string& name);
 
-  const std::vector<ScriptStep>& steps() const { return steps_; }  // in the order of time
+  const std::vector<ScriptStep>& steps() const { return steps_; }  // in order of time
 
  private:
   std::vector<ScriptStep> steps_;

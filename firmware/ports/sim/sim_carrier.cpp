@@ -12,10 +12,8 @@ namespace r4::sim {
 
 namespace {
 
-// The host's end of a memory pair, with the board that has the other end.
 class SimCarrier final : public Carrier {
  public:
-  // `world` is empty for a board that nobody else knows of.
   SimCarrier(asio::io_context& io, std::unique_ptr<SimulatedBoard> board,
              std::unique_ptr<Carrier> end, std::shared_ptr<SimulatedRobot::World> world)
       : io_(io), board_(std::move(board)), end_(std::move(end)), world_(std::move(world)) {}

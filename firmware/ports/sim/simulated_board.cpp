@@ -42,7 +42,7 @@ void SimulatedBoard::add_carrier(std::unique_ptr<Carrier> carrier) {
 void SimulatedBoard::start() {
   stop();
   alive_ = std::make_shared<const bool>(true);
-  // All boards begin with a millisecond of the clock, so that those of one loop wake up together.
+  // A whole millisecond of the clock, so that all boards of an io_context wake up together.
   start_ = std::chrono::floor<Milliseconds>(Clock::now());
   clock_start_ms_ = options_.clock_ms ? options_.clock_ms() : 0;
   passed_ = hangs_until_ = watchdog_fed_ = Milliseconds(0);
@@ -74,7 +74,7 @@ SimulatedBoard::Milliseconds SimulatedBoard::elapsed() const {
   return std::chrono::floor<Milliseconds>(Clock::now() - start_);
 }
 
-// The chips stay as they are until the firmware makes them safe, first of all.
+// The chips keep their state until the firmware makes them safe.
 void SimulatedBoard::reset_microcontroller() {
   clock_offset_ms_ = static_cast<std::uint32_t>(scramble(seed_ + boots_));
   ++boots_;
@@ -100,7 +100,6 @@ void SimulatedBoard::reset_microcontroller() {
   for (const auto& port : ports_) port->number = application_->add_port(*port);
 }
 
-// Of this boot.
 std::array<std::uint8_t, Authentication::chance_size> SimulatedBoard::chance() const {
   std::array<std::uint8_t, Authentication::chance_size> bytes;
   std::random_device device;
@@ -112,7 +111,7 @@ std::array<std::uint8_t, Authentication::chance_size> SimulatedBoard::chance() c
   return bytes;
 }
 
-// `cause`: what ended the last boot.
+// `cause`: what ended the boot before.
 void SimulatedBoard::boot(SafeReason cause) {
   in_application_ = true;
   application_->start(board_ms(passed_));
@@ -139,7 +138,6 @@ std::uint32_t SimulatedBoard::poll(Milliseconds elapsed) {
   return static_cast<std::uint32_t>((next - elapsed).count());
 }
 
-// Makes up for the time that has passed on the board and around it.
 void SimulatedBoard::advance(Milliseconds elapsed) {
   const std::vector<ScriptStep>& steps = options_.script.steps();
   for (;;) {
@@ -244,7 +242,6 @@ void SimulatedBoard::take(const ScriptStep& step) {
   }
 }
 
-// What the pins do, and what is wrong with the chips, where that is news.
 void SimulatedBoard::tell_pins() {
   const ChipFault fault = hardware_->hal().fault();
   if (fault.any() != told_fault_) {
@@ -269,7 +266,6 @@ void SimulatedBoard::settle_downs(std::uint32_t t_ms) {
   }
 }
 
-// Sees to it that poll() is called at `at` or before.
 void SimulatedBoard::arm(Milliseconds at) {
   if (armed_ && armed_for_ <= at) return;
   armed_ = true;

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A whole R4 board in a process: the firmware's application and chip drivers on a model of the
-// board, reached through any carriers. One timer drives it, which sleeps until the application
-// needs time; then the milliseconds that have passed on the board are made up for, one by one.
+// board, reached through any carriers. Its one timer sleeps until the application needs time; then
+// the milliseconds that have passed are run, one by one.
 //
-// A hardware watchdog resets the microcontroller, not the chips, when the guard does not let it be
-// fed for watchdog_ms. A slow computer is no slow board: only a `hang` of the script keeps the loop
-// from checking in.
+// If the guard prevents feeding for watchdog_ms, a hardware watchdog resets the microcontroller,
+// not the chips. On a slow computer the loop still checks in; only a script's `hang` prevents that.
 //
-// It lives on one io_context and is used from that io_context's thread only. A datagram costs no
-// heap.
+// Used from the thread of its io_context only. A datagram allocates no heap memory.
 #pragma once
 
 #include <array>
@@ -35,59 +33,54 @@ namespace r4::sim {
 
 class SimulatedBoard final : private firmware::Observer, private CarrierPort::Owner {
  public:
-  // What happens on the board; each may be empty, none may stop the board. `t_ms` is the board's
-  // clock, the T of its datagrams.
+  // Each may be empty; none may stop the board. `t_ms`: the board's clock, the T of its datagrams.
   struct Events {
     std::function<void(std::uint32_t t_ms, firmware::BoardState, SafeReason)> on_state;
     std::function<void(std::uint32_t t_ms, const Pins&)> on_pins;
-    std::function<void(std::uint32_t t_ms, const ScriptStep&)> on_step;  // of the script, happen()
-    std::function<void()> on_millisecond;                                // passed on the board
+    std::function<void(std::uint32_t t_ms, const ScriptStep&)> on_step;  // script or happen()
+    std::function<void()> on_millisecond;                                // has passed on the board
     std::function<void(std::uint32_t t_ms, ChipFault)> on_fault;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, const Command&)> on_executed;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, Refusal)> on_refused;
     std::function<void(std::uint32_t t_ms, Verdict)> on_rejected;
-    // The session's host is heard by that transport as well, or no longer.
+    // A carrier became a path of the session, or left the session.
     std::function<void(std::uint32_t t_ms, const Carrier&, bool joined)> on_path;
     std::function<void(std::uint32_t t_ms, const Carrier&, const CarrierEvent&)> on_carrier;
   };
 
   struct Options {
-    // Of clock, analog inputs and nonces, which it makes predictable: for tests. Without one they
-    // are others each time.
+    // Makes clock, analog inputs and nonces predictable: for tests. Without a seed they are random.
     std::optional<std::uint64_t> seed;
-    std::string board_id = "sim-1";  // the texts of its answer to Q:ID
+    std::string board_id = "sim-1";  // texts of its answer to Q:ID
     std::string firmware_version = R4LINK_VERSION;
     std::string capabilities = "sim";
     Script script;
     Settings settings;
     Events events;
-    // A clock in ms, for tests. With one the board has no timer: the caller calls poll().
+    // A clock in ms, for tests: then the board has no timer, and the caller calls poll().
     std::function<std::uint32_t()> clock_ms;
   };
 
   SimulatedBoard(asio::io_context& io, Options options);
   ~SimulatedBoard();
 
-  // Before start(); at most Application::max_ports. Throws Error{usage} for one more.
+  // Call before start(). Throws Error{usage} beyond Application::max_ports.
   void add_carrier(std::unique_ptr<Carrier> carrier);
 
-  // Opens the carriers (throws Error if one cannot be opened) and switches the board on.
+  // Opens the carriers, and throws Error if that fails. Switches the board on.
   void start();
-  // Switches it off: outputs off, carriers closed.
+  // Outputs off, carriers closed.
   void stop() noexcept;
 
-  // Does everything that is due; returns the milliseconds until the next call is needed.
   std::uint32_t poll();
 
-  // Something happens now, as by a line of the script. Only between start() and stop(), and not
-  // from within an event.
+  // A step happens now, as if in the script. Only between start() and stop(), and not in an event.
   void happen(const ScriptStep& step);
 
   BoardModel& model() { return model_; }
   const BoardModel& model() const { return model_; }
-  // The firmware running now; only between start() and stop().
+  // The running firmware; only between start() and stop().
   const firmware::Application& application() const { return *application_; }
-  // The board's clock.
   std::uint32_t now_ms() const { return board_ms(elapsed()); }
 
   static constexpr std::chrono::milliseconds watchdog_ms{500};
@@ -96,7 +89,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   using Clock = std::chrono::steady_clock;
   using Milliseconds = std::chrono::milliseconds;
 
-  Milliseconds elapsed() const;  // since start()
+  Milliseconds elapsed() const;
   std::uint32_t board_ms(Milliseconds elapsed) const {
     return static_cast<std::uint32_t>(elapsed.count()) + clock_offset_ms_;
   }
@@ -127,22 +120,21 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   std::uint64_t seed_;
   BoardModel model_;
   OptionalDevices optional_devices_{model_.devices().bus};
-  std::optional<SimulatedHardware> hardware_;  // of this boot
+  std::optional<SimulatedHardware> hardware_;
   std::vector<std::unique_ptr<CarrierPort>> ports_;
   std::optional<firmware::Application> application_;
 
-  std::uint32_t clock_offset_ms_ =
-      0;  // another for each boot, so that no T of one is a T of another
+  std::uint32_t clock_offset_ms_ = 0;  // different at each boot, so that no T repeats
   std::uint32_t boots_ = 0;
   Clock::time_point start_;
-  std::uint32_t clock_start_ms_ = 0;  // of options_.clock_ms
+  std::uint32_t clock_start_ms_ = 0;  // options_.clock_ms at start()
   Milliseconds passed_{};             // on the board, since start()
-  Milliseconds hangs_until_{};        // the loop
+  Milliseconds hangs_until_{};        // of the loop
   Milliseconds watchdog_fed_{};
   std::optional<Pins> told_pins_;
   bool told_fault_ = false;
   std::size_t next_step_ = 0;
-  bool in_application_ = false;  // a carrier may report its end from inside a send
+  bool in_application_ = false;  // a carrier may report its end inside a send
   std::uint32_t downs_ = 0;      // bit n: port n went down meanwhile
 
   asio::steady_timer timer_;

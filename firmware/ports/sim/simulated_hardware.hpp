@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The microcontroller on the model of the board: the firmware's chip drivers, with the timers and
-// interrupts that drive them.
+// The firmware's chip drivers on the model of the board, with their timers and interrupts.
 #pragma once
 
 #include <cstdint>
@@ -16,22 +15,19 @@ class SimulatedHardware final : private BoardModel::Interrupts {
  public:
   explicit SimulatedHardware(BoardModel& board);
 
-  // The microcontroller starts: outputs off, then the chips are set up, which takes boot_ms of the
-  // board's time at most.
+  // Outputs off, then the set-up of the chips, in at most boot_ms of the board's time.
   void power_up();
-  // A millisecond passes on the board: what interrupts and timers do in it, and the drivers' turn if
-  // the loop turns.
+  // Runs interrupts, timers, and, if the loop turns, the drivers.
   void pass_millisecond(bool loop_turns = true);
 
   firmware::BoardHardware& hal() { return hardware_; }
   firmware::UserI2c& i2c() { return i2c_; }
-  // What the application has to know of the user's devices.
   void add_devices(firmware::Application::Config& config) {
     config.i2c = &i2c_;
     for (int i = 0; i < uart_channels; ++i) config.uarts[i] = &uarts_[i];
   }
 
-  // For a chip's EEPROM that is written for the first time, and a handle that settles.
+  // Time for a first write of a chip's EEPROM, and for the handle to settle.
   static constexpr int boot_ms = 100;
 
  private:

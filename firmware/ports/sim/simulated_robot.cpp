@@ -14,7 +14,7 @@ namespace {
 
 using World = SimulatedRobot::World;
 
-// A URL is text, so what it names in this process has to be found by its number.
+// A URL is text, so worlds of this process are found by number.
 struct Worlds {
   std::mutex mutex;
   std::map<long, std::weak_ptr<World>> by_number;
@@ -93,7 +93,7 @@ void World::settle(const asio::io_context& io) {
   SimulatedBoard* board = nullptr;
   {
     const std::lock_guard lock(mutex_);
-    if (io_ != &io) return;  // closed meanwhile: when it is opened again
+    if (io_ != &io) return;  // closed meanwhile: steps wait for the next open
     now.swap(said_);
     board = board_;
   }

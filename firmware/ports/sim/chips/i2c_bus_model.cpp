@@ -6,7 +6,7 @@ namespace sim {
 
 using firmware::I2cResult;
 
-// While one lives, no interrupt comes. The time that passes on the wire is waited for at its end.
+// Interrupts are off while it lives. At its end, waits for the time that passed on the wire.
 class I2cBusModel::Held {
  public:
   explicit Held(const I2cBusModel& bus) : bus_(bus) {
@@ -131,7 +131,7 @@ void I2cBusModel::clear_errors() {
   held_ = 0;
 }
 
-// What is under way is cut short by it.
+// Cuts a transfer under way short.
 void I2cBusModel::begin(Transfer& transfer, I2cTransfer::Kind kind, std::uint8_t address) {
   const Held held(*this);
   transfers_ = transfers_ + 1;
@@ -140,7 +140,7 @@ void I2cBusModel::begin(Transfer& transfer, I2cTransfer::Kind kind, std::uint8_t
   transfer.address = address;
   transfer.start_ns = now_ns_;
   addressed_ = 0;
-  // The STOP of a recovery is for all that were cut off.
+  // The STOP of a recovery reaches all chips that were cut off.
   if (kind != I2cTransfer::Kind::recover) taking_part_ = 0;
 }
 
@@ -154,7 +154,7 @@ I2cResult I2cBusModel::end(Transfer& transfer, I2cResult result) {
       if (result != I2cResult::timeout) {
         stop_chips();
       } else if (transfer.kind != I2cTransfer::Kind::recover) {
-        // A chip that is cut off by a held line sees no STOP.
+        // A chip cut off by a held line sees no STOP.
         now_ns_ += std::uint64_t{firmware::i2c_timeout_us} * 1000;
       }
     }
@@ -227,7 +227,7 @@ I2cResult I2cBusModel::send_byte(Transfer& transfer, std::uint8_t byte, bool ref
 I2cResult I2cBusModel::fetch_byte(Transfer& transfer, std::uint8_t& byte) {
   const Held held(*this);
   if (held_ != 0) return I2cResult::timeout;
-  byte = 0xFF;  // what nobody pulls down
+  byte = 0xFF;  // no chip pulls SDA low
   for (int i = 0; i < chip_count_; ++i) {
     if (cut_short(transfer)) return I2cResult::timeout;
     if ((addressed_ >> i & 1) != 0) byte &= chips_[i]->read();
@@ -238,7 +238,7 @@ I2cResult I2cBusModel::fetch_byte(Transfer& transfer, std::uint8_t& byte) {
   return I2cResult::ok;
 }
 
-// One that refuses `address` after so many bytes; nullptr: none.
+// The refusal of `address` after `first` to `last` bytes; nullptr if there is none.
 I2cBusModel::Refusal* I2cBusModel::refusal_of(std::uint8_t address, std::size_t first,
                                               std::size_t last) {
   for (Refusal& refusal : refusals_) {

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A simulated I2C bus at 400 kHz: chip models behind the drivers' interface, the time that each
-// transfer takes, errors on request, and somebody who is told of every transfer.
+// A simulated I2C bus at 400 kHz: chip models behind the drivers' interface, the time of each
+// transfer, and errors on request. Transfers and advance() let time pass. Only an I2cProcessor
+// really waits.
 //
-// Time passes by transfers and by advance(). Nobody waits, unless a processor is told to.
-//
-// An interrupt may make transfers in the middle of another: the one that it came into ends with
-// `timeout` and touches no chip any more. Where that can happen, an I2cProcessor keeps each byte
-// whole, as the wire does.
+// An interrupt may make transfers during a transfer. That transfer then ends with `timeout` and
+// leaves the chips alone. An I2cProcessor keeps each byte whole, as the wire does.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +16,7 @@
 namespace r4 {
 namespace sim {
 
-// What happened on the bus. The bytes are the caller's and the chips': valid only while told.
+// The bytes belong to the caller and the chips: valid during on_transfer() only.
 struct I2cTransfer {
   enum class Kind : std::uint8_t { write, write_read, recover };
   Kind kind = Kind::write;
@@ -35,20 +33,19 @@ struct I2cTransfer {
 
 class I2cObserver {
  public:
-  // A transfer has ended. One that an interrupt's transfers cut short is told after those.
+  // A transfer has ended. A transfer cut short by an interrupt is reported after the interrupt's.
   virtual void on_transfer(const I2cTransfer& transfer) = 0;
 
  protected:
   ~I2cObserver() = default;
 };
 
-// Whose program makes the transfers.
 class I2cProcessor {
  public:
-  // Holds interrupts back; what it returns goes to the release_interrupts() that belongs to it.
+  // The result goes to the matching release_interrupts().
   virtual std::uint32_t hold_interrupts() = 0;
   virtual void release_interrupts(std::uint32_t before) = 0;
-  // The wire was busy for `ns` just now; interrupts may come.
+  // The wire was busy for `ns`; interrupts may come.
   virtual void wait(std::uint32_t ns) = 0;
 
  protected:
@@ -61,11 +58,9 @@ class I2cBusModel final : public firmware::I2cBus {
   static constexpr int max_chips = 8;
   static constexpr int max_errors = 8;  // of each kind at once
 
-  // The chip must outlive the bus. It is powered on. False: there are max_chips already.
+  // Powers the chip on; it must outlive the bus. False if there are max_chips already.
   bool attach(I2cChipModel& chip);
-  // A chip that is not connected takes no part, whatever the address.
   void connect(const I2cChipModel& chip, bool connected);
-  // nullptr: nobody.
   void set_observer(I2cObserver* observer) { observer_ = observer; }
   void set_processor(I2cProcessor* processor) { processor_ = processor; }
 
@@ -79,17 +74,16 @@ class I2cBusModel final : public firmware::I2cBus {
   std::uint64_t now_ns() const;
   std::uint64_t now_us() const { return now_ns() / 1000; }
   void advance(std::uint64_t us);
-  // Begun so far; wraps.
   std::uint32_t transfers() const { return transfers_; }
 
-  // Errors; false if there are max_errors of that kind already. Transfers to `address` are not
-  // acknowledged after `after_bytes` bytes of data (0: the address itself), `times` times.
+  // Errors; false if there are max_errors of that kind already. Refuses `address` after
+  // `after_bytes` bytes of data (0: the address itself), `times` times.
   bool refuse(std::uint8_t address, std::size_t after_bytes = 0, int times = 1);
-  // A chip holds SDA: transfers time out, until recover() was called `recoveries` times.
+  // A chip holds SDA: transfers time out until `recoveries` calls of recover().
   void hold(int recoveries = 1);
-  // The bus is held from the moment on at which `after_bytes` more bytes were sent.
+  // Holds the bus after `after_bytes` more bytes.
   void hold_after(std::size_t after_bytes, int recoveries = 1);
-  // `chip` loses power for a moment when `after_bytes` more bytes were sent on the bus.
+  // `chip` loses power for a moment after `after_bytes` more bytes on the bus.
   bool reset_after(I2cChipModel& chip, std::size_t after_bytes);
   void clear_errors();
 
@@ -100,13 +94,12 @@ class I2cBusModel final : public firmware::I2cBus {
   struct Refusal {
     std::uint8_t address = 0;
     std::size_t after_bytes = 0;
-    int times = 0;  // 0: this place is free
+    int times = 0;  // 0: unused
   };
   struct Reset {
     I2cChipModel* chip = nullptr;
-    std::size_t after_bytes = 0;  // 0: this place is free
+    std::size_t after_bytes = 0;  // 0: unused
   };
-  // A transfer under way.
   struct Transfer : I2cTransfer {
     std::uint32_t number = 0;
   };
@@ -131,11 +124,11 @@ class I2cBusModel final : public firmware::I2cBus {
   ChipSet taking_part_ = 0;  // since the last STOP
   Refusal refusals_[max_errors];
   Reset resets_[max_errors];
-  std::size_t hold_after_ = 0;  // 0: not
+  std::size_t hold_after_ = 0;  // 0: never
   int hold_recoveries_ = 0;
-  int held_ = 0;  // that many recover() calls are needed
+  int held_ = 0;  // calls of recover() still needed
   std::uint64_t now_ns_ = 0;
-  volatile std::uint32_t transfers_ = 0;  // begun so far
+  volatile std::uint32_t transfers_ = 0;
   I2cObserver* observer_ = nullptr;
   I2cProcessor* processor_ = nullptr;
 };

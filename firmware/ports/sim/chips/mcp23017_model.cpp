@@ -57,7 +57,7 @@ bool Mcp23017Model::write(std::uint8_t byte) {
   if (locate(port, number)) {
     if (number == Register::iocon) {
       iocon_ = byte & 0xFE;
-    } else if (number == Register::gpio) {  // a write to the port is one to its latch
+    } else if (number == Register::gpio) {  // a write to the port goes to its latch
       registers_[port][at(Register::olat)] = byte;
     } else if (number != Register::intf && number != Register::intcap) {
       registers_[port][at(number)] = byte;
@@ -83,7 +83,7 @@ std::uint8_t Mcp23017Model::read() {
   return value;
 }
 
-// The register that the pointer names: A and B alternate, or (BANK) A is 00-0A and B 10-1A.
+// The pointer's register: A and B alternate, or (BANK) A is 00-0A and B 10-1A.
 bool Mcp23017Model::locate(int& port, Register& number) const {
   const int index = bank() ? pointer_ & 0x0F : pointer_ / 2;
   port = bank() ? pointer_ >> 4 : pointer_ % 2;

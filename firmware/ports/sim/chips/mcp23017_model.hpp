@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The MCP23017 by its data sheet (DS20001952): both register layouts (IOCON.BANK), sequential and
-// byte mode, latches, directions, polarity. Not modelled: interrupts (their registers store values,
-// INTF and INTCAP read 0).
+// The MCP23017 by its data sheet (DS20001952). Not modelled: interrupts (their registers store
+// values, INTF and INTCAP read 0).
 #pragma once
 
 #include <cstdint>
@@ -13,7 +12,6 @@ namespace sim {
 
 class Mcp23017Model final : public I2cChipModel {
  public:
-  // The registers of a port, in the data sheet's order.
   enum class Register : std::uint8_t {
     iodir,
     ipol,
@@ -31,11 +29,10 @@ class Mcp23017Model final : public I2cChipModel {
 
   explicit Mcp23017Model(std::uint8_t address) : address_(address) {}
 
-  // What the pins do; bit n is pin n.
+  // Bit n is pin n.
   std::uint8_t driven(int port) const;  // 1: the chip drives the pin
-  std::uint8_t level(int port) const;   // of the driven pins; others as outside
+  std::uint8_t level(int port) const;   // of driven pins; others as outside
   std::uint8_t reg(int port, Register number) const;
-  // The levels that come from outside.
   void set_outside(int port, std::uint8_t levels);
 
   void power_on() override;

@@ -87,11 +87,11 @@ bool Mcp4728Model::general_call(std::uint8_t byte) {
   }
 }
 
-// Takes the bytes so far; false refuses the last one. The first byte of the transfer is the command;
-// in what repeats after it, the command's bits mean nothing.
+// Takes the bytes so far; false refuses the last. The transfer's first byte is the command; in
+// repeated parts its bits have no meaning.
 bool Mcp4728Model::command_complete() {
   const unsigned command = command_;
-  if (command >> 6 == 0) {  // fast write: two bytes a channel, reference and gain stay
+  if (command >> 6 == 0) {  // fast write: two bytes per channel, reference and gain stay
     if (size_ < 2) return true;
     Setting& input = input_[channel_ % channels];
     input.power_down = bytes_[0] >> 4 & 3;
@@ -129,7 +129,7 @@ bool Mcp4728Model::command_complete() {
       break;
   }
   switch (command >> 5) {
-    case 0b100:  // reference, gain: a bit a channel, A first
+    case 0b100:  // reference, gain: one bit per channel, A first
     case 0b110:
       for (int i = 0; i < channels; ++i) {
         const bool bit = (command >> (3 - i) & 1) != 0;
@@ -149,7 +149,7 @@ bool Mcp4728Model::command_complete() {
       return true;
     }
     default:
-      return false;  // the address bits are written with the LDAC pin, which nobody moves
+      return false;  // writing the address bits needs the LDAC pin, which is fixed
   }
 }
 

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The MCP4728 by its data sheet (DS22187): input and output registers, EEPROM and its write time,
-// every write command but the change of the address, reading, general calls.
-//
-// While the EEPROM is being written, write commands are taken for ignored, the most careful reading
-// of the data sheet.
+// The MCP4728 by its data sheet (DS22187), without the change of the address. Write commands during
+// a write of the EEPROM are ignored: the strictest reading of the data sheet.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +16,6 @@ class Mcp4728Model final : public I2cChipModel {
   static constexpr int channels = 4;
   static constexpr std::uint64_t eeprom_write_us = 50000;
 
-  // What a channel is set to.
   struct Setting {
     bool internal_reference = false;
     std::uint8_t power_down = 0;  // 0: normal, 1-3: 1k, 100k, 500k to ground
@@ -31,20 +27,19 @@ class Mcp4728Model final : public I2cChipModel {
     }
   };
 
-  // As from the factory: internal reference, code 0. The LDAC pin is wired as said.
+  // Factory state: internal reference, code 0. `ldac_low`: how the LDAC pin is wired.
   explicit Mcp4728Model(std::uint8_t address, bool ldac_low = false);
 
-  // What the outputs do.
   const Setting& output(int channel) const { return output_[channel]; }
   const Setting& input(int channel) const { return input_[channel]; }
   const Setting& eeprom(int channel) const { return eeprom_[channel]; }
   void set_eeprom(int channel, const Setting& setting) { eeprom_[channel] = setting; }
-  // At the pin, of a chip on 5 V; 0 if powered down.
+  // At the pin of a chip on 5 V; 0 if powered down.
   std::int32_t microvolts(int channel) const;
   double volts(int channel) const { return microvolts(channel) / 1e6; }
   bool busy() const { return now_ns() < busy_until_ns_; }
   int eeprom_writes() const { return eeprom_writes_; }
-  // The EEPROM is worn out: it keeps what it has.
+  // The EEPROM is worn out: it keeps its contents.
   void wear_out() { worn_out_ = true; }
 
   void power_on() override;
@@ -68,9 +63,9 @@ class Mcp4728Model final : public I2cChipModel {
   bool has_command_ = false;
   std::uint8_t command_ = 0;    // the first byte of the transfer
   std::uint8_t bytes_[3] = {};  // since the last channel was complete
-  std::size_t size_ = 0;        // of them
-  int channel_ = 0;             // the next of a fast or sequential write
-  int first_channel_ = 0;       // of a sequential write
+  std::size_t size_ = 0;
+  int channel_ = 0;        // the next of a fast or sequential write
+  int first_channel_ = 0;  // of a sequential write
   bool general_ = false;
   bool ignoring_ = false;
   int read_at_ = 0;

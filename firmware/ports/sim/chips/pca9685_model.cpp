@@ -149,10 +149,10 @@ void Pca9685Model::write_mode1(std::uint8_t value) {
   const std::uint8_t before = registers_[mode1];
   const bool was_asleep = (before & sleep) != 0;
   std::uint8_t after = value & static_cast<std::uint8_t>(~restart & ~external_clock);
-  after |= before & external_clock;  // set once, while asleep; only a reset clears it
+  after |= before & external_clock;  // set only while asleep, cleared only by a reset
   if (was_asleep && (value & sleep) != 0) after |= value & external_clock;
   if ((value & sleep) != 0 && !was_asleep) {
-    // Channels that were not shut down in order wait for RESTART.
+    // Channels without an orderly shutdown wait for RESTART.
     for (std::size_t i = led_first + 3; i <= led_last; i += 4) {
       if ((registers_[i] & full) == 0) restart_wanted_ = true;
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The PCA9685 by its data sheet (Rev. 4), register for register. Not modelled: the OE pin (held
-// low), the phase of the pulses, test mode. The external clock stands, as on the board: with EXTCLK
-// the outputs stay as they are, pulses high, which is the worst that the data sheet allows.
+// The PCA9685 by its data sheet (Rev. 4). Not modelled: the OE pin (held low), the phase of the
+// pulses, test mode. There is no external clock, as on the board: with EXTCLK the outputs stay as
+// they are, pulses high, the worst case that the data sheet allows.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,6 @@ class Pca9685Model final : public I2cChipModel {
 
   explicit Pca9685Model(std::uint8_t address) : address_(address) {}
 
-  // What a pin does.
   int duty(int channel) const;  // 0-4096 of 4096; 0 while the oscillator stands
   bool high(int channel) const { return duty(channel) == 4096; }
   std::int32_t pulse_ns(int channel) const { return duty(channel) * (reg(0xFE) + 1) * 40; }
@@ -25,7 +24,7 @@ class Pca9685Model final : public I2cChipModel {
   double frequency_hz() const { return 25e6 / (4096.0 * (reg(0xFE) + 1)); }
   std::uint8_t reg(std::uint8_t number) const { return registers_[number]; }
 
-  // A disturbance changes a mode register: MODE1 or MODE2, whatever may be written there.
+  // A disturbance flips bits of a mode register, even bits that cannot be written.
   void disturb_mode1(std::uint8_t bits) { registers_[0x00] ^= bits; }
   void disturb_mode2(std::uint8_t bits) { registers_[0x01] ^= bits; }
 
@@ -50,8 +49,8 @@ class Pca9685Model final : public I2cChipModel {
   std::uint8_t active_[4 * channels] = {};  // LED0_ON_L … as the outputs have them
   std::uint8_t pointer_ = 0;
   Phase phase_ = Phase::idle;
-  bool led_written_ = false;     // since the last STOP
-  bool restart_wanted_ = false;  // the RESTART bit
+  bool led_written_ = false;  // since the last STOP
+  bool restart_wanted_ = false;
   std::uint64_t awake_since_ns_ = 0;
 };
 

@@ -38,7 +38,7 @@ std::uint16_t As5600Model::setting(int at) const {
   return static_cast<std::uint16_t>((settings_[at] << 8 | settings_[at + 1]) & 0xFFF);
 }
 
-// From ZPOS on, stretched to what MPOS or MANG make of a turn.
+// From ZPOS on, scaled to the range of MPOS or MANG.
 std::uint16_t As5600Model::output() const {
   const int turned = (latched_ - setting(as_zpos)) & 0xFFF;
   int all = setting(as_mang);

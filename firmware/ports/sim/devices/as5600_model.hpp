@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An AS5600 by its registers (ams, data sheet v1-06, "Register Description"): the angle of a magnet, in 4096ths of a
-// turn. What is burnt into it is not modelled.
+// An AS5600 by its registers (ams, data sheet v1-06, "Register Description"): a magnet's angle, in
+// 4096ths of a turn. Burnt settings are not modelled.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ class As5600Model final : public RegisterDevice {
 
   As5600Model() : RegisterDevice(address) { power_on(); }
   void power_on() override;
-  // The magnet's angle, 0 to 4095.
+  // 0 to 4095.
   void turn(std::int32_t angle) { angle_ = static_cast<std::uint16_t>(angle & 0xFFF); }
   void set_magnet(Magnet magnet) { magnet_ = magnet; }
 
@@ -26,7 +26,7 @@ class As5600Model final : public RegisterDevice {
   std::uint8_t read_register(std::uint8_t at) override;
   void write_register(std::uint8_t at, std::uint8_t byte) override;
   void latch() override { latched_ = angle_; }
-  // Who reads an angle again and again need not name it again.
+  // The pointer stays at an angle, for repeated reads.
   std::uint8_t after(std::uint8_t at) const override;
   std::uint16_t setting(int at) const;
   std::uint16_t output() const;

@@ -42,7 +42,7 @@ void Bno055Model::power_on() {
 
 bool Bno055Model::configures() const { return (registers_[bno_opr_mode] & bno_mode_bits) == 0; }
 
-// 16 bits, the lower byte first.
+// Lower byte first.
 void Bno055Model::put(int at, std::int32_t value) {
   const std::int32_t within = value > 0x7FFF ? 0x7FFF : value < -0x8000 ? -0x8000 : value;
   registers_[at] = static_cast<std::uint8_t>(within);
@@ -60,7 +60,7 @@ void Bno055Model::latch() {
     const std::int32_t acceleration = motion_.mm_per_s2[i];
     put(bno_acc_data + 2 * i, in_mg ? acceleration * 1000 / 9807 : acceleration / 10);
     put(bno_mag_data + 2 * i, motion_.nanotesla[i] * 16 / 1000);
-    // 900 a radian, or 16 a degree
+    // 900 per radian, or 16 per degree
     put(bno_gyr_data + 2 * i,
         in_rad_per_s ? motion_.mrad_per_s[i] * 9 / 10 : motion_.mrad_per_s[i] * 9167 / 10000);
     put(bno_eul_data + 2 * i,

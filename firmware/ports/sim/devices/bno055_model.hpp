@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A BNO055 by its registers (Bosch BST-BNO055-DS000 rev. 1.8, 3.3, 3.6 and 4): its sensors and their fusion, silent
-// until OPR_MODE leaves CONFIGMODE, in which alone its other settings can be written.
+// A BNO055 by its registers (Bosch BST-BNO055-DS000 rev. 1.8, 3.3, 3.6 and 4): sensors and fusion.
+// In CONFIGMODE it is silent, and only there its other settings can be written.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,7 @@ class Bno055Model final : public RegisterDevice {
 
   std::uint8_t registers_[page_size];  // of page 0
   std::uint8_t page_ = 0;
-  std::uint64_t runs_from_ns_ = 0;  // a change of mode takes its time
+  std::uint64_t runs_from_ns_ = 0;  // a change of mode takes time
   Motion motion_;
 };
 

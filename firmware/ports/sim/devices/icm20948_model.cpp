@@ -22,7 +22,7 @@ constexpr int icm_temp_out_h = 0x39;
 constexpr int icm_gyro_config_1 = 0x01;
 constexpr int icm_accel_config = 0x14;
 constexpr int icm_last_of_bank_2 = 0x54;
-// Each bank
+// Every bank
 constexpr int icm_reg_bank_sel = 0x7F;
 constexpr std::uint8_t icm_asleep = 0x40;
 constexpr std::uint8_t icm_reset = 0x80;
@@ -56,7 +56,7 @@ void Icm20948Model::feel(const std::int32_t (&milli_g)[3], const std::int32_t (&
   centi_c_ = centi_c;
 }
 
-// 16 bits, the higher byte first; the converter does not overflow.
+// Higher byte first; the converter does not overflow.
 void Icm20948Model::put(int at, std::int32_t value) {
   const std::int32_t within = value > 0x7FFF ? 0x7FFF : value < -0x8000 ? -0x8000 : value;
   registers_[0][at] = static_cast<std::uint8_t>(static_cast<std::uint32_t>(within) >> 8);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An ICM-20948 by its registers (InvenSense DS-000189 rev. 1.3, 7 and 8): accelerometer, gyroscope and thermometer,
-// registers in four banks, asleep until PWR_MGMT_1 wakes it.
+// An ICM-20948 by its registers (InvenSense DS-000189 rev. 1.3, 7 and 8): accelerometer, gyroscope,
+// thermometer; asleep until PWR_MGMT_1 wakes it.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@ namespace sim {
 
 class Icm20948Model final : public RegisterDevice {
  public:
-  static constexpr std::uint8_t address = 0x69;  // AD0 high: an MPU-6050 has the other
+  static constexpr std::uint8_t address = 0x69;  // AD0 high: an MPU-6050 has 0x68
 
   Icm20948Model() : RegisterDevice(address) { power_on(); }
   void power_on() override;
 
-  // What it feels: thousandths of g (x, y, z), degrees a second, hundredths of a degree Celsius.
+  // Thousandths of g (x, y, z), degrees per second, hundredths of a degree Celsius.
   void feel(const std::int32_t (&milli_g)[3], const std::int32_t (&deg_per_s)[3],
             std::int32_t centi_c);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An INA219 by its registers (TI SBOS448G, 8.6): bus voltage, and the current through a shunt. Registers have
-// 16 bits, the higher byte first; a read repeats the one that the pointer names.
+// An INA219 by its registers (TI SBOS448G, 8.6): bus voltage, and current through a shunt.
+// Registers have 16 bits, higher byte first; a read repeats the pointer's register.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ class Ina219Model final : public I2cChipModel {
   bool write(std::uint8_t byte) override;
   std::uint8_t read() override;
 
-  // What is connected: millivolts on the bus, microvolts over the shunt.
+  // Millivolts on the bus, microvolts over the shunt.
   void measure(std::int32_t bus_mv, std::int32_t shunt_uv) {
     bus_mv_ = bus_mv;
     shunt_uv_ = shunt_uv;
@@ -31,9 +31,9 @@ class Ina219Model final : public I2cChipModel {
   std::uint16_t configuration_ = 0x399F;
   std::uint16_t calibration_ = 0;
   std::uint8_t pointer_ = 0;
-  std::uint8_t byte_ = 0;      // of the transfer: 0 the pointer or the higher byte
-  std::uint8_t high_ = 0;      // that was written
-  std::uint16_t latched_ = 0;  // of which the lower byte is to come
+  std::uint8_t byte_ = 0;  // of the transfer; 0: the pointer or the higher byte
+  std::uint8_t high_ = 0;
+  std::uint16_t latched_ = 0;  // its lower byte is still to come
   std::int32_t bus_mv_ = 12160;
   std::int32_t shunt_uv_ = 125000;  // 1.25 A through 0.1 ohm
 };

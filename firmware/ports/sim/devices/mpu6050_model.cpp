@@ -44,7 +44,7 @@ void Mpu6050Model::feel(const std::int32_t (&milli_g)[3], const std::int32_t (&d
   centi_c_ = centi_c;
 }
 
-// 16 bits, the higher byte first; the converter does not overflow.
+// Higher byte first; the converter does not overflow.
 void Mpu6050Model::put(int at, std::int32_t value) {
   const std::int32_t within = value > 0x7FFF ? 0x7FFF : value < -0x8000 ? -0x8000 : value;
   registers_[at] = static_cast<std::uint8_t>(static_cast<std::uint32_t>(within) >> 8);
@@ -74,7 +74,7 @@ void Mpu6050Model::write_register(std::uint8_t at, std::uint8_t byte) {
   if (!is_writable(at)) return;
   if (at == pwr_mgmt_1 && (byte & device_reset) != 0) return power_on();
   registers_[at] = byte;
-  if (at == user_ctrl) registers_[at] &= 0x70;  // its resets clear themselves
+  if (at == user_ctrl) registers_[at] &= 0x70;  // the resets clear themselves
   static_assert(gyro_zout_l < register_count && user_ctrl < register_count, "they are there");
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An MPU-6050 by its registers (InvenSense RM-MPU-6000A-00, 4.2): accelerometer, thermometer and gyroscope,
-// asleep until PWR_MGMT_1 wakes it.
+// An MPU-6050 by its registers (InvenSense RM-MPU-6000A-00, 4.2): accelerometer, thermometer,
+// gyroscope; asleep until PWR_MGMT_1 wakes it.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ class Mpu6050Model final : public RegisterDevice {
   Mpu6050Model() : RegisterDevice(address) { power_on(); }
   void power_on() override;
 
-  // What it feels: thousandths of g (x, y, z), degrees a second, hundredths of a degree Celsius.
+  // Thousandths of g (x, y, z), degrees per second, hundredths of a degree Celsius.
   void feel(const std::int32_t (&milli_g)[3], const std::int32_t (&deg_per_s)[3],
             std::int32_t centi_c);
 

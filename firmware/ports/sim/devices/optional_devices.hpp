@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What can be connected to the user's bus of a simulated board beside what is there (user_devices.hpp).
+// Devices that can join those of user_devices.hpp on the user's bus.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,6 @@ struct OptionalDevices {
     if (device == 2) return vl53l0x;
     return as5600;
   }
-  // The supply comes, or comes back.
   void power_on() {
     for (int i = 0; i < optional_device_count; ++i) (*this)[i].power_on();
   }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What most I2C devices have in common: one address, registers of a byte, and a pointer that the first byte
-// of a write sets and each byte moves on.
+// One address, one-byte registers, and a pointer: a write's first byte sets it, each byte moves it.
 #pragma once
 
 #include <cstdint>
@@ -39,7 +38,7 @@ class RegisterDevice : public I2cChipModel {
   ~RegisterDevice() = default;
   virtual std::uint8_t read_register(std::uint8_t at) = 0;
   virtual void write_register(std::uint8_t at, std::uint8_t byte) = 0;
-  // What a burst reads belongs together: it is taken when the burst begins.
+  // Called when a read begins: the bytes of a burst belong together.
   virtual void latch() {}
   virtual std::uint8_t after(std::uint8_t at) const { return static_cast<std::uint8_t>(at + 1); }
   void set_pointer(std::uint8_t at) { pointer_ = at; }

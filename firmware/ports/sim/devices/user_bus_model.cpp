@@ -32,7 +32,7 @@ void UserBusModel::reset() {
   ends_ns_ = now_ns_;
 }
 
-// A line that a device takes in the middle of it stops a transfer that is on the wire.
+// A device that takes a line during a transfer stops the transfer.
 UserBusModel::Progress UserBusModel::progress() {
   if (waits_ || (now_ns_ < ends_ns_ && !is_free())) {
     waits_ = true;
@@ -44,7 +44,7 @@ UserBusModel::Progress UserBusModel::progress() {
 void UserBusModel::begin(const firmware::UserTransfer& transfer) {
   ++transfers_;
   clocks_ = 0;
-  waits_ = !is_free();  // the controller takes the bus for another master's, and waits
+  waits_ = !is_free();  // the controller takes the lines for another controller's, and waits
   if (waits_) return;
   result_ = send(transfer) ? Progress::done : Progress::refused;
   for (int i = 0; i < device_count_; ++i) {
@@ -81,7 +81,7 @@ bool UserBusModel::send(const firmware::UserTransfer& transfer) {
   if (!address(transfer.address, true)) return false;
   for (std::size_t n = 0; n < transfer.in_size; ++n) {
     clocks_ += 9;
-    std::uint8_t byte = 0xFF;  // what nobody pulls down
+    std::uint8_t byte = 0xFF;  // no device pulls SDA low
     for (int i = 0; i < device_count_; ++i) {
       if ((addressed_ >> i & 1) != 0) byte &= devices_[i]->read();
     }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus of the simulated board: a controller at 100 kHz as firmware/devices/user_i2c_port.hpp
-// has it, the devices on its two lines, and what goes wrong with those.
-//
-// A transfer takes its time on the wire: what it reads is what the devices held when it began.
+// The user's I2C bus of the simulated board: a controller at 100 kHz, the devices on its two lines,
+// and their faults. A transfer takes its time on the wire; it reads what the devices held when it
+// began.
 #pragma once
 
 #include <cstdint>
@@ -20,19 +19,17 @@ class UserBusModel final : public firmware::UserI2cPort {
 
   enum class Fault : std::uint8_t {
     none,
-    held,       // a device holds SDA down
-    cut_off,    // … until it has seen nine clocks: it was cut off in the middle of a byte
-    stretched,  // a device holds SCL down
+    held,       // a device holds SDA low
+    cut_off,    // … until it has seen nine clocks: it was cut off in mid-byte
+    stretched,  // a device holds SCL low
   };
 
-  // The device must outlive the bus. False: there are max_devices already.
+  // The device must outlive the bus. False if there are max_devices already.
   bool attach(I2cChipModel& device);
-  // A device that is not connected takes no part.
   void connect(const I2cChipModel& device, bool connected);
   void set_fault(Fault fault);
   Fault fault() const { return fault_; }
   void advance(std::uint64_t us) { now_ns_ += us * 1000; }
-  // The microcontroller begins again.
   void reset();
   std::uint32_t transfers() const { return transfers_; }  // begun so far; wraps
 
@@ -52,15 +49,15 @@ class UserBusModel final : public firmware::UserI2cPort {
   I2cChipModel* devices_[max_devices] = {};
   int device_count_ = 0;
   unsigned disconnected_ = 0;  // bit: device
-  unsigned addressed_ = 0;     // by the last START
+  unsigned addressed_ = 0;
   Fault fault_ = Fault::none;
-  int clocks_left_ = 0;  // until a device that was cut off lets go
-  bool scl_ = true;      // as the microcontroller drives them
+  int clocks_left_ = 0;  // until a device that was cut off releases SDA
+  bool scl_ = true;
   bool sda_ = true;
   std::uint64_t now_ns_ = 0;
   std::uint64_t ends_ns_ = 0;
   std::uint32_t transfers_ = 0;
-  int clocks_ = 0;      // of the transfer, on the wire
+  int clocks_ = 0;
   bool waits_ = false;  // for lines that are not free
   Progress result_ = Progress::done;
 };

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is connected to the user's bus and UARTs of the simulated board.
 #pragma once
 
 #include <cstdint>
@@ -27,12 +26,11 @@ struct UserDevices {
   I2cChipModel& operator[](UserDevice device) {
     return device == UserDevice::ina219 ? static_cast<I2cChipModel&>(ina219) : mpu6050;
   }
-  // The supply comes, or comes back. What is broken stays so.
+  // Faults stay.
   void power_on() {
     for (int i = 0; i < user_device_count; ++i) (*this)[static_cast<UserDevice>(i)].power_on();
   }
 
-  // The microcontroller begins again.
   void reset() {
     bus.reset();
     for (UserUartModel& uart : uarts) uart.reset();

@@ -46,7 +46,7 @@ void UserUartModel::pass_millisecond() {
   const bool talks = peer_ == UartPeer::gnss || peer_ == UartPeer::lidar;
   if (talks && !has_byte()) say_more();
   if (!mode_.on()) {
-    at_ = size_ = 0;  // nobody listens
+    at_ = size_ = 0;
     return;
   }
   const std::uint32_t byte = bits_of_byte() * thousand;
@@ -97,8 +97,6 @@ bool UserUartModel::send(const std::uint8_t* bytes, std::size_t size) {
 }
 
 void UserUartModel::drop() { waiting_.cut(0); }
-
-// --- what the peers say
 
 void UserUartModel::say_more() {
   if (peer_ == UartPeer::gnss && sentence_ < sentences) {
@@ -159,7 +157,7 @@ void UserUartModel::say_sentence() {
   put("\r\n");
 }
 
-// Something that comes nearer, from 3 m to 1 m, again and again.
+// A target comes nearer, from 3 m to 1 m, repeatedly.
 void UserUartModel::say_distance() {
   const std::uint32_t cm = 300 - now_ms_ / period_ms % 200;
   constexpr std::uint32_t strength = 1200;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A UART of the simulated board's user, and who is at its other end. Bytes take their time on the wire, both
-// ways; what a peer sends at another rate or in another form than the board's comes damaged.
+// A user's UART of the simulated board, and its peer. Bytes take their time on the wire, both ways.
+// If rate or form differ from the board's, the peer's bytes come damaged.
 #pragma once
 
 #include <cstddef>
@@ -13,11 +13,11 @@ namespace r4 {
 namespace sim {
 
 enum class UartPeer : std::uint8_t {
-  none,   // nobody
+  none,
   loop,   // TX and RX are joined
-  gnss,   // a receiver: RMC, GGA, GSA and two GSV each 100 ms; 115200:8N1
-  lidar,  // a TFmini's nine bytes each 10 ms; 115200:8N1
-  noise,  // bytes without end as fast as the rate allows, one in four damaged
+  gnss,   // a receiver: RMC, GGA, GSA and two GSV every 100 ms; 115200:8N1
+  lidar,  // a TFmini's nine bytes every 10 ms; 115200:8N1
+  noise,  // endless bytes at full rate, one in four damaged
 };
 constexpr int uart_peer_count = 5;
 
@@ -26,7 +26,6 @@ class UserUartModel final : public firmware::UserUartPort {
   void connect(UartPeer peer);
   UartPeer peer() const { return peer_; }
   void pass_millisecond();
-  // The microcontroller begins again.
   void reset() { set_up(UartMode()); }
 
   void set_up(const UartMode& mode) override;
@@ -36,8 +35,8 @@ class UserUartModel final : public firmware::UserUartPort {
   void drop() override;
 
   const UartMode& mode() const { return mode_; }
-  std::uint32_t sent() const { return sent_; }  // bytes that were on the wire so far; wraps
-  // Of the peer, so far: what it has said, damaged or not.
+  std::uint32_t sent() const { return sent_; }  // bytes sent on the wire so far; wraps
+  // Bytes that the peer has sent so far, damaged or not.
   std::uint32_t said() const { return said_; }
 
  private:
@@ -60,11 +59,10 @@ class UserUartModel final : public firmware::UserUartPort {
   std::uint32_t lost_ = 0;
   std::uint32_t sent_ = 0;
   std::uint32_t said_ = 0;
-  // What the peer is about to say.
   char text_[longest_text];
   std::size_t size_ = 0;
   std::size_t at_ = 0;
-  int sentence_ = 0;  // of this epoch, the next
+  int sentence_ = 0;  // of this epoch, next
   firmware::ByteRing<256> received_;
   firmware::ByteRing<send_capacity> waiting_;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A VL53L0X by its registers (ST DS11555 rev. 4, 3.2, and their names in ST's API, STSW-IMG005): a distance by the time
-// that light takes, each 33 ms once SYSRANGE_START has begun it.
+// A VL53L0X by its registers (ST DS11555 rev. 4, 3.2; names of ST's API, STSW-IMG005): a distance
+// by time of flight, every 33 ms after SYSRANGE_START has begun it.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,10 @@ namespace sim {
 class Vl53l0xModel final : public RegisterDevice {
  public:
   static constexpr std::uint8_t address = 0x29;
-  static constexpr std::int32_t no_target = 8190;  // what it says in mm when it sees nothing
+  static constexpr std::int32_t no_target = 8190;  // reading in mm without a target
 
   Vl53l0xModel() : RegisterDevice(address) { power_on(); }
   void power_on() override;
-  // How far what it sees is, millimetres; no_target.
   void see(std::int32_t mm) { mm_ = mm; }
 
  private:
@@ -30,7 +29,7 @@ class Vl53l0xModel final : public RegisterDevice {
   std::uint8_t start_ = 0;  // SYSRANGE_START
   std::uint8_t i2c_mode_ = 0;
   std::uint8_t result_[result_size];  // from RESULT_RANGE_STATUS on
-  std::uint64_t ranged_ns_ = 0;       // when it began, or the range before
+  std::uint64_t ranged_ns_ = 0;       // when ranging began, or the last range ended
   std::int32_t mm_ = 500;
 };
 

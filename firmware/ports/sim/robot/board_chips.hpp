@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The chips of the R4 board on their bus, and what their pins do.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +19,6 @@ struct BoardChips {
   BoardChips(const BoardChips&) = delete;
   BoardChips& operator=(const BoardChips&) = delete;
 
-  // The supply comes, or comes back.
   void power_on();
   ChipPins pins() const;
   // Channels count from 1.

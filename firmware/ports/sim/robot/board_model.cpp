@@ -10,13 +10,12 @@ namespace {
 
 static_assert(osmc_channels == encoder_channels, "each of these motors turns an encoder");
 
-// A value of an analog input and how often it occurs.
 struct Level {
   std::int16_t centivolts;
   std::uint8_t count;
 };
 
-// The capture's (paper section 4.4).
+// From the capture (paper section 4.4).
 constexpr Level ain24[] = {{2413, 4},  {2415, 1}, {2418, 6}, {2421, 6},
                            {2428, 33}, {2431, 7}, {2433, 4}, {2456, 1}};
 constexpr Level ain12[] = {{1208, 5},  {1209, 2},  {1211, 4},  {1212, 3}, {1214, 1},
@@ -29,7 +28,7 @@ constexpr Level aindmh_held[] = {{1183, 1},  {1193, 1}, {1208, 2}, {1209, 2}, {1
 constexpr Level ainsteer[] = {{86, 2},  {92, 2},   {94, 2},  {95, 4},  {98, 7},
                               {99, 12}, {100, 10}, {102, 2}, {103, 8}, {105, 10},
                               {106, 1}, {107, 1},  {119, 1}};
-// An input that nothing drives, and that of a released handle.
+// An undriven input, and that of a released handle.
 constexpr Level near_zero[] = {{0, 4}, {1, 2}, {2, 1}};
 
 template <std::size_t N>
@@ -192,7 +191,7 @@ void BoardModel::turn(int channel, std::int32_t counts, Interrupts& interrupts) 
   }
 }
 
-// Forward, A leads B: 00 10 11 01.
+// Forward: A leads B, 00 10 11 01.
 void BoardModel::tell_levels(int channel, Interrupts& interrupts) {
   const std::int32_t count = shafts_[channel - 1].count;
   const unsigned quarter = static_cast<unsigned>(count) & 3U;
@@ -239,12 +238,11 @@ std::int32_t BoardModel::analog_cv(Analog input) const {
   return pick(near_zero, random);
 }
 
-// The surroundings have changed within the millisecond.
 void BoardModel::convert_again() {
   for (Converter& converter : converters_) converter.converted = false;
 }
 
-// The divider before the converter: 50 V is its full range (drivers/analog.hpp).
+// The divider before the converter has a full range of 50 V (drivers/analog.hpp).
 std::uint16_t BoardModel::Converter::read() {
   if (converted && at_ms == model->time_ms_) return counts;
   constexpr std::int32_t range_cv = 5000;

@@ -1,24 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The R4 board around its microcontroller: the chips on their bus, the pins, what is connected to
-// them, and the time that passes there. As portable as the firmware and in integers, for the image for
-// the Cortex-M7 runs it too.
+// The R4 board around its microcontroller: the chips on their bus, the pins, the connected devices,
+// and their time. Portable and in integers, because the image for the Cortex-M7 runs it too.
 //
-// Connected is the vehicle of the paper's capture (section 4.4), standing on the bench:
+// Connected is the vehicle of the paper's capture (section 4.4) on the bench, or a RobotModel with
+// the bench's supply, handle and steppers:
 //
-//     supply      of the motors: there while the dead-man's handle is held and relay 1 is closed, as
-//                 docs/safety.md has it. Without it no motor turns, whatever its driver is told.
+//     supply      of the motors: on while the dead-man's handle is held and relay 1 is closed
+//                 (docs/safety.md). Without it no motor turns.
 //     OSMC 1-4    a motor each, whose shaft turns encoder 1-4: 4000 counts a second at full duty;
 //                 the index line is high for one of the 1000 counts of a turn, count 0
-//     DHB1A       the steering motor; AINSTEER tells where it stands: 1 V, where forward ends, to 4 V,
+//     DHB1A       the steering motor; AINSTEER is its position: 1 V, where forward ends, to 4 V,
 //                 1.5 s from end to end at full duty
 //     battery     AIN24 sags with the current of the OSMC motors (20 mOhm)
 //     US 1-4      ultrasonic sensors with nothing in sight
 //     steppers    a motor each that takes a step at each pulse
 //
-// or a RobotModel in its place, but for supply, handle and steppers.
-//
-// Analog inputs take the values of the capture's converters as often as they occur there; which one
-// depends on the seed and the time alone, so the same seed gives the same trace.
+// Analog inputs take the values of the capture as often as they occur there. The choice depends on
+// seed and time only, so the same seed gives the same trace.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +33,7 @@ namespace sim {
 
 class BoardModel {
  public:
-  // Where edges interrupt the microcontroller. Channels count from 1.
+  // Edges that interrupt the microcontroller. Channels count from 1.
   class Interrupts {
    public:
     virtual void on_encoder(int channel, bool a, bool b, bool index) = 0;
@@ -51,53 +49,48 @@ class BoardModel {
 
   explicit BoardModel(std::uint64_t seed);
 
-  // The supply comes, or comes back: motors stand, counters are at 0. The surroundings stay.
+  // Motors stand, counters are at 0. The surroundings stay.
   void power_on();
-  // The levels of the encoders as they are, as if they had just come.
+  // Reports the levels of the encoders, as if they had just changed.
   void tell_levels(Interrupts& interrupts);
-  // A millisecond passes, which ends at `now_us` of the microcontroller's clock.
+  // The millisecond ends at `now_us` of the microcontroller's clock.
   void pass_millisecond(std::uint32_t now_us, Interrupts& interrupts);
 
   BoardChips& chips() { return chips_; }
   UserDevices& devices() { return devices_; }
   firmware::BoardPins microcontroller_pins();
   Pins pins() const;
-  // Could pins() tell something else than when this was asked last? No, while there was nothing on the bus for a while
-  // and all steppers stand: then it is not worth its time, in a process of many boards.
+  // False if pins() cannot have changed: the bus is idle and all steppers stand. This saves time.
   bool pins_may_differ();
-  // Something else has happened to the chips.
+  // The chips were changed without a transfer.
   void disturb_pins() { disturbed_ms_ = time_ms_; }
   bool motors_have_supply() const { return handle_held_ && chips_.relay_closed(supply_relay); }
-  // How far the shaft of an encoder has turned since power came, in the encoder's counts.
+  // Counts of an encoder's shaft since power came.
   std::int32_t shaft_count(int channel) const { return shafts_[channel - 1].count; }
 
-  // How many steps the stepper motor has taken since power came, forward less backward.
+  // Steps of the motor since power came, forward less backward.
   std::int32_t stepper_shaft(int channel) const { return steppers_[channel - 1].driver.shaft(); }
 
-  // What is connected from now on; nullptr: the vehicle on the bench. It must outlive this.
+  // The robot must outlive this; nullptr: the vehicle on the bench.
   void connect(RobotModel* robot);
 
-  // The surroundings. Channels count from 1. Of a RobotModel motors and encoders are its own affair.
+  // The surroundings. Channels count from 1. A RobotModel decides on its motors and encoders.
   void hold_handle(bool held);
   bool handle_held() const { return handle_held_; }
-  // A spare input is pulled down, or let go.
   void set_gpio(int channel, bool high) { gpio_[channel - 1].set(high); }
   std::uint16_t dac_mv(int channel) const { return dac_[channel - 1].millivolts(); }
-  // Something is `cm` (0: nothing) before the sensor.
+  // `cm`: distance; 0: nothing.
   void set_ultrasonic(int channel, std::uint16_t cm) { sensors_[channel - 1].set_distance(cm); }
   void connect_ultrasonic(int channel, bool connected) { sensors_[channel - 1].connect(connected); }
-  // Somebody turns the shaft to where the encoder has counted `counts` since power came.
+  // A hand turns the shaft to `counts` since power came.
   void turn_encoder(int channel, std::int32_t counts);
-  // The motor of that OSMC channel is held fast, however it is driven.
   void stall_motor(int channel, bool stalled) { shafts_[channel - 1].stalled = stalled; }
-  // The input stays at `centivolts` (hundredths of a volt) from now on.
   void pin_analog(Analog input, std::int32_t centivolts);
-  // What the inputs are now: hundredths of a volt, and the sensor with its distance.
   std::int32_t analog_cv(Analog input) const;
   const UltrasonicModel& ultrasonic(int channel) const { return sensors_[channel - 1]; }
 
  private:
-  static constexpr std::uint32_t settling_ms = 5;  // of a chip's outputs, behind a transfer
+  static constexpr std::uint32_t settling_ms = 5;  // of a chip's outputs, after a transfer
   static constexpr std::int32_t steering_range = 3 * 1000 * 2048;  // 1.5 s of 4096 a millisecond
 
   struct Shaft {
@@ -105,14 +98,13 @@ class BoardModel {
     std::int32_t count = 0;
     bool stalled = false;
     bool by_hand = false;
-    std::int32_t hand_count = 0;  // where it is being turned to
+    std::int32_t hand_count = 0;  // target of the hand
   };
   struct Stepper {
     StepperDriverModel driver;
-    std::uint32_t pulses = 0;  // seen so far
+    std::uint32_t pulses = 0;
     std::uint32_t pause_ms = stepper_pause_ms;
   };
-  // A converter, which asks the model for the voltage once a millisecond.
   struct Converter final : firmware::AnalogPin {
     std::uint16_t read() override;
     const BoardModel* model = nullptr;
@@ -131,13 +123,13 @@ class BoardModel {
 
   std::uint64_t seed_;
   RobotModel* robot_ = nullptr;
-  RobotModel::Senses senses_;  // its
+  RobotModel::Senses senses_;
   std::uint32_t time_ms_ = 0;
   BoardChips chips_;
   UserDevices devices_;
   Stepper steppers_[stepper_channels];
   Shaft shafts_[encoder_channels];
-  std::int32_t steering_ = 0;  // from where forward ends
+  std::int32_t steering_ = 0;  // from the end of forward
   UltrasonicModel sensors_[ultrasonic_channels];
   bool handle_held_ = true;
   InputPinModel handle_;
@@ -145,8 +137,8 @@ class BoardModel {
   InputPinModel gpio_[gpio_channels];
   Converter converters_[analog_channels];
   std::int32_t pinned_cv_[analog_channels] = {};
-  std::uint32_t bus_transfers_ = 0;  // when pins_may_differ() was asked
-  std::uint32_t disturbed_ms_ = 0;   // since something happened that may change them
+  std::uint32_t bus_transfers_ = 0;  // at the last pins_may_differ()
+  std::uint32_t disturbed_ms_ = 0;   // last time that pins may have changed
   std::uint8_t pinned_ = 0;          // bit n: analog input n stays at pinned_cv_[n]
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A brushed DC motor behind an H-bridge, in integers: the speed follows the duty with a time constant
-// of 256 ms, the current is what the missing speed asks for.
+// A brushed DC motor on an H-bridge, in integers: the speed follows the duty with a time constant
+// of 256 ms, the current follows the missing speed.
 #pragma once
 
 #include <cstdint>
@@ -17,12 +17,12 @@ class MotorModel {
 
   void stop() { speed_q12_ = 0; }
 
-  // A millisecond at this duty. Returns the counts turned in it: forward positive.
+  // Returns the counts turned, forward positive.
   std::int32_t pass_millisecond(Drive drive) {
     const std::int32_t duty = drive.direction == Direction::forward ? drive.pwm : -drive.pwm;
     duty_ = duty;
     const std::int32_t wanted_q12 = duty * (top_speed * 4096 / pwm_max);
-    // Towards zero as far as to the end: a motor without current stands after a while.
+    // The last part is taken whole, so that a motor without current comes to a stand.
     const std::int32_t missing_q12 = wanted_q12 - speed_q12_;
     const std::int32_t step = missing_q12 / 256;
     speed_q12_ += step != 0 ? step : missing_q12;
@@ -33,7 +33,7 @@ class MotorModel {
   }
 
   std::int32_t speed() const { return speed_q12_ / 4096; }  // counts a second
-  // What it draws from the battery, hundredths of an ampere: in proportion to the duty.
+  // Hundredths of an ampere from the battery, in proportion to the duty.
   std::int32_t current_ca() const {
     const std::int32_t missing = duty_ * top_speed / pwm_max - speed();
     const std::int32_t winding_ca = missing * stall_current_ca / top_speed;
@@ -43,7 +43,7 @@ class MotorModel {
   }
 
  private:
-  static constexpr std::int32_t counts_q12 = 4096 * 1000;  // a second has 1000 of its steps
+  static constexpr std::int32_t counts_q12 = 4096 * 1000;  // 1000 steps per second
 
   std::int32_t duty_ = 0;       // -4095 to 4095
   std::int32_t speed_q12_ = 0;  // counts a second, times 4096

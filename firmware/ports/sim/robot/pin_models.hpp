@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Single pins of the microcontroller, as something outside of it sees and sets them.
 #pragma once
 
 #include <cstdint>
@@ -41,8 +40,7 @@ class AnalogOutputPinModel final : public firmware::AnalogOutputPin {
   std::uint16_t millivolts_ = 0;
 };
 
-// A stepper motor and its driver with step and direction inputs: a step at each rising edge, which
-// the motor takes if it has supply.
+// A step at each rising edge, which the motor takes if it has supply.
 class StepperDriverModel {
  public:
   StepperDriverModel() { step_.driver = this; }
@@ -55,9 +53,9 @@ class StepperDriverModel {
 
   void power_on() { position_ = shaft_ = 0; }
   void supply_motor(bool supplied) { supplied_ = supplied; }
-  // Steps that were asked for, forward less backward, since power came; wraps at 32 bits.
+  // Commanded steps since power came, forward less backward; wraps at 32 bits.
   std::int32_t position() const { return static_cast<std::int32_t>(position_); }
-  // The steps of them that the motor took.
+  // The steps that the motor took.
   std::int32_t shaft() const { return static_cast<std::int32_t>(shaft_); }
   std::uint32_t pulses() const { return step_.pin.rises(); }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Repeatable randomness of the simulated board: SplitMix64 (Steele, Lea, Flood 2014).
+// Repeatable random numbers: SplitMix64 (Steele, Lea, Flood 2014).
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,6 @@
 namespace r4 {
 namespace sim {
 
-// A number that looks random, always the same for the same input.
 constexpr std::uint64_t scramble(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15U;
   x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9U;

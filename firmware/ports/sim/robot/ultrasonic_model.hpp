@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An ultrasonic sensor HC-SR04 (data sheet): after a trigger pulse its echo line is high for 58 us a
-// centimetre, or 38 ms if nothing is there.
+// An ultrasonic sensor HC-SR04 (data sheet): after a trigger pulse its echo line is high for 58 us
+// per centimetre, or 38 ms if nothing is there.
 #pragma once
 
 #include <cstdint>
@@ -21,12 +21,10 @@ class UltrasonicModel {
   // 0: nothing is in sight.
   void set_distance(std::uint16_t cm) { cm_ = cm; }
   std::uint16_t distance() const { return cm_; }
-  // A sensor without its cable says nothing.
   void connect(bool connected) { connected_ = connected; }
   bool connected() const { return connected_; }
 
-  // It is `now_us`. Reports the edges of the echo line since the last call, with their times:
-  // on_edge(bool high, std::uint32_t at_us).
+  // Reports the echo line's edges since the last call: on_edge(bool high, std::uint32_t at_us).
   template <class OnEdge>
   void pass(std::uint32_t now_us, OnEdge&& on_edge) {
     const bool fell = triggered_ && !trigger_.high();
@@ -54,7 +52,7 @@ class UltrasonicModel {
   bool connected_ = true;
   bool triggered_ = false;
   Phase phase_ = Phase::quiet;
-  std::uint32_t next_us_ = 0;  // the next edge
+  std::uint32_t next_us_ = 0;
 };
 
 }  // namespace sim
