@@ -52,7 +52,7 @@ BridgeAudience::Place& BridgeAudience::place_of(Peer peer, Time now) {
     if (now < place.watches_until) continue;
     if (best == nullptr || place.heard < best->heard) best = &place;
   }
-  if (best == nullptr) best = places_.data();  // there are more places than may watch
+  if (best == nullptr) best = places_.data();  // there are more places than watchers
   *best = Place();
   best->peer = peer;
   best->heard = now;

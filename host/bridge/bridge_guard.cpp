@@ -37,7 +37,7 @@ void BridgeGuard::on_board_datagram(const Datagram& datagram, MessageKind kind, 
 }
 
 // As the host estimates it (Signer). The host hears each T later, so this estimate is never behind
-// the host's.
+// the host's estimate.
 std::uint32_t BridgeGuard::board_ms(Time now) const {
   const Time::duration passed = now - told_;
   return t_ms_ + ms_of(passed - passed / 32);

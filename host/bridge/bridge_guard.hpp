@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which host datagrams a bridge may pass to its board, as far as that depends on keys.
-//
-// A board obeys its own cable without a signature, and a bridge must not lend that trust to its
-// hosts:
+// Decides by keys which host datagrams a bridge may pass to its board. A board obeys its own cable
+// without a signature, and a bridge must not lend that trust to its hosts:
 //
 //     keys    board                        heartbeats and commands pass
 //     given   any                          if they are signed for this board, once, within 250 ms
@@ -11,8 +9,8 @@
 //     none    at a cable, has a key        never: the bridge cannot check signatures
 //     none    at a cable, not heard yet    never
 //
-// The rule is that of the board (protocol/keys/authentication.hpp), with the nonce and the clock
-// that the board reports. E:STOP, Q:ID and W need no signature, neither here nor at the board.
+// The rule is the board's (protocol/keys/authentication.hpp), with the nonce and the clock that the
+// board reports. E:STOP, Q:ID and W need no signature, neither here nor at the board.
 #pragma once
 
 #include <chrono>
@@ -35,15 +33,14 @@ class BridgeGuard {
     key_needed,        // the board has a key, and the bridge has none
   };
 
-  // `keys`: the board's keys that its hosts sign with; at most max_keys. `trusted`: the board obeys
-  // every datagram of this transport (its cable), and the bridge is not open to everyone.
+  // `keys`: the board's keys with which its hosts sign; at most max_keys. `trusted`: the board
+  // obeys every datagram of this transport (its cable), and the bridge is not open to everyone.
   BridgeGuard(const std::vector<Key>& keys, bool trusted);
 
   void on_board_datagram(const Datagram& datagram, MessageKind kind, Time now);
   // The board's transport is down. It may lead to another board when it comes back.
   void on_board_gone() { heard_ = false; }
 
-  // Judges a heartbeat or a command.
   Verdict judge(const Datagram& datagram, Time now);
   // Counts a verdict other than authentic. True if it may be answered.
   bool may_answer(Verdict verdict);

@@ -39,11 +39,11 @@ DisarmCause cause_of(const Board& board, const LoopOptions& options) {
   return options.arming == Arming::off ? DisarmCause::none : board.disarmed_by();
 }
 
-// Leaves the outputs as `rest` has them, or safe. Returns the end of the report's `why`.
+// Sets the outputs to `rest`, or makes the board safe. Returns the end of the report's `why`.
 std::string come_to_rest(Board& board, const LoopOptions& options, bool& at_rest) {
   at_rest = true;
   const auto is_safe = [&] { return cause_of(board, options) != DisarmCause::none; };
-  // A disarmed board's outputs are safe already, and nothing would be sent to it.
+  // A disarmed board's outputs are already safe, and no command would be sent to it.
   if (is_safe() && board.disarmed_by() != DisarmCause::not_yet) return {};
   try {
     board.send(options.rest, options.rest_timeout);
@@ -99,7 +99,7 @@ LoopReport run_loop(Board& board, const LoopOptions& options,
         }
         ++report.steps;
         guard.on_commanded(*wanted);
-        // A refused post needs no repeat: the next one is newer, and the guard sees the reason.
+        // A refused post needs no repeat: the next post is newer, and the guard sees the reason.
         if (!wanted->empty()) static_cast<void>(board.post(*wanted));
       } catch (...) {
         thrown = std::current_exception();

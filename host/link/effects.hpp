@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The effects of a call to a session, in order: datagrams to send, then events to report. The
-// session itself calls nothing outside.
+// The effects of a call to a session, in order: datagrams to send, then events to report.
 #pragma once
 
 #include <array>
@@ -31,7 +30,6 @@ struct Sending {
   std::string_view datagram;
 };
 
-// A newer state of the board has come, or a heartbeat.
 struct StateCame {};
 struct HeartbeatCame {};
 struct BoardIdentified {
@@ -51,18 +49,17 @@ struct CommandEnded {
   Ticket ticket = 0;
   CommandResult result;
 };
-// The board has restarted since its last datagram, and kept nothing but its stored settings.
-// Reported before its new state.
+// The board has restarted and kept only its stored settings. Reported before its new state.
 struct BoardRestarted {};
 // The session was armed (cause none) or disarmed.
 struct ArmingChanged {
   DisarmCause cause = DisarmCause::none;
 };
-// The board refused a command that was posted.
+// The board refused a posted command.
 struct PostRefused {
   RefusedPost refused;
 };
-// Views in an event point into the datagram received last, and are valid as long as its bytes.
+// Views in an event point into the newest datagram, and are valid as long as its bytes.
 using SessionEvent =
     std::variant<StateCame, HeartbeatCame, BoardIdentified, CommandRefused, BadDatagramCame,
                  LinkChanged, CommandEnded, BoardRestarted, ArmingChanged, PostRefused>;
@@ -70,7 +67,6 @@ using SessionEvent =
 // Memory is reused: in the steady state nothing is allocated.
 class Effects {
  public:
-  // Space for one datagram.
   using Room = std::array<char, max_datagram>;
 
   void send(std::size_t path, Priority priority, CommandKind kind, std::uint32_t pnum,
@@ -78,12 +74,12 @@ class Effects {
     sendings_.push({{path, priority, kind, pnum, {}}, bytes_.size(), datagram.size()});
     bytes_ += datagram;
   }
-  // The datagram received last. The events are about it.
+  // The newest datagram, which the events are about.
   Datagram& datagram() { return datagram_; }
   void report(const SessionEvent& event) { events_.push(event); }
 
   bool any_sendings() const { return sendings_.any(); }
-  // The oldest. Its datagram is copied to `room`, because the session may add more while a
+  // Takes the oldest. Its datagram is copied to `room`, because the session may add more while a
   // transport sends it.
   Sending take_sending(Room& room) {
     Stored first = sendings_.take();
@@ -96,7 +92,6 @@ class Effects {
   SessionEvent take_event() { return events_.take(); }
 
  private:
-  // First in, first out.
   template <class Item>
   class Queue {
    public:
