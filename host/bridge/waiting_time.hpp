@@ -2,8 +2,8 @@
 // The longest time that a datagram may have waited to be read.
 //
 // Carriers do not report when a datagram came. But a datagram read now came after the input was
-// last empty: when the carrier said so, or one tick ago, because each tick reads everything that
-// waits. A process that was stopped (Ctrl-Z), or got no processor, misses ticks.
+// last empty: when the carrier said so, or one tick ago, because everything that waits at one tick
+// is read before the next. A process that was stopped (Ctrl-Z), or got no processor, misses ticks.
 #pragma once
 
 #include <algorithm>
