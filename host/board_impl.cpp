@@ -16,7 +16,6 @@ namespace r4 {
 
 namespace {
 
-// Throws an error that explains why `what` was not confirmed.
 template <class What, class Part>
 Part confirmed(const What& what, Part part) {
   if (part->result.outcome == Outcome::confirmed) return part;
@@ -103,8 +102,6 @@ void Board::Impl::keep(std::unique_ptr<Recording> own) {
   const std::lock_guard lock(keeping);
   recording.swap(own);
 }
-
-// --- on the loop
 
 void Board::Impl::listen() {
   async.on_state([this](const ReceivedState& fresh, const Datagram&) {
@@ -221,8 +218,6 @@ void Board::Impl::shut() {
   look_timer.cancel();
   async.async_close(farewell_limit, [this](const CommandResult&) { end_loop(); });
 }
-
-// --- on any thread
 
 void Board::Impl::require_control(std::string_view what) {
   const std::lock_guard lock(mutex);

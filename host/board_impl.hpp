@@ -35,8 +35,7 @@ namespace r4 {
 struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
   using CarriersMaker = std::function<std::vector<std::unique_ptr<Carrier>>(Loop& loop)>;
   Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first);
-  // Returns with running threads. Throws Error, also if the system has no thread or descriptor
-  // left.
+  // Returns with running threads. Throws Error, also if the system has no thread or descriptor.
   static std::shared_ptr<Impl> started(const CarriersMaker& make, BoardOptions options,
                                        BoardCallbacks first);
   void start();
@@ -52,8 +51,7 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   std::shared_ptr<const Part> execute(const Command& command, Duration timeout);
   void execute(const Setpoints& setpoints, Duration timeout);
   void execute(const std::string& request, Start start, Duration timeout);
-  // The same, but the caller judges the outcome. Throws if the outcome is unknown or the board
-  // closed.
+  // The same, but the caller judges the outcome. Throws if it is unknown or the board is closed.
   std::shared_ptr<const Part> run(const std::string& text, Start start, Duration timeout,
                                   bool stop = false);
   PostResult post(const Command& command);
@@ -116,9 +114,8 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   std::mutex keeping;  // guards `recording`
   std::unique_ptr<Recording> recording;
 
-  // Used on the loop only.
   asio::steady_timer look_timer{io};
-  bool held_for_callback = false;  // the heartbeats
+  bool held_for_callback = false;
 
   // Shared by all threads, under the lock. A change of the state or the link is news.
   std::string name;  // of the transports
@@ -131,7 +128,7 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
     UartStream stream;
     UartData to_read;
     UartData to_report;
-    bool reports = false;  // a callback has been added
+    bool reports = false;
   };
   UartInbox uarts[uart_channels];
   LinkStatus link;

@@ -83,7 +83,6 @@ void CallbackThread::run() {
   }
 }
 
-// Waits for the next notice or task. False at the end.
 bool CallbackThread::take(Notice& notice, std::function<void()>& task) {
   std::unique_lock lock(mutex_);
   news_.wait(lock, [&] { return ended_ || told_ > taken_ || !tasks_.empty(); });

@@ -56,13 +56,12 @@ class CallbackThread {
 
   // `take` takes the waiting bytes. Call this before start().
   void take_uart(std::function<Board::UartData(int channel)> take) { take_uart_ = std::move(take); }
-  // Keeps `owner` until the thread ends.
   void start(std::shared_ptr<void> owner);
   // After this returns, no callback runs except the caller, and none is called again.
   void stop();
 
   void notify(Notice notice);
-  // How long the present callback has run; no value if no callback runs.
+  // No value if no callback runs.
   std::optional<Clock::duration> busy_for() const;
 
   // Adds a callback, which is called with the newest notice, if any, and with each new notice.
@@ -87,7 +86,7 @@ class CallbackThread {
 
   template <class Kind>
   Subscription add(Subscribers<Kind>& callbacks, std::function<void(const Kind&)> callback) {
-    if (!callback) return {};  // as Subscribers::add()
+    if (!callback) return {};
     const auto one = std::make_shared<typename Subscribers<Kind>::One>(std::move(callback));
     {
       const std::lock_guard lock(mutex_);
@@ -111,13 +110,11 @@ class CallbackThread {
       if (!ended_) one(news);
     });
   }
-  // Calls a new callback with the newest notice, if any.
   void call_first(Subscribers<ReceivedState>::One& one);
   void call_first(Subscribers<LinkStatus>::One& one) { one(link_); }
   void call_first(Subscribers<CarrierEvent>::One& one);
   void call_first(Subscribers<DisarmCause>::One& one) { one(arming_); }
   void call_first(Subscriber&) {}
-  // Keeps what call_first() needs.
   void keep(const Restart&) { state_ = ReceivedState(); }
   void keep(const ReceivedState& state) { state_ = state; }
   void keep(const LinkStatus& link) { link_ = link; }

@@ -340,7 +340,6 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
   return words;
 }
 
-// The results of the other commands of a group.
 std::string group_words(std::size_t size, const CommandResult& result) {
   if (size == 1) return "";
   if (result.executed != 0) {

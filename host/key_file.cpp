@@ -29,7 +29,6 @@ Error cannot_be_read(const std::string& path, int error) {
   return {denied ? ErrorKind::permission : ErrorKind::open, path, std::strerror(error), fix};
 }
 
-// Reads at most a little more than the length of a key.
 std::string contents(const FileDescriptor& file, const std::string& path) {
   std::array<char, 2 * key_text_size> buffer;
   std::string text;

@@ -25,8 +25,7 @@ class PostBox {
   static constexpr std::size_t capacity = 256;
   using Letter = CommandOrGroup;
 
-  // `deliver` is called on the loop, once for each command or group. The loop must end before the
-  // box.
+  // `deliver` is called on the loop for each command or group. The loop must end before the box.
   PostBox(asio::io_context& io, std::function<void(const Letter&)> deliver)
       : io_(io), deliver_(std::move(deliver)) {
     waiting_.reserve(capacity);
@@ -36,7 +35,6 @@ class PostBox {
   // From any thread. False if the box is full. A stop is never refused, and is delivered first.
   bool put(const Command& command) {
     const std::lock_guard lock(mutex_);
-    // A stop cancels earlier commands.
     if (command.kind == CommandKind::stop) waiting_.clear();
     return add(OwnCommand(command));
   }

@@ -23,7 +23,6 @@ namespace r4 {
 
 class States::Queue {
  public:
-  // `on_wait`: see BoardOptions.
   Queue(StatesOptions options, std::function<void()> on_wait)
       : lossless_(options.lossless),
         most_(options.most != 0  ? options.most

@@ -15,7 +15,6 @@
 
 namespace r4 {
 
-// A callback, as its Subscription sees it.
 class Subscriber {
  public:
   virtual ~Subscriber() = default;
@@ -50,8 +49,7 @@ class Subscribers {
    public:
     explicit One(Function function) : function_(std::make_shared<Function>(std::move(function))) {}
     void operator()(const Arguments&... arguments) {
-      // Keeps the captures until the call is over, even if the callback ends itself. Destroyed
-      // without the lock.
+      // Keeps the captures until the call is over, and is destroyed without the lock.
       std::shared_ptr<Function> called;
       const std::lock_guard lock(running_);
       if (ended()) return;

@@ -40,8 +40,7 @@ std::optional<Peer> BridgeAudience::asker_of(std::optional<std::uint32_t> pnum, 
   return newest->from;
 }
 
-// A new peer takes a free place, or the place of the peer that was silent longest, but never the
-// place of a watcher.
+// A new peer takes a free place, or that of the longest silent peer other than a watcher.
 BridgeAudience::Place& BridgeAudience::place_of(Peer peer, Time now) {
   Place* best = nullptr;
   for (Place& place : places_) {

@@ -34,13 +34,11 @@ class BridgeAudience {
   Effect on_lease(Peer from, bool ends, std::uint64_t echo, Time now);
   std::uint32_t new_token(Peer to, Time now);
 
-  // That peer hears the board's heartbeats for a while.
   void listen(Peer from, Time now) { place_of(from, now).listens_until = now + curiosity; }
 
   // The peer sent the board a datagram with that number, if any, and that session.
   void on_question(Peer from, std::optional<std::uint32_t> pnum, SessionId sid, Time now);
-  // The peer that last sent such a datagram. An answer to a session goes only to a peer that named
-  // its id.
+  // An answer to a session goes only to a peer that named its id.
   std::optional<Peer> asker_of(std::optional<std::uint32_t> pnum, SessionId sid, Time now) const;
 
   template <class Call>
@@ -68,9 +66,9 @@ class BridgeAudience {
  private:
   struct Place {
     Peer peer = everyone;
-    Time heard;               // Time(): the place is free
-    std::uint32_t token = 0;  // 0: none
-    Time told;                // when the token was sent
+    Time heard;  // Time(): the place is free
+    std::uint32_t token = 0;
+    Time told;  // when the token was sent
     Time watches_until;
     Time listens_until;
   };

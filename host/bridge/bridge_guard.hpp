@@ -26,7 +26,6 @@ class BridgeGuard {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  // Why no datagram passes that needs a signature.
   enum class Trouble : std::uint8_t {
     none,
     board_has_no_key,  // and the bridge has one
@@ -52,8 +51,8 @@ class BridgeGuard {
 
   Authentication authentication_;
   const bool trusted_;
-  bool heard_ = false;  // a heartbeat of the board has come
-  bool asks_ = false;   // its newest heartbeat asks for signatures
+  bool heard_ = false;
+  bool asks_ = false;  // its newest heartbeat asks for signatures
   bool has_clock_ = false;
   std::uint32_t t_ms_ = 0;  // the board's clock at told_
   Time told_;

@@ -41,7 +41,6 @@ class BridgeHosts {
   // The board must have lost a silent paper host before another paper host passes.
   static constexpr std::chrono::milliseconds paper_margin{500};
 
-  // `timeout`: the board's.
   explicit BridgeHosts(std::chrono::milliseconds timeout);
 
   // `judged`: the board begins or feeds a session by that heartbeat, or answers BUSY. False if it
@@ -50,7 +49,7 @@ class BridgeHosts {
   void on_busy(SessionId sid, Time now);
   // The board reports that it has no host, so it refuses none.
   void on_board_free();
-  // Lets time pass. True if served() has changed.
+  // True if served() has changed.
   bool poll(Time now);
 
   // The peers of the served hosts as of the last poll(), each peer once.
@@ -64,7 +63,6 @@ class BridgeHosts {
   bool serves(SessionId sid, Time now) const;
   // The number of the first heartbeat of this host that passed, or passed after a silence.
   std::optional<std::uint32_t> first_heartbeat(Peer from, SessionId sid) const;
-  // Calls `call(peer)` for each path of that session if it is served.
   template <class Call>
   void for_each_path(SessionId sid, Time now, Call call) const {
     for (const Host& host : hosts_) {

@@ -34,7 +34,6 @@ class BridgeWatch {
     asked_ = true;
     return write_lease(writer, wish_.empty() ? idle_wish : std::string_view(wish_));
   }
-  // True if there may be a lease to end, by write_end().
   bool asked() const { return asked_; }
   Text write_end(DatagramWriter& writer) {
     asked_ = false;

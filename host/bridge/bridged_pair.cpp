@@ -214,8 +214,7 @@ void BridgedPair::follow_hosts(Time now) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   const Text farewell = watch_.write_end(writer);
-  // The board streams to the served host without a lease. On a bus other programs may also watch,
-  // so there the lease runs out.
+  // The board streams to the served host without a lease. On a bus, other programs may watch.
   if (!board_.carrier->is_shared()) send(board_, view(farewell), Priority::normal, everyone);
 }
 
@@ -364,8 +363,7 @@ void BridgedPair::report_trouble() {
   on_event_(BridgeSide::board, {CarrierEvent::Kind::warning, problem});
 }
 
-// Answers for the board, with its newest packet number and time. `session`: as in the board's
-// refusal.
+// Answers for the board. `session`: as in the board's refusal.
 void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to,
                          Time now, std::optional<std::uint32_t> session) {
   if (!asked.has_pnum() || !board_known_ || now - board_heard_ > clock_lifetime) return;

@@ -54,7 +54,6 @@ class BridgedPair {
  public:
   using Time = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::milliseconds oldest{100};
-  // The time between attempts to open a side.
   static constexpr std::chrono::milliseconds try_again{500};
 
   struct Setup {
@@ -94,7 +93,7 @@ class BridgedPair {
     BridgedPair& pair;
     const BridgeSide which;
     const std::unique_ptr<Carrier> carrier;
-    BoardEnd& end;  // of the carrier
+    BoardEnd& end;
     bool opened = false;
     std::string obstacle;  // why it could not be opened, as last reported
     Time tried;
@@ -122,8 +121,7 @@ class BridgedPair {
   void pass_on(const Datagram& datagram, Peer from, bool trusted, Time now);
   bool send(Side& to, std::string_view bytes, Priority priority, Peer peer);
   bool is_old(Side& side, Time now);
-  // The treatment of a side that cannot be opened. Only an absence, such as of an unplugged device,
-  // may end by itself.
+  // Only an absence, such as of an unplugged device, may end by itself.
   enum class Failure : std::uint8_t { throws, throws_unless_absent, is_reported };
   void try_to_open(Side& side, Failure failure, Time now);
 

@@ -32,7 +32,6 @@ class WaitingTime {
     empty_ = std::max(empty_, tick_);
     tick_ = now;
   }
-  // For a datagram that is read now.
   std::chrono::steady_clock::duration at_most(Time now) const { return now - empty_; }
 
  private:

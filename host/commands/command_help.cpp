@@ -35,8 +35,7 @@ std::string form_with_ranges(const CommandHelp& command) {
   return command.form + (command.ranges.empty() ? "" : " with " + command.ranges);
 }
 
-// The form and ranges of the command that `text` begins with, or the forms of all commands with its
-// letter. Empty if there are none.
+// The forms of the command that `text` begins with, or of all commands with its letter.
 std::string forms_like(std::string_view text) {
   std::string forms;
   if (text.empty() || (text.size() > 1 && text[1] != ':')) return forms;

@@ -74,9 +74,8 @@ void CommandsUnderWay::on_heartbeat(const SafeReport& report, std::optional<std:
   }
 }
 
-// True if a heartbeat with that T was sent after the farewell. A state of the same millisecond may
-// have come earlier. On a slow network the board's clock has a large error, so T must be certainly
-// later.
+// True if T is from after the farewell. A state of the same millisecond may be older. On a slow
+// network the board's clock has a large error, so only a certainly later T counts.
 bool CommandsUnderWay::is_after_farewell(std::uint32_t t_ms) const {
   constexpr Time fast{5000};
   constexpr Time tick{1000};  // the board shows one T for this long

@@ -53,8 +53,7 @@ CommandsUnderWay::Pending* CommandsUnderWay::allocate(const Command& command, Ti
   return slot;
 }
 
-// Gives an E:CLEAR without a named cause the present cause. False before the board's first
-// heartbeat.
+// Gives an E:CLEAR without a named cause the present cause. False before the first heartbeat.
 bool CommandsUnderWay::name_cause(Pending& pending) const {
   if (pending.cause == Command::unnamed_cause) pending.cause = cause_;
   if (pending.cause == Command::unnamed_cause) return false;
@@ -100,7 +99,7 @@ Ticket CommandsUnderWay::send_at_once(const Command& command, Time timeout, Time
 }
 
 Ticket CommandsUnderWay::stop(Time timeout, Time now) {
-  forget_stop();  // the new stop is repeated instead
+  forget_stop();
   ++counts_.commands;
   const Ticket ticket = send_at_once(Command::stop(), timeout, now);
   if (ticket == 0) outbox_.send(Command::stop(), {}, now);
@@ -123,7 +122,6 @@ bool CommandsUnderWay::send_step(const Command& command, Time now) {
   return true;
 }
 
-// The first sending takes a new number. Later sendings have the same bytes.
 void CommandsUnderWay::transmit(Pending& pending, Time now) {
   if (pending.stage == Stage::queued) {
     if (pending.is_group()) write_group(pending);

@@ -50,7 +50,6 @@ class CommandsUnderWay {
   static constexpr std::size_t max_pending = 64;
   static constexpr std::size_t max_stops = 16;
 
-  // All references outlive this.
   CommandsUnderWay(const SessionOptions& options, HostLink& link, LinkKeeper& keeper,
                    Outbox& outbox, HeardBoard& board, const ArmRequests& arming, CommandEnds& ends,
                    Statistics& counts);
@@ -61,7 +60,6 @@ class CommandsUnderWay {
   Ticket send(const Command& command, Time timeout, Time now);
   Ticket send(const Setpoints& group, Time timeout, Time now);
   Ticket leave(Time timeout, Time now);
-  // For a request that is not a command itself.
   Ticket take_ticket() { return next_ticket_++; }
   // Gives up a command, which the board may have executed. A stop continues.
   void cancel(Ticket ticket, Time now);
@@ -69,7 +67,6 @@ class CommandsUnderWay {
   void end_all_but_stops(Outcome outcome, Time now);
   void give_up(Time now);
   void end_all(Time now);
-  // Ends the repetition of a confirmed stop.
   void forget_stop();
 
   // --- a step of arm(). At most one is under way.
@@ -80,7 +77,6 @@ class CommandsUnderWay {
     CommandKind kind;
     CommandResult result;
   };
-  // The step that has ended since the last call, if any.
   std::optional<StepEnd> take_step_end() { return std::exchange(step_end_, {}); }
   // True if arm() has to wait: for a step, for a stop, or for an earlier E:CLEAR.
   bool delays_arming();
@@ -99,11 +95,9 @@ class CommandsUnderWay {
 
   void on_state(Time now);
   void on_heartbeat(const SafeReport& report, std::optional<std::uint32_t> t_ms, Time now);
-  // The board reports the stop that it has obeyed.
   void on_stop(const SafeReport& report, Time now);
   void on_identity(const Identity& identity, Time now);
-  // `proof`: the refusal proves that the command was not executed. `others`: other paths carry
-  // duplicates of the command.
+  // `proof`: the command was not executed. `others`: other paths carry duplicates of the command.
   void on_refusal(const Nack& nack, bool proof, bool others, Time now);
   // True if the command with that number is a setting that the board takes over a cable only.
   bool is_cable_only(std::uint32_t pnum);
@@ -114,8 +108,7 @@ class CommandsUnderWay {
   bool is_group_ahead();
   // True if it is known whether the board executes groups. Otherwise the board is asked.
   bool knows_groups(Time now);
-  // The number of the newest cause that only E:CLEAR ends; 0 without such a cause;
-  // Command::unnamed_cause before the first heartbeat.
+  // The newest cause that only E:CLEAR ends; 0: none; unnamed_cause before the first heartbeat.
   std::int32_t cause() const { return cause_; }
   bool is_held_back(CommandKind kind) const { return drives_output(kind) && !arming_.may_drive(); }
 

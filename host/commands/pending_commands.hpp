@@ -31,8 +31,8 @@ namespace r4 {
 // these states in turn: each is queued when its predecessor is confirmed.
 struct PendingCommand {
   enum class Stage : std::uint8_t {
-    free,       // a slot without a command
-    queued,     // not sent yet
+    free,
+    queued,
     sent,       // and repeated
     overtaken,  // CMD is past it: the answer to a retry decides
     executed,   // the board answered DUPLICATE
@@ -55,12 +55,10 @@ struct PendingCommand {
   std::uint8_t failed = 0;
   std::array<char, max_datagram> bytes;
 
-  // True if it was sent and has not ended.
   bool is_out() const {
     return stage != Stage::free && stage != Stage::queued && stage != Stage::lingering;
   }
   bool is_group() const { return !group.empty(); }
-  // True if more commands of a group follow, one after the other.
   bool has_more() const { return step != 0 && step < group.size(); }
 };
 
@@ -68,14 +66,13 @@ class PendingCommands {
  public:
   static constexpr std::size_t max_slots = 128;
 
-  // At most max_slots together. Stops have their own slots, so that commands cannot keep a stop
-  // out.
+  // At most max_slots together. Stops have their own slots, so commands cannot keep a stop out.
   PendingCommands(std::size_t commands, std::size_t stops)
       : slots_(commands + stops), commands_(commands), stops_(stops) {
     slots_[0] = std::make_unique<PendingCommand>();
   }
 
-  // A fresh slot, the last in the order; nullptr if all are taken.
+  // Returns nullptr if all slots are taken.
   PendingCommand* add(CommandKind kind) {
     std::size_t& room = room_for(kind);
     if (room == 0) return nullptr;

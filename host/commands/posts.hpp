@@ -23,10 +23,9 @@ class Posts {
   PostResult send(const Command& command, Time now);
   PostResult send(const Setpoints& group, Time now);
   void on_sent(const Sending& sending, SendResult result) { delivery_.on_sent(sending, result); }
-  // The result of the last post, after its effects have been performed.
+  // After the effects of the last post have been performed.
   PostResult result();
   bool is_clear() const { return kind_ == CommandKind::clear; }
-  // The board has proved that it did not execute that command.
   void on_refusal(const Nack& nack);
 
  private:

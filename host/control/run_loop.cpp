@@ -14,7 +14,6 @@ using Milliseconds = std::chrono::milliseconds;
 constexpr std::size_t waiting_states = 8;  // a state may come in several datagrams
 constexpr Milliseconds look_interval{20};  // between checks of link and arming without a state
 
-// The board's watchdog, on while the loop runs.
 class StepWatchdog {
  public:
   StepWatchdog(Board& board, Milliseconds period) : board_(board), on_(period.count() > 0) {

@@ -38,7 +38,6 @@ struct Fleet::Impl final : BlockingLoop {
   // explain() for the part of a board that was not confirmed.
   using Why =
       std::function<Problem(std::size_t part, const CommandResult& result, const LinkStatus& link)>;
-  // Starts a part at each board, and waits until all have ended.
   FleetResults execute(std::string text, const Boards& which, Duration timeout, Start start,
                        const Why& why, bool stop = false);
   // Also throws if the fleet is closed.
@@ -62,15 +61,14 @@ struct Fleet::Impl final : BlockingLoop {
   std::vector<std::string> urls;
   Boards all_boards;
   std::vector<std::unique_ptr<AsyncBoard>> boards;
-  std::size_t leaving = 0;  // boards whose farewell has not ended
+  std::size_t leaving = 0;
 
   // Shared by all threads, under the lock.
-  std::vector<LinkStatus> links;  // of each board
+  std::vector<LinkStatus> links;
   std::deque<FleetEvent> events;
   std::uint64_t missed_events = 0;
 };
 
-// All boards get the same request.
 template <class What>
 auto why_of(const What& what) {
   return [&what](std::size_t, const CommandResult& result, const LinkStatus& link) {

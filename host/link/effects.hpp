@@ -21,7 +21,6 @@ namespace r4 {
 // Names a command that a session took; never 0.
 using Ticket = std::uint64_t;
 
-// A datagram for one path.
 struct Sending {
   std::size_t path = 0;
   Priority priority = Priority::normal;
@@ -55,7 +54,6 @@ struct BoardRestarted {};
 struct ArmingChanged {
   DisarmCause cause = DisarmCause::none;
 };
-// The board refused a posted command.
 struct PostRefused {
   RefusedPost refused;
 };
@@ -79,8 +77,7 @@ class Effects {
   void report(const SessionEvent& event) { events_.push(event); }
 
   bool any_sendings() const { return sendings_.any(); }
-  // Takes the oldest. Its datagram is copied to `room`, because the session may add more while a
-  // transport sends it.
+  // The datagram is copied to `room`, because the session may add more while a transport sends it.
   Sending take_sending(Room& room) {
     Stored first = sendings_.take();
     bytes_.copy(room.data(), first.size, first.begin);
@@ -113,12 +110,12 @@ class Effects {
 
   struct Stored {
     Sending sending;
-    std::size_t begin = 0;  // of its datagram, in bytes_
+    std::size_t begin = 0;  // in bytes_
     std::size_t size = 0;
   };
 
   Queue<Stored> sendings_;
-  std::string bytes_;  // of the datagrams to be sent
+  std::string bytes_;
   Queue<SessionEvent> events_;
   Datagram datagram_;
 };

@@ -26,7 +26,6 @@ class FieldSelection {
  public:
   enum class Stage : std::uint8_t { left, satisfied, asking, unheard };
 
-  // `fields` as in F; empty: the board keeps its own choice.
   explicit FieldSelection(std::string fields) : fields_(std::move(fields)) {
     if (fields_.empty()) stage_ = Stage::left;
   }
@@ -38,10 +37,8 @@ class FieldSelection {
     if (stage_ == Stage::unheard) stage_ = Stage::asking;
   }
 
-  // A session begins, so the board is asked as soon as possible.
   void begin_anew() { next_ = Time{0}; }
 
-  // A state with CMD.
   void on_cmd(Time now) {
     cmd_seen_ = now;
     on_answer();

@@ -48,7 +48,6 @@ class GroupSupport {
     state_ = State::apart;
     return false;
   }
-  // When ask() may be true next, in the state `unknown`.
   Time next() const { return next_; }
 
  private:

@@ -25,7 +25,6 @@ class HostKey {
 
   void on_heartbeat(const Datagram& heartbeat);
   void on_board_time(std::uint32_t t_ms, Time now);
-  // The board has a host: this host or another.
   void on_host_seen(Time now) {
     in_vain_ = 0;
     host_seen_ = now;
@@ -59,7 +58,7 @@ class HostKey {
 
   std::optional<Signer> signer_;
   Time clock_start_;
-  bool heard_ = false;      // a heartbeat has come
+  bool heard_ = false;
   bool asked_for_ = false;  // the newest heartbeat asks for signatures
   int in_vain_ = 0;         // heartbeats sent since the board last had a host
   std::optional<Time> host_seen_;

@@ -65,7 +65,6 @@ void LinkKeeper::keep_alive(Time now) {
   watches() ? send_lease(now) : send_heartbeat(now);
 }
 
-// Each path has its own lease, with its own T to echo.
 void LinkKeeper::send_lease(Time now) {
   const bool others = options_.fields != "DEFAULT";
   const Text list = others ? Text(options_.fields.data(), options_.fields.size()) : Text();

@@ -27,7 +27,6 @@ namespace r4 {
 
 class LinkKeeper {
  public:
-  // All references outlive the keeper.
   LinkKeeper(const SessionOptions& options, HostLink& link, HostKey& key, Paths& paths,
              Outbox& outbox, Statistics& counts);
 
@@ -42,7 +41,6 @@ class LinkKeeper {
   void on_busy(std::size_t path, std::optional<std::uint32_t> t_ms, Time now);
   // A state of the board's time `t_ms` names a command of this session.
   void on_own_command(std::uint32_t t_ms, Time now);
-  // For answers and confirmations of the board.
   FieldSelection& fields() { return fields_; }
 
   // --- actions that are due
@@ -56,7 +54,6 @@ class LinkKeeper {
   Time next(Time now) const;
   // Ends the link: the keeper sends nothing more.
   void leave(Time now);
-  // A new session begins, in the outbox's role.
   void begin_anew();
   // Holds heartbeats and commands back until it is called with false.
   void hold(bool held);

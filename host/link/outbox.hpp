@@ -64,13 +64,11 @@ class Outbox {
   BoardRole role_;
 };
 
-// Whether any path has taken a datagram.
 class Delivery {
  public:
   void begin(Outbox::Sent sent);
   // True if the result is for this datagram.
   bool on_sent(const Sending& sending, SendResult result);
-  // True if every path has answered, and none has taken the datagram.
   bool failed() const { return open_ == 0 && result_ != SendResult::sent; }
   // `sent` once a path has taken it; before that, the first path's answer.
   SendResult result() const { return result_; }
@@ -78,7 +76,7 @@ class Delivery {
 
  private:
   std::uint32_t pnum_ = 0;
-  int open_ = 0;  // paths that have not answered yet
+  int open_ = 0;
   SendResult result_ = SendResult::down;
 };
 

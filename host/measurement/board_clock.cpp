@@ -31,7 +31,6 @@ void BoardClock::limit(Side& side, std::uint32_t t_ms, Time host, Time margin) {
   limit(side, t_ms, host, margin);
 }
 
-// False if the limit contradicts the earlier limits.
 bool BoardClock::place(Side& side, std::uint32_t t_ms, Time host, Time margin) {
   Limit fresh;
   fresh.at = since_first(t_ms);
@@ -68,7 +67,6 @@ void BoardClock::Slopes::narrow(const Limit& upper, const Limit& lower) {
   }
 }
 
-// Compares the limits of that second with its own and with those of earlier seconds.
 void BoardClock::take_slopes(std::int64_t second) {
   const Limit& upper = upper_.limits[slot_of(second)];
   const Limit& lower = lower_.limits[slot_of(second)];

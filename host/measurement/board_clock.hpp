@@ -56,8 +56,7 @@ class BoardClock {
   static constexpr std::int64_t none = INT64_MIN;
   static constexpr int seconds = 64;
 
-  // The limits from one side. The lower side negates each offset, so one algorithm serves both
-  // sides.
+  // The lower side negates each offset, so one algorithm serves both sides.
   struct Side {
     std::array<Limit, seconds> limits;
     // The tightest limit at present. Later it is looser by the drift.
@@ -87,7 +86,6 @@ class BoardClock {
   // A side's limit at that time of the board: by the front, and by all its limits.
   double highest(const Side& side, double at) const;
   double highest_of_all(const Side& side, double at) const;
-  // The limit of one side at `later` microseconds after `limit`.
   double moved(const Side& side, const Limit& limit, double later) const;
 
   bool any_ = false;
@@ -97,7 +95,6 @@ class BoardClock {
   Time first_{0};
   Side upper_, lower_;
   std::array<Slopes, seconds> slopes_;
-  // The range of the offset's slope.
   double slowest_ = -most_drift;
   double fastest_ = most_drift;
 };

@@ -30,7 +30,7 @@ class IdentityQuestion {
   }
   // Returns when the answered question was first sent; no value if none is open.
   std::optional<Time> answered(const Identity& identity) {
-    for (std::size_t i = 1; i <= open_.size(); ++i) {  // from the newest
+    for (std::size_t i = 1; i <= open_.size(); ++i) {
       Asked& asked = open_[(count_ - i) % open_.size()];
       if (!asked.open || (identity.has_asked && identity.asked != asked.pnum)) continue;
       const Time at = asked.at;

@@ -35,7 +35,6 @@ class Lease {
     next_ = now + (hopeless ? reminder : renewal);
   }
   void renew(Time now) { next_ = now; }
-  // The T for the next W.
   std::uint32_t echo() const { return echo_; }
 
   void on_state(Time now) {
@@ -51,9 +50,7 @@ class Lease {
       state_ = nack.code == Refusal::busy ? State::full : State::unknown;
     }
   }
-  // True if states come.
   bool streaming(Time now) const { return state_ == State::watching && now - heard_ < silence; }
-  // Why the board does not stream to this watcher.
   std::optional<LinkCause> cause(Time now) const {
     if (streaming(now)) return std::nullopt;
     if (state_ == State::full) return LinkCause::watchers_full;
@@ -72,18 +69,15 @@ class Lease {
   std::uint32_t echo_ = 0;
 };
 
-// The leases of a session, one for each path.
 class Leases {
  public:
   explicit Leases(std::size_t paths) : leases_(paths) {}
 
   Lease& operator[](std::size_t path) { return leases_[path]; }
-  // True if states come on any path.
   bool streaming(Time now) const {
     return std::any_of(leases_.begin(), leases_.end(),
                        [now](const Lease& lease) { return lease.streaming(now); });
   }
-  // The causes of all leases; none if states come on any path.
   LinkCauses causes(Time now) const {
     LinkCauses all;
     if (streaming(now)) return all;
@@ -92,7 +86,6 @@ class Leases {
     }
     return all;
   }
-  // When the first lease of `paths` is due.
   Time next(std::uint8_t paths) const {
     Time next = Time::max();
     for (std::size_t i = 0; i < leases_.size(); ++i) {

@@ -12,7 +12,6 @@
 
 namespace r4 {
 
-// Bit i is the path i.
 using PathSet = std::uint8_t;
 constexpr PathSet path_bit(std::size_t index) { return static_cast<PathSet>(1U << index); }
 
@@ -49,7 +48,6 @@ class PathClock {
   std::uint32_t at_ms_ = 0;
 };
 
-// The questions Q:ID on a path.
 struct PathQuestions {
   IdentityQuestion open;
   bool answered = false;  // since the transport came up
@@ -60,7 +58,6 @@ struct PathQuestions {
   Time round_trip{0};
 };
 
-// BUSY on a path.
 struct PathBusy {
   Time until{0};
   // The T of the board's newest BUSY; no value if this program's transport heard another host.
@@ -70,8 +67,8 @@ struct PathBusy {
 struct Path {
   bool up = false;
   bool can_ask = true;
-  bool known = false;       // leads to the session's board
-  bool other = false;       // leads to another board
+  bool known = false;
+  bool other = false;
   bool connecting = false;  // its last heartbeat had `PNum:0`
   std::uint32_t boot = 0;
   PathClock clock;

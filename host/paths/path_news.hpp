@@ -50,18 +50,17 @@ class PathNews {
 
   // For the session: `lost` counts datagrams that no path has brought.
   const PacketCounters& counters() const { return counters_; }
-  // For one path.
   const PacketCounters& counters(std::size_t path) const { return paths_[path].tracker.counters(); }
   std::uint64_t copies(std::size_t path) const { return paths_[path].copies; }
 
  private:
   struct Numbers {
     PacketTracker tracker;
-    std::uint32_t pnum = 0;            // of the datagram being handled
-    Arrival arrival = Arrival::first;  // likewise
-    std::uint32_t gap = 0;             // missing numbers before it
-    std::uint32_t others = 0;          // datagrams first on other paths since this path's newest
-    std::uint32_t lost = 0;            // counted as lost because of this path
+    std::uint32_t pnum = 0;  // of the datagram being handled
+    Arrival arrival = Arrival::first;
+    std::uint32_t gap = 0;     // missing numbers before it
+    std::uint32_t others = 0;  // datagrams first on other paths since this path's newest
+    std::uint32_t lost = 0;    // counted as lost because of this path
     std::uint64_t copies = 0;
   };
   // The newest datagram of a kind, and the path that brought it first.

@@ -43,7 +43,6 @@ namespace r4 {
 // More than 40 functions: each fact about one path has a private function.
 class Paths {
  public:
-  // `link`: what the session knows of the board.
   Paths(std::size_t count, LinkTiming timing, const HostLink& link)
       : paths_(count),
         timeout_(std::chrono::milliseconds{timing.timeout_ms}),
@@ -73,7 +72,6 @@ class Paths {
   bool is_known(std::size_t index) const { return paths_[index].known; }
   // The paths on which Q:ID is due.
   PathSet to_ask(Time now) const;
-  // `sent`: the path has taken Q:ID.
   void asked(std::size_t index, std::uint32_t pnum, bool sent, Time now);
   // Lets time pass. True if the session begins.
   bool poll(Time now);
@@ -86,12 +84,10 @@ class Paths {
     restarted,  // admitted, and the board has restarted
     yes,
   };
-  // A state or a heartbeat.
   Admission admit(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, Time now);
   // An answer to this session. `counts`: it is numbered with the states.
   bool admit_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool counts,
                     Time now);
-  // The answer to Q:ID.
   Admission admit_identity(std::size_t index, const Identity& identity, std::uint32_t t_ms,
                            Time now);
   // A heartbeat `PNum:0`, which reports that the board is booting. True if it is believed.
@@ -110,10 +106,8 @@ class Paths {
   void on_own_state(std::uint32_t t_ms, Time now) { own_ = {now, t_ms}; }
   // True if BUSY holds on all paths that carry.
   bool all_busy(Time now) const;
-  // When that ends, unless another BUSY comes.
   Time all_busy_until(Time now) const;
 
-  // A watcher's leases, one for each path.
   Leases& leases() { return leases_; }
   const Leases& leases() const { return leases_; }
 
@@ -125,7 +119,6 @@ class Paths {
   bool two_boards() const {
     return those([](const Path& path) { return path.other; }) != 0;
   }
-  // Everything but the name.
   PathStatus report(std::size_t index, Time now) const;
   const PacketCounters& counters() const { return news_.counters(); }
 
@@ -149,7 +142,6 @@ class Paths {
     return set;
   }
   bool is_only() const { return paths_.size() == 1; }
-  // How late a T may be on a path.
   static std::int32_t late_of(const Path& path) {
     return path.connecting ? PathClock::restart_tolerance_ms : PathClock::tolerance_ms;
   }
@@ -181,7 +173,7 @@ class Paths {
   std::vector<Path> paths_;
   Time timeout_;
   const HostLink& link_;
-  std::optional<std::string> id_;  // the session's board
+  std::optional<std::string> id_;
   bool begun_ = false;
   bool anew_ = true;  // no datagram since all paths were down
   Time first_answer_{0};

@@ -62,21 +62,16 @@ class Session {
 
   // --- events. poll() is needed after each of these.
 
-  // A datagram has come over `path`.
   void receive(std::size_t path, std::string_view bytes, Time now);
   // The transport of a path is up or down; at first each is down. `can_ask`: false if a watcher may
   // not send questions (a bus).
   void on_transport(std::size_t path, bool up, Time now, bool can_ask = true);
-  // The trouble of all transports together.
   void on_trouble(TransportTrouble trouble) { keeper_.on_transport_trouble(trouble); }
   // This computer slept for longer than the board waits for its host, while `now` stood still. A
-  // new, disarmed session begins, every command under way but a stop is cancelled, and
-  // BoardRestarted reports it.
+  // new, disarmed session begins, commands but stops are cancelled, and BoardRestarted reports it.
   void on_sleep(Time now);
 
-  // Performs everything that is due.
   void poll(Time now);
-  // The latest time for the next poll().
   Time next_poll(Time now);
 
   // --- commands. CommandEnded reports the end, at most `timeout` after `now`.
@@ -92,10 +87,9 @@ class Session {
   // Clears the cause of the safe state, if possible, and closes relay 1, the motor supply.
   // Confirmed by the board's state. Output commands that are sent after it wait for it.
   Ticket arm(Time timeout, Time now);
-  // Ends heartbeats and every command under way but stops, and sends the farewell: the outputs are
-  // safe at once, and another host need not wait for the timeout. Confirmed by the board's report.
-  // Returns 0 if no board hears it, or the board knows no farewells. Afterwards only stops are
-  // sent.
+  // Ends heartbeats and all commands but stops, and sends the farewell: the outputs are safe at
+  // once, and another host need not wait for the timeout. Confirmed by the board's report. Returns
+  // 0 if no board hears it, or the board knows no farewells. Afterwards only stops are sent.
   Ticket leave(Time timeout, Time now);
   bool leaving() const { return keeper_.is_leaving(); }
   // The same, but the commands end as cancelled. When the farewell has ended, change_role() may let
@@ -106,7 +100,6 @@ class Session {
   void change_role(BoardRole role, Time now);
   // Gives up a command, which the board may have executed. A stop continues.
   void cancel(Ticket ticket, Time now);
-  // Ends every command under way: the board is closed.
   void end_all(Time now);
 
   // Sends a command once, without waiting for its end. PostRefused reports a refusal. After `sent`,
@@ -115,8 +108,7 @@ class Session {
   // no_link also while it is unknown whether the board executes groups.
   PostResult post(const Setpoints& group, Time now);
   PostResult posted();
-  // True if the board executes no groups, so the commands of a group are posted one after the
-  // other.
+  // True if the board executes no groups: then a group's commands are posted one after the other.
   bool posts_apart() const { return board_.groups().state() == GroupSupport::State::apart; }
 
   // --- gates
@@ -142,13 +134,10 @@ class Session {
   // The requested fields, as in F; empty: the board keeps its own choice.
   const std::string& fields() { return keeper_.fields().fields(); }
   Statistics statistics(Time now) const;
-  // The board's datagrams.
   const PacketCounters& packets() const { return paths_.counters(); }
-  // Everything but the name.
   PathStatus path(std::size_t index, Time now) const { return paths_.report(index, now); }
 
  private:
-  // Each handles one kind of the board's datagrams.
   void on_state(std::size_t path, const Datagram& datagram, Time now);
   void on_heartbeat(std::size_t path, const Datagram& datagram, Time now);
   void on_identity(std::size_t path, const Datagram& datagram, Time now);
@@ -188,8 +177,7 @@ class Session {
 };
 
 // Posts a command or a group. If the board knows no groups, a group's commands go one after the
-// other, up to the first that is not sent. `send_all()` sends the effects' datagrams and may
-// advance `now`.
+// other, up to the first that is not sent. send_all() sends the effects, and may advance `now`.
 template <class What, class SendAll>
 PostResult post_by(Session& session, const What& what, const Time& now, SendAll send_all) {
   if constexpr (std::is_same_v<What, Setpoints>) {

@@ -142,7 +142,7 @@ class BldcChannel(_Channel[Sent]):
     """A brushless motor."""
 
     def set(self, duty: float, *, brake: bool = False, timeout: float = 1.0) -> Sent:
-        """`duty`: -1, full reverse, to 1, full forward. `brake`: True applies the driver's brake."""
+        """`duty`: -1 (full reverse) to 1 (full forward). `brake`: True brakes by the driver."""
         return self._board.send(Command.bldc(self._channel, duty=duty, brake=brake), timeout)
 
     def set_pwm(self, pwm: int, *, direction: int = Direction.FORWARD, brake: bool = False,
@@ -152,7 +152,7 @@ class BldcChannel(_Channel[Sent]):
         return self._board.send(Command.bldc(self._channel, pwm=pwm, direction=direction, brake=brake), timeout)
 
     def post(self, duty: float, *, brake: bool = False) -> PostResult:
-        """`duty`: -1, full reverse, to 1, full forward. `brake`: True applies the driver's brake."""
+        """`duty`: -1 (full reverse) to 1 (full forward). `brake`: True brakes by the driver."""
         return self._board.post(Command.bldc(self._channel, duty=duty, brake=brake))
 
     def post_pwm(self, pwm: int, *, direction: int = Direction.FORWARD, brake: bool = False) -> PostResult:

@@ -225,7 +225,7 @@ class Odometry:
 
 
 class Standstill(NamedTuple):
-    """A motor with an encoder: at `pwm` or more, it turns by more than `counts` within `time`, s."""
+    """A motor with an encoder: at `pwm` or more, it turns by more than `counts` in `time` s."""
     encoder: int = 1
     channel: int = 1
     drive: Literal['osmc', 'dhb12', 'bldc'] = 'osmc'
