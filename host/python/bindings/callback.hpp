@@ -44,8 +44,7 @@ class KeptThreadState {
   std::unique_ptr<py::gil_scoped_acquire> kept_;
 };
 
-// Copied, called and destroyed by any thread; takes the GIL to use the function. sys.unraisablehook
-// reports an exception of the function.
+// Any thread copies, calls and destroys it. sys.unraisablehook reports its exceptions.
 class Callback {
  public:
   struct Held {

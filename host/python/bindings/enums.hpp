@@ -40,8 +40,7 @@ class PythonEnum {
   // text of 255, so the texts show which numbers are enumerators.
   PythonEnum(const char* name, WordOf word_of);
 
-  // A number without an enumerator, as newer firmware may send, is the member of that text. Throws
-  // if there is none.
+  // Newer firmware may send a number without an enumerator: throws if no member has its text.
   pybind11::handle member(std::uint8_t number) const;
   // Takes a member or its text. Throws for anything else.
   std::uint8_t number(pybind11::handle word) const;

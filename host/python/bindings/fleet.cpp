@@ -47,8 +47,7 @@ std::vector<BoardSetpoints> setpoints_of(
   return setpoints;
 }
 
-// By the event's kind: the link, the transport's event, why the session is not armed, the refused
-// post, or the number of missed events.
+// By the event's kind.
 py::object subject_of(const FleetEvent& event) {
   switch (event.kind) {
     case FleetEvent::Kind::link:

@@ -29,7 +29,6 @@ class Pickle {
     (one(members), ...);
   }
   const std::string& bytes() const { return bytes_; }
-  // True if everything was read.
   bool whole() const { return whole_ && at_ == bytes_.size(); }
 
  private:

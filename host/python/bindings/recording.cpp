@@ -38,7 +38,6 @@ struct Column {
 
 constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
 
-// A value of a described device, in all states.
 struct Measured {
   std::shared_ptr<const Device> device;
   std::size_t value;
@@ -50,7 +49,6 @@ struct Measured {
 // For one board, whose bus has 112 addresses.
 constexpr std::size_t most_measured = 1000;
 
-// The part of a recording about one board.
 struct RecordedBoard {
   std::string url, name;
   std::vector<std::int64_t> times_us;  // since 1970
@@ -84,7 +82,7 @@ class Columns final : public RecordingVisitor {
  public:
   explicit Columns(bool datagrams) : with_datagrams_(datagrams) {}
 
-  // Texts of the file are printable(), because a Python str cannot hold any bytes.
+  // Texts of the file are printable(), because a Python str cannot hold arbitrary bytes.
   void on_path(const RecordedPath& path) override {
     const std::string url = printable(path.url);
     const auto known = std::find_if(boards_.begin(), boards_.end(),
@@ -214,7 +212,6 @@ std::string column_of(StateField field, int which) {
   return name.append("_").append(value);
 }
 
-// Numpy's type of the column.
 const char* type_of(StateField field, int which) {
   switch (kind_row_of(field).form) {
     case FieldForm::volts:

@@ -81,8 +81,7 @@ class States:
 
 
 class UartStream:
-    """Received bytes of a UART: `async for data, lost in board.uart[1]: …`, until the board is
-    closed. `channel`: 1 or 2."""
+    """Received bytes of UART `channel`, 1 or 2: `async for data, lost in board.uart[1]: …`."""
 
     def __init__(self, core: _core.Board, channel: int, news: asyncio.Event, subscription: Subscription) -> None:
         self._core, self._channel = core, channel
@@ -197,8 +196,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
         return channels.Uarts(lambda channel: Uart(self, channel))
 
     def states(self, most: int | None = None, *, lossless: bool = False) -> States:
-        """The states from now on until the board is closed, as r4link.Board.states(). `most`: 1 or
-        more states wait."""
+        """As r4link.Board.states(), until the board is closed. `most`: 1 or more states wait."""
         news = asyncio.Event()
         self._news.add(news)
         return States(self._board.states(most, lossless=lossless), news,
@@ -206,8 +204,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
 
 
 async def discover(**options: Any) -> Discovery:
-    """As r4link.discover(), with the same options. Cancelling the task does not end the search,
-    which takes at most 1.3 s."""
+    """As r4link.discover(). Cancelling the task does not end the search, at most 1.3 s."""
     return await asyncio.get_running_loop().run_in_executor(None, lambda: _core.discover(**options))
 
 

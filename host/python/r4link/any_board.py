@@ -25,8 +25,8 @@ class AnyBoard(ABC, Generic[Sent]):
     @abstractmethod
     def _call(self, call: Callable[[Core], Any], *, at_once: bool = False,
               then: Callable[[Any], Any] = lambda result: result) -> Any:
-        """Makes a call that waits. Returns then(its result), or a coroutine of it. The coroutine
-        waits for earlier calls unless it goes `at_once`."""
+        """Makes a call that waits. Returns then(result), or a coroutine of it. The coroutine waits
+        for earlier calls unless `at_once`."""
 
     @abstractmethod
     def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
@@ -45,9 +45,9 @@ class AnyBoard(ABC, Generic[Sent]):
         return sent
 
     def release_control(self, timeout: float = 1.0) -> Sent:
-        """Disarms, and sends the farewell until the board has answered, so that the board is safe
-        and free. Then this program watches. If the board does not answer in time, it goes safe by
-        its own timeout, and NotConfirmedError is raised. Commands that wait in other threads raise
+        """Disarms, and sends the farewell until the board has answered: it is then safe and free.
+        Afterwards this program watches. Without an answer the board goes safe by its own timeout,
+        and NotConfirmedError is raised. Commands that wait in other threads raise
         CancelledError."""
         sent: Sent = self._call(lambda core: core.release_control(_ms(timeout)))
         return sent
@@ -88,8 +88,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return self._core.disarmed_by()
 
     def stop(self, timeout: float = 1.0) -> Sent:
-        """Makes every output safe at once. The stop is repeated until the board confirms it, and is
-        latched until Command.clear()."""
+        """Makes every output safe at once. Repeated until confirmed, latched until Command.clear()."""
         sent: Sent = self._call(lambda core: core.stop(_ms(timeout)), at_once=True)
         return sent
 
@@ -127,8 +126,8 @@ class AnyBoard(ABC, Generic[Sent]):
         return self.send(Command.dac(channel, millivolts=millivolts), timeout)
 
     def proximity(self, channel: int, *, cm: int, timeout: float = 1.0) -> Sent:
-        """Makes the board safe while ultrasonic sensor `channel`, 1 to 4, measures less than `cm`,
-        1 to 400 centimetres; 0: off."""
+        """The board goes safe when ultrasonic sensor `channel`, 1 to 4, measures less than `cm`, 1 to
+        400 centimetres; 0: off."""
         return self.send(Command.proximity(channel, cm=cm), timeout)
 
     def fields(self, names: str, timeout: float = 1.0) -> Sent:
@@ -158,8 +157,7 @@ class AnyBoard(ABC, Generic[Sent]):
 
     @property
     def state(self) -> State:
-        """The newest state; false if there is none. `received` is its time on the clock of
-        time.monotonic()."""
+        """The newest state; false if none. `received`: on the clock of time.monotonic()."""
         return self._core.state()
 
     @property
@@ -214,8 +212,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return self._core.on_arming(self._callback(callback))
 
     def on_refused(self, callback: Callable[[RefusedPost], object]) -> Subscription:
-        """Called when the board refuses a posted command, or the command does not reach the
-        board."""
+        """Called when a posted command is refused by the board, or does not reach the board."""
         return self._core.on_refused(self._callback(callback))
 
     def record(self, to: str | os.PathLike[str] | Recording, *, rotate_bytes: int = 0, rotate_after: int = 0,
@@ -229,9 +226,8 @@ class AnyBoard(ABC, Generic[Sent]):
             self._core.record(os.fspath(to), rotate_bytes, rotate_after, keep_bytes)
 
     def watchdog(self, period: float) -> None:
-        """After `period` seconds without feed() the heartbeats stop and the board goes safe; 0
-        turns it off. Feed where the robot is attended: callbacks and an event loop do not feed
-        it."""
+        """After `period` seconds without feed() the heartbeats stop and the board goes safe; 0:
+        off. Feed where the robot is attended: callbacks and an event loop do not feed it."""
         self._core.watchdog(_ms(period))
 
     def feed(self) -> None:

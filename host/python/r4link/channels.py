@@ -142,22 +142,20 @@ class BldcChannel(_Channel[Sent]):
     """A brushless motor."""
 
     def set(self, duty: float, *, brake: bool = False, timeout: float = 1.0) -> Sent:
-        """`duty`: -1 (full reverse) to 1 (full forward). `brake`: True brakes by the driver."""
+        """`duty`: -1 (reverse) to 1 (forward). `brake`: True applies the driver's brake."""
         return self._board.send(Command.bldc(self._channel, duty=duty, brake=brake), timeout)
 
     def set_pwm(self, pwm: int, *, direction: int = Direction.FORWARD, brake: bool = False,
                 timeout: float = 1.0) -> Sent:
-        """`pwm`: 0 to 4095 (full speed). `direction`: FORWARD or REVERSE. `brake`: True applies the
-        driver's brake."""
+        """`pwm`: 0 to 4095 (full). `direction`: FORWARD, REVERSE. `brake`: the driver's brake."""
         return self._board.send(Command.bldc(self._channel, pwm=pwm, direction=direction, brake=brake), timeout)
 
     def post(self, duty: float, *, brake: bool = False) -> PostResult:
-        """`duty`: -1 (full reverse) to 1 (full forward). `brake`: True brakes by the driver."""
+        """`duty`: -1 (reverse) to 1 (forward). `brake`: True applies the driver's brake."""
         return self._board.post(Command.bldc(self._channel, duty=duty, brake=brake))
 
     def post_pwm(self, pwm: int, *, direction: int = Direction.FORWARD, brake: bool = False) -> PostResult:
-        """`pwm`: 0 to 4095 (full speed). `direction`: FORWARD or REVERSE. `brake`: True applies the
-        driver's brake."""
+        """`pwm`: 0 to 4095 (full). `direction`: FORWARD, REVERSE. `brake`: the driver's brake."""
         return self._board.post(Command.bldc(self._channel, pwm=pwm, direction=direction, brake=brake))
 
 
@@ -208,14 +206,12 @@ class UartChannel(Generic[Sent]):
         self._board, self._channel = board, channel
 
     def write(self, data: bytes, timeout: float = 1.0) -> Sent:
-        """Writes 1 to 48 bytes, and returns when the board has taken all of them. It may move
-        something, so it needs arm()."""
+        """Writes 1 to 48 bytes; returns when the board has all. It may move something: arm() first."""
         return self._board.send(f'X:UART,{self._channel},x{bytes(data).hex()}', timeout)
 
     def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
-        """Adds a callback for each later state that brings bytes, besides read(). It gets each byte
-        once, in order, and the number of missing bytes, on the thread of the board's other
-        callbacks."""
+        """Adds a callback for later bytes, besides read(): each byte once, in order, and the number
+        of missing bytes. It runs on the thread of the board's other callbacks."""
         return self._board._core.uart_on_bytes(self._channel, self._board._callback(callback))
 
 

@@ -63,8 +63,7 @@ class Pid:
         self._core = _core.Pid(kp, ki, kd, feed_forward, minimum, maximum, rate, derivative_filter)
 
     def step(self, setpoint: float, measured: float, dt: float) -> float:
-        """The output, `dt` seconds after the last step. Raises DataError for a number that is not
-        finite."""
+        """The output, `dt` seconds after the last step. Raises DataError unless all are finite."""
         return self._core.step(setpoint, measured, dt)
 
     def reset(self) -> None:
@@ -89,8 +88,8 @@ class Pid:
 class Wheel:
     """A wheel with an encoder: give it each state, in order. `encoder`: 1 to 4. `counts_a_turn`:
     counts of the encoder for one turn of the wheel. `radius`: metres. `window`: seconds over which
-    `speed` is the mean. `max_speed`: m/s; a faster change is not a movement, but an encoder set to
-    zero or a restart."""
+    `speed` is the mean. `max_speed`: m/s; a faster change means a zeroed encoder or a restart, not
+    a movement."""
 
     def __init__(self, encoder: int, counts_a_turn: float, radius: float, *, reversed: bool = False,
                  window: float = 0.05, max_speed: float = 20.0) -> None:
@@ -122,7 +121,7 @@ class SteeringSensor:
         self._core = _core.SteeringSensor(left, right, margin)
 
     def angle(self, state: State) -> float | None:
-        """In radians; None if the voltage is impossible because a cable is off. Do not drive
+        """In radians; None if a cable is off, because the voltage is impossible. Do not drive
         then."""
         return self._core.angle(state)
 

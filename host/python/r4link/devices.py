@@ -83,7 +83,7 @@ class Device:
 
     def is_set_up(self, state: State) -> bool | None:
         """False if the device was reset: its values are not measurements, so attach it again. None
-        if it was not read yet, or does not show it."""
+        if not read yet, or not shown."""
         return self._core.is_set_up(state)
 
     def reading(self, state: State, value: str) -> DeviceReading:

@@ -46,8 +46,7 @@ class FleetEvent(NamedTuple):
 
 
 class FleetResults(Sequence[FleetResult]):
-    """The results of a command at several boards, in the order in which they were named. True if
-    all boards confirmed it."""
+    """The results of a command at several boards, in the given order. True if all confirmed it."""
 
     def __init__(self, results: list[FleetResult]) -> None:
         self._results = results
@@ -72,8 +71,7 @@ class FleetResults(Sequence[FleetResult]):
         return None if each.confirmed else error_of(*each.problem)
 
     def require(self) -> None:
-        """Raises the error of the first board without confirmation, with the number of other such
-        boards."""
+        """Raises the error of the first unconfirmed board, with the number of other such boards."""
         first = next((place for place, each in enumerate(self._results) if not each.confirmed), None)
         if first is None:
             return
@@ -129,8 +127,7 @@ class Fleet:
         return f'<r4link.Fleet of {len(self)} boards>'
 
     def index(self, board: int | str) -> int:
-        """The index of a board, from 0. `board`: its URL, name or board id; an index is returned
-        unchanged."""
+        """The index of a board, from 0. `board`: its URL, name, board id, or index."""
         return self._core.find(board) if isinstance(board, str) else board
 
     def url(self, board: int) -> str:
@@ -197,8 +194,7 @@ class Fleet:
         self._core.record(recording)
 
     def watchdog(self, period: float) -> None:
-        """After `period` seconds without feed() the heartbeats stop, and all boards go safe; 0
-        turns it off."""
+        """After `period` seconds without feed() heartbeats stop, and all boards go safe; 0: off."""
         self._core.watchdog(_ms(period))
 
     def feed(self) -> None:

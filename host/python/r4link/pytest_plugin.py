@@ -37,8 +37,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _node(number: int) -> int:
-    """The node of a board, numbered from 0. The workers of pytest-xdist share the bus, so no two
-    workers use one node."""
+    """The node of board `number`, from 0, on a bus that all workers of pytest-xdist share."""
     workers = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
     worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
     node = 1 + worker + number * workers
@@ -93,8 +92,7 @@ def r4_board(request: pytest.FixtureRequest, r4_robot: Robot) -> Iterator[TestBo
 
 @pytest.fixture
 def r4_link(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[TestBoard]:
-    """A board behind the mark's bad link, or behind one with a little loss and delay and a random
-    seed."""
+    """A board behind the mark's bad link, or one with a little loss and delay and a random seed."""
     link = _marked(request).get('link') or f'loss=2%,delay=5ms±5,seed={random.randrange(1 << 32)}'
     request.node.add_report_section('setup', 'r4_link', f"@pytest.mark.r4(link='{link}')")
     with _robot(request, tmp_path, 0, link) as robot, _board(request, robot) as board:

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""For tests of a robot's program (docs/testing.md): a simulated robot on any transport, and
-expectations."""
+"""For tests of a robot's program (docs/testing.md): simulated robots and expectations."""
 from __future__ import annotations
 
 import collections
@@ -88,8 +87,8 @@ class SimProcess:
         return self._url
 
     def happen(self, words: str) -> None:
-        """A line of a scenario (docs/simulation.md), without its time. Raises DataError if the
-        process has ended."""
+        """A line of a scenario (docs/simulation.md), without its time. Raises DataError after the
+        end."""
         assert self._process.stdin
         self._require_own()
         try:
@@ -118,8 +117,7 @@ class SimProcess:
                     volts=tuple(senses['analog'].values()))
 
     def close(self) -> None:
-        """Ends the process. Idempotent. In a fork it does nothing, because the process is the
-        parent's."""
+        """Ends the process. Idempotent. No effect in a fork: the process is the parent's."""
         if os.getpid() != self._parent:
             return
         self._process.kill()

@@ -38,8 +38,7 @@ class I2cAnswer(NamedTuple):
 
 
 class I2cBusReport(NamedTuple):
-    """The status of the user's bus: the newest outcome, failed transfers, and clocked
-    recoveries."""
+    """The status of the user's bus: newest outcome, failed transfers, recoveries by clocking."""
     outcome: I2cOutcome
     errors: int
     recoveries: int
@@ -54,7 +53,6 @@ class UartBytes(NamedTuple):
 
 
 class UartData(NamedTuple):
-    """Bytes received on a UART, each once, in order; `lost`: how many are missing before or among
-    them."""
+    """Bytes of a UART, each once, in order; `lost`: how many are missing before or among them."""
     data: bytes
     lost: int

@@ -52,7 +52,6 @@ class Call {
   }
   asio::cancellation_signal& cancelled() { return cancelled_; }
 
-  // Readable when the call has ended.
   int fileno() const { return news_; }
   // Does nothing after the end, and in a fork.
   static void cancel(const std::shared_ptr<Call>& self) {
@@ -89,7 +88,6 @@ std::string name_of(const Request& request) {
   return shown(request);
 }
 
-// Throws Error unless the board has confirmed the request.
 constexpr auto confirmed = [](const auto& request, const AsyncBoard& board,
                               const CommandResult& result) {
   if (result.outcome != Outcome::confirmed) throw Error(explain(request, result, board.link()));

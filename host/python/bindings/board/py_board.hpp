@@ -54,7 +54,6 @@ class PyBoard {
     const py::gil_scoped_acquire gil;
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   }
-  // Does nothing in a fork.
   template <class Action>
   void if_here(Action action) const {
     board_->if_here(action);
