@@ -114,6 +114,7 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   std::mutex keeping;  // guards `recording`
   std::unique_ptr<Recording> recording;
 
+  // Used on the loop only.
   asio::steady_timer look_timer{io};
   bool held_for_callback = false;
 
@@ -128,7 +129,7 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
     UartStream stream;
     UartData to_read;
     UartData to_report;
-    bool reports = false;
+    bool reports = false;  // a callback has been added
   };
   UartInbox uarts[uart_channels];
   LinkStatus link;

@@ -56,6 +56,7 @@ class CallbackThread {
 
   // `take` takes the waiting bytes. Call this before start().
   void take_uart(std::function<Board::UartData(int channel)> take) { take_uart_ = std::move(take); }
+  // Keeps `owner` until the thread ends.
   void start(std::shared_ptr<void> owner);
   // After this returns, no callback runs except the caller, and none is called again.
   void stop();

@@ -142,7 +142,7 @@ struct Bridge::Impl {
   LoopTimer timer{io};
   OperationSlot ticking;
   std::vector<std::unique_ptr<BridgedPair>> pairs;
-  std::mutex mutex;
+  std::mutex mutex;  // between callers in other threads
   std::vector<BridgeStatus> last;
   std::thread thread;
 };

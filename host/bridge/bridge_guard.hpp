@@ -26,6 +26,7 @@ class BridgeGuard {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
+  // Why datagrams that need a signature do not pass.
   enum class Trouble : std::uint8_t {
     none,
     board_has_no_key,  // and the bridge has one

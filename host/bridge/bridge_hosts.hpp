@@ -41,6 +41,7 @@ class BridgeHosts {
   // The board must have lost a silent paper host before another paper host passes.
   static constexpr std::chrono::milliseconds paper_margin{500};
 
+  // `timeout`: the board's.
   explicit BridgeHosts(std::chrono::milliseconds timeout);
 
   // `judged`: the board begins or feeds a session by that heartbeat, or answers BUSY. False if it

@@ -50,6 +50,7 @@ class CommandsUnderWay {
   static constexpr std::size_t max_pending = 64;
   static constexpr std::size_t max_stops = 16;
 
+  // All references outlive this.
   CommandsUnderWay(const SessionOptions& options, HostLink& link, LinkKeeper& keeper,
                    Outbox& outbox, HeardBoard& board, const ArmRequests& arming, CommandEnds& ends,
                    Statistics& counts);

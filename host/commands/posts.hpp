@@ -26,6 +26,7 @@ class Posts {
   // After the effects of the last post have been performed.
   PostResult result();
   bool is_clear() const { return kind_ == CommandKind::clear; }
+  // The board has proved that it did not execute that command.
   void on_refusal(const Nack& nack);
 
  private:

@@ -57,7 +57,7 @@ struct ArmingChanged {
 struct PostRefused {
   RefusedPost refused;
 };
-// Views in an event point into the newest datagram, and are valid as long as its bytes.
+// Views in an event point into the datagram received last, and are valid as long as its bytes.
 using SessionEvent =
     std::variant<StateCame, HeartbeatCame, BoardIdentified, CommandRefused, BadDatagramCame,
                  LinkChanged, CommandEnded, BoardRestarted, ArmingChanged, PostRefused>;
@@ -72,7 +72,7 @@ class Effects {
     sendings_.push({{path, priority, kind, pnum, {}}, bytes_.size(), datagram.size()});
     bytes_ += datagram;
   }
-  // The newest datagram, which the events are about.
+  // The datagram received last, which the events are about.
   Datagram& datagram() { return datagram_; }
   void report(const SessionEvent& event) { events_.push(event); }
 

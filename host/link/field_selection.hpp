@@ -26,6 +26,7 @@ class FieldSelection {
  public:
   enum class Stage : std::uint8_t { left, satisfied, asking, unheard };
 
+  // `fields` as in F; empty: the board keeps its own choice.
   explicit FieldSelection(std::string fields) : fields_(std::move(fields)) {
     if (fields_.empty()) stage_ = Stage::left;
   }

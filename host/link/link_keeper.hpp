@@ -27,6 +27,7 @@ namespace r4 {
 
 class LinkKeeper {
  public:
+  // All references outlive the keeper.
   LinkKeeper(const SessionOptions& options, HostLink& link, HostKey& key, Paths& paths,
              Outbox& outbox, Statistics& counts);
 

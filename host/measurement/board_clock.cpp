@@ -31,6 +31,7 @@ void BoardClock::limit(Side& side, std::uint32_t t_ms, Time host, Time margin) {
   limit(side, t_ms, host, margin);
 }
 
+// False if the limit contradicts the earlier limits.
 bool BoardClock::place(Side& side, std::uint32_t t_ms, Time host, Time margin) {
   Limit fresh;
   fresh.at = since_first(t_ms);

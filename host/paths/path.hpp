@@ -67,8 +67,8 @@ struct PathBusy {
 struct Path {
   bool up = false;
   bool can_ask = true;
-  bool known = false;
-  bool other = false;
+  bool known = false;       // leads to the session's board
+  bool other = false;       // leads to another board
   bool connecting = false;  // its last heartbeat had `PNum:0`
   std::uint32_t boot = 0;
   PathClock clock;

@@ -233,7 +233,7 @@ Paths::Admission Paths::admit(std::size_t index, std::uint32_t pnum, std::uint32
   return begun_ ? admission : Admission::no;
 }
 
-// A delayed heartbeat must not end the session, so the board is asked instead.
+// While heartbeats of the board are recent, a delayed one must not end the session: ask the board.
 bool Paths::admit_connecting(std::size_t index, Time now) {
   Path& path = paths_[index];
   if (!path.known) return false;

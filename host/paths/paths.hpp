@@ -173,7 +173,7 @@ class Paths {
   std::vector<Path> paths_;
   Time timeout_;
   const HostLink& link_;
-  std::optional<std::string> id_;
+  std::optional<std::string> id_;  // of the session's board
   bool begun_ = false;
   bool anew_ = true;  // no datagram since all paths were down
   Time first_answer_{0};

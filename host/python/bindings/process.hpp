@@ -34,6 +34,7 @@ class OfThisProcess {
   }
 
   bool is_here() const { return ::getpid() == process_; }
+  // Throws Error in a fork.
   Value& get() const {
     if (is_here()) return *value_;
     throw Error(Problem{ErrorKind::refused, what_,
@@ -43,6 +44,7 @@ class OfThisProcess {
   }
   Value* operator->() const { return &get(); }
   Value& operator*() const { return get(); }
+  // Does nothing in a fork.
   template <class Action>
   void if_here(Action action) const {
     if (is_here()) action(*value_);
