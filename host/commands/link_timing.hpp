@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The order in which a board's timeout and heartbeat interval are set. The board takes one setting
-// at a time and requires the interval below the timeout. No step is refused, whatever its present
-// values.
+// The order in which a board's timeout and heartbeat interval are set: one setting at a time, with
+// the interval below the timeout. No step is refused, whatever the board's present values.
 #pragma once
 
 #include <chrono>

@@ -9,9 +9,9 @@
             …
 
 A board's commands are sent in the order in which they were begun, each when its predecessor has
-ended; stop() does not wait. If a task is cancelled, its command is not sent again, but may have
-been executed. A stop is sent even if its task is cancelled. The calls of a board belong to one
-event loop.
+ended; stop() waits for no other command. If a task is cancelled, its command is not sent again, but
+may have been executed. A stop is sent even if its task is cancelled. The calls of a board belong to
+one event loop.
 """
 from __future__ import annotations
 
@@ -160,8 +160,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
         return cls((await discover()).only().url, **options)
 
     async def close(self) -> None:
-        """Sends the farewell. Waiting calls raise ClosedError, and loops over states and bytes
-        end."""
+        """Sends the farewell. Waiting calls raise ClosedError; loops over states and bytes end."""
         await asyncio.get_running_loop().run_in_executor(None, self._board.close)
         for news in list(self._news):
             news.set()

@@ -88,7 +88,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return self._core.disarmed_by()
 
     def stop(self, timeout: float = 1.0) -> Sent:
-        """Makes every output safe at once. Repeated until confirmed, latched until Command.clear()."""
+        """Makes all outputs safe at once. Repeated until confirmed; latched until Command.clear()."""
         sent: Sent = self._call(lambda core: core.stop(_ms(timeout)), at_once=True)
         return sent
 
@@ -126,8 +126,8 @@ class AnyBoard(ABC, Generic[Sent]):
         return self.send(Command.dac(channel, millivolts=millivolts), timeout)
 
     def proximity(self, channel: int, *, cm: int, timeout: float = 1.0) -> Sent:
-        """The board goes safe when ultrasonic sensor `channel`, 1 to 4, measures less than `cm`, 1 to
-        400 centimetres; 0: off."""
+        """The board goes safe when ultrasonic sensor `channel`, 1 to 4, measures less than `cm`,
+        1 to 400 centimetres; 0: off."""
         return self.send(Command.proximity(channel, cm=cm), timeout)
 
     def fields(self, names: str, timeout: float = 1.0) -> Sent:

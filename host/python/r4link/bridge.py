@@ -64,8 +64,9 @@ class Bridge:
         """`hosts`: where hosts are heard, 'udp://0.0.0.0:2018'. `board`: as Board takes it.
         Patterns for the same number of boards are joined in order. After `timeout` seconds without
         a heartbeat of the served host, another host may pass: at least the board's timeout. `key`:
-        key files of the board (`~`: your home); only datagrams signed with one of them pass. A
-        network and a board at a serial port need `key`, unless `open` lets everyone drive."""
+        key files of the board (`~`: your home); only datagrams signed with one of them pass.
+        Between a network and a board at a serial port, `key` is required unless `open` lets
+        everyone drive."""
         files = [key] if isinstance(key, (str, os.PathLike)) else key
         self._core = _core.Bridge(hosts, board, timeout=_ms(timeout), open=open,
                                   keys=[os.path.expanduser(os.fspath(each)) for each in files])

@@ -121,8 +121,7 @@ class SimBoard:
         self.happen(f'handle {"held" if held else "released"}')
 
     def obstacle(self, sensor: int, cm: int | None) -> None:
-        """What ultrasonic `sensor`, 1 to 4, measures: `cm` centimetres, 0: nothing, None: cable
-        off."""
+        """Sets ultrasonic `sensor`, 1 to 4, to `cm` centimetres; 0: nothing; None: cable off."""
         self.happen(f'us {sensor} {"off" if cm is None else cm}')
 
     def turn(self, encoder: int, counts: int) -> None:

@@ -30,9 +30,8 @@ TRANSPORTS = ('sim', 'udp', 'pty', 'can')
 
 
 def make_state(t_ms: int, **fields: Any) -> State:
-    """A state that no board has sent, for tests without a board: make_state(10, enc1=5,
-    ainsteer=2.5, osmc1=(400, 1)). `t_ms`: the board's clock, and when it was sampled and received,
-    in ms (1000 per second)."""
+    """A state that no board has sent, for tests without a board. `t_ms`: the board's clock and, in
+    ms, when it was sampled and received: make_state(10, enc1=5, ainsteer=2.5, osmc1=(400, 1))."""
     return _core.make_state(t_ms, t_ms / 1000, fields)
 
 
@@ -87,8 +86,7 @@ class SimProcess:
         return self._url
 
     def happen(self, words: str) -> None:
-        """A line of a scenario (docs/simulation.md), without its time. Raises DataError after the
-        end."""
+        """A line of a scenario (docs/simulation.md), without time. Raises DataError if it has ended."""
         assert self._process.stdin
         self._require_own()
         try:
@@ -97,7 +95,7 @@ class SimProcess:
             raise DataError('r4 sim', 'it has ended', f'exit code {self._process.poll()}') from error
 
     def look(self) -> Look:
-        """The last values of its pins, and sensor values that are at least 10 ms old."""
+        """The last values of its pins, and sensor values that are at most 10 ms old."""
         self._require_own()
         deadline = time.monotonic() + 5
         while not self._outputs or not self._sensors:  # the first line of each
@@ -175,8 +173,7 @@ class TestBoard(Board):
     robot: Robot
 
     def expect(self, within: float = 0.5, **fields: Any) -> None:
-        """Waits for a state with all of these values: `board.expect(osmc1=358, enc1=lambda n: n >
-        10)`.
+        """Waits for a state with these values: `board.expect(osmc1=358, enc1=lambda n: n > 10)`.
 
         A number is the pwm of a drive or the speed of a BLDC motor; volts have a tolerance of 0.02.
         Raises AssertionError with the received values.
@@ -205,8 +202,7 @@ class TestBoard(Board):
                              f'(link {self.link.state}, reason {self.link.reason}; {state!r})')
 
     def expect_safe(self, reason: SafeReason | str | None = None, within: float = 1.1) -> None:
-        """Waits until the board is safe, for that reason, and no pin of its chips drives
-        anything."""
+        """Waits until the board is safe, for that reason, with no pin of its chips driven."""
         reason = None if reason is None else SafeReason(reason)
         deadline = time.monotonic() + within
         while True:

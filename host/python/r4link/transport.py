@@ -51,8 +51,7 @@ class Transport:
         """Begins to receive. If the first call raises, the Board raises OpenError."""
 
     def send(self, datagram: bytes) -> None:
-        """Sends one datagram. Meanwhile later datagrams wait: for 100 ms, a stop without a
-        limit."""
+        """Sends one datagram. Later datagrams wait for it: 100 ms, a stop without a limit."""
         raise NotImplementedError(f'{type(self).__name__} has no send()')
 
     def close(self) -> None:
