@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The words of commands and settings for people, beside the tables of the portable core (r4link/tables/).
+// Words for commands and settings, beside the tables of the portable core (r4link/tables/).
 #pragma once
 
 #include <string>

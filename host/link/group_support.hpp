@@ -10,9 +10,9 @@
 //      |                                 |
 //      +---- the board has restarted ----+
 //
-//     unknown   while a group waits, Q:ID is sent every 100 ms. A bad line may lose many of them, and
-//               commands that belong together must not be executed one by one. So a board that has
-//               ever answered anything is asked until it answers
+//     unknown   while a group waits, Q:ID is sent every 100 ms. A bad line may lose many of them,
+//               but commands of a group must not be executed one by one. So a board that has ever
+//               answered anything is asked until it answers
 //     together  a group is one datagram
 //     apart     the commands of a group are sent one after the other. A late answer still counts
 #pragma once

@@ -10,8 +10,8 @@
 //      +---------------+---------------------------------------------------+
 //
 //     asking       no proof yet that the board obeys this host
-//     refused      the board has answered BUSY: another host controls it. Leads to controlling if the
-//                  board's times show that CMD is newer than each BUSY
+//     refused      the board has answered BUSY: another host controls it. Leads to controlling if
+//                  the board's times show that CMD is newer than each BUSY
 //     controlling  the board has executed a command of this session since the link came up
 #pragma once
 

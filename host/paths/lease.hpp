@@ -7,11 +7,11 @@
 //         |                                                              ^
 //         +----------- BUSY: full; refused otherwise: unknown -----------+
 //
-//     asking    W is sent every 500 ms; at once with a LEASE to echo, and when a transport comes up.
-//               After 1 s without a state, `watching` is treated as `asking`: a refusal counts
-//     watching  likewise: a lease lasts 2 s
+//     asking    W is sent every 500 ms; at once with a LEASE to echo, or when a transport comes up
+//     watching  likewise: a lease lasts 2 s. After 1 s without a state it is treated as `asking`:
+//               a refusal counts
 //     full      the board has no room for another watcher; W is sent once a second
-//     unknown   the board does not know watchers; W is sent once a second, because another board may
+//     unknown   the board does not know watchers; W is sent once a second, as another board may
 //               replace it
 #pragma once
 

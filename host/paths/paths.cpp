@@ -35,7 +35,7 @@ void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
   if (path.known && first_answer_.count() == 0) first_answer_ = now;
   anew_ = anew_ || all_down();
   if (!up) return;
-  // The numbers may begin anew, and a lease may have ended.
+  // The numbers may restart, and a lease may have ended.
   news_.restart(index);
   leases_[index].renew(now);
 }

@@ -206,7 +206,7 @@ class UartChannel(Generic[Sent]):
         self._board, self._channel = board, channel
 
     def write(self, data: bytes, timeout: float = 1.0) -> Sent:
-        """Writes 1 to 48 bytes; returns when the board has all. It may move something: needs arm()."""
+        """Writes 1 to 48 bytes; returns when the board has all. May move something: needs arm()."""
         return self._board.send(f'X:UART,{self._channel},x{bytes(data).hex()}', timeout)
 
     def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:

@@ -86,7 +86,7 @@ class SimProcess:
         return self._url
 
     def happen(self, words: str) -> None:
-        """A line of a scenario (docs/simulation.md), without time. Raises DataError if it has ended."""
+        """A line of a scenario (docs/simulation.md), no time. Raises DataError if it has ended."""
         assert self._process.stdin
         self._require_own()
         try:
