@@ -62,12 +62,12 @@ bool Board::post_to_loop(std::function<void(AsyncBoard&)> action) {
       [impl = impl_.get(), action = std::move(action)] { action(impl->async); });
 }
 
-// A call owns the Impl, so that the Board may be destroyed while it waits.
+// Each call owns the Impl, so that the Board may be destroyed while the call waits.
 
 void Board::wait_active(Duration timeout) {
   require_wait("wait_active()", timeout);
   const auto impl = impl_;
-  // The paths lead to two boards, so the link never began.
+  // The paths lead to two boards, so the link cannot begin.
   const auto refused = [](const LinkStatus& link) {
     return link.causes.has(LinkCause::two_boards) && link.state == HostLinkState::connecting;
   };
@@ -84,7 +84,7 @@ void Board::wait_active(Duration timeout) {
 
 void Board::send(const Command& command, Duration timeout) {
   const auto impl = impl_;
-  // A stop goes out whatever the timeout.
+  // A stop is sent even without a timeout.
   if (command.kind == CommandKind::stop && timeout.count() <= 0) impl->post(command);
   impl->execute(command, timeout);
 }

@@ -16,7 +16,6 @@ namespace r4 {
 
 namespace {
 
-// Throws an error that explains why `what` was not confirmed.
 template <class What, class Part>
 Part confirmed(const What& what, Part part) {
   if (part->result.outcome == Outcome::confirmed) return part;
@@ -77,7 +76,7 @@ void Board::Impl::start() {
 // Ends the loop first: it does not wait for callbacks, so a callback may close the board.
 void Board::Impl::close() {
   BlockingLoop::close([this] { shut(); });
-  keep(nullptr);  // the farewell is recorded
+  keep(nullptr);  // after shut(), so that the farewell is recorded
   callbacks.stop();
 }
 
@@ -104,8 +103,6 @@ void Board::Impl::keep(std::unique_ptr<Recording> own) {
   recording.swap(own);
 }
 
-// --- on the loop
-
 void Board::Impl::listen() {
   async.on_state([this](const ReceivedState& fresh, const Datagram&) {
     {
@@ -130,7 +127,7 @@ void Board::Impl::listen() {
     callbacks.notify(fresh);
   });
   async.on_event([this](const CarrierEvent& event) {
-    take_name();  // a board that was plugged in again may be at another port
+    take_name();  // a board that was plugged in again may have another port
     callbacks.notify(event);
   });
   async.on_path([this](const PathStatus& path) { callbacks.notify(path); });
@@ -160,8 +157,8 @@ void Board::Impl::take_name() {
   for (const PathStatus& path : paths) path_names.push_back(path.name);
 }
 
-// Heartbeats mean that the robot is looked after. The next look is when the callback that runs now,
-// or one that begins now, reaches the limit.
+// Heartbeats mean that the robot is attended. The next look is due when the running callback, or a
+// callback that starts now, reaches the limit.
 void Board::Impl::look_at_callbacks() {
   const auto busy = callbacks.busy_for();
   const bool hangs = busy && *busy >= callback_limit;
@@ -221,8 +218,6 @@ void Board::Impl::shut() {
   look_timer.cancel();
   async.async_close(farewell_limit, [this](const CommandResult&) { end_loop(); });
 }
-
-// --- on any thread
 
 void Board::Impl::require_control(std::string_view what) {
   const std::lock_guard lock(mutex);
@@ -287,7 +282,7 @@ PostResult Board::Impl::post(const Setpoints& setpoints) {
   if (is_held_back()) return PostResult::not_armed;
   return box.put(setpoints) ? PostResult::sent : PostResult::queue_full;
 }
-// True if output commands are refused here, which it counts. Under the lock.
+// True if this program refuses output commands now; counts the refusal. Under the lock.
 bool Board::Impl::is_held_back() {
   if (arming != Arming::required || disarmed_by == DisarmCause::none) return false;
   ++refused_here;

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The implementation of a Board: the thread of its link, the thread of its callbacks, and calls
-// that wait.
+// The implementation of a Board: the link's thread, the callbacks' thread, and calls that wait.
 //
 //     a thread of the program       the link's thread            the callbacks' thread
 //     send() -- Call, post() -->    AsyncBoard on its loop  -->  callback_thread.hpp
 //            <-- ended, news --
 //
-// The link's thread (blocking_loop.hpp) does not wait: no code of the program runs there but a
-// transport of its own, and what it gives to post_to_loop().
+// The link's thread (blocking_loop.hpp) does not wait. The only code of the program that it runs is
+// the program's own transport and functions given to post_to_loop().
 #pragma once
 
 #include <array>
@@ -32,11 +31,11 @@
 
 namespace r4 {
 
-// It has more than 15 members: they are grouped by the thread that may touch them.
+// More than 15 members, grouped by the thread that may touch them.
 struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Impl> {
   using CarriersMaker = std::function<std::vector<std::unique_ptr<Carrier>>(Loop& loop)>;
   Impl(const CarriersMaker& make, BoardOptions options, BoardCallbacks first);
-  // Its threads run. Throws Error, also where the system has no thread or descriptor left.
+  // Returns with running threads. Throws Error, also if the system has no thread or descriptor.
   static std::shared_ptr<Impl> started(const CarriersMaker& make, BoardOptions options,
                                        BoardCallbacks first);
   void start();
@@ -48,13 +47,11 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   void require_control(std::string_view what);
   void require_sendable(const Command& command);
   void require_sendable(const Setpoints& setpoints);
-  // Has the board execute a command, a group, or the request of that name. Throws if it is not
-  // confirmed.
+  // Has the board execute a command, a group, or the named request. Throws unless it is confirmed.
   std::shared_ptr<const Part> execute(const Command& command, Duration timeout);
   void execute(const Setpoints& setpoints, Duration timeout);
   void execute(const std::string& request, Start start, Duration timeout);
-  // The same, but the caller judges the outcome. Throws if that is not known, or the board is
-  // closed.
+  // The same, but the caller judges the outcome. Throws if it is unknown or the board is closed.
   std::shared_ptr<const Part> run(const std::string& text, Start start, Duration timeout,
                                   bool stop = false);
   PostResult post(const Command& command);
@@ -73,7 +70,7 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
       return !queue;
     });
   }
-  // What `ask` returns on the loop; `last` if the board is closed.
+  // Returns the result of `ask` on the loop, or `last` if the board is closed.
   template <class Report, class Ask>
   Report report(std::string_view what, const Report& last, Ask ask) {
     Report now;
@@ -84,14 +81,14 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   void calibrate_servo(int channel, const ServoCalibration& calibration);
   ServoCalibration servo_calibration(int channel);
 
-  // Keeps a recording of this board's own until another one takes its place.
+  // Keeps a recording of this board until another recording replaces it.
   void keep(std::unique_ptr<Recording> own);
 
   // --- on the loop
 
   void listen();
   void take_name();
-  // Control may have been released since it was posted.
+  // Control may have been released since the post.
   template <class What>
   PostResult post_now(const What& what) {
     try {
@@ -109,30 +106,30 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   void on_callback_end(Clock::duration busy);
 
   const Arming arming;
-  const Duration callback_limit;  // 0: none
+  const Duration callback_limit;  // 0: no limit
   BoardLoop loop{io};
   AsyncBoard async;
   PostBox box;
   CallbackThread callbacks;
-  std::mutex keeping;  // of the recording
+  std::mutex keeping;  // guards `recording`
   std::unique_ptr<Recording> recording;
 
-  // Of the loop.
+  // Used on the loop only.
   asio::steady_timer look_timer{io};
-  bool held_for_callback = false;  // the heartbeats
+  bool held_for_callback = false;
 
-  // What both sides see. News are changes of the state and the link.
+  // Shared by all threads, under the lock. A change of the state or the link is news.
   std::string name;  // of the transports
   std::vector<std::string> path_names;
   ReceivedState state;
   std::uint64_t states = 0;
   std::vector<std::weak_ptr<States::Queue>> queues;
-  // What has come in, for read() and for callbacks.
+  // Received bytes, for read() and for callbacks.
   struct UartInbox {
     UartStream stream;
     UartData to_read;
     UartData to_report;
-    bool reports = false;  // there is a callback, or was one
+    bool reports = false;  // a callback has been added
   };
   UartInbox uarts[uart_channels];
   LinkStatus link;

@@ -9,7 +9,7 @@ namespace r4 {
 CallbackThread::CallbackThread(std::function<void(Clock::duration)> on_end)
     : on_end_(std::move(on_end)), ring_(capacity) {}
 
-// The last callback may have destroyed the board.
+// The last callback may destroy the board, and then this thread cannot join itself.
 CallbackThread::~CallbackThread() {
   if (thread_.joinable()) thread_.detach();
 }
@@ -19,7 +19,7 @@ void CallbackThread::start(std::shared_ptr<void> owner) {
 }
 
 void CallbackThread::stop() {
-  std::deque<Task> gone;  // with what the callbacks have captured, destroyed without the lock
+  std::deque<Task> gone;  // captures of the callbacks, destroyed without the lock
   {
     const std::lock_guard lock(mutex_);
     ended_ = true;
@@ -64,7 +64,7 @@ void CallbackThread::run() {
   Notice notice;
   std::function<void()> task;
   while (take(notice, task)) {
-    // An exception of a callback ends the program where it is thrown.
+    // noexcept: an exception of a callback ends the program where it is thrown.
     [&]() noexcept {
       if (task) {
         task();
@@ -83,7 +83,6 @@ void CallbackThread::run() {
   }
 }
 
-// Waits for the next notice or task; false at the end.
 bool CallbackThread::take(Notice& notice, std::function<void()>& task) {
   std::unique_lock lock(mutex_);
   news_.wait(lock, [&] { return ended_ || told_ > taken_ || !tasks_.empty(); });

@@ -3,13 +3,13 @@
 //
 //     the link's loop --notify()--> notices, 64 at most --> the callbacks, one at a time
 //
-// So a callback may take its time, and may wait for the board: heartbeats and commands go on. But a
-// callback that hangs must end in the safe state, because nobody looks after the robot. busy_for()
-// reports how long a callback has run, and after a limit the loop stops the heartbeats.
+// A callback may take long and may wait for the board: heartbeats and commands continue. But a
+// callback that hangs leaves the robot unattended, so it must end in the safe state: after a limit
+// of busy_for() the loop stops the heartbeats.
 //
-// The link does not wait for callbacks. A state that waits is replaced by the next state. While 32
-// notices wait, refusals and warnings are dropped. While 64 wait, each new notice replaces the
-// oldest. notify() allocates nothing.
+// The link does not wait for callbacks. A newer state replaces a state that waits. While 32 notices
+// wait, refusals and warnings are dropped. While 64 wait, each new notice replaces the oldest.
+// notify() allocates nothing.
 #pragma once
 
 #include <atomic>
@@ -35,7 +35,7 @@
 
 namespace r4 {
 
-// It has more than 15 members, grouped by the thread that may touch them.
+// More than 15 members, grouped by the thread that may touch them.
 class CallbackThread {
  public:
   using Clock = std::chrono::steady_clock;
@@ -48,25 +48,24 @@ class CallbackThread {
                               DisarmCause, RefusedPost, UartNews>;
   static constexpr std::size_t capacity = 64;
 
-  // `on_end`: a callback that ran for this time has ended; called on this thread.
+  // `on_end` is called on this thread after each callback, with the time that the callback ran.
   explicit CallbackThread(std::function<void(Clock::duration)> on_end);
   ~CallbackThread();
   CallbackThread(const CallbackThread&) = delete;
   CallbackThread& operator=(const CallbackThread&) = delete;
 
-  // Takes the bytes that wait. Before start().
+  // `take` takes the waiting bytes. Call this before start().
   void take_uart(std::function<Board::UartData(int channel)> take) { take_uart_ = std::move(take); }
-  // `owner` is kept until the thread ends.
+  // Keeps `owner` until the thread ends.
   void start(std::shared_ptr<void> owner);
-  // When this returns, no callback runs, except one that called this, and none is called again.
+  // After this returns, no callback runs except the caller, and none is called again.
   void stop();
 
   void notify(Notice notice);
-  // The time for which the present callback has run; nothing if no callback runs.
+  // No value if no callback runs.
   std::optional<Clock::duration> busy_for() const;
 
-  // Adds a callback for that kind of notice. It is called with the newest notice, if there is one,
-  // then with each new notice.
+  // Adds a callback, which is called with the newest notice, if any, and with each new notice.
   template <class Kind>
   Subscription add(std::function<void(const Kind&)> callback) {
     return add(std::get<Subscribers<Kind>>(callbacks_), std::move(callback));
@@ -80,7 +79,7 @@ class CallbackThread {
   }
 
  private:
-  // An action between two notices: after the first `after` notices of all.
+  // An action that runs after notice number `after`.
   struct Task {
     std::uint64_t after;
     std::function<void()> action;
@@ -88,7 +87,7 @@ class CallbackThread {
 
   template <class Kind>
   Subscription add(Subscribers<Kind>& callbacks, std::function<void(const Kind&)> callback) {
-    if (!callback) return {};  // as Subscribers::add()
+    if (!callback) return {};
     const auto one = std::make_shared<typename Subscribers<Kind>::One>(std::move(callback));
     {
       const std::lock_guard lock(mutex_);
@@ -98,7 +97,7 @@ class CallbackThread {
                           callbacks.add(one);
                           call_first(*one);
                         }});
-      news_.notify_one();  // with the lock: the callback may be called at once, and destroy this
+      news_.notify_one();  // with the lock: the callback may run at once and destroy this
     }
     return Subscription(one);
   }
@@ -112,13 +111,11 @@ class CallbackThread {
       if (!ended_) one(news);
     });
   }
-  // Calls a new callback with the newest notice, if there is one.
   void call_first(Subscribers<ReceivedState>::One& one);
   void call_first(Subscribers<LinkStatus>::One& one) { one(link_); }
   void call_first(Subscribers<CarrierEvent>::One& one);
   void call_first(Subscribers<DisarmCause>::One& one) { one(arming_); }
   void call_first(Subscriber&) {}
-  // Keeps what call_first() needs.
   void keep(const Restart&) { state_ = ReceivedState(); }
   void keep(const ReceivedState& state) { state_ = state; }
   void keep(const LinkStatus& link) { link_ = link; }
@@ -133,7 +130,7 @@ class CallbackThread {
   std::atomic<std::thread::id> id_{};
   std::mutex joining_;
 
-  // For this thread only: the callbacks, and the newest notices.
+  // Used on this thread only: the callbacks, and the newest notices.
   std::tuple<Subscribers<Restart>, Subscribers<ReceivedState>, Subscribers<LinkStatus>,
              Subscribers<CarrierEvent>, Subscribers<PathStatus>, Subscribers<DisarmCause>,
              Subscribers<RefusedPost>>
@@ -142,15 +139,15 @@ class CallbackThread {
   ReceivedState state_;
   LinkStatus link_;
   std::optional<CarrierEvent> event_;    // up or down
-  std::optional<CarrierEvent> warning_;  // since then
+  std::optional<CarrierEvent> warning_;  // since `event_`
   DisarmCause arming_ = DisarmCause::not_yet;
 
-  mutable std::mutex mutex_;  // of what follows; ended_ is read without it, too
+  mutable std::mutex mutex_;  // guards the members below; ended_ is also read without it
   std::condition_variable news_;
   std::atomic<bool> ended_{false};
   std::vector<Notice> ring_;
   std::uint64_t told_ = 0;   // notices so far; the newest is ring_[(told_ - 1) % capacity]
-  std::uint64_t taken_ = 0;  // of them, taken out or dropped
+  std::uint64_t taken_ = 0;  // notices taken out or dropped
   std::deque<Task> tasks_;
   std::optional<Clock::time_point> busy_since_;
 };

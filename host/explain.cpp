@@ -118,7 +118,7 @@ CauseWords words_of(LinkCause cause) {
 constexpr const char* clear_on_purpose =
     "clear it on purpose: r4 send URL E:CLEAR, or board.send(\"E:CLEAR\"), ";
 
-// Why outputs are not driven, and what to do before arm() is called.
+// Why outputs are not driven, and what to do before arm().
 Words disarm_words(DisarmCause cause) {
   switch (cause) {
     case DisarmCause::not_yet:
@@ -154,8 +154,7 @@ Words disarm_words(DisarmCause cause) {
   return {};
 }
 
-// A path that is not used does not disturb the other paths, so it is named only if nothing else is
-// wrong.
+// Named only if there is no other cause: an unused path does not disturb the other paths.
 constexpr LinkCauses harmless{LinkCause::other_board};
 
 Words link_words(const LinkStatus& link) {
@@ -189,7 +188,7 @@ bool link_is_well(const LinkStatus& link) {
   return link.state == HostLinkState::active && link.causes.without(harmless).empty();
 }
 
-// In the functions below `command` is null for a request that is not a command.
+// Below, `command` is null for a request that is not a command.
 
 bool is(CommandKind kind, const Command* command) {
   return command != nullptr && command->kind == kind;
@@ -210,7 +209,7 @@ Words refusal_words(const Command* command, Refusal code, const LinkStatus& link
     case Refusal::range:
     case Refusal::channel:
       if (command != nullptr) words.fix = bad_command(*command, code).fix;
-      // An invalid key is not sent, so the board has no room for it.
+      // An invalid key is never sent, so RANGE means that the board has no room for the key.
       if (code == Refusal::range && sets("key", command)) {
         words.reason = fmt::format("refused by the board: RANGE (it holds {} keys)", max_keys);
         words.fix = "take one away: C:key,id:off";
@@ -294,7 +293,7 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
       words = refusal_words(command, result.code, link);
       break;
     case Outcome::timed_out: {
-      if (result.at == 0 && result.executed != 0) {  // a transfer, which is no group
+      if (result.at == 0 && result.executed != 0) {  // a transfer, not a group
         return {"was begun, and its end was not heard in time",
                 "give it more time, or look at the field I2CX"};
       }
@@ -341,7 +340,6 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
   return words;
 }
 
-// What became of the other commands of a group.
 std::string group_words(std::size_t size, const CommandResult& result) {
   if (size == 1) return "";
   if (result.executed != 0) {

@@ -29,7 +29,6 @@ Error cannot_be_read(const std::string& path, int error) {
   return {denied ? ErrorKind::permission : ErrorKind::open, path, std::strerror(error), fix};
 }
 
-// Reads a little more than the length of a key, at most.
 std::string contents(const FileDescriptor& file, const std::string& path) {
   std::array<char, 2 * key_text_size> buffer;
   std::string text;
@@ -51,8 +50,7 @@ Key load_key(const std::string& path) {
   if (S_ISDIR(status.st_mode)) {
     throw Error(ErrorKind::open, path, "is a directory", "name the file that holds the key");
   }
-  // Root may let a group read its file, such as the group of a service. systemd does so with
-  // credentials.
+  // Root may let a group read its file, as systemd does with credentials of a service.
   const mode_t allowed = status.st_uid == 0 ? S_IRWXU | S_IRGRP : S_IRWXU;
   if ((status.st_mode & (S_IRWXU | S_IRWXG | S_IRWXO) & ~allowed) != 0) {
     throw Error(ErrorKind::permission, path, "others can read or write this key",

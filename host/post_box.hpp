@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A bounded queue of commands from any thread to a loop, which it wakes once for all waiting
-// commands. After its construction it allocates only for commands with texts.
+// A bounded queue of commands from any thread to a loop, which wakes once for all waiting commands.
+// After construction it allocates only for commands with texts.
 #pragma once
 
 #include <asio/bind_allocator.hpp>
@@ -25,18 +25,16 @@ class PostBox {
   static constexpr std::size_t capacity = 256;
   using Letter = CommandOrGroup;
 
-  // `deliver` is called on the loop, once for each command or group. The loop must end before the
-  // box is destroyed.
+  // `deliver` is called on the loop for each command or group. The loop must end before the box.
   PostBox(asio::io_context& io, std::function<void(const Letter&)> deliver)
       : io_(io), deliver_(std::move(deliver)) {
     waiting_.reserve(capacity);
     taken_.reserve(capacity);
   }
 
-  // Any thread. False if the box is full. A stop is always taken, and is delivered first.
+  // From any thread. False if the box is full. A stop is never refused, and is delivered first.
   bool put(const Command& command) {
     const std::lock_guard lock(mutex_);
-    // A stop cancels earlier commands.
     if (command.kind == CommandKind::stop) waiting_.clear();
     return add(OwnCommand(command));
   }
@@ -58,7 +56,7 @@ class PostBox {
     {
       const std::lock_guard lock(mutex_);
       woken_ = false;
-      wake_memory_.release();  // Asio freed it before it made this call
+      wake_memory_.release();  // Asio has freed it before this call
       taken_.swap(waiting_);
     }
     for (const Letter& letter : taken_) deliver_(letter);
@@ -71,7 +69,7 @@ class PostBox {
   std::vector<Letter> waiting_;
   std::vector<Letter> taken_;
   bool woken_ = false;
-  // Room for one wake-up: there is never another one under way.
+  // Room for one wake-up: at most one is under way.
   alignas(std::max_align_t) std::byte wake_buffer_[128];
   std::pmr::monotonic_buffer_resource wake_memory_{wake_buffer_, sizeof wake_buffer_};
 };

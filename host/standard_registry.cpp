@@ -56,7 +56,7 @@ std::string path_of(const std::string& text) {
            std::to_string(udp.listen) + "|" + udp.local.to_string();
   }
   if (url.scheme() == "can") return "can|" + url.host() + value("node", "1");
-  std::error_code failed;  // then the path stays as it is written
+  std::error_code failed;
   const std::filesystem::path device = std::filesystem::weakly_canonical(url.path(), failed);
   const std::string path = failed || !url.path().starts_with('/') ? url.path() : device.string();
   return url.scheme() + "|" + url.host() + "|" + path + value("sn", "");

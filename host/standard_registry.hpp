@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The transports of the library: those of transports/, `sim:` (the simulated board in this
-// process), and `replay:`.
+// The library's transports: transports/, `sim:` (a simulated board in this process), and `replay:`.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +11,7 @@ namespace r4 {
 
 const Registry& standard_registry();
 
-// Throws Error{usage} if a session cannot have that number of paths.
+// Throws Error{usage} if a session cannot have `count` paths.
 void require_paths(std::size_t count);
 
 }  // namespace r4

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The implementation of States: a bounded queue between the link's thread, which does not wait, and
-// a thread of the program.
+// The implementation of States: a bounded queue from the link's thread, which does not wait, to a
+// thread of the program.
 #pragma once
 
 #include <fmt/format.h>
@@ -23,7 +23,6 @@ namespace r4 {
 
 class States::Queue {
  public:
-  // `on_wait`: of BoardOptions.
   Queue(StatesOptions options, std::function<void()> on_wait)
       : lossless_(options.lossless),
         most_(options.most != 0  ? options.most
@@ -92,7 +91,7 @@ class States::Queue {
     first_ = (first_ + 1) % ring_.size();
     --count_;
   }
-  // A short queue stays small, and a queue that has its size allocates nothing.
+  // Grows on demand, so a short queue stays small. At its full size it allocates nothing.
   void grow() {
     std::rotate(ring_.begin(), ring_.begin() + static_cast<std::ptrdiff_t>(first_), ring_.end());
     first_ = 0;
@@ -102,12 +101,12 @@ class States::Queue {
   const bool lossless_;
   const std::size_t most_;
   const std::function<void()> on_wait_;
-  mutable std::mutex mutex_;  // of what follows
+  mutable std::mutex mutex_;  // guards the members below
   std::condition_variable news_;
   std::vector<ReceivedState> ring_;
   std::size_t first_ = 0;
   std::size_t count_ = 0;
-  std::uint64_t gap_ = 0;  // states that are lost after those that wait
+  std::uint64_t gap_ = 0;  // states lost after the queued states
   std::uint64_t missed_ = 0;
   bool ended_ = false;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The callbacks of one kind, each with a handle by which it is ended.
+// The callbacks of one kind, each with a handle that ends it.
 #pragma once
 
 #include <unistd.h>
@@ -15,12 +15,11 @@
 
 namespace r4 {
 
-// A callback, as its Subscription knows it.
 class Subscriber {
  public:
   virtual ~Subscriber() = default;
   void end() {
-    // In a fork no thread calls it, and a thread that called it then holds the lock for ever.
+    // After a fork, no thread runs the callback. A lock that a thread held then is never released.
     if (::getpid() != process_) return;
     ended_ = true;
     std::shared_ptr<void> gone;            // destroyed without the lock
@@ -30,7 +29,7 @@ class Subscriber {
   bool ended() const { return ended_; }
 
  protected:
-  // Takes the callback out, with what it has captured. Under the lock.
+  // Takes out the callback with its captures. Under the lock.
   virtual std::shared_ptr<void> take() = 0;
 
   std::recursive_mutex running_;
@@ -40,7 +39,7 @@ class Subscriber {
   std::atomic<bool> ended_{false};
 };
 
-// Callbacks are added from any thread and called from one; a call allocates nothing.
+// Callbacks are added from any thread and called from one thread. A call allocates nothing.
 template <class... Arguments>
 class Subscribers {
  public:
@@ -50,8 +49,7 @@ class Subscribers {
    public:
     explicit One(Function function) : function_(std::make_shared<Function>(std::move(function))) {}
     void operator()(const Arguments&... arguments) {
-      // Keeps what it has captured until the call is over, though it may end itself; destroyed
-      // without the lock.
+      // Keeps the captures until the call is over, and is destroyed without the lock.
       std::shared_ptr<Function> called;
       const std::lock_guard lock(running_);
       if (ended()) return;
@@ -79,7 +77,7 @@ class Subscribers {
     list_ = std::make_shared<const List>(std::move(fresh));
   }
 
-  // Callbacks that are added meanwhile are left out.
+  // Callbacks that are added during the call are left out.
   template <class Action>
   void each(Action action) const {
     std::unique_lock lock(mutex_);

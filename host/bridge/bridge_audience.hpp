@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The peers that hear a board through a bridge besides the served hosts: watchers
-// (docs/protocol.md, 4.8), and for a second each peer that stopped the board, asks for control of
-// it, or needs its nonce to sign what it sends.
+// The peers, besides served hosts, that hear a board through a bridge: watchers (docs/protocol.md,
+// 4.8), and for a second each peer that stopped the board, asks for control, or needs the nonce.
 //
 //     W:rate --> is sent a LEASE --W:rate that echoes it--> hears everything for two seconds
 //                                                           after each W
 //
-// As at the board, nothing is streamed to a peer before it echoes a random number that was sent to
-// it. So a forged sender address of a W cannot make a bridge flood a third party. For the same
-// reason the answers to peers that have echoed nothing are few.
+// A peer is streamed to only after it has echoed a random number that was sent to it. So a W with a
+// forged sender address cannot make a bridge flood a third party. For the same reason, peers that
+// have echoed nothing get few answers.
 #pragma once
 
 #include <array>
@@ -33,27 +32,23 @@ class BridgeAudience {
   enum class Effect : std::uint8_t { watching, unproven, full };
   // A `W` of a peer, with its T. `ends`: its rate is 0, which ends the lease.
   Effect on_lease(Peer from, bool ends, std::uint64_t echo, Time now);
-  // A new LEASE for that peer.
   std::uint32_t new_token(Peer to, Time now);
 
-  // That peer hears the board's heartbeats for a while.
   void listen(Peer from, Time now) { place_of(from, now).listens_until = now + curiosity; }
 
   // The peer sent the board a datagram with that number, if any, and that session.
   void on_question(Peer from, std::optional<std::uint32_t> pnum, SessionId sid, Time now);
-  // The peer that sent such a datagram last. An answer to a session goes to no peer that did not
-  // name its id.
+  // An answer to a session goes only to a peer that named its id.
   std::optional<Peer> asker_of(std::optional<std::uint32_t> pnum, SessionId sid, Time now) const;
 
-  // Calls `call(peer)` for each peer that hears states.
   template <class Call>
   void for_each_watcher(Time now, Call call) const {
     for (const Place& place : places_) {
       if (now < place.watches_until) call(place.peer);
     }
   }
-  // Calls `call(peer)` for each peer that hears heartbeats and is no watcher. Each call begins with
-  // another peer, so that each has its turn when a budget does not suffice for all.
+  // Calls `call(peer)` for each peer that hears heartbeats only. Each call begins with another
+  // peer, so that a small budget reaches every peer in turn.
   template <class Call>
   void for_each_listener(Time now, Call call) {
     ++turn_;
@@ -71,9 +66,9 @@ class BridgeAudience {
  private:
   struct Place {
     Peer peer = everyone;
-    Time heard;               // Time(): the place is free
-    std::uint32_t token = 0;  // 0: none
-    Time told;                // when the token was sent
+    Time heard;  // Time(): the place is free
+    std::uint32_t token = 0;
+    Time told;  // when the token was sent
     Time watches_until;
     Time listens_until;
   };

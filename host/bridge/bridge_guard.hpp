@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which host datagrams a bridge may pass to its board, as far as that depends on keys.
-//
-// A board obeys its own cable without a signature, and a bridge must not lend that trust to its
-// hosts:
+// Decides by keys which host datagrams a bridge may pass to its board. A board obeys its own cable
+// without a signature, and a bridge must not lend that trust to its hosts:
 //
 //     keys    board                        heartbeats and commands pass
 //     given   any                          if they are signed for this board, once, within 250 ms
@@ -11,8 +9,8 @@
 //     none    at a cable, has a key        never: the bridge cannot check signatures
 //     none    at a cable, not heard yet    never
 //
-// The rule is that of the board (protocol/keys/authentication.hpp), with the nonce and the clock
-// that the board reports. E:STOP, Q:ID and W need no signature, neither here nor at the board.
+// The rule is the board's (protocol/keys/authentication.hpp), with the nonce and the clock that the
+// board reports. E:STOP, Q:ID and W need no signature, neither here nor at the board.
 #pragma once
 
 #include <chrono>
@@ -28,22 +26,21 @@ class BridgeGuard {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  // Why no datagram passes that needs a signature.
+  // Why datagrams that need a signature do not pass.
   enum class Trouble : std::uint8_t {
     none,
     board_has_no_key,  // and the bridge has one
     key_needed,        // the board has a key, and the bridge has none
   };
 
-  // `keys`: the board's keys that its hosts sign with; at most max_keys. `trusted`: the board obeys
-  // every datagram of this transport (its cable), and the bridge is not open to everyone.
+  // `keys`: the board's keys with which its hosts sign; at most max_keys. `trusted`: the board
+  // obeys every datagram of this transport (its cable), and the bridge is not open to everyone.
   BridgeGuard(const std::vector<Key>& keys, bool trusted);
 
   void on_board_datagram(const Datagram& datagram, MessageKind kind, Time now);
   // The board's transport is down. It may lead to another board when it comes back.
   void on_board_gone() { heard_ = false; }
 
-  // Judges a heartbeat or a command.
   Verdict judge(const Datagram& datagram, Time now);
   // Counts a verdict other than authentic. True if it may be answered.
   bool may_answer(Verdict verdict);
@@ -55,8 +52,8 @@ class BridgeGuard {
 
   Authentication authentication_;
   const bool trusted_;
-  bool heard_ = false;  // a heartbeat of the board has come
-  bool asks_ = false;   // its newest heartbeat asks for signatures
+  bool heard_ = false;
+  bool asks_ = false;  // its newest heartbeat asks for signatures
   bool has_clock_ = false;
   std::uint32_t t_ms_ = 0;  // the board's clock at told_
   Time told_;

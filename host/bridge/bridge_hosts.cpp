@@ -25,7 +25,6 @@ bool BridgeHosts::on_heartbeat(Peer from, const Datagram& heartbeat, bool judged
   return true;
 }
 
-// The place of a known host, or a new one; null if there is none.
 BridgeHosts::Host* BridgeHosts::place_for(Peer from, SessionId sid, Time now) {
   for (Host& host : hosts_) {
     if (is_of(host, from, sid)) return &host;
@@ -36,7 +35,7 @@ BridgeHosts::Host* BridgeHosts::place_for(Peer from, SessionId sid, Time now) {
     place = hosts_.data();
     if (place->heard != Time() && now - place->heard < timeout_ + paper_margin) return nullptr;
   } else {
-    // Hosts that were never served give way first, then the one that was silent longest.
+    // Hosts that were never served give way first, then the host that was silent longest.
     const auto rank = [now](const Host& host) {
       return std::pair(now >= host.served_from, host.heard);
     };

@@ -9,9 +9,9 @@
 //                                v | the board reports that it has no host          |
 //                              refused <--------------------------------------------+
 //
-// The board decides which host controls it, and answers BUSY to every other one. So the host that
-// the board obeys is the one that it does not refuse. States are sent to served hosts alone, and
-// their datagrams pass at once. Other hosts share a budget (bridged_pair.hpp).
+// The board answers BUSY to every host but the controlling host. So the host that the board does
+// not refuse is in control. Only served hosts get states, and their datagrams pass at once. Other
+// hosts share a budget (bridged_pair.hpp).
 //
 // A served host keeps its place while it is heard. After a silence it is served again at once,
 // unless another served host needed the place.
@@ -38,34 +38,32 @@ class BridgeHosts {
   static constexpr std::size_t most = 16;  // besides the paper host
   // Longer than a board needs to answer.
   static constexpr std::chrono::milliseconds patience{50};
-  // The board must have lost a silent paper host before another one passes.
+  // The board must have lost a silent paper host before another paper host passes.
   static constexpr std::chrono::milliseconds paper_margin{500};
 
   // `timeout`: the board's.
   explicit BridgeHosts(std::chrono::milliseconds timeout);
 
-  // `judged`: the board begins or feeds a session by that heartbeat, or answers BUSY.
-  // False if it must not pass: there is another paper host, or `most` other hosts are served.
+  // `judged`: the board begins or feeds a session by that heartbeat, or answers BUSY. False if it
+  // must not pass: there is another paper host, or `most` other hosts are served.
   bool on_heartbeat(Peer from, const Datagram& heartbeat, bool judged, Time now);
-  // The board has refused that session.
   void on_busy(SessionId sid, Time now);
   // The board reports that it has no host, so it refuses none.
   void on_board_free();
-  // Lets time pass. True if served() has changed.
+  // True if served() has changed.
   bool poll(Time now);
 
   // The peers of the served hosts as of the last poll(), each peer once.
   const std::vector<Peer>& served() const { return served_; }
   bool is_served_at(Peer peer) const;
-  // True if a heartbeat of this host passed, at most a timeout ago.
+  // True if a heartbeat of this host passed at most a timeout ago.
   bool knows(Peer from, SessionId sid, Time now) const;
-  // True if datagrams of this host pass at once: it is served, or was before a silence. That holds
-  // for every path of its session.
+  // True if datagrams of this host pass at once, over every path of its session: it is served, or
+  // was served before a silence.
   bool trusts(Peer from, SessionId sid, Time now) const;
   bool serves(SessionId sid, Time now) const;
   // The number of the first heartbeat of this host that passed, or passed after a silence.
   std::optional<std::uint32_t> first_heartbeat(Peer from, SessionId sid) const;
-  // Calls `call(peer)` for each path of that session if it is served.
   template <class Call>
   void for_each_path(SessionId sid, Time now, Call call) const {
     for (const Host& host : hosts_) {

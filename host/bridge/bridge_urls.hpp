@@ -13,12 +13,11 @@ struct BridgedUrls {
   std::string board;
 };
 
-// Throws Error{usage} for patterns of different lengths, for a side of several paths, for a side
-// that would be joined to itself, and for a transport that cannot be that side.
+// Throws Error{usage} for patterns of different lengths, a side of several paths, a side joined to
+// itself, and a transport that cannot be that side.
 std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board);
 
-// True if the side of hosts is reached only by programs of this computer, or by devices that are
-// plugged into it.
+// True if only programs of this computer, or devices plugged into it, reach the side of hosts.
 bool is_of_this_computer(const std::string& hosts);
 
 }  // namespace r4

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A bridge watches its board while it serves no host (docs/protocol.md, 4.8), for the watchers at
-// the hosts' side, and for programs that share the board's transport with the bridge.
-//
-// It asks for the rate and fields of the newest watcher at the hosts' side; without a watcher, for
-// a few states a second, which are a small load for a bus of many boards.
+// A bridge that serves no host watches its board (docs/protocol.md, 4.8), for the watchers at the
+// hosts' side, and for programs that share the board's transport with the bridge. It requests the
+// rate and fields of its newest watcher. Without a watcher it requests a few states a second, a
+// small load for a bus of many boards.
 #pragma once
 
 #include <chrono>
@@ -30,20 +29,18 @@ class BridgeWatch {
   void wish_nothing() { wish_.clear(); }
 
   bool due(SteadyTime now) const { return lease_.due(time(now)); }
-  // The W that is due.
   Text write(DatagramWriter& writer, SteadyTime now) {
     lease_.sent(time(now));
     asked_ = true;
     return write_lease(writer, wish_.empty() ? idle_wish : std::string_view(wish_));
   }
-  // True if there may be a lease to end, by write_end().
   bool asked() const { return asked_; }
   Text write_end(DatagramWriter& writer) {
     asked_ = false;
     return write_lease(writer, "0");
   }
 
-  // True if that answers a W of this bridge, which names no session.
+  // True for an answer to a W of this bridge, which names no session.
   bool on_refusal(const Nack& nack, SteadyTime now) {
     if (nack.sid != no_session || next_pnum_ - 1 - nack.pnum >= remembered) return false;
     if (nack.lease == 0) wish_nothing();  // the board does not take it

@@ -56,8 +56,6 @@ BridgedPair::BridgedPair(Setup setup)
       known_(setup.timeout),
       guard_(setup.keys, setup.trusted) {}
 
-// --- the two sides
-
 void BridgedPair::open() {
   const Time now = now_();
   try_to_open(hosts_, hosts_may_be_away_ ? Failure::throws_unless_absent : Failure::throws, now);
@@ -121,8 +119,6 @@ BridgeStatus BridgedPair::status() const {
   return status;
 }
 
-// --- what passes
-
 void BridgedPair::Side::on_datagram(std::string_view bytes, Peer from) {
   Datagram datagram;
   if (!read_datagram(bytes, datagram)) {
@@ -176,7 +172,7 @@ void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
   const bool asks_who = is_single(datagram, Text("Q")) && command.values() == "ID";
   if (!asks_who && !is_allowed(datagram, MessageKind::command, from, now)) return;
   if (!asks_who && !known_.knows(from, sid, now)) {
-    ++hosts_.counters.kept_out;  // its heartbeat comes first, and that is answered
+    ++hosts_.counters.kept_out;  // its heartbeat comes first, and is answered
     return;
   }
   if (!trusted && !may_ask(now)) return;
@@ -189,16 +185,15 @@ void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
   pass_on(datagram, from, trusted && !(asks_who && sid == no_session), now);
 }
 
-// True if one more datagram of a host that is not trusted may pass.
 bool BridgedPair::may_ask(Time now) {
   if (asking_.take(ms_of(now))) return true;
   ++hosts_.counters.kept_out;
   return false;
 }
 
-// True if the board begins or feeds a session by that heartbeat, or else answers BUSY: it echoes a
-// heartbeat of the board, as a session must, or is a paper host's. The answer needs a number, so a
-// paper host without numbers cannot be refused, and is served only where no other host is.
+// True if the board begins or feeds a session by that heartbeat, or answers BUSY: the heartbeat
+// echoes one of the board, as a session must, or is a paper host's. BUSY needs a packet number, so
+// a paper host without numbers cannot be refused, and is served only if no other host is.
 bool BridgedPair::is_judged(const Datagram& heartbeat) const {
   if (heartbeat.session_id() == no_session) return heartbeat.has_pnum() || known_.served().empty();
   const auto board_t = static_cast<std::uint32_t>(board_t_);
@@ -208,8 +203,8 @@ bool BridgedPair::is_judged(const Datagram& heartbeat) const {
          milliseconds(std::abs(std::int64_t{ago})) <= timeout_;
 }
 
-// When the set of served hosts changes, the carrier gets the new set: it keeps the numbers of their
-// peers, whatever other peers send.
+// When the set of served hosts changes, the carrier gets the new set, so that it keeps the numbers
+// of their peers while other peers send.
 void BridgedPair::follow_hosts(Time now) {
   if (!known_.poll(now)) return;
   const std::vector<Peer>& served = known_.served();
@@ -219,12 +214,10 @@ void BridgedPair::follow_hosts(Time now) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   const Text farewell = watch_.write_end(writer);
-  // The board streams to the served host without a lease. On a bus other programs may watch, too,
-  // so there the lease runs out.
+  // The board streams to the served host without a lease. On a bus, other programs may watch.
   if (!board_.carrier->is_shared()) send(board_, view(farewell), Priority::normal, everyone);
 }
 
-// True if that heartbeat or command may pass, as far as keys decide.
 bool BridgedPair::is_allowed(const Datagram& datagram, MessageKind kind, Peer from, Time now) {
   const Verdict verdict = guard_.judge(datagram, now);
   if (verdict == Verdict::authentic) return true;
@@ -316,8 +309,7 @@ void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time
   });
 }
 
-// Delivers to each path of the session that the answer names if it is served, else to the peer that
-// asked.
+// Delivers to each path of the named session if it is served, else to the peer that asked.
 void BridgedPair::on_answer(const Datagram& answer, MessageKind kind, Time now) {
   const SessionId sid = answer.session_id();
   std::optional<Peer> asker;
@@ -371,8 +363,7 @@ void BridgedPair::report_trouble() {
   on_event_(BridgeSide::board, {CarrierEvent::Kind::warning, problem});
 }
 
-// Answers in the board's place, with the number of its newest datagram and its time. `session`: as
-// a refusal of the board names it.
+// Answers for the board. `session`: as in the board's refusal.
 void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to,
                          Time now, std::optional<std::uint32_t> session) {
   if (!asked.has_pnum() || !board_known_ || now - board_heard_ > clock_lifetime) return;
@@ -391,8 +382,7 @@ void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t leas
   send(hosts_, view(text), Priority::normal, to);
 }
 
-// Delivers to the board. The answer to a host that is not trusted goes to the peer that it asked
-// from.
+// Delivers to the board. The answer to an untrusted host goes to the peer that it asked from.
 void BridgedPair::pass_on(const Datagram& datagram, Peer from, bool trusted, Time now) {
   if (!trusted) {
     std::optional<std::uint32_t> pnum;

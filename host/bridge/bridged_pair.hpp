@@ -13,15 +13,14 @@
 //                                      peer that asked
 //
 // The bytes stay as they are. A datagram that may have waited for longer than `oldest` before it
-// was read is dropped, unless it is a stop. So nothing that a bridge held back is executed, or
-// keeps a board alive. The carriers' queues bound the time before sending likewise. Settings that a
-// board takes only from its own cable (site_settings.hpp) never pass: a bridge would turn everyone
-// who reaches it into that cable, and would carry keys and passwords over a network.
+// was read is dropped, unless it is a stop: a delayed datagram must not be executed, or keep a
+// board alive. The carriers' queues bound the time before sending likewise. Settings that a board
+// takes only from its own cable (site_settings.hpp) never pass. Otherwise a bridge would turn
+// everyone who reaches it into that cable, and would carry keys and passwords over a network.
 //
-// A bridge makes no heartbeat. It makes answers: BUSY for a host that is kept out, AUTH for a
-// datagram that must not pass, and a LEASE for a watcher, since all of a bridge's watchers are one
-// peer to the board. While no host is served, the bridge itself watches the board
-// (bridge_watch.hpp).
+// A bridge makes no heartbeat. It answers BUSY to a host that is kept out, AUTH to a datagram that
+// must not pass, and LEASE to a watcher, because all of a bridge's watchers are one peer to the
+// board. While no host is served, the bridge itself watches the board (bridge_watch.hpp).
 #pragma once
 
 #include <array>
@@ -49,25 +48,23 @@
 
 namespace r4 {
 
-// It has more than 15 members: the two sides, a class for each rule that a datagram passes, and the
+// More than 15 members: the two sides, a class for each rule that a datagram passes, and the
 // board's newest number and clock.
 class BridgedPair {
  public:
   using Time = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::milliseconds oldest{100};
-  // The time from one attempt to open a side to the next.
   static constexpr std::chrono::milliseconds try_again{500};
 
   struct Setup {
     std::unique_ptr<Carrier> hosts;
     std::unique_ptr<Carrier> board;
-    // True if the side of hosts may be away at the beginning, too, as a device may. A port to
-    // listen at may not.
+    // True if the side of hosts may be absent at first, as a device may. A listening port may not.
     bool hosts_may_be_away = false;
     std::chrono::milliseconds timeout{1000};  // the board's
     std::vector<Key> keys;                    // the board's
-    bool trusted = false;                     // as BridgeGuard takes it
-    // Goes on while this computer sleeps, so that datagrams from before the sleep are old.
+    bool trusted = false;                     // as in BridgeGuard
+    // Counts while this computer sleeps, so that datagrams from before the sleep are old.
     std::function<Time()> now = [] { return Time(BootClock::now().time_since_epoch()); };
     std::function<void(BridgeSide, const CarrierEvent&)> on_event;
   };
@@ -96,9 +93,9 @@ class BridgedPair {
     BridgedPair& pair;
     const BridgeSide which;
     const std::unique_ptr<Carrier> carrier;
-    BoardEnd& end;  // of the carrier
+    BoardEnd& end;
     bool opened = false;
-    std::string obstacle;  // why it could not be opened, as reported last
+    std::string obstacle;  // why it could not be opened, as last reported
     Time tried;
     WaitingTime waiting;
     BridgeCounters counters;
@@ -124,8 +121,7 @@ class BridgedPair {
   void pass_on(const Datagram& datagram, Peer from, bool trusted, Time now);
   bool send(Side& to, std::string_view bytes, Priority priority, Peer peer);
   bool is_old(Side& side, Time now);
-  // The treatment of a side that cannot be opened. An absence, such as of a device that is not
-  // plugged in, may end by itself. Other faults do not.
+  // Only an absence, such as of an unplugged device, may end by itself.
   enum class Failure : std::uint8_t { throws, throws_unless_absent, is_reported };
   void try_to_open(Side& side, Failure failure, Time now);
 

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How long a datagram may have waited to be read, at most.
+// The longest time that a datagram may have waited to be read.
 //
-// Carriers do not report when a datagram came. But a datagram that is read now came after the input
-// was empty last. It was empty when the carrier said so; and everything that waited at one tick of
-// the loop is read before the next tick. A process that was stopped (Ctrl-Z), or got no processor,
-// misses ticks.
+// Carriers do not report when a datagram came. But a datagram read now came after the input was
+// last empty: when the carrier said so, or one tick ago, because everything that waits at one tick
+// is read before the next. A process that was stopped (Ctrl-Z), or got no processor, misses ticks.
 #pragma once
 
 #include <algorithm>
@@ -33,11 +32,10 @@ class WaitingTime {
     empty_ = std::max(empty_, tick_);
     tick_ = now;
   }
-  // For a datagram that is read now.
   std::chrono::steady_clock::duration at_most(Time now) const { return now - empty_; }
 
  private:
-  Time empty_;  // when the input was empty last
+  Time empty_;  // when the input was last empty
   Time tick_;
 };
 

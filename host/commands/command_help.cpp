@@ -15,7 +15,7 @@ namespace r4 {
 
 namespace {
 
-// The key in a text "C:key,value". Without a comma it ends at a space, colon or equals sign.
+// The key in "C:key,value". Without a comma it ends at a space, colon or equals sign.
 std::string_view key_in(std::string_view text) {
   const std::string_view key = text.substr(2);
   return key.substr(0, key.find_first_of(", :="));
@@ -35,8 +35,7 @@ std::string form_with_ranges(const CommandHelp& command) {
   return command.form + (command.ranges.empty() ? "" : " with " + command.ranges);
 }
 
-// The form and ranges of the command that `text` begins as; without its word, the forms of all that
-// have its letter. Empty: no command has it.
+// The forms of the command that `text` begins with, or of all commands with its letter.
 std::string forms_like(std::string_view text) {
   std::string forms;
   if (text.empty() || (text.size() > 1 && text[1] != ':')) return forms;

@@ -13,16 +13,13 @@
 
 namespace r4 {
 
-// The problem of a text that is not a valid command.
 Problem bad_command(std::string_view text, Refusal refusal);
-// The problem of a command whose values are wrong.
 Problem bad_command(const Command& command, Refusal refusal);
 
-// Throws Error{usage} for a command that cannot be sent: outside its ranges, or with texts that do
-// not fit into a datagram.
+// Throws Error{usage} for values outside their ranges, or texts too long for a datagram.
 void require_valid(const Command& command);
 
-// Why a transfer on the user's bus has failed. The board has executed the command.
+// Why a transfer on the user's bus has failed, although the board has executed the command.
 Problem failed_transfer(std::string_view command, I2cOutcome outcome);
 // Throws Error{usage} for a group without commands. Setpoints holds only valid commands.
 void require_any(const Setpoints& group);

@@ -34,7 +34,7 @@ Command parsed(std::string_view text) {
     refusal = parse_fields(command.text, set);
   }
   if (refusal == Refusal::none && command.kind == CommandKind::setting) {
-    Settings settings;  // the board's settings are unknown, so these leave each key its whole range
+    Settings settings;  // the board's settings are unknown, so each key has its whole range
     settings.heartbeat_ms = 50;
     settings.timeout_ms = 10000;
     refusal = set(settings, command.text, command.text2);

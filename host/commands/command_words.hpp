@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The words of commands and settings for people, beside the tables of the portable core (r4link/tables/).
+// Words for commands and settings, beside the tables of the portable core (r4link/tables/).
 #pragma once
 
 #include <string>
@@ -16,12 +16,12 @@ struct KindWords {
   std::string_view meaning;  // "OSMC motor driver"
   // The command in words. describe() replaces the names in braces.
   std::string_view sentence;
-  // Used for a value of 0, and if an optional value is left out. Empty: `sentence` is used.
+  // Used for a value of 0, and without an optional value. Empty: `sentence` is used.
   std::string_view empty_sentence = {};
 };
 const KindWords& words_of(CommandKind kind);
 
-// What the setting takes: "50-1000 ms, below the timeout".
+// The setting's values: "50-1000 ms, below the timeout".
 std::string values_of(Setting setting);
 
 }  // namespace r4

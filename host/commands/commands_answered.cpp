@@ -7,9 +7,8 @@ namespace r4 {
 
 namespace {
 
-// For boards that do not report CMD: true if `state`, as one datagram carried it, shows the value
-// that `command` sets. Commands without a state field (threshold, fields, settings) are never
-// shown.
+// For boards without CMD: true if `state`, as one datagram carried it, shows the value that
+// `command` sets. Never true for commands without a state field (threshold, fields, settings).
 bool state_shows(const State& state, const Command& command) {
   if (command.kind == CommandKind::relay) {
     return state.present.has(StateField::relays) && state.relay(command.channel) == command.on;
@@ -56,9 +55,8 @@ void CommandsUnderWay::on_stop(const SafeReport& report, Time now) {
   }
 }
 
-// A board whose host has left is safe for the reason `link`, unless there is a graver reason. A
-// heartbeat from before the farewell proves nothing. Then the answer to a repetition ends the
-// farewell.
+// A board whose host has left is safe for the reason `link` or a graver reason. A heartbeat from
+// before the farewell proves nothing: then the answer to a repetition ends the farewell.
 void CommandsUnderWay::on_heartbeat(const SafeReport& report, std::optional<std::uint32_t> t_ms,
                                     Time now) {
   on_stop(report, now);
@@ -76,9 +74,8 @@ void CommandsUnderWay::on_heartbeat(const SafeReport& report, std::optional<std:
   }
 }
 
-// True if a heartbeat with that T was sent after the farewell. A state of the same millisecond may
-// have come before the farewell. On a slow network the board's clock is known badly, and only a T
-// that is certainly later counts.
+// True if T is from after the farewell. A state of the same millisecond may be older. On a slow
+// network the board's clock has a large error, so only a certainly later T counts.
 bool CommandsUnderWay::is_after_farewell(std::uint32_t t_ms) const {
   constexpr Time fast{5000};
   constexpr Time tick{1000};  // the board shows one T for this long
@@ -91,7 +88,7 @@ bool CommandsUnderWay::is_after_farewell(std::uint32_t t_ms) const {
 
 void CommandsUnderWay::on_identity(const Identity& identity, Time now) {
   for (Pending& pending : pending_.under_way()) {
-    // A second answer to an earlier question does not answer this one.
+    // A second answer to an earlier question does not answer this question.
     if (identity.has_asked && identity.asked != pending.pnum) continue;
     if (pending.is_out() && pending.kind == CommandKind::identify) {
       finish(pending, Outcome::confirmed, Refusal::none, now);
@@ -104,7 +101,7 @@ void CommandsUnderWay::on_refusal(const Nack& nack, bool proof, bool others, Tim
     if (!pending.is_out() || pending.pnum != nack.pnum) continue;
     if (pending.kind == CommandKind::leave) {  // executed, or the board has no session of this host
       const bool left = nack.code == Refusal::duplicate;
-      if (!left && others) continue;  // another copy may be executed: a heartbeat will show it
+      if (!left && others) continue;  // a duplicate may be executed: a heartbeat will show it
       finish(pending, left ? Outcome::confirmed : Outcome::refused, nack.code, now);
       continue;
     }

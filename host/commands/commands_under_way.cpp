@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How commands begin, go out, and end by time or by the program. commands_answered.cpp ends
-// commands by the board's answers.
+// How commands begin, are sent, and end by time or by the program. commands_answered.cpp ends them
+// by the board's answers.
 #include "commands_under_way.hpp"
 
 #include <algorithm>
@@ -12,8 +12,7 @@ namespace r4 {
 
 namespace {
 
-// True for commands that switch the outputs off. They are repeated soon, even while the heartbeats
-// are held.
+// Commands that switch the outputs off are repeated soon, even while the heartbeats are held.
 bool is_urgent(CommandKind kind) { return kind == CommandKind::stop || kind == CommandKind::leave; }
 
 constexpr Time no_deadline = std::chrono::hours{24};
@@ -32,8 +31,6 @@ CommandsUnderWay::CommandsUnderWay(const SessionOptions& options, HostLink& link
       ends_(ends),
       counts_(counts),
       pending_(max_pending, max_stops) {}
-
-// --- begin
 
 CommandsUnderWay::Pending* CommandsUnderWay::allocate(const Command& command, Time timeout,
                                                       Time now) {
@@ -56,8 +53,7 @@ CommandsUnderWay::Pending* CommandsUnderWay::allocate(const Command& command, Ti
   return slot;
 }
 
-// Gives an E:CLEAR the number of the cause that is known now, if it names none yet. False before
-// the first heartbeat of the board.
+// Gives an E:CLEAR without a named cause the present cause. False before the first heartbeat.
 bool CommandsUnderWay::name_cause(Pending& pending) const {
   if (pending.cause == Command::unnamed_cause) pending.cause = cause_;
   if (pending.cause == Command::unnamed_cause) return false;
@@ -103,7 +99,7 @@ Ticket CommandsUnderWay::send_at_once(const Command& command, Time timeout, Time
 }
 
 Ticket CommandsUnderWay::stop(Time timeout, Time now) {
-  forget_stop();  // the new stop is repeated instead
+  forget_stop();
   ++counts_.commands;
   const Ticket ticket = send_at_once(Command::stop(), timeout, now);
   if (ticket == 0) outbox_.send(Command::stop(), {}, now);
@@ -126,9 +122,6 @@ bool CommandsUnderWay::send_step(const Command& command, Time now) {
   return true;
 }
 
-// --- going out
-
-// Sends a pending command: the first time with a new number, then again with the same bytes.
 void CommandsUnderWay::transmit(Pending& pending, Time now) {
   if (pending.stage == Stage::queued) {
     if (pending.is_group()) write_group(pending);
@@ -182,8 +175,6 @@ Time CommandsUnderWay::next() {
   return next;
 }
 
-// --- groups
-
 bool CommandsUnderWay::knows_groups(Time now) {
   if (board_.groups().ask(keeper_.fields().answers(), now)) {
     board_.asked(outbox_.send(Command::identify(), {}, now).pnum, now);
@@ -191,8 +182,7 @@ bool CommandsUnderWay::knows_groups(Time now) {
   return board_.groups().state() != GroupSupport::State::unknown;
 }
 
-// Chooses between one datagram and many. False if the choice is not known yet: then the group
-// waits.
+// Chooses between one datagram and many. False if the choice is unknown: then the group waits.
 bool CommandsUnderWay::choose_form(Pending& pending, Time now) {
   if (pending.step != 0) return true;
   if (!knows_groups(now)) {
@@ -203,7 +193,6 @@ bool CommandsUnderWay::choose_form(Pending& pending, Time now) {
   return true;
 }
 
-// Writes the fields that are sent next.
 void CommandsUnderWay::write_group(Pending& pending) {
   DatagramWriter writer(pending.bytes.data(), pending.bytes.size());
   if (pending.step != 0) {
@@ -222,8 +211,6 @@ bool CommandsUnderWay::is_group_ahead() {
   }
   return false;
 }
-
-// --- ends
 
 void CommandsUnderWay::finish(Pending& pending, Outcome outcome, Refusal code, Time now) {
   if (pending.stage == Stage::lingering) return pending_.remove(pending);  // its end was reported
@@ -301,8 +288,6 @@ void CommandsUnderWay::end_all(Time now) {
     finish(pending, Outcome::closed, Refusal::none, now);
   }
 }
-
-// --- steps of arm()
 
 void CommandsUnderWay::remove_step() {
   step_end_.reset();

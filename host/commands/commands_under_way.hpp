@@ -9,21 +9,19 @@
 //
 // A retry has the bytes and the packet number of the original (signed anew, if there is a key), so
 // the board can execute it only once. When CMD has moved past a command, the retry's answer
-// (DUPLICATE: executed, STALE: not) decides. A refusal proves that the command was not executed
-// only if it names a session that began before the command was sent, because the board forgets over
-// an outage. A board without CMD (the paper's release) confirms a command by the value that its
+// (DUPLICATE: executed, STALE: not) decides. The board forgets over an outage, so a refusal proves
+// that the command was not executed only if it names a session that began before the command was
+// sent. With a key, AUTH proves only that one duplicate was refused: another duplicate may have
+// been executed. A board without CMD (the paper's release) confirms a command by the value that its
 // state shows.
 //
-// With a key, AUTH proves only that one copy was not taken: another copy may have been executed.
-//
-// A group of commands is one datagram and one pending command if the board executes groups
-// (../link/group_support.hpp). Otherwise its commands go one after the other, and later commands
-// wait.
+// If the board executes groups (../link/group_support.hpp), a group is one datagram and one pending
+// command. Otherwise its commands go one after the other, and later commands wait.
 //
 // E:STOP does not wait for the link. It is repeated every 20 ms until a heartbeat of the board
 // reports the reason `stop` and this stop's own number, and then for a while longer, because an
-// E:CLEAR of another program may be on its way. E:CLEAR names the cause that was known at the call.
-// When the board reports a newer cause, the E:CLEAR is given up.
+// E:CLEAR of another program may be on its way. E:CLEAR names the cause that was known at the call,
+// and is given up when the board reports a newer cause.
 #pragma once
 
 #include <cstddef>
@@ -59,21 +57,17 @@ class CommandsUnderWay {
 
   // --- calls of the program. Each returns 0 if there is no room.
 
-  // A stop is sent even if there is no room. The caller ends all other commands under way before.
+  // A stop is sent even without room. The caller first ends all other commands under way.
   Ticket send(const Command& command, Time timeout, Time now);
   Ticket send(const Setpoints& group, Time timeout, Time now);
-  // The farewell.
   Ticket leave(Time timeout, Time now);
-  // For a request that is not a command itself.
   Ticket take_ticket() { return next_ticket_++; }
-  // Gives up a command, which the board may have executed. A stop goes on.
+  // Gives up a command, which the board may have executed. A stop continues.
   void cancel(Ticket ticket, Time now);
   // Ends every command but stops, or every command but stops and questions.
   void end_all_but_stops(Outcome outcome, Time now);
   void give_up(Time now);
-  // Ends every command.
   void end_all(Time now);
-  // A confirmed stop is repeated no longer.
   void forget_stop();
 
   // --- a step of arm(). At most one is under way.
@@ -84,7 +78,6 @@ class CommandsUnderWay {
     CommandKind kind;
     CommandResult result;
   };
-  // The step that has ended since the last call, if one has.
   std::optional<StepEnd> take_step_end() { return std::exchange(step_end_, {}); }
   // True if arm() has to wait: for a step, for a stop, or for an earlier E:CLEAR.
   bool delays_arming();
@@ -92,11 +85,10 @@ class CommandsUnderWay {
   // --- actions that are due
 
   void expire(Time now);
-  // Sends waiting commands, in the order of the calls.
   void send_queued(Time now);
   // Ends output commands that are held back and do not wait for an arm().
   void refuse_held_back(Time now);
-  // Repeats commands that are not confirmed, and the stop that was confirmed last.
+  // Repeats commands that are not confirmed, and the last confirmed stop.
   void repeat(Time now);
   Time next();
 
@@ -104,23 +96,20 @@ class CommandsUnderWay {
 
   void on_state(Time now);
   void on_heartbeat(const SafeReport& report, std::optional<std::uint32_t> t_ms, Time now);
-  // The board reports the stop that it has obeyed.
   void on_stop(const SafeReport& report, Time now);
   void on_identity(const Identity& identity, Time now);
-  // `proof`: the refusal proves that the command was not executed. `others`: other paths carry
-  // copies of the command.
+  // `proof`: the command was not executed. `others`: other paths carry duplicates of the command.
   void on_refusal(const Nack& nack, bool proof, bool others, Time now);
   // True if the command with that number is a setting that the board takes over a cable only.
   bool is_cable_only(std::uint32_t pnum);
 
   // --- for commands that are sent once
 
-  // True if a group waits, or commands of a group are left: later commands must not overtake them.
+  // True if a group, or the rest of a group, waits: later commands must not overtake it.
   bool is_group_ahead();
   // True if it is known whether the board executes groups. Otherwise the board is asked.
   bool knows_groups(Time now);
-  // The number of the newest cause that only E:CLEAR ends; 0 if there is none;
-  // Command::unnamed_cause before the first heartbeat.
+  // The newest cause that only E:CLEAR ends; 0: none; unnamed_cause before the first heartbeat.
   std::int32_t cause() const { return cause_; }
   bool is_held_back(CommandKind kind) const { return drives_output(kind) && !arming_.may_drive(); }
 
@@ -152,7 +141,7 @@ class CommandsUnderWay {
   std::int32_t cause_ = Command::unnamed_cause;
   bool group_waits_ = false;  // for the answer to Q:ID
   std::optional<StepEnd> step_end_;
-  // The time of the farewell, and the T of the newest state by then.
+  // The time of the farewell, and the newest T of a state before it.
   struct Farewell {
     Time at{0};
     std::optional<std::uint32_t> state_ms;

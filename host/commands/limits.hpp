@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The ranges of a program's options and times, in one place. A value outside its range throws
-// Error{usage} with the name, the value and the range: a -1 that became 49 days would keep motors
-// on.
+// The ranges of a program's options and times. A value outside its range throws Error{usage} with
+// the name, the value and the range: a -1 that became 49 days would keep motors on.
 #pragma once
 
 #include <chrono>
@@ -18,25 +17,24 @@ struct SessionOptions;
 // Called by the constructors of the boards and of Session.
 void require_valid(const SessionOptions& options);
 
-// A program that only watches may stop its board and ask for its identity. Other commands throw.
+// A watcher may stop its board and ask for its identity. Other commands throw.
 void require_control(BoardRole role, std::string_view what);
 void require_control(BoardRole role, const Command& command);
 void require_control(BoardRole role, const Setpoints& group);
 
-// The time within which a command must be confirmed: longer than 0. A stop has no such limit, and
-// goes out with any timeout.
+// A command must be confirmed within more than 0 ms. A stop is sent with any timeout.
 void require_timeout(std::string_view what, std::chrono::milliseconds timeout);
 
-// The time to wait for something that may be there already: 0 looks without waiting.
+// A time to wait: 0 checks without waiting.
 void require_wait(std::string_view what, std::chrono::milliseconds timeout);
 
 // The period of the application watchdog: up to an hour; 0 turns it off.
 void require_watchdog(std::chrono::milliseconds period);
-// The longest time that a callback may take: up to an hour; 0 for no limit.
+// The longest time of a callback: up to an hour; 0 for no limit.
 void require_callback_limit(std::chrono::milliseconds limit);
 
-// The board's timeout and heartbeat interval, set together by a host that sends a heartbeat every
-// `ours`: two of the host's heartbeats must fit into the timeout.
+// The board's timeout and heartbeat interval for a host that sends a heartbeat every `ours`: two of
+// the host's heartbeats must fit into the timeout.
 void require_link_timing(std::chrono::milliseconds timeout, std::chrono::milliseconds heartbeat,
                          std::chrono::milliseconds ours);
 

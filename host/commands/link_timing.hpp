@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The order in which a board's timeout and heartbeat interval are set, so that the board refuses
-// none of the steps, whatever its present values are: it takes one setting at a time, and the
-// interval must be below the timeout.
+// The order in which a board's timeout and heartbeat interval are set: one setting at a time, with
+// the interval below the timeout. No step is refused, whatever the board's present values.
 #pragma once
 
 #include <chrono>
@@ -12,7 +11,7 @@
 
 namespace r4 {
 
-// The least values that a board takes (protocol/messages/settings.hpp).
+// The least values that a board accepts (protocol/messages/settings.hpp).
 constexpr std::uint32_t least_heartbeat_ms = 50;
 constexpr std::uint32_t least_timeout_ms = 100;
 
@@ -21,7 +20,7 @@ struct LinkTimingStep {
   std::uint32_t ms;
 };
 
-// First an interval below any timeout, then the timeout, then the wanted interval, if it differs.
+// First an interval below any timeout, then the timeout, then the wanted interval if it differs.
 inline std::vector<LinkTimingStep> link_timing_steps(std::chrono::milliseconds timeout,
                                                      std::chrono::milliseconds heartbeat) {
   const auto timeout_ms = static_cast<std::uint32_t>(timeout.count());

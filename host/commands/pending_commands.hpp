@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands of a session that are under way: a fixed number of slots, walked in the order of the
-// calls. Few commands are under way at once, and a fleet has many sessions. So a slot gets its
-// memory at its first use, and keeps it.
+// A session's commands under way: a fixed number of slots, walked in the order of the calls. A slot
+// gets its memory at its first use, because a fleet has many sessions with few commands each.
 #pragma once
 
 #include <algorithm>
@@ -24,44 +23,42 @@ namespace r4 {
 //                          +-------DUPLICATE-----------+--> executed
 //
 // It may end in any of these states. It is confirmed when CMD names it, or CMD is past it and it
-// was executed. A stop that is confirmed has ended for the program, but stays for a while:
+// was executed. A confirmed stop has ended for the program, but stays for a while:
 //
 //     sent --the board reports it--> lingering --the time is over, another stop, an E:CLEAR--> free
 //
-// A group is one command if the board takes it as one datagram. Otherwise each of its commands goes
-// through these states in turn: it is queued when its predecessor is confirmed.
+// A group is one command if the board takes it as one datagram. Otherwise its commands go through
+// these states in turn: each is queued when its predecessor is confirmed.
 struct PendingCommand {
   enum class Stage : std::uint8_t {
-    free,       // a slot without a command
-    queued,     // not sent yet
+    free,
+    queued,
     sent,       // and repeated
     overtaken,  // CMD is past it: the answer to a retry decides
-    executed,   // the board answered DUPLICATE: it has executed this number
+    executed,   // the board answered DUPLICATE
     lingering,  // a confirmed stop, which is repeated
   };
   Stage stage = Stage::free;
   CommandKind kind = CommandKind::heartbeat;
-  bool cable_only = false;  // a setting that the board takes over a cable only
+  bool cable_only = false;  // the board takes this setting over a cable only
   bool is_step = false;     // sent by arm(), not by the program
   std::uint32_t pnum = 0;
   std::uint64_t ticket = 0;
-  std::int32_t cause = Command::unnamed_cause;  // clear: the cause it names, once one is known
+  std::int32_t cause = Command::unnamed_cause;  // clear: the named cause, once known
   std::chrono::microseconds started{0}, deadline{0}, retry{0};
   std::size_t size = 0;  // of the fields in `bytes`: the command; once sent, also PNum and T
   Command command;       // without its texts; of a group the first, or the one under way
   Setpoints group;       // empty for a single command
-  // If the commands of a group go one after the other: the current one, from 1; else 0.
+  // If a group's commands go one after the other: the current command, from 1; else 0.
   std::uint8_t step = 0;
-  // If a group is one datagram: the command that the board has refused, from 1.
+  // If a group is one datagram: the refused command, from 1.
   std::uint8_t failed = 0;
   std::array<char, max_datagram> bytes;
 
-  // True if it was sent and has not ended.
   bool is_out() const {
     return stage != Stage::free && stage != Stage::queued && stage != Stage::lingering;
   }
   bool is_group() const { return !group.empty(); }
-  // True if more commands of a group follow this one, one after the other.
   bool has_more() const { return step != 0 && step < group.size(); }
 };
 
@@ -69,14 +66,13 @@ class PendingCommands {
  public:
   static constexpr std::size_t max_slots = 128;
 
-  // At most max_slots together. The stops have slots of their own, so that no number of commands
-  // can keep a stop out.
+  // At most max_slots together. Stops have their own slots, so commands cannot keep a stop out.
   PendingCommands(std::size_t commands, std::size_t stops)
       : slots_(commands + stops), commands_(commands), stops_(stops) {
     slots_[0] = std::make_unique<PendingCommand>();
   }
 
-  // A fresh slot for a command, the last in the order; nullptr if all are taken.
+  // Returns nullptr if all slots are taken.
   PendingCommand* add(CommandKind kind) {
     std::size_t& room = room_for(kind);
     if (room == 0) return nullptr;
@@ -99,8 +95,8 @@ class PendingCommands {
     command.stage = PendingCommand::Stage::free;
   }
 
-  // The commands under way now, oldest first. During a walk commands may be added, which are not
-  // visited, and removed, which are skipped.
+  // The present commands, oldest first. Commands added during a walk are not visited, and removed
+  // commands are skipped.
   class Walk {
    public:
     class Iterator {
@@ -138,10 +134,10 @@ class PendingCommands {
  private:
   std::size_t& room_for(CommandKind kind) { return kind == CommandKind::stop ? stops_ : commands_; }
 
-  // First those under way, oldest first, then the free ones. Null: not used yet.
+  // Commands under way, oldest first, then free slots. Null: never used.
   std::vector<std::unique_ptr<PendingCommand>> slots_;
   std::size_t used_ = 0;
-  std::size_t commands_, stops_;  // how many more
+  std::size_t commands_, stops_;  // free slots
 };
 
 }  // namespace r4

@@ -23,15 +23,14 @@ class Posts {
   PostResult send(const Command& command, Time now);
   PostResult send(const Setpoints& group, Time now);
   void on_sent(const Sending& sending, SendResult result) { delivery_.on_sent(sending, result); }
-  // The result of the last post, when its effects have been performed.
+  // After the effects of the last post have been performed.
   PostResult result();
-  // True if the last post was an E:CLEAR.
   bool is_clear() const { return kind_ == CommandKind::clear; }
   // The board has proved that it did not execute that command.
   void on_refusal(const Nack& nack);
 
  private:
-  // A command, or the first of a group, that the board may still refuse.
+  // A command, or the first command of a group, that the board may still refuse.
   struct Posted {
     bool open = false;
     bool is_group = false;
@@ -40,7 +39,7 @@ class Posts {
   };
 
   PostResult begin(Outbox::Sent sent, const Command& command, bool is_group);
-  // Takes the post with that number out of the memory. Null if there is none.
+  // Takes the post with that number out of the memory; null if there is none.
   const Posted* take(std::uint32_t pnum);
 
   Effects& effects_;

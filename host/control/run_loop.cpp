@@ -14,7 +14,6 @@ using Milliseconds = std::chrono::milliseconds;
 constexpr std::size_t waiting_states = 8;  // a state may come in several datagrams
 constexpr Milliseconds look_interval{20};  // between checks of link and arming without a state
 
-// The board's watchdog, on while the loop runs.
 class StepWatchdog {
  public:
   StepWatchdog(Board& board, Milliseconds period) : board_(board), on_(period.count() > 0) {
@@ -39,11 +38,11 @@ DisarmCause cause_of(const Board& board, const LoopOptions& options) {
   return options.arming == Arming::off ? DisarmCause::none : board.disarmed_by();
 }
 
-// Leaves the outputs as `rest` has them, or safe. Returns the end of the report's `why`.
+// Sets the outputs to `rest`, or makes the board safe. Returns the end of the report's `why`.
 std::string come_to_rest(Board& board, const LoopOptions& options, bool& at_rest) {
   at_rest = true;
   const auto is_safe = [&] { return cause_of(board, options) != DisarmCause::none; };
-  // A disarmed board's outputs are safe already, and nothing would be sent to it.
+  // A disarmed board's outputs are already safe, and no command would be sent to it.
   if (is_safe() && board.disarmed_by() != DisarmCause::not_yet) return {};
   try {
     board.send(options.rest, options.rest_timeout);
@@ -99,7 +98,7 @@ LoopReport run_loop(Board& board, const LoopOptions& options,
         }
         ++report.steps;
         guard.on_commanded(*wanted);
-        // A refused post needs no repeat: the next one is newer, and the guard sees the reason.
+        // A refused post needs no repeat: the next post is newer, and the guard sees the reason.
         if (!wanted->empty()) static_cast<void>(board.post(*wanted));
       } catch (...) {
         thrown = std::current_exception();

@@ -23,8 +23,6 @@ std::vector<std::size_t> boards_of(const std::vector<BoardSetpoints>& setpoints)
 
 }  // namespace
 
-// --- results
-
 bool FleetResults::all_confirmed() const {
   return std::all_of(results_.begin(), results_.end(), std::mem_fn(&FleetResult::confirmed));
 }
@@ -46,8 +44,6 @@ void FleetResults::require() const {
   if (others != 0) problem.reason += " (and " + std::to_string(others) + " other boards)";
   throw Error(std::move(problem));
 }
-
-// --- the fleet
 
 Fleet::Fleet(const std::vector<std::string>& patterns, BoardOptions options)
     : impl_(with_system_errors("a fleet", [&] {
@@ -198,8 +194,6 @@ void Fleet::watchdog(Duration period) {
 void Fleet::feed() {
   for (const auto& board : impl_->boards) board->feed();
 }
-
-// --- one board
 
 void FleetBoard::send(const Command& command, Duration timeout) {
   fleet_->send({board_}, command, timeout).require();

@@ -12,8 +12,7 @@ namespace r4 {
 
 namespace {
 
-// Each datagram of hundreds of boards would wake the thread. So if more than this happens in a
-// window, the thread pauses before it looks again, and finds several.
+// Each datagram would wake the thread. In a busy window it pauses first, and then takes several.
 constexpr std::chrono::milliseconds window{10};
 constexpr std::size_t busy_window = 200;
 constexpr std::chrono::microseconds breather{200};
@@ -44,7 +43,7 @@ Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options
   }
   start([this] { run(); });
   try {
-    // On the loop, so that a name that is looked up does not delay boards that are open.
+    // On the loop, so that resolving a name does not delay open boards.
     asio::post(io, asio::use_future([this] {
                  for (const auto& board : boards) board->open();
                }))
@@ -58,8 +57,6 @@ Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options
 void Fleet::Impl::close() {
   BlockingLoop::close([this] { shut(); });
 }
-
-// --- on the loop
 
 void Fleet::Impl::run() {
   auto since = Clock::now();
@@ -136,8 +133,6 @@ BoardHealth Fleet::Impl::health_of(std::size_t board) const {
     health.paths = std::move(paths);
   return health;
 }
-
-// --- on any thread
 
 void Fleet::Impl::require_board(std::size_t board) const {
   if (board < boards.size()) return;
@@ -219,7 +214,7 @@ FleetResults Fleet::Impl::stop(const Boards& which, Duration timeout) {
   const Command stop = Command::stop();
   FleetResults results = execute(shown(stop), which, std::max(timeout, Duration{1}),
                                  start_of(OwnCommand(stop)), why_of(stop), true);
-  // The stop must not be lost when its caller does not wait any longer.
+  // The stop must not be lost when its caller stops waiting.
   if (!results.all_confirmed()) stop_async(results.failed());
   return results;
 }

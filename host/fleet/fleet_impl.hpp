@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The implementation of a Fleet: its boards on one loop, the thread of the loop, and calls that
-// wait.
+// The implementation of a Fleet: its boards on one loop, the loop's thread, and calls that wait.
 //
 //     a thread of the program          the links' thread
 //     send(), post() -- a Call -->     every AsyncBoard in turn, in one pass
@@ -39,10 +38,9 @@ struct Fleet::Impl final : BlockingLoop {
   // explain() for the part of a board that was not confirmed.
   using Why =
       std::function<Problem(std::size_t part, const CommandResult& result, const LinkStatus& link)>;
-  // Starts a part at each board, and waits until all have ended.
   FleetResults execute(std::string text, const Boards& which, Duration timeout, Start start,
                        const Why& why, bool stop = false);
-  // Throws if the fleet is closed, too.
+  // Also throws if the fleet is closed.
   void run_on_loop(std::string_view what, const std::function<void()>& action);
   Boards wait_active(const Boards& which, Duration timeout);
   std::optional<FleetEvent> next_event(Duration timeout);
@@ -63,15 +61,14 @@ struct Fleet::Impl final : BlockingLoop {
   std::vector<std::string> urls;
   Boards all_boards;
   std::vector<std::unique_ptr<AsyncBoard>> boards;
-  std::size_t leaving = 0;  // boards whose farewell has not ended
+  std::size_t leaving = 0;
 
-  // What both sides see.
-  std::vector<LinkStatus> links;  // of each board
+  // Shared by all threads, under the lock.
+  std::vector<LinkStatus> links;
   std::deque<FleetEvent> events;
   std::uint64_t missed_events = 0;
 };
 
-// All boards are asked for the same.
 template <class What>
 auto why_of(const What& what) {
   return [&what](std::size_t, const CommandResult& result, const LinkStatus& link) {

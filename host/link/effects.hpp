@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The effects of a call to a session, in order: datagrams to send, then events to report. The
-// session itself calls nothing outside.
+// The effects of a call to a session, in order: datagrams to send, then events to report.
 #pragma once
 
 #include <array>
@@ -22,7 +21,6 @@ namespace r4 {
 // Names a command that a session took; never 0.
 using Ticket = std::uint64_t;
 
-// A datagram for one path.
 struct Sending {
   std::size_t path = 0;
   Priority priority = Priority::normal;
@@ -31,7 +29,6 @@ struct Sending {
   std::string_view datagram;
 };
 
-// A newer state of the board has come, or a heartbeat.
 struct StateCame {};
 struct HeartbeatCame {};
 struct BoardIdentified {
@@ -51,14 +48,12 @@ struct CommandEnded {
   Ticket ticket = 0;
   CommandResult result;
 };
-// The board has restarted since its last datagram, and kept nothing but its stored settings.
-// Reported before its new state.
+// The board has restarted and kept only its stored settings. Reported before its new state.
 struct BoardRestarted {};
 // The session was armed (cause none) or disarmed.
 struct ArmingChanged {
   DisarmCause cause = DisarmCause::none;
 };
-// The board refused a command that was posted.
 struct PostRefused {
   RefusedPost refused;
 };
@@ -70,7 +65,6 @@ using SessionEvent =
 // Memory is reused: in the steady state nothing is allocated.
 class Effects {
  public:
-  // Space for one datagram.
   using Room = std::array<char, max_datagram>;
 
   void send(std::size_t path, Priority priority, CommandKind kind, std::uint32_t pnum,
@@ -78,13 +72,12 @@ class Effects {
     sendings_.push({{path, priority, kind, pnum, {}}, bytes_.size(), datagram.size()});
     bytes_ += datagram;
   }
-  // The datagram received last. The events are about it.
+  // The datagram received last, which the events are about.
   Datagram& datagram() { return datagram_; }
   void report(const SessionEvent& event) { events_.push(event); }
 
   bool any_sendings() const { return sendings_.any(); }
-  // The oldest. Its datagram is copied to `room`, because the session may add more while a
-  // transport sends it.
+  // The datagram is copied to `room`, because the session may add more while a transport sends it.
   Sending take_sending(Room& room) {
     Stored first = sendings_.take();
     bytes_.copy(room.data(), first.size, first.begin);
@@ -96,7 +89,6 @@ class Effects {
   SessionEvent take_event() { return events_.take(); }
 
  private:
-  // First in, first out.
   template <class Item>
   class Queue {
    public:
@@ -118,12 +110,12 @@ class Effects {
 
   struct Stored {
     Sending sending;
-    std::size_t begin = 0;  // of its datagram, in bytes_
+    std::size_t begin = 0;  // in bytes_
     std::size_t size = 0;
   };
 
   Queue<Stored> sendings_;
-  std::string bytes_;  // of the datagrams to be sent
+  std::string bytes_;
   Queue<SessionEvent> events_;
   Datagram datagram_;
 };

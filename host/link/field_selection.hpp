@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state fields that a session asks its board for, and whether the board answers. Without I/O.
+// The state fields that a session requests, and whether the board answers. Without I/O.
 //
 //                  CMD comes, in control                five F without any answer
 //     satisfied <------------------------- asking ----------------------------------> unheard
@@ -32,17 +32,14 @@ class FieldSelection {
   }
 
   const std::string& fields() const { return fields_; }
-  // The program has chosen other fields.
   void choose(std::string fields) {
     fields_ = std::move(fields);
     unanswered_ = 0;
     if (stage_ == Stage::unheard) stage_ = Stage::asking;
   }
 
-  // A session begins, so the board is asked as soon as it may be.
   void begin_anew() { next_ = Time{0}; }
 
-  // A state with CMD.
   void on_cmd(Time now) {
     cmd_seen_ = now;
     on_answer();
@@ -53,7 +50,7 @@ class FieldSelection {
     if (stage_ == Stage::unheard) stage_ = Stage::asking;
   }
 
-  // True if F is to be sent now. `may_ask`: the link is up, and no other host controls the board.
+  // True if F is due. `may_ask`: the link is up, and no other host controls the board.
   bool ask(bool controlling, bool may_ask, Time now) {
     if (stage_ == Stage::left) return false;
     if (controlling && now - cmd_seen_ < retry) {

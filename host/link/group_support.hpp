@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Whether the board executes a group of commands together: the capability `group` in its answer to
-// Q:ID. Without I/O, part of a session.
+// Q:ID. A part of a session, without I/O.
 //
 //               I:… with the word
 //     unknown ----------------------> together
@@ -10,9 +10,9 @@
 //      |                                 |
 //      +---- the board has restarted ----+
 //
-//     unknown   while a group waits, Q:ID is sent every 100 ms. A bad line may lose many of them. A
-//               board that has ever answered anything is asked until it answers, because otherwise
-//               commands that belong together would be executed one by one
+//     unknown   while a group waits, Q:ID is sent every 100 ms. A bad line may lose many of them,
+//               but commands of a group must not be executed one by one. So a board that has ever
+//               answered anything is asked until it answers
 //     together  a group is one datagram
 //     apart     the commands of a group are sent one after the other. A late answer still counts
 #pragma once
@@ -38,8 +38,8 @@ class GroupSupport {
     state_ = State::unknown;
     unanswered_ = 0;
   }
-  // True if Q:ID is to be sent now; to be called while a group waits. `answers`: the board has ever
-  // answered anything. A board that has not (the paper's release) will not answer Q:ID either.
+  // True if Q:ID is due. Call it while a group waits. `answers`: the board has ever answered
+  // anything. A board that has not (the paper's release) does not answer Q:ID either.
   bool ask(bool answers, Time now) {
     if (state_ != State::unknown || now < next_) return false;
     next_ = now + retry;
@@ -48,7 +48,6 @@ class GroupSupport {
     state_ = State::apart;
     return false;
   }
-  // When ask() may be true next, in the state `unknown`.
   Time next() const { return next_; }
 
  private:

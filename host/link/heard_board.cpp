@@ -7,9 +7,9 @@ namespace r4 {
 
 namespace {
 
-// The board's clock needs more questions than the program asks for: at first until the error is
-// small, later whenever the error has grown. The interval is not a whole number of milliseconds. So
-// the answers also show where a millisecond of the board's clock begins.
+// The board's clock needs more questions than the program asks: at first until the error is small,
+// later whenever the error has grown. The interval is not a whole number of milliseconds, so the
+// answers also show where a millisecond of the board's clock begins.
 constexpr Time soon_interval{102'300};
 constexpr Time first_goal{500}, later_goal{1'000};
 constexpr int first_questions = 100, questions_in_vain = 10;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board as its datagrams since its start show it: the newest state, the clock, and the
-// firmware's capabilities. A restart of the board clears all of these.
+// The board as its datagrams show it: the newest state, the clock, and the firmware's capabilities.
+// A restart of the board clears all of these.
 #pragma once
 
 #include <cstdint>
@@ -24,19 +24,16 @@ class HeardBoard {
 
   // The newest datagram is a heartbeat. `t_ms`: its T; none if the board is booting.
   void on_heartbeat(SafeReason reason, std::optional<std::uint32_t> t_ms, Time now);
-  // The newest state. `reason`: why the board is safe; no value if a newer heartbeat has reported
-  // it.
+  // `reason`: why the board is safe; no value if a newer heartbeat has reported it.
   void on_state(const ReceivedState& state, std::optional<SafeReason> reason, Time now);
-  // The answer to Q:ID. Returns when the question was sent; no value if the answer is not to a
-  // question of this session.
+  // Returns when the question was sent; no value if this session did not ask.
   std::optional<Time> on_identity(const Identity& identity, std::uint32_t t_ms, Time now);
   void on_restart();
 
   const ReceivedState& state() const { return state_; }
   const BoardClock& clock() const { return clock_; }
-  // True if the states show that relay 1 is open.
   bool supply_is_open() const { return state_.present.has(StateField::relays) && !supply_closed(); }
-  // Whether relay 1 is closed; no value if the newest state does not show it, or the board is safe.
+  // True if relay 1 is closed; no value if the newest state does not show it, or the board is safe.
   std::optional<bool> supply() const;
   // True if the board obeys a farewell (E:LEAVE), or may obey it.
   bool may_know_leave() const { return knows_leave_.value_or(confirms()); }
@@ -47,9 +44,8 @@ class HeardBoard {
 
   // --- Q:ID, sent for the round trip and for the board's clock
 
-  // When the session's own question is due; Time::max() for never.
+  // Time::max() for never.
   Time next_question() const;
-  // The session's own question is sent, with that number.
   void ask(std::uint32_t pnum, Time now);
   // Another question is sent, for the program or for a group.
   void asked(std::uint32_t pnum, Time now);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What this host is to its board. Without I/O, part of a session.
+// The role of this host at its board. A part of a session, without I/O.
 //
 //                        CMD names a command of this session
 //     asking ----------------------------------------------------> controlling
@@ -9,10 +9,9 @@
 //      |  300 ms after the last BUSY                      the link goes down
 //      +---------------+---------------------------------------------------+
 //
-//     (If the board's times show that CMD is newer than each BUSY, refused leads to controlling.)
-//
-//     asking       nothing shows yet that the board obeys this host
-//     refused      the board has answered BUSY: another host controls it
+//     asking       no proof yet that the board obeys this host
+//     refused      the board has answered BUSY: another host controls it. Leads to controlling if
+//                  the board's times show that CMD is newer than each BUSY
 //     controlling  the board has executed a command of this session since the link came up
 #pragma once
 
@@ -33,7 +32,6 @@ class HostRoleMachine {
     controlling_ = true;
     refused_until_ = Time{0};
   }
-  // Whether the link is up now.
   void on_link(bool up) { controlling_ = controlling_ && up; }
 
   bool controlling() const { return controlling_; }

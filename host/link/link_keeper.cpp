@@ -22,8 +22,6 @@ LinkKeeper::LinkKeeper(const SessionOptions& options, HostLink& link, HostKey& k
   hold(false);
 }
 
-// --- events
-
 void LinkKeeper::on_transport(std::size_t path, bool up, bool can_ask, Time now) {
   paths_.on_transport(path, up, can_ask, now);
   transport_down_ = paths_.all_down();
@@ -55,8 +53,6 @@ void LinkKeeper::on_own_command(std::uint32_t t_ms, Time now) {
   role_.on_own_command(!paths_.all_busy(now), now);
 }
 
-// --- actions that are due
-
 void LinkKeeper::ask_paths(Time now) {
   if (const PathSet due = paths_.to_ask(now); due != 0) {
     outbox_.send(Command::identify(), {.paths = due, .unknown_too = true}, now);
@@ -69,7 +65,6 @@ void LinkKeeper::keep_alive(Time now) {
   watches() ? send_lease(now) : send_heartbeat(now);
 }
 
-// Each path has a lease of its own, with its own T to echo.
 void LinkKeeper::send_lease(Time now) {
   const bool others = options_.fields != "DEFAULT";
   const Text list = others ? Text(options_.fields.data(), options_.fields.size()) : Text();
@@ -84,7 +79,7 @@ void LinkKeeper::send_lease(Time now) {
 
 void LinkKeeper::send_heartbeat(Time now) {
   if (!link_.heartbeat_due(to_ms(now))) return;
-  link_.heartbeat_sent(to_ms(now));  // on_sent() takes it back if no path takes the heartbeat
+  link_.heartbeat_sent(to_ms(now));  // on_sent() undoes this if no path takes the heartbeat
   heartbeat_.begin(outbox_.send(Command::heartbeat(), {.echo = link_.echo()}, now));
   if (heartbeat_.failed()) link_.heartbeat_not_sent(to_ms(now));
 }
@@ -96,8 +91,7 @@ void LinkKeeper::select_fields(Time now) {
 }
 
 Time LinkKeeper::next(Time now) const {
-  // due_in() counts whole milliseconds, so wait for the end of the millisecond, not for its
-  // beginning.
+  // due_in() counts whole milliseconds, so wait for the end of the millisecond.
   Time link = now + std::chrono::milliseconds{link_.due_in(to_ms(now))};
   link = std::chrono::floor<std::chrono::milliseconds>(link);
   if (link <= now) link = now + Time{1000};
@@ -123,13 +117,10 @@ void LinkKeeper::begin_anew() {
   hold(held_);
 }
 
-// A watcher sends no heartbeats.
 void LinkKeeper::hold(bool held) {
   held_ = held;
   link_.hold(held_ || watches());
 }
-
-// --- the state of the link
 
 bool LinkKeeper::is_up() const {
   const HostLinkState state = link_.state();
@@ -140,8 +131,8 @@ bool LinkKeeper::is_up() const {
 
 bool LinkKeeper::hears_board() const { return watches() ? is_heard(link_.state()) : is_up(); }
 
-// Commands wait for proof of control: the board has executed this session's F. Before that, the
-// board may not have accepted the session, and a refusal would prove nothing.
+// Commands wait for proof of control: the board has executed this session's F. Earlier the board
+// may not have accepted the session, and a refusal would prove nothing.
 bool LinkKeeper::in_control(Time now) const {
   const FieldSelection::Stage stage = fields_.stage();
   const bool no_proof_to_come =
@@ -161,7 +152,7 @@ LinkStatus LinkKeeper::status(ChipFault fault, Time now) const {
   if (!watches()) {
     causes.set(LinkCause::watchdog, link_.watchdog_expired(to_ms(now)));
     causes.set(LinkCause::callback, held_);
-    // The silence of a lost board is no sign of a wrong key.
+    // The silence of a lost board does not indicate a wrong key.
     const std::optional<LinkCause> key = key_.cause(now);
     if (key && link_.state() != HostLinkState::lost) causes.set(*key);
   }

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Keeps the link of a session alive and reports its status. It sends heartbeats, or a watcher's
-// leases, asks the board for the state fields that the session needs, and decides whether commands
-// may go out.
+// Keeps the link of a session alive: sends heartbeats or a watcher's leases, requests the state
+// fields that the session needs, and decides whether commands may be sent.
 //
 // It joins machines that have their own diagrams: the link (protocol/link/host_link.hpp), the role
-// of this host (host_role.hpp), the fields (field_selection.hpp), the key (host_key.hpp), and a
-// watcher's leases (../paths/lease.hpp).
+// (host_role.hpp), the fields (field_selection.hpp), the key (host_key.hpp), and a watcher's leases
+// (../paths/lease.hpp).
 #pragma once
 
 #include <cstddef>
@@ -34,32 +33,28 @@ class LinkKeeper {
 
   // --- events
 
-  // The transport of a path is up or down.
   void on_transport(std::size_t path, bool up, bool can_ask, Time now);
   void on_transport_trouble(TransportTrouble trouble) { trouble_ = trouble; }
-  // A path has taken a datagram or refused it.
+  // `result`: a path has taken the datagram or refused it.
   void on_sent(const Sending& sending, SendResult result, Time now);
   // The board answered BUSY at its time `t_ms`. Without a time: a transport on CAN hears another
   // host with this program's ids.
   void on_busy(std::size_t path, std::optional<std::uint32_t> t_ms, Time now);
   // A state of the board's time `t_ms` names a command of this session.
   void on_own_command(std::uint32_t t_ms, Time now);
-  // The board has confirmed or answered something.
   FieldSelection& fields() { return fields_; }
 
   // --- actions that are due
 
   // Asks each path's board for its identity. The session begins when the boards are known.
   void ask_paths(Time now);
-  // Sends the heartbeat, or the leases, if they are due.
   void keep_alive(Time now);
-  // Sends F if the states lack fields that the session needs, or control has to be proved.
+  // Sends F if the states lack needed fields, or control has to be proved.
   void select_fields(Time now);
   // When one of these three is due next; Time::max() for never.
   Time next(Time now) const;
-  // Ends the link: from now on the keeper sends nothing.
+  // Ends the link: the keeper sends nothing more.
   void leave(Time now);
-  // A new session begins, in the outbox's role.
   void begin_anew();
   // Holds heartbeats and commands back until it is called with false.
   void hold(bool held);
@@ -72,15 +67,15 @@ class LinkKeeper {
   bool is_up() const;
   // True if the board is heard, even if it does not hear this host.
   bool hears_board() const;
-  // True if commands may go out at once: the link is up, the board has executed a command of this
+  // True if commands may be sent at once: the link is up, the board has executed a command of this
   // session, and neither a callback nor the watchdog holds the session back.
   bool in_control(Time now) const;
   bool controls() const { return role_.controlling(); }
   bool is_leaving() const { return leaving_; }
   LinkStatus status(ChipFault fault, Time now) const;
 
-  // Adds the fields that the session needs to a command that chooses fields, and remembers the
-  // choice. Returns any other command unchanged. The text is valid until the next call.
+  // Adds the needed fields to a command that chooses fields, and remembers the choice. Other
+  // commands are unchanged. The text is valid until the next call.
   Command with_needed_fields(const Command& command);
 
  private:

@@ -21,15 +21,14 @@ class Outbox {
  public:
   static constexpr PathSet all_paths = 0xFF;
 
-  // How a datagram goes out. A stop always has the priority of stops.
+  // A stop always has the priority of stops.
   struct Way {
     Priority priority = Priority::normal;
     PathSet paths = all_paths;
     std::optional<std::uint32_t> echo{};  // the T that it carries, in ms; none: the host's time
-    // Also to paths whose board is not known, and to a board without a key.
+    // Also over paths whose board is unknown, and to a board without a key.
     bool unknown_too = false;
   };
-  // A datagram that went out: its number, and its paths.
   struct Sent {
     std::uint32_t pnum = 0;
     PathSet paths = 0;
@@ -38,21 +37,20 @@ class Outbox {
   Outbox(Effects& effects, HostLink& link, HostKey& key, Paths& paths, BoardRole role)
       : effects_(effects), link_(link), key_(key), paths_(paths), role_(role) {}
 
-  // A command, or a group, that is sent once.
   Sent send(const Command& command, Way way, Time now);
   Sent send(const Setpoints& group, Time now);
-  // A command that is in the writer already, with its stamp. A stop goes to every path. Other
-  // commands go to the paths that lead to the session's board, if that board has this host's key.
+  // Sends a stamped command. A stop goes to every path. Other commands go to the paths that lead to
+  // the session's board, if that board has this host's key.
   PathSet send(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum, Way way, Time now);
 
-  // Writes SID, PNum and, where a datagram echoes one, T.
+  // Writes SID, PNum and, in a datagram that echoes a T, T.
   void stamp(DatagramWriter& writer, CommandKind kind, std::uint32_t pnum,
              std::uint32_t t_ms) const;
 
   BoardRole role() const { return role_; }
   void change_role(BoardRole role) { role_ = role; }
   bool watches() const { return role_ == BoardRole::watch; }
-  // The id that this session's datagrams carry. A watcher has none.
+  // The id in this session's datagrams. A watcher has none.
   SessionId session_id() const { return watches() ? no_session : link_.session(); }
 
  private:
@@ -66,21 +64,20 @@ class Outbox {
   BoardRole role_;
 };
 
-// Whether one of the paths has taken a datagram.
 class Delivery {
  public:
   void begin(Outbox::Sent sent);
-  // A path has taken the datagram or refused it. True if the datagram is this one.
+  // True if the result is for this datagram.
+  // True if the result is for this datagram.
   bool on_sent(const Sending& sending, SendResult result);
-  // True if every path has answered, and none has taken it.
   bool failed() const { return open_ == 0 && result_ != SendResult::sent; }
-  // `sent` as soon as one path has taken it; before that, what the first path answered.
+  // `sent` once a path has taken it; before that, the first path's answer.
   SendResult result() const { return result_; }
   std::uint32_t pnum() const { return pnum_; }
 
  private:
   std::uint32_t pnum_ = 0;
-  int open_ = 0;  // paths that have not answered yet
+  int open_ = 0;
   SendResult result_ = SendResult::down;
 };
 

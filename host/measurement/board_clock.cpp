@@ -25,20 +25,20 @@ void BoardClock::limit(Side& side, std::uint32_t t_ms, Time host, Time margin) {
     newest_t_ms_ = t_ms;
   }
   if (place(side, t_ms, host, margin)) return;
-  // No clock that drifts by 100 ppm satisfies all limits: one of the two clocks was set, or stood
-  // still while the computer slept. The newest limit is true.
+  // No clock with a drift of 100 ppm satisfies all limits: one clock was set, or stood still while
+  // the computer slept. The newest limit is true.
   restart();
   limit(side, t_ms, host, margin);
 }
 
-// False if the limit contradicts the limits so far.
+// False if the limit contradicts the earlier limits.
 bool BoardClock::place(Side& side, std::uint32_t t_ms, Time host, Time margin) {
   Limit fresh;
   fresh.at = since_first(t_ms);
   fresh.second = static_cast<std::int64_t>(std::floor(fresh.at / 1e6));
   fresh.offset = static_cast<double>((host - first_ + margin).count()) - fresh.at;
   if (!is_upper(side)) fresh.offset = -fresh.offset;
-  if (is_old(fresh.second)) return false;  // no datagram is under way for so long
+  if (is_old(fresh.second)) return false;  // no datagram travels for so long
   if (fresh.offset < -highest(is_upper(side) ? lower_ : upper_, fresh.at)) return false;
   if (fresh.second > newest_second_) next_second(fresh.second);
   Limit& kept = side.limits[slot_of(fresh.second)];
@@ -48,7 +48,7 @@ bool BoardClock::place(Side& side, std::uint32_t t_ms, Time host, Time margin) {
   return true;
 }
 
-// The second that has ended narrows the drift, and the oldest second is forgotten.
+// The ended second narrows the drift, and the oldest second is forgotten.
 void BoardClock::next_second(std::int64_t second) {
   narrow_drift(std::exchange(newest_second_, second));
   const double at = static_cast<double>(second) * 1e6;
@@ -68,7 +68,6 @@ void BoardClock::Slopes::narrow(const Limit& upper, const Limit& lower) {
   }
 }
 
-// Compares the limits of that second with its own and with those of earlier seconds.
 void BoardClock::take_slopes(std::int64_t second) {
   const Limit& upper = upper_.limits[slot_of(second)];
   const Limit& lower = lower_.limits[slot_of(second)];
@@ -84,7 +83,7 @@ void BoardClock::take_slopes(std::int64_t second) {
   }
 }
 
-// That second has ended. The second before it is taken again, for an answer that came late.
+// Takes the second before the ended one again, because an answer may have come late.
 void BoardClock::narrow_drift(std::int64_t second) {
   take_slopes(second - 1);
   take_slopes(second);

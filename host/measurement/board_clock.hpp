@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's clock in terms of the host's clock, without I/O. Two facts bound it, whatever the
-// link does:
+// The board's clock in terms of the host's clock, without I/O. Two facts bound it:
 //
 //     a datagram with T came at r:                  the board's clock showed T before r
 //     a question asked at a was answered with T:    it showed T + 1 ms after a
 //
 // Each fact limits the offset (the host's time less the board's) at one T, from above or from
-// below. The clocks drift apart along a straight line of at most 100 ppm. Every line between the
-// limits is possible. The tightest limits of each second are kept for the last minute: the
+// below. The clocks drift apart along a straight line of at most 100 ppm, and every line between
+// the limits is possible. The tightest limits of each second are kept for the last minute. So the
 // memory is constant, and the estimate follows a drift that changes with the temperature.
 //
-// The estimate is the middle of the remaining range. It is right if the fastest datagrams of both
+// The estimate is the middle of the remaining range: right if the fastest datagrams of both
 // directions take equally long. Without answers (a watcher may not be able to ask) the estimate is
 // the upper limit, and its error is unknown.
 #pragma once
@@ -27,30 +26,28 @@ namespace r4 {
 
 class BoardClock {
  public:
-  // A datagram of the board with that T has come.
   void heard(std::uint32_t t_ms, Time now) { limit(upper_, t_ms, now, Time{0}); }
-  // The answer to a question that was asked at that time has T = t_ms.
+  // `asked`: when the question was asked that this T answers.
   void answered(std::uint32_t t_ms, Time asked) {
     limit(lower_, t_ms, asked, std::chrono::milliseconds{-1});
   }
-  // The board has restarted, with another clock.
   void restart() { *this = BoardClock(); }
 
   struct Instant {
     Time at;
     std::optional<Time> error;  // the truth is at most this far away; no value: unknown
   };
-  // When the board's clock began to show t_ms. Only once a datagram has come.
+  // When the board's clock began to show t_ms. Call it only after a datagram has come.
   Instant at(std::uint32_t t_ms) const;
 
-  // How much slower than the host's the board's clock runs, and the error of that; ppm.
+  // How much slower the board's clock runs than the host's, and the error of that; ppm.
   double drift_ppm() const { return (slowest_ + fastest_) / 2 * 1e6; }
   double drift_error_ppm() const { return (fastest_ - slowest_) / 2 * 1e6; }
 
   static constexpr double most_drift = 100e-6;
 
  private:
-  // Microseconds, since the first datagram.
+  // Microseconds since the first datagram.
   struct Limit {
     std::int64_t second = none;  // of the board's clock; none: no limit
     double at = 0;
@@ -59,16 +56,14 @@ class BoardClock {
   static constexpr std::int64_t none = INT64_MIN;
   static constexpr int seconds = 64;
 
-  // The limits from one side. The lower side holds each offset negated. So both are upper limits,
-  // and one algorithm serves both.
+  // The lower side negates each offset, so one algorithm serves both sides.
   struct Side {
     std::array<Limit, seconds> limits;
-    // The tightest limit as it is now. At later times it is looser by the drift.
+    // The tightest limit at present. Later it is looser by the drift.
     Limit front{none, 0, std::numeric_limits<double>::infinity()};
   };
 
-  // The slopes of the lines that pass between the limits of one second and those of that or later
-  // seconds.
+  // The slopes of the lines between the limits of one second and those of that or later seconds.
   struct Slopes {
     std::int64_t second = none;
     double slowest = -most_drift;
@@ -91,17 +86,15 @@ class BoardClock {
   // A side's limit at that time of the board: by the front, and by all its limits.
   double highest(const Side& side, double at) const;
   double highest_of_all(const Side& side, double at) const;
-  // The limit of one side at `later` microseconds after `limit`.
   double moved(const Side& side, const Limit& limit, double later) const;
 
   bool any_ = false;
   std::uint32_t newest_t_ms_ = 0;
-  std::int64_t newest_board_ms_ = 0;  // the same since the first datagram, without the wrap
+  std::int64_t newest_board_ms_ = 0;  // since the first datagram, without the wrap
   std::int64_t newest_second_ = 0;
   Time first_{0};
   Side upper_, lower_;
   std::array<Slopes, seconds> slopes_;
-  // The range of the offset's slope.
   double slowest_ = -most_drift;
   double fastest_ = most_drift;
 };

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The questions Q:ID that have no answer yet. Without I/O. The newest eight questions are
-// remembered, and each of them is one such machine:
+// The newest eight questions Q:ID and their answers. Without I/O. Each question is one machine:
 //
 //     idle --asked--> open --I:… names it--> idle: the round trip is known
 //                      |
 //                      +-- eight newer ones --> forgotten
 //
 // The answer names its question (ASKED). If a board does not name it, the round trip counts from
-// the newest question, and the answer is good for nothing else.
+// the newest question, and the answer closes all questions.
 #pragma once
 
 #include <algorithm>
@@ -23,16 +22,15 @@ namespace r4 {
 
 class IdentityQuestion {
  public:
-  // A question goes out.
   void asked(std::uint32_t pnum, Time now) {
     // A repeated question may get the answer to its first sending.
     const auto same = [pnum](const Asked& each) { return each.open && each.pnum == pnum; };
     if (std::any_of(open_.begin(), open_.end(), same)) return;
     open_[count_++ % open_.size()] = {pnum, now, true};
   }
-  // The board has answered. Returns when its question was first sent; no value if none is open.
+  // Returns when the answered question was first sent; no value if none is open.
   std::optional<Time> answered(const Identity& identity) {
-    for (std::size_t i = 1; i <= open_.size(); ++i) {  // from the newest
+    for (std::size_t i = 1; i <= open_.size(); ++i) {
       Asked& asked = open_[(count_ - i) % open_.size()];
       if (!asked.open || (identity.has_asked && identity.asked != asked.pnum)) continue;
       const Time at = asked.at;

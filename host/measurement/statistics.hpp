@@ -18,7 +18,6 @@ class StatisticsCollector {
   // Other parts of the session increment plain counters directly.
   Statistics counts;
 
-  // `counts` with everything that depends on `now`.
   Statistics report(std::chrono::microseconds now) const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a program that watches a board keeps its lease there. A part of a session, without I/O.
+// Keeps a watcher's lease at a board. A part of a session, without I/O.
 //
 //         +--+ STALE: its LEASE is echoed
 //         v  |          states come
@@ -7,13 +7,12 @@
 //         |                                                              ^
 //         +----------- BUSY: full; refused otherwise: unknown -----------+
 //
-// After 1 s without a state `watching` is treated as `asking`: a refusal counts.
-//
-//     asking    W is sent every 500 ms; at once with a LEASE to echo, and when a transport comes up
-//     watching  likewise: a lease lasts 2 s
-//     full      the board has no room for another watcher; it is asked once a second
-//     unknown   the board does not know watchers; it is asked once a second, because another board
-//               may replace it
+//     asking    W is sent every 500 ms; at once with a LEASE to echo, or when a transport comes up
+//     watching  likewise: a lease lasts 2 s. After 1 s without a state it is treated as `asking`:
+//               a refusal counts
+//     full      the board has no room for another watcher; W is sent once a second
+//     unknown   the board does not know watchers; W is sent once a second, as another board may
+//               replace it
 #pragma once
 
 #include <algorithm>
@@ -36,25 +35,22 @@ class Lease {
     next_ = now + (hopeless ? reminder : renewal);
   }
   void renew(Time now) { next_ = now; }
-  // The T to put into the next W.
   std::uint32_t echo() const { return echo_; }
 
   void on_state(Time now) {
     state_ = State::watching;
     heard_ = now;
   }
-  // The answer to a W of this program.
+  // The board refused a W of this program.
   void on_refusal(const Nack& nack, Time now) {
     if (nack.lease != 0) {
       echo_ = nack.lease;
       renew(now);
-    } else if (!streaming(now)) {  // else the states come because a host is in control
+    } else if (!streaming(now)) {  // else a controlling host causes the states
       state_ = nack.code == Refusal::busy ? State::full : State::unknown;
     }
   }
-  // True if states come.
   bool streaming(Time now) const { return state_ == State::watching && now - heard_ < silence; }
-  // Why the board does not stream to this watcher.
   std::optional<LinkCause> cause(Time now) const {
     if (streaming(now)) return std::nullopt;
     if (state_ == State::full) return LinkCause::watchers_full;
@@ -73,18 +69,15 @@ class Lease {
   std::uint32_t echo_ = 0;
 };
 
-// The leases of a session, one for each path.
 class Leases {
  public:
   explicit Leases(std::size_t paths) : leases_(paths) {}
 
   Lease& operator[](std::size_t path) { return leases_[path]; }
-  // True if states come on any path.
   bool streaming(Time now) const {
     return std::any_of(leases_.begin(), leases_.end(),
                        [now](const Lease& lease) { return lease.streaming(now); });
   }
-  // The causes of all leases; none if states come on any path.
   LinkCauses causes(Time now) const {
     LinkCauses all;
     if (streaming(now)) return all;
@@ -93,7 +86,6 @@ class Leases {
     }
     return all;
   }
-  // When the first lease of `paths` (bit i: path i) is due.
   Time next(std::uint8_t paths) const {
     Time next = Time::max();
     for (std::size_t i = 0; i < leases_.size(); ++i) {

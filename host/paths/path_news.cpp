@@ -100,7 +100,6 @@ void PathNews::count_copy(Numbers& path) {
   path.others -= std::min(path.others, path.gap + 1);
 }
 
-// Counts the missing numbers, less those that other paths have brought.
 void PathNews::count_gap(Numbers& path) {
   if (path.gap <= path.others) return;
   path.lost += path.gap - path.others;

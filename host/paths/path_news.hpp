@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Separates the new datagrams of a session from duplicates, and counts lost ones (paths.hpp).
-// Packet numbers differ between paths, so T orders the datagrams of different paths. Numbers order
-// the datagrams of one path within a millisecond.
+// Separates a session's new datagrams from duplicates, and counts lost ones (paths.hpp). T orders
+// the datagrams of different paths, whose packet numbers differ. Numbers order those of one path
+// within a millisecond.
 #pragma once
 
 #include <array>
@@ -29,39 +29,38 @@ class PathNews {
   // The next number is unrelated to the last one.
   void restart(std::size_t index);
 
-  // --- whether it is new: each of these functions also counts it
+  // --- whether a datagram is new: each of these functions also counts it
 
-  // True if the heartbeat is not a duplicate from another path, and not older.
+  // False for a duplicate from another path, and for an older heartbeat.
   bool take_heartbeat(std::size_t path, std::uint32_t t_ms);
-  // False if a newer state is known: an older one never replaces it.
+  // False if a newer state is known: an older state never replaces it.
   bool is_newest_state(std::size_t path, std::uint32_t t_ms);
-  // True if the state is not a duplicate. States of one T may each hold a part of the fields: then
-  // a state is new if it brings a field that no state of this T has brought.
+  // False for a duplicate. States of one T may each hold a part of the fields: such a state is new
+  // if it brings a field that no state of this T has brought.
   bool take_state(std::size_t path, std::uint32_t t_ms, FieldSet present);
-  // True if no newer datagram is known. Then this is the newest.
+  // True if no newer datagram is known. Then this datagram is the newest.
   bool is_newest(std::size_t path, std::uint32_t t_ms);
-  // Each path may bring an answer to its duplicate of a command. True if this answer adds nothing.
+  // True if this answer repeats the answer to a duplicate of the command on another path.
   bool is_copy(const Nack& nack);
 
-  // The board has restarted: its T is unrelated to before.
+  // The board has restarted: its T is unrelated to earlier T.
   void forget() { newest_ = {}; }
-  // The board says that it is booting: its next heartbeat is new.
+  // The board is booting: its next heartbeat is new.
   void on_connecting() { newest_.any = newest_.heartbeat = std::nullopt; }
 
   // For the session: `lost` counts datagrams that no path has brought.
   const PacketCounters& counters() const { return counters_; }
-  // For one path.
   const PacketCounters& counters(std::size_t path) const { return paths_[path].tracker.counters(); }
   std::uint64_t copies(std::size_t path) const { return paths_[path].copies; }
 
  private:
   struct Numbers {
     PacketTracker tracker;
-    std::uint32_t pnum = 0;            // of the datagram being handled
-    Arrival arrival = Arrival::first;  // likewise
-    std::uint32_t gap = 0;             // missing numbers before it
-    std::uint32_t others = 0;          // that came first on other paths since its newest
-    std::uint32_t lost = 0;            // counted as lost because of this path
+    std::uint32_t pnum = 0;  // of the datagram being handled
+    Arrival arrival = Arrival::first;
+    std::uint32_t gap = 0;     // missing numbers before it
+    std::uint32_t others = 0;  // datagrams first on other paths since this path's newest
+    std::uint32_t lost = 0;    // counted as lost because of this path
     std::uint64_t copies = 0;
   };
   // The newest datagram of a kind, and the path that brought it first.

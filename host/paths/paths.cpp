@@ -21,8 +21,6 @@ const char* to_text(PathState state) {
   return "unknown";
 }
 
-// --- the transports
-
 void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
   Path& path = paths_[index];
   path.up = up;
@@ -37,7 +35,7 @@ void Paths::on_transport(std::size_t index, bool up, bool can_ask, Time now) {
   if (path.known && first_answer_.count() == 0) first_answer_ = now;
   anew_ = anew_ || all_down();
   if (!up) return;
-  // The numbers may begin anew, and a lease may have ended.
+  // The numbers may restart, and a lease may have ended.
   news_.restart(index);
   leases_[index].renew(now);
 }
@@ -60,8 +58,6 @@ void Paths::on_sleep(Time now) {
   anew_ = true;
 }
 
-// --- which board is at the other end
-
 PathSet Paths::to_ask(Time now) const {
   return those(
       [now](const Path& path) { return path.up && path.can_ask && now >= path.questions.ask_at; });
@@ -70,7 +66,7 @@ PathSet Paths::to_ask(Time now) const {
 void Paths::asked(std::size_t index, std::uint32_t pnum, bool sent, Time now) {
   Path& path = paths_[index];
   PathQuestions& questions = path.questions;
-  if (!sent && questions.ask_at > now) return;  // not a question of this part
+  if (!sent && questions.ask_at > now) return;  // not asked by this class
   const Time again = now + (path.other ? ask_other_interval : ask_interval);
   questions.asked_at = now;
   questions.ask_at = path.known && sent ? Time::max() : again;
@@ -81,7 +77,7 @@ void Paths::asked(std::size_t index, std::uint32_t pnum, bool sent, Time now) {
   questions.in_doubt = false;
 }
 
-// At once, but at most ten times a second.
+// At most ten times a second.
 void Paths::ask_soon(Path& path, Time now) {
   if (!path.can_ask) return;
   PathQuestions& questions = path.questions;
@@ -153,8 +149,6 @@ Time Paths::next(Time now) const {
   return next;
 }
 
-// --- received datagrams
-
 bool Paths::in_clock(const Path& path, std::uint32_t t_ms, Time now) {
   return path.clock.known() && path.clock.fits(t_ms, now, now, late_of(path));
 }
@@ -167,8 +161,7 @@ bool Paths::fits_others(const Path& path, std::uint32_t t_ms, Time now) const {
   });
 }
 
-// True if a believed path's T fits the session. Before the session begins, the other paths' clocks
-// decide.
+// True if a believed path's T fits the session or, before it begins, the other paths' clocks.
 bool Paths::fits(const Path& path, std::uint32_t t_ms, Time now) const {
   if (!begun_) return fits_others(path, t_ms, now);
   return !clock_.known() || clock_.fits(t_ms, now, now, late_of(path));
@@ -240,8 +233,7 @@ Paths::Admission Paths::admit(std::size_t index, std::uint32_t pnum, std::uint32
   return begun_ ? admission : Admission::no;
 }
 
-// A late one must not end the session while heartbeats of the board are recent, so the board is
-// asked instead.
+// While heartbeats of the board are recent, a delayed one must not end the session: ask the board.
 bool Paths::admit_connecting(std::size_t index, Time now) {
   Path& path = paths_[index];
   if (!path.known) return false;
@@ -297,8 +289,6 @@ bool Paths::others_carry(const Path& path, Time now) const {
                      [&](const Path& each) { return &each != &path && is_heard(each, now); });
 }
 
-// --- BUSY
-
 void Paths::on_busy(std::size_t index, std::optional<std::uint32_t> t_ms, Time now) {
   Path& path = paths_[index];
   path.busy = {now + busy_memory, t_ms};
@@ -322,8 +312,6 @@ Time Paths::all_busy_until(Time now) const {
   }
   return until;
 }
-
-// --- reports
 
 PathState Paths::state(const Path& path, Time now) const {
   if (!path.up) return PathState::down;

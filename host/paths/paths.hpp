@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The paths over which a session reaches its board. This part of a session, without I/O, decides to
-// which paths the session speaks, and which datagrams it takes (docs/redundancy.md). Of the other
-// parts only LinkKeeper asks how many paths there are, to send a lease over each.
+// Decides over which paths a session sends, and which datagrams it admits (docs/redundancy.md). A
+// part of a session, without I/O. Among the other parts only LinkKeeper uses the number of paths,
+// to send a lease over each.
 //
 //             up           its board answers Q:ID             a datagram comes
 //     down -------> asking -----------------------> silent <-------------------> carrying
@@ -10,13 +10,12 @@
 //     answers        v  |  it gives the right id
 //                   other
 //
-//     Each of them leads to `down`. An answer of another board leads from each to `other`. The only
-//     path, and a bus on which this program may not send questions, skip `asking`: there is nothing
-//     to compare the board with.
+// Each state leads to `down`. An answer of another board leads from each to `other`. The only path,
+// and a bus on which this program may not ask, skip `asking`: there is no board to compare with.
 //
-// Before its board has answered, a path is sent only the question and stops, and its datagrams are
+// Before its board has answered, a path carries only the question and stops, and its datagrams are
 // dropped. The first board that answers is the session's board, unless all other paths lead to
-// another one. The session begins when all paths that are up have answered, or 300 ms after the
+// another board. The session begins when all paths that are up have answered, or 300 ms after the
 // first answer.
 //
 // Packet numbers differ between paths, so the board's time T decides which datagram is newest. Each
@@ -41,10 +40,9 @@
 
 namespace r4 {
 
-// It has more than 40 functions: what is true of one path has a private function with a name.
+// More than 40 functions: each fact about one path has a private function.
 class Paths {
  public:
-  // `link`: what the session knows of the board.
   Paths(std::size_t count, LinkTiming timing, const HostLink& link)
       : paths_(count),
         timeout_(std::chrono::milliseconds{timing.timeout_ms}),
@@ -56,8 +54,8 @@ class Paths {
 
   // --- the transports
 
-  // `can_ask`: false on a bus for a watcher, which may not send questions. The only path is then
-  // believed. With other paths its T must fit the board's clock, which starts at random.
+  // `can_ask`: false for a watcher on a bus, which may not ask. The only path is then believed.
+  // Beside other paths its T must fit the board's clock, which starts at random.
   void on_transport(std::size_t index, bool up, bool can_ask, Time now);
   bool all_down() const {
     return those([](const Path& path) { return path.up; }) == 0;
@@ -72,9 +70,8 @@ class Paths {
   PathSet speaking() const { return begun_ ? known() : PathSet{0}; }
   bool begun() const { return begun_; }
   bool is_known(std::size_t index) const { return paths_[index].known; }
-  // The paths that are to be sent Q:ID now.
+  // The paths on which Q:ID is due.
   PathSet to_ask(Time now) const;
-  // The path has taken Q:ID, or not.
   void asked(std::size_t index, std::uint32_t pnum, bool sent, Time now);
   // Lets time pass. True if the session begins.
   bool poll(Time now);
@@ -84,18 +81,16 @@ class Paths {
 
   enum class Admission : std::uint8_t {
     no,
-    restarted,  // yes, and the board has restarted
+    restarted,  // admitted, and the board has restarted
     yes,
   };
-  // A state or a heartbeat.
   Admission admit(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, Time now);
   // An answer to this session. `counts`: it is numbered with the states.
   bool admit_answer(std::size_t index, std::uint32_t pnum, std::uint32_t t_ms, bool counts,
                     Time now);
-  // The answer to Q:ID.
   Admission admit_identity(std::size_t index, const Identity& identity, std::uint32_t t_ms,
                            Time now);
-  // A heartbeat `PNum:0`, by which a board says that it is booting. True if that is believed.
+  // A heartbeat `PNum:0`, which reports that the board is booting. True if it is believed.
   bool admit_connecting(std::size_t index, Time now);
 
   PathNews& news() { return news_; }
@@ -111,10 +106,8 @@ class Paths {
   void on_own_state(std::uint32_t t_ms, Time now) { own_ = {now, t_ms}; }
   // True if BUSY holds on all paths that carry.
   bool all_busy(Time now) const;
-  // When that ends, unless another BUSY comes.
   Time all_busy_until(Time now) const;
 
-  // A watcher's leases, one for each path.
   Leases& leases() { return leases_; }
   const Leases& leases() const { return leases_; }
 
@@ -126,7 +119,6 @@ class Paths {
   bool two_boards() const {
     return those([](const Path& path) { return path.other; }) != 0;
   }
-  // Everything but the name.
   PathStatus report(std::size_t index, Time now) const;
   const PacketCounters& counters() const { return news_.counters(); }
 
@@ -136,7 +128,7 @@ class Paths {
   static constexpr Time patience = std::chrono::milliseconds{300};
   // After this many unanswered questions the board is believed without an answer.
   static constexpr int most_unanswered = 10;
-  // A heartbeat goes out every 100 ms at least, and each is answered.
+  // Heartbeats go out every 100 ms or more often, and the board answers each.
   static constexpr Time busy_memory = std::chrono::milliseconds{300};
   // T wraps, so BUSY is not compared with an older state.
   static constexpr Time own_state_memory = std::chrono::hours{1};
@@ -150,7 +142,6 @@ class Paths {
     return set;
   }
   bool is_only() const { return paths_.size() == 1; }
-  // How late a T may be on a path.
   static std::int32_t late_of(const Path& path) {
     return path.connecting ? PathClock::restart_tolerance_ms : PathClock::tolerance_ms;
   }
@@ -182,12 +173,12 @@ class Paths {
   std::vector<Path> paths_;
   Time timeout_;
   const HostLink& link_;
-  std::optional<std::string> id_;  // the session's board
+  std::optional<std::string> id_;  // of the session's board
   bool begun_ = false;
   bool anew_ = true;  // no datagram since all paths were down
   Time first_answer_{0};
   std::uint32_t boot_ = 0;
-  Time proven_{0};   // when the boot was proved last
+  Time proven_{0};   // when the boot was last proved
   PathClock clock_;  // by the newest T of all paths
   struct OwnState {
     Time at{0};

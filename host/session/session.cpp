@@ -58,8 +58,6 @@ void Session::begin_session() {
   while (link_.wants_session()) link_.begin_session(random_());
 }
 
-// --- time
-
 void Session::poll(Time now) {
   link_.poll(to_ms(now));
   if (link_.long_silent(to_ms(now))) forget_board(now);
@@ -86,7 +84,6 @@ Time Session::next_poll(Time now) {
   return keeper_.hears_board() ? std::min(next, board_.next_question()) : next;
 }
 
-// Updates the role, the arming, and the status that programs see.
 void Session::refresh(Time now) {
   keeper_.update();
   arming_.on_link(keeper_.is_up(), keeper_.in_control(now), link_.state() == HostLinkState::safe,
@@ -124,16 +121,14 @@ void Session::forget_board(Time now) {
   on_new_boot(now);
 }
 
-// A path has proved that the board has restarted.
 void Session::on_restart(Time now) {
   link_.on_restart();
   link_.on_heard(to_ms(now));
   on_new_boot(now);
 }
 
-// A board that has restarted has forgotten its session. If the board did not report the restart
-// itself, this host's clock, and with it the deadlines of commands, may have stood still instead.
-// Then a new session begins, and the commands end.
+// If the board did not report its restart, this host's clock may have stood still instead, and with
+// it the deadlines of commands. Then a new session begins, and the commands end.
 void Session::on_new_boot(Time now) {
   board_.on_restart();
   arming_.disarm(DisarmCause::restart);
@@ -145,9 +140,6 @@ void Session::on_new_boot(Time now) {
   effects_.report(BoardRestarted{});
 }
 
-// --- arming
-
-// Takes the next step of arm(), if there is one.
 void Session::advance_arming(Time now) {
   if (arming_.take_abandoned()) commands_.remove_step();
   if (!arming_.any() || !keeper_.in_control(now) || commands_.delays_arming()) return;
@@ -155,7 +147,6 @@ void Session::advance_arming(Time now) {
   if (step && !commands_.send_step(*step, now)) end_arming(Outcome::full, now);
 }
 
-// Ends every waiting arm().
 void Session::end_arming(Outcome outcome, Time now) {
   arming_.end(outcome, Refusal::none, now);
   commands_.remove_step();
@@ -166,8 +157,6 @@ Ticket Session::arm(Time timeout, Time now) {
   const Ticket ticket = commands_.take_ticket();
   return arming_.add(ticket, commands_.cause(), now + timeout, now) ? ticket : 0;
 }
-
-// --- commands
 
 Ticket Session::send(const Command& command, Time timeout, Time now) {
   require_valid(command);
@@ -186,7 +175,6 @@ Ticket Session::send(const Setpoints& group, Time timeout, Time now) {
   return commands_.send(group, timeout, now);
 }
 
-// `sent` if a command may be posted now.
 PostResult Session::gate_of_posts(CommandKind kind, Time now) {
   commands_.send_queued(now);  // earlier commands go first
   if (!in_control(now)) return PostResult::no_link;
@@ -228,8 +216,8 @@ void Session::cancel(Ticket ticket, Time now) {
   advance_arming(now);
 }
 
-// A board that confirms commands refuses a farewell that it does not know. So the farewell is also
-// sent while the board's answer, which would show whether it knows farewells, may be lost.
+// Also while it is unknown whether the board knows farewells: a board that confirms commands
+// refuses an unknown farewell.
 bool Session::may_say_farewell() const {
   return keeper_.is_up() && !watches() && board_.may_know_leave();
 }
@@ -265,8 +253,6 @@ void Session::end_all(Time now) {
   commands_.end_all(now);
 }
 
-// --- gates
-
 void Session::watchdog(std::chrono::milliseconds period, Time now) {
   link_.watchdog(static_cast<std::uint32_t>(period.count()), to_ms(now));
   refresh(now);
@@ -281,8 +267,6 @@ void Session::feed(Time now) {
   link_.feed(to_ms(now));
   refresh(now);
 }
-
-// --- reports
 
 Statistics Session::statistics(Time now) const {
   Statistics report = statistics_.report(now);

@@ -1,21 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The host's side of one board, without I/O: datagrams and time in, effects out
-// (../link/effects.hpp).
-//
-// A session keeps the link alive, takes control, chooses the state fields that it needs, sends
-// commands and finds out whether the board executed them. It calls nothing outside: after each call
-// the caller performs the effects, first the sendings, then the reports.
+// (../link/effects.hpp). Each datagram is written once and signed for each path (outbox.hpp). Of
+// duplicates only the first counts, and the newest datagram has the newest T (paths.hpp).
 //
 //   datagram --> Paths --> HostLink, HeardBoard --> LinkKeeper --> ArmRequests --> CommandsUnderWay
 //                admits    the board's state        is this host   may outputs     which have
-//                                                   in control?    be driven?      ended?
+//                                                    in control?    be driven?      ended?
 //
-// Session owns these parts and the order in which a datagram, or time, passes through them:
-// receive() and poll() show it.
-//
-// Every datagram goes out on each path, written once and signed for each (outbox.hpp). A received
-// datagram is taken once, from the path that brings it first. The newest has the newest T
-// (paths.hpp).
+// Session owns these parts. receive() and poll() show their order.
 #pragma once
 
 #include <chrono>
@@ -47,11 +39,11 @@
 
 namespace r4 {
 
-// It has more than 40 functions, because most are its interface, and call one part each.
+// More than 40 functions: most are its interface, and call one part each.
 class Session {
  public:
-  // `random` returns 64 random bits at each call; the default takes them from the system.
-  // Throws Error{usage} if options.fields are not state fields.
+  // `random` returns 64 random bits at each call; the default asks the system. Throws Error{usage}
+  // if options.fields are not state fields.
   explicit Session(SessionOptions options, BoardRole role = BoardRole::control,
                    std::size_t paths = 1, std::function<std::uint64_t()> random = {});
   Session(const Session&) = delete;
@@ -63,79 +55,69 @@ class Session {
 
   // --- effects
 
-  // Perform them after each call that takes a time: first the sendings, then the reports. Give the
-  // result of each sending to on_sent().
+  // After each call that takes a time, perform the sendings, then the reports. Give the result of
+  // each sending to on_sent().
   Effects& effects() { return effects_; }
   void on_sent(const Sending& sending, SendResult result, Time now);
 
   // --- events. poll() is needed after each of these.
 
-  // A datagram has come over that path.
   void receive(std::size_t path, std::string_view bytes, Time now);
-  // The transport of a path is up or down. Each is down at first. `can_ask`: false if a watcher may
+  // The transport of a path is up or down; at first each is down. `can_ask`: false if a watcher may
   // not send questions (a bus).
   void on_transport(std::size_t path, bool up, Time now, bool can_ask = true);
-  // The trouble of all transports together.
   void on_trouble(TransportTrouble trouble) { keeper_.on_transport_trouble(trouble); }
   // This computer slept for longer than the board waits for its host, while `now` stood still. A
-  // new session begins: it is disarmed, and every command under way but a stop is cancelled.
-  // BoardRestarted reports it.
+  // new, disarmed session begins, commands but stops are cancelled, and BoardRestarted reports it.
   void on_sleep(Time now);
 
-  // Performs everything that is due.
   void poll(Time now);
-  // When poll() is needed next, at the latest.
   Time next_poll(Time now);
 
-  // --- commands. CommandEnded reports the end, at the latest at `timeout` from now.
+  // --- commands. CommandEnded reports the end, at most `timeout` after `now`.
 
-  // Throws Error{usage} for a command outside its ranges. Returns 0 if 64 are under way already.
-  // Command::identify(): confirmed by the answer, and BoardIdentified follows.
-  // Command::stop(): discards all other commands. Confirmed when the board reports that it has
-  // obeyed this very stop. If 16 stops are under way already, it returns 0, and still sends the
-  // stop.
+  // Throws Error{usage} for a command outside its ranges. Returns 0 if 64 commands are under way.
+  // Command::identify(): the answer confirms it, and BoardIdentified follows. Command::stop():
+  // discards all other commands, and is confirmed when the board reports that it has obeyed this
+  // very stop. If 16 stops are under way, it returns 0 but is sent.
   Ticket send(const Command& command, Time timeout, Time now);
-  // Commands that the board executes together or not at all. If the board knows no groups, they are
-  // sent one after the other, each when its predecessor is confirmed. Throws Error{usage} for an
-  // empty group.
+  // Commands that the board executes together or not at all. If the board knows no groups, each
+  // command is sent when its predecessor is confirmed. Throws Error{usage} for an empty group.
   Ticket send(const Setpoints& group, Time timeout, Time now);
-  // Clears the cause of the safe state, if it can be cleared, and closes relay 1, the motor supply.
-  // Confirmed when the board's state shows it. Output commands that are sent after it wait for it.
+  // Clears the cause of the safe state, if possible, and closes relay 1, the motor supply.
+  // Confirmed by the board's state. Output commands that are sent after it wait for it.
   Ticket arm(Time timeout, Time now);
-  // Ends every command under way but stops, ends the heartbeats, and sends the farewell: the
-  // board's outputs are safe at once, and another host need not wait for the timeout. Confirmed
-  // when the board reports it. Returns 0 if no board hears it, or the board knows no farewells.
-  // Afterwards only stops are sent.
+  // Ends heartbeats and all commands but stops, and sends the farewell: the outputs are safe at
+  // once, and another host need not wait for the timeout. Confirmed by the board's report. Returns
+  // 0 if no board hears it, or the board knows no farewells. Afterwards only stops are sent.
   Ticket leave(Time timeout, Time now);
   bool leaving() const { return keeper_.is_leaving(); }
-  // The same, but the commands end as cancelled. When the farewell has ended, change_role() lets
+  // The same, but the commands end as cancelled. When the farewell has ended, change_role() may let
   // the session watch.
   Ticket release_control(Time timeout, Time now);
-  // From now on the session controls, or only watches. It is disarmed and has a new id, and every
-  // command under way but stops is cancelled. on_transport() must follow for each path that is up.
+  // Makes the session control or watch. It is disarmed, has a new id, and every command under way
+  // but stops is cancelled. on_transport() must follow for each path that is up.
   void change_role(BoardRole role, Time now);
-  // Gives up a command, which the board may have executed. A stop goes on.
+  // Gives up a command, which the board may have executed. A stop continues.
   void cancel(Ticket ticket, Time now);
-  // Ends every command under way: the board is closed.
   void end_all(Time now);
 
-  // Sends a command once and does not wait for its end. PostRefused reports a refusal. `sent`: the
-  // command is among the effects; when they are performed, posted() returns the final result.
+  // Sends a command once, without waiting for its end. PostRefused reports a refusal. After `sent`,
+  // perform the effects, then posted() returns the final result.
   PostResult post(const Command& command, Time now);
-  // no_link also while it is not known whether the board executes groups.
+  // no_link also while it is unknown whether the board executes groups.
   PostResult post(const Setpoints& group, Time now);
   PostResult posted();
-  // True if the board executes no groups. Then the commands of a group are posted one after the
-  // other.
+  // True if the board executes no groups: then a group's commands are posted one after the other.
   bool posts_apart() const { return board_.groups().state() == GroupSupport::State::apart; }
 
   // --- gates
 
-  // The application watchdog: without feed() for `period` the heartbeats stop, so that the board
-  // goes safe, and commands are held back. 0 turns it off.
+  // The application watchdog: after `period` without feed() the heartbeats stop, so the board goes
+  // safe, and commands are held back. 0 turns it off.
   void watchdog(std::chrono::milliseconds period, Time now);
   void feed(Time now);
-  // Stops heartbeats and commands in the same way, until it is called with false.
+  // Holds back heartbeats and commands until it is called with false.
   void hold(bool held, Time now);
 
   // --- reports
@@ -145,20 +127,17 @@ class Session {
   bool in_control(Time now) const { return keeper_.in_control(now); }
   // Why the session is not armed; none if it is armed.
   DisarmCause disarmed_by() const { return arming_.cause(); }
-  // True if the board has reported the cause that an E:CLEAR would have to name. An earlier E:CLEAR
+  // True if the board has reported the cause that an E:CLEAR must name. Without it, an E:CLEAR
   // names the first cause that the board reports.
   bool knows_cause() const { return commands_.cause() != Command::unnamed_cause; }
   const ReceivedState& state() const { return board_.state(); }
-  // The fields that are asked for, as in F; empty: the board keeps its own choice.
+  // The requested fields, as in F; empty: the board keeps its own choice.
   const std::string& fields() { return keeper_.fields().fields(); }
   Statistics statistics(Time now) const;
-  // The board's datagrams.
   const PacketCounters& packets() const { return paths_.counters(); }
-  // Everything but the name.
   PathStatus path(std::size_t index, Time now) const { return paths_.report(index, now); }
 
  private:
-  // Handle a datagram of the board, by kind.
   void on_state(std::size_t path, const Datagram& datagram, Time now);
   void on_heartbeat(std::size_t path, const Datagram& datagram, Time now);
   void on_identity(std::size_t path, const Datagram& datagram, Time now);
@@ -197,9 +176,8 @@ class Session {
   LinkStatus status_;
 };
 
-// Posts a command, or a group. `send_all()` sends the effects' datagrams. To a board that knows no
-// groups the commands of a group go one after the other, up to the first that is not sent. `now` is
-// read anew for each command: send_all() may advance it.
+// Posts a command or a group. If the board knows no groups, a group's commands go one after the
+// other, up to the first that is not sent. send_all() sends the effects, and may advance `now`.
 template <class What, class SendAll>
 PostResult post_by(Session& session, const What& what, const Time& now, SendAll send_all) {
   if constexpr (std::is_same_v<What, Setpoints>) {

@@ -82,8 +82,7 @@ void Session::on_heartbeat(std::size_t path, const Datagram& datagram, Time now)
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   bool taken = false;
   if (booting) {
-    // On a bus a watcher also hears this heartbeat, which is meant for hosts. It goes by states
-    // instead.
+    // On a bus a watcher also hears this heartbeat for hosts, and relies on states instead.
     const bool for_hosts = watches() && paths_.leases().streaming(now);
     taken = !for_hosts && paths_.admit_connecting(path, now);
   } else {
@@ -135,8 +134,8 @@ void Session::on_identity(std::size_t path, const Datagram& datagram, Time now) 
   commands_.on_identity(identity, now);
 }
 
-// True if the answer is numbered together with the states. Answers to hosts without control have
-// numbers of their own.
+// True if the answer is numbered with the states. Answers to hosts without control have own
+// numbers.
 bool Session::counts(const Identity& identity) const {
   const bool to_watcher = watches() && identity.sid == no_session;
   return to_watcher || !(identity.has_busy && identity.busy);
@@ -148,8 +147,7 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   if (!paths_.admit_answer(path, datagram.pnum(), t_ms, nack.has_session, now)) return;
   if (nack.sid != outbox_.session_id() || !link_.is_taken(nack.pnum)) {
-    // A watcher hears answers to other hosts on a CAN bus, on a shared transport and in a
-    // recording.
+    // A watcher hears answers to other hosts on a bus, a shared transport and in a recording.
     if (watches() && nack.has_session) link_.on_heard(to_ms(now));
     return refresh(now);
   }
@@ -166,7 +164,7 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   const bool not_taken = nack.code == Refusal::auth && !commands_.is_cable_only(nack.pnum);
   if (not_taken) key_.on_refusal(now);
   if (!paths_.news().is_copy(nack)) effects_.report(CommandRefused{nack});
-  // AUTH refuses one copy. A repetition, or the copy on another path, may have been executed.
+  // AUTH refuses one duplicate. A repetition or another path's duplicate may have been executed.
   const bool others = (paths_.speaking() & ~path_bit(path)) != 0;
   const bool other_copy = nack.code == Refusal::auth && ((not_taken && key_.has_key()) || others);
   const bool proof = !other_copy && is_proof(nack);
@@ -176,8 +174,7 @@ void Session::on_refusal(std::size_t path, const Datagram& datagram, Time now) {
   refresh(now);
 }
 
-// The board refuses only leases of a watcher. The link's status reports the codes of a refused
-// lease.
+// Of a watcher's commands, the board refuses only leases. The link's status reports these codes.
 void Session::on_lease_refused(std::size_t path, const Nack& nack, Time now) {
   paths_.leases()[path].on_refusal(nack, now);
   const bool in_status =
@@ -185,19 +182,16 @@ void Session::on_lease_refused(std::size_t path, const Nack& nack, Time now) {
   if (!in_status) effects_.report(CommandRefused{nack});
 }
 
-// True if the refusal proves that the command was not executed. It proves this only while the board
-// remembers its executed commands: in the session in which the command was sent, and for a limited
-// count of numbers. Without proof the command ends at its deadline.
+// True if the refusal proves that the command was not executed: only while the board remembers its
+// executed commands, in one session and for a limited count. Otherwise the deadline decides.
 bool Session::is_proof(const Nack& nack) const {
-  // Numbers are compared by their distance to the newest, because a session may be older than half
-  // of all numbers.
+  // Compared by the distance to the newest: a session may be older than half of all numbers.
   const std::uint32_t since_command = link_.last_pnum() - nack.pnum;
   const std::uint32_t since_session = link_.last_pnum() - nack.session;
   return nack.has_session && link_.is_taken(nack.session) && since_session > since_command &&
          since_command < BoardLink::memory;
 }
 
-// The board's datagram may have ended a step of arm().
 void Session::take_step_end(Time now) {
   const std::optional<CommandsUnderWay::StepEnd> step = commands_.take_step_end();
   if (!step) return;

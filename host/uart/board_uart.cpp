@@ -52,7 +52,6 @@ void Board::dac(Channel channel, Millivolts voltage, Duration timeout) {
   send(Command::dac(channel, voltage), timeout);
 }
 
-// On the loop.
 void Board::Impl::take_uarts(const State& fresh) {
   for (int i = 0; i < uart_channels; ++i) {
     if (!fresh.present.has(state_field(FieldKind::uart, i + 1))) continue;

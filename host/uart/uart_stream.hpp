@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The bytes that a UART of the user has received, put together from states. States may be missing,
-// late or duplicates (firmware/devices/user_uart.hpp).
+// Joins the bytes that a UART received from states, which may be missing, late or duplicates
+// (firmware/devices/user_uart.hpp).
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ class UartStream {
  public:
   static constexpr std::size_t capacity = std::size_t{64} * 1024;
 
-  // The board has restarted, and counts from 0.
+  // Call this when the board has restarted: it counts from 0.
   void restart() { begun_ = false; }
 
   // Appends new bytes and losses to each of `outs`. True if there are any.
@@ -28,7 +28,7 @@ class UartStream {
     }
     const auto known = static_cast<std::int32_t>(next_ - field.position);
     const auto damaged = static_cast<std::int32_t>(field.lost - lost_);
-    if (known > field.data.size || damaged < 0) return false;  // of an older state
+    if (known > field.data.size || damaged < 0) return false;  // from an older state
     const std::uint64_t lost = static_cast<std::uint64_t>(damaged) +
                                (known < 0 ? 0U - static_cast<std::uint32_t>(known) : 0U);
     next_ = field.position + field.data.size;
@@ -39,7 +39,7 @@ class UartStream {
   }
 
  private:
-  // Beyond the capacity, the oldest bytes are lost.
+  // Above the capacity, the oldest bytes are lost.
   static void append(Board::UartData& out, const std::uint8_t* begin, const std::uint8_t* end,
                      std::uint64_t lost) {
     out.bytes.insert(out.bytes.end(), begin, end);
@@ -51,8 +51,8 @@ class UartStream {
   }
 
   bool begun_ = false;
-  std::uint32_t next_ = 0;  // the position of the byte that comes next
-  std::uint32_t lost_ = 0;  // by the board, so far
+  std::uint32_t next_ = 0;  // the position of the next byte
+  std::uint32_t lost_ = 0;  // the board's count of lost bytes
 };
 
 }  // namespace r4

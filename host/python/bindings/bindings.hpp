@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The module r4link._core: r4::Board for Python, times in milliseconds. What a program uses is in r4link/*.py, on top
-// of it.
-//
-// The thread of the link never takes the GIL; that of the callbacks does, for each of them, and so does that of a
-// transport in Python.
+// The module r4link._core: r4::Board for Python, with times in milliseconds. The public interface
+// is r4link/*.py, above this module. The link's thread never takes the GIL. The callbacks' thread,
+// and that of a transport in Python, take it for each call.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -36,13 +34,13 @@ void bind_recording(py::module_& module);
 void bind_servo(py::module_& module);
 void bind_simulation(py::module_& module);
 
-// Of a board and of a fleet.
+// For a board and a fleet.
 BoardOptions options_of(BoardRole role, bool arming, const std::string& fields,
                         const std::optional<std::string>& key, int watch_rate_hz, int heartbeat_ms,
                         int timeout_ms, int command_retry_ms, int stop_retry_ms, int stop_linger_ms,
                         int identify_interval_ms, int callback_limit_ms);
 
-// Of r4link.Transport objects, which they keep.
+// From r4link.Transport objects, which the makers keep.
 std::vector<CarrierMaker> makers_of(const py::list& transports);
 
 // For error_of() of r4link/errors.py.
@@ -55,10 +53,10 @@ py::object to_python(const I2cAnswer& answer);
 py::object to_python(const I2cBusReport& report);
 py::object to_python(const UartBytes& received);
 
-// A field of a state, in its unit (state.hpp): float of volts, bool of the handle, Drive, Bldc,
+// A field of a state in its unit (state.hpp): float in volts, bool for the handle, Drive, Bldc,
 // I2cReading, int.
 py::object value_of(const State& state, StateField field);
-// "osmc1": an attribute.
+// The name of the attribute, such as "osmc1".
 std::string attribute_of(StateField field);
 
 }  // namespace r4::python

@@ -16,7 +16,7 @@ namespace r4::python {
 namespace {
 
 using Released = py::call_guard<py::gil_scoped_release>;
-// Its name, whether it is up, and the counters in their order.
+// The name, whether it is up, and the counters in their order.
 using End = std::tuple<std::string, bool, std::vector<std::uint64_t>>;
 
 End end_of(const BridgeEnd& end) {

@@ -9,7 +9,7 @@
 
 namespace r4::python {
 
-// True when no other thread gets the GIL: what is left of the interpreter's objects stays.
+// True if no other thread can get the GIL: then the remaining Python objects are left alone.
 inline bool interpreter_ends() {
 #if PY_VERSION_HEX >= 0x030D0000
   return Py_IsInitialized() == 0 || Py_IsFinalizing() != 0;
@@ -18,8 +18,8 @@ inline bool interpreter_ends() {
 #endif
 }
 
-// The interpreter's state of a thread that is not its own, kept until the thread ends: making one for each call, with
-// the memory of its first frame, costs more than the call.
+// The interpreter's state of a foreign thread, kept until the thread ends: making one for each call
+// costs more than the call.
 class KeptThreadState {
  public:
   KeptThreadState() = default;
@@ -44,12 +44,11 @@ class KeptThreadState {
   std::unique_ptr<py::gil_scoped_acquire> kept_;
 };
 
-// Copied, called and destroyed by any thread. The function is touched with the GIL alone; what it raises is told
-// as Python tells of what it cannot raise (sys.unraisablehook).
+// Any thread copies, calls and destroys it. sys.unraisablehook reports its exceptions.
 class Callback {
  public:
   struct Held {
-    py::object function;  // none after clear(), of the garbage collector
+    py::object function;  // none after clear() by the garbage collector
   };
 
   explicit Callback(py::object function)

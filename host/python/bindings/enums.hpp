@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Enumerations for Python: each enumerator of C++ is the member of r4link/enums.py that has its text.
+// Enumerations for Python: each C++ enumerator is the member of r4link/enums.py with its text.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -36,12 +36,11 @@ class PythonEnum {
  public:
   using WordOf = std::string (*)(std::uint8_t number);
 
-  // Throws if Python has no member for an enumerator of C++. The enumerators are found by their
-  // texts: a number without an enumerator has the text of 255.
+  // Throws if Python has no member for a C++ enumerator. A number without an enumerator has the
+  // text of 255, so the texts show which numbers are enumerators.
   PythonEnum(const char* name, WordOf word_of);
 
-  // Newer firmware may send a number without an enumerator: then it is the member of that text, and
-  // an error if there is none.
+  // Newer firmware may send a number without an enumerator: throws if no member has its text.
   pybind11::handle member(std::uint8_t number) const;
   // Takes a member or its text. Throws for anything else.
   std::uint8_t number(pybind11::handle word) const;
@@ -63,7 +62,6 @@ std::string word_of(Enum value) {
   return to_text(value);
 }
 
-// The enumeration of that name in Python.
 template <class Enum>
 const PythonEnum& python_enum(const char* name) {
   static const PythonEnum found(
@@ -73,7 +71,6 @@ const PythonEnum& python_enum(const char* name) {
 
 }  // namespace r4::python
 
-// Arguments and results of these types are converted.
 #define R4_CASTER(name_in_python, Enum)                                      \
   template <>                                                                \
   class pybind11::detail::type_caster<Enum> {                                \

@@ -7,7 +7,7 @@
 namespace r4::python {
 namespace {
 
-// The class in r4link/errors.py of an error that is not about a command.
+// The class in r4link/errors.py for an error that is not about a command.
 const char* error_class(ErrorKind kind) {
   switch (kind) {
     case ErrorKind::data:

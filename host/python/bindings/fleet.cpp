@@ -47,8 +47,7 @@ std::vector<BoardSetpoints> setpoints_of(
   return setpoints;
 }
 
-// What happened, by its kind: another link, the transport's event, why the session is not armed, the refused post,
-// how many were missed.
+// By the event's kind.
 py::object subject_of(const FleetEvent& event) {
   switch (event.kind) {
     case FleetEvent::Kind::link:
@@ -82,7 +81,7 @@ void bind_fleet(py::module_& module) {
       .def_readonly("paths", &BoardHealth::paths)
       .def_property_readonly("well", &BoardHealth::well);
 
-  // The Error of a board that did not confirm is made in r4link/fleet.py.
+  // r4link/fleet.py makes the Error of a board that did not confirm.
   py::class_<FleetResult>(module, "FleetResult")
       .def(pickled<FleetResult>("FleetResult"))
       .def_readonly("board", &FleetResult::board)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Values that can be pickled and copied. What is pickled is read by the same version of R4 link only: by the other
-// processes of a program, not by next year's.
+// Values that can be pickled and copied. Only the same version of R4 link reads a pickle, so it is
+// good for other processes of a program, not for storage.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 namespace r4::python {
 
-// Goes through the members of a value, to write their bytes or to read them.
+// Visits the members of a value, to write their bytes or to read them.
 class Pickle {
  public:
   Pickle() = default;
@@ -29,7 +29,6 @@ class Pickle {
     (one(members), ...);
   }
   const std::string& bytes() const { return bytes_; }
-  // Everything was read.
   bool whole() const { return whole_ && at_ == bytes_.size(); }
 
  private:
@@ -126,13 +125,12 @@ inline void members_of(Pickle& pickle, Discovery& it) {
 }
 inline void members_of(Pickle& pickle, FleetResult& it) { pickle(it.board, it.result, it.problem); }
 
-// The value that a pickle is read into.
 template <class Value>
 Value blank() {
   return Value{};
 }
 
-// For copy and pickle; a value of another version is refused with an Error.
+// For copy and pickle. Throws Error for a value of another version.
 template <class Value>
 auto pickled(const char* name) {
   return py::pickle(

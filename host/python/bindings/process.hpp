@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What belongs to one process. In a fork of that process its threads are missing, its locks may be held for ever, and
-// its path is the parent's: there it is left alone.
+// A value that belongs to one process. A fork of that process must leave it alone: its threads are
+// missing, its locks may be held for ever, and its path is the parent's.
 #pragma once
 
 #include <unistd.h>
@@ -17,12 +17,12 @@ namespace r4::python {
 template <class Value>
 class OfThisProcess {
  public:
-  // `what`: "the board".
+  // `what` names it in errors: "the board".
   OfThisProcess(const char* what, std::unique_ptr<Value> value)
       : what_(what), value_(std::move(value)) {}
   OfThisProcess(OfThisProcess&&) noexcept = default;
   OfThisProcess& operator=(OfThisProcess&&) = delete;
-  // The GIL is held: others go on while it ends.
+  // The GIL is held, and released while the value ends.
   ~OfThisProcess() {
     if (!value_) return;
     if (!is_here()) {
@@ -44,7 +44,7 @@ class OfThisProcess {
   }
   Value* operator->() const { return &get(); }
   Value& operator*() const { return get(); }
-  // Does `action` with it; nothing in a fork.
+  // Does nothing in a fork.
   template <class Action>
   void if_here(Action action) const {
     if (is_here()) action(*value_);

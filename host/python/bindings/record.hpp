@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A small value for Python.
 #pragma once
 
 #include "pickle.hpp"
 
 namespace r4::python {
 
-// With its members as attributes and as a dict.
+// A small value for Python, with its members as attributes and as a dict.
 template <class Value>
 class Record {
  public:

@@ -29,7 +29,7 @@
 namespace r4::python {
 namespace {
 
-// One of the numbers of a field, in all states. Before the first one that has the field it is 0.
+// One number of a field, in all states. Before the first state with the field it is 0.
 struct Column {
   StateField field;
   int which;
@@ -38,19 +38,17 @@ struct Column {
 
 constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
 
-// A value of a described device, in all states.
 struct Measured {
   std::shared_ptr<const Device> device;
   std::size_t value;
-  std::string value_name, name;  // "gyro_z", and of the column
+  std::string value_name, name;  // "gyro_z", and the column's name
   std::vector<double> numbers;
-  bool here = true;  // no other has taken its place
+  bool here = true;  // no other device has replaced it
 };
 
-// Of one board, whose bus has 112 addresses.
+// For one board, whose bus has 112 addresses.
 constexpr std::size_t most_measured = 1000;
 
-// What a recording has of one board.
 struct RecordedBoard {
   std::string url, name;
   std::vector<std::int64_t> times_us;  // since 1970
@@ -63,12 +61,12 @@ struct RecordedBoard {
   std::vector<std::tuple<std::int64_t, bool, std::string>> datagrams;
 };
 
-// A number as its column keeps it: volts in hundredths.
+// A number as stored in its column: volts in hundredths.
 std::int32_t kept(double number, FieldForm form) {
   return static_cast<std::int32_t>(std::llround(form == FieldForm::volts ? 100 * number : number));
 }
 
-// "bno055_gyro_z"; of a second one of that kind "bno055_29_gyro_z", with its address.
+// "bno055_gyro_z"; for a second device of that kind, with its address: "bno055_29_gyro_z".
 std::string column_of(const Device& device, const DeviceValue& value,
                       const std::vector<Measured>& others) {
   const std::string& kind = device.description().name;
@@ -84,7 +82,7 @@ class Columns final : public RecordingVisitor {
  public:
   explicit Columns(bool datagrams) : with_datagrams_(datagrams) {}
 
-  // Texts of the file are printable(): any bytes may be there, and a str of Python has none.
+  // Texts of the file are printable(), because a Python str cannot hold arbitrary bytes.
   void on_path(const RecordedPath& path) override {
     const std::string url = printable(path.url);
     const auto known = std::find_if(boards_.begin(), boards_.end(),
@@ -118,7 +116,7 @@ class Columns final : public RecordingVisitor {
           std::find_if(board.measured.begin(), board.measured.end(), [&](const Measured& each) {
             return each.value_name == values[i].name && each.device->text() == text;
           });
-      if (known != board.measured.end()) {  // in other slots, perhaps
+      if (known != board.measured.end()) {  // perhaps in other slots
         known->device = device;
         known->value = i;
         known->here = true;
@@ -190,7 +188,7 @@ class Columns final : public RecordingVisitor {
   std::vector<std::string> damage_;
 };
 
-// Without a copy.
+// Without a copy of the numbers.
 template <class Number>
 py::array_t<Number> to_array(std::vector<Number>&& numbers) {
   auto owned = std::make_unique<std::vector<Number>>(std::move(numbers));
@@ -202,7 +200,7 @@ py::array_t<Number> to_array(std::vector<Number>&& numbers) {
   return py::array_t<Number>(static_cast<py::ssize_t>(all.size()), all.data(), owner);
 }
 
-// "osmc1_pwm", of a field with several numbers.
+// "osmc1_pwm": the field and one of its numbers.
 std::string column_of(StateField field, int which) {
   const std::string_view value = kind_row_of(field).values[which].name;
   std::string name = attribute_of(field);
@@ -214,7 +212,6 @@ std::string column_of(StateField field, int which) {
   return name.append("_").append(value);
 }
 
-// Numpy's type of the column.
 const char* type_of(StateField field, int which) {
   switch (kind_row_of(field).form) {
     case FieldForm::volts:
@@ -242,8 +239,8 @@ const char* type_of(StateField field, int which) {
   }
 }
 
-// (boards, events, damage); a board: (url, name, damaged, times, t_ms, pnum, [(column, type, numbers)], events,
-// datagrams). The numbers of volts are hundredths.
+// Returns (boards, events, damage). A board is (url, name, damaged, times, t_ms, pnum, [(column,
+// type, numbers)], events, datagrams), with volts in hundredths.
 py::tuple Columns::take() {
   py::list boards;
   for (RecordedBoard& board : boards_) {

@@ -10,7 +10,7 @@
 namespace r4::python {
 namespace {
 
-// An int is an angle, too. A bool is not.
+// Also takes an int, but not a bool.
 Degrees degrees_of(const py::object& degrees) {
   if (PyBool_Check(degrees.ptr())) throw py::type_error("degrees must be a number");
   const double value = PyFloat_AsDouble(degrees.ptr());

@@ -55,7 +55,7 @@ void bind_simulation(py::module_& module) {
           "happen", [](const PyRobot& robot, const std::string& words) { robot->happen(words); },
           py::call_guard<py::gil_scoped_release>())
       .def("look", &look);
-  // Throws where with_link() would.
+  // Throws in the same cases as with_link().
   module.def("check_link", [](const std::string& url, const std::string& link) {
     static_cast<void>(sim::with_link(url, link));
   });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A state: each field of the board an attribute, made when it is asked for.
+// A state: each field of the board is an attribute, made on request.
 #include <chrono>
 #include <string>
 
@@ -76,7 +76,7 @@ StateNumbers numbers_from(F field, const py::handle& value) {
   }
 }
 
-// A state that no board has sent, for tests of what is done with states.
+// A state that no board has sent, for tests of programs.
 ReceivedState make_state(std::uint32_t t_ms, double at, const py::dict& fields) {
   ReceivedState state;
   state.t_ms = t_ms;
@@ -100,8 +100,8 @@ ReceivedState make_state(std::uint32_t t_ms, double at, const py::dict& fields) 
   return state;
 }
 
-// Throws AttributeError for a field that the newest datagram does not carry: its value would be an
-// old one, or 0. A state without FAULT reports that there is none (docs/protocol.md).
+// Throws AttributeError for a field that the newest datagram does not carry: its value would be
+// old, or 0. A state without FAULT reports that there is no fault (docs/protocol.md).
 void require(const ReceivedState& state, F field) {
   if (state.present.has(field) || field == F::fault) return;
   const Text name = name_of(field);
@@ -142,7 +142,7 @@ void bind_state(py::module_& module) {
              return self.relay(channel);
            })
       .def("__bool__", &ReceivedState::any)
-      // Lists the fields that the state carries, so that Python suggests no other one.
+      // Lists only the fields that the state carries, for completion in Python.
       .def("__dir__",
            [](const py::object& self) {
              py::set attributes(py::module_::import("builtins").attr("dir")(py::type::of(self)));

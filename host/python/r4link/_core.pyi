@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""host/python/bindings: times in milliseconds. Programs use what r4link/__init__.py names."""
+"""host/python/bindings: times in milliseconds. For programs: the names in r4link/__init__.py."""
 import os
 from datetime import datetime
 from types import TracebackType
@@ -16,7 +16,7 @@ from .values import Bldc, Drive, I2cAnswer, I2cBusReport, I2cReading, UartBytes,
 __version__: str
 FIELDS: tuple[str, ...]
 ENUMS: dict[str, tuple[Word, ...]]
-"""By the name of an enumeration of enums.py: its members in the order of their numbers in C++."""
+"""The members of each enumeration of enums.py, in the order of their numbers in C++."""
 
 class _Record:
     def as_dict(self) -> dict[str, Any]: ...
@@ -29,16 +29,16 @@ class LinkStatus(_Record):
         """Why the board is safe."""
     @property
     def causes(self) -> tuple[LinkCause, ...]:
-        """All that is wrong with the link, the gravest first: in the order of LinkCause."""
+        """All causes of the link's status, the gravest first: in the order of LinkCause."""
     @property
     def cause(self) -> LinkCause | None:
-        """The gravest."""
+        """The gravest cause."""
     @property
     def busy(self) -> bool:
         """Another host controls the board."""
     @property
     def gated(self) -> bool:
-        """Our heartbeats and commands do not go out: the watchdog was not fed, or a callback does not return."""
+        """Heartbeats and commands are held back: the watchdog was not fed, or a callback hangs."""
     @property
     def in_control(self) -> bool: ...
     @property
@@ -46,7 +46,7 @@ class LinkStatus(_Record):
         """The paths that carry, from 0."""
     @property
     def chip(self) -> str | None:
-        """Of a fault: the chip and its trouble."""
+        """The chip with a fault, and the fault."""
 
 class PathStatus(_Record):
     @property
@@ -57,7 +57,7 @@ class PathStatus(_Record):
     def busy(self) -> bool: ...
     @property
     def board_id(self) -> str:
-        """The board that answered there last."""
+        """The board that last answered on this path."""
     @property
     def received(self) -> int: ...
     @property
@@ -66,13 +66,13 @@ class PathStatus(_Record):
     def loss(self) -> float: ...
     @property
     def copies(self) -> int:
-        """What another path had brought before."""
+        """Datagrams that another path brought first."""
     @property
     def round_trip_us(self) -> float:
-        """0: not known yet."""
+        """0: unknown."""
     @property
     def age_us(self) -> float:
-        """Since the newest datagram; 0: none yet."""
+        """Since the newest datagram; 0: none."""
 
 class Identity(_Record):
     @property
@@ -94,7 +94,7 @@ class Statistics(_Record):
     def damaged(self) -> int: ...
     @property
     def packets_received(self) -> int:
-        """Of those with a packet number, duplicates too; lost, duplicate, late and old are of these."""
+        """Datagrams with a packet number; lost, duplicate, late and old are among these."""
     @property
     def lost(self) -> int: ...
     @property
@@ -103,7 +103,7 @@ class Statistics(_Record):
     def late(self) -> int: ...
     @property
     def old(self) -> int:
-        """So late that it is not known whether they are duplicates."""
+        """Too late to know whether they are duplicates."""
     @property
     def restarts(self) -> int: ...
     @property
@@ -122,7 +122,8 @@ class Statistics(_Record):
     def state_age_us(self) -> float: ...
     @property
     def clock_drift_ppm(self) -> float:
-        """By how much the board's clock is slower than this computer's; this and its error are 0 until known."""
+        """How much slower the board's clock is than this computer's; with its error 0 until
+        known."""
     @property
     def clock_drift_error_ppm(self) -> float: ...
     @property
@@ -139,7 +140,7 @@ class Statistics(_Record):
     def timed_out(self) -> int: ...
 
 class CarrierCounters(_Record):
-    """What a transport has carried: include/r4link/carrier.hpp."""
+    """The counters of a transport: include/r4link/carrier.hpp."""
     @property
     def rx_datagrams(self) -> int: ...
     @property
@@ -176,7 +177,7 @@ class Event(_Record):
 class RefusedPost(_Record):
     @property
     def refusal(self) -> Refusal:
-        """The board's code; Refusal.NONE if the command was not sent: `why`."""
+        """The board's code; Refusal.NONE if the command was not sent: see `why`."""
     @property
     def why(self) -> PostResult: ...
     @property
@@ -185,10 +186,10 @@ class RefusedPost(_Record):
     def group(self) -> int: ...
 
 class State:
-    """What the board reports.
+    """A state of the board.
 
-    A field that the state does not carry (see `present`) raises AttributeError: ask for it by `Board.fields()`.
-    `fault` is always there: None, if the board reports no fault.
+    A field that the state does not carry (see `present`) raises AttributeError: request it by
+    `Board.fields()`. `fault` is always there; None: no fault.
     """
     @property
     def pnum(self) -> int: ...
@@ -197,26 +198,26 @@ class State:
         """The board's clock; wraps at 2^32."""
     @property
     def received(self) -> float | None:
-        """When it came, on the clock of time.monotonic(); None while none has come."""
+        """When it came, by time.monotonic(); None if there is no state."""
     @property
     def sampled(self) -> float | None:
-        """When the board sampled it, as its clock and the round trips tell, on the clock of time.monotonic()."""
+        """When the board sampled it, by the board's clock and round trips, as time.monotonic()."""
     @property
     def sampled_error(self) -> float | None:
-        """Seconds that `sampled` may be wrong by; None where that is not known: then it was not later."""
+        """The largest error of `sampled` in seconds; None: unknown, then it is the latest time."""
     @property
     def sampled_utc(self) -> datetime | None:
-        """`sampled` by the calendar's clock as it is set now."""
+        """`sampled` by the present setting of the calendar's clock."""
     @property
     def present(self) -> tuple[str, ...]: ...
     @property
     def safe(self) -> SafeReason:
-        """Why the outputs are safe; SafeReason.NONE: they are not."""
+        """Why the outputs are safe; SafeReason.NONE: they are not safe."""
     @property
     def fault(self) -> str | None: ...
     @property
     def dmhsta(self) -> bool:
-        """The dead-man's handle is held."""
+        """True if the dead-man's handle is held."""
     def relay(self, channel: int) -> bool:
         """True if the relay is closed. `channel`: 1 to 8."""
     def as_dict(self) -> dict[str, Any]:
@@ -302,11 +303,8 @@ class State:
     gpio: int
 
 class Command:
-    """A command to a board, for send(), post() and Setpoints. Channels count from 1. str() gives its text, as
-    docs/protocol.md has it, with a key or password if it sets one:
-
-        str(Command.osmc(1, pwm=358))       # 'O:358,1,1'
-    """
+    """A command to a board, for send(), post() and Setpoints. Channels count from 1. str() gives
+    its text: str(Command.osmc(1, pwm=358)) is 'O:358,1,1'."""
     @overload
     @staticmethod
     def osmc(channel: int, *, duty: float) -> Command:
@@ -314,7 +312,7 @@ class Command:
     @overload
     @staticmethod
     def osmc(channel: int, *, pwm: int, direction: int = ...) -> Command:
-        """Channel 1 to 4. `pwm`: 0 to 4095. `direction`: FORWARD, which is the default, or REVERSE."""
+        """Channel 1 to 4. `pwm`: 0 to 4095. `direction`: FORWARD (default) or REVERSE."""
     @overload
     @staticmethod
     def dhb12(channel: int, *, duty: float) -> Command:
@@ -322,7 +320,7 @@ class Command:
     @overload
     @staticmethod
     def dhb12(channel: int, *, pwm: int, direction: int = ...) -> Command:
-        """Channel 1 to 4. `pwm`: 0 to 4095. `direction`: FORWARD, which is the default, or REVERSE."""
+        """Channel 1 to 4. `pwm`: 0 to 4095. `direction`: FORWARD (default) or REVERSE."""
     @overload
     @staticmethod
     def bldc(channel: int, *, duty: float, brake: bool = ...) -> Command:
@@ -330,7 +328,7 @@ class Command:
     @overload
     @staticmethod
     def bldc(channel: int, *, pwm: int, direction: int = ..., brake: bool = ...) -> Command:
-        """Channel 1 to 4. `pwm`: 0 to 4095. `direction`: FORWARD, which is the default, or REVERSE."""
+        """Channel 1 to 4. `pwm`: 0 to 4095. `direction`: FORWARD (default) or REVERSE."""
     @staticmethod
     def servo(channel: int, *, us: int) -> Command:
         """Channel 1 to 16. `us`: the pulse width, up to 2500 microseconds; 0: no pulses."""
@@ -339,10 +337,10 @@ class Command:
         """Channel 1 to 8."""
     @staticmethod
     def stepper(channel: int, *, position: int, speed: int = 1000) -> Command:
-        """Channel 1 to 4. `position`: steps, a signed 32-bit number. `speed`: 1 to 20000 steps a second."""
+        """Channel 1 to 4. `position`: steps, signed 32 bits. `speed`: 1 to 20000 steps a second."""
     @staticmethod
     def zero(channel: int) -> Command:
-        """Encoder and stepper `channel`, 1 to 4, count from 0 where they are."""
+        """Sets the counts of encoder and stepper `channel`, 1 to 4, to 0; nothing moves."""
     @staticmethod
     def dac(channel: int, *, millivolts: int) -> Command:
         """Channel 1 or 2. `millivolts`: 0 to 3300."""
@@ -357,19 +355,14 @@ class Command:
         """Clears the stop, the watchdog or the fault that the board reports."""
     @staticmethod
     def parse(text: str) -> Command:
-        """The command of a text. Raises UsageError if there is none, or a value is outside its range.
-
-            Command.parse('O:358,1,1')      # as Command.osmc(1, pwm=358)
-        """
+        """The command of a text: Command.parse('O:358,1,1') is Command.osmc(1, pwm=358). Raises
+        UsageError if the text is not a valid command, or a value is outside its range."""
     def describe(self) -> str:
-        """In words, with units. A key or password is hidden.
-
-            Command.parse('O:358,1,1').describe()       # 'OSMC 1 forward, duty 0.087'
-        """
+        """In words with units: 'OSMC 1 forward, duty 0.087'. A key or password is hidden."""
 
 class Setpoints:
-    """Output commands that a board executes together, in one pass over its chips, or not at all. Raises UsageError for
-    a value outside its range and for a second command to the same channel.
+    """Output commands that a board executes together, in one pass over its chips, or not at all.
+    Raises UsageError for a value outside its range, and for two commands to one channel.
 
         board.send(r4link.Setpoints(Command.osmc(1, duty=0.1), Command.servo(3, us=1500)))
     """
@@ -379,8 +372,9 @@ class Setpoints:
     def __len__(self) -> int: ...
 
 class ServoCalibration:
-    """How the pulse of a servo maps to its angle: `us` and `degrees` are those of the two ends of its travel, in the same
-    order; it is linear between them. Raises UsageError for a pulse that is not 1 to 2500, and unless both differ.
+    """Maps the pulse of a servo linearly to its angle. `us` and `degrees`: the two ends of its
+    travel, in the same order. Raises UsageError for a pulse that is not 1 to 2500, and unless both
+    differ.
 
         arm = ServoCalibration(us=(1000, 2000), degrees=(-45, 45))
     """
@@ -388,26 +382,26 @@ class ServoCalibration:
     def pulse(self, *, degrees: float) -> int:
         """The nearest whole microsecond. Raises UsageError for an angle beyond an end."""
     def degrees(self, *, us: int) -> float | None:
-        """The angle of a pulse, also of a pulse beyond an end. None for 0: the servo is off."""
+        """The angle of a pulse, also beyond an end. None for 0: the servo is off."""
 
 class Subscription:
     def cancel(self) -> None:
-        """When it returns, the callback will not be called again and, unless this is called within it, is not
-        running."""
+        """Ends the callback. After this returns it does not run, unless it called this itself."""
 
 class Recording:
-    """A recording of one or several boards (docs/recordings.md). A new file after `rotate_bytes` bytes or `rotate_after`
-    seconds, and at most `keep_bytes` bytes are kept; 0: no limit."""
+    """A recording of one or several boards (docs/recordings.md). A new file begins after
+    `rotate_bytes` bytes or `rotate_after` seconds, and at most `keep_bytes` bytes are kept; 0: no
+    limit."""
     def __init__(self, path: str | os.PathLike[str], *, rotate_bytes: int = ..., rotate_after: int = ...,
                  keep_bytes: int = ...) -> None: ...
     def close(self) -> None:
-        """Writes what waits, and closes the file. Idempotent."""
+        """Writes waiting data, and closes the file. Idempotent."""
     def __enter__(self) -> Self: ...
     def __exit__(self, kind: Type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None: ...
     @property
     def problem(self) -> str | None:
-        """Why it has ended before it was closed; or that its file was removed or truncated meanwhile, and begun anew."""
+        """Why it ended early; or that its file was removed or truncated, and restarted."""
     @property
     def records(self) -> int: ...
     @property
@@ -434,7 +428,7 @@ class FoundBoard(_Record):
     """A board that discover() has found: include/r4link/discovery/discover.hpp."""
     @property
     def url(self) -> str:
-        """Opens it: 'serial:?sn=…', 'can://can0?node=1', 'udp:?id=left-arm'."""
+        """The URL that opens it: 'serial:?sn=…', 'can://can0?node=1', 'udp:?id=left-arm'."""
     @property
     def place(self) -> str:
         """Where it was found: `path` of a port, `interface` of a bus or `address` of a network."""
@@ -446,19 +440,19 @@ class FoundBoard(_Record):
         """CAN: its number on the bus, 0 to 31."""
     @property
     def identity(self) -> Identity | None:
-        """None: it did not say who it is."""
+        """None: it did not report its identity."""
     @property
     def busy(self) -> bool | None:
-        """True if a host controls it; None: that is not known."""
+        """True if a host controls it; None: unknown."""
     @property
     def holder(self) -> Program | None:
-        """Serial and CAN: the program of this computer that holds the transport. Its name is '' if it did not answer."""
+        """Serial and CAN: the program of this computer on the transport. Name '': no answer."""
     @property
     def holder_controls(self) -> bool:
         """False: the holder watches."""
     @property
     def foreign_frames(self) -> bool:
-        """CAN: another protocol uses the board's command id. So the board was not asked."""
+        """CAN: another protocol uses the board's command id, so the board was not asked."""
 
 class SearchedPort(_Record):
     @property
@@ -474,10 +468,10 @@ class SearchedPort(_Record):
     def description(self) -> str: ...
     @property
     def is_r4(self) -> bool:
-        """It has the USB id of a board."""
+        """True if it has the USB id of a board."""
     @property
     def asked(self) -> bool:
-        """The port was asked, or a program of this computer holds it."""
+        """True if the port was asked, or a program of this computer holds it."""
     @property
     def trouble(self) -> str | None:
         """Why the port could not be asked."""
@@ -493,13 +487,13 @@ class SearchedBus(_Record):
     def has_controller(self) -> bool: ...
     @property
     def state(self) -> str:
-        """Of the controller: 'error-active' …; '': not known."""
+        """Of the controller: 'error-active' …; '': unknown."""
     @property
     def bit_rate(self) -> int:
-        """In bit/s; 0: not known."""
+        """In bit/s; 0: unknown."""
     @property
     def trouble(self) -> str | None:
-        """Why nothing could be heard."""
+        """Why no board could be heard."""
 
 class SearchedNetwork(_Record):
     @property
@@ -523,15 +517,16 @@ class Discovery:
     def networks(self) -> list[SearchedNetwork]: ...
     @property
     def more(self) -> bool:
-        """More than 64 boards have answered by UDP."""
+        """True if more than 64 boards have answered by UDP."""
     def only(self) -> FoundBoard:
-        """The only board; one that several transports reach is one board. Raises OpenError if there is no board, with
-        what was searched, and UsageError with the URLs of several."""
+        """The only board, even on several transports. Raises OpenError without a board, and
+        UsageError with the URLs of several."""
 
 def discover(*, serial: bool = True, can: bool = True, udp: bool = True, serial_ports: Sequence[str] = (),
              udp_port: int = 2018) -> Discovery:
-    """The boards that this computer reaches, as `r4 list` shows them. Blocks for up to 1.3 s. `serial_ports`: ports to
-    ask whatever their USB id is, by path. `udp_port`: 1 to 65535, where boards listen."""
+    """The boards that this computer reaches, as `r4 list` shows them. Blocks for up to 1.3 s.
+    `serial_ports`: paths of ports to ask, whatever their USB id. `udp_port`: 1 to 65535, where
+    boards listen."""
 
 def shipped_devices() -> list[str]: ...
 def load_device(text: str, first_slot: int, /) -> Device: ...
@@ -696,12 +691,12 @@ class SimulatedRobot:
     def look(self) -> dict[str, Any]: ...
 
 class BoardHealth:
-    """How a board of a fleet is."""
+    """The health of a board of a fleet."""
     @property
     def board(self) -> int: ...
     @property
     def url(self) -> str:
-        """That it was opened by."""
+        """The URL that opened it."""
     @property
     def identity(self) -> Identity:
         """Empty until it has answered."""
@@ -715,13 +710,13 @@ class BoardHealth:
     def statistics(self) -> Statistics: ...
     @property
     def paths(self) -> list[PathStatus]:
-        """Of several; of one alone it is empty."""
+        """One status for each of several paths; empty for a single path."""
     @property
     def well(self) -> bool:
-        """ACTIVE and in control: commands go out."""
+        """True if ACTIVE and in control: commands can be sent."""
 
 class FleetResult:
-    """What became of a command at one board."""
+    """The result of a command at one board."""
     @property
     def board(self) -> int: ...
     @property

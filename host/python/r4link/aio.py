@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4link.aio.Board: the same for asyncio.
+"""r4link.aio.Board: r4link.Board for asyncio.
 
     async with r4link.aio.Board('udp://192.168.0.125') as board:
         await board.wait_active()
@@ -8,9 +8,10 @@
         async for state in board.states():
             …
 
-Commands of a board go out in the order in which they were begun, each when the one before has ended; stop() waits for
-none of them. A task that is cancelled takes its command back: it is sent no more, though it may have been executed. Only a
-stop is still sent when its task is cancelled. The calls of a board belong to one event loop.
+A board's commands are sent in the order in which they were begun, each when its predecessor has
+ended; stop() waits for no other command. If a task is cancelled, its command is not sent again, but
+may have been executed. A stop is sent even if its task is cancelled. The calls of a board belong to
+one event loop.
 """
 from __future__ import annotations
 
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 
 async def _result(call: _core.Call) -> Any:
-    """The result of a call, which the thread of the link ends: it makes the descriptor readable."""
+    """The result of a call. The link's thread makes the descriptor readable when the call ends."""
     loop = asyncio.get_running_loop()
     ended = loop.create_future()
     loop.add_reader(call.fileno(), _end, ended)
@@ -40,7 +41,7 @@ async def _result(call: _core.Call) -> Any:
         await ended
     finally:
         loop.remove_reader(call.fileno())
-        call.cancel()  # unless it has ended
+        call.cancel()  # no effect if it has ended
     return call.result()
 
 
@@ -50,11 +51,8 @@ def _end(ended: asyncio.Future[None]) -> None:
 
 
 class States:
-    """The states of a board from now on: `async for state in board.states(): …`, until the board is closed.
-
-    The link leaves them beside the callbacks, so that none is lost where these are slow; the callback of this one
-    only tells that there is one.
-    """
+    """The states of a board from now on: `async for state in board.states(): …`, until the board is
+    closed. The link queues the states itself, so slow callbacks lose none."""
 
     def __init__(self, states: blocking.States, news: asyncio.Event, subscription: Subscription) -> None:
         self._states = states
@@ -65,7 +63,7 @@ class States:
         return self
 
     async def __anext__(self) -> State:
-        await asyncio.sleep(0)  # the loop has others to look after, however many states wait
+        await asyncio.sleep(0)  # lets other tasks run, however many states wait
         while True:
             self._news.clear()
             state = self._states.take()
@@ -78,13 +76,12 @@ class States:
 
     @property
     def dropped(self) -> int:
-        """Those that gave way or found no room."""
+        """The number of states that a newer state replaced or that found no room."""
         return self._states.dropped
 
 
 class UartStream:
-    """What comes in on a UART: `async for data, lost in board.uart[1]: …`, until the board is closed. What waits is in
-    the link; the callback of this one only tells that there is something. `channel`: 1 or 2."""
+    """Received bytes of UART `channel`, 1 or 2: `async for data, lost in board.uart[1]: …`."""
 
     def __init__(self, core: _core.Board, channel: int, news: asyncio.Event, subscription: Subscription) -> None:
         self._core, self._channel = core, channel
@@ -95,7 +92,7 @@ class UartStream:
         return self
 
     async def __anext__(self) -> UartData:
-        await asyncio.sleep(0)  # the loop has others to look after
+        await asyncio.sleep(0)  # lets other tasks run
         while True:
             self._news.clear()
             try:
@@ -119,7 +116,7 @@ class Uart(channels.UartChannel[Coroutine[Any, Any, None]]):
         return UartStream(self._board._core, self._channel, news, self.on_bytes(lambda _: news.set()))
 
     async def read(self, timeout: float = 0.0) -> UartData:
-        """As that of r4link.Board."""
+        """As Uart.read() of r4link.Board. `timeout`: seconds."""
         received = self._board._core.uart_read(self._channel, 0)
         if received.data or received.lost or _ms(timeout) <= 0:
             return received
@@ -130,15 +127,15 @@ class Uart(channels.UartChannel[Coroutine[Any, Any, None]]):
 
 
 class Board(AnyBoard[Coroutine[Any, Any, None]]):
-    """r4link.Board for asyncio; takes the same options. A call that does not wait is not a coroutine. Callbacks run on the
-    loop of the task that adds them."""
+    """r4link.Board for asyncio, with the same options. A call that does not wait is not a
+    coroutine. Callbacks run on the loop of the task that adds them."""
 
     def __init__(self, url: str | Transport | Iterable[str] | Iterable[Transport], **options: Any) -> None:
         self._board = blocking.Board(url, **options)
         self._core = self._board._core
-        self._calls: Any = _core.Calls(self._core)  # as _core.Board has them, but each returns at once
+        self._calls: Any = _core.Calls(self._core)  # each returns at once
         self._turn = asyncio.Lock()
-        self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of loops over states and bytes
+        self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of loops
 
     def _call(self, call: Callable[[_core.Board], Any], *, at_once: bool = False,
               then: Callable[[Any], Any] = lambda result: result) -> Any:
@@ -163,7 +160,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
         return cls((await discover()).only().url, **options)
 
     async def close(self) -> None:
-        """Says farewell; calls that wait raise ClosedError, loops over states and bytes end."""
+        """Sends the farewell. Waiting calls raise ClosedError; loops over states and bytes end."""
         await asyncio.get_running_loop().run_in_executor(None, self._board.close)
         for news in list(self._news):
             news.set()
@@ -176,14 +173,14 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
         await asyncio.shield(self.close())
 
     async def next_state(self, timeout: float = 1.0) -> State:
-        """Waits for a state, up to `timeout` seconds."""
+        """Waits up to `timeout` seconds for a state."""
         try:
             return await asyncio.wait_for(anext(self.states()), _ms(timeout) / 1000)
         except (asyncio.TimeoutError, StopAsyncIteration):
-            return self._core.next_state(1)  # says why there is none
+            return self._core.next_state(1)  # raises the reason
 
     def identify(self, timeout: float = 1.0) -> Coroutine[Any, Any, Identity]:
-        """Asks the board who it is. `timeout`: seconds to wait for the answer."""
+        """Asks the board for its identity. `timeout`: seconds to wait for the answer."""
         identity: Coroutine[Any, Any, Identity] = self._call(lambda core: core.identify(_ms(timeout)))
         return identity
 
@@ -198,7 +195,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
         return channels.Uarts(lambda channel: Uart(self, channel))
 
     def states(self, most: int | None = None, *, lossless: bool = False) -> States:
-        """The states from now on, until the board is closed: as those of r4link.Board. `most`: 1 or more states wait."""
+        """As r4link.Board.states(), until the board is closed. `most`: 1 or more states wait."""
         news = asyncio.Event()
         self._news.add(news)
         return States(self._board.states(most, lossless=lossless), news,
@@ -206,7 +203,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
 
 
 async def discover(**options: Any) -> Discovery:
-    """As r4link.discover(), with the same options. A task that is cancelled does not end the search, 1.3 s at most."""
+    """As r4link.discover(). Cancelling the task does not end the search, at most 1.3 s."""
     return await asyncio.get_running_loop().run_in_executor(None, lambda: _core.discover(**options))
 
 

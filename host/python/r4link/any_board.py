@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What r4link.Board and r4link.aio.Board have in common. Times are seconds.
+"""The common part of r4link.Board and r4link.aio.Board. Times are seconds.
 
-A call that waits returns None or, from r4link.aio.Board, a coroutine. Every `timeout` is the time in which the board's
-state must confirm the command; if it does not, the call raises RefusedError.
+A call that waits returns None or, from r4link.aio.Board, a coroutine. Each `timeout` is the time
+within which the board's state must confirm the command. Otherwise the call raises RefusedError.
 """
 from __future__ import annotations
 
@@ -25,56 +25,59 @@ class AnyBoard(ABC, Generic[Sent]):
     @abstractmethod
     def _call(self, call: Callable[[Core], Any], *, at_once: bool = False,
               then: Callable[[Any], Any] = lambda result: result) -> Any:
-        """Makes a call that waits. Returns then(its result), or a coroutine of that, which waits for the calls before
-        it unless it goes `at_once`."""
+        """Makes a call that waits. Returns then(result), or a coroutine of it. The coroutine waits
+        for earlier calls unless `at_once`."""
 
     @abstractmethod
     def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
-        """Returns the function that the thread of the callbacks calls for a callback of the program."""
+        """Returns the function that the callbacks' thread calls for a callback of the program."""
 
     @property
     def role(self) -> BoardRole:
-        """What this program is to the board at the moment."""
+        """The present role of this program at the board."""
         return self._core.role()
 
     def take_control(self) -> Sent:
-        """From now on this program controls the board; callbacks and recordings stay. It begins disarmed: wait_active(),
-        arm(). Raises RefusedError if another program of this computer controls it, which `holder` names; then this one
-        watches on."""
+        """Makes this program control the board; callbacks and recordings stay. It begins disarmed:
+        call wait_active() and arm(). If another program of this computer controls the board, it
+        raises RefusedError with the `holder`, and this program continues to watch."""
         sent: Sent = self._call(lambda core: core.take_control())
         return sent
 
     def release_control(self, timeout: float = 1.0) -> Sent:
-        """Disarms, says farewell until the board has answered, so that it is safe and free, and watches from then on.
-        Raises NotConfirmedError if it does not answer in time: it goes safe by its own timeout, and this program watches
-        all the same. Commands that other threads wait for raise CancelledError."""
+        """Disarms, and sends the farewell until the board has answered: it is then safe and free.
+        Afterwards this program watches. Without an answer the board goes safe by its own timeout,
+        and NotConfirmedError is raised. Commands that wait in other threads raise
+        CancelledError."""
         sent: Sent = self._call(lambda core: core.release_control(_ms(timeout)))
         return sent
 
     def wait_active(self, timeout: float = 3.0) -> Sent:
-        """Until the board is under our control or, where we only watch, is heard. Raises RefusedError that says what
-        it is instead."""
+        """Waits until this program controls the board or, as a watcher, hears it. Raises
+        RefusedError with the link's state and cause."""
         sent: Sent = self._call(lambda core: core.wait_active(_ms(timeout)), at_once=True)
         return sent
 
     # --- commands
 
     def send(self, command: str | Command | Setpoints, timeout: float = 1.0) -> Sent:
-        """A command, or its text: 'O:358,1,1'. Setpoints, as in 'O:358,1,1;O:358,1,2', are executed in one pass and
-        confirmed as one, or none is. Command.clear() clears the stop, the watchdog or the fault that the board
-        reports; it moves nothing."""
+        """Sends a command, or its text: 'O:358,1,1'. Setpoints, as in 'O:358,1,1;O:358,1,2', are
+        executed in one pass and confirmed together, or not at all. Command.clear() clears the stop,
+        the watchdog or the fault that the board reports, and moves nothing."""
         sent: Sent = self._call(lambda core: core.send(command, _ms(timeout)))
         return sent
 
     def post(self, command: Command | Setpoints) -> PostResult:
-        """Sends once, without waiting or confirmation. on_refused() reports what the board refuses."""
+        """Sends once, without waiting or confirmation. on_refused() reports a refusal."""
         return self._core.post(command)
 
     def arm(self, timeout: float = 1.0) -> Sent:
-        """Before the first output command, and again after whatever made the outputs safe but a lost link.
+        """Allows output commands. Call it before the first output command, and again after the
+        outputs went safe, except after a lost link.
 
-        Clears a stop, a watchdog or a fault that came while this program controlled the board, and closes relay 1. One
-        that may have come before the program began is not cleared: NotArmedError says so, and Command.clear() clears it.
+        Clears a stop, a watchdog or a fault that came while this program controlled the board, and
+        closes relay 1. A cause that may be older than the program is not cleared: it raises
+        NotArmedError, and Command.clear() clears it.
         """
         sent: Sent = self._call(lambda core: core.arm(_ms(timeout)))
         return sent
@@ -85,7 +88,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return self._core.disarmed_by()
 
     def stop(self, timeout: float = 1.0) -> Sent:
-        """Every output safe, at once, repeated until the board confirms it; latched until Command.clear()."""
+        """Makes all outputs safe at once: repeated until confirmed, latched until Command.clear()."""
         sent: Sent = self._call(lambda core: core.stop(_ms(timeout)), at_once=True)
         return sent
 
@@ -118,17 +121,17 @@ class AnyBoard(ABC, Generic[Sent]):
         return BldcChannel(self, channel)
 
     def dac(self, channel: int, *, millivolts: int, timeout: float = 1.0) -> Sent:
-        """Sets a voltage of the board: `channel` 1 or 2, `millivolts` 0 to 3300; 0 in the safe state. It is an output,
-        so it takes arm(). Command.dac() can be posted, and can be one of Setpoints."""
+        """Sets a voltage: `channel` 1 or 2, `millivolts` 0 to 3300; 0 in the safe state. An output
+        command, so arm() is needed. Command.dac() can be posted, and can be one of Setpoints."""
         return self.send(Command.dac(channel, millivolts=millivolts), timeout)
 
     def proximity(self, channel: int, *, cm: int, timeout: float = 1.0) -> Sent:
-        """The board goes safe when ultrasonic sensor `channel`, 1 to 4, measures less than `cm`, 1 to 400 centimetres;
-        0: off."""
+        """The board goes safe when ultrasonic sensor `channel`, 1 to 4, measures less than `cm`,
+        1 to 400 centimetres; 0: off."""
         return self.send(Command.proximity(channel, cm=cm), timeout)
 
     def fields(self, names: str, timeout: float = 1.0) -> Sent:
-        """The state fields to ask for: 'DEFAULT,ENC1'."""
+        """Requests state fields: 'DEFAULT,ENC1'."""
         return self.send(f'F:{names}', timeout)
 
     def setting(self, key: str, value: str, timeout: float = 1.0) -> Sent:
@@ -136,16 +139,17 @@ class AnyBoard(ABC, Generic[Sent]):
         return self.send(f'C:{key},{value}', timeout)
 
     def attach(self, device: Device, timeout: float = 1.0) -> Sent:
-        """Sets a described device up (r4link.devices): checks its identity, writes its settings, which takes arm(), and
-        starts the board's readings, until this session ends. Raises RefusedError if the device does not answer, or is
-        another one. Call it again after on_restart() and a lost link. `timeout`: of each step. Raises UsageError if a
-        device of another address or name has one of the slots: i2c.poll_off() of that slot frees it."""
+        """Sets up a described device (r4link.devices): checks its identity, writes its settings,
+        which needs arm(), and starts the board's readings until this session ends. `timeout`: for
+        each step. Raises RefusedError if the device does not answer or is another device. Raises
+        UsageError if a device of another address or name has one of the slots: i2c.poll_off() frees
+        a slot. Call it again after on_restart() and a lost link."""
         sent: Sent = self._call(lambda core: core.attach(device._core, _ms(timeout)))
         return sent
 
     def link_timing(self, board_timeout: float, heartbeat: float, timeout: float = 1.0) -> Sent:
-        """Changes two settings together: `board_timeout`, the seconds without a host heartbeat after which the board goes
-        safe, and `heartbeat`, the seconds between its own heartbeats."""
+        """Changes two settings together: `board_timeout`, the seconds without a host heartbeat
+        after which the board goes safe, and `heartbeat`, the seconds between its own heartbeats."""
         sent: Sent = self._call(lambda core: core.link_timing(_ms(board_timeout), _ms(heartbeat), _ms(timeout)))
         return sent
 
@@ -153,78 +157,79 @@ class AnyBoard(ABC, Generic[Sent]):
 
     @property
     def state(self) -> State:
-        """The newest; false while none has come. `received` is when, on the clock of time.monotonic()."""
+        """The newest state; false if none. `received`: on the clock of time.monotonic()."""
         return self._core.state()
 
     @property
     def link(self) -> LinkStatus:
-        """How the link to the board is at the moment."""
+        """The present status of the link."""
         return self._core.link()
 
     @property
     def statistics(self) -> Statistics:
-        """What the link has counted and measured."""
+        """The counts and measurements of the link."""
         return self._core.statistics()
 
     @property
     def carrier_counters(self) -> CarrierCounters:
-        """What the transport has carried."""
+        """The counters of the transport."""
         return self._core.carrier_counters()
 
     @property
     def name(self) -> str:
-        """The transport, for people; of several paths all of them."""
+        """The transport's name for people; with several paths, all names."""
         return self._core.name()
 
     @property
     def paths(self) -> list[PathStatus]:
-        """How each of its paths does, in the order of the URLs."""
+        """The status of each path, in the order of the URLs."""
         return self._core.paths()
 
-    # --- callbacks: each is first called with what is already there. As functions or as decorators.
+    # --- callbacks, as functions or decorators. A new callback first gets the newest value.
 
     def on_state(self, callback: Callable[[State], object]) -> Subscription:
-        """A state has come."""
+        """Called for each new state."""
         return self._core.on_state(self._callback(callback))
 
     def on_link(self, callback: Callable[[LinkStatus], object]) -> Subscription:
-        """The link has changed."""
+        """Called when the link has changed."""
         return self._core.on_link(self._callback(callback))
 
     def on_path(self, callback: Callable[[PathStatus], object]) -> Subscription:
-        """A path has begun to carry, or ceased to."""
+        """Called when a path begins or ceases to carry."""
         return self._core.on_path(self._callback(callback))
 
     def on_event(self, callback: Callable[[Event], object]) -> Subscription:
-        """The transport went up or down, or something is to be warned of."""
+        """Called when the transport goes up or down, and for a warning."""
         return self._core.on_event(self._callback(callback))
 
     def on_restart(self, callback: Callable[[], object]) -> Subscription:
-        """The board has restarted, and has lost its settings."""
+        """Called when the board has restarted and lost its settings."""
         return self._core.on_restart(self._callback(callback))
 
     def on_arming(self, callback: Callable[[DisarmCause], object]) -> Subscription:
-        """Armed (DisarmCause.NONE), or not any more, and why."""
+        """Called when the program is armed (DisarmCause.NONE) or disarmed, with the cause."""
         return self._core.on_arming(self._callback(callback))
 
     def on_refused(self, callback: Callable[[RefusedPost], object]) -> Subscription:
-        """A command that was posted was refused: by the board, or on its way there."""
+        """Called when a posted command is refused by the board, or does not reach the board."""
         return self._core.on_refused(self._callback(callback))
 
     def record(self, to: str | os.PathLike[str] | Recording, *, rotate_bytes: int = 0, rotate_after: int = 0,
                keep_bytes: int = 0) -> None:
-        """Every datagram from now on, in both directions, into a file (docs/recordings.md). A new file is begun after
-        `rotate_bytes` bytes or `rotate_after` seconds, and at most `keep_bytes` bytes are kept; 0: no limit."""
+        """Records every datagram from now on, in both directions, into a file (docs/recordings.md).
+        A new file begins after `rotate_bytes` bytes or `rotate_after` seconds, and at most
+        `keep_bytes` bytes are kept; 0: no limit."""
         if isinstance(to, Recording):
             self._core.record(to)
         else:
             self._core.record(os.fspath(to), rotate_bytes, rotate_after, keep_bytes)
 
     def watchdog(self, period: float) -> None:
-        """Without feed() for `period` seconds our heartbeats stop and the board goes safe; 0 turns it off. Feed where the
-        robot is looked after: callbacks and an event loop do not feed it."""
+        """After `period` seconds without feed() the heartbeats stop and the board goes safe; 0:
+        off. Feed where the robot is attended: callbacks and an event loop do not feed it."""
         self._core.watchdog(_ms(period))
 
     def feed(self) -> None:
-        """The program is well, for another period of watchdog()."""
+        """Restarts the period of watchdog(): the program is well."""
         self._core.feed()

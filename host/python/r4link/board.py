@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """r4link.Board: a board, opened by URL. Blocking calls with timeouts, and callbacks.
 
-Times are seconds. A call that waits releases the GIL and obeys Ctrl-C. Callbacks run on a thread of their own, one
-at a time; one that does not return within `callback_limit` stops the heartbeats, so that the board goes safe.
+Times are seconds. A call that waits releases the GIL and obeys Ctrl-C. Callbacks run on their own
+thread, one at a time. If a callback does not return within `callback_limit`, the heartbeats stop,
+and the board goes safe.
 """
 from __future__ import annotations
 
@@ -29,14 +30,14 @@ _open: weakref.WeakSet[_core.Board] = weakref.WeakSet()
 
 @atexit.register
 def _close_all() -> None:
-    """Farewells are said while the interpreter is whole."""
+    """Sends the farewells while the interpreter is whole."""
     for board in list(_open):
         board.close()
 
 
 class States:
-    """The states of a board from now on: `for state in board.states(): …`, until the board is closed. Keeps it open.
-    `most`: 1 or more states wait."""
+    """The states of a board from now on: `for state in board.states(): …`, until the board is
+    closed. Keeps it open. `most`: 1 or more states wait."""
 
     def __init__(self, board: Board, most: int | None, timeout: float, lossless: bool) -> None:
         if most is not None and most < 1:
@@ -49,49 +50,50 @@ class States:
         return self
 
     def __next__(self) -> State:
-        """Raises RefusedError when none comes within the timeout, DataError where one was lost of which none should
-        be; the next call goes on behind it."""
+        """Raises RefusedError if no state comes within the timeout. If lossless, raises DataError
+        where states were lost; the next call returns the first state after the loss."""
         while (state := self._board.take(self._states, self._timeout_ms)) is None:
             if self._states.ended:
                 raise StopIteration
-            self._board.next_state(1)  # says why there is none
+            self._board.next_state(1)  # raises the reason
         return state
 
     def take(self) -> State | None:
-        """The next one if it is there already."""
+        """The next state if one waits, else None."""
         return self._board.take(self._states, 0)
 
     @property
     def ended(self) -> bool:
-        """The board was closed, and none waits."""
+        """True if the board was closed, and no state waits."""
         return self._states.ended
 
     @property
     def dropped(self) -> int:
-        """Those that gave way or found no room."""
+        """The number of states that a newer state replaced or that found no room."""
         return self._states.missed
 
 
 class Board(AnyBoard[None]):
-    """A board, opened by URL (docs/transports.md), or with_link(); see the options of include/r4link/options.hpp.
+    """A board, opened by URL (docs/transports.md), or with_link(). See the options in
+    include/r4link/options.hpp.
 
-    Returns without waiting for the board: wait_active(). `role` is BoardRole.CONTROL, or BoardRole.WATCH for a program
-    that only looks, and may stop the board, until take_control(). `key` is the path of a key file (`~` is yours). Raises
-    UsageError, OpenError, DeniedError.
+    Returns without waiting for the board: wait_active(). `role` is BoardRole.CONTROL or
+    BoardRole.WATCH. A watcher only reads states, and may stop the board, until take_control().
+    `key` is the path of a key file (`~` is your home). Raises UsageError, OpenError, DeniedError.
 
         with r4link.Board('udp://192.168.0.125') as board:
             board.wait_active()
             board.arm()                 # closes relay 1, the motor supply
             board.osmc(1).set(0.1)      # the board's own state has confirmed it
 
-    Several URLs are paths to the one board (docs/redundancy.md): r4link.Board(['serial:auto', 'udp://192.168.0.125']).
-    In place of URLs it takes a Transport of your own, or several.
+    Several URLs are paths to one board (docs/redundancy.md): r4link.Board(['serial:auto',
+    'udp://192.168.0.125']). It also takes one Transport of your own, or several, instead of URLs.
 
-    `watch_rate_hz`: 1 to 1000 states a second for a program that watches. `heartbeat`: seconds between heartbeats.
-    `timeout`: seconds of silence after which the link is lost. `command_retry`, `stop_retry`: seconds after which a command
-    or a stop is sent again. `stop_linger`: seconds for which a confirmed stop is repeated. `identify_interval`: seconds
-    after which the board is asked again who it is; 0: never. `callback_limit`: seconds for which a callback may run; 0: no
-    limit.
+    `watch_rate_hz`: 1 to 1000 states a second for a watcher. `heartbeat`: seconds between
+    heartbeats. `timeout`: seconds of silence after which the link is lost. `command_retry`,
+    `stop_retry`: seconds between repetitions of a command or a stop. `stop_linger`: seconds for
+    which a confirmed stop is repeated. `identify_interval`: seconds between questions for the
+    board's identity; 0: never. `callback_limit`: seconds that a callback may take; 0: no limit.
     """
 
     def __init__(self, url: str | Transport | Iterable[str] | Iterable[Transport], *, role: BoardRole | str = BoardRole.CONTROL, arming: bool = True,
@@ -117,8 +119,8 @@ class Board(AnyBoard[None]):
 
     @classmethod
     def first(cls, **options: Any) -> Self:
-        """Opens the only board that r4link.discover() finds, which takes 1.3 s at most. Raises OpenError if there is no
-        board, with what was searched, and UsageError with the URLs of several."""
+        """Opens the only board that r4link.discover() finds within 1.3 s. Raises OpenError without
+        a board, and UsageError with the URLs if there are several."""
         return cls(_core.discover().only().url, **options)
 
     def _call(self, call: Callable[[_core.Board], Any], *, at_once: bool = False,
@@ -129,8 +131,8 @@ class Board(AnyBoard[None]):
         return callback
 
     def close(self) -> None:
-        """Says farewell and closes the transport: the board goes safe at once. Calls that wait in other threads
-        raise ClosedError. Idempotent; a callback may call it."""
+        """Sends the farewell and closes the transport: the board goes safe at once. Waiting calls
+        in other threads raise ClosedError. Idempotent; a callback may call it."""
         self._core.close()
 
     def __enter__(self) -> Self:
@@ -154,15 +156,16 @@ class Board(AnyBoard[None]):
         return Uarts(lambda channel: Uart(self, channel))
 
     def identify(self, timeout: float = 1.0) -> Identity:
-        """Asks the board who it is. `timeout`: seconds to wait for the answer."""
+        """Asks the board for its identity. `timeout`: seconds to wait for the answer."""
         return self._core.identify(_ms(timeout))
 
     def next_state(self, timeout: float = 1.0) -> State:
-        """Waits for a state, up to `timeout` seconds."""
+        """Waits up to `timeout` seconds for a state."""
         return self._core.next_state(_ms(timeout))
 
     def states(self, most: int | None = None, timeout: float = 1.0, *, lossless: bool = False) -> States:
-        """The states from now on, for a loop, which waits up to `timeout` seconds for each. The newest at a time; with
-        `most` up to so many wait, then the oldest give way. With `lossless` none does: 65536 wait (eleven minutes at 100
-        Hz) or `most`, and what found no room is a DataError at its place."""
+        """The states from now on, for a loop, which waits up to `timeout` seconds for each. By
+        default only the newest state waits. With `most`, up to that number (1 or more) wait, and
+        newer states replace the oldest. With `lossless`, `most` states wait (default: 65536, eleven
+        minutes at 100 Hz), and a loss raises DataError at its place."""
         return States(self, most, timeout, lossless)

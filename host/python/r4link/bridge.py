@@ -5,7 +5,7 @@
         ...
         print(bridge.status()[0].hosts.counters)
 
-It runs on a thread of its own, which never takes the GIL.
+It runs on its own thread, which never takes the GIL.
 """
 from __future__ import annotations
 
@@ -32,24 +32,24 @@ def _close_all() -> None:
 
 
 class BridgeCounters(NamedTuple):
-    """What came from one side, in datagrams, and what became of it."""
+    """The datagrams that came from one side, by what the bridge did with them."""
     passed: int
-    stops: int  # of those: emergency stops
+    stops: int  # the emergency stops among `passed`
     # Dropped:
-    damaged: int  # a wrong checksum, too long, or no datagram at all
-    misdirected: int  # what only a board says from the hosts' side, or the other way round
-    kept_out: int  # of hosts that are not served: docs/bridge.md
-    refused: int  # not signed though it must be, or a setting that only a cable may change
+    damaged: int  # a wrong checksum, too long, or not a datagram
+    misdirected: int  # a datagram that only a board sends, from the hosts, or the reverse
+    kept_out: int  # from hosts that are not served: docs/bridge.md
+    refused: int  # a missing signature, or a setting that only a cable may change
     late: int  # may have waited for more than 100 ms: the bridge was held up
-    undelivered: int  # the other side is away, takes no more, or nobody is known there
-    # Of what passed: a newer state took its place in front of the other side, or it waited there for 100 ms.
+    undelivered: int  # the other side is down, full, or has no known peer
+    # Of `passed`: replaced by a newer state at the other side, or waited there for 100 ms.
     outdated: int
 
 
 class BridgeEnd(NamedTuple):
     name: str  # of the transport
     up: bool
-    counters: BridgeCounters  # of what came from there
+    counters: BridgeCounters  # of the datagrams that came from there
 
 
 class BridgeStatus(NamedTuple):
@@ -61,17 +61,19 @@ class BridgeStatus(NamedTuple):
 class Bridge:
     def __init__(self, hosts: str, board: str, *, timeout: float = 1.0,
                  key: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (), open: bool = False) -> None:
-        """`hosts`: where hosts are heard, 'udp://0.0.0.0:2018'; `board`: as Board takes it. Patterns of as many boards
-        are joined in order. After `timeout` without a heartbeat of the host that is let through, another is: no shorter
-        than the board's timeout. With `key`, the path of a key file of the board's or several (`~` is yours), only what
-        is signed with one passes. To a board at a serial port a network needs that, unless `open` lets everyone drive."""
+        """`hosts`: where hosts are heard, 'udp://0.0.0.0:2018'. `board`: as Board takes it.
+        Patterns for the same number of boards are joined in order. After `timeout` seconds without
+        a heartbeat of the served host, another host may pass: at least the board's timeout. `key`:
+        key files of the board (`~`: your home); only datagrams signed with one of them pass.
+        Between a network and a board at a serial port, `key` is required unless `open` lets
+        everyone drive."""
         files = [key] if isinstance(key, (str, os.PathLike)) else key
         self._core = _core.Bridge(hosts, board, timeout=_ms(timeout), open=open,
                                   keys=[os.path.expanduser(os.fspath(each)) for each in files])
         _open.add(self)
 
     def close(self) -> None:
-        """Ends it at once; the boards go safe after their timeout. Idempotent."""
+        """Ends the bridge at once; the boards go safe after their timeout. Idempotent."""
         _open.discard(self)
         self._core.close()
 
@@ -83,6 +85,6 @@ class Bridge:
         self.close()
 
     def status(self) -> list[BridgeStatus]:
-        """Of each board, in order; after close(), how it was then."""
+        """The status of each board, in order; after close(), the last status."""
         return [BridgeStatus(*(BridgeEnd(name, up, BridgeCounters(*counters)) for name, up, counters in ends))
                 for ends in self._core.status()]

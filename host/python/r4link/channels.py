@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a board has: its output channels, the user's I2C bus and UARTs.
+"""The parts of a board: its output channels, the user's I2C bus and UARTs.
 
-The classes serve r4link.Board and r4link.aio.Board: a call that waits returns what the board's send() returns, None or
-a coroutine. Times are seconds. Every `timeout` is the time in which the board's state must confirm the command.
+The classes serve r4link.Board and r4link.aio.Board: a call that waits returns None or a coroutine,
+as the board's send() does. Times are seconds. Each `timeout` is the time within which the board's
+state must confirm the command.
 """
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from .values import UartData
 if TYPE_CHECKING:
     from .any_board import AnyBoard
 
-# What a call that waits returns for a command, for bytes, for addresses: that, or a coroutine of it.
+# The results of waiting calls for a command, for bytes, and for addresses, or coroutines of them.
 Sent = TypeVar('Sent')
 Read = TypeVar('Read')
 Scanned = TypeVar('Scanned')
@@ -26,15 +27,15 @@ _MOST_S = 24 * 3600.0
 
 
 def _ms(seconds: float) -> int:
-    """Whole milliseconds, rounded up: a timeout of a little is not one of nothing."""
+    """Whole milliseconds, rounded up so that a short timeout is not 0."""
     if math.isnan(seconds):
         raise UsageError('a time of nan seconds', 'it is no number', 'give seconds')
     return math.ceil(max(-_MOST_S, min(seconds, _MOST_S)) * 1000)
 
 
 class _Channel(Generic[Sent]):
-    """A set method returns when the board's state confirms the setpoint, and raises RefusedError otherwise. A post
-    method sends the setpoint once, returns at once, and says whether it was sent."""
+    """A set method returns when the board's state confirms the setpoint, and raises RefusedError
+    otherwise. A post method sends the setpoint once, and returns at once with the result."""
 
     def __init__(self, board: AnyBoard[Sent], channel: int) -> None:
         self._board = board
@@ -69,13 +70,13 @@ class ServoChannel(_Channel[Sent]):
     """A servo, driven by its pulse or, once it is calibrated, by its angle."""
 
     def calibrate(self, calibration: ServoCalibration) -> None:
-        """Has to be called once before this servo is driven in degrees. The Board keeps the calibration, also while the
-        link is lost; it is not sent to the board."""
+        """Call it once before driving this servo in degrees. The Board keeps the calibration, also
+        while the link is lost; it is not sent to the board."""
         self._board._core.calibrate_servo(self._channel, calibration)
 
     @property
     def calibration(self) -> ServoCalibration:
-        """Raises UsageError if the servo was not calibrated."""
+        """Raises UsageError if the servo is not calibrated."""
         return self._board._core.servo_calibration(self._channel)
 
     @overload
@@ -85,8 +86,9 @@ class ServoChannel(_Channel[Sent]):
     def set(self, *, degrees: float, timeout: float = ...) -> Sent: ...
 
     def set(self, *, us: int | None = None, degrees: float | None = None, timeout: float = 1.0) -> Sent:
-        """Takes either `us`, the pulse width up to 2500 microseconds (0: no pulses), or `degrees`, an angle between the
-        two ends of the calibration. Raises UsageError for an angle beyond them, or before calibrate()."""
+        """Takes either `us`, the pulse width up to 2500 microseconds (0: no pulses), or `degrees`,
+        an angle between the two ends of the calibration. Raises UsageError for an angle beyond
+        them, or before calibrate()."""
         return self._board.send(self._command(us, degrees), timeout)
 
     @overload
@@ -123,16 +125,16 @@ class StepperChannel(_Channel[Sent]):
     """A stepper."""
 
     def move_to(self, position: int, *, speed: int = 1000, timeout: float = 1.0) -> Sent:
-        """`position`: the target in steps, a signed 32-bit number. `speed`: 1 to 20000 steps a second. Returns when the
-        board has taken the target, not when the stepper is there."""
+        """`position`: the target in steps, a signed 32-bit number. `speed`: 1 to 20000 steps a
+        second. Returns when the board has taken the target, before the stepper has reached it."""
         return self._board.send(Command.stepper(self._channel, position=position, speed=speed), timeout)
 
     def post(self, position: int, *, speed: int = 1000) -> PostResult:
-        """`position`: the target in steps, a signed 32-bit number. `speed`: 1 to 20000 steps a second."""
+        """`position`: the target in steps, signed 32 bits. `speed`: 1 to 20000 steps a second."""
         return self._board.post(Command.stepper(self._channel, position=position, speed=speed))
 
     def zero(self, *, timeout: float = 1.0) -> Sent:
-        """The stepper and the encoder of this channel count from 0 here; the stepper does not move."""
+        """Sets the counts of this channel's stepper and encoder to 0; the stepper does not move."""
         return self._board.send(Command.zero(self._channel), timeout)
 
 
@@ -140,27 +142,28 @@ class BldcChannel(_Channel[Sent]):
     """A brushless motor."""
 
     def set(self, duty: float, *, brake: bool = False, timeout: float = 1.0) -> Sent:
-        """`duty`: from -1, full reverse, to 1, full forward. `brake`: True applies the driver's brake."""
+        """`duty`: -1 (reverse) to 1 (forward). `brake`: True applies the driver's brake."""
         return self._board.send(Command.bldc(self._channel, duty=duty, brake=brake), timeout)
 
     def set_pwm(self, pwm: int, *, direction: int = Direction.FORWARD, brake: bool = False,
                 timeout: float = 1.0) -> Sent:
-        """`pwm`: 0 to 4095 (full speed). `direction`: FORWARD or REVERSE. `brake`: True applies the driver's brake."""
+        """`pwm`: 0 to 4095 (full). `direction`: FORWARD, REVERSE. `brake`: the driver's brake."""
         return self._board.send(Command.bldc(self._channel, pwm=pwm, direction=direction, brake=brake), timeout)
 
     def post(self, duty: float, *, brake: bool = False) -> PostResult:
-        """`duty`: from -1, full reverse, to 1, full forward. `brake`: True applies the driver's brake."""
+        """`duty`: -1 (reverse) to 1 (forward). `brake`: True applies the driver's brake."""
         return self._board.post(Command.bldc(self._channel, duty=duty, brake=brake))
 
     def post_pwm(self, pwm: int, *, direction: int = Direction.FORWARD, brake: bool = False) -> PostResult:
-        """`pwm`: 0 to 4095 (full speed). `direction`: FORWARD or REVERSE. `brake`: True applies the driver's brake."""
+        """`pwm`: 0 to 4095 (full). `direction`: FORWARD, REVERSE. `brake`: the driver's brake."""
         return self._board.post(Command.bldc(self._channel, pwm=pwm, direction=direction, brake=brake))
 
 
 class I2c(Generic[Sent, Read, Scanned]):
-    """The devices on the user's I2C bus (docs/devices.md). read(), write() and scan() return when the device has
-    answered, and raise RefusedError where none does. `address`: 0x08 to 0x77, without the read bit. `register`: 0 to 255,
-    or up to 2 bytes; b'' names none. `count`: up to 32 bytes. `slot`: 1 to 8."""
+    """The devices on the user's I2C bus (docs/devices.md). read(), write() and scan() return when
+    the device has answered, and raise RefusedError without an answer. `address`: 0x08 to 0x77,
+    without the read bit. `register`: 0 to 255, or up to 2 bytes; b'' names none. `count`: up to 32
+    bytes. `slot`: 1 to 8."""
 
     def __init__(self, board: AnyBoard[Sent]) -> None:
         self._board = board
@@ -171,24 +174,24 @@ class I2c(Generic[Sent, Read, Scanned]):
         return read
 
     def write(self, address: int, data: bytes, count: int = 0, timeout: float = 1.0) -> Read:
-        """May move something, so that it takes arm(). Then reads `count` bytes."""
+        """Writes, then reads `count` bytes. A write may move something, so it needs arm()."""
         text = f'X:WRITE,{address},x{bytes(data).hex()}' + (f',{count}' if count else '')
         read: Read = self._transfer(text, timeout)
         return read
 
     def scan(self, timeout: float = 2.0) -> Scanned:
-        """The addresses that answer, at most 32."""
+        """Returns the addresses that answer, at most 32."""
         addresses: Scanned = self._transfer('X:SCAN', timeout, list)
         return addresses
 
     def poll(self, slot: int, address: int, register: int | bytes, count: int, period: float,
              timeout: float = 1.0) -> Sent:
-        """The board reads it by itself from now on, every `period` seconds (0.005 to 60), into that slot: state.i2c1,
-        after fields('DEFAULT,I2C1')."""
+        """Makes the board read by itself every `period` seconds (0.005 to 60), into that slot:
+        state.i2c1, after fields('DEFAULT,I2C1')."""
         return self._board.send(f'X:POLL,{address},{_register(register)},{count},{_ms(period)},{slot}', timeout)
 
     def poll_off(self, slot: int, timeout: float = 1.0) -> Sent:
-        """The board ends the readings of that slot."""
+        """Ends the board's readings of that slot."""
         return self._board.send(f'X:OFF,{slot}', timeout)
 
     def _transfer(self, text: str, timeout: float, then: Callable[[bytes], object] = bytes) -> Any:
@@ -196,32 +199,32 @@ class I2c(Generic[Sent, Read, Scanned]):
 
 
 class UartChannel(Generic[Sent]):
-    """A UART of the user's; `channel`: 1 or 2 (docs/devices.md): setting('uart1', '115200:8N1') turns it on,
-    fields('DEFAULT,UART1') has the board tell what comes in."""
+    """A UART of the user; `channel`: 1 or 2 (docs/devices.md). setting('uart1', '115200:8N1') turns
+    it on, and fields('DEFAULT,UART1') makes the board report its bytes."""
 
     def __init__(self, board: AnyBoard[Sent], channel: int) -> None:
         self._board, self._channel = board, channel
 
     def write(self, data: bytes, timeout: float = 1.0) -> Sent:
-        """1 to 48 bytes; returns when the board has taken them all. May move something, so that it takes arm()."""
+        """Writes 1 to 48 bytes; returns when the board has all. May move something: needs arm()."""
         return self._board.send(f'X:UART,{self._channel},x{bytes(data).hex()}', timeout)
 
     def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
-        """Called for each state that brings some, beside read(): each byte once, in order, and how many are missing.
-        From now on, where the other callbacks of the board are called."""
+        """Adds a callback for later bytes, besides read(): each byte once, in order, and the number
+        of missing bytes. It runs on the thread of the board's other callbacks."""
         return self._board._core.uart_on_bytes(self._channel, self._board._callback(callback))
 
 
 class Uart(UartChannel[None]):
     """A UART of r4link.Board.
 
-        for data, lost in board.uart[1]:    # what read() would return, as it comes, until the board is closed
+        for data, lost in board.uart[1]:    # as read() returns it, until the board is closed
             parser.feed(data)
     """
 
     def read(self, timeout: float = 0.0) -> UartData:
-        """What has come since the last read(), at most 64 KB: older bytes count as lost. Waits until there is
-        something; nothing where it does not come in time."""
+        """The bytes since the last read(), at most 64 KB: older bytes count as lost. Waits up to
+        `timeout` seconds for bytes, then returns none."""
         return self._board._core.uart_read(self._channel, _ms(timeout))
 
     def __iter__(self) -> Iterator[UartData]:
@@ -246,5 +249,5 @@ class Uarts(Generic[AnyUart]):
 
 
 def _register(register: int | bytes) -> str:
-    """As a command has it: 'x3b00'."""
+    """As in a command: 'x3b00'."""
     return 'x' + (register.to_bytes(1, 'big') if isinstance(register, int) else bytes(register)).hex()

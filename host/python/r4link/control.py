@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Control loops on the host (docs/control.md): PID, wheels, kinematics, odometry, and a loop that ends itself.
+"""Control loops on the host (docs/control.md): PID, wheels, kinematics, odometry, and a loop that
+ends itself.
 
-Metres, radians, seconds; x forward, y and angles to the left, as in ROS (REP 103). The classes are those of C++
-(include/r4link/control/); none of them reads a clock.
+Metres, radians, seconds; x forward, y and angles to the left, as in ROS (REP 103). The classes are
+those of C++ (include/r4link/control/); none of them reads a clock.
 """
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from .enums import DisarmCause, LinkState, LoopEnd
 
 
 class Twist(NamedTuple):
-    """How a robot moves on the ground."""
+    """The movement of a robot on the ground."""
     forward: float  # m/s
     turn: float = 0.0  # rad/s
 
@@ -35,7 +36,7 @@ class WheelSpeeds(NamedTuple):
 
 
 class CarCommand(NamedTuple):
-    speed: float  # of the middle of the rear axle
+    speed: float  # m/s, of the middle of the rear axle
     steering: float
 
 
@@ -46,13 +47,15 @@ class Pose(NamedTuple):
 
 
 class Pid:
-    """Proportional, integral and derivative control of one value. The integral stands while the output cannot follow
-    (`minimum`, `maximum`, `rate` a second); the derivative is of the measured value, low-passed.
+    """Proportional, integral and derivative control of one value. The integral stops while the
+    output is limited (`minimum`, `maximum`, `rate` a second). The derivative is of the measured
+    value, low-passed.
 
-    `setpoint` and `measured` are in one unit, any; `output`, `minimum` and `maximum` in units of the output, such as -1 to
-    1 for a duty. `kp`: units of the output per unit of error; `ki`: per unit and second; `kd`: per unit a second;
-    `feed_forward`: per unit of the setpoint. `derivative_filter`: seconds, the time constant of the low pass; 0: none.
-    `dt`: seconds."""
+    `setpoint` and `measured` are in one unit, any. `output`, `minimum` and `maximum` are in units
+    of the output, such as -1 to 1 for a duty. `kp`: units of the output per unit of error; `ki`:
+    per unit and second; `kd`: per unit a second; `feed_forward`: per unit of the setpoint.
+    `derivative_filter`: seconds, the time constant of the low pass; 0: none. `dt`: seconds.
+    """
 
     def __init__(self, kp: float = 0.0, ki: float = 0.0, kd: float = 0.0, *, feed_forward: float = 0.0,
                  minimum: float = -1.0, maximum: float = 1.0, rate: float = math.inf,
@@ -60,15 +63,15 @@ class Pid:
         self._core = _core.Pid(kp, ki, kd, feed_forward, minimum, maximum, rate, derivative_filter)
 
     def step(self, setpoint: float, measured: float, dt: float) -> float:
-        """The output, `dt` seconds after the last step. Raises DataError for a number that is not finite."""
+        """The output, `dt` seconds after the last step. Raises DataError unless all are finite."""
         return self._core.step(setpoint, measured, dt)
 
     def reset(self) -> None:
-        """Forgets all: the output is 0, or the limit next to it."""
+        """Forgets everything: the output is 0, or the limit next to 0."""
         self._core.reset()
 
     def take_over(self, output: float, setpoint: float, measured: float) -> None:
-        """Goes on from an output that something else has made so far, without a jump."""
+        """Continues without a jump from an output of another controller."""
         self._core.take_over(output, setpoint, measured)
 
     @property
@@ -83,16 +86,17 @@ class Pid:
 
 
 class Wheel:
-    """A wheel with an encoder: give it each state, in order. `encoder`: 1 to 4. `counts_a_turn`: counts of the encoder for
-    one turn of the wheel. `radius`: metres. `window`: seconds over which `speed` is the mean. `max_speed`: m/s; a faster
-    one is no movement, but an encoder that was set to zero or a board that restarted."""
+    """A wheel with an encoder: give it each state, in order. `encoder`: 1 to 4. `counts_a_turn`:
+    counts of the encoder for one turn of the wheel. `radius`: metres. `window`: seconds over which
+    `speed` is the mean. `max_speed`: m/s; a faster change means a zeroed encoder or a restart, not
+    a movement."""
 
     def __init__(self, encoder: int, counts_a_turn: float, radius: float, *, reversed: bool = False,
                  window: float = 0.05, max_speed: float = 20.0) -> None:
         self._core = _core.Wheel(encoder, counts_a_turn, radius, reversed, max(0, _ms(window)), max_speed)
 
     def advance(self, state: State) -> float:
-        """How many metres it has rolled since the state before, by ENCn."""
+        """The metres that it has rolled since the last state, by ENCn."""
         return self._core.advance(state)
 
     def measured(self, state: State) -> float:
@@ -100,7 +104,7 @@ class Wheel:
         return self._core.measured(state)
 
     def reset(self) -> None:
-        """Forgets the states before."""
+        """Forgets earlier states."""
         self._core.reset()
 
     @property
@@ -110,14 +114,15 @@ class Wheel:
 
 
 class SteeringSensor:
-    """The angle by AINSTEER, linear between two ends, (volts, radians) each. `margin`: volts beyond the ends that are still
-    an angle. `angle`: radians."""
+    """The angle by AINSTEER, linear between two ends, (volts, radians) each. `margin`: volts beyond
+    the ends that are still an angle. `angle`: radians."""
 
     def __init__(self, left: tuple[float, float], right: tuple[float, float], margin: float = 0.3) -> None:
         self._core = _core.SteeringSensor(left, right, margin)
 
     def angle(self, state: State) -> float | None:
-        """In radians; None if the voltage is not possible: a cable is off. Do not drive then."""
+        """In radians; None if a cable is off, because the voltage is impossible. Do not drive
+        then."""
         return self._core.angle(state)
 
     def volts(self, angle: float) -> float:
@@ -126,8 +131,8 @@ class SteeringSensor:
 
 
 class DifferentialDrive:
-    """Two driven wheels, `separation` metres apart. If a wheel would be faster than `max_wheel` m/s, the robot is slowed down
-    on the same path."""
+    """Two driven wheels, `separation` metres apart. If a wheel would be faster than `max_wheel`
+    m/s, the robot is slowed down on the same path."""
 
     def __init__(self, separation: float, max_wheel: float = math.inf) -> None:
         self._core = _core.DifferentialDrive(separation, max_wheel)
@@ -137,13 +142,14 @@ class DifferentialDrive:
         return SideSpeeds(*self._core.wheels(*twist))
 
     def twist(self, wheels: SideSpeeds) -> Twist:
-        """How the robot moves with these speeds of its wheels."""
+        """The movement of the robot with these wheel speeds."""
         return Twist(*self._core.twist(*wheels))
 
 
 class FourWheelDrive:
-    """Four driven wheels that slip to turn, as if `track`, in metres from left to right, were wider by the ratio `slip`.
-    If a wheel would be faster than `max_wheel` m/s, the robot is slowed down on the same path."""
+    """Four driven wheels that slip to turn, as if `track`, in metres from left to right, were wider
+    by the ratio `slip`. If a wheel would be faster than `max_wheel` m/s, the robot is slowed down
+    on the same path."""
 
     def __init__(self, track: float, slip: float = 1.5, max_wheel: float = math.inf) -> None:
         self._core = _core.FourWheelDrive(track, slip, max_wheel)
@@ -153,23 +159,23 @@ class FourWheelDrive:
         return WheelSpeeds(*self._core.wheels(*twist))
 
     def twist(self, wheels: WheelSpeeds) -> Twist:
-        """How the robot moves with these speeds of its wheels."""
+        """The movement of the robot with these wheel speeds."""
         return Twist(*self._core.twist(*wheels))
 
 
 class Ackermann:
-    """A car, steered in front; the robot is where the middle of its rear axle is. `wheelbase` and `track` are in metres,
-    `max_steering` and `steering` in radians, `max_speed` in m/s."""
+    """A car with front steering; its position is the middle of its rear axle. `wheelbase` and
+    `track` are in metres, `max_steering` and `steering` in radians, `max_speed` in m/s."""
 
     def __init__(self, wheelbase: float, max_steering: float, *, track: float = 0.0, max_speed: float = math.inf) -> None:
         self._core = _core.Ackermann(wheelbase, track, max_steering, max_speed)
 
     def command(self, twist: Twist) -> CarCommand:
-        """It cannot turn on the spot: then it stands."""
+        """For a turn on the spot, which is impossible, the car stands."""
         return CarCommand(*self._core.command(*twist))
 
     def twist(self, command: CarCommand) -> Twist:
-        """How the robot moves with that speed and steering."""
+        """The movement of the robot with that speed and steering."""
         return Twist(*self._core.twist(*command))
 
     def limited_steering(self, steering: float) -> float:
@@ -186,18 +192,19 @@ class Ackermann:
 
 
 class Odometry:
-    """Where a robot is by what its wheels have done, and the covariance of that. The variances of each step:
-    `length_per_m`, m^2 a metre of the way; `turn_per_m`, rad^2 a metre of the way; `turn_per_rad`, rad^2 a radian."""
+    """The pose of a robot by the movements of its wheels, and its covariance. The variances of each
+    step: `length_per_m`, m^2 a metre of the way; `turn_per_m`, rad^2 a metre of the way;
+    `turn_per_rad`, rad^2 a radian."""
 
     def __init__(self, *, length_per_m: float = 0.0004, turn_per_m: float = 0.0004, turn_per_rad: float = 0.0025) -> None:
         self._core = _core.Odometry(length_per_m, turn_per_m, turn_per_rad)
 
     def advance(self, length: float, turn: float) -> None:
-        """The robot has gone `length` metres (below 0: backwards) and turned by `turn` radians meanwhile."""
+        """The robot has gone `length` metres (below 0: backwards) and turned by `turn` radians."""
         self._core.advance(length, turn)
 
     def reset(self, pose: Pose = Pose(0.0, 0.0, 0.0), covariance: Sequence[float] = (0.0,) * 9) -> None:
-        """The robot is known to be there."""
+        """Sets the known pose."""
         self._core.reset(*pose, covariance)
 
     @property
@@ -211,13 +218,13 @@ class Odometry:
         return self._core.covariance
 
     def ros_covariance(self, unknown: float = 1e6) -> tuple[float, ...]:
-        """The 36 numbers of geometry_msgs/PoseWithCovariance. `unknown`: the variance of z (m^2) and of the rotations about
-        x and y (rad^2), of which a robot on the ground knows nothing."""
+        """The 36 numbers of geometry_msgs/PoseWithCovariance. `unknown`: the variance of z (m^2)
+        and of the rotations about x and y (rad^2), which odometry on the ground cannot know."""
         return self._core.ros_covariance(unknown)
 
 
 class Standstill(NamedTuple):
-    """A motor that turns an encoder: driven with `pwm` or more, it turns by more than `counts` within `time`."""
+    """A motor with an encoder: at `pwm` or more, it turns by more than `counts` in `time` s."""
     encoder: int = 1
     channel: int = 1
     drive: Literal['osmc', 'dhb12', 'bldc'] = 'osmc'
@@ -229,7 +236,7 @@ class Standstill(NamedTuple):
 class LoopReport(NamedTuple):
     end: LoopEnd
     why: str
-    at_rest: bool  # the outputs are as `rest` has them, or safe; if not, `why` says what to do
+    at_rest: bool  # the outputs are as in `rest`, or safe; if not, `why` says what to do
     steps: int
 
 
@@ -242,8 +249,8 @@ def _options(fields: str, late: float, first: float, standstill: Sequence[Stands
 
 
 class LoopGuard:
-    """When a loop has to end, for one of your own, with asyncio say. `late`, `first`: seconds, as of run_loop(). `now`:
-    seconds of time.monotonic()."""
+    """Ends a loop of your own, such as one with asyncio. `late`, `first`: seconds, as in
+    run_loop(). `now`: seconds of time.monotonic()."""
 
     def __init__(self, *, fields: str = '', late: float = 0.1, first: float = 1.0,
                  standstill: Sequence[Standstill] = ()) -> None:
@@ -254,25 +261,25 @@ class LoopGuard:
         self._core.start(now)
 
     def on_state(self, state: State, disarmed_by: DisarmCause | str, now: float) -> float | None:
-        """The seconds since the last step, on the board's clock, if one is due."""
+        """The seconds since the last step, on the board's clock, if a step is due; else None."""
         return self._core.on_state(state, disarmed_by, now)
 
     def on_commanded(self, setpoints: Setpoints) -> None:
-        """What the step commands. A motor that is not among them keeps what was commanded before."""
+        """The commands of the step. A motor that is not among them keeps its earlier command."""
         self._core.on_commanded(setpoints)
 
     def check(self, link: LinkState | str, disarmed_by: DisarmCause | str, now: float) -> LoopEnd:
-        """To be asked at `deadline` at the latest, with Board.link.state and Board.disarmed_by."""
+        """Call it at `deadline` at the latest, with Board.link.state and Board.disarmed_by."""
         return self._core.check(link, disarmed_by, now)
 
     @property
     def deadline(self) -> float:
-        """When states will be late, if none comes until then: seconds of time.monotonic()."""
+        """When states will be late if none comes before: seconds of time.monotonic()."""
         return self._core.deadline
 
     @property
     def ended(self) -> LoopEnd:
-        """Why the loop has ended; LoopEnd.NONE: it has not."""
+        """Why the loop has ended; LoopEnd.NONE if it has not."""
         return self._core.ended
 
     @property
@@ -284,13 +291,16 @@ class LoopGuard:
 def run_loop(board: Board, step: Callable[[State, float], Setpoints | None], *, rest: Setpoints, fields: str = '',
              late: float = 0.1, first: float = 1.0, standstill: Sequence[Standstill] = (), rest_timeout: float = 0.2,
              watchdog: float = 0.3, arming: bool = True) -> LoopReport:
-    """Runs a loop on this thread until it ends: `step(state, dt)` for each new state that has all `fields`, with the
-    seconds since the step before on the board's clock. What it returns is posted; None ends the loop. Then the outputs
-    are left as `rest` has them. `arming`: as of the board. What the step raises comes after that; so does Ctrl-C.
+    """Runs a loop on this thread until it ends: `step(state, dt)` for each new state that has all
+    `fields`, with the seconds since the last step on the board's clock. Its result is posted; None
+    ends the loop. Then the outputs are set to `rest`. Exceptions of the step, and Ctrl-C, are
+    raised after that. `arming`: as in Board.
 
-    `late`: seconds after which the newest state is too old. `first`: seconds that the first state may take.
-    `rest_timeout`: seconds in which the board must confirm `rest`; if it does not, it is stopped. `watchdog`: seconds that
-    a step may take, as of Board.watchdog(); 0: the program feeds the watchdog itself, or has none."""
+    `late`: seconds after which the newest state is too old. `first`: seconds that the first state
+    may take. `rest_timeout`: seconds in which the board must confirm `rest`; otherwise it is
+    stopped. `watchdog`: seconds that a step may take, as in Board.watchdog(); 0: the program feeds
+    the watchdog itself, or has none.
+    """
     options = _options(fields, late, first, standstill, rest, rest_timeout, watchdog, arming)
     return LoopReport(*board._core.run_loop(options, step))
 

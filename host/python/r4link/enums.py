@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The enumerations of the package. A member is also the text of its value, so both of these work:
+"""The enumerations of the package. A member equals the text of its value, so both of these work:
 
     if board.link.state is r4link.LinkState.ACTIVE: ...
     if board.link.state == 'active': ...
 
-The values and their order are those of C++: importing r4link fails if a value of C++ has no member here.
+The values and their order are those of C++: importing r4link fails if a C++ value has no member.
 """
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from typing import NoReturn
 
 
 class Word(str, enum.Enum):
-    """An enumeration of texts. str() and format() of a member give its text, as with enum.StrEnum of Python 3.11. Each
-    member has a documentation string of its own: print(r4link.LinkState.ACTIVE.__doc__)."""
+    """An enumeration of texts. str() and format() of a member give its text, as with enum.StrEnum
+    of Python 3.11. Each member has its own docstring: print(r4link.LinkState.ACTIVE.__doc__)."""
 
     def __new__(cls, word: str, meaning: str = '') -> Word:
         member = str.__new__(cls, word)
@@ -42,7 +42,7 @@ class Direction(enum.IntEnum):
 
 
 class BoardRole(Word):
-    """What a program is to its board."""
+    """The role of a program at its board."""
     CONTROL = 'control', 'it sends heartbeats, and commands the board as soon as no other host does'
     WATCH = 'watch', 'it only receives what the board reports; it may stop the board'
 
@@ -56,7 +56,7 @@ class LinkState(Word):
 
 
 class SafeReason(Word):
-    """Why the outputs of a board are safe. The position of a member is its number in the SAFE field."""
+    """Why a board's outputs are safe. A member's position is its number in the SAFE field."""
     NONE = 'none', 'the outputs are not safe: they obey commands'
     LINK = 'link', 'no valid host heartbeat came within the timeout, or the transport is down'
     STOP = 'stop', 'an emergency stop came; it lasts until Command.clear() or arm()'
@@ -84,7 +84,7 @@ class LinkCause(Word):
 
 
 class PathState(Word):
-    """How one path to a board is (docs/redundancy.md)."""
+    """The status of one path to a board (docs/redundancy.md)."""
     DOWN = 'down', 'its transport is down, or could not be opened yet'
     ASKING = 'asking', 'its transport is up, and the board there has not answered yet who it is'
     OTHER_BOARD = 'other board', 'it leads to another board: only stops are sent on it'
@@ -139,7 +139,7 @@ class Refusal(Word):
 
 
 class PostResult(Word):
-    """What became of a posted command or group. True if it was sent."""
+    """The result of posting a command or group. True if it was sent."""
     SENT = 'sent', 'it was sent'
     NOT_ARMED = 'not armed', 'not sent: it drives an output, and the program is not armed: arm()'
     NO_LINK = 'no link', 'not sent: the link is not up, or the board does not accept our commands yet'
@@ -159,7 +159,7 @@ class I2cOutcome(Word):
 
 
 class DeviceRole(Word):
-    """What a described device is for a robot (docs/described-devices.md)."""
+    """The role of a described device for a robot (docs/described-devices.md)."""
     NONE = 'none', 'it has no role, so its values and units are its own'
     IMU = 'imu', 'an inertial sensor: acceleration in m/s2 and turn rate in rad/s, perhaps an orientation'
     POWER = 'power', 'it measures voltage in V and current in A'
@@ -175,7 +175,7 @@ class EventKind(Word):
 
 
 class FleetEventKind(Word):
-    """What happened to a board of a fleet, and with that, what `FleetEvent.what` is."""
+    """The kind of an event of a board in a fleet, and so of `FleetEvent.what`."""
     LINK = 'link', 'the link changed: a LinkStatus'
     TRANSPORT = 'transport', 'the transport went up or down, or warns: an Event'
     ARMING = 'arming', 'the board was armed or disarmed: a DisarmCause'

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What can go wrong. Each error names the thing, the reason and the fix.
+"""The errors of the package. Each error names the thing, the reason and the fix.
 
     Error
       DataError            a datagram, a recording or a file is bad
-      UsageError           a URL, an option or a command is wrong (a ValueError, too)
-      RefusedError         the board refused, or did not confirm; `refusal` is its code: Refusal.SAFE, Refusal.RANGE …
-        NotConfirmedError  no confirmation in time: it may have been executed or not (a TimeoutError, too)
-        CancelledError     given up: a stop or a newer cause to be safe came first, or the program did
+      UsageError           a URL, an option or a command is wrong (also a ValueError)
+      RefusedError         the board refused or did not confirm; `refusal`: Refusal.SAFE, …
+        NotConfirmedError  no confirmation in time: it may have been executed (also a TimeoutError)
+        CancelledError     given up by the program, or because a stop or a newer cause came first
         ClosedError        the board was closed, or belongs to another process
         NotArmedError      not sent: it drives an output, and the program is not armed: arm()
-      OpenError            the transport cannot be opened or is gone (an OSError, too)
-      DeniedError          the system denies it (an OSError, too)
+      OpenError            the transport cannot be opened or is gone (also an OSError)
+      DeniedError          the system denies it (also an OSError)
       UnsupportedError     kernel support or an interface is missing
 """
 from __future__ import annotations
@@ -27,10 +27,11 @@ class Program(NamedTuple):
 
 
 class Error(Exception):
-    """What went wrong (`thing`, `reason`), and what to do about it (`fix`, '' where nobody can know).
+    """An error (`thing`, `reason`) and its fix (`fix`, '' if unknown).
 
-    `outcome` says how a command ended, `refusal` why the board refused it, and `at` which command of a group that
-    was, from 1 (0: none in particular). `holder` is the program that controls the board already, where that is the reason.
+    `outcome`: how a command ended. `refusal`: why the board refused it. `at`: which command of a
+    group, from 1 (0: none in particular). `holder`: the program that already controls the board, if
+    that is the reason.
     """
 
     def __init__(self, thing: str, reason: str, fix: str = '', *, outcome: Outcome | str = Outcome.NONE,
@@ -48,7 +49,7 @@ class Error(Exception):
         return str(self.args[0])
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For copy and pickle: multiprocessing brings it from one process to another."""
+        """For copy and pickle, as in multiprocessing."""
         return _again, (type(self), self.args[0]), self.__dict__
 
 
@@ -71,11 +72,11 @@ class RefusedError(Error):
 
 
 class NotConfirmedError(RefusedError, TimeoutError):
-    """No confirmation in time: it may have been executed or not."""
+    """No confirmation in time: the command may have been executed."""
 
 
 class CancelledError(RefusedError):
-    """Given up: a stop or a newer cause to be safe came first, or the program did."""
+    """Given up by the program, or because a stop or a newer cause came first."""
 
 
 class ClosedError(RefusedError):
@@ -105,8 +106,8 @@ _OF_OUTCOME = {Outcome.TIMED_OUT: NotConfirmedError, Outcome.CANCELLED: Cancelle
 
 def error_of(kind: str, thing: str, reason: str, fix: str, outcome: Outcome, refusal: Refusal, at: int,
              holder: tuple[int, str] | None = None) -> Error:
-    """The error of a problem of C++ (include/r4link/error.hpp). `kind`: the name of the class, if the outcome has none.
-    `at`: from 1; 0: no command in particular."""
+    """The error for a problem of C++ (include/r4link/error.hpp). `kind`: the name of the class, if
+    the outcome has none. `at`: from 1; 0: no command in particular."""
     made = _OF_OUTCOME.get(outcome, _OF_KIND.get(kind, Error))
     return made(thing, reason, fix, outcome=outcome, refusal=refusal, at=at,
                 holder=None if holder is None else Program(*holder))

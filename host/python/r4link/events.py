@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The logger 'r4link': what happens to a board's link, for logging (docs/python.md)."""
+"""The logger 'r4link' for events of a board's link (docs/python.md)."""
 from __future__ import annotations
 
 import logging
@@ -19,7 +19,7 @@ _QUIET_PATHS = (PathState.ASKING, PathState.CARRYING)
 
 
 def log_events(board: Board) -> None:
-    """Logs the events of `board` from now on, on the thread of its callbacks. Refers to the board by name only."""
+    """Logs later events of `board` on its callbacks' thread. Keeps only the board's name."""
     name = _printable(board.name)
 
     def log(level: int, text: str) -> None:
@@ -40,5 +40,5 @@ def log_events(board: Board) -> None:
 
 
 def _printable(text: str) -> str:
-    """Control characters would write lines of their own."""
+    """Control characters could forge lines of the log."""
     return ''.join(each if each.isprintable() else '?' for each in text)

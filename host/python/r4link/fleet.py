@@ -8,8 +8,8 @@
         for health in fleet.health(): ...
         fleet.stop()
 
-Boards count from 0, in the order of the URLs; where a board is meant, its index, URL, name or board id will do.
-Times are seconds. A call that waits releases the GIL and obeys Ctrl-C.
+Boards count from 0, in the order of the URLs. A board may be named by its index, URL, name or board
+id. Times are seconds. A call that waits releases the GIL and obeys Ctrl-C.
 """
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ _open: weakref.WeakSet[Fleet] = weakref.WeakSet()
 
 @atexit.register
 def _close_all() -> None:
-    """Farewells are said while the interpreter is whole."""
+    """Sends the farewells while the interpreter is whole."""
     for fleet in list(_open):
         fleet.close()
 
 
 class FleetEvent(NamedTuple):
-    """Something that happened to a board."""
+    """An event of one board."""
     kind: FleetEventKind
     board: int
     what: LinkStatus | Event | DisarmCause | None | RefusedPost | int  # by its kind
 
 
 class FleetResults(Sequence[FleetResult]):
-    """What became of a command at several boards, in the order in which they were named; true if all confirmed it."""
+    """The results of a command at several boards, in the given order. True if all confirmed it."""
 
     def __init__(self, results: list[FleetResult]) -> None:
         self._results = results
@@ -62,16 +62,16 @@ class FleetResults(Sequence[FleetResult]):
 
     @property
     def failed(self) -> list[int]:
-        """The boards that did not."""
+        """The boards that did not confirm the command."""
         return [each.board for each in self._results if not each.confirmed]
 
     def error(self, index: int) -> Error | None:
-        """Why a board did not confirm it. `index`: from 0, in the order of the results."""
+        """Why a board did not confirm the command. `index`: from 0, in the order of the results."""
         each = self._results[index]
         return None if each.confirmed else error_of(*each.problem)
 
     def require(self) -> None:
-        """Raises the error of the first board that did not confirm it; it tells how many others did not."""
+        """Raises the error of the first unconfirmed board, with the number of other such boards."""
         first = next((place for place, each in enumerate(self._results) if not each.confirmed), None)
         if first is None:
             return
@@ -89,9 +89,10 @@ class Fleet:
                  identify_interval: float = 1.0) -> None:
         """Opens all transports and begins the links; returns without waiting for the boards.
 
-        Each of `urls` is a URL or a pattern of many: 'can://can0?node=0-7'. Raises UsageError, OpenError or DeniedError
-        where one of them cannot be opened. The options are those of Board: `watch_rate_hz` is 1 to 1000 states a second;
-        `heartbeat`, `command_retry`, `stop_retry`, `stop_linger` and `identify_interval` are seconds.
+        Each of `urls` is a URL or a pattern of many: 'can://can0?node=0-7'. Raises UsageError,
+        OpenError or DeniedError if one of them cannot be opened. The options are those of Board:
+        `watch_rate_hz` is 1 to 1000 states a second; `heartbeat`, `command_retry`, `stop_retry`,
+        `stop_linger` and `identify_interval` are seconds.
         """
         for url in urls:
             if not isinstance(url, str):
@@ -108,7 +109,7 @@ class Fleet:
         _open.add(self)
 
     def close(self) -> None:
-        """Ends heartbeats and says farewell: all boards go safe at once. Idempotent."""
+        """Ends heartbeats and sends farewells: all boards go safe at once. Idempotent."""
         _open.discard(self)
         self._core.close()
 
@@ -126,7 +127,7 @@ class Fleet:
         return f'<r4link.Fleet of {len(self)} boards>'
 
     def index(self, board: int | str) -> int:
-        """The index of a board, from 0. `board`: its URL, name or board id; an index is returned as it is."""
+        """The index of a board, from 0. `board`: its URL, name, board id, or index."""
         return self._core.find(board) if isinstance(board, str) else board
 
     def url(self, board: int) -> str:
@@ -134,7 +135,7 @@ class Fleet:
         return self._core.url(board)
 
     def wait_active(self, timeout: float = 3.0) -> None:
-        """Waits until all are ACTIVE under our control, or, where the program only watches, are heard."""
+        """Waits until this program controls all boards or, as a watcher, hears them."""
         missing = self._core.wait_active(_ms(timeout))
         if missing:
             others = f' (and {len(missing) - 1} other boards)' if len(missing) > 1 else ''
@@ -143,17 +144,17 @@ class Fleet:
             raise RefusedError(health.url, state + others, 'see health(), and that they are on and reached')
 
     def health(self) -> list[BoardHealth]:
-        """How each board is, in the order of the URLs."""
+        """The health of each board, in the order of the URLs."""
         return self._core.health()
 
     def states(self) -> list[State]:
-        """The newest state of each, at one instant."""
+        """The newest state of each board, at one instant."""
         return self._core.states()
 
     def send(self, command: str | Command | Mapping[int | str, Setpoints], timeout: float = 1.0, *,
              boards: Iterable[int | str] | None = None) -> FleetResults:
-        """A command to all boards, or to those; each is confirmed by its own state. A mapping has the setpoints of
-        each of its boards."""
+        """Sends a command to all boards, or to `boards`; each board's own state confirms it. A
+        mapping gives each of its boards its own setpoints."""
         if isinstance(command, Mapping):
             if boards is not None:
                 raise TypeError('the mapping names its boards: leave `boards` out')
@@ -161,42 +162,43 @@ class Fleet:
         return FleetResults(self._core.send(command, self._indices(boards), _ms(timeout)))
 
     def arm(self, timeout: float = 1.0, *, boards: Iterable[int | str] | None = None) -> FleetResults:
-        """Arms all boards, or those, as Board.arm() does."""
+        """Arms all boards, or `boards`, as Board.arm() does."""
         return FleetResults(self._core.arm(self._indices(boards), _ms(timeout)))
 
     def stop(self, timeout: float = 1.0) -> FleetResults:
-        """Every output of every board safe, at once; on a CAN bus by one frame. Does not raise where boards do not
-        confirm: then cut the power."""
+        """Makes every output of every board safe at once; on a CAN bus by one frame. Does not raise
+        if boards do not confirm: then cut the power."""
         return FleetResults(self._core.stop(_ms(timeout)))
 
     def stop_async(self) -> None:
-        """The same without waiting for the boards."""
+        """Begins a stop as stop() does, and returns at once."""
         self._core.stop_async()
 
     def post(self, setpoints: Mapping[int | str, Setpoints]) -> list[PostResult]:
-        """Setpoints of several boards, sent once, in one pass, and not confirmed: for streams."""
+        """Sends setpoints of several boards once, in one pass, without confirmation: for
+        streams."""
         return self._core.post(self._pairs(setpoints))
 
     def next_event(self, timeout: float = 0.0) -> FleetEvent | None:
-        """The next thing that has happened, oldest first; None if there is nothing in time."""
+        """The oldest event that was not taken yet; None if there is none in time."""
         event = self._core.next_event(_ms(timeout))
         return None if event is None else FleetEvent(*event)
 
     def events(self) -> Iterator[FleetEvent]:
-        """What has happened since it was asked last."""
+        """The events since the last call."""
         while (event := self.next_event()) is not None:
             yield event
 
     def record(self, recording: Recording) -> None:
-        """Every datagram of every board goes into that recording, too."""
+        """Adds every datagram of every board to that recording."""
         self._core.record(recording)
 
     def watchdog(self, period: float) -> None:
-        """Without feed() for `period` seconds the heartbeats stop, and all boards go safe; 0 turns it off."""
+        """After `period` seconds without feed() heartbeats stop, and all boards go safe; 0: off."""
         self._core.watchdog(_ms(period))
 
     def feed(self) -> None:
-        """The program is well, for another period of watchdog()."""
+        """Restarts the period of watchdog(): the program is well."""
         self._core.feed()
 
     def _indices(self, boards: Iterable[int | str] | None) -> list[int] | None:

@@ -2,13 +2,13 @@
 """Fixtures for tests of a robot's program (docs/testing.md):
 
     r4_robot    a simulated robot, for a program that opens its URL
-    r4_board    a board of such a robot, under control, that expects
-    r4_bus      several of them: @pytest.mark.r4(boards=3)
-    r4_link     a board behind a bad link: @pytest.mark.r4(link='loss=5%,delay=20ms±10,seed=7'); a test that fails
-                tells which
+    r4_board    a board of such a robot, under control, with expectations
+    r4_bus      several such boards: @pytest.mark.r4(boards=3)
+    r4_link     a board behind a bad link: @pytest.mark.r4(link='loss=5%,delay=20ms±10,seed=7');
+                a failing test reports the link
 
-on the transport of the mark, @pytest.mark.r4(transport='udp'), or of --r4-transport: sim (in this process), udp,
-pty, can (a bus in the kernel, --r4-interface).
+The transport is that of the mark, @pytest.mark.r4(transport='udp'), or of --r4-transport: sim (in
+this process), udp, pty, can (a bus in the kernel, --r4-interface).
 """
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _node(number: int) -> int:
-    """Of the board of that number, from 0: the workers of pytest-xdist share the bus, and none has the node of another."""
+    """The node of board `number`, from 0, on a bus that all workers of pytest-xdist share."""
     workers = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
     worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
     node = 1 + worker + number * workers
@@ -78,7 +78,7 @@ def _board(request: pytest.FixtureRequest, robot: Robot) -> Iterator[TestBoard]:
 
 @pytest.fixture
 def r4_robot(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[Robot]:
-    """A simulated robot: `url` to be opened by the program under test, happen(), look()."""
+    """A simulated robot: `url` for the program under test, happen(), look()."""
     with _robot(request, tmp_path, 0) as robot:
         yield robot
 
@@ -92,7 +92,7 @@ def r4_board(request: pytest.FixtureRequest, r4_robot: Robot) -> Iterator[TestBo
 
 @pytest.fixture
 def r4_link(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[TestBoard]:
-    """A board behind a bad link: as the mark says, or one that loses and delays a little, with a seed of its own."""
+    """A board behind the mark's bad link, or one with a little loss and delay and a random seed."""
     link = _marked(request).get('link') or f'loss=2%,delay=5ms±5,seed={random.randrange(1 << 32)}'
     request.node.add_report_section('setup', 'r4_link', f"@pytest.mark.r4(link='{link}')")
     with _robot(request, tmp_path, 0, link) as robot, _board(request, robot) as board:

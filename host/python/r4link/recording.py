@@ -24,20 +24,21 @@ class RecordedDatagram(NamedTuple):
 
 
 class RecordedBoard(NamedTuple):
-    """What a recording has of one board.
+    """The part of a recording about one board.
 
-    `states` is a structured array, a row a state: `time` (UTC, the host's), `t_ms` (the board's), `pnum`, and a
-    column for each number of each field that occurs: volts, `osmc1_pwm` (0-4095), `osmc1_dir` (1: forward),
-    `safe` (0: none, as SAFE). A field that a state does not carry keeps its value; before the first one that
-    does it is 0. Of a described device that the recording tells of each value has one, `bno055_gyro_z` in its unit,
-    nan where it is no measurement; of a second one of that kind, with its address, `bno055_29_gyro_z`.
+    `states` is a structured array with a row for each state: `time` (UTC, the host's), `t_ms` (the
+    board's), `pnum`, and a column for each number of each field: volts, `osmc1_pwm` (0-4095),
+    `osmc1_dir` (1: forward), `safe` (0: none, as SAFE). A field that a state does not carry keeps
+    its last value; before the first value it is 0. Each value of a recorded described device has a
+    column in its unit, `bno055_gyro_z`, with nan if it is not a measurement. A second device of
+    that kind has its address in the name: `bno055_29_gyro_z`.
     """
     url: str
-    name: str  # its own or its id; '' where it has not told
+    name: str  # the board's name or id; '' if unknown
     states: npt.NDArray[Any]
     events: list[RecordedEvent]
-    damaged: int  # datagrams that are none
-    datagrams: list[RecordedDatagram]  # all of both directions, where they were asked for
+    damaged: int  # invalid datagrams
+    datagrams: list[RecordedDatagram]  # of both directions, if requested
 
     def to_pandas(self) -> Any:
         """The states as a pandas.DataFrame, by time."""
@@ -63,8 +64,8 @@ class Log(NamedTuple):
 
 
 def read(path: str | os.PathLike[str], datagrams: bool = False) -> Log:
-    """A recording, compressed or not. Raises OpenError, DeniedError, and DataError for what is none; damage
-    within it is told in `damage`, and all the rest is there."""
+    """Reads a recording, compressed or not. Raises OpenError, DeniedError, and DataError if it is
+    not a recording. Damage within it is listed in `damage`, and the rest is read."""
     import numpy as np
 
     def times(us: Any) -> Any:
@@ -80,7 +81,7 @@ def read(path: str | os.PathLike[str], datagrams: bool = False) -> Log:
         kinds: list[Any] = [('time', 'datetime64[us]'), ('t_ms', 'u4'), ('pnum', 'u4')]
         taken = {name for name, _ in kinds}
         for i, (column, kind, numbers) in enumerate(columns):
-            while column in taken:  # what a device calls its values is up to its description
+            while column in taken:  # a description may name its values freely
                 column += '_'
             taken.add(column)
             columns[i] = (column, kind, numbers)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulated board, with the robot around it, for tests of what drives it."""
+"""A simulated board and robot, for tests of programs that drive a robot."""
 from __future__ import annotations
 
 from types import TracebackType
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 
 class Look(NamedTuple):
-    """What the chips and the robot do, whatever the state says. Channel n is element n-1."""
-    open: bool  # a link to the board is open; if not, this is what was last
+    """The chips and the robot, independent of the reported state. Channel n is element n-1."""
+    open: bool  # a link to the board is open; if not, these are the last values
     supply: bool  # the motors have a supply: relay 1 is closed, the handle held
     handle_held: bool
     is_safe: bool  # no output drives anything
@@ -26,8 +26,8 @@ class Look(NamedTuple):
     servo_us: tuple[int, ...]
     relays: tuple[bool, ...]
     bldc: tuple[Bldc, ...]
-    encoder: tuple[int, ...]  # counts since power came
-    stepper: tuple[int, ...]  # steps that the motors took since then
+    encoder: tuple[int, ...]  # counts since power on
+    stepper: tuple[int, ...]  # steps of the motors since power on
     volts: tuple[float, ...]  # AIN24, AIN12, AIN5, AINDMH, AINSTEER, AIN6
 
 
@@ -37,11 +37,11 @@ class LinkedUrl(str):
 
 
 def with_link(url: str, link: str) -> LinkedUrl:
-    """A board behind a bad link, whatever transport it is on:
+    """A board behind a bad link, on any transport:
 
         r4link.Board(r4link.with_link('udp://192.168.0.125', 'loss=5%,delay=20ms±10,seed=7'))
 
-    Raises UsageError for words that docs/simulation.md does not have.
+    Raises UsageError for words that are not in docs/simulation.md.
     """
     _core.check_link(url, link)
     linked = LinkedUrl(url)
@@ -50,21 +50,22 @@ def with_link(url: str, link: str) -> LinkedUrl:
 
 
 class SimBoard:
-    """A simulated board and what is around it.
+    """A simulated board and its surroundings.
 
-    In this process, switched on afresh each time its URL is opened:
+    In this process, powered on each time its URL is opened:
 
         sim = r4link.SimBoard()
         with r4link.Board(sim.url) as board:
             board.wait_active()
-            sim.happen('handle released')       # a line of a scenario (docs/simulation.md), without its time
+            sim.happen('handle released')       # a line of a scenario (docs/simulation.md), no time
             sim.look().osmc[0].pwm
 
-    Or, with a URL to listen on, in a process of its own until close(), for any program: 'udp://127.0.0.1:0' (a free
-    port), 'pty:', 'can://vcan0?node=3'. That is the command r4, by the variable R4 or on PATH.
+    With a URL to listen on, in its own process until close(), for any program: 'udp://127.0.0.1:0'
+    (a free port), 'pty:', 'can://vcan0?node=3'. This starts the command r4, from the variable R4 or
+    PATH.
 
-    `link` is what is wrong with the link: 'loss=5%,seed=7'. `settings` are those of a board with a URL, as of
-    `r4 sim --set`: {'name': 'left', 'key': '1:<64 hexadecimal digits>'}.
+    `link`: faults of the link, 'loss=5%,seed=7'. `settings`: for a board with a URL, as in `r4 sim
+    --set`: {'name': 'left', 'key': '1:<64 hexadecimal digits>'}.
     """
 
     def __init__(self, url: str | None = None, *, link: str = '', settings: Mapping[str, str] | None = None) -> None:
@@ -83,11 +84,11 @@ class SimBoard:
 
     @property
     def url(self) -> str:
-        """What a host opens. In this process: for one link at a time, while this object lives."""
+        """The URL for a host. In this process: for one link at a time, while this object lives."""
         return self._url
 
     def close(self) -> None:
-        """Ends the process, where it has one. Idempotent."""
+        """Ends the process, if there is one. Idempotent."""
         if not isinstance(self._robot, _core.SimulatedRobot):
             self._robot.close()
 
@@ -99,55 +100,55 @@ class SimBoard:
         self.close()
 
     def look(self) -> Look:
-        """No older than 10 ms."""
+        """The present Look, at most 10 ms old."""
         if isinstance(self._robot, _core.SimulatedRobot):
             return Look(**self._robot.look())
         return self._robot.look()
 
     def happen(self, words: str) -> None:
-        """'us 1 15', 'handle released', 'chip dac off'. Raises DataError for words that say nothing of the kind."""
+        """'us 1 15', 'handle released', 'chip dac off'. Raises DataError for unknown words."""
         if not isinstance(self._robot, _core.SimulatedRobot):
             try:
-                _core.SimulatedRobot().happen(words)  # the process would tell later
+                _core.SimulatedRobot().happen(words)  # the process would report it later
             except DataError as error:
                 raise DataError(words, error.reason, error.fix) from None
         self._robot.happen(words)
 
-    # --- the same, with types
+    # --- happen() with typed arguments
 
     def handle(self, held: bool) -> None:
-        """The dead-man's handle."""
+        """Holds or releases the dead-man's handle."""
         self.happen(f'handle {"held" if held else "released"}')
 
     def obstacle(self, sensor: int, cm: int | None) -> None:
-        """What an ultrasonic `sensor`, 1 to 4, measures: `cm` centimetres, 0: nothing, None: its cable is off."""
+        """Sets ultrasonic `sensor`, 1 to 4, to `cm` centimetres; 0: nothing; None: cable off."""
         self.happen(f'us {sensor} {"off" if cm is None else cm}')
 
     def turn(self, encoder: int, counts: int) -> None:
-        """Somebody turns `encoder`, 1 to 4, to so many `counts`, 1000 a millisecond."""
+        """Turns `encoder`, 1 to 4, to that number of `counts`, 1000 a millisecond."""
         self.happen(f'enc {encoder} {counts}')
 
     def analog(self, name: str, volts: float) -> None:
-        """An analog input, 'AIN24', stays at `volts`, to 0.01 V."""
+        """Keeps an analog input, 'AIN24', at `volts`, to 0.01 V."""
         self.happen(f'analog {name.upper()} {volts:.2f}')
 
     def motor(self, osmc: int, stalled: bool) -> None:
-        """The motor of `osmc`, 1 to 4, is held fast, or free."""
+        """Holds the motor of `osmc`, 1 to 4, or releases it."""
         self.happen(f'motor {osmc} {"stalled" if stalled else "free"}')
 
     def chip(self, name: Literal['osmc', 'dhb', 'servo', 'expander', 'dac'],
              supply: Literal['off', 'on', 'reset']) -> None:
-        """It acknowledges nothing while it is off; reset: it loses its supply for a moment."""
+        """A chip that is off acknowledges nothing. `reset`: it loses its supply for a moment."""
         self.happen(f'chip {name} {supply}')
 
     def i2c(self, held: bool) -> None:
-        """A chip holds the bus."""
+        """Makes a chip hold the bus, or releases it."""
         self.happen(f'i2c {"held" if held else "free"}')
 
     def hang(self, seconds: float) -> None:
-        """The firmware's loop stands still for `seconds`, to 1 ms."""
+        """Stops the firmware's loop for `seconds`, to 1 ms."""
         self.happen(f'hang {seconds:.3f}')
 
     def reboot(self) -> None:
-        """Power off and on again."""
+        """Switches the power off and on."""
         self.happen('reboot')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tests of a robot's program need (docs/testing.md): a simulated robot on any transport, and expectations."""
+"""For tests of a robot's program (docs/testing.md): simulated robots and expectations."""
 from __future__ import annotations
 
 import collections
@@ -30,8 +30,8 @@ TRANSPORTS = ('sim', 'udp', 'pty', 'can')
 
 
 def make_state(t_ms: int, **fields: Any) -> State:
-    """A state that no board has sent, to test what is done with states, without a board and in no time: `t_ms` is the
-    board's clock and, in ms, when it was sampled and received. make_state(10, enc1=5, ainsteer=2.5, osmc1=(400, 1))."""
+    """A state that no board has sent, for tests without a board. `t_ms`: the board's clock and, in
+    ms, when it was sampled and received: make_state(10, enc1=5, ainsteer=2.5, osmc1=(400, 1))."""
     return _core.make_state(t_ms, t_ms / 1000, fields)
 
 
@@ -40,20 +40,20 @@ class Robot(Protocol):
 
     @property
     def url(self) -> str:
-        """What a host opens."""
+        """The URL for a host."""
 
     def happen(self, words: str) -> None:
         """A line of a scenario (docs/simulation.md), without its time."""
 
     def look(self) -> Look:
-        """What its pins and sensors do."""
+        """The present pins and sensors."""
 
 
 class SimProcess:
-    """A simulated board in a process of its own, which is `r4 sim`: R4 in the environment, or on PATH.
+    """A simulated board in its own process, `r4 sim`: from the variable R4, or on PATH.
 
-    `url` is where it listens, 'udp://127.0.0.1:0', 'pty:PATH', 'can://vcan0?node=3'; its `url` is then what a host
-    opens. Raises OpenError if it does not listen.
+    The argument `url` is where it listens: 'udp://127.0.0.1:0', 'pty:PATH', 'can://vcan0?node=3'.
+    The attribute `url` is the URL for a host. Raises OpenError if it does not listen.
     """
 
     def __init__(self, url: str, *options: str) -> None:
@@ -77,16 +77,16 @@ class SimProcess:
             raise OpenError(url, str(told.get('reason', 'r4 sim ended')), str(told.get('fix', 'see r4 sim --help')))
         self._url: str = told['host_url']
         if self._url.startswith('udp:'):
-            self._url += '?listen=0'  # the paper's port of hosts is one, and several tests may run at a time
+            self._url += '?listen=0'  # parallel tests cannot share the paper's host port
         self._reader.start()
 
     @property
     def url(self) -> str:
-        """What a host opens."""
+        """The URL for a host."""
         return self._url
 
     def happen(self, words: str) -> None:
-        """A line of a scenario (docs/simulation.md), without its time. Raises DataError where it has ended."""
+        """A line of a scenario (docs/simulation.md), no time. Raises DataError if it has ended."""
         assert self._process.stdin
         self._require_own()
         try:
@@ -95,7 +95,7 @@ class SimProcess:
             raise DataError('r4 sim', 'it has ended', f'exit code {self._process.poll()}') from error
 
     def look(self) -> Look:
-        """What its pins did last, and what its sensors sensed 10 ms ago or later."""
+        """The last values of its pins, and sensor values that are at most 10 ms old."""
         self._require_own()
         deadline = time.monotonic() + 5
         while not self._outputs or not self._sensors:  # the first line of each
@@ -115,7 +115,7 @@ class SimProcess:
                     volts=tuple(senses['analog'].values()))
 
     def close(self) -> None:
-        """Ends it. Idempotent. In a fork it is the parent's, and goes on."""
+        """Ends the process. Idempotent. No effect in a fork: the process is the parent's."""
         if os.getpid() != self._parent:
             return
         self._process.kill()
@@ -123,7 +123,7 @@ class SimProcess:
         if self._reader.is_alive():
             self._reader.join()
         for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
-            with contextlib.suppress(OSError):  # what waits for a process that has ended goes nowhere
+            with contextlib.suppress(OSError):  # data for an ended process is dropped
                 if pipe:
                     pipe.close()
 
@@ -154,8 +154,8 @@ class SimProcess:
 
 def make_robot(transport: str, folder: pathlib.Path, *, interface: str = 'vcan0', node: int = 1,
                link: str = '') -> Robot:
-    """A simulated robot: 'sim' in this process, else as a process on UDP, a pty in `folder` or a CAN bus, behind
-    such a `link` as r4 sim --link says. `node`: 0 to 31, its number on the bus."""
+    """A simulated robot: 'sim' in this process, else as a process on UDP, a pty in `folder` or a
+    CAN bus, behind a `link` as in r4 sim --link. `node`: 0 to 31, its number on the bus."""
     if link and transport == 'sim':
         raise UsageError(f'link {link!r}', "transport 'sim' has no link", "use 'udp', 'pty' or 'can'")
     if transport == 'sim':
@@ -167,16 +167,16 @@ def make_robot(transport: str, folder: pathlib.Path, *, interface: str = 'vcan0'
 
 
 class TestBoard(Board):
-    """A board that expects. `robot` is what is around it."""
+    """A board with expectations. `robot` is the simulated robot around it."""
 
-    __test__ = False  # it is no test
+    __test__ = False  # not a test class
     robot: Robot
 
     def expect(self, within: float = 0.5, **fields: Any) -> None:
-        """That a state comes in time that has all of these: `board.expect(osmc1=358, enc1=lambda n: n > 10)`.
+        """Waits for a state with these values: `board.expect(osmc1=358, enc1=lambda n: n > 10)`.
 
-        A number is the pwm of a drive or the speed of a BLDC motor; volts are right to 0.02. Raises AssertionError,
-        which tells what came instead.
+        A number is the pwm of a drive or the speed of a BLDC motor; volts have a tolerance of 0.02.
+        Raises AssertionError with the received values.
         """
         for name in fields:
             if name not in FIELDS:
@@ -202,7 +202,7 @@ class TestBoard(Board):
                              f'(link {self.link.state}, reason {self.link.reason}; {state!r})')
 
     def expect_safe(self, reason: SafeReason | str | None = None, within: float = 1.1) -> None:
-        """That the board is safe in time, for that reason, and that no pin of its chips drives anything."""
+        """Waits until the board is safe, for that reason, with no pin of its chips driven."""
         reason = None if reason is None else SafeReason(reason)
         deadline = time.monotonic() + within
         while True:

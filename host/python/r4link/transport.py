@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transports of your own: a subclass of Transport moves datagrams, and CanTransport takes any bus of python-can.
+"""Transports of your own: a subclass of Transport moves datagrams, and CanTransport takes any bus
+of python-can.
 
-open(), send() and close() are called on one thread that does nothing else. They may wait, and the link goes on meanwhile.
+open(), send() and close() are called on a thread of their own. They may wait: the link continues.
 
-The heartbeats on such a transport need the interpreter. A program that keeps the interpreter busy for a second loses its
-link, and the board goes safe.
+The heartbeats on such a transport need the interpreter. If a program keeps the interpreter busy for
+a second, the link is lost, and the board goes safe.
 
-A method that raises takes the transport down: on_event() reports the exception, close() is called, and open() five times
-a second until it returns.
+If a method raises, the transport is down: on_event() reports the exception, close() is called, and
+open() is called five times a second until it returns.
 """
 from __future__ import annotations
 
@@ -26,7 +27,7 @@ class Transport:
 
         class Radio(r4link.Transport):
             def open(self):
-                self.modem = Modem()                     # it calls back on a thread of its own
+                self.modem = Modem()                     # it calls back on its own thread
                 self.modem.on_packet = self.received
             def send(self, datagram):
                 self.modem.transmit(datagram)
@@ -43,22 +44,22 @@ class Transport:
 
     @property
     def name(self) -> str:
-        """For people: board.name, and in errors."""
+        """The name for people: board.name, and in errors."""
         return type(self).__name__
 
     def open(self) -> None:
         """Begins to receive. If the first call raises, the Board raises OpenError."""
 
     def send(self, datagram: bytes) -> None:
-        """Sends one datagram. While it waits, later datagrams wait too: for 100 ms, a stop without a limit."""
+        """Sends one datagram. Later datagrams wait for it: 100 ms, a stop without a limit."""
         raise NotImplementedError(f'{type(self).__name__} has no send()')
 
     def close(self) -> None:
-        """Undoes open(). It is not called after an open() that raised. Board.close() waits 1 s for it."""
+        """Undoes open(). Not called after an open() that raised. Board.close() waits 1 s for it."""
 
     def received(self, datagram: bytes) -> None:
-        """To be called with each datagram that has come, from any thread. Does not wait; does nothing while the transport
-        is closed. Raises UsageError if it is longer than 1024 bytes."""
+        """Call it with each received datagram, from any thread. It does not wait, and does nothing
+        while the transport is closed. Raises UsageError for more than 1024 bytes."""
         receive = self._receive
         if receive is not None:
             receive(memoryview(datagram).tobytes())
@@ -79,15 +80,16 @@ class Transport:
 
 
 class CanTransport(Transport):
-    """A board on a CAN bus of python-can, whichever of its interfaces that is (docs/can.md):
+    """A board on a CAN bus of python-can, on any of its interfaces (docs/can.md):
 
         with can.Bus(interface='slcan', channel='/dev/ttyACM0', bitrate=1000000) as bus:
             with r4link.Board(r4link.CanTransport(bus, node=3)) as board:
                 ...
 
-    `bus`: a can.BusABC. `node`: the board's number on the bus, 0 to 31. `fd`: sends CAN FD frames. `pack`: sends and gets the packed form; False:
-    text. The bus stays open when the board is closed. While it is open, nothing else may call bus.recv(). An interface of
-    Linux is better opened by its URL, can://can0, which does not need the interpreter.
+    `bus`: a can.BusABC. `node`: the board's number on the bus, 0 to 31. `fd`: sends CAN FD frames.
+    `pack`: sends and requests the packed form; False: text. The bus stays open when the board is
+    closed. While the board is open, nothing else may call bus.recv(). For an interface of Linux
+    prefer its URL, can://can0, which does not need the interpreter.
     """
 
     def __init__(self, bus: Any, *, node: int = 1, fd: bool = False, pack: bool = True) -> None:
@@ -96,7 +98,7 @@ class CanTransport(Transport):
         self.node = node
         self.fd = fd
         self.pack = pack
-        self._failure: Exception | None = None  # of the thread that receives
+        self._failure: Exception | None = None  # of the receiving thread
         self._ending = threading.Event()
         self._reader = threading.Thread()
 
@@ -127,7 +129,7 @@ class CanTransport(Transport):
                     continue
                 receive(message.arbitration_id, bytes(message.data), message.is_extended_id, message.is_fd)
         except Exception as error:  # pylint: disable=broad-except
-            self._failure = error  # for the next frame that is sent: a host sends some ten times a second
+            self._failure = error  # raised at the next frame: a host sends about ten a second
 
     def _send_frame(self, can_id: int, data: bytes, extended: bool, fd: bool) -> None:
         if self._failure is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small values: what a channel is told, and what it says."""
+"""Small values: setpoints and readings of channels."""
 from typing import NamedTuple
 
 from .enums import I2cOutcome
@@ -24,7 +24,7 @@ class Bldc(NamedTuple):
 
 
 class I2cReading(NamedTuple):
-    """What the board read by itself from a device on the user's bus; t_ms is its clock then."""
+    """A reading that the board took by itself on the user's bus; t_ms: the board's clock then."""
     t_ms: int
     errors: int
     data: bytes
@@ -38,21 +38,21 @@ class I2cAnswer(NamedTuple):
 
 
 class I2cBusReport(NamedTuple):
-    """How the user's bus does: the newest outcome, transfers that failed, how often it was clocked free."""
+    """The status of the user's bus: newest outcome, failed transfers, recoveries by clocking."""
     outcome: I2cOutcome
     errors: int
     recoveries: int
 
 
 class UartBytes(NamedTuple):
-    """What a state says of a UART: where its bytes begin in all that was kept, how many the board has lost, and the
-    bytes, of which some were in the state before."""
+    """A UART in one state: the position of its first byte in all kept bytes, the number of bytes
+    that the board has lost, and the bytes. Some of them may be in the state before."""
     position: int
     lost: int
     data: bytes
 
 
 class UartData(NamedTuple):
-    """What has come in on a UART: each byte once, in order; `lost`: how many are missing before or among them."""
+    """Bytes of a UART, each once, in order; `lost`: how many are missing before or among them."""
     data: bytes
     lost: int

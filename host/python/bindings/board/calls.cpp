@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The calls of r4link.aio.Board.
+// The calls of r4link.aio.Board. The loop never needs the GIL, and no thread waits for a call.
 //
 //     the thread of Python            the board's loop
 //     Calls.arm(…) ---- posted ---->  AsyncBoard::async_arm()
 //     Call, whose descriptor  <-----  its handler
 //     becomes readable
-//
-// So the loop never needs the GIL, and no thread waits for a call.
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -41,7 +39,7 @@ class Call {
   Call(const Call&) = delete;
   Call& operator=(const Call&) = delete;
 
-  // On the loop, or before it knows the call: `end` returns the value, or throws.
+  // On the loop, or before the loop knows the call. `end` returns the value, or throws.
   template <class End>
   void end_with(End end) {
     try {
@@ -54,11 +52,8 @@ class Call {
   }
   asio::cancellation_signal& cancelled() { return cancelled_; }
 
-  // --- in Python
-
-  // Readable when the call has ended.
   int fileno() const { return news_; }
-  // Nothing if it has ended, and in a fork.
+  // Does nothing after the end, and in a fork.
   static void cancel(const std::shared_ptr<Call>& self) {
     if (self->ended_) return;
     self->board_.if_here([&](Board& board) {
@@ -66,7 +61,7 @@ class Call {
           [self](AsyncBoard&) { self->cancelled_.emit(asio::cancellation_type::terminal); });
     });
   }
-  // Once it has ended.
+  // Only after the end.
   py::object result() const {
     if (error_) std::rethrow_exception(error_);
     if (const auto* identity = std::get_if<BoardIdentity>(&value_)) return py::cast(*identity);
@@ -79,21 +74,20 @@ class Call {
  private:
   PyBoard& board_;  // Python keeps it as long as this
   const int news_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  std::atomic<bool> ended_{false};  // it publishes the result
+  std::atomic<bool> ended_{false};  // publishes the result
   std::exception_ptr error_;
   Value value_;
-  asio::cancellation_signal cancelled_;  // of the loop
+  asio::cancellation_signal cancelled_;  // on the loop
 };
 using CallPtr = std::shared_ptr<Call>;
 
-// A request is an OwnCommand, Setpoints, or the name of something else: "arm()".
+// A request is an OwnCommand, Setpoints, or a name such as "arm()".
 std::string name_of(const std::string& request) { return request; }
 template <class Request>
 std::string name_of(const Request& request) {
   return shown(request);
 }
 
-// Throws Error unless the board has confirmed the request.
 constexpr auto confirmed = [](const auto& request, const AsyncBoard& board,
                               const CommandResult& result) {
   if (result.outcome != Outcome::confirmed) throw Error(explain(request, result, board.link()));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board as Python holds it.
+// A board, as Python holds it.
 #pragma once
 
 #include <chrono>
@@ -21,7 +21,7 @@ using Released = py::call_guard<py::gil_scoped_release>;
 
 class PyBoard {
  public:
-  // `link`: the faults of its link (sim::with_link()), or "". With `transports` it is opened on those.
+  // `link`: the faults of its link (sim::with_link()), or "". `transports`: used instead of `url`.
   PyBoard(const std::string& url, const std::vector<CarrierMaker>& transports,
           const std::string& link, BoardOptions options) {
     options.on_wait = on_wait;
@@ -40,21 +40,20 @@ class PyBoard {
 
   Board* operator->() { return &board_->get(); }
 
-  // The GIL is not held.
+  // Call it without the GIL.
   void close() {
     board_->if_here([this](Board& board) {
       board.close();
       const py::gil_scoped_acquire gil;
-      clear();  // they may refer to this board
+      clear();  // the callbacks may refer to this board
     });
   }
 
-  // Ends a call that waits, on its thread, if a signal has come.
+  // If a signal has come, this throws, which ends the waiting call on its thread.
   static void on_wait() {
     const py::gil_scoped_acquire gil;
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   }
-  // Nothing in a fork.
   template <class Action>
   void if_here(Action action) const {
     board_->if_here(action);
@@ -69,7 +68,7 @@ class PyBoard {
     return to(callback);
   }
 
-  // For the garbage collector: functions of Python that refer to the board are circles.
+  // For the garbage collector: Python functions that refer to the board form cycles.
   int traverse(visitproc visit, void* arg) const {
     for (const auto& each : callbacks_) {
       if (const auto held = each.lock()) Py_VISIT(held->function.ptr());
@@ -84,7 +83,7 @@ class PyBoard {
 
  private:
   std::vector<std::weak_ptr<Callback::Held>> callbacks_;  // with the GIL
-  std::optional<OfThisProcess<Board>> board_;             // it goes first: its threads use the rest
+  std::optional<OfThisProcess<Board>> board_;  // destroyed first: its threads use the rest
 };
 
 }  // namespace r4::python

@@ -12,7 +12,7 @@
 namespace r4::python {
 namespace {
 
-// The methods of a r4link.Transport, for a thread that has no state of the interpreter.
+// The methods of a r4link.Transport, for a thread without a state of the interpreter.
 class Methods {
  public:
   explicit Methods(const py::object& transport)
@@ -24,7 +24,7 @@ class Methods {
         }) {}
 
   const std::string& name() const { return name_; }
-  // `arguments()` makes them, with the GIL. Throws Error with what the method raises.
+  // `arguments()` makes them, with the GIL. An exception of the method becomes an Error.
   template <class Arguments>
   void call(const char* method, Arguments arguments) const {
     const py::gil_scoped_acquire gil;
