@@ -88,7 +88,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return self._core.disarmed_by()
 
     def stop(self, timeout: float = 1.0) -> Sent:
-        """Makes all outputs safe at once: repeated until confirmed, latched until Command.clear()."""
+        """All outputs safe at once: repeated until confirmed, latched until Command.clear()."""
         sent: Sent = self._call(lambda core: core.stop(_ms(timeout)), at_once=True)
         return sent
 
