@@ -129,7 +129,7 @@ void check_words(const std::string& protocol) {
       "| `" + help.form + "` | " + std::string(help.meaning) + " | " + help.ranges;
   expect(protocol.find(row) != std::string::npos, "docs/protocol.md has no " + row);
   const OwnCommand command = parse_command_text("L:4095,1,2");
-  expect(describe(command.get()) == "winch 2 forward, duty 1", "the description");
+  expect(describe(command) == "winch 2 forward, duty 1", "the description");
   expect(shown_by(CommandKind::winch) == FieldKind::winch, "the field that shows it");
 }
 

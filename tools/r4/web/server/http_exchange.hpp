@@ -116,17 +116,17 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
     };
     const std::string_view target = view(request.target());
     const std::string_view path = target.substr(0, target.find('?'));
-    const bool page = path == "/live" && asks_for(page_protocol);
+    const bool from_page = path == "/live" && asks_for(page_protocol);
     const auto foxglove =
         std::find_if(foxglove_protocols.begin(), foxglove_protocols.end(), asks_for);
-    if (!page && foxglove == foxglove_protocols.end()) {
+    if (!from_page && foxglove == foxglove_protocols.end()) {
       return refuse(http::status::bad_request,
                     "the subprotocol r4.web.v1 is at /live, foxglove.websocket.v1 anywhere");
     }
     const std::string_view host = view(request[http::field::host]);
     const std::string_view origin = view(request[http::field::origin]);
     Verdict verdict =
-        page ? server_.access.check(host, origin) : server_.access.check_reader(host, origin);
+        from_page ? server_.access.check(host, origin) : server_.access.check_reader(host, origin);
     if (verdict != Verdict::allowed) return refuse(http::status::forbidden, to_text(verdict));
     verdict =
         server_.access.check_token(view(request[http::field::authorization]), target, protocols);
@@ -138,8 +138,8 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
     stream_.expires_never();
     const ClientId id = server_.next_number++;
     const auto client = std::make_shared<Client>(server_, std::move(stream_), id,
-                                                 page ? Protocol::page : Protocol::foxglove,
-                                                 page ? page_protocol : *foxglove);
+                                                 from_page ? Protocol::page : Protocol::foxglove,
+                                                 from_page ? page_protocol : *foxglove);
     server_.clients.emplace(id, client);
     client->accept(request);
     server_.exchanges.erase(number_);
