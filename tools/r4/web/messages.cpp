@@ -64,14 +64,17 @@ std::string hello_text(const Columns& columns, const std::vector<WebBoard*>& boa
   for (std::size_t i = 0; i < boards.size(); ++i) {
     list.push_back({{"board", i}, {"url", boards[i]->url()}, {"name", boards[i]->identity().name}});
   }
-  return text_of({{"type", "hello"},
-                  {"version", R4LINK_VERSION},
-                  {"boards", std::move(list)},
-                  {"fields", columns.names()},
-                  {"units", columns.units()},
-                  {"channels", channels_json()},
-                  {"you", you},
-                  {"clock_ms", clock_ms}});
+  std::string text = text_of({{"type", "hello"},
+                              {"version", R4LINK_VERSION},
+                              {"boards", std::move(list)},
+                              {"fields", columns.names()},
+                              {"units", columns.units()},
+                              {"you", you},
+                              {"clock_ms", clock_ms}});
+  // Made once: most of the work, which a crowd of clients must not ask of the loop each time.
+  static const std::string channels = text_of(channels_json());
+  text.pop_back();
+  return text + R"(,"channels":)" + channels + '}';
 }
 
 std::string board_text(std::size_t number, WebBoard& slot) {
