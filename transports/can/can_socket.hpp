@@ -47,7 +47,7 @@ class CanSocket final : public CanMedium {
   struct Inbox;
   const std::string interface_;
   const std::string name_;
-  [[maybe_unused]] const bool fd_;  // a test has a socket of its own
+  const bool fd_;
   FileDescriptor descriptor_;
   FileDescriptor first_;  // has its own priority and queue
   bool simulated_ = false;
