@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CanBus's medium: a SocketCAN socket or a program's own bus. For one thread; only open() waits.
+// A CanBus's medium: a SocketCAN socket or a program's own bus. For one thread; only the
+// first open() of a program's own bus waits.
 #pragma once
 
 #include <array>
@@ -63,7 +64,7 @@ class CanMedium {
   virtual int receive(std::array<Received, batch>& frames) = 0;
   // Hands over frames in order. Sets `sent` to the number of accepted frames.
   virtual Outcome send(const CanFrame* frames, std::size_t count, std::size_t& sent) = 0;
-  // Hands over one frame ahead of all waiting frames.
+  // Hands over one frame ahead of all waiting frames except stops.
   virtual Outcome send_first(const CanFrame& frame) = 0;
 
   // Frames lost because they were not received in time, over all openings.

@@ -2,18 +2,19 @@
 // Connects a program's own transport, whose calls may wait, to the loop of a link: a thread makes
 // the calls, and items wait in both directions.
 //
-//                     open() returns           a call throws
-//     opening ──────────────────────────▶ up ───────────────▶ down
-//        │ it throws                      │ ▲  open() returns   │
-//        ▼               end()            ▼ └───────────────────┤ five times a second
-//      ended ◀──────────────────────────────────────────────────┘
+//     opening ──────────────▶ up ────────────────────────▶ down ─────────▶ ended
+//        │   open() returns   ▲   send() throws, or end()  ▲ │    end()
+//        │                    └──── open() returns ────────┼─┘
+//        └───────────────────────── open() throws ─────────┘
+//
+// In `down`, the thread calls open() five times a second. The loop waits for the first open() only.
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <exception>
 #include <functional>
 #include <memory>
@@ -29,7 +30,7 @@
 namespace r4 {
 
 // `Own`: open(received), send(item) and close(), which may throw. `Outbox`: the type Item, clear()
-// and std::optional<Item> next(Time), which takes the next item to send.
+// and std::optional<Item> next(Time), which takes the next item to send; for dropped(), `dropped`.
 template <class Own, class Outbox>
 class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
  public:
@@ -39,7 +40,8 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
   static constexpr std::chrono::milliseconds pause{200};  // between two attempts to open it
   static constexpr std::chrono::seconds end_patience{1};
 
-  // `news()`: an item has come, or the transport went up or down. On any thread, under the lock.
+  // `news()`: items wait for take(), or the transport went up or down. On any thread, under the
+  // lock.
   Exchange(std::string name, std::unique_ptr<Own> own, std::unique_ptr<Outbox> outbox,
            std::function<void()> news)
       : name_(std::move(name)),
@@ -49,12 +51,15 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
 
   // --- on the loop
 
-  // Opens the transport, and waits for that. Throws Error.
+  // The first call starts the thread, and waits until open() has returned or thrown. After that the
+  // thread reopens the transport by itself. Throws Error if the transport is not up.
   void start() {
     std::unique_lock lock(mutex_);
-    thread_ = std::thread([self = this->shared_from_this()] { self->run(); });
-    changed_.wait(lock, [this] { return state_ != State::opening; });
-    if (state_ == State::ended) throw Error(problem_);
+    if (!thread_.joinable()) {
+      thread_ = std::thread([self = this->shared_from_this()] { self->run(); });
+      changed_.wait(lock, [this] { return state_ != State::opening; });
+    }
+    if (state_ != State::up) throw Error(problem_);
   }
   // Sends the waiting items and closes the transport. A call that hangs is left to its thread.
   void end() noexcept {
@@ -77,10 +82,18 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
     changed_.notify_all();
     return true;
   }
-  // The items received since the last call, oldest first.
-  std::vector<Item> take() {
+  // At most `most` received items, oldest first. If it returns `most`, news() follows. Returns
+  // nothing while the transport is not up, and nothing from before a failure.
+  std::vector<Item> take(std::size_t most) {
     const std::lock_guard lock(mutex_);
-    return std::exchange(inbox_, {});
+    if (state_ != State::up) return {};
+    std::vector<Item> items;
+    while (items.size() < most && !inbox_.empty()) {
+      items.push_back(std::move(inbox_.front()));
+      inbox_.pop_front();
+    }
+    if (items.size() == most && news_) news_();
+    return items;
   }
   bool up() const {
     const std::lock_guard lock(mutex_);
@@ -93,6 +106,10 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
   std::uint64_t sent() const {
     const std::lock_guard lock(mutex_);
     return sent_;
+  }
+  std::uint64_t dropped() const {
+    const std::lock_guard lock(mutex_);
+    return outbox_->dropped;
   }
   // The number of received items that found no room.
   std::uint64_t overflows() const {
@@ -118,14 +135,11 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
 
   void run() {
     std::unique_lock lock(mutex_);
-    bool opened = call(lock, [this] { open(); });
-    if (opened) change(State::up);
-    while (opened && !(ending_ && state_ == State::down)) {
+    change(open(lock) ? State::up : State::down);
+    while (!(ending_ && state_ == State::down)) {
       if (state_ == State::down) {
-        if (changed_.wait_for(lock, pause, [this] { return ending_; })) break;
-        if (!call(lock, [this] { open(); })) continue;
-        outbox_->clear();
-        change(State::up);
+        const bool ends = changed_.wait_for(lock, pause, [this] { return ending_; });
+        if (!ends && open(lock)) change(State::up);
       } else if (std::optional<Item> item = outbox_->next(Clock::now())) {
         if (call(lock, [&] { own_->send(*item); })) {
           ++sent_;
@@ -137,16 +151,20 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
         problem_ = why;
       } else if (ending_) {
         call(lock, [this] { own_->close(); });
-        break;
+        change(State::down);
       } else {
         changed_.wait(lock);
       }
     }
     change(State::ended);
   }
-  void open() {
-    own_->open([weak = this->weak_from_this()](Item item) {
-      if (const auto self = weak.lock()) self->received(std::move(item));
+  bool open(std::unique_lock<std::mutex>& lock) {
+    inbox_.clear();
+    outbox_->clear();
+    return call(lock, [this] {
+      own_->open([weak = this->weak_from_this()](Item item) {
+        if (const auto self = weak.lock()) self->received(std::move(item));
+      });
     });
   }
   // Calls `function` without the lock. False if it throws.
@@ -180,7 +198,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
   State state_ = State::opening;
   bool ending_ = false;
   Problem problem_{ErrorKind::open, "", "", ""};
-  std::vector<Item> inbox_;
+  std::deque<Item> inbox_;
   std::uint64_t sent_ = 0;
   std::uint64_t overflows_ = 0;
   std::thread thread_;

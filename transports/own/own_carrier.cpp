@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "../send_queue.hpp"
 #include "exchange.hpp"
@@ -16,6 +17,7 @@ namespace {
 
 constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;
+constexpr std::size_t most_at_once = 32;  // then the other work of the loop has its turn
 
 struct DatagramOutbox {
   using Item = std::string;
@@ -56,23 +58,13 @@ class OwnCarrier final : public Carrier {
       : loop_(loop), transport_(std::move(transport)), name_(transport_->name()) {}
   ~OwnCarrier() override { close(); }
 
+  // If it throws, the exchange goes on, and a later call succeeds when the transport is up.
   void open(Handler& handler) override {
-    close();
+    if (handler_ != nullptr) close();
+    if (!exchange_) make_exchange();
+    exchange_->start();
     handler_ = &handler;
-    opening_ = std::make_shared<int>();
-    exchange_ = std::make_shared<Exchange<DatagramCalls, DatagramOutbox>>(
-        name_, std::make_unique<DatagramCalls>(DatagramCalls{transport_}),
-        std::make_unique<DatagramOutbox>(), [this, weak = std::weak_ptr<int>(opening_)] {
-          loop_.post([this, weak] {
-            if (!weak.expired()) take();
-          });
-        });
-    try {
-      exchange_->start();
-    } catch (...) {
-      close();
-      throw;
-    }
+    post_take(opening_);  // for what came before this call
     report();
   }
   void close() noexcept override {
@@ -81,8 +73,7 @@ class OwnCarrier final : public Carrier {
     reported_up_ = false;
     if (!exchange_) return;
     exchange_->end();
-    counters();
-    before_ = counters_;
+    before_ = counters();
     exchange_.reset();
   }
   SendResult send(std::string_view bytes, Priority priority, Peer) override {
@@ -94,7 +85,6 @@ class OwnCarrier final : public Carrier {
     if (!reported_up_) return result;
     exchange_->send([&](DatagramOutbox& outbox) {
       result = outbox.queue.push(bytes, priority, everyone, SendQueue::Time::clock::now());
-      dropped_ = outbox.dropped;
     });
     if (result == SendResult::sent) before_.tx_bytes += bytes.size();
     return result;
@@ -105,23 +95,37 @@ class OwnCarrier final : public Carrier {
     counters_ = before_;
     if (!exchange_) return counters_;
     counters_.tx_datagrams += exchange_->sent();
-    counters_.tx_dropped += dropped_;
+    counters_.tx_dropped += exchange_->dropped();
     counters_.rx_overflows += exchange_->overflows();
     return counters_;
   }
 
  private:
+  void make_exchange() {
+    opening_ = std::make_shared<int>();
+    exchange_ = std::make_shared<Exchange<DatagramCalls, DatagramOutbox>>(
+        name_, std::make_unique<DatagramCalls>(DatagramCalls{transport_}),
+        std::make_unique<DatagramOutbox>(),
+        [this, opening = std::weak_ptr<int>(opening_)] { post_take(opening); });
+  }
+  // On any thread.
+  void post_take(const std::weak_ptr<int>& opening) {
+    loop_.post([this, opening] {
+      if (!opening.expired() && handler_ != nullptr) take();
+    });
+  }
   void take() {
     const std::weak_ptr<int> opening = opening_;
     report();
     if (opening.expired()) return;
-    for (const std::string& datagram : exchange_->take()) {
+    const std::vector<std::string> datagrams = exchange_->take(most_at_once);
+    for (const std::string& datagram : datagrams) {
       ++before_.rx_datagrams;
       before_.rx_bytes += datagram.size();
       handler_->on_datagram(datagram, everyone);
       if (opening.expired()) return;
     }
-    handler_->on_drained();
+    if (datagrams.size() < most_at_once) handler_->on_drained();
   }
   void report() {
     const bool is_up = exchange_->up();
@@ -137,12 +141,11 @@ class OwnCarrier final : public Carrier {
   Loop& loop_;
   const std::shared_ptr<OwnTransport> transport_;
   const std::string name_;
-  Handler* handler_ = nullptr;
-  std::shared_ptr<int> opening_;  // null: closed
+  Handler* handler_ = nullptr;    // null: not open
+  std::shared_ptr<int> opening_;  // made and reset with exchange_
   std::shared_ptr<Exchange<DatagramCalls, DatagramOutbox>> exchange_;
   bool reported_up_ = false;
-  std::uint64_t dropped_ = 0;  // by the outbox of this opening
-  CarrierCounters before_;     // without the counts of exchange_
+  CarrierCounters before_;  // without the counts of exchange_
   mutable CarrierCounters counters_;
 };
 

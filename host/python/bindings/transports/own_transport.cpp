@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "r4link/transports/own_transport.hpp"
 
+#include <cxxabi.h>
+#include <unistd.h>
+
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -11,6 +15,27 @@
 
 namespace r4::python {
 namespace {
+
+// Returns code(), which may wait for the GIL. Until 3.13, CPython ends a thread that waits for the
+// GIL while the interpreter ends. The thread would destroy Python objects without the GIL on its
+// way out, so it stays here instead. `code` must not own Python objects.
+template <class Code>
+auto staying(Code code) {
+  try {
+    return code();
+  } catch (const abi::__forced_unwind&) {
+    for (;;) ::pause();
+  }
+}
+
+// `call()`: a call of the C API that returns a new reference and may run Python code. Throws
+// py::error_already_set.
+template <class Call>
+py::object from_python(Call call) {
+  const auto result = py::reinterpret_steal<py::object>(staying(call));
+  if (!result) throw py::error_already_set();
+  return result;
+}
 
 // The methods of a r4link.Transport, for a thread without a state of the interpreter.
 class Methods {
@@ -27,10 +52,14 @@ class Methods {
   // `arguments()` makes them, with the GIL. An exception of the method becomes an Error.
   template <class Arguments>
   void call(const char* method, Arguments arguments) const {
-    const py::gil_scoped_acquire gil;
+    std::optional<py::gil_scoped_acquire> gil;
+    staying([&] { gil.emplace(); });
     KeptThreadState::of_this_thread();
     try {
-      held_->attr(method)(*arguments());
+      const py::object function =
+          from_python([&] { return PyObject_GetAttrString(held_->ptr(), method); });
+      const py::tuple given = arguments();
+      from_python([&] { return PyObject_CallObject(function.ptr(), given.ptr()); });
     } catch (const py::error_already_set& error) {
       throw Error(ErrorKind::open, name_, reason_of(error), "");
     }
@@ -40,7 +69,8 @@ class Methods {
   static std::string reason_of(const py::error_already_set& error) {
     std::string reason = "it raised " + std::string(py::str(error.type().attr("__name__")));
     try {
-      const std::string text = py::str(error.value());
+      const auto text =
+          from_python([&] { return PyObject_Str(error.value().ptr()); }).cast<std::string>();
       if (!text.empty()) reason += ": " + text;
     } catch (const py::error_already_set&) {  // the exception has no text
     }
