@@ -67,18 +67,14 @@ bool Board::post_to_loop(std::function<void(AsyncBoard&)> action) {
 void Board::wait_active(Duration timeout) {
   require_wait("wait_active()", timeout);
   const auto impl = impl_;
-  // The paths lead to two boards, so the link cannot begin.
-  const auto refused = [](const LinkStatus& link) {
-    return link.causes.has(LinkCause::two_boards) && link.state == HostLinkState::connecting;
-  };
   const bool active = impl->wait_for_news(timeout, [&] {
     const LinkStatus& link = impl->link;
-    if (refused(link)) return true;
+    if (link.cannot_begin()) return true;
     if (impl->async.role() == BoardRole::watch) return is_heard(link.state);
     return link.state == HostLinkState::active && impl->in_control && !link.gated();
   });
   const LinkStatus link = impl->read(impl->link);
-  if (refused(link)) throw Error(explain(paths()));
+  if (link.cannot_begin()) throw Error(explain(paths()));
   if (!active) throw Error(explain(impl->read(impl->name), link));
 }
 

@@ -208,6 +208,7 @@ Words refusal_words(const Command* command, Refusal code, const LinkStatus& link
     case Refusal::format:
     case Refusal::range:
     case Refusal::channel:
+      words.fix = "see with r4 monitor what has changed on the board, then try again";
       if (command != nullptr) words.fix = bad_command(*command, code).fix;
       // An invalid key is never sent, so RANGE means that the board has no room for the key.
       if (code == Refusal::range && sets("key", command)) {
@@ -266,12 +267,12 @@ Words unconfirmed_stop_words(const CommandResult& result, LinkStatus link) {
     why = {"the board streams its state, and reports no stop", ""};
   }
   const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(result.elapsed).count();
-  Words words{
-      result.outcome == Outcome::timed_out
-          ? fmt::format("the stop was not confirmed within {} ms: {}", ms, why.reason)
-          : "the stop was not confirmed: it was given up, for the board was closed or too many "
-            "wait already",
-      std::string(stop_last_resort)};
+  Words words{result.outcome == Outcome::timed_out
+                  ? fmt::format("the stop was not confirmed within {} ms: {}", ms, why.reason)
+              : result.outcome == Outcome::full
+                  ? "the stop was sent once and not confirmed, because 16 stops are under way"
+                  : "the stop was not confirmed: the board was closed, or the wait was cancelled",
+              std::string(stop_last_resort)};
   if (!why.fix.empty()) words.fix += "; " + why.fix;
   return words;
 }
@@ -290,6 +291,8 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
         Problem why = failed_transfer({}, result.transfer.outcome);
         return {std::move(why.reason), std::move(why.fix)};
       }
+      // Without a code the board has not refused: the link cannot begin.
+      if (result.code == Refusal::none) return link_words(link);
       words = refusal_words(command, result.code, link);
       break;
     case Outcome::timed_out: {

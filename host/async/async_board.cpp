@@ -148,8 +148,9 @@ class AsyncBoard::TransferSteps final : public Impl::Sequence {
   }
   void complete(const CommandResult& result, How how) override {
     CommandResult ended = result;
-    if (pnum_ == 0) {
+    if (!begun_) {
       if (ended.outcome != Outcome::confirmed) return end(ended, how);
+      begun_ = true;
       pnum_ = ended.pnum;
       return impl_.enter(How::post, [&] {
         impl_.waits.add(
@@ -168,7 +169,8 @@ class AsyncBoard::TransferSteps final : public Impl::Sequence {
  private:
   const Time timeout_;
   const Time deadline_;
-  std::uint32_t pnum_ = 0;  // of the command, once the board has confirmed it
+  bool begun_ = false;      // the board has confirmed the command
+  std::uint32_t pnum_ = 0;  // of that command
 };
 
 void AsyncBoard::start_transfer(const Command& command, Duration timeout,
@@ -176,7 +178,7 @@ void AsyncBoard::start_transfer(const Command& command, Duration timeout,
   if (command.kind != CommandKind::i2c_read && command.kind != CommandKind::i2c_write &&
       command.kind != CommandKind::i2c_scan) {
     throw Error(ErrorKind::usage, shown(command), "is not a transfer on the I2C bus",
-                "use async_send()");
+                "send it with send() or async_send()");
   }
   (new TransferSteps(*impl_, Impl::time_of(timeout), std::move(completion)))->begin(command);
 }

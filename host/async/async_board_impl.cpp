@@ -100,7 +100,8 @@ bool AsyncBoard::Impl::has_come(const Waits::Condition& condition) const {
                  ? is_heard(link.state)
                  : link.state == HostLinkState::active && link.in_control;
     case Waits::For::answer:
-      return session.state().i2c_answer.pnum == condition.pnum;
+      // In an answer, 0 means that there is none yet.
+      return condition.pnum != 0 && session.state().i2c_answer.pnum == condition.pnum;
     case Waits::For::time:
       return now >= condition.deadline;
   }
@@ -112,11 +113,7 @@ bool AsyncBoard::Impl::end_waits() {
       [this](const Waits::Condition& each) -> std::optional<Outcome> {
         if (!is_open()) return Outcome::closed;
         if (has_come(each)) return Outcome::confirmed;
-        const LinkStatus& link = session.link();
-        // The link never begins.
-        const bool hopeless = each.what == Waits::For::active &&
-                              link.state == HostLinkState::connecting &&
-                              link.causes.has(LinkCause::two_boards);
+        const bool hopeless = each.what == Waits::For::active && session.link().cannot_begin();
         if (hopeless) return Outcome::refused;
         return now >= each.deadline ? std::optional(Outcome::timed_out) : std::nullopt;
       },

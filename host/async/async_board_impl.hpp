@@ -122,7 +122,8 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   void settle();
   bool end_waits();
 
-  // `start` returns the ticket, or 0: it ends as `not_taken`. `id`: of the first step.
+  // `start` returns the command's ticket; after 0 the command ends as `not_taken`. `id`: the ticket
+  // of the first step, if this is a later step.
   template <class Start>
   void begin(CompletionPtr completion, Start start, Ticket id = 0,
              Outcome not_taken = Outcome::full) {

@@ -63,7 +63,8 @@ class Waits {
     });
     return conditions_.size() != before;
   }
-  // Cancels that condition. Returns the ticket of that command, to be cancelled, or 0.
+  // Ends the condition with that id as cancelled. Returns the ticket of the command with that id,
+  // which the session must cancel; 0 if there is none.
   Ticket cancel(Ticket id, Time now) {
     end_conditions(
         [id](const Condition& each) {

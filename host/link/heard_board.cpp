@@ -19,12 +19,14 @@ constexpr int first_questions = 100, questions_in_vain = 10;
 void HeardBoard::on_heartbeat(SafeReason reason, std::optional<std::uint32_t> t_ms, Time now) {
   if (t_ms) clock_.heard(*t_ms, now);
   state_.safe = reason;
+  state_.reported.add(StateField::safe);
   if (reason == SafeReason::none) state_.fault = ChipFault();
 }
 
 void HeardBoard::on_state(const ReceivedState& state, std::optional<SafeReason> reason, Time now) {
   const SafeReason told = reason.value_or(state_.safe);
   state_ = state;
+  state_.reported.add(state.present);
   clock_.heard(state_.t_ms, now);
   const BoardClock::Instant sampled = clock_.at(state_.t_ms);
   state_.sampled = ReceivedState::Clock::time_point(sampled.at);

@@ -24,7 +24,7 @@ namespace r4 {
 // Time of the host's steady clock, in microseconds since any start.
 using Time = std::chrono::microseconds;
 
-// What is wrong with a link, the gravest first.
+// The problems of a link, the gravest first. `other_board` does not disturb the link.
 enum class LinkCause : std::uint8_t {
   transport_down,  // the transports of all paths are down: unplugged, or switched off
   two_boards,      // the paths lead to two boards, and no state is accepted
@@ -107,6 +107,10 @@ struct LinkStatus {
 
   // The gravest cause.
   std::optional<LinkCause> cause() const { return causes.first(); }
+  // True if the link cannot begin, because the paths lead to two boards.
+  bool cannot_begin() const {
+    return state == HostLinkState::connecting && causes.has(LinkCause::two_boards);
+  }
   // True if heartbeats and commands are held back because the program seems to hang.
   bool gated() const { return causes.has_any({LinkCause::watchdog, LinkCause::callback}); }
   friend bool operator==(const LinkStatus&, const LinkStatus&) = default;
@@ -151,7 +155,8 @@ struct CommandResult {
   std::uint8_t executed = 0;
   // Packet number of the command, for example in I2CX of the state. 0: not sent.
   std::uint32_t pnum = 0;
-  // For a Device that was not set up: the failed step, from 1, and the answer to its transfer.
+  // `step`: of a Device that was not set up, the failed step, from 1. `transfer`: the answer to
+  // async_transfer() or to that step. A transfer that timed out with `executed` 1 was begun.
   std::uint16_t step = 0;
   I2cAnswer transfer{};
 };
@@ -195,6 +200,9 @@ struct RefusedPost {
 struct ReceivedState : State {
   using Clock = std::chrono::steady_clock;
 
+  // The fields that have a value from the board: reported since it started. A field that is not
+  // among them reads 0.
+  FieldSet reported;
   // When its newest datagram arrived.
   Clock::time_point received = never;
   // Clock::time_point::min() before the first state since the board started.
@@ -230,7 +238,7 @@ struct Statistics {
   std::uint64_t received = 0;  // valid
   std::uint64_t states = 0;
   std::uint64_t damaged = 0;  // bad checksum, syntax or length
-  std::uint64_t copies = 0;   // already received on another path; not counted in `received`
+  std::uint64_t copies = 0;   // duplicates, on the same or another path; not counted in `received`
   // lost: not received on any path. duplicate: received before. restarts: of the board, by its
   // clock; a sleep of this computer that is longer than the board's timeout counts as one.
   PacketCounters packets;
@@ -263,8 +271,8 @@ struct PathStatus {
   PathState state = PathState::down;
   bool busy = false;         // that board reports that another host controls it
   std::string board_id;      // of the board that answered last on this path
-  PacketCounters packets;    // of the board's datagrams on this path
-  std::uint64_t copies = 0;  // of these, already received on another path
+  PacketCounters packets;    // of the board's datagrams on this path; restarts: of their numbers
+  std::uint64_t copies = 0;  // of these, duplicates: received before on this or another path
   double round_trip_us = 0;  // us, of the newest question and answer; 0: none yet
   double age_us = 0;         // us since the newest datagram; 0: none yet
   // Lost share of the board's datagrams, 0-1.
@@ -284,7 +292,7 @@ R4LINK_API Problem explain(std::string_view name, const LinkStatus& link);
 // Which path leads to another board, and the fix.
 R4LINK_API Problem explain(const std::vector<PathStatus>& paths);
 
-// What is wrong with a link, and the fix.
+// Describes the cause, and the fix.
 R4LINK_API Problem explain(LinkCause cause);
 
 // Why the session is not armed, and the fix. Not for none. `what`: the request that failed.

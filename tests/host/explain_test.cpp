@@ -127,10 +127,25 @@ TEST(Explain, NamesACommandWithoutItsSecret) {
   EXPECT_EQ(explain(Command::setting("password", "eeeeeeee"), refused, {}).thing, "C:password,...");
 }
 
+TEST(Explain, ALinkThatCannotBeginIsNotARefusalOfTheBoard) {
+  const CommandResult refused{Outcome::refused, Refusal::none, Time{0}};
+  const LinkStatus link{.causes = {LinkCause::two_boards}};
+  const Problem problem = explain("async_wait_active()", refused, link);
+  EXPECT_EQ(problem.reason, explain("board", link).reason);
+  EXPECT_NE(problem.fix, "");
+}
+
+TEST(Explain, AStopThatIsOneTooManyHasBeenSent) {
+  const CommandResult full{Outcome::full, Refusal::none, Time{0}};
+  const Problem problem = explain(Command::stop(), full, {});
+  EXPECT_NE(problem.reason.find("sent once"), std::string::npos) << problem.reason;
+  EXPECT_TRUE(problem.fix.starts_with(stop_last_resort)) << problem.fix;
+}
+
 TEST(Explain, TakesTheNameOfARequestForNoCommand) {
   const CommandResult refused{Outcome::refused, Refusal::range, Time{0}};
   EXPECT_EQ(explain("arm()", refused, {}).thing, "arm()");
-  EXPECT_EQ(explain("arm()", refused, {}).fix, "");
+  EXPECT_NE(explain("arm()", refused, {}).fix, "");
   EXPECT_EQ(explain("E:STOP", timed_out_command(), {}).reason.find("the stop"), std::string::npos);
 }
 

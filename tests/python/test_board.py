@@ -172,9 +172,9 @@ def test_a_state_is_all_that_the_board_says(board):
     assert set(state.present) < set(dir(state)) and 'enc2' not in dir(state)
 
 
-def test_a_field_that_the_state_does_not_carry_is_an_error(board):
+def test_a_field_that_the_board_has_not_reported_is_an_error(board):
     state = board.next_state()
-    with pytest.raises(AttributeError, match=re.escape("enc2: the state does not carry this field; ask the board for it: "
+    with pytest.raises(AttributeError, match=re.escape("enc2: the board has not reported this field; ask for it: "
                                                        "fields('DEFAULT,ENC2')")):
         state.enc2
     with pytest.raises(AttributeError, match='relays: '):

@@ -96,17 +96,22 @@ ReceivedState make_state(std::uint32_t t_ms, double at, const py::dict& fields) 
                   "give one that docs/protocol.md allows");
     }
     state.present.add(field);
+    state.reported.add(field);
   }
   return state;
 }
 
-// Throws AttributeError for a field that the newest datagram does not carry: its value would be
-// old, or 0. A state without FAULT reports that there is no fault (docs/protocol.md).
+// A state without FAULT reports that there is no fault (docs/protocol.md).
+bool has_value(const ReceivedState& state, F field) {
+  return state.reported.has(field) || field == F::fault;
+}
+
+// Throws AttributeError for a field that the board has not reported: its value would be 0.
 void require(const ReceivedState& state, F field) {
-  if (state.present.has(field) || field == F::fault) return;
+  if (has_value(state, field)) return;
   const Text name = name_of(field);
   throw py::attribute_error(attribute_of(field) +
-                            ": the state does not carry this field; ask the board for it: "
+                            ": the board has not reported this field; ask for it: "
                             "fields('DEFAULT," +
                             std::string(name.data(), name.size()) + "')");
 }
@@ -146,9 +151,9 @@ void bind_state(py::module_& module) {
       .def("__dir__",
            [](const py::object& self) {
              py::set attributes(py::module_::import("builtins").attr("dir")(py::type::of(self)));
-             const auto& carried = self.cast<const ReceivedState&>();
+             const auto& reported = self.cast<const ReceivedState&>();
              for (const StateFieldRow& row : state_fields) {
-               if (carried.present.has(row.field) || row.field == F::fault) continue;
+               if (has_value(reported, row.field)) continue;
                attributes.attr("discard")(attribute_of(row.field));
              }
              return attributes;

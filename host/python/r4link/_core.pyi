@@ -188,8 +188,9 @@ class RefusedPost(_Record):
 class State:
     """A state of the board.
 
-    A field that the state does not carry (see `present`) raises AttributeError: request it by
-    `Board.fields()`. `fault` is always there; None: no fault.
+    A field that the board has not reported since it started raises AttributeError: request it by
+    `Board.fields()`. `present` names the fields of the newest datagram; another field has the
+    value of an earlier datagram. `fault` is always there; None: no fault.
     """
     @property
     def pnum(self) -> int: ...

@@ -8,10 +8,9 @@
         async for state in board.states():
             …
 
-A board's commands are sent in the order in which they were begun, each when its predecessor has
-ended; stop() waits for no other command. If a task is cancelled, its command is not sent again, but
-may have been executed. A stop is sent even if its task is cancelled. The calls of a board belong to
-one event loop.
+A board's commands are sent in the order in which their coroutines begin. If a task is cancelled, its
+command is not sent again, but may have been executed. A stop is sent even if its task is cancelled.
+The calls of a board belong to one event loop.
 """
 from __future__ import annotations
 
@@ -134,21 +133,24 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
         self._board = blocking.Board(url, **options)
         self._core = self._board._core
         self._calls: Any = _core.Calls(self._core)  # each returns at once
-        self._turn = asyncio.Lock()
         self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of loops
 
-    def _call(self, call: Callable[[_core.Board], Any], *, at_once: bool = False,
+    def _call(self, call: Callable[[_core.Board], Any],
               then: Callable[[Any], Any] = lambda result: result) -> Any:
         async def run() -> Any:
-            if at_once:
-                return then(await _result(call(self._calls)))
-            async with self._turn:
-                return then(await _result(call(self._calls)))
+            return then(await _result(call(self._calls)))
 
         coroutine = run()
         # Python's warning of a forgotten await names the method that made `call`.
         method = call.__qualname__.split('.<locals>')[0].rsplit('.', 1)[-1]
         coroutine.__qualname__ = f'Board.{method}'
+        return coroutine
+
+    def stop(self, timeout: float = 1.0) -> Coroutine[Any, Any, None]:
+        """As r4link.Board.stop(). The stop begins with this call, even if the coroutine never runs
+        or is cancelled. `timeout`: seconds to wait for the confirmation."""
+        stop: _core.Call = self._calls.stop(_ms(timeout))
+        coroutine: Coroutine[Any, Any, None] = self._call(lambda core: stop)
         return coroutine
 
     def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:

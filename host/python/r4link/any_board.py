@@ -23,10 +23,9 @@ class AnyBoard(ABC, Generic[Sent]):
     _core: Core
 
     @abstractmethod
-    def _call(self, call: Callable[[Core], Any], *, at_once: bool = False,
+    def _call(self, call: Callable[[Core], Any],
               then: Callable[[Any], Any] = lambda result: result) -> Any:
-        """Makes a call that waits. Returns then(result), or a coroutine of it. The coroutine waits
-        for earlier calls unless `at_once`."""
+        """Makes a call that waits. Returns then(result), or a coroutine of it."""
 
     @abstractmethod
     def _callback(self, callback: Callable[..., object]) -> Callable[..., object]:
@@ -55,7 +54,7 @@ class AnyBoard(ABC, Generic[Sent]):
     def wait_active(self, timeout: float = 3.0) -> Sent:
         """Waits until this program controls the board or, as a watcher, hears it. Raises
         RefusedError with the link's state and cause."""
-        sent: Sent = self._call(lambda core: core.wait_active(_ms(timeout)), at_once=True)
+        sent: Sent = self._call(lambda core: core.wait_active(_ms(timeout)))
         return sent
 
     # --- commands
@@ -89,7 +88,7 @@ class AnyBoard(ABC, Generic[Sent]):
 
     def stop(self, timeout: float = 1.0) -> Sent:
         """All outputs safe at once: repeated until confirmed, latched until Command.clear()."""
-        sent: Sent = self._call(lambda core: core.stop(_ms(timeout)), at_once=True)
+        sent: Sent = self._call(lambda core: core.stop(_ms(timeout)))
         return sent
 
     def stop_async(self) -> None:

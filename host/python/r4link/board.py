@@ -123,7 +123,7 @@ class Board(AnyBoard[None]):
         a board, and UsageError with the URLs if there are several."""
         return cls(_core.discover().only().url, **options)
 
-    def _call(self, call: Callable[[_core.Board], Any], *, at_once: bool = False,
+    def _call(self, call: Callable[[_core.Board], Any],
               then: Callable[[Any], Any] = lambda result: result) -> Any:
         return then(call(self._core))
 

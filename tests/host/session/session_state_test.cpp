@@ -42,6 +42,24 @@ TEST_F(SessionState, FollowsTheReasonOfHeartbeatsWhileNoStatesCome) {
   EXPECT_EQ(link.session.state().safe, SafeReason::none);
 }
 
+TEST_F(SessionState, NamesTheFieldsReportedSinceTheBoardStarted) {
+  const auto reported = [this](StateField field) {
+    return link.session.state().reported.has(field);
+  };
+  link.state("ENC1:7;SAFE:0;CMD:1;");
+  link.state("OSMC1:358,1;");  // another part of a state that is too long for one datagram
+  EXPECT_TRUE(reported(StateField::enc1) && reported(StateField::osmc1));
+  EXPECT_FALSE(link.session.state().present.has(StateField::enc1));
+  EXPECT_FALSE(reported(StateField::enc2));
+  link.pass(300ms);
+  link.reboot();
+  link.state("AIN24:24.28;");
+  EXPECT_TRUE(reported(StateField::ain24));
+  EXPECT_FALSE(reported(StateField::enc1));
+  link.heartbeat(SafeReason::link);
+  EXPECT_TRUE(reported(StateField::safe)) << "heartbeats report it, too";
+}
+
 TEST_F(SessionState, ForgetsAChipFaultThatTheBoardReportsNoMore) {
   link.state("SAFE:6;FAULT:97,1;CMD:1;");
   EXPECT_EQ(link.session.state().fault.address, 97);
