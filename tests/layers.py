@@ -124,7 +124,6 @@ EXCEPTIONS = {
     'host/standard_registry.cpp': {'firmware/ports/sim'},
     # Every part of a datagram, as the wire has it.
     'tools/r4/watch/decode.cpp': BELOW,
-    'tools/r4/drive/send.cpp': {'host/commands', 'protocol/datagram'},
     # It makes the frames of the ends of a CAN bus, flow control included, by the node of both.
     'tools/r4/formats/candump_log.cpp': {'transports', 'transports/framing/can'},
 }

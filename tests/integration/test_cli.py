@@ -44,8 +44,8 @@ NO_BOARD = 'udp://127.0.0.1:9?listen=0'
     (['monitor', 'sim:', '--jsn'], USAGE, 'did you mean --json'),
     (['monitor', 'sim:', '--count'], USAGE, '--count: needs a value'),
     (['monitor', 'sim:', '--count', '0'], USAGE, 'out of range'),
-    (['monitor', 'sim:', '--count', 'many'], USAGE, 'is no whole number'),
-    (['monitor', 'sim:', '--duration', '-1'], USAGE, 'is no time'),
+    (['monitor', 'sim:', '--count', 'many'], USAGE, 'is not a whole number'),
+    (['monitor', 'sim:', '--duration', '-1'], USAGE, 'is not a valid time'),
     (['monitor', 'sim:', '--fields', 'AIN99'], USAGE, 'no such state field'),
     (['bench', 'sim:', 'sim:?node=2'], USAGE, 'a board of its own'),
     (['send', 'sim:', 'sim:?node=2', 'O:1,1,1'], USAGE, 'a board of its own'),
@@ -228,6 +228,16 @@ def test_output_that_cannot_be_written_is_an_error(arguments):
     lost_errno = 'Input/output error'  # stdio does not keep it
     reason = 'No space left on device' if arguments[0] == 'sim' else f'(No space left on device|{lost_errno})'
     assert re.match(f'r4: standard output: {reason}; ', result.stderr), result.stderr
+
+
+@pytest.mark.parametrize('closed', [False, True])
+def test_a_standard_error_that_cannot_be_written_changes_no_exit_code(closed):
+    with open('/dev/full', 'wb') as full:
+        arguments = [R4, 'stop', 'udp://127.0.0.1:9', '--timeout', '0.1', '--json']
+        command = ['sh', '-c', 'exec "$@" 2>&-', 'sh', *arguments] if closed else arguments
+        result = subprocess.run(command, stdout=subprocess.PIPE, stderr=full, text=True, check=False)
+    assert result.returncode == REFUSED, result
+    assert objects(result.stdout)[-1]['kind'] == 'refused'
 
 
 def test_a_board_does_not_wait_for_whoever_reads_its_log():

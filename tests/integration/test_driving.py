@@ -27,7 +27,7 @@ def shown_commands():
             if shown is None:
                 continue
             commands = COMMANDS.findall(shown[1])
-            if any(map(DRIVES.match, commands)) and 'O:358,1,5' not in commands:  # the mistake in README
+            if any(map(DRIVES.match, commands)) and 'O:358,1,5' not in commands:  # the mistake in quick-start.md
                 yield pytest.param(commands, id=f'{where}: {" ".join(commands)}')
 
 

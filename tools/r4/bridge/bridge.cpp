@@ -50,7 +50,7 @@ constexpr std::array<NamedCounter, 9> named_counters{{
 
 const char* to_text(BridgeSide side) { return side == BridgeSide::hosts ? "hosts" : "board"; }
 
-// Prints on a thread of its own, so that the bridge never waits for a reader of the output.
+// Prints outside the thread of the bridge, so that the bridge never waits for a reader.
 class Report {
  public:
   explicit Report(bool json) : json_(json) {}
@@ -89,6 +89,12 @@ class Report {
       tell_counters(BridgeSide::hosts, all[i].hosts, told_[i].hosts);
       tell_counters(BridgeSide::board, all[i].board, told_[i].board);
     }
+  }
+
+  void end() const {
+    const std::uint64_t lost = lines_.lost();
+    if (lost == 0) return;
+    print_trouble("r4: {} lines were left out: the reader of the output is too slow", lost);
   }
 
  private:
@@ -143,6 +149,7 @@ int bridge(const Options& options) {
   io.restart();
   io.poll();  // handles the last events
   report.counters(bridge.status());
+  report.end();
   return 0;
 }
 

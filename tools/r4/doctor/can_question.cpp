@@ -12,7 +12,7 @@
 namespace r4::tool {
 namespace {
 
-constexpr std::chrono::milliseconds ask_again{300};
+constexpr std::chrono::milliseconds ask_again{300};   // longer than a timely answer takes
 constexpr std::chrono::milliseconds look_at_bus{20};  // while another host uses the bus
 
 }  // namespace
@@ -40,7 +40,8 @@ void CanQuestion::ask() {
 }
 
 void CanQuestion::hear(const Datagram& datagram) {
-  if (!asked_ || kind_of(datagram) != MessageKind::identity) return;
+  Identity identity;
+  if (!asked_ || !read_identity(datagram, identity)) return;
   answer_us_ = std::chrono::duration<double, std::micro>(Clock::now() - *asked_).count();
   asked_.reset();
 }

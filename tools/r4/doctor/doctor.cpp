@@ -253,8 +253,9 @@ int doctor(const Options& given) {
 
 constexpr const char* footer =
     R"(Without a URL it looks at what this machine has: serial ports and who may open them, rules of udev,
-ModemManager, CAN interfaces, network, clock, processors. With URLs it looks at what these need, and
-then listens to each board for 5 s, as one that watches: it commands nothing.
+ModemManager, CAN interfaces, network, clock, processors. It asks boards at USB ports for their identity
+(Q:ID), as r4 list does. With URLs it looks at what these need, and then listens to each board for 5 s, as
+one that watches: it commands nothing.
 
 Below each finding is the command that mends it. --fix runs those that need no choice, each shown
 before, and looks again. It kills no program, sets no bit rate and takes no interface down.

@@ -16,11 +16,9 @@
 #include "../shell/help.hpp"
 #include "../shell/json.hpp"
 #include "../shell/key_file.hpp"
+#include "../shell/number.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "host/commands/command_help.hpp"
-#include "host/commands/limits.hpp"
-#include "protocol/datagram/numbers.hpp"
 #include "r4link/async_board.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
@@ -92,9 +90,8 @@ bool needs_motor_supply(const Order& order) {
 
 std::optional<Milliseconds> setting_of(const Order& order, std::string_view key) {
   if (!is(CommandKind::setting, order) || command_of(order)->text != Text(key)) return {};
-  std::uint32_t ms = 0;
-  parse_number(command_of(order)->text2, ms);
-  return Milliseconds(ms);
+  const Text value = command_of(order)->text2;
+  return Milliseconds(number_in<std::uint32_t>({value.data(), value.size()}).value_or(0));
 }
 
 // Timeout and heartbeat interval in any order: one step, as the board may refuse either alone.
@@ -137,25 +134,28 @@ class Sender {
       : options_(options),
         orders_(orders),
         board_(boards_.add(options.url, board_options(options, orders)).board),
-        hold_(boards_.io()),
-        answer_limit_(boards_.io()) {}
+        hold_(boards_.io()) {}
 
   int run() {
-    const Subscription states = board_.on_state([this](const ReceivedState&, const Datagram&) {
-      if (waiting_ && is_answered(*waiting_)) tell(*std::exchange(waiting_, std::nullopt));
-    });
     const Subscription refused = board_.on_link([this](const LinkStatus& link) {
       if (link.causes.has(LinkCause::two_boards)) boards_.stop();
     });
     const Subscription events = board_.on_event([this](const CarrierEvent& event) {
       if (event.kind == CarrierEvent::Kind::down) down_ = event.problem;
     });
+    for (std::size_t i = 0; i < orders_.size(); ++i) {
+      const auto timing = link_timing_at(orders_, i);
+      if (!timing) continue;
+      board_.require_link_timing(timing->timeout, timing->heartbeat);
+      ++i;
+    }
     board_.open();
     send_next();
     boards_.run();
     require_one_board(board_);
-    tell_paths_down(board_.paths(), options_.json);
+    const std::vector<PathStatus> paths = board_.paths();
     boards_.leave();
+    tell_paths_down(paths, options_.json);
     if (failure_) throw Error(*failure_);
     return 0;
   }
@@ -166,57 +166,35 @@ class Sender {
       hold_.after(options_.hold, [this] { boards_.stop(); });
       return;
     }
-    const auto done = [this](const CommandResult& result) { on_result(result); };
+    const auto done = [this](const CommandResult& result) { tell(result); };
     if (const auto timing = link_timing_at(orders_, next_)) {
       board_.async_link_timing(timing->timeout, timing->heartbeat, options_.timeout, done);
+    } else if (is_transfer()) {
+      board_.async_transfer(*command_of(orders_[next_]), options_.timeout, done);
     } else {
       std::visit([&](const auto& each) { board_.async_send(each, options_.timeout, done); },
                  orders_[next_]);
     }
   }
 
-  // Confirmation only means that an I2C transfer has started; a later state reports its end.
   bool is_transfer() const {
     const Order& order = orders_[next_];
     return is(CommandKind::i2c_read, order) || is(CommandKind::i2c_write, order) ||
            is(CommandKind::i2c_scan, order);
   }
-  bool is_answered(const CommandResult& result) const {
-    return board_.state().i2c_answer.pnum == result.pnum;
-  }
-
-  void on_result(const CommandResult& result) {
-    const bool waits =
-        result.outcome == Outcome::confirmed && is_transfer() && !is_answered(result);
-    if (!waits) return tell(result);
-    waiting_ = result;
-    answer_limit_.after(options_.timeout, [this] {
-      if (!waiting_) return;
-      CommandResult late = *std::exchange(waiting_, std::nullopt);
-      late.outcome = Outcome::timed_out;
-      tell(late);
-    });
-  }
-
   void tell(const CommandResult& result) {
-    answer_limit_.cancel();
     const std::size_t size = link_timing_at(orders_, next_) ? 2 : 1;
     std::string text = shown(orders_[next_]);
     if (size == 2) text += " " + shown(orders_[next_ + 1]);
-    const I2cAnswer& transfer = board_.state().i2c_answer;
-    const bool has_transfer = is_transfer() && is_answered(result);
-    const bool failed = has_transfer && transfer.outcome != I2cOutcome::done;
-    const bool confirmed = result.outcome == Outcome::confirmed && !failed;
-    const Problem problem = failed      ? failed_transfer(text, transfer.outcome)
-                            : size == 2 ? explain(text, result, board_.link())
-                                        : explain_next(result);
+    const bool confirmed = result.outcome == Outcome::confirmed;
+    const Problem problem = size == 2 ? explain(text, result, board_.link()) : explain_next(result);
     if (options_.json) {
       print_line(result_json(text, result, problem, confirmed));
     } else if (confirmed) {
       print_text("{}  confirmed in {:.1f} ms{}\n", text, milliseconds(result),
                  next_ == 0 ? ", connecting included" : "");
       if (is(CommandKind::identify, orders_[next_])) print_identity();
-      if (has_transfer && shows_bytes(transfer)) print_text("  {}\n", shown_bytes(transfer));
+      if (is_transfer()) print_bytes(result.transfer);
     } else {
       print_text("{}  {}\n", text, problem.reason);
     }
@@ -253,18 +231,16 @@ class Sender {
            (state.relays & 1) == 0;
   }
 
-  bool shows_bytes(const I2cAnswer& transfer) const {
-    return transfer.data.size != 0 || is(CommandKind::i2c_scan, orders_[next_]);
-  }
   // The bytes of a scan are addresses.
-  std::string shown_bytes(const I2cAnswer& transfer) const {
-    if (is(CommandKind::i2c_scan, orders_[next_])) {
-      return transfer.data.size == 0
-                 ? "nobody answers"
-                 : fmt::format("0x{:02x}",
-                               fmt::join(transfer.data.begin(), transfer.data.end(), " 0x"));
+  void print_bytes(const I2cAnswer& transfer) const {
+    const auto& data = transfer.data;
+    if (!is(CommandKind::i2c_scan, orders_[next_])) {
+      if (data.size != 0) print_text("  x{:02x}\n", fmt::join(data.begin(), data.end(), ""));
+    } else if (data.size == 0) {
+      print_text("  nobody answers\n");
+    } else {
+      print_text("  0x{:02x}\n", fmt::join(data.begin(), data.end(), " 0x"));
     }
-    return fmt::format("x{:02x}", fmt::join(transfer.data.begin(), transfer.data.end(), ""));
   }
 
   void print_identity() const {
@@ -296,9 +272,10 @@ class Sender {
     if (confirmed && needs_motor_supply(orders_[next_])) {
       object["motor_supply"] = supply_is_missing() ? "open" : "closed";
     }
-    if (is_transfer() && is_answered(result)) {
-      const DeviceBytes<i2c_max_bytes>& data = board_.state().i2c_answer.data;
-      object["transfer"] = to_text(board_.state().i2c_answer.outcome);
+    const bool answered = confirmed || result.transfer.outcome != I2cOutcome::done;
+    if (is_transfer() && answered) {
+      const DeviceBytes<i2c_max_bytes>& data = result.transfer.data;
+      object["transfer"] = to_text(result.transfer.outcome);
       object["bytes"] = fmt::format("x{:02x}", fmt::join(data.begin(), data.end(), ""));
     }
     if (confirmed && is(CommandKind::identify, orders_[next_])) {
@@ -316,8 +293,6 @@ class Sender {
   BoardSet boards_;
   AsyncBoard& board_;
   Timer hold_;
-  Timer answer_limit_;
-  std::optional<CommandResult> waiting_;  // waits for the end of an I2C transfer
   std::size_t next_ = 0;
   std::optional<Problem> failure_;
   std::optional<Problem> down_;  // the latest reason why the transport was down
@@ -329,12 +304,6 @@ int send(const SendOptions& given) {
   std::vector<Order> orders;
   for (const std::string& text : options.commands) {
     orders.push_back(order_of(text, options.url));
-  }
-  for (std::size_t i = 0; i < orders.size(); ++i) {
-    const auto timing = link_timing_at(orders, i);
-    if (!timing) continue;
-    require_link_timing(timing->timeout, timing->heartbeat, Milliseconds{0});
-    ++i;
   }
   return Sender(options, orders).run();
 }

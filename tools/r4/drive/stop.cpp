@@ -74,21 +74,22 @@ int stop(const StopOptions& options) {
   board->async_send(Command::stop(), options.timeout, [&](const CommandResult& r) {
     result = r;
     if (r.outcome != Outcome::confirmed) return io.stop();
-    print_confirmed(options, r);
-    // Meanwhile the library repeats the stop.
+    // Meanwhile the library repeats the stop. Printing waits: a reader of the output may block it.
     repeating.after(SessionOptions().stop_linger, [&] { io.stop(); });
   });
   io.run();
   const LinkStatus link = board->link();
   const std::vector<PathStatus> paths = board->paths();
   board->close();
+  const bool confirmed = result && result->outcome == Outcome::confirmed;
+  if (confirmed) print_confirmed(options, *result);
   tell_paths_down(paths, options.json);
-  if (!result || result->outcome != Outcome::confirmed) {
+  if (!confirmed) {
     Problem problem = explain(Command::stop(), result.value_or(CommandResult()), link);
     problem.thing = fmt::format("E:STOP to {}", board->name());
     throw Error(problem);
   }
-  // Both boards got the stop, and one has confirmed it.
+  // The stop was sent to both boards, and one has confirmed it.
   if (link.causes.has_any({LinkCause::two_boards, LinkCause::other_board})) {
     throw Error(explain(paths));
   }

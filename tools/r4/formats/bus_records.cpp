@@ -5,7 +5,7 @@
 
 #include "../bus/bus_datagram.hpp"
 #include "../bus/candump.hpp"
-#include "number.hpp"
+#include "../shell/number.hpp"
 #include "r4link/discovery/url.hpp"
 #include "r4link/messages/packed_form.hpp"
 #include "r4link/vocabulary.hpp"

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string_view>
 
-#include "../formats/number.hpp"
+#include "../shell/number.hpp"
 #include "r4link/error.hpp"
 
 namespace r4::tool {

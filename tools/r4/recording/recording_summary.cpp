@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include "../formats/number.hpp"
+#include "../shell/number.hpp"
 #include "formats.hpp"
 #include "r4link/messages/message.hpp"
 

@@ -124,7 +124,7 @@ class BoardCommands {
   asio::cancellation_signal give_up_arming_;
   std::vector<Done> stops_;
   bool stopping_ = false;
-  Clock::time_point stopped_{};  // newest stop: commands written before it are ignored
+  Clock::time_point stopped_{};  // newest stop: an arm or E:CLEAR written before it is refused
   Pressed pressed_;              // on `arm`
   std::uint64_t stale_ = 0;
   std::vector<std::unique_ptr<int>> sources_;  // each address identifies a topic

@@ -41,7 +41,7 @@ Json transfers_json(const CarrierCounters& counters);
 // with "transfers" if the transport uses frames.
 Json counters_json(const CarrierCounters& counters);
 
-// Bytes as printable ASCII: a backslash and every other byte become \xNN.
+// Printable ASCII stays, except the backslash. All other bytes, and the backslash, become \xNN.
 std::string escaped(std::string_view bytes);
 
 // Bytes that are not UTF-8 are replaced. line_of() is ASCII.

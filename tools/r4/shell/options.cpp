@@ -6,9 +6,11 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
+#include <optional>
 #include <ratio>
 #include <system_error>
 
+#include "number.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/discovery/transports.hpp"
 #include "r4link/error.hpp"
@@ -23,8 +25,8 @@ Milliseconds read_seconds(const std::string& name, const std::string& text, Zero
   const char* const end = text.data() + text.size();
   const auto read = std::from_chars(text.data(), end, value, std::chars_format::fixed);
   if (read.ec != std::errc() || read.ptr != end || !(value >= 0 && value <= most)) {
-    throw Error(ErrorKind::usage, fmt::format("{} {}", name, text), "is no time",
-                "write seconds such as 5 or 0.25");
+    throw Error(ErrorKind::usage, fmt::format("{} {}", name, text), "is not a valid time",
+                "write 0 to 10000000 seconds, such as 5 or 0.25");
   }
   const Milliseconds time = std::chrono::round<std::chrono::duration<std::int64_t, std::centi>>(
       std::chrono::duration<double>(value));
@@ -37,16 +39,14 @@ Milliseconds read_seconds(const std::string& name, const std::string& text, Zero
 
 std::uint64_t read_number(const std::string& name, const std::string& text, std::uint64_t min,
                           std::uint64_t max) {
-  std::uint64_t number = 0;
-  const char* const end = text.data() + text.size();
-  const auto read = std::from_chars(text.data(), end, number);
-  if (read.ec != std::errc() || read.ptr != end || number < min || number > max) {
-    const bool is_number = read.ptr == end && read.ec != std::errc::invalid_argument;
+  const std::optional<std::uint64_t> number = number_in<std::uint64_t>(text);
+  if (!number || *number < min || *number > max) {
+    const bool is_number = text.find_first_not_of("0123456789") == std::string::npos;
     throw Error(ErrorKind::usage, fmt::format("{} {}", name, text),
-                is_number ? "is out of range" : "is no whole number",
+                is_number && !text.empty() ? "is out of range" : "is not a whole number",
                 fmt::format("write {} to {}", min, max));
   }
-  return number;
+  return *number;
 }
 
 template <class Out>

@@ -19,7 +19,7 @@ namespace r4::tool {
 
 using Milliseconds = std::chrono::milliseconds;
 
-// Seconds such as 5 or 0.25, with two decimals, at most 10 million.
+// Seconds such as 5 or 0.25, rounded to hundredths, at most 10 million. 0 only with Zero::allowed.
 enum class Zero { refused, allowed };
 CLI::Option* add_seconds(CLI::App& command, const std::string& name, Milliseconds& out,
                          const std::string& meaning, Zero zero = Zero::refused);

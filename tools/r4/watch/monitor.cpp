@@ -34,7 +34,8 @@ constexpr Milliseconds tick{100};
 constexpr Milliseconds table_interval{1000};
 // With --count only: the longest silence of the boards after the start.
 constexpr Milliseconds patience{5000};
-// With --device: when to leave the board to another host, and the time to confirm that.
+// With --device: how long another host must control the board until this program releases it, and
+// how long the board may take to confirm the release.
 constexpr Milliseconds busy_patience{1500}, release_time{200};
 // Bytes that wait for a reader. For one board: about half a second of states.
 constexpr std::size_t unread_of_board = 32768, most_unread = std::size_t{1} << 18;
@@ -102,12 +103,13 @@ class Monitor {
       view->on_tick();
     }
     if (table_) table_->show();
-    if (const std::uint64_t lost = lines_->lost(); lost != 0) {
-      print_trouble("r4: {} lines were left out: whoever reads the output is too slow", lost);
-    }
-    boards_.leave();
+    const std::uint64_t lost = lines_->lost();
+    boards_.leave();  // before printing, which a reader may block
     views_.clear();
     lines_.reset();
+    if (lost != 0) {
+      print_trouble("r4: {} lines were left out: the reader of the output is too slow", lost);
+    }
     boards_.require_heard();
     return 0;
   }

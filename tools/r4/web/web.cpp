@@ -33,8 +33,6 @@ struct Options {
   bool json = false;
 };
 
-constexpr Milliseconds farewell_time{200};
-
 int serve_web(const Options& options) {
   web::HubOptions hub_options;
   hub_options.server.address = web::listen_address(options.listen);
@@ -71,7 +69,7 @@ int serve_web(const Options& options) {
   }
   boards.run();
   hub.end();
-  boards.leave(farewell_time);
+  boards.leave(web::farewell_time);
   return 0;
 }
 

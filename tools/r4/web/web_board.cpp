@@ -14,7 +14,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto farewell_time = 200ms;
 constexpr auto stop_time = 2s;
 
 }  // namespace

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <asio/io_context.hpp>
+#include <chrono>
 #include <functional>
 #include <optional>
 #include <string>
@@ -14,6 +15,9 @@
 #include "r4link/recording.hpp"
 
 namespace r4::tool::web {
+
+// How long a farewell is repeated without an answer.
+constexpr std::chrono::milliseconds farewell_time{200};
 
 class WebBoard {
  public:

@@ -8,7 +8,7 @@
 #include <memory>
 #include <new>
 
-#include "../number.hpp"
+#include "../../shell/number.hpp"
 #include "r4link/error.hpp"
 #include "r4link/recordings/zstd_stream.hpp"
 

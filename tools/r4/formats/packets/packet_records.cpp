@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "../number.hpp"
+#include "../../shell/number.hpp"
 #include "packets.hpp"
 #include "pcapng_sink.hpp"
 #include "r4link/error.hpp"
