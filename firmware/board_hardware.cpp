@@ -233,8 +233,8 @@ void BoardHardware::reset_lost_modes() {
   }
 }
 
-// Trouble that a driver finds during a make_safe() says nothing about its chip, so the chip is set
-// up again without a fault.
+// make_safe() may interrupt a transfer, or write registers that a driver is comparing. Trouble that
+// the driver then finds says nothing about its chip, so the chip is set up again without a fault.
 void BoardHardware::set_up_what_was_cut_off() {
   for (int i = 0; i < chip_count; ++i) {
     if (chips_[i]->trouble() != ChipTrouble::none && !failed_[i]) chips_[i]->begin();

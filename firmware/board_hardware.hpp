@@ -138,7 +138,7 @@ class BoardHardware final : public Hal {
   std::uint32_t now_us_ = 0;
   std::uint32_t held_since_us_ = 0;
   bool handle_seen_ = false;           // the pin read held at the last poll
-  bool handle_held_ = false;           // the handle has settled
+  bool handle_held_ = false;           // the pin has read held for handle_settle_us
   volatile bool busy_ = false;         // the bus is in use: in poll(), apply() or make_safe()
   volatile bool interrupted_ = false;  // make_safe() came in between
 };

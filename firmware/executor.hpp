@@ -20,7 +20,9 @@ struct Setpoints {
 };
 
 // Carries out `command` completely, or changes nothing and returns the reason. The caller has used
-// check_command(), so only names of fields and settings, and channels, are refused here.
+// check_command(), so only names of fields and settings, and channels, are refused here. Heartbeat,
+// stop, clear, leave, identify, watch and the X commands other than X:DAC change nothing here: the
+// application handles them.
 Refusal carry_out(const Command& command, Setpoints& setpoints);
 
 }  // namespace firmware

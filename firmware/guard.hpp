@@ -7,8 +7,11 @@
 //     E:STOP has arrived        stop() was called                  outputs safe, cause stop
 //     a duty hangs              5 deadlines missed in a row        outputs safe, cause watchdog
 //     a duty is often late      2 missed a second for long         outputs safe, cause watchdog
-//     a duty stays away         tick() does not return true        hardware watchdog resets board
-//     too many duties           add_duty()                         both, again after each clear
+//     a duty stays away         tick() does not return true        the port starves the hardware
+//                                                                  watchdog, which resets the board
+//     too many duties           add_duty()                         outputs safe (watchdog), reset;
+//                                                                  again after each clear, because
+//                                                                  that duty would be unwatched
 //
 // A duty is work that must repeat: a turn of the loop, of a thread, of another interrupt. It checks
 // in each time. tick() runs in an interrupt, on the core that it interrupts; check_in() in any

@@ -20,10 +20,17 @@ struct StepperTarget {
   friend bool operator!=(const StepperTarget& a, const StepperTarget& b) { return !(a == b); }
 };
 
+// An output at rest is 0, and a brake is on.
+inline void rest(Bldc& channel) { channel.brake = true; }
+template <class Value>
+void rest(Value&) {}
+
 // Default: the safe state, all off and the brakes on.
 struct Outputs {
   Outputs() {
-    for (Bldc& channel : bldc) channel.brake = true;
+#define R4_OUTPUT(kind, Value, member, ...) \
+  for (Value & channel : member) rest(channel);
+#include "r4link/tables/board.def"
   }
 #define R4_OUTPUT(kind, Value, member, channels, ...) Value member[channels] = {};
 #include "r4link/tables/board.def"
@@ -50,7 +57,7 @@ class Hal {
  public:
   // Called when a setpoint changed. Writes only differences.
   virtual void apply(const Outputs& outputs) = 0;
-  // Every output off, at once; a fault handler may call it at any time.
+  // Every output off, at once, in any state; a fault handler may call it at any time.
   virtual void make_safe() = 0;
   virtual void sample(Inputs& inputs) = 0;
   // Encoder and stepper `channel` (1 …) restart at zero; the stepper holds.

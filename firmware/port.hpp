@@ -25,9 +25,11 @@ class Port {
   virtual void also_hold(Peer peer) { static_cast<void>(peer); }
   // True if `peer` receives datagrams for everyone.
   virtual bool reaches(Peer peer) const { return peer == everyone; }
-  // Where port (CAN) and host have the packed form: setting `pack`, while a host is in control.
+  // True: send the packed form, if the port has one (CAN) and the host uses it. Wanted with the
+  // setting `pack` while a host is in control.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
-  // True for a bus (CAN): only the programs on it hear it, so a watcher need not prove its peer.
+  // True for a bus (CAN): every program on it hears what the port sends, and no other program does.
+  // So a watcher need not prove its peer.
   virtual bool is_bus() const { return false; }
   // True for a cable of the board's own, from which site settings are accepted (site_settings.hpp).
   virtual bool may_configure() const { return false; }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The R4 board's application: datagrams in, outputs and datagrams out (paper sections 2-4). It owns
 // no thread, clock or socket. The port calls receive() for each datagram, poll() as time passes,
-// port_down() when a transport fails, and guard().tick() in a timer interrupt.
+// port_down() when a transport fails, and guard().tick() in a timer interrupt. Setpoints reach the
+// hardware only in update_outputs(); every cause of the safe state goes through Safety.
 //
 //     CONNECTING   no host yet: outputs safe, `H:R4-ROS2;PNum:0;T:0;` each heartbeat interval
 //     ACTIVE       a host is in control and there is no cause: outputs follow the setpoints
@@ -52,7 +53,8 @@ class Application {
 
   Application(Hal& hal, const Config& config, Observer* observer = nullptr);
 
-  // Call before start(). Returns the port's number, or no_port if there are max_ports already.
+  // Call before start(). Returns the port's number, or no_port if there are max_ports already: the
+  // port is not served.
   std::uint8_t add_port(Port& port);
   // Makes the outputs safe and sends the first heartbeat.
   void start(std::uint32_t now_ms);
@@ -201,7 +203,7 @@ class Application {
   Inputs inputs_;
   PortSlot ports_[max_ports];
   std::uint8_t port_count_ = 0;
-  bool any_behind_ = false;
+  bool any_behind_ = false;  // may be true when no port is behind
   BoardState reported_state_ = BoardState::connecting;
   SafeReason reported_reason_ = SafeReason::none;
   std::uint32_t turned_ms_ = 0;

@@ -56,7 +56,7 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
 
 // A host must not clear a cause that came while E:CLEAR was on its way, so E:CLEAR names the newest
 // cause. An E:CLEAR without that number must come later than the timeout after the cause, because
-// no earlier datagram is held back for longer.
+// no earlier datagram is held back for longer. Without a latched cause, every E:CLEAR is accepted.
 Refusal Application::judge_clear(const Command& command, std::uint32_t waited_ms,
                                  std::uint32_t now_ms) const {
   if (unread_stops_ != 0) return Refusal::stale;  // the sender cannot know their numbers

@@ -56,7 +56,8 @@ bool Application::reaches(Source watcher) const {
   return audience(watcher.port) == everyone && ports_[watcher.port].port->reaches(watcher.peer);
 }
 
-// True if the watcher therefore shares the port's numbers, except in CONNECTING.
+// True if the watcher receives the datagrams for everyone and so shares the port's numbers; never
+// in CONNECTING.
 bool Application::hears_all(Source watcher) const {
   return link_.state() != BoardLinkState::connecting && reaches(watcher);
 }

@@ -45,7 +45,7 @@ class UserI2c {
   const I2cReading& reading(int slot) const { return readings_[slot - 1]; }
   const I2cAnswer& answer() const { return answer_; }
   const I2cBusReport& report() const { return report_; }
-  // True if a transfer has ended since the last call.
+  // True if a single transfer or a scan has ended since the last call.
   bool take_answered() {
     const bool answered = answered_;
     answered_ = false;

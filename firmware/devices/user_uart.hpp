@@ -57,7 +57,7 @@ class UserUart {
   std::uint32_t first_ = 0;  // start of the newest state
   std::uint32_t new_ = 0;    // its first new byte
   std::uint32_t lost_ = 0;
-  std::uint32_t end_ = 0;  // of the next byte in bytes_
+  std::uint32_t end_ = 0;  // index in bytes_ of the next byte
   std::uint8_t bytes_[capacity];
 };
 

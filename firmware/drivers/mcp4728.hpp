@@ -15,7 +15,8 @@
 // unnoticed reset. The fast write is a third shorter but depends on both.
 //
 // Set-up: zeros to all outputs. Unless the EEPROM holds zeros with the supply as reference, it is
-// written, once; new chips have other values, and a chip ignores other writes meanwhile.
+// written, once; new chips have other values. The outputs stay at zero meanwhile, because the chip
+// ignores other writes.
 #pragma once
 
 #include <cstdint>

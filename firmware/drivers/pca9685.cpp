@@ -27,7 +27,8 @@ constexpr int on_h = 1;
 constexpr int off_l = 2;
 constexpr int off_h = 3;
 
-// A burst includes at most so many unchanged registers, because a new burst would cost as much.
+// A burst continues over a gap of at most so many unchanged registers between two groups: a new
+// burst would cost as much.
 constexpr int bridged = 2;
 
 }  // namespace

@@ -21,7 +21,8 @@
 // The chip has no timeout: it keeps driving when the microcontroller fails. all_off() makes all
 // three chips safe in three bytes, but a disturbance can set bits that defeat it: INVRT turns "off"
 // into "on", and with EXTCLK the outputs wait for a missing clock. Only a reset clears EXTCLK. So
-// the modes are read back after a safe state; lost_mode() then asks for reset_all().
+// the modes are read back after a safe state. If EXTCLK or MODE2 is not as written, lost_mode()
+// asks for reset_all().
 #pragma once
 
 #include <cstdint>

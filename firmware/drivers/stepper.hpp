@@ -31,6 +31,7 @@ class Stepper {
   void go(std::int32_t position, std::int32_t speed);
   // A pulse that has begun ends with the next tick.
   void stop() { speed_.store(0, std::memory_order_relaxed); }
+  // Sets the position to 0 and stops.
   void zero();
   void tick();
 

@@ -9,7 +9,8 @@
 //     when arming is impossible, or a cause has come that is newer than the call; timed_out,
 //     cancelled and closed like a command.
 //
-// Several calls share their steps, and end together. Later output commands wait for it.
+// Several calls share their steps, and end together. Later output commands wait
+// for the calls to end.
 #pragma once
 
 #include <cstddef>

@@ -214,7 +214,8 @@ void BridgedPair::follow_hosts(Time now) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   const Text farewell = watch_.write_end(writer);
-  // The board streams to the served host without a lease. On a bus, other programs may watch.
+  // The board streams to the served host without a lease. On a bus, other programs may watch, so
+  // there the lease runs out.
   if (!board_.carrier->is_shared()) send(board_, view(farewell), Priority::normal, everyone);
 }
 

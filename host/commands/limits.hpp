@@ -22,7 +22,7 @@ void require_control(BoardRole role, std::string_view what);
 void require_control(BoardRole role, const Command& command);
 void require_control(BoardRole role, const Setpoints& group);
 
-// A command must be confirmed within more than 0 ms. A stop is sent with any timeout.
+// The timeout of a command must be longer than 0 ms. A stop is sent with any timeout.
 void require_timeout(std::string_view what, std::chrono::milliseconds timeout);
 
 // A time to wait: 0 checks without waiting.

@@ -61,7 +61,8 @@ class NodeQuestion final : private Carrier::Handler {
   bool answered() const { return is_known(board_); }
 
  private:
-  // Busy: another host was heard in the listening time of a new host, by its datagrams.
+  // The carrier sends only after it has heard no other host for a new host's listening time. `busy`
+  // without foreign frames means another host.
   void ask() {
     if (board_.identity) return;
     const SendResult result = carrier_->send(identity_question(), Priority::normal);

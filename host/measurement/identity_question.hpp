@@ -6,7 +6,8 @@
 //                      +-- eight newer ones --> forgotten
 //
 // The answer names its question (ASKED). If a board does not name it, the round trip counts from
-// the newest question, and the answer closes all questions.
+// the newest question, and the answer closes all questions. It may belong to an older question, so
+// it does not limit the board's clock (board_clock.hpp).
 #pragma once
 
 #include <algorithm>

@@ -40,7 +40,7 @@ class PathNews {
   bool take_state(std::size_t path, std::uint32_t t_ms, FieldSet present);
   // True if no newer datagram is known. Then this datagram is the newest.
   bool is_newest(std::size_t path, std::uint32_t t_ms);
-  // True if this answer repeats the answer to a duplicate of the command on another path.
+  // True if this answer adds nothing: each path may bring an answer to its duplicate of a command.
   bool is_copy(const Nack& nack);
 
   // The board has restarted: its T is unrelated to earlier T.

@@ -8,7 +8,10 @@
 //                      [](const r4::CommandResult& result) { … });
 //     io.run();
 //
-// Nothing here blocks. Call every function on the thread of the io_context, or before it runs.
+// Call every function on the thread of the io_context, or before it runs; callbacks run on that
+// thread. Only open() and close() may block: open() before run() waits up to 5 s for a host name,
+// and both wait for a transport of your own (transports/own_transport.hpp).
+//
 // Completion tokens work: callbacks, asio::use_future, asio::use_awaitable. A handler runs on its
 // associated executor, never inside the call that started it. A failed command is a result, not an
 // exception: explain() (link.hpp) puts it into words. A handler's cancellation slot cancels the
@@ -147,7 +150,8 @@ class AsyncBoard {
     return initiate<&AsyncBoard::start_arm, Token>(token, timeout);
   }
   // void(CommandResult). Sends a Command::i2c_read(), i2c_write() or i2c_scan() and ends with the
-  // device's answer: CommandResult::transfer. Refused also if the transfer failed.
+  // device's answer: CommandResult::transfer. Refused also if the transfer failed. Throws as
+  // require_sendable(), and for another command or a timeout that is not above 0.
   template <class Token>
   auto async_transfer(const Command& command, Duration timeout, Token&& token) {
     require_sendable(command);
@@ -204,8 +208,10 @@ class AsyncBoard {
   // The state of each path, in the order of the URLs.
   std::vector<PathStatus> paths() const;
 
-  // As those of Board. After the event loop was held up for more than 50 ms, on_state gets only the
-  // newest waiting state. on_nack gets each refusal once, but no DUPLICATE for a retry.
+  // Any number of callbacks of each kind, called in the order of adding; the handle ends one.
+  // Unlike those of Board, they get only later events: read state(), link() and disarmed_by()
+  // first. After the event loop was held up for more than 50 ms, on_state gets only the newest
+  // waiting state. on_nack gets each refusal once, but no DUPLICATE for a retry.
   Subscription on_state(std::function<void(const ReceivedState&, const Datagram&)> callback);
   Subscription on_board_heartbeat(std::function<void(const Datagram&)> callback);
   Subscription on_nack(std::function<void(const Nack&, const Datagram&)> callback);
@@ -236,7 +242,6 @@ class AsyncBoard {
   void hold_heartbeats(bool held);
 
  private:
-  friend class Fleet;  // one CAN frame stops its boards on a bus
   struct Impl;
 
   class Cancel {

@@ -123,7 +123,8 @@ class R4LINK_API Board {
   explicit Board(const std::vector<CarrierMaker>& makers, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
   // Opens the only board that discover() finds (discovery/discover.hpp). Blocks for at most 1.3 s.
-  // Throws Error{open} if there is no board, Error{usage} with the URLs of several.
+  // Throws Error{open} if there is no board, and Error{usage} with their URLs if there are several
+  // boards.
   static Board first(BoardOptions options = {}, const DiscoveryOptions& where = {});
   ~Board();
   Board(const Board&) = delete;
@@ -131,9 +132,10 @@ class R4LINK_API Board {
 
   // Stops the heartbeats, says farewell and closes the transport. The board goes safe at once and
   // is free for another host. If it does not answer, or does not know farewells, it goes safe by
-  // its timeout. Blocks for at most 100 ms. Calls that wait in other threads throw Error{refused}.
-  // After the return no callback runs, except the one that called close(). Idempotent. The
-  // destructor calls it, and may run while other threads wait.
+  // its timeout. Blocks for at most 100 ms; with a transport of your own, up to 1 s more for each.
+  // Also waits for a running callback, and for the disk if record() has opened a file. Calls that
+  // wait in other threads throw Error{refused}. After the return no callback runs, except the one
+  // that called close(). Idempotent. The destructor calls it, and may run while other threads wait.
   void close();
 
   // The role of this program: BoardOptions::role at first.
@@ -380,8 +382,10 @@ class R4LINK_API Board {
   Subscription on_event(std::function<void(const CarrierEvent&)> callback);
   // A path has started or stopped carrying.
   Subscription on_path(std::function<void(const PathStatus&)> callback);
-  // The board restarted, or this computer slept for longer than the board's timeout: its settings,
-  // also the thresholds of U, are lost. Comes before the board's new state.
+  // The board restarted, or this computer slept for longer than the board's timeout. The readings
+  // of i2c() and attach() end. The fields are requested again, unless SessionOptions::fields is
+  // empty. After a restart, the thresholds of U are 0, and settings (C) may be lost. Comes before
+  // the board's new state.
   Subscription on_restart(std::function<void()> callback);
   // Armed (none), or disarmed and why.
   Subscription on_arming(std::function<void(DisarmCause)> callback);

@@ -28,7 +28,7 @@ enum class SendResult : std::uint8_t {
   sent,  // handed to the system, or queued
   full,  // the queue is full: try again later
   down,  // the transport is down, or the peer is not known
-  busy,  // not sent, because another host controls the board through the same interface (CAN)
+  busy,  // not sent, because another host sends to this board on the bus (CAN)
 };
 
 // Why datagrams do not pass although the transport is up (CAN).
@@ -140,7 +140,8 @@ class R4LINK_API Carrier {
     virtual void on_datagram(std::string_view bytes, Peer from) = 0;
     virtual void on_carrier_event(const CarrierEvent& event) = 0;
     // All datagrams that have arrived were passed on. After a delay, a handler knows by it which
-    // state is the newest. After a long burst on a byte stream, it may come late.
+    // state is the newest. After a long burst on a byte stream, it may come only with the next
+    // datagram.
     virtual void on_drained() {}
     // A datagram that another program sent to the board, if the transport can hear it.
     virtual void on_overheard(std::string_view bytes) { static_cast<void>(bytes); }
@@ -163,8 +164,8 @@ class R4LINK_API Carrier {
   virtual void close() noexcept = 0;
 
   // Sends one datagram of at most max_datagram (1024) bytes, without a terminator. Never blocks;
-  // copies `bytes` if they must wait. A datagram not written within 100 ms is dropped and counted.
-  // A host sends to its only board: `everyone`.
+  // copies `bytes` if they must wait. A datagram not written within 100 ms is dropped and counted,
+  // unless it is a stop. A host sends to its only board: `everyone`.
   virtual SendResult send(std::string_view bytes, Priority priority, Peer to = everyone) = 0;
 
   // True if the board cannot tell one host from another: on a bus, or through a program that shares

@@ -28,7 +28,8 @@ enum class ErrorKind : int {
 enum class Outcome : std::uint8_t {
   none,       // not about a command
   confirmed,  // by the board's state
-  refused,    // the board refused it and did not execute it: see the Refusal
+  refused,    // the board refused it and did not execute it: see the Refusal; or a transfer failed
+              // on its bus, or the link cannot begin
   timed_out,  // not confirmed by the deadline; the board may have executed it
   cancelled,  // ended by a stop, a newer safe cause, another clock of the board, or the program
   closed,     // ended because the board was closed

@@ -84,7 +84,7 @@ struct FleetEvent {
     link,       // `link` has changed
     transport,  // `transport` is an event of the transport
     arming,     // `disarmed_by` has changed; none: armed
-    restart,    // the board restarted: its settings are lost
+    restart,    // as Board::on_restart(): readings end; after a restart, thresholds of U are 0
     refused,    // the board refused a posted command: `refused`
     // `count` events were dropped before this one, because next_event() was not called in time
     missed,
@@ -261,7 +261,8 @@ struct BridgeOptions {
   // with it pass, as on a radio; stops and questions always do.
   std::vector<Key> keys;
   // A board obeys its own cable unsigned. So by default a bridge to a cable passes nothing unsigned
-  // to a board with a key, and is refused on a network without `keys`. True: any host may drive.
+  // to a board with a key, and is refused on a network without `keys`. True: everyone who reaches
+  // the hosts' side may drive the board. Not together with `keys`.
   bool open = false;
   // How long a served host may be silent before another is served; at least the board's timeout.
   std::chrono::milliseconds timeout{1000};

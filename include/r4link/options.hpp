@@ -44,7 +44,8 @@ struct SessionOptions {
   std::chrono::milliseconds stop_retry{20};
   // How long a stop is repeated after it is confirmed.
   std::chrono::milliseconds stop_linger{200};
-  // Period of Q:ID, for identity and round-trip time; 0: never. Then farewells need identify().
+  // Period of Q:ID; 0: never. Then the round trip and ReceivedState::sampled_error stay unknown,
+  // and on one path identity() too, unless the program calls identify() or sends a group.
   std::chrono::milliseconds identify_interval{1000};
   // The board's key. Each host needs an id of its own: a shared one makes the slower host a replay.
   std::optional<Key> key;

@@ -55,7 +55,8 @@ class R4LINK_API Recording {
   Recording(const Recording&) = delete;
   Recording& operator=(const Recording&) = delete;
 
-  // Writes the buffer and ends the file; waits for the disk. Ignores later datagrams. Idempotent.
+  // Writes the buffer and ends the file; waits for the disk. Ignores later datagrams. Any thread;
+  // idempotent.
   void close();
 
   // Why the recording ended early; empty: no problem. Kind `data`: it continues, but the file was

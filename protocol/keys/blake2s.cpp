@@ -9,7 +9,7 @@ namespace {
 constexpr std::uint32_t initial[8] = {0x6A09E667, 0xBB67AE85, 0x3C6EF372, 0xA54FF53A,
                                       0x510E527F, 0x9B05688C, 0x1F83D9AB, 0x5BE0CD19};
 
-// The position of each message word, in each round (RFC 7693, 2.7).
+// The message word for each position, in each round (RFC 7693, 2.7).
 constexpr int rounds = 10;
 constexpr std::uint8_t schedule[rounds][16] = {
     {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15},

@@ -15,7 +15,7 @@ class AnswerBudget {
 
   bool take(std::uint32_t now_ms) {
     std::uint32_t debt_ms = whole_ms_ - now_ms;
-    if (debt_ms > burst * spacing_ms) debt_ms = 0;  // full for a while
+    if (debt_ms > burst * spacing_ms) debt_ms = 0;  // the budget has long been full
     if (debt_ms + spacing_ms > burst * spacing_ms) return false;
     whole_ms_ = now_ms + debt_ms + spacing_ms;
     return true;

@@ -213,7 +213,8 @@ void BoardLink::executed(std::uint32_t pnum) {
 
 // --- the board's own heartbeats
 
-// True while the host has not echoed the newest heartbeat, which may have been lost.
+// True while a host with a session id has not echoed the newest heartbeat. A lost heartbeat must
+// not make the host's echoes stale.
 bool BoardLink::lacks_echo() const {
   return has_owner() && host_.sid != no_session && newer(last_sent_ms_, newest_echo_ms_);
 }

@@ -117,10 +117,11 @@ class BoardLink {
   std::uint32_t fed_ms() const { return fed_ms_; }
   // When the link is lost if the host stays silent. Valid only while ACTIVE.
   std::uint32_t deadline_ms() const { return fed_ms_ + timing_.timeout_ms; }
-  // The number of the heartbeat that began this host's session. A refusal reports it: later
-  // commands are remembered. False for another host, or if its heartbeats have no numbers.
+  // The number of the heartbeat that began this host's session. A refusal reports it, so that the
+  // host knows that the board remembers all later commands. False for another host, or if its
+  // heartbeats have no numbers.
   bool first_heartbeat(HostId host, std::uint32_t& pnum) const;
-  // The last command executed in this session (the CMD field); 0 before the first.
+  // The number of the last command executed in this session (CMD); 0 before the first.
   std::uint32_t last_executed() const { return last_executed_; }
 
   static constexpr std::uint32_t echo_retry_ms = 100;

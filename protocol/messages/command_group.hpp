@@ -24,7 +24,7 @@ class GroupRules {
   static constexpr std::size_t kinds =
       static_cast<std::size_t>(__builtin_popcount(kinds_that_move(CommandEffect::output)));
   static_assert(kinds_that_move(CommandEffect::output) == (1U << kinds) - 1,
-                "those that join groups come first");
+                "the kinds that join groups come first");
 
   int count_ = 0;
   std::uint16_t taken_[kinds] = {};  // bit n-1: channel n

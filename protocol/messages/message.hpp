@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Heartbeats, refusals and identification. r4link/messages/message.hpp reads the last two.
+// Writes heartbeats, refusals and identification. r4link/messages/message.hpp reads them.
 #pragma once
 
 #include <cstdint>

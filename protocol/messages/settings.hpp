@@ -22,7 +22,7 @@ struct Settings {
   std::uint16_t timeout_ms = row_of(Setting::timeout).standard;
   Recovery recovery = Recovery::last;
   bool pack = row_of(Setting::pack).standard != 0;
-  I2cPoll polls[i2c_slots];  // set when a session begins
+  I2cPoll polls[i2c_slots];  // the readings that start when a session begins
   UartMode uarts[uart_channels];
   SiteSettings site;
 

@@ -230,7 +230,7 @@ void write_field(DatagramWriter& writer, StateField field, const State& state) {
 namespace {
 
 // A state before a datagram is read into it. Few datagrams carry the members from `rare_place` on,
-// half of the state, so they are copied only before their first change.
+// most of the state, so they are copied only before their first change.
 class Before {
  public:
   explicit Before(State& state) : state_(state) { std::memcpy(common_, bytes(), rare_place); }

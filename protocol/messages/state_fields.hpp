@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state as fields of a datagram (paper section 4.1). Reading: r4link/messages/message.hpp.
+// The state as fields of a datagram (paper section 4.1). Reading: read_state() of r4link/state.hpp.
 #pragma once
 
 #include "r4link/datagram.hpp"

@@ -137,7 +137,7 @@ Text BootReport::keys(char (&out)[max_line]) const {
   return line.done();
 }
 
-// Empty if the session never had more than one path.
+// Empty if no session since boot had more than one path.
 Text BootReport::paths(char (&out)[max_line]) const {
   const SessionPaths& paths = *sources_.paths;
   if (paths.joins() == 0) return Text();

@@ -10,7 +10,8 @@ namespace {
 
 firmware::BoardHardware::Config hardware_config() {
   firmware::BoardHardware::Config config;
-  config.ultrasonic_fitted = (1U << ultrasonic_channels) - 1;  // a missing sensor reads nothing
+  // A missing sensor is blind: with a threshold it counts as an obstacle.
+  config.ultrasonic_fitted = (1U << ultrasonic_channels) - 1;
   config.step_tick_hz = static_cast<std::int32_t>(step_tick_hz);
   return config;
 }

@@ -21,7 +21,7 @@ namespace giga {
 
 class Sketch {
  public:
-  void begin();  // first in setup(); takes about 0.5 s, then all outputs are off
+  void begin();  // first in setup(); returns after about 0.5 s, with all outputs off
   // Call in loop(). One turn of the board, then rests until there is work, at most 2 ms.
   void poll();
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a SimulatedRobot shares with the board of its URL, which runs on another thread.
+// The state that a SimulatedRobot shares with the board of its URL, which runs on another thread.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -13,7 +13,8 @@
 //     2   i2c held              a chip holds the bus, until free
 //     2   userbus held          a user's device holds SDA, until free; cut: for nine clocks;
 //                               stretched: it holds SCL
-//     2   device ina219 off     the user's device does not answer, until on; reset: as for a chip
+//     2   device ina219 off     the user's device (mpu6050, ina219, icm20948, bno055, vl53l0x,
+//                               as5600) does not answer, until on; reset: as for a chip
 //     2   uart 1 noise          the peer of that user's UART: gnss, lidar, loop (TX joined to RX),
 //                               noise, off
 //     2   gpio 3 low            that spare input is pulled down, until high
@@ -73,7 +74,8 @@ class Script {
   static Script parse(std::string_view text, const std::string& name);
   // Throws Error{usage} if the file cannot be read, Error{data} if it is longer than 1 MB.
   static Script load(const std::string& path);
-  // A step for now, from a line without its time. Throws Error{data} as "NAME: reason; fix".
+  // A step that is due at once, from a line without a time. Empty for an empty line or a
+  // comment. Throws Error{data} as "NAME: reason; fix".
   static std::optional<ScriptStep> parse_now(std::string_view text, const std::string& name);
 
   const std::vector<ScriptStep>& steps() const { return steps_; }  // in order of time

@@ -72,6 +72,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   // Outputs off, carriers closed.
   void stop() noexcept;
 
+  // Does everything that is due; returns the milliseconds until the next call.
   std::uint32_t poll();
 
   // A step happens now, as if in the script. Only between start() and stop(), and not in an event.

@@ -66,7 +66,9 @@ class CanSurvey {
 
   R4LINK_API void on_frame(const CanFrame& frame, std::uint32_t at_us);
 
-  // True if frames with this id make R4 datagrams. False: another protocol uses it.
+  // True for the emergency stop, for a command id that has carried R4 datagrams, and for the other
+  // ids of a node whose board has sent R4 datagrams. Otherwise the id is not R4's, or has carried
+  // no R4 datagram yet.
   R4LINK_API bool is_r4(std::uint32_t id) const;
   const HeardNode& board(std::uint8_t node) const { return boards_[node % can_nodes]; }
   const std::map<std::uint32_t, CanTraffic>& traffic() const { return traffic_; }

@@ -55,6 +55,7 @@ struct LoopOptions {
   // Names of the state fields that each step needs, "ENC1,AINSTEER". Request them from the board
   // with SessionOptions::fields or Board::fields().
   std::string fields = {};
+  // Longest age of the newest state with these fields.
   std::chrono::milliseconds late{100};
   // Time limit for the first state.
   std::chrono::milliseconds first{1000};
@@ -134,8 +135,9 @@ struct LoopReport {
 };
 
 // Runs the loop on this thread until it ends. The step returns setpoints to post, or nothing to end
-// it. Sets the board's recovery to `rearm`: outputs do not come back after a lost link without a
-// loop. Throws what the step throws, after the outputs are at rest, and Error.
+// it. Sets the board's recovery to `rearm`, so that outputs do not come back after a lost link when
+// no loop runs. Throws what the step throws, after the outputs are at rest. Throws Error{usage} for
+// wrong options (also an empty `rest`), and as Board does if it does not answer.
 R4LINK_API LoopReport
 run_loop(Board& board, const LoopOptions& options,
          const std::function<std::optional<Setpoints>(const LoopStep&)>& step);

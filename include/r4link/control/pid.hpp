@@ -34,7 +34,8 @@ struct PidOptions {
 
 class R4LINK_API Pid {
  public:
-  // Throws Error{usage} for NaN, minimum >= maximum, a rate not above 0, and a negative filter.
+  // Throws Error{usage} for a gain, limit or filter that is not finite, for minimum >= maximum, for
+  // a rate that is not above 0, and for a negative filter.
   explicit Pid(const PidOptions& options);
 
   // The output, `dt_s` seconds after the last step; unchanged if dt_s is not above 0. Throws

@@ -66,7 +66,8 @@ class R4LINK_API SteeringSensor {
     // A voltage farther beyond the ends means an unplugged cable or a broken sensor.
     double margin_volts = 0.3;
   };
-  // Throws Error{usage} unless the voltages differ and left_rad is above right_rad.
+  // Throws Error{usage} unless the voltages differ by more than 0.01 V, left_rad is above
+  // right_rad, and margin_volts is not negative.
   explicit SteeringSensor(const Calibration& calibration);
 
   // Empty if the voltage is not possible: then do not steer by it, and do not drive.

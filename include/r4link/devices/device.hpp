@@ -39,13 +39,14 @@ class R4LINK_API Device {
   // description lacks, and for too few slots.
   Device(DeviceDescription description, int address, int first_slot = 1);
   // "NAME[@ADDRESS[:SLOT]]", with NAME as for DeviceDescription::load(): "bno055", "bno055@0x28:3",
-  // "./mine.device@64". Defaults: the usual address, and `first_slot`. Throws Error as load() does.
+  // "./mine.device@64". Defaults: the usual address, and `first_slot`. Throws Error as load() and
+  // the constructor do, and usage for an address or a slot that is not a number.
   static Device from(std::string_view text, int first_slot = 1);
   // From the place and description in a recording: "bno055@0x28:1". Throws Error as
   // DeviceDescription::parse() and the constructor.
   static Device parse(std::string_view place, std::string_view description);
-  // Several devices in successive slots, except those with a slot in their text. Throws
-  // Error{usage} if two devices share a slot.
+  // Several devices in successive slots, except those with a slot in their text. Throws as from()
+  // of one text, and Error{usage} if two devices share a slot or an address.
   static std::vector<Device> from(const std::vector<std::string>& texts);
 
   const DeviceDescription& description() const { return description_; }

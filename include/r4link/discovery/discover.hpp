@@ -97,8 +97,9 @@ struct Discovery {
   std::vector<SearchedNetwork> networks;
   bool more = false;  // more than `most_answers` boards have answered by UDP
 
-  // The only board; several URLs with one board id are one board, the first URL. Throws Error: open
-  // if there is no board, with what was searched; usage with the URLs of several.
+  // The only board. A board found once by each of several transports, with one board id, is one
+  // board: its first URL. Throws Error: open if there is no board, with the places searched; usage
+  // if there are several boards, with their URLs.
   R4LINK_API FoundBoard only() const;
 };
 

@@ -43,6 +43,8 @@ R4LINK_API void write_device(std::string& out, const RecordedDevice& device);
 // Bytes beyond max_record_bytes are left out. Times are limited to the years 1970 to 9999.
 R4LINK_API void write_record(std::string& out, const Record& record);
 
+// --- reading
+
 enum class LineKind : std::uint8_t {
   damaged,  // not a line of a recording: `problem` says why
   record,
@@ -65,6 +67,8 @@ struct RecordLine {
 
 // Reads a line without its end. False if it is damaged.
 R4LINK_API bool read_record_line(std::string_view line, RecordLine& out);
+
+// --- bytes and times, as a line has them
 
 // Appends bytes; a backslash, and a byte that is not printable ASCII, as \xNN.
 R4LINK_API void append_escaped(std::string& out, std::string_view bytes);

@@ -33,14 +33,15 @@ class RecordingVisitor {
   virtual void on_record(const Record& record) = 0;
   // Reading continues after the damage.
   virtual void on_damage(const RecordingDamage& damage) = 0;
-  // Comes before the first record of that path, and again when its name is known. After a new
-  // header a path number may mean another path.
+  // Usually comes before the first record of that path; a damaged or foreign file may lack it.
+  // Comes again when the path's name is known. After a new header a path number may mean another
+  // path.
   virtual void on_path(const RecordedPath& path) { static_cast<void>(path); }
   // The device at that place of that path from now on, until a header. Device::parse() reads it.
   virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
   // A recording begins or continues here: one file may hold several.
   virtual void on_header() {}
-  // Any # line; those of headers and devices follow on_header() and on_device().
+  // Any # line except path lines; those of headers and devices follow on_header() and on_device().
   virtual void on_comment(std::string_view line) { static_cast<void>(line); }
 };
 

@@ -21,7 +21,6 @@ enum class CommandKind : std::uint8_t {
 #define R4_COMMAND(kind, ...) kind,
 #include "board.def"
 };
-constexpr std::size_t command_kinds = static_cast<std::size_t>(CommandKind::watch) + 1;
 
 enum class CommandEffect : std::uint8_t {
   none,
@@ -53,7 +52,6 @@ enum class CommandValue : std::uint8_t {
 #include "board.def"
   end
 };
-constexpr std::size_t command_values = static_cast<std::size_t>(CommandValue::end);
 
 struct ValueRow {
   constexpr ValueRow(CommandValue of, ValueRole in, std::int32_t least, std::int32_t most)
@@ -121,6 +119,7 @@ constexpr CommandRow command_rows[] = {
 #undef R4_VALUES
 }  // namespace short_names
 using short_names::command_rows;
+constexpr std::size_t command_kinds = sizeof command_rows / sizeof *command_rows;
 constexpr const CommandRow& row_of(CommandKind kind) {
   return command_rows[static_cast<std::size_t>(kind)];
 }

@@ -17,7 +17,6 @@ enum class Setting : std::uint8_t {
 #define R4_SETTING(setting, ...) setting,
 #include "board.def"
 };
-constexpr std::size_t setting_kinds = static_cast<std::size_t>(Setting::key) + 1;
 
 struct SettingRow {
   Text key;  // if there are several keys, the first

@@ -53,7 +53,8 @@ class CanNode {
   // or if it is empty or too long.
   bool begin(Text datagram, std::uint32_t now_us);
 
-  // Writes the frame to send, the same until frame_sent() or a more urgent one; false if none.
+  // Writes the most urgent frame to send: the same until frame_sent() or a more urgent one. False
+  // if none.
   bool offer(std::uint32_t now_us, CanFrame& frame);
   // As offer(), but only frames that may overtake all accepted ones: flow control, for which the
   // other end waits, and the reason for going safe.

@@ -10,7 +10,8 @@
 // Both ends are driven frame by frame and own no clock, no heap and no bus:
 //     on_frame(frame, now)   a frame arrived; frames of other ids are ignored
 //     offer(now, frame)      true if there is a frame to send; the same one is offered until …
-//     frame_sent(now)        … the bus, or the queue before it, has accepted it; else no effect
+//     frame_sent(now)        … the bus, or the queue before it, has accepted it; no effect
+//                            without an offered frame
 //     deadline()             when to call poll() and offer() again, so that a loop needs one timer
 //     poll(now)              ends a timed-out transfer; so do on_frame(), and offer() for its frame
 // Call frame_sent() before handing in later arrivals. A full queue costs time, but never a frame

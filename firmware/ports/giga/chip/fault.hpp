@@ -2,6 +2,7 @@
 // After a fault the board switches every output off, stores a note and resets.
 //     bus, memory or usage fault, hard fault          -> Kind::fault, where and why
 //     the core gives up (mbed error, failed assert)   -> Kind::fault, its status
+//     the core warns (mbed warning)                   -> nothing
 //     a stack of the interrupts is full               -> Kind::stack
 //     duties do not check in (the guard starves)      -> Kind::watchdog
 //     the timer interrupt stops                       -> the watchdog's reset, seen in RCC_RSR

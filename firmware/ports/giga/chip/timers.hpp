@@ -28,7 +28,7 @@ class StepTick {  // called in the 40 kHz interrupt
 };
 
 void start_step_timer(StepTick& tick);
-// Then the guard feeds the watchdog.
+// After this call the guard decides when the watchdog is fed.
 void start_guard_timer(firmware::Guard& guard);
 
 // For a received E:STOP: the guard makes the outputs safe at once. From any interrupt or thread,

@@ -8,7 +8,7 @@
 //
 // Joining takes up to 7 s. Without WiFi firmware in the flash the library spins for ever, so the
 // thread has the lowest priority. The library's status may be wrong for long, so the network is
-// also rejoined after hosts have been silent for quiet_ms.
+// also rejoined when hosts that were heard have been silent for quiet_ms.
 #pragma once
 
 #include <atomic>

@@ -50,7 +50,8 @@ class UdpLink {
   void set_up(bool up) { up_.store(up, std::memory_order_release); }
 
   bool up() const { return up_.load(std::memory_order_acquire); }
-  std::uint32_t lost() const { return lost_.load(std::memory_order_relaxed); }  // received
+  // Received datagrams for which the ring had no room.
+  std::uint32_t lost() const { return lost_.load(std::memory_order_relaxed); }
 
  private:
   friend class UdpPort;
