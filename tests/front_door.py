@@ -80,7 +80,7 @@ def yaml_faults(root):
 
 
 def tool_faults(root):
-    pages = ('README.md', 'CONTRIBUTING.md', 'docs/contributing.md', 'docs/packages.md', '.github/workflows/ci.yml',
+    pages = ('README.md', 'CONTRIBUTING.md', 'docs/design/contributing.md', 'docs/how-to/packages.md', '.github/workflows/ci.yml',
              '.github/workflows/release.yml')
     for page in pages:
         for tool, options in TOOL.findall((root / page).read_text()):

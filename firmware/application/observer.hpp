@@ -12,7 +12,7 @@
 namespace r4 {
 namespace firmware {
 
-// The states of a board as docs/safety.md names them.
+// The states of a board as docs/reference/safety.md names them.
 enum class BoardState : std::uint8_t { connecting, active, safe };
 
 const char* to_text(BoardState state);

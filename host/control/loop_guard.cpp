@@ -24,7 +24,7 @@ FieldSet fields_of(std::string_view names) {
     const StateField field = state_field(name);
     if (field == StateField::count) {
       throw wrong("there is no state field " + std::string(name),
-                  "give names of docs/protocol.md, ENC1 say, with commas between them");
+                  "give names of docs/reference/protocol.md, ENC1 say, with commas between them");
     }
     fields.add(field);
     names.remove_prefix(std::min(names.size(), name.size() + 1));

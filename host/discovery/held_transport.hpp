@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Watches a board through another program of this computer that holds the transport. Sends nothing
-// to the board (docs/sharing.md).
+// to the board (docs/how-to/sharing.md).
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -48,7 +48,7 @@ PathSet Outbox::send(DatagramWriter& writer, CommandKind kind, std::uint32_t pnu
   return over;
 }
 
-// Each path has its own signature, which proves that path (docs/protocol.md, "Paths"). A watcher's
+// Each path has its own signature, which proves that path (docs/reference/protocol.md, "Paths"). A watcher's
 // datagrams need no signature. False if the datagram would be too long.
 bool Outbox::send_over(std::size_t path, DatagramWriter& writer, CommandKind kind,
                        std::uint32_t pnum, Priority priority, Time now) {

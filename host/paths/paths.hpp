@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decides over which paths a session sends, and which datagrams it admits (docs/redundancy.md). A
+// Decides over which paths a session sends, and which datagrams it admits (docs/how-to/redundancy.md). A
 // part of a session, without I/O. Among the other parts only LinkKeeper uses the number of paths,
 // to send a lease over each.
 //

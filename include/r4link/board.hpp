@@ -108,7 +108,7 @@ class R4LINK_API Board {
   // Opens the transport and starts the link; returns without waiting for the board. Throws Error.
   explicit Board(std::string_view url, BoardOptions options = {}, BoardCallbacks callbacks = {});
   // Over one to four paths to the same board: {"serial:auto", "udp://192.168.0.125"}
-  // (docs/redundancy.md). In one text, '+' joins them. Throws Error{usage} also for a duplicate,
+  // (docs/how-to/redundancy.md). In one text, '+' joins them. Throws Error{usage} also for a duplicate,
   // and for sim: and replay:, which are boards of their own. If a path cannot be opened, on_event
   // reports why, and it is tried again every second. Throws if no path can be opened.
   explicit Board(const std::vector<std::string>& urls, BoardOptions options = {},
@@ -278,7 +278,7 @@ class R4LINK_API Board {
     int channel_;
   };
 
-  // The devices on the user's I2C bus (docs/devices.md): 7-bit addresses, at most 32 bytes each
+  // The devices on the user's I2C bus (docs/how-to/devices.md): 7-bit addresses, at most 32 bytes each
   // way. Calls return when the device has answered. Error{refused}: no answer.
   class I2c {
    public:
@@ -305,7 +305,7 @@ class R4LINK_API Board {
     Board& board_;
   };
   I2c i2c() { return I2c(*this); }
-  // Sets up a described device (devices/device.hpp, docs/described-devices.md): checks its
+  // Sets up a described device (devices/device.hpp, docs/how-to/described-devices.md): checks its
   // identity, writes its registers, which needs arm(), and starts the board's readings, until our
   // session ends. Adds their fields to those of fields(). Call it again after on_restart() and a
   // lost link. `timeout` is for each step. Throws Error{refused} if the device does not answer or
@@ -313,7 +313,7 @@ class R4LINK_API Board {
   // name has one of its slots: i2c().poll_off() of that slot frees it.
   void attach(const Device& device, Duration timeout = default_timeout);
 
-  // One of the user's UARTs, 1 or 2 (docs/devices.md): setting("uart1", "115200:8N1") turns it on,
+  // One of the user's UARTs, 1 or 2 (docs/how-to/devices.md): setting("uart1", "115200:8N1") turns it on,
   // fields("DEFAULT,UART1") requests its bytes. They are put together here from the states: in
   // order, each byte once. Missing bytes are counted.
   struct UartData {
@@ -392,7 +392,7 @@ class R4LINK_API Board {
   // A posted command was refused by the board, or not sent.
   Subscription on_refused(std::function<void(const RefusedPost&)> callback);
 
-  // Records every datagram in both directions to a file (recording.hpp, docs/recordings.md), or to
+  // Records every datagram in both directions to a file (recording.hpp, docs/how-to/recordings.md), or to
   // a recording that other boards share. It lasts until close(), until the recording is closed or
   // destroyed, or until another one is named. If it ends by itself because the disk is full,
   // on_event() reports it, and the link continues. Throws Error if the file cannot be written.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every command of the board, typed and checked (paper section 4.2; docs/protocol.md).
+// Every command of the board, typed and checked (paper section 4.2; docs/reference/protocol.md).
 #pragma once
 
 #include <cstdint>
@@ -107,7 +107,7 @@ struct R4LINK_API Command {
   // The board streams its states to the sender for two seconds, without control; 0 Hz ends that.
   // `list`: the fields; empty: those that the controlling host has chosen.
   static Command watch(std::int32_t rate_hz, Text list = Text());
-  // On the user's I2C bus (docs/devices.md): 7-bit addresses; bytes as x and two hexadecimal digits
+  // On the user's I2C bus (docs/how-to/devices.md): 7-bit addresses; bytes as x and two hexadecimal digits
   // each, "x75", and "x" for none. The answer comes as I2CX in the state.
   static Command i2c_read(int address, Text register_bytes, int count);
   static Command i2c_write(int address, Text bytes, int count = 0);  // then reads `count` bytes
@@ -122,7 +122,7 @@ struct R4LINK_API Command {
 };
 
 // The most commands in one datagram. Several are a group: output commands for different channels,
-// which are executed together or not at all (docs/protocol.md; setpoints.hpp).
+// which are executed together or not at all (docs/reference/protocol.md; setpoints.hpp).
 constexpr int max_group = 16;
 
 // Checks the ranges of a command that a factory has made: Refusal::format, ::channel or ::range if

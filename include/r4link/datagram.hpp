@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A datagram as it is on the wire, checked and read in place (paper section 4; docs/protocol.md).
+// A datagram as it is on the wire, checked and read in place (paper section 4; docs/reference/protocol.md).
 //
 //     datagram = 1*field "^0x" 1*8HEXDIG "^" [CR] [LF]
 //     field    = name ":" value *("," value) ";"
@@ -19,7 +19,7 @@
 
 namespace r4 {
 
-// The longest datagram in bytes, without the terminator (docs/protocol.md).
+// The longest datagram in bytes, without the terminator (docs/reference/protocol.md).
 constexpr std::size_t max_datagram = 1024;
 
 enum class ReadError : std::uint8_t {

@@ -15,7 +15,7 @@
 
 namespace r4 {
 
-// The value is the exit code of `r4` (docs/transports.md).
+// The value is the exit code of `r4` (docs/reference/transports.md).
 enum class ErrorKind : int {
   data = 1,         // an invalid datagram, recording or file
   usage = 2,        // a wrong URL, option or command

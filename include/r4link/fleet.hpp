@@ -10,7 +10,7 @@
 //     fleet.stop();                                // all of them, at once
 //
 // Boards count from 0, in the order of the URLs. A pattern stands for its boards in order
-// (docs/fleet.md). '+' joins the paths to one board: "can://can0?node=0-7+can://can1?node=0-7". All
+// (docs/how-to/fleet.md). '+' joins the paths to one board: "can://can0?node=0-7+can://can1?node=0-7". All
 // links live on one thread and one loop; boards on one CAN bus share a socket. A silent board does
 // not disturb another. ReceivedState::sampled is comparable across boards.
 //
@@ -219,7 +219,7 @@ class R4LINK_API FleetBoard {
   std::size_t board_;
 };
 
-// --- two transports joined: a gateway to a board (docs/bridge.md)
+// --- two transports joined: a gateway to a board (docs/how-to/bridge.md)
 
 enum class BridgeSide : std::uint8_t { hosts, board };
 
@@ -230,7 +230,7 @@ struct BridgeCounters {
   // Dropped:
   std::uint64_t damaged = 0;      // a wrong checksum, too long, or not a datagram
   std::uint64_t misdirected = 0;  // only a board sends it but a host did, or the reverse
-  std::uint64_t kept_out = 0;     // from hosts that are not served: docs/bridge.md
+  std::uint64_t kept_out = 0;     // from hosts that are not served: docs/how-to/bridge.md
   std::uint64_t refused =
       0;                   // an unsigned command that must be signed, or a setting for a cable only
   std::uint64_t late = 0;  // the bridge was held up: may have waited for more than 100 ms
@@ -280,7 +280,7 @@ struct BridgeOptions {
 class R4LINK_API Bridge {
  public:
   // `hosts`: the URL to listen on, as for r4 sim; `board`: the board's URL. Patterns of equal size
-  // (docs/fleet.md) are paired in order. Throws Error: usage, permission, and as the transports do.
+  // (docs/how-to/fleet.md) are paired in order. Throws Error: usage, permission, and as the transports do.
   Bridge(std::string_view hosts, std::string_view board, BridgeOptions options = {});
   ~Bridge();
   Bridge(const Bridge&) = delete;

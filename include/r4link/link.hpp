@@ -86,7 +86,7 @@ class LinkCauses {
   std::uint32_t bits_ = 0;
 };
 
-// The state of one path (docs/redundancy.md). A board's only path is never asking or other_board.
+// The state of one path (docs/how-to/redundancy.md). A board's only path is never asking or other_board.
 enum class PathState : std::uint8_t {
   down,         // the transport is down, or could not be opened yet
   asking,       // the transport is up, and the board's identity is not known yet

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Recording: a file with every datagram of one or several boards (docs/recordings.md).
+// r4::Recording: a file with every datagram of one or several boards (docs/how-to/recordings.md).
 //
 //     r4::Board board("udp://192.168.0.125");
 //     board.record("drive.r4log");
@@ -42,7 +42,7 @@ struct RecordingOptions {
 };
 
 // Reads a recording, compressed or not, in constant memory; blocks until its end. "-" is the
-// standard input. Throws Error: open, permission, data. Example: docs/recordings.md.
+// standard input. Throws Error: open, permission, data. Example: docs/how-to/recordings.md.
 R4LINK_API void read_recording(const std::string& path, RecordingVisitor& visitor);
 
 class R4LINK_API Recording {

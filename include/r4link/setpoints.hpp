@@ -5,7 +5,7 @@
 //                 r4::Command::servo(3, r4::Microseconds(1500))});
 //
 // The effect is that of the commands one after the other, in the order of add(), with nothing in
-// between: closing relay 1 after a motor's command cancels that command (docs/safety.md).
+// between: closing relay 1 after a motor's command cancels that command (docs/reference/safety.md).
 #pragma once
 
 #include <array>

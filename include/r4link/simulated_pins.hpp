@@ -39,7 +39,7 @@ struct R4LINK_API Pins : ChipPins {
 R4LINK_API bool operator==(const Pins& a, const Pins& b);
 inline bool operator!=(const Pins& a, const Pins& b) { return !(a == b); }
 
-// A robot model in place of the bench vehicle (docs/simulation.md): its motors and sensors.
+// A robot model in place of the bench vehicle (docs/how-to/simulation.md): its motors and sensors.
 class R4LINK_API RobotModel {
  public:
   struct Senses {

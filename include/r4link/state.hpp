@@ -13,7 +13,7 @@ namespace r4 {
 
 class Datagram;
 
-// In wire order: the paper's ten first; from I2C1 on, devices (docs/devices.md) and faults.
+// In wire order: the paper's ten first; from I2C1 on, devices (docs/how-to/devices.md) and faults.
 enum class StateField : std::uint8_t {
 #define R4_STATE_FIELD(field, ...) field,
 #include "tables/board.def"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the board has, and small types of commands, states and the link: channel counts and ranges
-// (paper section 2; table in docs/protocol.md), reasons, troubles and refusals.
+// (paper section 2; table in docs/reference/protocol.md), reasons, troubles and refusals.
 #pragma once
 
 #include <cstdint>
@@ -99,7 +99,7 @@ struct ChipFault {
 // The chip at an address (paper, Figure 3): "PCA9685 0x40 (OSMC)"; or "unknown chip".
 R4LINK_API const char* chip_name(std::uint8_t address);
 
-// --- devices on the user's I2C bus (docs/devices.md)
+// --- devices on the user's I2C bus (docs/how-to/devices.md)
 
 constexpr int i2c_slots = 8;       // readings that the board repeats by itself
 constexpr int i2c_max_bytes = 32;  // each way, of one transfer
@@ -150,7 +150,7 @@ struct I2cBusReport {
   std::uint32_t recoveries = 0;          // how often the bus was clocked free
 };
 
-// --- the user's UARTs, DAC and spare inputs (docs/devices.md)
+// --- the user's UARTs, DAC and spare inputs (docs/how-to/devices.md)
 
 constexpr int uart_channels = 2;
 constexpr int uart_max_write = 48;  // in one command
@@ -177,7 +177,7 @@ using SessionId = std::uint64_t;
 // For watchers, hosts of the paper, and datagrams for everyone.
 constexpr SessionId no_session = 0;
 
-// Why a board refuses a command: the code in `N:<PNum>,<code>` (docs/protocol.md).
+// Why a board refuses a command: the code in `N:<PNum>,<code>` (docs/reference/protocol.md).
 enum class Refusal : std::uint8_t {
   none,
   unknown,  // no such command, field or setting
@@ -246,7 +246,7 @@ constexpr Peer everyone = 0;
 
 enum class Priority : std::uint8_t {
   state,  // newest wins: an older waiting state is replaced
-  // W, renewed each second; waits as `normal`; has its own frame on a bus (docs/can.md)
+  // W, renewed each second; waits as `normal`; has its own frame on a bus (docs/how-to/can.md)
   lease,
   normal,  // waits its turn; refused if the queue is full
   stop,    // overtakes all others and is never dropped

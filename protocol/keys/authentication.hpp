@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Proves that a datagram is from a host with the board's key, made just now and not seen before
-// (docs/protocol.md "Authentication"). Only hosts sign.
+// (docs/reference/protocol.md "Authentication"). Only hosts sign.
 // The board sends a nonce in its heartbeats, 64 random bits as `AN:<16 hex digits>;`. The host
 // signs with the last field of its datagrams:
 //     A:<key id>,<counter>,<board T>,<tag>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The host's end of the link: heartbeats, their gate, and the known state of the board (paper
-// section 4.3; docs/protocol.md "The link").
+// section 4.3; docs/reference/protocol.md "The link").
 //
 //     connecting --> active <--> safe        active, safe --> lost --> active, safe, connecting
 //

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The watchers' leases, up to four (docs/protocol.md "Watching").
+// The watchers' leases, up to four (docs/reference/protocol.md "Watching").
 //
 //     free --W:rate that echoes its token--> watching --lease_ms without one, or W:0--> free
 //       |  ^                                   |  ^

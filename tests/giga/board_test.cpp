@@ -475,7 +475,7 @@ TEST(GigaPins, VoltagesAreConvertedWithoutTheCore) {
   }
 }
 
-// --- the wiring, channel by channel, as the table in docs/firmware.md has it
+// --- the wiring, channel by channel, as the table in docs/how-to/firmware.md has it
 
 // What is connected to one channel of each kind.
 struct Wires {

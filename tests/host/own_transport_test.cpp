@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The transport of docs/transports.md, "Writing another", between a Board and a simulated board.
+// The transport of docs/reference/transports.md, "Writing another", between a Board and a simulated board.
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 
@@ -95,7 +95,8 @@ TEST(OwnTransport, IsShownInTheDocumentationAsItIsTested) {
   };
   const std::string code = text_of("docs/examples/own_transport/socket_carrier.hpp");
   ASSERT_FALSE(code.empty());
-  EXPECT_NE(text_of("docs/transports.md").find("```cpp\n" + code + "```\n"), std::string::npos);
+  EXPECT_NE(text_of("docs/reference/transports.md").find("```cpp\n" + code + "```\n"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drives the winch of docs/contributing.md on the simulated board: add_an_output.py compiles this with
+// Drives the winch of docs/design/contributing.md on the simulated board: add_an_output.py compiles this with
 // the edit of that page. Prints what is wrong.
 #include <cstdio>
 #include <fstream>
@@ -121,13 +121,13 @@ void check_board() {
   expect(host.refusal.find(",SAFE;") != std::string::npos, "the safe state: " + host.refusal);
 }
 
-// `protocol`: the text of docs/protocol.md.
+// `protocol`: the text of docs/reference/protocol.md.
 void check_words(const std::string& protocol) {
   const CommandHelp& help = command_help(CommandKind::winch);
   expect(help.form == "L:pwm,dir,ch", "the help: " + help.form);
   const std::string row =
       "| `" + help.form + "` | " + std::string(help.meaning) + " | " + help.ranges;
-  expect(protocol.find(row) != std::string::npos, "docs/protocol.md has no " + row);
+  expect(protocol.find(row) != std::string::npos, "docs/reference/protocol.md has no " + row);
   const OwnCommand command = parse_command_text("L:4095,1,2");
   expect(describe(command) == "winch 2 forward, duty 1", "the description");
   expect(shown_by(CommandKind::winch) == FieldKind::winch, "the field that shows it");

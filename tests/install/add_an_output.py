@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Adds the output of docs/contributing.md to a copy of the tree and drives it. Usage: add_an_output.py TREE CXX"""
+"""Adds the output of docs/design/contributing.md to a copy of the tree and drives it. Usage: add_an_output.py TREE CXX"""
 import pathlib
 import re
 import shutil
@@ -36,20 +36,20 @@ def main():
         for top in COPIED:
             shutil.copytree(tree / top, scratch / top)
         touched = set()
-        for path, old, new in edits((tree / 'docs/contributing.md').read_text('utf-8')):
+        for path, old, new in edits((tree / 'docs/design/contributing.md').read_text('utf-8')):
             text = (scratch / path).read_text('utf-8')
             if text.count(old) != 1:
-                sys.exit(f'docs/contributing.md: {path} does not have once:\n{old}')
+                sys.exit(f'docs/design/contributing.md: {path} does not have once:\n{old}')
             (scratch / path).write_text(text.replace(old, new), 'utf-8')
             touched.add(path)
         print('\n'.join(sorted(touched)))
         if not 0 < len(touched) <= MOST_FILES:
-            sys.exit(f'docs/contributing.md: the output takes {len(touched)} files, {MOST_FILES} at most')
+            sys.exit(f'docs/design/contributing.md: the output takes {len(touched)} files, {MOST_FILES} at most')
         flags = [compiler, '-O0', '-std=c++20', '-Wall', '-Wextra', '-Werror', f'-I{scratch}', f'-I{scratch}/include']
         sources = sorted(path for pattern in PORTABLE + HOST for path in scratch.glob(pattern))
         program = scratch / 'add_an_output'
         subprocess.run([*flags, '-o', program, tree / 'tests/install/add_an_output.cpp', *sources, '-lfmt'], check=True)
-        subprocess.run([program, scratch / 'docs/protocol.md'], check=True)
+        subprocess.run([program, scratch / 'docs/reference/protocol.md'], check=True)
 
 
 if __name__ == '__main__':

@@ -132,7 +132,7 @@ program_of() {
 
 # The programs in README.md and in the quick start drive a simulated robot, whose motors have supply only
 # while relay 1 is closed.
-for page in README.md docs/quick-start.md; do
+for page in README.md docs/start/quick-start.md; do
   rm -f "$work/board"
   mkfifo "$work/board"
   "$build_tree/r4" sim --json --duration 30 udp://127.0.0.1:0 >"$work/board" &
@@ -156,24 +156,24 @@ for page in README.md docs/quick-start.md; do
   echo "install: $page drives a motor"
 done
 
-program_of "$source_tree/docs/simulation.md" >simulation.cpp
+program_of "$source_tree/docs/how-to/simulation.md" >simulation.cpp
 "$cxx" -std=c++20 -O1 simulation.cpp "${flags[@]}" -o simulation
 ./simulation || {
-  echo 'install: the program in docs/simulation.md did not see what it says'
+  echo 'install: the program in docs/how-to/simulation.md did not see what it says'
   exit 1
 }
 
-program_of "$source_tree/docs/control.md" >control.cpp
+program_of "$source_tree/docs/how-to/control.md" >control.cpp
 "$cxx" -std=c++20 -O1 control.cpp "${flags[@]}" -o control
 if ! ./control >control.txt || ! grep -q '^0\.[89].* m, 0\.[45].* m/s; the loop has ended: the step' control.txt; then
-  echo "install: the program in docs/control.md does not control a speed: $(cat control.txt)"
+  echo "install: the program in docs/how-to/control.md does not control a speed: $(cat control.txt)"
   exit 1
 fi
 
-program_of "$source_tree/docs/fleet.md" >fleet.cpp
+program_of "$source_tree/docs/how-to/fleet.md" >fleet.cpp
 "$cxx" -std=c++20 -O1 fleet.cpp "${flags[@]}" -o fleet
 if ! ./fleet >fleet.txt || [[ -s fleet.txt ]]; then
-  echo "install: the program in docs/fleet.md did not command its boards: $(cat fleet.txt)"
+  echo "install: the program in docs/how-to/fleet.md did not command its boards: $(cat fleet.txt)"
   exit 1
 fi
 

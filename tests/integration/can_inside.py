@@ -259,7 +259,7 @@ def test_can_fd_carries_a_plain_state_in_three_frames_and_a_packed_one_in_one():
         dump.frames.clear()
         result = send(board.host_url, 'O:358,1,1')
         assert result.returncode == 0, result
-    # Flags, the length behind a zero, and the head of a default state (docs/packed.md, layouts 2 and 3).
+    # Flags, the length behind a zero, and the head of a default state (docs/reference/packed.md, layouts 2 and 3).
     assert any(frame == TELEMETRY and re.match('.00..9', data) for frame, data in dump.frames)
 
 

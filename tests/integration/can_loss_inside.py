@@ -70,7 +70,7 @@ def test_a_confirmed_command_was_executed_exactly_once(loss, count):
         result = run('send', HOST, '--json', '--timeout', '10', *commands, timeout=200)
         log = board.rest()
     told = told_of(objects(result.stdout), commands)
-    # The first frames of commands (docs/packed.md, layout 7), but for the F that the host sends first.
+    # The first frames of commands (docs/reference/packed.md, layout 7), but for the F that the host sends first.
     firsts = [data for _, data in dump.frames if re.match('10..B8', data)]
     begun = sum(first != firsts[0] for first in firsts)
     print(f'{told.count("confirmed")} of {count} confirmed, begun {begun} times')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A second implementation of the packed form, written from docs/packed.md alone.
+"""A second implementation of the packed form, written from docs/reference/packed.md alone.
 
 pack(datagram) -> bytes, or None if it travels plain; unpack(bytes) -> datagram, ValueError if malformed.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A second implementation of authentication, written from docs/protocol.md: Python's hashlib and a socket.
+"""A second implementation of authentication, written from docs/reference/protocol.md: Python's hashlib and a socket.
 
 Nothing of r4 is used here.
 """

@@ -10,7 +10,7 @@ from machine import SANITIZED, within
 from paper_client import PaperClient
 from r4_process import ERROR, Board, Running, again, driving, is_state, lasts, monitor, run, watch
 
-# The board's timeout, and what docs/safety.md promises on top; a busy machine as much again.
+# The board's timeout, and what docs/reference/safety.md promises on top; a busy machine as much again.
 SAFE_WITHIN_S = 1.02 + 0.08
 LASTS_S = 2
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 bus: the table, the JSON, the warning, the exit codes, and the numbers of docs/can.md."""
+"""r4 bus: the table, the JSON, the warning, the exit codes, and the numbers of docs/how-to/can.md."""
 import math
 import os
 import re
@@ -101,7 +101,7 @@ def test_wrong_options_are_told_with_the_fix(arguments, words):
 
 
 def test_the_documentation_shows_what_is_printed():
-    with open(os.path.join(DOCS, 'can.md'), encoding='utf-8') as file:
+    with open(os.path.join(DOCS, 'how-to', 'can.md'), encoding='utf-8') as file:
         text = file.read()
     examples = re.findall(r'^    \$ r4 bus(?! can:)(.*)\n((?:    .*\n|\n(?=    (?!\$)))*)', text, re.MULTILINE)
     assert len(examples) >= 2

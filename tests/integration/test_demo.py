@@ -105,5 +105,5 @@ def test_neither_a_board_nor_a_monitor_at_100_hz_spins():
         took = time.monotonic() - began
         shares = {name: (each.cpu_seconds() - before[name]) / took for name, each in processes.items()}
     print(f'{300 / took:.0f} Hz; of a core', ', '.join(f'{name} {share:.1%}' for name, share in shares.items()))
-    # 0.5 % on an idle machine (docs/benchmarks.md); what a processor is charged with on a busy one is another matter.
+    # 0.5 % on an idle machine (docs/design/benchmarks.md); what a processor is charged with on a busy one is another matter.
     assert SANITIZED or max(shares.values()) <= 0.25

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Described devices: r4 devices, monitor and convert with --device, as docs/described-devices.md shows them."""
+"""Described devices: r4 devices, monitor and convert with --device, as docs/how-to/described-devices.md shows them."""
 import csv
 import time
 

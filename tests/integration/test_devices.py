@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Devices on the user's I2C bus: r4 send and r4 monitor against the simulated board, as docs/devices.md shows them."""
+"""Devices on the user's I2C bus: r4 send and r4 monitor against the simulated board, as docs/how-to/devices.md shows them."""
 
 import pytest
 

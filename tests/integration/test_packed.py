@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The packed form of r4 against a second implementation, written from docs/packed.md alone."""
+"""The packed form of r4 against a second implementation, written from docs/reference/packed.md alone."""
 import os
 import random
 import re
@@ -79,7 +79,7 @@ def may_be_masked(text):
 
 
 def test_the_document_has_the_table_of_the_second_implementation():
-    with open(os.path.join(DATA, '..', '..', 'docs', 'packed.md'), encoding='utf-8') as file:
+    with open(os.path.join(DATA, '..', '..', 'docs', 'reference', 'packed.md'), encoding='utf-8') as file:
         text = file.read()
     for name in packed_form.NAMES:
         assert re.search(rf'\b{re.escape(name)}\b', text) or re.match(r'SERVO|ENC|US|BLDC|I2C', name), name

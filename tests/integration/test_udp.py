@@ -13,7 +13,7 @@ import pytest
 from machine import SANITIZED, within, within_ms
 from r4_process import PATIENCE_S, Board, driving, free_port, is_link, is_state, lasts, monitor, objects, run
 
-# The board's timeout, and what docs/safety.md promises on top.
+# The board's timeout, and what docs/reference/safety.md promises on top.
 SAFE_WITHIN_MS = 1020
 
 

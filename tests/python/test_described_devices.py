@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Described devices (docs/described-devices.md)."""
+"""Described devices (docs/how-to/described-devices.md)."""
 import asyncio
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Devices on the user's I2C bus (docs/devices.md)."""
+"""Devices on the user's I2C bus (docs/how-to/devices.md)."""
 import asyncio
 import itertools
 

@@ -10,7 +10,7 @@ from running import ROOT
 
 SOURCES = sorted(path for path in (ROOT / 'host/python/r4link').glob('*.py*')
                  if path.name not in ('__init__.py', 'py.typed', 'pytest_plugin.py'))
-SECONDS = {'timeout', 'within'}  # in the whole package: docs/python.md
+SECONDS = {'timeout', 'within'}  # in the whole package: docs/how-to/python.md
 UNITS = {'us', 'degrees', 'cm', 'millivolts'}  # their name is their unit
 # What has to follow the name of a number.
 UNIT_OR_RANGE = re.compile(r'\d|FORWARD|\b(seconds?|time\.monotonic|volts?|metres?|m/s|radians?|rad|steps|counts'

@@ -37,7 +37,7 @@ def test_examples_run(example, sim, tmp_path):
     assert 'OSMC 1: 410 forward' in told, told
 
 
-@pytest.mark.parametrize('page', ['README.md', 'docs/control.md', 'docs/fleet.md', 'docs/python.md'])
+@pytest.mark.parametrize('page', ['README.md', 'docs/how-to/control.md', 'docs/how-to/fleet.md', 'docs/how-to/python.md'])
 def test_what_the_documentation_shows_runs(page, tmp_path):
     shown = re.findall(r'^```python\n(.*?)^```', (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
     assert shown

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pytest plugin, by the example of docs/testing.md and tests that fail."""
+"""The pytest plugin, by the example of docs/how-to/testing.md and tests that fail."""
 import os
 import pathlib
 import re

@@ -10,7 +10,7 @@ import pytest
 import r4link
 from r4link import _core
 
-SCENARIO = pathlib.Path(__file__).resolve().parents[2] / 'docs/simulation.md'
+SCENARIO = pathlib.Path(__file__).resolve().parents[2] / 'docs/how-to/simulation.md'
 
 
 def volts(sim, _):

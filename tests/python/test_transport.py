@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transports of a program's own: r4link.Transport and r4link.CanTransport (docs/python.md)."""
+"""Transports of a program's own: r4link.Transport and r4link.CanTransport (docs/how-to/python.md)."""
 import asyncio
 import gc
 import os

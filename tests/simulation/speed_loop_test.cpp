@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A wheel's speed, controlled from a host at 100 Hz over a link that delays and loses, in virtual time: what
-// docs/control.md promises.
+// docs/how-to/control.md promises.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ control::LoopOptions speed_loop_options() {
   return options;
 }
 
-// The loop of docs/control.md, on a session in place of a board.
+// The loop of docs/how-to/control.md, on a session in place of a board.
 class SpeedLoop {
  public:
   enum class By { counts, frequency };

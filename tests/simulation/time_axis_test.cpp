@@ -19,7 +19,7 @@ namespace r4::simulation {
 namespace {
 
 constexpr std::size_t axis_boards = 8;
-constexpr std::uint64_t axis_settled_us = 10'000'000;  // what docs/architecture.md promises
+constexpr std::uint64_t axis_settled_us = 10'000'000;  // what docs/design/architecture.md promises
 
 class SharedBus {
  public:
@@ -31,7 +31,7 @@ class SharedBus {
   };
 
   // One after the other, at 1 Mbit/s: 32 characters to a packed frame, which takes 110 us, and up to half of that until
-  // it is read. With that the load is that of docs/can.md.
+  // it is read. With that the load is that of docs/how-to/can.md.
   void put(std::uint64_t now_us, std::size_t board, bool to_board, std::string_view bytes) {
     const std::uint64_t frames = bytes.size() / 32 + 1;
     free_us_ = std::max(free_us_, now_us) + 110 * frames;

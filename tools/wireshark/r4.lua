@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
 -- R4 for Wireshark: the datagrams of R4 boards and their hosts on UDP, on SocketCAN, and in what r4 convert makes of a
--- recording. docs/wireshark.md tells how to install and use it; docs/protocol.md and can.md tell what is shown.
+-- recording. docs/how-to/wireshark.md tells how to install and use it; docs/reference/protocol.md and can.md tell what is shown.
 
 -- Wireshark may find this file in several places, the personal folder and that of the package: the first one counts.
 if package.loaded.r4_dissector then

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
--- The grammar of a datagram and its checksum (docs/protocol.md, section 1). Pure Lua, 5.2 to 5.4.
+-- The grammar of a datagram and its checksum (docs/reference/protocol.md, section 1). Pure Lua, 5.2 to 5.4.
 
 local floor, byte, find = math.floor, string.byte, string.find
 -- bit32 is gone from Lua 5.3 on, where operators do it, which are no syntax in 5.2.

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
--- ISO-TP (ISO 15765-2) as R4 uses it (docs/can.md): frames of one id are joined to messages, once, when a capture is
+-- ISO-TP (ISO 15765-2) as R4 uses it (docs/how-to/can.md): frames of one id are joined to messages, once, when a capture is
 -- read. What each frame was is kept for when it is shown again.
 
 local M = {}

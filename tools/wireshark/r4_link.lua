@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
 -- What is told of a datagram by those before and behind it: packet numbers that are missing, late or there twice
--- (docs/protocol.md, 4.5), which datagram confirms which command and how long that took, and when outputs became safe.
+-- (docs/reference/protocol.md, 4.5), which datagram confirms which command and how long that took, and when outputs became safe.
 -- It is found out once, when a capture is read; notes(frame) is what there is to say when a frame is shown.
 
 local datagram = require("r4_datagram")

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
--- The packed form, back to a datagram (docs/packed.md). The table of words belongs to its version.
+-- The packed form, back to a datagram (docs/reference/packed.md). The table of words belongs to its version.
 
 local M = {}
 

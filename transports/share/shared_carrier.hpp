@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A transport that a user's programs share (docs/sharing.md). Wraps the carrier of a URL.
+// A transport that a user's programs share (docs/how-to/sharing.md). Wraps the carrier of a URL.
 //
 //     seeking ----a program holds it----> asking ----welcome----> joined
 //      |   ^                                |                       |

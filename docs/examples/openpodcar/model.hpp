@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A model of the vehicle, behind a simulated board (docs/simulation.md, Tests of your own robot): mass, motor, brake,
+// A model of the vehicle, behind a simulated board (docs/how-to/simulation.md, Tests of your own robot): mass, motor, brake,
 // steering actuator with its potentiometer, wheels, encoder, and what the sensor in front sees. Its wheels do not slip.
 #pragma once
 

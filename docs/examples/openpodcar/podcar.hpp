@@ -60,7 +60,7 @@ class Podcar {
   r4::control::Wheel wheel_{podcar_wheel};
   r4::control::SteeringSensor sensor_{podcar_steering};
   r4::control::Odometry odometry_;
-  // 2.5 m/s at full duty, after 0.8 s; docs/control.md, Tuning.
+  // 2.5 m/s at full duty, after 0.8 s; docs/how-to/control.md, Tuning.
   r4::control::Pid speed_{{.kp = 0.9, .ki = 1.1, .feed_forward = 0.16, .rate = 2}};
   // The actuator is an integrator, so proportional is enough.
   r4::control::Pid steering_{{.kp = 30, .rate = 20}};

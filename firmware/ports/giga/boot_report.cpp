@@ -53,7 +53,7 @@ class LineWriter {
 
 Text fate_of_settings(const SettingsStore& store) {
   if (store.state() == StoreState::absent) {
-    return "not kept: no key-value store on QSPI partition 3 (docs/firmware.md)";
+    return "not kept: no key-value store on QSPI partition 3 (docs/how-to/firmware.md)";
   }
   if (store.state() == StoreState::avoided) {
     return "not kept: the key-value store ended the last boot";

@@ -60,7 +60,7 @@ constexpr Pin gpio_pins[gpio_channels] = {{'D', 13}, {'B', 4},  {'B', 8}, {'B', 
                                           {'J', 10}, {'J', 11}, {'H', 6}};  // D6-D13, pulled up
 
 // FDCAN2, alternate function 9. The Giga has no transceiver: wire the SN65HVD230 of the R4 board
-// (paper, section 2) to these pins (docs/can.md).
+// (paper, section 2) to these pins (docs/how-to/can.md).
 constexpr Pin can_tx_pin = {'B', 13};
 constexpr Pin can_rx_pin = {'B', 5};
 constexpr std::uint32_t can_function = 9;

@@ -93,7 +93,7 @@ ReceivedState make_state(std::uint32_t t_ms, double at, const py::dict& fields) 
     }
     if (!set_numbers(state, field, numbers_from(field, value))) {
       throw Error(ErrorKind::usage, attribute_of(field), "it has no such value",
-                  "give one that docs/protocol.md allows");
+                  "give one that docs/reference/protocol.md allows");
     }
     state.present.add(field);
     state.reported.add(field);
@@ -101,7 +101,7 @@ ReceivedState make_state(std::uint32_t t_ms, double at, const py::dict& fields) 
   return state;
 }
 
-// A state without FAULT reports that there is no fault (docs/protocol.md).
+// A state without FAULT reports that there is no fault (docs/reference/protocol.md).
 bool has_value(const ReceivedState& state, F field) {
   return state.reported.has(field) || field == F::fault;
 }

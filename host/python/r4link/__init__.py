@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""R4 link: the R4 robot control board over UDP, USB serial and CAN (docs/python.md)."""
+"""R4 link: the R4 robot control board over UDP, USB serial and CAN (docs/how-to/python.md)."""
 import importlib.util as _importlib
 
 if _importlib.find_spec('r4link._core') is None:

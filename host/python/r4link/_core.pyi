@@ -224,7 +224,7 @@ class State:
     def as_dict(self) -> dict[str, Any]:
         """The fields that the newest datagram carries, with `pnum` and `t_ms`."""
     def __bool__(self) -> bool: ...
-    # One attribute a field of docs/protocol.md, in its unit.
+    # One attribute a field of docs/reference/protocol.md, in its unit.
     ain24: float
     ain12: float
     ain5: float
@@ -390,7 +390,7 @@ class Subscription:
         """Ends the callback. After this returns it does not run, unless it called this itself."""
 
 class Recording:
-    """A recording of one or several boards (docs/recordings.md). A new file begins after
+    """A recording of one or several boards (docs/how-to/recordings.md). A new file begins after
     `rotate_bytes` bytes or `rotate_after` seconds, and at most `keep_bytes` bytes are kept; 0: no
     limit."""
     def __init__(self, path: str | os.PathLike[str], *, rotate_bytes: int = ..., rotate_after: int = ...,

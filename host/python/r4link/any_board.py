@@ -134,7 +134,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return self.send(f'F:{names}', timeout)
 
     def setting(self, key: str, value: str, timeout: float = 1.0) -> Sent:
-        """Changes a setting of the board (docs/protocol.md): setting('rate', '50')."""
+        """Changes a setting of the board (docs/reference/protocol.md): setting('rate', '50')."""
         return self.send(f'C:{key},{value}', timeout)
 
     def attach(self, device: Device, timeout: float = 1.0) -> Sent:
@@ -216,7 +216,7 @@ class AnyBoard(ABC, Generic[Sent]):
 
     def record(self, to: str | os.PathLike[str] | Recording, *, rotate_bytes: int = 0, rotate_after: int = 0,
                keep_bytes: int = 0) -> None:
-        """Records every datagram from now on, in both directions, into a file (docs/recordings.md).
+        """Records every datagram from now on, in both directions, into a file (docs/how-to/recordings.md).
         A new file begins after `rotate_bytes` bytes or `rotate_after` seconds, and at most
         `keep_bytes` bytes are kept; 0: no limit."""
         if isinstance(to, Recording):

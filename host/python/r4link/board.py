@@ -74,7 +74,7 @@ class States:
 
 
 class Board(AnyBoard[None]):
-    """A board, opened by URL (docs/transports.md), or with_link(). See the options in
+    """A board, opened by URL (docs/reference/transports.md), or with_link(). See the options in
     include/r4link/options.hpp.
 
     Returns without waiting for the board: wait_active(). `role` is BoardRole.CONTROL or
@@ -86,7 +86,7 @@ class Board(AnyBoard[None]):
             board.arm()                 # closes relay 1, the motor supply
             board.osmc(1).set(0.1)      # the board's own state has confirmed it
 
-    Several URLs are paths to one board (docs/redundancy.md): r4link.Board(['serial:auto',
+    Several URLs are paths to one board (docs/how-to/redundancy.md): r4link.Board(['serial:auto',
     'udp://192.168.0.125']). It also takes one Transport of your own, or several, instead of URLs.
 
     `watch_rate_hz`: 1 to 1000 states a second for a watcher. `heartbeat`: seconds between

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4link.Bridge: a gateway between hosts and a board, in this process (docs/bridge.md).
+"""r4link.Bridge: a gateway between hosts and a board, in this process (docs/how-to/bridge.md).
 
     with r4link.Bridge('udp://0.0.0.0:2018', 'can://can0?node=3') as bridge:
         ...
@@ -38,7 +38,7 @@ class BridgeCounters(NamedTuple):
     # Dropped:
     damaged: int  # a wrong checksum, too long, or not a datagram
     misdirected: int  # a datagram that only a board sends, from the hosts, or the reverse
-    kept_out: int  # from hosts that are not served: docs/bridge.md
+    kept_out: int  # from hosts that are not served: docs/how-to/bridge.md
     refused: int  # a missing signature, or a setting that only a cable may change
     late: int  # may have waited for more than 100 ms: the bridge was held up
     undelivered: int  # the other side is down, full, or has no known peer

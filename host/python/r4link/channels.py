@@ -160,7 +160,7 @@ class BldcChannel(_Channel[Sent]):
 
 
 class I2c(Generic[Sent, Read, Scanned]):
-    """The devices on the user's I2C bus (docs/devices.md). read(), write() and scan() return when
+    """The devices on the user's I2C bus (docs/how-to/devices.md). read(), write() and scan() return when
     the device has answered, and raise RefusedError without an answer. `address`: 0x08 to 0x77,
     without the read bit. `register`: 0 to 255, or up to 2 bytes; b'' names none. `count`: up to 32
     bytes. `slot`: 1 to 8."""
@@ -199,7 +199,7 @@ class I2c(Generic[Sent, Read, Scanned]):
 
 
 class UartChannel(Generic[Sent]):
-    """A UART of the user; `channel`: 1 or 2 (docs/devices.md). setting('uart1', '115200:8N1') turns
+    """A UART of the user; `channel`: 1 or 2 (docs/how-to/devices.md). setting('uart1', '115200:8N1') turns
     it on, and fields('DEFAULT,UART1') makes the board report its bytes."""
 
     def __init__(self, board: AnyBoard[Sent], channel: int) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Control loops on the host (docs/control.md): PID, wheels, kinematics, odometry, and a loop that
+"""Control loops on the host (docs/how-to/control.md): PID, wheels, kinematics, odometry, and a loop that
 ends itself.
 
 Metres, radians, seconds; x forward, y and angles to the left, as in ROS (REP 103). The classes are

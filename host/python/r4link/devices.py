@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Described devices: the meaning of the bytes of a sensor on the user's I2C bus
-(docs/described-devices.md).
+(docs/how-to/described-devices.md).
 
     imu = r4link.Device('bno055@0x28')
     board.arm()                            # setting it up may write to it

@@ -84,7 +84,7 @@ class LinkCause(Word):
 
 
 class PathState(Word):
-    """The status of one path to a board (docs/redundancy.md)."""
+    """The status of one path to a board (docs/how-to/redundancy.md)."""
     DOWN = 'down', 'its transport is down, or could not be opened yet'
     ASKING = 'asking', 'its transport is up, and the board there has not answered yet who it is'
     OTHER_BOARD = 'other board', 'it leads to another board: only stops are sent on it'
@@ -124,7 +124,7 @@ class Outcome(Word):
 
 
 class Refusal(Word):
-    """Why a board refuses a command: the code of its answer (docs/protocol.md)."""
+    """Why a board refuses a command: the code of its answer (docs/reference/protocol.md)."""
     NONE = 'NONE', 'the board did not refuse the command'
     UNKNOWN = 'UNKNOWN', 'there is no such command, field or setting'
     FORMAT = 'FORMAT', 'the text does not have the form of the command'
@@ -159,7 +159,7 @@ class I2cOutcome(Word):
 
 
 class DeviceRole(Word):
-    """The role of a described device for a robot (docs/described-devices.md)."""
+    """The role of a described device for a robot (docs/how-to/described-devices.md)."""
     NONE = 'none', 'it has no role, so its values and units are its own'
     IMU = 'imu', 'an inertial sensor: acceleration in m/s2 and turn rate in rad/s, perhaps an orientation'
     POWER = 'power', 'it measures voltage in V and current in A'
@@ -185,7 +185,7 @@ class FleetEventKind(Word):
 
 
 class LoopEnd(Word):
-    """Why a control loop has ended (docs/control.md)."""
+    """Why a control loop has ended (docs/how-to/control.md)."""
     NONE = 'none', 'it has not ended'
     ASKED = 'asked', 'the step returned None'
     LATE = 'late', 'the newest state with all fields was sampled longer ago than `late`'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The logger 'r4link' for events of a board's link (docs/python.md)."""
+"""The logger 'r4link' for events of a board's link (docs/how-to/python.md)."""
 from __future__ import annotations
 
 import logging

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4link.Fleet: many boards on one thread, opened by URLs and patterns of URLs (docs/fleet.md).
+"""r4link.Fleet: many boards on one thread, opened by URLs and patterns of URLs (docs/how-to/fleet.md).
 
     with r4link.Fleet('can://can0?node=0-7', 'udp://10.0.0.{1-250}?listen=0') as fleet:
         fleet.wait_active()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fixtures for tests of a robot's program (docs/testing.md):
+"""Fixtures for tests of a robot's program (docs/how-to/testing.md):
 
     r4_robot    a simulated robot, for a program that opens its URL
     r4_board    a board of such a robot, under control, with expectations

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 class RecordedEvent(NamedTuple):
     time: np.datetime64  # UTC
-    words: str  # 'up URL', 'link safe stop': docs/recordings.md
+    words: str  # 'up URL', 'link safe stop': docs/how-to/recordings.md
 
 
 class RecordedDatagram(NamedTuple):

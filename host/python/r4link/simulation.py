@@ -41,7 +41,7 @@ def with_link(url: str, link: str) -> LinkedUrl:
 
         r4link.Board(r4link.with_link('udp://192.168.0.125', 'loss=5%,delay=20ms±10,seed=7'))
 
-    Raises UsageError for words that are not in docs/simulation.md.
+    Raises UsageError for words that are not in docs/how-to/simulation.md.
     """
     _core.check_link(url, link)
     linked = LinkedUrl(url)
@@ -57,7 +57,7 @@ class SimBoard:
         sim = r4link.SimBoard()
         with r4link.Board(sim.url) as board:
             board.wait_active()
-            sim.happen('handle released')       # a line of a scenario (docs/simulation.md), no time
+            sim.happen('handle released')       # a line of a scenario (docs/how-to/simulation.md), no time
             sim.look().osmc[0].pwm
 
     With a URL to listen on, in its own process until close(), for any program: 'udp://127.0.0.1:0'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""For tests of a robot's program (docs/testing.md): simulated robots and expectations."""
+"""For tests of a robot's program (docs/how-to/testing.md): simulated robots and expectations."""
 from __future__ import annotations
 
 import collections
@@ -43,7 +43,7 @@ class Robot(Protocol):
         """The URL for a host."""
 
     def happen(self, words: str) -> None:
-        """A line of a scenario (docs/simulation.md), without its time."""
+        """A line of a scenario (docs/how-to/simulation.md), without its time."""
 
     def look(self) -> Look:
         """The present pins and sensors."""
@@ -86,7 +86,7 @@ class SimProcess:
         return self._url
 
     def happen(self, words: str) -> None:
-        """A line of a scenario (docs/simulation.md), no time. Raises DataError if it has ended."""
+        """A line of a scenario (docs/how-to/simulation.md), no time. Raises DataError if it has ended."""
         assert self._process.stdin
         self._require_own()
         try:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Commands as the text that a board reads (docs/protocol.md): parsed, written, described.
+// Commands as the text that a board reads (docs/reference/protocol.md): parsed, written, described.
 //
 //     const r4::OwnCommand command = r4::parse_command_text("O:358,1,1");
 //     r4::to_text(command);   // "O:358,1,1"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::DeviceDescription: an I2C device as a text file (docs/described-devices.md).
+// r4::DeviceDescription: an I2C device as a text file (docs/how-to/described-devices.md).
 //
 //     const auto imu = r4::DeviceDescription::load("mpu6050");   // shipped, or "./mine.device"
 //     imu.values[0].decode(bytes, count);                        // "accel_x", m/s2

@@ -7,7 +7,7 @@
 // A range of nodes or of ports needs no braces. If there are several braces, the last one counts
 // fastest. A number that begins with 0 keeps its width: {07-12} is 07, 08 …
 //
-// One text also joins several paths to one board (docs/redundancy.md):
+// One text also joins several paths to one board (docs/how-to/redundancy.md):
 //
 //     serial:auto+udp://192.168.0.125          can://can0?node=0-7+can://can1?node=0-7
 //

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The packed form: a datagram recoded for a CAN bus (docs/packed.md). A state of the paper, 154
+// The packed form: a datagram recoded for a CAN bus (docs/reference/packed.md). A state of the paper, 154
 // bytes, becomes 25 bytes, a heartbeat 13.
 //
 //     packed = head numbers digits checksum

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The parts of a recording (docs/recordings.md). Each record has a time and a path.
+// The parts of a recording (docs/how-to/recordings.md). Each record has a time and a path.
 #pragma once
 
 #include <cstddef>
@@ -36,7 +36,7 @@ struct RecordedPath {
   std::string name;  // the board's name, or its id; empty until the board has reported it
 };
 
-// A device on a path's board, with its description (docs/described-devices.md).
+// A device on a path's board, with its description (docs/how-to/described-devices.md).
 struct RecordedDevice {
   std::uint16_t path = 1;
   std::string place;  // "bno055@0x28:1"

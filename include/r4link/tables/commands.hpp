@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands of the board (docs/protocol.md, section 3): a row for each kind, with values that
+// The commands of the board (docs/reference/protocol.md, section 3): a row for each kind, with values that
 // have rows of their own, from board.def. Read by protocol/messages/command.cpp and host/commands/.
 //
 //     r4::row_of(r4::CommandKind::servo).channels                // 16

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state fields (docs/protocol.md), made of the rows of board.def in two tables: for each field
+// The state fields (docs/reference/protocol.md), made of the rows of board.def in two tables: for each field
 // its kind and channel, and for each kind the form, units and State member of its values.
 //
 //     for (const StateFieldRow& row : state_fields) …   in the order of the wire
@@ -43,7 +43,7 @@ enum class FieldForm : std::uint8_t {
   u32,     // uint32
   reason,  // SafeReason
   fault,   // ChipFault: chip,trouble
-  // of devices on the user's bus and UARTs (docs/devices.md)
+  // of devices on the user's bus and UARTs (docs/how-to/devices.md)
   reading,  // I2cReading
   answer,   // I2cAnswer
   bus,      // I2cBusReport

@@ -122,7 +122,7 @@ TEST_F(ApplicationGroup, WithAStopInItIsAStop) {
   }
 }
 
-// Closing the supply moves nothing (docs/safety.md); what stands behind it was commanded after it.
+// Closing the supply moves nothing (docs/reference/safety.md); what stands behind it was commanded after it.
 TEST_F(ApplicationGroup, HasTheEffectOfItsCommandsInTheirOrder) {
   host.command("O:358,1,1;R:1,On");
   EXPECT_EQ(board.outputs().relays, 1);

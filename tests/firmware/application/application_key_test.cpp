@@ -125,7 +125,7 @@ TEST_F(ApplicationKey, AnswersAnUnsignedHeartbeatWithItsNonce) {
   }
 }
 
-// docs/safety.md, "Limits": who forges an address makes the board send there at most so much.
+// docs/reference/safety.md, "Limits": who forges an address makes the board send there at most so much.
 TEST_F(ApplicationKey, AnswersWithAtMostFiveTimesTheBytes) {
   host.connect();
   std::size_t longest = 0;
@@ -153,7 +153,7 @@ TEST_F(ApplicationKey, AnswersAnUnsignedCommandWithAuth) {
   }
 }
 
-// docs/protocol.md 4.2: the T of a CONNECTING heartbeat is for the signature, not to be echoed.
+// docs/reference/protocol.md 4.2: the T of a CONNECTING heartbeat is for the signature, not to be echoed.
 TEST_F(ApplicationKey, AnEchoOfWhatItSaysWhileConnectingStartsNothingButAZeroDoes) {
   for (int i = 0; i < 20; ++i) {
     host.listen();

@@ -57,9 +57,9 @@ TEST(CommandHelp, ShowsTheValuesThatASettingTakes) {
   }
 }
 
-// Section 3 of docs/protocol.md has a row for each kind, with the form and the ranges of the tables.
+// Section 3 of docs/reference/protocol.md has a row for each kind, with the form and the ranges of the tables.
 TEST(CommandHelp, HasTheFormsAndRangesOfTheDocumentedProtocol) {
-  std::ifstream file(R4_TEST_DATA "/../../docs/protocol.md");
+  std::ifstream file(R4_TEST_DATA "/../../docs/reference/protocol.md");
   std::map<std::string, std::string> documented;
   for (std::string line; std::getline(file, line);) {
     std::smatch parts;
@@ -77,7 +77,7 @@ TEST(CommandHelp, HasTheFormsAndRangesOfTheDocumentedProtocol) {
 
 // The tables of settings there have the range and the default of each.
 TEST(CommandHelp, TakesTheDocumentedSettings) {
-  std::ifstream file(R4_TEST_DATA "/../../docs/protocol.md");
+  std::ifstream file(R4_TEST_DATA "/../../docs/reference/protocol.md");
   std::map<std::string, std::string> documented;
   for (std::string line; std::getline(file, line);) {
     std::smatch parts;

@@ -130,7 +130,7 @@ TEST(BoardClock, OnAFastPathItIsWithinSevenTenthsOfAMillisecond) {
 }
 
 // A question takes one frame there. A state takes many back, after the states of seven other boards
-// (docs/can.md).
+// (docs/how-to/can.md).
 TEST(BoardClock, OnALoadedCanBusItIsWithinSevenTenthsOfAMillisecond) {
   expect_exact({.least_us = 150, .most_us = 600, .least_back_us = 700, .most_back_us = 2'800},
                20'000, 10'000, 700, 1'500);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One session over several paths to a board that restarts, or seems to (docs/redundancy.md).
+// One session over several paths to a board that restarts, or seems to (docs/how-to/redundancy.md).
 #include <gtest/gtest.h>
 
 #include "robot_on_paths.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One session over several paths, opposite the real board (docs/redundancy.md).
+// One session over several paths, opposite the real board (docs/how-to/redundancy.md).
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -17,7 +17,7 @@ namespace {
 
 using test::str;
 
-// The values of a field as docs/protocol.md names them: "V", "pwm,direction".
+// The values of a field as docs/reference/protocol.md names them: "V", "pwm,direction".
 std::string value_cell_of(const FieldKindRow& kind) {
   if (kind.value_count() == 1) return kind.values[0].unit;
   std::string names;
@@ -51,7 +51,7 @@ std::vector<std::string> names_in(const std::string& cell) {
 }
 
 TEST(StateFields, AreThoseOfProtocolMd) {
-  std::ifstream file(R4_TEST_DATA "/../../docs/protocol.md");
+  std::ifstream file(R4_TEST_DATA "/../../docs/reference/protocol.md");
   std::string line;
   while (std::getline(file, line) && line != "### State fields") continue;
   while (std::getline(file, line) && line != "|---|---|---|") continue;

@@ -155,7 +155,7 @@ int bridge(const Options& options) {
 
 constexpr const char* footer =
     R"(The first URL is where hosts are heard, as r4 sim takes it; the second is the board's, as r4 send takes
-it. So any old tool that speaks UDP drives a board on USB or CAN (docs/bridge.md). Datagrams pass as they are,
+it. So any old tool that speaks UDP drives a board on USB or CAN (docs/how-to/bridge.md). Datagrams pass as they are,
 and nothing is said for a host that is dead: a board behind a bridge goes safe as any other.
 
 Of several hosts one at a time is let through: the first that sends heartbeats, until it has been silent for

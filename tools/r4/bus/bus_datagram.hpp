@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams on a CAN bus: plain, or packed (docs/packed.md).
+// Datagrams on a CAN bus: plain, or packed (docs/reference/packed.md).
 #pragma once
 
 #include <array>

@@ -23,7 +23,7 @@ struct BusPlan {
   bool packed = true;
 };
 
-// Sent by the link itself (docs/protocol.md).
+// Sent by the link itself (docs/reference/protocol.md).
 constexpr std::uint32_t board_heartbeats_hz = 2;
 constexpr std::uint32_t host_heartbeats_hz = 10;
 

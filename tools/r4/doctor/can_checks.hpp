@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CAN checks: kernel support, and interfaces set up as in docs/can.md.
+// CAN checks: kernel support, and interfaces set up as in docs/how-to/can.md.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The native format, .r4log and .r4log.zst (docs/recordings.md), as a source and a sink.
+// The native format, .r4log and .r4log.zst (docs/how-to/recordings.md), as a source and a sink.
 #pragma once
 
 #include <optional>

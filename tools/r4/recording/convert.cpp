@@ -127,7 +127,7 @@ int convert(const ConvertOptions& options) {
 
 constexpr const char* convert_footer =
     R"(FILE may be of any format that is read, compressed by zstd or not: what is in it tells which. The
-ending of the output's name tells what is written (docs/recordings.md):
+ending of the output's name tells what is written (docs/how-to/recordings.md):
   .r4log .r4log.zst   the native one
   .log                the frames of a CAN bus as candump -L writes them; of candump -tz, --start tells
                       when the first frame was

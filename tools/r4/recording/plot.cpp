@@ -54,7 +54,7 @@ Wanted to_wanted(const std::string& text) {
   const StateField field = state_field(Text(name));
   if (field == StateField::count) {
     throw Error(ErrorKind::usage, text, "is no field of a state",
-                "name one of docs/protocol.md, such as AIN24, OSMC1 or ENC1");
+                "name one of docs/reference/protocol.md, such as AIN24, OSMC1 or ENC1");
   }
   return {colon == std::string::npos ? std::string() : text.substr(0, colon), field};
 }
@@ -318,7 +318,7 @@ int plot(const PlotOptions& options) {
 }
 
 constexpr const char* plot_footer =
-    R"(A field of docs/protocol.md, in small letters if you like; of one board only, where the recording has
+    R"(A field of docs/reference/protocol.md, in small letters if you like; of one board only, where the recording has
 several: left-arm:AIN24, by its name, its URL or the number of its path. A drive is drawn with its
 direction, backwards below zero. What has the same unit shares an axis. Safe states are shaded by their
 reason, and so is where a board said nothing for more than a second. It takes python3-matplotlib.

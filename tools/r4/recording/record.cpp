@@ -151,7 +151,7 @@ by; damaged ones, too; and what happened to the links. It watches, as r4 monitor
 control, and a program that drives a board is not disturbed. It goes on when a transport is lost and
 comes back. If another program moves, removes or truncates the file, it is begun anew, and told of.
 
-The file is text, one line a datagram (docs/recordings.md); one whose name ends in .zst is compressed.
+The file is text, one line a datagram (docs/how-to/recordings.md); one whose name ends in .zst is compressed.
 A recording that is there goes on at its end. A crash costs at most the last second. With --rotate or
 --keep the files are drive-00001.r4log, drive-00002.r4log …, each whole in itself.
 

@@ -12,7 +12,7 @@ namespace {
 constexpr const char* footer =
     R"(Joins the ROS 2 graph as the node /r4, without ROS being installed: the paper's topics R4, R4_Heart_Beat,
 R4_Active and R4_Command (std_msgs/String), a topic for each component, diagnostics, and the services ~/stop,
-~/clear, ~/arm and ~/send (for clients with rmw_cyclonedds). docs/ros2.md has each topic with its units, and
+~/clear, ~/arm and ~/send (for clients with rmw_cyclonedds). docs/how-to/ros2.md has each topic with its units, and
 how to drive a robot by cmd_vel.
 
 Nothing drives before it is armed: by --arm, once, when the board is there; by true on the topic

@@ -19,7 +19,7 @@ constexpr std::chrono::milliseconds streaming{600};
 constexpr std::chrono::milliseconds patience{5000};
 constexpr double timeout_ms = 1000;
 // How long a busy computer may delay a simulated board. A real board is safe 20 ms after its
-// timeout (docs/safety.md). The story reports the measured time.
+// timeout (docs/reference/safety.md). The story reports the measured time.
 constexpr double held_up_ms = 1000;
 
 const Drive commanded{358, Direction::forward};

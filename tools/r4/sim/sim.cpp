@@ -232,7 +232,7 @@ the paper's capture. It prints where it listens and what it does; with --json on
   {"type":"listening","url":…,"host_url":…}
   {"type":"event","t":…,"state":"CONNECTING|ACTIVE|SAFE","reason":…}   t: the board's clock, ms
 with "board" if there are several, "outputs" when a pin of a chip or a stepper does something else, with
-"supply", whether the motors have any (relay 1 closed, handle held: docs/safety.md),
+"supply", whether the motors have any (relay 1 closed, handle held: docs/reference/safety.md),
 "fault" when a chip is in trouble, "executed" or "refused" for a command, "rejected" (missing, unknown
 key, wrong tag, replayed, old) for what was not signed as a key asks, "transport" when one went down or
 came up, and "silence" (ms since the host was last heard) when the board goes safe for that.

@@ -160,7 +160,7 @@ constexpr const char* decode_footer = R"(One JSON object for each line of input 
   fields        the other fields: numbers as numbers, several values as an array
   error         length, syntax or crc, with the position of the byte where it went wrong
   expected, found   for crc: the checksum of the bytes, and the one that they claim
-  packed        of a line packed:HEX (r4 encode --packed, docs/packed.md): its size in bytes;
+  packed        of a line packed:HEX (r4 encode --packed, docs/reference/packed.md): its size in bytes;
                 the rest is about the datagram that it holds
   error packed  it holds none; reason: hex (not pairs of hexadecimal digits), length, version
                 (of a later one: update r4) or syntax

@@ -144,7 +144,7 @@ constexpr const char* encode_footer = R"(Examples:
   r4 encode O:358,1,1 --pnum 66 --time 1699276044383 --packed
                               packed:8d004218ba4beb85f3b358c1c1df7fefae81
 
---packed is the form for a CAN bus (docs/packed.md), in hexadecimal; a datagram that would not
+--packed is the form for a CAN bus (docs/reference/packed.md), in hexadecimal; a datagram that would not
 get shorter is printed plain, as it would travel. r4 decode reads both.
 
 Commands of the board (r4 send --help) are checked before they are encoded.

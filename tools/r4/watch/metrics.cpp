@@ -125,7 +125,7 @@ class MetricsCommand final : web::ServerEvents {
 int serve_metrics(const MetricsOptions& options) { return MetricsCommand(options).run(options); }
 
 constexpr const char* metrics_footer =
-    R"(Answers Prometheus at http://127.0.0.1:9618/metrics (docs/metrics.md): of each board whether it is heard,
+    R"(Answers Prometheus at http://127.0.0.1:9618/metrics (docs/how-to/metrics.md): of each board whether it is heard,
 why its outputs are off, rate, loss, round trip, age and jitter of its states, analog inputs; of each CAN
 interface how busy it is, and for which boards. It watches, as r4 monitor does, and takes no control.
 --listen 0.0.0.0:9618 answers other computers, too: anybody there may read, and nobody may do more. It is

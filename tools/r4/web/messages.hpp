@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// JSON messages from r4 web to pages (docs/web.md).
+// JSON messages from r4 web to pages (docs/how-to/web.md).
 #pragma once
 
 #include <cstdint>

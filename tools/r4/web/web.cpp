@@ -81,7 +81,7 @@ safe at once. Anybody who sees the page may stop them.
 
 It answers at this computer alone, to all its users; with --token to who has the address that it prints.
 --listen 0.0.0.0:8080 answers other computers, and to them always so. Nothing is encrypted: over a network
-that is not yours, use ssh -L, or a proxy in front, whose name --host tells (docs/web.md).
+that is not yours, use ssh -L, or a proxy in front, whose name --host tells (docs/how-to/web.md).
 With --device it shows what a sensor on the user's I2C bus measures (r4 devices); who takes control sets
 it up, once the board is armed.
 

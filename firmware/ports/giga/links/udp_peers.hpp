@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The hosts that have sent datagrams, and the receivers of a datagram to everyone, as in
-// udp://BIND?peer=HOST (docs/transports.md). From the network thread only.
+// udp://BIND?peer=HOST (docs/reference/transports.md). From the network thread only.
 #pragma once
 
 #include <cstdint>

@@ -6,7 +6,7 @@
 // the bench's supply, handle and steppers:
 //
 //     supply      of the motors: on while the dead-man's handle is held and relay 1 is closed
-//                 (docs/safety.md). Without it no motor turns.
+//                 (docs/reference/safety.md). Without it no motor turns.
 //     OSMC 1-4    a motor each, whose shaft turns encoder 1-4: 4000 counts a second at full duty;
 //                 the index line is high for one of the 1000 counts of a turn, count 0
 //     DHB1A       the steering motor; AINSTEER is its position: 1 V, where forward ends, to 4 V,

@@ -15,7 +15,7 @@ Entity::Entity(dds_entity_t made, const std::string& what) : entity_(made) {
   throw Error(ErrorKind::open, what, fmt::format("Cyclone DDS says: {}", dds_strretcode(-made)),
               "look at what CYCLONEDDS_URI and the environment of ROS say, and that the network "
               "interface is "
-              "up (docs/ros2.md)");
+              "up (docs/how-to/ros2.md)");
 }
 
 void Entity::reset() {

@@ -4,7 +4,7 @@
 //     r4 send serial:auto C:network,MyNetwork
 //     r4 send serial:auto C:password,MyPassword
 //
-// Send the line `report` in the serial monitor to see the board's condition (docs/firmware.md).
+// Send the line `report` in the serial monitor to see the board's condition (docs/how-to/firmware.md).
 #include <R4Link.h>
 
 void setup() { R4Link.begin(); }
