@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The I2C bus for the chip drivers (NXP UM10204). Every call is bounded: it returns within its time
-// on the wire (i2c_wire_us) plus i2c_timeout_us, so a port must not use a library that waits
-// longer. Each transfer ends with STOP, even after an error.
+// The I2C bus for the chip drivers (NXP UM10204). Every call is bounded: it returns within i2c_most_us,
+// so a port must not use a library that waits longer. Each transfer ends with STOP, even after an
+// error.
 #pragma once
 
 #include <cstddef>
@@ -21,6 +21,11 @@ constexpr std::uint32_t i2c_timeout_us = 1000;
 // At 400 kHz, addresses included: nine clocks per byte, one per START and one for STOP.
 constexpr std::uint32_t i2c_wire_us(std::size_t bytes, std::size_t starts = 1) {
   return static_cast<std::uint32_t>((bytes * 9 + starts + 1) * 5 / 2);
+}
+
+// The longest time of a call: two attempts on the wire, and all that they wait.
+constexpr std::uint32_t i2c_most_us(std::size_t bytes, std::size_t starts = 1) {
+  return 2 * i2c_wire_us(bytes, starts) + i2c_timeout_us;
 }
 
 class I2cBus {

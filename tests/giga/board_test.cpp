@@ -300,6 +300,17 @@ TEST(GigaWiFi, JoinsTheNetworkThatIsSetOverUsbAndAnswersThere) {
   }));
 }
 
+TEST(GigaWiFi, JoinsAnOpenNetwork) {
+  GigaBench bench;
+  bench.giga.air_password = "";
+  bench.giga.stored["r4-settings"] = "network,lab\n";
+  bench.boot();
+  EXPECT_TRUE(bench.run_until([&] {
+    const std::lock_guard<std::mutex> lock(bench.giga.mutex);
+    return bench.giga.wifi_connected && bench.giga.udp_port == 2018;
+  }));
+}
+
 TEST(GigaWiFi, AThreadThatHangsInTheLibraryDoesNotDisturbTheLoop) {
   GigaBench bench;
   bench.giga.wifi_hangs = true;

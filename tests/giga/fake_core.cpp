@@ -280,7 +280,10 @@ void USBSerial::send_nb(std::uint8_t* buffer, std::uint32_t size, std::uint32_t*
 
 // --- WiFi
 
-int WiFiClass::begin(const char* ssid) { return begin(ssid, ""); }
+int WiFiClass::begin(const char*) {
+  std::fputs("the core reads a password at address 0\n", stderr);
+  std::abort();
+}
 int WiFiClass::begin(const char* ssid, const char* passphrase, wl_enc_type) {
   for (;;) {
     {

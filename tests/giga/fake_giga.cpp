@@ -231,7 +231,7 @@ int Giga::rises(char port, int number) const {
 void Giga::interrupts_may_come() {
   constexpr std::uint64_t bite_ns = 500000000;
   if (watchdog_runs && now_ns_ - watchdog_fed_ns > bite_ns) {
-    r4_fake_rcc.RSR.value = 1U << 26;
+    r4_fake_rtc.BKP8R.value = 4;  // by the boot loader, which clears RCC_RSR
     reset();
   }
   if (primask != 0 || in_interrupt) return;

@@ -42,6 +42,13 @@ class I2cPeripheral {
   }
   // The chips do not acknowledge the byte behind so many more data bytes.
   void refuse_after(int bytes) { refuse_after_ = bytes; }
+  // The peripheral reports a bus error after so many more bytes, although there was none (ES0430 2.15.2).
+  void report_bus_error_after(int bytes) { bus_error_after_ = bytes; }
+  // Another device pulls SDA down after so many more bytes, in so many transfers.
+  void lose_after(int bytes, int transfers) {
+    lose_after_ = bytes;
+    losses_ = transfers;
+  }
   // Bytes put on the wire, addresses included: {address << 1 | read, bytes…} for each START.
   std::vector<std::vector<std::uint8_t>> log;
 
@@ -80,6 +87,10 @@ class I2cPeripheral {
   int sda_held_ = 0;
   bool scl_held_ = false;
   int refuse_after_ = -1;
+  int bus_error_after_ = -1;
+  int lose_after_ = 0;
+  int losses_ = 0;
+  int sent_ = 0;  // in this transfer
   int hold_after_ = -1;
   int hold_clocks_ = 0;
 };

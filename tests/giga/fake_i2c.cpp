@@ -11,6 +11,8 @@ constexpr std::uint32_t rxne = 1U << 2;
 constexpr std::uint32_t nackf = 1U << 4;
 constexpr std::uint32_t stopf = 1U << 5;
 constexpr std::uint32_t tc = 1U << 6;
+constexpr std::uint32_t berr = 1U << 8;
+constexpr std::uint32_t arlo = 1U << 9;
 constexpr std::uint32_t busy = 1U << 15;
 constexpr std::uint32_t cr2_read = 1U << 10;
 constexpr std::uint32_t cr2_start = 1U << 13;
@@ -70,6 +72,7 @@ void I2cPeripheral::start(std::uint32_t cr2) {
   cr2_ = cr2;
   left_ = cr2 >> 16 & 0xFF;
   flags_ = 0;
+  sent_ = 0;
   if (sda_held_ > 0 || scl_held_) {
     step_ = Step::stuck;
     return;
@@ -78,6 +81,7 @@ void I2cPeripheral::start(std::uint32_t cr2) {
 }
 
 void I2cPeripheral::count_byte() {
+  if (bus_error_after_ >= 0 && bus_error_after_-- == 0) flags_ |= berr;
   if (hold_after_ < 0) return;
   if (hold_after_-- > 0) return;
   sda_held_ = hold_clocks_;
@@ -111,6 +115,13 @@ void I2cPeripheral::end_of_bytes() {
 void I2cPeripheral::progress() {
   if (sda_held_ > 0 && step_ != Step::idle) step_ = Step::stuck;
   if (giga().now_ns() < due_ns_) return;
+  if (losses_ > 0 && step_ != Step::idle && sent_++ == lose_after_) {
+    --losses_;
+    taking_part_.clear();
+    flags_ |= arlo;
+    step_ = Step::idle;
+    return;
+  }
   const bool reading = (cr2_ & cr2_read) != 0;
   switch (step_) {
     case Step::address: {

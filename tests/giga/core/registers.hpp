@@ -47,7 +47,7 @@ struct PWR_TypeDef {
   R4Register CR1;
 };
 struct RTC_TypeDef {
-  R4Register BKP20R, BKP21R, BKP22R, BKP23R;
+  R4Register BKP8R, BKP20R, BKP21R, BKP22R, BKP23R;
 };
 struct SCB_Type {
   R4Register AIRCR, CFSR;

@@ -21,11 +21,12 @@ constexpr std::uint32_t mark = 0x52344700;  // the lowest byte holds the kind
 constexpr std::uint32_t in_store_mark = 0x80;
 
 // RM0399: backup domain writable (PWR_CR1), clock of the RTC registers (RCC_APB4ENR), cause of the
-// reset (RCC_RSR).
+// reset (RCC_RSR). The Giga's boot loader clears RCC_RSR and leaves the cause in backup register 8.
 constexpr std::uint32_t pwr_backup_writable = 1U << 8;
 constexpr std::uint32_t rcc_rtc_on = 1U << 16;
 constexpr std::uint32_t rsr_forget = 1U << 16;
 constexpr std::uint32_t rsr_watchdog = 1U << 26;
+constexpr std::uint32_t boot_loader_watchdog = 4;
 
 void open_backup_registers() {
   PWR->CR1 |= pwr_backup_writable;
@@ -135,8 +136,9 @@ FaultNote take_fault_note() {
   FaultNote note;
   const std::uint32_t kept = RTC->BKP20R ^ mark;
   const std::uint32_t kind = kept & ~in_store_mark;
-  const bool by_watchdog = (RCC->RSR & rsr_watchdog) != 0;
+  const bool by_watchdog = (RCC->RSR & rsr_watchdog) != 0 || RTC->BKP8R == boot_loader_watchdog;
   RCC->RSR |= rsr_forget;
+  RTC->BKP8R = 0;
   if (kind >= static_cast<std::uint32_t>(FaultNote::Kind::fault) &&
       kind <= static_cast<std::uint32_t>(FaultNote::Kind::stack)) {
     note.kind = static_cast<FaultNote::Kind>(kind);

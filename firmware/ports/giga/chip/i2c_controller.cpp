@@ -17,7 +17,6 @@ constexpr std::uint32_t isr_byte = 1U << 2;        // RXNE
 constexpr std::uint32_t isr_refused = 1U << 4;     // NACKF
 constexpr std::uint32_t isr_stopped = 1U << 5;     // STOPF
 constexpr std::uint32_t isr_complete = 1U << 6;    // TC
-constexpr std::uint32_t isr_bus_error = 1U << 8;   // BERR
 constexpr std::uint32_t isr_lost = 1U << 9;        // ARLO: another device pulls SDA down
 constexpr std::uint32_t isr_busy = 1U << 15;
 constexpr std::uint32_t icr_all = 0x3F38;
@@ -63,15 +62,26 @@ void I2cController::start(std::uint32_t kernel_hz) {
   registers_.CR1 = cr1_on;
 }
 
-I2cController::Transfer I2cController::begin(std::size_t bytes, std::size_t starts) {
+// `attempt(transfer)` returns the result of one attempt. A second attempt follows a timeout, unless
+// another transfer took over the bus in the meantime: then it could undo what that transfer did.
+template <class Attempt>
+I2cResult I2cController::transfer(std::size_t bytes, std::size_t starts, Attempt attempt) {
   constexpr std::uint32_t clean_up_us = 20;
   if (under_way_) recover();
   under_way_ = true;
   Transfer transfer;
   transfer.recovery = recoveries_;
-  transfer.began_us = clock_();
-  transfer.limit_us = firmware::i2c_wire_us(bytes, starts) + firmware::i2c_timeout_us - clean_up_us;
-  return transfer;
+  transfer.limit_us =
+      firmware::i2c_wire_us(bytes, starts) + firmware::i2c_timeout_us / attempts - clean_up_us;
+  I2cResult result = I2cResult::timeout;
+  for (int i = 0; i < attempts && result == I2cResult::timeout; ++i) {
+    transfer.began_us = clock_();
+    result = wait_until_free(transfer);  // at once a timeout if the bus was taken over
+    if (result == I2cResult::ok) result = attempt(transfer);
+    result = finish(transfer, result);
+  }
+  under_way_ = false;
+  return result;
 }
 
 bool I2cController::alive(const Transfer& transfer) const {
@@ -99,7 +109,7 @@ I2cResult I2cController::wait_until_free(const Transfer& transfer) {
   while ((registers_.ISR & isr_busy) != 0) {
     if (!alive(transfer)) return I2cResult::timeout;
   }
-  return I2cResult::ok;
+  return alive(transfer) ? I2cResult::ok : I2cResult::timeout;
 }
 
 I2cResult I2cController::send(const Transfer& transfer, std::uint8_t address,
@@ -111,7 +121,7 @@ I2cResult I2cController::send(const Transfer& transfer, std::uint8_t address,
   const std::uint32_t end = then_stop ? isr_stopped : isr_complete;
   for (;;) {
     const std::uint32_t status = registers_.ISR;
-    if ((status & (isr_bus_error | isr_lost)) != 0) return I2cResult::timeout;
+    if ((status & isr_lost) != 0) return I2cResult::timeout;
     if ((status & isr_refused) != 0) {  // the peripheral sends STOP by itself
       if ((status & isr_stopped) != 0) return I2cResult::no_acknowledge;
     } else if ((status & end) != 0) {
@@ -132,7 +142,7 @@ I2cResult I2cController::receive(const Transfer& transfer, std::uint8_t address,
   std::size_t received = 0;
   for (;;) {
     const std::uint32_t status = registers_.ISR;
-    if ((status & (isr_bus_error | isr_lost)) != 0) return I2cResult::timeout;
+    if ((status & isr_lost) != 0) return I2cResult::timeout;
     if ((status & isr_byte) != 0 && received < size) {
       bytes[received++] = static_cast<std::uint8_t>(registers_.RXDR);
     } else if ((status & isr_stopped) != 0) {
@@ -144,7 +154,6 @@ I2cResult I2cController::receive(const Transfer& transfer, std::uint8_t address,
 
 I2cResult I2cController::finish(const Transfer& transfer, I2cResult result) {
   const InterruptLock lock;
-  under_way_ = false;
   if (transfer.recovery != recoveries_) return I2cResult::timeout;
   registers_.ICR = icr_all;
   if (result != I2cResult::ok) restart();
@@ -163,23 +172,20 @@ void I2cController::restart() {
 
 I2cResult I2cController::write(std::uint8_t address, const std::uint8_t* bytes, std::size_t size) {
   if (size > max_size) return I2cResult::no_acknowledge;
-  const Transfer transfer = begin(1 + size, 1);
-  I2cResult result = wait_until_free(transfer);
-  if (result == I2cResult::ok) result = send(transfer, address, bytes, size, true);
-  return finish(transfer, result);
+  return transfer(1 + size, 1, [&](const Transfer& transfer) {
+    return send(transfer, address, bytes, size, true);
+  });
 }
 
 I2cResult I2cController::write_read(std::uint8_t address, const std::uint8_t* out,
                                     std::size_t out_size, std::uint8_t* in, std::size_t in_size) {
   if (out_size > max_size || in_size > max_size) return I2cResult::no_acknowledge;
   if (in_size == 0) return write(address, out, out_size);
-  const Transfer transfer = begin(2 + out_size + in_size, 2);
-  I2cResult result = wait_until_free(transfer);
-  if (result == I2cResult::ok && out_size != 0) {
-    result = send(transfer, address, out, out_size, false);
-  }
-  if (result == I2cResult::ok) result = receive(transfer, address, in, in_size);
-  return finish(transfer, result);
+  return transfer(2 + out_size + in_size, 2, [&](const Transfer& transfer) {
+    const I2cResult result =
+        out_size == 0 ? I2cResult::ok : send(transfer, address, out, out_size, false);
+    return result == I2cResult::ok ? receive(transfer, address, in, in_size) : result;
+  });
 }
 
 void I2cController::pause_us(std::uint32_t us) const {

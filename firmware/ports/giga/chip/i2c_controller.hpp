@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // An I2C peripheral of the STM32H747 as master at up to 400 kHz (RM0399, chapter I2C). Fulfils
-// drivers/i2c_bus.hpp: a call waits at most its time on the wire plus i2c_timeout_us. recover() or
+// drivers/i2c_bus.hpp. A transfer that lost the bus or timed out is repeated once, so that one
+// disturbance does not stop the robot; a bus error (BERR) is ignored, because as master the
+// peripheral reports bus errors that did not occur (ST errata ES0430 2.15.2). recover() or
 // another transfer may interrupt a transfer, also from a fault handler: the interrupted transfer
 // then returns timeout. The core's library (Wire) waits 36 ms for each byte on a hung bus.
 #pragma once
@@ -50,7 +52,9 @@ class I2cController final : public firmware::I2cBus {
     std::uint32_t began_us;
     std::uint32_t limit_us;
   };
-  Transfer begin(std::size_t bytes, std::size_t starts);
+  static constexpr int attempts = 2;
+  template <class Attempt>
+  firmware::I2cResult transfer(std::size_t bytes, std::size_t starts, Attempt attempt);
   bool alive(const Transfer& transfer) const;
   bool request(const Transfer& transfer, std::uint32_t cr2);
   bool put(const Transfer& transfer, std::uint8_t byte);

@@ -82,8 +82,9 @@ bool Network::turn() {
 
 void Network::join() {
   const bool open = wanted_.password[0] == '\0';
-  const int status =
-      open ? WiFi.begin(wanted_.network) : WiFi.begin(wanted_.network, wanted_.password);
+  // begin(network) would pass a null password, of which the core copies 64 bytes.
+  const int status = open ? WiFi.begin(wanted_.network, "", ENC_TYPE_NONE)
+                          : WiFi.begin(wanted_.network, wanted_.password);
   tried_ = true;
   tried_ms_ = BoardClock::now_ms();
   if (status != WL_CONNECTED || socket_.open(WiFi.getNetwork()) != NSAPI_ERROR_OK) return;
