@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Why the outputs are safe: causes, each latched until its own condition ends it (docs/reference/safety.md).
+// Why the outputs are safe: causes, each latched until its own condition ends it
+// (docs/reference/safety.md).
 //
 //     cause      enters                                   leaves                      setpoints
 //     link       owner silent, or its transport failed    the owner is back           kept

@@ -63,7 +63,7 @@ def form_faults(content):
         if field['type'] in ('dropdown', 'checkboxes') and not options:
             yield f'{field["id"]}: there is nothing to choose'
         if not all(isinstance(each, str) or 'label' in each for each in options):
-            yield f'{field["id"]}: an option is no text (quote it)'
+            yield f'{field["id"]}: an option is not text (quote it)'
 
 
 def yaml_faults(root):

@@ -155,7 +155,7 @@ def faults_of(root, path):
     """Yields (line, reason) for each broken rule of the source at `path` below `root`."""
     room = str(pathlib.PurePath(path).parent)
     if room not in ALLOWED:
-        yield 1, f'{room} is no room of ALLOWED in tests/layers.py'
+        yield 1, f'{room} is not a room of ALLOWED in tests/layers.py'
         return
     allowed = ALLOWED[room] | {room} | EXCEPTIONS.get(path, set())
     portable = room in PORTABLE or path in PORTABLE_PUBLIC

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What keeps a command from running: the thing, the reason, what to do about it."""
+"""The reason why a command cannot run: the thing, the reason, the fix."""
 
 UNSUPPORTED = 6  # the exit code, as that of r4: what the kernel or the machine has not
 

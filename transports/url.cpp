@@ -145,7 +145,7 @@ long Url::get_number(std::string_view key, long min, long max, long fallback) co
   if (!parse_number(*value, number) || number < min || number > max) {
     refuse(text_,
            "'" + std::string(key) + "=" + *value +
-               (is_whole_number(*value) ? "' is out of range" : "' is no whole number"),
+               (is_whole_number(*value) ? "' is out of range" : "' is not a whole number"),
            "give a whole number from " + std::to_string(min) + " to " + std::to_string(max));
   }
   return number;

@@ -78,7 +78,7 @@ std::vector<std::string> numbers_of(std::string_view pattern, std::string_view l
     std::uint32_t first = 0;
     std::uint32_t last = 0;
     if (!parse_number(lower, first) || !parse_number(upper, last) || first > last) {
-      refuse_pattern(pattern, "'" + std::string(part) + "' is no number and no range");
+      refuse_pattern(pattern, "'" + std::string(part) + "' is neither a number nor a range");
     }
     if (last - first >= most_pattern_urls) refuse_as_too_many(pattern);
     const std::size_t width = lower.front() == '0' ? lower.size() : 0;

@@ -15,11 +15,11 @@
 //                   a cause that cannot be cleared, or is new; the deadline; R:1,On confirmed
 //
 // A lost link does not disarm. Whether the board brings its outputs back (`recovery`) is shown by
-// relay 1, the motor supply (docs/reference/safety.md), in every state. arm() clears the cause that it finds
-// first, and each cause hidden by that one, once. A stop that is pressed meanwhile stays, and ends
-// the arm(), as do a released handle and an obstacle. It never clears a stop, a watchdog or a fault
-// that may be older than the session, because a restarted program would drive off again. A cause
-// may be older until the controlled board was heard without it.
+// relay 1, the motor supply (docs/reference/safety.md), in every state. arm() clears the cause that
+// it finds first, and each cause hidden by that one, once. A stop that is pressed meanwhile stays,
+// and ends the arm(), as do a released handle and an obstacle. It never clears a stop, a watchdog
+// or a fault that may be older than the session, because a restarted program would drive off again.
+// A cause may be older until the controlled board was heard without it.
 #pragma once
 
 #include <cstdint>

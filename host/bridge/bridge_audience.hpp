@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The peers, besides served hosts, that hear a board through a bridge: watchers (docs/reference/protocol.md,
-// 4.8), and for a second each peer that stopped the board, asks for control, or needs the nonce.
+// The peers, besides served hosts, that hear a board through a bridge: watchers
+// (docs/reference/protocol.md, 4.8), and for a second each peer that stopped the board, asks for
+// control, or needs the nonce.
 //
 //     W:rate --> is sent a LEASE --W:rate that echoes it--> hears everything for two seconds
 //                                                           after each W

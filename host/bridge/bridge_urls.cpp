@@ -64,7 +64,7 @@ void require_two_sides(const Url& hosts, const Url& board) {
 
 void require_board(const Url& board) {
   if (board.scheme() == "replay") {
-    throw Error(ErrorKind::usage, board.text(), "a recording is no board: nobody can drive it",
+    throw Error(ErrorKind::usage, board.text(), "a recording cannot be driven",
                 "r4 replay plays it to programs");
   }
   if (board.scheme() == "pty") {

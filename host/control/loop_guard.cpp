@@ -51,7 +51,7 @@ const char* to_text(LoopEnd end) {
 LoopGuard::LoopGuard(LoopOptions options)
     : options_(std::move(options)), needed_(fields_of(options_.fields)) {
   if (options_.late.count() <= 0 || options_.first.count() <= 0) {
-    throw wrong("late or first is no time", "give milliseconds above 0");
+    throw wrong("late or first is not a valid time", "give milliseconds above 0");
   }
   for (const Standstill& each : options_.standstill) {
     if (each.encoder < 1 || each.encoder > encoder_channels) {

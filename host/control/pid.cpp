@@ -12,7 +12,7 @@ Pid::Pid(const PidOptions& options) : options_(options) {
   for (const double each : {options.kp, options.ki, options.kd, options.feed_forward,
                             options.minimum, options.maximum, options.derivative_filter_s}) {
     if (!std::isfinite(each)) {
-      throw Error(ErrorKind::usage, "Pid", "an option is no finite number",
+      throw Error(ErrorKind::usage, "Pid", "an option is not a finite number",
                   "give gains, limits and the filter as numbers");
     }
   }
@@ -47,7 +47,7 @@ void Pid::take_over(double output, double setpoint, double measured) {
 
 double Pid::step(double setpoint, double measured, double dt_s) {
   if (!std::isfinite(setpoint) || !std::isfinite(measured)) {
-    throw Error(ErrorKind::data, "Pid", "its setpoint or measured value is no finite number",
+    throw Error(ErrorKind::data, "Pid", "its setpoint or measured value is not a finite number",
                 "check what it is calculated from");
   }
   if (!(dt_s > 0)) return output_;

@@ -99,7 +99,7 @@ void DescriptionParser::take_line(std::string_view line) {
   if (what == "poll") return take_poll(words);
   if (what == "value") return take_value(words);
   if (what == "ready") return take_ready(words);
-  fail(fmt::format("\"{}\" is none of its words",
+  fail(fmt::format("\"{}\" is not one of its words",
                    is_printable(what) ? what.substr(0, longest_name) : "this"),
        "they are device, title, role, address, check, lookalike, write, poll, value and ready");
 }

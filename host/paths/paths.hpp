@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decides over which paths a session sends, and which datagrams it admits (docs/how-to/redundancy.md). A
-// part of a session, without I/O. Among the other parts only LinkKeeper uses the number of paths,
-// to send a lease over each.
+// Decides over which paths a session sends, and which datagrams it admits
+// (docs/how-to/redundancy.md). A part of a session, without I/O. Among the other parts only
+// LinkKeeper uses the number of paths, to send a lease over each.
 //
 //             up           its board answers Q:ID             a datagram comes
 //     down -------> asking -----------------------> silent <-------------------> carrying

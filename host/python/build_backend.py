@@ -67,7 +67,7 @@ def _built():
 
 
 def contents():
-    """What is in a wheel, but for its tag: {name: content}."""
+    """The content of a wheel, but for its tag: {name: content}."""
     entries = ''.join(f'[{group}]\n' + ''.join(f'{name} = {where}\n' for name, where in each.items())
                       for group, each in PROJECT['entry-points'].items())
     return {**dict(_built()), f'{INFO}/entry_points.txt': entries.encode(), f'{INFO}/METADATA': METADATA.encode(),

@@ -52,7 +52,8 @@ RecordingFile::RecordingFile(std::string path) : path_(std::move(path)) {
   struct stat status {};
   // Do not even open a device: a terminal may lead to a board.
   if (::stat(path_.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
-    throw Error(ErrorKind::open, path_, S_ISDIR(status.st_mode) ? "is a directory" : "is no file",
+    throw Error(ErrorKind::open, path_,
+                S_ISDIR(status.st_mode) ? "is a directory" : "is not a file",
                 "name a file that can be written");
   }
   file_.reset(::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOCTTY, 0666));

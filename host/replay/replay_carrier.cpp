@@ -27,7 +27,7 @@ double speed_of(const Url& url) {
   const std::optional<std::string> text = url.get("speed");
   std::int32_t hundredths = 100;
   if (text && (!parse_hundredths(Text(*text), hundredths) || hundredths < 1 || hundredths > max)) {
-    throw Error(ErrorKind::usage, url.text(), "speed " + *text + " is no such number",
+    throw Error(ErrorKind::usage, url.text(), "speed " + *text + " is not a valid factor",
                 "write replay:FILE?speed=0.5");
   }
   return hundredths / 100.0;

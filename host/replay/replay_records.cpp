@@ -19,7 +19,7 @@ const std::string& readable(const std::string& thing, const std::string& file) {
   throw Error(ErrorKind::open, thing,
               error       ? error.message()
               : directory ? "is a directory"
-                          : "is no regular file",
+                          : "is not a regular file",
               "name a file that r4 record has written");
 }
 

@@ -4,8 +4,8 @@
 // duplicates only the first counts, and the newest datagram has the newest T (paths.hpp).
 //
 //   datagram --> Paths --> HostLink, HeardBoard --> LinkKeeper --> ArmRequests --> CommandsUnderWay
-//                admits    the board's state        is this host   may outputs     which have
-//                                                    in control?    be driven?      ended?
+//                admits    the board's state        control        arming          ends of
+//                                                                                  commands
 //
 // Session owns these parts. receive() and poll() show their order.
 #pragma once

@@ -61,8 +61,8 @@ class AsyncBoard {
   AsyncBoard(const executor_type& executor, std::string_view url, BoardOptions options = {});
   AsyncBoard(asio::io_context& io, std::string_view url, BoardOptions options = {})
       : AsyncBoard(io.get_executor(), url, std::move(options)) {}
-  // Over one to four paths to the same board (docs/how-to/redundancy.md). Throws Error{usage} also for a
-  // duplicate, and for sim: and replay:, which are boards of their own.
+  // Over one to four paths to the same board (docs/how-to/redundancy.md). Throws Error{usage} also
+  // for a duplicate, and for sim: and replay:, which are boards of their own.
   AsyncBoard(const executor_type& executor, const std::vector<std::string>& urls,
              BoardOptions options = {});
   AsyncBoard(asio::io_context& io, const std::vector<std::string>& urls, BoardOptions options = {})
@@ -216,8 +216,8 @@ class AsyncBoard {
   Subscription on_board_heartbeat(std::function<void(const Datagram&)> callback);
   Subscription on_nack(std::function<void(const Nack&, const Datagram&)> callback);
   Subscription on_bad_datagram(std::function<void(const ReadResult&, std::string_view)> callback);
-  // Datagrams of other programs to the board on a shared transport (docs/how-to/sharing.md): heartbeats
-  // and commands of the controlling host, all stops. Dots replace secrets.
+  // Datagrams of other programs to the board on a shared transport (docs/how-to/sharing.md):
+  // heartbeats and commands of the controlling host, all stops. Dots replace secrets.
   Subscription on_overheard(std::function<void(std::string_view)> callback);
   Subscription on_link(std::function<void(const LinkStatus&)> callback);
   // A path has started or stopped carrying. If a transport reports that it is down, this comes at

@@ -64,7 +64,7 @@ struct BoardCallbacks {
   std::function<void(const RefusedPost&)> on_refused;
 };
 
-// What happens to states that come faster than they are taken.
+// How a queue treats states that come faster than they are taken.
 struct StatesOptions {
   // True: no state is dropped silently. When the queue overflows, take() returns the queued states
   // and then throws once. False: the oldest queued state is dropped.
@@ -108,9 +108,9 @@ class R4LINK_API Board {
   // Opens the transport and starts the link; returns without waiting for the board. Throws Error.
   explicit Board(std::string_view url, BoardOptions options = {}, BoardCallbacks callbacks = {});
   // Over one to four paths to the same board: {"serial:auto", "udp://192.168.0.125"}
-  // (docs/how-to/redundancy.md). In one text, '+' joins them. Throws Error{usage} also for a duplicate,
-  // and for sim: and replay:, which are boards of their own. If a path cannot be opened, on_event
-  // reports why, and it is tried again every second. Throws if no path can be opened.
+  // (docs/how-to/redundancy.md). In one text, '+' joins them. Throws Error{usage} also for a
+  // duplicate, and for sim: and replay:, which are boards of their own. If a path cannot be opened,
+  // on_event reports why, and it is tried again every second. Throws if no path can be opened.
   explicit Board(const std::vector<std::string>& urls, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
   Board(std::initializer_list<std::string_view> urls, BoardOptions options = {},
@@ -278,8 +278,8 @@ class R4LINK_API Board {
     int channel_;
   };
 
-  // The devices on the user's I2C bus (docs/how-to/devices.md): 7-bit addresses, at most 32 bytes each
-  // way. Calls return when the device has answered. Error{refused}: no answer.
+  // The devices on the user's I2C bus (docs/how-to/devices.md): 7-bit addresses, at most 32 bytes
+  // each way. Calls return when the device has answered. Error{refused}: no answer.
   class I2c {
    public:
     using Bytes = std::vector<std::uint8_t>;
@@ -313,9 +313,9 @@ class R4LINK_API Board {
   // name has one of its slots: i2c().poll_off() of that slot frees it.
   void attach(const Device& device, Duration timeout = default_timeout);
 
-  // One of the user's UARTs, 1 or 2 (docs/how-to/devices.md): setting("uart1", "115200:8N1") turns it on,
-  // fields("DEFAULT,UART1") requests its bytes. They are put together here from the states: in
-  // order, each byte once. Missing bytes are counted.
+  // One of the user's UARTs, 1 or 2 (docs/how-to/devices.md): setting("uart1", "115200:8N1") turns
+  // it on, fields("DEFAULT,UART1") requests its bytes. They are put together here from the states:
+  // in order, each byte once. Missing bytes are counted.
   struct UartData {
     std::vector<std::uint8_t> bytes;
     std::uint64_t lost = 0;  // bytes that are missing before or among these
@@ -392,10 +392,11 @@ class R4LINK_API Board {
   // A posted command was refused by the board, or not sent.
   Subscription on_refused(std::function<void(const RefusedPost&)> callback);
 
-  // Records every datagram in both directions to a file (recording.hpp, docs/how-to/recordings.md), or to
-  // a recording that other boards share. It lasts until close(), until the recording is closed or
-  // destroyed, or until another one is named. If it ends by itself because the disk is full,
-  // on_event() reports it, and the link continues. Throws Error if the file cannot be written.
+  // Records every datagram in both directions to a file (recording.hpp, docs/how-to/recordings.md),
+  // or to a recording that other boards share. It lasts until close(), until the recording is
+  // closed or destroyed, or until another one is named. If it ends by itself because the disk is
+  // full, on_event() reports it, and the link continues. Throws Error if the file cannot be
+  // written.
   void record(const std::string& path, RecordingOptions options = {});
   void record(Recording& recording);
 

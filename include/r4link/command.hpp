@@ -107,8 +107,8 @@ struct R4LINK_API Command {
   // The board streams its states to the sender for two seconds, without control; 0 Hz ends that.
   // `list`: the fields; empty: those that the controlling host has chosen.
   static Command watch(std::int32_t rate_hz, Text list = Text());
-  // On the user's I2C bus (docs/how-to/devices.md): 7-bit addresses; bytes as x and two hexadecimal digits
-  // each, "x75", and "x" for none. The answer comes as I2CX in the state.
+  // On the user's I2C bus (docs/how-to/devices.md): 7-bit addresses; bytes as x and two hexadecimal
+  // digits each, "x75", and "x" for none. The answer comes as I2CX in the state.
   static Command i2c_read(int address, Text register_bytes, int count);
   static Command i2c_write(int address, Text bytes, int count = 0);  // then reads `count` bytes
   static Command i2c_scan();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A datagram as it is on the wire, checked and read in place (paper section 4; docs/reference/protocol.md).
+// A datagram as it is on the wire, checked and read in place (paper section 4;
+// docs/reference/protocol.md).
 //
 //     datagram = 1*field "^0x" 1*8HEXDIG "^" [CR] [LF]
 //     field    = name ":" value *("," value) ";"

@@ -10,9 +10,10 @@
 //     fleet.stop();                                // all of them, at once
 //
 // Boards count from 0, in the order of the URLs. A pattern stands for its boards in order
-// (docs/how-to/fleet.md). '+' joins the paths to one board: "can://can0?node=0-7+can://can1?node=0-7". All
-// links live on one thread and one loop; boards on one CAN bus share a socket. A silent board does
-// not disturb another. ReceivedState::sampled is comparable across boards.
+// (docs/how-to/fleet.md). '+' joins the paths to one board:
+// "can://can0?node=0-7+can://can1?node=0-7". All links live on one thread and one loop; boards on
+// one CAN bus share a socket. A silent board does not disturb another. ReceivedState::sampled is
+// comparable across boards.
 //
 // Thread-safe; no call blocks the links. As with Board: if this object is destroyed or its process
 // hangs, all boards go safe. A command that was not sent by its timeout is never sent, except a
@@ -280,7 +281,8 @@ struct BridgeOptions {
 class R4LINK_API Bridge {
  public:
   // `hosts`: the URL to listen on, as for r4 sim; `board`: the board's URL. Patterns of equal size
-  // (docs/how-to/fleet.md) are paired in order. Throws Error: usage, permission, and as the transports do.
+  // (docs/how-to/fleet.md) are paired in order. Throws Error: usage, permission, and as the
+  // transports do.
   Bridge(std::string_view hosts, std::string_view board, BridgeOptions options = {});
   ~Bridge();
   Bridge(const Bridge&) = delete;

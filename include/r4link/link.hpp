@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a host knows of its link to a board: its health, the ends of commands, and the newest state.
+// A link to a board as the host sees it: its health, the ends of commands, and the newest state.
 #pragma once
 
 #include <bit>
@@ -86,7 +86,8 @@ class LinkCauses {
   std::uint32_t bits_ = 0;
 };
 
-// The state of one path (docs/how-to/redundancy.md). A board's only path is never asking or other_board.
+// The state of one path (docs/how-to/redundancy.md). A board's only path is never asking or
+// other_board.
 enum class PathState : std::uint8_t {
   down,         // the transport is down, or could not be opened yet
   asking,       // the transport is up, and the board's identity is not known yet

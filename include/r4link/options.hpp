@@ -14,7 +14,7 @@
 
 namespace r4 {
 
-// What a program is to its board; take_control() and release_control() change it.
+// A program's role at its board; take_control() and release_control() change it.
 enum class BoardRole : std::uint8_t {
   control,  // sends heartbeats, and commands when no other host controls the board
   watch,    // reads states without control; may only stop the board

@@ -36,8 +36,8 @@ class R4LINK_API SimulatedRobot {
   // "sim:?robot=1": the board in this world, for one link at a time while this object lives.
   const std::string& url() const;
 
-  // Makes an event happen, "us 1 15" (docs/how-to/simulation.md lists all): soon, if the board is open,
-  // perhaps after the return. Throws Error{data} for an unknown event.
+  // Makes an event happen, "us 1 15" (docs/how-to/simulation.md lists all): soon, if the board is
+  // open, perhaps after the return. Throws Error{data} for an unknown event.
   void happen(std::string_view words);
 
   struct Look {
@@ -64,8 +64,9 @@ class R4LINK_API SimulatedRobot {
 //
 //     r4::Board board(r4::sim::with_link(robot.url(), "loss=5%,delay=20ms±10,seed=7"));
 //
-// docs/how-to/simulation.md lists the words; unknown words throw Error{usage}. The same seed does the same
-// to the same datagrams at the same times. A watcher needs its own URL: `?listen=0` on UDP.
+// docs/how-to/simulation.md lists the words; unknown words throw Error{usage}. The same seed does
+// the same to the same datagrams at the same times. A watcher needs its own URL: `?listen=0` on
+// UDP.
 R4LINK_API CarrierMaker with_link(std::string_view url, std::string_view link);
 
 }  // namespace r4::sim

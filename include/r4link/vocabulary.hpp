@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the board has, and small types of commands, states and the link: channel counts and ranges
+// The channels of a board, and small types of commands, states and the link: counts and ranges
 // (paper section 2; table in docs/reference/protocol.md), reasons, troubles and refusals.
 #pragma once
 

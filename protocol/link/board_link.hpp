@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The board's end of the link: which host controls the board, whether that host is alive, and which
-// of its commands may be executed (paper section 4.3; docs/reference/protocol.md "The link", docs/reference/safety.md).
+// of its commands may be executed (paper section 4.3; docs/reference/protocol.md "The link",
+// docs/reference/safety.md).
 //
 //                 heartbeat that may begin a session      the host is silent for the timeout,
 //     CONNECTING ------------------------------> ACTIVE -- leaves, or all its paths are gone ---+

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A group: several commands in one datagram, executed completely or not at all (docs/reference/protocol.md).
+// A group: several commands in one datagram, executed completely or not at all
+// (docs/reference/protocol.md).
 //     O:358,1,1;O:358,1,2;PNum:2147488900;T:1699276044383;^0xc5a5ff80^
 #pragma once
 

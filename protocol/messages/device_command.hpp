@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Commands for connected devices: X, the I2C bus, UARTs and DAC (docs/reference/protocol.md,
-// docs/how-to/devices.md). Bytes are x and two hexadecimal digits each, "x3B00", to differ from numbers;
-// "x" is no bytes.
+// docs/how-to/devices.md). Bytes are x and two hexadecimal digits each, "x3B00", to differ from
+// numbers; "x" is not valid.
 #pragma once
 
 #include <cstdint>

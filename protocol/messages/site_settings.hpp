@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The settings of one board at its site: its wiring and its network. Keys, ranges and defaults:
-// r4link/tables/settings.hpp; meanings: docs/reference/protocol.md, section 3. Only a host on a cable of the
-// board's own may change them (Port::may_configure()).
+// r4link/tables/settings.hpp; meanings: docs/reference/protocol.md, section 3. Only a host on a
+// cable of the board's own may change them (Port::may_configure()).
 // In a name or password, bytes outside the grammar are written as in URLs: %2C is a comma, %25 a
 // percent sign, %6Fff the network that is called "off".
 // network, password, host, port, name, key and analog inputs take effect at once, the other

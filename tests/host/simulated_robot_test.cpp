@@ -134,7 +134,7 @@ TEST(SimulatedRobot, MayBeUsedInACallbackAndByBoardsOneAfterTheOther) {
 TEST(SimulatedRobot, ReportsWhatIsWrong) {
   SimulatedRobot robot;
   EXPECT_EQ(test::problem_of([&] { robot.happen("us 5 10"); }).text(),
-            robot.url() + ": '5' is no ultrasonic sensor; there are 1 to 4");
+            robot.url() + ": '5' is not a valid ultrasonic sensor; there are 1 to 4");
   EXPECT_EQ(test::problem_of([&] { robot.happen("handle"); }).text(),
             robot.url() + ": 'handle' has too few or too many words; write handle held|released");
   EXPECT_NO_THROW(robot.happen(" # nothing happens"));

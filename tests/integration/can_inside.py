@@ -363,7 +363,7 @@ def test_bus_off_is_safe_at_once_and_a_restart_brings_it_back(vcan_board):
 
 @pytest.mark.parametrize('url, code, message', [
     ('can://can7?node=1', 6, 'there is no interface can7'),
-    ('can://lo?node=1', 2, 'lo is no CAN interface'),
+    ('can://lo?node=1', 2, 'lo is not a CAN interface'),
     ('can://can0?fd=1', 4, 'not set up for CAN FD'),
 ])
 def test_what_cannot_be_opened_is_said_with_the_fix(url, code, message):

@@ -50,7 +50,7 @@ def convert(source, target, *options, code=0):
 def test_pandas_reads_csv_with_the_right_types(native, tmp_path):
     said = convert(native, tmp_path / 'drive.csv').stdout
     table = pandas.read_csv(tmp_path / 'drive.csv')
-    assert f'73 records; left out are {73 - len(table)} that are no state' in said
+    assert f'73 records; left out are {73 - len(table)} that are not states' in said
     kinds = {name: kind.kind for name, kind in table.dtypes.items()}
     assert kinds['time [s]'] == kinds['AIN24 [V]'] == 'f'
     for name in ('path', 'PNum', 'T [ms]', 'DMHSTA [0/1]', 'OSMC1 pwm [0-4095]', 'STEP1POS [steps]'):

@@ -75,7 +75,7 @@ def test_what_is_written_to_a_board_happens_around_it_at_once():
         assert board.next(lambda each: each['type'] == 'sensors')['us'] == [0, 0, 15, 0]
         write('  # nothing\n\nus 3 far')
         error = board.next(lambda each: each['type'] == 'error')
-        assert (error['thing'], error['reason']) == ('standard input', "'far' is no distance")
+        assert (error['thing'], error['reason']) == ('standard input', "'far' is not a distance")
         write('handle released')
         board.next(lambda each: each.get('reason') == 'handle')
         write('handle held')

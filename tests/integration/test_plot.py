@@ -89,7 +89,7 @@ def test_draws_bitmaps_and_pages(native, tmp_path):
 
 
 @pytest.mark.parametrize('arguments, code, message', [
-    (['AIN99', '-o', 'a.svg'], USAGE, 'AIN99: is no field of a state'),
+    (['AIN99', '-o', 'a.svg'], USAGE, 'AIN99: is not a field of a state'),
     (['AIN24', '-o', 'a.bmp'], USAGE, 'has no ending that tells what to draw'),
     (['ENC1', '-o', 'a.svg'], DATA_BAD, 'ENC1: is in no state of'),
     (['middle-arm:AIN24', '-o', 'a.svg'], DATA_BAD, 'middle-arm:AIN24: is in no state of'),

@@ -131,8 +131,9 @@ TEST(Url, TellsANumberThatIsNoneFromOneThatIsTooLarge) {
   };
   EXPECT_EQ(text("can://can0?node=32"),
             "can://can0?node=32: 'node=32' is out of range; give a whole number from 0 to 31");
-  EXPECT_EQ(text("can://can0?node=0-7"),
-            "can://can0?node=0-7: 'node=0-7' is no whole number; give a whole number from 0 to 31");
+  EXPECT_EQ(
+      text("can://can0?node=0-7"),
+      "can://can0?node=0-7: 'node=0-7' is not a whole number; give a whole number from 0 to 31");
 }
 
 TEST(Url, NamesTheKeyThatATransportDoesNotHave) {

@@ -2,7 +2,7 @@
 -- The grammar of a datagram and its checksum (docs/reference/protocol.md, section 1). Pure Lua, 5.2 to 5.4.
 
 local floor, byte, find = math.floor, string.byte, string.find
--- bit32 is gone from Lua 5.3 on, where operators do it, which are no syntax in 5.2.
+-- bit32 is gone from Lua 5.3 on, where operators do it, which 5.2 cannot parse.
 local bxor = bit32 and bit32.bxor or load("return function(a, b) return a ~ b end")()
 local bxor4 = bit32 and bit32.bxor or load("return function(a, b, c, d) return a ~ b ~ c ~ d end")()
 

@@ -148,7 +148,7 @@ def feed(port):
 
 
 class Lines:
-    """What has come from a socket, by lines."""
+    """The received lines of a socket."""
 
     def __init__(self, source):
         self._source = source
@@ -361,7 +361,7 @@ class Guest:
         self._deadline = time.monotonic() + KILL_AFTER_S
 
     def _processor_s(self):
-        """What QEMU has had of a processor so far."""
+        """The processor time that QEMU has used."""
         with open(f'/proc/{self._qemu.pid}/stat', encoding='ascii') as stat:
             user, system = stat.read().rsplit(')', 1)[1].split()[11:13]
         return (int(user) + int(system)) / os.sysconf('SC_CLK_TCK')

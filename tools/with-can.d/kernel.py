@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tarfile
 import tempfile
+import time
 
 from trouble import Trouble
 
@@ -66,7 +67,7 @@ def prepared():
 
 
 def mark_of_given():
-    """What sets the kernel of R4_CAN_KERNEL apart from the usual one, and from that file's others."""
+    """A suffix that distinguishes the kernel of R4_CAN_KERNEL from other kernels, of that file too."""
     given = os.environ.get('R4_CAN_KERNEL')
     if not given:
         return ''
@@ -106,10 +107,10 @@ def fetched(cache):
     given = os.environ.get('R4_CAN_KERNEL')
     if given:
         if not os.path.isfile(given):
-            raise Trouble(f'R4_CAN_KERNEL={given}', 'it is no file', GIVEN_IS)
+            raise Trouble(f'R4_CAN_KERNEL={given}', 'it is not a file', GIVEN_IS)
         return pathlib.Path(given)
     if shutil.which('apt-get') is None or shutil.which('dpkg-deb') is None:
-        raise Trouble('the guest\'s kernel', 'it is a Debian package, and this is no Debian system',
+        raise Trouble('the guest\'s kernel', 'it is a Debian package, and this system is not Debian',
                       'set R4_CAN_KERNEL to the path of a Debian linux-image-*-amd64 package')
     depends = subprocess.run(['apt-cache', 'depends', PACKAGE], capture_output=True, text=True,
                              check=False).stdout
@@ -119,9 +120,13 @@ def fetched(cache):
                       'sudo apt-get update; on another system than Debian set R4_CAN_KERNEL to the '
                       'path of a Debian linux-image-*-amd64 package')
     print(f'with-can: downloading {names[0]} (70 MB, once)', file=sys.stderr)
-    done = subprocess.run(['apt-get', '-q', '-o', 'Acquire::Retries=3', 'download', names[0]], cwd=cache, check=False,
-                          stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                          errors='replace')
+    for pause in (5, 15, 30, 0):  # a name that cannot be resolved now may be a minute later
+        done = subprocess.run(['apt-get', '-q', '-o', 'Acquire::Retries=3', 'download', names[0]], cwd=cache,
+                              check=False, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                              errors='replace')
+        if done.returncode == 0 or 'Temporary failure' not in done.stderr:
+            break
+        time.sleep(pause)
     found = sorted(glob.glob(f'{cache}/{names[0]}_*.deb'), key=os.path.getmtime)
     if done.returncode != 0 or not found:
         said = [line for line in done.stderr.splitlines() if line.startswith('E:')]

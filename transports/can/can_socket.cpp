@@ -130,7 +130,7 @@ void CanSocket::open() {
   }
   if (!state.exists) fail(interface_, ENODEV);
   if (!state.is_can) {
-    throw Error(ErrorKind::usage, name_, interface_ + " is no CAN interface",
+    throw Error(ErrorKind::usage, name_, interface_ + " is not a CAN interface",
                 "r4 list shows those that are there");
   }
   if (!state.up) fail(interface_, ENETDOWN);

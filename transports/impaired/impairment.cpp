@@ -22,7 +22,7 @@ double number(std::string_view part, std::string_view& text, double most) {
   const auto [end, error] =
       std::from_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
   if (error != std::errc() || !(value >= 0 && value <= most)) {
-    refuse(part, "is no number from 0 to " + std::to_string(static_cast<long>(most)));
+    refuse(part, "is not a number from 0 to " + std::to_string(static_cast<long>(most)));
   }
   text.remove_prefix(static_cast<std::size_t>(end - text.data()));
   return value;
@@ -36,7 +36,7 @@ bool take(std::string_view& text, std::string_view beginning) {
 
 double share(std::string_view part, std::string_view text) {
   const double percent = number(part, text, 100);
-  if (text != "%") refuse(part, "is no share in percent");
+  if (text != "%") refuse(part, "is not a share in percent");
   return percent / 100;
 }
 
@@ -68,21 +68,21 @@ Impairment Impairment::parse(std::string_view text) {
     } else if (key == "delay") {
       result.delay = duration(part, value, "ms");
       if (take(value, "±") || take(value, "+-")) result.jitter = duration(part, value, "ms");
-      if (!value.empty()) refuse(part, "is no delay");
+      if (!value.empty()) refuse(part, "is not a valid delay");
       if (result.jitter > result.delay) refuse(part, "varies by more than it is");
     } else if (key == "cut") {
       result.cut_at = duration(part, value, "s");
       if (!take(value, "+")) refuse(part, "does not say for how long");
       result.cut_for = duration(part, value, "s");
-      if (!value.empty()) refuse(part, "is no cut");
+      if (!value.empty()) refuse(part, "is not a valid cut");
     } else if (key == "seed") {
       const auto [end, error] =
           std::from_chars(value.data(), value.data() + value.size(), result.seed);
       if (error != std::errc() || end != value.data() + value.size()) {
-        refuse(part, "is no whole number");
+        refuse(part, "is not a whole number");
       }
     } else {
-      refuse(part.empty() ? "''" : part, "says nothing of a link");
+      refuse(part.empty() ? "''" : part, "is not a property of a link");
     }
     if (part.size() == text.size()) return result;
     text.remove_prefix(part.size() + 1);

@@ -288,7 +288,8 @@ void UdpEnd::report() {
 Problem UdpEnd::no_route(const std::string& subject, int error) const {
   if (error == EADDRNOTAVAIL && !url_.local.is_unspecified()) {
     return {ErrorKind::open, subject,
-            fmt::format("{} is no address of this computer at the moment", url_.local.to_string()),
+            fmt::format("this computer does not have the address {} at the moment",
+                        url_.local.to_string()),
             "connect its interface, or name an address that `ip address` shows"};
   }
   if (auto problem = out_of_resources(subject, error)) return std::move(*problem);

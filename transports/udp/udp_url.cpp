@@ -21,7 +21,7 @@ asio::ip::address local_address(const std::string& text, const std::string& url)
   asio::error_code error;
   asio::ip::address address = asio::ip::make_address(text, error);
   if (!error && !address.is_unspecified() && !address.is_multicast()) return address;
-  throw Error(ErrorKind::usage, url, "'local=" + text + "' is no address of this computer",
+  throw Error(ErrorKind::usage, url, "'local=" + text + "' is not an address of this computer",
               "write one that `ip -brief address` shows, as in local=192.168.0.7");
 }
 
@@ -59,7 +59,7 @@ UdpUrl::UdpUrl(const Url& url, Role role)
     url.allow_only("listen local");
     if (const auto text_of_it = url.get("local")) local = local_address(*text_of_it, text);
     if (port == 0) {
-      throw Error(ErrorKind::usage, text, "port 0 is no board's", "the board's is 2018");
+      throw Error(ErrorKind::usage, text, "no board has port 0", "the board's is 2018");
     }
     return;
   }

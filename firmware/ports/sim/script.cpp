@@ -58,7 +58,7 @@ std::uint32_t milliseconds_of(const Line& line, std::string_view word, const cha
   thousandths.resize(3, '0');
   if (!good_length || !parse_number(Text(word.substr(0, point)), seconds) || seconds > max_s ||
       !parse_number(Text(thousandths), milliseconds)) {
-    fail(line, word, "is no time", fix);
+    fail(line, word, "is not a valid time", fix);
   }
   return seconds * 1000 + milliseconds;
 }
@@ -67,7 +67,7 @@ int channel_of(const Line& line, int channels, const char* what) {
   std::uint32_t channel = 0;
   if (!parse_number(Text(line.words[1]), channel) || channel < 1 ||
       channel > static_cast<std::uint32_t>(channels)) {
-    fail(line, line.words[1], std::string("is no ") + what,
+    fail(line, line.words[1], std::string("is not a valid ") + what,
          "there are 1 to " + std::to_string(channels));
   }
   return static_cast<int>(channel);
@@ -88,7 +88,7 @@ void read_ultrasonic(const Line& line, ScriptStep& step) {
   }
   std::uint32_t cm = 0;
   if (!parse_number(Text(line.words[2]), cm) || cm > proximity_max_cm) {
-    fail(line, line.words[2], "is no distance", "write 0 (nothing) to 400 cm, or off");
+    fail(line, line.words[2], "is not a distance", "write 0 (nothing) to 400 cm, or off");
   }
   step.value = static_cast<std::int32_t>(cm);
 }
@@ -96,26 +96,26 @@ void read_ultrasonic(const Line& line, ScriptStep& step) {
 void read_encoder(const Line& line, ScriptStep& step) {
   step.channel = channel_of(line, encoder_channels, "encoder");
   if (!parse_number(Text(line.words[2]), step.value)) {
-    fail(line, line.words[2], "is no count", "write a whole number of 32 bits");
+    fail(line, line.words[2], "is not a count", "write a whole number of 32 bits");
   }
 }
 
 void read_analog(const Line& line, ScriptStep& step) {
   const StateField field = state_field(Text(line.words[1]));
   if (field == StateField::count || row_of(field).kind != FieldKind::analog) {
-    fail(line, line.words[1], "is no analog input",
+    fail(line, line.words[1], "is not an analog input",
          "write AIN24, AIN12, AIN5, AINDMH, AINSTEER or AIN6");
   }
   step.channel = row_of(field).channel - 1;
   if (!parse_hundredths(Text(line.words[2]), step.value)) {
-    fail(line, line.words[2], "is no voltage", "write volts such as 21.5");
+    fail(line, line.words[2], "is not a voltage", "write volts such as 21.5");
   }
 }
 
 void read_motor(const Line& line, ScriptStep& step) {
   step.channel = channel_of(line, osmc_channels, "motor");
   if (line.words[2] != "stalled" && line.words[2] != "free") {
-    fail(line, line.words[2], "is nothing that can happen to a motor", "write stalled or free");
+    fail(line, line.words[2], "cannot happen to a motor", "write stalled or free");
   }
   step.value = line.words[2] == "stalled" ? 1 : 0;
 }
@@ -124,8 +124,7 @@ std::int32_t supply_of(const Line& line, const char* what) {
   static constexpr std::string_view supplies[] = {"off", "on", "reset"};
   const auto* const supply = std::find(std::begin(supplies), std::end(supplies), line.words[2]);
   if (supply == std::end(supplies)) {
-    fail(line, line.words[2], std::string("is nothing that can happen to a ") + what,
-         "write off, on or reset");
+    fail(line, line.words[2], std::string("cannot happen to a ") + what, "write off, on or reset");
   }
   return static_cast<std::int32_t>(supply - std::begin(supplies));
 }
@@ -135,7 +134,7 @@ void read_chip(const Line& line, ScriptStep& step) {
                                                                    "servo"};
   const auto* const chip = std::find(std::begin(chips), std::end(chips), line.words[1]);
   if (chip == std::end(chips)) {
-    fail(line, line.words[1], "is no chip", "write osmc, dhb, expander, dac or servo");
+    fail(line, line.words[1], "is not a chip", "write osmc, dhb, expander, dac or servo");
   }
   step.channel = static_cast<int>(chip - std::begin(chips));
   step.value = supply_of(line, "chip");
@@ -162,7 +161,7 @@ void read_device(const Line& line, ScriptStep& step) {
       "mpu6050", "ina219", "icm20948", "bno055", "vl53l0x", "as5600"};
   const auto* const device = std::find(std::begin(devices), std::end(devices), line.words[1]);
   if (device == std::end(devices)) {
-    fail(line, line.words[1], "is no device on the user's bus",
+    fail(line, line.words[1], "is not a device on the user's bus",
          "write mpu6050, ina219, icm20948, bno055, vl53l0x or as5600");
   }
   step.channel = static_cast<int>(device - std::begin(devices));
@@ -175,7 +174,7 @@ void read_uart(const Line& line, ScriptStep& step) {
   step.channel = channel_of(line, uart_channels, "UART of the user's");
   const auto* const peer = std::find(std::begin(peers), std::end(peers), line.words[2]);
   if (peer == std::end(peers)) {
-    fail(line, line.words[2], "is nobody at a UART", "write gnss, lidar, loop, noise or off");
+    fail(line, line.words[2], "is not a device at a UART", "write gnss, lidar, loop, noise or off");
   }
   step.value = static_cast<std::int32_t>(peer - std::begin(peers));
 }

@@ -67,7 +67,7 @@ class SafeReason(Word):
 
 
 class LinkCause(Word):
-    """What is wrong with a link, the gravest first."""
+    """Faults of a link, the gravest first."""
     TRANSPORT_DOWN = 'transport down', 'the transport is down: unplugged, or switched off (of several paths: all are)'
     TWO_BOARDS = 'two boards', 'the paths lead to two boards, and no state is heard'
     WATCHDOG = 'watchdog', 'feed() was not called in time, so no heartbeat or command is sent'
@@ -168,7 +168,7 @@ class DeviceRole(Word):
 
 
 class EventKind(Word):
-    """What happened to a transport."""
+    """A change of a transport."""
     UP = 'up', 'the transport went up'
     DOWN = 'down', 'the transport went down: `reason` says why'
     WARNING = 'warning', 'something is wrong, and the transport stays up: `reason` says what'

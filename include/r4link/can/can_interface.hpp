@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the system knows of a CAN interface, and how to bring it up.
+// The state of a CAN interface as the system reports it, and how to bring it up.
 #pragma once
 
 #include <cstdint>

@@ -70,10 +70,10 @@ R4LINK_API void require_cable(std::string_view url, std::string_view secret);
 // The same if the command holds a secret. The boards call it before they send.
 R4LINK_API void require_cable(std::string_view url, const Command& command);
 
-// What a board's refusal means: "no such channel".
+// The meaning of a board's refusal: "no such channel".
 R4LINK_API std::string_view meaning_of(Refusal refusal);
 
-// What the kind is called: "OSMC", "servo".
+// The name of the kind: "OSMC", "servo".
 R4LINK_API std::string_view name_of(CommandKind kind);
 
 // One kind of command, for help and for the fix in an error.

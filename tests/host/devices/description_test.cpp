@@ -279,7 +279,7 @@ TEST(DeviceDescription, ReportsWhatIsWrongAndInWhichLine) {
            WrongText{1, "title x\n", "it does not begin with its name"},
            WrongText{1, "device A\n", "that is not a valid name"},
            WrongText{6, description_head + "\n\nregister x00\n",
-                     "\"register\" is none of its words"},
+                     "\"register\" is not one of its words"},
            WrongText{2, "device a\naddress 7\n", "an address is out of range"},
            WrongText{2, "device a\naddress 0x78\n", "an address is out of range"},
            WrongText{2, "device a\naddress 9 9\n", "an address is named twice"},

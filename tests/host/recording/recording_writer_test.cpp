@@ -135,7 +135,7 @@ TEST_F(RecordingWriterTest, WritesOverNothingElse) {
                        "another program records into it"));
   EXPECT_EQ(problem_of([&] { RecordingWriter(folder.string(), {}); }).reason, "is a directory");
   ASSERT_EQ(::mkfifo(path("fifo").c_str(), 0600), 0);
-  EXPECT_EQ(problem_of([&] { RecordingWriter(path("fifo"), {}); }).reason, "is no file");
+  EXPECT_EQ(problem_of([&] { RecordingWriter(path("fifo"), {}); }).reason, "is not a file");
   EXPECT_EQ(problem_of([&] { RecordingWriter(path("no/where.r4log"), {}); }).kind, ErrorKind::open);
 }
 

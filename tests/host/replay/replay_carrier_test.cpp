@@ -140,7 +140,7 @@ TEST_F(Replay, RefusesAFileThatItCannotPlay) {
   EXPECT_EQ(problem_of([&] { Board("replay:" + testing::TempDir()); }).reason, "is a directory");
   const std::string fifo = file + "-fifo";
   ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
-  EXPECT_EQ(problem_of([&] { Board("replay:" + fifo); }).reason, "is no regular file");
+  EXPECT_EQ(problem_of([&] { Board("replay:" + fifo); }).reason, "is not a regular file");
   fs::remove(fifo);
   text = "something else";
   EXPECT_EQ(problem_of([&] { play(""); }).reason, "no recording");

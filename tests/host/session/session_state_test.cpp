@@ -37,7 +37,7 @@ TEST_F(SessionState, FollowsTheReasonOfHeartbeatsWhileNoStatesCome) {
   link.heartbeat(SafeReason::link);
   EXPECT_EQ(link.session.state().safe, SafeReason::link);
   EXPECT_EQ(link.session.state().encoder(1), 7);
-  EXPECT_EQ(link.session.state().received, received) << "a heartbeat is no state";
+  EXPECT_EQ(link.session.state().received, received) << "a heartbeat is not a state";
   link.heartbeat();
   EXPECT_EQ(link.session.state().safe, SafeReason::none);
 }
@@ -68,7 +68,7 @@ TEST_F(SessionState, ForgetsAChipFaultThatTheBoardReportsNoMore) {
   link.state("SAFE:0;CMD:1;");
   EXPECT_FALSE(link.session.state().fault.any());
   link.state("SAFE:5;CMD:1;");
-  EXPECT_FALSE(link.session.state().fault.any()) << "a watchdog reset is no chip's";
+  EXPECT_FALSE(link.session.state().fault.any()) << "a watchdog reset is not a fault of a chip";
 }
 
 TEST_F(SessionState, IsOfOneBootOnly) {

@@ -39,7 +39,7 @@ TEST(Csv, HasARowForEachStateAndAColumnForEachValue) {
   // What is damaged, and what is none, is counted.
   const auto states = lines.size() - 1;
   EXPECT_EQ(csv.left_out,
-            std::to_string(paper_capture().size() + 2 - states) + " that are no state");
+            std::to_string(paper_capture().size() + 2 - states) + " that are not states");
   EXPECT_GT(states, 50);
   for (const std::string& line : lines) {
     EXPECT_EQ(std::count(line.begin(), line.end(), ','), 16) << line;
@@ -92,7 +92,7 @@ TEST(Csv, HasNoRowForAStateWhoseValuesAreNone) {
   // The checksum is right: a column of numbers stays one.
   const Converted csv = converted(one_state("AIN24:abc;PNum:1;T:2;"), ".r4log", ".csv");
   EXPECT_EQ(lines_of(csv.bytes).size(), 1);
-  EXPECT_EQ(csv.left_out, "1 that are no state");
+  EXPECT_EQ(csv.left_out, "1 that are not states");
 }
 
 TEST(Csv, HasWhatDescribedDevicesMeasured) {

@@ -279,7 +279,7 @@ TEST_F(UdpCarrierTest, SaysWhyItCannotBeOpened) {
                 "no host 'no-such-board.invalid'", "check the name"},
            Case{"udp://192.0.2.1:0", Role::board, "cannot be opened on 192.0.2.1", "0.0.0.0"},
            Case{"udp://127.0.0.1:20180?listen=0&local=10.254.77.9", Role::host,
-                "10.254.77.9 is no address of this computer at the moment", "ip address"},
+                "this computer does not have the address 10.254.77.9 at the moment", "ip address"},
        }) {
     const Problem problem = problem_of([&] { open_carrier(io, each.url, each.role, at_host); });
     EXPECT_EQ(problem.kind, ErrorKind::open) << each.url;

@@ -106,7 +106,7 @@ Findings check_can_interface(const Machine& machine, const CanInterface& interfa
   }
   if (!interface.is_can) {
     Finding finding = about(interface, Severity::error, "can.missing");
-    finding.reason = "is no CAN interface";
+    finding.reason = "is not a CAN interface";
     finding.fix = "r4 list";
     finding.kind = ErrorKind::unsupported;
     return {finding};

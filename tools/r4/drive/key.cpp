@@ -64,7 +64,7 @@ int give(const KeyOptions& options) {
 
 int keys(const KeyOptions& options) {
   if (options.file.empty() || is_url(options.file)) {
-    throw Error(ErrorKind::usage, fmt::format("'{}'", options.file), "is no file",
+    throw Error(ErrorKind::usage, fmt::format("'{}'", options.file), "is not a file",
                 options.action == "new" ? "r4 key new FILE" : "r4 key give FILE serial:auto");
   }
   return options.action == "new" ? make(options) : give(options);
@@ -83,7 +83,7 @@ Examples:
   r4 key give ~/.r4-key serial:auto     the board has it, and from now on asks for it
   r4 send udp://192.168.0.125 R:1,On O:358,1,1 --key ~/.r4-key
 
-Exit codes: 0 done; 1 the file holds no key; 2 usage, also a URL that is no cable; 3 the board did not
+Exit codes: 0 done; 1 the file holds no key; 2 usage, also a URL that is not a cable; 3 the board did not
 take it; 4, 5 the file or the transport cannot be opened.)";
 
 }  // namespace

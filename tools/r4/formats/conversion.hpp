@@ -53,7 +53,7 @@ class Sink {
   virtual void on_header() {}
   virtual void on_record(const Record& record) = 0;
   virtual void finish() = 0;
-  // The missing part, for people: "12 that are no state"; empty: nothing is missing.
+  // The missing part, for people: "12 that are not states"; empty: nothing is missing.
   virtual std::string left_out() const { return {}; }
 };
 

@@ -170,7 +170,7 @@ void CsvSink::finish() {
 }
 
 std::string CsvSink::left_out() const {
-  std::string text = others_ == 0 ? std::string() : fmt::format("{} that are no state", others_);
+  std::string text = others_ == 0 ? std::string() : fmt::format("{} that are not states", others_);
   if (!devices_.problems().empty()) text += (text.empty() ? "" : ", ") + devices_.problems();
   if (!late_.empty()) {
     text += fmt::format(

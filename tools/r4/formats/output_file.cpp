@@ -18,7 +18,8 @@ OutputFile::OutputFile(std::string path, bool replace)
   struct stat status {};
   if (::lstat(path_.c_str(), &status) == 0) {
     if (!S_ISREG(status.st_mode)) {
-      throw Error(ErrorKind::open, path_, S_ISDIR(status.st_mode) ? "is a directory" : "is no file",
+      throw Error(ErrorKind::open, path_,
+                  S_ISDIR(status.st_mode) ? "is a directory" : "is not a file",
                   "name a file that is not there yet");
     }
     if (!replace_) {

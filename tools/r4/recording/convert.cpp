@@ -151,7 +151,7 @@ Examples:
   zstdcat robot-*.r4log.zst | r4 convert - -o robot.jsonl
   r4 convert bus.log -o bus.r4log --start 2026-11-23T21:20:00    of candump -tz
 
-Exit codes: 0 all of it was converted; 1 some could not be read, or it is no recording; 2 usage; 4, 5 a
+Exit codes: 0 all of it was converted; 1 some could not be read, or it is not a recording; 2 usage; 4, 5 a
 file cannot be read or written.)";
 
 }  // namespace

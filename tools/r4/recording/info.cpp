@@ -46,7 +46,7 @@ Examples:
   r4 info robot-*.r4log.zst --json | jq .paths
   zstdcat robot-00007.r4log.zst | r4 info -
 
-Exit codes: 0 all of it could be read; 1 some could not, or it is no recording; 4, 5 the file cannot be
+Exit codes: 0 all of it could be read; 1 some could not, or it is not a recording; 4, 5 the file cannot be
 read.)";
 
 }  // namespace

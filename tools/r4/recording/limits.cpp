@@ -36,7 +36,8 @@ std::optional<std::uint64_t> read(std::string_view text, const std::array<Unit, 
 std::uint64_t read_size(const std::string& option, const std::string& text) {
   const std::optional<std::uint64_t> size = read(text, sizes);
   if (size) return *size;
-  throw Error(ErrorKind::usage, option + " " + text, "is no size", "write 500K, 100M or 2G");
+  throw Error(ErrorKind::usage, option + " " + text, "is not a valid size",
+              "write 500K, 100M or 2G");
 }
 
 void take_rotation(const std::string& text, RecordingOptions& out) {

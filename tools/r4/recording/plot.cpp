@@ -53,7 +53,7 @@ Wanted to_wanted(const std::string& text) {
                  [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
   const StateField field = state_field(Text(name));
   if (field == StateField::count) {
-    throw Error(ErrorKind::usage, text, "is no field of a state",
+    throw Error(ErrorKind::usage, text, "is not a field of a state",
                 "name one of docs/reference/protocol.md, such as AIN24, OSMC1 or ENC1");
   }
   return {colon == std::string::npos ? std::string() : text.substr(0, colon), field};
@@ -327,7 +327,7 @@ Examples:
   r4 plot drive.r4log AIN24 OSMC1 -o drive.svg
   r4 plot robot.r4log.zst left-arm:ENC1HZ right-arm:ENC1HZ -o arms.png
 
-Exit codes: 0 drawn; 1 drawn, but some could not be read, or it is no recording, or has no such field;
+Exit codes: 0 drawn; 1 drawn, but some could not be read, or it is not a recording, or has no such field;
 2 usage; 4, 5 a file cannot be read or written; 6 there is no matplotlib.)";
 
 }  // namespace

@@ -191,8 +191,7 @@ void BoardCommands::arm(Done done) {
 void BoardCommands::send(const std::optional<std::string>& text, const void* source,
                          const Origin& origin, const Done& done) {
   if (!text) {
-    done(false,
-         "~/send: that is no text of a board's commands; write them as in O:358,1,1;S:1500,3");
+    done(false, "~/send: the text is not a valid command; write it as in O:358,1,1;S:1500,3");
     return;
   }
   if (asks_to_stop(*text)) {

@@ -155,7 +155,7 @@ double positive_number(std::string_view name, std::string_view text) {
   double number = 0;
   if (read(text, number) && std::isfinite(number) && number > 0) return number;
   throw Error(ErrorKind::usage, std::string(name) + " " + std::string(text),
-              "is no number greater than 0", "write it as in 0.42");
+              "is not a number greater than 0", "write it as in 0.42");
 }
 
 }  // namespace r4::tool::ros2

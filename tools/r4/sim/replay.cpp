@@ -173,7 +173,7 @@ int replay(const ReplayOptions& options) { return Replay(options).run(); }
 double read_speed(const std::string& text) {
   std::int32_t hundredths = 0;
   if (parse_hundredths(Text(text), hundredths) && hundredths > 0) return hundredths / 100.0;
-  throw Error(ErrorKind::usage, "--speed " + text, "is no such speed",
+  throw Error(ErrorKind::usage, "--speed " + text, "is not a valid speed",
               "write one such as 0.5 or 10");
 }
 
@@ -195,7 +195,7 @@ Examples:
   r4 replay robots.r4log 'can://vcan0?node=3' --path 2
   r4 replay drive.r4log --step                  press Return
 
-Exit codes: 0 the recording has ended, or --duration or Ctrl-C; 1 some of it could not be read, or it is no
+Exit codes: 0 the recording has ended, or --duration or Ctrl-C; 1 some of it could not be read, or it is not a
 recording; 2 usage; 4, 5 the file or the transport cannot be opened.)";
 
 }  // namespace

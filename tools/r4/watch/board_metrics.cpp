@@ -95,7 +95,7 @@ void describe(const SetBoard& each, MetricFamilies& out) {
   out.gauge("r4_up", "The board is heard.", one, up ? 1 : 0);
   if (!who.board_id.empty()) {
     MetricLabels info = with(with(one, "board", who.name), "hardware_id", who.board_id);
-    out.gauge("r4_info", "Who the board is; always 1.",
+    out.gauge("r4_info", "The board's identity; always 1.",
               with(std::move(info), "firmware", who.firmware), 1);
   }
   for (int i = 0; up && i < safe_reason_count; ++i) {
@@ -105,7 +105,8 @@ void describe(const SetBoard& each, MetricFamilies& out) {
   }
   out.count("r4_received_total", "Datagrams of the board.", one, statistics.received);
   out.count("r4_states_total", "Those of them that are states.", one, statistics.states);
-  out.count("r4_damaged_total", "What came and was no datagram.", one, statistics.damaged);
+  out.count("r4_damaged_total", "Received data that were not a valid datagram.", one,
+            statistics.damaged);
   out.count("r4_lost_total", "Datagrams of the board that did not come in their turn.", one,
             lost_in_turn(statistics.packets));
   out.count("r4_duplicates_total", "Datagrams that came again.", one, statistics.packets.duplicate);

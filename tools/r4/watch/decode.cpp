@@ -164,7 +164,7 @@ constexpr const char* decode_footer = R"(One JSON object for each line of input 
                 the rest is about the datagram that it holds
   error packed  it holds none; reason: hex (not pairs of hexadecimal digits), length, version
                 (of a later one: update r4) or syntax
-  text          the datagram; bytes that are no printable ASCII, and \, as \xNN
+  text          the datagram; bytes that are not printable ASCII, and \, as \xNN
 
 --candump reads what candump prints, candump -L best, and joins the frames of every interface and
 node to datagrams. Before those keys, and with the line and time of the last frame:

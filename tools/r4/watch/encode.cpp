@@ -45,7 +45,7 @@ void write_fields(DatagramWriter& writer, std::string_view text) {
 
     Field field;
     if (!read_field(Text(part), field)) {
-      fail(fmt::format("'{}'", part), "is no field",
+      fail(fmt::format("'{}'", part), "is not a field",
            "write NAME:VALUE,VALUE… in printable ASCII without ^, fields separated by ';'");
     }
     if (field.name() == Text("PNum") || field.name() == Text("T")) {

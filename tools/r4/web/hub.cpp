@@ -101,16 +101,17 @@ void Hub::on_open(ClientId client, Protocol protocol) {
 void Hub::on_message(ClientId client, Protocol protocol, std::string text) {
   if (protocol == Protocol::foxglove) {
     if (!foxglove_.on_message(client, text)) {
-      return server_.drop(client, "that is no message of foxglove.websocket.v1");
+      return server_.drop(client, "the message is not one of foxglove.websocket.v1");
     }
     return server_.read_on(client);
   }
   std::optional<PageRequest> request = page_request(text);
   if (!request) {
     server_.send(
-        client, {std::make_shared<const std::string>(error_text("that is no message of r4.web.v1")),
-                 "", Outgoing::Kind::other});
-    return server_.drop(client, "that is no message of r4.web.v1");
+        client,
+        {std::make_shared<const std::string>(error_text("the message is not one of r4.web.v1")), "",
+         Outgoing::Kind::other});
+    return server_.drop(client, "the message is not one of r4.web.v1");
   }
   asio::post(io_, [this, client, request = std::move(*request)] {
     obey(client, request);

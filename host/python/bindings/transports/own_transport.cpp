@@ -32,7 +32,7 @@ auto staying(Code code) {
 // py::error_already_set.
 template <class Call>
 py::object from_python(Call call) {
-  const auto result = py::reinterpret_steal<py::object>(staying(call));
+  auto result = py::reinterpret_steal<py::object>(staying(call));
   if (!result) throw py::error_already_set();
   return result;
 }

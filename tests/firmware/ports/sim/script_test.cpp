@@ -49,7 +49,7 @@ TEST(Script, ReadsWhatHappensToDevices) {
   EXPECT_EQ(error_of("1 userbus broken"),
             "bench.txt:1: 'broken' is nothing a bus can be; write held, cut, stretched or free");
   EXPECT_EQ(error_of("1 device bmp280 off"),
-            "bench.txt:1: 'bmp280' is no device on the user's bus; write mpu6050, "
+            "bench.txt:1: 'bmp280' is not a device on the user's bus; write mpu6050, "
             "ina219, icm20948, bno055, vl53l0x or as5600");
 }
 
@@ -118,7 +118,8 @@ TEST(Script, IsEmptyWithoutSteps) {
 TEST(Script, SaysWhereWhatAndHowToMendIt) {
   EXPECT_EQ(error_of("1 handle held\n2 handle open\n"),
             "bench.txt:2: 'open' is nothing a handle can be; write held or released");
-  EXPECT_EQ(error_of("1 us 5 10"), "bench.txt:1: '5' is no ultrasonic sensor; there are 1 to 4");
+  EXPECT_EQ(error_of("1 us 5 10"),
+            "bench.txt:1: '5' is not a valid ultrasonic sensor; there are 1 to 4");
   EXPECT_EQ(error_of("1 us"),
             "bench.txt:1: 'us' has too few or too many words; write TIME us SENSOR CM|off");
 }
@@ -202,13 +203,13 @@ TEST(Script, ReadsTroubleWithChipsBusAndLoop) {
   EXPECT_EQ(steps[5].value, ScriptStep::off);
 
   EXPECT_EQ(error_of("1 chip eeprom off"),
-            "bench.txt:1: 'eeprom' is no chip; write osmc, dhb, expander, dac or servo");
+            "bench.txt:1: 'eeprom' is not a chip; write osmc, dhb, expander, dac or servo");
   EXPECT_EQ(error_of("1 chip dac broken"),
-            "bench.txt:1: 'broken' is nothing that can happen to a chip; write off, on or reset");
+            "bench.txt:1: 'broken' cannot happen to a chip; write off, on or reset");
   EXPECT_EQ(error_of("1 i2c stuck"),
             "bench.txt:1: 'stuck' is nothing a bus can be; write held or free");
   EXPECT_EQ(error_of("1 hang long"),
-            "bench.txt:1: 'long' is no time; write for how long, in seconds such as 0.3");
+            "bench.txt:1: 'long' is not a valid time; write for how long, in seconds such as 0.3");
   EXPECT_EQ(error_of("1 dance"),
             "bench.txt:1: 'dance' is nothing that can happen; use handle, us, enc, analog, motor, "
             "chip, i2c, userbus, device, uart, gpio, hang, fault, watchdog or reboot");

@@ -466,7 +466,7 @@ int main(int argc, char** argv) {
     const bool good = (name == "--nodes" && r4::test::parse(value, options.nodes, 10)) ||
                       (name == "--bitrate" && r4::test::parse(value, options.bitrate, 10));
     if (good) continue;
-    std::fprintf(stderr, "slcan_bus: %s %s is no option of it\n", argv[i], argv[i + 1]);
+    std::fprintf(stderr, "slcan_bus: %s %s is not a valid option\n", argv[i], argv[i + 1]);
     return 2;
   }
   r4::test::Bus(options).run();

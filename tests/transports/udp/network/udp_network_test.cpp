@@ -137,7 +137,8 @@ int lose_the_address_that_is_sent_from() {
   const auto host = open_carrier(io, url, Role::host, at_host);
   if (!set_second(false)) return 11;
   if (!run_until(io, [&] { return at_host.count(Kind::down) == 1; })) return 12;
-  const std::string words = fmt::format("{} is no address of this computer", second_address);
+  const std::string words =
+      fmt::format("this computer does not have the address {}", second_address);
   const Problem& lost = at_host.last(Kind::down)->problem;
   if (lost.reason.find(words) != 0 || lost.fix.empty()) return 13;
   if (!set_second(true)) return 14;

@@ -60,7 +60,7 @@ void McapSource::finish() {
     return each.second.path.has_value();
   });
   if (!ours_ && !any_of_ours) {
-    throw Error(ErrorKind::data, name_, "an MCAP file that is no recording of r4",
+    throw Error(ErrorKind::data, name_, "an MCAP file that is not a recording of r4",
                 "convert what r4 record or r4 convert has made");
   }
 }
@@ -221,7 +221,7 @@ void McapSource::on_message(std::string_view content) {
     return found != object.end() && found->is_string() ? found->get_ptr<const std::string*>()
                                                        : nullptr;
   };
-  if (!object.is_object()) return damage("a message that is no JSON object");
+  if (!object.is_object()) return damage("a message that is not a JSON object");
   bytes_.clear();
   const std::uint16_t path = *channel->second.path;
   const std::string* const event = text_of("event");
@@ -231,13 +231,13 @@ void McapSource::on_message(std::string_view content) {
                                                      : text_of("text");
   const bool good =
       text != nullptr && append_unescaped(bytes_, *text) && bytes_.size() <= max_record_line;
-  if (!good) return damage("a message that is no record");
+  if (!good) return damage("a message that is not a record");
   if (path == no_path) {
     const char* const problem = lines_.on_line(bytes_, channel->first);
     if (problem != nullptr) damage(problem);
     return;
   }
-  if (event == nullptr && from == nullptr) return damage("a message that is no record");
+  if (event == nullptr && from == nullptr) return damage("a message that is not a record");
   const RecordKind kind = event != nullptr   ? RecordKind::event
                           : *from == "board" ? RecordKind::from_board
                                              : RecordKind::to_board;

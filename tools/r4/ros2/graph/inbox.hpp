@@ -39,7 +39,8 @@ struct Origin {
 
 class Inbox {
  public:
-  // Calls `on_drained` on the loop after all waiting samples have been taken. A participant must exist.
+  // Calls `on_drained` on the loop after all waiting samples have been taken. A participant must
+  // exist.
   Inbox(asio::io_context& io, Transit::Clocks clocks, std::function<void()> on_drained);
   ~Inbox() { stop(); }
   Inbox(const Inbox&) = delete;

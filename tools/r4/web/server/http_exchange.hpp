@@ -73,7 +73,7 @@ class Server::Impl::Exchange : public std::enable_shared_from_this<Exchange> {
     }
     if (error.category() == http::make_error_code(http::error::bad_version).category() &&
         error != http::error::end_of_stream && error != http::error::partial_message) {
-      return refuse(http::status::bad_request, "this is no request");
+      return refuse(http::status::bad_request, "this is not a valid request");
     }
     if (error) return end();
     dispatch();

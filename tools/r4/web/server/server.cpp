@@ -31,7 +31,7 @@ void Server::Impl::listen() {
   const auto found =
       resolver.resolve(listen_address.host, std::to_string(listen_address.port), error);
   if (error || found.empty()) {
-    throw Error(ErrorKind::open, name, "is no address of this computer",
+    throw Error(ErrorKind::open, name, "is not an address of this computer",
                 "ip address shows which there are");
   }
   const tcp::endpoint endpoint = found.begin()->endpoint();
