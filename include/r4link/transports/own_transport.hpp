@@ -40,7 +40,8 @@ class R4LINK_API OwnTransport {
   virtual void close() = 0;
 };
 
-// A CAN bus that the system does not know; the link does the rest of can:// on it (docs/how-to/can.md).
+// A CAN bus that the system does not know; the link does the rest of can:// on it
+// (docs/reference/can.md).
 class R4LINK_API OwnCanBus {
  public:
   // Passes on a received frame, as above; not remote frames or own frames. Throws Error{usage} for
