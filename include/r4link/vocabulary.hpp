@@ -246,7 +246,7 @@ constexpr Peer everyone = 0;
 
 enum class Priority : std::uint8_t {
   state,  // newest wins: an older waiting state is replaced
-  // W, renewed each second; waits as `normal`; has its own frame on a bus (docs/how-to/can.md)
+  // W, renewed each second; waits as `normal`; has its own frame on a bus (docs/reference/can.md)
   lease,
   normal,  // waits its turn; refused if the queue is full
   stop,    // overtakes all others and is never dropped

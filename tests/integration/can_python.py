@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A host and a board on a CAN bus, frame by frame on python-can.
 
-A second implementation, written from docs/reference/protocol.md, docs/how-to/can.md and docs/reference/packed.md: it shares no code
+A second implementation, written from docs/reference/protocol.md, docs/reference/can.md and
+docs/reference/packed.md: it shares no code
 with r4. Nothing here sleeps; everything waits for frames until a deadline.
 """
 import random

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The promises of docs/reference/safety.md under random faults. R4_SCHEDULES sets how many schedules are run
+// The promises of docs/design/safety-argument.md under random faults. R4_SCHEDULES sets how many schedules are run
 // (30,000 by default). A fifth as many are run with standstills, and a tenth with several paths.
 // Their seeds are from R4_FIRST_SEED on (1 by default), so that a long run can go on where another ended.
 // R4_SEED replays one schedule and prints its trace.

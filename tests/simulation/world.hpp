@@ -2,7 +2,7 @@
 // The link simulator: the board's application and the host's session, the very code that ships,
 // joined by a faulty channel in virtual time. One seed is one run, to the last byte.
 //
-// While it runs it checks the promises of docs/reference/safety.md and stops at the first one broken:
+// While it runs it checks the promises of docs/design/safety-argument.md and stops at the first one broken:
 //   silence    outputs are live only while intact heartbeats of the host in control arrive: the last
 //              one at most timeout + 20 ms ago, however long it waited to be read, and sent at most
 //              2 timeouts + 20 ms ago; or the board stands still, until its first turn

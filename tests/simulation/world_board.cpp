@@ -20,7 +20,7 @@ bool driven(const firmware::Outputs& outputs) { return outputs != firmware::Outp
 }  // namespace
 
 // The board's clock begins at random. By chance, once in 200,000 times, it is within 10 s of where it was before, and what
-// is played again of that boot passes for one of this (docs/reference/safety.md, Limits): no mistake to look for.
+// is played again of that boot passes for one of this (docs/design/safety-argument.md): no mistake to look for.
 std::uint32_t World::first_time() {
   constexpr std::int32_t apart_ms = 60'000;
   std::uint32_t first = 0;

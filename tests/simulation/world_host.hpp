@@ -63,7 +63,7 @@ struct World::Host final : test::DrivenSession::Handler {
     Datagram datagram;
     if (priority == Priority::stop && read_datagram(Text(bytes), datagram))
       stop_pnum = datagram.pnum();
-    // Who shares a place with the host in control sends nothing but a stop (docs/how-to/can.md).
+    // Who shares a place with the host in control sends nothing but a stop (docs/reference/can.md).
     if (stopper && world.schedule_.shared_place && priority != Priority::stop) {
       return SendResult::busy;
     }

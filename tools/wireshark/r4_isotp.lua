@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
--- ISO-TP (ISO 15765-2) as R4 uses it (docs/how-to/can.md): frames of one id are joined to messages, once, when a capture is
--- read. What each frame was is kept for when it is shown again.
+-- ISO-TP (ISO 15765-2) as R4 uses it (docs/reference/can.md): frames of one id are joined to
+-- messages, once, when a capture is read. What each frame was is kept for when it is shown again.
 
 local M = {}
 

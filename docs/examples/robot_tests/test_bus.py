@@ -6,7 +6,7 @@ import struct
 import pytest
 
 pytestmark = [pytest.mark.can, pytest.mark.r4(transport='can', boards=2)]
-EMERGENCY_STOP = 0x010  # docs/how-to/can.md: any content, obeyed by every board
+EMERGENCY_STOP = 0x010  # docs/reference/can.md: any content, obeyed by every board
 
 
 @pytest.fixture(name='button')

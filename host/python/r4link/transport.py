@@ -80,7 +80,7 @@ class Transport:
 
 
 class CanTransport(Transport):
-    """A board on a CAN bus of python-can, on any of its interfaces (docs/how-to/can.md):
+    """A board on a CAN bus of python-can, on any of its interfaces (docs/reference/can.md):
 
         with can.Bus(interface='slcan', channel='/dev/ttyACM0', bitrate=1000000) as bus:
             with r4link.Board(r4link.CanTransport(bus, node=3)) as board:

@@ -41,7 +41,7 @@ class R4LINK_API OwnTransport {
 };
 
 // A CAN bus that the system does not know; the link does the rest of can:// on it
-// (docs/how-to/can.md).
+// (docs/reference/can.md).
 class R4LINK_API OwnCanBus {
  public:
   // Passes on a received frame, as above; not remote frames or own frames. Throws Error{usage} for

@@ -125,7 +125,7 @@ TEST_F(ApplicationKey, AnswersAnUnsignedHeartbeatWithItsNonce) {
   }
 }
 
-// docs/reference/safety.md, "Limits": who forges an address makes the board send there at most so much.
+// docs/design/safety-argument.md: who forges an address makes the board send there at most so much.
 TEST_F(ApplicationKey, AnswersWithAtMostFiveTimesTheBytes) {
   host.connect();
   std::size_t longest = 0;

@@ -100,7 +100,7 @@ TEST(ApplicationWatch, WhatAHeartbeatShowsToWhoWatchesCanBeEchoed) {
   EXPECT_EQ(board.state(), BoardState::active);
 }
 
-// Who asks says nothing but that somebody watches (docs/how-to/can.md).
+// Who asks says nothing but that somebody watches (docs/reference/can.md).
 TEST(ApplicationWatch, OnABusABoardStreamsToWhoAsksUntilAHostIsThere) {
   TestBoard board({}, 2);
   board.ports[1].bus = true;

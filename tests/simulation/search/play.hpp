@@ -16,7 +16,7 @@
 //   returns   at the end of a run without strangers, a host that runs is in control
 //
 // With a key, the first copy of a signed datagram that reaches the board counts as its host's,
-// whatever its peer is (docs/reference/safety.md, limits). Any further copy counts as the stranger's.
+// whatever its peer is (docs/design/safety-argument.md). Any further copy counts as the stranger's.
 #pragma once
 
 #include <cstdint>

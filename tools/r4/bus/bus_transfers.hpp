@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Joins recorded CAN frames to datagrams with the ISO-TP receivers of boards and hosts
-// (docs/how-to/can.md).
+// (docs/reference/can.md).
 //
 // Only listens: one receiver for each interface, node and lane that occurs. Uses the recording's
 // time. Memory is bounded by max_interfaces for any input.

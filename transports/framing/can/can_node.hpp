@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The traffic between a board and its hosts on a CAN bus (docs/how-to/can.md), at either end: whole
-// datagrams on one side, frames on the other.
+// The traffic between a board and its hosts on a CAN bus (docs/reference/can.md), at either end:
+// whole datagrams on one side, frames on the other.
 //     dialogue    host to board, and the board's answers (N, I): ISO-TP with flow control
 //     telemetry   the board's states and heartbeats: ISO-TP without, for any number of listeners
 // Three raw frames are added. The board's end turns an emergency stop into E:STOP. It sends the
@@ -40,7 +40,7 @@ class CanNode {
   // `node` is 0-31. With `fd`, sends frames of up to 64 bytes; both formats are received.
   CanNode(CanEnd end, std::uint8_t node, bool fd);
 
-  // At a host: requests the board's states by a frame (docs/how-to/can.md, "Who watches").
+  // At a host: requests the board's states by a frame (docs/reference/can.md, "Watchers").
   void ask_for_states() { request_due_ = true; }
 
   // Sends packed datagrams; a board sends plain if its host's newest datagram was plain.

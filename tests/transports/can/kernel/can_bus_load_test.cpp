@@ -213,7 +213,7 @@ TEST_F(CanBusLoad, DropsFramesThatTheBusDoesNotTakeForLong) {
 // A board's datagram in seven frames, which come while the reader in this thread is held up.
 class CanBusTimes : public CanBusTest {
  protected:
-  static constexpr std::chrono::milliseconds n_cr{100};  // docs/how-to/can.md
+  static constexpr std::chrono::milliseconds n_cr{100};  // docs/reference/can.md
 
   struct Sending {
     std::uint32_t before_us;

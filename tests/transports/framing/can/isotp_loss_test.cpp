@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Streams of telemetry in which frames are lost: how many datagrams come out that are made of two.
-// The numbers are printed; docs/how-to/can.md has them. Same seed, same numbers.
+// The numbers are printed. Same seed, same numbers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
