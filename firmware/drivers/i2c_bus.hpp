@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The I2C bus for the chip drivers (NXP UM10204). Every call is bounded: it returns within i2c_most_us,
-// so a port must not use a library that waits longer. Each transfer ends with STOP, even after an
-// error.
+// The I2C bus for the chip drivers (NXP UM10204). Every call is bounded: it returns within
+// i2c_most_us, so a port must not use a library that waits longer. Each transfer ends with STOP,
+// even after an error.
 #pragma once
 
 #include <cstddef>

@@ -153,6 +153,36 @@ TEST(GigaUsb, AProgramThatOpensThePortHearsThePresentFromItsFirstLineOn) {
   EXPECT_LE(giga::BoardClock::now_ms() - static_cast<std::uint32_t>(datagram.time_ms()), 600U);
 }
 
+TEST(GigaUsb, APortThatWasClosedWhileAPacketWasUnderWaySendsToTheNextProgram) {
+  for (const std::uint64_t closed_ms : {0U, 1U, 200U}) {
+    GigaBench bench;
+    bench.boot();
+    PlainHost host;
+    bench.drive(host, bench.usb());
+    bench.giga.usb_close_under_way();
+    bench.run_ms(closed_ms);
+    bench.giga.usb_open = true;
+    bench.giga.usb_host.clear();
+    PlainHost next;
+    bench.run_ms(100, next, bench.usb());
+    EXPECT_GE(bench.usb_lines().size(), 5U) << closed_ms;
+    EXPECT_TRUE(bench.giga.usb_flushed) << "the old packet would come first";
+    EXPECT_EQ(r4_fake_usb.device.DIEPEMPMSK.value, 0U);
+  }
+}
+
+TEST(GigaUsb, AnEndpointIsNotOpenedBeforeAComputerHasFoundTheBoard) {
+  GigaBench bench;
+  bench.boot();
+  bench.giga.usb_close_under_way();
+  bench.giga.usb_configured = false;
+  bench.run_ms(50);
+  EXPECT_FALSE(bench.giga.usb_endpoint_open());
+  bench.giga.usb_configured = true;
+  bench.run_ms(50);
+  EXPECT_TRUE(bench.giga.usb_endpoint_open());
+}
+
 TEST(GigaUsb, AFloodOfInputTakesItsTurn) {
   GigaBench bench;
   bench.boot();

@@ -252,6 +252,12 @@ std::uint32_t EventFlags::wait_any_for(std::uint32_t flags, Kernel::Clock::durat
 // --- USB
 
 arduino::USBSerial _SerialUSB;
+static int usb_locks = 0;
+bool USBDevice::configured() { return giga().usb_configured; }
+arduino::PluggableUSBDevice& PluggableUSBD() {
+  static arduino::PluggableUSBDevice device;
+  return device;
+}
 
 namespace arduino {
 
@@ -269,14 +275,26 @@ int USBSerial::read() {
   if (packets.front().empty()) packets.pop_front();
   return byte;
 }
-void USBSerial::send_nb(std::uint8_t* buffer, std::uint32_t size, std::uint32_t* actual, bool) {
+void USBCDC::send_nb(std::uint8_t* buffer, std::uint32_t size, std::uint32_t* actual, bool) {
   Giga& chip = giga();
   *actual = 0;
-  if (!chip.usb_open || !chip.usb_reads) return;
-  *actual = std::min(size, 64U);
-  chip.usb_host.append(reinterpret_cast<const char*>(buffer), *actual);
-  chip.usb_sent.push_back({*actual, chip.now_ms()});
+  if (!chip.usb_open || _tx_in_progress) return;
+  if (chip.usb_endpoint_open()) {
+    if (!chip.usb_reads) return;
+    *actual = std::min(size, 64U);
+    chip.usb_host.append(reinterpret_cast<const char*>(buffer), *actual);
+    chip.usb_sent.push_back({*actual, chip.now_ms()});
+  } else {
+    *actual = std::min(size, 64U);
+    _tx_in_progress = true;  // for good
+  }
 }
+void USBCDC::_change_terminal_connected(bool connected) {
+  if (usb_locks == 0) std::abort();  // the core asserts its lock
+  if (!connected) _tx_in_progress = false;
+}
+void PluggableUSBDevice::lock() { ++usb_locks; }
+void PluggableUSBDevice::unlock() { --usb_locks; }
 
 // --- WiFi
 

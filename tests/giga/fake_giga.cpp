@@ -21,6 +21,7 @@ TIM_TypeDef r4_fake_tim7;
 RCC_TypeDef r4_fake_rcc;
 PWR_TypeDef r4_fake_pwr;
 RTC_TypeDef r4_fake_rtc;
+R4FakeUsb r4_fake_usb;
 SCB_Type r4_fake_scb;
 std::uint32_t r4_fake_message_ram[2560];
 
@@ -34,6 +35,8 @@ bool reset_expected = false;
 
 constexpr std::uint64_t us_ns = 1000;
 constexpr std::uint64_t timer_hz = 240000000;
+// DIEPCTL of the endpoint: active, bulk, FIFO 1, 64 bytes.
+constexpr std::uint32_t usb_active = 1U << 15 | 2U << 18 | 1U << 22 | 64;
 
 void clear_registers() {
   for (GPIO_TypeDef& port : r4_fake_gpio) {
@@ -131,6 +134,11 @@ void Giga::connect_registers() {
   uart[1].connect(r4_fake_uart4);
   can.connect();
   connect_converter();
+  r4_fake_usb.in[1].DIEPCTL.value = usb_active;
+  r4_fake_usb.device.DAINTMSK.value = 2;
+  r4_fake_usb.global.GRSTCTL.on_write = [this](std::uint32_t value) {
+    usb_flushed = usb_flushed || value == (1U << 5 | 1U << 6);
+  };
   r4_fake_iwdg1.KR.on_write = [this](std::uint32_t key) {
     if (key == 0xCCCC) watchdog_runs = true;
     if (key == 0xAAAA) ++watchdog_feeds;
@@ -290,6 +298,20 @@ void Giga::let_happen() {
     events_.erase(events_.begin());
     event();
   }
+}
+
+bool Giga::usb_endpoint_open() const {
+  return (r4_fake_usb.in[1].DIEPCTL.value & usb_active) == usb_active &&
+         (r4_fake_usb.device.DAINTMSK.value & 2U) != 0;
+}
+
+void Giga::usb_close_under_way() {
+  usb_open = false;
+  usb_flushed = false;
+  r4_fake_usb.in[1].DIEPCTL.value = 0;
+  r4_fake_usb.in[1].DIEPINT.value = 0;
+  r4_fake_usb.device.DAINTMSK.value = 0;
+  r4_fake_usb.device.DIEPEMPMSK.value = 2;
 }
 
 void Giga::usb_send(const std::string& bytes) {

@@ -201,6 +201,11 @@ class Giga {
 
   // --- USB
   bool usb_open = false;
+  bool usb_configured = true;  // a computer has found the board
+  bool usb_endpoint_open() const;
+  // A program closes the port while a packet is under way: the core closes the endpoint, too.
+  void usb_close_under_way();
+  bool usb_flushed = false;  // the FIFO of the endpoint, since then
   std::uint32_t usb_baud = 115200;
   bool usb_reads = true;  // the host's program reads
   std::string usb_host;   // what it has read, and not taken yet

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// can://INTERFACE[?node=1&fd=0&pack=1]: datagrams of one board on a CAN bus (docs/reference/can.md),
-// by ISO-TP on SocketCAN. Several carriers may share an interface.
+// can://INTERFACE[?node=1&fd=0&pack=1]: datagrams of one board on a CAN bus
+// (docs/reference/can.md), by ISO-TP on SocketCAN. Several carriers may share an interface.
 //     node=N   the board's number on the bus, 0-31 (default 1)
 //     fd=1     sends CAN FD frames; receives classic and FD frames
 //     pack=0   a host sends and gets text, not the packed form; both forms are received. A board

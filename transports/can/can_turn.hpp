@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decides which host sends on a board's command id (docs/reference/can.md, "Several hosts"). All hosts
-// answer a heartbeat at once: on one id their frames would mix and, on real wires, drive hosts
-// bus-off. So a host listens before it sends, and the later host is silent until it has not heard
-// the other host for a second. The emergency stop needs no turn: all hosts send the same frame.
+// Decides which host sends on a board's command id (docs/reference/can.md, "Several hosts"). All
+// hosts answer a heartbeat at once: on one id their frames would mix and, on real wires, drive
+// hosts bus-off. So a host listens before it sends, and the later host is silent until it has not
+// heard the other host for a second. The emergency stop needs no turn: all hosts send the same
+// frame.
 #pragma once
 
 #include <chrono>

@@ -49,6 +49,20 @@ struct PWR_TypeDef {
 struct RTC_TypeDef {
   R4Register BKP8R, BKP20R, BKP21R, BKP22R, BKP23R;
 };
+struct USB_OTG_GlobalTypeDef {
+  R4Register GRSTCTL;
+};
+struct USB_OTG_DeviceTypeDef {
+  R4Register DAINTMSK, DIEPEMPMSK;
+};
+struct USB_OTG_INEndpointTypeDef {
+  R4Register DIEPCTL, DIEPINT;
+};
+struct R4FakeUsb {
+  USB_OTG_GlobalTypeDef global;
+  USB_OTG_DeviceTypeDef device;
+  USB_OTG_INEndpointTypeDef in[6];
+};
 struct SCB_Type {
   R4Register AIRCR, CFSR;
 };
@@ -67,6 +81,7 @@ extern RCC_TypeDef r4_fake_rcc;
 extern PWR_TypeDef r4_fake_pwr;
 extern RTC_TypeDef r4_fake_rtc;
 extern SCB_Type r4_fake_scb;
+extern R4FakeUsb r4_fake_usb;
 extern std::uint32_t r4_fake_message_ram[2560];
 
 #define GPIOA (&r4_fake_gpio[0])
@@ -93,6 +108,10 @@ extern std::uint32_t r4_fake_message_ram[2560];
 #define PWR (&r4_fake_pwr)
 #define RTC (&r4_fake_rtc)
 #define SCB (&r4_fake_scb)
+#define USB_OTG_FS_PERIPH_BASE (reinterpret_cast<std::uintptr_t>(&r4_fake_usb))
+#define USB_OTG_DEVICE_BASE (sizeof(USB_OTG_GlobalTypeDef))
+#define USB_OTG_IN_ENDPOINT_BASE (sizeof(USB_OTG_GlobalTypeDef) + sizeof(USB_OTG_DeviceTypeDef))
+#define USB_OTG_EP_REG_SIZE (sizeof(USB_OTG_INEndpointTypeDef))
 #define SRAMCAN_BASE (reinterpret_cast<std::uintptr_t>(r4_fake_message_ram))
 
 enum IRQn_Type {

@@ -5,7 +5,7 @@
 //     the core warns (mbed warning)                   -> nothing
 //     a stack of the interrupts is full               -> Kind::stack
 //     duties do not check in (the guard starves)      -> Kind::watchdog
-//     the timer interrupt stops                       -> the watchdog's reset (RCC_RSR, boot loader)
+//     the timer interrupt stops                       -> the watchdog's reset
 //
 // The note is in backup registers of the real-time clock. After the next boot the board reports it
 // and keeps its outputs off until E:CLEAR.

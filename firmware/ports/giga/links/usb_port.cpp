@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "usb_port.hpp"
 
+#include "usb_sender.hpp"
+
 // clang-format off
 #include "../chip/chip.hpp"
 #include <USB/PluggableUSBSerial.h>
@@ -48,6 +50,7 @@ void UsbPort::send_packet() {
 }
 
 bool UsbPort::poll(std::uint32_t now_ms) {
+  keep_usb_sending();
   const bool open = _SerialUSB.connected();
   const bool closed = open_ && !open;
   if (open != open_) {  // old data is not for the next program
