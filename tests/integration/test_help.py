@@ -10,7 +10,8 @@ import pytest
 from r4_process import DATA, objects, run
 
 COMMANDS = ['monitor', 'send', 'stop', 'list', 'doctor', 'bridge', 'bus', 'bench', 'record', 'info', 'convert', 'plot',
-            'replay', 'metrics', 'web', 'ros2', 'sim', 'key', 'demo', 'encode', 'decode', 'completion', 'man', 'devices']
+            'replay', 'metrics', 'web', 'ros2', 'sim', 'key', 'demo', 'encode', 'decode', 'completion', 'man', 'devices',
+            'upload']
 
 
 def test_version():

@@ -154,13 +154,13 @@ int bridge(const Options& options) {
 }
 
 constexpr const char* footer =
-    R"(The first URL is where hosts are heard, as r4 sim takes it; the second is the board's, as r4 send takes
-it. So any old tool that speaks UDP drives a board on USB or CAN (docs/how-to/bridge.md). Datagrams pass as they are,
-and nothing is said for a host that is dead: a board behind a bridge goes safe as any other.
+    R"(The first URL is where hosts connect, as for r4 sim; the second URL is the board's, as for r4 send. So any
+tool that speaks UDP drives a board on USB or CAN (docs/how-to/bridge.md). Datagrams pass unchanged. The
+bridge sends nothing for a silent host: a board behind a bridge goes safe like any other board.
 
-Of several hosts one at a time is let through: the first that sends heartbeats, until it has been silent for
---timeout. The others may watch, and stop the board: E:STOP of anyone goes first. What has waited for longer
-than 0.1 s is dropped. A board that is not there, or goes, is waited for.
+The bridge serves up to 16 hosts, and the board decides which host controls it. Hosts without a session id
+(the paper's) pass one at a time: the next one when the first was silent for --timeout. A stop from any host
+passes first. A datagram that has waited for 0.1 s is dropped. The bridge waits for a board that is absent.
 
 A board obeys its own cable without a key. To a board at a serial port that has a key, a bridge
 therefore passes only what is signed with it, and needs the key for that: --key FILE. Without a key

@@ -318,10 +318,10 @@ int plot(const PlotOptions& options) {
 }
 
 constexpr const char* plot_footer =
-    R"(A field of docs/reference/protocol.md, in small letters if you like; of one board only, where the recording has
-several: left-arm:AIN24, by its name, its URL or the number of its path. A drive is drawn with its
-direction, backwards below zero. What has the same unit shares an axis. Safe states are shaded by their
-reason, and so is where a board said nothing for more than a second. It takes python3-matplotlib.
+    R"(A field is one of docs/reference/protocol.md, in capital or small letters. In a recording of several boards,
+left-arm:AIN24 names one board by its name, its URL or the number of its path. A drive is drawn with its
+direction, backward below zero. Fields with the same unit share an axis. Safe states, and pauses of more
+than a second without data, are shaded. It needs python3-matplotlib.
 
 Examples:
   r4 plot drive.r4log AIN24 OSMC1 -o drive.svg

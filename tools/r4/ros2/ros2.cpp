@@ -12,17 +12,17 @@ namespace {
 constexpr const char* footer =
     R"(Joins the ROS 2 graph as the node /r4, without ROS being installed: the paper's topics R4, R4_Heart_Beat,
 R4_Active and R4_Command (std_msgs/String), a topic for each component, diagnostics, and the services ~/stop,
-~/clear, ~/arm and ~/send (for clients with rmw_cyclonedds). docs/how-to/ros2.md has each topic with its units, and
-how to drive a robot by cmd_vel.
+~/clear, ~/arm and ~/send (for clients with rmw_cyclonedds). docs/how-to/ros2.md lists the topics with
+their units, and shows how to drive a robot by cmd_vel.
 
-Nothing drives before it is armed: by --arm, once, when the board is there; by true on the topic
-arm; by the service ~/arm. After a stop or a fault that has to be done again. A stop or a fault that
-came before this program began is cleared by ~/clear first, or by E:CLEAR on R4_Command. What a
-publisher drives is switched off when it is gone, or silent for --deadline. Of several boards each
-has a namespace: board1, board2 …, or a pattern's numbers.
+Outputs stay off until the board is armed: once by --arm, when the board is found; by true on the topic
+arm; or by the service ~/arm. After a stop or a fault, arm again. If the stop or the fault came before this
+program began, clear it first: by ~/clear, or by E:CLEAR on R4_Command. The outputs of a publisher are
+switched off when it disappears, or is silent for --deadline. With several boards, each has a namespace:
+board1, board2 …, or the numbers of a pattern.
 
 The graph is that of ROS_DOMAIN_ID, on this computer alone unless ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET,
-ROS_STATIC_PEERS or CYCLONEDDS_URI say otherwise.
+ROS_STATIC_PEERS or CYCLONEDDS_URI allow more.
 
 Examples:
   r4 ros2 serial:auto

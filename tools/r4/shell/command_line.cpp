@@ -42,6 +42,7 @@ constexpr std::array subcommands = std::to_array<Subcommand>({
     {"demo", add_demo},       {"encode", add_encode},
     {"decode", add_decode},   {"completion", add_completion},
     {"man", add_man},         {"devices", add_devices},
+    {"upload", add_upload},
 });
 
 // Adds only the subcommand that the first argument names, else all: declaring the options of all

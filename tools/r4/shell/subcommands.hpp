@@ -33,6 +33,7 @@ void add_replay(CLI::App& root, Action& chosen);
 void add_info(CLI::App& root, Action& chosen);
 void add_convert(CLI::App& root, Action& chosen);
 void add_plot(CLI::App& root, Action& chosen);
+void add_upload(CLI::App& root, Action& chosen);
 void add_key_command(CLI::App& root, Action& chosen);
 void add_demo(CLI::App& root, Action& chosen);
 void add_completion(CLI::App& root, Action& chosen);

@@ -125,11 +125,11 @@ class MetricsCommand final : web::ServerEvents {
 int serve_metrics(const MetricsOptions& options) { return MetricsCommand(options).run(options); }
 
 constexpr const char* metrics_footer =
-    R"(Answers Prometheus at http://127.0.0.1:9618/metrics (docs/how-to/metrics.md): of each board whether it is heard,
-why its outputs are off, rate, loss, round trip, age and jitter of its states, analog inputs; of each CAN
-interface how busy it is, and for which boards. It watches, as r4 monitor does, and takes no control.
---listen 0.0.0.0:9618 answers other computers, too: anybody there may read, and nobody may do more. It is
-asked by its address; --host adds a name of this computer, or that of a proxy in front.
+    R"(Answers Prometheus at http://127.0.0.1:9618/metrics (docs/how-to/metrics.md). For each board: whether it is
+heard, why its outputs are off, rate, loss, round trip, age and jitter of its states, analog inputs. For each
+CAN interface: its load, and by which boards. It watches, as r4 monitor does, and takes no control.
+--listen 0.0.0.0:9618 also answers other computers, which can only read. Requests must name the address;
+--host adds a name of this computer, or of a proxy in front of it.
 
 Examples:
   r4 metrics udp://192.168.0.125

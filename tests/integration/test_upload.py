@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""r4 upload with a dfu-util of our own, and a board at a pseudo-terminal."""
+import fcntl
+import os
+import pty
+import struct
+import termios
+import threading
+import tty
+
+import pytest
+
+from r4_process import ERROR, Board, lasts, objects, run
+
+# Its boot loader is there after a board has been opened at 1200 baud, or if the test says so.
+DFU_UTIL = '''#!/bin/bash
+echo "$*" >>"$R4_TEST_DFU/calls"
+case "$*" in
+*-l*)
+  echo 'dfu-util 0.11'
+  [[ ! -e $R4_TEST_DFU/denied ]] || { echo 'Cannot open DFU device 2341:0366 found on devnum 9 (LIBUSB_ERROR_ACCESS)'; exit 74; }
+  [[ $(grep -c -e -l "$R4_TEST_DFU/calls") -ge $(cat "$R4_TEST_DFU/there") ]] || exit 0
+  for device in $(cat "$R4_TEST_DFU/paths"); do
+    echo "Found DFU: [2341:0366] ver=0200, devnum=9, cfg=1, intf=0, path=\\"$device\\", alt=1, name=\\"@External\\""
+    echo "Found DFU: [2341:0366] ver=0200, devnum=9, cfg=1, intf=0, path=\\"$device\\", alt=0, name=\\"@Internal\\""
+  done
+  ;;
+*)
+  printf 'Download\\t[            ]   0%%            0 bytes\\rDownload\\t[=====       ]  45%%        24576 bytes\\r'
+  printf 'Download\\t[============] 100%%        65536 bytes\\nDownload done.\\n'
+  [[ ! -e $R4_TEST_DFU/fails ]] || { printf 'dfu-util: \\033[31mverify failed\\n'; exit 74; }
+  echo 'File downloaded successfully'
+  exit 74
+  ;;
+esac
+'''
+SKETCH = struct.pack('<II', 0x24080000, 0x080402c1) + bytes(1000)
+WRITE = '-d 2341:0366 -a 0 -s 0x08040000:leave -D '
+
+
+@pytest.fixture(name='place')
+def fake_dfu_util(tmp_path, monkeypatch):
+    program = tmp_path / 'bin' / 'dfu-util'
+    program.parent.mkdir()
+    program.write_text(DFU_UTIL)
+    program.chmod(0o755)
+    monkeypatch.setenv('PATH', f'{program.parent}:{os.environ["PATH"]}')
+    monkeypatch.setenv('R4_TEST_DFU', str(tmp_path))
+    (tmp_path / 'there').write_text('2')
+    (tmp_path / 'paths').write_text('1-2')
+    (tmp_path / 'sketch.bin').write_bytes(SKETCH)
+    return tmp_path
+
+
+def calls(place):
+    return (place / 'calls').read_text().splitlines() if (place / 'calls').exists() else []
+
+
+def test_stops_the_board_writes_the_sketch_and_reports_the_version(place):
+    with Board(f'pty:{place}/board') as board:
+        assert run('send', board.host_url, 'R:1,On', 'O:358,1,1').returncode == 0
+        done = run('upload', str(place / 'sketch.bin'), board.host_url, '--json')
+        assert done.returncode == 0, done
+        board.outputs(lambda outputs: outputs['osmc'][0][0] == 0)
+    lines = objects(done.stdout)
+    assert [each['type'] for each in lines] == ['stopped', 'progress', 'progress', 'progress', 'written', 'identity']
+    assert [each['percent'] for each in lines if each['type'] == 'progress'] == [0, 45, 100]
+    assert lines[-1]['firmware'] and calls(place)[-1] == f'{WRITE}{place}/sketch.bin'
+
+
+def test_a_board_in_its_boot_loader_is_written_at_once(place):
+    (place / 'there').write_text('1')
+    with Board(f'pty:{place}/board') as board:
+        done = run('upload', str(place / 'sketch.bin'), board.host_url)
+    assert done.returncode == 0 and 'is written' in done.stdout and 'outputs are off\n' in done.stdout
+    assert 'the board reports that its outputs' not in done.stdout
+    assert len(calls(place)) == 3 and calls(place)[-1].startswith(WRITE)
+
+
+def test_a_board_with_other_firmware_is_opened_at_1200_baud(place):
+    board, port = pty.openpty()
+    tty.setraw(port)
+    speeds = set()
+    ended = threading.Event()
+
+    def watch():
+        while not ended.is_set():
+            speeds.add(termios.tcgetattr(port)[4])
+            lasts(0.02)
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    done = run('upload', str(place / 'sketch.bin'), f'serial://{os.ttyname(port)}', '--timeout', '0.2')
+    ended.set()
+    watcher.join()
+    os.close(board)
+    os.close(port)
+    assert done.returncode == 3 and 'no R4 firmware answers' in done.stderr and ERROR.search(done.stderr)
+    assert 'cannot switch outputs off' in done.stdout and termios.B1200 in speeds
+    assert calls(place)[-1].startswith(WRITE)
+
+
+@pytest.mark.parametrize('content, reason', [
+    (b'', 'too short'), (b'abc', 'too short'), (bytes(100), 'not a sketch'),
+    (struct.pack('<II', 0x24080000, 0x080402c0), 'not a sketch'),
+    (struct.pack('<II', 0x24080000, 0x08000001), 'not a sketch'),
+    (struct.pack('<II', 0x30000000, 0x080402c1), 'not a sketch'),
+    (SKETCH + bytes(1966080), 'do not fit'),
+], ids=['empty', 'short', 'zeros', 'even', 'boot-loader', 'no-ram', 'long'])
+def test_a_file_that_is_not_a_sketch_is_refused_before_anything_is_stopped(place, content, reason):
+    (place / 'sketch.bin').write_bytes(content)
+    done = run('upload', str(place / 'sketch.bin'), 'serial:///dev/null')
+    assert done.returncode == 1 and reason in done.stderr and ERROR.search(done.stderr)
+    assert not calls(place)
+
+
+def upload(place, *options):
+    with Board(f'pty:{place}/board') as board:
+        return run('upload', str(place / 'sketch.bin'), board.host_url, '--timeout', '0.3', *options)
+
+
+def test_what_keeps_it_from_writing_is_named(place):
+    (place / 'there').write_text('999')
+    done = upload(place)
+    assert done.returncode == 4 and 'it was not found; press the board' in done.stderr
+    (place / 'there').write_text('0')
+    (place / 'paths').write_text('1-2 1-3')
+    done = upload(place)
+    assert done.returncode == 2 and 'several boards' in done.stderr
+    (place / 'denied').touch()
+    done = upload(place)
+    assert done.returncode == 5 and 'udev' in done.stderr
+    (place / 'denied').unlink()
+    (place / 'paths').write_text('1-2')
+    (place / 'fails').touch()
+    done = upload(place)
+    assert done.returncode == 4 and r'r4: dfu-util: \x1b[31mverify failed; press' in done.stderr
+    assert run('upload', str(place / 'sketch.bin'), 'udp://127.0.0.1').returncode == 2
+
+
+def test_a_port_that_another_program_uses_is_not_taken(place):
+    with Board(f'pty:{place}/board') as board:
+        assert run('send', board.host_url, 'R:1,On', 'O:358,1,1').returncode == 0
+        with open(f'{place}/board', 'rb', buffering=0) as port:
+            fcntl.flock(port, fcntl.LOCK_EX)
+            done = run('upload', str(place / 'sketch.bin'), board.host_url)
+    assert done.returncode == 4 and 'another program uses the port' in done.stderr
+    assert not any(each.startswith(WRITE) for each in calls(place))
+
+
+def test_a_missing_dfu_util_is_named(place, monkeypatch):
+    monkeypatch.setenv('PATH', '/nowhere')
+    done = run('upload', str(place / 'sketch.bin'), 'serial:///dev/null')
+    assert done.returncode == 6 and 'apt-get install dfu-util' in done.stderr

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "../shell/json.hpp"
+#include "../shell/options.hpp"
+#include "../shell/output.hpp"
+#include "../shell/subcommands.hpp"
+#include "dfu_util.hpp"
+#include "r4link/board.hpp"
+#include "r4link/discovery/discover.hpp"
+#include "r4link/discovery/url.hpp"
+#include "r4link/error.hpp"
+
+namespace r4::tool {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct UploadOptions {
+  std::string file;
+  std::string url = "serial:auto";
+  Milliseconds timeout{20000};
+  bool json = false;
+};
+
+// --- the file
+
+std::uint32_t word(const std::array<unsigned char, 8>& bytes, std::size_t at) {
+  return bytes[at] | bytes[at + 1] << 8U | bytes[at + 2] << 16U |
+         static_cast<std::uint32_t>(bytes[at + 3]) << 24U;
+}
+
+// A sketch for the Giga's M7 begins with the top of its stack and its first instruction.
+void check_image(const std::string& path) {
+  constexpr std::uint32_t flash = 0x08040000;
+  constexpr std::uint32_t flash_size = 1966080;  // of the core's boards.txt
+  const auto refuse = [&](const std::string& reason) {
+    throw Error(
+        ErrorKind::data, path, reason,
+        "give the .bin file of Sketch > Export Compiled Binary, for the board Arduino Giga R1");
+  };
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  if (!file) throw Error(ErrorKind::open, path, std::strerror(errno), "look at its name");
+  const std::streamoff size = file.tellg();
+  std::array<unsigned char, 8> begin{};
+  file.seekg(0);
+  if (size <= 0 || !file.read(reinterpret_cast<char*>(begin.data()), begin.size())) {
+    refuse("it is not a compiled sketch: it is too short");
+  }
+  if (size > flash_size) {
+    refuse(fmt::format("{} bytes do not fit: the Giga takes {}", size, flash_size));
+  }
+  const std::uint32_t stack = word(begin, 0);
+  const std::uint32_t start = word(begin, 4);
+  const bool in_ram =
+      (stack > 0x20000000 && stack <= 0x20020000) || (stack > 0x24000000 && stack <= 0x24080000);
+  if (!in_ram || start % 2 == 0 || start < flash || start >= flash + flash_size) {
+    refuse("it is not a sketch for the Giga's M7 core");
+  }
+}
+
+// --- the port
+
+// The port of `url`; empty if this computer has no such port.
+std::optional<std::string> port_of(const std::string& url) {
+  const Url parsed = Url::parse(url);
+  if (parsed.scheme() != "serial") {
+    throw Error(ErrorKind::usage, url, "a sketch goes over the board's USB cable alone",
+                "give serial:auto, serial:?sn=... or serial:///dev/ttyACM0");
+  }
+  if (!parsed.path().empty() && parsed.path() != "auto") return parsed.path();
+  const Discovery found = discover({.can = false, .udp = false});
+  const std::optional<std::string> number = parsed.get("sn");
+  std::optional<std::string> path;
+  for (const SearchedPort& port : found.ports) {
+    if (!port.is_r4 || (number && port.serial_number != *number)) continue;
+    if (path) {
+      throw Error(ErrorKind::usage, url, fmt::format("{} and {} are boards", *path, port.path),
+                  "name one by its number, as r4 list shows it");
+    }
+    path = port.path;
+  }
+  return path;
+}
+
+// Opens the port for this program alone.
+class Port {
+ public:
+  explicit Port(const std::string& path)
+      : number_(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
+    const int error = number_ < 0 ? errno : 0;
+    const bool denied = error == EACCES || error == EPERM;
+    if (error != 0 && error != EBUSY) {
+      throw Error(denied ? ErrorKind::permission : ErrorKind::open, path, std::strerror(error),
+                  "r4 doctor serial:auto");
+    }
+    if (error == EBUSY || ::flock(number_, LOCK_EX | LOCK_NB) != 0) {
+      close();
+      throw Error(ErrorKind::open, path, "another program uses the port",
+                  "close it: r4 list shows which one");
+    }
+  }
+  ~Port() { close(); }
+  Port(const Port&) = delete;
+  Port& operator=(const Port&) = delete;
+
+  // 1200 baud: the firmware switches its outputs off and waits for the port to close.
+  void ask_for_upload(const std::string& path) const {
+    constexpr std::chrono::milliseconds held{400};  // the core resets after 200 ms at the earliest
+    termios settings{};
+    const bool set = ::tcgetattr(number_, &settings) == 0 && ::cfsetspeed(&settings, B1200) == 0 &&
+                     (::cfmakeraw(&settings), ::tcsetattr(number_, TCSANOW, &settings)) == 0;
+    if (!set) {
+      throw Error(ErrorKind::open, path, std::strerror(errno), "unplug the board and plug it in");
+    }
+    const int ready = TIOCM_DTR;
+    ::ioctl(number_, TIOCMBIS, &ready);  // a pseudo-terminal has no such line
+    std::this_thread::sleep_for(held);
+  }
+
+ private:
+  void close() {
+    if (number_ >= 0) ::close(number_);
+    number_ = -1;
+  }
+  int number_;
+};
+
+// --- the steps
+
+void report(const UploadOptions& options, const Json& object, const std::string& text) {
+  if (options.json) {
+    print_line(object);
+  } else {
+    print_text("{}\n", text);
+  }
+}
+
+// Other firmware, or none, does not answer: it cannot be asked to switch anything off.
+void switch_off(const UploadOptions& options) {
+  try {
+    Board board(options.url);
+    board.stop();
+    report(options, {{"type", "stopped"}}, "the board reports that its outputs are off");
+  } catch (const Error& error) {
+    if (error.kind() != ErrorKind::refused) throw;
+    report(options, {{"type", "silent"}},
+           "no R4 firmware answers: this command cannot switch outputs off");
+  }
+}
+
+void wait_for_boot_loader(Clock::time_point deadline) {
+  constexpr std::chrono::milliseconds pause{200};
+  for (;;) {
+    switch (look_for_boot_loader()) {
+      case BootLoaders::one:
+        return;
+      case BootLoaders::several:
+        throw Error(ErrorKind::usage, "the boot loader", "several boards wait in it",
+                    "unplug all boards but one");
+      case BootLoaders::not_permitted:
+        throw Error(
+            ErrorKind::permission, "the boot loader (USB 2341:0366)", "permission denied",
+            "install the udev rules, which r4 doctor --udev-rules prints, or run it as root");
+      case BootLoaders::none:
+        break;
+    }
+    if (Clock::now() >= deadline) {
+      throw Error(ErrorKind::open, "the boot loader (USB 2341:0366)", "it was not found",
+                  "press the board's reset button twice, until its green light pulses, and repeat");
+    }
+    std::this_thread::sleep_for(pause);
+  }
+}
+
+void write(const UploadOptions& options) {
+  const bool bar = !options.json && ::isatty(STDOUT_FILENO) == 1;
+  write_by_dfu(options.file, [&](int percent) {
+    if (options.json) {
+      print_line({{"type", "progress"}, {"percent", percent}});
+    } else if (bar) {
+      print_raw(fmt::format("\r[{:<50}] {:3} %",
+                            std::string(static_cast<std::size_t>(percent / 2), '='), percent));
+    }
+  });
+  if (bar) print_raw("\n");
+  report(options, {{"type", "written"}, {"file", options.file}},
+         fmt::format("{} is written", options.file));
+}
+
+void wait_for_board(const UploadOptions& options, Clock::time_point deadline) {
+  constexpr std::chrono::milliseconds pause{200};
+  for (;;) {
+    try {
+      Board board(options.url, {.role = BoardRole::watch});
+      const BoardIdentity identity = board.identify();
+      return report(
+          options,
+          {{"type", "identity"}, {"firmware", identity.firmware}, {"id", identity.board_id}},
+          fmt::format("the board runs firmware {}, id {}; its outputs are off", identity.firmware,
+                      identity.board_id));
+    } catch (const Error&) {
+      if (Clock::now() >= deadline) break;
+    }
+    std::this_thread::sleep_for(pause);
+  }
+  throw Error(ErrorKind::refused, options.url, "the sketch is written, but no R4 firmware answers",
+              "see whether the sketch is R4Board, and what r4 doctor reports");
+}
+
+int upload(const UploadOptions& options) {
+  check_image(options.file);
+  const std::optional<std::string> port = port_of(options.url);
+  if (look_for_boot_loader() == BootLoaders::none) {
+    if (!port) {
+      throw Error(ErrorKind::open, options.url, "no board was found at USB",
+                  "plug it in; or press its reset button twice, until its green light pulses");
+    }
+    { const Port free(*port); }  // before anything is stopped
+    switch_off(options);
+    Port(*port).ask_for_upload(*port);
+  }
+  wait_for_boot_loader(Clock::now() + options.timeout);
+  write(options);
+  wait_for_board(options, Clock::now() + options.timeout);
+  return 0;
+}
+
+constexpr const char* upload_footer =
+    R"(FILE is what the Arduino IDE makes by Sketch > Export Compiled Binary. The command stops the board,
+starts its boot loader (1200 baud), writes the sketch with dfu-util, and waits until the board reports
+its version. A board that waits in its boot loader already (reset button pressed twice) is written at once.
+Keep the wheels off the ground: a sketch that is not R4's may drive outputs.
+
+Examples:
+  r4 upload R4Board.ino.bin
+  r4 upload R4Board.ino.bin serial:///dev/ttyACM0
+
+Exit codes: 0 the board runs the sketch; 1 the file is not a sketch for the Giga; 2 usage, also a URL that
+is not a cable; 3 the sketch is written, but no R4 firmware answers; 4 no board, no boot loader, or
+dfu-util failed; 5 permission denied; 6 dfu-util is not installed.)";
+
+}  // namespace
+
+void add_upload(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<UploadOptions>();
+  CLI::App* const command = add_subcommand(
+      root, chosen, "upload", "Put a compiled sketch onto a board", upload_footer, options, upload);
+  add_text(*command, "FILE", options->file, "the compiled sketch, a .bin file", file_type,
+           Need::required);
+  add_text(*command, "URL", options->url, "where the board is (default serial:auto)", url_type);
+  add_seconds(*command, "--timeout", options->timeout,
+              "how long to wait for the boot loader, and then for the board (default 20)");
+  add_json(*command, options->json, "print JSON");
+}
+
+}  // namespace r4::tool
