@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The program dfu-util, which writes a sketch by the Giga's boot loader (USB Device Firmware Upgrade
-// 1.1, with ST's extension DfuSe).
+// The program dfu-util, which writes a sketch by the Giga's boot loader (USB Device Firmware
+// Upgrade 1.1, with ST's extension DfuSe).
 #pragma once
 
 #include <functional>
