@@ -199,12 +199,12 @@ TEST(GigaPins, TheUsersVoltagesAreA12AndA13) {
   EXPECT_TRUE(giga::dac_pins[1] == (giga::Pin{'A', 5}));
 }
 
-TEST(GigaPins, TheSpareInputsAreD6ToD13) {
-  const giga::Pin pins_of_variant[] = {{'D', 13}, {'B', 4},  {'B', 8},  {'B', 9},
+TEST(GigaPins, TheSpareInputsAreD6AndD44AndD8ToD13) {
+  const giga::Pin pins_of_variant[] = {{'D', 13}, {'G', 10}, {'B', 8},  {'B', 9},
                                        {'K', 1},  {'J', 10}, {'J', 11}, {'H', 6}};
   ASSERT_EQ(std::size(giga::gpio_pins), std::size(pins_of_variant));
   for (std::size_t i = 0; i < std::size(pins_of_variant); ++i) {
-    EXPECT_TRUE(giga::gpio_pins[i] == pins_of_variant[i]) << "D" << 6 + i;
+    EXPECT_TRUE(giga::gpio_pins[i] == pins_of_variant[i]) << "input " << i + 1;
   }
 }
 

@@ -56,8 +56,10 @@ constexpr std::uint32_t uart_functions[uart_channels] = {7, 8};
 
 constexpr Pin dac_pins[dac_channels] = {{'A', 4}, {'A', 5}};  // A12 A13
 
-constexpr Pin gpio_pins[gpio_channels] = {{'D', 13}, {'B', 4},  {'B', 8}, {'B', 9}, {'K', 1},
-                                          {'J', 10}, {'J', 11}, {'H', 6}};  // D6-D13, pulled up
+// D7 stands at half the supply on the Giga, so it cannot be an input with a pull-up.
+constexpr Pin gpio_pins[gpio_channels] = {
+    {'D', 13}, {'G', 10}, {'B', 8},  {'B', 9},
+    {'K', 1},  {'J', 10}, {'J', 11}, {'H', 6}};  // D6 D44 D8-D13, pulled up
 
 // FDCAN2, alternate function 9. The Giga has no transceiver: wire the SN65HVD230 of the R4 board
 // (paper, section 2) to these pins (docs/how-to/can.md).

@@ -90,7 +90,7 @@ TEST(Mcap, RefusesWhatItCannotReadOrHold) {
   const std::string foreign =
       std::string("\x89MCAP0\r\n\x01\x08\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0", 25);
   EXPECT_TRUE(contains(problem_of([&] { converted(foreign, ".mcap", ".r4log"); }).reason,
-                       "no recording of r4"));
+                       "not a recording of r4"));
   std::string late;
   write_record_header(late);
   write_record(late, {Time{18'446'744'073'709'552}, 1, RecordKind::event, "x"});
@@ -229,7 +229,7 @@ TEST(Mcap, PassesOverTheTopicsOfOtherPrograms) {
   const std::string foreign =
       mcap_file("ros1", as_records({{Op::channel, channel}, {Op::message, message}}));
   EXPECT_TRUE(contains(problem_of([&] { converted(foreign, ".mcap", ".r4log"); }).reason,
-                       "no recording of r4"));
+                       "not a recording of r4"));
 }
 
 TEST(Mcap, RefusesRecordingsThatWereMerged) {
