@@ -28,7 +28,7 @@ ClockEdge edge_of(BoardInAThread& simulated) {
       const std::uint32_t before = board.now_ms();
       std::uint32_t shown = before;
       while (shown == before) {
-        from = next;  // the last time before the clock changed
+        from = next;  // before the last reading that showed no change
         next = Clock::now();
         shown = board.now_ms();
       }
