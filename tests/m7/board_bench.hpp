@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole board on the processor, for tests. Its drivers talk to chips behind a bus in real time,
+// The whole board on the processor, for tests. Its drivers use chips on a bus in real time,
 // and interrupts come in the middle of its transfers. A host sends commands as lines of text, and a
 // listener receives the board's UDP datagrams.
 //

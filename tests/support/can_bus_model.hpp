@@ -4,8 +4,8 @@
 //
 //     CanBusModel bus({.rate = {1000000, 0}, .seed = 7});
 //     const int board = bus.add_node({.sent = …, .received = …});
-//     bus.send(board, frame);                 // false: no room, try again when one was sent
-//     bus.at(2'000'000, [&] { … });           // an event of the test's own
+//     bus.send(board, frame);                 // false: no room, try again after a frame was sent
+//     bus.at(2'000'000, [&] { … });           // an event of the test
 //     bus.run_until(1'000'000'000);
 //     bus.load();                             // busy time / time
 //

@@ -48,7 +48,7 @@ void expect_inputs(const ControlledBoard& board) {
     }
   });
   const State state = await(board, [](const State& s) { return s.distance_cm(4) == 200; });
-  const State again = await(board, [&](const State& s) {  // every sensor was read since
+  const State again = await(board, [&](const State& s) {  // every sensor was read after the change
     return s.t_ms - state.t_ms > 250;
   });
   EXPECT_TRUE(again.handle_held);

@@ -35,7 +35,7 @@ TEST(Printable, WritesCharactersThatReorderOrHideTextAsBytes) {
 TEST(Printable, WritesInvalidUtf8AsBytes) {
   EXPECT_EQ(printable("\xff\xfe"), "\\xff\\xfe");
   EXPECT_EQ(printable("a\xc3"), "a\\xc3");         // cut
-  EXPECT_EQ(printable("\x80"), "\\x80");           // without its first byte
+  EXPECT_EQ(printable("\x80"), "\\x80");           // a continuation byte without a first byte
   EXPECT_EQ(printable("\xc0\x9b"), "\\xc0\\x9b");  // longer than necessary
   EXPECT_EQ(printable("\xe0\x82\x9b"), "\\xe0\\x82\\x9b");
   EXPECT_EQ(printable("\xed\xa0\x80"), "\\xed\\xa0\\x80");  // half of a surrogate pair

@@ -241,7 +241,7 @@ TEST(DatagramProperty, EverySingleByteOfDamageToTheCaptureIsRefusedOrChangesNoth
       judge(damaged);
     }
   }
-  EXPECT_GT(same, 5U) << "the byte itself, a capital, a leading zero, a terminator";
+  EXPECT_GT(same, 5U) << "harmless: the same byte, a capital digit, a leading zero, a terminator";
 }
 
 }  // namespace

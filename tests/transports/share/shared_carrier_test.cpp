@@ -257,7 +257,7 @@ TEST_F(SharedCarrier, MayBeClosedByAProgramThatHearsAStopOfAnother) {
   EXPECT_EQ(device.sent, std::vector<std::string>{stop});
 }
 
-// A board behind a link to a pty is such a device when it restarts.
+// When a board with a link to a pty restarts, the link leads to a new device.
 TEST_F(SharedCarrier, RestartsWhenADeviceThatIsKnownByItsPathIsGone) {
   share.is_path = true;
   const auto one = opened(BoardRole::watch);

@@ -115,7 +115,7 @@ TEST_F(CanBusLoad, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
   for (int run = 0; run < most_runs && !in_time; ++run) {
     std::vector<std::unique_ptr<Link>> links;
     while (links.size() < hosts) links.push_back(std::make_unique<Link>(io, links.size()));
-    run_for(soon);  // hosts listen before they speak
+    run_for(soon);  // a host listens before it sends
     for (const auto& link : links) {
       ASSERT_EQ(link->host->send(in_two_frames, Priority::normal), SendResult::sent);
     }
@@ -147,7 +147,7 @@ TEST_F(CanBusLoad, AFirstFrameThatNobodyAnswersTimesOutThoughOthersKeepTheBusFul
   EXPECT_LT(talker.accepted, 200);
 }
 
-// A board that always has a state to send needs a timer for the answer that it waits for.
+// A board that always has a state to send must still detect that an answer is missing.
 TEST_F(CanBusLoad, AnUnansweredDatagramTimesOutAfterAStateThatOccupiesTheBusLong) {
   Recorder told;
   const auto board = make_can_carrier(io, Link::url(near_end, node), Role::board);

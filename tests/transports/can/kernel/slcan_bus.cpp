@@ -30,13 +30,13 @@
 // Orders, one line each on stdin. The answer to each is one line, {"type":"done"} or
 // {"type":"error","reason":…}. The process ends at the end of stdin.
 //
-//     noise P            each frame is damaged with that probability: error frame, and sent again
-//     spoil K | heal K   node K's frames are damaged: it becomes passive, then bus-off | ends
-//     errors K TEC REC   sets the counters of node K, and its state by them
-//     away K | back K    node K is off the bus: it acknowledges nothing | on it again
-//     babble ID | quiet  another node sends that id (hex) without a pause, 8 bytes | stops
-//     stall K | go K     node K's pty is not read, as if its controller took nothing | ends
-//     status             answered by the counters of each node
+//     noise P            damages each frame with probability P, so that it is sent again
+//     spoil K | heal K   damages the frames of node K: it becomes passive, then bus-off | ends that
+//     errors K TEC REC   sets the counters of node K, and its state accordingly
+//     away K | back K    disconnects node K from the bus: it does not acknowledge | reconnects it
+//     babble ID | quiet  another node sends this id (hex) without a pause, 8 bytes | ends that
+//     stall K | go K     does not read the pty of node K, as if the controller were full | reads it
+//     status             the answer has the counters of each node
 //
 // Changes of state are printed when they occur: {"type":"state","node":0,"state":"passive",…}.
 #include <fcntl.h>

@@ -12,7 +12,7 @@
 
 namespace r4::test {
 
-// A classic frame, or an FD one if it has more than 8 bytes.
+// A classic frame, or an FD frame if it has more than 8 bytes.
 inline CanFrame frame_of(std::uint32_t id, const std::string& hex) {
   CanFrame frame{};
   frame.id = id;

@@ -212,7 +212,7 @@ TEST(IsotpReceiver, ConsecutiveFramesAreAsLongAsTheFirst) {
   } cases[] = {
       {first, "21 " + counting(15, 15), IsotpError::none},
       {first, "21 " + counting(11, 15), IsotpError::malformed},  // too short
-      {first, "21 " + counting(19, 15), IsotpError::malformed},  // longer than the first
+      {first, "21 " + counting(19, 15), IsotpError::malformed},  // longer than the first frame
       {"10 0F " + counting(14), "21 0F", IsotpError::none},  // only the last frame may be shorter
       {"10 0F " + counting(14), "21 0F CC CC", IsotpError::none},
       {"10 0F " + counting(14), "21", IsotpError::malformed},
