@@ -21,7 +21,7 @@ Bench& new_board() {
 
 namespace {
 
-// The Ethernet chip hears what it sends (IEEE 802.3, 22.2.4.1.2: loopback).
+// In loopback the Ethernet chip receives the frames that it sends (IEEE 802.3, 22.2.4.1.2).
 void hear_oneself() {
   constexpr std::uint32_t mac_command = ethernet_base + 0xA4;
   constexpr std::uint32_t mac_data = ethernet_base + 0xA8;
@@ -52,8 +52,8 @@ std::size_t write_hello(const Mac& mac, std::uint8_t* frame) {
 
 }  // namespace
 
-// Both ends are one chip: its frames are for itself, by their MAC address, and only what is for the
-// board's IP address is the board's.
+// The board and the listener share one Ethernet chip, so both have the same MAC address. A frame
+// for the board's IP address goes to the board.
 void Listener::start(UdpPort& board) {
   EXPECT(board.start() && chip_.start());
   hear_oneself();

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole board on the processor, for tests: drivers on chips behind a bus in real time, interrupts
-// in the middle of its transfers, a host that commands by lines of text, and one that listens to UDP.
+// The whole board on the processor, for tests. Its drivers use chips on a bus in real time,
+// and interrupts come in the middle of its transfers. A host sends commands as lines of text, and a
+// listener receives the board's UDP datagrams.
 //
-// Timer 1 interrupts every 50 us: five bytes of a line at 1 Mbit/s, and each millisecond the board's
-// own interrupt.
+// Timer 1 interrupts every 50 us. Each interrupt delivers five bytes of a line at 1 Mbit/s, and
+// every millisecond it also runs the board's interrupt.
 #pragma once
 
 #include <cstdint>
@@ -25,14 +26,14 @@ constexpr std::uint16_t board_port = 2018;
 
 extern void (*on_step)();
 
-// Interrupts come while one lives.
+// Timer 1 interrupts as long as an object of this class lives.
 class Stepping {
  public:
   explicit Stepping(void (*handler)(), std::uint32_t first_us = step_us) {
     on_step = handler;
     BoardClock::wake_every(step_us, first_us);
     give_way(Irq::timer1);
-    disable(Irq::timer1);  // and forget what has come before
+    disable(Irq::timer1);  // clears a pending interrupt
     enable(Irq::timer1);
   }
   ~Stepping() { disable(Irq::timer1); }
@@ -44,11 +45,12 @@ inline std::uint32_t us_since(std::uint32_t ticks) {
   return (BoardClock::ticks() - ticks) / BoardClock::ticks_per_us;
 }
 
-// What the board sends over UDP, as somebody hears it who has once said a word.
+// Receives the datagrams that the board sends over UDP. The listener sends one datagram first, so
+// that the board knows its address.
 class Listener {
  public:
   void start(UdpPort& board);
-  // Takes what has come.
+  // Reads all datagrams that have arrived.
   void hear();
 
   const State& state() const { return state_; }                       // the newest
@@ -76,7 +78,7 @@ class Listener {
   std::uint32_t bad_ = 0;
 };
 
-// A board with a host that is lines of text.
+// A board, and a host that sends lines of text to it.
 class Bench final : public sim::I2cObserver {
  public:
   Bench() : board_(1, link_, udp_, config()) {
@@ -94,7 +96,7 @@ class Bench final : public sim::I2cObserver {
     safe_ = safe;
   }
 
-  // Each step_us.
+  // Called every step_us.
   void step() {
     for (std::uint32_t i = 0; i < bytes_a_step && line_sent_ < line_size_; ++i) {
       link_.on_byte(line_[line_sent_]);
@@ -106,7 +108,7 @@ class Bench final : public sim::I2cObserver {
     if ((++steps_ % (1000 / step_us) == 0 || stop) && board_.on_wake()) feedings_ = feedings_ + 1;
   }
 
-  // A line begins to come.
+  // Starts to deliver a line; step() delivers its bytes.
   void send(DatagramWriter& writer) {
     const Text datagram = writer.finish(pnum_, 100000 + pnum_);
     ++pnum_;
@@ -128,7 +130,7 @@ class Bench final : public sim::I2cObserver {
     write_command(writer, command);
     send(writer);
   }
-  // Turns of the loop until the line has come and its effect, too.
+  // Turns the loop for `ms`, and until the whole line has arrived.
   void run_ms(std::uint32_t ms) {
     const std::uint32_t began = now_ms();
     while (now_ms() - began < ms || line_sent_ < line_size_) {
@@ -137,7 +139,7 @@ class Bench final : public sim::I2cObserver {
       board_.rest();
     }
   }
-  // The same with a heartbeat each 100 ms.
+  // Like run_ms(), with a heartbeat every 100 ms.
   void run_alive_ms(std::uint32_t ms) {
     for (; ms != 0; ms -= ms < 100 ? ms : 100) {
       heartbeat();
@@ -148,7 +150,7 @@ class Bench final : public sim::I2cObserver {
     command(what);
     run_ms(2);
   }
-  // A session, and every output on.
+  // Begins a session and switches every output on.
   void drive_everything() {
     heartbeat();
     run_ms(2);
@@ -177,7 +179,7 @@ class Bench final : public sim::I2cObserver {
   BoardProgram& board() { return board_; }
   sim::BoardModel& model() { return board_.model(); }
   SafeReason reason() { return board_.application().reason(); }
-  // From now on what the board says over UDP is heard.
+  // Starts to listen to what the board sends over UDP.
   Listener& listen() {
     listener_.start(udp_);
     board_.turn();
@@ -208,7 +210,7 @@ class Bench final : public sim::I2cObserver {
   volatile std::uint32_t safe_ticks_ = 0;
 };
 
-// A board that is just on, with its host; there is room for one. bench is the newest.
+// Replaces the only board by one that was just switched on, with its host. `bench` points to it.
 Bench& new_board();
 extern Bench* bench;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's bus on the processor: what it reads, and that the board does not wait for it.
+// The user's I2C bus on the processor: its readings are right, and the board does not wait for it.
 #include <initializer_list>
 
 #include "board_bench.hpp"
@@ -24,7 +24,7 @@ struct Longest {
   std::uint32_t silence_ms = 0;
 };
 
-// The stream, silence and a stop of a board whose devices are as `trouble` leaves them.
+// Checks the states, the reaction to silence and a stop while `trouble` disturbs the user's bus.
 template <class Trouble>
 void expect_unhindered(Trouble trouble, Longest& longest) {
   Bench& host = new_board();
@@ -45,7 +45,7 @@ void expect_unhindered(Trouble trouble, Longest& longest) {
       silence_ms - (BoardClock::ticks() - host.safe_ticks()) / BoardClock::ticks_per_us / 1000;
   if (safe_ms > longest.silence_ms) longest.silence_ms = safe_ms;
 
-  host.drive_everything();  // a paper host begins anew
+  host.drive_everything();  // a paper host begins a new session
   EXPECT(!host.safe());
   host.command(Command::stop());
   host.run_ms(5);
@@ -71,7 +71,8 @@ TEST(Devices, AreReadAndToldWithTheirTime) {
   EXPECT(state.t_ms - state.raw.i2c[0].t_ms <= 13 && state.i2c_bus.errors == 0);
 }
 
-// The stream, a stop and silence, with a bus that is free, held, and stretched for ever.
+// Checks states, stop and silence with a free bus, a held bus and a bus with endless clock
+// stretching.
 TEST(Devices, ABusThatIsHeldCostsTheBoardNothing) {
   Longest longest;
   for (const Fault fault : {Fault::none, Fault::held, Fault::stretched}) {

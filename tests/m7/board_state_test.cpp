@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole board on the processor, seen by who listens to it: its inputs, the interlocks that they
-// are for, and the fastest stream.
+// The whole board on the processor, as a watcher sees it: its inputs, the interlocks that use these
+// inputs, and the highest rate of states.
 #include "board_bench.hpp"
 
 namespace {
@@ -8,13 +8,13 @@ namespace {
 using namespace r4;
 using namespace r4::m7;
 
-// Whole turns and a part, another for each; encoders 2 and 4 turn backwards.
+// Whole turns and a part of a turn, different for each encoder; encoders 2 and 4 turn backwards.
 std::int32_t turns_of(int channel) {
   return (channel % 2 == 0 ? -channel : channel) * sim::BoardModel::counts_a_turn;
 }
 std::int32_t part_of(int channel) { return channel % 2 == 0 ? -7 * channel : 7 * channel; }
 
-// A board with a host in control, and what it says.
+// A board with a host in control, and the states that the board sends.
 struct Heard {
   Heard() : host(new_board()), steps(step_of_board), told(host.listen()) {
     host.heartbeat();
@@ -40,7 +40,7 @@ TEST(BoardState, BringsEveryInputExactly) {
     board.host.model().set_ultrasonic(channel, static_cast<std::uint16_t>(50 * channel));
   }
   board.host.execute(Command::stepper(3, Steps(50), StepsPerSecond(5000)));
-  board.host.run_alive_ms(700);  // every sensor has its turn
+  board.host.run_alive_ms(700);  // long enough to read every sensor
   const State& state = board.state();
   EXPECT(state.handle_held && state.raw.stepper_steps[2] == 50);
   for (int i = 0; i < analog_channels; ++i) EXPECT(state.raw.analog_cv[i] == 100 * (i + 1) + i);
@@ -59,7 +59,7 @@ TEST(BoardState, BringsEveryInputExactly) {
     EXPECT(state.raw.encoder_counts[channel - 1] == 0);
     EXPECT(state.raw.encoder_index_counts[channel - 1] == -part_of(channel));
   }
-  board.host.execute(Command::relay(1, true));  // closes the motors' supply
+  board.host.execute(Command::relay(1, true));  // switches the supply of the motors on
   for (int channel = 1; channel <= 4; ++channel) {
     board.host.execute(Command::osmc(channel, Pwm(1000 * channel), Direction::forward));
   }
@@ -86,7 +86,7 @@ TEST(BoardState, AReleasedHandleSwitchesEverythingOff) {
   board.host.model().hold_handle(true);
   board.host.run_alive_ms(100);
   EXPECT(board.host.reason() == SafeReason::none && board.state().handle_held);
-  EXPECT(board.host.chips_are_safe());  // until it is commanded again
+  EXPECT(board.host.chips_are_safe());  // until the next command
   board.host.execute(Command::relay(1, true));
   EXPECT(board.host.pins().relays == 1);
 }
@@ -110,8 +110,8 @@ TEST(BoardState, AnObstacleBeforeEachSensorSwitchesEverythingOff) {
   }
 }
 
-// By the board's own clock and counters: an instruction takes 8 ns here, whatever else this machine
-// does.
+// Measured by the board's clock and counters. An instruction takes 8 ns here, however busy this
+// computer is.
 TEST(BoardState, StreamsAt1000HzOverUdpWithNothingLostOrLeftOut) {
   Heard board;
   board.host.execute(Command::fields("DEFAULT,LATE"));

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole board on the processor: interrupts in the middle of its transfers, and what they must
-// bring about.
+// The whole board on the processor: interrupts come in the middle of its transfers.
 #include "board_bench.hpp"
 
 namespace {
@@ -41,7 +40,7 @@ TEST(Board, EveryCommandReachesItsPins) {
 
 namespace {
 
-// When the wheels, the four OSMC channels, change.
+// The time at which the wheels, the four OSMC channels, change.
 struct Wheels {
   std::uint32_t first_ticks = 0;
   std::uint32_t last_ticks = 0;
@@ -151,16 +150,17 @@ TEST(Board, SilenceIsNoticedInTheTimerInterruptWhileTheLoopIsElsewhere) {
   const std::uint32_t silence_ms = host.now_ms() - fed_ms;
   on_target::say_number("ms of silence until safe, with a timeout of 200", silence_ms);
   EXPECT(host.safe() && silence_ms >= timeout_ms && silence_ms <= timeout_ms + 3);
-  // The first turn after the standstill takes 8 ms. Then the line is known to be empty.
+  // The first turn after the standstill takes 8 ms. After that the board knows that the line is
+  // empty.
   host.run_ms(20);
   EXPECT(host.board().application().reason() == SafeReason::link);
-  // A paper host that comes back begins anew.
+  // A paper host that comes back begins a new session.
   host.heartbeat();
   host.run_ms(20);
   EXPECT(host.board().application().reason() == SafeReason::none && host.pins().relays == 0);
 }
 
-// E:STOP at each moment of the bus's busiest time: all outputs are being written anew.
+// E:STOP at each moment while all outputs are written again, which is the busiest time of the bus.
 TEST(Board, AStopIsDoneWithinTwoMillisecondsOfItsLastByte) {
   Bench& host = new_board();
   const Stepping steps(step_of_board);
@@ -170,7 +170,7 @@ TEST(Board, AStopIsDoneWithinTwoMillisecondsOfItsLastByte) {
     host.drive_everything();
     host.run_ms(timeout_ms + 10);
     EXPECT(host.safe());
-    host.heartbeat();  // what was set comes back
+    host.heartbeat();  // the board writes all outputs again
     while (!host.line_has_come()) host.board().turn();
     const std::uint32_t resumed = BoardClock::ticks();
     bool sent = false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What compiler, C library and byte order could make differ on the board: checksums, signatures,
-// numbers, lines, the packed form.
+// Checksums, signatures, numbers, lines and the packed form on the board. The compiler, the C
+// library or the byte order could make them differ from a computer.
 #include "on_target.hpp"
 #include "protocol/datagram/crc32.hpp"
 #include "protocol/datagram/numbers.hpp"
@@ -48,7 +48,7 @@ TEST(Crc32, IsThatOfZlib) {
   EXPECT(crc32("123456789") == 0xCBF43926U);
   EXPECT(crc32("") == 0);
   EXPECT(crc32("6789", crc32("12345")) == 0xCBF43926U);
-  EXPECT(crc32("O:358,1,1;PNum:66;T:1699276044383;^") == 0x7FEFAE81U);  // the paper's
+  EXPECT(crc32("O:358,1,1;PNum:66;T:1699276044383;^") == 0x7FEFAE81U);  // from the paper
 }
 
 TEST(AuthenticationTag, IsThatOfPythonsHashlib) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the protocol costs on a Cortex-M7, in instructions. Under `-icount shift=10` an instruction
-// takes 1024 ns of the board's time, so the timer counts them; a loop of known length says how many
-// ticks that are.
+// The cost of the protocol on a Cortex-M7, in instructions. With `-icount shift=10` an instruction
+// takes 1024 ns of the board's time, so the timer counts instructions. A loop of known length gives
+// the number of ticks per instruction.
 #include <new>
 
 #include "firmware/application/application.hpp"
@@ -24,24 +24,24 @@ namespace {
 using namespace r4;
 using namespace r4::m7;
 
-// Runs 2 * `turns` instructions, and a few.
+// Runs 2 * `turns` instructions and a small constant number of others.
 __attribute__((noinline)) void loop(std::uint32_t turns) {
   asm volatile("1: subs %0, #1\n\tbne 1b" : "+r"(turns) : : "cc");
 }
 
-// The same work is done that many times between two looks at the timer: a tick is less than an
-// instruction, but looking costs some too.
+// Repetitions between two readings of the timer. Reading the timer also takes instructions, and the
+// repetitions make this share small.
 constexpr std::uint32_t repetitions = 100;
 
 template <class Work>
 std::uint32_t ticks_of(Work&& work) {
-  work();  // what is done only once
+  work();  // the first call also does the work that is done only once
   const std::uint32_t before = BoardClock::ticks();
   for (std::uint32_t i = 0; i < repetitions; ++i) work();
   return BoardClock::ticks() - before;
 }
 
-// Ticks for a million instructions.
+// Ticks of the timer in a million instructions.
 std::uint32_t ticks_per_million = 0;
 
 void calibrate() {
@@ -56,7 +56,7 @@ std::uint32_t instructions_of(Work&& work) {
   return static_cast<std::uint32_t>(ticks * 1000000 / ticks_per_million / repetitions);
 }
 
-// A port that measures nothing but takes everything.
+// A port that accepts every datagram and discards it.
 class Sink final : public firmware::Port {
  public:
   void send(Text datagram, Priority, std::uint32_t) override { size_ = datagram.size(); }
@@ -66,7 +66,7 @@ class Sink final : public firmware::Port {
   volatile std::size_t size_ = 0;
 };
 
-// Costs next to nothing: what the chips cost is not the protocol's.
+// Costs almost no instructions, because the cost of the chips does not belong to the protocol.
 class Hal final : public firmware::Hal {
  public:
   void apply(const firmware::Outputs& outputs) override { pwm_ = outputs.osmc[0].pwm; }
@@ -80,7 +80,8 @@ class Hal final : public firmware::Hal {
   std::uint16_t pwm_ = 0;
 };
 
-// The chips as long as they are set up; then the wire takes what it is told, and costs nothing.
+// A bus with simulated chips until set_free(). After that every write succeeds and costs almost
+// nothing.
 class Bus final : public firmware::I2cBus {
  public:
   firmware::I2cResult write(std::uint8_t address, const std::uint8_t* bytes,
@@ -123,15 +124,15 @@ Text written(const State& state, char* buffer) {
   return writer.finish(22, 79146);
 }
 
-// Signs for a board with a key; without one does nothing.
+// Signs the datagram; does nothing without a signer.
 void sign(Signer* signer, DatagramWriter& writer) {
   if (signer != nullptr) signer->sign(writer, 1700000000000000, 1000);
 }
 
 constexpr SessionId session = 0x0123456789abcdef;
 
-// One command after the other, each with its own number; what reading, checking and executing
-// costs. With a key they are signed. `group`: so many commands are one datagram.
+// Instructions to read, check and execute one datagram with `group` commands. Each datagram has a
+// new packet number, and is signed if there is a key.
 std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, SessionId sid,
                                    const Key* key = nullptr, std::uint32_t group = 1) {
   Sink sink;
@@ -140,7 +141,7 @@ std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, Sess
   const std::uint8_t chance[Authentication::chance_size] = {1};
   config.chance = chance;
   if (key != nullptr) config.settings.site.keys[0] = *key;
-  // One after the other in the same place: the stack has no room for it.
+  // All calls use the same static memory, because the stack is too small for an application.
   alignas(firmware::Application) static unsigned char place[sizeof(firmware::Application)];
   firmware::Application& application = *new (place) firmware::Application(hal, config);
   const std::uint8_t port = application.add_port(sink);
@@ -151,7 +152,7 @@ std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, Sess
   static char commands[repetitions + 1][128];
   static Text texts[repetitions + 1];
   application.start(1000);
-  for (std::uint32_t i = 0; i < 2; ++i) {  // the second echoes the answer to the first
+  for (std::uint32_t i = 0; i < 2; ++i) {  // the second heartbeat echoes the board's answer
     DatagramWriter heartbeat(commands[0], sizeof commands[0]);
     heartbeat.field("H").value("ROS2-R4");
     heartbeat.session(sid);
@@ -172,14 +173,14 @@ std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, Sess
   std::uint32_t next = 0;
   const std::uint32_t count =
       instructions_of([&] { application.receive(port, 1, texts[next++], 1000); });
-  // It has cost what it should only if it was done.
+  // The count is valid only if the board executed all commands.
   const bool done = application.state() == firmware::BoardState::active &&
                     application.link().last_executed() == first + repetitions &&
                     application.outputs().osmc[group - 1].pwm == 358;
   return done ? count : 0;
 }
 
-// The same on the drivers of all channels.
+// The same with the drivers of all channels.
 std::uint32_t with_drivers() {
   static Bus bus;
   static sim::BoardModel around(1);
@@ -196,7 +197,7 @@ std::uint32_t with_drivers() {
   return count;
 }
 
-// A wire that has done what it is told when it is asked.
+// A bus on which each transfer is done at the next call of progress().
 class UserWire final : public firmware::UserI2cPort {
  public:
   void begin(const firmware::UserTransfer& transfer) override {
@@ -213,7 +214,7 @@ class UserWire final : public firmware::UserI2cPort {
   std::uint32_t transfers = 0;
 };
 
-// One of eight readings of the user's bus, begun in one turn of the loop and ended in the next.
+// One of eight readings of the user's bus; it takes two calls of poll().
 std::uint32_t reading_instructions() {
   static UserWire wire;
   static firmware::UserI2c bus(wire);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// ISO-TP on the board: what one end cuts the other joins.
+// ISO-TP on the board: the sender splits a datagram into frames, and the receiver joins them.
 #include "on_target.hpp"
 #include "r4link/datagram.hpp"
 #include "transports/framing/can/isotp_receiver.hpp"
@@ -16,7 +16,8 @@ IsotpChannel channel() {
   return channel;
 }
 
-// Lets both ends talk until they are done; drops frame `lost` (none: 0). True if it arrived.
+// Moves frames between both ends until the transfer ends; drops frame `lost` (0: none). True if the
+// datagram arrived.
 bool arrives(Text datagram, std::uint32_t lost) {
   IsotpSenderOptions sending;
   sending.channel = channel();

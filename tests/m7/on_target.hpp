@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tests that run on the processor itself. A test reads as in gtest:
+// Runs tests on the processor itself. A test looks like a test of gtest:
 //
 //     TEST(Crc32, IsThatOfThePaper) { EXPECT(crc32("123456789") == 0xCBF43926); }
 #pragma once
@@ -12,7 +12,7 @@ namespace on_target {
 class Test {
  public:
   Test(const char* name, void (*body)());
-  // Runs all; returns how many have failed.
+  // Runs all tests; returns the number of failed tests.
   static std::uint32_t run_all();
 
  private:
@@ -21,9 +21,9 @@ class Test {
   Test* next_;
 };
 
-// Says what did not hold, and counts it against the test that runs.
+// Prints the failed condition and marks the running test as failed.
 void failed(const char* what, const char* file, std::uint32_t line);
-// Says a number, for the log.
+// Prints a number to the log.
 void say_number(const char* what, std::uint32_t number);
 
 }  // namespace on_target

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Runs the tests, then breaks the board in every way and looks after each reset at what is known of
-// it. Ends with the number of what failed.
+// Runs the tests, then provokes each kind of fault. After each reset it checks the note of the
+// fault. The exit status is the number of failures.
 #include <cstdint>
 
 #include "board_bench.hpp"
@@ -14,7 +14,7 @@ namespace {
 using namespace r4;
 using namespace r4::m7;
 
-// Over resets.
+// Keeps its values over resets.
 struct Story {
   std::uint32_t failures;
   std::uint32_t made_safe;
@@ -30,14 +30,14 @@ class Spy final : public firmware::Hal {
   bool clear_fault() override { return true; }
 };
 
-// The parameter makes each turn different, so that the compiler keeps all of them.
+// `depth` makes each call different, so that the compiler does not remove the recursion.
 __attribute__((noinline)) std::uint32_t overflow(std::uint32_t depth) {
   volatile std::uint32_t room[64];
   room[depth % 64] = depth;
   return depth == 0 ? 0 : overflow(depth + 1) + room[(depth + 1) % 64];
 }
 
-// As handlers would that go down to its last word; the guard's interrupt looks at it.
+// Simulates handlers that fill their stack to its last word; the interrupt of the guard checks it.
 void fill_handler_stack() {
   Bench& board = new_board();
   *r4_handler_stack = 0;
@@ -63,7 +63,7 @@ int main() {
   constexpr std::uint32_t bus_fault = 5;
   constexpr std::uint32_t usage_fault = 6;
   constexpr std::uint32_t nothing = 0xFFFFFFA0;
-  constexpr std::uint32_t code = 0x2000;  // an address in it
+  constexpr std::uint32_t code = 0x2000;  // an address in the code
   switch (boots()) {
     case 1:
       story.failures = on_target::Test::run_all();

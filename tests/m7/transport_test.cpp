@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The ends of the board's transports, without their chips.
+// The board's side of its transports, without their chips.
 #include <cstring>
 
 #include "firmware/ports/m7/links/udp_frames.hpp"
@@ -12,7 +12,7 @@ using namespace r4;
 using namespace r4::firmware;
 using namespace r4::m7;
 
-// All that the UART would send now.
+// Takes all bytes that the UART would send now.
 Text drain(TransmitLines& lines, char* out, std::size_t size) {
   std::size_t used = 0;
   while (used < size && lines.take(out[used])) ++used;
@@ -29,7 +29,7 @@ Mac mac(std::uint8_t last) {
   return mac;
 }
 
-// The board's end, a frame, and room for an answer.
+// The board's side, a received frame, and a buffer for an answer.
 struct End {
   UdpFrames board{board_address, board_port};
   alignas(4) std::uint8_t frame[1536];
@@ -114,7 +114,7 @@ TEST(UdpFrames, TakeADatagramAndAnswerWhereItCameFrom) {
   const UdpFrames::Arrival arrival = end.board.take(end.frame, size, end.reply);
   EXPECT(arrival.from == asker() && arrival.datagram == Text("H:R4"));
   EXPECT(end.board.write(arrival.from, "answer", end.frame) == UdpFrames::min_frame);
-  // The other end finds both checksums right.
+  // The receiver of the answer finds both checksums right.
   UdpFrames host(0x0A000202, 5000);
   const UdpFrames::Arrival heard = host.take(end.frame, UdpFrames::min_frame, end.reply);
   EXPECT(heard.datagram == Text("answer"));
@@ -129,9 +129,9 @@ TEST(UdpFrames, DropWhatIsDamagedCutOrForOthers) {
     end.frame[at] = value;
     return end.board.take(end.frame, size, end.reply).from.host == 0;
   };
-  EXPECT(refused(22, 63));    // the IP checksum no longer fits
+  EXPECT(refused(22, 63));    // a wrong IP checksum
   EXPECT(refused(37, 0xE3));  // another port
-  EXPECT(refused(39, 13));    // a length beyond the packet
+  EXPECT(refused(39, 13));    // a length greater than the packet
   EXPECT(refused(41, 1));     // a wrong UDP checksum
   EXPECT(refused(14, 0x65));  // not IPv4
   const std::size_t size = question(end.frame);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every datagram that the paper prints (section 4.4) is read, understood and written again.
+// Reads, interprets and writes again every datagram that the paper prints (section 4.4).
 #include <gtest/gtest.h>
 
 #include <string>

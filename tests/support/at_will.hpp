@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Options of a board that is driven without being armed first, for tests of something else.
+// Options for a board that is driven without arming, for tests in which arming is not the subject.
 #pragma once
 
 #include "r4link/options.hpp"

@@ -54,8 +54,8 @@ BoardInAThread::BoardInAThread(const std::vector<std::string>& transports,
 
 BoardInAThread::~BoardInAThread() { switch_off(); }
 
-// The system gives the number of a pty to the next one as soon as nobody has it open. A host that waits
-// for this board would find the board of another test there.
+// The system reuses the number of a pty as soon as no program has it open. A host that waits for
+// this board would then find the board of another test.
 void BoardInAThread::switch_off() {
   if (!thread_.joinable()) return;
   for (const std::string& url : urls_) {

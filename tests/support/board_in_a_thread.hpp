@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A simulated board with an event loop and a thread of its own, for hosts in the test's thread.
+// A simulated board with its own event loop and thread, for hosts in the thread of the test.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -18,11 +18,11 @@ namespace r4::test {
 
 class BoardInAThread {
  public:
-  // What it listens on: "udp" (a free port of this machine), "pty", or a URL of a CAN bus. `script`:
-  // what happens to it (firmware/ports/sim/script.hpp).
+  // `transport`: "udp" (a free port of this computer), "pty", or the URL of a CAN bus. `script`:
+  // events of the simulation (firmware/ports/sim/script.hpp).
   explicit BoardInAThread(const std::string& transport, const std::string& script = "")
       : BoardInAThread(std::vector<std::string>{transport}, script) {}
-  // On several at once.
+  // A board on several transports.
   explicit BoardInAThread(const std::vector<std::string>& transports,
                           const std::string& script = "",
                           const std::string& board_id = "test-board");
@@ -30,22 +30,22 @@ class BoardInAThread {
   BoardInAThread(const BoardInAThread&) = delete;
   BoardInAThread& operator=(const BoardInAThread&) = delete;
 
-  // The URL by which a host reaches it.
+  // The URL with which a host reaches the board.
   const std::string& url() const { return urls_[0]; }
   const std::vector<std::string>& urls() const { return urls_; }
 
-  // Switches it off; the transport disappears.
+  // Switches the board off; its transport disappears.
   void switch_off();
 
-  // Does `action` on the board's thread.
+  // Runs `action` in the thread of the board.
   void run(const std::function<void(sim::SimulatedBoard&)>& action);
 
   // True if the board is safe because it has no host, and motor 1 is off.
   bool is_without_host();
 
-  // What the board has executed so far, "O:358,1,1".
+  // The commands that the board has executed so far, "O:358,1,1".
   std::vector<std::string> executed();
-  // Waits for the board to enter that state; false after 5 s.
+  // Waits until the board enters the given state; false after 5 s.
   bool wait_for(firmware::BoardState state, SafeReason reason = SafeReason::none);
 
  private:
@@ -61,8 +61,8 @@ class BoardInAThread {
   std::thread thread_;
 };
 
-// Waits until a host has heard that its board is safe for that reason; false after 5 s. What it
-// asks before may be cancelled by the news.
+// Waits until the host has heard that its board is safe for the given reason; false after 5 s. The
+// change may cancel requests of the host that are under way.
 bool hears_of(const Board& host, SafeReason reason);
 
 }  // namespace r4::test

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much stack functions need with all that they call, by what GCC says with -fcallgraph-info=su.
+"""The stack that functions need with all functions that they call, from the output of GCC with -fcallgraph-info=su.
 
-GCC does not say who is called through an interface: rules do, (caller, classes, functions), regular
-expressions over mangled names. A caller without a rule is an error, so nothing is left out.
+GCC does not list the functions that are called through an interface. Rules list them: (caller, classes, functions),
+regular expressions over mangled names. A caller without a rule is an error, so no call is left out.
 """
 import re
 
-LIBRARY_FRAME = 64  # of the C library: more than any function needs
+LIBRARY_FRAME = 64  # for a function of the C library: more than any of them needs
 
 
 def is_of(name, classes):
@@ -14,7 +14,7 @@ def is_of(name, classes):
 
 
 class CallGraph:
-    """`files`: what GCC has written (.ci). `turns`: functions that call themselves, and how often at most.
+    """`files`: the output of GCC (.ci). `turns`: functions that call themselves, and the largest number of calls.
     `leaves`: functions whose calls through pointers are not followed."""
 
     def __init__(self, files, through_interfaces, turns=None, leaves=()):
@@ -29,7 +29,7 @@ class CallGraph:
             if frame:
                 assert frame[2] == 'static', f'{title}: its frame has no bound'
                 self.frames[title.split(':')[-1]] = int(frame[1])
-                self.calls.pop(title, None)  # of a weak function that this one takes the place of
+                self.calls.pop(title, None)  # the calls of a weak function that this one replaces
         for edge in re.findall(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', text, re.MULTILINE):
             caller, callee = (name.split(':')[-1] for name in edge)
             self.calls.setdefault(caller, set()).add(callee)
@@ -42,13 +42,13 @@ class CallGraph:
         if caller in self.leaves:
             return callees
         rules = [rule for rule in self.through_interfaces if is_of(caller, rule[0])]
-        assert rules, f'{caller} calls something through an interface: what?'
+        assert rules, f'{caller} calls a function through an interface and has no rule'
         for _, classes, functions in rules:
             callees |= {name for name in self.frames if is_of(name, rf'(?:{classes})\d+(?:{functions})')}
         return callees
 
     def depth(self, name, path=()):
-        """Bytes from the call of `name` on, at most."""
+        """The largest number of bytes of stack from the call of `name`."""
         assert name not in path, f'{name} calls itself: {path}'
         if name not in self.depths:
             self.depths[name] = self.frames.get(name, LIBRARY_FRAME) * self.turns.get(name, 1) + max(

@@ -25,16 +25,17 @@ using simulation::Random;
 constexpr std::uint64_t us_ns = 1000;
 constexpr std::uint64_t second_ns = 1000000000;
 constexpr std::uint64_t poll_every_ns = 1000000;
-constexpr std::uint64_t drain_ns = 200000000;  // what is under way at the end may arrive
+constexpr std::uint64_t drain_ns = 200000000;  // datagrams on their way at the end may still arrive
 
 struct Message {
   std::string plain;
   std::uint64_t due_ns = 0;
-  bool state = false;      // a newer one replaces it
+  bool state = false;      // a newer state replaces a waiting one
   bool heartbeat = false;  // of the host
 };
 
-// What a board and its host say next, some hours after the board began to count.
+// Writes the next datagrams of a board and its host, as some hours after the board started to
+// count.
 class Voice {
  public:
   explicit Voice(std::uint64_t seed) : random_(seed) {
@@ -117,8 +118,8 @@ class Voice {
   SessionId session_;
 };
 
-// One direction of a board's link: datagrams in, datagrams out. No more than one frame of it is in
-// a controller at any time.
+// One direction of the link of a board: datagrams in, datagrams out. A controller holds at most one
+// frame of it at any time.
 class Stream {
  public:
   Stream(CanBusModel& bus, const BackboneOptions& options, int from, int to,
@@ -276,7 +277,7 @@ class Backbone {
     };
     return bus_.add_node(std::move(options));
   }
-  // The streams of a frame at that node.
+  // The streams to which a frame belongs, at the given node.
   std::vector<Stream*> heard_by(int node, const CanFrame& frame) {
     const CanIdMeaning meaning = classify(frame);
     const int board = meaning.node;
@@ -324,7 +325,8 @@ class Backbone {
     });
   }
 
-  // From a random phase on, or from 0 if all are in step, to the end of the run.
+  // Runs `action` from a random phase to the end of the run; from time 0 if all streams are in
+  // step.
   void every(std::uint32_t hz, std::function<void(std::uint64_t)> action) {
     if (hz == 0) return;
     const std::uint64_t period_ns = second_ns / hz;
@@ -348,7 +350,7 @@ class Backbone {
   CanBusModel bus_;
   Random random_;
   BackboneResult result_;
-  std::vector<std::unique_ptr<Stream>> streams_;  // of each board: telemetry, commands
+  std::vector<std::unique_ptr<Stream>> streams_;  // for each board: telemetry, then commands
   std::vector<std::unique_ptr<Voice>> voices_;
   std::size_t nodes_ = 0;
   int host_ = 0;

@@ -10,27 +10,27 @@ namespace {
 constexpr std::uint64_t never = ~std::uint64_t{0};
 constexpr unsigned passive_errors = 128;
 constexpr unsigned bus_off_errors = 256;
-constexpr unsigned receive_errors_after_passive = 127;  // a good frame: to between 119 and 127
+constexpr unsigned receive_errors_after_passive = 127;  // a good frame sets the count to 119..127
 constexpr unsigned error_step = 8;
 constexpr std::uint64_t runs_to_come_back = 128;
 constexpr std::uint64_t run_bits = 11;
 constexpr std::uint64_t suspend_bits = 8;
 
-// Acknowledge delimiter, end of frame and intermission: what an error frame replaces. All of them
+// An error frame replaces acknowledge delimiter, end of frame and intermission. All of these bits
 // are recessive, and so are the last 11 bits of an error frame.
 constexpr std::uint32_t ending_bits =
     can_acknowledge_delimiter_bits + can_end_of_frame_bits + can_intermission_bits;
 static_assert(ending_bits == run_bits, "a frame ends in one run of recessive bits");
 
-// A missing acknowledgement: the sender's flag. A wrong CRC: the receivers begin theirs one bit
-// after it. Delimiter and intermission follow.
+// If an acknowledgement is missing, the sender begins an error flag at once. If the CRC is wrong,
+// the receivers begin their flag one bit later. Delimiter and intermission follow.
 constexpr std::uint32_t error_delimiter_bits = 8;
 constexpr std::uint32_t error_frame_bits(bool acknowledge_alone) {
   return (acknowledge_alone ? 6 : 7) + error_delimiter_bits + can_intermission_bits;
 }
 
-// The bits of arbitration as a number: the lowest wins. An 11-bit id beats the 29-bit ids that
-// begin with it, data beats a request.
+// The bits of arbitration as a number: the lowest number wins. An 11-bit id wins against a 29-bit
+// id that begins with it; a data frame wins against a remote request.
 std::uint64_t rank(const CanFrame& frame) {
   const std::uint64_t request = frame.remote ? 1 : 0;
   if (!frame.extended) return std::uint64_t{frame.id} << 21 | request << 20;
@@ -118,7 +118,8 @@ CanBusModel::Next CanBusModel::next() const {
   return first;
 }
 
-// Arbitration. Nodes that send the very same frame all win; others with the same id destroy it.
+// Arbitration. If nodes send exactly the same frame, all of them win. Different frames with the
+// same id destroy each other.
 void CanBusModel::begin_frame() {
   const std::uint64_t runs = (now_ns_ - recessive_since_ns_) / bits_ns(run_bits);
   std::uint64_t best = never;
@@ -242,7 +243,8 @@ void CanBusModel::count_success(Node& node, bool sender) {
   }
 }
 
-// A passive sender that merely lacks an acknowledgement does not count: alone on the bus, it stays.
+// A missing acknowledgement does not increase the count of a passive sender. So a sender that is
+// alone on the bus stays passive.
 void CanBusModel::count_error(Node& node, bool sender) {
   if (sender) {
     const bool lonely = !damaged_ && node.state == CanNodeState::passive;

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CAN bus in virtual time: every frame takes the time of its bits, and the bus decides who is next.
+// A CAN bus in virtual time: each frame takes the time of its bits, and arbitration selects the
+// next frame.
 //
 //     CanBusModel bus({.rate = {1000000, 0}, .seed = 7});
 //     const int board = bus.add_node({.sent = …, .received = …});
-//     bus.send(board, frame);                 // false: no room, try again when one was sent
-//     bus.at(2'000'000, [&] { … });           // an event of the test's own
+//     bus.send(board, frame);                 // false: no room, try again after a frame was sent
+//     bus.at(2'000'000, [&] { … });           // an event of the test
 //     bus.run_until(1'000'000'000);
 //     bus.load();                             // busy time / time
 //
-// What it keeps to (ISO 11898-1:2015): arbitration by id among those that wait when the bus becomes
-// idle (10.4.2.2), the bits of each frame (can_bits.hpp), error frames and retransmission (10.4.4),
-// error counters, error-passive with its 8 bits of suspended transmission, bus-off and the return
-// after 128 times 11 recessive bits (12.1.4). What it leaves out: errors of bits within a frame
-// (every error is one of the CRC or of the acknowledgement, seen by all), overload frames, clocks
-// that differ, the propagation delay.
+// The model follows ISO 11898-1:2015: arbitration by id among the frames that wait when the bus
+// becomes idle (10.4.2.2), the bits of each frame (can_bits.hpp), error frames and retransmission
+// (10.4.4), error counters, error-passive nodes with 8 bits of suspended transmission, bus-off and
+// the return after 128 times 11 recessive bits (12.1.4). The model leaves out bit errors within a
+// frame (every error is an error of the CRC or of the acknowledgement, and all nodes see it),
+// overload frames, clocks that differ, and the propagation delay.
 //
-// Times are nanoseconds from 0. Same options and same calls: the same run.
+// Times are nanoseconds from 0. The same options and the same calls give the same run.
 #pragma once
 
 #include <cstdint>
@@ -31,25 +32,26 @@ namespace r4::test {
 struct CanBusOptions {
   CanBitRate rate{1000000, 0};
   std::uint64_t seed = 1;
-  double corrupted = 0;  // probability that all see a frame damaged: it is sent again
-  double missed = 0;     // probability that one receiver loses a good frame, of which nobody knows
+  double corrupted = 0;  // probability that all nodes see a frame damaged, so that it is sent again
+  double missed = 0;     // probability that one receiver loses a good frame unnoticed
 };
 
 enum class CanQueue : std::uint8_t {
-  mailboxes,  // of the frames that wait the lowest id is next
-  fifo,       // the oldest is next, whatever waits behind it
+  mailboxes,  // of the frames that wait, the frame with the lowest id is next
+  fifo,       // the oldest frame is next
 };
 enum class CanNodeState : std::uint8_t { active, passive, bus_off };
 enum class CanBusError : std::uint8_t { damaged, not_acknowledged };
 
 struct CanNodeOptions {
   CanQueue queue = CanQueue::mailboxes;
-  std::size_t room = 3;    // frames that can wait
-  bool silent = false;     // listens only: acknowledges nothing, counts no errors
-  bool comes_back = true;  // returns from bus-off by itself
-  // A frame of its own is out (called before the others receive it); one of another node came in;
-  // it saw an error frame (all do of a damaged frame, its sender of one that nobody acknowledged);
-  // its state has changed. At the end of the frame, its intermission not yet begun.
+  std::size_t room = 3;    // number of frames that can wait
+  bool silent = false;     // only listens: does not acknowledge and does not count errors
+  bool comes_back = true;  // returns from bus-off without a command
+  // Called at the end of a frame, before its intermission: `sent` after a frame of this node
+  // (before the receivers are called), `received` after a frame of another node, `failed` after an
+  // error frame, and `changed` after a change of state. All nodes see the error frame of a damaged
+  // frame. Only the sender sees the error frame of a missing acknowledgement.
   std::function<void(const CanFrame&)> sent = {};
   std::function<void(const CanFrame&)> received = {};
   std::function<void(CanBusError)> failed = {};
@@ -57,9 +59,9 @@ struct CanNodeOptions {
 };
 
 struct CanIdTraffic {
-  std::uint64_t frames = 0;          // that arrived
+  std::uint64_t frames = 0;          // frames that arrived
   std::uint64_t failed = 0;          // attempts that ended in an error frame
-  std::uint64_t busy_ns = 0;         // of both
+  std::uint64_t busy_ns = 0;         // time of frames and failed attempts
   std::uint64_t max_latency_ns = 0;  // from send() to the end of the frame
 };
 
@@ -68,28 +70,30 @@ class CanBusModel {
   explicit CanBusModel(const CanBusOptions& options) : options_(options), random_(options.seed) {}
 
   int add_node(CanNodeOptions options);
-  // Queues a frame; false: no room. Frames stay queued through bus-off.
+  // Queues a frame; false if there is no room. Frames stay queued during bus-off.
   bool send(int node, const CanFrame& frame);
-  // The next `count` frames are seen damaged by all.
+  // All nodes see the next `count` frames damaged.
   void corrupt_next(unsigned count) { corrupt_next_ = count; }
   void set_corrupted(double probability) { options_.corrupted = probability; }
-  // What this node sends is seen damaged by all: it will be bus-off.
+  // All nodes see the frames of this node damaged, so that it goes bus-off.
   void spoil(int node, bool spoiled) { to_node(node).spoiled = spoiled; }
-  // Its controller is on the bus or it is off: neither sends nor hears, nor acknowledges. What is
-  // on the bus ends first.
+  // Connects the node to the bus or disconnects it. A disconnected node does not send, receive or
+  // acknowledge. A frame that is on the bus ends first.
   void set_present(int node, bool present) { to_node(node).present = present; }
-  // Whether it returns from bus-off by itself; to be allowed to begins that.
+  // Allows or forbids the return from bus-off without a command. If the node is bus-off, the return
+  // begins when it is allowed.
   void let_come_back(int node, bool comes_back) { to_node(node).options.comes_back = comes_back; }
   void set_errors(int node, unsigned transmit_errors, unsigned receive_errors);
-  // Forgets what waits, but not the frame on the bus.
+  // Discards the frames that wait, but not the frame on the bus.
   void clear(int node);
-  // Runs `action` then; those of one time in the order of the calls, and before what the bus does.
+  // Runs `action` at the given time. Actions of the same time run in the order of the calls, before
+  // the events of the bus.
   void at(std::uint64_t time_ns, std::function<void()> action) {
     actions_.emplace(time_ns < now_ns_ ? now_ns_ : time_ns, std::move(action));
   }
-  // Runs all that happens up to and with that time.
+  // Runs all events up to and including the given time.
   void run_until(std::uint64_t time_ns);
-  // When something happens next; ~0 if nothing does.
+  // The time of the next event; ~0 if there is none.
   std::uint64_t next_ns() const;
 
   std::uint64_t now_ns() const { return now_ns_; }
@@ -115,20 +119,20 @@ class CanBusModel {
     CanNodeState state = CanNodeState::active;
     unsigned transmit_errors = 0;
     unsigned receive_errors = 0;
-    std::uint64_t recessive_runs = 0;  // of 11 bits, while bus-off
+    std::uint64_t recessive_runs = 0;  // number of runs of 11 recessive bits during bus-off
     std::uint64_t suspended_until_ns = 0;
-    std::size_t chosen = 0;  // place in the queue of the frame on the bus
+    std::size_t chosen = 0;  // index in the queue of the frame on the bus
     bool sending = false;
     bool present = true;
     bool spoiled = false;
     bool on_bus() const { return present && state != CanNodeState::bus_off; }
   };
-  // What the bus does next, and when.
+  // The next event of the bus and its time.
   enum class Step : std::uint8_t { none, begin, end, come_back };
   struct Next {
     Step step;
     std::uint64_t time_ns;
-    std::size_t node;  // of come_back
+    std::size_t node;  // for come_back
   };
 
   const Node& at_node(int node) const { return nodes_[static_cast<std::size_t>(node)]; }
@@ -155,7 +159,7 @@ class CanBusModel {
   std::uint64_t busy_ns_ = 0;
   std::uint64_t begun_ns_ = 0;            // of the frame on the bus
   std::uint64_t frame_ends_ns_ = 0;       // of the frame on the bus, before its intermission
-  std::uint64_t free_at_ns_ = 0;          // the intermission is over
+  std::uint64_t free_at_ns_ = 0;          // end of the intermission
   std::uint64_t recessive_since_ns_ = 0;  // the last 11 bits of a frame are always recessive
   unsigned corrupt_next_ = 0;
   bool on_bus_ = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Carriers from which a test derives what it needs.
+// Base classes for the carriers of a test.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@
 
 namespace r4::test {
 
-// Is up when it is open. Sends into nothing, and receives nothing.
+// Is up while it is open. Discards what is sent, and receives nothing.
 class IdleCarrier : public Carrier {
  public:
   void open(Handler& handler) override {
@@ -32,7 +32,7 @@ class IdleCarrier : public Carrier {
   CarrierCounters counters_;
 };
 
-// Hands everything on between its owner and another carrier.
+// Forwards all calls between its owner and another carrier.
 class WrappedCarrier : public Carrier, protected Carrier::Handler {
  public:
   explicit WrappedCarrier(std::unique_ptr<Carrier> below) : below_(std::move(below)) {}

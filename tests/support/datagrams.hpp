@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams for tests: the paper's capture, and any fields with the right checksum behind them.
+// Datagrams for tests: the paper's capture, and any fields with the right checksum.
 #pragma once
 
 #include <string>
@@ -20,7 +20,7 @@ const std::vector<CapturedLine>& paper_capture();
 // The first line of the capture, a state of 156 bytes.
 std::string captured_state();
 
-// `fields` with "^0x<crc>^" behind them; the fields are not checked.
+// `fields`, followed by "^0x<crc>^"; the fields are not checked.
 std::string with_crc(std::string_view fields);
 
 std::string str(Text text);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session whose effects are done at the end of each call, as an AsyncBoard does them: its
-// datagrams go to transmit(), then its events go to the functions named after them.
+// A session whose effects are executed at the end of each call, as in AsyncBoard. Its datagrams go
+// to transmit(), then its events go to the functions with their names.
 #pragma once
 
 #include <optional>
@@ -37,7 +37,7 @@ class DrivenSession : public Session {
   explicit DrivenSession(Handler& handler, Arguments&&... arguments)
       : Session(std::forward<Arguments>(arguments)...), handler_(handler) {}
 
-  // Returns when poll() is needed next.
+  // Returns the time of the next poll().
   Time poll(Time now) {
     on_trouble(handler_.trouble());
     Session::poll(now);

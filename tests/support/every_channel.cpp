@@ -10,7 +10,7 @@ namespace r4::test {
 
 namespace {
 
-constexpr std::chrono::seconds channel_patience{10};  // for a busy machine
+constexpr std::chrono::seconds channel_patience{10};  // long enough for a busy computer
 
 sim::Pins pins_of(const ControlledBoard& board) {
   sim::Pins pins;
@@ -18,18 +18,18 @@ sim::Pins pins_of(const ControlledBoard& board) {
   return pins;
 }
 
-// The first state for which `is_so` is true; the last one if there is none.
+// The first state for which `is_so` is true; the last state if there is none.
 State await(const ControlledBoard& board, const std::function<bool(const State&)>& is_so) {
   State state;
   for (int tries = 0; tries < 1000; ++tries) {
     state = board.next_state();
     if (is_so(state)) return state;
   }
-  ADD_FAILURE() << "no state came to be so";
+  ADD_FAILURE() << "the expected state did not come";
   return state;
 }
 
-// Whole turns, and a part of a turn, different for each encoder; encoders 2 and 4 turn backwards.
+// Whole turns and a part of a turn, different for each encoder; encoders 2 and 4 turn backwards.
 std::int32_t turns_of(int channel) {
   return (channel % 2 == 0 ? -channel : channel) * sim::BoardModel::counts_a_turn;
 }
@@ -48,7 +48,7 @@ void expect_inputs(const ControlledBoard& board) {
     }
   });
   const State state = await(board, [](const State& s) { return s.distance_cm(4) == 200; });
-  const State again = await(board, [&](const State& s) {  // every sensor was read since
+  const State again = await(board, [&](const State& s) {  // every sensor was read after the change
     return s.t_ms - state.t_ms > 250;
   });
   EXPECT_TRUE(again.handle_held);
@@ -69,9 +69,9 @@ void expect_inputs(const ControlledBoard& board) {
   }
 }
 
-// Each motor turns its own encoder, at a speed of its own.
+// Each motor turns one encoder, at a different speed.
 void expect_speeds(const ControlledBoard& board) {
-  board.command("R:1,On");  // closes their supply
+  board.command("R:1,On");  // switches the supply of the motors on
   for (int channel = 1; channel <= osmc_channels; ++channel) {
     board.command(fmt::format("O:{},{},{}", 1000 * channel, channel % 2, channel));
   }
@@ -143,7 +143,7 @@ void expect_steppers(const ControlledBoard& board) {
   }
 }
 
-// A motor runs, and the relay of the dead-man's handle is closed.
+// A motor runs, and relay 1 is closed.
 void drive(const ControlledBoard& board) {
   board.command("R:1,On");
   board.command("O:500,1,1");
@@ -152,7 +152,7 @@ void drive(const ControlledBoard& board) {
   EXPECT_EQ(board.next_state().relays, 1);
 }
 
-// Every output is off, and stays off until it is commanded again.
+// Every output is off, and stays off until the next command.
 void expect_that_nothing_came_back(const ControlledBoard& board) {
   const State state = board.next_state();
   EXPECT_EQ(state.relays, 0);
@@ -186,7 +186,7 @@ ControlledBoard controlled(BoardInAThread& simulated, Board& host) {
   return {
       [&host](const std::string& command) { host.send(command, channel_patience); },
       [&host] {
-        host.next_state(channel_patience);  // this one may have been sent before the call
+        host.next_state(channel_patience);  // this state may have been sent before the call
         return host.next_state(channel_patience);
       },
       [&simulated](const auto& action) { simulated.run(action); },
@@ -203,7 +203,7 @@ void expect_every_channel(const ControlledBoard& board) {
   expect_steppers(board);
   board.command("E:STOP");
   await(board, [](const State& s) { return s.safe == SafeReason::stop; });
-  // The steppers' pulses have ended; the model knows that after a pause.
+  // The pulses of the steppers have ended; the model detects that after a pause.
   const State stopped = board.next_state();
   await(board, [&](const State& s) {
     return s.t_ms - stopped.t_ms > sim::BoardModel::stepper_pause_ms + 20;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tests every channel of a board from end to end, over any transport: from a command at the host,
-// over the register and the pin in the model, to the state at the host; and every input from its
-// pin to the host.
+// Tests every channel of a board from end to end, over any transport. An output goes from a command
+// of the host over the register and the pin of the model to the state at the host. An input goes
+// from its pin to the host.
 #pragma once
 
 #include <functional>
@@ -14,14 +14,14 @@
 
 namespace r4::test {
 
-// A host that controls a simulated board, and a way to the board itself.
+// A host that controls a simulated board, and direct access to the board.
 struct ControlledBoard {
-  std::function<void(const std::string&)> command;  // returns when it was executed
-  std::function<State()> next_state;                // one that was sent after the call
+  std::function<void(const std::string&)> command;  // returns after the board executed it
+  std::function<State()> next_state;                // a state that was sent after the call
   std::function<void(const std::function<void(sim::SimulatedBoard&)>&)> at_board;
 };
 
-// For a board in a thread, and the host that has opened it.
+// For a board in a thread and the host that controls it.
 ControlledBoard controlled(BoardInAThread& simulated, Board& host);
 
 void expect_every_channel(const ControlledBoard& board);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The first value that a callback sets, for the thread of the test. A callback has a copy: it may
-// run when the test is over.
+// The first value that a callback sets, for the thread of the test. The callback holds a copy,
+// because it may run after the end of the test.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ class First {
   void set(Value value) const {
     if (!state_->is_set.exchange(true)) state_->promise.set_value(std::move(value));
   }
-  // Fails the test if there is none within 5 s. Once.
+  // Fails the test if there is no value within 5 s. Call it once.
   Value get() const {
     auto future = state_->promise.get_future();
     if (future.wait_for(std::chrono::seconds{5}) == std::future_status::ready) return future.get();

@@ -17,20 +17,20 @@ namespace r4::test {
 
 class Hold {
  public:
-  // A transport for that URL.
+  // Makes a transport for the given URL.
   CarrierMaker at(const std::string& url) {
     return [turn = turn_, url](Loop& loop) {
       return std::make_unique<Held>(standard_registry().make(context_of(loop), url, Role::host),
                                     turn);
     };
   }
-  // Blocks the loop at its next send().
+  // Blocks the loop at the next send().
   void begin() { turn_->reach(Turn::Stage::wanted); }
   bool wait_until_held() { return turn_->wait_for(Turn::Stage::held); }
   void release() { turn_->reach(Turn::Stage::released); }
 
  private:
-  // Shared, so that it outlives its use by both threads.
+  // Shared, so that it lives as long as both threads use it.
   class Turn {
    public:
     enum class Stage : std::uint8_t { free, wanted, held, released };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A loop that a test runs until something has come.
+// A loop that a test runs until a condition is true.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,17 +20,17 @@ struct OnALoop {
     io.restart();
     while (!done()) {
       if (std::chrono::steady_clock::now() > deadline) return false;
-      // With nothing to wait for there is nothing that could change.
+      // If the loop has nothing to wait for, nothing can change.
       if (io.run_one_for(std::chrono::seconds{10}) == 0 && io.stopped()) return done();
     }
     return true;
   }
-  // The result that `start(handler)` brings.
+  // The result that `start` passes to its handler.
   template <class Start>
   CommandResult result_of(Start start) {
     std::optional<CommandResult> result;
     start([&](const CommandResult& r) { result = r; });
-    EXPECT_FALSE(result) << "never inside the call";
+    EXPECT_FALSE(result) << "the handler must not run inside the call";
     EXPECT_TRUE(run_until([&] { return result.has_value(); }));
     return result.value_or(CommandResult{});
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a test asks of an error.
+// Checks of errors for tests.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -24,7 +24,8 @@ Problem problem_of(Action action) {
 
 inline testing::AssertionResult contains(const std::string& text, const std::string& part) {
   if (text.find(part) != std::string::npos) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "\"" << text << "\" has no \"" << part << "\"";
+  return testing::AssertionFailure()
+         << "\"" << text << "\" has no \"" << part << "\" does not contain \"";
 }
 
 }  // namespace r4::test

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A system that refuses what a program needs: no descriptor that epoll may wait for, no thread.
+// Simulates a system that refuses resources: a descriptor for epoll, or a thread.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -22,15 +22,16 @@ namespace r4::test {
 struct RefusedCall {
   long number;
   int error;
-  std::optional<std::uint32_t> second_argument;  // only the calls with this one
+  // if set, only calls with this second argument are refused
+  std::optional<std::uint32_t> second_argument;
 };
 
-// As where a user's programs wait for as many descriptors as they may (fs.epoll.max_user_watches).
+// The user has reached the limit of descriptors for epoll (fs.epoll.max_user_watches).
 inline const RefusedCall no_watches{SYS_epoll_ctl, ENOSPC, EPOLL_CTL_ADD};
-// As where a user may have no more threads (ulimit -u).
+// The user has reached the limit of threads (ulimit -u).
 inline const RefusedCall no_threads{SYS_clone3, EAGAIN, std::nullopt};
 
-// From now on, and for good, the kernel refuses that call to this thread.
+// From now on the kernel refuses the call to this thread. This cannot be undone.
 inline void refuse(const RefusedCall& call) {
   const auto load = [](std::size_t offset) {
     return sock_filter(BPF_STMT(BPF_LD | BPF_W | BPF_ABS, static_cast<std::uint32_t>(offset)));
@@ -53,7 +54,7 @@ inline void refuse(const RefusedCall& call) {
   ASSERT_EQ(::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program), 0);
 }
 
-// A test that refuses calls runs in a thread, for its end only gives them back.
+// Runs a test that refuses calls in a thread, because the refusal ends only with the thread.
 inline void in_a_thread_of_its_own(const std::function<void()>& test) { std::thread(test).join(); }
 
 }  // namespace r4::test

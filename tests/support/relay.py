@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A path between a host and a board, as a process: what is done to it is done to the path.
+"""A path between a host and a board, as a process. A test disturbs the path by signals to the process.
 
-    relay.py udp PORT         from 127.0.0.2, a port of its own, to the board's on 127.0.0.1
-    relay.py pty LINK DEVICE  from a pty that LINK names to the board's
+    relay.py udp PORT         from a new port on 127.0.0.2 to the port of the board on 127.0.0.1
+    relay.py pty LINK DEVICE  from a new pty, to which LINK points, to the pty of the board
 
-Killed: unplugged, as the system tells at once of a pty, and of UDP never. Stopped (SIGSTOP): a path that brings nothing,
-and, when it goes on, what is old. Prints the URL for a host when it is there.
+If the process is killed, the path is unplugged: the system reports that at once for a pty, and never for UDP.
+While the process is stopped (SIGSTOP), the path delivers nothing; when it continues, it delivers old datagrams.
+Prints the URL for a host as soon as the path works.
 """
 import os
 import select

@@ -13,7 +13,7 @@ namespace {
 using Clock = ReceivedState::Clock;
 using namespace std::chrono_literals;
 
-// When the board's clock began to show t_ms; it may have been `width` earlier.
+// The time at which the board's clock began to show t_ms; it may be up to `width` too late.
 struct ClockEdge {
   std::uint32_t t_ms = 0;
   Clock::time_point at;
@@ -28,7 +28,7 @@ ClockEdge edge_of(BoardInAThread& simulated) {
       const std::uint32_t before = board.now_ms();
       std::uint32_t shown = before;
       while (shown == before) {
-        from = next;  // before it was read when it had not changed
+        from = next;  // before the last reading that showed no change
         next = Clock::now();
         shown = board.now_ms();
       }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Compares the reported sampling times of states with the true ones, over a real transport: the
-// simulated board's clock is this computer's, so the true time is known to some microseconds.
+// Compares the sampling times that states report with the true times, over a real transport. The
+// simulated board uses the clock of this computer, so the true time is known to some microseconds.
 #pragma once
 
 #include <cstddef>
@@ -11,15 +11,15 @@
 namespace r4::test {
 
 struct SampledTruth {
-  std::size_t states = 0;     // with a reported error
-  std::size_t dishonest = 0;  // of these, states whose error was larger than reported
+  std::size_t states = 0;     // states with a reported error
+  std::size_t dishonest = 0;  // states whose true error was larger than the reported error
   ReceivedState::Clock::duration bound = ReceivedState::unknown;  // the last reported error
-  // Of the last states, since the reported error was small enough.
+  // Of the last states, after the reported error was small enough.
   ReceivedState::Clock::duration median_error{}, worst_error{};
 };
 
-// Waits until the reported error is at most `enough`, 10 s at most, and then measures a hundred
-// states. No other host may control the board.
+// Waits at most 10 s until the reported error is at most `enough`, then measures a hundred states.
+// No other host may control the board.
 SampledTruth look_at_sampled(BoardInAThread& simulated, const std::string& host_url,
                              ReceivedState::Clock::duration enough);
 

@@ -11,10 +11,10 @@
 
 namespace r4::test {
 
-// Bytes first, first + 1 …
+// The bytes first, first + 1 …
 Key key_of(std::uint8_t id, std::uint8_t first = 0);
 
-// The defaults, and these keys.
+// The default settings with these keys.
 template <class... Keys>
 Settings settings_with(const Keys&... keys) {
   Settings settings;
@@ -23,7 +23,7 @@ Settings settings_with(const Keys&... keys) {
   return settings;
 }
 
-// `fields` ("O:358,1,1;PNum:7;T:1;") with the signature that they get at counter and board T.
+// `fields` ("O:358,1,1;PNum:7;T:1;") with their signature for the given counter and board T.
 std::string with_signature(std::string_view fields, const Key& key, std::string_view nonce,
                            std::uint64_t counter, std::uint32_t board_t);
 

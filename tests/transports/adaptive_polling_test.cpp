@@ -11,7 +11,7 @@ using Silence = AdaptivePolling::Silence;
 
 class AdaptivePollingTest : public testing::Test {
  protected:
-  // A silence of that kind and length, and then an arrival.
+  // A silence of the given kind and length, followed by an arrival.
   void silence(Silence kind, AdaptivePolling::Duration length) {
     polling.on_silence(kind, now);
     now += length;

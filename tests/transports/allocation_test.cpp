@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A datagram costs no heap: each carrier exchanges datagrams while every `new` is counted.
+// A datagram needs no heap: each carrier exchanges datagrams while every `new` is counted.
 #include <gtest/gtest.h>
 
 #include "recorder.hpp"
@@ -10,7 +10,7 @@
 namespace r4::test {
 namespace {
 
-// Answers each datagram with another one.
+// Answers each datagram with another datagram.
 class Player final : public Carrier::Handler {
  public:
   void on_datagram(std::string_view, Peer from) override {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A child process inherits no descriptor of a transport: it would keep a port while it runs.
+// A child process inherits no descriptor of a transport, because it would keep the port while it
+// runs.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -41,7 +42,7 @@ TEST(Descriptors, OfNoTransportAreInherited) {
   open.push_back(open_carrier(io, "pty:", Role::board, events));
   open.push_back(open_carrier(io, "serial://" + open.back()->name().substr(4), Role::host, events));
   const std::string board = open.front()->name();
-  for (int i = 0; i < 12; ++i) {  // enough that a loop reads many sockets together
+  for (int i = 0; i < 12; ++i) {  // so many that a loop reads several sockets together
     open.push_back(open_carrier(io, board + "?listen=0", Role::host, events));
   }
   io.poll();

@@ -32,7 +32,7 @@ TEST_F(MemoryCarrierTest, CarriesBothWaysInOrder) {
   a->send("1", Priority::normal);
   a->send("2", Priority::normal);
   b->send("3", Priority::normal);
-  EXPECT_TRUE(at_b.datagrams.empty()) << "delivered from within send()";
+  EXPECT_TRUE(at_b.datagrams.empty()) << "must not be delivered within send()";
   ASSERT_TRUE(
       run_until(io, [&] { return at_b.datagrams.size() == 2 && at_a.datagrams.size() == 1; }));
   EXPECT_EQ(at_b.datagrams[0].text, "1");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Foreign text in one line that a terminal and a log may show.
+// Text of other programs as one line that is safe in a terminal and a log.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -20,7 +20,7 @@ TEST(Printable, WritesControlCharactersAsBytes) {
   EXPECT_EQ(printable("a\x1b]0;owned\x07"), "a\\x1b]0;owned\\x07");
   EXPECT_EQ(printable("one\r\n\ttwo\x7f"), "one\\x0d\\x0a\\x09two\\x7f");
   EXPECT_EQ(printable(std::string_view("a\0b", 3)), "a\\x00b");
-  EXPECT_EQ(printable("\u009b2J"), "\\xc2\\x9b2J");  // ESC [ in one character
+  EXPECT_EQ(printable("\u009b2J"), "\\xc2\\x9b2J");  // ESC [ as one character
 }
 
 TEST(Printable, WritesCharactersThatReorderOrHideTextAsBytes) {
@@ -35,10 +35,10 @@ TEST(Printable, WritesCharactersThatReorderOrHideTextAsBytes) {
 TEST(Printable, WritesInvalidUtf8AsBytes) {
   EXPECT_EQ(printable("\xff\xfe"), "\\xff\\xfe");
   EXPECT_EQ(printable("a\xc3"), "a\\xc3");         // cut
-  EXPECT_EQ(printable("\x80"), "\\x80");           // without its first byte
-  EXPECT_EQ(printable("\xc0\x9b"), "\\xc0\\x9b");  // longer than it need be
+  EXPECT_EQ(printable("\x80"), "\\x80");           // a continuation byte without a first byte
+  EXPECT_EQ(printable("\xc0\x9b"), "\\xc0\\x9b");  // longer than necessary
   EXPECT_EQ(printable("\xe0\x82\x9b"), "\\xe0\\x82\\x9b");
-  EXPECT_EQ(printable("\xed\xa0\x80"), "\\xed\\xa0\\x80");  // half of a pair
+  EXPECT_EQ(printable("\xed\xa0\x80"), "\\xed\\xa0\\x80");  // half of a surrogate pair
   EXPECT_EQ(printable("\xf4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80");
   EXPECT_EQ(printable("\xe2\x80!"), "\\xe2\\x80!");
 }
@@ -51,7 +51,7 @@ RC_GTEST_PROP(Printable, ChangesNothingTheSecondTime, (const std::string& text))
 TEST(Printable, IsTheTextOfEveryError) {
   const Error error(ErrorKind::open, "port\x1b[2J", "in use by a\nb", "kill \u202E it");
   EXPECT_STREQ(error.what(), "port\\x1b[2J: in use by a\\x0ab; kill \\xe2\\x80\\xae it");
-  EXPECT_EQ(error.problem().thing, "port\x1b[2J") << "programs have it as it was";
+  EXPECT_EQ(error.problem().thing, "port\x1b[2J") << "programs get the unchanged text";
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ namespace r4::test {
 using Clock = std::chrono::steady_clock;
 using Kind = CarrierEvent::Kind;
 
-// Generous: a test that waits this long has failed.
+// Long enough: a test that waits for this time has failed.
 inline constexpr std::chrono::seconds patience{5};
 
 class Recorder final : public Carrier::Handler {
@@ -80,7 +80,7 @@ class Recorder final : public Carrier::Handler {
   std::function<void()> then_overheard;       // also called
 };
 
-// Runs the loop until `done()`; false if it is not within `limit`.
+// Runs the loop until `done()`; false if `done()` is still false after `limit`.
 template <class Done>
 [[nodiscard]] bool run_until(asio::io_context& io, Done done, Clock::duration limit = patience) {
   const auto deadline = Clock::now() + limit;
@@ -94,7 +94,7 @@ template <class Done>
   return true;
 }
 
-// Runs the loop for a while: to check that something does not happen, or to keep a rate.
+// Runs the loop for the given time, to check that something does not happen or to keep a rate.
 inline void run_for(asio::io_context& io, Clock::duration time) {
   const auto never = [] { return false; };
   static_cast<void>(run_until(io, never, time));
@@ -115,7 +115,7 @@ inline std::unique_ptr<Carrier> open_carrier(asio::io_context& io, const std::st
   return carrier;
 }
 
-// The Error that `action` throws; none if it throws none.
+// The Error that `action` throws; none if it does not throw an Error.
 template <class Action>
 std::optional<Error> error_of(Action action) {
   try {
@@ -126,13 +126,13 @@ std::optional<Error> error_of(Action action) {
   return std::nullopt;
 }
 
-// File descriptors that this process has open.
+// The number of open file descriptors of this process.
 std::size_t open_descriptors();
 
 // Runs `action` in a child process and returns its exit status; 126 if a signal ended it.
 int run_in_child(const std::function<int()>& action);
 
-// The same without privileges, as user nobody.
+// The same as user nobody, without privileges.
 int run_unprivileged(const std::function<int()>& action);
 
 }  // namespace r4::test

@@ -22,7 +22,7 @@ TEST(Registry, MakesACarrierForEachTransport) {
   EXPECT_NE(registry.make(io, "serial:auto", Role::host), nullptr);
   EXPECT_NE(registry.make(io, "pty:", Role::board), nullptr);
   const auto on_can = registry.make(io, "can://can0?node=31&fd=1&pack=1", Role::host);
-  EXPECT_EQ(on_can->name(), "can://can0?node=31&fd=1") << "to pack is the default";
+  EXPECT_EQ(on_can->name(), "can://can0?node=31&fd=1") << "the packed form is the default";
   EXPECT_EQ(registry.make(io, "can://can0?pack=0", Role::host)->name(), "can://can0?node=1&pack=0");
   EXPECT_NE(registry.make(io, "can://can0?node=0", Role::board), nullptr);
   EXPECT_EQ(registry.entries().size(), 4U);
@@ -58,7 +58,7 @@ TEST(Registry, ACarrierThatIsNotSharedIgnoresTheGroupOfItsUrl) {
     EXPECT_NE(registry.make(io, url, Role::host), nullptr) << url;
   }
   EXPECT_TRUE(error_of([&] { registry.make(io, "udp://:2018?share=lab", Role::board); }))
-      << "a board shares nothing";
+      << "a board does not share its transport";
 }
 
 TEST(Registry, SharesAPathWithAGroupThatIsThere) {

@@ -70,7 +70,7 @@ TEST(UrlPattern, APlusJoinsWhereAUrlFollows) {
            {"serial:///dev/a%2Budp:b", {"serial:///dev/a%2Budp:b"}},
            {"udp:?id=a+", {"udp:?id=a+"}},
            {"udp:auto+serial:", {"udp:auto", "serial:"}},
-           {"+udp:auto", {"", "udp:auto"}},  // which Url refuses
+           {"+udp:auto", {"", "udp:auto"}},  // Url refuses the empty text
            {"", {""}},
        }) {
     EXPECT_EQ(split_paths(text), urls) << text;

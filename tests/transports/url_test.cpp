@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The grammar of URLs as a table of what is taken, and how, and what is refused, and why.
+// The grammar of URLs as two tables: accepted URLs with their parts, and refused URLs with the
+// reason.
 #include "r4link/discovery/url.hpp"
 
 #include <gtest/gtest.h>

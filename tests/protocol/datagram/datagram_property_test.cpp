@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What holds for any datagram. A failure prints RC_PARAMS with its seed; the same RC_PARAMS in the
-// environment runs it again.
+// Properties of every datagram. A failure prints RC_PARAMS with its seed. To run it again, set the
+// same RC_PARAMS in the environment.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 #include <rapidcheck/gtest.h>
@@ -21,7 +21,7 @@ using test::paper_capture;
 using test::str;
 using test::with_crc;
 
-// Everything that a datagram says.
+// The content of a datagram.
 struct Content {
   std::vector<std::pair<std::string, std::string>> fields;
   std::optional<std::uint32_t> pnum;
@@ -45,7 +45,7 @@ std::optional<Content> read_content(const std::string& bytes) {
   return content_of(datagram);
 }
 
-// All bytes from `first` to `last` but those of `except`.
+// All bytes from `first` to `last` except those in `except`.
 std::string bytes_but(char first, char last, const std::string& except) {
   std::string bytes;
   for (char c = first; c <= last; ++c) {
@@ -72,7 +72,7 @@ rc::Gen<std::string> any_values() {
   return text_of(alphabet, 0, 30);
 }
 
-// Any content, PNum and T at any place or missing.
+// Any content; PNum and T are at any place or missing.
 rc::Gen<Content> any_content() {
   return rc::gen::exec([] {
     Content content;
@@ -91,7 +91,7 @@ rc::Gen<Content> any_content() {
       content.time_ms = *rc::gen::arbitrary<std::uint64_t>();
       insert("T", std::to_string(*content.time_ms));
     }
-    // Now and then right at the limit.
+    // Sometimes exactly at the limit.
     if (*rc::gen::arbitrary<bool>()) content.fields.emplace_back("PAD", "");
     return content;
   });
@@ -153,13 +153,13 @@ ReadResult result_of(const std::string& bytes) {
   return read_datagram(bytes, datagram);
 }
 
-// Is there a field PNum or T?
+// True if there is a field PNum or T.
 bool mentions_numbers(const std::string& fields) {
   const std::string text = ';' + fields;
   return text.find(";PNum:") != std::string::npos || text.find(";T:") != std::string::npos;
 }
 
-// The grammar said a second time, slowly.
+// A second, slow implementation of the grammar.
 bool is_datagram(const std::string& bytes) {
   static const std::regex grammar(
       "([!-+\\--9<-\\]_-~]+:[ -:<-\\]_-~]*;)+\\^0x[0-9a-fA-F]{1,8}\\^\r?\n?",
@@ -173,7 +173,7 @@ RC_GTEST_PROP(DatagramProperty, AcceptedIsWhatTheGrammarSays, ()) {
   RC_ASSERT(read_content(bytes).has_value() == is_datagram(bytes));
 }
 
-// The same with fields of all lengths, and a byte of any kind anywhere.
+// The same with fields of all lengths, and with any byte at any place.
 RC_GTEST_PROP(DatagramProperty, AcceptedIsWhatTheGrammarSaysOfLongDatagramsToo, ()) {
   static const std::string alphabet = ":;, ^xT\n\x7F\x80";
   const std::string good = *any_datagram();
@@ -185,7 +185,7 @@ RC_GTEST_PROP(DatagramProperty, AcceptedIsWhatTheGrammarSaysOfLongDatagramsToo, 
   }
   const std::string damaged = with_crc(fields);
   const auto content = read_content(damaged);
-  // Beyond the grammar: PNum and T are numbers and stand once.
+  // The grammar does not require that PNum and T are numbers and occur once.
   const bool numbers_wrong =
       !content && result_of(damaged).position < fields.size() && mentions_numbers(fields);
   RC_ASSERT(content.has_value() == is_datagram(damaged) || numbers_wrong);
@@ -211,7 +211,7 @@ RC_GTEST_PROP(DatagramProperty, AnySingleByteOfDamageIsRefusedOrChangesNothing, 
   }
 }
 
-// The same for the capture, with nothing left to chance.
+// The same for the capture, with every byte at every place instead of random ones.
 TEST(DatagramProperty, EverySingleByteOfDamageToTheCaptureIsRefusedOrChangesNothing) {
   std::size_t same = 0;
   for (const std::size_t line : {0U, 6U, 12U, 15U, 19U}) {  // state, commands, heartbeats
@@ -241,7 +241,7 @@ TEST(DatagramProperty, EverySingleByteOfDamageToTheCaptureIsRefusedOrChangesNoth
       judge(damaged);
     }
   }
-  EXPECT_GT(same, 5U) << "the byte itself, a capital, a leading zero, a terminator";
+  EXPECT_GT(same, 5U) << "harmless: the same byte, a capital digit, a leading zero, a terminator";
 }
 
 }  // namespace

@@ -94,7 +94,7 @@ TEST(Datagram, ALineOfTheWrongLengthIsTold) {
   }
   ASSERT_EQ(bytes.size(), max_datagram);
   EXPECT_TRUE(read_of(bytes));
-  EXPECT_TRUE(read_of(bytes + "\r\n")) << "the terminator does not count";
+  EXPECT_TRUE(read_of(bytes + "\r\n")) << "the terminator does not count to the length";
   fields.insert(2, "x");
   const ReadResult result = read_of(with_crc(fields));
   EXPECT_EQ(result.error, ReadError::length);

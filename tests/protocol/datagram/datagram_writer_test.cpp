@@ -54,7 +54,7 @@ TEST(DatagramWriter, NamesKnownBeforehandAreWrittenTheSame) {
                 !FieldName("A:").allowed() && !FieldName("\x7F").allowed() &&
                 !FieldName("").allowed());
   EXPECT_EQ(str(twelve.name()), "TWELVELETTER");
-  // In a buffer of every size, also where the fixed copy would not fit.
+  // In a buffer of every size, also where the copy of fixed size does not fit.
   for (std::size_t capacity = 0; capacity <= 64; ++capacity) {
     const auto write = [&](const auto& first, const auto& second) {
       std::string buffer(capacity + 32, '#');
@@ -93,7 +93,7 @@ TEST(DatagramWriter, NothingCanForgeAField) {
   char buffer[max_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
   writer.field("A").value("1,2");
-  EXPECT_TRUE(writer.finish(1, 2).empty()) << "a comma makes two values of one";
+  EXPECT_TRUE(writer.finish(1, 2).empty()) << "a comma would split the value into two";
 }
 
 TEST(DatagramWriter, ARefusalIsRememberedToTheEnd) {
@@ -131,7 +131,8 @@ TEST(DatagramWriter, IsFinishedOnce) {
   EXPECT_TRUE(writer.finish().empty());
 }
 
-// In a buffer of every size: the whole datagram, or nothing and no byte behind the buffer.
+// In a buffer of every size, finish() writes the whole datagram or nothing, and no byte after the
+// buffer.
 TEST(DatagramWriter, WhatDoesNotFitIsRefusedAsAWhole) {
   const auto write = [](char* buffer, std::size_t capacity) {
     DatagramWriter writer(buffer, capacity);
@@ -146,7 +147,8 @@ TEST(DatagramWriter, WhatDoesNotFitIsRefusedAsAWhole) {
     std::string buffer(capacity + 32, '#');
     const std::string written = write(&buffer[0], capacity);
     EXPECT_EQ(written, capacity < whole.size() ? "" : whole) << capacity;
-    EXPECT_EQ(buffer.substr(capacity), std::string(32, '#')) << "written behind " << capacity;
+    EXPECT_EQ(buffer.substr(capacity), std::string(32, '#'))
+        << "written after the end of a buffer of " << capacity;
   }
 }
 

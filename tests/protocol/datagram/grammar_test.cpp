@@ -8,7 +8,7 @@
 namespace r4 {
 namespace {
 
-// The grammar of datagram.hpp, said again byte by byte.
+// A second implementation of the grammar in datagram.hpp, byte by byte.
 bool in_name(int c) {
   return c >= 0x21 && c <= 0x7E && c != ':' && c != ';' && c != ',' && c != '^';
 }
@@ -28,7 +28,8 @@ TEST(Grammar, SeparatorsAreFoundAtEveryPlaceOfABlockOfEverySize) {
     for (std::size_t at = 0; at < size; ++at) {
       const std::uint64_t bit = std::uint64_t{1} << at;
       for (int c = 0; c < 256; ++c) {
-        std::string block(size, 'x');  // its own memory: reading behind it is seen by the sanitizer
+        // separate memory, so that the sanitizer reports a read past its end
+        std::string block(size, 'x');
         block[at] = static_cast<char>(c);
         const Separators found = separators(block);
         ASSERT_EQ(found.colons, c == ':' ? bit : 0) << c;

@@ -18,7 +18,7 @@ std::optional<Number> parsed(const std::string& text) {
   constexpr Number untouched = 77;
   Number number = untouched;
   if (parse_number(text, number)) return number;
-  EXPECT_EQ(number, untouched) << "refused, but written: " << text;
+  EXPECT_EQ(number, untouched) << "refused, but the number was written: " << text;
   return std::nullopt;
 }
 
@@ -44,7 +44,7 @@ std::string written(Write write) {
   EXPECT_LE(end - buffer, static_cast<std::ptrdiff_t>(max_number_text));
   EXPECT_TRUE(std::all_of(end, static_cast<const char*>(std::end(buffer)), [](char c) {
     return c == '#';
-  })) << "written behind the number";
+  })) << "written after the end of the number";
   return std::string(buffer, static_cast<std::size_t>(end - buffer));
 }
 

@@ -33,7 +33,7 @@ class TestAuthentication : public testing::Test {
   std::string sign(std::uint64_t counter, std::uint32_t t = now, const Key& key = key_of(3)) const {
     return with_signature(fields, key, nonce(), counter, t);
   }
-  // Of fields, to which the checksum is put.
+  // `text`: fields, without a checksum.
   Verdict verdict(const std::string& text, std::uint32_t now_ms = now) {
     const std::string bytes = with_crc(text);
     Datagram datagram;
@@ -44,14 +44,15 @@ class TestAuthentication : public testing::Test {
   Authentication board{chance};
 };
 
-TEST(AuthenticationTag, IsThatOfAnotherImplementation) {  // Python's hashlib
+TEST(AuthenticationTag, IsThatOfAnotherImplementation) {  // computed by Python's hashlib
   EXPECT_EQ(with_signature(fields, key_of(3), "0123456789abcdef", 1700000000000000, 79146),
             fields + "A:3,1700000000000000,79146,YDgO3-AnQVQ;");
 }
 
 TEST_F(TestAuthentication, TakesWhatIsSignedWithOneOfItsKeys) {
   EXPECT_EQ(verdict(sign(1)), Verdict::authentic);
-  EXPECT_EQ(verdict(sign(1, now, key_of(5, 100))), Verdict::authentic) << "counters are of a key";
+  EXPECT_EQ(verdict(sign(1, now, key_of(5, 100))), Verdict::authentic)
+      << "each key has separate counters";
   EXPECT_EQ(verdict(sign(2, now, key_of(5, 101))), Verdict::wrong_tag);
   EXPECT_EQ(verdict(sign(2, now, key_of(4))), Verdict::unknown_key);
 }
@@ -68,7 +69,7 @@ TEST_F(TestAuthentication, NeedsASignatureAsTheLastField) {
   EXPECT_EQ(verdict(fields + "A:,1,79146,YDgO3-AnQVQ;"), Verdict::unknown_key);
   EXPECT_EQ(verdict(fields + "A:0,1,79146,YDgO3-AnQVQ;"), Verdict::unknown_key);
   EXPECT_EQ(verdict(fields + "A:3,1,79146,;"), Verdict::wrong_tag);
-  // One that stands before the last means nothing.
+  // A field A that is not the last field is not a signature.
   EXPECT_EQ(verdict(fields + "A:9,9,9,9;A:3,1,79146,YDgO3-AnQVQ;"), Verdict::wrong_tag);
 }
 
@@ -85,14 +86,15 @@ TEST_F(TestAuthentication, EveryChangedByteIsSeen) {
       EXPECT_NE(board.verify(datagram, now), Verdict::authentic) << changed;
     }
   }
-  EXPECT_EQ(verdict(good), Verdict::authentic) << "and none of them has spent its counter";
+  EXPECT_EQ(verdict(good), Verdict::authentic)
+      << "a datagram with a wrong tag uses up no counter value";
 }
 
 TEST_F(TestAuthentication, TakesEachCounterOnce) {
   EXPECT_EQ(verdict(sign(0)), Verdict::replayed) << "the first counter is 1";
   EXPECT_EQ(verdict(sign(10)), Verdict::authentic);
   EXPECT_EQ(verdict(sign(10)), Verdict::replayed);
-  EXPECT_EQ(verdict(sign(9)), Verdict::authentic) << "it was overtaken";
+  EXPECT_EQ(verdict(sign(9)), Verdict::authentic) << "a later counter value overtook it";
   EXPECT_EQ(verdict(sign(9)), Verdict::replayed);
   EXPECT_EQ(verdict(sign(10), now + 251), Verdict::replayed);
   EXPECT_EQ(verdict(sign(0xFFFFFFFFFFFFFFFF)), Verdict::authentic);
@@ -106,15 +108,16 @@ TEST_F(TestAuthentication, WhatIsBelowACounterThatWasForgottenWasUsed) {
   }
   EXPECT_EQ(verdict(sign(100)), Verdict::replayed);
   EXPECT_EQ(verdict(sign(1000)), Verdict::authentic);
-  EXPECT_EQ(verdict(sign(100)), Verdict::replayed) << "the oldest was forgotten for it";
-  EXPECT_EQ(verdict(sign(99)), Verdict::replayed) << "it may be one that was forgotten";
+  EXPECT_EQ(verdict(sign(100)), Verdict::replayed)
+      << "the board forgot the oldest value for the new one";
+  EXPECT_EQ(verdict(sign(99)), Verdict::replayed) << "it may be a forgotten value";
   EXPECT_EQ(verdict(sign(101)), Verdict::replayed);
-  EXPECT_EQ(verdict(sign(500)), Verdict::authentic) << "it was overtaken";
+  EXPECT_EQ(verdict(sign(500)), Verdict::authentic) << "a later counter value overtook it";
   EXPECT_EQ(verdict(sign(101)), Verdict::replayed);
 }
 
-// Each key's counters are its own, and one that is used much makes the board forget what the other has used, not
-// take it again.
+// Each key has separate counters. If one key is used much, the board forgets the counter values of
+// another key and then refuses them.
 TEST_F(TestAuthentication, ForgetsTheOldestOfAllKeysTogether) {
   const auto sign_other = [this](std::uint64_t counter) {
     return sign(counter, now, key_of(5, 100));
@@ -127,7 +130,7 @@ TEST_F(TestAuthentication, ForgetsTheOldestOfAllKeysTogether) {
   }
   EXPECT_EQ(verdict(sign_other(9)), Verdict::replayed);
   EXPECT_EQ(verdict(sign_other(8)), Verdict::replayed);
-  EXPECT_EQ(verdict(sign(1)), Verdict::authentic) << "nothing of its own key was forgotten";
+  EXPECT_EQ(verdict(sign(1)), Verdict::authentic) << "no counter value of this key was forgotten";
   EXPECT_EQ(verdict(sign_other(10)), Verdict::authentic);
 }
 
@@ -136,7 +139,8 @@ TEST_F(TestAuthentication, TakesNothingOlderThan250MsNorOfTheFuture) {
   EXPECT_EQ(verdict(sign(2, now - 251)), Verdict::old);
   EXPECT_EQ(verdict(sign(3, now + 1)), Verdict::old);
   EXPECT_EQ(verdict(sign(3, now + 1), now + 1), Verdict::replayed);
-  EXPECT_EQ(verdict(sign(4, 0xFFFFFF80), 0x20), Verdict::authentic) << "over the clock's wrap";
+  EXPECT_EQ(verdict(sign(4, 0xFFFFFF80), 0x20), Verdict::authentic)
+      << "across the wrap of the clock";
 }
 
 TEST_F(TestAuthentication, AnotherNonceEndsAllThatWasSignedBefore) {
@@ -145,7 +149,7 @@ TEST_F(TestAuthentication, AnotherNonceEndsAllThatWasSignedBefore) {
   board.renew();
   EXPECT_NE(nonce(), old_nonce);
   EXPECT_EQ(verdict(before), Verdict::wrong_tag);
-  EXPECT_EQ(verdict(sign(1)), Verdict::authentic) << "counters begin anew";
+  EXPECT_EQ(verdict(sign(1)), Verdict::authentic) << "a new nonce restarts the counters";
 }
 
 TEST_F(TestAuthentication, NoncesAreSixteenDigitsAndNoneComesTwice) {
@@ -244,7 +248,7 @@ TEST_F(TestSigner, IsReadyOnceItHasANonce) {
 TEST_F(TestSigner, FollowsTheBoardsClockFromBelow) {
   std::uint64_t counter = 1;
   for (const std::uint32_t passed : {0U, 1U, 2U, 31U, 32U, 100U, 1000U, 5000U}) {
-    // A host whose clock is 3 % fast says no time that is yet to come.
+    // A host whose clock is 3 % fast does not send a time in the future.
     const std::uint32_t slow = passed - passed * 3 / 100;
     EXPECT_EQ(verdict_of(signed_now(++counter, 1000 + passed), now + slow), Verdict::authentic)
         << passed;

@@ -21,7 +21,7 @@ std::string hex(const Bytes& bytes) {
   return text;
 }
 
-// In pieces of `step` bytes.
+// The digest, computed in pieces of `step` bytes.
 Bytes digest_of(const Bytes& message, std::size_t digest_size, const Bytes& key,
                 std::size_t step = ~std::size_t{0}) {
   Blake2s hash(digest_size, key.data(), key.size());
@@ -35,7 +35,7 @@ Bytes digest_of(const Bytes& message, std::size_t digest_size, const Bytes& key,
   return digest;
 }
 
-// RFC 7693, appendix E: a Fibonacci generator.
+// A Fibonacci generator as in RFC 7693, appendix E.
 Bytes sequence(std::size_t size, std::uint32_t seed) {
   Bytes bytes;
   std::uint32_t a = 0xDEAD4BADU * seed;

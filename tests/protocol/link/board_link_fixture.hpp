@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's end of the link in virtual time, with what hosts send to it.
+// The board's end of the link in virtual time, and the heartbeats and commands of its hosts.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,8 +13,8 @@ namespace r4 {
 
 constexpr Source here{0, 1};
 constexpr Source there{0, 2};
-constexpr HostId ours{here, 0x1111};   // the host that connect() brings
-constexpr HostId other{here, 0x2222};  // another host, at the same place
+constexpr HostId ours{here, 0x1111};   // the host of connect()
+constexpr HostId other{here, 0x2222};  // another host, at the same address
 constexpr HostId paper{here, no_session};
 constexpr std::uint32_t first_number = 0x80000064U;
 
@@ -33,7 +33,7 @@ struct BoardLinkTest : testing::Test {
     link.shown(now);
     sent.push_back(now);
   }
-  // The board answers one peer; returns the T.
+  // The board answers one peer. Returns the T of the answer.
   std::uint32_t answer() {
     const std::uint32_t t = link.answer_time(now);
     link.shown(t);
@@ -56,21 +56,21 @@ struct BoardLinkTest : testing::Test {
   HeartbeatEffect heartbeat(std::uint32_t pnum, std::uint64_t t, HostId host = ours) {
     return take(numbered(pnum, t, host));
   }
-  // The same, which may have waited for so long before it was read.
+  // A heartbeat that may have waited for up to `waited_ms` before the board read it.
   HeartbeatEffect late(std::uint32_t waited_ms, std::uint32_t pnum, std::uint64_t t,
                        HostId host = ours) {
     BoardLink::HostHeartbeat heartbeat = numbered(pnum, t, host);
     heartbeat.waited_ms = waited_ms;
     return take(heartbeat);
   }
-  // As in the paper's capture: without a number.
+  // A heartbeat without a packet number, as in the paper's capture.
   HeartbeatEffect numberless(std::uint64_t t, HostId host = paper) {
     BoardLink::HostHeartbeat heartbeat = numbered(0, t, host);
     heartbeat.has_pnum = false;
     return take(heartbeat);
   }
 
-  // What becomes of a command: "execute" or the refusal's name.
+  // Returns "execute", or the name of the refusal.
   std::string command(std::uint32_t pnum, HostId host = ours) {
     const Refusal code = link.admit(host, pnum, now);
     if (code == Refusal::none) {
@@ -80,7 +80,8 @@ struct BoardLinkTest : testing::Test {
     return std::string(name_of(code).data(), name_of(code).size());
   }
 
-  // A host with a session id in control. Its heartbeats were first_number, without an echo, and the next.
+  // Connects a host with a SID. It sends heartbeat first_number without an echo, then first_number
+  // + 1.
   void connect() {
     send_due();
     ASSERT_EQ(heartbeat(first_number, 0), HeartbeatEffect::unheard);

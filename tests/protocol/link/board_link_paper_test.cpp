@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's end of the link with hosts as the paper's release has them, without a session id.
+// The board's end of the link with hosts as in the paper's release, without a SID.
 #include "board_link_fixture.hpp"
 
 namespace r4 {
@@ -53,7 +53,7 @@ TEST_F(BoardLinkTest, APaperHostThatEchoesBeginsAnewWithAnEchoFromAfterTheLoss) 
 }
 
 TEST_F(BoardLinkTest, AHostWithAnotherClockIsAnotherHost) {
-  // The same place and no numbers, as on a serial line.
+  // The same peer without packet numbers, as on a serial line.
   send_due();
   numberless(0);
   numberless(sent.back());
@@ -71,7 +71,8 @@ TEST_F(BoardLinkTest, APaperHostWithoutNumbersIsServed) {
   EXPECT_EQ(numberless(79701), HeartbeatEffect::fed);
 }
 
-// It cannot be told from one that restarted during the outage, and counts its commands from 0 again.
+// The board cannot distinguish this host from one that restarted during the outage and counts from
+// 0 again.
 TEST_F(BoardLinkTest, APaperHostWithoutNumbersBeginsANewSessionAfterALoss) {
   numberless(79201);
   command(5000, paper);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's end of the link in virtual time: which heartbeat feeds, and which command may pass.
+// The board's end of the link in virtual time: which heartbeats feed it, and which commands it
+// accepts.
 #include "board_link_fixture.hpp"
 
 namespace r4 {
@@ -146,7 +147,8 @@ TEST_F(BoardLinkTest, AHostThatSentVeryMuchDuringAnOutageResumes) {
   EXPECT_EQ(command(next + 1), "execute");
 }
 
-// The board's heartbeat of the millisecond in which the link was lost can be echoed before and after it.
+// A host can echo the heartbeat of the millisecond in which the link was lost both before and after
+// the loss.
 TEST_F(BoardLinkTest, ACopyOfAnOldHeartbeatDoesNotBeginTheSessionAnew) {
   connect();
   command(first_number + 2);
@@ -163,13 +165,14 @@ TEST_F(BoardLinkTest, AHostIsServedAfterWeeksOfSilence) {
   connect();
   now += 2000;
   ASSERT_TRUE(link.poll(now));
-  for (int day = 0; day < 30; ++day) {  // more than half a turn of the clock
+  for (int day = 0; day < 30; ++day) {  // longer than half the range of the clock
     now += 24U * 3600 * 1000;
     send_due();
   }
   now += 5;
   ASSERT_EQ(heartbeat(first_number + 2, sent.back()), HeartbeatEffect::resumed);
-  EXPECT_TRUE(link.heartbeat_due(now + BoardLink::echo_retry_ms)) << "its echo is missed again";
+  EXPECT_TRUE(link.heartbeat_due(now + BoardLink::echo_retry_ms))
+      << "the board asks for its echo again";
 }
 
 // --- fresh echoes
@@ -178,8 +181,9 @@ TEST_F(BoardLinkTest, OnlyAFreshEchoFeeds) {
   connect();
   const std::uint32_t echoed = sent.back();
   run(999);
-  EXPECT_EQ(heartbeat(first_number + 2, echoed + 1), HeartbeatEffect::stale);  // no T of ours
-  EXPECT_EQ(heartbeat(first_number + 3, now + 5), HeartbeatEffect::stale);     // of the future
+  // not a T of this board
+  EXPECT_EQ(heartbeat(first_number + 2, echoed + 1), HeartbeatEffect::stale);
+  EXPECT_EQ(heartbeat(first_number + 3, now + 5), HeartbeatEffect::stale);  // in the future
   EXPECT_EQ(heartbeat(first_number + 4, 0), HeartbeatEffect::unheard);
   EXPECT_EQ(heartbeat(first_number + 5, (std::uint64_t{1} << 32) + sent.back()),
             HeartbeatEffect::stale);
@@ -211,7 +215,7 @@ TEST_F(BoardLinkTest, ARepeatedOrOvertakenHeartbeatDoesNotFeed) {
   EXPECT_EQ(link.fed_ms(), now - 100);
 }
 
-// --- heartbeats that may have waited
+// --- heartbeats that may have waited before they are read
 
 TEST_F(BoardLinkTest, AHeartbeatFeedsFromWhenItMayHaveCome) {
   connect();
@@ -315,7 +319,7 @@ TEST_F(BoardLinkTest, ACommandIsLate250MsAfterAHeartbeatOvertookIt) {
   EXPECT_EQ(command(first_number + 5), "execute");
   now += 1;
   EXPECT_EQ(command(first_number + 6), "STALE");
-  EXPECT_EQ(command(first_number + 11), "execute");  // overtaken by none
+  EXPECT_EQ(command(first_number + 11), "execute");  // not overtaken
 }
 
 TEST_F(BoardLinkTest, TheFirstHeartbeatThatOvertookItCounts) {
@@ -324,8 +328,8 @@ TEST_F(BoardLinkTest, TheFirstHeartbeatThatOvertookItCounts) {
     heartbeat(first_number + 10 + 2 * i, sent.back());
     run(50);
   }
-  EXPECT_EQ(command(first_number + 17), "STALE");    // 18 came 300 ms ago
-  EXPECT_EQ(command(first_number + 19), "execute");  // 20 came 250 ms ago
+  EXPECT_EQ(command(first_number + 17), "STALE");    // heartbeat 18 came 300 ms ago
+  EXPECT_EQ(command(first_number + 19), "execute");  // heartbeat 20 came 250 ms ago
 }
 
 TEST_F(BoardLinkTest, TheFirstHeartbeatThatOvertookItCountsAtAnyRate) {
@@ -351,12 +355,13 @@ TEST_F(BoardLinkTest, ADeadHeartbeatOvertakesNothing) {
 TEST_F(BoardLinkTest, ARefusedNumberIsSpent) {
   connect();
   link.refused(ours, first_number + 5, Refusal::range);
-  EXPECT_EQ(command(first_number + 5), "RANGE") << "a copy is told why it was refused";
+  EXPECT_EQ(command(first_number + 5), "RANGE")
+      << "the board answers a duplicate with the reason of its refusal";
   EXPECT_EQ(command(first_number + 4), "STALE");
   EXPECT_EQ(command(first_number + 6), "execute");
-  link.refused(other, first_number + 50, Refusal::range);  // of another host: nothing
+  link.refused(other, first_number + 50, Refusal::range);  // another host: no effect
   EXPECT_EQ(command(first_number + 7), "execute");
-  link.refused(ours, first_number + 7 + 65537, Refusal::range);  // from outside the window: nothing
+  link.refused(ours, first_number + 7 + 65537, Refusal::range);  // outside the window: no effect
   EXPECT_EQ(command(first_number + 8), "execute");
   EXPECT_EQ(link.last_executed(), first_number + 8);
 }
@@ -407,7 +412,7 @@ TEST_F(BoardLinkTest, ReportsToTheSessionWithWhichHeartbeatItBegan) {
   EXPECT_EQ(first, 3U);
   run(1000);
   numberless(5);
-  EXPECT_FALSE(link.first_heartbeat(paper, first)) << "its heartbeats have no numbers";
+  EXPECT_FALSE(link.first_heartbeat(paper, first)) << "the heartbeats of this host have no numbers";
 }
 
 // --- the board's own heartbeats
@@ -467,7 +472,7 @@ TEST_F(BoardLinkTest, AHostThatMayHaveNothingToEchoIsAnswered) {
   EXPECT_EQ(heartbeat(first_number, 99), HeartbeatEffect::unheard);
   connect();
   run(500);
-  // In ACTIVE the session's host hears the regular ones, but on a new path.
+  // In ACTIVE the controlling host hears the regular heartbeats, except on a new path.
   EXPECT_EQ(heartbeat(first_number + 2, 99), HeartbeatEffect::stale);
   EXPECT_EQ(heartbeat(first_number + 2, 0), HeartbeatEffect::unheard);
   run(1000);
@@ -503,7 +508,7 @@ TEST_F(BoardLinkTest, TellsExactlyWhenItNeedsTime) {
   now += 1;
   EXPECT_EQ(link.due_in(now), 0U);
   send_due();
-  EXPECT_EQ(link.due_in(now), 100U);  // the echo
+  EXPECT_EQ(link.due_in(now), 100U);  // for the echo
   heartbeat(first_number + 2, sent.back());
   link.set_timing(BoardLink::Timing{500, 120});
   EXPECT_EQ(link.due_in(now), 120U);

@@ -18,8 +18,8 @@ BoardLink::HostHeartbeat numbered(std::uint32_t pnum, std::uint32_t t) {
   return heartbeat;
 }
 
-// A host that sends heartbeats and questions, and no command, for `count` datagrams. Returns its
-// next number.
+// A host that sends `count` heartbeats and questions, and no command. Returns its next packet
+// number.
 std::uint32_t idle(BoardLink& link, std::uint32_t& now_ms, std::uint32_t pnum,
                    std::uint32_t count) {
   std::uint32_t echo = 0;
@@ -30,7 +30,7 @@ std::uint32_t idle(BoardLink& link, std::uint32_t& now_ms, std::uint32_t pnum,
       echo = now_ms;
     }
     const std::uint32_t t = i == 0 ? 0 : i == 1 ? now_ms : echo;
-    if (i == 1) link.shown(link.answer_time(now_ms));  // the answer to its first
+    if (i == 1) link.shown(link.answer_time(now_ms));  // the answer to the first heartbeat
     link.on_heartbeat(numbered(pnum++, t), now_ms);
     link.poll(now_ms);
   }

@@ -17,7 +17,7 @@ struct HostLinkTest : testing::Test {
     link.on_reason(reason, now);
   }
   void booting(SafeReason reason = SafeReason::none) { link.on_booting(reason, now); }
-  // Sends what is due; true if a heartbeat was.
+  // Sends what is due. True if a heartbeat was sent.
   bool send_due() {
     if (!link.heartbeat_due(now)) return false;
     link.heartbeat_sent(now);
@@ -43,7 +43,7 @@ TEST_F(HostLinkTest, TriesAgainSoonWhenAHeartbeatCouldNotBeSent) {
   heartbeat();
   ASSERT_TRUE(link.heartbeat_due(now));
   link.heartbeat_not_sent(now);
-  EXPECT_FALSE(link.echoed()) << "the board has not got its time back";
+  EXPECT_FALSE(link.echoed()) << "the board has not received its time yet";
   EXPECT_FALSE(link.heartbeat_due(now));
   EXPECT_EQ(link.due_in(now), HostLink::retry_ms);
   now += HostLink::retry_ms;
@@ -64,7 +64,8 @@ TEST_F(HostLinkTest, AnswersABoardHeartbeatAtOnceWithItsTime) {
   EXPECT_EQ(link.due_in(now), 100U);
 }
 
-// A board that cannot use the answer sends its T again. The two must not answer each other without end.
+// A board that cannot use the answer sends the same T again. Board and host must not answer each
+// other for ever.
 TEST_F(HostLinkTest, AnswersEachTimeOfTheBoardAtOnceOnlyTheFirstTime) {
   heartbeat();
   ASSERT_TRUE(send_due());
@@ -142,7 +143,7 @@ TEST_F(HostLinkTest, WantsANewSessionIfOnlyTheClockTellsOfARestart) {
   link.begin_session(7);
   heartbeat();
   const std::uint32_t before = link.take_pnum();
-  link.on_restart();  // or our clock stood still
+  link.on_restart();  // or the clock of the host stood still
   ASSERT_EQ(link.restarts(), 1U);
   EXPECT_EQ(link.echo(), 0U);
   ASSERT_TRUE(link.wants_session());
@@ -153,7 +154,7 @@ TEST_F(HostLinkTest, WantsANewSessionIfOnlyTheClockTellsOfARestart) {
   booting();
   link.on_restart();
   ASSERT_EQ(link.restarts(), 2U);
-  EXPECT_FALSE(link.wants_session()) << "the board said that it restarted";
+  EXPECT_FALSE(link.wants_session()) << "the board reported its restart";
 }
 
 TEST_F(HostLinkTest, KnowsNothingOfItsBoardAfterASleepOfItsComputer) {
@@ -172,7 +173,7 @@ TEST_F(HostLinkTest, KnowsNothingOfItsBoardAfterASleepOfItsComputer) {
 }
 
 TEST_F(HostLinkTest, TellsThatItsBoardHasBeenSilentForDays) {
-  EXPECT_FALSE(link.long_silent(now)) << "nothing was heard";
+  EXPECT_FALSE(link.long_silent(now)) << "nothing was heard yet";
   heartbeat();
   now += 12U * 24 * 3600 * 1000;
   EXPECT_FALSE(link.long_silent(now));
@@ -245,7 +246,7 @@ TEST_F(HostLinkTest, TellsExactlyWhenItNeedsTime) {
   EXPECT_EQ(link.due_in(now), 0U);
   now += 850;
   send_due();
-  EXPECT_EQ(link.due_in(now), 50U);  // until the board is lost
+  EXPECT_EQ(link.due_in(now), 50U);  // until the link is lost
   now += 50;
   EXPECT_TRUE(link.poll(now));
 }

@@ -67,7 +67,7 @@ TEST(PacketTracker, ALatePacketIsADuplicateTheSecondTime) {
 TEST(PacketTracker, RemembersTheLast64) {
   PacketTracker tracker;
   tracker.on(1000);
-  tracker.on(1064);  // 1000 is 64 behind now, 1001 is 63
+  tracker.on(1064);  // 1000 is now 64 numbers back, 1001 is 63
   EXPECT_EQ(tracker.on(1001), Arrival::late);
   EXPECT_EQ(tracker.on(1000), Arrival::old);
   EXPECT_EQ(tracker.counters().lost, 62U);
@@ -125,7 +125,7 @@ TEST(PacketTracker, GoesOnOverTheWrap) {
 
 TEST(PacketTracker, BeginsAnewWhenToldSo) {
   PacketTracker tracker;
-  tracker.restart();  // nothing has begun yet
+  tracker.restart();  // before the first datagram
   EXPECT_EQ(tracker.counters().restarts, 0U);
   tracker.on(500);
   tracker.restart();
@@ -146,7 +146,8 @@ TEST(PacketTracker, SaysWhichArrivalsAreTheNewest) {
   EXPECT_FALSE(is_current(Arrival::old));
 }
 
-// Any order and repetition within the memory, from any start: every number is counted as what it is.
+// Packet numbers in any order with duplicates, from any start: the tracker counts each number
+// correctly as long as it remembers it.
 TEST(PacketTracker, CountsAnyShuffleWithinItsMemoryExactly) {
   rc::check([](std::uint32_t start) {
     PacketTracker tracker;

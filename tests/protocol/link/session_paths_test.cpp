@@ -49,7 +49,7 @@ TEST_F(SessionPathsTest, ASilentPathLeavesButNotTheLast) {
 
 TEST_F(SessionPathsTest, AHeartbeatKeepsItsPath) {
   paths.on_heartbeat(path_b, 500);
-  EXPECT_FALSE(paths.on_heartbeat(path_a, 900)) << "it is one already";
+  EXPECT_FALSE(paths.on_heartbeat(path_a, 900)) << "the session has this path already";
   EXPECT_EQ(left_by(1499), 0);
 }
 
@@ -68,16 +68,16 @@ TEST_F(SessionPathsTest, ALostPortTakesAllItsPaths) {
 TEST_F(SessionPathsTest, CountWhatIsLostOverAllPathsAndRepeatedOnOne) {
   paths.on_heartbeat(path_b, 1);
   EXPECT_FALSE(paths.count(path_a, 10));
-  EXPECT_TRUE(paths.count(path_b, 10)) << "another path has brought it";
+  EXPECT_TRUE(paths.count(path_b, 10)) << "another path brought this datagram";
   EXPECT_FALSE(paths.count(path_b, 12));
-  EXPECT_FALSE(paths.count(path_b, 12)) << "the same path";
+  EXPECT_FALSE(paths.count(path_b, 12)) << "a duplicate on the same path";
   EXPECT_TRUE(paths.count(path_a, 12));
   EXPECT_EQ(paths.lost(), 1U);
   EXPECT_EQ(paths.repeated(), 1U);
   EXPECT_FALSE(paths.count(path_a, 11));
   EXPECT_EQ(paths.lost(), 0U);
   for (std::uint32_t pnum = 13; pnum < 120; ++pnum) paths.count(path_a, pnum);
-  EXPECT_TRUE(paths.count(path_b, 14)) << "a path that lags shows no restart";
+  EXPECT_TRUE(paths.count(path_b, 14)) << "a slow path is not a restart";
   EXPECT_TRUE(paths.count(path_b, 15));
 }
 

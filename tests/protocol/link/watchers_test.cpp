@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Leases of those who watch, in virtual time.
+// The leases of watchers, in virtual time.
 #include "protocol/link/watchers.hpp"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ struct WatchersTest : testing::Test {
   Effect ask(Source from, std::uint64_t echo = 0, std::uint32_t rate_hz = 50) {
     return watchers.on_lease(from, rate_hz, echo, false, now);
   }
-  // W, and the token that it is told.
+  // Sends W; returns the token with which the board answers.
   std::uint32_t told(Source from) {
     now += Watchers::answer_spacing_ms;
     EXPECT_EQ(ask(from), Effect::unproven);
@@ -35,7 +35,7 @@ struct WatchersTest : testing::Test {
 
   Watchers watchers;
   std::uint32_t token = 70000;
-  std::uint32_t now = 0xffffff00U;  // it wraps soon
+  std::uint32_t now = 0xffffff00U;  // shortly before the clock wraps
 };
 
 TEST_F(WatchersTest, NothingStreamsBeforeTheEcho) {
@@ -56,7 +56,8 @@ TEST_F(WatchersTest, TheTokenOfAnotherPlaceProvesNothing) {
   EXPECT_FALSE(watchers.any());
   watch(here);
   now += 30;
-  EXPECT_EQ(ask(place(2), token), Effect::unproven) << "nor that of one who watches";
+  EXPECT_EQ(ask(place(2), token), Effect::unproven)
+      << "the token of another watcher does not prove an address either";
 }
 
 TEST_F(WatchersTest, ATokenIsGoodForTheTimeOfALease) {
@@ -64,7 +65,8 @@ TEST_F(WatchersTest, ATokenIsGoodForTheTimeOfALease) {
   now += Watchers::lease_ms;
   EXPECT_EQ(ask(here, echo), Effect::watching);
   now += Watchers::lease_ms;
-  EXPECT_EQ(ask(here, echo), Effect::unproven) << "what was held back renews nothing that is over";
+  EXPECT_EQ(ask(here, echo), Effect::unproven)
+      << "a delayed datagram does not renew an expired lease";
 }
 
 TEST_F(WatchersTest, AFloodIsAnsweredFiftyTimesASecond) {
@@ -109,7 +111,7 @@ TEST_F(WatchersTest, ALeaseLastsTwoSecondsFromItsRenewal) {
 
 TEST_F(WatchersTest, AWatcherEndsItsLeaseAndNobodyElseDoes) {
   const std::uint32_t echo = watch(here);
-  EXPECT_EQ(ask(here, 0, 0), Effect::ignored) << "forged";
+  EXPECT_EQ(ask(here, 0, 0), Effect::ignored) << "a forged datagram";
   EXPECT_EQ(ask(place(2), echo, 0), Effect::ignored);
   EXPECT_EQ(ask(here, echo, 0), Effect::ended);
   EXPECT_FALSE(watchers.any());
@@ -130,7 +132,7 @@ TEST_F(WatchersTest, ThereIsRoomForFour) {
   EXPECT_EQ(ask(place(5), echo), Effect::full);
   watchers.end_of(place(2));
   EXPECT_EQ(ask(place(5), echo), Effect::watching);
-  EXPECT_EQ(watchers.find(place(5))->pnum, 0U) << "it begins to count";
+  EXPECT_EQ(watchers.find(place(5))->pnum, 0U) << "the packet number restarts";
 }
 
 TEST_F(WatchersTest, EachGetsItsOwnRate) {
@@ -140,9 +142,9 @@ TEST_F(WatchersTest, EachGetsItsOwnRate) {
   for (std::uint32_t t = now; t - now < 3000; t += 10) states += watcher.take(t) ? 1 : 0;
   EXPECT_NEAR(states, 90, 3);
   states = 0;
-  now += 10'000;  // it could not be served
+  now += 10'000;  // ten seconds without service
   for (std::uint32_t t = now; t - now < 1000; t += 10) states += watcher.take(t) ? 1 : 0;
-  EXPECT_NEAR(states, 30, 2) << "and nothing is made up for";
+  EXPECT_NEAR(states, 30, 2) << "the watcher gets no extra states for the time without service";
 }
 
 }  // namespace

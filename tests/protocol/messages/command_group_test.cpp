@@ -13,7 +13,7 @@ namespace {
 
 using test::str;
 
-// "ok", or the code and which command it is: "FORMAT 2".
+// "ok", or the code of the refusal and the index of the command: "FORMAT 2".
 std::string judged(const std::string& fields) {
   const std::string bytes = test::with_crc(fields);
   Datagram datagram;
@@ -29,7 +29,7 @@ std::string judged(const std::string& fields) {
   return str(name_of(refusal)) + " " + std::to_string(at);
 }
 
-// That many commands, each for an output of its own.
+// `count` commands, each for another output.
 std::string commands(int count) {
   std::string fields;
   for (int i = 1; i <= count; ++i) {
@@ -57,7 +57,7 @@ TEST(CommandGroup, TheFirstThatCannotBeExecutedIsNamed) {
       {"O:1,1,1;X:1;", "UNKNOWN 2"},
       {"O:1,1,1;E:HALT;", "UNKNOWN 2"},
       {"O:1,1,1;N:5,SAFE;", "UNKNOWN 2"},
-      // Twice the same output.
+      // The same output twice.
       {"O:1,1,1;O:1,1,1;", "FORMAT 2"},
       {"S:1,1;O:1,1,1;D:1,1,1;S:2,1;", "FORMAT 4"},
       {"R:1,On;R:1,Off;", "FORMAT 2"},
@@ -66,11 +66,11 @@ TEST(CommandGroup, TheFirstThatCannotBeExecutedIsNamed) {
       {"X:DAC,1,1;X:DAC,1,2;", "FORMAT 2"},
       {"O:1,1,1;X:DAC,2,3301;", "RANGE 2"},
       {"O:1,1,1;X:DAC,3,1;", "CHANNEL 2"},
-      // Transfers of their own.
+      // Commands that need a transfer and cannot be in a group.
       {"O:1,1,1;X:UART,1,x41;", "FORMAT 2"},
       {"X:WRITE,104,x6b00;O:1,1,1;", "FORMAT 1"},
       {"O:1,1,1;X:READ,104,x75,1;", "FORMAT 2"},
-      // No outputs.
+      // Commands that are not for an output.
       {"O:1,1,1;C:rate,50;", "FORMAT 2"},
       {"U:10,1;O:1,1,1;", "FORMAT 1"},
       {"F:ALL;O:1,1,1;", "FORMAT 1"},

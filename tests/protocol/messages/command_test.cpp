@@ -12,7 +12,7 @@
 
 namespace r4 {
 
-// Names in gtest's messages.
+// gtest prints these names in its messages.
 void PrintTo(Refusal refusal, std::ostream* out) { *out << test::str(name_of(refusal)); }
 
 namespace {
@@ -20,7 +20,7 @@ namespace {
 using test::str;
 using test::with_crc;
 
-// How the command in `text` ("O:358,1,1") is command_judged; a refusal must leave the result alone.
+// Judges the command in `text` ("O:358,1,1"). A refusal must not change the result.
 Refusal command_judged(const std::string& text) {
   Field field;
   EXPECT_TRUE(read_field(text, field)) << text;
@@ -40,7 +40,7 @@ std::string written(const Command& command) {
   return writer.ok() ? std::string(buffer, writer.size()) : "refused";
 }
 
-// The command in `text`, written again; the name of the refusal if it is refused.
+// The command in `text`, read and written again; the name of the refusal if it is refused.
 std::string again(const std::string& text) {
   Field field;
   EXPECT_TRUE(read_field(text, field)) << text;
@@ -71,7 +71,7 @@ TEST(Command, TheTableHasOneRowForEachLetterAndWord) {
       EXPECT_TRUE(apart || row.kind == other.kind) << row.letter << str(row.word);
     }
     EXPECT_TRUE(is_command_letter(row.letter)) << row.letter;
-    EXPECT_LE(row.most - row.least, 1) << row.letter << ": which one is left out must be known";
+    EXPECT_LE(row.most - row.least, 1) << row.letter << ": at most one value may be optional";
   }
 }
 
@@ -106,10 +106,10 @@ TEST(Command, TheFactoriesMakeWhatIsWritten) {
   EXPECT_EQ(written(Command::identify()), "Q:ID");
 }
 
-// A command whose value stands first, its range, and how its text is made of value and channel.
+// A command whose first value has a range; its text is made from this value and the channel.
 struct Ranged {
   const char* letter;
-  const char* middle;  // between value and channel
+  const char* middle;  // the text between value and channel
   long long min;
   long long max;
   int channels;

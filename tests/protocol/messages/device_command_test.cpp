@@ -15,14 +15,14 @@ namespace {
 
 using test::str;
 
-// The command written again, or the name of its refusal.
+// The command, read and written again, or the name of its refusal.
 std::string device_again(const std::string& text) {
   Field field;
   EXPECT_TRUE(read_field(Text(text), field)) << text;
   Command command = Command::relay(7, true);
   const Refusal refusal = parse_command(field, command);
   if (refusal != Refusal::none) {
-    EXPECT_EQ(command.kind, CommandKind::relay) << text << ": a refusal leaves the result alone";
+    EXPECT_EQ(command.kind, CommandKind::relay) << text << ": a refusal does not change the result";
     return str(name_of(refusal));
   }
   char buffer[max_datagram];
@@ -42,7 +42,8 @@ TEST(DeviceCommand, IsReadAndWrittenAgain) {
         std::string("X:OFF,8"), "X:WRITE,104," + bytes_text(32) + ",32"}) {
     EXPECT_EQ(device_again(text), text);
   }
-  EXPECT_EQ(device_again("X:READ,0x68,x75,1"), "X:READ,104,x75,1") << "as data sheets have it";
+  EXPECT_EQ(device_again("X:READ,0x68,x75,1"), "X:READ,104,x75,1")
+      << "data sheets write addresses in hexadecimal";
 }
 
 TEST(DeviceCommand, WhatIsWrongHasItsCode) {

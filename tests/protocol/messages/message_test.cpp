@@ -133,7 +133,8 @@ TEST(Message, ARefusalOfAGroupTellsWhichCommandItIs) {
   const Text bytes = writer.finish(1, 2);
   EXPECT_EQ(str(bytes), with_crc("N:7,RANGE;AT:3;SESSION:9;PNum:1;T:2;"));
   Nack again;
-  ASSERT_TRUE(read_nack(Read("N:7,RANGE;SESSION:9;AT:3;").datagram, again)) << "in any order";
+  ASSERT_TRUE(read_nack(Read("N:7,RANGE;SESSION:9;AT:3;").datagram, again))
+      << "the fields may come in any order";
   EXPECT_EQ(again.at, 3);
   for (const char* fields :
        {"N:7,RANGE;", "N:7,RANGE;AT:256;", "N:7,RANGE;AT:x;", "N:7,RANGE;AT:;"}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is secret in a setting, and datagrams without it.
+// Finds the secret in a setting, and removes it from datagrams.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -64,7 +64,7 @@ TEST(Secrets, LeaveEveryOtherDatagramAsItIs) {
   }
 }
 
-// Its checksum would tell whether a guess is right.
+// The checksum of a damaged datagram could confirm a guess of the secret.
 TEST(Secrets, OfADamagedDatagramTakeTheRestWithThem) {
   std::string damaged = with_crc("C:password,letmein!;PNum:66;T:79146;");
   damaged[15] = '\x07';
@@ -88,7 +88,7 @@ RC_GTEST_PROP(Secrets, AreGoneTheFirstTime, (bool is_valid)) {
 }
 
 TEST(Secrets, NeverMakeADatagramLongerThanTheRoomForIt) {
-  // One character, and a checksum with more digits than before.
+  // The secret has one character, and the new checksum has more digits than the old one.
   for (int i = 0; i < 2000; ++i) {
     const std::string bytes = with_crc("C:x,1;PNum:" + std::to_string(i) + ";");
     const std::string result = masked(bytes);

@@ -32,8 +32,8 @@ TEST(Settings, NumbersAreTakenToTheEdgesOfTheirRange) {
                         Case{"heartbeat", 50, 1000, &Settings::heartbeat_ms},
                         Case{"timeout", 100, 10000, &Settings::timeout_ms}}) {
     Settings settings;
-    settings.heartbeat_ms = 60;   // out of the way of the smallest timeout,
-    settings.timeout_ms = 10000;  // and of the largest heartbeat
+    settings.heartbeat_ms = 60;   // lower than the smallest timeout,
+    settings.timeout_ms = 10000;  // and longer than the largest heartbeat interval
     for (const int value : {c.min, c.max}) {
       EXPECT_EQ(set_text(settings, c.key, std::to_string(value)), Refusal::none) << c.key;
       EXPECT_EQ(settings.*c.member, value) << c.key;

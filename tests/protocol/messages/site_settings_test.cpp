@@ -151,7 +151,7 @@ TEST(SiteSettings, HoldFourKeysAndReplaceOneOfTheSameId) {
   EXPECT_EQ(set_text(settings, "key", "3:off"), Refusal::none);
   EXPECT_EQ(settings.keys[0].id, 1);
   EXPECT_EQ(settings.keys[2].id, 4);
-  EXPECT_TRUE(settings.keys[3] == Key()) << "nothing of it is left";
+  EXPECT_TRUE(settings.keys[3] == Key()) << "the whole key is erased";
   EXPECT_EQ(set_text(settings, "key", "3:off"), Refusal::none);
   EXPECT_EQ(set_text(settings, "key", "5:" + std::string(64, '5')), Refusal::none);
 }
@@ -194,7 +194,7 @@ TEST(KeptSettings, ComeBackAsTheyWere) {
   Settings back;
   read_settings(Text(written(settings)), back);
   EXPECT_TRUE(back == settings) << written(back);
-  EXPECT_EQ(back.heartbeat_ms, 1000) << "it had to wait for the timeout";
+  EXPECT_EQ(back.heartbeat_ms, 1000) << "heartbeat_ms is valid only after timeout_ms is set";
 }
 
 TEST(KeptSettings, AFirmwareWithOtherDefaultsTakesThemAsTheyWereKept) {
@@ -203,7 +203,7 @@ TEST(KeptSettings, AFirmwareWithOtherDefaultsTakesThemAsTheyWereKept) {
   EXPECT_FALSE(back.pack);
   EXPECT_EQ(back.state_rate_hz, 50);
   read_settings("rate,50\n", back = Settings());
-  EXPECT_TRUE(back.pack) << "of a firmware that did not know of it";
+  EXPECT_TRUE(back.pack) << "the text comes from a firmware without this setting";
 }
 
 TEST(KeptSettings, TheLongestFit) {

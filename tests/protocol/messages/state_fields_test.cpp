@@ -17,7 +17,7 @@ namespace {
 
 using test::str;
 
-// The values of a field as docs/reference/protocol.md names them: "V", "pwm,direction".
+// The values of a field in the table of docs/reference/protocol.md: "V", "pwm,direction".
 std::string value_cell_of(const FieldKindRow& kind) {
   if (kind.value_count() == 1) return kind.values[0].unit;
   std::string names;
@@ -27,7 +27,7 @@ std::string value_cell_of(const FieldKindRow& kind) {
   return names;
 }
 
-// The names in a cell of that table: "`ENC1` … `ENC4`" stands for all four.
+// The names in a cell of that table: "`ENC1` … `ENC4`" means all four.
 std::vector<std::string> names_in(const std::string& cell) {
   std::vector<std::string> names;
   std::istringstream words(cell);

@@ -44,7 +44,7 @@ std::vector<StateField> every_field() {
   return fields;
 }
 
-// Every member different from every other, and from zero.
+// Every member is different from zero and from every other member.
 State numbered_state() {
   State state;
   for (int i = 0; i < analog_channels; ++i) state.raw.analog_cv[i] = 1001 + i;
@@ -103,7 +103,7 @@ State numbered_state() {
   return state;
 }
 
-// Each field on the wire as numbered_state() has it, in the order of StateField.
+// Each field of numbered_state() as text, in the order of StateField.
 const char* const numbered_fields[] = {
     "AIN24:10.01",     "AIN12:10.02",     "AIN5:10.03",        "AINDMH:10.04",
     "DMHSTA:1",        "AINSTEER:10.05",  "DHB1A:2001,1",      "OSMC1:3001,1",
@@ -210,7 +210,7 @@ TEST(State, NumbersOutsideTheRangeOfTheirFieldAreNotSet) {
   }
 }
 
-// What the user connects in one of its own.
+// The fields of devices that the user connects go into a second datagram.
 TEST(State, AllFieldsFitTwoDatagramsAndRoundTrip) {
   const State state = numbered_state();
   FieldSet own;
@@ -334,10 +334,10 @@ TEST(State, AValueOutsideItsRangeOrFormRefusesTheWhole) {
     State state = numbered_state();
     state.pnum = 77;
     EXPECT_FALSE(read_fields("RELAYS:7;PNum:1;" + field + ";T:2;", state)) << field;
-    EXPECT_EQ(state.relays, 0x81) << "half applied: " << field;
+    EXPECT_EQ(state.relays, 0x81) << "partly applied: " << field;
     EXPECT_EQ(state.pnum, 77U) << field;
   }
-  EXPECT_FALSE(accepts("AIN24:1.00;T:4294967296;")) << "the board's clock has 32 bits";
+  EXPECT_FALSE(accepts("AIN24:1.00;T:4294967296;")) << "the clock of the board has 32 bits";
 }
 
 TEST(State, ARefusedDatagramLeavesEachFieldAsItWas) {
@@ -356,7 +356,7 @@ TEST(State, ARefusedDatagramLeavesEachFieldAsItWas) {
 TEST(State, AFieldThatStandsTwiceRefusesTheWhole) {
   EXPECT_FALSE(accepts("AIN24:1.00;AIN24:1.00;"));
   EXPECT_FALSE(accepts("OSMC1:1,1;AIN24:1.00;OSMC1:1,1;"));
-  EXPECT_TRUE(accepts("NEW:1;NEW:1;")) << "unknown fields are not ours to judge";
+  EXPECT_TRUE(accepts("NEW:1;NEW:1;")) << "unknown fields are ignored";
 }
 
 TEST(State, NamesAreFoundAndOthersAreNot) {
@@ -370,7 +370,7 @@ TEST(State, NamesAreFoundAndOthersAreNot) {
       EXPECT_TRUE(found == StateField::count || str(name_of(found)) == other) << other;
     }
   }
-  EXPECT_EQ(names.size(), static_cast<std::size_t>(state_field_count)) << "no name twice";
+  EXPECT_EQ(names.size(), static_cast<std::size_t>(state_field_count)) << "every name occurs once";
   for (const std::string name : {"", "PNum", "T", "ain24", "SERVO17POS", "SERVO0POS"}) {
     EXPECT_EQ(state_field(name), StateField::count) << name;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Compares the bus model of capacity tests with ISO 11898-1.
+// Compares the bus model of the capacity tests with ISO 11898-1.
 #include "tests/support/can_bus_model.hpp"
 
 #include <gtest/gtest.h>
@@ -132,7 +132,7 @@ TEST(CanBusModel, ADamagedFrameIsSentAgainAndCounted) {
   bench.bus.run_until(second_ns);
   EXPECT_EQ(bench.ids(), (Ids{0x100}));
   EXPECT_EQ(bench.bus.traffic().at(0x100).failed, 2U);
-  // Its last 11 bits give way to 7 of flags, 8 of delimiter and 3 of intermission.
+  // 7 bits of flags, 8 of delimiter and 3 of intermission replace the last 11 bits of the frame.
   EXPECT_EQ(bench.bus.busy_ns(), (3 * bits(frame(0x100)) + 2 * 7) * bit_ns);
   EXPECT_EQ(bench.bus.transmit_errors(node), 2 * 8 - 1U);
   EXPECT_EQ(bench.bus.receive_errors(0), 2 - 1U);
@@ -150,9 +150,9 @@ TEST(CanBusModel, ASenderBecomesPassiveAfter16ErrorsAndBusOffAfter32) {
   using enum CanNodeState;
   EXPECT_EQ(states, (std::vector<CanNodeState>{passive, bus_off, active}));
   EXPECT_EQ(bench.bus.traffic().at(0x100).failed, 32U);
-  // While passive, 8 bits pass before the next attempt: after the 16th to the 31st.
+  // A passive node waits for 8 bits before its next attempt: after the 16th to the 31st error.
   const std::uint64_t until_off = 32 * (bits(frame(0x100)) + 7) + 16 * 8;
-  // 128 runs of 11 recessive bits, of which the end of the last error frame is the first.
+  // 128 runs of 11 recessive bits; the end of the last error frame is the first run.
   const std::uint64_t back = until_off - 11 + std::uint64_t{128 * 11};
   ASSERT_EQ(bench.heard.size(), 1U);
   EXPECT_EQ(bench.heard[0].at_ns, (back + bits(frame(0x100)) - 3) * bit_ns);
@@ -166,8 +166,8 @@ TEST(CanBusModel, AFrameInBetweenEndsARunOfRecessiveBits) {
   bench.bus.send(node, frame(0x100));
   bench.bus.corrupt_next(32);
   const std::uint64_t until_off = (32 * (bits(frame(0x100)) + 7) + 16 * 8) * bit_ns;
-  // Ten bits after the bus is free: a run of 21 bits counts once. The end of this frame begins
-  // anew.
+  // The other frame begins ten bits after the bus is free, so a run of 21 bits counts once. The end
+  // of the other frame begins a new run.
   bench.bus.at(until_off + 10 * bit_ns, [&] { bench.bus.send(other, frame(0x200)); });
   bench.bus.run_until(second_ns);
   ASSERT_EQ(bench.heard.size(), 2U);
@@ -204,7 +204,7 @@ TEST(CanBusModel, AloneOnTheBusASenderStaysPassive) {
   EXPECT_EQ(bus.state(node), CanNodeState::passive);
   EXPECT_EQ(bus.transmit_errors(node), 128U);
   EXPECT_EQ(bus.traffic().at(0x100).frames, 0U);
-  EXPECT_GT(bus.load(), 0.8) << "it tries for ever";
+  EXPECT_GT(bus.load(), 0.8) << "the sender tries for ever";
   bus.add_node({});
   bus.run_until(2 * second_ns);
   EXPECT_EQ(bus.traffic().at(0x100).frames, 1U);

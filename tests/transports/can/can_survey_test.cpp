@@ -15,7 +15,7 @@ namespace {
 
 constexpr CanBitRate one_mbit{1000000, 0};
 
-// A board's end of a bus with a survey.
+// The board's end of a bus, with a survey.
 struct Bus {
   explicit Bus(std::uint8_t node = 3) : board(CanEnd::board, node, false) {
     survey.on_datagram([this](std::uint8_t from, const Datagram& datagram) {
@@ -25,7 +25,7 @@ struct Bus {
     survey.on_stop([this] { ++stops; });
   }
 
-  // Sends a datagram of the board; frame `without` of it is not heard.
+  // Sends a datagram of the board; the survey does not hear frame `without`.
   void say(Text datagram, int without = -1) {
     ASSERT_TRUE(board.begin(datagram, now_us));
     CanFrame frame{};
@@ -51,7 +51,7 @@ struct Bus {
   CanSurvey survey{one_mbit};
   std::vector<std::string> heard;
   int stops = 0;
-  std::uint32_t now_us = 0xFFFF0000;  // wraps under way
+  std::uint32_t now_us = 0xFFFF0000;  // wraps during the test
 };
 
 TEST(CanSurvey, TellsIdsOfR4FromIdsOfAnotherProtocol) {
@@ -68,7 +68,7 @@ TEST(CanSurvey, TellsIdsOfR4FromIdsOfAnotherProtocol) {
   }
   bus.state(1);
   EXPECT_TRUE(bus.survey.is_r4(telemetry_id(3)));
-  EXPECT_FALSE(bus.survey.is_r4(command_id(3))) << "no host has said anything";
+  EXPECT_FALSE(bus.survey.is_r4(command_id(3))) << "no host has sent anything";
   EXPECT_FALSE(bus.survey.is_r4(0x123));
   EXPECT_TRUE(bus.survey.is_r4(emergency_stop_id));
 }
@@ -98,7 +98,7 @@ TEST(CanSurvey, HearsThePackedForm) {
 TEST(CanSurvey, CountsLostDatagrams) {
   Bus bus;
   bus.state(10);
-  bus.state(11, 2);  // a frame of it is lost
+  bus.state(11, 2);  // one frame is lost
   bus.state(14);
   bus.state(15);
   EXPECT_EQ(bus.survey.board(3).states, 3U);
@@ -113,7 +113,7 @@ TEST(CanSurvey, ABoardWithoutAHostIsNotConnected) {
   EXPECT_FALSE(bus.survey.board(3).connected);
   bus.heartbeat(1, 700, SafeReason::none);
   EXPECT_TRUE(bus.survey.board(3).connected);
-  bus.heartbeat(0, 0, SafeReason::none);  // it has restarted
+  bus.heartbeat(0, 0, SafeReason::none);  // the board has restarted
   bus.heartbeat(1, 90, SafeReason::none);
   EXPECT_EQ(bus.survey.board(3).lost, 0U);
 }
@@ -139,7 +139,7 @@ TEST(CanSurvey, TellsWhyABoardIsSafe) {
   frame.data[0] = 99;
   bus.survey.on_frame(frame, bus.now_us);
   EXPECT_EQ(bus.survey.board(3).reason, SafeReason::fault);
-  frame.size = 0;  // tells nothing
+  frame.size = 0;  // an empty frame names no reason
   bus.survey.on_frame(frame, bus.now_us);
   EXPECT_EQ(bus.survey.board(3).reason, SafeReason::fault);
 }

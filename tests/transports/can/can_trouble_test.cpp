@@ -15,12 +15,12 @@ TEST(CanTrouble, TakesFramesWithoutADatagramForAnotherProtocol) {
   for (auto after = 0ms; after < 500ms; after += 10ms) {
     trouble.on_host_frame(trouble_start + after);
     EXPECT_EQ(trouble.now(trouble_start + after), TransportTrouble::none) << after.count();
-    EXPECT_TRUE(trouble.hears_host(trouble_start + after)) << "it may be one";
+    EXPECT_TRUE(trouble.hears_host(trouble_start + after)) << "the frames may come from a host";
   }
   trouble.on_host_frame(trouble_start + 500ms);
   EXPECT_EQ(trouble.now(trouble_start + 500ms), TransportTrouble::foreign_frames);
   EXPECT_FALSE(trouble.hears_host(trouble_start + 500ms));
-  EXPECT_EQ(trouble.now(trouble_start + 1500ms), TransportTrouble::none) << "they have ended";
+  EXPECT_EQ(trouble.now(trouble_start + 1500ms), TransportTrouble::none) << "the frames have ended";
 }
 
 TEST(CanTrouble, TakesAHostThatIsHeldUpOrEndsForNoOtherProtocol) {
@@ -30,7 +30,7 @@ TEST(CanTrouble, TakesAHostThatIsHeldUpOrEndsForNoOtherProtocol) {
   for (auto after = 1ms; after < 2s; after += 10ms) {
     EXPECT_EQ(trouble.now(trouble_start + after), TransportTrouble::none) << after.count();
   }
-  trouble.on_host_frame(trouble_start + 900ms);  // the first of a heartbeat
+  trouble.on_host_frame(trouble_start + 900ms);  // the first frame of a heartbeat
   EXPECT_EQ(trouble.now(trouble_start + 900ms), TransportTrouble::none);
   EXPECT_TRUE(trouble.hears_host(trouble_start + 900ms));
 }
@@ -50,12 +50,13 @@ TEST(CanTrouble, TellsOfFramesThatComeTooLateWhileTheBoardIsHeard) {
   CanTrouble trouble;
   trouble.on_late(2, trouble_start);
   trouble.on_board(trouble_start);
-  EXPECT_EQ(trouble.now(trouble_start), TransportTrouble::none) << "two may be chance";
+  EXPECT_EQ(trouble.now(trouble_start), TransportTrouble::none) << "two late frames may be chance";
   trouble.on_late(3, trouble_start + 1900ms);
   EXPECT_EQ(trouble.now(trouble_start + 1950ms), TransportTrouble::late_frames);
-  EXPECT_EQ(trouble.now(trouble_start + 2100ms), TransportTrouble::none) << "they were long ago";
+  EXPECT_EQ(trouble.now(trouble_start + 2100ms), TransportTrouble::none)
+      << "the late frames were long ago";
   trouble.on_late(10, trouble_start + 4s);
-  EXPECT_EQ(trouble.now(trouble_start + 4s), TransportTrouble::none) << "the board has gone";
+  EXPECT_EQ(trouble.now(trouble_start + 4s), TransportTrouble::none) << "the board is not heard";
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ TEST(CanTurn, AHostThatComesLaterIsSilentUntilTheOtherHasGone) {
   turn.listen(start);
   auto heard = start + 99ms;
   for (; heard < start + 5s; heard += 100ms) {
-    EXPECT_FALSE(turn.on_other(heard)) << "it has not spoken";
+    EXPECT_FALSE(turn.on_other(heard)) << "this host has not sent yet";
     EXPECT_FALSE(turn.ours(heard + 99ms));
     EXPECT_TRUE(turn.others());
   }
@@ -54,13 +54,14 @@ TEST(CanTurn, AHostThatHasJustBegunGivesWay) {
   turn.on_own(start);
   EXPECT_TRUE(turn.on_other(start + 49ms));
   EXPECT_FALSE(turn.ours(start + 50ms));
-  EXPECT_FALSE(turn.on_other(start + 51ms)) << "it is silent already";
+  EXPECT_FALSE(turn.on_other(start + 51ms)) << "this host is silent already";
 }
 
 TEST(CanTurn, AHostThatWasSilentForASecondIsANewcomer) {
   CanTurn turn(1);
   talk(turn, start, 10s);
-  EXPECT_TRUE(turn.on_other(start + 11s)) << "held up, and another has taken over";
+  EXPECT_TRUE(turn.on_other(start + 11s))
+      << "this host was held up, and another host has taken over";
   EXPECT_FALSE(turn.ours(start + 11s));
 
   CanTurn early(1);
@@ -77,8 +78,8 @@ TEST(CanTurn, ListensAgainWhenTheBusComesBack) {
   EXPECT_TRUE(turn.others());
 }
 
-// Two hosts that begin in the same millisecond both fall silent. One of them is back first, and
-// stays.
+// Two hosts that begin in the same millisecond both fall silent. One of them returns first and
+// keeps the turn.
 TEST(CanTurn, OfTwoThatBeginTogetherOneGetsIt) {
   for (std::uint32_t seed = 1; seed <= 100; ++seed) {
     CanTurn turns[] = {CanTurn(seed), CanTurn(seed + 1000)};

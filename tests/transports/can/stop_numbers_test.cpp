@@ -27,7 +27,7 @@ TEST(StopNumbers, GiveAHeartbeatTheNumberThatTheHostKnows) {
 
 TEST(StopNumbers, LeaveEverythingElseAsItIs) {
   StopNumbers numbers;
-  EXPECT_EQ(in_full(numbers, stopped_by(5)), stopped_by(5)) << "no stop is known";
+  EXPECT_EQ(in_full(numbers, stopped_by(5)), stopped_by(5)) << "no stop is known yet";
   numbers.add(3000000001, 5);
   const std::string damaged = stopped_by(5).replace(2, 1, "X");
   for (const std::string& each :

@@ -17,12 +17,12 @@ using test::str;
 
 using Lines = std::vector<std::string>;
 
-// The lines of a stream, pushed in pieces of `piece` bytes.
+// The lines of a stream that is pushed in pieces of `piece` bytes.
 Lines lines_of(LineFraming& framing, const std::string& stream,
                std::size_t piece = ~std::size_t{0}) {
   Lines lines;
   for (std::size_t at = 0; at < stream.size(); at += piece) {
-    const std::string part = stream.substr(at, piece);  // its own memory, gone after the call
+    const std::string part = stream.substr(at, piece);  // separate memory that ends after the call
     framing.push(part.data(), part.size(), [&](Text line) { lines.push_back(str(line)); });
     if (piece > stream.size()) break;
   }
@@ -95,7 +95,7 @@ TEST(LineFraming, TenMegabytesWithoutATerminatorCostOneLine) {
     EXPECT_EQ(lines_of(framing, noise, piece), Lines{});
     EXPECT_EQ(framing.oversize(), 1U);
     EXPECT_LE(framing.pending(), max_datagram);
-    EXPECT_EQ(lines_of(framing, good + "\r\n"), Lines{}) << "the end of the noise";
+    EXPECT_EQ(lines_of(framing, good + "\r\n"), Lines{}) << "this terminator ends the noise";
     EXPECT_EQ(lines_of(framing, good + "\r\n"), Lines{good});
     EXPECT_EQ(framing.oversize(), 1U);
   }
@@ -128,7 +128,7 @@ TEST(LineFraming, ForgetsAnUnfinishedLineOnReset) {
   lines_of(framing, std::string(2000, 'x'));
   framing.reset();
   EXPECT_EQ(lines_of(framing, "whole\n"), Lines{"whole"});
-  EXPECT_EQ(framing.oversize(), 1U) << "counters are kept";
+  EXPECT_EQ(framing.oversize(), 1U) << "the counters are kept";
 }
 
 TEST(LineFraming, TheSameLinesHoweverTheStreamIsCut) {
@@ -136,7 +136,7 @@ TEST(LineFraming, TheSameLinesHoweverTheStreamIsCut) {
   for (const test::CapturedLine& line : test::paper_capture()) stream += line.bytes + "\r\n";
   stream.insert(stream.size() / 2, std::string(1500, 'n') + "\n\r\n");
   const Lines whole = lines_of(stream);
-  EXPECT_EQ(whole.size(), 71U) << "one lost in the noise, one left of it";
+  EXPECT_EQ(whole.size(), 71U) << "one line is lost in the noise, and a part of it is left";
   for (std::size_t piece = 1; piece < 400; ++piece) {
     ASSERT_EQ(lines_of(stream, piece), whole) << "pieces of " << piece;
   }

@@ -21,7 +21,7 @@ TEST(PeerTable, NumbersEverySenderOnce) {
   EXPECT_EQ(numbers.size(), static_cast<std::size_t>(Peers::capacity));
   EXPECT_EQ(numbers.count(Peers::nobody), 0U);
   const std::uint32_t first = peers.heard(0);
-  EXPECT_EQ(numbers.count(first), 1U) << "known";
+  EXPECT_EQ(numbers.count(first), 1U) << "a known peer keeps its number";
   EXPECT_EQ(peers.audience(), first);
   EXPECT_EQ(*peers.find(first), 0);
 }
@@ -31,7 +31,7 @@ TEST(PeerTable, GivesTheNextThePlaceOfTheOneSilentLongestAndNoNumberTwice) {
   std::set<std::uint32_t> numbers;
   for (int i = 0; i < Peers::capacity; ++i) numbers.insert(peers.heard(i));
   peers.heard(0);
-  const std::uint32_t silent = peers.heard(1) + 1;  // the number of 2
+  const std::uint32_t silent = peers.heard(1) + 1;  // the number of peer 2
   EXPECT_EQ(*peers.find(silent), 2);
   numbers.insert(peers.heard(100));
   EXPECT_EQ(peers.find(silent), nullptr);
@@ -67,7 +67,7 @@ TEST(PeerTable, SendsWhatIsForEveryoneToTheHostInControlWhateverOthersSend) {
   Peers peers;
   const std::uint32_t number = peers.heard(owner);
   const std::uint32_t stranger = peers.heard(1);
-  EXPECT_EQ(peers.audience(), stranger) << "nobody is in control";
+  EXPECT_EQ(peers.audience(), stranger) << "no host is in control";
   peers.hold(number);
   EXPECT_EQ(peers.audience(), number);
   for (int i = 0; i < 1000; ++i) peers.heard(i, Text(with_crc("H:ROS2-R4;")));
@@ -76,11 +76,11 @@ TEST(PeerTable, SendsWhatIsForEveryoneToTheHostInControlWhateverOthersSend) {
   EXPECT_EQ(peers.audience(), number);
 
   peers.hold(Peers::nobody);
-  EXPECT_EQ(peers.audience(), number) << "until another speaks";
+  EXPECT_EQ(peers.audience(), number) << "until another peer sends";
   const std::uint32_t next = peers.heard(2000);
   EXPECT_EQ(peers.audience(), next);
   for (int i = 0; i < 1000; ++i) peers.heard(i);
-  EXPECT_EQ(peers.heard(owner), number) << "it may come back";
+  EXPECT_EQ(peers.heard(owner), number) << "the host may come back";
 }
 
 TEST(PeerTable, WhoOnlyWatchesIsNoAudience) {
@@ -91,13 +91,13 @@ TEST(PeerTable, WhoOnlyWatchesIsNoAudience) {
   EXPECT_TRUE(peers.watches(watcher));
   EXPECT_EQ(peers.audience(), Peers::nobody);
   peers.heard(1, Text(with_crc("Q:ID;")));
-  EXPECT_EQ(peers.audience(), Peers::nobody) << "it asks, and watches on";
+  EXPECT_EQ(peers.audience(), Peers::nobody) << "a watcher may ask questions";
   const std::uint32_t host = peers.heard(owner, Text(heartbeat));
   peers.heard(1, Text(watch));
   EXPECT_EQ(peers.audience(), host);
   peers.heard(1, Text(heartbeat));
   EXPECT_FALSE(peers.watches(watcher));
-  EXPECT_EQ(peers.audience(), watcher) << "it is a host now";
+  EXPECT_EQ(peers.audience(), watcher) << "the watcher became a host";
 }
 
 TEST(PeerTable, NobodyMakesAWatcherOfTheHostInControl) {
@@ -105,14 +105,14 @@ TEST(PeerTable, NobodyMakesAWatcherOfTheHostInControl) {
   const std::uint32_t host = peers.heard(owner, Text(with_crc("H:ROS2-R4;")));
   peers.hold(host);
   peers.heard(owner, Text(with_crc("W:50;PNum:5;T:0;")));
-  EXPECT_FALSE(peers.watches(host)) << "its address was forged";
+  EXPECT_FALSE(peers.watches(host)) << "the address of the watcher's datagram was forged";
 }
 
 TEST(PeerTable, KeepsEachPlaceOfTheHostInControlUntilAnotherIsHeld) {
   Peers peers;
   const std::uint32_t first = peers.heard(1);
   const std::uint32_t second = peers.heard(2);
-  peers.also_hold(second);  // nobody is in control
+  peers.also_hold(second);  // no host is in control
   peers.hold(first);
   peers.also_hold(second);
   peers.also_hold(second);
@@ -120,12 +120,12 @@ TEST(PeerTable, KeepsEachPlaceOfTheHostInControlUntilAnotherIsHeld) {
   for (int i = 0; i < 1000; ++i) peers.heard(100 + i);
   EXPECT_EQ(peers.heard(1), first);
   EXPECT_EQ(peers.heard(2), second);
-  peers.hold(Peers::nobody);  // it may come back
+  peers.hold(Peers::nobody);  // the host may come back
   for (int i = 0; i < 1000; ++i) peers.heard(100 + i);
   EXPECT_EQ(peers.heard(2), second);
   peers.hold(first);
   for (int i = 0; i < 1000; ++i) peers.heard(100 + i);
-  EXPECT_NE(peers.heard(2), second) << "that place is its own no more";
+  EXPECT_NE(peers.heard(2), second) << "its place is free for others";
   EXPECT_EQ(peers.heard(1), first);
 }
 
@@ -133,7 +133,7 @@ TEST(PeerTable, LetsANewHostInDuringAFlood) {
   Peers peers;
   for (int i = 0; i < 5000; ++i) peers.heard(i);
   const std::uint32_t number = peers.heard(owner);
-  // Until the board has decided who it is, others go on sending.
+  // Other peers send before the board decides which host has control.
   for (int i = 1; i < Peers::capacity; ++i) peers.heard(10000 + i);
   peers.hold(number);
   for (int i = 0; i < 5000; ++i) peers.heard(i);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A link that is bad on purpose: what it does, in virtual time, and as a transport.
+// A transport that disturbs datagrams on purpose: its effects in virtual time, and as a carrier.
 #include "transports/impaired/impairment.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,8 @@ struct OnItsWay {
   bool operator==(const OnItsWay&) const = default;
 };
 
-// A datagram a millisecond, each of 20 bytes, and what of them comes when.
+// Sends a datagram of 20 bytes every millisecond; returns the datagrams that arrive with their
+// times.
 std::vector<OnItsWay> arrivals(const std::string& how, int count, ImpairmentCounters& counters,
                                std::uint64_t stream = 1) {
   ImpairedDirection direction(Impairment::parse(how), stream, 0ms);
@@ -69,7 +70,8 @@ TEST(Impairment, HasTheStatedEffectsAndRepeatsThemForTheSameSeed) {
         each.bytes) {
       continue;  // damaged
     }
-    if (each.at < number * 1ms + 10ms || each.at > number * 1ms + 30ms) continue;  // in its number
+    // the number is damaged
+    if (each.at < number * 1ms + 10ms || each.at > number * 1ms + 30ms) continue;
     least = std::min(least, each.at - number * 1ms);
     most = std::max(most, each.at - number * 1ms);
     overtaken += number < last ? 1 : 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// serial and pty joined by a real pseudo-terminal, and each against a terminal of the test.
+// The carriers serial and pty, connected by a real pseudo-terminal, and each with a terminal of the
+// test.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -29,7 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 
-// "serial:///dev/pts/5" of "pty:/dev/pts/5".
+// Makes "serial:///dev/pts/5" from "pty:/dev/pts/5".
 std::string url_for_host(const Carrier& board) { return "serial://" + board.name().substr(4); }
 
 // A pseudo-terminal of the test: the far end of a serial carrier.
@@ -54,7 +55,7 @@ FileDescriptor open_raw(const std::string& device) {
   return terminal;
 }
 
-// Everything that can be read at once.
+// All bytes that can be read at once.
 std::string read_all(const FileDescriptor& terminal) {
   std::string all;
   std::array<char, 4096> buffer{};
@@ -227,7 +228,7 @@ TEST_F(SerialPtyTest, ReportsOnceWhyADeviceThatIsBackCannotBeOpened) {
   open_host("serial://" + link);
   board.reset();
   ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::down) == 1; }));
-  std::ofstream(link) << "this is no terminal";
+  std::ofstream(link) << "this is not a terminal";
   ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::warning) == 1; }));
   EXPECT_EQ(at_host.last(Kind::warning)->problem.reason, "it is not a serial port");
   run_for(io, milliseconds(250));
@@ -285,7 +286,7 @@ TEST_F(SerialPtyTest, GivesAStalledReaderAYoungStateFirst) {
   ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
   std::vector<Clock::time_point> sent;
   double oldest = 0;
-  // Stalls of different lengths and phases, a state each 10 ms, a heartbeat each 50.
+  // Stalls of different lengths and phases; a state every 10 ms, a heartbeat every 50 ms.
   for (const int stall_ms : {5, 35, 41, 47, 53, 120, 250, 503}) {
     const auto start = Clock::now();
     for (int i = 0; milliseconds(10 * i) < milliseconds(stall_ms); ++i) {
@@ -302,7 +303,7 @@ TEST_F(SerialPtyTest, GivesAStalledReaderAYoungStateFirst) {
     const auto first = std::find_if(lines.begin(), lines.end(),
                                     [](const std::string& l) { return l.starts_with("state "); });
     ASSERT_NE(first, lines.end());
-    EXPECT_EQ(first->find('.') + 150, first->size()) << "a cut line";
+    EXPECT_EQ(first->find('.') + 150, first->size()) << "the first line was cut";
     const auto index = static_cast<std::size_t>(std::stoul(first->substr(6)));
     oldest = std::max(oldest, in_milliseconds(woke - sent[index]));
   }
@@ -322,7 +323,7 @@ TEST_F(SerialPtyTest, LosesNothingToAReaderThatKeepsUp) {
   EXPECT_EQ(board->counters().tx_dropped, 0U);
 }
 
-// A far end that does not read: the host's lines wait.
+// The far end does not read, so the lines of the host wait.
 class StalledBoardTest : public SerialPtyTest {
  protected:
   StalledBoardTest() {
@@ -330,7 +331,7 @@ class StalledBoardTest : public SerialPtyTest {
     while (host->send(line(sent), Priority::normal) == SendResult::sent) ++sent;
   }
   static std::string line(int i) { return "line " + std::to_string(i) + std::string(150, '.'); }
-  // The lines that the far end reads, up to `last`.
+  // Reads the lines at the far end up to `last`.
   std::vector<std::string> read_until(const std::string& last) {
     std::string text;
     const auto deadline = Clock::now() + patience;
@@ -352,7 +353,8 @@ TEST_F(StalledBoardTest, LetsAStopOvertakeWaitingLines) {
   EXPECT_EQ(host->send("state 2", Priority::state), SendResult::sent);
   EXPECT_EQ(host->send("stop", Priority::stop), SendResult::sent);
   const auto lines = read_until("state 2");
-  // In the system: whole lines and the one in progress; then stop; then the 64 that waited.
+  // The system holds whole lines and the unfinished one. Then the stop follows, then the 64 waiting
+  // lines.
   ASSERT_EQ(lines.size(), static_cast<std::size_t>(sent) + 2);
   const auto in_system = static_cast<std::size_t>(sent - 64);
   for (std::size_t i = 0; i < lines.size() - 1; ++i) {
@@ -402,11 +404,12 @@ TEST_F(SerialPtyTest, CanBeTakenFromAProgramThatYieldsWhichThenReadsAndSendsNoth
   write_text(terminal.master, "for the first\r\n");
   ASSERT_TRUE(wait_for(first, "for the first"));
   for (const auto& claim : {controls, yields})
-    EXPECT_TRUE(error_of([&] { claimed(url, claim, second); })) << "asked to take it, it is not";
+    EXPECT_TRUE(error_of([&] { claimed(url, claim, second); }))
+        << "these claims do not take the port";
 
   const auto two = claimed(url, takes_and_yields, second);
   EXPECT_TRUE(error_of([&] { claimed(url, takes_and_yields, third); }))
-      << "those two would take turns";
+      << "both programs would take the port in turn";
   const auto three = claimed(url, takes, third);
   for (int i = 0; i < 20; ++i) {
     write_text(terminal.master, fmt::format("for the third {}\r\n", i));
@@ -419,7 +422,7 @@ TEST_F(SerialPtyTest, CanBeTakenFromAProgramThatYieldsWhichThenReadsAndSendsNoth
   EXPECT_FALSE(one->up());
   EXPECT_EQ(two->send("late", Priority::normal), SendResult::down);
   for (const auto& claim : {takes, takes_and_yields, yields, controls})
-    EXPECT_TRUE(error_of([&] { claimed(url, claim, second); })) << "it yields to nobody";
+    EXPECT_TRUE(error_of([&] { claimed(url, claim, second); })) << "the holder does not yield";
   EXPECT_EQ(read_all(terminal.master), "");
 }
 
@@ -478,7 +481,8 @@ TEST_F(SerialPtyTest, ReplacesALinkAndNothingElse) {
   EXPECT_TRUE(fs::is_regular_file(path));
   fs::rename(path, folder / "precious");
   fs::create_symlink(folder / "precious", path);
-  ASSERT_TRUE(error_of([&] { open_board("pty:" + path.string()); })) << "no link of a board's";
+  ASSERT_TRUE(error_of([&] { open_board("pty:" + path.string()); }))
+      << "the link does not lead to a pty";
   EXPECT_EQ(fs::read_symlink(path), folder / "precious");
   fs::remove(path);
   fs::create_symlink("/nowhere", path);
@@ -487,7 +491,7 @@ TEST_F(SerialPtyTest, ReplacesALinkAndNothingElse) {
   Recorder recorder;
   const auto successor = open_carrier(io, "pty:" + path.string(), Role::board, recorder);
   board->close();
-  EXPECT_TRUE(fs::exists(path)) << "the link is the successor's now";
+  EXPECT_TRUE(fs::exists(path)) << "the link belongs to the successor";
   successor->close();
   EXPECT_FALSE(fs::exists(fs::symlink_status(path)));
   const auto no_folder = error_of([&] { open_board("pty:" + (folder / "no" / "board").string()); });
@@ -527,7 +531,7 @@ TEST_F(SerialPtyTest, LeaksNoDescriptorsOver30Reopenings) {
   EXPECT_LE(open_descriptors(), before);
 }
 
-// The program may be driving, so it must go on and try again.
+// The program may control a board, so it must continue and try again.
 TEST_F(SerialPtyTest, ARefusedWaitIsAnErrorOfTheHostAndAWarningOfTheBoard) {
   in_a_thread_of_its_own([&] {
     open_board();

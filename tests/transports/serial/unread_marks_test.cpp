@@ -30,7 +30,7 @@ TEST(UnreadMarks, AreNeverTooYoungHoweverManyAreWritten) {
   for (int i = 0; i < 100'000; ++i) {
     marks.wrote(10, now);
     now += std::chrono::microseconds(100);
-    // 5 ms of it are unread.
+    // 500 bytes, written in the last 5 ms, are unread.
     marks.unread_at_most(500);
     ASSERT_TRUE(marks.any());
     if (i < 100) continue;

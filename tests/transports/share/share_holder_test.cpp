@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program that holds a transport, and what other programs can do with it.
+// A program that holds a transport, and the actions that other programs may take with it.
 #include "transports/share/share_holder.hpp"
 
 #include <fmt/format.h>
@@ -30,13 +30,13 @@ using Letter = ShareMessage::Kind;
 
 class ShareHolderTest : public SharedTransportTest {
  protected:
-  // A connection to the program that controls, without a carrier.
+  // A connection to the controlling program, without a carrier.
   FileDescriptor raw() {
     FileDescriptor connection = connect_to_holder(share, BoardRole::control);
     EXPECT_TRUE(connection);
     return connection;
   }
-  // A connection that is served.
+  // A connection after its hello, as a sharing program.
   FileDescriptor raw_watcher() {
     FileDescriptor connection = raw();
     EXPECT_EQ(send_message(connection.get(), Letter::hello, ShareMessage::version), 0);
@@ -52,7 +52,7 @@ class ShareHolderTest : public SharedTransportTest {
     }
     return all;
   }
-  // All packets until the holder ends the connection.
+  // All packets until the holder closes the connection.
   std::vector<std::string> until_the_end(const FileDescriptor& connection) {
     std::vector<std::string> packets;
     EXPECT_TRUE(in_time([&] {
@@ -63,7 +63,7 @@ class ShareHolderTest : public SharedTransportTest {
         if (size == 0) return true;
         if (size > 0) packets.emplace_back(bytes.data(), static_cast<std::size_t>(size));
       }
-    })) << "still there";
+    })) << "the holder did not close the connection";
     return packets;
   }
   static bool is_ended(const FileDescriptor& connection) {
@@ -140,7 +140,7 @@ TEST_F(ShareHolderTest, LetsNothingButAStopThroughToTheBoard) {
   run_for(io, 20ms);
   EXPECT_TRUE(device.sent.empty());
   EXPECT_TRUE(holder->heard.datagrams.empty());
-  EXPECT_TRUE(holder->carrier->up()) << "a program that controls keeps the transport";
+  EXPECT_TRUE(holder->carrier->up()) << "a controlling program keeps the transport";
 }
 
 TEST_F(ShareHolderTest, TellsASeventeenthWhyAndServesItOnceAPlaceIsFree) {
@@ -151,7 +151,7 @@ TEST_F(ShareHolderTest, TellsASeventeenthWhyAndServesItOnceAPlaceIsFree) {
   EXPECT_EQ(one_too_many->heard.last(Kind::down)->problem.text(),
             "device:: 16 programs share it already, as many as may; end one of them; its place is "
             "free at once");
-  run_for(io, 1200ms);  // it asks again, and is told the same
+  run_for(io, 1200ms);  // the program asks again and gets the same answer
   EXPECT_EQ(one_too_many->heard.count(Kind::down), 1U);
   device.deliver("not for it");
   sharers.pop_back();
@@ -163,13 +163,13 @@ TEST_F(ShareHolderTest, TellsASeventeenthWhyAndServesItOnceAPlaceIsFree) {
 TEST_F(ShareHolderTest, ObeysTheStopOfASeventeenthAndLetsItHearThatTheBoardObeys) {
   const auto holder = opened(BoardRole::control);
   const auto sharers = raw_watchers(ShareHolder::most_served);
-  // As r4 stop does.
+  // r4 stop does the same.
   const auto stopper = opened_in(io, BoardRole::watch);
   EXPECT_EQ(stopper->carrier->send(stop, Priority::stop), SendResult::sent);
   ASSERT_TRUE(run_until(io, [&] { return stopper->carrier->up(); }));
   EXPECT_EQ(device.sent, std::vector<std::string>{stop});
   EXPECT_TRUE(all_hear("SAFE:2;", stopper));
-  // After it was told that there is no place, too.
+  // A stop also works after the answer that there is no place.
   const auto late = opened_in(io, BoardRole::watch);
   ASSERT_TRUE(run_until(io, [&] { return late->heard.count(Kind::down) == 1; }));
   EXPECT_EQ(late->carrier->send(stop, Priority::stop), SendResult::sent);
@@ -181,7 +181,7 @@ TEST_F(ShareHolderTest, ObeysAStopHoweverManyProgramsAreThereAndWithoutAHello) {
   const auto sharers = raw_watchers(ShareHolder::most_served);
   std::vector<FileDescriptor> others;
   for (std::size_t i = 1; i <= 10; ++i) {
-    others.push_back(raw());  // says nothing
+    others.push_back(raw());  // sends nothing
     others.push_back(raw());
     EXPECT_EQ(send_message(others.back().get(), Letter::stop, stop), 0);
     ASSERT_TRUE(run_until(io, [&] { return device.sent.size() == i; })) << i;
@@ -189,7 +189,7 @@ TEST_F(ShareHolderTest, ObeysAStopHoweverManyProgramsAreThereAndWithoutAHello) {
 }
 
 TEST_F(ShareHolderTest, TurnsStrangersAwayOneAtATimeWithAPauseAfterEach) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can be a stranger, too";
+  if (::geteuid() != 0) GTEST_SKIP() << "needs root, to act as another user";
   const auto holder = opened(BoardRole::control);
   std::vector<FileDescriptor> strangers;
   while (strangers.size() < 20) strangers.push_back(foreign_socket(BoardRole::control, false));
@@ -198,12 +198,12 @@ TEST_F(ShareHolderTest, TurnsStrangersAwayOneAtATimeWithAPauseAfterEach) {
   };
   const auto began = Clock::now();
   ASSERT_TRUE(run_until(io, [&] { return turned_away() == 1; }));
-  EXPECT_EQ(turned_away(), 1) << "the loop does other things in between";
+  EXPECT_EQ(turned_away(), 1) << "the loop does other work between two strangers";
   ASSERT_TRUE(run_until(io, [&] { return turned_away() == 20; }));
   EXPECT_GE(Clock::now() - began, 19 * ShareHolder::between_arrivals);
 }
 
-// A refusal of the system must not end the program, which may be driving.
+// If the system refuses a call, the program must not end, because it may control a board.
 TEST_F(ShareHolderTest, GoesOnWhereTheLoopCannotWaitForAProgramThatComes) {
   in_a_thread_of_its_own([&] {
     const auto holder = opened(BoardRole::control);
@@ -214,7 +214,7 @@ TEST_F(ShareHolderTest, GoesOnWhereTheLoopCannotWaitForAProgramThatComes) {
     EXPECT_TRUE(all_hear("state", watcher, holder));
     const auto told = program(BoardRole::watch, io);
     EXPECT_TRUE(contains(problem_of([&] { told->open(); }).reason, "wait for as many files"))
-        << "it cannot wait for the holder";
+        << "the system refuses the wait for the holder";
   });
 }
 

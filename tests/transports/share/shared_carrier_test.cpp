@@ -70,7 +70,8 @@ TEST_F(SharedCarrier, LetsProgramsThatWatchHearNoSecret) {
   device.deliver(setting);  // an echo of the line
   ASSERT_TRUE(run_until(io, [&] { return watcher->has(masked); }));
   EXPECT_EQ(watcher->heard.overheard, (std::vector<std::string>{masked, masked}));
-  EXPECT_EQ(device.sent, std::vector<std::string>{setting}) << "the board gets it as it is";
+  EXPECT_EQ(device.sent, std::vector<std::string>{setting})
+      << "the board receives the secret unchanged";
 }
 
 TEST_F(SharedCarrier, ServesItsOwnProgramBeforeOthers) {
@@ -79,7 +80,7 @@ TEST_F(SharedCarrier, ServesItsOwnProgramBeforeOthers) {
   send_message(watcher.get(), ShareMessage::Kind::hello, ShareMessage::version);
   std::array<char, ShareMessage::max_size> packet;
   const auto hear = [&] { return receive_packet(watcher.get(), packet.data(), packet.size()) > 0; };
-  for (int answers = 0; answers < 2;) {  // welcome, up
+  for (int answers = 0; answers < 2;) {  // one for welcome, one for up
     run_for(io, 1ms);
     answers += hear() ? 1 : 0;
   }
@@ -158,9 +159,10 @@ TEST_F(SharedCarrier, GivesTheTransportToAProgramThatControls) {
 TEST_F(SharedCarrier, GivesControlToAProgramThatWatchesAndTakesItBack) {
   const auto one = opened(BoardRole::watch);
   const auto two = opened(BoardRole::watch);
-  for (const auto* each : {two.get(), one.get()}) {  // beside the holder, and as the holder
+  for (const auto* each : {two.get(), one.get()}) {  // as a served program, then as the holder
     each->carrier->change_role(BoardRole::control);
-    EXPECT_TRUE(error_of([&] { program(BoardRole::control, io)->open(); })) << "at once";
+    EXPECT_TRUE(error_of([&] { program(BoardRole::control, io)->open(); }))
+        << "control changes at once";
     EXPECT_TRUE(all_hear("driven", one, two));
     EXPECT_FALSE(each->carrier->is_shared());
     EXPECT_EQ(each->carrier->send("hello", Priority::normal), SendResult::sent);
@@ -171,7 +173,7 @@ TEST_F(SharedCarrier, GivesControlToAProgramThatWatchesAndTakesItBack) {
     EXPECT_TRUE(all_hear("nobody drives", one, two));
     EXPECT_EQ(each->heard.count(Kind::down), 0U);
     each->carrier->change_role(BoardRole::watch);
-    EXPECT_TRUE(each->carrier->up()) << "that is no change";
+    EXPECT_TRUE(each->carrier->up()) << "the role did not change";
   }
   EXPECT_EQ(device.sent.size(), 2U);
 }
@@ -194,7 +196,8 @@ TEST_F(SharedCarrier, RefusesControlToAProgramThatWatchesAndLeavesItWatching) {
 TEST_F(SharedCarrier, ChangesItsRoleInAnyCallback) {
   const auto one = opened(BoardRole::watch);
   const auto two = opened(BoardRole::watch);
-  for (Program* const each : {one.get(), two.get()}) {  // the holder, and one that it serves
+  // the holder, then the program that it serves
+  for (Program* const each : {one.get(), two.get()}) {
     bool changed = false;
     const auto role = [&](BoardRole wanted) {
       changed = false;
@@ -225,7 +228,8 @@ TEST_F(SharedCarrier, IsTakenOverByAnotherProgramWhenTheHolderEnds) {
   }
   EXPECT_EQ(device.opened, 4);
   EXPECT_EQ(programs.front()->heard.count(Kind::down), 0U);
-  EXPECT_GE(programs.front()->carrier->counters().rx_datagrams, 2U) << "also what others held";
+  EXPECT_GE(programs.front()->carrier->counters().rx_datagrams, 2U)
+      << "includes datagrams from earlier holders";
 }
 
 TEST_F(SharedCarrier, ReportsEventsOfTheTransportToAllPrograms) {
@@ -241,7 +245,7 @@ TEST_F(SharedCarrier, ReportsEventsOfTheTransportToAllPrograms) {
   ASSERT_TRUE(run_until(io, [&] { return late->carrier->up() && early->carrier->up(); }));
   EXPECT_EQ(early->carrier->counters().downs, 1U);
   EXPECT_EQ(early->carrier->counters().ups, 2U);
-  EXPECT_EQ(late->carrier->counters().downs, 0U) << "it was down when it came";
+  EXPECT_EQ(late->carrier->counters().downs, 0U) << "the transport was down before it opened";
 }
 
 TEST_F(SharedCarrier, MayBeClosedByAProgramThatHearsAStopOfAnother) {
@@ -253,7 +257,7 @@ TEST_F(SharedCarrier, MayBeClosedByAProgramThatHearsAStopOfAnother) {
   EXPECT_EQ(device.sent, std::vector<std::string>{stop});
 }
 
-// A board behind a link to a pty is such a device when it restarts.
+// When a board with a link to a pty restarts, the link leads to a new device.
 TEST_F(SharedCarrier, RestartsWhenADeviceThatIsKnownByItsPathIsGone) {
   share.is_path = true;
   const auto one = opened(BoardRole::watch);
@@ -263,7 +267,7 @@ TEST_F(SharedCarrier, RestartsWhenADeviceThatIsKnownByItsPathIsGone) {
   device.report({Kind::down, unplugged});
   ASSERT_TRUE(run_until(io, [&] { return two->heard.count(Kind::down) == 1; }));
   EXPECT_TRUE(in_time([&] { return one->carrier->up() && two->carrier->up(); }));
-  EXPECT_FALSE(connect_to_holder(before, BoardRole::watch)) << "another device may be there";
+  EXPECT_FALSE(connect_to_holder(before, BoardRole::watch)) << "another device may be at that path";
   EXPECT_TRUE(all_hear("to all", one, two));
   EXPECT_EQ(device.opened, 2);
   EXPECT_EQ(one->heard.count(Kind::down) + two->heard.count(Kind::down), 2U);
@@ -272,7 +276,7 @@ TEST_F(SharedCarrier, RestartsWhenADeviceThatIsKnownByItsPathIsGone) {
 // --- a holder that does not answer
 
 TEST_F(SharedCarrier, NamesAHolderThatDoesNotAnswerIfTheTransportCannotBeOpened) {
-  asio::io_context stopped;  // nobody runs it
+  asio::io_context stopped;  // runs only in goes_on()
   const auto holder = opened_in(stopped, BoardRole::watch);
   const auto watcher = opened_in(io, BoardRole::watch);
   const auto driver = opened_in(io, BoardRole::control);
@@ -288,7 +292,7 @@ TEST_F(SharedCarrier, NamesAHolderThatDoesNotAnswerIfTheTransportCannotBeOpened)
     });
   };
   ASSERT_TRUE(goes_on());
-  // Again, after the watcher was served.
+  // The holder stops again after it served the watcher.
   ASSERT_TRUE(run_until(io, [&] { return watcher->heard.count(Kind::down) == 2; }));
   ASSERT_TRUE(goes_on());
   EXPECT_EQ(watcher->heard.count(Kind::down), 2U);
@@ -299,7 +303,7 @@ TEST_F(SharedCarrier, IsOpenedBesideAHolderThatDoesNotAnswer) {
   asio::io_context hanging;
   const auto holder = opened_in(hanging, BoardRole::watch);
   const auto watcher = opened_in(io, BoardRole::watch);
-  // A board that says nothing is not a holder that hangs.
+  // A silent board does not mean that the holder hangs.
   EXPECT_FALSE(run_until(
       io,
       [&] {
@@ -314,7 +318,7 @@ TEST_F(SharedCarrier, IsOpenedBesideAHolderThatDoesNotAnswer) {
   EXPECT_FALSE(watcher->carrier->is_shared());
   const auto driver = opened(BoardRole::control);
   const auto late = opened(BoardRole::watch);
-  EXPECT_TRUE(late->carrier->is_shared()) << "the program that controls serves it";
+  EXPECT_TRUE(late->carrier->is_shared()) << "the controlling program serves it";
   EXPECT_EQ(watcher->heard.count(Kind::down), 0U);
 }
 
@@ -329,7 +333,7 @@ TEST_F(SharedCarrier, IsTakenFromAHolderThatDoesNotAnswerAndOnlyWatches) {
   EXPECT_TRUE(watcher->carrier->is_shared());
   const auto driven_at = device.opened;
   EXPECT_FALSE(holder->has("driven"));
-  // It goes on.
+  // The holder runs again.
   ASSERT_TRUE(in_time([&] {
     run_for(hanging, 5ms);
     device.deliver("joined");
@@ -398,7 +402,7 @@ TEST_F(SharedCarrier, IsNotForOtherUsers) {
 }
 
 TEST_F(SharedCarrier, IsForTheMembersOfTheGroupThatTheHolderNames) {
-  // A user whose only group is that of nobody (65534).
+  // A user whose only group is that of user nobody (65534).
   const auto stop_it = [&](const ShareGroup& of) {
     return run_unprivileged([&] {
       const ShareName shared{share.text, of};
@@ -409,7 +413,7 @@ TEST_F(SharedCarrier, IsForTheMembersOfTheGroupThatTheHolderNames) {
   };
   share.group = {"members", 65534};
   const auto holder = opened(BoardRole::control);
-  EXPECT_NE(stop_it({"others", 65534}), 0) << "another name";
+  EXPECT_NE(stop_it({"others", 65534}), 0) << "another group name";
   EXPECT_EQ(stop_it(share.group), 0);
   EXPECT_TRUE(run_until(io, [&] { return !device.sent.empty(); }));
   EXPECT_EQ(device.sent, std::vector<std::string>{stop});
@@ -421,9 +425,9 @@ TEST_F(SharedCarrier, IsForTheMembersOfTheGroupThatTheHolderNames) {
   EXPECT_EQ(device.sent.size(), 1U);
 }
 
-// Any user may take a name.
+// Any user may bind the name of a holder.
 TEST_F(SharedCarrier, IsOpenedThoughAStrangerHasTakenItsNames) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can be a stranger, too";
+  if (::geteuid() != 0) GTEST_SKIP() << "needs root, to act as another user";
   device.exclusive = false;
   const FileDescriptor squatters[] = {foreign_socket(BoardRole::control, true),
                                       foreign_socket(BoardRole::watch, true)};
@@ -433,7 +437,8 @@ TEST_F(SharedCarrier, IsOpenedThoughAStrangerHasTakenItsNames) {
   EXPECT_FALSE(watcher->carrier->is_shared());
   driver->carrier->close();
   watcher->carrier->change_role(BoardRole::control);
-  EXPECT_TRUE(run_until(io, [&] { return device.opened == 3; })) << "nor from taking control";
+  EXPECT_TRUE(run_until(io, [&] { return device.opened == 3; }))
+      << "a stranger must not prevent the change of control";
 }
 
 }  // namespace

@@ -24,12 +24,13 @@
 
 namespace r4::test {
 
-// A device that one program can have open at a time, such as a serial port, or several programs.
+// A device that only one program can open at a time, such as a serial port, or that several
+// programs can open.
 struct Device {
   class Port;
   bool exclusive = true;
-  bool may_be_taken = false;  // from a program that yields
-  Port* open = nullptr;       // the newest one, if several programs have it open
+  bool may_be_taken = false;  // a claim may take the device from a program that yields
+  Port* open = nullptr;       // the newest port, if several programs have the device open
   int opened = 0;
   std::vector<std::string> sent;
   std::function<void()> then_sent;  // also called
@@ -92,7 +93,7 @@ class Device::Port final : public Carrier {
 };
 
 inline void Device::deliver(const std::string& datagram) {
-  ASSERT_NE(open, nullptr) << "nobody has it open";
+  ASSERT_NE(open, nullptr) << "no program has the device open";
   asio::post(open->io_, [port = open, datagram] {
     if (port->handler_ == nullptr) return;
     if (datagram.size() > max_datagram) {
@@ -141,7 +142,7 @@ class SharedTransportTest : public testing::Test {
         role);
     return made;
   }
-  // A program whose open() has returned, in this loop or in a loop that may not run.
+  // A program whose open() has returned, in this loop or in a loop that does not run.
   std::unique_ptr<Program> opened_in(asio::io_context& loop, BoardRole role) {
     auto made = program(role, loop);
     made->open();
@@ -152,7 +153,7 @@ class SharedTransportTest : public testing::Test {
     EXPECT_TRUE(run_until(io, [&] { return made->carrier->up(); }));
     return made;
   }
-  // Until `done()`, also while this loop has nothing to wait for.
+  // Waits for `done()`, even if this loop has nothing to wait for.
   template <class Done>
   [[nodiscard]] bool in_time(Done done) {
     const auto deadline = Clock::now() + patience;
@@ -162,7 +163,7 @@ class SharedTransportTest : public testing::Test {
     }
     return true;
   }
-  // The device repeats `text` until all programs have heard it.
+  // The device repeats `text` until all given programs have received it.
   template <class... Programs>
   bool all_hear(const std::string& text, const Programs&... programs) {
     return in_time([&] {
@@ -171,8 +172,8 @@ class SharedTransportTest : public testing::Test {
       return (programs->has(text) && ...);
     });
   }
-  // A socket of another user's program, which only root can make: it has the name of the holder
-  // with that role, or is connected to that holder.
+  // A socket of another user's program, which only root can make. With `has_name` it has the name
+  // of the holder with the given role; otherwise it is connected to that holder.
   FileDescriptor foreign_socket(BoardRole role, bool has_name) const {
     const std::string name =
         (role == BoardRole::control ? "r4link/0/control/" : "r4link/0/") + share.text;

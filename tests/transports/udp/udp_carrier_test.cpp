@@ -27,10 +27,10 @@ std::string port_of(const Carrier& board) {
   return address.substr(address.rfind(':') + 1);
 }
 
-// A board answers only what is a datagram.
+// A board answers only valid datagrams.
 std::string valid(std::string_view name) { return with_crc(std::string(name) + ":;"); }
 
-// Another program's socket.
+// The socket of another program.
 class Socket {
  public:
   Socket(asio::io_context& io, const char* address, unsigned short port = 0)
@@ -43,7 +43,7 @@ class Socket {
                     udp::endpoint(asio::ip::make_address(address),
                                   static_cast<unsigned short>(std::stoi(port))));
   }
-  // Empty if nothing is there.
+  // Empty if nothing arrived.
   std::string receive() {
     char buffer[2048];
     asio::error_code error;
@@ -103,7 +103,7 @@ TEST_F(UdpCarrierTest, CarriesBothWays) {
   }
 }
 
-// A socket that hears one address only, as a host hears its board.
+// A socket that receives from one address only, as a host receives from its board.
 std::string answer_from(asio::io_context& io, const char* asked, const std::string& port,
                         Carrier& board, const Recorder& at_board) {
   udp::socket socket(io, udp::endpoint(udp::v4(), 0));
@@ -255,7 +255,7 @@ TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostInControlAlthoughAnotherWasHeard
   EXPECT_TRUE(run_until(io, [&] { return owner.receive() == "another state"; }));
   EXPECT_EQ(stranger.receive(), "");
 
-  board_end_of(*board).hold(everyone);  // it has gone
+  board_end_of(*board).hold(everyone);  // the host no longer has control
   stranger.send(valid("again"), port_of(*board));
   ASSERT_TRUE(wait_for(at_board, valid("again")));
   board->send("for anybody", Priority::state);
@@ -373,7 +373,7 @@ TEST_F(UdpCarrierTest, LeaksNoDescriptorsOver30Reopenings) {
   EXPECT_LE(open_descriptors(), before);
 }
 
-// Two boards of one program, which hears both at one port.
+// Two boards of one program, which receives from both at one port.
 class UdpTwoBoardsTest : public testing::Test {
  protected:
   struct Link {
@@ -391,7 +391,7 @@ class UdpTwoBoardsTest : public testing::Test {
   }
   std::string url(const Link& link) const { return link.board->name() + "?listen=" + listen; }
   void open_host(Link& link) { link.host = open_carrier(io, url(link), Role::host, link.at_host); }
-  // Both hosts ask `count` times at once, and each gets the answers to its own questions.
+  // Both hosts send `count` questions at once. Each host receives the answers to its questions.
   void talk(const std::string& name, int count) {
     const std::size_t before[] = {links[0].at_host.datagrams.size(),
                                   links[1].at_host.datagrams.size()};
@@ -430,11 +430,11 @@ TEST_F(UdpTwoBoardsTest, AreToldApartByTheirAddress) {
   open_board(links[1], "127.0.0.2");
   for (Link& link : links) open_host(link);
   talk("both", 50);
-  // The first host hears any port of its board, as if it were alone.
+  // The first host accepts any port of its board, like a host of a single board.
   Socket other_port(io, "127.0.0.1");
   other_port.send("other port", listen);
   EXPECT_TRUE(run_until(io, [&] { return links[0].at_host.has("other port"); }));
-  // The second host hears only the port of its URL.
+  // The second host accepts only the port in its URL.
   Socket of_the_second(io, "127.0.0.2");
   of_the_second.send("other port of the second", listen);
   EXPECT_TRUE(run_until(io, [&] { return links[0].host->counters().rx_foreign == 1; }));
@@ -476,7 +476,8 @@ TEST_F(UdpTwoBoardsTest, OfWhichOneClosesAndOpensAgain) {
   }
 }
 
-// A datagram that came from the second board before it was opened does not go to the first.
+// A datagram of the second board that arrives before its host is open does not go to the first
+// host.
 TEST_F(UdpTwoBoardsTest, OfWhichTheSecondSpeaksBeforeItIsOpened) {
   for (Link& link : links) open_board(link, "127.0.0.1");
   open_host(links[0]);
@@ -516,12 +517,13 @@ TEST_F(UdpTwoBoardsTest, KeepThePortFromOtherPrograms) {
   EXPECT_EQ(tries_to_share("0.0.0.0"), asio::error::address_in_use);
   EXPECT_EQ(tries_to_share("127.0.0.1"), asio::error::address_in_use);
   links[0].host->close();
-  EXPECT_EQ(tries_to_share("0.0.0.0"), asio::error::address_in_use) << "the second is still there";
+  EXPECT_EQ(tries_to_share("0.0.0.0"), asio::error::address_in_use)
+      << "the second host is still open";
   links[1].host->close();
   EXPECT_FALSE(tries_to_share("0.0.0.0"));
 }
 
-// The system reports to a connected socket that its board is off, and that costs no datagram.
+// The system reports to a connected socket that its board is off. This must not cost a datagram.
 TEST_F(UdpTwoBoardsTest, OfWhichTheSecondIsOff) {
   open_board(links[0], "127.0.0.1");
   open_host(links[0]);
@@ -541,7 +543,7 @@ TEST_F(UdpTwoBoardsTest, OfWhichTheSecondIsOff) {
   EXPECT_EQ(off.at_host.events.size(), 1U);
 }
 
-// A loop and a thread for each, as r4::Board has them.
+// Each host has a loop and a thread, as in r4::Board.
 TEST_F(UdpTwoBoardsTest, OpenAndCloseInThreadsOfTheirOwn) {
   const auto worker = [this](const char* address) {
     asio::io_context own;

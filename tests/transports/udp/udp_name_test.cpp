@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board by its name: how a UDP carrier finds its address, and finds it again.
+// A board with a host name: how a UDP carrier looks up its address, and looks it up again.
 #include <gtest/gtest.h>
 
 #include <asio/post.hpp>
@@ -16,10 +16,10 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// A name server of the test. A thread that asks it may outlive the test.
+// A name server for the test. A thread that asks it may outlive the test.
 class Names {
  public:
-  // The address of the host from now on; "": none.
+  // Sets the address of the host; "" if it has none.
   void set(const std::string& address) {
     const std::lock_guard lock(shared_->mutex);
     shared_->found = FoundHost();
@@ -29,7 +29,7 @@ class Names {
       shared_->found.addresses = {asio::ip::make_address(address)};
     }
   }
-  // Questions wait for an answer.
+  // While `on`, questions get no answer.
   void hang(bool on) {
     const std::lock_guard lock(shared_->mutex);
     shared_->hangs = on;
@@ -75,7 +75,7 @@ class UdpNameTest : public testing::Test {
     const Url url = Url::parse("udp://board.test:" + port + "?listen=0");
     return make_udp_carrier_with(io, url, Role::host, lookup);
   }
-  // Opens it in a handler of the loop.
+  // Opens the host in a handler of the loop.
   void open_in_loop() {
     host = make();
     asio::post(io, [this] { host->open(at_host); });
@@ -139,7 +139,7 @@ TEST_F(UdpNameTest, IsAskedForUntilItIsKnown) {
   names.set("");
   open_in_loop();
   ASSERT_TRUE(run_until(io, [&] { return names.asked() >= 5; }));
-  ASSERT_EQ(at_host.count(Kind::down), 1U) << "told once";
+  ASSERT_EQ(at_host.count(Kind::down), 1U) << "reported once";
   const Problem& problem = at_host.last(Kind::down)->problem;
   EXPECT_EQ(problem.reason, "there is no host 'board.test' (not known)");
   EXPECT_FALSE(problem.fix.empty());
@@ -183,7 +183,7 @@ TEST_F(UdpNameTest, IsNotLookedUpAgainWhileTheBoardIsHeard) {
   host->open(at_host);
   host->send(valid_answer("hello"), Priority::normal);
   ASSERT_TRUE(run_until(io, [&] { return at_board.has(valid_answer("hello")); }));
-  // Only what is valid counts.
+  // Only valid datagrams count.
   const auto speak = [&](const std::string& text, int times) {
     for (int i = 0; i < times; ++i) {
       board->send(text, Priority::normal);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board on a CAN bus with its host, channel by channel.
+// Tests every channel of a board on a CAN bus with its host.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -13,18 +13,19 @@
 namespace r4::test {
 namespace {
 
-// In the packed form. In plain text every channel goes over UDP and a pty
+// In the packed form. Every channel in plain text is tested over UDP and a pty
 // (tests/host/board_test.cpp).
 TEST(CanBoard, EveryChannelReachesItsPinAndComesBack) {
   BoardInAThread simulated("can://vcan0?node=9");
   Board board(simulated.url(), at_will());
   board.wait_active();
-  board.setting("rate", "50");  // an emulated machine has not the time for 100
+  board.setting("rate", "50");  // an emulated computer is too slow for 100
   expect_every_channel(controlled(simulated, board));
   EXPECT_NE(board.carrier_counters().transfers->packed, 0U);
 }
 
-// An emulated computer takes longer for a datagram than a real one, and reports so.
+// An emulated computer takes longer for a datagram than a real one, and the reported error includes
+// that.
 TEST(CanSampledTime, IsWithinItsErrorAlways) {
   using namespace std::chrono_literals;
   BoardInAThread simulated("can://vcan0?node=9");

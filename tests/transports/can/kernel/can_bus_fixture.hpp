@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CanBus on a vxcan pair of its own: to it, frames from the far end come from another computer,
-// and frames that are sent at the near end are local. For tools/with-can.
+// A CanBus on a separate vxcan pair. For the CanBus, frames from the far end come from another
+// computer, and frames that are sent at the near end are local. For tools/with-can.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ class CanBusTest : public testing::Test {
     remove();
     ASSERT_EQ(0, std::system("ip link add dev vxcan7 type vxcan peer name vxcan8 && "
                              "ip link set vxcan7 up && ip link set vxcan8 up"))
-        << "it takes root, and vxcan in the kernel: tools/with-can";
+        << "needs root, and vxcan in the kernel: tools/with-can";
   }
   static void TearDownTestSuite() { remove(); }
 
@@ -82,7 +82,7 @@ class CanBusTest : public testing::Test {
   }
 };
 
-// Notes the calls of its bus.
+// Records the calls of its bus.
 class Witness final : public CanBus::Member {
  public:
   explicit Witness(std::shared_ptr<CanBus> bus, std::uint32_t id = heard_frame_id)
@@ -99,7 +99,7 @@ class Witness final : public CanBus::Member {
   }
 
   std::vector<std::pair<Kind, std::string>> events;
-  std::string fix;  // of the newest event
+  std::string fix;  // fix of the newest event
   std::vector<std::uint8_t> frames;
   std::vector<std::uint32_t> came_us;
   std::function<void()> in_event = [] {};
@@ -107,13 +107,13 @@ class Witness final : public CanBus::Member {
 
  private:
   void on_frame(const CanFrame& frame, std::uint32_t at_us) override {
-    EXPECT_TRUE(bus_) << "it has left";
+    EXPECT_TRUE(bus_) << "called after leave()";
     frames.push_back(frame.data[0]);
     came_us.push_back(at_us);
     in_frame();
   }
   void on_bus(const CarrierEvent& event) override {
-    EXPECT_TRUE(bus_) << "it has left";
+    EXPECT_TRUE(bus_) << "called after leave()";
     events.emplace_back(event.kind, event.problem.reason);
     fix = event.problem.fix;
     EXPECT_EQ(event.problem.thing, std::string("can://") + near_end);

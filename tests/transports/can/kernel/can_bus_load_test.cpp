@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CanBus that takes frames slowly, and a CanBus whose reader is held up: frames that wait, that
+// A CanBus that accepts frames slowly, and a CanBus whose reader is held up: frames that wait, that
 // are late, and that are lost.
 #include <algorithm>
 #include <fstream>
@@ -12,7 +12,7 @@
 namespace r4::test {
 namespace {
 
-// Offers a number of frames, and notes what happens to them.
+// Offers a number of frames, and records whether each was sent, was late or was dropped.
 class Talker final : public CanBus::Member {
  public:
   Talker(std::shared_ptr<CanBus> bus, int frames) : left_(frames), bus_(std::move(bus)) {
@@ -51,7 +51,7 @@ class Talker final : public CanBus::Member {
   std::shared_ptr<CanBus> bus_;
 };
 
-// `rate`: bits a second, 128 a frame.
+// `rate`: bits a second; a frame counts as 128 bits.
 class SlowBus {
  public:
   explicit SlowBus(int rate) {
@@ -64,7 +64,7 @@ class SlowBus {
   SlowBus& operator=(const SlowBus&) = delete;
 };
 
-// A host and its board, at the two ends.
+// A host and its board, at the two ends of the bus.
 struct Link {
   Link(asio::io_context& io, std::size_t number)
       : host(make_can_carrier(io, url(near_end, number), Role::host)),
@@ -83,7 +83,7 @@ struct Link {
   std::unique_ptr<Carrier> host, board;
 };
 
-constexpr int most_runs = 20;  // tries, because this computer may stand still during a run
+constexpr int most_runs = 20;  // attempts, because this computer may stand still during a run
 
 class CanBusLoad : public CanBusTest {};
 
@@ -95,8 +95,8 @@ TEST_F(CanBusLoad, ReportsFramesThatWaitedAndSendsThemAllInOrder) {
   EXPECT_TRUE(bus->full());
   EXPECT_EQ(talker.late, 0);
   ASSERT_TRUE(run_until([&] { return !bus->full(); }));
-  EXPECT_GT(talker.late, talker.accepted / 2) << "the kernel takes few at a time";
-  EXPECT_LT(talker.late, talker.accepted) << "the first ones did not wait";
+  EXPECT_GT(talker.late, talker.accepted / 2) << "the kernel accepts few frames at a time";
+  EXPECT_LT(talker.late, talker.accepted) << "the first frames did not wait";
   CanFrame frame;
   for (int i = 0; i < talker.accepted; ++i) {
     ASSERT_TRUE(remote.receive(frame, CanBus::now_us() + 1000000)) << i;
@@ -107,7 +107,7 @@ TEST_F(CanBusLoad, ReportsFramesThatWaitedAndSendsThemAllInOrder) {
 
 const std::string in_two_frames = "0123456789";
 
-// All first frames together occupy the bus longer than each may stay unanswered.
+// All first frames together occupy the bus for longer than the time limit of each answer.
 TEST_F(CanBusLoad, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
   constexpr std::size_t hosts = 16;
   const SlowBus slow(64000);
@@ -115,7 +115,7 @@ TEST_F(CanBusLoad, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
   for (int run = 0; run < most_runs && !in_time; ++run) {
     std::vector<std::unique_ptr<Link>> links;
     while (links.size() < hosts) links.push_back(std::make_unique<Link>(io, links.size()));
-    run_for(soon);  // hosts listen before they speak
+    run_for(soon);  // a host listens before it sends
     for (const auto& link : links) {
       ASSERT_EQ(link->host->send(in_two_frames, Priority::normal), SendResult::sent);
     }
@@ -147,7 +147,7 @@ TEST_F(CanBusLoad, AFirstFrameThatNobodyAnswersTimesOutThoughOthersKeepTheBusFul
   EXPECT_LT(talker.accepted, 200);
 }
 
-// A board that always has a state to send needs a timer for the answer that it waits for.
+// A board that always has a state to send must still detect that an answer is missing.
 TEST_F(CanBusLoad, AnUnansweredDatagramTimesOutAfterAStateThatOccupiesTheBusLong) {
   Recorder told;
   const auto board = make_can_carrier(io, Link::url(near_end, node), Role::board);
@@ -156,10 +156,10 @@ TEST_F(CanBusLoad, AnUnansweredDatagramTimesOutAfterAStateThatOccupiesTheBusLong
   ASSERT_EQ(board->send(std::string(max_datagram, 'A'), Priority::state), SendResult::sent);
   ASSERT_EQ(board->send("N:" + in_two_frames, Priority::normal), SendResult::sent);
   ASSERT_TRUE(run_until([&] { return Link::timed_out(*board) == 1; }));
-  EXPECT_TRUE(bus->full()) << "the state was over before";
+  EXPECT_TRUE(bus->full()) << "the state must occupy the bus until the time-out";
 }
 
-// The frame came in time, by its time stamp: it does not matter when this process reads it.
+// The time stamp of the frame is in time, so it does not matter when this process reads the frame.
 TEST_F(CanBusLoad, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
   bool in_time = false;
   for (int run = 0; run < most_runs && !in_time; ++run) {
@@ -178,7 +178,7 @@ TEST_F(CanBusLoad, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
     far.send(go);
     in_time = CanBus::now_us() - began_us < 20000;
     if (!in_time) continue;
-    std::this_thread::sleep_for(std::chrono::milliseconds(40));  // held up, twice as long as N_Bs
+    std::this_thread::sleep_for(std::chrono::milliseconds(40));  // held up for twice N_Bs
     EXPECT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
     CanFrame second{};
     io.restart();
@@ -186,7 +186,7 @@ TEST_F(CanBusLoad, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
     EXPECT_EQ(second.data[0], 0x21) << "the consecutive frame";
     EXPECT_EQ(Link::timed_out(*link.host), 0U);
   }
-  EXPECT_TRUE(in_time) << "this machine stands still again and again";
+  EXPECT_TRUE(in_time) << "this computer stood still in every run";
 }
 
 TEST_F(CanBusLoad, DropsFramesThatTheBusDoesNotTakeForLong) {
@@ -200,7 +200,7 @@ TEST_F(CanBusLoad, DropsFramesThatTheBusDoesNotTakeForLong) {
     EXPECT_FALSE(bus->full());
     EXPECT_EQ(talker.late, 0);
   }
-  // Frames in the kernel's queue are gone, or they arrive. No other frame does.
+  // Frames in the queue of the kernel are lost or arrive. No other frame arrives.
   Talker next(bus, 1);
   ASSERT_TRUE(run_until([&] {
     bus->send();
@@ -208,9 +208,9 @@ TEST_F(CanBusLoad, DropsFramesThatTheBusDoesNotTakeForLong) {
   }));
 }
 
-// --- when frames came
+// --- time stamps of frames
 
-// A board's datagram in seven frames, which come while the reader in this thread is held up.
+// A datagram of the board in seven frames, which arrive while the reader in this thread is held up.
 class CanBusTimes : public CanBusTest {
  protected:
   static constexpr std::chrono::milliseconds n_cr{100};  // docs/reference/can.md
@@ -227,16 +227,16 @@ class CanBusTimes : public CanBusTest {
     for (CanFrame frame; board.offer(0, frame); board.frame_sent(0)) frames.push_back(frame);
   }
 
-  // Sends the next frames, with `gap` before each.
+  // Sends the next frames, with `gap` before each frame.
   void send(std::size_t count, std::chrono::milliseconds gap) {
     for (; count != 0; --count) {
-      std::this_thread::sleep_for(gap);  // nothing is waited for: it is what is sent
+      std::this_thread::sleep_for(gap);  // the pause itself is part of the test
       const std::uint32_t before_us = CanBus::now_us();
       remote.send(frames[sendings.size()]);
       sendings.push_back({before_us, CanBus::now_us()});
     }
   }
-  // The least and the longest possible time between frames n-1 and n.
+  // The shortest and the longest possible time between frames n-1 and n.
   std::uint32_t least_gap_us(std::size_t n) const {
     return sendings[n].before_us - sendings[n - 1].after_us;
   }
@@ -256,7 +256,7 @@ class CanBusTimes : public CanBusTest {
 };
 
 TEST_F(CanBusTimes, AreWhenFramesCameHoweverLateTheyAreRead) {
-  constexpr std::chrono::milliseconds gap{25};  // six of them are more than N_Cr
+  constexpr std::chrono::milliseconds gap{25};  // six gaps are longer than N_Cr
   ASSERT_EQ(frames.size(), 7U);
   bool in_time = false;
   for (int run = 0; run < most_runs && !in_time; ++run) {
@@ -268,13 +268,13 @@ TEST_F(CanBusTimes, AreWhenFramesCameHoweverLateTheyAreRead) {
     read_all();
     send(frames.size() - 1, gap);
     read_all();
-    in_time = true;  // unless this computer stood still
+    in_time = true;  // false if this computer stood still
     for (std::size_t n = 1; n < frames.size(); ++n) {
       if (most_gap_us(n) > n_cr / std::chrono::microseconds(1)) in_time = false;
     }
   }
-  ASSERT_TRUE(in_time) << "this machine stands still again and again";
-  for (std::size_t n = 2; n < frames.size(); ++n) {  // the frames that were read together
+  ASSERT_TRUE(in_time) << "this computer stood still in every run";
+  for (std::size_t n = 2; n < frames.size(); ++n) {  // frames that were read together
     const std::uint32_t gap_us = member.came_us[n] - member.came_us[n - 1];
     EXPECT_GE(gap_us + 1, least_gap_us(n)) << n;
     EXPECT_LE(gap_us, most_gap_us(n) + 1) << n;
@@ -293,7 +293,7 @@ TEST_F(CanBusTimes, ShowAPauseOfTheSenderThoughAllIsReadTogether) {
 
 // --- frames that are lost because no program reads
 
-// More frames than a socket holds. The interface counts the frames that came.
+// Sends more frames than a socket holds. The interface counts the received frames.
 class CanBusOverflow : public CanBusTest {
  protected:
   static std::uint64_t came() {
@@ -301,7 +301,8 @@ class CanBusOverflow : public CanBusTest {
     std::ifstream("/sys/class/net/vxcan7/statistics/rx_packets") >> count;
     return count;
   }
-  // Returns when all frames in the socket were read. A frame reports how many were lost before it.
+  // Returns when all frames in the socket were read. A frame reports how many frames were lost
+  // before it.
   void flood() {
     const std::size_t before = member.frames.size();
     for (int i = 0; i < 3000; ++i) remote.send(data(1));

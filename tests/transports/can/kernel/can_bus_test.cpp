@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What CanBus reports to its members, and what they may do during a call.
+// The events that CanBus reports to its members, and the calls that members may make during an
+// event.
 #include "transports/can/can_bus.hpp"
 
 #include <sys/resource.h>
@@ -45,7 +46,7 @@ TEST_F(CanBusTest, OtherProcessesOfThisMachineDoNotProveThatTheControllerIsBack)
   local.send(data(1));
   run_for(soon);
   EXPECT_EQ(member.events, (Told{{Kind::down, bus_off}}));
-  EXPECT_TRUE(member.frames.empty()) << "what did not get to the bus";
+  EXPECT_TRUE(member.frames.empty()) << "a local frame that did not reach the bus";
   remote.send(data(2));
   ASSERT_TRUE(run_until([&] { return bus->up(); }));
   ASSERT_TRUE(run_until([&] { return !member.frames.empty(); }));
@@ -184,19 +185,19 @@ TEST_F(CanBusTest, AnInterfaceOfWhichTheSystemTellsNothingIsNotSaidToBeMissing) 
   EXPECT_NO_THROW(socket.open());
 }
 
-// The kernel refuses more ids than it has filters for.
+// The kernel refuses a socket that has more ids than the kernel has filters for.
 TEST_F(CanBusTest, ABusWhoseFiltersTheKernelRefusesIsDownUntilItTakesThem) {
   Witness member(bus);
   Witness greedy(bus);
   std::vector<std::uint32_t> ids(0x700);
   std::iota(ids.begin(), ids.end(), 0U);
   bus->join(greedy, ids);
-  EXPECT_TRUE(member.events.empty()) << "told from the loop, not within join()";
+  EXPECT_TRUE(member.events.empty()) << "reported by the loop, not within join()";
   ASSERT_TRUE(run_until([&] { return !member.events.empty(); }));
   EXPECT_EQ(member.events.back().first, Kind::down);
   EXPECT_EQ(member.events.back().second.find("the kernel does not take the filters"), 0U);
   EXPECT_NE(member.fix.find("fewer nodes"), std::string::npos);
-  run_for(soon);  // it is tried again meanwhile
+  run_for(soon);  // the bus tries again meanwhile
   EXPECT_FALSE(bus->up());
   EXPECT_EQ(member.events.size(), 1U);
   greedy.leave();
@@ -228,22 +229,22 @@ TEST_F(CanBusTest, CountsFramesThatTheControllerLost) {
   local.send(data(1));
   ASSERT_TRUE(run_until([&] { return !member.frames.empty(); }));
   EXPECT_EQ(bus->overflows(), 1U);
-  EXPECT_TRUE(member.events.empty()) << "it is counted, not told";
+  EXPECT_TRUE(member.events.empty()) << "an overflow is counted, not reported";
 
   Recorder told;
   const auto carrier = host();
   carrier->open(told);
   EXPECT_EQ(carrier->counters().rx_overflows, 1U);
   carrier->close();
-  EXPECT_EQ(carrier->counters().rx_overflows, 1U) << "also afterwards";
+  EXPECT_EQ(carrier->counters().rx_overflows, 1U) << "the counter stays after close()";
 }
 
 TEST_F(CanBusTest, MembersMayLeaveInsideADownEventAndNobodyIsSkipped) {
   Witness first(bus), second(bus), third(bus), fourth(bus);
   second.in_event = [&] {
-    first.leave();   // was told
-    second.leave();  // is being told
-    third.leave();   // would be next
+    first.leave();   // was called already
+    second.leave();  // is being called
+    third.leave();   // would be called next
   };
   local.send(error(CAN_ERR_BUSOFF));
   ASSERT_TRUE(run_until([&] { return !fourth.events.empty(); }));

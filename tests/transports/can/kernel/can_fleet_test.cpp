@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A fleet on one CAN bus: its boards are stopped by one frame.
+// A fleet on one CAN bus: one frame stops all its boards.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 namespace r4::test {
 namespace {
 
-// A command that a busy machine held up is refused, as it should be.
+// A board refuses a late command, so on a busy computer the test sends it again.
 void send_to_all(Fleet& fleet, const std::string& command) {
   for (int most = 20; most > 0; --most) {
     if (fleet.send(command, std::chrono::seconds{5}).all_confirmed()) return;
@@ -37,23 +37,23 @@ TEST(CanFleet, IsStoppedByOneFrameAndEachBoardConfirmsIt) {
 
   RawCan bare(emergency_stop_id);
   EXPECT_TRUE(fleet.stop(std::chrono::seconds{5}).all_confirmed());
-  std::uint32_t quiet_us = clock_us() + 300000;  // repeated for 200 ms
+  std::uint32_t quiet_us = clock_us() + 300000;  // longer than a stop is repeated, 200 ms
   int frames = 0;
   CanFrame frame;
   while (bare.receive(frame, quiet_us)) ++frames;
-  EXPECT_EQ(frames, 1) << "of the four boards together";
+  EXPECT_EQ(frames, 1) << "one frame for all four boards";
   for (const auto& board : boards) {
     EXPECT_TRUE(board->wait_for(firmware::BoardState::safe, SafeReason::stop));
     std::vector<std::string> stops = board->executed();
     std::erase_if(stops, [](const std::string& each) { return !each.starts_with("E:STOP"); });
-    EXPECT_GE(stops.size(), 2U) << "the bare frame, and the one with the number";
-    EXPECT_LE(stops.size(), 25U) << "repeated every 20 ms by all together";
+    EXPECT_GE(stops.size(), 2U) << "the bare frame, and the datagram with a packet number";
+    EXPECT_LE(stops.size(), 25U) << "all boards together repeat it every 20 ms";
   }
   fleet.send(Command::clear(), std::chrono::seconds{5}).require();
   send_to_all(fleet, "O:1,1,1");
 }
 
-// It keeps the one; the others are free.
+// The other host keeps its board; the other boards are free.
 TEST(CanFleet, AHostOfAnotherComputerThatDrivesOneBoardConcernsNoOther) {
   std::vector<std::unique_ptr<BoardInAThread>> boards;
   for (int node = 24; node < 28; ++node) {
@@ -62,7 +62,7 @@ TEST(CanFleet, AHostOfAnotherComputerThatDrivesOneBoardConcernsNoOther) {
   std::atomic<bool> drives{true};
   std::thread other([&] {
     RawCan raw(went_safe_id(27));
-    CanFrame heartbeat{};  // of one frame; its text is nothing
+    CanFrame heartbeat{};  // one frame whose text has no meaning
     heartbeat.id = command_id(27);
     heartbeat.size = 3;
     heartbeat.data[0] = 2;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// can-utils' isotpsend and isotprecv against our ISO-TP engine. For tools/with-can. Both use the
-// kernel's ISO-TP sockets: kernel_isotp_test.cpp has every length.
+// The tools isotpsend and isotprecv of can-utils with our ISO-TP engine. For tools/with-can. Both
+// tools use the ISO-TP sockets of the kernel; kernel_isotp_test.cpp tests every length.
 #include <gtest/gtest.h>
 #include <stdio.h>
 
@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::uint32_t sizes[] = {63, 1024};
 
-// A shell command that runs beside us.
+// A shell command that runs in parallel to the test.
 class Program {
  public:
   explicit Program(const std::string& command) : output_(popen(command.c_str(), "r")) {
@@ -27,13 +27,13 @@ class Program {
   Program(const Program&) = delete;
   Program& operator=(const Program&) = delete;
 
-  // All that it printed up to its end.
+  // The complete output of the command.
   std::string output() {
     std::string text;
     for (int byte; (byte = fgetc(output_)) != EOF;) text += static_cast<char>(byte);
     return text;
   }
-  // Waits for its end; its status.
+  // Waits for the end of the command; returns its exit status.
   int end() { return output_ == nullptr ? -1 : pclose(std::exchange(output_, nullptr)); }
 
  private:
@@ -56,7 +56,7 @@ std::string link_options(const Form& form) {
          " " + can_interface;
 }
 
-// With padding. kernel_isotp_test.cpp has the forms without padding, too.
+// With padding. kernel_isotp_test.cpp also tests the forms without padding.
 class CanUtils : public testing::TestWithParam<Form> {};
 INSTANTIATE_TEST_SUITE_P(, CanUtils, testing::Values(forms[1], forms[3]),
                          [](const auto& form) { return form.param.name; });
@@ -67,7 +67,8 @@ TEST_P(CanUtils, IsotprecvPrintsWhatTheEngineSends) {
   options.n_bs_us = 100000;
   IsotpSender sender(options);
   for (const std::uint32_t size : sizes) {
-    if (size < GetParam().tx_dl - 1U) continue;  // a single frame tells nothing about a listener
+    // a single frame does not show whether a program listens
+    if (size < GetParam().tx_dl - 1U) continue;
     const std::string datagram = content_of(size);
     Program program("timeout 10 isotprecv -s 200 -d 180 -b 8 -P l" + link_options(GetParam()));
     const std::uint32_t until_us = clock_us() + 5000000;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drives our engine frame by frame over a raw socket, as a carrier does, to the end of one
+// Drives our engine frame by frame over a raw socket, as a carrier does, until the end of one
 // transfer.
 #pragma once
 
@@ -18,20 +18,22 @@ namespace r4::test {
 
 constexpr std::uint32_t data_id = 0x180;
 constexpr std::uint32_t flow_control_id = 0x200;
-// The guest is slow and shares its processors: where time is not the question there is plenty.
+// The emulated computer is slow and shares its processors, so limits that are not under test are
+// long.
 constexpr std::uint32_t patience_us = 2000000;
-constexpr std::uint32_t start_limit_us = 10000000;  // of a transfer; a program may send it
+// from the call to the first frame, which may come from another program
+constexpr std::uint32_t start_limit_us = 10000000;
 
-// The lengths to try: each one at which single frames end or sequence numbers restart, then every
-// 17th, so that last frames of all sizes come up, and lengths that need a 32-bit first frame.
-// Isotp.EveryLengthInEveryFrameLengthArrives tries all lengths, without a bus.
+// The lengths to test: each length at which single frames end or sequence numbers restart. Then
+// every 17th length, so that last frames of all sizes occur, and lengths that need a 32-bit first
+// frame. Isotp.EveryLengthInEveryFrameLengthArrives tests all lengths, without a bus.
 constexpr std::uint32_t next_length(std::uint32_t size) {
   if (size < 136 || size == 4095 || size == 4096) return size + 1;
   return size < 1024 ? std::min(size + 17, 1024U) : size == 1024 ? 4095 : 8200;
 }
 constexpr std::uint32_t longest_length = 8200;
 
-// How both ends make their frames.
+// The form of the frames of both ends.
 struct Form {
   const char* name;
   std::uint8_t tx_dl;
@@ -76,7 +78,7 @@ inline KernelIsotpOptions kernel_of(const Form& form) {
   return options;
 }
 
-// No two lengths have the same content.
+// Two lengths never have the same content.
 inline std::string content_of(std::uint32_t size) {
   std::mt19937 random(size);
   std::string bytes(size, '\0');
@@ -84,15 +86,15 @@ inline std::string content_of(std::uint32_t size) {
   return bytes;
 }
 
-// Whether data frame number n (the first is 0) is lost; a place, too, to do something at its time.
+// True if data frame number n (from 0) is lost. A test may also act at that time.
 using Lost = std::function<bool(unsigned)>;
 inline bool none_lost(unsigned /*frame*/) { return false; }
 
 struct Course {
-  IsotpError error = IsotpError::none;      // what ended the transfer
+  IsotpError error = IsotpError::none;      // the end of the transfer
   unsigned frames = 0;                      // data frames
   unsigned answers = 0;                     // flow controls
-  std::uint32_t least_gap_us = UINT32_MAX;  // of data frames without flow control between them
+  std::uint32_t least_gap_us = UINT32_MAX;  // between data frames without flow control between them
   std::uint32_t took_us = 0;                // from the first frame to the end
   std::uint32_t silence_us = 0;             // from the last frame to the end
 };
@@ -102,7 +104,7 @@ inline Course drive(RawCan& bus, IsotpSender& sender, const std::string& datagra
   Course course;
   const std::uint32_t began_us = clock_us();
   std::uint32_t last_us = began_us;
-  bool follows = false;  // the next data frame follows one, not an answer
+  bool follows = false;  // the last frame was a data frame, not an answer
   sender.begin(datagram.data(), static_cast<std::uint32_t>(datagram.size()), began_us);
   CanFrame frame;
   while (sender.busy()) {
@@ -127,8 +129,8 @@ inline Course drive(RawCan& bus, IsotpSender& sender, const std::string& datagra
   return course;
 }
 
-// Until a transfer has ended, well or not; n_cr and friends are the receiver's own. No transfer
-// within start_limit_us: a course of no frames.
+// Runs until a transfer ends, with or without an error; n_cr and other limits are options of the
+// receiver. If no transfer begins within start_limit_us, the course has no frames.
 inline Course drive(RawCan& bus, IsotpReceiver& receiver, const Lost& lost = none_lost) {
   Course course;
   std::uint32_t first_us = clock_us();

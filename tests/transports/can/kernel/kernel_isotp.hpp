@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CAN_ISOTP socket: ISO-TP as the Linux kernel does it, the independent peer of our engine.
+// A CAN_ISOTP socket: the ISO-TP of the Linux kernel, an implementation independent of our engine.
 #pragma once
 
 #include <linux/can/isotp.h>
@@ -15,12 +15,13 @@ namespace r4::test {
 
 struct KernelIsotpOptions {
   std::uint32_t flags = 0;  // CAN_ISOTP_*
-  std::uint8_t tx_dl = 8;   // more than 8: FD frames, and nothing else is heard
+  std::uint8_t tx_dl = 8;   // more than 8: only FD frames are sent and received
   std::uint8_t tx_padding = 0xAA;
   std::uint8_t rx_padding = 0xCC;
   std::uint8_t block_size = 0;
   std::uint8_t stmin = 0;
-  std::uint32_t frame_txtime_ns = CAN_ISOTP_FRAME_TXTIME_ZERO;  // else each frame is a timer
+  // otherwise each frame waits for a timer
+  std::uint32_t frame_txtime_ns = CAN_ISOTP_FRAME_TXTIME_ZERO;
 };
 
 class KernelIsotp : CanSocket {
@@ -45,13 +46,13 @@ class KernelIsotp : CanSocket {
     bind_to_interface(address);
   }
 
-  // Returns when the first frame is on the bus; waits for the end of the transfer before.
+  // Returns when the first frame is on the bus. Waits first until the last transfer has ended.
   void send(const std::string& datagram) {
     const ssize_t size = write(fd(), datagram.data(), datagram.size());
     if (size != static_cast<ssize_t>(datagram.size())) fail("CAN_ISOTP send");
   }
 
-  // The next datagram, if there is one in that time; none, too, after an error.
+  // The next datagram; none if it does not arrive within the limit, or after an error.
   std::optional<std::string> receive(std::uint32_t limit_us = 2000000) {
     std::string datagram(65536, '\0');
     const std::uint32_t until_us = clock_us() + limit_us;
@@ -67,14 +68,14 @@ class KernelIsotp : CanSocket {
     return datagram;
   }
 
-  // The next datagram, however long it takes; returns its size, cut to `size`.
+  // Waits for the next datagram without a limit; returns its size, cut to `size`.
   std::size_t await_datagram(void* data, std::size_t size) {
     const ssize_t got = recv(fd(), data, size, 0);
     if (got < 0) fail("CAN_ISOTP receive");
     return static_cast<std::size_t>(got);
   }
 
-  // The error since the last call, an errno; 0: none. Waits for it up to `limit_us`.
+  // The errno since the last call; 0: none. Waits for an error up to `limit_us`.
   int error(std::uint32_t limit_us = 0) {
     int error = std::exchange(error_, 0);
     if (error == 0 && limit_us != 0) await(fd(), 0, clock_us() + limit_us);

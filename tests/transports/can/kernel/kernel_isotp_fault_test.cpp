@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Our ISO-TP engine and the kernel's, on one bus, when something goes wrong. For tools/with-can.
+// Our ISO-TP engine and the kernel's on one bus, with faults. For tools/with-can.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/prctl.h>
@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::uint32_t capacity = 1024;
 
-// The time-outs under test, and how late a slow machine may find that they have passed.
+// The time-outs under test, and how late a slow computer may detect them.
 constexpr std::uint32_t time_out_us = 200000;
 constexpr std::uint32_t lateness_us = 1000000;
 
@@ -42,7 +42,7 @@ struct EngineReceiver {
   IsotpReceiver receiver;
 };
 
-// A process of its own that can be killed. Returns when it has opened its socket.
+// A separate process that can be killed. Returns when the process has opened its socket.
 class Peer {
  public:
   explicit Peer(const std::function<void(const std::function<void()>& ready)>& life) {
@@ -68,7 +68,7 @@ class Peer {
   Peer(const Peer&) = delete;
   Peer& operator=(const Peer&) = delete;
 
-  // It is gone, with its socket, on return.
+  // On return the process and its socket no longer exist.
   void kill_now() {
     if (process_ <= 0) return;
     kill(process_, SIGKILL);
@@ -89,8 +89,9 @@ TEST(KernelIsotpFaults, KernelReportsMissingPadding) {
   EXPECT_EQ(kernel.error(), EBADMSG);
 }
 
-// Whichever frame is lost, no damaged datagram is delivered, and the next transfer is sound. The
-// last frame of the damaged one is full: a short one out of its place is ignored, by both engines.
+// For each lost frame: no damaged datagram is delivered, and the next transfer succeeds. The last
+// frame of the damaged datagram is full, because both engines ignore a short frame that is not the
+// last one.
 constexpr std::uint32_t damaged_size = 174;
 constexpr unsigned last_frame = 24;
 
@@ -190,8 +191,8 @@ TEST(KernelIsotpFaults, EngineEndsWithN_BsWhenTheKernelsProcessIsKilledInTheMidd
   EXPECT_TRUE(restarted.receive() == content_of(1000));
 }
 
-// The kernel finishes what a killed process has begun to send, so that this process runs our
-// sender.
+// The kernel finishes the transfer of a killed process. So this process runs our sender, which
+// cannot finish.
 TEST(KernelIsotpFaults, EngineEndsWithN_CrWhenTheSendersProcessIsKilledInTheMiddle) {
   RawCan bus(data_id);
   Peer peer([](const std::function<void()>& ready) {

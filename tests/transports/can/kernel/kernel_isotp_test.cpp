@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Our ISO-TP engine and the kernel's, on one bus, when all goes well. For tools/with-can.
+// Our ISO-TP engine and the kernel's on one bus, without faults. For tools/with-can.
 #include "tests/transports/can/kernel/kernel_isotp.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ unsigned faults(const IsotpReceiverCounters& counters) {
          counters.unexpected_frame + counters.malformed;
 }
 
-// Our end is the sender; the kernel's socket receives.
+// Our engine sends; the kernel's socket receives.
 struct EngineToKernel {
   explicit EngineToKernel(const Form& form) : EngineToKernel(sender_of(form), kernel_of(form)) {}
   EngineToKernel(const IsotpSenderOptions& options, const KernelIsotpOptions& peer)
@@ -32,7 +32,7 @@ struct EngineToKernel {
   IsotpSender sender;
 };
 
-// The kernel's socket sends; our end is the receiver.
+// The kernel's socket sends; our engine receives.
 struct KernelToEngine {
   explicit KernelToEngine(const Form& form) : KernelToEngine(kernel_of(form), receiver_of(form)) {}
   KernelToEngine(const KernelIsotpOptions& peer, const IsotpReceiverOptions& options)
@@ -73,7 +73,7 @@ TEST_P(KernelIsotpForms, ReceivesEveryLengthFromTheEngine) {
 
 TEST_P(KernelIsotpForms, SendsEveryLengthToTheEngine) {
   IsotpReceiverOptions options = receiver_of(GetParam());
-  options.block_size = 200;  // a socket's buffer surely holds so many frames
+  options.block_size = 200;  // the buffer of a socket holds this number of frames
   KernelToEngine link(kernel_of(GetParam()), options);
   std::uint32_t datagrams = 0;
   for (std::uint32_t size = 0; size < longest_length; ++datagrams) {
@@ -103,7 +103,7 @@ TEST_P(KernelIsotpForms, ListensToTheEngineSendingWithoutFlowControl) {
     EXPECT_TRUE(second_listener.receive() == datagram);
   }
   CanFrame frame;
-  EXPECT_FALSE(link.bus.receive(frame, clock_us())) << "a listener has answered";
+  EXPECT_FALSE(link.bus.receive(frame, clock_us())) << "the listener sent a frame";
 }
 
 TEST_P(KernelIsotpForms, IsHeardByTheEngineListeningToItsBroadcast) {
@@ -125,7 +125,8 @@ TEST_P(KernelIsotpForms, IsHeardByTheEngineListeningToItsBroadcast) {
 
 TEST(KernelIsotp, AgreesWithTheEngineOnEveryFrameSizeOfFd) {
   constexpr std::uint8_t frame_sizes[] = {12, 16, 20, 24, 32, 48};
-  constexpr std::uint32_t longest = 150;  // three frames of the longest, and more of the others
+  // three frames of the longest kind, and more of the shorter ones
+  constexpr std::uint32_t longest = 150;
   for (const std::uint8_t tx_dl : frame_sizes) {
     const Form form{"", tx_dl, false};
     for (EngineToKernel link(form); link.sender.counters().started < longest;) {
@@ -142,7 +143,7 @@ TEST(KernelIsotp, AgreesWithTheEngineOnEveryFrameSizeOfFd) {
   }
 }
 
-// What a receiver asks for: BS and STmin as bytes on the wire.
+// The requests of a receiver: BS and STmin as bytes on the wire.
 struct Pace {
   std::uint8_t block_size;
   std::uint8_t stmin;
@@ -151,7 +152,8 @@ constexpr Pace paces[] = {{0, 0}, {1, 0}, {7, 0}, {255, 0}, {0, 0xF5}, {0, 2}, {
 constexpr std::uint32_t paced_size = 510;
 constexpr unsigned paced_consecutive = (paced_size - 6) / 7;
 
-// Flow controls of a transfer, and the least time its gaps take; none where a block ends.
+// The number of flow controls of a transfer, and the shortest total time of its gaps. There is no
+// gap at the end of a block.
 unsigned answers(const Pace& pace) {
   return pace.block_size == 0 ? 1 : 1 + (paced_consecutive - 1) / pace.block_size;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CAN_RAW socket as tests need it: it hears one id, and every wait has an end. What the kernel
-// refuses is thrown, so that the test fails with the reason.
+// A CAN_RAW socket for tests: it receives one id, and every wait has a limit. If the kernel refuses
+// a call, the class throws the reason, so that the test fails with it.
 #pragma once
 
 #include <linux/can.h>
@@ -32,7 +32,7 @@ inline std::uint32_t clock_us() {
                                     static_cast<std::uint64_t>(now.tv_nsec) / 1000);
 }
 
-// Waits for `events` of `fd` until `until_us`; an error of the socket ends it too.
+// Waits for `events` of `fd` until `until_us`. An error of the socket also ends the wait.
 inline bool await(int fd, short events, std::uint32_t until_us) {
   const std::uint32_t now_us = clock_us();
   const std::uint32_t left_us = reached(now_us, until_us) ? 0 : until_us - now_us;
@@ -41,7 +41,7 @@ inline bool await(int fd, short events, std::uint32_t until_us) {
   return ppoll(&wait, 1, &limit, nullptr) == 1;
 }
 
-// A socket of PF_CAN, bound to the interface by whoever derives from it.
+// A socket of PF_CAN; the derived class binds it to the interface.
 class CanSocket {
  public:
   CanSocket(const CanSocket&) = delete;
@@ -74,17 +74,17 @@ class CanSocket {
 
 class RawCan : CanSocket {
  public:
-  // Hears classic and FD frames with that 11-bit id, not its own.
+  // Receives classic and FD frames with the given 11-bit id, but not the frames that it sends.
   explicit RawCan(std::uint32_t heard_id, const char* interface = can_interface)
       : CanSocket(SOCK_RAW, CAN_RAW) {
     set(SOL_CAN_RAW, CAN_RAW_FILTER, can_filter{heard_id, CAN_SFF_MASK | CAN_EFF_FLAG},
         "CAN_RAW_FILTER");
     set(SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1, "CAN_RAW_FD_FRAMES");
-    set(SOL_SOCKET, SO_RCVBUF, 1 << 20, "SO_RCVBUF");  // as much of it as the system grants
+    set(SOL_SOCKET, SO_RCVBUF, 1 << 20, "SO_RCVBUF");  // the system may grant less
     bind_to_interface({}, interface);
   }
 
-  // A full queue (ENOBUFS) costs time: the frame is offered again until it is taken.
+  // If the queue is full (ENOBUFS), the frame is offered again until the kernel accepts it.
   void send(const CanFrame& frame, std::uint32_t limit_us = 1000000) {
     canfd_frame raw{};
     raw.can_id = frame.id;
@@ -98,7 +98,7 @@ class RawCan : CanSocket {
     }
   }
 
-  // The next frame, if there is one until then.
+  // The next frame, if it arrives before the given time.
   bool receive(CanFrame& frame, std::uint32_t until_us) {
     canfd_frame raw;
     ssize_t size;

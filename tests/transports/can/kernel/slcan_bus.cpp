@@ -3,41 +3,42 @@
 //
 //     slcan_bus [--nodes 2] [--bitrate 125000]
 //
-// It opens a pty a node and prints one line:
+// It opens a pty for each node and prints one line:
 // {"type":"ready","bitrate":125000,"ptys":["/dev/pts/3",…]}. Each pty speaks the slcan protocol, as
-// adapters of Linux' line discipline 17 do:
+// the adapters of line discipline 17 of Linux do:
 //
 //     fd = os.open(pty, os.O_RDWR | os.O_NOCTTY); fcntl.ioctl(fd, termios.TIOCSETD, 17 as an int)
 //     ip link set slcan0 type can bitrate 125000 && ip link set slcan0 up
 //
-// (or slcan_attach). The process keeps the ptys open: the interfaces stay until it ends. The kernel
-// sends C, S and O when an interface of known bit rate comes up. A wrong bit rate is refused, and
-// that node stays off the bus. O resets the controller: no errors, nothing queued, and out of
-// bus-off by 128 times 11 recessive bits. The controller has three mailboxes, lowest id first;
-// while they are full, nothing is read from the pty, and frames wait in the kernel.
+// (or slcan_attach). The process keeps the ptys open, so the interfaces exist until it ends. The
+// kernel sends C, S and O when an interface of known bit rate comes up. A wrong bit rate is
+// refused, and that node stays off the bus. O resets the controller: no errors, an empty queue, and
+// a return from bus-off after 128 times 11 recessive bits. The controller has three mailboxes,
+// lowest id first. While they are full, the pty is not read, and frames wait in the kernel.
 //
-// The bus (support/can_bus_model.hpp) follows the clock. A process that was held up catches up:
-// frames on the bus keep their own times, whenever the process computes them.
+// The bus (support/can_bus_model.hpp) follows the clock. If the process was held up, it catches up:
+// frames on the bus keep their correct times, whenever the process computes them.
 //
-// The process reports the same to the kernel as a hardware controller to its driver: s[awpb]RRRTTT
-// when the state of a node changes (active, warning from 96 errors, passive, bus-off; the
-// counters), e3aaa when a frame was not acknowledged, e3ccc when a frame was damaged (each at most
-// every 10 ms; three letters because slcan ignores lines of less than five characters). The kernel
-// makes error frames of these. Linux 6.1 turns the carrier off at bus-off, and slcan turns it on
-// again only by `ip link set slcan0 down` and `up` (no restart-ms, no CAN_ERR_RESTARTED).
+// The process reports to the kernel what a hardware controller reports to its driver. It sends
+// s[awpb]RRRTTT when the state of a node changes (active, warning from 96 errors, passive, bus-off;
+// the counters). It sends e3aaa when a frame was not acknowledged, and e3ccc when a frame was
+// damaged, each at most every 10 ms. They have three letters because slcan ignores lines of less
+// than five characters. The kernel turns these lines into error frames. Linux 6.1 turns the carrier
+// off at bus-off. slcan turns it on again only after `ip link set slcan0 down` and `up` (no
+// restart-ms, no CAN_ERR_RESTARTED).
 //
-// Orders, a line each on stdin; each is answered by a line, {"type":"done"} or
+// Orders, one line each on stdin. The answer to each is one line, {"type":"done"} or
 // {"type":"error","reason":…}. The process ends at the end of stdin.
 //
-//     noise P            each frame is damaged with that probability: error frame, and sent again
-//     spoil K | heal K   node K's frames are damaged: it becomes passive, then bus-off | ends
-//     errors K TEC REC   sets the counters of node K, and its state by them
-//     away K | back K    node K is off the bus: it acknowledges nothing | on it again
-//     babble ID | quiet  another node sends that id (hex) without a pause, 8 bytes | stops
-//     stall K | go K     node K's pty is not read, as if its controller took nothing | ends
-//     status             answered by the counters of each node
+//     noise P            damages each frame with probability P, so that it is sent again
+//     spoil K | heal K   damages the frames of node K: it becomes passive, then bus-off | ends that
+//     errors K TEC REC   sets the counters of node K, and its state accordingly
+//     away K | back K    disconnects node K from the bus: it does not acknowledge | reconnects it
+//     babble ID | quiet  another node sends this id (hex) without a pause, 8 bytes | ends that
+//     stall K | go K     does not read the pty of node K, as if the controller were full | reads it
+//     status             the answer has the counters of each node
 //
-// Changes of state are printed as they come: {"type":"state","node":0,"state":"passive",…}.
+// Changes of state are printed when they occur: {"type":"state","node":0,"state":"passive",…}.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
@@ -142,13 +143,13 @@ class Bus {
   struct Adapter {
     int node = 0;
     int pty = -1;
-    int kept = -1;  // the far end, so that the pty always has one
+    int kept = -1;  // the far end, kept open so that the pty always has one
     std::string name;
     std::string input;
     bool open = false;
     bool right_rate = true;
     bool stalled = false;
-    int unread = 0;  // bytes in the pty when there was no room
+    int unread = 0;  // bytes in the pty while there was no room
     char told = 'a';
     std::array<std::uint64_t, 2> error_told_ns{};  // by kind
     std::uint64_t overruns = 0;                    // bytes for which the pty had no room
@@ -219,7 +220,7 @@ void Bus::add_adapter(std::size_t number) {
     tell_state(number);
   };
   node.changed = [this, number](CanNodeState state) {
-    // After O it came back once. The next bus-off lasts until the next O.
+    // After O the node may return from bus-off once. The next bus-off lasts until the next O.
     if (state == CanNodeState::active) bus_.let_come_back(adapters_[number].node, false);
     tell_state(number);
   };
@@ -261,7 +262,7 @@ void Bus::run() {
   }
 }
 
-// --- a node's pty
+// --- the pty of a node
 
 void Bus::read(Adapter& adapter) {
   std::array<char, 4096> bytes;
@@ -269,8 +270,8 @@ void Bus::read(Adapter& adapter) {
   if (count > 0) adapter.input.append(bytes.data(), static_cast<std::size_t>(count));
 }
 
-// The kernel writes one frame and waits until it is read. Text after it is a command: the frames
-// before a C are not sent.
+// The kernel writes one frame and waits until it is read. Later bytes are a command; frames before
+// a C are not sent.
 void Bus::read_if_closed(Adapter& adapter) {
   int unread = 0;
   if (::ioctl(adapter.pty, FIONREAD, &unread) != 0) return;

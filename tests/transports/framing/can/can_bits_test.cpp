@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The length of frames against published values, and against a second computation that writes every
-// bit down as a character.
+// Compares the length of frames with published values, and with a second computation that writes
+// every bit as a character.
 #include "r4link/can/can_bits.hpp"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ std::string binary(std::uint32_t value) {
   return std::bitset<Width>(value).to_string();
 }
 
-// Long division of the bits, with as many zeros behind them (ISO 11898-1:2015, 10.4.2.6).
+// Long division of the bits, followed by zeros for the remainder (ISO 11898-1:2015, 10.4.2.6).
 std::string crc15(const std::string& bits) {
   const std::string divisor = "1100010110011001";
   std::string rest = bits + zeros(15);
@@ -72,7 +72,7 @@ std::size_t classic_bits(const CanFrame& frame) {
   return stuffed(bits + crc15(bits)).size() + tail.size();
 }
 
-// The whole FD frame, of which the CRC field is as long whatever it holds.
+// The bits of an FD frame. The length of its CRC field does not depend on its value.
 std::size_t fd_bits(const CanFrame& frame, bool switches) {
   const int sizes[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
   std::uint32_t code = 0;
@@ -83,7 +83,7 @@ std::size_t fd_bits(const CanFrame& frame, bool switches) {
   bits += frame.extended ? "010" : "0010";  // RRS, (IDE,) FDF, res
   bits += switches ? "10" : "00";           // BRS, ESI
   bits += binary<4>(code) + data_of(frame);
-  // Behind the last bit nothing is stuffed: the CRC field begins with a stuff bit of its own.
+  // No stuff bit follows the last bit, because the CRC field begins with a fixed stuff bit.
   const std::size_t before_crc = stuffed(bits.substr(0, bits.size() - 1)).size() + 1;
   const std::size_t crc_field = frame.size <= 16 ? 27 : 32;
   return before_crc + crc_field + tail.size();
@@ -96,7 +96,7 @@ CanFrame any_frame() {
   frame.remote = !frame.fd && *rc::gen::inRange(0, 8) == 0;
   frame.id = *rc::gen::arbitrary<std::uint32_t>() & (frame.extended ? 0x1FFFFFFFU : max_can_id);
   frame.size = can_frame_size(static_cast<std::uint32_t>(*rc::gen::inRange(0, frame.fd ? 65 : 9)));
-  // Long runs of equal bits, too: what stuffing is about.
+  // Also long runs of equal bits, which need stuff bits.
   const std::vector<std::uint8_t> bytes = *rc::gen::elementOf(
       std::vector<std::vector<std::uint8_t>>{{0x00}, {0xFF}, {0x0F}, {0x3C, 0x1E}, {}});
   for (std::size_t i = 0; i < frame.size; ++i) {
@@ -121,14 +121,15 @@ TEST(CanBits, OfAClassicFrameAreThePublishedOnes) {
 
 TEST(CanBits, OfFramesCountedByHand) {
   CanFrame frame{};
-  // 34 zeros, as their CRC is 0, too: a stuff bit after each five.
+  // 34 zeros, because the CRC is also 0: a stuff bit after every five.
   EXPECT_EQ(total(can_bits(frame)), 47U + 6U);
-  // SOF and id 0 are 12 zeros: after 5 and 10 of them; the rest of the 14 before FDF are 4 more.
+  // SOF and id 0 are 12 zeros: stuff bits after 5 and 10 of them. The other 4 of the 14 bits before
+  // FDF follow.
   frame = test::frame_of(0, "");
   frame.fd = true;
   const CanBits bits = can_bits(frame);
   EXPECT_EQ(bits.nominal, 14U + 2U + 3U + 12U);
-  // ESI and length code are five zeros behind a BRS of 1: the fixed stuff bit is there already.
+  // ESI and length code are five zeros after a BRS of 1: the fixed stuff bit follows them anyway.
   EXPECT_EQ(bits.data, 5U + 27U + 1U);
 }
 
@@ -174,10 +175,10 @@ TEST(CanBits, TakeTheirTime) {
   CanFrame frame{};
   frame.fd = true;
   EXPECT_EQ(time_ns(frame, at_one_mbit), 1000U * total(can_bits(frame, false)))
-      << "no data rate: it does not switch";
+      << "without a data rate the frame does not switch";
 }
 
-// The worst case of a datagram: its frames, and one flow control where there is one.
+// The longest time of a datagram: all its frames and one flow control.
 std::uint64_t worst_ns(std::size_t size, std::uint8_t tx_dl, CanBitRate rate) {
   IsotpSenderOptions options;
   options.channel.fd = tx_dl > 8;
@@ -196,12 +197,12 @@ std::uint64_t worst_ns(std::size_t size, std::uint8_t tx_dl, CanBitRate rate) {
 TEST(CanBits, OfADatagramGiveTheCapacityOfABus) {
   EXPECT_EQ(worst_ns(170, 8, at_one_mbit), 3420000U) << "25 frames and a flow control";
   EXPECT_EQ(worst_ns(170, 8, half_mbit), 6840000U);
-  EXPECT_EQ(1000000000U / worst_ns(170, 8, at_one_mbit), 292U) << "a second";
+  EXPECT_EQ(1000000000U / worst_ns(170, 8, at_one_mbit), 292U) << "datagrams a second";
   EXPECT_EQ(worst_ns(45, 8, at_one_mbit), 1000000U) << "7 frames and a flow control";
   EXPECT_EQ(worst_ns(170, 64, one_and_five_mbit), 516200U) << "3 frames and a flow control";
 }
 
-// Design: an emergency stop waits for one frame in progress and takes its own time, in 270 us.
+// Design: an emergency stop waits for one frame on the bus and takes one frame time, within 270 us.
 TEST(CanBits, TwoFramesAreLessThan270Microseconds) {
   EXPECT_LE(2 * time_ns(worst_can_bits(8, false, false), at_one_mbit), 270000U);
 }

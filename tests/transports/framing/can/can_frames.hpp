@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CAN frames as tests write and read them: "10 14 61 62".
+// CAN frames as text for tests: "10 14 61 62".
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace r4::test {
 
-// A classic frame, or an FD one if it has more than 8 bytes.
+// A classic frame, or an FD frame if it has more than 8 bytes.
 inline CanFrame frame_of(std::uint32_t id, const std::string& hex) {
   CanFrame frame{};
   frame.id = id;
@@ -34,7 +34,7 @@ inline std::string hex_of(const CanFrame& frame) {
   return hex;
 }
 
-// The hex of `count` bytes that count up from `first`.
+// `count` bytes that count up from `first`, in hexadecimal.
 inline std::string counting(int count, int first = 1) {
   CanFrame frame{};
   std::string hex;

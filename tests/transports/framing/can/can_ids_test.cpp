@@ -44,7 +44,7 @@ TEST(CanIds, EveryIdMeansWhatWasMadeForItAndNothingElse) {
     plan[telemetry_id(node)] = {CanIdKind::telemetry, n};
     plan[watch_id(node)] = {CanIdKind::watch, n};
   }
-  EXPECT_EQ(plan.size(), 1 + 5 * can_nodes) << "no id has two meanings";
+  EXPECT_EQ(plan.size(), 1 + 5 * can_nodes) << "every id has one meaning";
   for (std::uint32_t id = 0; id <= max_can_id; ++id) {
     const auto found = plan.find(id);
     const auto expected =

@@ -14,12 +14,12 @@ namespace {
 using test::str;
 using test::with_crc;
 
-// A board and a host on a bus in virtual time, which can lose frames.
+// A board and a host on a bus in virtual time that can lose frames.
 struct NodeBus {
   explicit NodeBus(bool fd = false, std::uint8_t host_node = 3)
       : board(CanEnd::board, 3, fd), host(CanEnd::host, host_node, fd) {}
 
-  // Moves every frame that either has to send, until none has.
+  // Moves frames until neither end has a frame to send.
   void settle() {
     CanFrame frame{};
     for (bool any = true; any;) {
@@ -45,10 +45,10 @@ struct NodeBus {
   }
 
   CanNode board, host;
-  std::uint32_t now_us = 0xFFFFFF00;  // wraps in the test
+  std::uint32_t now_us = 0xFFFFFF00;  // wraps during the test
   std::vector<std::string> at_board, at_host;
   std::vector<std::uint32_t> ids;
-  std::size_t lose = 0;  // the frame of that number, from 1
+  std::size_t lose = 0;  // number of the lost frame, from 1; 0: none
 };
 
 const std::string state_line = with_crc("AIN24:23.5;AIN12:12.1;OSMC1:358,1;PNum:77;T:81234;");
@@ -73,7 +73,7 @@ TEST(CanNodeStop, IsTheEmergencyFrameBareOrWithANumberBehindItsId) {
   }
   frame.id = numbered_stop_id(5);
   frame.remote = true;
-  EXPECT_TRUE(board.on_frame(frame, 0).empty()) << "a remote request is none";
+  EXPECT_TRUE(board.on_frame(frame, 0).empty()) << "a remote request is not a stop";
 }
 
 TEST(CanNodeWatch, AsksForStatesByOneFrameOfItsOwnId) {
@@ -85,7 +85,7 @@ TEST(CanNodeWatch, AsksForStatesByOneFrameOfItsOwnId) {
   NodeBus other(false, 4);
   other.host.ask_for_states();
   other.settle();
-  EXPECT_TRUE(other.at_board.empty()) << "another board is watched";
+  EXPECT_TRUE(other.at_board.empty()) << "the host watches another board";
 }
 
 class CanNodeForms : public testing::TestWithParam<std::pair<bool, bool>> {};
@@ -110,7 +110,7 @@ INSTANTIATE_TEST_SUITE_P(ClassicAndFd, CanNodeForms,
                          testing::Values(std::pair(false, false), std::pair(false, true),
                                          std::pair(true, false), std::pair(true, true)));
 
-// What a board sends goes by its host's form: by that of the newest datagram that came from there.
+// A board uses the form of the newest datagram that it received from its host.
 TEST(CanNode, ABoardAnswersAHostThatWritesPlainTextInPlainText) {
   NodeBus bus;
   bus.board.use_packed_form(true);
@@ -126,7 +126,7 @@ TEST(CanNode, ABoardAnswersAHostThatWritesPlainTextInPlainText) {
     EXPECT_TRUE(bus.host.begin(command_line, bus.now_us));
     bus.settle();
   };
-  EXPECT_TRUE(packed_at_host(state_line)) << "nobody has spoken yet";
+  EXPECT_TRUE(packed_at_host(state_line)) << "no host has sent anything yet";
   host_says(false);
   for (const std::string& line : {state_line, heartbeat_line, answer_line}) {
     EXPECT_FALSE(packed_at_host(line)) << line;
@@ -136,14 +136,14 @@ TEST(CanNode, ABoardAnswersAHostThatWritesPlainTextInPlainText) {
     EXPECT_TRUE(packed_at_host(line)) << line;
   }
   bus.board.use_packed_form(false);
-  EXPECT_FALSE(packed_at_host(state_line)) << "its setting says never";
+  EXPECT_FALSE(packed_at_host(state_line)) << "the setting of the board forbids the packed form";
   bus.board.use_packed_form(true);
   host_says(false);
   const std::uint32_t bad = bus.board.counters().bad_form;
   EXPECT_TRUE(bus.host.begin(std::string("\x80\xff\x12", 3), bus.now_us));
   bus.settle();
   EXPECT_EQ(bus.board.counters().bad_form, bad + 1);
-  EXPECT_FALSE(packed_at_host(state_line)) << "garbage is no packed datagram";
+  EXPECT_FALSE(packed_at_host(state_line)) << "garbage is not a packed datagram";
 }
 
 TEST(CanNode, AHostPacksForABoardThatDoesNot) {
@@ -160,7 +160,7 @@ TEST(CanNode, AHostPacksForABoardThatDoesNot) {
   EXPECT_EQ(bus.board.counters().unpacked, 1U);
 }
 
-// It is in no form, and anybody's.
+// An emergency frame has no form and may come from any host.
 TEST(CanNode, AnEmergencyFrameDoesNotChangeTheForm) {
   NodeBus bus;
   bus.board.use_packed_form(true);
@@ -186,7 +186,7 @@ TEST(CanNode, StatesAndAnswersHaveIdsOfTheirOwn) {
 }
 
 TEST(CanNode, TelemetryGoesOnWhileAnAnswerWaitsForFlowControl) {
-  NodeBus bus(false, 4);  // nobody answers for node 3
+  NodeBus bus(false, 4);  // no host answers for node 3
   bus.board.begin(answer_line, bus.now_us);
   bus.settle();
   EXPECT_FALSE(bus.board.idle(CanLane::dialogue));
@@ -216,7 +216,7 @@ TEST(CanNode, EveryLostFrameCostsOneDatagramAndNoMore) {
   }
 }
 
-// A host's process is held up for longer than a bus ever is.
+// The process of a host can be held up for longer than a bus.
 TEST(CanNode, ACommandIsTakenIfItsFramesAreLateByLessThan100Ms) {
   for (const std::uint32_t late_us : {99999U, 100000U}) {
     CanNode board(CanEnd::board, 3, false);
@@ -266,7 +266,7 @@ TEST(CanNode, ABoardThatGoesSafeSaysSoAheadInOneFrame) {
   };
   EXPECT_EQ(beat(""), telemetry_id(3));
   EXPECT_EQ(beat("SAFE:2;"), went_safe_id(3));
-  EXPECT_EQ(beat("SAFE:2;"), telemetry_id(3)) << "it was told";
+  EXPECT_EQ(beat("SAFE:2;"), telemetry_id(3)) << "the host knows this reason already";
   EXPECT_EQ(beat("SAFE:4;"), went_safe_id(3)) << "another reason";
   EXPECT_EQ(beat(""), telemetry_id(3));
   EXPECT_EQ(beat("SAFE:4;"), went_safe_id(3));
@@ -277,7 +277,7 @@ TEST(CanNode, AReasonThatTheBusDidNotTakeIsToldLater) {
   NodeBus bus;
   const std::string safe = with_crc("H:R4-ROS2;PNum:79;T:81300;SAFE:2;");
   bus.board.begin(safe, bus.now_us);
-  bus.board.cancel();  // the bus went down first
+  bus.board.cancel();  // the bus went down before the frame was sent
   bus.board.begin(safe, bus.now_us);
   bus.settle();
   EXPECT_EQ(bus.ids.front(), went_safe_id(3));
@@ -301,7 +301,7 @@ TEST(CanNode, APackedDatagramThatIsDamagedIsDropped) {
   frame.id = telemetry_id(3);
   frame.size = 5;
   frame.data[0] = 4;     // single frame
-  frame.data[1] = 0xFF;  // no version that there is
+  frame.data[1] = 0xFF;  // an unknown version
   EXPECT_TRUE(bus.host.on_frame(frame, bus.now_us).empty());
   EXPECT_EQ(bus.host.counters().bad_form, 1U);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Streams of telemetry in which frames are lost: how many datagrams come out that are made of two.
-// The numbers are printed. Same seed, same numbers.
+// Counts the datagrams that a receiver joins from two datagrams in streams of telemetry with lost
+// frames. Prints the numbers. The same seed gives the same numbers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,9 +17,10 @@ namespace r4 {
 namespace {
 
 constexpr std::uint32_t frame_us = 130;     // a classic frame at 1 Mbit/s
-constexpr std::uint32_t period_us = 10000;  // from a datagram to the next
+constexpr std::uint32_t period_us = 10000;  // from one datagram to the next
 
-// The lengths of a stream's datagrams: each between the two by chance, and every so often another.
+// The lengths of the datagrams in a stream: a random length between two limits, and regularly
+// another length.
 struct Stream {
   const char* what;
   std::uint32_t shortest, longest;
@@ -30,10 +31,10 @@ struct Stream {
 struct Count {
   int whole = 0;
   int joined = 0;
-  int told = 0;  // joined ones between whose frames one of another number was heard
+  int told = 0;  // joined datagrams between whose frames the receiver heard a wrong sequence number
 };
 
-// A board sends, and one listens that hears each frame by chance.
+// A board sends, and a listener hears each frame with a certain probability.
 class LossyLine {
  public:
   explicit LossyLine(double loss) : lost_(loss) {}
@@ -43,7 +44,7 @@ class LossyLine {
     for (int number = 0; number < stream.datagrams; ++number) {
       const bool other = stream.other_every != 0 && number % stream.other_every == 0;
       const std::uint32_t size = other ? stream.other : length(chance_);
-      // Each is filled with one byte of its own: the next with the same is 251 later.
+      // Each datagram is filled with one byte; the same byte returns after 251 datagrams.
       std::memset(bytes_.data(), number % 251, size);
       send(size, number % 251);
       now_us_ += period_us;
@@ -82,8 +83,8 @@ class LossyLine {
     }
   }
 
-  // Do the frames heard since the last first frame count up from it? Those that no length allows are
-  // passed over (9.6.4.1).
+  // True if the frames heard since the last first frame count up from it. Frames of an invalid
+  // length are ignored (9.6.4.1).
   bool note(const CanFrame& frame, bool passed_over) {
     if (frame.data[0] >> 4 != static_cast<int>(IsotpFrameType::consecutive)) {
       next_ = 1;
@@ -113,9 +114,10 @@ class LossyLine {
   Count count_;
 };
 
-// No frame of another number is passed over within a datagram. What is left is a run of lost frames
-// over a border after which the numbers fit: its length is the frames of a datagram, less 16 (32 …)
-// if there are more. 18 frames are the worst: two lost ones suffice.
+// A wrong sequence number within a datagram is always noticed. The other case is a run of lost
+// frames over a border, after which the numbers fit. Its length is the number of frames of a
+// datagram, less 16 (32 …) if the datagram has more. 18 frames are the worst case: two lost frames
+// are enough.
 TEST(IsotpLoss, OnlyARunOfLostFramesOverABorderJoinsTwoDatagrams) {
   const struct {
     Stream stream;

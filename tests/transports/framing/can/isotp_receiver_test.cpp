@@ -36,19 +36,19 @@ IsotpReceiverOptions listening() {
   return options;
 }
 
-// A receiver in virtual time with a buffer of its own, on a bus that takes every frame at once.
+// A receiver with a buffer in virtual time, on a bus that accepts every frame at once.
 struct Receiver {
   explicit Receiver(const IsotpReceiverOptions& options, std::uint32_t capacity = 1024)
       : buffer(capacity, '\xEE'), isotp(options, buffer.data(), capacity) {}
 
-  // Hands in a frame. What was delivered is added to `datagrams`.
+  // Passes a frame to the receiver. Appends a complete datagram to `datagrams`.
   IsotpError take(const CanFrame& frame) {
     const IsotpArrival arrival = isotp.on_frame(frame, now);
     if (arrival.datagram) datagrams.emplace_back(isotp.text().data(), isotp.text().size());
     return arrival.error;
   }
   IsotpError take(const std::string& hex) { return take(frame_of(id, hex)); }
-  // The flow control that it sends now; empty: none.
+  // The flow control that the receiver sends now; empty if there is none.
   std::string answer() {
     CanFrame frame;
     if (!isotp.offer(now, frame)) return "";
@@ -65,7 +65,7 @@ struct Receiver {
   std::uint32_t now = 0;
 };
 
-// Every transfer that began ended in one way or is on its way; every frame was one thing.
+// Every transfer that began has one end or is under way; every frame is counted once.
 void expect_counters_add_up(const IsotpReceiver& receiver) {
   const IsotpReceiverCounters& c = receiver.counters();
   EXPECT_EQ(c.started, c.datagrams + c.send_timeout + c.consecutive_timeout +
@@ -90,8 +90,8 @@ TEST(IsotpReceiver, TakesSingleFramesOfEveryForm) {
       {"00 01 " + counting(10), 1},
       {"", 0},
       {"00", 0},
-      {"00 01 01", 0},                 // the escape belongs to longer frames
-      {"01", 0},                       // nothing follows
+      {"00 01 01", 0},                 // only longer frames use the escape
+      {"01", 0},                       // no data
       {"07 01 02 03 04 05 06", 0},     // too long by one
       {"08 01 02 03 04 05 06 07", 0},  //
       {"0F 01 02 03 04 05 06 07", 0},  //
@@ -99,7 +99,7 @@ TEST(IsotpReceiver, TakesSingleFramesOfEveryForm) {
       {"00 0B " + counting(10), 0},    // too long by one
       {"00 FF " + counting(62), 0},    //
       {"08 " + counting(11), 0},       // a long frame without the escape
-      {"00 07 " + counting(7), 0},     // no frame has 9 bytes
+      {"00 07 " + counting(7), 0},     // a frame cannot have 9 bytes
       {"40 01", 0},                    // reserved types
       {"F0 01 02 03 04 05 06 07", 0},  //
   };
@@ -134,7 +134,7 @@ TEST(IsotpReceiver, IgnoresFirstFramesThatCannotBe) {
     bool good;
   } cases[] = {
       {"10 08 01 02 03 04 05 06", true},
-      {"10 07 01 02 03 04 05 06", false},  // would fit a single frame
+      {"10 07 01 02 03 04 05 06", false},  // fits a single frame
       {"10 01 01 02 03 04 05 06", false},
       {"10 08 01 02 03 04 05", false},  // a first frame is never short
       {"10 08", false},
@@ -144,7 +144,7 @@ TEST(IsotpReceiver, IgnoresFirstFramesThatCannotBe) {
       {"10 3F " + counting(62), true},
       {"10 3E " + counting(62), false},
       {"10 00 00 00 10 00 01 02", true},
-      {"10 00 00 00 0F FF 01 02", false},  // needs no escape
+      {"10 00 00 00 0F FF 01 02", false},  // fits without the escape
       {"10 00 00 00 00 00 01 02", false},
   };
   for (const auto& c : cases) {
@@ -163,7 +163,7 @@ TEST(IsotpReceiver, JoinsFramesAndAnswersAsItWasTold) {
   Receiver receiver(options);
   EXPECT_EQ(receiver.take("10 1B 01 02 03 04 05 06"), IsotpError::none);
   EXPECT_EQ(receiver.answer(), "30 02 F3");
-  EXPECT_EQ(receiver.answer(), "") << "once";
+  EXPECT_EQ(receiver.answer(), "") << "only one flow control";
   EXPECT_EQ(receiver.take("21 07 08 09 0A 0B 0C 0D"), IsotpError::none);
   EXPECT_EQ(receiver.answer(), "");
   EXPECT_EQ(receiver.take("22 0E 0F 10 11 12 13 14"), IsotpError::none);
@@ -198,11 +198,12 @@ TEST(IsotpReceiver, SaysNothingWhenItListensOnly) {
   EXPECT_EQ(receiver.datagrams, std::vector<std::string>{counted(20)});
   EXPECT_EQ(receiver.take("10 15 01 02 03 04 05 06"), IsotpError::overflow);
   EXPECT_EQ(receiver.answer(), "");
-  EXPECT_EQ(receiver.counted(&IsotpReceiverCounters::frames), 4U) << "flow control is passed over";
+  EXPECT_EQ(receiver.counted(&IsotpReceiverCounters::frames), 4U)
+      << "a listener ignores flow control";
   expect_counters_add_up(receiver.isotp);
 }
 
-// 9.5.4, 9.6.4.1, 9.6.4.2: the first frame tells how long the others are.
+// 9.5.4, 9.6.4.1, 9.6.4.2: the first frame sets the length of the other frames.
 TEST(IsotpReceiver, ConsecutiveFramesAreAsLongAsTheFirst) {
   const std::string first = "10 1D " + counting(14);  // RX_DL 16: 29 = 14 + 15 bytes
   const struct {
@@ -211,8 +212,8 @@ TEST(IsotpReceiver, ConsecutiveFramesAreAsLongAsTheFirst) {
   } cases[] = {
       {first, "21 " + counting(15, 15), IsotpError::none},
       {first, "21 " + counting(11, 15), IsotpError::malformed},  // too short
-      {first, "21 " + counting(19, 15), IsotpError::malformed},  // longer than the first
-      {"10 0F " + counting(14), "21 0F", IsotpError::none},      // only the last may be shorter
+      {first, "21 " + counting(19, 15), IsotpError::malformed},  // longer than the first frame
+      {"10 0F " + counting(14), "21 0F", IsotpError::none},  // only the last frame may be shorter
       {"10 0F " + counting(14), "21 0F CC CC", IsotpError::none},
       {"10 0F " + counting(14), "21", IsotpError::malformed},
       {"10 1E " + counting(14), "21 " + counting(15, 15), IsotpError::none},
@@ -222,7 +223,8 @@ TEST(IsotpReceiver, ConsecutiveFramesAreAsLongAsTheFirst) {
     Receiver receiver(listening());
     EXPECT_EQ(receiver.take(c.size_29), IsotpError::none);
     EXPECT_EQ(receiver.take(c.frame), c.error) << c.frame;
-    EXPECT_TRUE(c.error == IsotpError::none || receiver.isotp.busy()) << "it is ignored";
+    EXPECT_TRUE(c.error == IsotpError::none || receiver.isotp.busy())
+        << "a malformed frame is ignored";
     expect_counters_add_up(receiver.isotp);
   }
 }
@@ -248,8 +250,8 @@ TEST(IsotpReceiver, AnyOtherSequenceNumberEndsTheTransfer) {
   }
 }
 
-// The end of one transfer and the beginning of the next are lost: the numbers fit again, but for the
-// short frame between, which has no number that fits.
+// The end of one transfer and the beginning of the next are lost. The sequence numbers fit again,
+// except the number of the short frame between them.
 TEST(IsotpReceiver, AShortFrameOfAnotherNumberEndsTheTransferToo) {
   Receiver receiver(listening());
   receiver.take("10 19 61 61 61 61 61 61");
@@ -260,7 +262,8 @@ TEST(IsotpReceiver, AShortFrameOfAnotherNumberEndsTheTransferToo) {
   EXPECT_TRUE(receiver.datagrams.empty());
 
   receiver.take("10 19 61 61 61 61 61 61");
-  EXPECT_EQ(receiver.take("22 " + counting(11)), IsotpError::wrong_sequence_number) << "or longer";
+  EXPECT_EQ(receiver.take("22 " + counting(11)), IsotpError::wrong_sequence_number)
+      << "a longer frame ends the transfer, too";
   EXPECT_FALSE(receiver.isotp.busy());
   expect_counters_add_up(receiver.isotp);
 }
@@ -268,9 +271,10 @@ TEST(IsotpReceiver, AShortFrameOfAnotherNumberEndsTheTransferToo) {
 // 9.8.3
 TEST(IsotpReceiver, IgnoresConsecutiveFramesThatItDoesNotExpect) {
   Receiver receiver(controlled());
-  EXPECT_EQ(receiver.take("21 01"), IsotpError::unexpected_frame) << "no first frame";
+  EXPECT_EQ(receiver.take("21 01"), IsotpError::unexpected_frame) << "without a first frame";
   receiver.take("10 0A 01 02 03 04 05 06");
-  EXPECT_EQ(receiver.take("21 07 08 09 0A"), IsotpError::unexpected_frame) << "not cleared to send";
+  EXPECT_EQ(receiver.take("21 07 08 09 0A"), IsotpError::unexpected_frame)
+      << "before the flow control";
   receiver.answer();
   EXPECT_EQ(receiver.take("21 07 08 09 0A"), IsotpError::none);
   EXPECT_EQ(receiver.datagrams, std::vector<std::string>{counted(10)});
@@ -289,9 +293,10 @@ TEST(IsotpReceiver, ANewTransferReplacesAnUnfinishedOne) {
     EXPECT_EQ(receiver.datagrams, std::vector<std::string>{counted(10)});
 
     receiver.take("10 0A 61 62 63 64 65 66");
-    EXPECT_EQ(receiver.take("02 01 02"), IsotpError::interrupted) << "beside a datagram";
+    EXPECT_EQ(receiver.take("02 01 02"), IsotpError::interrupted)
+        << "reported together with the datagram";
     EXPECT_EQ(receiver.datagrams.back(), counted(2));
-    EXPECT_EQ(receiver.answer(), "") << "what was owed to the first is not owed to the second";
+    EXPECT_EQ(receiver.answer(), "") << "no flow control for the interrupted transfer";
     EXPECT_EQ(receiver.counted(&IsotpReceiverCounters::interrupted), 2U);
     EXPECT_EQ(receiver.take("10 07 01 02 03 04 05 06"), IsotpError::malformed);
     expect_counters_add_up(receiver.isotp);
@@ -310,25 +315,26 @@ TEST(IsotpReceiver, AMalformedFrameDoesNotInterrupt) {
   expect_counters_add_up(receiver.isotp);
 }
 
-// What arrived in time may be read late; meanwhile there may be other things to send.
+// A frame that arrives in time may be read late, and the receiver may be asked for a frame to send
+// before.
 TEST(IsotpReceiver, DoesNotGiveUpForBeingAskedForAFrameTooLate) {
   Receiver receiver(controlled());
   receiver.take("10 0A 01 02 03 04 05 06");
   EXPECT_EQ(receiver.answer(), "30 00 00");
   receiver.now = 2 * n_cr_us;
   EXPECT_EQ(receiver.answer(), "");
-  receiver.now = n_cr_us - 1;  // the stamp of the frame
+  receiver.now = n_cr_us - 1;  // the time stamp of the frame
   EXPECT_EQ(receiver.take("21 07 08 09 0A"), IsotpError::none);
   EXPECT_EQ(receiver.datagrams.size(), 1U);
   expect_counters_add_up(receiver.isotp);
 }
 
-// 9.8.2, N_Cr: from the flow control or the frame before.
+// 9.8.2, N_Cr: from the flow control or the last consecutive frame.
 TEST(IsotpReceiver, GivesUpWhenFramesStayAway) {
   for (const IsotpReceiverOptions& options : {controlled(), listening()}) {
     for (int frames = 0; frames < 3; ++frames) {
       Receiver receiver(options);
-      receiver.now = 0xFFFFF000;  // the time wraps under way
+      receiver.now = 0xFFFFF000;  // the time wraps during the transfer
       receiver.take("10 FF 01 02 03 04 05 06");
       receiver.answer();
       for (int i = 1; i <= frames; ++i) {
@@ -341,7 +347,7 @@ TEST(IsotpReceiver, GivesUpWhenFramesStayAway) {
       EXPECT_EQ(receiver.isotp.deadline().at_us, receiver.now + n_cr_us);
       EXPECT_EQ(receiver.isotp.poll(receiver.now + n_cr_us - 1), IsotpError::none);
       EXPECT_EQ(receiver.isotp.poll(receiver.now + n_cr_us), IsotpError::consecutive_timeout);
-      EXPECT_EQ(receiver.isotp.poll(receiver.now + n_cr_us), IsotpError::none) << "told once";
+      EXPECT_EQ(receiver.isotp.poll(receiver.now + n_cr_us), IsotpError::none) << "reported once";
       EXPECT_FALSE(receiver.isotp.deadline().armed);
       EXPECT_EQ(receiver.counted(&IsotpReceiverCounters::consecutive_timeout), 1U);
       expect_counters_add_up(receiver.isotp);
@@ -371,7 +377,7 @@ TEST(IsotpReceiver, GivesUpWhenTheBusDoesNotAcceptItsFlowControl) {
   CanFrame frame;
   EXPECT_TRUE(receiver.isotp.offer(0, frame));
   EXPECT_EQ(receiver.isotp.deadline().at_us, 20000U);
-  EXPECT_TRUE(receiver.isotp.offer(19999, frame)) << "the same, again";
+  EXPECT_TRUE(receiver.isotp.offer(19999, frame)) << "the same frame again";
   EXPECT_EQ(receiver.isotp.poll(20000), IsotpError::send_timeout);
   EXPECT_FALSE(receiver.isotp.offer(20000, frame));
   EXPECT_FALSE(receiver.isotp.busy());
@@ -395,7 +401,7 @@ TEST(IsotpReceiver, RefusesWhatIsLongerThanItsBuffer) {
     EXPECT_EQ(receiver.answer(), "");
     EXPECT_EQ(receiver.take("21 07 08 09 0A 0B 0C 0D"), IsotpError::unexpected_frame);
     EXPECT_EQ(receiver.counted(&IsotpReceiverCounters::overflow), 1U);
-    EXPECT_EQ(receiver.buffer, std::string(20, '\xEE')) << "nothing was written";
+    EXPECT_EQ(receiver.buffer, std::string(20, '\xEE')) << "the buffer is unchanged";
     expect_counters_add_up(receiver.isotp);
   }
 }
@@ -412,7 +418,8 @@ TEST(IsotpReceiver, AnOverflowInterruptsAndIsForgottenByTheNextTransfer) {
   receiver.take("10 15 01 02 03 04 05 06");
   CanFrame frame;
   EXPECT_TRUE(receiver.isotp.offer(0, frame));
-  EXPECT_EQ(receiver.isotp.poll(20000), IsotpError::send_timeout) << "nobody was told";
+  EXPECT_EQ(receiver.isotp.poll(20000), IsotpError::send_timeout)
+      << "the refusal did not reach the sender";
   EXPECT_EQ(receiver.counted(&IsotpReceiverCounters::refusal_timeout), 1U);
   EXPECT_FALSE(receiver.isotp.deadline().armed);
   expect_counters_add_up(receiver.isotp);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An ISO-TP sender in virtual time, as its tests drive it.
+// An ISO-TP sender in virtual time, for its tests.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -38,12 +38,12 @@ inline IsotpSenderOptions fd(std::uint8_t tx_dl) {
   return options;
 }
 
-// A sender in virtual time, on a bus that takes every frame at once.
+// A sender in virtual time, on a bus that accepts every frame at once.
 struct Sender : IsotpSender {
   explicit Sender(const IsotpSenderOptions& options, std::uint32_t start_us = 0)
       : IsotpSender(options), now(start_us) {}
 
-  // Takes what is offered now.
+  // Accepts all frames that the sender offers now.
   Frames take() {
     Frames frames;
     CanFrame frame;
@@ -68,7 +68,7 @@ struct Sender : IsotpSender {
   std::string bytes;
 };
 
-// Every transfer that began ended in one way or is on its way.
+// Every transfer that began has one end or is under way.
 inline void expect_counters_add_up(const IsotpSender& sender) {
   const IsotpSenderCounters& c = sender.counters();
   EXPECT_EQ(c.started, c.datagrams + c.send_timeout + c.flow_control_timeout + c.overflow +

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// By the clauses of ISO 15765-2:2016, 9.6.5: the gap between frames, and who asks for it.
+// By the clauses of ISO 15765-2:2016, 9.6.5: the gap between frames, requested by flow control or
+// by options.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -12,7 +13,7 @@
 namespace r4::test {
 namespace {
 
-// 9.6.5.6: block size and gap may change from flow control to flow control.
+// 9.6.5.6: each flow control may change block size and gap.
 TEST(IsotpSender, ObeysTheNewestFlowControl) {
   Sender sender(classic());
   sender.start(counted(6 + 7 * 6));
@@ -22,14 +23,15 @@ TEST(IsotpSender, ObeysTheNewestFlowControl) {
   sender.answer("30 02 00");
   EXPECT_EQ(sender.take().size(), 2U) << "at once, without a gap";
   sender.answer("30 00 F5");
-  EXPECT_EQ(sender.take().size(), 0U) << "the gap is to the frame before this flow control, too";
+  EXPECT_EQ(sender.take().size(), 0U)
+      << "the gap also begins at the frame before this flow control";
   EXPECT_EQ(sender.deadline().at_us, 500U);
   sender.now = 500;
   EXPECT_EQ(sender.take().size(), 1U);
   EXPECT_EQ(sender.deadline().at_us, 1000U);
 }
 
-// 9.6.5.4, 9.6.5.5: from the frame that was accepted to the next.
+// 9.6.5.4, 9.6.5.5: from the accepted frame to the next frame.
 TEST(IsotpSender, KeepsTheGapThatTheReceiverAsksFor) {
   for (int stmin = 0; stmin < 256; ++stmin) {
     const std::uint32_t gap_us = stmin <= 0x7F                    ? stmin * 1000U
@@ -47,7 +49,7 @@ TEST(IsotpSender, KeepsTheGapThatTheReceiverAsksFor) {
       continue;
     }
     for (int frame = 0; frame < 3; ++frame) {
-      EXPECT_EQ(sender.take().size(), 1U) << "the first without a gap";
+      EXPECT_EQ(sender.take().size(), 1U) << "the first frame has no gap";
       EXPECT_EQ(sender.deadline().at_us, sender.now + gap_us);
       CanFrame early;
       EXPECT_FALSE(sender.offer(sender.now + gap_us - 1, early));
@@ -77,17 +79,17 @@ TEST(IsotpSender, KeepsItsOwnGapWithoutFlowControlAndTheLongerOneWith) {
   }
 }
 
-// 9.6.5.4: STmin is between any two consecutive frames, whatever comes between them.
+// 9.6.5.4: STmin is the gap between any two consecutive frames, whatever frames are between them.
 TEST(IsotpSender, KeepsTheGapOverTheBorderOfABlock) {
   const struct {
-    std::uint32_t answered_us;  // after the frame before
+    std::uint32_t answered_us;  // after the last frame
     std::uint32_t due_us;
   } cases[] = {{0, 100000}, {1000, 100000}, {99999, 100000}, {100000, 100000}, {150000, 150000}};
   for (const auto& c : cases) {
     IsotpSenderOptions options = classic();
     options.n_bs_us = 200000;
     Sender sender(options, 0xFFFFFF80);
-    sender.start(counted(6 + 7 * 20));  // the numbers come to 1 again
+    sender.start(counted(6 + 7 * 20));  // the sequence number is 1 again
     sender.take();
     for (int frame = 0; frame < 20; ++frame) {
       const std::uint32_t before = sender.now;
@@ -99,13 +101,14 @@ TEST(IsotpSender, KeepsTheGapOverTheBorderOfABlock) {
         EXPECT_EQ(sender.offer(sender.now, early), c.answered_us == c.due_us) << frame;
         sender.now = before + c.due_us;
       }
-      EXPECT_EQ(sender.take().size(), 1U) << "the first without a gap";
+      EXPECT_EQ(sender.take().size(), 1U) << "the first frame has no gap";
     }
     EXPECT_FALSE(sender.busy());
   }
 }
 
-// The receiver's clock of frames may be ahead of ours: what answers may be stamped before it.
+// The time stamps of received frames may be ahead of our clock. So an answer may have an earlier
+// stamp than the frame that it answers.
 TEST(IsotpSender, KeepsTheGapAlsoIfFlowControlIsStampedBeforeTheFrameThatItFollows) {
   Sender sender(classic(), 1000);
   sender.start(counted(30));
@@ -117,7 +120,7 @@ TEST(IsotpSender, KeepsTheGapAlsoIfFlowControlIsStampedBeforeTheFrameThatItFollo
   EXPECT_EQ(sender.deadline().at_us, 101000U);
 }
 
-// A gap to a frame that still waits for the bus would be none on the wire.
+// A gap that begins before a frame is on the bus would be too short on the wire.
 TEST(IsotpSender, BeginsTheGapAnewWhenItsFrameGotToTheBusLate) {
   Sender sender(classic());
   sender.start(counted(40));
@@ -125,12 +128,12 @@ TEST(IsotpSender, BeginsTheGapAnewWhenItsFrameGotToTheBusLate) {
   sender.wait_anew(500);  // the first frame
   sender.now = 600;
   sender.answer("30 02 64");
-  EXPECT_EQ(sender.take().size(), 1U) << "the first without a gap";
+  EXPECT_EQ(sender.take().size(), 1U) << "the first frame has no gap";
   sender.wait_anew(90000);
   EXPECT_EQ(sender.deadline().at_us, 190000U);
   sender.now = 190000;
   EXPECT_EQ(sender.take().size(), 1U);
-  sender.wait_anew(200000);  // the last of its block
+  sender.wait_anew(200000);  // the last frame of its block
   sender.now = 201000;
   sender.answer("30 00 64");
   EXPECT_EQ(sender.deadline().at_us, 300000U);

@@ -12,7 +12,7 @@
 namespace r4::test {
 namespace {
 
-// 9.6.2.1, 10.4.2: what fits is one frame, in the shortest form.
+// 9.6.2.1, 10.4.2: a short datagram is one frame, in the shortest form.
 TEST(IsotpSender, ASingleFrameHoldsWhatFits) {
   IsotpSenderOptions padded = classic();
   padded.channel.padding = true;
@@ -62,12 +62,12 @@ TEST(IsotpSender, AFirstFrameTellsTheLength) {
   for (const auto& c : cases) {
     Sender sender(c.options);
     ASSERT_TRUE(sender.start(counted(c.size)));
-    EXPECT_EQ(sender.take(), Frames{c.frame}) << "and waits for flow control";
+    EXPECT_EQ(sender.take(), Frames{c.frame}) << "waits for flow control";
     EXPECT_TRUE(sender.busy());
   }
 }
 
-// 9.6.4.3: the first consecutive frame is 1, after 15 comes 0.
+// 9.6.4.3: the first consecutive frame has number 1; 0 follows 15.
 TEST(IsotpSender, ConsecutiveFramesCountModuloSixteen) {
   Sender sender(burst());
   ASSERT_TRUE(sender.start(std::string(6 + 7 * 17 + 1, 'x')));
@@ -76,7 +76,7 @@ TEST(IsotpSender, ConsecutiveFramesCountModuloSixteen) {
   for (std::size_t i = 1; i < frames.size(); ++i) {
     EXPECT_EQ(frames[i].substr(0, 2), std::string("2") + "0123456789ABCDEF"[i % 16]);
   }
-  EXPECT_EQ(frames.back(), "22 78") << "the last one as short as it can be";
+  EXPECT_EQ(frames.back(), "22 78") << "the last frame is as short as possible";
   EXPECT_EQ(sender.counters().frames, 19U);
 }
 
@@ -108,7 +108,7 @@ TEST(IsotpSender, BeginsOneTransferAtATimeAndNoEmptyOne) {
   EXPECT_EQ(sender.counters().started, 2U);
 }
 
-// A full queue costs time, never a frame.
+// A full queue delays frames, but does not lose them.
 TEST(IsotpSender, OffersTheSameFrameUntilItIsAccepted) {
   Sender sender(burst());
   sender.start(counted(20));
@@ -120,7 +120,7 @@ TEST(IsotpSender, OffersTheSameFrameUntilItIsAccepted) {
       EXPECT_EQ(hex_of(frame), expected);
     }
     sender.frame_sent(sender.now);
-    sender.frame_sent(sender.now);  // was accepted before: nothing
+    sender.frame_sent(sender.now);  // already accepted: no effect
   }
   EXPECT_EQ(sender.counters().datagrams, 1U);
   EXPECT_EQ(sender.counters().frames, 3U);
@@ -130,7 +130,7 @@ TEST(IsotpSender, OffersTheSameFrameUntilItIsAccepted) {
 TEST(IsotpSender, GivesUpAFrameThatTheBusDoesNotAccept) {
   for (const int accepted : {0, 1, 2}) {
     Sender sender(burst());
-    sender.now = 0xFFFFF000;  // the time wraps under way
+    sender.now = 0xFFFFF000;  // the time wraps during the transfer
     sender.start(counted(30));
     CanFrame frame;
     for (int i = 0; i < accepted; ++i) {
@@ -150,20 +150,22 @@ TEST(IsotpSender, GivesUpAFrameThatTheBusDoesNotAccept) {
   }
 }
 
-// What arrived in time may be read late; meanwhile there may be other things to send.
+// Flow control that arrives in time may be read late, and the sender may be asked for a frame
+// before.
 TEST(IsotpSender, DoesNotGiveUpForBeingAskedForAFrameTooLate) {
   Sender sender(classic());
   sender.start(counted(10));
   EXPECT_EQ(sender.take().size(), 1U);
   sender.now = 30000;
   EXPECT_TRUE(sender.take().empty());
-  sender.now = 19999;  // the stamp of the flow control
+  sender.now = 19999;  // the time stamp of the flow control
   EXPECT_EQ(sender.answer("30 00 00"), IsotpError::none);
   EXPECT_EQ(sender.take().size(), 1U);
   expect_counters_add_up(sender);
 }
 
-// 9.6.5.3: flow control after the first frame and after each block of BS frames but the last.
+// 9.6.5.3: flow control after the first frame and after each block of BS frames, but not after the
+// last block.
 TEST(IsotpSender, SendsBlocksAsLongAsTheReceiverSays) {
   const struct {
     std::string flow_control;
@@ -218,7 +220,7 @@ TEST(IsotpSender, WaitsAnewWhenItsFrameGotToTheBusLate) {
   sender.now = 34999;
   EXPECT_EQ(sender.answer("30 00 7F"), IsotpError::none);
   sender.wait_anew(40000);
-  EXPECT_EQ(sender.deadline().at_us, 34999U) << "it waits for nobody";
+  EXPECT_EQ(sender.deadline().at_us, 34999U) << "no answer is awaited";
   EXPECT_EQ(sender.take().size(), 1U);
 }
 
@@ -229,7 +231,7 @@ TEST(IsotpSender, WaitsWhenToldToButNotForEver) {
   Sender sender(options);
   sender.start(counted(6 + 7 * 3));
   sender.take();
-  for (int block = 0; block < 2; ++block) {  // the limit is for waits in a row
+  for (int block = 0; block < 2; ++block) {  // the limit is for consecutive waits
     for (int i = 0; i < 3; ++i) {
       sender.now += 19999;
       EXPECT_EQ(sender.answer("31 00 00"), IsotpError::none);
@@ -263,7 +265,7 @@ TEST(IsotpSender, TellsBadFlowControlApart) {
        &IsotpSenderCounters::invalid_flow_status},
       {"30", IsotpError::malformed, false, &IsotpSenderCounters::malformed},
       {"30 00", IsotpError::malformed, false, &IsotpSenderCounters::malformed},
-      {"30 00 00 00 00 00 00 00 00", IsotpError::malformed, false,  // no frame has 9 bytes
+      {"30 00 00 00 00 00 00 00 00", IsotpError::malformed, false,  // a frame cannot have 9 bytes
        &IsotpSenderCounters::malformed},
   };
   for (const auto& c : cases) {
@@ -277,7 +279,7 @@ TEST(IsotpSender, TellsBadFlowControlApart) {
     expect_counters_add_up(sender);
     if (!c.ends) {
       sender.answer("30 00 00");
-      EXPECT_EQ(sender.take().size(), 4U) << "a good one is still obeyed";
+      EXPECT_EQ(sender.take().size(), 4U) << "a valid flow control is still obeyed";
     }
   }
 }
@@ -292,7 +294,7 @@ TEST(IsotpSender, IgnoresFlowControlThatItDoesNotWaitFor) {
   sender.take();
   EXPECT_EQ(sender.answer("32 00 00"), IsotpError::unexpected_frame) << "between two frames";
   EXPECT_TRUE(sender.busy());
-  EXPECT_EQ(sender.deadline().at_us, 127000U) << "the gap is as it was";
+  EXPECT_EQ(sender.deadline().at_us, 127000U) << "the gap is unchanged";
   EXPECT_EQ(sender.counters().unexpected_frame, 3U);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Sender and receiver joined frame by frame in virtual time. A failure prints RC_PARAMS with its
-// seed; the same RC_PARAMS in the environment runs it again.
+// seed. To run it again, set the same RC_PARAMS in the environment.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 #include <rapidcheck/gtest.h>
@@ -40,7 +40,7 @@ Options burst(std::uint8_t tx_dl = 8) {
   return options;
 }
 
-// Everything that can be chosen, of the ends together.
+// Random options that fit for both ends.
 rc::Gen<Options> any_options() {
   return rc::gen::exec([] {
     Options options;
@@ -57,12 +57,12 @@ rc::Gen<Options> any_options() {
     options.receiver.listen_only = !options.sender.flow_control;
     options.receiver.block_size = *rc::gen::arbitrary<std::uint8_t>();
     options.receiver.stmin = *rc::gen::arbitrary<std::uint8_t>();
-    options.receiver.n_cr_us = 200000;  // more than any gap that STmin can ask for
+    options.receiver.n_cr_us = 200000;  // longer than any gap that STmin can request
     return options;
   });
 }
 
-// What the sender puts on the bus without anybody answering.
+// The frames that the sender puts on the bus without an answer.
 std::vector<CanFrame> frames_of(const Options& options, const std::string& datagram) {
   IsotpSender sender(options.sender);
   std::vector<CanFrame> frames;
@@ -76,7 +76,7 @@ std::vector<CanFrame> frames_of(const Options& options, const std::string& datag
   return frames;
 }
 
-// What comes of the frames, one every `step_us`.
+// The result of receiving the frames, one every `step_us`.
 struct Received {
   Datagrams datagrams;
   IsotpReceiverCounters counters;
@@ -99,7 +99,7 @@ Received receive(const Options& options, const std::vector<CanFrame>& frames,
   return outcome;
 }
 
-// Both ends on one bus, with whatever happens to their frames.
+// Both ends on one bus that may refuse or lose frames.
 class IsotpBus {
  public:
   IsotpBus(const Options& options, std::uint32_t capacity)
@@ -107,7 +107,8 @@ class IsotpBus {
         buffer_(capacity, '\0'),
         receiver(options.receiver, buffer_.data(), capacity) {}
 
-  // Runs one transfer to its end. `refuses()`: the bus has no room; `loses()`: the frame is gone.
+  // Runs one transfer to its end. `refuses()`: the bus has no room. `loses()`: the bus loses the
+  // frame.
   template <class Refuses, class Loses>
   Datagrams transfer(const std::string& datagram, Refuses refuses, Loses loses) {
     Datagrams datagrams;
@@ -135,7 +136,7 @@ class IsotpBus {
   IsotpSender sender;
 
  private:
-  // To the next deadline, or a little if somebody has a frame that the bus refuses.
+  // To the next deadline, or 200 us if the bus refuses a frame.
   void advance() {
     std::uint32_t wait = 200;
     const IsotpDeadline deadlines[] = {sender.deadline(), receiver.deadline()};
@@ -153,7 +154,7 @@ class IsotpBus {
 
  public:
   IsotpReceiver receiver;
-  std::uint32_t now = 0xFFFF0000;  // wraps in the long ones
+  std::uint32_t now = 0xFFFF0000;  // wraps during long transfers
 };
 
 RC_GTEST_PROP(Isotp, AnyDatagramArrivesByteForByte, ()) {
@@ -177,7 +178,8 @@ RC_GTEST_PROP(Isotp, AnyDatagramArrivesByteForByte, ()) {
   RC_ASSERT(c.unexpected_frame + c.malformed == 0U);
 }
 
-// Not chance: every length, every frame length, both formats of padding, no flow control.
+// Every length, every frame length and both formats of padding, without flow control and without
+// random values.
 TEST(Isotp, EveryLengthInEveryFrameLengthArrives) {
   const std::uint8_t lengths[] = {8, 12, 16, 20, 24, 32, 48, 64};
   for (const std::uint8_t tx_dl : lengths) {
@@ -229,7 +231,8 @@ RC_GTEST_PROP(Isotp, WithFlowControlALossCostsTheDatagramAndIsToldOf, ()) {
   RC_ASSERT(r.started == r.datagrams + r.consecutive_timeout + r.wrong_sequence_number);
 }
 
-// Within one transfer: loss of any frames; doubling and overtaking within fewer than 16.
+// Within one transfer: any frames may be lost; frames may be duplicated or overtaken by fewer than
+// 16 numbers.
 RC_GTEST_PROP(Isotp, DamageToTheOrderOfFramesGivesTheBytesOrNothing, ()) {
   const Options options = burst(*rc::gen::element<std::uint8_t>(8, 8, 12, 20, 64));
   const auto size = static_cast<std::size_t>(*rc::gen::inRange(1, 1025));
@@ -289,16 +292,16 @@ RC_GTEST_PROP(Isotp, AListenerInALossyStreamHearsWhatWasSentOrNothing, ()) {
   }
 }
 
-// The exception that the header names: the numbers fit again over the border of two transfers.
+// The exception that the header describes: the numbers fit again over the border of two transfers.
 TEST(Isotp, WithoutFlowControlLossOverABorderCanJoinTwoDatagrams) {
   const struct {
     std::size_t size, kept;
-    std::size_t lost;  // frames in a row, the second first frame among them
+    std::size_t lost;  // consecutive frames, including the second first frame
   } cases[] = {
       {6 + 7 * 15, 10, 16},  // transfers of 16 frames
-      {6 + 7 * 31, 20, 16},  // of 32
+      {6 + 7 * 31, 20, 16},  // transfers of 32 frames
       {6 + 7 * 31, 20, 32},  //
-      {170, 20, 9},          // of 25
+      {170, 20, 9},          // transfers of 25 frames
       {170, 18, 25},         //
   };
   for (const auto& c : cases) {
@@ -312,10 +315,10 @@ TEST(Isotp, WithoutFlowControlLossOverABorderCanJoinTwoDatagrams) {
     const Received joined = receive(burst(), frames);
     const std::size_t of_first = 6 + 7 * (c.kept - 1);
     EXPECT_EQ(joined.datagrams, Datagrams{first.substr(0, of_first) + second.substr(of_first)})
-        << "what the CRC of the datagram is for";
+        << "only the CRC of the datagram detects this";
 
     Options patient = burst();
-    patient.receiver.n_cr_us = 100;  // a pause between transfers that N_Cr is shorter than
+    patient.receiver.n_cr_us = 100;  // shorter than the pause between the transfers
     EXPECT_EQ(receive(patient, frames).datagrams, Datagrams{});
   }
 }

@@ -27,7 +27,7 @@ using test::str;
 using test::with_crc;
 using Bytes = std::vector<std::uint8_t>;
 
-// Empty if it travels plain.
+// Empty if the datagram travels as plain text.
 Bytes packed_bytes(const std::string& datagram, std::size_t capacity = max_datagram) {
   Bytes bytes(max_datagram, 0xEE);
   bytes.resize(pack(datagram, bytes.data(), capacity));
@@ -46,7 +46,8 @@ std::string hex(const Bytes& bytes) {
   return text;
 }
 
-// How many classic frames ISO-TP needs: one of up to 7 bytes, else 6 and then 7 in each.
+// The number of classic frames in ISO-TP: one frame for up to 7 bytes, otherwise 6 bytes and then 7
+// in each.
 std::size_t frames(std::size_t size) { return size <= 7 ? 1 : 1 + (size - 6 + 6) / 7; }
 
 std::string fields_of(FieldSet set, const State& state) {
@@ -56,7 +57,7 @@ std::string fields_of(FieldSet set, const State& state) {
   return str(writer.finish(state.pnum, state.t_ms));
 }
 
-// What a board that works reports a day after it was switched on.
+// A state of a busy board, a day after it was switched on.
 State busy_state() {
   State state;
   const std::int32_t volts[] = {2631, 1207, 503, 1198, 97, 330};
@@ -100,8 +101,8 @@ TEST(PackedForm, EveryCapturedStateFits25BytesAndComesBack) {
   std::sort(states.begin(), states.end());
   fmt::print("captured states: median {}, at most {} bytes = {} classic frames\n",
              states[states.size() / 2], states.back(), frames(states.back()));
-  EXPECT_LE(states[states.size() / 2], 48U);  // the promise
-  EXPECT_EQ(states.back(), 25U);              // what it is
+  EXPECT_LE(states[states.size() / 2], 48U);  // the documented limit
+  EXPECT_EQ(states.back(), 25U);              // the actual size
 }
 
 TEST(PackedForm, IsTheDocumentsExampleByteForByte) {
@@ -109,7 +110,7 @@ TEST(PackedForm, IsTheDocumentsExampleByteForByte) {
             "911d0a134f297c4bc2004bb10671fff03212c77d0ff07cfd9a");
 }
 
-// --- sizes of everything that travels
+// --- the size of every kind of datagram
 
 TEST(PackedForm, EveryKindOfDatagramIsCompact) {
   const State state = busy_state();
@@ -196,7 +197,8 @@ TEST(PackedForm, TheTableHasEveryNameAndWordOfTheProtocol) {
       continue;
     }
     if (i < static_cast<int>(packed::state_words)) {
-      EXPECT_EQ(code, static_cast<unsigned>(i)) << str(name) << ": the code of its place";
+      EXPECT_EQ(code, static_cast<unsigned>(i))
+          << str(name) << "the code must be the index in the table";
     }
     EXPECT_EQ(packed::words[code].form == PackedForm::text,
               name == Text("FAULT") || name == Text("I2CBUS"))
@@ -228,7 +230,7 @@ TEST(PackedForm, EveryWordHasOneCode) {
   }
 }
 
-// --- what travels plain
+// --- datagrams that travel as plain text
 
 TEST(PackedForm, WhatIsNotExactlyADatagramAsWritersPrintItTravelsPlain) {
   const std::string good = "O:358,1,1;PNum:66;T:1699276044383;";
@@ -275,7 +277,7 @@ TEST(PackedForm, ATooSmallBufferMeansPlainAndIsNotOverrun) {
   }
 }
 
-// --- values at their edges
+// --- limits of values
 
 TEST(PackedForm, ValuesAtTheEdgesOfTheirFormsComeBack) {
   const std::string long_enough = "AIN6:1.00;RXOK:100000000;RXLOST:100000000;RXDUP:1000000;";
@@ -391,7 +393,7 @@ rc::Gen<std::string> any_values() {
                    [](const auto& pair) { return pair.first + '.' + pair.second; }));
 }
 
-// Mostly with a beginning or an end that has a layout.
+// Most datagrams begin or end with fields that have a layout.
 rc::Gen<std::string> any_datagram() {
   return rc::gen::exec([] {
     static const std::string captured = test::captured_state();
@@ -442,7 +444,7 @@ RC_GTEST_PROP(PackedForm, AnyBytesUnpackSafelyToTheGrammarOrARefusal, ()) {
   RC_ASSERT(result.size <= capacity);
   RC_ASSERT(static_cast<bool>(result) == (result.size != 0));
   if (!result) return;
-  // With the right checksum it would be a datagram, unless a PNum or T is out of range.
+  // With the right checksum the result is a datagram, unless a PNum or T is out of range.
   out.resize(result.size);
   Datagram datagram;
   const ReadResult read_result = read_datagram(out, datagram);
@@ -466,12 +468,12 @@ TEST(PackedForm, MalformedBytesAreRefusedWithTheirReason) {
   EXPECT_EQ(error(good, test::captured_state().size()), UnpackError::none);
   EXPECT_EQ(error({'O', ':', '1', ',', '0', ',', '1'}), UnpackError::version);
   EXPECT_EQ(error({0xC0, 0, 0, 0, 0, 0}), UnpackError::version);
-  EXPECT_EQ(error({0xB8, 0, 0, 0, 0, 0}), UnpackError::syntax);  // of a session, and too short
+  EXPECT_EQ(error({0xB8, 0, 0, 0, 0, 0}), UnpackError::syntax);  // has a session, but is too short
   EXPECT_EQ(error({0x80, 0, 0, 0, 0}), UnpackError::syntax);     // no field
   EXPECT_EQ(error({0x81, 0x3B, 0x1D, 0, 0, 0, 0}), UnpackError::syntax);  // a size without numbers
   EXPECT_EQ(error({0x80, 0x3B, 0x1D, 0, 0, 0, 0}), UnpackError::none);    // O:1
-  EXPECT_EQ(error({0x80, 0x3B, 0x11, 0, 0, 0, 0}), UnpackError::syntax);  // a text without end
-  EXPECT_EQ(error({0x80, 0x72, 0x1D, 0, 0, 0, 0}), UnpackError::syntax);  // no such code
+  EXPECT_EQ(error({0x80, 0x3B, 0x11, 0, 0, 0, 0}), UnpackError::syntax);  // a text without an end
+  EXPECT_EQ(error({0x80, 0x72, 0x1D, 0, 0, 0, 0}), UnpackError::syntax);  // an unknown code
   EXPECT_EQ(error({0x80, 0x3B, 0xE1, 0x3B, 0xDF, 0, 0, 0, 0}), UnpackError::syntax);  // a ';'
   EXPECT_EQ(error({0x80, 0x3B, 0xE1, 0x78, 0xDF, 0, 0, 0, 0}), UnpackError::none);    // an 'x'
   EXPECT_EQ(error({0x80, 0x3B, 0xE1, 0x78, 0xD0, 0, 0, 0, 0}), UnpackError::syntax);  // the filler
@@ -487,7 +489,7 @@ TEST(PackedForm, FullOfWordsItDoesNotUnpackToMoreThanADatagram) {
 
 // --- damage
 
-// What the reader above makes of damaged bytes.
+// The result of unpacking damaged bytes.
 enum class Fate { refused, same, other };
 Fate fate_of(const Bytes& damaged, const std::string& original) {
   char out[max_datagram];
@@ -541,7 +543,7 @@ RC_GTEST_PROP(PackedForm, NoDamageMakesAnotherDatagram, ()) {
   }
 }
 
-// What lost frames on a bus can do: the beginning of one datagram, the end of another.
+// Lost frames on a bus can join the beginning of one datagram and the end of another.
 TEST(PackedForm, NoTwoDatagramsSplicedAtAFrameMakeAThird) {
   std::vector<std::string> lines;
   for (const test::CapturedLine& line : paper_capture()) {

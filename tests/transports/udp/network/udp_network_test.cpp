@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A UDP host whose network goes and comes: in a network of the test's own (network_namespaces(7)),
-// each test in a process of its own, because a process cannot come back from there.
+// A UDP host whose network disappears and returns. Each test runs in a separate network
+// (network_namespaces(7)) and in a separate process, because a process cannot leave such a network.
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ bool enter_a_network_of_our_own() {
   return ::unshare(CLONE_NEWNET) == 0 || ::unshare(CLONE_NEWUSER | CLONE_NEWNET) == 0;
 }
 
-// Gives an interface of that network, the loopback or an alias of it, an address, or takes it away.
+// Sets or removes the address of an interface of that network, the loopback or its alias.
 bool set_address(const char* interface, const char* dotted) {
   const FileDescriptor control(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   ifreq request{};
@@ -78,7 +78,7 @@ int lose_and_regain_the_network() {
   if (!run_until(io, [&] { return at_board.has("3"); })) return 22;
   if (host->counters().downs != 1 || host->counters().ups != 2) return 23;
 
-  if (!set_loopback(false)) return 24;  // and nothing is sent
+  if (!set_loopback(false)) return 24;  // this time the host sends nothing
   const auto lost_again = Clock::now();
   if (!run_until(io, [&] { return at_host.count(Kind::down) == 2; })) return 25;
   if (at_host.last(Kind::down)->when - lost_again > std::chrono::milliseconds(50)) return 26;
@@ -89,7 +89,7 @@ TEST(UdpNetwork, IsReportedWhenLostAndComesBackByItself) {
   EXPECT_EQ(run_in_child(lose_and_regain_the_network), 0);
 }
 
-// Two boards at one port of the host, and the second's network is lost for half a second.
+// Two boards at one port of the host. The network of the second board is lost for half a second.
 int lose_the_network_of_the_second() {
   if (!enter_a_network_of_our_own() || !set_loopback(true)) return 10;
   if (!set_second(true)) return 11;
@@ -128,7 +128,7 @@ TEST(UdpNetwork, OfASecondBoardIsLostAndTheFirstIsHeardAllTheWhile) {
   EXPECT_EQ(run_in_child(lose_the_network_of_the_second), 0);
 }
 
-// The host sends from an address of this computer that is taken away.
+// The address of this computer from which the host sends is removed.
 int lose_the_address_that_is_sent_from() {
   if (!enter_a_network_of_our_own() || !set_loopback(true) || !set_second(true)) return 10;
   asio::io_context io;
@@ -149,16 +149,18 @@ TEST(UdpNetwork, TellsWhichAddressOfThisComputerIsGone) {
   EXPECT_EQ(run_in_child(lose_the_address_that_is_sent_from), 0);
 }
 
-// ThreadSanitizer lets no child of a program with threads start a thread, as a lookup does.
+// ThreadSanitizer does not allow a child of a program with threads to start a thread, as a lookup
+// does.
 #ifndef __SANITIZE_THREAD__
-// The board has moved when the network of its old address is gone. The host follows it.
+// The board moves to a new address while the network of its old address is lost. The host follows
+// it.
 int follow_the_board_out_of_a_lost_network() {
   if (!enter_a_network_of_our_own() || !set_loopback(true) || !set_second(true)) return 10;
   asio::io_context io;
   Recorder at_board, at_host;
   const auto moved = std::make_shared<std::atomic<bool>>(false);
   HostLookup lookup;
-  lookup.resolve = [moved](const std::string&) {  // in a thread that may outlive the test
+  lookup.resolve = [moved](const std::string&) {  // runs in a thread that may outlive the test
     FoundHost found;
     found.addresses = {asio::ip::make_address(*moved ? "127.0.0.1" : second_address)};
     return found;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Boards on the loopback that answer every datagram, each at an address of its own and all at one
-// port. They have a thread, because a search blocks.
+// Boards on the loopback that answer every datagram, each at a different address and all at one
+// port. They run in a thread, because a search blocks.
 #pragma once
 
 #include <asio/executor_work_guard.hpp>
@@ -39,8 +39,8 @@ class AnsweringBoards {
   AnsweringBoards(const AnsweringBoards&) = delete;
   AnsweringBoards& operator=(const AnsweringBoards&) = delete;
 
-  // Adds a board at 127.0.<address>, such as "0.2". It sends all `answers` to each question from
-  // number `first` on. Replaces a board at that address.
+  // Adds a board at 127.0.<address>, such as "0.2"; replaces a board at that address. It answers
+  // each question from number `first` on with all `answers`.
   void add(const std::string& address, Answers answers, int first = 1) {
     on_thread([&] {
       boards_.erase(address);
@@ -53,7 +53,7 @@ class AnsweringBoards {
       boards_[address] = std::move(board);
     });
   }
-  // Another port of that address answers before the board does.
+  // Answers from another port of that address before the board answers.
   void add_elsewhere(const std::string& address, const std::string& answer) {
     on_thread([&] {
       boards_.at(address)->elsewhere = answer;
@@ -69,7 +69,7 @@ class AnsweringBoards {
 
   std::uint16_t port() const { return port_; }
 
-  // A short search at the addresses of these boards and at `others`.
+  // A short search at the addresses of these boards and of `others`.
   BoardSearch search(const std::vector<std::string>& others = {}) {
     BoardSearch search;
     search.port = port_;
@@ -107,7 +107,7 @@ class AnsweringBoards {
     board.socket.async_receive_from(
         asio::buffer(board.buffer), board.asker,
         [this, &board](const asio::error_code& error, std::size_t) {
-          if (error) return;  // `board` may be gone
+          if (error) return;  // the board may be deleted
           if (++board.asked >= board.first) {
             asio::error_code ignored;
             if (!board.elsewhere.empty()) {

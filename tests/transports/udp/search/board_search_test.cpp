@@ -54,7 +54,7 @@ TEST(BoardSearch, ReportsTheAnswerAndTheAddressOfEachBoard) {
       EXPECT_EQ(each.name, "");
       EXPECT_EQ(each.busy, false);
     } else {
-      EXPECT_FALSE(each.busy) << "it does not tell";
+      EXPECT_FALSE(each.busy) << "the answer does not include BUSY";
     }
   }
 }
@@ -82,7 +82,7 @@ TEST(BoardSearch, SendsOnlyTheIdentityQuestion) {
   asio::ip::udp::endpoint from;
   const std::size_t size = socket.receive_from(asio::buffer(buffer), from);
   EXPECT_EQ(std::string(buffer, size), with_crc("Q:ID;"));
-  EXPECT_NE(from.port(), 2390) << "a program that has that port may search";
+  EXPECT_NE(from.port(), 2390) << "the search must leave that port to other programs";
 }
 
 TEST(BoardSearch, IgnoresEverythingButAnswersOfBoards) {
@@ -114,15 +114,15 @@ TEST(BoardSearch, KeepsOnly64OfACrowdAndSaysSo) {
   for (int i = 1; i <= 100; ++i) {
     boards.add("1." + std::to_string(i), {identity("crowd-" + std::to_string(i))});
   }
-  boards.add("2.1", {identity("wanted")}, 3);  // the last to answer
+  boards.add("2.1", {identity("wanted")}, 3);  // answers last
   const BoardSearch search = boards.search();
   const BoardSearch::Result found = search.run();
   EXPECT_EQ(found.boards.size(), BoardSearch::most_boards);
   EXPECT_TRUE(found.more);
   const BoardSearch::Result one = search.run("wanted");
-  EXPECT_EQ(ids(one), std::vector<std::string>{"wanted"}) << "a crowd does not hide it";
+  EXPECT_EQ(ids(one), std::vector<std::string>{"wanted"}) << "many other boards do not hide it";
   EXPECT_FALSE(one.more);
-  EXPECT_EQ(one.others, BoardSearch::most_boards) << "they are not counted for ever";
+  EXPECT_EQ(one.others, BoardSearch::most_boards) << "the count of other boards has a limit";
 }
 
 TEST(BoardSearch, KeepsTheFirstAnswerOfEachAddressAndEndsInTimeHoweverMuchComes) {
@@ -141,7 +141,7 @@ TEST(BoardSearch, CountsABoardOnceThatListensOnAllAddressesOfThisComputer) {
   boards.add("0.2", {identity("sim-1")});
   boards.add("0.3", {identity("sim-1")});
   BoardSearch search = boards.search();
-  EXPECT_EQ(search.run().boards.size(), 2U) << "two, of the same id";
+  EXPECT_EQ(search.run().boards.size(), 2U) << "two boards of the same id";
   search.networks = [] {
     const auto own = [](const char* address) {
       return BoardSearch::Network{"lo", 0, asio::ip::make_address_v4(address),
@@ -162,7 +162,7 @@ TEST(BoardSearch, ReportsWhyItCannotAsk) {
   };
   const BoardSearch::Result found = search.run();
   ASSERT_EQ(found.networks.size(), 1U);
-  EXPECT_NE(found.networks[0].trouble, "") << "the address is not of this computer";
+  EXPECT_NE(found.networks[0].trouble, "") << "this computer does not have the address";
   const FoundHost none = find_board(search, {});
   ASSERT_TRUE(none.problem);
   EXPECT_NE(none.problem->reason.find("nothing can be sent (gone0: "), std::string::npos)
@@ -221,7 +221,7 @@ TEST(FindBoard, DoesNotChooseBetweenTwoOfOneName) {
   EXPECT_NE(found.problem->fix.find("udp:?id=one"), std::string::npos) << found.problem->fix;
   EXPECT_NE(found.problem->fix.find("udp:?id=two"), std::string::npos) << found.problem->fix;
   const FoundHost again = find_board(boards.search(), {"left", "two"});
-  EXPECT_FALSE(again.problem) << "it is known which one it has been";
+  EXPECT_FALSE(again.problem) << "the id of the last board is known";
   EXPECT_EQ(again.addresses.at(0).to_string(), "127.0.0.3");
 }
 
@@ -229,7 +229,8 @@ TEST(FindBoard, TheOnlyOneIsNotReplacedByAnotherButABoardOfThatNameIs) {
   AnsweringBoards boards;
   boards.add("0.2", {identity("one", "NAME:left;")});
   EXPECT_TRUE(find_board(boards.search(), {"", "gone"}).problem);
-  EXPECT_TRUE(find_board(boards.search(), {"", "left"}).problem) << "that was an id";
+  EXPECT_TRUE(find_board(boards.search(), {"", "left"}).problem)
+      << "'left' is a name, but an id is wanted";
   EXPECT_FALSE(find_board(boards.search(), {"left", "gone"}).problem);
 }
 

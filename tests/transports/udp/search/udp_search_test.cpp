@@ -18,7 +18,7 @@ class UdpSearchTest : public testing::Test {
  protected:
   UdpSearchTest() { lookup.retry = lookup.silence = milliseconds(20); }
 
-  // Not open. Boards may be at `places`.
+  // Makes a host that is not open. It searches for boards at `places`.
   void make(const std::string& url, const std::vector<std::string>& places = {"0.2", "0.3"}) {
     BoardSearch search = boards.search();
     search.patience = milliseconds(60);
@@ -37,7 +37,7 @@ class UdpSearchTest : public testing::Test {
   void open_in_loop() {
     asio::post(io, [this] { host->open(at_host); });
   }
-  // True if that board answers this host.
+  // True if the given board answers this host.
   bool has_link(const std::string& id) {
     const std::size_t before = at_host.datagrams.size();
     host->send(with_crc("Q:ID;"), Priority::normal);
@@ -90,7 +90,7 @@ TEST_F(UdpSearchTest, InAHandlerOfTheLoopItIsDownUntilTheBoardIsThere) {
   EXPECT_EQ(at_host.last(Kind::down)->problem.reason, "no R4 board answered (asked on lo)");
   EXPECT_EQ(host->send("too early", Priority::normal), SendResult::down);
   run_for(io, milliseconds(300));
-  EXPECT_EQ(at_host.count(Kind::down), 1U) << "told once";
+  EXPECT_EQ(at_host.count(Kind::down), 1U) << "reported once";
   boards.add("0.3", {identity("one")});
   ASSERT_TRUE(run_until(io, [&] { return at_host.count(Kind::up) == 1; }));
   EXPECT_TRUE(has_link("one"));
