@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// E:STOP while the loop is busy: it is heard in the interrupt that receives it, and obeyed at once.
+// E:STOP while the loop is busy: the interrupt or thread that receives it hears it, and the board
+// obeys at once.
 #include "bench.hpp"
 
 namespace r4::test {
