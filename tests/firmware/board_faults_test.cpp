@@ -326,7 +326,7 @@ TEST(BoardHardware, NothingThatWasStillToBeWrittenComesAfterASafeStateThatTheBus
       bench.apply(full(), polls);
       bench.board.bus.hold_after(after, 1000);
       bench.hardware.make_safe();
-      const bool told = after > 3;  // the first transfer reaches the PWM chips
+      const bool told = after > 3;  // true: the PWM chips got the first transfer
       bench.board.bus.clear_errors();
       for (int ms = 0; ms < 200; ++ms) {
         bench.run(1);

@@ -71,9 +71,9 @@ TEST(Executor, ClosingTheMotorSupplyMovesNothing) {
   EXPECT_EQ(outputs.osmc[3].pwm, 0);
   EXPECT_EQ(outputs.dhb12[1].pwm, 0);
   EXPECT_EQ(outputs.bldc[2].speed, 0);
-  EXPECT_FALSE(outputs.bldc[2].brake) << "a DAC may be the throttle of a motor";
+  EXPECT_FALSE(outputs.bldc[2].brake) << "a brake stays as it is";
   EXPECT_FALSE(outputs.stepper[0].enabled);
-  EXPECT_EQ(outputs.dac_mv[0], 0) << "the throttle of a motor of its own, perhaps";
+  EXPECT_EQ(outputs.dac_mv[0], 0) << "a DAC may be the throttle of a motor";
   EXPECT_EQ(outputs.servo_us[0], 1500) << "relay 1 does not supply the servos";
   EXPECT_EQ(outputs.relays, 0b11);
 

@@ -91,7 +91,7 @@ class GigaBench {
       next += 100;
     }
   }
-  // Runs the board until `done`, and gives the firmware's threads time. True if it was done.
+  // Runs the board until `done`, and gives the firmware's threads time. True if that happened in time.
   bool run_until(const std::function<bool()>& done) {
     for (int i = 0; i < 20000; ++i) {
       if (done()) return true;

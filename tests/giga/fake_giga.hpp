@@ -256,7 +256,7 @@ class Giga {
   int interrupts = 0;
   std::map<int, std::function<void(bool)>> edges;  // PinName to the function for an edge
   bool flag = false;
-  bool core_error = false;  // a fatal one
+  bool core_error = false;  // a fatal error
   int isr_queue = 0;        // requests of the running interrupt to the core
   [[noreturn]] void reset();
   void connect_registers();

@@ -186,7 +186,8 @@ TEST(I2cController, ATransferThatLostTheBusIsRepeatedOnce) {
   }
 }
 
-// An interrupt at every microsecond of two attempts switches everything off: the second attempt must not undo that.
+// An interrupt at every microsecond of two attempts switches everything off. The second attempt
+// must not undo that.
 TEST(I2cController, AnAttemptThatWasTakenOverIsNotRepeated) {
   for (std::uint64_t at_us = 1; at_us < 260; ++at_us) {
     Bus bus;

@@ -57,7 +57,7 @@ TEST(GigaStacksReport, TellsTheMostThatTheyHaveHeld) {
   GigaBench bench;
   bench.boot();
   r4_giga_own_stack[924] = 0;  // a hundred words
-  __StackLimit[56] = 0;        // 200
+  __StackLimit[56] = 0;        // two hundred words
   EXPECT_TRUE(
       has_line(bench.report(), "Interrupt stacks: the core's 800 of 1024, ours 400 of 4096"));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands that move an output, and the answers to all other datagrams.
+// The commands that move an output, and the answers to the other commands.
 #include <gtest/gtest.h>
 
 #include "tests/firmware/board_fixture.hpp"

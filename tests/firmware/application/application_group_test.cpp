@@ -123,8 +123,8 @@ TEST_F(ApplicationGroup, WithAStopInItIsAStop) {
   }
 }
 
-// Closing the supply moves nothing (docs/reference/safety.md). A command after it in the group
-// counts.
+// Closing the supply moves nothing (docs/reference/safety.md), but a command after it in the group
+// does.
 TEST_F(ApplicationGroup, HasTheEffectOfItsCommandsInTheirOrder) {
   host.command("O:358,1,1;R:1,On");
   EXPECT_EQ(board.outputs().relays, 1);

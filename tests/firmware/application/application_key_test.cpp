@@ -126,8 +126,8 @@ TEST_F(ApplicationKey, AnswersAnUnsignedHeartbeatWithItsNonce) {
   }
 }
 
-// docs/design/safety-argument.md: with a forged address, an attacker can make the board send at
-// most this many bytes to it.
+// docs/design/safety-argument.md: an attacker who forges an address can make the board send there
+// at most five times the bytes of the attack.
 TEST_F(ApplicationKey, AnswersWithAtMostFiveTimesTheBytes) {
   host.connect();
   std::size_t longest = 0;
@@ -213,7 +213,7 @@ TEST_F(ApplicationKey, WhatTheNetworkHeldBackForMoreThan250MsDoesNothing) {
   board.run(1);
   board.receive(late, host.at);
   EXPECT_TRUE(board.safe());
-  // A heartbeat with a higher counter is too old as well.
+  // A command with a higher counter is too old as well.
   const std::string later = host.signed_fields(host.fields("O:358,1,1", 1));
   board.run(251);
   board.receive(later, host.at);
@@ -363,7 +363,7 @@ TEST(ApplicationHeartbeat, NumberZeroMeansConnectingAndNothingElse) {
   board.run(10);
   host.connect();
   board.take();
-  // The numbers of answers to other peers start at their beginning.
+  // Answers to other peers have their own numbers, which begin at 1.
   board.receive("H:ROS2-R4;PNum:7;T:0;", {0, 99});
   const std::vector<Heard> heard = board.take(MessageKind::board_heartbeat);
   ASSERT_EQ(heard.size(), 1U);

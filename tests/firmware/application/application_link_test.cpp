@@ -185,7 +185,7 @@ TEST_F(ApplicationStandstill, EachPortHasABacklogOfItsOwn) {
   const std::uint32_t read_ms = two.now_ms;
   two.run(3000);
   EXPECT_EQ(two.log.state_ms - read_ms, 1000U - 300U);
-  two.application->drained(2);  // port 2 has no backlog
+  two.application->drained(2);  // there is no port 2
 }
 
 TEST_F(ApplicationStandstill, AHeartbeatThatMayBeTooOldGivesNobodyControl) {

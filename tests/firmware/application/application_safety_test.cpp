@@ -94,7 +94,7 @@ TEST_F(ApplicationSafety, AStopIsObeyedHoweverOldItIs) {
   EXPECT_TRUE(board.safe());
   clear();
   host.command("O:1,1,1");
-  host.resend("E:STOP", old);  // and however often it comes
+  host.resend("E:STOP", old);  // also if it comes again
   EXPECT_TRUE(board.safe());
 }
 
@@ -308,7 +308,7 @@ TEST_F(ApplicationSafety, HeartbeatsNameTheNewestStop) {
   EXPECT_EQ(newest().stop, 78U);
   board.receive("E:STOP;PNum:77;T:1;", Source{0, 99});  // a late duplicate
   EXPECT_EQ(newest().stop, 77U);
-  // The form that a frame on a CAN bus carries.
+  // The stop as a frame on a CAN bus reports it.
   board.receive("E:STOP;STOP:200000;", Source{0, 99});
   EXPECT_EQ(newest().stop, 200000U);
   board.receive("E:STOP;", Source{0, 99});

@@ -100,7 +100,7 @@ TEST(ApplicationWatch, WhatAHeartbeatShowsToWhoWatchesCanBeEchoed) {
   EXPECT_EQ(board.state(), BoardState::active);
 }
 
-// On a bus, W tells the board only that there is a watcher (docs/reference/can.md).
+// On a bus, W shows only that there is a watcher (docs/reference/can.md).
 TEST(ApplicationWatch, OnABusABoardStreamsToWhoAsksUntilAHostIsThere) {
   TestBoard board({}, 2);
   board.ports[1].bus = true;

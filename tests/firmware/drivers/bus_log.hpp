@@ -13,7 +13,7 @@
 
 namespace r4::test {
 
-// All transfers since the last clear(). The log must outlive the drivers that use the bus.
+// All transfers since the last clear(). The log must outlive all uses of the bus.
 class BusLog final : public sim::I2cObserver {
  public:
   // A transfer that owns its bytes.

@@ -204,7 +204,7 @@ TEST(SimulatedHardware, WithoutSupplyNoMotorTurnsWhateverItsDriverIsTold) {
   EXPECT_EQ(bench.board.stepper_shaft(1), -1000);
   EXPECT_GT(bench.mean(Analog::ainsteer), straight + 100);
 
-  // The handle's button cuts the supply itself. The firmware did not switch the outputs off here.
+  // The handle's button cuts the supply itself: no command switches the motors off here.
   bench.board.hold_handle(false);
   bench.run(4000);  // until the motor has stopped
   expect_that_all_stand();
