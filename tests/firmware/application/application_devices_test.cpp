@@ -112,7 +112,7 @@ TEST_F(ApplicationDevices, ReadingsEndWithTheSessionAndThoseOfSettingsStay) {
   pass(50);
   State state = newest_state();
   EXPECT_EQ(state.raw.i2c[0].data.size, 1);
-  EXPECT_EQ(state.raw.i2c[1].data.size, 0) << "this session did not ask for the reading";
+  EXPECT_EQ(state.raw.i2c[1].data.size, 0) << "this session turned the reading off";
 
   pass(1200, false);  // the host is silent
   ASSERT_EQ(board.reason(), SafeReason::link);

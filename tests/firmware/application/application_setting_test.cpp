@@ -24,7 +24,7 @@ TEST_F(ApplicationSetting, SettingsTakeEffectAtOnce) {
   EXPECT_EQ(board.take(MessageKind::state).size(), 100U);
 
   host.command("C:timeout,200");
-  EXPECT_EQ(answers(), Lines{"RANGE"});  // not longer than the interval of heartbeats
+  EXPECT_EQ(answers(), Lines{"RANGE"});  // it must be longer than the interval of heartbeats
   host.command("C:heartbeat,50");
   host.command("C:timeout,200");
   host.echo();
