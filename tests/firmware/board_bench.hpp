@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's hardware on models of its chips and pins, with interrupts in the middle of transfers.
+// The board's hardware on models of its chips and pins. A test can place an interrupt inside a
+// transfer.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -16,7 +17,7 @@ using firmware::I2cBus;
 using firmware::I2cResult;
 using firmware::Outputs;
 
-// Between the hardware and the bus: something may happen in the middle of a transfer.
+// A bus between the hardware and its model: `what` runs in the middle of a chosen transfer.
 struct InterruptedBus final : I2cBus {
   explicit InterruptedBus(I2cBus& below) : bus(below) {}
   I2cResult write(std::uint8_t address, const std::uint8_t* bytes, std::size_t size) override {
@@ -38,7 +39,7 @@ struct InterruptedBus final : I2cBus {
     return cuts;
   }
   I2cBus& bus;
-  int after = -1;  // that many transfers from now
+  int after = -1;  // transfers until `what` runs; -1: never
   bool cuts = true;
   std::function<void()> what;
   int recoveries = 0;
@@ -75,7 +76,7 @@ struct BoardBench {
   std::uint64_t longest_poll_us = 0;
 };
 
-// Everything moves.
+// Every output has a value other than its safe one.
 inline Outputs full() {
   Outputs outputs;
   for (int i = 0; i < 4; ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Interrupts, chips that fail and buses that are held: the outputs are safe nevertheless.
+// The outputs are safe despite interrupts, failing chips and a held bus.
 #include <gtest/gtest.h>
 
 #include "board_bench.hpp"
@@ -12,8 +12,8 @@ using Bench = test::BoardBench;
 using test::full;
 
 TEST(BoardHardware, IsSafeFromAnyTransferOfAnyUseOn) {
-  // make_safe() in an interrupt at every transfer of set-up, apply and verification: with the
-  // transfer cut off, and with it going through afterwards, stale.
+  // make_safe() runs in an interrupt at every transfer of set-up, apply and verification. The
+  // transfer is cut short, or it completes afterwards with old values.
   for (const bool cuts : {true, false}) {
     for (int at = 0; at < 60; ++at) {
       Bench bench;
@@ -105,13 +105,14 @@ TEST(BoardHardware, MayBeMadeSafeWhileItIsBeingMadeSafe) {
     bench.hardware.make_safe();
     EXPECT_TRUE(bench.board.pins().is_safe()) << at;
     EXPECT_FALSE(bench.hardware.fault().any())
-        << "what was cut short is no trouble of transfer " << at;
+        << "a transfer that was cut short is not a fault: transfer " << at;
     bench.run(150);
     EXPECT_TRUE(bench.hardware.ready() && !bench.hardware.fault().any()) << at;
   }
 }
 
-// As where a host repeats its stop: the interrupt of the next cuts into what follows the first.
+// As when a host repeats its stop: the second interrupt comes in the middle of the first
+// make_safe().
 TEST(BoardHardware, MayBeMadeSafeAgainWhileAnInterruptMakesItSafe) {
   for (int at = 0; at < 7; ++at) {
     for (int again = 0; again < 14; ++again) {
@@ -219,7 +220,7 @@ TEST(BoardHardware, AChipThatIsResetAtAnyByteNeverLeavesAnythingRunningUnnoticed
   }
 }
 
-// What a disturbance does to the modes of a PWM chip: INVRT, EXTCLK, both.
+// The effect of a disturbance on the modes of a PWM chip: INVRT, EXTCLK, or both.
 constexpr std::uint8_t inverted_outputs = 0x10;
 constexpr std::uint8_t external_clock = 0x40;
 struct Disturbance {
@@ -316,8 +317,8 @@ TEST(BoardHardware, AHeldBusIsFreedAndEverythingIsSafeAtOnce) {
 }
 
 TEST(BoardHardware, NothingThatWasStillToBeWrittenComesAfterASafeStateThatTheBusCutShort) {
-  // Most of what was applied still waits for its turn when the bus is held in the middle of
-  // make_safe(), and cannot be freed; a moment later it is free by itself.
+  // Most of the applied values still wait when the bus is held in the middle of make_safe() and
+  // cannot be freed. A moment later the bus is free again.
   for (int polls = 0; polls < 3; ++polls) {
     for (std::size_t after = 1; after <= 33; ++after) {
       Bench bench;
@@ -325,7 +326,7 @@ TEST(BoardHardware, NothingThatWasStillToBeWrittenComesAfterASafeStateThatTheBus
       bench.apply(full(), polls);
       bench.board.bus.hold_after(after, 1000);
       bench.hardware.make_safe();
-      const bool told = after > 3;  // the PWM chips, by the first transfer
+      const bool told = after > 3;  // true: the PWM chips got the first transfer
       bench.board.bus.clear_errors();
       for (int ms = 0; ms < 200; ++ms) {
         bench.run(1);
@@ -355,7 +356,8 @@ TEST(BoardHardware, ABusThatStaysHeldCostsTheLoopLittle) {
   EXPECT_LE(bench.board.bus.now_us() - began, i2c_timeout_us + 100U);
 }
 
-// Some chip lets go when the bus is recovered, and holds it again whenever it is addressed.
+// A chip releases the bus when the bus is recovered, and holds it again whenever the chip is
+// addressed.
 class HeldByOne final : public I2cBus {
  public:
   HeldByOne(I2cBus& below, std::uint8_t holder) : bus_(below), holder_(holder) {}

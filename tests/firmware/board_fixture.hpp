@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's application on hardware and ports in memory, in virtual time, with hosts to drive it.
+// The board's application on hardware and ports in memory, in virtual time, with hosts that control
+// it.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -37,11 +38,11 @@ class MemoryHal final : public firmware::Hal {
     return !inputs.fault.any();
   }
 
-  firmware::Outputs outputs;  // what the hardware does
-  firmware::Inputs inputs;    // what the board will see
+  firmware::Outputs outputs;  // the outputs of the hardware
+  firmware::Inputs inputs;    // the inputs that the board will read
   int applied = 0;
   int made_safe = 0;
-  bool broken = false;  // a fault cannot be cleared
+  bool broken = false;  // true: a fault cannot be cleared
   std::vector<int> zeroed;
 };
 
@@ -71,13 +72,13 @@ class MemoryPort final : public firmware::Port {
   bool cable = false;
   bool bus = false;
   std::uint32_t held = 0;                // the peer of a path of the session
-  std::vector<std::uint32_t> also_held;  // those of its other paths
+  std::vector<std::uint32_t> also_held;  // the peers of its other paths
   const std::uint32_t* now_ms = nullptr;
   std::size_t limit = max_datagram;
   std::vector<Sent> sent;
 };
 
-// What happened on the board, in words: "ACTIVE none", "executed 5", "refused 5 RANGE".
+// The events of the board as text: "ACTIVE none", "executed 5", "refused 5 RANGE".
 class EventLog final : public firmware::Observer {
  public:
   void on_state(std::uint32_t t_ms, firmware::BoardState state, SafeReason reason) override {
@@ -101,15 +102,15 @@ class EventLog final : public firmware::Observer {
   }
 
   std::vector<std::string> states;
-  std::uint32_t state_ms = 0;  // of the newest
-  int outputs = 0;             // changes
+  std::uint32_t state_ms = 0;  // time of the newest state
+  int outputs = 0;             // number of changes
   std::vector<std::uint32_t> executed;
   std::vector<std::string> refused;
   std::vector<std::string> rejected;
   std::vector<std::string> paths;  // "joined 1/4": port and peer
 };
 
-// A datagram of the board, read.
+// A datagram of the board, decoded.
 struct Heard {
   std::string bytes;
   MessageKind kind = MessageKind::state;
@@ -142,7 +143,7 @@ class TestBoard {
     application->start(now_ms);
   }
 
-  // Lets time pass, with poll() exactly when the board asked for it.
+  // Advances the time, and calls poll() exactly when the board asked for it.
   void run(std::uint32_t ms) {
     for (std::uint32_t left = ms;;) {
       const std::uint32_t due = application->poll(now_ms);
@@ -153,13 +154,13 @@ class TestBoard {
     }
   }
 
-  // Fields, with the right checksum, from a source.
+  // Receives fields, to which the right checksum is added, from a source.
   void receive(const std::string& fields, Source from = {}) { receive_raw(with_crc(fields), from); }
   void receive_raw(const std::string& bytes, Source from = {}) {
     application->receive(from.port, from.peer, bytes, now_ms);
   }
 
-  // Everything that a port sent since the last take().
+  // All datagrams that a port sent since the last take().
   std::vector<Heard> take(int port = 0) {
     newest_t(port);
     std::vector<Heard> heard;
@@ -186,7 +187,8 @@ class TestBoard {
     return heard;
   }
 
-  // The T that a host on that port echoes: of the newest heartbeat, 0 before the first and of one that says CONNECTING.
+  // The T that a host on that port echoes: the T of the newest heartbeat. 0 before the first
+  // heartbeat, and if the newest says CONNECTING.
   std::uint32_t newest_t(int port = 0) {
     for (const MemoryPort::Sent& sent : ports[port].sent) {
       Datagram datagram;
@@ -200,7 +202,7 @@ class TestBoard {
     return newest_t_[port];
   }
 
-  // The cause that the newest heartbeat tells of; 0: none.
+  // The cause that the newest heartbeat reports; 0: none.
   std::int32_t newest_cause() {
     for (int i = 0; i < firmware::Application::max_ports; ++i) newest_t(i);
     return newest_cause_;
@@ -222,7 +224,7 @@ class TestBoard {
   std::int32_t newest_cause_ = 0;
 };
 
-// The state that a datagram of the board carries.
+// The state in a datagram of the board.
 inline State state_of(const Heard& heard) {
   Datagram datagram;
   State state;
@@ -244,7 +246,7 @@ inline std::string stamp_of(SessionId sid, std::uint32_t pnum, std::uint64_t t) 
   return id + "PNum:" + std::to_string(pnum) + ";T:" + std::to_string(t) + ";";
 }
 
-// A host with one path, numbering its packets. A paper host has no_session.
+// A host with one path, which numbers its packets. A paper host has no_session.
 class TestHost {
  public:
   TestHost(TestBoard& to, SessionId session, Source place = {})
@@ -254,7 +256,7 @@ class TestHost {
     board.receive("H:ROS2-R4;" + stamp_of(sid, pnum, t), at);
     return pnum++;
   }
-  // A heartbeat that echoes the board's newest.
+  // A heartbeat that echoes the board's newest heartbeat.
   std::uint32_t echo() {
     heard_ = board.newest_t(at.port);
     return heartbeat(heard_);
@@ -264,18 +266,18 @@ class TestHost {
     resend(field, pnum);
     return pnum++;
   }
-  // E:CLEAR of the cause that the board has told of.
+  // E:CLEAR with the cause that the board has reported.
   std::uint32_t clear() { return command(clear_field()); }
   std::string clear_field() { return "E:CLEAR," + std::to_string(board.newest_cause()); }
   void resend(const std::string& field, std::uint32_t number) {
     board.receive(field + ";" + stamp_of(sid, number, 1699276044383), at);
   }
-  // Takes control: T:0, then the echo of what the board sent.
+  // Takes control: T:0, then an echo of the board's answer.
   void connect() {
     heartbeat(0);
     echo();
   }
-  // Lets time pass with an echo every 100 ms.
+  // Advances the time, with an echo every 100 ms.
   void stay(std::uint32_t ms) {
     for (std::uint32_t done = 0; done < ms; done += 100) {
       echo();
@@ -304,7 +306,7 @@ struct BoardInControl : testing::Test {
     board.log.executed.clear();
     board.log.refused.clear();
   }
-  // The code of the answers to the datagrams since forget().
+  // The codes of the answers since forget().
   std::vector<std::string> answers(int port = 0) {
     std::vector<std::string> codes;
     for (const Heard& heard : board.take(MessageKind::nack, port)) {

@@ -71,15 +71,15 @@ TEST(Executor, ClosingTheMotorSupplyMovesNothing) {
   EXPECT_EQ(outputs.osmc[3].pwm, 0);
   EXPECT_EQ(outputs.dhb12[1].pwm, 0);
   EXPECT_EQ(outputs.bldc[2].speed, 0);
-  EXPECT_FALSE(outputs.bldc[2].brake) << "a brake is left as it is";
+  EXPECT_FALSE(outputs.bldc[2].brake) << "a brake stays as it is";
   EXPECT_FALSE(outputs.stepper[0].enabled);
-  EXPECT_EQ(outputs.dac_mv[0], 0) << "the throttle of a motor of its own, perhaps";
-  EXPECT_EQ(outputs.servo_us[0], 1500) << "servos are not on that supply";
+  EXPECT_EQ(outputs.dac_mv[0], 0) << "a DAC may be the throttle of a motor";
+  EXPECT_EQ(outputs.servo_us[0], 1500) << "relay 1 does not supply the servos";
   EXPECT_EQ(outputs.relays, 0b11);
 
   carry_out(Command::osmc(4, Pwm(500), Direction::forward), setpoints);
   carry_out(Command::relay(1, true), setpoints);
-  EXPECT_EQ(outputs.osmc[3].pwm, 500) << "it is closed already";
+  EXPECT_EQ(outputs.osmc[3].pwm, 500) << "the relay is closed already";
 }
 
 TEST(Executor, ChangesNothingWhenItRefuses) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The guard in the timer interrupt: what it sees, when, and what the application makes of it.
+// The guard in the timer interrupt: the faults that it notices, when it does, and the effect on the
+// application.
 #include "firmware/guard.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,8 @@ using test::TestBoard;
 using test::TestHost;
 
 struct GuardTest : testing::Test {
-  // Ticks for `ms`, the duties of `alive` checking in each time. The ticks that returned true.
+  // Ticks for `ms` milliseconds, in each of which the duties of `alive` check in. Returns the
+  // number of ticks that returned true.
   int run(std::uint32_t ms, std::initializer_list<Guard::Duty> alive = {}) {
     int fed = 0;
     for (std::uint32_t i = 0; i < ms; ++i) {
@@ -32,7 +34,7 @@ struct GuardTest : testing::Test {
 
   MemoryHal hal;
   Guard guard{hal};
-  std::uint32_t now_ms = 0xfffffff0U;  // it wraps under way
+  std::uint32_t now_ms = 0xfffffff0U;  // wraps during the test
 };
 
 TEST_F(GuardTest, FeedsTheWatchdogOnlyWhenEveryDutyHasCheckedIn) {
@@ -40,13 +42,13 @@ TEST_F(GuardTest, FeedsTheWatchdogOnlyWhenEveryDutyHasCheckedIn) {
   const Guard::Duty wifi = guard.add_duty(1000);
   EXPECT_EQ(run(10, {loop, wifi}), 10);
   EXPECT_EQ(run(10, {loop}), 0);
-  EXPECT_EQ(run(10, {wifi}), 1);  // the loop was there in between
+  EXPECT_EQ(run(10, {wifi}), 1);  // the loop checked in before
   EXPECT_EQ(run(10), 0);
 }
 
 TEST_F(GuardTest, WithoutDutiesThereIsNothingToWaitFor) { EXPECT_EQ(run(3), 3); }
 
-// Outputs that nobody watches must not be live: one who builds such a board sees it at once.
+// Outputs must not be live without a guard. A developer who adds too many duties sees it at once.
 TEST_F(GuardTest, ADutyTooManyKeepsTheOutputsSafeAndStarvesTheWatchdog) {
   for (int i = 0; i < Guard::max_duties; ++i) EXPECT_EQ(guard.add_duty(20), i);
   EXPECT_EQ(run(1, {0, 1, 2, 3, 4, 5, 6, 7}), 1);
@@ -101,7 +103,7 @@ TEST_F(GuardTest, MakesTheOutputsSafeAtTheDeadlineAndNotBefore) {
   EXPECT_EQ(hal.made_safe, 1);
   EXPECT_EQ(guard.take(), SafeReason::link);
   run(1000);
-  EXPECT_EQ(hal.made_safe, 1);  // once
+  EXPECT_EQ(hal.made_safe, 1);  // exactly once
 }
 
 TEST_F(GuardTest, ADeadlineIsPutOffOrTakenBack) {
@@ -147,7 +149,7 @@ struct GuardedBoard : testing::Test {
     EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
     board.log.states.clear();
   }
-  // The timer goes on, the loop hangs.
+  // The timer runs on, but the loop hangs.
   void hang(std::uint32_t ms) {
     for (std::uint32_t i = 0; i < ms; ++i) guard().tick(++board.now_ms);
   }
@@ -159,7 +161,7 @@ struct GuardedBoard : testing::Test {
 
 TEST_F(GuardedBoard, SilenceIsSeenWhileTheLoopHangsEvenIfAHeartbeatWaits) {
   const std::uint32_t fed_ms = board.application->link().fed_ms();
-  board.now_ms = fed_ms + 990;  // ten milliseconds are left, and the loop hangs for eleven
+  board.now_ms = fed_ms + 990;  // 10 ms are left, and the loop hangs for 11 ms
   guard().tick(board.now_ms);
   hang(9);
   EXPECT_FALSE(board.safe());
@@ -205,14 +207,14 @@ TEST_F(GuardedBoard, RepetitionsOfAStopThatAnInterruptHasHeardAreNoNewCause) {
   host.echo();
   host.clear();
   EXPECT_EQ(board.reason(), SafeReason::none);
-  guard().stop();  // the next: its number is not known before it is read
+  guard().stop();  // the next stop: its number is unknown until the loop reads it
   guard().tick(board.now_ms);
   board.run(1);
   EXPECT_EQ(board.reason(), SafeReason::stop);
   EXPECT_FALSE(application.safe_report().has_stop);
 }
 
-// An interrupt hears stops whose datagrams are lost then: a port had no room for them.
+// An interrupt hears stops whose datagrams are then lost, because a port had no room for them.
 class StopWithoutDatagram : public GuardedBoard {
  protected:
   void hear() {
@@ -221,7 +223,7 @@ class StopWithoutDatagram : public GuardedBoard {
     board.run(1);
   }
   std::int32_t cause() const { return board.application->safe_report().cause; }
-  // An E:CLEAR that names that cause.
+  // True if an E:CLEAR that names that cause makes the board leave the safe state.
   bool clears(std::int32_t named) {
     host.echo();
     host.command("E:CLEAR," + std::to_string(named));
@@ -235,7 +237,7 @@ TEST_F(StopWithoutDatagram, IsNoStopOfSomebodyElseThatComesLater) {
   const std::int32_t heard = cause();
   host.resend("E:STOP", host.pnum++);
   EXPECT_NE(cause(), heard);
-  EXPECT_FALSE(clears(heard)) << "it was asked for before the second stop";
+  EXPECT_FALSE(clears(heard)) << "the clear was asked for before the second stop";
   EXPECT_TRUE(clears(cause()));
 }
 
@@ -243,7 +245,7 @@ TEST_F(StopWithoutDatagram, IsANewCauseOnABoardThatIsStoppedAlready) {
   host.resend("E:STOP", host.pnum++);
   const std::int32_t first = cause();
   hear();
-  EXPECT_FALSE(clears(first)) << "it is not known yet whether the stop is a repetition";
+  EXPECT_FALSE(clears(first)) << "the stop may still be a repetition";
   board.run(lost_ms);
   EXPECT_NE(cause(), first);
   EXPECT_FALSE(clears(first));
@@ -263,7 +265,7 @@ TEST_F(StopWithoutDatagram, IsANewCauseAlsoIfARepetitionOfTheFirstStopIsRead) {
 }
 
 TEST_F(GuardedBoard, WhatTheGuardTookOffStaysOffUntilTheApplicationKnows) {
-  // The guard trips between the loop's look at the time and its command.
+  // The guard trips after the loop has read the time and before the loop executes its command.
   class Trip final : public firmware::Observer {
    public:
     void on_state(std::uint32_t, firmware::BoardState, SafeReason) override {}

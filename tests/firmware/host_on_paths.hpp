@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host with several paths: each carries the same datagrams, some later than others.
+// A host with several paths. Each path carries the same datagrams, some paths later than others.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ class HostOnPaths {
   HostOnPaths(TestBoard& to, std::vector<Path> its_paths)
       : paths(std::move(its_paths)), board_(to) {}
 
-  // Sends on every path that is not cut; returns the number.
+  // Sends on every path that is not cut, and returns the number.
   std::uint32_t send(const std::string& field, std::uint64_t t) {
     const std::uint32_t number = pnum++;
     for (const Path& path : paths) {
@@ -45,7 +45,7 @@ class HostOnPaths {
     heartbeat();
     run(250);
   }
-  // Lets time pass, with a heartbeat every 100 ms.
+  // Advances the time, with a heartbeat every 100 ms.
   void run(std::uint32_t ms) {
     for (std::uint32_t i = 0; i < ms; ++i) {
       board_.run(1);
@@ -53,7 +53,7 @@ class HostOnPaths {
       if (static_cast<std::int32_t>(board_.now_ms - next_heartbeat_ms_) >= 0) heartbeat();
     }
   }
-  // The newest T that came on a path which is not cut.
+  // The newest T that arrived on a path which is not cut.
   std::uint32_t echo() {
     std::uint32_t newest = 0;
     for (const Path& path : paths) {
@@ -64,8 +64,9 @@ class HostOnPaths {
 
   std::vector<Path> paths;
   std::uint32_t pnum = 12345;
-  std::string last;  // that was sent
-  // What is done to the fields before they are sent: nothing, or they are signed.
+  std::string last;  // the last datagram sent
+  // Changes the fields before they are sent, for example signs them. By default they stay as they
+  // are.
   std::function<std::string(const std::string&)> seal = [](const std::string& fields) {
     return fields;
   };

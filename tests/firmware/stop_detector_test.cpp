@@ -14,7 +14,7 @@ namespace {
 
 using test::with_crc;
 
-// How many stops are heard in these bytes.
+// The number of stops that the detector finds in these bytes.
 int stops_in(StopDetector& detector, const std::string& bytes) {
   int stops = 0;
   for (const char byte : bytes) stops += detector.push(byte) ? 1 : 0;
@@ -39,7 +39,7 @@ TEST(StopDetector, HearsAStopWhereverItStandsAndNothingElse) {
     EXPECT_EQ(stops_in(detector, datagram + "\r\n"), c.stop ? 1 : 0) << c.fields;
     const std::string line = datagram + "\n";
     EXPECT_EQ(stops_in(detector, line + line), c.stop ? 2 : 0) << c.fields;
-    EXPECT_EQ(stops_in(detector, datagram), 0) << "no end yet: " << c.fields;
+    EXPECT_EQ(stops_in(detector, datagram), 0) << "the datagram has not ended: " << c.fields;
   }
 }
 

@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any datagrams, from anyone, at any time: the board does not crash, and moves nothing that it was
-// not validly told to move.
+// Any datagrams, from any peer, at any time: the board does not crash, and changes no output
+// without a valid command.
 //
-// The input is lines. A line is a control byte and a payload. Control: bits 0-1 the peer, bit 2 the
-// port, bit 3 a checksum is put behind the payload, bits 4-6 how much time passes before. A payload
-// that begins with '!' is something that happens around the board. In others, to reach what only a
-// host in session reaches: $T stands for the T of the newest heartbeat that the peer heard, $S for
-// its session id, as "SID:...;", $N for its next packet number, $L for its last, $P for its next as a
-// paper host, $A for a right signature of what is before it, $W for the newest LEASE that the peer was
-// told. If the first payload is "!k", the board has a key:
-// then nothing is executed, and no heartbeat feeds, without such a signature, but a stop.
+// The input is lines. Each line is a control byte and a payload. Bits 0-1 of the control byte are
+// the peer, bit 2 is the port, bit 3 adds a checksum after the payload, and bits 4-6 are the time
+// that passes before the line. A payload that begins with '!' is an event around the board.
+//
+// Other payloads have placeholders for the values that only a host with a session knows:
+//   $T  the T of the newest heartbeat that the peer heard
+//   $S  the field of the peer's session, "SID:...;"
+//   $N  its next packet number; $L its last; $P its next as a paper host
+//   $A  a valid signature of the text before it
+//   $W  the newest LEASE that the peer received
+//
+// If the first payload is "!k", the board has a key. Then only a stop is executed without such a
+// signature, and an unsigned heartbeat does not keep the link alive.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -55,7 +60,7 @@ bool within_ranges(const Outputs& outputs) {
 constexpr int ports = 2;
 constexpr std::uint32_t peers = 4;
 
-// A user's UART on which more comes in than can be told.
+// A user's UART that receives more bytes than states can carry.
 class UserUartLine final : public firmware::UserUartPort {
  public:
   void set_up(const UartMode& mode) override {
@@ -80,7 +85,7 @@ class UserUartLine final : public firmware::UserUartPort {
   unsigned sum_ = 0;
 };
 
-// A user's bus on which something answers at every even address; it can be made to hold its lines.
+// A user's I2C bus with a device at every even address. The bus can be held.
 class UserBus final : public firmware::UserI2cPort {
  public:
   void begin(const firmware::UserTransfer& transfer) override {
@@ -115,7 +120,7 @@ class UserBus final : public firmware::UserI2cPort {
   unsigned sum_ = 0;
 };
 
-// A board with what is around it, and what its hosts would know.
+// A board with its surroundings, and with the knowledge of its hosts.
 class World final : public firmware::Hal, public firmware::Observer {
  public:
   explicit World(bool keyed) : keyed_(keyed) {
@@ -128,7 +133,7 @@ class World final : public firmware::Hal, public firmware::Observer {
     for (int i = 0; i < uart_channels; ++i) config.uarts[i] = &uarts_[i];
     board_ = std::make_unique<firmware::Application>(*this, config, this);
     for (int i = 0; i < ports; ++i) {
-      // The same peer on another port is another path of the same session.
+      // A peer's SID is the same on both ports, so its other port is another path of the session.
       for (std::uint32_t peer = 0; peer < peers; ++peer) hosts_[i][peer].sid = peer + 1;
       ports_[i].world = this;
       ports_[i].number = i;
@@ -162,12 +167,12 @@ class World final : public firmware::Hal, public firmware::Observer {
   };
   struct Host {
     std::uint32_t board_t = 0;
-    std::uint32_t number = 1000;  // of a host with a session id
+    std::uint32_t number = 1000;  // of a host with a SID
     std::uint32_t paper_number = 0;
     SessionId sid = no_session;
-    std::set<std::uint32_t> told;  // LEASEs
+    std::set<std::uint32_t> told;  // LEASE values
     std::uint32_t newest_told = 0;
-    bool watches = false;  // it has echoed one
+    bool watches = false;  // the peer has echoed a LEASE
     std::uint32_t watches_ms = 0;
   };
 
@@ -188,13 +193,13 @@ class World final : public firmware::Hal, public firmware::Observer {
   void on_state(std::uint32_t, BoardState, SafeReason) override {}
   void on_outputs(std::uint32_t, const Outputs& outputs) override { require(outputs == outputs_); }
   void on_executed(std::uint32_t, std::uint32_t pnum, const Command& command) override {
-    require(executed_ == 0 || pnum == executed_pnum_);  // those of a group have one number
+    require(executed_ == 0 || pnum == executed_pnum_);  // the commands of a group have one number
     ++executed_;
     executed_pnum_ = pnum;
     require(executed_ == 1 || drives_output(command.kind));
     stop_ = command.kind == CommandKind::stop;
     const bool leaves = command.kind == CommandKind::leave;
-    // A new timeout may end that, but only behind it.
+    // A new timeout may end the session, but only after the command.
     require(stop_ || board().link().has_owner() != leaves);
     require(!leaves || outputs_ == Outputs());
   }
@@ -227,8 +232,8 @@ class World final : public firmware::Hal, public firmware::Observer {
     ++sent_;
   }
 
-  // The host in control gets states, on each of its paths, everyone at the ports where it is not, and who has echoed
-  // what it was told, for the time of a lease.
+  // States may go to each path of the controlling host, to everyone on the ports without such a
+  // path, and for the time of a lease to a watcher that has echoed its LEASE.
   bool may_get_states(int port, std::uint32_t peer) const {
     const BoardLink& link = board_->link();
     const Host& host = hosts_[port][peer];
@@ -250,7 +255,8 @@ class World final : public firmware::Hal, public firmware::Observer {
     watcher.watches_ms = now_ms_;
   }
 
-  // Time passes; the board is polled as it asks, but not more often than fuzzing has patience for.
+  // Time passes. The board is polled when it asks, but at most about nine times for a line, to keep
+  // fuzzing fast.
   void pass(std::uint32_t ms) {
     for (std::uint32_t left = ms; left != 0;) {
       const std::uint32_t due = std::max(board().poll(now_ms_), ms / 8);
@@ -283,7 +289,7 @@ class World final : public firmware::Hal, public firmware::Observer {
       case 'b':
         bus_.held = value % 2 != 0;
         break;
-      case 'j':  // the board is held up: time passes, nothing is polled
+      case 'j':  // the loop stands still: time passes, nothing is polled
         now_ms_ += static_cast<std::uint32_t>(value) * 20;
         return;
       default:
@@ -308,9 +314,10 @@ class World final : public firmware::Hal, public firmware::Observer {
     executed_ = refused_ = rejected_ = 0;
     stop_ = false;
     board().receive(from.port, from.peer, Text(bytes), now_ms_);
-    // A damaged datagram does nothing and is not answered.
+    // A damaged datagram has no effect and gets no answer.
     if (!valid) require(executed_ == 0 && sent_ == sent);
-    // Outputs move by a command that is executed, come back with a heartbeat, or become safe.
+    // Outputs change only by an executed command, by a heartbeat that restores them, or to the safe
+    // state.
     if (outputs_ != before && outputs_ != Outputs()) {
       require(executed_ != 0 || kind == MessageKind::host_heartbeat);
     }
@@ -325,7 +332,7 @@ class World final : public firmware::Hal, public firmware::Observer {
         require(outputs_ == Outputs() && board().reason() == SafeReason::stop);
       } else {
         require(signed_ && board().link().is_session_of({from, datagram.session_id()}));
-        require(executed_ == datagram.command_count());  // all of a group, or none
+        require(executed_ == datagram.command_count());  // the whole group, or none of it
         require(executed_ <= max_group);
         require(datagram.has_pnum() && board().link().last_executed() == executed_pnum_);
       }
@@ -333,14 +340,14 @@ class World final : public firmware::Hal, public firmware::Observer {
     check();
   }
 
-  // What has been executed is not executed again.
+  // A command that was executed is not executed again.
   void receive_again(Source from, const std::string& bytes) {
     const Outputs before = outputs_;
     receive(from, bytes);
     require(executed_ == 0 && (outputs_ == before || outputs_ == Outputs()));
   }
 
-  // What must hold at any moment.
+  // The conditions that hold at any moment.
   void check() {
     if (board().state() != BoardState::active) require(outputs_ == Outputs());
     if (outputs_ == Outputs()) return;
@@ -410,7 +417,7 @@ class World final : public firmware::Hal, public firmware::Observer {
   }
 
   const bool keyed_;
-  bool signed_ = false;  // this line, or no signature is needed
+  bool signed_ = false;  // true: the line is signed, or the board needs no signature
   std::uint64_t counter_ = 0;
   std::uint32_t now_ms_ = 0xffffff00U;
   firmware::Inputs inputs_ = held();
@@ -445,7 +452,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string input(reinterpret_cast<const char*>(data), size);
   World world(input.compare(0, 3, "0!k") == 0);
   for (std::size_t at = 0; at < size;) {
-    std::size_t end = input.find('\n', at + 1);  // the control byte may be one
+    std::size_t end = input.find('\n', at + 1);  // the control byte may itself be a line feed
     if (end == std::string::npos) end = size;
     world.line(static_cast<std::uint8_t>(input[at]), input.substr(at + 1, end - at - 1));
     at = end + 1;

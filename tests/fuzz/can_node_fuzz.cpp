@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What comes in on a CAN bus: any frames at any times, to a board's end and a host's end that also
-// talk to each other, lose frames, time out and are cancelled, and to a third who surveys the bus.
-// The input is a list of actions.
+// The input of a CAN bus: any frames at any times, to the ends of a board and of a host, and to a
+// listener that surveys the bus. The two ends also send to each other, lose frames, time out and
+// cancel. The input is a list of actions.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -24,7 +24,7 @@ constexpr Text watch_datagram("W:5;^0x414648b3^");
 constexpr std::uint32_t longest_wait_us = 127000;  // STmin; N_As, N_Bs and N_Cr are less
 constexpr CanLane lanes[] = {CanLane::dialogue, CanLane::telemetry};
 
-// All counters of a node, in one order.
+// Appends all counters of a node, in a fixed order.
 template <class Counters>
 void append(std::vector<std::uint32_t>& all, const Counters& counters) {
   static_assert(sizeof(Counters) % sizeof(std::uint32_t) == 0, "counters of 32 bits alone");
@@ -46,7 +46,7 @@ std::uint32_t completed(const CanNode& node) {
   return node.received(CanLane::dialogue).datagrams + node.received(CanLane::telemetry).datagrams;
 }
 
-// One end, with what must hold whatever it is fed with.
+// One end of the bus, with the conditions that hold for any input.
 class End {
  public:
   End(CanEnd end, std::uint8_t node, bool fd)
@@ -87,7 +87,7 @@ class End {
     const std::uint32_t completed_before = completed(node_);
     const Text datagram = node_.on_frame(frame, now_us);
     require(datagram.size() <= max_datagram);
-    std::uint32_t sum = 0;  // every byte can be read
+    std::uint32_t sum = 0;  // reads every byte, so that a sanitizer checks it
     for (const char c : datagram) sum += static_cast<std::uint8_t>(c);
     require(datagram.empty() || sum != 0 || datagram[0] == 0);
 
@@ -110,7 +110,7 @@ class End {
     check();
   }
 
-  // After poll(), what is armed lies ahead, or there is something to send.
+  // After poll(), the deadline is in the future, or the node has a frame to send.
   void poll(std::uint32_t now_us) {
     node_.poll(now_us);
     check();
@@ -146,7 +146,7 @@ class End {
   std::vector<std::uint32_t> counters_;
 };
 
-// Who hears all of it and says nothing.
+// A listener that hears all frames and sends none.
 class Listener {
  public:
   Listener() {
@@ -160,7 +160,7 @@ class Listener {
   }
 
   void on_frame(CanFrame frame, std::uint32_t now_us) {
-    // The kernel passes on no others.
+    // The kernel passes on only frames with these identifiers and sizes.
     frame.id &= frame.extended ? 0x1FFFFFFFU : max_can_id;
     frame.size = std::min(frame.size, frame.fd ? max_fd_size : max_classic_size);
     const std::uint64_t datagrams = datagrams_;
@@ -247,7 +247,7 @@ class Fuzz {
     }
   }
 
-  // A heartbeat, a datagram that is none, an answer, a state.
+  // A heartbeat, bytes that are not a datagram, an answer, or a state.
   void begin(End& end) {
     std::array<char, 256> buffer;
     const std::uint8_t kind = input_.byte();
@@ -287,7 +287,7 @@ class Fuzz {
     listener_.on_frame(frame, now_us_);
   }
 
-  // Moves frames between the two; some are lost, or offered and not taken.
+  // Moves frames between the two ends. Some frames get lost, or are offered but not taken.
   void exchange(std::uint8_t action) {
     CanFrame frame;
     for (int i = 0; i < 40; ++i) {

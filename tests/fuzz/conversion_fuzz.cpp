@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whatever a file holds, reading it as a recording, a log of frames, a capture or an MCAP file ends, crashes nothing,
-// and gives the same however the bytes come; what was read comes back byte by byte from the formats that hold all of
-// it, and the others are what they should be; and `r4 info` tells as much of it.
+// Any file, read as a recording, a log of frames, a capture or an MCAP file: reading ends, does not
+// crash, and has the same result for any cut of the bytes. The records come back byte for byte from
+// the formats that hold all of a recording. The other formats are well-formed, and the summary of
+// `r4 info` counts the same records.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -18,7 +19,7 @@
 
 namespace r4 {
 
-// A recording has the texts of its devices; nothing here names a file.
+// A recording contains the texts of its devices, so no file is needed here.
 DeviceDescription DeviceDescription::load(const std::string& name) {
   throw Error(ErrorKind::open, name, "there are no files here", "");
 }
@@ -28,7 +29,7 @@ namespace {
 struct Made final : tool::Output {
   void write(std::string_view written) override { file += written; }
   std::string file;
-  std::string told;  // of damage, and why it was refused
+  std::string told;  // the damage, and the error
   std::uint64_t records = 0;
 };
 
@@ -42,7 +43,7 @@ void read(std::string_view bytes, const char* from, std::size_t piece, Recording
   source->finish();
 }
 
-// As `r4 convert` makes it, of bytes that come in pieces of that size.
+// Converts as `r4 convert` does, with the bytes in pieces of that size.
 Made converted(std::string_view bytes, const char* from, const char* to, std::size_t piece) {
   Made made;
   try {
@@ -72,12 +73,12 @@ Made converted(const Made& recording, const char* to) {
 
 void comes_back(const Made& recording, const char* by) {
   const Made there = converted(recording, by);
-  if (there.file.empty()) return;  // a time that MCAP cannot write
+  if (there.file.empty()) return;  // MCAP cannot write this time
   const Made back = converted(there.file, by, native, there.file.size());
   require(back.file == recording.file && back.told.empty());
 }
 
-// A table: every row has as many columns.
+// Requires a table: every row has the same number of columns.
 void is_csv(std::string_view text) {
   std::size_t columns = 0, in_header = 0;
   bool quoted = false;
@@ -122,7 +123,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view bytes(reinterpret_cast<const char*>(data) + 2, size - 2);
   const r4::Made whole = converted(bytes, from, r4::native, size);
   const r4::Made cut = converted(bytes, from, r4::native, 1 + data[1]);
-  // Of compression that is damaged, how much is read depends on the pieces.
+  // If damaged data are compressed, the pieces decide how much of them is read.
   r4::require(r4::is_zstd(bytes) || (whole.file == cut.file && whole.told == cut.told));
   if (whole.file.empty()) return 0;
   r4::comes_back(whole, "x.pcapng");

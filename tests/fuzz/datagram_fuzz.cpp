@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any bytes: whatever the protocol accepts, written again, reads equal. The input is taken as it
-// is, and as fields to which the right checksum is put, so that the fuzzer need not find CRCs.
+// Any bytes: a datagram that the protocol accepts reads equal after it was written again. The input
+// is used unchanged, and as fields with the right checksum, so that the fuzzer need not find CRCs.
 #include <cstdint>
 #include <cstdlib>
 #include <string>
@@ -27,7 +27,7 @@ void require(bool holds) {
 
 std::string str(Text text) { return {text.data(), text.size()}; }
 
-// What `write` puts into a datagram, without PNum, T and CRC.
+// The fields that `write` puts into a datagram, without PNum, T and CRC.
 template <class Write>
 std::string written(Write write) {
   static char buffer[4 * max_datagram];

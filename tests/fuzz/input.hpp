@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A fuzzer's input as a list of small numbers, and what it must not break.
+// The input of a fuzzer as a list of small numbers, and require() for the conditions that must
+// hold.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +13,7 @@ inline void require(bool holds) {
   if (!holds) std::abort();
 }
 
-// The input, byte by byte; zeros after its end.
+// The input, byte by byte, with zeros after its end.
 class Input {
  public:
   Input(const std::uint8_t* data, std::size_t size) : at_(data), end_(data + size) {}

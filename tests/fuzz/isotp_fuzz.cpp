@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any frames at any times: a sender and a receiver, each with arbitrary options, keep their
-// promises. The input is a list of actions; what the options are is in its first bytes.
+// Any frames at any times: a sender and a receiver with arbitrary options keep their promises. The
+// first bytes of the input are the options, the rest is a list of actions.
 //
-// As long as frames of the sender's are lost but none is added, what the receiver delivers is a
-// datagram that was sent; or, which four bits of sequence number cannot tell, one of two over whose
-// border no frame was heard. With flow control on both sides it is one that was sent, but for flow
-// control that comes when its sender is at the next already.
+// If frames of the sender get lost but none is added, the receiver delivers a datagram that was
+// sent. There is one exception, because a sequence number has four bits: the receiver may join two
+// datagrams if it heard no frame across their border. With flow control on both sides there is no
+// such exception, unless flow control arrives when its sender has begun the next datagram.
 #include <cstdint>
 #include <cstring>
 #include <vector>
@@ -17,7 +17,8 @@
 namespace r4 {
 namespace {
 
-constexpr std::uint32_t longest_wait_us = 127000;  // of the options below, STmin included
+// The longest wait with the options below, STmin included.
+constexpr std::uint32_t longest_wait_us = 127000;
 
 std::uint32_t time_from(Input& input) { return 1 + input.word() % longest_wait_us; }
 
@@ -26,7 +27,7 @@ class Fuzz {
   explicit Fuzz(Input& input)
       : input_(input),
         capacity_(input.word() % 6000),
-        // On the heap and of just that size: one byte beyond it is caught.
+        // On the heap and of exactly this size, so that a sanitizer finds an access beyond it.
         buffer_(capacity_),
         datagram_(input.word() % 6000),
         sender_(sender_options()),
@@ -109,8 +110,7 @@ class Fuzz {
     }
   }
 
-  // Each datagram is all of one byte, its number, and of a length of its own: a little less than
-  // the last, or as long.
+  // All bytes of a datagram are its number. Its size is at most 15 bytes less than the buffer's.
   void begin(std::uint8_t action) {
     if (sender_.busy() || datagram_.empty()) return;
     const std::size_t less = action >> 4;
@@ -135,7 +135,8 @@ class Fuzz {
     take(frame);
   }
 
-  // Moves frames between the two, or only offers them. Those whose bit of `lost` is set get lost.
+  // Moves frames between the two, or only offers them. A frame whose bit of `lost` is set gets
+  // lost.
   void exchange(bool accepted, std::uint32_t lost) {
     CanFrame frame;
     for (int i = 0; i < 20; ++i) {
@@ -159,7 +160,7 @@ class Fuzz {
     }
   }
 
-  // The bus takes the sender's frame. From one consecutive frame to the next it keeps STmin.
+  // The bus takes the sender's frame. The sender keeps STmin between two consecutive frames.
   void accept() {
     const std::uint32_t before = sender_.counters().frames;
     sender_.frame_sent(now_us_);
@@ -168,7 +169,7 @@ class Fuzz {
     accepted_us_ = now_us_;
   }
 
-  // A frame of the sender's is heard.
+  // The receiver hears a frame of the sender.
   void take_own(const CanFrame& frame) {
     const bool consecutive = frame.data[0] >> 4 == static_cast<int>(IsotpFrameType::consecutive);
     if (!consecutive) {
@@ -181,7 +182,7 @@ class Fuzz {
     const std::uint32_t unexpected = receiver_.counters().unexpected_frame;
     const std::uint32_t delivered = receiver_.counters().datagrams;
     take(frame);
-    // One that comes while none is waited for is not within a datagram.
+    // A consecutive frame that is not expected belongs to no datagram.
     if (consecutive && receiver_.counters().unexpected_frame == unexpected) {
       in_order_ = in_order_ && (frame.data[0] & 0xF) == next_;
       if (receiver_.counters().malformed == malformed) next_ = (next_ + 1) & 0xF;
@@ -210,7 +211,7 @@ class Fuzz {
     require(!receiver_.busy());
   }
 
-  // After poll(), what is armed lies ahead, or the end itself has something to offer.
+  // After poll(), the deadline is in the future, or the end has a frame to send.
   void check_deadlines() {
     sender_.poll(now_us_);
     receiver_.poll(now_us_);
@@ -249,7 +250,7 @@ class Fuzz {
 
   Input& input_;
   bool controlled_ = false;    // the sender waits for flow control
-  bool listens_only_ = false;  // the receiver sends none
+  bool listens_only_ = false;  // the receiver sends no flow control
   std::uint32_t capacity_;
   std::vector<std::uint8_t> buffer_;
   std::vector<std::uint8_t> datagram_;
@@ -257,15 +258,15 @@ class Fuzz {
   IsotpReceiver receiver_;
   std::uint32_t now_us_ = 0;
 
-  std::uint8_t number_ = 0;        // of the datagram that was begun last; its bytes
-  std::uint32_t size_ = 0;         // and its length
-  bool any_foreign_ = false;       // a frame that is not of the two was handed in
-  std::uint32_t accepted_ = 0;     // frames of it that the bus has taken
-  std::uint32_t accepted_us_ = 0;  // the last of them
-  std::uint32_t gap_us_ = 0;       // that the newest flow control asks for
-  std::uint8_t heard_number_ = 0;  // of the first frame that was heard last
-  int next_ = 0;                   // the number of the frame to come behind it
-  bool in_order_ = false;          // those since then have counted up from 1
+  std::uint8_t number_ = 0;        // number and bytes of the newest datagram
+  std::uint32_t size_ = 0;         // its size
+  bool any_foreign_ = false;       // a frame from neither end was received
+  std::uint32_t accepted_ = 0;     // frames of the datagram on the bus so far
+  std::uint32_t accepted_us_ = 0;  // time of the newest of them
+  std::uint32_t gap_us_ = 0;       // STmin of the newest flow control
+  std::uint8_t heard_number_ = 0;  // number of the newest first or single frame heard
+  int next_ = 0;                   // sequence number of the next frame
+  bool in_order_ = false;          // the frames since then counted up from 1
   bool flow_control_late_ = false;
 };
 

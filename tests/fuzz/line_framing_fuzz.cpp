@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any stream, cut anywhere, gives the lines that splitting it whole gives, in bounded memory. The
-// first four bytes of the input choose the cuts.
+// Any stream, cut anywhere, gives the same lines as the uncut stream, in bounded memory. The first
+// four bytes of the input choose the cuts.
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -18,11 +18,11 @@ void require(bool holds) {
 
 struct Split {
   std::vector<std::string> lines;
-  std::vector<std::string> oversize;  // how those begin that are too long
+  std::vector<std::string> oversize;  // the beginnings of lines that are too long
   bool operator==(const Split&) const = default;
 };
 
-// What the framing should give, said in the plainest way.
+// The expected result, computed in the simplest way.
 Split expected(const std::string& stream) {
   Split split;
   std::string line;
@@ -50,7 +50,7 @@ Split framed(const std::string& stream, std::uint32_t cuts) {
   LineFraming framing;
   for (std::size_t at = 0; at < stream.size();) {
     cuts = cuts * 1664525U + 1013904223U;
-    // Mostly small pieces, now and then one longer than a line.
+    // Most pieces are small. One in 16 may be longer than a line.
     const std::size_t limit = (cuts >> 28) == 0 ? 3000 : (cuts >> 28) * 8;
     const std::string part = stream.substr(at, (cuts >> 8) % limit);
     at += part.size();

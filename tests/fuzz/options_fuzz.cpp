@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What people write where a link is named: whatever it is, it is refused with a reason, or it is a URL, or a bad link
-// within its bounds that loses and delays what it says and invents nothing.
+// Any text for a link: it is refused with a reason, or it is a valid URL, or it is a bad link
+// within its bounds. A bad link loses and delays datagrams as its text says, and invents none.
 #include <chrono>
 #include <cstdint>
 #include <string>

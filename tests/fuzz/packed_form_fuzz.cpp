@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any bytes: as a packed datagram they unpack to something of the grammar or are refused, and what
-// they unpack to, packed again, comes back; as a datagram, and as fields to which a checksum is put,
-// they come back byte for byte or travel plain.
+// Any bytes. As a packed datagram they are refused, or they unpack to a text of the grammar, which
+// comes back when it is packed again. As a datagram, and as fields with a checksum, they come back
+// byte for byte or are sent as text.
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -24,7 +24,7 @@ void comes_back(Text datagram) {
   const std::size_t size = pack(datagram, bytes, sizeof bytes);
   if (size == 0) return;
   require(size < datagram.size() && is_packed(bytes[0]));
-  // In memory of its own size, so that a byte too many is seen.
+  // On the heap and of exactly this size, so that a sanitizer finds an access beyond it.
   const std::string exact(reinterpret_cast<const char*>(bytes), size);
   std::string out(datagram.size(), '\0');
   const UnpackResult result =

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whatever a file holds, reading it as a recording ends, crashes nothing, and gives the same however the bytes come;
-// a record that was read is written and read again as it was; and what is played of it is what the board said.
+// Any file, read as a recording: reading ends, does not crash, and has the same result for any cut
+// of the bytes. A record that was read reads equal after it was written again. The replay gives the
+// datagrams of the board.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -42,10 +43,11 @@ class Lines final : public RecordingVisitor {
 
   std::string text;
   std::optional<Time> beginning;
-  std::vector<std::string> said;  // by the board of the first path, since then
+  std::vector<std::string> said;  // by the board of the first path, since the beginning
 };
 
-// What is told of it. Of compression that is damaged, how much is read depends on the pieces.
+// The text of the records and errors. If damaged data are compressed, the pieces decide how much of
+// them is read.
 Lines told(std::string_view bytes, std::size_t piece) {
   Lines lines;
   try {
@@ -61,7 +63,7 @@ Lines told(std::string_view bytes, std::size_t piece) {
   return lines;
 }
 
-// A file of these bytes, as long as it is there.
+// A file with these bytes, which exists as long as the object.
 class File {
  public:
   explicit File(std::string_view bytes) : file_(::memfd_create("recording", MFD_CLOEXEC)) {
@@ -76,7 +78,7 @@ class File {
   const int file_;
 };
 
-// What is played of the first path.
+// The datagrams that a replay of the first path gives.
 std::vector<std::string> played(const std::string& path, const ReplayStart& start) {
   std::vector<std::string> said;
   try {
@@ -104,7 +106,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (!r4::is_zstd(bytes)) r4::require(whole.text == cut.text);
   const r4::File file(bytes);
   const std::vector<std::string> played = r4::played(file.path(), {});
-  // One of another version, which ends both, is told when what is before it has not been played.
+  // A record of another version ends both. The replay may end before it has played the records
+  // before that one.
   r4::require(played.empty() || played == whole.said);
   const std::vector<std::string> later =
       r4::played(file.path(), {.time = r4::Time(data[0] * 100'000)});

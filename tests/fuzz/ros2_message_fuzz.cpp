@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whatever a message of ROS holds, a string of R4_Command and ~/send or the numbers of the other topics: it is refused
-// with a reason, or it is commands that the board takes, and none of those that cannot come from a topic.
+// Any message of ROS: a string of R4_Command and ~/send, or the numbers of the other topics. The
+// message is refused with a reason, or it gives commands that the board accepts and that may come
+// from a topic.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -48,7 +49,8 @@ void read_string(std::string_view bytes) {
   } catch (const Error& error) {
     const Problem& problem = error.problem();
     require(problem.kind == ErrorKind::usage && !problem.reason.empty() && !problem.fix.empty());
-    require(std::all_of(problem.thing.begin(), problem.thing.end(), is_ascii));  // on /rosout
+    // This text goes to /rosout.
+    require(std::all_of(problem.thing.begin(), problem.thing.end(), is_ascii));
   }
 }
 

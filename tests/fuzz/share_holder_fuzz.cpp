@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What other programs do to one that holds a transport: any number of them come, say anything in any order, read
-// or do not, and go. The input is a list of actions. Whatever they do, nothing but a stop gets to the board, one
-// that watches hears all, and a stop of one that comes last is obeyed.
+// Other programs connect to the holder of a shared transport. Any number of them come, send any
+// messages, read or do not read, and go. Only their stops reach the board, a watcher hears
+// everything, and a stop of a program that comes last is obeyed. The input is a list of actions.
 #include <fmt/format.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -78,14 +78,14 @@ class Holder final : private ShareHolder::Owner {
       default:
         break;
     }
-    if (action & 0x40) return;  // more is to come before the holder looks
+    if (action & 0x40) return;  // the holder runs after a later action
     run();
     hear();
   }
 
   void end() {
     run();
-    run_until([] { return false; });  // it takes those in that have come, one after the other
+    run_until([] { return false; });  // the holder accepts the waiting programs one after the other
     if (given_away_) return;
     const int before = stops_;
     const FileDescriptor last = come(Kind::stop, stop);
@@ -119,7 +119,8 @@ class Holder final : private ShareHolder::Owner {
   static void say(const FileDescriptor& connection, Kind kind, std::string_view text) {
     if (connection) send_message(connection.get(), kind, text);
   }
-  // Runs event after event until `done`, or until nothing happens for as long as ten arrivals take.
+  // Runs one event after another until `done`, or until nothing happens for the time of ten
+  // arrivals.
   template <class Done>
   void run_until(Done done) {
     for (std::size_t event = 0; event < 100 * most_connections && !done(); ++event) {
@@ -132,7 +133,7 @@ class Holder final : private ShareHolder::Owner {
     io.poll();
     require(holder_.served() <= ShareHolder::most_served_after_a_stop);
   }
-  // What the one that watches hears.
+  // Reads all messages that the watcher received.
   void hear() {
     std::array<char, ShareMessage::max_size + 1> packet;
     while (true) {
@@ -152,7 +153,7 @@ class Holder final : private ShareHolder::Owner {
   const bool gives_way_;
   bool given_away_ = false;
   int stops_ = 0;
-  int told_ = 0;  // and not yet heard
+  int told_ = 0;  // sent to the watcher and not yet heard
   ShareHolder holder_{io, *this};
   FileDescriptor watcher_;
   std::vector<FileDescriptor> others_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Messages of another program that shares a transport (docs/how-to/sharing.md).
+// Any messages of another program that shares a transport (docs/how-to/sharing.md).
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>

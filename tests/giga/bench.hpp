@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The firmware on a fake Giga, with hosts at the ends of its transports.
+// The firmware on a fake Giga, with hosts at the other ends of its transports.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ extern "C" void r4_fake_core_warning(std::int32_t status, std::uint32_t address)
 
 namespace r4::test {
 
-// A host that does as the paper's client: heartbeats of its own clock, numbers from below.
+// A host like the paper's client: its heartbeats have its own clock, and its numbers begin at 1.
 class PlainHost {
  public:
   std::string heartbeat(std::uint64_t now_ms) {
@@ -57,7 +57,7 @@ class GigaBench {
     system = std::make_unique<giga::System>();
     system->boot();
   }
-  // Boots with a network in its settings. True if the board has joined it.
+  // Boots with a network in its settings. True if the board has joined the network.
   bool boot_in_network() {
     giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
     boot();
@@ -66,14 +66,14 @@ class GigaBench {
       return giga.udp_port != 0;
     });
   }
-  // The chip starts again, as after a reset or with new power for the microcontroller alone.
+  // Restarts the microcontroller, as after a reset or when only its own supply was off.
   void restart() {
     giga.reset_by([this] { giga.reset(); });
     system.reset();
     giga.connect_registers();
     boot();
   }
-  // As the sketch does it.
+  // One turn of the loop, as in the sketch.
   void turn() {
     system->poll();
     giga::rest();
@@ -82,7 +82,7 @@ class GigaBench {
     const std::uint64_t end = giga.now_ms() + ms;
     while (giga.now_ms() < end) turn();
   }
-  // With a host that sends a heartbeat each 100 ms.
+  // Runs the board with a host that sends a heartbeat every 100 ms.
   void run_ms(std::uint64_t ms, PlainHost& host, const Send& send) {
     const std::uint64_t end = giga.now_ms() + ms;
     for (std::uint64_t next = giga.now_ms(); giga.now_ms() < end; turn()) {
@@ -91,7 +91,7 @@ class GigaBench {
       next += 100;
     }
   }
-  // Until `done`, giving the firmware's threads time.
+  // Runs the board until `done`, and gives the firmware's threads time. True if that happened in time.
   bool run_until(const std::function<bool()>& done) {
     for (int i = 0; i < 20000; ++i) {
       if (done()) return true;
@@ -101,7 +101,7 @@ class GigaBench {
     return false;
   }
 
-  // --- the ends of the transports
+  // --- the hosts' ends of the transports
   Send usb() {
     return [this](const std::string& line) { giga.usb_send(line + "\r\n"); };
   }
@@ -142,7 +142,7 @@ class GigaBench {
   bool active() { return application().state() == firmware::BoardState::active; }
   sim::ChipPins pins() const { return giga.chips.pins(); }
 
-  // A host in control by `send`, OSMC 1 at 358.
+  // A host takes control over `send` and sets OSMC 1 to 358.
   void drive(PlainHost& host, const Send& send) {
     run_ms(150, host, send);
     send(host.command("O:358,1,1"));
@@ -156,7 +156,7 @@ class GigaBench {
   std::unique_ptr<giga::System> system;
   CanNode can_node{CanEnd::host, 1, false};
   std::vector<std::string> can_datagrams;
-  std::vector<CanFrame> can_raw;  // that are no part of a datagram
+  std::vector<CanFrame> can_raw;  // the frames that belong to no datagram
 
  private:
   void on_can(const CanFrame& frame) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The whole firmware on a fake Giga: what it does at power-up, over its transports, and when parts of
-// it fail.
+// The whole firmware on a fake Giga: its behaviour at power-up, over its transports, and when parts
+// of it fail.
 #include <algorithm>
 
 #include "bench.hpp"
@@ -14,7 +14,7 @@ TEST(GigaPowerUp, SwitchesEveryOutputOffBeforeAnythingElse) {
   const auto& log = bench.giga.i2c.log;
   bench.boot();
   ASSERT_GE(log.size(), 6U);
-  EXPECT_EQ(log[0], (std::vector<std::uint8_t>{0, 0x06})) << "the reset of all PWM chips, first";
+  EXPECT_EQ(log[0], (std::vector<std::uint8_t>{0, 0x06})) << "first the reset of all PWM chips";
   EXPECT_EQ(log[1], (std::vector<std::uint8_t>{0x70 << 1, 0xFD, 0x10})) << "then all off";
   const auto first_set_up = std::find_if(log.begin(), log.end(), [](const auto& transfer) {
     return transfer.size() > 1 && (transfer[0] >> 1 == 0x40) && transfer[1] == 0xFE;
@@ -66,13 +66,13 @@ TEST(GigaUsb, AHostThatStopsReadingNeverHoldsTheLoop) {
     if (i % 50 == 0) bench.usb()(host.heartbeat(bench.giga.now_ms()));
   }
   EXPECT_LT(longest_us, 3000U);
-  EXPECT_TRUE(bench.active()) << "it still hears";
+  EXPECT_TRUE(bench.active()) << "the board still receives";
   bench.giga.usb_reads = true;
   bench.giga.usb_host.clear();
   bench.run_ms(60, host, bench.usb());
   const std::vector<std::string> lines = bench.usb_lines();
   ASSERT_GT(lines.size(), 3U);
-  // What had begun ends first; behind it there is nothing from before.
+  // The interrupted line ends first. After it, no old line is sent.
   Datagram datagram;
   const std::string& second = lines[2];
   ASSERT_TRUE(read_datagram(Text(second.data(), second.size()), datagram)) << second;
@@ -93,7 +93,7 @@ TEST(GigaUsb, AnUploadAt1200BaudFindsEverythingOffBeforeTheCoreResets) {
   EXPECT_LE(bench.giga.now_ns() - asked_ns, 2000000U);
   EXPECT_EQ(bench.reason(), SafeReason::fault);
 
-  // It stays, whatever the host says and whatever becomes of the port, until the reset comes.
+  // The board stays safe until the reset, whatever the host sends and whatever happens to the port.
   for (int i = 0; i < 300; ++i) {
     if (i == 100) bench.giga.usb_baud = 115200;
     if (i == 200) bench.giga.usb_open = false;
@@ -116,7 +116,7 @@ TEST(GigaUsb, ACommandRightBehindAClearDoesNotDriveDuringAnUpload) {
   bench.drive(host, bench.usb());
   bench.giga.usb_baud = 1200;
   bench.usb()(host.command("E:CLEAR") + "\r\n" + host.command("O:358,1,1"));
-  bench.system->poll();  // both in one turn
+  bench.system->poll();  // both commands in one turn
   EXPECT_TRUE(bench.pins().is_safe());
   EXPECT_EQ(bench.application().outputs().osmc[0].pwm, 0);
   EXPECT_EQ(bench.reason(), SafeReason::fault);
@@ -200,7 +200,7 @@ TEST(GigaUsb, AFloodOfInputTakesItsTurn) {
 }
 
 TEST(GigaUsb, EndsNoBurstWithAFullPacket) {
-  // A host's driver waits for more behind a packet of 64 bytes.
+  // A host's driver waits for more data after a packet of 64 bytes.
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -215,7 +215,7 @@ TEST(GigaUsb, EndsNoBurstWithAFullPacket) {
       if ((line.size() + 2) % giga::UsbPort::packet_size == 0) ++multiples;
     }
   }
-  EXPECT_GT(multiples, 0) << "otherwise this proves nothing";
+  EXPECT_GT(multiples, 0) << "the test needs a line that fills its packets";
   const auto& packets = bench.giga.usb_sent;
   for (std::size_t i = 0; i + 1 < packets.size(); ++i) {
     if (packets[i].size != giga::UsbPort::packet_size) continue;
@@ -286,7 +286,8 @@ TEST(GigaCan, LeavesBusOffByItself) {
   bench.giga.can.sent.clear();
   bench.run_ms(700);
   ASSERT_FALSE(bench.giga.can.sent.empty());
-  EXPECT_LT(bench.giga.can.sent.front().data[0], 0x20) << "not the rest of what was cut off";
+  EXPECT_LT(bench.giga.can.sent.front().data[0], 0x20)
+      << "not the rest of the interrupted datagram";
   bench.can_datagrams.clear();
   bench.run_ms(600, host, bench.can());
   EXPECT_TRUE(bench.active());
@@ -425,7 +426,7 @@ TEST(GigaWiFi, AnotherCalibrationDoesNotDropIt) {
     const std::lock_guard<std::mutex> lock(bench.giga.mutex);
     return std::any_of(bench.giga.udp_out.begin(), bench.giga.udp_out.end(),
                        [](const fake::Datagram& datagram) { return datagram.port == 2390; });
-  })) << "the new host is called";
+  })) << "the board sends to the new host";
   EXPECT_EQ(joins(), 1);
 }
 
@@ -495,7 +496,7 @@ TEST(GigaPins, VoltagesAreConvertedWithoutTheCore) {
   PlainHost host;
   bench.run_ms(150, host, bench.usb());
   const int by_core = bench.giga.core_conversions;
-  EXPECT_EQ(by_core, analog_channels) << "when it starts";
+  EXPECT_EQ(by_core, analog_channels) << "at the start only";
   bench.giga.analog = {{0x24, 6554},  {0x25, 13108}, {0x10, 19662},
                        {0x11, 26215}, {0x23, 32769}, {0x22, 39322}};
   bench.usb()(host.command("F:AIN24,AIN12,AIN5,AINDMH,AINSTEER,AIN6"));
@@ -516,9 +517,9 @@ TEST(GigaPins, VoltagesAreConvertedWithoutTheCore) {
   }
 }
 
-// --- the wiring, channel by channel, as the table in docs/how-to/firmware.md has it
+// --- the wiring of each channel, as in the table of docs/how-to/firmware.md
 
-// What is connected to one channel of each kind.
+// The pins of one channel of each kind.
 struct Wires {
   giga::Pin step, direction, a, b, index, trigger, echo;
 };
@@ -544,7 +545,8 @@ class GigaWiring : public testing::TestWithParam<int> {
   bool pin(giga::Pin pin) { return bench_.giga.pin(pin.port, pin.number); }
   void command(const std::string& field) { bench_.usb()(host_.command(field)); }
   void run_ms(std::uint64_t ms) { bench_.run_ms(ms, host_, bench_.usb()); }
-  // The newest state has these values in the fields of this channel, and 0 in those of the others.
+  // Expects these values in the newest state: `value` in the field of this channel, 0 in those of
+  // the other channels.
   void expect_state(const char* name, const char* suffix, int value) {
     const std::vector<std::string> lines = bench_.usb_lines();
     const auto state = std::find_if(lines.rbegin(), lines.rend(), [&](const std::string& line) {
@@ -575,7 +577,7 @@ TEST_P(GigaWiring, AStepperStepsAtItsOwnPins) {
     EXPECT_EQ(bench_.giga.rises(each.step.port, each.step.number), &each == &mine() ? 45 : 0);
     EXPECT_EQ(bench_.giga.rises(each.direction.port, each.direction.number),
               &each == &mine() ? 1 : 0);
-    EXPECT_FALSE(pin(each.step)) << "the last step's pulse has ended";
+    EXPECT_FALSE(pin(each.step)) << "the pulse of the last step has ended";
     EXPECT_FALSE(pin(each.direction)) << "backward, or as after power-up";
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What crosses between the loop and the threads.
+// The data that cross between the loop and the threads.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -54,7 +54,7 @@ TEST(DatagramRing, RefusesWhatDoesNotFitAndGoesOnAroundItsEnd) {
       EXPECT_EQ(str(text), datagram);
     }
   }
-  EXPECT_FALSE(ring.put(note, "x", 250)) << "room is kept";
+  EXPECT_FALSE(ring.put(note, "x", 250)) << "some room is reserved";
 }
 
 TEST(DatagramRing, CarriesBetweenThreadsWithoutLosingAnyByte) {
@@ -67,7 +67,7 @@ TEST(DatagramRing, CarriesBetweenThreadsWithoutLosingAnyByte) {
       if (ring.put(note, Text(text))) {
         ++i;
       } else {
-        std::this_thread::yield();  // one processor must suffice
+        std::this_thread::yield();  // the test also works on one processor
       }
     }
   });
@@ -122,7 +122,7 @@ TEST(UdpLink, TellsTheNetworkThreadWhoIsInControl) {
   port.also_hold(9);
   port.also_hold(7);
   port.also_hold(everyone);
-  EXPECT_EQ(link.held(1), 9U) << "its second place";
+  EXPECT_EQ(link.held(1), 9U) << "the second path's peer";
   EXPECT_EQ(link.held(2), everyone);
   port.hold(8);
   EXPECT_EQ(link.held(0), 8U);
@@ -132,16 +132,16 @@ TEST(UdpLink, TellsTheNetworkThreadWhoIsInControl) {
 TEST(UdpPeers, SendToThePapersClientWhereItListensAndWhereItAsks) {
   giga::UdpPeers peers;
   giga::UdpAddress to[2];
-  EXPECT_EQ(peers.find(everyone, to), 0) << "nobody is there";
+  EXPECT_EQ(peers.find(everyone, to), 0) << "no peer is known";
   peers.set_host(77);
-  ASSERT_EQ(peers.find(everyone, to), 1) << "before it was heard";
+  ASSERT_EQ(peers.find(everyone, to), 1) << "the set host, before it is heard";
   EXPECT_EQ(to[0].ip, 77U);
   EXPECT_EQ(to[0].port, 2390);
   const std::uint32_t number = peers.heard({77, 50000}, Text(hello));
   ASSERT_EQ(peers.find(number, to), 2);
-  EXPECT_EQ(to[0].port, 50000) << "a search, or another program of that computer";
+  EXPECT_EQ(to[0].port, 50000) << "a search, or another program on that computer";
   EXPECT_EQ(to[1].ip, 77U);
-  EXPECT_EQ(to[1].port, 2390) << "it asks from another socket";
+  EXPECT_EQ(to[1].port, 2390) << "the client asks from another socket";
   const std::uint32_t same = peers.heard({77, 2390}, Text(hello));
   ASSERT_EQ(peers.find(same, to), 1);
   EXPECT_EQ(to[0].port, 2390);
@@ -168,11 +168,11 @@ TEST(UdpLink, StatesForWatchersLeaveRoomForThoseOfTheHost) {
   const std::string state(300, 'x');
   for (int i = 0; i < 20; ++i) port.send(Text(state), Priority::state, 2);
   const std::uint32_t dropped = port.dropped();
-  EXPECT_GT(dropped, 0U) << "the thread is away";
+  EXPECT_GT(dropped, 0U) << "the network thread is not running";
   for (int i = 0; i < 3; ++i) port.send(Text(state), Priority::state, 1);
   EXPECT_EQ(port.dropped(), dropped);
   for (int i = 0; i < 3; ++i) port.send(Text(state), Priority::normal, 2);
-  EXPECT_EQ(port.dropped(), dropped) << "and for answers";
+  EXPECT_EQ(port.dropped(), dropped) << "room for answers remains";
 }
 
 TEST(UdpLink, AThreadThatWasAwaySendsThePresent) {
@@ -191,7 +191,7 @@ TEST(UdpLink, AThreadThatWasAwaySendsThePresent) {
   Text text;
   int heartbeats = 0;
   while (link.take(now_ms, peer, buffer, text)) {
-    ASSERT_EQ(str(text), "H:R4-ROS2;") << "no old state";
+    ASSERT_EQ(str(text), "H:R4-ROS2;") << "not an old state";
     ++heartbeats;
   }
   EXPECT_EQ(heartbeats, 6) << "states left room for answers";
@@ -205,7 +205,7 @@ TEST(UdpLink, TellsTheLoopOnceThatTheNetworkHasGone) {
   giga::UdpLink link;
   giga::UdpPort port(link, &clock_ms);
   const auto receive = [&] { return port.receive([](std::uint32_t, Text) {}); };
-  EXPECT_FALSE(receive()) << "it was never there";
+  EXPECT_FALSE(receive()) << "the network was never up";
   link.set_up(true);
   EXPECT_FALSE(receive());
   link.set_up(false);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's bus of the Giga: its peripheral by the registers, and the board beside it.
+// The user's I2C bus of the Giga: its peripheral at the level of registers, and its effect on the
+// board.
 #include <cstring>
 #include <iterator>
 
@@ -22,7 +23,7 @@ class GigaDevices : public testing::Test {
     bench.usb()(host.command(field));
     bench.run_ms(3);
   }
-  // The states of so long, of which the newest is read.
+  // Runs for `ms` and returns the number of states with the field `told`. The newest is in `state`.
   std::size_t states(std::uint64_t ms) {
     bench.usb_lines();
     bench.run_ms(ms, host, bench.usb());
@@ -47,7 +48,7 @@ class GigaDevices : public testing::Test {
   GigaBench bench;
   PlainHost host;
   State state;
-  const char* told = "I2CBUS";  // a field of the states that count
+  const char* told = "I2CBUS";  // only states with this field count
 };
 
 TEST(UserI2cTiming, KeepsTheLimitsOfStandardModeForEveryClock) {
@@ -65,7 +66,8 @@ TEST(UserI2cTiming, KeepsTheLimitsOfStandardModeForEveryClock) {
   }
 }
 
-// Read from variants/GIGA of ArduinoCore-mbed, commit 2080938: I2C_SDA1 PH_12, I2C_SCL1 PB_6_ALT0, both I2C4.
+// From variants/GIGA of ArduinoCore-mbed, commit 2080938: I2C_SDA1 PH_12, I2C_SCL1 PB_6_ALT0, both
+// I2C4.
 TEST(GigaPins, TheUsersBusIsTheCoresWire1) {
   EXPECT_TRUE(giga::user_scl_pin == (giga::Pin{'B', 6}));
   EXPECT_TRUE(giga::user_sda_pin == (giga::Pin{'H', 12}));
@@ -139,7 +141,7 @@ TEST_F(GigaDevices, ADeviceThatWasCutOffIsClockedFree) {
   bench.giga.user_i2c.hold_sda(9);
   states(200);
   EXPECT_EQ(state.i2c_bus.recoveries, 1U);
-  EXPECT_LE(state.t_ms - state.raw.i2c[0].t_ms, 20U) << "it is read again";
+  EXPECT_LE(state.t_ms - state.raw.i2c[0].t_ms, 20U) << "the device is read again";
 }
 
 TEST_F(GigaDevices, ALineThatIsHeldCostsTheBoardNothing) {
@@ -174,7 +176,7 @@ TEST(UserUartTiming, IsWithinOnePercentAtEveryRateAndClock) {
   for (std::uint32_t mhz = 16; mhz <= 250; ++mhz) {
     for (const std::uint32_t baud : {1200U, 9600U, 38400U, 115200U, 230400U, 460800U}) {
       const giga::UartTiming timing = giga::user_uart_timing(mhz * 1000000, baud);
-      EXPECT_GE(timing.divider, 16U) << "RM0399: of 16 samples a bit";
+      EXPECT_GE(timing.divider, 16U) << "RM0399: at least 16 samples a bit";
       EXPECT_LE(timing.divider, 0xFFFFU);
       const double real = mhz * 1e6 / (1U << timing.prescaler) / timing.divider;
       EXPECT_NEAR(real, baud, 0.015 * baud) << mhz;
@@ -182,8 +184,9 @@ TEST(UserUartTiming, IsWithinOnePercentAtEveryRateAndClock) {
   }
 }
 
-// Of the same commit: pins_arduino.h SERIAL2_TX 18, SERIAL2_RX 19, SERIAL3_TX 16, SERIAL3_RX 17; variant.cpp D18 PD_5,
-// D19 PD_6, D16 PH_13, D17 PI_9. By the data sheet PD5 and PD6 are USART2 by function 7, PH13 and PI9 UART4 by function 8.
+// From the same commit: pins_arduino.h has SERIAL2_TX 18, SERIAL2_RX 19, SERIAL3_TX 16, SERIAL3_RX
+// 17; variant.cpp has D18 PD_5, D19 PD_6, D16 PH_13, D17 PI_9. By the data sheet, PD5 and PD6 are
+// USART2 with function 7, PH13 and PI9 are UART4 with function 8.
 TEST(GigaPins, TheUsersUartsAreTheCoresSerial2AndSerial3) {
   EXPECT_TRUE(giga::uart_tx_pins[0] == (giga::Pin{'D', 5}));
   EXPECT_TRUE(giga::uart_rx_pins[0] == (giga::Pin{'D', 6}));
@@ -193,7 +196,7 @@ TEST(GigaPins, TheUsersUartsAreTheCoresSerial2AndSerial3) {
   EXPECT_EQ(giga::uart_functions[1], 8U);
 }
 
-// The same: A12 PA_4 (DAC1_OUT1), A13 PA_5 (DAC1_OUT2).
+// From the same commit: A12 PA_4 (DAC1_OUT1), A13 PA_5 (DAC1_OUT2).
 TEST(GigaPins, TheUsersVoltagesAreA12AndA13) {
   EXPECT_TRUE(giga::dac_pins[0] == (giga::Pin{'A', 4}));
   EXPECT_TRUE(giga::dac_pins[1] == (giga::Pin{'A', 5}));
@@ -239,7 +242,7 @@ TEST_F(GigaDevices, WhatAUartHasNotSentWhenAStopComesIsDropped) {
   command("E:STOP");
   const std::size_t sent = bench.giga.uart[0].sent.size();
   bench.run_ms(1000);
-  EXPECT_LE(bench.giga.uart[0].sent.size(), sent + 1) << "the one that is on the wire";
+  EXPECT_LE(bench.giga.uart[0].sent.size(), sent + 1) << "at most the byte on the wire";
 }
 
 TEST_F(GigaDevices, NoDamagedByteIsToldAndNoOtherIsLost) {
@@ -276,7 +279,7 @@ TEST_F(GigaDevices, NoiseOnTheUartsCostsTheBoardNothing) {
   bench.run_ms(20, host, bench.usb());
   EXPECT_EQ(bench.pins().osmc[0].pwm, 358);
   bench.run_ms(1010);
-  EXPECT_TRUE(bench.pins().is_safe()) << "silence";
+  EXPECT_TRUE(bench.pins().is_safe()) << "the host is silent";
 }
 
 TEST_F(GigaDevices, AVoltageIsSetAndIsZeroInTheSafeState) {

@@ -91,13 +91,13 @@ void CanPeripheral::store(std::uint32_t base, std::uint32_t index, const CanFram
   }
 }
 
-// What the filters do with a frame: 1 and 2 are FIFO 0 and 1, 0 is no match.
+// The filters' decision about a frame: 1 and 2 are FIFO 0 and 1, 0 means that no filter matches.
 std::uint32_t CanPeripheral::filter_result(const CanFrame& frame) const {
   if (frame.extended) {
     const std::uint32_t filters = can.XIDFC.value >> 16 & 0x7F;
     for (std::uint32_t i = 0; i < filters; ++i) {
       const std::uint32_t* const filter = &r4_fake_message_ram[start_word(can.XIDFC) + 2 * i];
-      if (filter[1] >> 30 != 2) continue;  // id and mask: the kind that this firmware uses
+      if (filter[1] >> 30 != 2) continue;  // identifier and mask: the kind that this firmware uses
       const std::uint32_t mask = filter[1] & 0x1FFFFFFF & can.XIDAM.value;
       if ((frame.id & mask) == (filter[0] & mask)) return filter[0] >> 29 & 7U;
     }
@@ -135,7 +135,8 @@ bool CanPeripheral::deliver(const CanFrame& frame) {
     }
     return true;
   }
-  if ((can.GFC.value >> 4 & 3U) == 0) {  // what no filter knows goes to FIFO 0 after a reset
+  // The setting after a reset: frames without a match go to FIFO 0.
+  if ((can.GFC.value >> 4 & 3U) == 0) {
     store(start_word(can.RXF0C), (fifo0_get_ + fifo0_fill_) % fifo_size(can.RXF0C), frame);
     ++fifo0_fill_;
     return true;

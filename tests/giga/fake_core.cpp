@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The parts of the core that the firmware calls, on a fake Giga.
+// The functions of the core that the firmware calls, on a fake Giga.
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
@@ -29,8 +29,8 @@ namespace {
 using r4::fake::Giga;
 using r4::fake::giga;
 
-// A thread of the firmware. It ends where it sleeps or hangs: there it stays, for good, and touches
-// nothing any more.
+// A thread of the firmware. When it is stopped, it waits forever at its next sleep, or where it
+// hangs, and touches nothing more.
 struct FakeThread {
   std::mutex mutex;
   std::condition_variable changed;
@@ -43,7 +43,7 @@ struct FakeThread {
     changed.notify_all();
     changed.wait(lock, [this] { return parked; });
   }
-  // Stays here if it is to end.
+  // Waits forever if the thread was stopped.
   void may_end() {
     std::unique_lock<std::mutex> lock(mutex);
     while (end) {
@@ -228,7 +228,7 @@ void ThisThread::sleep_for(Kernel::Clock::duration_u32 time) {
     return;
   }
   giga().pass_ms(time.count());
-  // The other threads' turn, also on a busy machine.
+  // Gives the other threads time, also on a busy machine.
   std::this_thread::sleep_for(std::chrono::microseconds(giga().flash_hangs ? 20 : 1000));
 }
 
@@ -286,7 +286,7 @@ void USBCDC::send_nb(std::uint8_t* buffer, std::uint32_t size, std::uint32_t* ac
     chip.usb_sent.push_back({*actual, chip.now_ms()});
   } else {
     *actual = std::min(size, 64U);
-    _tx_in_progress = true;  // for good
+    _tx_in_progress = true;  // forever
   }
 }
 void USBCDC::_change_terminal_connected(bool connected) {
@@ -358,7 +358,7 @@ nsapi_size_or_error_t UDPSocket::sendto(const SocketAddress& address, const void
 nsapi_size_or_error_t UDPSocket::recvfrom(SocketAddress* address, void* data, unsigned int size) {
   const std::lock_guard<std::mutex> lock(giga().mutex);
   if (giga().udp_in.empty()) {
-    if (blocking_) std::abort();  // it would wait for ever
+    if (blocking_) std::abort();  // the call would wait forever
     return NSAPI_ERROR_WOULD_BLOCK;
   }
   const r4::fake::Datagram datagram = giga().udp_in.front();

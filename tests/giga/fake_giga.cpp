@@ -157,7 +157,7 @@ void Giga::connect_registers() {
   };
 }
 
-// ADC1, switched on and ready at once; it has converted when it is looked at again.
+// ADC1: ready as soon as it is on. A conversion has ended when the firmware looks again.
 void Giga::connect_converter() {
   constexpr std::uint32_t on = 1U << 0;
   constexpr std::uint32_t convert = 1U << 2;
@@ -235,17 +235,17 @@ int Giga::rises(char port, int number) const {
   return rises_[static_cast<std::size_t>(port - 'A')][static_cast<std::size_t>(number)];
 }
 
-// Runs what is due, unless interrupts are off or one is running.
+// Runs the interrupts that are due, unless interrupts are off or an interrupt is running.
 void Giga::interrupts_may_come() {
   constexpr std::uint64_t bite_ns = 500000000;
   if (watchdog_runs && now_ns_ - watchdog_fed_ns > bite_ns) {
-    r4_fake_rtc.BKP8R.value = 4;  // by the boot loader, which clears RCC_RSR
+    r4_fake_rtc.BKP8R.value = 4;  // as the boot loader does, which clears RCC_RSR
     reset();
   }
   if (primask != 0 || in_interrupt) return;
   for (Timer* timer : {&ticker, &step_timer}) {
     isr_queue = 0;
-    while (timer->period_ns != 0 && timer->next_ns <= now_ns_) {  // the late ones in one interrupt
+    while (timer->period_ns != 0 && timer->next_ns <= now_ns_) {  // all late ticks in one interrupt
       timer->next_ns += timer->period_ns;
       in_interrupt = true;
       ++interrupts;
@@ -256,7 +256,8 @@ void Giga::interrupts_may_come() {
   run_pending();
 }
 
-// What the firmware has asked for, by priority. (One that gives way is not interrupted here.)
+// Runs the interrupts that the firmware has requested, by priority. An interrupt of higher priority
+// does not interrupt one of lower priority here.
 void Giga::run_pending() {
   for (;;) {
     int next = -1;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A Giga in virtual time: the microcontroller's registers that the firmware uses, with what is
-// behind them, and the parts of the core that it calls. One at a time; the firmware runs in the
-// test's thread, its threads are threads.
+// A Giga in virtual time: the registers of the microcontroller that the firmware uses, the hardware
+// behind them, and the functions of the core that the firmware calls. One Giga can exist at a time.
+// The firmware runs in the thread of the test, and its threads are real threads.
 //
-// Time passes when the firmware looks at the clock (a microsecond each time), rests, or when the
-// test lets it pass. Timers interrupt whatever runs then, unless interrupts are off, so an
-// interrupt comes in the middle of a transfer as on the chip. A reset ends reset_by()'s action.
+// Time passes when the firmware reads the clock (1 us each time), when the firmware rests, or when
+// the test lets time pass. Timers interrupt the running code unless interrupts are off, so an
+// interrupt can come in the middle of a transfer, as on the chip. A reset ends the action of
+// reset_by().
 #pragma once
 
 #include <array>
@@ -31,28 +32,28 @@ namespace r4::fake {
 // The I2C peripheral between the firmware and the chips, by RM0399.
 class I2cPeripheral {
  public:
-  // Somebody holds SDA until SCL has risen so often.
+  // Another device holds SDA until SCL has risen `clocks` times.
   void hold_sda(int clocks) { sda_held_ = clocks; }
-  // Somebody holds SCL, for good.
+  // Another device holds SCL until this is called with false.
   void hold_scl(bool held) { scl_held_ = held; }
-  // SDA is held from the moment on at which so many more bytes were sent.
+  // SDA is held for `clocks` after `bytes` more bytes were sent.
   void hold_after(int bytes, int clocks) {
     hold_after_ = bytes;
     hold_clocks_ = clocks;
   }
-  // The chips do not acknowledge the byte behind so many more data bytes.
+  // After `bytes` more data bytes, the chips do not acknowledge the next byte.
   void refuse_after(int bytes) { refuse_after_ = bytes; }
-  // The peripheral reports a bus error after so many more bytes, although there was none (ES0430 2.15.2).
+  // The peripheral reports a false bus error after `bytes` more bytes (ES0430 2.15.2).
   void report_bus_error_after(int bytes) { bus_error_after_ = bytes; }
-  // Another device pulls SDA down after so many more bytes, in so many transfers.
+  // Another device pulls SDA low after `bytes` more bytes, in each of `transfers` transfers.
   void lose_after(int bytes, int transfers) {
     lose_after_ = bytes;
     losses_ = transfers;
   }
-  // Bytes put on the wire, addresses included: {address << 1 | read, bytes…} for each START.
+  // The bytes on the wire, addresses included: {address << 1 | read, bytes…} for each START.
   std::vector<std::vector<std::uint8_t>> log;
 
-  // To the registers, as after a reset.
+  // Connects to the registers, in the state after a reset.
   void connect(I2C_TypeDef& registers, std::vector<sim::I2cChipModel*> chips,
                std::uint64_t clock_ns);
   bool sda_low() const { return sda_held_ > 0; }
@@ -80,7 +81,7 @@ class I2cPeripheral {
   std::uint32_t cr2_ = 0;
   std::uint32_t left_ = 0;
   std::uint32_t flags_ = 0;
-  std::optional<std::uint8_t> txdr_;  // behind the byte that is on the wire
+  std::optional<std::uint8_t> txdr_;  // waits for the byte on the wire to end
   std::uint8_t out_ = 0;
   std::uint8_t in_ = 0;
   std::vector<sim::I2cChipModel*> taking_part_;
@@ -90,20 +91,21 @@ class I2cPeripheral {
   int bus_error_after_ = -1;
   int lose_after_ = 0;
   int losses_ = 0;
-  int sent_ = 0;  // in this transfer
+  int sent_ = 0;  // bytes sent in this transfer
   int hold_after_ = -1;
   int hold_clocks_ = 0;
 };
 
-// A USART between the firmware and a wire, by RM0399: FIFOs of 16 bytes, and a byte's time on the wire.
+// A USART between the firmware and a wire, by RM0399: FIFOs of 16 bytes, and the time of a byte on
+// the wire.
 class UartPeripheral {
  public:
   void connect(USART_TypeDef& registers);
-  // Somebody says that, from now on, as fast as the board listens.
+  // The peer sends these bytes from this moment on, at the baud rate of the board.
   void say(const std::string& bytes);
-  // Bytes without end, one in four damaged.
+  // The peer sends bytes without end. One in four is damaged.
   bool noise = false;
-  std::uint32_t said = 0;  // so far, to the board: undamaged, and damaged
+  std::uint32_t said = 0;  // undamaged bytes so far, to the board
   std::uint32_t damaged = 0;
   std::string sent;
   std::uint64_t byte_ns() const;
@@ -130,16 +132,16 @@ class UartPeripheral {
 class CanPeripheral {
  public:
   void connect();
-  // From the bus. False: the filters did not let it in.
+  // A frame from the bus. False if the filters rejected it.
   bool deliver(const CanFrame& frame);
   void pass(std::uint64_t now_ns);
 
-  bool acknowledged = true;  // somebody else is on the bus
-  bool quiet = true;         // the bus is fit to come back to
+  bool acknowledged = true;  // another node is on the bus
+  bool quiet = true;         // the bus allows the recovery from bus-off
   void go_bus_off();
   std::deque<CanFrame> sent;
-  int overtaken = 0;  // frames sent from the buffer before the queue
-  // What the controller calls when a frame has gone out.
+  int overtaken = 0;  // urgent frames sent before the waiting ones
+  // Called when a frame was sent.
   std::function<void(const CanFrame&)> on_sent;
 
  private:
@@ -148,7 +150,7 @@ class CanPeripheral {
   std::uint32_t filter_result(const CanFrame& frame) const;
 
   std::uint32_t pending_ = 0;
-  std::uint32_t put_ = 1;  // of the queue's elements 1 … 8
+  std::uint32_t put_ = 1;  // of the elements 1 … 8 of the queue
   std::uint32_t get_ = 1;
   std::uint32_t fifo0_get_ = 0, fifo0_fill_ = 0, fifo1_get_ = 0, fifo1_fill_ = 0;
   std::uint64_t free_at_ns_ = 0;
@@ -174,13 +176,14 @@ class Giga {
   std::uint64_t now_ms() const { return now_ns_ / 1000000; }
   void pass_us(std::uint64_t us);
   void pass_ms(std::uint64_t ms) { pass_us(ms * 1000); }
-  // Something happens outside then, whatever the firmware is busy with.
+  // `event` happens outside the firmware at that time, even if the firmware is busy.
   void at(std::uint64_t when_ns, std::function<void()> event) { events_.emplace(when_ns, event); }
 
   // --- resets
-  // Did `action` end in a reset of the chip? The peripherals are then as after one.
+  // True if `action` ended in a reset of the chip. The peripherals then have their state after a
+  // reset.
   bool reset_by(const std::function<void()>& action);
-  // The watchdog is not fed by anybody and does not bite.
+  // While false, the watchdog does not need to be fed.
   bool watchdog_runs = false;
   std::uint64_t watchdog_fed_ns = 0;
   int watchdog_feeds = 0;
@@ -188,27 +191,27 @@ class Giga {
   // --- the board
   sim::BoardChips chips;
   I2cPeripheral i2c;
-  sim::UserDevices devices;  // on the user's bus
+  sim::UserDevices devices;  // on the user's I2C bus
   I2cPeripheral user_i2c;
   UartPeripheral uart[uart_channels];
   CanPeripheral can;
   void set_pin(char port, int number, bool level);  // an input, from outside
   bool pin(char port, int number);                  // an output
-  int rises(char port, int number) const;           // how often it rose so far
+  int rises(char port, int number) const;           // rising edges so far
   std::map<int, unsigned short> analog;             // PinName to counts
   bool converter_hangs = false;                     // the registers of ADC1 do nothing
-  int core_conversions = 0;                         // those by the core, which waits
+  int core_conversions = 0;                         // conversions by the core, which waits for each
 
   // --- USB
   bool usb_open = false;
   bool usb_configured = true;  // a computer has found the board
   bool usb_endpoint_open() const;
-  // A program closes the port while a packet is under way: the core closes the endpoint, too.
+  // A program closes the port while a packet is under way: the core closes the endpoint as well.
   void usb_close_under_way();
-  bool usb_flushed = false;  // the FIFO of the endpoint, since then
+  bool usb_flushed = false;  // true: the FIFO of the endpoint was flushed after that
   std::uint32_t usb_baud = 115200;
   bool usb_reads = true;  // the host's program reads
-  std::string usb_host;   // what it has read, and not taken yet
+  std::string usb_host;   // bytes that the program has read and the test has not taken
   void usb_send(const std::string& bytes);
   std::deque<std::string> usb_packets;  // to the board
   struct UsbPacket {
@@ -219,7 +222,7 @@ class Giga {
 
   // --- WiFi; for both threads
   std::mutex mutex;
-  std::string air = "lab";  // the network that is there
+  std::string air = "lab";  // the name of the network in range
   std::string air_password = "correct horse";
   bool wifi_hangs = false;  // joining never returns
   bool wifi_connected = false;
@@ -245,16 +248,16 @@ class Giga {
   std::map<int, void (*)()> vectors;
   std::map<int, std::uint32_t> priorities;
   std::array<std::atomic<bool>, 150>
-      pending{};  // interrupts that the firmware asks for; any thread
+      pending{};  // interrupts that the firmware requests, from any thread
   std::vector<void (*)()> usb_callbacks;
-  static constexpr std::uintptr_t core_stack_in_use = 200;  // bytes, by the core's start
+  static constexpr std::uintptr_t core_stack_in_use = 200;  // bytes, used when the core starts
   std::uint32_t primask = 0;
   bool in_interrupt = false;
   int interrupts = 0;
-  std::map<int, std::function<void(bool)>> edges;  // PinName to what an edge calls
+  std::map<int, std::function<void(bool)>> edges;  // PinName to the function for an edge
   bool flag = false;
-  bool core_error = false;  // a fatal one
-  int isr_queue = 0;        // what the interrupt that runs has told the core
+  bool core_error = false;  // a fatal error
+  int isr_queue = 0;        // requests of the running interrupt to the core
   [[noreturn]] void reset();
   void connect_registers();
 

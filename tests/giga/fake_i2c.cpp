@@ -88,8 +88,9 @@ void I2cPeripheral::count_byte() {
   hold_after_ = -1;
 }
 
-// What waits in TXDR goes to the wire, and there is room for the next one (RM0399, chapter I2C, "Master transmitter"):
-// a byte that is refused leaves that one where it is, until the peripheral is off.
+// Moves the byte in TXDR to the wire, which makes room for the next byte (RM0399, chapter I2C,
+// "Master transmitter"). If the byte is refused, the next byte stays in TXDR until the peripheral
+// is off.
 void I2cPeripheral::shift() {
   out_ = *txdr_;
   txdr_.reset();

@@ -43,19 +43,19 @@ void UartPeripheral::connect(USART_TypeDef& registers) {
   };
   registers.ICR.on_write = [this](std::uint32_t value) {
     if ((value & 1U << 3) != 0) overrun_ = false;
-    // Of the byte that would be read next.
+    // Clears the damage of the byte that is read next.
     if ((value & 7U) != 0 && !received_.empty()) received_.front().damaged = false;
   };
   registers.RQR.on_write = [this](std::uint32_t value) {
     pass();
-    // The first one is on the wire.
+    // The first byte is on the wire already.
     if ((value & 1U << 4) != 0 && to_send_.size() > 1) to_send_.resize(1);
   };
   registers.RDR.on_read = [this] {
     if (received_.empty()) return 0U;
     const auto byte = static_cast<unsigned char>(received_.front().value);
     received_.pop_front();
-    return static_cast<std::uint32_t>(byte) | 1U << 8;  // a parity bit, perhaps
+    return static_cast<std::uint32_t>(byte) | 1U << 8;  // a parity bit is possible here
   };
   registers.TDR.on_write = [this](std::uint32_t value) {
     pass();
@@ -69,7 +69,7 @@ void UartPeripheral::say(const std::string& bytes) {
   to_say_.insert(to_say_.end(), bytes.begin(), bytes.end());
 }
 
-// What has come and gone since the last look.
+// Moves the bytes that came in or went out since the last call.
 void UartPeripheral::pass() {
   if (!on() || registers_->BRR.value == 0) return;
   const std::uint64_t now_ns = giga().now_ns();

@@ -52,13 +52,13 @@ TEST(CanBitTiming, SamplesAt86Point7Percent) {
     EXPECT_NEAR((1.0 + other.before_sample) / mhz, 13.0 / 15, 0.025) << mhz;
   }
   EXPECT_FALSE(giga::can_bit_timing(10000000, 1000000).valid) << "too coarse";
-  EXPECT_FALSE(giga::can_bit_timing(60500000, 1000000).valid) << "no whole number";
+  EXPECT_FALSE(giga::can_bit_timing(60500000, 1000000).valid) << "not a whole number";
 }
 
 TEST(Fdcan, WritesTheTimingAsTheRegisterWantsIt) {
   Controller c;
   EXPECT_EQ(FDCAN2->NBTP.value, 7U << 25 | 0U << 16 | 50U << 8 | 7U);
-  EXPECT_EQ(FDCAN2->CCCR.value & 3U, 0U) << "on the bus";
+  EXPECT_EQ(FDCAN2->CCCR.value & 3U, 0U) << "the controller is on the bus";
 }
 
 TEST(Fdcan, DoesNotStartWithoutAFittingClock) {
@@ -131,7 +131,7 @@ TEST(Fdcan, WhatIsUrgentOvertakesTheQueue) {
   Controller c;
   for (int i = 0; i < 8; ++i) c.can.send(frame(0x407));
   EXPECT_TRUE(c.can.send_urgent(frame(0x027)));
-  EXPECT_FALSE(c.can.send_urgent(frame(0x027))) << "one at a time";
+  EXPECT_FALSE(c.can.send_urgent(frame(0x027))) << "one urgent frame at a time";
   c.pass_ms(2);
   EXPECT_EQ(c.chip.can.sent.front().id, 0x027U);
   EXPECT_EQ(c.chip.can.sent.size(), 9U);
@@ -150,7 +150,7 @@ TEST(Fdcan, LeavesBusOffAfterAWhileAndForgetsWhatWaited) {
   EXPECT_EQ(FDCAN2->CCCR.value & 1U, 0U);
   c.pass_ms(3);
   EXPECT_EQ(c.can.state(), CanState::active);
-  EXPECT_TRUE(c.chip.can.sent.empty()) << "what waited is old";
+  EXPECT_TRUE(c.chip.can.sent.empty()) << "waiting frames are old";
   EXPECT_TRUE(c.can.send(frame(0x407)));
   c.pass_ms(1);
   EXPECT_EQ(c.chip.can.sent.size(), 1U);

@@ -78,7 +78,7 @@ TEST(I2cController, TellsThatNobodyAnswers) {
   EXPECT_LE(bus.took_us, 60U);
   Bytes in(1);
   EXPECT_EQ(bus.bus.write_read(0x55, nullptr, 0, in.data(), 1), I2cResult::no_acknowledge);
-  EXPECT_EQ(bus.write(0x40, {0x00}), I2cResult::ok) << "and goes on";
+  EXPECT_EQ(bus.write(0x40, {0x00}), I2cResult::ok) << "the bus still works";
 }
 
 TEST(I2cController, AsksWhoIsThereWithoutBytes) {
@@ -109,7 +109,7 @@ TEST(I2cController, ARecoveryGivesAChipThatHoldsNothingNoBits) {
   const int before = bus.chip.rises(giga::i2c_scl_pin.port, giga::i2c_scl_pin.number);
   EXPECT_TRUE(bus.bus.recover());
   EXPECT_LE(bus.chip.rises(giga::i2c_scl_pin.port, giga::i2c_scl_pin.number) - before, 2)
-      << "the release, and STOP";
+      << "SCL is released, then STOP";
 }
 
 TEST(I2cController, WaitsForAHeldLineNoLongerThanItPromises) {
@@ -186,7 +186,8 @@ TEST(I2cController, ATransferThatLostTheBusIsRepeatedOnce) {
   }
 }
 
-// An interrupt at every microsecond of two attempts switches everything off: the second attempt must not undo that.
+// An interrupt at every microsecond of two attempts switches everything off. The second attempt
+// must not undo that.
 TEST(I2cController, AnAttemptThatWasTakenOverIsNotRepeated) {
   for (std::uint64_t at_us = 1; at_us < 260; ++at_us) {
     Bus bus;

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Arduino library compiles as it stands, for the Giga's processor and dialect, needs no heap, and
-lacks nothing but the core; the stacks of its interrupts suffice.
+"""The Arduino library compiles unchanged for the Giga's processor and its dialect of C++. It needs no heap and, apart
+from the core, no other library. The stacks of its interrupts are large enough.
 
-The core cannot be had here: tests/giga/core declares what the firmware uses of it, with the
-originals' signatures and macros. Usage: library_test.py TREE
+The core is not available here. tests/giga/core declares the parts that the firmware uses, with the signatures and
+macros of the originals. Usage: library_test.py TREE
 """
 import concurrent.futures
 import os
@@ -19,16 +19,16 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 from stack_bounds import stack_bounds  # noqa: E402
 
 CROSS = 'arm-none-eabi-'
-# As the Arduino IDE's for the Giga, and warnings are errors. What is measured is without exceptions.
+# The flags of the Arduino IDE for the Giga, with warnings as errors. The measured code has no exceptions.
 FLAGS = ['-std=gnu++14', '-fno-rtti', '-fno-exceptions', '-Os', '-mcpu=cortex-m7', '-mthumb',
          '-mfloat-abi=softfp', '-mfpu=fpv5-d16', '-DARDUINO_GIGA', '-DTARGET_GIGA', '-DCORE_CM7',
          '-Wall', '-Wextra', '-Wvla', '-Werror']
-# The core itself leaves exceptions on for the Giga, and is about to go on to C++17.
+# The core itself allows exceptions on the Giga, and will use C++17.
 OTHER_DIALECT = ['-fexceptions', '-std=gnu++17', '-fsyntax-only']
-# Who asks for one of these uses the heap, or can throw.
+# Code that needs one of these symbols uses the heap, or can throw.
 FORBIDDEN = re.compile(r'\b(malloc|calloc|realloc|free|_Zn[wa]\w*|_Zd[la]\w*|__cxa_throw\w*|_ZSt\d+__throw\w*)$')
-# Mbed's SocketAddress gives its text back (delete[]) where one ends; the text is made only for who asks for it,
-# and nobody here does: _ZNK13SocketAddress14get_ip_addressEv is not among what the library lacks.
+# The destructor of Mbed's SocketAddress frees its text (delete[]). Only get_ip_address() makes that text, and the
+# library never calls it: _ZNK13SocketAddress14get_ip_addressEv is not among the symbols that the library needs.
 GIVEN_BACK = {'_ZdaPv': 'firmware/ports/giga/links/network.cpp'}
 TEXT_OF_ADDRESS = '_ZNK13SocketAddress14get_ip_addressEv'
 SHELL = {'library.properties', 'library.json', 'keywords.txt', 'LICENSE', 'src/R4Link.h',
@@ -43,7 +43,7 @@ def run(*command):
 
 
 def assemble(tree, folder):
-    """The library, unpacked; assembled twice, it is the same file."""
+    """Unpacks the library. Assembling it twice gives the same file."""
     first, second = folder / 'a.zip', folder / 'b.zip'
     for target in (first, second):
         run(tree / 'tools/arduino', target)
@@ -59,19 +59,19 @@ def assemble(tree, folder):
 
 
 def refuses_what_it_cannot_do(tree):
-    """A wrong option, a place that cannot be written to: told with the fix, and the exit status."""
+    """A wrong option and a place that cannot be written give an error with a fix, and the exit status."""
     for arguments, status in ((['--nonsense'], 2), (['a.zip', '--folder', 'b'], 2), (['/proc/a/b.zip'], 4)):
         done = subprocess.run([tree / 'tools/arduino', *arguments], capture_output=True, text=True, check=False)
         assert done.returncode == status and '\n  fix: ' in done.stderr, (arguments, done)
 
 
 def compile_all(tree, library, out):
-    """Every source, and the sketch as the IDE makes C++ of it: Arduino.h in front."""
+    """Compiles every source, and the sketch as the IDE does: with Arduino.h in front."""
     sketch = out / 'sketch.cpp'
     example = library / 'examples/R4Board/R4Board.ino'
     sketch.write_text(f'#include <Arduino.h>\n#line 1 "{example}"\n{example.read_text()}')
     version = int(run(CROSS + 'g++', '-dumpversion').split('.')[0])
-    with_graph = ['-fcallgraph-info=su'] if version >= 10 else []  # older ones cannot tell
+    with_graph = ['-fcallgraph-info=su'] if version >= 10 else []  # older compilers have no call graph
     sources = sorted((library / 'src').rglob('*.cpp')) + [sketch]
 
     def compile_one(numbered):
@@ -87,12 +87,12 @@ def compile_all(tree, library, out):
 
 
 def lacking_in(file):
-    """What it does not have itself, as the linker names it."""
+    """The symbols that the file needs from elsewhere, as the linker names them."""
     return [line.split()[-1] for line in run(CROSS + 'nm', '-u', file).splitlines()]
 
 
 def needs(objects, out):
-    """What the objects together still lack."""
+    """The symbols that the objects together still need, and the object that combines them."""
     together = out / 'together.o'
     run(CROSS + 'ld', '-r', '-o', together, *(target for _, target in objects))
     return lacking_in(together), together
@@ -108,7 +108,7 @@ def uses_no_heap(objects, lacking):
 
 
 def stacks_suffice(out):
-    """What our interrupt handlers need, where the compiler tells."""
+    """Our interrupt handlers fit on their stacks. Checked if the compiler reports call graphs."""
     graphs = list(out.glob('*.ci'))
     for name, (need, room) in (stack_bounds(graphs) if graphs else {}).items():
         print(f'stack of the interrupts, {name}: {need} of {room} bytes')
@@ -127,7 +127,7 @@ def main():
         lacking, together = needs(objects, out)
         uses_no_heap(objects, lacking)
         ours = [symbol for symbol in lacking if re.match(r'_ZN?K?\w*2r4', symbol)]
-        assert not ours, f'the library lacks what it uses: {ours}'
+        assert not ours, f'the library lacks functions that it uses: {ours}'
         stacks_suffice(out)
         text, data, bss = run(CROSS + 'size', together).splitlines()[1].split()[:3]
     print(f'{len(objects)} sources; {int(text)} bytes of code, {int(data) + int(bss)} of RAM, without the core')

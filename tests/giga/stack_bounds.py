@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What our interrupt handlers need of each stack (firmware/ports/giga/chip/interrupt_stack.hpp), by what GCC says."""
+"""The bytes of each stack that our interrupt handlers need, from GCC's call graphs.
+
+The stacks are in firmware/ports/giga/chip/interrupt_stack.hpp.
+"""
 import pathlib
 import re
 import sys
@@ -8,13 +11,13 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / 'support'))
 from call_graph import CallGraph  # noqa: E402
 
-CORE_STACK = 1024      # the core gives it to all handlers: MBED_CONF_TARGET_BOOT_STACK_SIZE
+CORE_STACK = 1024      # the core's stack for all handlers: MBED_CONF_TARGET_BOOT_STACK_SIZE
 OWN_STACK = 4096
 LAST_STACK = 768
-EXCEPTION_FRAME = 108  # what the processor puts on the stack, registers of the FPU included, and aligns
-SWITCH = 8             # run_on(): GCC counts nothing for what is written in assembler
-CORE_READ = 512        # USBSerial::read(), whose buffer of 256 bytes is on the stack
-OF_CORE_STACK = 128    # what one of our handlers may put there, the processor's frame not counted
+EXCEPTION_FRAME = 108  # the processor's frame with the registers of the FPU, aligned
+SWITCH = 8             # run_on(): GCC does not count code in assembler
+CORE_READ = 512        # USBSerial::read() has a buffer of 256 bytes on the stack
+OF_CORE_STACK = 128    # the share of one of our handlers, without the processor's frame
 
 THROUGH_INTERFACES = [
     ('Guard', 'BoardHardware', 'make_safe'),
@@ -30,7 +33,7 @@ THROUGH_INTERFACES = [
     ('Stepper|UltrasonicSensors', 'GpioOutput', 'write'),
 ]
 TURNS = {'_ZN2r412write_numberEPcy': 3}
-# Goes on with another function on another stack.
+# These continue with another function on another stack.
 LEAVES = ('_ZN2r44giga12on_own_stackEPFvvE', '_ZN2r44giga13on_last_stackEPFvvE')
 
 
@@ -38,7 +41,7 @@ def stack_bounds(files):
     graph = CallGraph(files, THROUGH_INTERFACES, TURNS, LEAVES)
 
     def depth(*functions):
-        """Of the deepest of these, by their names without arguments."""
+        """The depth of the deepest of these functions, which are named without arguments."""
         names = [name for name in graph.frames for function in functions
                  if re.search(rf'(?<=\d){function}(?:E\w*|v)$|^{function}$', name)]
         assert len(names) >= len(functions), f'{functions}: {names}'
@@ -47,7 +50,8 @@ def stack_bounds(files):
     gives_way = depth('hear_usb_now') + CORE_READ
     at_once = depth('pass_millisecond', 'look', 'step', 'hear_can')
     return {
-        # Above the one that gives way may be the core's, which fit into its own stack, and above all ours.
+        # Handlers of the core may interrupt the one that gives way. They need at most the core's own stack. Our other
+        # handlers may interrupt all of them.
         'ours': (gives_way + CORE_STACK + EXCEPTION_FRAME + at_once + SWITCH, OWN_STACK),
         'the core\'s, of us': (SWITCH + depth('on_millisecond', 'on_stop', 'on_step_timer', 'on_can', 'on_usb',
                                              'on_edge', 'listen'), OF_CORE_STACK),

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The stacks of the interrupts: the guard sees one that is full. (That they suffice: stack_bounds.py.)
+// The stacks of the interrupts: the guard notices a full stack. (stack_bounds.py checks their
+// sizes.)
 #include "bench.hpp"
 #include "tests/giga/core/registers.hpp"
 
@@ -9,7 +10,7 @@ extern "C" std::uint32_t r4_giga_own_stack[1024];
 namespace r4::test {
 namespace {
 
-// The core's stack and ours; the handlers' frames come down to their ends.
+// The core's stack or ours. Frames of the handlers grow down to its lowest word.
 std::uint32_t* lowest_word(bool own) { return own ? r4_giga_own_stack : __StackLimit; }
 
 class GigaStacks : public testing::TestWithParam<bool> {};
@@ -21,11 +22,12 @@ TEST_P(GigaStacks, OneThatIsFullSwitchesEverythingOffWithinAMillisecondAndStaysA
   bench.drive(host, bench.usb());
   const std::uint64_t full_ns = bench.giga.now_ns();
   EXPECT_TRUE(bench.giga.reset_by([&] {
-    lowest_word(GetParam())[7] = 0x12345678;  // the last word but seven: nothing else is hit yet
+    // The stack is full, but nothing below it is overwritten.
+    lowest_word(GetParam())[7] = 0x12345678;
     bench.run_ms(20);
   }));
   EXPECT_TRUE(bench.pins().is_safe());
-  EXPECT_LE(bench.giga.now_ns() - full_ns, 2000000U) << "a millisecond, and the way to the chips";
+  EXPECT_LE(bench.giga.now_ns() - full_ns, 2000000U) << "1 ms, and the time to reach the chips";
 
   bench.restart();
   EXPECT_EQ(bench.reason(), SafeReason::fault);
@@ -44,7 +46,7 @@ TEST_P(GigaStacks, OneThatIsFullEndsAHungBoardToo) {
   bench.drive(host, bench.usb());
   EXPECT_TRUE(bench.giga.reset_by([&] {
     lowest_word(GetParam())[0] = 0;
-    bench.giga.pass_ms(3);  // the loop does not come back
+    bench.giga.pass_ms(3);  // the loop does not return
   }));
   EXPECT_TRUE(bench.pins().is_safe());
 }
@@ -55,7 +57,7 @@ TEST(GigaStacksReport, TellsTheMostThatTheyHaveHeld) {
   GigaBench bench;
   bench.boot();
   r4_giga_own_stack[924] = 0;  // a hundred words
-  __StackLimit[56] = 0;        // 200
+  __StackLimit[56] = 0;        // two hundred words
   EXPECT_TRUE(
       has_line(bench.report(), "Interrupt stacks: the core's 800 of 1024, ours 400 of 4096"));
 }

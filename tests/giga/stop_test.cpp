@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// E:STOP while the loop is busy with something else: heard where it comes in, obeyed at once.
+// E:STOP while the loop is busy: the interrupt or thread that receives it hears it, and the board
+// obeys at once.
 #include "bench.hpp"
 
 namespace r4::test {
 namespace {
 
-// A driving board, and how long a stop takes from the moment it has come in to the last safe register.
+// A board that drives its outputs. Measures the time from the arrival of a stop to the last safe
+// register.
 class StopBench : public GigaBench {
  public:
   StopBench() {
@@ -15,14 +17,15 @@ class StopBench : public GigaBench {
     run_ms(20);
   }
 
-  // Much to write to the chips, in the turns that follow.
+  // Commands that cause many writes to the chips in the next turns.
   void drive_everything() {
     for (const char* command : {"O:4095,0,2", "D:4095,1,2", "S:2000,2", "B:4000,1,0,2", "R:3,On"}) {
       usb()(host.command(command));
     }
   }
 
-  // `stop` comes `after_us` from now; `meanwhile` is what the loop does.
+  // Sends `stop` after `after_us`, while the loop runs `meanwhile`. Returns the microseconds from
+  // the stop to the safe state.
   std::uint64_t us_to_safe(const std::function<void()>& stop, std::uint64_t after_us,
                            const std::function<void()>& meanwhile) {
     const std::uint64_t stop_ns = giga.now_ns() + after_us * 1000;
@@ -32,7 +35,7 @@ class StopBench : public GigaBench {
       watch();
     });
     for (int i = 0; i < 1000 && safe_ns_ == 0; ++i) meanwhile();
-    EXPECT_NE(safe_ns_, 0U) << "it is not safe at all";
+    EXPECT_NE(safe_ns_, 0U) << "the board never became safe";
     return (safe_ns_ - stop_ns) / 1000;
   }
   void clear_and_drive() {
@@ -102,7 +105,8 @@ TEST(GigaStop, OverUsbAndByCansFrameIsObeyedAtAnyMomentOfATurn) {
   }
 }
 
-// A datagram on CAN is put together in the loop, so it waits for a turn's end; our hosts send the frame.
+// The loop assembles a datagram from CAN frames, so its stop waits for the end of a turn. Our hosts
+// send the frame.
 TEST(GigaStop, OverCanAsADatagramIsObeyedInTheNextTurn) {
   StopBench bench;
   std::uint64_t longest_us = 0;
@@ -142,7 +146,7 @@ TEST(GigaStop, OverUsbIsHeardAsTheFirstLineOfAProgramAfterOneThatWasCutOff) {
 }
 
 TEST(GigaStop, OverUsbPassesADeadLoopWithAFullRing) {
-  // What a host floods the board with waits at the host; the guard sees the hung loop.
+  // The host keeps the bytes that the board cannot take. The guard notices that the loop hangs.
   StopBench bench;
   for (int i = 0; i < 200; ++i) bench.giga.usb_send(std::string(64, 'x'));
   bench.giga.usb_send("\n" + with_crc("E:STOP;") + "\r\n");
@@ -158,7 +162,8 @@ TEST(GigaStop, OverUdpIsObeyedWhenTheThreadHasItWhileTheLoopHangs) {
   PlainHost host;
   bench.drive(host, bench.usb());
   bench.udp()(with_crc("E:STOP;"));
-  for (int i = 0; i < 20000 && !bench.giga.pending[MDIOS_IRQn]; ++i) {  // the thread's turn
+  // Gives the network thread time.
+  for (int i = 0; i < 20000 && !bench.giga.pending[MDIOS_IRQn]; ++i) {
     std::this_thread::sleep_for(std::chrono::microseconds(50));
   }
   const std::uint64_t heard_ns = bench.giga.now_ns();

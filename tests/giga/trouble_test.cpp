@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the firmware does when it, its hardware or its power fails, and what it keeps.
+// The firmware's reaction when it, its hardware or its supply fails, and the data that it keeps.
 #include "bench.hpp"
 #include "tests/giga/core/registers.hpp"
 
@@ -14,7 +14,7 @@ TEST(GigaWatchdog, IsFedByTheGuardAsLongAsTheLoopTurns) {
   EXPECT_GT(bench.giga.watchdog_feeds - feeds, 300);
 }
 
-// `turn` passes a millisecond of a board that does not do its duty any more.
+// `turn` lets 1 ms pass on a board that fails to do one of its duties.
 template <class Turn>
 void expect_safe_soon_and_reset(GigaBench& bench, Turn turn) {
   std::uint64_t safe_after_ms = 0;
@@ -37,7 +37,7 @@ TEST(GigaWatchdog, ALoopThatHangsIsSafeSoonAndResetsTheBoardWhichStaysSafe) {
   bench.boot();
   PlainHost host;
   bench.drive(host, bench.usb());
-  expect_safe_soon_and_reset(bench, [&] { bench.giga.pass_ms(1); });  // only the timers come back
+  expect_safe_soon_and_reset(bench, [&] { bench.giga.pass_ms(1); });  // only the timers run
 
   bench.system.reset();
   bench.giga.connect_registers();
@@ -81,7 +81,7 @@ TEST(GigaWatchdog, ADeadlineThatTheLoopMissesIsCountedInTheReport) {
   bench.giga.pass_ms(50);  // without a turn
   bench.run_ms(20);
   EXPECT_TRUE(has_line(bench.report(), "Deadlines missed: 2"));
-  EXPECT_EQ(bench.reason(), SafeReason::none) << "so few are forgiven";
+  EXPECT_EQ(bench.reason(), SafeReason::none) << "two missed deadlines are forgiven";
 }
 
 TEST(GigaWatchdog, BitesWhenEvenTheTimerInterruptIsDead) {
@@ -167,7 +167,7 @@ TEST(GigaFault, ASettingsStoreThatEndsTheBootIsLeftOutOfTheNext) {
   bench.system.reset();
   const std::uint64_t before_ms = bench.giga.now_ms();
   bench.boot();
-  EXPECT_LE(bench.giga.now_ms() - before_ms, 20U) << "it waits for no store";
+  EXPECT_LE(bench.giga.now_ms() - before_ms, 20U) << "the boot does not wait for the store";
   EXPECT_EQ(bench.reason(), SafeReason::fault);
   EXPECT_TRUE(
       has_line(bench.report(), "Settings: not kept: the key-value store ended the last boot"));
@@ -175,7 +175,8 @@ TEST(GigaFault, ASettingsStoreThatEndsTheBootIsLeftOutOfTheNext) {
   bench.giga.flash_hangs = false;
   bench.restart();
   EXPECT_NE(bench.reason(), SafeReason::fault);
-  EXPECT_EQ(bench.application().settings().state_rate_hz, 20) << "it gets another chance";
+  EXPECT_EQ(bench.application().settings().state_rate_hz, 20)
+      << "the next boot uses the store again";
 }
 
 TEST(GigaFault, AfterTheStoreHasStartedDoesNotCostTheSettings) {
@@ -199,7 +200,7 @@ TEST(GigaTimers, LateTicksInOneInterruptWakeTheLoopOnce) {
   bench.run_ms(10);
   const std::uint64_t before_ms = bench.giga.now_ms();
   for (int i = 0; i < 10; ++i) bench.turn();
-  EXPECT_LE(bench.giga.now_ms() - before_ms, 12U) << "each tick wakes it as before";
+  EXPECT_LE(bench.giga.now_ms() - before_ms, 12U) << "each tick wakes the loop again";
 }
 
 TEST(GigaBus, AStuckBusCostsTheLoopAtMostItsBound) {
@@ -224,7 +225,7 @@ TEST(GigaBus, AStuckBusCostsTheLoopAtMostItsBound) {
   bench.usb()(host.command("E:CLEAR"));
   bench.usb()(host.command("O:358,1,1"));
   bench.run_ms(20);
-  EXPECT_EQ(bench.pins().osmc[0].pwm, 358) << "it comes back";
+  EXPECT_EQ(bench.pins().osmc[0].pwm, 358) << "the motor runs again";
 }
 
 TEST(GigaSettings, SurviveARestart) {
@@ -240,7 +241,7 @@ TEST(GigaSettings, SurviveARestart) {
   ASSERT_TRUE(bench.run_until([&] {
     const std::lock_guard<std::mutex> lock(bench.giga.mutex);
     return bench.giga.writes == 1;
-  })) << "all of them at once, when they have settled";
+  })) << "all settings at once, after the last change";
   bench.giga.analog[0x24] = 0x8000;
   bench.restart();
   const Settings& settings = bench.application().settings();
@@ -300,7 +301,7 @@ TEST(GigaSettings, ThatCouldNotBeReadInTimeAreNotOverwritten) {
   bench.usb()(host.command("C:rate,50"));
   for (int i = 0; i < 30; ++i) {
     bench.run_ms(100, host, bench.usb());
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // the store's turn
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // gives the store's thread time
   }
   EXPECT_EQ(bench.giga.writes, 0);
   EXPECT_TRUE(has_line(bench.report(), "Settings: not kept: the key-value store was not ready"));

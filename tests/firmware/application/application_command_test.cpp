@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which commands move an output, and what the others are answered.
+// The commands that move an output, and the answers to the other commands.
 #include <gtest/gtest.h>
 
 #include "tests/firmware/board_fixture.hpp"
@@ -101,7 +101,7 @@ TEST_F(ApplicationCommand, AnEchoOfAnotherBootBeginsNothing) {
 
 TEST_F(ApplicationCommand, ACommandRefusedInAnOutageStaysRefused) {
   board.run(1500);
-  const std::uint32_t overtaken = host.pnum++;  // a heartbeat that comes after the command
+  const std::uint32_t overtaken = host.pnum++;  // a heartbeat that arrives after the command
   const std::uint32_t refused = host.command("O:1,1,1");
   EXPECT_EQ(answers(), Lines{"SAFE"});
   board.receive("H:ROS2-R4;" + test::stamp_of(our_session, overtaken, board.newest_t()), host.at);
@@ -184,10 +184,10 @@ TEST_F(ApplicationCommand, LimitsTheLongAnswersToHostsThatHaveProvedNothing) {
   EXPECT_LE(identities, 16U + 55U);
   board.take();
   board.receive("Q:ID;", host.at);
-  EXPECT_EQ(board.take(MessageKind::identity).size(), 1U) << "the host in control is answered";
+  EXPECT_EQ(board.take(MessageKind::identity).size(), 1U) << "the controlling host gets its answer";
 }
 
-// However many send one: nobody takes the answer, which proves the stop, from another.
+// However many hosts send a stop, each of them gets the answer that proves it.
 TEST_F(ApplicationCommand, ObeysAndAnswersEveryStop) {
   for (std::uint32_t peer = 1000; peer < 2000; ++peer) {
     board.take();
@@ -215,7 +215,7 @@ TEST_F(ApplicationCommand, TellsWhoAsksWhetherAnotherHostIsInControl) {
   const Source stranger{0, 99};
   EXPECT_NE(identity(stranger).find(";BUSY:1;"), std::string::npos);
   EXPECT_NE(identity(host.at, host.sid).find(";BUSY:0;"), std::string::npos);
-  board.run(1500);  // the link is lost: anybody may take it
+  board.run(1500);  // the link is lost: any host may take control
   EXPECT_NE(identity(stranger).find(";BUSY:0;"), std::string::npos);
 }
 
@@ -226,7 +226,7 @@ TEST_F(ApplicationCommand, TellsWhoAsksWhichQuestionItAnswers) {
   const std::vector<Heard> heard = board.take(MessageKind::identity);
   ASSERT_EQ(heard.size(), 2U);
   EXPECT_NE(heard[0].bytes.find(";ASKED:4294967295;"), std::string::npos);
-  EXPECT_EQ(heard[1].bytes.find("ASKED"), std::string::npos) << "it has no number";
+  EXPECT_EQ(heard[1].bytes.find("ASKED"), std::string::npos) << "the question has no number";
 }
 
 TEST_F(ApplicationCommand, ListensToNoOtherBoard) {
@@ -236,7 +236,7 @@ TEST_F(ApplicationCommand, ListensToNoOtherBoard) {
   }
   EXPECT_EQ(board.take(MessageKind::nack).size(), 0U);
   EXPECT_EQ(board.log.executed.size(), 0U);
-  // Nor do such datagrams feed.
+  // Such datagrams do not keep the link alive either.
   board.run(900);
   board.receive("H:R4-ROS2;PNum:1;T:1;", host.at);
   board.run(100);
@@ -271,7 +271,7 @@ TEST_F(ApplicationCommand, CountsWhatItReceives) {
   EXPECT_EQ(after.rx_refused - before.rx_refused, 2U);
 }
 
-// --- hosts that do not number their heartbeats, as in the paper's capture
+// --- hosts whose heartbeats have no number, as in the paper's capture
 
 TEST(ApplicationNumberless, BeginsANewSessionAfterAnOutage) {
   TestBoard board;
@@ -282,7 +282,7 @@ TEST(ApplicationNumberless, BeginsANewSessionAfterAnOutage) {
   board.receive("O:2,1,1;PNum:6599;T:1;");
   EXPECT_EQ(board.log.refused, (Lines{"6600 DUPLICATE", "6599 STALE"}));
   board.run(1500);
-  board.receive("H:ROS2-R4;T:1;");  // perhaps it restarted, and counts from 0
+  board.receive("H:ROS2-R4;T:1;");  // the host may have restarted; its clock counts from 0
   EXPECT_EQ(board.state(), BoardState::active);
   EXPECT_TRUE(board.safe());
   board.receive("S:1500,1;PNum:0;T:1;");

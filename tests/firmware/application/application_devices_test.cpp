@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's bus by protocol: commands, what the state tells, the safe state, and the session's end.
+// The user's I2C bus through the protocol: commands, the fields of a state, the safe state, and the
+// end of the session.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -20,7 +21,7 @@ class ApplicationDevices : public testing::Test {
  protected:
   ApplicationDevices() { host.connect(); }
 
-  // Milliseconds, with heartbeats.
+  // Milliseconds, with heartbeats that echo the board's time if `echoes`.
   void pass(std::uint32_t ms, bool echoes = true) {
     for (; ms != 0; --ms) {
       devices.bus.advance(1000);
@@ -44,7 +45,7 @@ TEST_F(ApplicationDevices, AnswersUnderTheNumberOfTheCommandForASecond) {
   const std::uint32_t number = host.command("X:READ,0x68,x75,1");
   pass(20);
   State state = newest_state();
-  ASSERT_TRUE(state.present.has(StateField::i2cx)) << "nobody has to choose it";
+  ASSERT_TRUE(state.present.has(StateField::i2cx)) << "the field is sent without a selection";
   EXPECT_EQ(state.i2c_answer.pnum, number);
   EXPECT_EQ(state.i2c_answer.outcome, I2cOutcome::done);
   ASSERT_EQ(state.i2c_answer.data.size, 1);
@@ -54,7 +55,7 @@ TEST_F(ApplicationDevices, AnswersUnderTheNumberOfTheCommandForASecond) {
   host.command("F:I2CX,I2CBUS");
   pass(20);
   state = newest_state();
-  EXPECT_EQ(state.i2c_answer.pnum, number) << "chosen, it stays";
+  EXPECT_EQ(state.i2c_answer.pnum, number) << "a selected field stays";
   EXPECT_TRUE(state.present.has(StateField::i2cbus));
 }
 
@@ -82,7 +83,7 @@ TEST_F(ApplicationDevices, SafeRefusesWritesAndNothingElse) {
   pass(20);
   const State state = newest_state();
   EXPECT_EQ(state.i2c_answer.pnum, read);
-  EXPECT_EQ(state.i2c_answer.data.bytes[0], 0x40) << "asleep still";
+  EXPECT_EQ(state.i2c_answer.data.bytes[0], 0x40) << "the device still sleeps";
   host.command("X:POLL,0x68,x75,1,10,1");
   host.command("X:SCAN");
   EXPECT_EQ(board.log.refused.size(), 1U);
@@ -90,7 +91,7 @@ TEST_F(ApplicationDevices, SafeRefusesWritesAndNothingElse) {
 
 TEST_F(ApplicationDevices, AStopDropsAWriteThatWaits) {
   host.command("X:POLL,0x68,x3b,14,5,1");
-  pass(1);  // on the wire
+  pass(1);  // the reading is on the wire
   const std::uint32_t write = host.command("X:WRITE,0x68,x6b00");
   host.command("E:STOP");
   pass(20);
@@ -100,7 +101,7 @@ TEST_F(ApplicationDevices, AStopDropsAWriteThatWaits) {
   EXPECT_EQ(devices.mpu6050.start(0x68, true), true);
   host.command("X:READ,0x68,x6b,1");
   pass(20);
-  EXPECT_EQ(newest_state().i2c_answer.data.bytes[0], 0x40) << "never written";
+  EXPECT_EQ(newest_state().i2c_answer.data.bytes[0], 0x40) << "the write was not carried out";
 }
 
 TEST_F(ApplicationDevices, ReadingsEndWithTheSessionAndThoseOfSettingsStay) {
@@ -111,16 +112,16 @@ TEST_F(ApplicationDevices, ReadingsEndWithTheSessionAndThoseOfSettingsStay) {
   pass(50);
   State state = newest_state();
   EXPECT_EQ(state.raw.i2c[0].data.size, 1);
-  EXPECT_EQ(state.raw.i2c[1].data.size, 0) << "this session has no use for it";
+  EXPECT_EQ(state.raw.i2c[1].data.size, 0) << "this session turned the reading off";
 
-  pass(1200, false);  // silence
+  pass(1200, false);  // the host is silent
   ASSERT_EQ(board.reason(), SafeReason::link);
   TestHost next(board, another_session, Source{0, 9});
   next.connect();
   next.command("F:I2C1,I2C2");
   pass(50, false);
   state = newest_state();
-  EXPECT_EQ(state.raw.i2c[0].data.size, 0) << "nobody's reading is another's";
+  EXPECT_EQ(state.raw.i2c[0].data.size, 0) << "a reading of one session is not sent to another";
   EXPECT_EQ(state.raw.i2c[0].t_ms, 0U);
   EXPECT_EQ(state.raw.i2c[1].data.size, 2);
   EXPECT_NE(state.raw.i2c[1].t_ms, 0U);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host that says that it ends: what becomes of the outputs, of control, and of what follows it.
+// A farewell: its effect on the outputs, on control, and on the commands that arrive after it.
 #include <gtest/gtest.h>
 
 #include "tests/firmware/board_fixture.hpp"
@@ -28,7 +28,8 @@ TEST_F(ApplicationFarewell, MakesTheOutputsSafeAndTheBoardFreeAtOnce) {
   EXPECT_EQ(board.hal.made_safe, made_safe + 1);
   EXPECT_EQ(board.log.states.back(), "SAFE link");
   board.run(1);
-  EXPECT_EQ(board.take(MessageKind::board_heartbeat).back().at_ms, board.now_ms - 1) << "it tells";
+  EXPECT_EQ(board.take(MessageKind::board_heartbeat).back().at_ms, board.now_ms - 1)
+      << "the board reports it at once";
   other.connect();
   EXPECT_EQ(board.state(), BoardState::active);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
@@ -61,10 +62,10 @@ TEST_F(ApplicationFarewell, LateOrRepeatedHasNoEffectOnTheNextSession) {
   leave(host, number);
   forget();
   leave(host, number);
-  EXPECT_EQ(answers(), (Lines{"DUPLICATE"})) << "its host learns that it was executed";
+  EXPECT_EQ(answers(), (Lines{"DUPLICATE"})) << "the host learns that its farewell was executed";
   board.run(1);
   TestHost next(board, another_session,
-                host.at);  // its numbers are such that the old one would fit
+                host.at);  // the numbers of this session are such that the old farewell would fit
   next.connect();
   next.command("O:358,1,1");
   forget();
@@ -92,10 +93,10 @@ TEST_F(ApplicationFarewell, LeavesAStopLatched) {
   EXPECT_FALSE(board.application->link().has_owner());
 }
 
-// --- of a board with a key
+// --- a board with a key
 
 struct SignedFarewell : testing::Test {
-  // A signed datagram, as it may be repeated.
+  // Sends a signed datagram and returns it, so that a test can replay it.
   std::string say(const std::string& field, std::uint32_t t) {
     Datagram heartbeat;
     for (const test::MemoryPort::Sent& sent : board.ports[0].sent) {

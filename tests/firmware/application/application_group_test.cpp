@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Several commands in one datagram: all of them are executed, in one go, or none.
+// A group of commands in one datagram: the board executes all of them in one step, or none.
 #include <gtest/gtest.h>
 
 #include "tests/firmware/board_fixture.hpp"
@@ -10,7 +10,7 @@ namespace {
 using Lines = std::vector<std::string>;
 
 struct ApplicationGroup : test::BoardInControl {
-  // The answers, and which command they name: "FORMAT AT:2".
+  // The answers, each with the command that it names: "FORMAT AT:2".
   Lines refusals() {
     Lines lines;
     for (const test::Heard& heard : board.take(MessageKind::nack)) {
@@ -81,7 +81,7 @@ TEST_F(ApplicationGroup, OfWhichOneCommandIsWrongChangesNothing) {
   EXPECT_EQ(board.log.executed.size(), 0U);
   EXPECT_EQ(board.application->settings().state_rate_hz, 100);
   host.command(many.substr(0, many.size() - 1));
-  EXPECT_EQ(board.log.executed.size(), 16U) << "sixteen are not too many";
+  EXPECT_EQ(board.log.executed.size(), 16U) << "a group may have sixteen commands";
 }
 
 TEST_F(ApplicationGroup, IsExecutedOnceAndInOrder) {
@@ -91,7 +91,8 @@ TEST_F(ApplicationGroup, IsExecutedOnceAndInOrder) {
   host.resend("P:2,1;P:2,2", late);
   EXPECT_EQ(refusals(), (Lines{"DUPLICATE", "STALE"}));
   EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>(2, number));
-  board.receive("O:1,1,1;O:1,1,2;T:1;", host.at);  // no number, nothing to execute it once by
+  // Without a number, the board could not execute it exactly once.
+  board.receive("O:1,1,1;O:1,1,2;T:1;", host.at);
   board.receive("O:1,1,1;O:1,1,2;PNum:5;T:1;", Source{0, 9});
   EXPECT_EQ(refusals(), Lines{"BUSY"});
   EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
@@ -106,7 +107,7 @@ TEST_F(ApplicationGroup, IsRefusedAsAWholeWhileTheOutputsAreSafe) {
   board.hal.inputs.handle_held = true;
   board.run(10);
   host.resend("O:1,1,1;Z:1", number);
-  EXPECT_EQ(refusals(), Lines{"SAFE"}) << "its number is spent";
+  EXPECT_EQ(refusals(), Lines{"SAFE"}) << "the number of the group is used up";
   EXPECT_TRUE(board.safe());
 }
 
@@ -122,7 +123,8 @@ TEST_F(ApplicationGroup, WithAStopInItIsAStop) {
   }
 }
 
-// Closing the supply moves nothing (docs/reference/safety.md); what stands behind it was commanded after it.
+// Closing the supply moves nothing (docs/reference/safety.md), but a command after it in the group
+// does.
 TEST_F(ApplicationGroup, HasTheEffectOfItsCommandsInTheirOrder) {
   host.command("O:358,1,1;R:1,On");
   EXPECT_EQ(board.outputs().relays, 1);

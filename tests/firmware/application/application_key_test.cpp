@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board with a key: whom it obeys, what it answers, and what it tells.
+// A board with a key: which hosts it obeys, its answers, and its heartbeats.
 #include <gtest/gtest.h>
 
 #include "tests/firmware/board_fixture.hpp"
@@ -19,13 +19,13 @@ using Lines = std::vector<std::string>;
 
 const Key key = key_of(1);
 
-// A host that signs.
+// A host that signs its datagrams.
 class KeyHost {
  public:
   explicit KeyHost(TestBoard& to, const Key& its_key = key, Source place = {0, 7})
       : board(to), at(place), key_(its_key) {}
 
-  // The nonce and T of the newest heartbeat.
+  // Reads the nonce and T of the newest heartbeat.
   void listen() {
     for (const test::MemoryPort::Sent& sent : board.ports[at.port].sent) {
       Datagram datagram;
@@ -42,7 +42,7 @@ class KeyHost {
   std::string signed_fields(const std::string& text) {
     return test::with_signature(text, key_, nonce, ++counter, board.now_ms);
   }
-  // A signed heartbeat that echoes.
+  // A signed heartbeat that echoes the board's time.
   std::string heartbeat() {
     listen();
     last = signed_fields(fields("H:ROS2-R4", echo));
@@ -113,7 +113,8 @@ TEST_F(ApplicationKey, ObeysNoHostThatDoesNot) {
   EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>());
 }
 
-// Each: a stranger who sends many takes no answer from a host that has yet to hear the nonce.
+// The board answers each of them: an attacker who sends many heartbeats cannot take the answer from
+// a host that still needs the nonce.
 TEST_F(ApplicationKey, AnswersAnUnsignedHeartbeatWithItsNonce) {
   for (std::uint32_t peer = 90; peer < 99; ++peer) {
     board.take();
@@ -125,7 +126,8 @@ TEST_F(ApplicationKey, AnswersAnUnsignedHeartbeatWithItsNonce) {
   }
 }
 
-// docs/design/safety-argument.md: who forges an address makes the board send there at most so much.
+// docs/design/safety-argument.md: an attacker who forges an address can make the board send there
+// at most five times the bytes of the attack.
 TEST_F(ApplicationKey, AnswersWithAtMostFiveTimesTheBytes) {
   host.connect();
   std::size_t longest = 0;
@@ -153,7 +155,8 @@ TEST_F(ApplicationKey, AnswersAnUnsignedCommandWithAuth) {
   }
 }
 
-// docs/reference/protocol.md 4.2: the T of a CONNECTING heartbeat is for the signature, not to be echoed.
+// docs/reference/protocol.md 4.2: the T of a CONNECTING heartbeat is for the signature only; a host
+// does not echo it.
 TEST_F(ApplicationKey, AnEchoOfWhatItSaysWhileConnectingStartsNothingButAZeroDoes) {
   for (int i = 0; i < 20; ++i) {
     host.listen();
@@ -165,7 +168,7 @@ TEST_F(ApplicationKey, AnEchoOfWhatItSaysWhileConnectingStartsNothingButAZeroDoe
     board.take();
     board.run(100);
   }
-  EXPECT_EQ(board.log.rejected, Lines()) << "rightly signed they are";
+  EXPECT_EQ(board.log.rejected, Lines()) << "the signatures are valid";
   host.connect();
   EXPECT_EQ(board.state(), BoardState::active);
 }
@@ -199,7 +202,7 @@ TEST_F(ApplicationKey, AReplayMovesNothingFromAnywhere) {
   EXPECT_EQ(board.log.executed.size(), 2U);
   EXPECT_EQ(board.log.rejected, Lines(9, "replayed"));
   board.run(1000);
-  ASSERT_EQ(board.reason(), SafeReason::link) << "replays keep nobody alive";
+  ASSERT_EQ(board.reason(), SafeReason::link) << "replays do not keep the link alive";
 }
 
 TEST_F(ApplicationKey, WhatTheNetworkHeldBackForMoreThan250MsDoesNothing) {
@@ -210,7 +213,7 @@ TEST_F(ApplicationKey, WhatTheNetworkHeldBackForMoreThan250MsDoesNothing) {
   board.run(1);
   board.receive(late, host.at);
   EXPECT_TRUE(board.safe());
-  // One with a rising counter is too old as well.
+  // A command with a higher counter is too old as well.
   const std::string later = host.signed_fields(host.fields("O:358,1,1", 1));
   board.run(251);
   board.receive(later, host.at);
@@ -240,14 +243,14 @@ TEST_F(ApplicationKey, AStopNeedsNoSignature) {
 TEST_F(ApplicationKey, AnUnsignedStopProvesNothingOfTheOwnersCommands) {
   host.connect();
   const std::uint32_t executed = host.command("O:358,1,1");
-  // With the number of a command that was kept from the board.
+  // The stop has the number of a command that was kept from the board.
   const std::uint32_t held_back = host.pnum++;
   board.receive("E:STOP;" + test::stamp_of(our_session, held_back, 0), host.at);
   EXPECT_EQ(board.reason(), SafeReason::stop);
   EXPECT_EQ(board.application->link().last_executed(), executed);
-  host.heartbeat();  // there is another nonce
+  host.heartbeat();  // the board sends another nonce
   const std::uint32_t stop = host.command("E:STOP");
-  EXPECT_EQ(board.application->link().last_executed(), stop) << "a signed one is a command";
+  EXPECT_EQ(board.application->link().last_executed(), stop) << "a signed stop is a command";
 }
 
 TEST_F(ApplicationKey, TheOwnersStopIsNoRepetitionOfOneThatWasForgedUnderItsNumber) {
@@ -258,7 +261,7 @@ TEST_F(ApplicationKey, TheOwnersStopIsNoRepetitionOfOneThatWasForgedUnderItsNumb
   const std::string clear = "E:CLEAR," + std::to_string(board.newest_cause());
   ASSERT_EQ(host.pnum, next);
   host.command("E:STOP");
-  host.command(clear);  // it was asked for before the stop
+  host.command(clear);  // the host asked for it before the stop
   EXPECT_EQ(board.reason(), SafeReason::stop);
 }
 
@@ -267,7 +270,7 @@ TEST_F(ApplicationKey, ACopyOfTheOwnersStopIsARepetitionWhateverItsSignatureIsWo
   const std::string stop = host.signed_fields(host.fields("E:STOP", host.pnum++));
   board.receive(stop, host.at);
   const std::int32_t cause = board.newest_cause();
-  board.receive(stop, host.at);  // signed for the nonce before
+  board.receive(stop, host.at);  // signed for the previous nonce
   board.receive(stop.substr(0, stop.find("A:")), host.at);
   EXPECT_EQ(board.newest_cause(), cause);
 }
@@ -360,7 +363,7 @@ TEST(ApplicationHeartbeat, NumberZeroMeansConnectingAndNothingElse) {
   board.run(10);
   host.connect();
   board.take();
-  // Answers to others count from their beginning.
+  // Answers to other peers have their own numbers, which begin at 1.
   board.receive("H:ROS2-R4;PNum:7;T:0;", {0, 99});
   const std::vector<Heard> heard = board.take(MessageKind::board_heartbeat);
   ASSERT_EQ(heard.size(), 1U);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who controls the board and how the link comes, goes and comes back.
+// Which host controls the board, and how the link begins, ends and recovers.
 #include <gtest/gtest.h>
 
 #include "tests/firmware/board_fixture.hpp"
@@ -71,7 +71,8 @@ TEST(ApplicationLink, HearsAPaperHostsHeartbeatWithoutNumberOrTime) {
                              "T:5;PNum:1;H:ROS2-R4;", "X:1;H:ROS2-R4;"}) {
     TestBoard board;
     board.receive(fields);
-    const bool expected = std::string(fields).rfind("X", 0) != 0;  // two command fields are none
+    // Two command fields are not a heartbeat.
+    const bool expected = std::string(fields).rfind("X", 0) != 0;
     EXPECT_EQ(board.state() == BoardState::active, expected) << fields;
   }
 }
@@ -96,7 +97,7 @@ TEST(ApplicationLink, SilenceCountsBeforeTheHeartbeatThatEndsIt) {
   TestHost host(board, no_session);
   host.heartbeat(5);
   host.command("O:358,1,1");
-  board.now_ms += 999;  // the board was held up: nothing was polled
+  board.now_ms += 999;  // the loop stood still: nothing was polled
   board.application->poll(board.now_ms);
   board.now_ms += 1;
   board.application->drained(0);
@@ -108,7 +109,7 @@ TEST(ApplicationLink, SilenceCountsBeforeTheHeartbeatThatEndsIt) {
 
 // --- a loop that stood still
 
-// A host of the paper's in control of a board whose loop turns.
+// A host as in the paper controls a board whose loop turns.
 struct ApplicationStandstill : testing::Test {
   ApplicationStandstill() {
     host.heartbeat(5);
@@ -116,7 +117,7 @@ struct ApplicationStandstill : testing::Test {
     board.run(500);
     board.take();
   }
-  // When the board became safe, after so much from now; 0: it did not within three seconds.
+  // Milliseconds from now until the board becomes safe; 0 if it stays active for three seconds.
   std::uint32_t safe_after() {
     const std::uint32_t from_ms = board.now_ms;
     board.run(3000);
@@ -128,7 +129,7 @@ struct ApplicationStandstill : testing::Test {
 };
 
 TEST_F(ApplicationStandstill, AHeartbeatThatWaitedCountsFromWhenTheLoopStoodStill) {
-  board.now_ms += 300;  // nothing was polled, and it came at the beginning
+  board.now_ms += 300;  // nothing was polled, and the heartbeat came at the beginning
   host.heartbeat(6);
   EXPECT_FALSE(board.safe());
   EXPECT_EQ(safe_after(), 1000U - 300U);
@@ -136,7 +137,7 @@ TEST_F(ApplicationStandstill, AHeartbeatThatWaitedCountsFromWhenTheLoopStoodStil
 
 TEST_F(ApplicationStandstill, SoItDoesBehindATurnOfTheLoop) {
   board.now_ms += 300;
-  board.application->poll(board.now_ms);  // the timer came before what had arrived was read
+  board.application->poll(board.now_ms);  // the timer came before the waiting datagrams were read
   board.run(20);
   host.heartbeat(6);
   EXPECT_EQ(safe_after(), 1000U - 320U);
@@ -184,7 +185,7 @@ TEST_F(ApplicationStandstill, EachPortHasABacklogOfItsOwn) {
   const std::uint32_t read_ms = two.now_ms;
   two.run(3000);
   EXPECT_EQ(two.log.state_ms - read_ms, 1000U - 300U);
-  two.application->drained(2);  // there is none
+  two.application->drained(2);  // there is no port 2
 }
 
 TEST_F(ApplicationStandstill, AHeartbeatThatMayBeTooOldGivesNobodyControl) {
@@ -192,12 +193,13 @@ TEST_F(ApplicationStandstill, AHeartbeatThatMayBeTooOldGivesNobodyControl) {
   host.heartbeat(6);
   EXPECT_EQ(board.log.states.back(), "SAFE link");
   EXPECT_TRUE(board.safe());
-  EXPECT_EQ(board.take(MessageKind::board_heartbeat).size(), 2U) << "it is asked for another";
+  EXPECT_EQ(board.take(MessageKind::board_heartbeat).size(), 2U)
+      << "the board asks for another heartbeat";
   board.application->drained(0);
   board.run(1);
   host.heartbeat(7);
   EXPECT_EQ(board.log.states.back(), "ACTIVE none");
-  EXPECT_TRUE(board.safe()) << "a paper host begins anew";
+  EXPECT_TRUE(board.safe()) << "a paper host starts a new session";
 }
 
 TEST_F(ApplicationStandstill, TheGuardExpectsTheHostFromThen) {
@@ -219,7 +221,7 @@ TEST_F(ApplicationStandstill, AStopAppliesAtOnceAndAClearThatNamesNoneCountsFrom
   board.run(500);
   host.heartbeat(7);
   board.run(300);
-  board.now_ms += 300;  // a second after the stop, but asked for sooner, perhaps
+  board.now_ms += 300;  // a second after the stop, but perhaps asked for sooner
   host.heartbeat(8);
   host.command("E:CLEAR");
   EXPECT_EQ(board.log.states.back(), "SAFE stop");
@@ -239,7 +241,7 @@ TEST_F(ApplicationStandstill, OneThatTheHeartbeatOvertookIsStale) {
   const std::uint32_t overtaken = host.pnum++;
   board.now_ms += 300;
   host.heartbeat(6);
-  host.resend("O:100,1,1", overtaken);  // 300 ms behind it, perhaps
+  host.resend("O:100,1,1", overtaken);  // perhaps 300 ms after it
   EXPECT_EQ(board.log.refused, (Lines{std::to_string(overtaken) + " STALE"}));
 }
 
@@ -295,7 +297,8 @@ TEST(ApplicationLink, APortTooManyIsRefusedAndWhatItWouldBringIsPassedOver) {
   EXPECT_EQ(board.state(), BoardState::connecting);
   EXPECT_EQ(board.reason(), SafeReason::none);
   EXPECT_TRUE(more.sent.empty());
-  EXPECT_FALSE(board.take(firmware::Application::max_ports - 1).empty()) << "the last is served";
+  EXPECT_FALSE(board.take(firmware::Application::max_ports - 1).empty())
+      << "the last port is served";
 }
 
 TEST(ApplicationLink, TellsThePortWhoIsInControlAndWhenNobodyIs) {
@@ -311,7 +314,7 @@ TEST(ApplicationLink, TellsThePortWhoIsInControlAndWhenNobodyIs) {
   ASSERT_EQ(board.reason(), SafeReason::link);
   EXPECT_EQ(board.ports[1].held, everyone);
   host.echo();
-  EXPECT_EQ(board.ports[1].held, 7U) << "it is back";
+  EXPECT_EQ(board.ports[1].held, 7U) << "the session is back";
   board.application->port_down(1, board.now_ms);
   EXPECT_EQ(board.ports[1].held, everyone);
   other.echo();
@@ -335,7 +338,7 @@ TEST(ApplicationLink, RestoresTheOutputsForTheSameHost) {
   board.take();
   board.run(10);
   const State state = state_of(board.take(MessageKind::state).back());
-  EXPECT_FALSE(state.present.has(StateField::ain12));  // the selection is the session's
+  EXPECT_FALSE(state.present.has(StateField::ain12));  // the selection belongs to the session
 }
 
 TEST(ApplicationLink, RearmKeepsTheOutputsOffUntilAFreshCommand) {
@@ -378,7 +381,7 @@ TEST(ApplicationLink, ARestartIsNoticedWithinTheTimeoutAndMakesTheOutputsSafe) {
   host.command("F:AIN24");
   TestHost restarted(board, another_session);
   restarted.heartbeat(0);
-  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);  // nothing is proven yet
+  EXPECT_EQ(board.outputs().osmc[0].pwm, 358);  // the restart is not proven yet
   board.run(1010);
   restarted.echo();
   EXPECT_TRUE(board.safe());
@@ -404,7 +407,7 @@ TEST(ApplicationLink, AnswersAHostThatHasNothingToEcho) {
 }
 
 TEST(ApplicationLink, AnswersAHostThatEchoesWhatIsPast) {
-  // After a reboot of the board.
+  // After a restart of the board.
   TestBoard board;
   TestHost host(board, our_session, Source{0, 3});
   board.take();
@@ -472,7 +475,7 @@ TEST(ApplicationLink, StreamsOnEveryPortWithNumbersOfItsOwn) {
     std::uint32_t next = 0;
     std::size_t states = 0;
     for (const Heard& heard : board.take(port)) {
-      if (heard.t_ms == 0) continue;  // from before the session
+      if (heard.t_ms == 0) continue;  // a state from before the session
       if (next != 0) {
         EXPECT_EQ(heard.pnum, next);
       }
@@ -492,7 +495,8 @@ TEST(ApplicationLink, TheFirstNumberOfASessionIsOneOnEveryPort) {
   EXPECT_EQ(board.take(MessageKind::state, 1)[0].pnum, 1U);
 }
 
-// The paper's Python client: T before PNum, its own clock in seconds, an answer to each heartbeat.
+// The paper's Python client: T comes before PNum, its clock counts in seconds, and it answers each
+// heartbeat.
 TEST(ApplicationLink, ServesThePapersPythonClient) {
   TestBoard board;
   std::uint32_t pnum = 0;
@@ -517,7 +521,7 @@ TEST(ApplicationLink, ServesThePapersPythonClient) {
 }
 
 TEST(ApplicationLink, TheClockWrapsInTheMiddleOfASession) {
-  // Heartbeats fall on every half second, and so on the wrap itself.
+  // Heartbeats are due on every half second, so one is due exactly when the clock wraps.
   TestBoard board({}, 1, 0U - 2000U);
   TestHost host{board, our_session, Source{0, 4}};
   host.connect();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session with several paths: how they join and leave, and that they are one session.
+// A session with several paths: how a path joins and leaves, and that all paths are one session.
 #include "tests/firmware/host_on_paths.hpp"
 #include "tests/support/signing.hpp"
 
@@ -23,7 +23,7 @@ constexpr Source path_c{2, 6};
 
 struct ApplicationPaths : testing::Test {
   const SessionPaths& paths() const { return board.application->paths(); }
-  // … with the counters of what came.
+  // The newest state, with the counters of received datagrams.
   State newest_state(HostOnPaths& host, int port = 0) {
     host.command("F:RXLOST,RXDUP,RXREF");
     board.take(port);
@@ -32,7 +32,7 @@ struct ApplicationPaths : testing::Test {
     if (states.empty()) throw std::runtime_error("no state came");
     return state_of(states.back());
   }
-  // The codes of the answers at a port.
+  // The codes of the answers on a port.
   Lines answers(int port) {
     Lines codes;
     for (const Heard& heard : board.take(MessageKind::nack, port)) {
@@ -70,11 +70,11 @@ TEST_F(ApplicationPaths, APathJoinsWithAFreshEchoOfTheSession) {
   EXPECT_EQ(paths().joins(), 1U);
   EXPECT_EQ(answers(1), Lines());
   board.receive(heartbeat(host.pnum++, t), path_c);
-  EXPECT_EQ(board.log.paths.back(), "joined 2/6") << "a number that came on no other path";
+  EXPECT_EQ(board.log.paths.back(), "joined 2/6") << "the number came on no other path";
   host.command("O:358,1,1");
   board.receive("O:5,1,2;" + test::stamp_of(our_session, host.pnum, 1), path_b);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
-  EXPECT_EQ(board.outputs().osmc[1].pwm, 5) << "either path brings commands";
+  EXPECT_EQ(board.outputs().osmc[1].pwm, 5) << "every path carries commands";
 }
 
 TEST_F(ApplicationPaths, ANewPathKeepsTheSessionAlive) {
@@ -102,7 +102,7 @@ TEST_F(ApplicationPaths, AStrangerStaysBusyAndNeverJoins) {
     board.receive("O:358,1,1;" + test::stamp_of(sid, host.pnum, 1), path_b);
     EXPECT_EQ(answers(1), Lines(3, "BUSY"));
     board.receive(heartbeat(pnum + 1, t, sid), path_a);
-    EXPECT_EQ(answers(0), Lines(1, "BUSY")) << "from the place of the host, too";
+    EXPECT_EQ(answers(0), Lines(1, "BUSY")) << "also from the address of the host";
   }
   host.stay(2000);
   EXPECT_EQ(paths().size(), 1);
@@ -160,7 +160,7 @@ TEST_F(ApplicationPaths, AnAnswerNamesTheSessionOfTheAskerAloneAndTellsOthersBus
   }
 }
 
-// --- commands over all of them
+// --- commands over all paths
 
 TEST_F(ApplicationPaths, ACommandIsExecutedOnceWhicheverPathBringsIt) {
   HostOnPaths host(board, {{path_a}, {path_b}});
@@ -171,8 +171,8 @@ TEST_F(ApplicationPaths, ACommandIsExecutedOnceWhicheverPathBringsIt) {
   const std::uint32_t second = host.command("Z:1");
   EXPECT_EQ(board.log.executed, (Numbers{both, second}));
   EXPECT_EQ(board.hal.zeroed, std::vector<int>{1});
-  EXPECT_EQ(answers(1), Lines{"DUPLICATE"}) << "its copy is answered";
-  EXPECT_EQ(board.log.refused, Lines()) << "and counts as nothing refused";
+  EXPECT_EQ(answers(1), Lines{"DUPLICATE"}) << "the duplicate is answered";
+  EXPECT_EQ(board.log.refused, Lines()) << "a duplicate is not counted as refused";
   const State state = newest_state(host, 1);
   EXPECT_EQ(state.rx_duplicate, 0U);
   EXPECT_EQ(state.rx_refused, 0U);
@@ -211,8 +211,8 @@ TEST_F(ApplicationPaths, ACopyOfARefusedCommandIsToldTheSame) {
   EXPECT_TRUE(board.safe());
 }
 
-// 400 commands a second over a path that lags, then also over a fast one, then over that one only. Commands have
-// numbers, too: the fast path is far ahead.
+// 400 commands a second: first over a slow path, then over the slow path and a fast one, then over
+// the fast one only. Heartbeats and commands share the numbers, so the fast path is far ahead.
 void expect_a_fast_path_takes_over(TestBoard& board, HostOnPaths& host, std::uint32_t lag_ms) {
   host.paths[0].cut = true;
   host.paths[1].lag_ms = lag_ms;
@@ -232,8 +232,8 @@ void expect_a_fast_path_takes_over(TestBoard& board, HostOnPaths& host, std::uin
     }
     host.run(10);
   }
-  EXPECT_EQ(board.log.states, Lines()) << "no trip";
-  EXPECT_EQ(board.log.executed, sent) << "each at once, and once";
+  EXPECT_EQ(board.log.states, Lines()) << "the board stays active";
+  EXPECT_EQ(board.log.executed, sent) << "each command at once, and exactly once";
   EXPECT_EQ(board.application->paths()[0], path_a);
 }
 
@@ -253,7 +253,7 @@ class ApplicationPathsWithAKey : public testing::Test {
     board.run(10);
     host.connect();
   }
-  // Of the newest heartbeat that went out.
+  // The nonce of the newest heartbeat.
   std::string nonce() { return test::str(board.application->authentication().nonce()); }
   const SessionPaths& paths() const { return board.application->paths(); }
 
@@ -269,13 +269,13 @@ TEST_F(ApplicationPathsWithAKey, EachPathHasASignatureOfItsOwnAndACommandIsExecu
   ASSERT_EQ(paths().size(), 2);
   board.log.rejected.clear();
   for (int i = 0; i < 200; ++i) {
-    host.paths[0].cut = i % 10 == 0;  // now and then one brings it alone, later
+    host.paths[0].cut = i % 10 == 0;  // sometimes one path alone carries a command, later
     host.command("Z:1");
     host.paths[0].cut = false;
     host.run(10);
   }
   EXPECT_EQ(board.log.rejected, Lines());
-  EXPECT_EQ(board.hal.zeroed.size(), 180U) << "what was overtaken on its way is stale";
+  EXPECT_EQ(board.hal.zeroed.size(), 180U) << "a command that was overtaken is stale";
   EXPECT_EQ(paths().losses(), 0U);
 }
 
@@ -293,7 +293,7 @@ TEST_F(ApplicationPathsWithAKey, ADuplicateFromAnotherPlaceIsAReplay) {
   EXPECT_FALSE(paths().has(attacker));
   board.receive("O:9,1,1;" + test::stamp_of(our_session, host.pnum, 1), attacker);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
-  EXPECT_EQ(board.log.rejected.back(), "missing") << "the session id alone is no proof";
+  EXPECT_EQ(board.log.rejected.back(), "missing") << "the SID alone proves nothing";
 }
 
 TEST_F(ApplicationPathsWithAKey, AFastPathTakesOverFromOneThatLagsAtAnyRateOfCommands) {
@@ -311,7 +311,7 @@ TEST_F(ApplicationPaths, ALostPortTakesTheLinkOnlyWithTheLastPath) {
   EXPECT_EQ(paths().size(), 1);
   EXPECT_EQ(board.log.paths.back(), "left 0/4");
   EXPECT_EQ(board.ports[0].held, everyone);
-  board.application->port_down(2, board.now_ms);  // nobody was there
+  board.application->port_down(2, board.now_ms);  // port 2 had no path
   EXPECT_EQ(board.state(), BoardState::active);
   board.application->port_down(1, board.now_ms);
   EXPECT_EQ(board.reason(), SafeReason::link);
@@ -330,7 +330,7 @@ TEST_F(ApplicationPaths, ASessionIsResumedFromAnyOfItsPaths) {
     host.paths[first].cut = false;
     host.run(300);
     EXPECT_EQ(fresh.state(), BoardState::active);
-    EXPECT_EQ(fresh.outputs().osmc[0].pwm, 358) << "the same session";
+    EXPECT_EQ(fresh.outputs().osmc[0].pwm, 358) << "the session is the same";
     host.command("O:7,1,1");
     EXPECT_EQ(fresh.outputs().osmc[0].pwm, 7);
     host.paths[1 - first].cut = false;
@@ -348,11 +348,12 @@ TEST_F(ApplicationPaths, TheFarewellByAllPathsIsObeyedOnce) {
   const std::uint32_t leave = host.command("E:LEAVE");
   EXPECT_EQ(board.reason(), SafeReason::link);
   EXPECT_TRUE(board.safe());
-  host.paths[0].cut = host.paths[1].cut = true;  // it has ended; what is under way comes
+  // The host has ended; datagrams on their way still arrive.
+  host.paths[0].cut = host.paths[1].cut = true;
   host.run(90);
   EXPECT_EQ(board.log.executed, Numbers{leave});
   EXPECT_EQ(answers(1), Lines{"DUPLICATE"});
-  EXPECT_EQ(board.reason(), SafeReason::link) << "a heartbeat from before begins nothing";
+  EXPECT_EQ(board.reason(), SafeReason::link) << "an older heartbeat starts no session";
 }
 
 // --- the stop
@@ -373,10 +374,10 @@ TEST_F(ApplicationPaths, TheSameStopByAllPathsIsOneCause) {
   host.paths[0].cut = true;
   host.command("E:STOP");
   host.run(50);
-  EXPECT_EQ(board.reason(), SafeReason::stop) << "by any of them";
+  EXPECT_EQ(board.reason(), SafeReason::stop) << "a stop on any path counts";
 }
 
-// --- what is sent
+// --- states and answers
 
 TEST_F(ApplicationPaths, TwoPlacesOnOnePortGetTheSame) {
   const Source other{0, 5};
@@ -399,13 +400,13 @@ TEST_F(ApplicationPaths, TwoPlacesOnOnePortGetTheSame) {
     pnum = heard.pnum;
   }
   EXPECT_GE(at_a.size(), 50U);
-  EXPECT_EQ(at_a, at_other) << "the answers, too: they have numbers of the same count";
+  EXPECT_EQ(at_a, at_other) << "also the answers: they share the numbers of the states";
   host.paths[1].cut = true;
   host.run(1200);
   EXPECT_EQ(board.ports[0].also_held, std::vector<std::uint32_t>());
 }
 
-// An answer carries the SID of its question, which its host alone may know.
+// An answer carries the SID of its question, and only the host of that session may know it.
 TEST_F(ApplicationPaths, AnotherHostAtAPathGetsItsAnswersAlone) {
   const Source other{0, 5};
   HostOnPaths host(board, {{path_a}, {other}});
@@ -426,11 +427,12 @@ TEST_F(ApplicationPaths, AWatcherBecomesAPathAndNeedsNoLeaseAnyMore) {
   TestHost host(board, our_session, path_a);
   host.connect();
   const Source place{2, 6};
-  board.ports[2].bus = true;  // it need prove nothing
+  board.ports[2].bus = true;  // on a bus, a watcher needs no proof
   board.receive("W:100;PNum:1;T:0;", place);
   forget();
   board.run(100);
-  EXPECT_EQ(board.take(MessageKind::state, 2).size(), 20U) << "its own, and those for everyone";
+  EXPECT_EQ(board.take(MessageKind::state, 2).size(), 20U)
+      << "its own states, and those for everyone";
   const std::uint32_t t = board.newest_t(0);
   const std::uint32_t pnum = host.echo();
   board.receive(heartbeat(pnum, t), place);
@@ -438,7 +440,7 @@ TEST_F(ApplicationPaths, AWatcherBecomesAPathAndNeedsNoLeaseAnyMore) {
   forget();
   board.run(100);
   const std::vector<Heard> states = board.take(MessageKind::state, 2);
-  EXPECT_EQ(states.size(), 10U) << "each once";
+  EXPECT_EQ(states.size(), 10U) << "each state once";
   for (const Heard& heard : states) EXPECT_EQ(heard.peer, place.peer);
 }
 

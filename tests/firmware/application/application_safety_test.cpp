@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every cause of the safe state: how it enters, what it leaves behind, how it leaves.
+// Every cause of the safe state: how the board enters it, which setpoints remain, and how the board
+// leaves it.
 #include <gtest/gtest.h>
 
 #include "tests/firmware/board_fixture.hpp"
@@ -33,12 +34,12 @@ struct ApplicationSafety : testing::Test {
     board.hal.inputs.handle_held = held;
     board.run(10);
   }
-  // E:CLEAR by an owner that has heard what there is to clear.
+  // E:CLEAR by the controlling host, which has heard the cause to clear.
   std::uint32_t clear() {
     board.run(0);
     return host.clear();
   }
-  // Nothing comes back by itself, whatever the host does but command.
+  // Only a command brings outputs back, whatever else the host does.
   void expect_nothing_restored() {
     host.stay(200);
     EXPECT_EQ(board.state(), BoardState::active);
@@ -93,7 +94,7 @@ TEST_F(ApplicationSafety, AStopIsObeyedHoweverOldItIs) {
   EXPECT_TRUE(board.safe());
   clear();
   host.command("O:1,1,1");
-  host.resend("E:STOP", old);  // and however often it comes
+  host.resend("E:STOP", old);  // also if it comes again
   EXPECT_TRUE(board.safe());
 }
 
@@ -114,7 +115,7 @@ TEST_F(ApplicationSafety, AStopOfAnotherProgramAtTheOwnersPlaceSpendsNoneOfItsNu
   board.log.refused.clear();
   host.resend("O:1,1,1", executed);
   EXPECT_EQ(board.log.refused, Lines{std::to_string(executed) + " DUPLICATE"});
-  // A command that has been on its way for long comes after the E:CLEAR, and stays out.
+  // A command that was long on its way arrives after the E:CLEAR. It stays without effect.
   const std::uint32_t under_way = host.pnum++;
   const std::uint32_t cleared = clear();
   EXPECT_EQ(board.state(), BoardState::active);
@@ -143,7 +144,7 @@ TEST_F(ApplicationSafety, AStopIsAnsweredToEveryoneAndToWhoAsked) {
     EXPECT_EQ(heard.kind, MessageKind::board_heartbeat);
     EXPECT_NE(heard.bytes.find(";SAFE:2;"), std::string::npos);
   }
-  // Each repetition is answered to its sender, so that it learns of it on a bad line.
+  // Each repetition is answered to its sender, so a sender on a bad line learns that it was obeyed.
   two.receive("E:STOP;PNum:1;T:1;", Source{1, 99});
   two.receive("E:STOP;PNum:1;T:1;", Source{0, 4});
   first = two.take(0);
@@ -208,12 +209,12 @@ TEST_F(ApplicationSafety, ARepeatedClearDoesNotClearALaterStop) {
 TEST_F(ApplicationSafety, AClearOnItsWayDoesNotClearWhatCameMeanwhile) {
   host.command("E:STOP");
   const std::string asked = host.clear_field();
-  board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});  // pressed again, by somebody else
+  board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});  // pressed again, by another person
   board.log.refused.clear();
   std::uint32_t number = host.command(asked);
   EXPECT_EQ(board.reason(), SafeReason::stop);
   EXPECT_EQ(board.log.refused, Lines{std::to_string(number) + " STALE"});
-  host.echo();  // also when the host has heard of the second, and asks for the first
+  host.echo();  // also if the host has heard the second cause and asks for the first
   board.run(2000);
   host.connect();
   number = host.command(asked);
@@ -232,7 +233,7 @@ TEST_F(ApplicationSafety, AClearOnItsWayDoesNotClearAFaultThatCameMeanwhile) {
     clear();
     EXPECT_EQ(board.reason(), cause);
     const std::string again = host.clear_field();
-    board.application->fail(cause, board.now_ms);  // once more
+    board.application->fail(cause, board.now_ms);  // the same fault again
     host.command(again);
     EXPECT_EQ(board.reason(), cause);
     clear();
@@ -246,7 +247,7 @@ TEST_F(ApplicationSafety, ARepetitionOfAStopIsNoNewCause) {
   host.resend("E:STOP", stop);
   host.command(asked);
   EXPECT_EQ(board.state(), BoardState::active);
-  host.resend("E:STOP", stop);  // behind the E:CLEAR it is one
+  host.resend("E:STOP", stop);  // after the E:CLEAR, a repetition is a new cause
   EXPECT_EQ(board.reason(), SafeReason::stop);
   host.command(asked);
   EXPECT_EQ(board.reason(), SafeReason::stop);
@@ -305,9 +306,10 @@ TEST_F(ApplicationSafety, HeartbeatsNameTheNewestStop) {
   EXPECT_EQ(newest().stop, 77U);
   board.receive("E:STOP;PNum:78;T:1;", Source{0, 98});
   EXPECT_EQ(newest().stop, 78U);
-  board.receive("E:STOP;PNum:77;T:1;", Source{0, 99});  // a late copy
+  board.receive("E:STOP;PNum:77;T:1;", Source{0, 99});  // a late duplicate
   EXPECT_EQ(newest().stop, 77U);
-  board.receive("E:STOP;STOP:200000;", Source{0, 99});  // as a frame on a CAN bus tells it
+  // The stop as a frame on a CAN bus reports it.
+  board.receive("E:STOP;STOP:200000;", Source{0, 99});
   EXPECT_EQ(newest().stop, 200000U);
   board.receive("E:STOP;", Source{0, 99});
   EXPECT_FALSE(newest().has_stop);
@@ -371,7 +373,7 @@ TEST_F(ApplicationSafety, StateKeepsComingWhileStopped) {
   EXPECT_EQ(heard.size(), 10U);
   const State state = state_of(heard.back());
   EXPECT_EQ(state.safe, SafeReason::stop);
-  EXPECT_EQ(state.raw.osmc[0].pwm, 0);  // as it is, not as it was commanded
+  EXPECT_EQ(state.raw.osmc[0].pwm, 0);  // the real state of the output, not the commanded one
 }
 
 // --- fault and watchdog
@@ -398,7 +400,7 @@ TEST_F(ApplicationSafety, AReleasedHandleIsSafeUntilItIsHeldAgain) {
   EXPECT_EQ(board.log.states, Lines{"SAFE handle"});
   host.command("O:1,1,1");
   EXPECT_TRUE(board.safe());
-  clear();  // clears no handle
+  clear();  // does not clear a released handle
   EXPECT_EQ(board.reason(), SafeReason::handle);
   handle(true);
   EXPECT_EQ(board.log.states, (Lines{"SAFE handle", "ACTIVE none"}));
@@ -470,7 +472,7 @@ TEST_F(ApplicationSafety, AnObstacleIsSafeUntilItHasBeenFiveCentimetresBeyondFor
   host.stay(20);
   EXPECT_EQ(board.reason(), SafeReason::none);
   distance(34);
-  EXPECT_EQ(board.reason(), SafeReason::none);  // the threshold counts again
+  EXPECT_EQ(board.reason(), SafeReason::none);  // the threshold of 30 cm counts again
   expect_nothing_restored();
 }
 
@@ -499,7 +501,7 @@ TEST_F(ApplicationSafety, EachSensorHasItsThreshold) {
   host.command("U:30,1");
   host.command("U:10,4");
   board.hal.inputs.ultrasonic_cm[3] = 10;
-  board.hal.inputs.ultrasonic_cm[1] = 1;  // has none
+  board.hal.inputs.ultrasonic_cm[1] = 1;  // sensor 2 has no threshold
   board.run(10);
   EXPECT_FALSE(board.safe());
   board.hal.inputs.ultrasonic_cm[3] = 9;
@@ -516,7 +518,7 @@ TEST_F(ApplicationSafety, AThresholdIsSetAtOnceAndTurnedOffAtOnce) {
   expect_nothing_restored();
 }
 
-// --- several at once
+// --- several causes at once
 
 TEST_F(ApplicationSafety, TheReasonIsInEveryHeartbeatAndState) {
   host.command("F:AIN24");
@@ -549,7 +551,7 @@ TEST_F(ApplicationSafety, AChipsFaultIsToldWithChipAndTrouble) {
   EXPECT_EQ(state.safe, SafeReason::fault);
   EXPECT_EQ(state.fault, (ChipFault{64, ChipTrouble::no_acknowledge}));
 
-  clear();  // executed; but it is still there
+  clear();  // executed; but the fault is still there
   host.stay(100);
   EXPECT_EQ(board.reason(), SafeReason::fault);
   host.command("O:1,1,1");

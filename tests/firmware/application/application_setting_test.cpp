@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a setting changes, from when on, and for how long.
+// The effect of each setting, when it begins, and how long it lasts.
 #include <gtest/gtest.h>
 
 #include "tests/firmware/board_fixture.hpp"
@@ -24,7 +24,7 @@ TEST_F(ApplicationSetting, SettingsTakeEffectAtOnce) {
   EXPECT_EQ(board.take(MessageKind::state).size(), 100U);
 
   host.command("C:timeout,200");
-  EXPECT_EQ(answers(), Lines{"RANGE"});  // not above the heartbeat's interval
+  EXPECT_EQ(answers(), Lines{"RANGE"});  // it must be longer than the interval of heartbeats
   host.command("C:heartbeat,50");
   host.command("C:timeout,200");
   host.echo();
@@ -96,14 +96,14 @@ TEST_F(ApplicationSetting, MakesEveryPortSendThePackedForm) {
   EXPECT_TRUE(board.ports[0].packed);
 }
 
-// Another host may come then, that knows the text only.
+// Another host, which knows the text only, may come next.
 TEST_F(ApplicationSetting, WithoutAHostABoardSpeaksPlainText) {
   board.run(1000);
   ASSERT_EQ(board.reason(), SafeReason::link);
   EXPECT_FALSE(board.ports[0].packed);
   host.echo();
   ASSERT_EQ(board.state(), BoardState::active);
-  EXPECT_TRUE(board.ports[0].packed) << "the same host goes on";
+  EXPECT_TRUE(board.ports[0].packed) << "the same host continues";
   host.command("C:pack,0");
   board.run(1000);
   host.echo();

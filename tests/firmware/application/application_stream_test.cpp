@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The stream of states: when, what, and in how many datagrams.
+// The stream of states: when they are sent, their fields, and the number of datagrams.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -72,7 +72,7 @@ TEST(ApplicationStream, CarriesTheNewestInputs) {
   EXPECT_EQ(state.raw.stepper_steps[1], 2'000'000'000);
 }
 
-// Makes every field as long as it gets.
+// Makes every field as long as it can get.
 void fill(TestBoard& board, TestHost& host) {
   for (auto& cv : board.hal.inputs.analog_cv) cv = -327'680;
   for (auto& steps : board.hal.inputs.stepper_steps) steps = -2'000'000'000;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's UARTs, DAC and spare inputs by protocol.
+// The user's UARTs, DAC and spare inputs through the protocol.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -54,7 +54,7 @@ TEST_F(ApplicationUarts, ASettingTurnsOneOnAndTheStateTellsWhatComes) {
   ASSERT_TRUE(state.present.has(StateField::uart1));
   EXPECT_GT(state.raw.uart[0].position, 1000U);
   EXPECT_EQ(state.raw.uart[0].lost, 0U);
-  EXPECT_EQ(state.raw.uart[1].position, 0U) << "off";
+  EXPECT_EQ(state.raw.uart[1].position, 0U) << "this UART is off";
   host.command("C:uart1,off");
   EXPECT_FALSE(devices.uarts[0].mode().on());
   EXPECT_EQ(refused("C:uart3,off"), "UNKNOWN");
@@ -93,13 +93,13 @@ TEST_F(ApplicationUarts, WhatCameWhileTheLinkWasLostIsNotToldAsNew) {
   ASSERT_FALSE(heard.empty());
   const UartBytes first = state_of(heard.front()).raw.uart[0];
   EXPECT_GT(first.position, before + firmware::UserUart::backlog)
-      << "a gap, as long as what nobody heard";
-  EXPECT_LT(first.data.size, 40) << "what came since";
+      << "a gap, as long as the bytes that were lost";
+  EXPECT_LT(first.data.size, 40) << "the bytes since the link came back";
 }
 
 TEST_F(ApplicationUarts, AWriteIsAnOutput) {
   devices.uarts[0].connect(UartPeer::loop);
-  EXPECT_EQ(refused("X:UART,1,x41"), "CHANNEL") << "it is off";
+  EXPECT_EQ(refused("X:UART,1,x41"), "CHANNEL") << "the UART is off";
   host.command("C:uart1,9600:8N1");
   EXPECT_EQ(refused("X:UART,1,x41"), "");
   pass(20);
@@ -119,7 +119,7 @@ TEST_F(ApplicationUarts, AWriteIsAnOutput) {
   const std::uint32_t sent = devices.uarts[0].sent();
   EXPECT_EQ(refused("X:UART,1,x41"), "SAFE");
   pass(200);
-  EXPECT_EQ(devices.uarts[0].sent(), sent) << "what waited is dropped";
+  EXPECT_EQ(devices.uarts[0].sent(), sent) << "waiting bytes are dropped";
 }
 
 TEST_F(ApplicationUarts, ADacIsAnOutputThatIsZeroInTheSafeState) {
@@ -137,10 +137,10 @@ TEST_F(ApplicationUarts, ADacIsAnOutputThatIsZeroInTheSafeState) {
   EXPECT_EQ(board.outputs().dac_mv[0], 0);
   EXPECT_EQ(refused("X:DAC,1,1"), "SAFE");
   host.clear();
-  EXPECT_EQ(board.outputs().dac_mv[1], 0) << "nothing comes back";
+  EXPECT_EQ(board.outputs().dac_mv[1], 0) << "the voltage is not restored";
   host.command("X:DAC,1,1000");
   pass(1001, false);
-  EXPECT_EQ(board.outputs().dac_mv[0], 0) << "silence";
+  EXPECT_EQ(board.outputs().dac_mv[0], 0) << "the host is silent";
 }
 
 TEST_F(ApplicationUarts, SpareInputsAreBits) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who watches a board: what it gets, and that it changes nothing.
+// A watcher of a board: which states it gets, and that it changes nothing.
 #include <gtest/gtest.h>
 
 #include "tests/firmware/board_fixture.hpp"
@@ -18,9 +18,9 @@ using test::TestBoard;
 using test::TestHost;
 using Lines = std::vector<std::string>;
 
-// A watcher at a place of its own.
+// A watcher at its own address.
 struct TestWatcher {
-  // What came to it since the last time.
+  // The datagrams that came to the watcher since the last call.
   std::vector<Heard> take() {
     std::vector<Heard> mine;
     for (const Heard& heard : board.take(at.port)) {
@@ -40,7 +40,7 @@ struct TestWatcher {
     board.receive(
         "W:" + lease + ";PNum:" + std::to_string(pnum++) + ";T:" + std::to_string(echo) + ";", at);
   }
-  // Asked, answered and echoed.
+  // Asks for a lease, takes the answer and echoes it.
   void watch(const std::string& lease) {
     take();
     ask(lease, 0);
@@ -71,21 +71,21 @@ TEST(ApplicationWatch, ABoardWithoutAHostStreamsToWhoWatchesItAndIsSafe) {
   std::size_t states = 0;
   std::uint32_t next = heard.front().pnum;
   for (const Heard& each : heard) {
-    EXPECT_EQ(each.pnum, next++) << "its own numbers, without a gap";
+    EXPECT_EQ(each.pnum, next++) << "the watcher's own numbers, without a gap";
     if (each.kind != MessageKind::state) continue;
     ++states;
     EXPECT_EQ(state_of(each).safe, SafeReason::link);
   }
   EXPECT_NEAR(static_cast<double>(states), 50, 1);
-  EXPECT_EQ(board.state(), BoardState::connecting) << "nobody controls it";
+  EXPECT_EQ(board.state(), BoardState::connecting) << "no host controls the board";
   EXPECT_EQ(board.hal.made_safe, 1);
   board.run(3000);
   watcher.take();
   board.run(1000);
-  EXPECT_TRUE(watcher.take(MessageKind::state).empty()) << "its lease is over";
+  EXPECT_TRUE(watcher.take(MessageKind::state).empty()) << "its lease has ended";
 }
 
-// On a bus hosts hear what is meant for those who watch.
+// On a bus, a host also hears the datagrams for watchers.
 TEST(ApplicationWatch, WhatAHeartbeatShowsToWhoWatchesCanBeEchoed) {
   TestBoard board;
   TestWatcher watcher{board, Source{0, 9}};
@@ -100,20 +100,20 @@ TEST(ApplicationWatch, WhatAHeartbeatShowsToWhoWatchesCanBeEchoed) {
   EXPECT_EQ(board.state(), BoardState::active);
 }
 
-// Who asks says nothing but that somebody watches (docs/reference/can.md).
+// On a bus, W shows only that there is a watcher (docs/reference/can.md).
 TEST(ApplicationWatch, OnABusABoardStreamsToWhoAsksUntilAHostIsThere) {
   TestBoard board({}, 2);
   board.ports[1].bus = true;
   board.run(100);
   board.receive("W:5;", Source{0, 0});
   board.run(1000);
-  EXPECT_TRUE(board.take(MessageKind::state, 0).empty()) << "elsewhere it proves nothing";
+  EXPECT_TRUE(board.take(MessageKind::state, 0).empty()) << "only on a bus W needs no proof";
   board.receive("W:5;", Source{1, 0});
   board.run(1000);
   const std::vector<Heard> states = board.take(MessageKind::state, 1);
   EXPECT_NEAR(static_cast<double>(states.size()), 5, 1);
   EXPECT_EQ(state_of(states.back()).safe, SafeReason::link);
-  EXPECT_EQ(board.state(), BoardState::connecting) << "nobody controls it";
+  EXPECT_EQ(board.state(), BoardState::connecting) << "no host controls the board";
 
   TestHost host(board, our_session, Source{1, 0});
   host.connect();
@@ -124,7 +124,7 @@ TEST(ApplicationWatch, OnABusABoardStreamsToWhoAsksUntilAHostIsThere) {
   host.stay(800);
   const std::vector<Heard> all = board.take(1);
   for (std::size_t i = 1; i < all.size(); ++i) EXPECT_EQ(all[i].pnum, all[i - 1].pnum + 1);
-  EXPECT_NEAR(static_cast<double>(all.size()), 110, 10) << "the host's, once";
+  EXPECT_NEAR(static_cast<double>(all.size()), 110, 10) << "the states for the host, once";
   board.run(3000);
   board.take(1);
   board.receive("W:5;", Source{1, 0});
@@ -133,7 +133,7 @@ TEST(ApplicationWatch, OnABusABoardStreamsToWhoAsksUntilAHostIsThere) {
   board.run(3000);
   board.take(1);
   board.run(1000);
-  EXPECT_TRUE(board.take(MessageKind::state, 1).empty()) << "nobody asks any more";
+  EXPECT_TRUE(board.take(MessageKind::state, 1).empty()) << "no watcher asks any more";
 }
 
 struct ApplicationWatched : BoardInControl {
@@ -169,7 +169,7 @@ TEST_F(ApplicationWatched, AWatcherCommandsNothingButStops) {
   board.take();
   board.receive("O:5,1,2;PNum:70;T:1;", watcher.at);
   board.receive("H:ROS2-R4;PNum:71;T:1;", watcher.at);
-  // A farewell that echoes as one of the host's does.
+  // A farewell with the same echo as a farewell of the host.
   const std::string t = std::to_string(board.newest_t());
   board.receive("E:LEAVE;PNum:72;T:" + t + ";", watcher.at);
   EXPECT_EQ(board.outputs().osmc[1].pwm, 0);
@@ -180,11 +180,11 @@ TEST_F(ApplicationWatched, AWatcherCommandsNothingButStops) {
   EXPECT_EQ(board.application->reason(), SafeReason::stop);
 }
 
-// Somebody may forge that it came from the host, with the number of a command that was executed.
+// An attacker may forge the address of the host and use the number of an executed command.
 TEST_F(ApplicationWatched, AnAnswerToAWProvesNothingToTheHostOfTheSession) {
   const std::uint32_t pnum = host.command("O:358,1,1");
   host.echo();
-  board.run(1050);  // the host is lost
+  board.run(1050);  // the link is lost
   board.take();
   for (const char* const lease : {"10", "1001", "10,NOTHING", "x"})
     host.resend(std::string("W:") + lease, pnum);
@@ -215,7 +215,7 @@ TEST_F(ApplicationWatched, OfAWatcherWithoutANumberNothingIsHeard) {
   EXPECT_TRUE(watcher.take().empty());
 }
 
-// As on a bus: both are at one place.
+// As on a bus: host and watcher share one address.
 TEST_F(ApplicationWatched, AWatcherAtTheHostsPlaceCountsForNothing) {
   TestWatcher beside{board, host.at, 1'000'000};
   for (int i = 0; i < 10; ++i) {
@@ -230,7 +230,7 @@ TEST_F(ApplicationWatched, AWatcherAtTheHostsPlaceCountsForNothing) {
   EXPECT_EQ(state.rx_duplicate, 0U);
 }
 
-// What is for everyone comes to a serial line anyway, with the numbers of the line.
+// On a serial line every datagram for everyone arrives anyway, with the numbers of the line.
 TEST(ApplicationWatch, OnALineEverythingHasTheNumbersOfTheLine) {
   TestBoard board({}, 2);
   TestWatcher watcher{board, Source{1, everyone}};
@@ -251,13 +251,13 @@ TEST(ApplicationWatch, OnALineEverythingHasTheNumbersOfTheLine) {
     }
   };
   take();
-  EXPECT_NEAR(static_cast<double>(states), 50, 1) << "the host's, and no others";
+  EXPECT_NEAR(static_cast<double>(states), 50, 1) << "the states for the host, and no others";
   board.run(1300);
   take();
   watcher.ask("50", watcher.token);
   board.run(1000);
   take();
-  EXPECT_NEAR(static_cast<double>(states), 50, 1) << "nobody is in control";
+  EXPECT_NEAR(static_cast<double>(states), 50, 1) << "no host is in control";
 }
 
 TEST_F(ApplicationWatched, AFifthIsToldThatThereIsNoRoom) {
@@ -288,12 +288,13 @@ TEST_F(ApplicationWatched, RefusesWhatIsNoLease) {
 TEST_F(ApplicationWatched, WhoTakesControlWatchesNoMore) {
   watcher.watch("10");
   host.echo();
-  board.run(1000);  // the host is lost
+  board.run(1000);  // the link is lost
   TestHost next(board, another_session, watcher.at);
   next.connect();
   board.take();
   next.stay(1000);
-  EXPECT_NEAR(static_cast<double>(board.take(MessageKind::state).size()), 100, 1) << "each once";
+  EXPECT_NEAR(static_cast<double>(board.take(MessageKind::state).size()), 100, 1)
+      << "each state once";
 }
 
 TEST_F(ApplicationWatched, GoesOnWhenTheHostIsLost) {

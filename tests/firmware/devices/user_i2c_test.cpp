@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's bus: the driver on the model of the bus, in virtual time, a turn of the loop each millisecond.
+// The user's I2C bus: the driver on the model of the bus, in virtual time, with one turn of the
+// loop each millisecond.
 #include "firmware/devices/user_i2c.hpp"
 
 #include <gtest/gtest.h>
@@ -14,7 +15,7 @@ namespace {
 using sim::UserBusModel;
 using sim::UserDevice;
 
-// Notes what the driver does with the lines.
+// Records the driver's accesses to the lines.
 struct LineLog final : UserI2cPort {
   Progress progress() override { return Progress::lost; }
   void begin(const UserTransfer&) override {}
@@ -31,7 +32,7 @@ struct LineLog final : UserI2cPort {
   void resume() override { resumed = true; }
   bool scl = true, sda = true, stop_seen = false, resumed = false;
   int clocks = 0;
-  int held_clocks = 0;  // for how many more a device holds SDA
+  int held_clocks = 0;  // clocks for which a device still holds SDA
 };
 
 class UserBus : public testing::Test {
@@ -53,7 +54,7 @@ class UserBus : public testing::Test {
     poll.period_ms = period_ms;
     return poll;
   }
-  // The answer to one transfer: its outcome and bytes.
+  // The answer to one transfer: its outcome and its bytes.
   std::string answered(const Command& command, std::uint32_t within_ms = 200) {
     if (!bus.ask(++pnum, command)) return "full";
     for (std::uint32_t ms = 0; ms < within_ms; ++ms) {
@@ -67,7 +68,7 @@ class UserBus : public testing::Test {
     return "nothing";
   }
 
-  std::uint32_t now_ms = 0xFFFFFF00U;  // soon wraps
+  std::uint32_t now_ms = 0xFFFFFF00U;  // close to the wrap
   std::uint32_t pnum = 0;
   sim::UserDevices devices;
   UserI2c bus{devices.bus};
@@ -78,7 +79,7 @@ TEST_F(UserBus, ReadsWritesAndWritesThenReads) {
   EXPECT_EQ(answered(Command::i2c_write(0x68, "x6b00")), "done");
   EXPECT_EQ(answered(Command::i2c_read(0x68, "x6b", 2)), "done 0 0");
   EXPECT_EQ(answered(Command::i2c_write(0x40, "x05", 2)), "done 0 0");
-  EXPECT_EQ(answered(Command::i2c_read(0x40, "x", 2)), "done 0 0") << "the pointer stays";
+  EXPECT_EQ(answered(Command::i2c_read(0x40, "x", 2)), "done 0 0") << "the register pointer stays";
   EXPECT_EQ(answered(Command::i2c_read(0x41, "x00", 2)), "no acknowledge");
   EXPECT_EQ(bus.report().errors, 1U);
   EXPECT_EQ(bus.report().recoveries, 0U);
@@ -95,7 +96,7 @@ TEST_F(UserBus, OneTransferAtATime) {
 TEST_F(UserBus, AScanFindsWhoAnswersBesideReadings) {
   bus.poll_slot(1, reads(0x68, 0x75, 1, 5), now_ms);
   EXPECT_EQ(answered(Command::i2c_scan(), 400), "done 64 104");
-  EXPECT_EQ(bus.report().errors, 0U) << "that nobody answers is no error of a scan";
+  EXPECT_EQ(bus.report().errors, 0U) << "an address without a device is not an error of a scan";
   EXPECT_EQ(bus.reading(1).errors, 0U);
 }
 
@@ -118,7 +119,7 @@ TEST_F(UserBus, ReadsEachSlotOnItsGrid) {
   EXPECT_EQ(bus.reading(1).data.bytes[4], 0x40) << "1 g is 16384";
   EXPECT_EQ(bus.reading(8).data.size, 2);
   EXPECT_LE(now_ms - newest, 12U);
-  // 100 of the one, 20 of each other.
+  // 100 readings of slot 1, and 20 of each other slot.
   EXPECT_NEAR(devices.bus.transfers() - began, 100 + 7 * 20, 2);
   EXPECT_EQ(bus.report().errors, 0U);
 }
@@ -143,7 +144,7 @@ TEST_F(UserBus, OneThatHasNoTimeLeftIsLeftOutAndNotMadeUpFor) {
   pass(5);
   const std::uint32_t before = devices.bus.transfers();
   devices.bus.advance(200'000);
-  now_ms += 200;  // the loop hung
+  now_ms += 200;  // the loop stood still
   bus.poll(now_ms);
   pass(9);
   EXPECT_LE(devices.bus.transfers() - before, 2U);
@@ -181,19 +182,19 @@ TEST_F(UserBus, IsClockedAsLongAsSdaIsHeldAndStopped) {
     driver.ask(1, Command::i2c_read(0x68, "x75", 1));
     for (std::uint32_t ms = 1; ms < 50 && !lines.resumed; ++ms) {
       driver.poll(ms);
-      driver.poll(ms);  // a loop that turns faster clocks no faster
+      driver.poll(ms);  // a loop that turns faster does not clock faster
     }
-    EXPECT_EQ(lines.clocks, held + 1) << "the last is that of STOP";
+    EXPECT_EQ(lines.clocks, held + 1) << "the last clock is that of STOP";
     EXPECT_TRUE(lines.stop_seen);
     EXPECT_TRUE(lines.resumed);
   }
 }
 
-// From two programs, or threads of one.
+// Two programs, or two threads of a program, may ask.
 TEST_F(UserBus, AnAnswerStaysAsItWasUntilTheNextOneIsThere) {
   EXPECT_EQ(answered(Command::i2c_read(0x68, "x75", 1)), "done 104");
   ASSERT_TRUE(bus.ask(9, Command::i2c_scan()));
-  pass(40);  // it has found one by now
+  pass(40);  // the scan has found a device by this time
   EXPECT_EQ(bus.answer().pnum, 1U);
   EXPECT_EQ(bus.answer().data.size, 1);
   EXPECT_EQ(bus.answer().data.bytes[0], 104);
@@ -213,11 +214,12 @@ TEST_F(UserBus, AHeldLineFailsWhatIsAskedForAndIsTriedAgain) {
     pass(20);
     devices.bus.set_fault(fault);
     EXPECT_EQ(answered(Command::i2c_read(0x68, "x75", 1)), "bus stuck");
-    pass(100);  // held by now
+    pass(100);  // the lines are held by this time
     const std::uint32_t errors = bus.reading(1).errors;
-    EXPECT_EQ(answered(Command::i2c_read(0x68, "x75", 1), 30), "bus stuck") << "soon";
+    EXPECT_EQ(answered(Command::i2c_read(0x68, "x75", 1), 30), "bus stuck")
+        << "the answer comes soon";
     pass(1000);
-    EXPECT_NEAR(bus.reading(1).errors - errors, 17, 8) << "what is not read is counted";
+    EXPECT_NEAR(bus.reading(1).errors - errors, 17, 8) << "readings that are left out are counted";
     EXPECT_GE(bus.report().recoveries, 8U);
     devices.bus.set_fault(UserBusModel::Fault::none);
     pass(UserI2c::free_after_ms + 60);
@@ -244,7 +246,7 @@ TEST_F(UserBus, AWriteThatHasNotBegunIsDropped) {
   EXPECT_EQ(bus.answer().pnum, 7U);
   EXPECT_EQ(bus.answer().outcome, I2cOutcome::cancelled);
   pass(50);
-  EXPECT_EQ(answered(Command::i2c_read(0x68, "x6b", 1)), "done 64") << "still asleep";
+  EXPECT_EQ(answered(Command::i2c_read(0x68, "x6b", 1)), "done 64") << "the device still sleeps";
 }
 
 TEST_F(UserBus, AReadIsNotDropped) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A UART of the user's: what states tell of the bytes that came in, and what becomes of those to be sent.
+// A UART of the user: the received bytes in the states, and the bytes to send.
 #include "firmware/devices/user_uart.hpp"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace {
 
 using sim::UartPeer;
 
-// Bytes come in when the test says so.
+// The test decides when bytes come in.
 struct Line final : UserUartPort {
   void set_up(const UartMode& wanted) override {
     mode = wanted;
@@ -52,7 +52,7 @@ class UserUartTest : public testing::Test {
     line.waiting += bytes;
     while (!line.waiting.empty()) uart.poll();
   }
-  // The next state's "position lost bytes".
+  // The UART fields of the next state: "position lost bytes".
   std::string state() {
     uart.next_state();
     return told();
@@ -70,7 +70,7 @@ class UserUartTest : public testing::Test {
 TEST_F(UserUartTest, TellsWhatIsNewAndOnceMoreWhatWasNewBefore) {
   arrive("abc");
   EXPECT_EQ(state(), "0 0 abc");
-  EXPECT_EQ(told(), "0 0 abc") << "whoever asks, of one state";
+  EXPECT_EQ(told(), "0 0 abc") << "every reader of one state gets the same";
   arrive("de");
   EXPECT_EQ(state(), "0 0 abcde");
   EXPECT_EQ(state(), "3 0 de");
@@ -98,10 +98,10 @@ TEST_F(UserUartTest, CountsWhatFindsNoRoomOrCameDamaged) {
   constexpr std::uint32_t with_it = UserUart::backlog % uart_max_bytes;
   EXPECT_EQ(last,
             std::to_string(UserUart::backlog - with_it) + " 12 " + std::string(with_it, 'x') + "y")
-      << "its position is that of what was kept";
+      << "the position is that of the bytes that were kept";
 }
 
-// As it comes at 115200 baud, 8N1: 11.52 bytes a millisecond, and a state every ten.
+// As at 115200 baud, 8N1: 11.52 bytes a millisecond, and a state every 10 ms.
 TEST_F(UserUartTest, TellsABurstOf530BytesWhole) {
   std::string sent;
   for (int i = 0; i < 530; ++i) sent += static_cast<char>('a' + i % 26);
@@ -155,7 +155,7 @@ TEST_F(UserUartTest, IsSetUpOnlyWhenSomethingChanges) {
   EXPECT_FALSE(uart.on());
   line.waiting = "x";
   uart.poll();
-  EXPECT_EQ(line.waiting, "x") << "it is off";
+  EXPECT_EQ(line.waiting, "x") << "the UART is off";
 }
 
 TEST_F(UserUartTest, PositionsWrap) {
@@ -186,7 +186,7 @@ class UserUartOnTheModel : public testing::Test {
       uart.next_state();
       UartBytes bytes;
       uart.tell(bytes);
-      EXPECT_LE(bytes.position, next) << "nothing is left out";
+      EXPECT_LE(bytes.position, next) << "no byte is left out";
       heard.append(bytes.data.begin() + (next - bytes.position), bytes.data.end());
       next = bytes.position + bytes.data.size;
       lost = bytes.lost;
@@ -231,8 +231,8 @@ TEST_F(UserUartOnTheModel, ALidarAt100HzComesThroughWhole) {
 
 TEST_F(UserUartOnTheModel, WhatDoesNotFitIsLostAndCounted) {
   listen(uart_max_baud, UartPeer::noise, 1000);
-  EXPECT_EQ(heard.size(), 6400U) << "64 a state";
-  // What was said is told, lost, or still waits.
+  EXPECT_EQ(heard.size(), 6400U) << "64 in each state";
+  // Each byte that the peer sent is in a state, counted as lost, or still waiting.
   EXPECT_NEAR(static_cast<double>(heard.size() + lost), model.said(), 256 + UserUart::backlog);
   EXPECT_GE(heard.size() + lost + 256 + UserUart::backlog, model.said());
 }
@@ -250,7 +250,8 @@ TEST_F(UserUartOnTheModel, WhatIsSentTakesItsTimeAndWhatWaitsCanBeDropped) {
   const auto* const bytes = reinterpret_cast<const std::uint8_t*>(text.data());
   EXPECT_TRUE(uart.write(bytes, text.size()));
   EXPECT_TRUE(uart.write(bytes, text.size()));
-  EXPECT_FALSE(uart.write(bytes, text.size())) << "128 wait at most, all or nothing";
+  EXPECT_FALSE(uart.write(bytes, text.size()))
+      << "at most 128 bytes wait, and a write is kept whole or refused";
   for (int i = 0; i < 10; ++i) model.pass_millisecond();
   EXPECT_NEAR(model.sent(), 9, 1);
   uart.drop_writes();

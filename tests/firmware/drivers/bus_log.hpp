@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What went over a simulated bus, as people write it in data sheets: "40 <- 00 31 04" for a write,
-// "40 <- 00 -> 21 04" for a read of a register; refused ones end with " NACK", those of a held bus
-// and those that were cut short with " TIMEOUT"; "recover" for nine clocks.
+// The transfers on a simulated bus, as text: "40 <- 00 31 04" is a write, "40 <- 00 -> 21 04" a
+// read of a register. " NACK" marks a refused transfer, " TIMEOUT" a transfer on a held bus or one
+// that was cut short, and "recover" stands for nine clocks.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +13,10 @@
 
 namespace r4::test {
 
-// Everything since the last clear(). It must outlive what is made on the bus.
+// All transfers since the last clear(). The log must outlive all uses of the bus.
 class BusLog final : public sim::I2cObserver {
  public:
-  // A transfer with bytes of its own.
+  // A transfer that owns its bytes.
   struct Transfer : sim::I2cTransfer {
     explicit Transfer(const sim::I2cTransfer& told)
         : I2cTransfer(told),
@@ -40,7 +40,7 @@ class BusLog final : public sim::I2cObserver {
 
 std::string to_text(const BusLog::Transfer& transfer);
 std::vector<std::string> lines(const BusLog& log);
-// Only those that write to a chip (not reads).
+// Only the writes to a chip, not the reads.
 std::vector<std::string> writes(const BusLog& log);
 
 struct BusCost {

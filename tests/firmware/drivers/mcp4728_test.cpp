@@ -57,7 +57,7 @@ TEST(Mcp4728, ProvisionsTheEepromOfANewChipWithZerosOnce) {
   EXPECT_EQ(all[0], zeros);
   EXPECT_EQ(all[1], factory_eeprom);
   EXPECT_EQ(all[2], "61 <- 50 00 00 00 00 00 00 00 00");
-  EXPECT_EQ(all[3].substr(0, 8), "61 -> 41");  // busy
+  EXPECT_EQ(all[3].substr(0, 8), "61 -> 41");  // the chip is busy
   EXPECT_EQ(all[all.size() - 2], zeros);
   EXPECT_EQ(all.back(), zero_eeprom);
   EXPECT_EQ(bench.chip.eeprom_writes(), 1);

@@ -213,7 +213,7 @@ TEST(Pca9685, AChipThatDoesNotAnswerIsTrouble) {
   EXPECT_EQ(bench.write(), Lines{"40 <-  NACK"});
   EXPECT_EQ(bench.pwm.trouble(), ChipTrouble::no_acknowledge);
   EXPECT_FALSE(bench.pwm.ready());
-  EXPECT_EQ(bench.write(), Lines{});  // silent until begin()
+  EXPECT_EQ(bench.write(), Lines{});  // no transfer until begin()
   bench.set_up();
   EXPECT_EQ(bench.pwm.trouble(), ChipTrouble::none);
 }

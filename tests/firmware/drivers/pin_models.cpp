@@ -22,7 +22,7 @@ Outputs outputs_of(const BoardParts& board) {
 Outputs as_pins(Outputs outputs) {
   for (StepperTarget& target : outputs.stepper) target = {};
   for (std::uint16_t& us : outputs.servo_us) {
-    const int counts = (us * 25 + 61) / 122;  // of 4.88 us
+    const int counts = (us * 25 + 61) / 122;  // one count is 4.88 us
     us = static_cast<std::uint16_t>((counts * 122 + 12) / 25);
   }
   return outputs;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pins that remember, and a bench with the whole board: chips on a bus, pins, the hardware.
+// Models of pins that keep their level, and a bench with the whole board: chips on a bus, pins, the
+// hardware.
 #pragma once
 
 #include <array>
@@ -36,7 +37,7 @@ struct AnalogOutputPinModel final : firmware::AnalogOutputPin {
   std::uint16_t millivolts = 0;
 };
 
-// The board's chips and pins. Their provisioned EEPROM makes the set-up short.
+// The board's chips and pins. A provisioned EEPROM keeps the set-up short.
 struct BoardParts : sim::BoardChips {
   BoardParts() {
     for (int i = 0; i < sim::Mcp4728Model::channels; ++i) dac.set_eeprom(i, {});
@@ -64,9 +65,10 @@ struct BoardParts : sim::BoardChips {
   std::array<InputPinModel, gpio_channels> gpio;
 };
 
-// What the chips' pins do now, in the application's terms; steppers are not looked at.
+// The outputs as the chips' pins show them, without the steppers.
 firmware::Outputs outputs_of(const BoardParts& board);
-// `outputs` as the pins can show them: without steppers, servo pulses to the nearest count.
+// `outputs` as the pins can show them: without steppers, and servo pulses rounded to the nearest
+// count.
 firmware::Outputs as_pins(firmware::Outputs outputs);
 
 }  // namespace r4::test

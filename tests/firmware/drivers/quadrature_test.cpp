@@ -8,7 +8,7 @@
 namespace r4::firmware {
 namespace {
 
-// A shaft with 4 counts a cycle; A leads B forward.
+// A shaft with 4 counts a cycle. A leads B when it turns forward.
 struct Shaft {
   void turn(int counts) {
     const int step = counts > 0 ? 1 : -1;
@@ -63,7 +63,7 @@ TEST(QuadratureEncoder, TheSameLevelsAgainCountNothing) {
 TEST(QuadratureEncoder, TheIndexIsWhereItsLineRoseLast) {
   Shaft shaft;
   shaft.turn(5);
-  EXPECT_EQ(shaft.encoder.index_count(), 0) << "none yet";
+  EXPECT_EQ(shaft.encoder.index_count(), 0) << "no index yet";
   shaft.encoder.index(true);
   shaft.turn(1);
   shaft.encoder.index(true);
@@ -82,7 +82,7 @@ TEST(QuadratureEncoder, TheIndexStaysWhereItIsWhenCountingBeginsElsewhere) {
   EXPECT_EQ(shaft.encoder.index_count(), 0);
   shaft.turn(100);
   shaft.encoder.zero();
-  EXPECT_EQ(shaft.encoder.index_count(), 0) << "none yet";
+  EXPECT_EQ(shaft.encoder.index_count(), 0) << "no index yet";
   shaft.turn(5);
   shaft.encoder.index(true);
   shaft.turn(7);

@@ -41,7 +41,7 @@ TEST(Stepper, GoesToItsPositionAndStays) {
 }
 
 TEST(Stepper, SpeedIsExactOverDays) {
-  // A speed that does not divide the ticks: after three days not one step may be missing.
+  // The speed does not divide the rate of ticks, and after three days no step may be missing.
   test::OutputPinModel step;
   test::OutputPinModel direction;
   Stepper stepper(step, direction, 200, 20000);
@@ -128,7 +128,7 @@ RC_GTEST_PROP(Stepper, ThePinsCountWhatThePositionSays, ()) {
       bench.tick(1);
       if (bench.step.rises == rises) continue;
       RC_ASSERT(direction == bench.direction.high);
-      RC_ASSERT(!was_high);  // pulses do not run into each other
+      RC_ASSERT(!was_high);  // pulses do not merge
       by_pins += bench.direction.high ? 1 : -1;
     }
     RC_ASSERT(bench.stepper.position() == by_pins);

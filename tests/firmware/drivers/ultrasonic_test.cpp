@@ -11,7 +11,7 @@
 namespace r4::firmware {
 namespace {
 
-// Four sensors with obstacles; the echo rises 450 us after the trigger fell.
+// Four sensors with obstacles. The echo rises 450 us after the falling edge of the trigger.
 struct UltrasonicBench {
   explicit UltrasonicBench(std::uint8_t fitted = 0x0F)
       : sensors(trigger[0], trigger[1], trigger[2], trigger[3], fitted) {}

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the firmware uses of ArduinoCore-mbed 4.6.0 and ArduinoCore-API 1.5.2: our own declarations,
-// and the macros of the original, which are a trap for whatever is included behind them.
+// The parts of ArduinoCore-mbed 4.6.0 and ArduinoCore-API 1.5.2 that the firmware uses: our own
+// declarations, and the macros of the original, which can break any header that is included after
+// them.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the firmware uses of Mbed OS 6.17: our own declarations with the signatures of the originals.
+// The parts of Mbed OS 6.17 that the firmware uses: our own declarations with the signatures of the
+// originals.
 #pragma once
 
 #include <chrono>
@@ -49,7 +50,7 @@ extern "C" {
 osThreadId_t osThreadGetId();
 std::int32_t osThreadSetPriority(osThreadId_t thread, osPriority_t priority);
 [[noreturn]] void mbed_die();
-// A fatal one: not during mbed_warning(), which calls the hook, too.
+// True during a fatal error. False during mbed_warning(), which also calls the hook.
 bool mbed_get_error_in_progress();
 std::int32_t mbed_set_error_hook(void (*hook)(const mbed_error_ctx*));
 }
@@ -60,8 +61,8 @@ namespace mbed {
 
 template <class Signature>
 class Callback;
-// A function, or a method or function with its object; kept inside, as in the original. Copied and
-// destroyed by code (MBED_CONF_PLATFORM_CALLBACK_NONTRIVIAL is 1 on the Giga).
+// A function, or a method or function with its object, stored inside as in the original. Code
+// copies and destroys it (MBED_CONF_PLATFORM_CALLBACK_NONTRIVIAL is 1 on the Giga).
 template <>
 class Callback<void()> {
  public:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A register with behaviour: what is read, and what a write does.
+// A register with behaviour: functions decide what a read returns and what a write does.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,7 @@ class Register {
   Register& operator|=(std::uint32_t bits) { return *this = *this | bits; }
   Register& operator&=(std::uint32_t bits) { return *this = *this & bits; }
 
-  // As after a reset, without behaviour.
+  // The state after a reset, without behaviour.
   void clear() {
     value = 0;
     on_read = nullptr;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The STM32H747's registers by the names of CMSIS, as far as the firmware uses them: plain words for
-// the compiler that only has to accept the firmware, objects with behaviour where it runs.
+// The STM32H747's registers that the firmware uses, by their CMSIS names. The compiler check sees
+// plain words; the tests run on objects with behaviour.
 #pragma once
 
 #include <cstdint>

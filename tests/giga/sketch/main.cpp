@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The example sketch as it stands, on a fake Giga: it boots, talks over USB, drives a motor.
+// The example sketch, unchanged, on a fake Giga: it boots, communicates over USB and drives a
+// motor.
 #include <Arduino.h>
 
 #include <firmware/ports/giga/library/examples/R4Board/R4Board.ino>

@@ -16,7 +16,7 @@ namespace {
 
 using Kind = ScriptStep::Kind;
 
-// The error that `text` gives, as a user sees it.
+// The error for `text`, as a user sees it.
 std::string error_of(const std::string& text) {
   try {
     Script::parse(text, "bench.txt");
@@ -140,13 +140,13 @@ TEST(Script, RefusesWhatItDoesNotUnderstand) {
            "1 handle HELD",         //
            "1 us 0 10",             // sensors are 1 to 4
            "1 us one 10",           //
-           "1 us 1 401",            // beyond what a sensor sees
+           "1 us 1 401",            // beyond the range of a sensor
            "1 us 1 -3",             //
            "1 enc 5 0",             //
            "1 enc 1 2147483648",    // more than 32 bits
            "1 enc 1 1.5",           //
            "1 analog AIN7 1",       //
-           "1 analog SERVO1POS 1",  // a field, but no input
+           "1 analog SERVO1POS 1",  // a field, but not an input
            "1 analog AIN24 high",   //
            "1 fault 3",             //
            "1 reboot now",          //
@@ -218,7 +218,7 @@ TEST(Script, ReadsTroubleWithChipsBusAndLoop) {
 TEST(Script, AFileThatDoesNotEndIsNoScenario) {
   try {
     Script::load("/dev/zero");
-    FAIL() << "it was read";
+    FAIL() << "the file was read";
   } catch (const Error& error) {
     EXPECT_EQ(error.kind(), ErrorKind::data);
     EXPECT_STREQ(error.what(),

@@ -23,7 +23,7 @@ struct Listener final : Carrier::Handler {
   }
 };
 
-// The board's answer to Q:ID through a carrier of this URL.
+// The board's answer to Q:ID through a carrier with this URL.
 std::string identity_of(const std::string& url) {
   asio::io_context io;
   const auto carrier = make_sim_carrier(io, Url::parse(url));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The simulated board over a memory pair, with a clock that the test moves.
+// The simulated board on a pair of memory carriers, with a clock that the test moves.
 #include "firmware/ports/sim/simulated_board.hpp"
 
 #include <gtest/gtest.h>
@@ -23,17 +23,17 @@ namespace {
 
 using firmware::BoardState;
 
-// What the host's end of a carrier hears.
+// The datagrams that arrive at the host's end.
 struct BoardListener final : Carrier::Handler {
   std::vector<std::string> heard;
   void on_datagram(std::string_view bytes, Peer) override { heard.emplace_back(bytes); }
   void on_carrier_event(const CarrierEvent&) override {}
 };
 
-// A board, a host at the other end of a memory pair, and the time.
+// A board, a host at the other end of a pair of memory carriers, and the time.
 class SimulatedBoardTest : public testing::Test {
  protected:
-  // `link`: what the board's end is called. One that is called pty: is a cable of its own.
+  // `link` is the name of the board's end. A name that begins with pty: is a cable.
   void build(SimulatedBoard::Options options = {}, const std::string& link = "memory:") {
     options.seed = options.seed.value_or(5);
     options.clock_ms = [this] { return clock_ms_; };
@@ -72,7 +72,7 @@ class SimulatedBoardTest : public testing::Test {
     io_.poll();
   }
 
-  // Lets the board run as its own timer would.
+  // Runs the board as its own timer would.
   void run(std::uint32_t ms) {
     const std::uint32_t end = clock_ms_ + ms;
     while (clock_ms_ != end) {
@@ -83,7 +83,7 @@ class SimulatedBoardTest : public testing::Test {
     }
   }
 
-  // The same with a host that answers at 10 Hz.
+  // Runs the board with a host that answers at 10 Hz.
   void run_alive(std::uint32_t ms) {
     for (std::uint32_t done = 0; done < ms; done += 100) {
       heartbeat(newest_t());
@@ -110,7 +110,7 @@ class SimulatedBoardTest : public testing::Test {
     listener_.heard.clear();
   }
 
-  // E:CLEAR of the newest cause.
+  // E:CLEAR with the newest cause.
   std::string clear_field() const {
     return "E:CLEAR," + std::to_string(board_->application().safe_report().cause);
   }
@@ -156,7 +156,7 @@ using Lines = std::vector<std::string>;
 
 // --- every output register
 
-// Drives nothing: full off.
+// True if the channel is full off.
 bool off(const Pca9685Model& chip, int channel) {
   const auto off_high = static_cast<std::uint8_t>(0x06 + 4 * channel + 3);
   return (chip.reg(off_high) & 0x10) != 0;
@@ -166,7 +166,7 @@ bool driven(const Pca9685Model& chip, int channel) {
   return !off(chip, channel) && chip.duty(channel) != 0;
 }
 
-// What is not in its safe value yet, or nothing.
+// The first register that does not have its safe value, or an empty text.
 std::string unsafe_register(BoardChips& chips) {
   for (const Pca9685Model* chip : {&chips.osmc, &chips.dhb12, &chips.servo}) {
     for (int i = 0; i < Pca9685Model::channels; ++i) {
@@ -351,7 +351,7 @@ TEST_F(SimulatedBoardTest, GoesSafeAtOnceWhenTheHostsCarrierCloses) {
   EXPECT_EQ(events_, (Lines{"down", "outputs 0", "SAFE link"}));
   EXPECT_TRUE(board_->model().pins().is_safe());
 
-  // It is back as soon as the host is.
+  // The board is active again as soon as the host is back.
   events_.clear();
   listener_.heard.clear();
   host_->open(listener_);
@@ -434,7 +434,7 @@ TEST_F(SimulatedBoardTest, EveryChannelReachesItsPinAndComesBack) {
       [this] {
         newest_t();
         listener_.heard.clear();
-        for (;;) {  // with all fields a state comes in parts; this one has them all
+        for (;;) {  // with all fields a state comes in parts; this part has all of them
           heartbeat(newest_t());
           run(10);
           State whole;
@@ -455,7 +455,7 @@ TEST_F(SimulatedBoardTest, EveryChannelReachesItsPinAndComesBack) {
 
 // --- trouble with the chips and the loop
 
-// A board whose host drives motor 1, and what the script does to it.
+// A board whose host drives motor 1, with a script of trouble.
 class TroubledBoardTest : public SimulatedBoardTest {
  protected:
   void drive(const std::string& script) {
@@ -487,7 +487,8 @@ TEST_F(TroubledBoardTest, AChipThatStopsAnsweringIsAFaultUntilItIsBackAndCleared
   command("O:400,1,1");
   EXPECT_EQ(events_, Lines{"refused SAFE"});
   run_alive(2000);
-  EXPECT_EQ(board_->application().reason(), SafeReason::fault);  // it does not go by itself
+  // A fault stays until it is cleared.
+  EXPECT_EQ(board_->application().reason(), SafeReason::fault);
   expect_drives_after_clear();
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The chip drivers on the model of the board: what moves when it is commanded, in virtual time.
+// The chip drivers on the model of the board: the effect of each output, in virtual time.
 #include "firmware/ports/sim/simulated_hardware.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ struct HardwareBench {
     return inputs;
   }
   std::int32_t volts(Analog input) { return sample().analog_cv[static_cast<int>(input)]; }
-  // The mean over a second, hundredths of a volt.
+  // The mean over one second, in hundredths of a volt.
   std::int32_t mean(Analog input) {
     std::int32_t sum = 0;
     for (int i = 0; i < 100; ++i) {
@@ -50,7 +50,7 @@ firmware::Outputs stepper_to(std::int32_t position, std::int32_t speed, int chan
   return outputs;
 }
 
-// Relay 1 closes the motors' supply.
+// Relay 1 closes the supply of the motors.
 firmware::Outputs supplied() {
   firmware::Outputs outputs;
   outputs.relays = 1;
@@ -131,7 +131,7 @@ TEST(SimulatedHardware, TheHandlesVoltageFollowsTheHandle) {
   EXPECT_FALSE(bench.sample().handle_held);
   EXPECT_LT(bench.volts(Analog::aindmh), 10);
   bench.board.hold_handle(true);
-  EXPECT_FALSE(bench.sample().handle_held);  // it may still bounce
+  EXPECT_FALSE(bench.sample().handle_held);  // the button may still bounce
   bench.run(30);
   EXPECT_TRUE(bench.sample().handle_held);
   EXPECT_GT(bench.volts(Analog::aindmh), 1100);
@@ -190,8 +190,8 @@ TEST(SimulatedHardware, WithoutSupplyNoMotorTurnsWhateverItsDriverIsTold) {
   outputs.relays = 0xFE;  // all but relay 1
   bench.hardware.hal().apply(outputs);
   expect_that_all_stand();
-  EXPECT_EQ(bench.board.pins().osmc[0].pwm, 4095) << "the driver is told to";
-  EXPECT_EQ(bench.board.pins().stepper[0].position, 1000) << "and this one, too";
+  EXPECT_EQ(bench.board.pins().osmc[0].pwm, 4095) << "the driver has the command";
+  EXPECT_EQ(bench.board.pins().stepper[0].position, 1000) << "the stepper has it, too";
   EXPECT_NEAR(bench.mean(Analog::ain24), idle, 5);
   EXPECT_NEAR(bench.mean(Analog::ainsteer), straight, 5);
 
@@ -204,16 +204,16 @@ TEST(SimulatedHardware, WithoutSupplyNoMotorTurnsWhateverItsDriverIsTold) {
   EXPECT_EQ(bench.board.stepper_shaft(1), -1000);
   EXPECT_GT(bench.mean(Analog::ainsteer), straight + 100);
 
-  // The handle's button cuts the supply by itself; nobody has told the firmware here.
+  // The handle's button cuts the supply itself: no command switches the motors off here.
   bench.board.hold_handle(false);
-  bench.run(4000);  // the motor runs out
+  bench.run(4000);  // until the motor has stopped
   expect_that_all_stand();
 }
 
 TEST(SimulatedHardware, AMotorTurnsItsEncoderAsFastAsItsDutySays) {
   HardwareBench bench;
   bench.hardware.hal().apply(osmc(2, 2048, Direction::forward));
-  bench.run(2000);  // up to speed
+  bench.run(2000);  // until the motor has its full speed
   const std::int32_t before = bench.sample().encoder_counts[1];
   bench.run(1000);
   EXPECT_NEAR(bench.sample().encoder_counts[1] - before, 2000, 5);

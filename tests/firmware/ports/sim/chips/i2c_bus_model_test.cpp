@@ -15,7 +15,7 @@ namespace {
 
 using firmware::I2cResult;
 
-// Answers to one address, remembers and counts.
+// A chip at one address that keeps the bytes and counts the stops.
 struct Memory final : I2cChipModel {
   explicit Memory(std::uint8_t at) : address(at) {}
   void power_on() override { ++power_ons; }
@@ -29,7 +29,7 @@ struct Memory final : I2cChipModel {
     interrupt();
     return next++;
   }
-  // Once, in the middle of a byte.
+  // Runs on_byte once, in the middle of a byte.
   void interrupt() {
     if (const auto handler = std::exchange(on_byte, nullptr)) handler();
   }
@@ -117,7 +117,7 @@ TEST(I2cBusModel, AChipThatIsResetInATransferIsOutOfIt) {
   std::uint8_t in[2] = {};
   bench.bus.reset_after(bench.chip, 2);
   EXPECT_EQ(bench.bus.write_read(0x11, nullptr, 0, in, 2), I2cResult::ok);
-  EXPECT_EQ(in[1], 0xFF);  // nobody pulls SDA down
+  EXPECT_EQ(in[1], 0xFF);  // no chip pulls SDA low
 }
 
 TEST(I2cBusModel, TheStopOfARecoveryReachesTheChipThatWasCutOff) {
@@ -144,11 +144,12 @@ TEST(I2cBusModel, ATransferInTheMiddleOfAnotherCutsItShort) {
   EXPECT_EQ(bench.chip.bytes, (std::deque<std::uint8_t>{1}));
   EXPECT_EQ(other.bytes, (std::deque<std::uint8_t>{7, 8}));
   EXPECT_EQ(other.stops, 2);
-  EXPECT_EQ(bench.chip.stops, 1);  // by the recovery
+  EXPECT_EQ(bench.chip.stops, 1);  // the stop of the recovery
   const auto& all = bench.log.transfers();
   ASSERT_EQ(all.size(), 4U);
   EXPECT_EQ(all.back().result, I2cResult::timeout);
-  // Its time is that of the others and of its two bytes, without a wait for a held line.
+  // Its duration is that of the other transfers and of its two bytes. There is no wait for a held
+  // line.
   EXPECT_EQ(all.back().duration_ns,
             all[0].duration_ns + all[1].duration_ns + all[2].duration_ns + (9 + 1) * 2500U);
   EXPECT_EQ(bench.write({4}), I2cResult::ok);

@@ -41,7 +41,7 @@ TEST(Mcp23017Model, CountsUpAndRollsOverToZero) {
   EXPECT_EQ(bench.chip.reg(0, Register::iodir), 0x00);
   EXPECT_EQ(bench.chip.reg(1, Register::iodir), 0x33);
   EXPECT_EQ(bench.chip.level(0), 0x0F);
-  EXPECT_EQ(bench.chip.level(1), 0xC0);  // the inputs read what is outside
+  EXPECT_EQ(bench.chip.level(1), 0xC0);  // inputs show the outside level
 }
 
 TEST(Mcp23017Model, ByteModeAlternatesBetweenTheTwoPorts) {

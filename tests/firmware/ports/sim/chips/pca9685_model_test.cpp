@@ -190,7 +190,7 @@ TEST(Pca9685Model, WithoutItsClockItKeepsItsOutputsUntilItIsReset) {
   bench.write({0x06, 0x00, 0x00, 0x34, 0x02});
   bench.chip.disturb_mode1(0x40);
   bench.write({0xFD, 0x10}, 0x70);
-  EXPECT_TRUE(bench.chip.high(0)) << "a pulse that may have stopped while it was high";
+  EXPECT_TRUE(bench.chip.high(0)) << "the clock may have stopped while a pulse was high";
   EXPECT_EQ(bench.chip.duty(1), 0);
   bench.write({0x00, 0x31});
   EXPECT_EQ(bench.read(0x00, 1), Bytes{0x71}) << "EXTCLK cannot be cleared by writing";

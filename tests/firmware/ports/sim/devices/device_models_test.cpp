@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The devices on the user's bus, register for register, as their data sheets have them.
+// The devices on the user's I2C bus, register for register, as in their data sheets.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -50,7 +50,7 @@ TEST_F(UserDeviceModels, Mpu6050FeelsWhatItIsToldAndDoesNotOverflow) {
   EXPECT_EQ(read(0x68, {0x3B}, 14),
             (Bytes{0xC0, 0x00, 0x20, 0x00, 0x7F, 0xFF, 0, 0, 0x33, 0x2C, 0x80, 0x12, 0, 0}));
   write(0x68, {0x75, 0x11});
-  EXPECT_EQ(read(0x68, {0x75}, 1), Bytes{0x68}) << "cannot be written";
+  EXPECT_EQ(read(0x68, {0x75}, 1), Bytes{0x68}) << "the register cannot be written";
 }
 
 TEST_F(UserDeviceModels, Ina219ConvertsByItsCalibration) {
@@ -58,14 +58,14 @@ TEST_F(UserDeviceModels, Ina219ConvertsByItsCalibration) {
   devices.ina219.measure(11980, 20000);  // the data sheet's example, 8.5.1
   EXPECT_EQ(read(0x40, {0x01}, 2), (Bytes{0x07, 0xD0}));
   EXPECT_EQ(read(0x40, {0x02}, 2), (Bytes{0x5D, 0x9A}));  // 2995 << 3 and CNVR
-  EXPECT_EQ(read(0x40, {0x04}, 2), (Bytes{0x00, 0x00})) << "not calibrated";
+  EXPECT_EQ(read(0x40, {0x04}, 2), (Bytes{0x00, 0x00})) << "without a calibration";
   write(0x40, {0x05, 0x50, 0x00});
   EXPECT_EQ(read(0x40, {0x04}, 2), (Bytes{0x27, 0x10}));
   EXPECT_EQ(read(0x40, {0x03}, 2), (Bytes{0x17, 0x66}));
   write(0x40, {0x00, 0x80, 0x00});
   EXPECT_EQ(read(0x40, {0x05}, 2), (Bytes{0x00, 0x00}));
   devices.ina219.measure(11980, -500000);
-  EXPECT_EQ(read(0x40, {0x01}, 2), (Bytes{0x83, 0x00})) << "it ends at 320 mV";
+  EXPECT_EQ(read(0x40, {0x01}, 2), (Bytes{0x83, 0x00})) << "the range ends at 320 mV";
 }
 
 TEST_F(UserDeviceModels, ATransferTakesItsTimeOnTheWire) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The devices that can be connected to the user's bus, register for register, as their data sheets have them.
+// The optional devices on the user's I2C bus, register for register, as in their data sheets.
 #include "firmware/ports/sim/devices/optional_devices.hpp"
 
 #include <gtest/gtest.h>
@@ -44,20 +44,21 @@ TEST_F(OptionalDeviceModels, AreOnTheBusOnlyWhenTheyAreConnected) {
 TEST_F(OptionalDeviceModels, Icm20948SleepsAndHasItsRangesInBank2) {
   EXPECT_EQ(read(0x69, {0x00}, 1), Bytes{0xEA});
   EXPECT_EQ(read(0x69, {0x06}, 1), Bytes{0x41});
-  EXPECT_EQ(read(0x69, {0x2D}, 14), Bytes(14)) << "asleep";
+  EXPECT_EQ(read(0x69, {0x2D}, 14), Bytes(14)) << "the device sleeps";
   write(0x69, {0x06, 0x01});
   devices.icm20948.feel({-1000, 500, 3000}, {100, -250, 0}, 2500);
-  // 2 g are 16384 a g, 250 degrees a second 131; 4 degrees above 21 are 1335.
+  // In the range of 2 g, 1 g is 16384. In the range of 250 degrees/s, 1 degree/s is 131. 4 degrees
+  // above 21 are 1335.
   EXPECT_EQ(read(0x69, {0x2D}, 14),
             (Bytes{0xC0, 0x00, 0x20, 0x00, 0x7F, 0xFF, 0x33, 0x2C, 0x80, 0x12, 0, 0, 0x05, 0x37}));
   write(0x69, {0x7F, 0x20});
   EXPECT_EQ(read(0x69, {0x14}, 1), Bytes{0x01});
   write(0x69, {0x14, 0x07});  // 16 g
-  EXPECT_EQ(read(0x69, {0x2D}, 2), (Bytes{0, 0})) << "of that bank";
+  EXPECT_EQ(read(0x69, {0x2D}, 2), (Bytes{0, 0})) << "a register of that bank";
   write(0x69, {0x7F, 0x00});
   EXPECT_EQ(read(0x69, {0x2D}, 2), (Bytes{0xF8, 0x00}));
   write(0x69, {0x06, 0x80});
-  EXPECT_EQ(read(0x69, {0x06}, 1), Bytes{0x41}) << "it was reset";
+  EXPECT_EQ(read(0x69, {0x06}, 1), Bytes{0x41}) << "after the reset";
 }
 
 TEST_F(OptionalDeviceModels, Bno055IsSilentUntilItLeavesConfigmode) {
@@ -67,7 +68,7 @@ TEST_F(OptionalDeviceModels, Bno055IsSilentUntilItLeavesConfigmode) {
   write(0x28, {0x3D, 0x0C});
   EXPECT_EQ(read(0x28, {0x08}, 6), (Bytes{0, 0, 0, 0, 0xD5, 0x03})) << "981 is 9.81 m/s2";
   write(0x28, {0x3B, 0x00});
-  EXPECT_EQ(read(0x28, {0x3B}, 1), Bytes{0x02}) << "it does not configure";
+  EXPECT_EQ(read(0x28, {0x3B}, 1), Bytes{0x02}) << "the device is not in CONFIGMODE";
   Bno055Model::Motion motion;
   motion.mrad_per_s[2] = -1000;
   devices.bno055.feel(motion);
@@ -79,14 +80,14 @@ TEST_F(OptionalDeviceModels, Bno055IsSilentUntilItLeavesConfigmode) {
 
 TEST_F(OptionalDeviceModels, Bno055TakesItsTimeToChangeItsMode) {
   write(0x28, {0x3D, 0x0C});
-  // What was written is done at its end, 10 ms later here; so it is asked to change once more.
+  // A write takes effect when it ends, here 10 ms later. So the test changes the mode again.
   write(0x28, {0x3D, 0x00});
   std::uint8_t mode[] = {0x3D, 0x0C};
   firmware::UserTransfer transfer;
   transfer.address = 0x28;
   transfer.out = mode;
   transfer.out_size = sizeof mode;
-  write(0x28, {0x3F, 0x20});  // reset: nothing of before is left
+  write(0x28, {0x3F, 0x20});  // a reset forgets the earlier mode
   bus.begin(transfer);
   bus.advance(1000);
   EXPECT_EQ(read(0x28, {0x08}, 6), Bytes(6)) << "1 ms";
@@ -109,7 +110,8 @@ TEST_F(OptionalDeviceModels, Vl53l0xRangesEach33MillisecondsOnceItIsTold) {
 
 TEST_F(OptionalDeviceModels, As5600RepeatsAnAngleAndCountsFromItsZero) {
   devices.as5600.turn(3072);
-  EXPECT_EQ(read(0x36, {0x0C}, 4), (Bytes{0x0C, 0x00, 0x0C, 0x00})) << "the pointer goes back";
+  EXPECT_EQ(read(0x36, {0x0C}, 4), (Bytes{0x0C, 0x00, 0x0C, 0x00}))
+      << "the pointer returns to the angle";
   write(0x36, {0x01, 0x08, 0x00});  // ZPOS
   EXPECT_EQ(read(0x36, {0x0E}, 2), (Bytes{0x04, 0x00}));
   EXPECT_EQ(read(0x36, {0x0B}, 1), Bytes{0x20});
