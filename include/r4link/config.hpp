@@ -2,7 +2,7 @@
 // The version, which is written only here, and what the shared library exports.
 #pragma once
 
-#define R4LINK_VERSION "0.1.0"
+#define R4LINK_VERSION "0.2.0"
 
 // Every other symbol is hidden; tests/install/exports.txt lists the exported ones.
 #define R4LINK_API __attribute__((visibility("default")))

@@ -73,7 +73,7 @@ in_cpp() {
   local libraries
   read -ra libraries <<<"$(pkg-config --libs r4link)"
   g++ -o drive/shared drive/build/CMakeFiles/drive.dir/main.cpp.o "${libraries[@]}"
-  ldd drive/shared | grep -q 'libr4link.so.0.1 => /lib/'
+  ldd drive/shared | grep -q 'libr4link.so.0.2 => /lib/'
   drive/shared 'sim:?node=1'
 }
 step 'a C++ program is built by CMake and by pkg-config, and drives a board' in_cpp
