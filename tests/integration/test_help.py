@@ -28,6 +28,13 @@ def test_help_names_every_command_url_and_exit_code():
         assert word in result.stdout
 
 
+def test_the_page_of_commands_says_what_the_help_says():
+    with open(os.path.join(DATA, '..', '..', 'docs', 'reference', 'commands.md'), encoding='utf-8') as page:
+        rows = re.findall(r'^\| `(\w+)` \| ([^|]*) \|', page.read(), re.MULTILINE)
+    commands = run('--help').stdout.split('\nCommands:\n')[1].split('\n\n')[0]
+    assert rows == re.findall(r'^  (\S+) +(\S.*)', commands, re.MULTILINE)
+
+
 @pytest.mark.parametrize('command', COMMANDS)
 def test_help_of_every_command_teaches(command):
     result = run(command, '--help')

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -43,15 +44,16 @@ struct VisitorOfAll final : RecordingVisitor {
 
 TEST(ReadRecording, VisitsAllThatWasRecorded) {
   const std::string path = testing::TempDir() + "r4-read-" + std::to_string(::getpid());
-  Statistics live;
+  std::uint64_t received = 0;  // after record()
   {
     Board board("sim:", at_will());
     board.record(path);
+    const std::uint64_t before = board.statistics().received;
     board.wait_active();
     board.osmc(1).set_pwm(358, Direction::forward);
     board.next_state();
     board.osmc(1).set_pwm(10, Direction::forward);
-    live = board.statistics();
+    received = board.statistics().received - before;
   }
   VisitorOfAll visitor;
   read_recording(path, visitor);
@@ -59,7 +61,7 @@ TEST(ReadRecording, VisitsAllThatWasRecorded) {
   EXPECT_EQ(visitor.paths.back(), "1 sim: sim-1");
   EXPECT_NE(std::find(visitor.pwm.begin(), visitor.pwm.end(), 358), visitor.pwm.end());
   EXPECT_EQ(visitor.pwm.back(), 10);
-  EXPECT_GE(visitor.from + 10, static_cast<int>(live.received)) << "but what came before record()";
+  EXPECT_GE(visitor.from, static_cast<int>(received));
   EXPECT_GT(visitor.to, 2);
   EXPECT_EQ(visitor.events.back(), "0 end");
 }

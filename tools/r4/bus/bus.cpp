@@ -182,8 +182,7 @@ cannot be opened.)";
 void add_bus(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command = add_subcommand(
-      root, chosen, "bus", "The load of a CAN bus: of a planned one, or of one that is there",
-      footer, options, bus);
+      root, chosen, "bus", "Show the load of a CAN bus, planned or real", footer, options, bus);
   add_text(
       *command, "URL", [options](const std::string& url) { options->url = url; },
       "a real bus, such as can://can0; without: a plan", url_type, Need::optional);

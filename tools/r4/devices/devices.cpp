@@ -97,8 +97,8 @@ Exit codes: 0 done; 1 the description is wrong; 2 no such device; 4, 5 the file 
 
 void add_devices(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
-  CLI::App* const command = add_subcommand(
-      root, chosen, "devices", "Tell which sensors are described", footer, options, devices);
+  CLI::App* const command = add_subcommand(root, chosen, "devices", "List the described sensors",
+                                           footer, options, devices);
   add_text(*command, "NAME", options->device, "one of them, or a file", file_type);
   add_json(*command, options->json, "print JSON, one object a line");
 }

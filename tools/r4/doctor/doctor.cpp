@@ -275,7 +275,7 @@ says nothing, or too much is lost; 4, 5 a transport cannot be opened; 6 an inter
 void add_doctor(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
   CLI::App* const command = add_subcommand(
-      root, chosen, "doctor", "Tell what is wrong with this machine and a link, and how to mend it",
+      root, chosen, "doctor", "Find what is wrong with this machine or a link, and how to mend it",
       footer, options, doctor);
   add_texts(*command, "URL", options->urls, "where boards are, such as serial:auto", url_type);
   add_duration(*command, options->duration, "how long to listen to each link (default 5)");

@@ -53,8 +53,8 @@ read.)";
 
 void add_info(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App* const command = add_subcommand(root, chosen, "info", "Tell what is in a recording",
-                                           info_footer, options, info);
+  CLI::App* const command =
+      add_subcommand(root, chosen, "info", "Summarise a recording", info_footer, options, info);
   add_texts(*command, "FILE", options->files, "recordings; - is the standard input", file_type,
             Need::required);
   add_json(*command, options->json, "print JSON, one object for each file");

@@ -334,8 +334,8 @@ Exit codes: 0 drawn; 1 drawn, but some could not be read, or it is not a recordi
 
 void add_plot(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<PlotOptions>();
-  CLI::App* const command =
-      add_subcommand(root, chosen, "plot", "Draw what a recording has", plot_footer, options, plot);
+  CLI::App* const command = add_subcommand(root, chosen, "plot", "Draw fields of a recording",
+                                           plot_footer, options, plot);
   add_text(*command, "FILE", options->file, "a recording; - is the standard input", file_type,
            Need::required);
   add_texts(*command, "FIELD", options->fields, "what is drawn, such as AIN24", "FIELD",

@@ -174,7 +174,7 @@ not heard; 2 usage; 4 the file or the transport cannot be opened, or the disk is
 void add_record(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<RecordOptions>();
   CLI::App* const command =
-      add_subcommand(root, chosen, "record", "Write down what is said, in both directions",
+      add_subcommand(root, chosen, "record", "Record the datagrams of boards, in both directions",
                      record_footer, options, record);
   add_boards(*command, options->urls);
   add_text(*command, "-o,--output", options->file, "the recording", file_type, Need::required);

@@ -39,8 +39,9 @@ permission denied.)";
 
 void add_ros2(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<ros2::BridgeOptions>();
-  CLI::App* const command = add_subcommand(root, chosen, "ros2", "Boards as nodes of ROS 2", footer,
-                                           options, ros2::run_bridge);
+  CLI::App* const command =
+      add_subcommand(root, chosen, "ros2", "Connect boards to ROS 2, without ROS", footer, options,
+                     ros2::run_bridge);
   add_boards(*command, options->urls);
   add_text(*command, "--name", options->name, "the node's name (default r4)", "NAME");
   add_text(*command, "--namespace", options->space, "its namespace (default /)", "NAME");

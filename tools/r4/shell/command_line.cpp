@@ -127,7 +127,7 @@ int run(int argc, const char* const* argv) {
   const auto is_json = [](const char* argument) { return std::string_view(argument) == "--json"; };
   const bool json = std::any_of(argv, argv + argc, is_json);
   Action chosen;
-  CLI::App root("R4 boards: watch them, command them, stop them, simulate them", "r4");
+  CLI::App root("Watch, command, stop and simulate R4 boards", "r4");
   root.set_version_flag("--version", "r4 " R4LINK_VERSION, "Print the version and exit");
   root.set_help_flag("-h,--help", "Print help and exit; also after a command");
   root.footer(root_footer);

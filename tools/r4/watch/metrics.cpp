@@ -144,8 +144,9 @@ permission denied.)";
 
 void add_metrics(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<MetricsOptions>();
-  CLI::App* const command = add_subcommand(root, chosen, "metrics", "Tell Prometheus of boards",
-                                           metrics_footer, options, serve_metrics);
+  CLI::App* const command =
+      add_subcommand(root, chosen, "metrics", "Serve metrics of boards to Prometheus",
+                     metrics_footer, options, serve_metrics);
   add_boards(*command, options->urls);
   add_text(*command, "--listen", options->listen, "where it answers (default 127.0.0.1:9618)",
            "ADDRESS:PORT");

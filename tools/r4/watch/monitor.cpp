@@ -255,8 +255,8 @@ cannot be opened; 5 permission denied.)";
 
 void add_monitor(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<MonitorOptions>();
-  CLI::App* const command = add_subcommand(root, chosen, "monitor", "Show what a board says, live",
-                                           monitor_footer, options, monitor);
+  CLI::App* const command = add_subcommand(
+      root, chosen, "monitor", "Show the states of boards, live", monitor_footer, options, monitor);
   add_boards(*command, options->urls);
   add_json(*command, options->json, "print JSON, one object a line");
   add_number(*command, "--count", options->count, 1, ~std::uint64_t{0},

@@ -100,8 +100,8 @@ denied.)";
 
 void add_web(CLI::App& root, Action& chosen) {
   const auto options = std::make_shared<Options>();
-  CLI::App* const command =
-      add_subcommand(root, chosen, "web", "Boards in a browser", footer, options, serve_web);
+  CLI::App* const command = add_subcommand(
+      root, chosen, "web", "Show and drive boards in a browser", footer, options, serve_web);
   add_boards(*command, options->urls);
   add_text(*command, "--listen", options->listen, "where it answers (default 127.0.0.1:8080)",
            "ADDRESS:PORT");
