@@ -50,7 +50,7 @@ TEST_F(BoardServo, RefusesDegreesThatItsCalibrationDoesNotHave) {
   board.servo(1).calibrate(gripper);
   EXPECT_EQ(problem_of([&] { board.servo(1).set(Degrees(46)); }).kind, ErrorKind::usage);
   EXPECT_EQ(problem_of([&] { board.servo(1).post(Degrees(-46)); }).kind, ErrorKind::usage);
-  EXPECT_EQ(board.next_state().servo_us(1), 1200) << "nothing was sent";
+  EXPECT_EQ(board.next_state().servo_us(1), 1200) << "a refused angle must not be sent";
   for (const int none : {-1, 0, 17}) {
     EXPECT_TRUE(
         contains(problem_of([&] { board.servo(none).calibrate(gripper); }).fix, "give 1 to 16"));

@@ -112,7 +112,7 @@ struct Report {
   std::uint32_t joins = 0;
   std::uint32_t path_losses = 0;  // of sessions that continued
   std::uint32_t failovers = 0;    // a path in use was disturbed, and another path stayed in use
-  // commands that timed out although a path met the limits all the time
+  // commands that ended while a path met the limits all the time
   std::uint32_t timed_on_good = 0;
   std::uint64_t copies = 0;     // duplicates that reached hosts
   std::uint32_t replayed = 0;   // datagrams recorded an hour ago

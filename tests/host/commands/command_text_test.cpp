@@ -100,7 +100,8 @@ TEST(CommandText, ShowsNoKeyAndNoPassword) {
   const OwnCommand key = parse_command_text("C:key,3:" + digits);
   EXPECT_EQ(shown(key), "C:key,3:...");
   EXPECT_EQ(describe(key), "setting key 3:...");
-  EXPECT_EQ(describe(Command::setting("rate", "5;0")), "setting ") << "no datagram can carry it";
+  EXPECT_EQ(describe(Command::setting("rate", "5;0")), "setting ")
+      << "no datagram can carry this value";
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// read_recording(): a recording for a program of C++.
+// read_recording(): a recording read by a C++ program.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -59,7 +59,8 @@ TEST(ReadRecording, VisitsAllThatWasRecorded) {
   EXPECT_EQ(visitor.paths.back(), "1 sim: sim-1");
   EXPECT_NE(std::find(visitor.pwm.begin(), visitor.pwm.end(), 358), visitor.pwm.end());
   EXPECT_EQ(visitor.pwm.back(), 10);
-  EXPECT_GE(visitor.from + 10, static_cast<int>(live.received)) << "but what came before record()";
+  EXPECT_GE(visitor.from + 10, static_cast<int>(live.received))
+      << "only datagrams before record() may be missing";
   EXPECT_GT(visitor.to, 2);
   EXPECT_EQ(visitor.events.back(), "0 end");
 }
