@@ -45,8 +45,8 @@ struct BoardThread : testing::Test {
     };
     return result;
   }
-  // True if the board has executed `command`. Sends another command first, because the board executes
-  // commands in order.
+  // True if the board has executed `command`. Sends another command first, because the board
+  // executes commands in order.
   bool has_executed(const std::string& command) {
     board.servo(1).set(Microseconds(1500));
     const std::vector<std::string> all = simulated.executed();
