@@ -70,7 +70,8 @@ TEST_F(AsyncBoardCancellation, EndsTheWaitForAStopThatGoesOn) {
   });
   EXPECT_EQ(result.outcome, Outcome::cancelled);
   const std::uint64_t sent = board.statistics().retries;
-  EXPECT_TRUE(run_until([&] { return board.statistics().retries >= sent + 3; })) << "repeated";
+  EXPECT_TRUE(run_until([&] { return board.statistics().retries >= sent + 3; }))
+      << "the stop must be repeated";
 }
 
 TEST(AsyncBoardCancel, IsNotLostBetweenTheSettingsOfALinkTiming) {

@@ -197,7 +197,7 @@ TEST_F(BoardPathsInMemory, AreReportedWhenTheyBeginOrCeaseToCarry) {
   std::vector<PathStatus> told;
   const Subscription keep = board->on_path([&](const PathStatus& path) { told.push_back(path); });
   paths[0]->plug(false);
-  ASSERT_EQ(told.size(), 1U) << "at once";
+  ASSERT_EQ(told.size(), 1U) << "the event must be reported at once";
   EXPECT_EQ(told[0].state, PathState::down);
   EXPECT_EQ(board->link().state, HostLinkState::active);
   paths[0]->plug(true);
@@ -231,8 +231,8 @@ TEST_F(BoardPathsInMemory, HaveNumbersInARecording) {
   text << std::ifstream(file).rdbuf();
   std::filesystem::remove(file);
   for (const std::string path : {" 1", " 2"}) {
-    EXPECT_TRUE(contains(text.str(), path + "< AIN24:")) << "brought";
-    EXPECT_TRUE(contains(text.str(), path + "> H:ROS2-R4;")) << "carried";
+    EXPECT_TRUE(contains(text.str(), path + "< AIN24:")) << "the path must bring states";
+    EXPECT_TRUE(contains(text.str(), path + "> H:ROS2-R4;")) << "the path must carry heartbeats";
   }
 }
 

@@ -37,7 +37,8 @@ TEST_F(BoardServo, IsDrivenInDegreesByItsOwnCalibration) {
   EXPECT_EQ(state.servo_us(16), 1500);
   EXPECT_NEAR(board.servo(3).calibration().degrees(state.servo_us(3))->value, 30, 0.05);
   board.servo(3).set(Microseconds(0));
-  EXPECT_FALSE(gripper.degrees(board.next_state().servo_us(3))) << "off";
+  EXPECT_FALSE(gripper.degrees(board.next_state().servo_us(3)))
+      << "a servo that is off has no angle";
 }
 
 TEST_F(BoardServo, RefusesDegreesThatItsCalibrationDoesNotHave) {

@@ -282,7 +282,7 @@ void expect_stops(CanQueue queue, std::uint64_t frames_before) {
   EXPECT_LE(max_board_ns, ms_ns);
 }
 
-// The frame that it waits for is the one in progress.
+// The one frame is the frame in progress.
 TEST(CanStop, WaitsForOneFrameAtMostAndEveryBoardIsSafeAMillisecondLater) {
   expect_stops(CanQueue::mailboxes, 1);
 }

@@ -37,7 +37,7 @@ struct Happening {
     address,    // the host's datagrams come from another address, permanently or for `length_us`
     // another process asks for an emergency stop and ends, after `length_us` at the latest
     stopper,
-    leave,          // the host process says farewell and ends; it comes back after `length_us`
+    leave,          // the host process sends a farewell and ends; it comes back after `length_us`
     watch,          // a program watches for `length_us`; `host` is its number
     watcher_stops,  // … and asks for an emergency stop
     // The host's end of a path is gone for `length_us`, and the system reports that. The board's

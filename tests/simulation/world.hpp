@@ -233,7 +233,7 @@ class World : public firmware::Hal, public firmware::Observer {
   void note(const std::string& line);
   void show(const std::string& line);
   void violate(const std::string& what);
-  // world_board.cpp, with what is overridden above
+  // world_board.cpp, with the overridden functions above
   void boot_board();
   void poll_board();
   void send(std::uint8_t port, Text datagram, Priority priority, std::uint32_t peer);

@@ -185,7 +185,7 @@ TEST_F(BridgedPairTest, ABoardThatIsAwayIsWaitedFor) {
   other.hosts->say(heartbeat, first);
   EXPECT_EQ(other.from_hosts().undelivered, 1U);
   other.pass(3s);
-  EXPECT_EQ(other.events, (Texts{"hosts up", "board down"})) << "told once";
+  EXPECT_EQ(other.events, (Texts{"hosts up", "board down"})) << "the event must be reported once";
   other.board->absence.reset();
   other.pass(500ms);
   EXPECT_EQ(other.events.back(), "board up");
@@ -295,7 +295,8 @@ TEST_F(BridgedPairTest, AWatcherBesideAHostHearsEverythingAfterAnEchoAndForTwoSe
   hosts->say("W:50;PNum:900;T:0;", second);
   const std::string token = lease_in(hosts->take());
   board->say(board_state);
-  EXPECT_EQ(hosts->take(), Texts{std::string(board_state) + "@1"}) << "not yet";
+  EXPECT_EQ(hosts->take(), Texts{std::string(board_state) + "@1"})
+      << "the peer has not echoed its token yet";
   hosts->say("W:50;PNum:901;T:" + token + ";", third);
   hosts->take();
   hosts->say("W:50;PNum:901;T:" + token + ";", second);

@@ -111,7 +111,7 @@ TEST(LoopGuard, EndsWhereADrivenMotorStands) {
   EXPECT_EQ(pass(50, 0), LoopEnd::none) << "the duty is too small to turn the motor";
   guard.on_commanded(Setpoints{Command::dhb12(2, Pwm(400), Direction::forward),
                                Command::dhb12(1, Pwm(0), Direction::forward)});
-  EXPECT_EQ(pass(50, -1), LoopEnd::none) << "it turns";
+  EXPECT_EQ(pass(50, -1), LoopEnd::none) << "the wheel turns";
   EXPECT_EQ(pass(6, 0), LoopEnd::none);
   EXPECT_EQ(pass(50, 0), LoopEnd::standstill);
   EXPECT_TRUE(contains(guard.why(),

@@ -65,8 +65,8 @@ TEST_F(OnePath, TheSessionSpeaksAsSoonAsTheTransportIsUp) {
 TEST_F(OnePath, NumbersOrderTheHeartbeatsOfOneMillisecond) {
   EXPECT_TRUE(heartbeat());
   EXPECT_TRUE(heartbeat());
-  EXPECT_FALSE(heartbeat(board_t(), board_pnum - 1)) << "the same";
-  EXPECT_FALSE(heartbeat(board_t(), board_pnum - 2)) << "late";
+  EXPECT_FALSE(heartbeat(board_t(), board_pnum - 1)) << "the same heartbeat again";
+  EXPECT_FALSE(heartbeat(board_t(), board_pnum - 2)) << "a late heartbeat";
 }
 
 TEST_F(OnePath, OlderDatagramsAndDuplicatesAreDropped) {
@@ -104,7 +104,7 @@ TEST_F(OnePath, ARestartIsNoticedWhenItsFirstHeartbeatsAreLost) {
   reboot();
   EXPECT_EQ(state(), Admission::restarted);
   pass(10);
-  EXPECT_EQ(state(), Admission::yes) << "once";
+  EXPECT_EQ(state(), Admission::yes) << "a restart must be reported once";
   EXPECT_EQ(paths.counters().lost, 0U) << "numbers that begin anew are not a loss";
 }
 

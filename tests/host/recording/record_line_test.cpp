@@ -184,7 +184,7 @@ TEST(RecordLine, OfADeviceHasItsPlaceAndTheTextOfItsDescription) {
   EXPECT_EQ(read.device.description, std::string(max_record_bytes, '\n'));
 
   ASSERT_TRUE(read_record_line("# device was changed at noon", read));
-  EXPECT_EQ(read.kind, LineKind::comment) << "a person's";
+  EXPECT_EQ(read.kind, LineKind::comment) << "a comment of a person";
   for (const char* const line :
        {"# device 0 bno055@0x28:1 device x", "# device 1 a\\x1b[2J@0x28:1 device x",
         "# device 70000 x", "# device 1 x \\x2"}) {

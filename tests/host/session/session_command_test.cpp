@@ -234,7 +234,7 @@ TEST_F(SessionStop, CannotBeCancelled) {
   link.session.cancel(stop, link.now);
   EXPECT_TRUE(link.results.empty());
   link.pass(100ms);
-  EXPECT_GT(link.count('E'), 3U) << "repeated";
+  EXPECT_GT(link.count('E'), 3U) << "the stop must be repeated";
 }
 
 TEST_F(SessionCommand, EndsWithTheSession) {

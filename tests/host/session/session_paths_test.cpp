@@ -110,7 +110,7 @@ TEST(SessionPaths, MissNothingWhileOnePathIsCutAThousandTimes) {
   EXPECT_EQ(unconfirmed, 0);
   EXPECT_TRUE(executed_once(robot));
   EXPECT_EQ(robot.trips, 0);
-  EXPECT_LE(robot.longest_gap_ms, 20) << "two periods";
+  EXPECT_LE(robot.longest_gap_ms, 20) << "at most two state periods";
   EXPECT_LE(robot.oldest_age_ms, 20U);
   EXPECT_FALSE(robot.went_back);
   EXPECT_EQ(robot.session->statistics(robot.now()).timed_out, 0U);

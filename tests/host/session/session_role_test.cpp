@@ -30,7 +30,7 @@ TEST_F(SessionRole, TakingControlBeginsAsAHostThatOpensTheBoard) {
   link.heartbeat(SafeReason::link);
   link.sent.clear();
   change(BoardRole::control);
-  ASSERT_EQ(link.count('H'), 1U) << "at once";
+  ASSERT_EQ(link.count('H'), 1U) << "the heartbeat must be sent at once";
   EXPECT_EQ(link.last('H').t, 0U) << "the board has sent this session no T to echo";
   EXPECT_NE(link.host_session, no_session);
   EXPECT_FALSE(link.session.in_control(link.now));
@@ -55,7 +55,7 @@ TEST_F(SessionRole, ReleasingControlSaysFarewellUntilTheBoardAnswersAndThenWatch
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
   link.sent.clear();
   change(BoardRole::watch);
-  EXPECT_EQ(link.count('W'), 1U) << "at once";
+  EXPECT_EQ(link.count('W'), 1U) << "the W must be sent at once";
   EXPECT_EQ(link.host_session, no_session);
   link.state("AIN24:24.28;SAFE:1;");
   link.pass(2s);

@@ -35,7 +35,7 @@ TEST_F(NewSession, SendsAHeartbeatAtOnceAndThenTenASecond) {
 TEST_F(NewSession, IsConnectingWhileTheBoardBoots) {
   link.boot_heartbeat();
   EXPECT_EQ(link.session.link().state, HostLinkState::connecting);
-  EXPECT_EQ(link.count('H'), 2U) << "it answers";
+  EXPECT_EQ(link.count('H'), 2U) << "the session must answer the first heartbeat";
   link.pass(1s);
   EXPECT_EQ(link.count('F'), 0U) << "no command may be sent before the board knows the host";
 }

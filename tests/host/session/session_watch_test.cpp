@@ -25,7 +25,7 @@ struct SessionWatch : testing::Test {
 TEST_F(SessionWatch, AsksForALeaseTwiceASecondAndSendsNothingElse) {
   link.pass(1900ms);
   EXPECT_EQ(link.count('W'), 4U);
-  EXPECT_EQ(link.sent.size(), 4U) << "no heartbeat";
+  EXPECT_EQ(link.sent.size(), 4U) << "a watcher must not send heartbeats";
   EXPECT_EQ(link.last('W').command, "W:100");
   EXPECT_EQ(link.last('W').t, 0U) << "no token was heard to echo";
 }

@@ -51,7 +51,7 @@ TEST_F(SessionWatchdog, FedAgainGivesControlBack) {
 
 TEST_F(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
   link.session.hold(true, link.now);
-  EXPECT_EQ(link.links.back().cause(), LinkCause::callback) << "on_link tells";
+  EXPECT_EQ(link.links.back().cause(), LinkCause::callback) << "on_link must report it";
   EXPECT_FALSE(link.session.in_control(link.now));
   EXPECT_EQ(link.session.post(turn_motor, link.now), PostResult::no_link);
   const Ticket waits = link.session.send(turn_motor, 5s, link.now);
@@ -111,7 +111,7 @@ TEST_F(NewSession, ReportsWhenTheBoardTakesCommands) {
   EXPECT_TRUE(contains(explain("board", link.session.link()).reason, "confirmed no command"));
   link.executed(link.last('F').pnum);
   EXPECT_TRUE(link.session.link().in_control);
-  EXPECT_TRUE(link.links.back().in_control) << "on_link tells";
+  EXPECT_TRUE(link.links.back().in_control) << "on_link must report it";
   EXPECT_EQ(explain("board", link.session.link()).reason,
             "the board is active and takes our commands");
 }

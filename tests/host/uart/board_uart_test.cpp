@@ -43,7 +43,7 @@ TEST(UartStream, DeliversEachByteOnceAndCountsWhatIsMissing) {
   EXPECT_TRUE(stream.take(field(109, 10, "j"), data))
       << "the gap must be accepted, because the board has lost bytes";
   EXPECT_EQ(data.lost, 7U);
-  EXPECT_FALSE(stream.take(field(100, 7, "abc"), data)) << "late";
+  EXPECT_FALSE(stream.take(field(100, 7, "abc"), data)) << "a late state must not count";
   EXPECT_EQ(text(data), "abcdej");
 }
 

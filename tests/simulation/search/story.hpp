@@ -18,7 +18,7 @@ struct Act {
     group,    // … several at once
     stop,     // the host asks for an emergency stop
     clear,    // … and clears it
-    leave,    // the host says farewell and ends
+    leave,    // the host sends a farewell and ends
     kill,     // the host process dies
     reboot,   // the board restarts
     sleep,    // the host's computer sleeps for 1.5 s

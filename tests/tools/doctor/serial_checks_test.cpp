@@ -51,7 +51,7 @@ TEST(DoctorSerial, WhoMayOpenThePortIsFine) {
   made_up.mode(giga, 0640);
   EXPECT_EQ(permission(made_up).severity, Severity::error) << "permission to read is not enough";
   made_up.machine.user.id = 0;
-  EXPECT_EQ(permission(made_up).severity, Severity::ok) << "root may";
+  EXPECT_EQ(permission(made_up).severity, Severity::ok) << "root may open every port";
 }
 
 TEST(DoctorSerial, APortOfAnotherGroupIsGivenToIt) {

@@ -27,7 +27,7 @@ TEST(Ros2Pressed, ForgetsWhomItHasNotHeardForLongest) {
   EXPECT_FALSE(pressed.on(number(0), true)) << "this publisher is the newest";
   EXPECT_TRUE(pressed.on(number(1000), true));
   EXPECT_FALSE(pressed.on(number(0), true));
-  EXPECT_TRUE(pressed.on(number(1), true)) << "forgotten";
+  EXPECT_TRUE(pressed.on(number(1), true)) << "the oldest publisher must be forgotten";
 }
 
 }  // namespace

@@ -123,7 +123,7 @@ TEST(StampOfACommand, IsOldBehindTheDeadlineAndSaysNothingIfItIsZero) {
   EXPECT_TRUE(is_outdated(stamp_time(999, 499'999'999), now, 500ms));
   EXPECT_FALSE(is_outdated(stamp_time(1001, 0), now, 500ms)) << "the sender's clock is ahead";
   EXPECT_FALSE(is_outdated(stamp_time(0, 0), now, 500ms));
-  EXPECT_FALSE(is_outdated(stamp_time(1, 0), now, 0ms)) << "no deadline";
+  EXPECT_FALSE(is_outdated(stamp_time(1, 0), now, 0ms)) << "0 ms means no deadline";
 }
 
 TEST(PositionOfACounter, BeginsWithTheCountAndFollowsItBothWays) {
