@@ -15,7 +15,7 @@ void add_one() {
   ++count_of_this_thread;
 }
 
-// nullptr: there is no memory.
+// nullptr if there is no memory.
 void* allocate(std::size_t size) {
   add_one();
   return std::malloc(size == 0 ? 1 : size);
@@ -34,8 +34,8 @@ void* or_throw(void* memory) {
 
 }  // namespace
 
-// The array forms of the standard library call these. Its nothrow forms do, too, but those of the
-// sanitizers do not, and what they gave out would come back here.
+// The array forms of the standard library call these operators. Its nothrow forms do so, too, but
+// those of the sanitizers do not, and their memory would be freed here.
 void* operator new(std::size_t size) { return or_throw(allocate(size)); }
 void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return allocate(size); }
 void* operator new(std::size_t size, std::align_val_t alignment) {

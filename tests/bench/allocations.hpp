@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Counts what goes through the global operator new, for benchmarks and tests of what promises to
-// allocate nothing.
+// Counts the calls of the global operator new, for benchmarks and for tests of functions that must
+// not allocate.
 #pragma once
 
 #include <cstdint>
 
 namespace r4::bench {
 
-// Calls of operator new in this process so far, all threads.
+// Calls of operator new in this process so far, by all threads.
 std::uint64_t allocations();
-// Those of the thread that asks.
+// Calls by the calling thread.
 std::uint64_t allocations_of_this_thread();
 
-// How many of them a call of `work` costs, on average.
+// The average number of calls of operator new during one call of `work`.
 template <class Work>
 double allocations_per_call(Work work) {
   constexpr int calls = 1000;

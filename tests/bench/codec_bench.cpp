@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a state datagram costs: the first line of the paper's capture, written and read. The floor
-// in the same run is copying its bytes and computing its CRC.
+// The cost of a state datagram: the first line of the paper's capture, written and read. The
+// reference in the same run copies its bytes and computes its CRC.
 #include <benchmark/benchmark.h>
 #include <libdeflate.h>
 
@@ -34,7 +34,7 @@ Text write_state(char* buffer, const State& state) {
   return writer.finish(state.pnum, state.t_ms);
 }
 
-// The line, its content unknown to the compiler.
+// The line, hidden from the compiler's optimizer.
 Text opaque_line() {
   Text bytes = line;
   benchmark::DoNotOptimize(bytes);
@@ -83,7 +83,7 @@ void crc_fast(benchmark::State& bench) {
 }
 BENCHMARK(crc_fast);
 
-// The floor: nothing is written or read without moving its bytes and checking their CRC.
+// The reference: each implementation must at least move the bytes and check their CRC.
 void copy_and_crc(benchmark::State& bench) {
   char buffer[max_datagram];
   measure(bench, line.size(), [&] {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What python_bench.py compares itself with: `r4_confirmed_send URL COUNT` sends commands one after the other, each
-// when the one before is confirmed, and prints how many microseconds half of them took at most.
+// The reference of python_bench.py. `r4_confirmed_send URL COUNT` sends commands one after the
+// other, each after its predecessor was confirmed, and prints the median time of a command in
+// microseconds.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>

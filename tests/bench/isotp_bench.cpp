@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What ISO-TP costs: a datagram of 170 bytes cut into 25 classic frames and joined again, in
-// memory. The floor in the same run is copying its bytes into and out of the same frames.
+// The cost of ISO-TP: a datagram of 170 bytes split into 25 classic frames and joined again, in
+// memory. The reference in the same run copies its bytes into and out of the same frames.
 #include <benchmark/benchmark.h>
 
 #include <cstdlib>
@@ -32,7 +32,7 @@ struct Ends {
 
   Ends() { std::memset(datagram, 'x', sizeof datagram); }
 
-  // Into `frames`.
+  // Splits the datagram into `frames`.
   void cut() {
     benchmark::DoNotOptimize(datagram);
     std::size_t count = 0;
@@ -79,7 +79,7 @@ void isotp_cut_and_join(benchmark::State& bench) {
 }
 BENCHMARK(isotp_cut_and_join);
 
-// The floor.
+// The reference.
 void isotp_copy(benchmark::State& bench) {
   Ends ends;
   measure(bench, datagram_size, [&] {

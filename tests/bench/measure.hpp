@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One way to time a piece of work in r4_bench.
+// The common way to time a piece of work in r4_bench.
 #pragma once
 
 #include <benchmark/benchmark.h>
@@ -11,7 +11,7 @@
 
 namespace r4::bench {
 
-// Times `work` on `size` bytes and reports what it allocates as "allocs".
+// Times `work` on `size` bytes and reports its allocations as "allocs".
 template <class Work>
 void measure(benchmark::State& bench, std::size_t size, Work work) {
   bench.counters["allocs"] = allocations_per_call(work);

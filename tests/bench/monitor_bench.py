@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a board and its monitor cost at 100 Hz: their shares of a processor. The aim is 2 % each.
+"""The cost of a board and its monitor at 100 Hz: their shares of a processor. The goal is 2 % each.
 
     R4=build/r4 PYTHONPATH=tests/integration /usr/bin/python3 tests/bench/monitor_bench.py [SECONDS]
 """

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What packing costs: the first state of the paper's capture. The floor in the same run is copying
+// The cost of packing: the first state of the paper's capture. The reference in the same run copies
 // the datagram.
 #include <benchmark/benchmark.h>
 
@@ -42,7 +42,7 @@ void unpack_datagram(benchmark::State& bench, Text datagram) {
 BENCHMARK_CAPTURE(unpack_datagram, state, line);
 BENCHMARK_CAPTURE(unpack_datagram, command, command);
 
-// The floor: nothing is recoded without moving its bytes.
+// The reference: each implementation must at least move the bytes.
 void copy_datagram(benchmark::State& bench) {
   char buffer[max_datagram];
   measure(bench, line.size(), [&] {

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the Python package costs, by a simulated board on UDP, against its bars.
+"""The cost of the Python package with a simulated board on UDP, compared with its limits.
 
     PYTHONPATH=build/python R4=build/r4 tests/bench/python_bench.py [SECONDS]
 
-Exit code 1 if one of them is missed. Processor time is that of this process, link and interpreter together.
+Exit code 1 if a limit is missed. The processor time is that of this process, link and interpreter together.
 """
 import asyncio
 import os
@@ -42,7 +42,7 @@ def processor_s():
 
 
 class Count:
-    """What a program does at least with a state: it looks at a field."""
+    """The least work of a program with a state: it reads one field."""
 
     def __init__(self):
         self.number = 0
@@ -70,7 +70,7 @@ def receiving(board):
 
 
 def callbacks(board):
-    """At 1000 Hz, by turns with and without."""
+    """Measures at 1000 Hz, in turns with and without the callback."""
     board.setting('rate', '1000')
     costs = []
     for _ in range(3):
@@ -101,7 +101,7 @@ def blocking_us(url, count):
 
 
 def sending(url):
-    """Confirmed commands, Python and C++ by turns."""
+    """Measures confirmed commands, in turns from Python and from C++."""
     python, native = [], []
     for _ in range(5):
         native.append(float(subprocess.run([BUILD / 'tests/bench/r4_confirmed_send', url, '300'], check=True,
@@ -123,7 +123,7 @@ async def awaited_us(url, count):
 
 
 def awaiting(url):
-    """Confirmed commands, awaited and blocking by turns."""
+    """Measures confirmed commands, in turns awaited and blocking."""
     awaited, blocking = [], []
     for _ in range(5):
         awaited.append(statistics.median(asyncio.run(awaited_us(url, 300))))

@@ -1,12 +1,13 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What it costs to record eight boards at 100 Hz: all of r4 record, as a share of one processor.
+"""The cost of recording eight boards at 100 Hz: all of r4 record, as a share of one processor.
 
     R4=build/r4 tests/bench/recording_bench.py [SECONDS] [ROUNDS]
 
-In each round three programs hear the same eight boards over UDP loopback, one after the other: r4 record into text
-and into zst, and for comparison a floor, which is C that waits in epoll, reads what has come, and does nothing else.
-What each uses is the kernel's account of its threads, after its start. Prints medians over the rounds.
+In each round three programs hear the same eight boards over UDP loopback, one after the other: r4 record into text,
+r4 record into zst, and a reference in C that waits in epoll, reads the datagrams, and does nothing else.
+The kernel's account of the threads gives the processor time of each program, without its start. Prints medians over
+the rounds.
 """
 import glob
 import json
@@ -71,13 +72,13 @@ int main(int argc, char** argv) {
 
 
 def used_ns(pid):
-    """What all threads of a process have had of processors."""
+    """The processor time of all threads of a process so far."""
     return sum(int(pathlib.Path(task).read_text(encoding='ascii').split()[0])
                for task in glob.glob(f'/proc/{pid}/task/*/schedstat'))
 
 
 def share_of(command, seconds):
-    """The share of a core that a program uses, after its start; and what it prints, when it is ended by SIGINT."""
+    """The share of a core that a program uses after its start, and its output after SIGINT has ended it."""
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         time.sleep(START_S)
         began, before = time.monotonic(), used_ns(process.pid)
@@ -88,7 +89,7 @@ def share_of(command, seconds):
 
 
 def recorded(path, url, seconds):
-    """The share of r4 record, states a second, and bytes a state."""
+    """The processor share of r4 record, states a second, and bytes a state."""
     share, _ = share_of([R4, 'record', url, '-o', path], seconds)
     told = json.loads(subprocess.run([R4, 'info', '--json', path], check=True, capture_output=True, text=True).stdout)
     assert len(told['paths']) == BOARDS and not told['damage'] and told['dropped'] == 0, told

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 ros2 with one simulated board at 100 Hz and a client of Fast DDS: what it takes of a core, and how long a command
-through ~/send needs until the client has the board's confirmation. Each goes out right behind the one before, so right
-behind a state: that is the longest way.
+"""r4 ros2 with one simulated board at 100 Hz and a client of Fast DDS: its share of a core, and the time of a command
+through ~/send until the client has the board's confirmation. Each command is sent immediately after the confirmation of
+its predecessor, and so just after a state: that is the longest wait.
 
     R4=build/r4 PYTHONPATH=tests/integration /usr/bin/python3 tests/bench/ros2_command_bench.py [COMMANDS, 500]
 
-Exit code 1 if a bar is missed: 3 % of a core; half of the confirmations within one period and 2 ms.
+Exit code 1 if a limit is missed: 3 % of a core; half of the confirmations within one period and 2 ms.
 """
 import os
 import statistics
@@ -29,14 +29,14 @@ def processor_s(pid):
 
 
 def share_of_a_core(ros2, seconds=5):
-    """In percent."""
+    """The share of a core, in percent."""
     before, began = processor_s(ros2.process.pid), time.monotonic()
     time.sleep(seconds)
     return 100 * (processor_s(ros2.process.pid) - before) / (time.monotonic() - began)
 
 
 def to_confirmation(ros2, peer):
-    """Milliseconds of each."""
+    """The milliseconds of each command."""
     peer.read('rr/r4/sendReply', SERVICE + '_Response_', user_data='clientid=1;')
     peer.writer('rq/r4/sendRequest', SERVICE + '_Request_', user_data='clientid=1;')
     ros2.logged('~/send: 1 publishers')

@@ -1,20 +1,20 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What it costs a program that drives a board when others watch it by the same path.
+"""The cost for a program that drives a board when other programs watch the board over the same path.
 
     PYTHONPATH=build/python R4=build/r4 tests/bench/sharing_bench.py udp|pty|can|usb|URL [SECONDS] [ROUNDS] [--trouble]
 
-udp and pty are here, with a simulated board. can and usb are in a guest of tools/with-can, whose processor is
-emulated: the bus vcan0 with a simulated board, and a serial port of USB with one at its other end. URL is a bus of this
-machine, on which a board is simulated, or a serial port with a board at its other end.
+udp and pty are on this machine, with a simulated board. can and usb are in a guest of tools/with-can, whose processor
+is emulated: the bus vcan0 with a simulated board, and a USB serial port with a simulated board at its other end. URL is
+a bus of this machine, on which this program simulates a board, or a serial port with a board at its other end.
 
-In each round the program drives alone, then with five others beside it (r4 monitor, r4 record, three programs that
-watch), then alone again: how far the two rounds alone differ is what the machine does by itself. Of the program's
-own recording: how old its states are when they come (against the fastest of them), how far apart its heartbeats went
-out, what processor time it takes, and how many packet numbers are missing. --trouble: of the five, one is stopped
-(SIGSTOP) all the time, and one is killed half way; then the program that drives is killed beside such five: what
-r4 record misses of the board. Then r4 stop beside all of them, and three r4 send in a row. Prints medians over the
-rounds, and of what is missing all.
+In each round the program drives alone, then beside five watching programs (r4 monitor, r4 record, and three other
+programs), then alone again: the difference between the two rounds alone is the noise of the machine. Measured from the
+program's own recording: the age of its states when they arrive (relative to the fastest), the intervals of its
+heartbeats, its processor time, and the number of missing packet numbers. With --trouble one of the five is stopped
+(SIGSTOP) all the time, and one is killed half way. Then, beside five such programs, the driving program is killed:
+this measures what r4 record misses of the board. Then r4 stop runs beside all of them, and three r4 send in a row.
+Prints medians over the rounds, and the sum of all missing packet numbers.
 """
 import argparse
 import contextlib
@@ -67,7 +67,7 @@ def ms(seconds):
 
 
 class SimulatedBoard:
-    """r4 sim on a transport; the lines that it prints, with their times."""
+    """r4 sim on a transport, and the lines that it prints with their times."""
 
     def __init__(self, where):
         url = {'udp': 'udp://127.0.0.1:0', 'pty': 'pty:'}.get(where, where)
@@ -85,7 +85,7 @@ class SimulatedBoard:
             self.kept.put((time.monotonic(), line))
 
     def when_stopped(self, since):
-        """When its outputs were off, for somebody has pressed the stop."""
+        """The time at which the outputs were off because of a stop."""
         while True:
             at, line = self.kept.get(timeout=30)
             if line.get('state') == 'SAFE' and line['reason'] == 'stop' and at > since:
@@ -97,7 +97,7 @@ class SimulatedBoard:
 
 
 class OtherBoard:
-    """A board that is there already."""
+    """A board that exists already."""
 
     def __init__(self, url):
         self.url = url
@@ -120,7 +120,7 @@ def beside(*arguments):
 
 
 def datagrams_of(path):
-    """When each came or went, in what direction, and itself: those that a reader takes."""
+    """The time, the direction and the text of each datagram that a reader accepts."""
     for line in pathlib.Path(path).read_text('ascii', 'replace').splitlines():
         at, what, datagram = (line.split(' ', 2) + ['', ''])[:3]
         body, _, check = datagram.partition('^0x')
@@ -130,7 +130,7 @@ def datagrams_of(path):
 
 
 def of_recording(path):
-    """Ages of the states and spacings of the heartbeats, in seconds; packet numbers that are missing."""
+    """Ages of the states and intervals of the heartbeats, in seconds; the number of missing packet numbers."""
     states, beats, numbers = [], [], []
     for at, what, datagram in datagrams_of(path):
         fields = dict(part.split(':', 1) for part in datagram.split('^')[0].split(';') if ':' in part)
@@ -154,7 +154,7 @@ def five_watchers(url, folder, recording=None):
 
 
 def killed_holder(board, folder):
-    """What r4 record misses of the board when the program that drives is killed: numbers, and the longest silence."""
+    """The loss of r4 record when the driving program is killed: missing packet numbers, and the longest silence."""
     watched = os.path.join(folder, f'{time.monotonic_ns()}.w.r4log')
     with five_watchers(board.url, folder, watched) as watchers, \
             subprocess.Popen([sys.executable, '-c', DRIVER, board.url, watched + '.driver', '1', 'wait'],
@@ -172,7 +172,7 @@ def killed_holder(board, folder):
     came = [(at, int(re.search('PNum:([0-9]+);', datagram)[1])) for at, what, datagram in datagrams_of(watched)
             if what[-1] == '<' and at > killed - 0.5]
     pairs = list(zip(came, came[1:]))
-    # They begin again where the board has no host.
+    # The packet numbers begin anew while the board has no host.
     return sum(max(0, b[1] - a[1] - 1) for a, b in pairs), max(b[0] - a[0] for a, b in pairs)
 
 
@@ -181,7 +181,7 @@ def drive(board, seconds, folder, others=False, trouble=False):
     with contextlib.ExitStack() as stack:
         watchers = stack.enter_context(five_watchers(board.url, folder)) if others else []
         if others:
-            time.sleep(2)  # they are there before what is measured
+            time.sleep(2)  # the programs run before the measurement starts
         if trouble:
             watchers[0].send_signal(signal.SIGSTOP)
             killer = threading.Timer(seconds / 2, watchers[2].kill)
@@ -196,8 +196,8 @@ def drive(board, seconds, folder, others=False, trouble=False):
 
 
 def stop_beside_all(board, folder):
-    """What r4 stop says that it took, and the time from its start to safe outputs, while another program drives and
-    five watch."""
+    """The time that r4 stop reports, and the time from its start to safe outputs, while another program drives and
+    five programs watch."""
     path = os.path.join(folder, f'{time.monotonic_ns()}.r4log')
     with five_watchers(board.url, folder), \
             subprocess.Popen([sys.executable, '-c', DRIVER, board.url, path, '1', 'wait'], stdin=subprocess.PIPE,
@@ -214,7 +214,7 @@ def stop_beside_all(board, folder):
 
 
 def run_in_guest(where):
-    """The same there."""
+    """The same in the guest."""
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
         options, url = [], 'can://vcan0'
         if where == 'usb':

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What browsers cost r4 web: its share of a processor and its memory, beside eight simulated boards at 100 Hz.
+"""The cost of browsers for r4 web: its share of a processor and its memory, with eight simulated boards at 100 Hz.
 
     R4=build/r4 PYTHONPATH=tests/integration /usr/bin/python3 tests/bench/web_bench.py [SECONDS]
 """
@@ -13,11 +13,11 @@ from web_client import PONG, Web, WebSocket
 
 BOARDS = 8
 SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 5
-ALIVE_S = 5  # r4 web drops who says nothing for longer than 20 s
+ALIVE_S = 5  # r4 web drops a browser that is silent for more than 20 s
 
 
 def drain(clients, seconds):
-    """Reads what comes to all of them, and looks at none of it; bytes a second."""
+    """Reads and ignores the data of all browsers. Returns bytes a second."""
     selector = selectors.DefaultSelector()
     for each in clients:
         each.socket.setblocking(False)

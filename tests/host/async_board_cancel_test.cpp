@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a handler's cancellation slot does to an AsyncBoard's commands.
+// The effect of a handler's cancellation slot on the commands of an AsyncBoard.
 #include <gtest/gtest.h>
 
 #include <asio/bind_cancellation_slot.hpp>
@@ -26,7 +26,7 @@ const Command run_motor = Command::osmc(1, Pwm(358), Direction::forward);
 struct AsyncBoardUnanswered : OnALoop {
   AsyncBoardUnanswered() { board.open(); }
 
-  // The result of what `start` begins, when its handler's slot cancels it.
+  // Calls `start` and lets the slot of its handler cancel the call. Returns the result.
   template <class Start>
   std::optional<CommandResult> cancelled(Start start) {
     std::optional<CommandResult> result;
@@ -70,7 +70,8 @@ TEST_F(AsyncBoardCancellation, EndsTheWaitForAStopThatGoesOn) {
   });
   EXPECT_EQ(result.outcome, Outcome::cancelled);
   const std::uint64_t sent = board.statistics().retries;
-  EXPECT_TRUE(run_until([&] { return board.statistics().retries >= sent + 3; })) << "repeated";
+  EXPECT_TRUE(run_until([&] { return board.statistics().retries >= sent + 3; }))
+      << "the stop must be repeated";
 }
 
 TEST(AsyncBoardCancel, IsNotLostBetweenTheSettingsOfALinkTiming) {
@@ -78,7 +79,7 @@ TEST(AsyncBoardCancel, IsNotLostBetweenTheSettingsOfALinkTiming) {
   AsyncBoard board(io, "sim:", at_will());
   asio::cancellation_signal signal;
   std::optional<CommandResult> result;
-  std::uint64_t confirmed = 0;  // before
+  std::uint64_t confirmed = 0;  // number of commands confirmed so far
   bool begun = false;
   board.on_state([&](const State&, const Datagram&) {
     if (!begun) return;
@@ -96,7 +97,7 @@ TEST(AsyncBoardCancel, IsNotLostBetweenTheSettingsOfALinkTiming) {
   });
   io.run_for(10s);
   ASSERT_TRUE(result);
-  EXPECT_EQ(result->outcome, Outcome::cancelled) << "after the first of three";
+  EXPECT_EQ(result->outcome, Outcome::cancelled) << "the first of three commands had been sent";
 }
 
 TEST_F(AsyncBoardCancellation, LetsACoroutineWaitForTheFirstOfTwo) {
@@ -111,7 +112,7 @@ TEST_F(AsyncBoardCancellation, LetsACoroutineWaitForTheFirstOfTwo) {
   };
   asio::co_spawn(io, race(), [](const std::exception_ptr& error) { EXPECT_FALSE(error); });
   io.run_for(5s);
-  EXPECT_EQ(first, 1U) << "the timer, and the command did not keep it waiting";
+  EXPECT_EQ(first, 1U) << "the timer ends first: the command must not delay it";
 }
 
 TEST(AsyncBoardCancel, ReportsTheNumberByWhichTheCommandWasSent) {
@@ -126,7 +127,7 @@ TEST(AsyncBoardCancel, ReportsTheNumberByWhichTheCommandWasSent) {
                        result = r;
                        board.close();
                      }));
-    signal.emit(asio::cancellation_type::terminal);  // it is on its way
+    signal.emit(asio::cancellation_type::terminal);  // the command has been sent
   });
   io.run_for(10s);
   ASSERT_TRUE(result);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How an AsyncBoard ends: with a farewell that the board answers, or without.
+// The end of an AsyncBoard: with a farewell that the board answers, or without a farewell.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -18,7 +18,7 @@ using namespace std::chrono_literals;
 using firmware::BoardState;
 
 struct AsyncBoardClose : testing::Test, OnALoop {
-  // A board that is driven, and would go on for ten seconds without a heartbeat.
+  // Drives a board that would stay active for ten seconds without a heartbeat.
   void drive() {
     board->open();
     board->async_send(Command::setting("timeout", "10000"), 3s, [](const CommandResult&) {});
@@ -80,7 +80,7 @@ TEST_F(AsyncBoardClose, TimesOutWhereTheBoardIsSilent) {
 
 TEST_F(AsyncBoardClose, EndsAtOnceForABoardThatIsNotOpen) {
   EXPECT_EQ(close(1s), Outcome::closed);
-  EXPECT_EQ(close(1s), Outcome::closed) << "a second time, too";
+  EXPECT_EQ(close(1s), Outcome::closed) << "a second close() has the same result";
 }
 
 TEST_F(AsyncBoardClose, EndsWhenTheBoardIsDestroyed) {
@@ -94,7 +94,8 @@ TEST_F(AsyncBoardClose, EndsWhenTheBoardIsDestroyed) {
 TEST_F(AsyncBoardClose, SendsTheFarewellWithoutWaiting) {
   drive();
   board->close();
-  EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link)) << "long before its timeout";
+  EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link))
+      << "the board must be safe long before its timeout";
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a callback or handler of an AsyncBoard throws leaves io.run(); the board goes on.
+// An exception of a callback or handler of an AsyncBoard leaves io.run(); the board continues.
 #include <gtest/gtest.h>
 
 #include <asio/io_context.hpp>
@@ -66,10 +66,10 @@ TEST_P(ThrownIn, LeavesTheLoopAndTheBoardGoesOn) {
   const int states_then = states;
   const int heartbeats_then = heartbeats;
   bool asked = false;
-  // Nothing comes to a session without a timer: the next heartbeats of ours are what keeps it
-  // alive.
+  // Without its timer the session receives nothing after a while: only our next heartbeats keep the
+  // link alive.
   while (states < states_then + 20 || heartbeats < heartbeats_then + 3 || !asked) {
-    ASSERT_NE(io.run_one_for(5s), 0U) << "reception or a timer is gone";
+    ASSERT_NE(io.run_one_for(5s), 0U) << "no reception and no timer is pending";
     if (states < states_then + 10 || asked) continue;
     asked = true;
     board.async_send(Command::identify(), 5s, [&](const CommandResult& result) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program whose computer sleeps. The boot clock of this test program is its own: it can be set
-// forward.
+// A program on a computer that sleeps. This test program replaces the boot clock, so that it can
+// set the clock forward.
 #include <gtest/gtest.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -23,7 +23,7 @@ std::atomic<int> slept_seconds{0};
 
 }  // namespace
 
-// In place of the C library's.
+// Replaces the function of the C library.
 extern "C" int clock_gettime(clockid_t clock, timespec* time) noexcept {
   const auto result = static_cast<int>(syscall(SYS_clock_gettime, clock, time));
   if (clock == CLOCK_BOOTTIME) time->tv_sec += slept_seconds;
@@ -51,7 +51,7 @@ TEST(SleepWatchTest, ReportsASleepThatIsLongerThanTheLimitOnce) {
 
 TEST(SleepWatchTest, DoesNotTakeAThreadThatGetsNoProcessorForASleep) {
   SleepWatch watch;
-  const Time before = steady_time() - 5s;  // the steady clock was read long before the boot clock
+  const Time before = steady_time() - 5s;  // the steady clock was read 5 s before the boot clock
   EXPECT_FALSE(watch.slept(before, 1s));
   slept_seconds += 2;
   EXPECT_TRUE(watch.slept(steady_time(), 1s));
@@ -76,7 +76,7 @@ TEST_F(AsyncBoardSleep, DisarmsAndSwitchesTheMotorsOff) {
   EXPECT_EQ(board.post(Command::osmc(1, Pwm(500), Direction::forward)), PostResult::no_link);
   EXPECT_EQ(restarts, 1);
   ASSERT_TRUE(run_until([&] { return board.in_control() && board.state().any(); }));
-  EXPECT_EQ(board.state().osmc(1).pwm, 0) << "another session has begun";
+  EXPECT_EQ(board.state().osmc(1).pwm, 0) << "another session has begun, without setpoints";
   EXPECT_EQ(board.post(Command::osmc(1, Pwm(500), Direction::forward)), PostResult::not_armed);
   EXPECT_EQ(restarts, 1);
 }

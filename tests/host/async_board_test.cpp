@@ -63,7 +63,7 @@ struct Undrained final : WrappedCarrier {
   void on_drained() override {}
 };
 
-// As a CAN bus: all hosts send from one place.
+// Models a CAN bus: all hosts send from one place.
 struct Bus final : IdleCarrier {
   explicit Bus(std::vector<std::string>& all) : sent(all) {}
   SendResult send(std::string_view bytes, Priority, Peer) override {
@@ -91,7 +91,7 @@ TEST_F(AsyncBoardTest, OnlyListensAsAWatcherOnABusButForLeasesAndStops) {
   result_of([&](auto end) { watching.async_send(Command::identify(), 600ms, end); });
   ASSERT_FALSE(sent.empty());
   for (const std::string& each : sent) EXPECT_EQ(each.substr(0, 2), "W:") << each;
-  EXPECT_FALSE(watching.link().causes.has(LinkCause::busy)) << "nobody controls it";
+  EXPECT_FALSE(watching.link().causes.has(LinkCause::busy)) << "no host controls the board";
   sent.clear();
   watching.async_send(Command::stop(), 50ms, [](const CommandResult&) {});
   ASSERT_TRUE(run_until([&] { return !sent.empty(); }));
@@ -107,7 +107,7 @@ TEST_F(AsyncBoardTest, SendsAStopWhateverItsTimeoutAndRepeatsOneThatIsPosted) {
     return std::count_if(sent.begin(), sent.end(),
                          [](const std::string& each) { return each.starts_with("E:STOP;"); });
   };
-  EXPECT_EQ(watching.post(Command::stop()), PostResult::no_link) << "it is not open";
+  EXPECT_EQ(watching.post(Command::stop()), PostResult::no_link) << "the board is not open";
   watching.open();
   for (const auto timeout : {0ms, -1ms}) {
     sent.clear();
@@ -159,7 +159,7 @@ TEST_F(AsyncBoardTest, GivesEverySubscriberTheNewestCause) {
   armed.async_arm(3s, [](const CommandResult&) {});
   ASSERT_TRUE(run_until([&] { return armed.link().reason == SafeReason::stop; }));
   ASSERT_FALSE(told.empty());
-  EXPECT_EQ(told.back(), DisarmCause::stop) << "the first one stopped the board meanwhile";
+  EXPECT_EQ(told.back(), DisarmCause::stop) << "the first board object has stopped the board";
 }
 
 TEST_F(AsyncBoardTest, ConfirmsThroughAFuture) {
@@ -247,7 +247,7 @@ TEST_F(AsyncBoardTest, RefusesTheSixtyFifthCommand) {
   for (std::size_t i = 0; i < Session::max_pending + 1; ++i)
     board.async_send(start_motor, 1s, note);
   ASSERT_TRUE(run_until([&] { return outcomes.size() == Session::max_pending + 1; }));
-  EXPECT_EQ(outcomes[0], Outcome::full) << "said at once";
+  EXPECT_EQ(outcomes[0], Outcome::full) << "a full queue must be reported at once";
   EXPECT_EQ(std::count(outcomes.begin(), outcomes.end(), Outcome::confirmed),
             static_cast<long>(Session::max_pending));
 }
@@ -267,14 +267,14 @@ TEST_F(AsyncBoardTest, CancelsWhenItClosesAndNoCallbackFollows) {
   EXPECT_FALSE(board.post(start_motor));
   EXPECT_TRUE(outcomes.empty()) << "handlers run on the loop";
   io.restart();
-  io.run();  // ends: nothing is left
+  io.run();  // returns: no work is left
   const std::vector<Outcome> expected{Outcome::cancelled, Outcome::closed, Outcome::closed,
                                       Outcome::closed};
-  EXPECT_EQ(outcomes, expected) << "the stop cancelled the first";
-  EXPECT_THROW(board.open(), Error) << "once only";
+  EXPECT_EQ(outcomes, expected) << "the stop cancels the first command";
+  EXPECT_THROW(board.open(), Error) << "open() is allowed once";
 }
 
-// A path that cannot be opened while it has trouble.
+// A path that cannot be opened while it reports trouble.
 struct Obstructed final : IdleCarrier {
   void open(Handler& handler) override {
     if (trouble) throw Error(*trouble);
@@ -297,7 +297,7 @@ TEST_F(AsyncBoardTest, IsNotOpenIfNoPathOpensThoughOneOpenedInAnEarlierAttempt) 
   EXPECT_EQ(problem_of([&] { other.open(); }).kind, ErrorKind::open);
 }
 
-// The board may be destroyed wherever the user's code runs.
+// The user's code may destroy the board in any callback.
 struct DestroyedIn : testing::TestWithParam<const char*>, OnALoop {};
 INSTANTIATE_TEST_SUITE_P(AsyncBoard, DestroyedIn,
                          testing::Values("handler", "state", "heartbeat", "link", "nack"),
@@ -332,7 +332,7 @@ TEST_P(DestroyedIn, TheBoardMayBeDestroyedInAnyCallback) {
   }
 }
 
-// The transport is up at once, and reports that inside of open().
+// The transport is up at once, and reports that inside open().
 TEST(AsyncBoardEnd, MayComeInsideAnEventOfOpening) {
   asio::io_context io;
   AsyncBoard closed(io, "sim:");
@@ -342,7 +342,7 @@ TEST(AsyncBoardEnd, MayComeInsideAnEventOfOpening) {
   destroyed->on_event([&](const CarrierEvent&) { destroyed.reset(); });
   destroyed->open();
   EXPECT_FALSE(destroyed);
-  io.run();  // ends: no timer is left
+  io.run();  // returns: no timer is left
 }
 
 TEST(AsyncBoardEnd, IsDestroyedBeforeOrWithoutItsLoop) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program that streams setpoints to a simulated board in real time: no motor starts by itself.
+// A program that streams setpoints to a simulated board in real time: no motor may start by itself.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -18,7 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 using firmware::BoardState;
 
-// Posts a setpoint every 2 ms, as a teleoperation does, until the end of the test.
+// Posts a setpoint every 2 ms, like teleop, until the end of the test.
 class Stream {
  public:
   explicit Stream(Board& board)
@@ -34,7 +34,7 @@ class Stream {
     ended_ = true;
     thread_.join();
   }
-  // The result of the last post, after another hundred.
+  // The result of the last of 100 more posts.
   PostResult::Value later() {
     const int last = turns_ + 100;
     for (int turns = turns_; turns < last; turns = turns_) turns_.wait(turns);
@@ -96,7 +96,7 @@ TEST(BoardArming, ArmsABoardThatIsStopped) {
 TEST(BoardArming, ClosingTheSupplyStartsNothingThatWasCommandedBefore) {
   Board board("sim:", at_will());
   board.wait_active();
-  board.osmc(1).set_pwm(500, Direction::forward);  // as a network delivers it that held it back
+  board.osmc(1).set_pwm(500, Direction::forward);  // like a datagram that the network delayed
   EXPECT_EQ(driven(board), 500);
   board.arm();
   EXPECT_EQ(driven(board), 0);

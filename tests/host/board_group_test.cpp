@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Groups of commands from end to end: r4::Board and r4::AsyncBoard opposite simulated boards, and
-// when the registers of the chips change.
+// Groups of commands from end to end: r4::Board and r4::AsyncBoard with simulated boards, and the
+// times at which the registers of the chips change.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,11 +26,11 @@ using namespace std::chrono_literals;
 
 constexpr Direction forward = Direction::forward;
 
-// The time on the bus at which each wheel begins to turn as it should: the outputs of the chips
+// The time on the I2C bus at which each wheel begins to turn as wanted: the outputs of the chips
 // change at the end of a transfer.
 class Wheels final : public sim::I2cObserver {
  public:
-  // `osmc`: the number of OSMC channels among the four; the rest are DHB12 channels.
+  // `osmc`: the number of OSMC channels among the four wheels; the other wheels are DHB12 channels.
   Wheels(sim::BoardChips& chips, Drive wanted, int osmc)
       : chips_(chips), wanted_(wanted), osmc_(osmc) {
     chips_.bus.set_observer(this);
@@ -63,7 +63,7 @@ class Wheels final : public sim::I2cObserver {
   std::optional<std::uint64_t> changed_ns_[4];
 };
 
-// The skew of four wheels that are set by one apply().
+// The time between the first and the last of four wheels that one apply() sets.
 double skew_of(const std::string& transport, int osmc, Drive before, Drive wanted) {
   BoardInAThread simulated(transport);
   Board board(simulated.url(), at_will());

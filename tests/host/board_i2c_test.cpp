@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Devices on the user's bus, by r4::Board.
+// Devices on the user's I2C bus, through r4::Board.
 #include <gtest/gtest.h>
 
 #include "r4link/board.hpp"
@@ -42,7 +42,7 @@ TEST_F(BoardI2c, PutsRepeatedReadingsIntoTheState) {
   for (int i = 0; i < 100 && state.raw.i2c[0].data.size == 0; ++i) state = board.next_state();
   ASSERT_EQ(state.raw.i2c[0].data.size, 1);
   EXPECT_EQ(state.raw.i2c[0].data.bytes[0], 0x68);
-  // A board that is late samples after the T of its state.
+  // A board whose loop is late samples after the T of its state.
   EXPECT_LE(static_cast<std::int32_t>(state.t_ms - state.raw.i2c[0].t_ms), 40);
   board.i2c().poll_off(1);
   for (int i = 0; i < 100 && state.raw.i2c[0].data.size != 0; ++i) state = board.next_state();

@@ -35,7 +35,7 @@ std::string temporary_path(const std::string& name) {
   return testing::TempDir() + "r4-" + name + std::to_string(::getpid());
 }
 
-// True if `done` becomes true within 5 s. It is checked after each state of the board.
+// True if `done` becomes true within 5 s. Checks it after each state of the board.
 template <class Done>
 [[nodiscard]] bool comes_true(Board& board, Done done) {
   const auto end = std::chrono::steady_clock::now() + 5s;
@@ -121,8 +121,8 @@ TEST(BoardPaths, AreOpenedLaterIfTheyCannotBeOpenedYet) {
   std::filesystem::remove(link);
 }
 
-// As if a second device is plugged in that "serial:auto" cannot tell from the board: an Error of
-// kind usage.
+// Models a second device that "serial:auto" cannot distinguish from the board: an Error of kind
+// usage.
 TEST(BoardPaths, AreNotDisturbedByAPathThatHasAnotherDevice) {
   const std::string link = temporary_path("odd-");
   BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
@@ -140,7 +140,7 @@ TEST(BoardPaths, AreNotDisturbedByAPathThatHasAnotherDevice) {
   EXPECT_EQ(board.link().carrying, 1);
 }
 
-// One end of a carrier in memory that can be cut, with an event or without.
+// One end of a carrier in memory. The test can cut it, with or without an event.
 class Cuttable final : public WrappedCarrier {
  public:
   using WrappedCarrier::WrappedCarrier;
@@ -197,7 +197,7 @@ TEST_F(BoardPathsInMemory, AreReportedWhenTheyBeginOrCeaseToCarry) {
   std::vector<PathStatus> told;
   const Subscription keep = board->on_path([&](const PathStatus& path) { told.push_back(path); });
   paths[0]->plug(false);
-  ASSERT_EQ(told.size(), 1U) << "at once";
+  ASSERT_EQ(told.size(), 1U) << "the event must be reported at once";
   EXPECT_EQ(told[0].state, PathState::down);
   EXPECT_EQ(board->link().state, HostLinkState::active);
   paths[0]->plug(true);
@@ -217,7 +217,7 @@ TEST_F(BoardPathsInMemory, CostNoHeapPerDatagram) {
   const std::uint64_t states = board->statistics().states;
   run_for(500ms);
   EXPECT_GT(board->statistics().states, states + 20);
-  EXPECT_LE(bench::allocations() - before, 10U) << "of the timer of this test";
+  EXPECT_LE(bench::allocations() - before, 10U) << "only the timer of this test allocates";
 }
 
 TEST_F(BoardPathsInMemory, HaveNumbersInARecording) {
@@ -231,8 +231,8 @@ TEST_F(BoardPathsInMemory, HaveNumbersInARecording) {
   text << std::ifstream(file).rdbuf();
   std::filesystem::remove(file);
   for (const std::string path : {" 1", " 2"}) {
-    EXPECT_TRUE(contains(text.str(), path + "< AIN24:")) << "brought";
-    EXPECT_TRUE(contains(text.str(), path + "> H:ROS2-R4;")) << "carried";
+    EXPECT_TRUE(contains(text.str(), path + "< AIN24:")) << "the path must bring states";
+    EXPECT_TRUE(contains(text.str(), path + "> H:ROS2-R4;")) << "the path must carry heartbeats";
   }
 }
 

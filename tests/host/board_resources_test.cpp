@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the system refuses a program is an Error that says so, whichever call needed it.
+// If the system refuses a resource, the call that needed it throws an Error with that reason.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -20,7 +20,7 @@ namespace {
 
 const std::string a_board = "udp://127.0.0.1:9?listen=0";
 
-// The error of `action` in a thread to which the system refuses that.
+// The error of `action` in a thread to which the system refuses the call `refused`.
 std::string error_where(const RefusedCall& refused, const std::function<void()>& action) {
   std::string text = "none";
   in_a_thread_of_its_own([&] {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board that is watched, controlled and watched again, without being closed: AsyncBoard and
-// Board.
+// An open board changes between watching and control: AsyncBoard and Board.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -36,7 +35,7 @@ BoardOptions watching() {
 }
 
 struct BoardRoles : testing::TestWithParam<std::vector<std::string>>, OnALoop {
-  // The outcome of what `start(handler)` starts.
+  // The outcome of the call that `start(handler)` starts.
   template <class Start>
   Outcome end_of(Start start) {
     return result_of(start).outcome;
@@ -61,7 +60,7 @@ struct BoardRoles : testing::TestWithParam<std::vector<std::string>>, OnALoop {
   int states = 0;
   Subscription counting = board.on_state([this](const auto&, const auto&) { ++states; });
 };
-// A path that is opened anew with the role, one that serves both, and the two together.
+// A path that is reopened for another role, a path that serves both roles, and both paths together.
 const std::vector<std::string> kinds_of_paths[] = {{"pty"}, {"udp"}, {"pty", "udp"}};
 INSTANTIATE_TEST_SUITE_P(Transports, BoardRoles, testing::ValuesIn(kinds_of_paths),
                          [](const auto& paths) {
@@ -91,7 +90,7 @@ TEST_P(BoardRoles, AreTakenAndGivenBackAgainAndAgain) {
     EXPECT_EQ(board.link().reason, SafeReason::link);
     EXPECT_EQ(problem_of([&] { board.post(turn_slowly); }).kind, ErrorKind::usage);
   }
-  EXPECT_EQ(release(), Outcome::confirmed) << "it watches already";
+  EXPECT_EQ(release(), Outcome::confirmed) << "the board is only watched already";
 }
 
 TEST_P(BoardRoles, KeepRecordingsStatisticsAndIdentity) {
@@ -147,7 +146,8 @@ TEST_P(BoardRoles, MayChangeInACallback) {
     board.async_release_control(2s, [&](const CommandResult& result) { released = result; });
   });
   ASSERT_TRUE(run_until([&] { return released && released->outcome == Outcome::confirmed; }));
-  ASSERT_TRUE(run_until([&] { return board.in_control(); })) << "it takes control at each state";
+  ASSERT_TRUE(run_until([&] { return board.in_control(); }))
+      << "the callback takes control at each state";
 }
 
 TEST_P(BoardRoles, OfABoardThatIsSilentEndAtTheTimeout) {
@@ -167,12 +167,12 @@ TEST_P(BoardRoles, EndWithTheBoard) {
   ASSERT_TRUE(run_until([&] { return released && closed; }));
   EXPECT_EQ(released->outcome, Outcome::closed);
   EXPECT_TRUE(closed->outcome == Outcome::confirmed || closed->outcome == Outcome::refused)
-      << "the first farewell may have been obeyed already";
+      << "the board may have obeyed the first farewell already";
   EXPECT_TRUE(simulated.is_without_host());
   EXPECT_EQ(problem_of([&] { board.take_control(); }).kind, ErrorKind::usage);
 }
 
-// A path that another program may control.
+// A path on which another program may control the board.
 struct Contested final : IdleCarrier {
   explicit Contested(bool taken) : is_taken(taken) {}
   void change_role(BoardRole role) override {
@@ -191,7 +191,8 @@ TEST(BoardRole, IsRefusedAsAWholeWhereOneOfThePathsIsTaken) {
   paths.push_back(std::move(free));
   paths.push_back(std::make_unique<Contested>(true));
   AsyncBoard board(io, std::move(paths), watching());
-  EXPECT_EQ(problem_of([&] { board.take_control(); }).kind, ErrorKind::usage) << "not open yet";
+  EXPECT_EQ(problem_of([&] { board.take_control(); }).kind, ErrorKind::usage)
+      << "the board is not open yet";
   board.open();
   EXPECT_EQ(problem_of([&] { board.take_control(); }).reason, "taken");
   EXPECT_EQ(first.roles, (std::vector<BoardRole>{BoardRole::control, BoardRole::watch}));
@@ -216,7 +217,8 @@ TEST(BoardRole, IsRefusedByNameWhereAnotherProgramControlsAndTheBoardIsWatchedOn
     EXPECT_EQ(driver.role(), BoardRole::watch);
     watcher.take_control();
     watcher.wait_active();
-    EXPECT_GT(driver.next_state().t_ms, 0U) << "beside the program that controls now";
+    EXPECT_GT(driver.next_state().t_ms, 0U)
+        << "a watcher hears states while another program controls";
   }
   watcher.arm();
   watcher.osmc(1).set_pwm(358, Direction::forward);
@@ -229,8 +231,8 @@ TEST(BoardRole, IsRefusedByNameWhereAnotherProgramControlsAndTheBoardIsWatchedOn
   EXPECT_EQ(problem_of([&] { watcher.release_control(); }).outcome, Outcome::closed);
 }
 
-// Commands may meet the change on their way to the loop: then no motor turns, and the program goes
-// on.
+// Commands of other threads may reach the loop during the change: then no motor turns, and the
+// program continues.
 TEST(BoardRole, MayBeChangedWhileOtherThreadsCommand) {
   BoardInAThread simulated("udp");
   BoardOptions options = watching();

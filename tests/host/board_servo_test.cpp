@@ -37,7 +37,8 @@ TEST_F(BoardServo, IsDrivenInDegreesByItsOwnCalibration) {
   EXPECT_EQ(state.servo_us(16), 1500);
   EXPECT_NEAR(board.servo(3).calibration().degrees(state.servo_us(3))->value, 30, 0.05);
   board.servo(3).set(Microseconds(0));
-  EXPECT_FALSE(gripper.degrees(board.next_state().servo_us(3))) << "off";
+  EXPECT_FALSE(gripper.degrees(board.next_state().servo_us(3)))
+      << "a servo that is off has no angle";
 }
 
 TEST_F(BoardServo, RefusesDegreesThatItsCalibrationDoesNotHave) {
@@ -50,7 +51,7 @@ TEST_F(BoardServo, RefusesDegreesThatItsCalibrationDoesNotHave) {
   board.servo(1).calibrate(gripper);
   EXPECT_EQ(problem_of([&] { board.servo(1).set(Degrees(46)); }).kind, ErrorKind::usage);
   EXPECT_EQ(problem_of([&] { board.servo(1).post(Degrees(-46)); }).kind, ErrorKind::usage);
-  EXPECT_EQ(board.next_state().servo_us(1), 1200) << "nothing was sent";
+  EXPECT_EQ(board.next_state().servo_us(1), 1200) << "a refused angle must not be sent";
   for (const int none : {-1, 0, 17}) {
     EXPECT_TRUE(
         contains(problem_of([&] { board.servo(none).calibrate(gripper); }).fix, "give 1 to 16"));

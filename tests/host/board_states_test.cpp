@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// States, one after the other: which wait, which give way, and gaps where none may be lost.
+// The order of states: which states wait, which are replaced, and gaps if every state is wanted.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -70,7 +70,7 @@ TEST(BoardStates, HaveNoHolesWhileACallbackAndTheLoopSleep) {
 TEST(BoardStates, EndWithTheBoardAndOutliveIt) {
   std::optional<Board> board("udp://127.0.0.1:9?listen=0");
   States states = board->states();
-  EXPECT_FALSE(states.take(1ms)) << "there is no such board";
+  EXPECT_FALSE(states.take(1ms)) << "the board has sent no state";
   EXPECT_FALSE(states.ended());
   auto waiting = std::async(std::launch::async, [&] { return states.take(60s); });
   EXPECT_EQ(waiting.wait_for(20ms), std::future_status::timeout);
@@ -91,7 +91,7 @@ TEST(BoardStates, EndTheWaitWithWhatOnWaitThrows) {
   EXPECT_THROW(states.take(60s), EnoughWaited);
 }
 
-// Against a deque, whatever the order of puts and takes.
+// Compared with a deque, for any order of puts and takes.
 TEST(BoardStates, ComeInOrderAndReportEachGapOnceHoweverTheyArePutAndTaken) {
   for (std::uint32_t seed = 0; seed < 40; ++seed) {
     std::mt19937 random(seed);

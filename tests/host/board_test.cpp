@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Board opposite simulated boards in real time: in process, over UDP and over a pty.
+// r4::Board with simulated boards in real time: in process, over UDP and over a pty.
 #include "r4link/board.hpp"
 
 #include <fmt/format.h>
@@ -68,7 +68,7 @@ TEST_P(BoardOver, ConfirmsEveryCommandOnceExecuted) {
   std::vector<std::string> executed = simulated.executed();
   ASSERT_GE(executed.size(), after_settings.size());
   executed.erase(executed.begin(), executed.end() - static_cast<long>(after_settings.size()));
-  EXPECT_EQ(executed, after_settings) << "each once, in order";
+  EXPECT_EQ(executed, after_settings) << "each command must be executed once, in order";
 }
 
 TEST_F(DrivenBoard, SetsThePinOfEveryChannelAndReadsItBack) {
@@ -96,7 +96,7 @@ TEST_P(BoardOver, StopsUntilCleared) {
 
   board.send(Command::clear());
   board.wait_active();
-  EXPECT_EQ(board.next_state().osmc(1).pwm, 0) << "nothing comes back after a stop";
+  EXPECT_EQ(board.next_state().osmc(1).pwm, 0) << "no output may come back after a stop";
   board.osmc(1).set_pwm(5, Direction::forward);
 }
 
@@ -131,13 +131,13 @@ TEST_P(BoardOver, TheBoardIsSafeAndFreeWhenTheHostHasEnded) {
       safe = each.application().state() == BoardState::safe &&
              each.application().reason() == SafeReason::link;
     });
-    EXPECT_TRUE(safe) << "before close() returns";
+    EXPECT_TRUE(safe) << "the board must be safe before close() returns";
   }
 }
 
 TEST(Board, ReportsARestartBeforeTheNewState) {
   BoardInAThread simulated("pty", "0.5 reboot\n");
-  std::vector<int> duties;  // of OSMC 1, in the order of the callbacks; -1: the restart
+  std::vector<int> duties;  // of OSMC 1, in the order of the callbacks; -1 marks the restart
   const First<std::vector<int>> four;
   Board board(simulated.url(), at_will());
   board.on_restart([&] { duties.push_back(-1); });
@@ -185,23 +185,23 @@ TEST(Board, ReportsThatAnotherHostControlsTheBoard) {
   Board owner(simulated.url(), at_will());
   owner.wait_active();
   BoardOptions options = at_will();
-  options.session.stop_linger = 0ms;  // the owner clears it at once
+  options.session.stop_linger = 0ms;  // the owner clears the stop at once
   Board other(simulated.url(), options);
   const Problem problem = problem_of([&] { other.osmc(1).set_pwm(1, Direction::forward, 300ms); });
   EXPECT_EQ(problem.kind, ErrorKind::refused);
   EXPECT_TRUE(contains(problem.reason, "another host controls the board"));
   EXPECT_TRUE(other.link().causes.has(LinkCause::busy));
 
-  other.stop();  // which anyone may
+  other.stop();  // any host may stop a board
   EXPECT_TRUE(hears_of(owner, SafeReason::stop));
   owner.send(Command::clear());
   owner.close();
-  ASSERT_NO_THROW(other.wait_active(5s)) << "control is free once the owner is silent";
+  ASSERT_NO_THROW(other.wait_active(5s)) << "control is free when the owner is silent";
 }
 
 TEST_F(DrivenBoard, PostsCommandsAndGroupsAndWaitsForStatesWithoutTheHeap) {
   board.osmc(1).set_pwm(1, Direction::forward);
-  board.identify();  // then it is known that the board executes groups
+  board.identify();  // so that the session knows that the board executes groups
   int sent = 0;
   const std::uint64_t before = bench::allocations_of_this_thread();
   for (int i = 0; i < 20; ++i) {
@@ -255,7 +255,7 @@ TEST(Board, ThrowsForAValueOutsideItsRangeAndNamesTheRange) {
   is_usage([&] { board.post(Command::osmc(1, Pwm(5000), Direction::forward)); });
   EXPECT_EQ(problem_of([&] { board.osmc(5).set_pwm(1, Direction::forward); }).text(),
             "O:1,1,5: no such channel; use O:pwm,dir,ch with pwm 0-4095, dir 0 or 1, ch 1-4");
-  EXPECT_EQ(board.statistics().refused, 0U) << "none of them was sent";
+  EXPECT_EQ(board.statistics().refused, 0U) << "an invalid command must not be sent";
 }
 
 TEST_F(DrivenBoard, StopsWithoutWaiting) {
@@ -285,7 +285,8 @@ TEST(Board, MeasuresTheLink) {
   EXPECT_LT(statistics.state_rate_hz, 150);
   EXPECT_EQ(statistics.loss(), 0);
   board.close();
-  EXPECT_GE(board.statistics().states, statistics.states) << "they stay after the end";
+  EXPECT_GE(board.statistics().states, statistics.states)
+      << "the statistics stay available after close()";
 }
 
 TEST(Board, TakesCommandsFromSeveralThreadsAtOnce) {
@@ -337,7 +338,7 @@ TEST(Board, CallsBackInAnotherThreadUntilTheSubscriptionEnds) {
   subscription.cancel();
   const int seen = states;
   for (int i = 0; i < 3; ++i) board.next_state();
-  EXPECT_EQ(states, seen) << "none after it was ended";
+  EXPECT_EQ(states, seen) << "no state may come after the callback was ended";
 }
 
 TEST(Board, ObeysACallbackThatWaits) {
@@ -372,7 +373,7 @@ TEST(Board, LetsACallbackEndItself) {
       board.on_state([&, captured, payload, ready = subscribed.get_future().share()](const State&) {
         ready.wait();
         subscription.cancel();
-        captured.set(*payload);  // of the function that has ended
+        captured.set(*payload);  // belongs to a function that has returned
       });
   subscribed.set_value();
   EXPECT_EQ(captured.get(), 42);
@@ -397,10 +398,10 @@ TEST(Board, ClosesTwiceAndThenRefusesEverything) {
   board.watchdog(10ms);
   board.feed();
   board.stop_async();
-  EXPECT_NE(board.state().t_ms, 0U) << "the last state stays";
+  EXPECT_NE(board.state().t_ms, 0U) << "the last state stays available";
 }
 
-// Closed or destroyed.
+// close() and the destructor.
 TEST(Board, WakesAllCallsThatWaitWhenItEnds) {
   for (const bool destroyed : {false, true}) {
     auto board = std::make_unique<Board>("udp://127.0.0.1:9?listen=0", at_will());
@@ -433,7 +434,7 @@ TEST(Board, WakesAllCallsThatWaitWhenItEnds) {
 TEST(Board, IsDestroyedInACallback) {
   auto board = std::make_unique<Board>("sim:", at_will());
   const First<bool> destroyed;
-  // Destroyed with the thread of the board's callbacks, which must end too.
+  // Destroyed in the thread of the board's callbacks, which must end, too.
   struct AtThreadExit {
     First<bool> ended;
     ~AtThreadExit() { ended.set(true); }

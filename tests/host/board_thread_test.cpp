@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Board and its threads: calls while a transport holds the link's thread up, the notices of a
+// The threads of r4::Board: calls while a transport delays the thread of the link, the notices of a
 // callback, and the board while a callback runs.
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -45,7 +45,8 @@ struct BoardThread : testing::Test {
     };
     return result;
   }
-  // After the next command.
+  // True if the board has executed `command`. Sends another command first, because the board
+  // executes commands in order.
   bool has_executed(const std::string& command) {
     board.servo(1).set(Microseconds(1500));
     const std::vector<std::string> all = simulated.executed();
@@ -61,7 +62,7 @@ TEST_F(BoardThread, NeverSendsACommandWhoseCallHasThrown) {
   hold_up();
   const auto begin = std::chrono::steady_clock::now();
   const Problem problem = problem_of([&] { board.send("O:777,1,1", 50ms); });
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, 450ms) << "the deadline is that of the call";
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 450ms) << "the call must keep its deadline";
   EXPECT_EQ(problem.kind, ErrorKind::refused);
   EXPECT_EQ(problem.thing, "O:777,1,1");
   EXPECT_TRUE(contains(problem.reason, "not sent"));
@@ -91,12 +92,12 @@ TEST_F(BoardThread, SendsAStopHoweverLate) {
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::stop));
 }
 
-// The transport's name is written anew each time a USB board is plugged in.
+// The name of the transport changes each time a USB board is plugged in.
 TEST(BoardName, IsWholeHoweverOftenTheBoardIsPluggedIn) {
   const std::string path = "/tmp/r4-board-name-" + std::to_string(::getpid());
   auto simulated = std::make_unique<BoardInAThread>("pty:" + path);
   Board board("serial://" + path);
-  board.watchdog(1ms);  // is never fed, so no wait ends
+  board.watchdog(1ms);  // is never fed, so that no wait ends
   auto waiting =
       std::async(std::launch::async, [&] { return problem_of([&] { board.wait_active(60s); }); });
   ASSERT_EQ(waiting.wait_for(50ms), std::future_status::timeout);
@@ -137,7 +138,7 @@ TEST(BoardCallbacks, AreCalledFirstWithTheUpOfTheTransport) {
   }
 }
 
-// Each has a loop and a thread of its own; the port at which hosts listen is one.
+// Each board has a separate loop and thread, but hosts listen on one port.
 TEST(TwoBoards, OfOneProgramShareThePortAndGetTheirOwnDatagrams) {
   BoardInAThread left("udp");
   BoardInAThread right("udp");
@@ -180,7 +181,7 @@ TEST(BoardCallbacks, AreNotCalledWithAStateThatNeverCame) {
   Board board("udp://127.0.0.1:9?listen=0");
   std::atomic<bool> called{false};
   board.on_state([&](const State&) { called = true; });
-  board.statistics();  // after it
+  board.statistics();  // queued after the callback
   EXPECT_FALSE(called);
 }
 
@@ -200,7 +201,7 @@ TEST(BoardCallbacks, GetEveryNoticeIfTheyAreThereBeforeTheTransport) {
     board.next_state();
   }
   ASSERT_GE(told.size(), 3U);
-  EXPECT_EQ(told[0], "connecting") << "how the link was before the transport was opened";
+  EXPECT_EQ(told[0], "connecting") << "the first status is from before the transport was opened";
   EXPECT_EQ(told[1], "up");
   EXPECT_EQ(told.back(), "active");
 }
@@ -273,7 +274,7 @@ TEST(BoardCallbacks, OfOneKindAreCalledInTheirOrderAndEndedOneByOne) {
   EXPECT_EQ(calls.get(), "ababbbbb");
 }
 
-// Waits in another thread for a call that runs.
+// cancel() waits in another thread until a running callback has returned.
 TEST(BoardCallbacks, AreNotRunningWhenTheirEndHasReturned) {
   Board board("sim:");
   std::promise<void> running;
@@ -325,7 +326,7 @@ TEST_F(HangingCallbacks, EndTheHeartbeatsUntilTheyReturn) {
 
 TEST(BoardCallbacks, GetTheNewestOfTheStatesThatCameMeanwhile) {
   Board board("sim:");
-  board.send("F:DEFAULT");  // from now on there is no other news
+  board.send("F:DEFAULT");  // no other news comes after this
   std::promise<void> late;
   const First<std::uint32_t> next;
   board.on_state([&, next, calls = 0](const State& state) mutable {
@@ -335,7 +336,7 @@ TEST(BoardCallbacks, GetTheNewestOfTheStatesThatCameMeanwhile) {
   });
   std::uint32_t newest = 0;
   for (int i = 0; i < 5; ++i) newest = board.next_state().t_ms;
-  // Calls that wait get a state before callbacks do: when the next one has come, this one was
+  // Waiting calls get a state before callbacks do. So when the next state has come, this state was
   // reported.
   board.next_state();
   late.set_value();
@@ -343,7 +344,7 @@ TEST(BoardCallbacks, GetTheNewestOfTheStatesThatCameMeanwhile) {
 }
 
 struct BoardLoop : DrivenBoard {
-  // The outcome of what `start(board, handler)` starts on the loop.
+  // The outcome of the call that `start(board, handler)` starts on the loop.
   template <class Start>
   std::future<Outcome> begin(Start start) {
     const auto ended = std::make_shared<std::promise<Outcome>>();
@@ -374,7 +375,7 @@ TEST_F(BoardLoop, EndsItsWorkAsClosedAndThenTakesNoMore) {
   board.close();
   ASSERT_EQ(late.wait_for(0s), std::future_status::ready);
   EXPECT_EQ(late.get(), Outcome::closed);
-  EXPECT_FALSE(board.post_to_loop([](AsyncBoard&) { ADD_FAILURE() << "it is closed"; }));
+  EXPECT_FALSE(board.post_to_loop([](AsyncBoard&) { ADD_FAILURE() << "the board is closed"; }));
 }
 
 }  // namespace

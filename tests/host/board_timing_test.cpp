@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board's timeout and heartbeat interval are set together; waiting until it is active means
-// control.
+// The timeout and the heartbeat interval of a board are set together. After wait_active() the
+// program has control.
 #include <gtest/gtest.h>
 
 #include <optional>

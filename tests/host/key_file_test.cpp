@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program reads its key from a file that is for its owner alone.
+// A program reads its key from a file that only its owner can read.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>

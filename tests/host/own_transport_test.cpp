@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The transport of docs/reference/transports.md, "Writing another", between a Board and a simulated board.
+// The transport of docs/reference/transports.md, section "Writing another", between a Board and a
+// simulated board.
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 

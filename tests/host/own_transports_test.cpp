@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Boards on transports of a program's own whose calls may wait (r4link/transports/own_transport.hpp).
+// Boards on transports of the program itself, whose calls may wait
+// (r4link/transports/own_transport.hpp).
 #include <gtest/gtest.h>
 
 #include <asio/executor_work_guard.hpp>
@@ -32,7 +33,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// What both ends of a transport in memory have: whom to hand over what the other end sends, and faults.
+// One end of a transport in memory: the function that receives the datagrams of the other end, and
+// faults.
 template <class Received>
 class End {
  public:
@@ -56,7 +58,7 @@ class End {
     if (fails) throw std::runtime_error("the modem is gone");
   }
 
-  std::atomic<bool> opens{false};  // throws
+  std::atomic<bool> opens{false};  // true: open() throws
   std::atomic<bool> fails{false};
   std::atomic<int> openings{0};
   std::atomic<int> closings{0};
@@ -113,7 +115,7 @@ struct Adapter final : OwnCanBus, End<OwnCanBus::Received> {
   Adapter* other = nullptr;
 };
 
-// A simulated board on a thread of its own, on the carrier that `make(io, loop)` makes.
+// A simulated board on a separate thread, on the carrier that `make(io, loop)` makes.
 class SimulatedEnd {
  public:
   template <class Make>
@@ -191,7 +193,7 @@ TEST(OwnTransports, WhatTheFirstOpenThrowsIsThrownWhereTheBoardIsOpened) {
   modem->opens = true;
   try {
     const Board board(carrier_on(modem));
-    ADD_FAILURE() << "it is open";
+    ADD_FAILURE() << "the transport opened, although it must fail";
   } catch (const Error& error) {
     EXPECT_EQ(error.problem().thing, "modem");
     EXPECT_EQ(error.problem().reason, "no modem");
@@ -236,7 +238,7 @@ TEST(OwnTransports, ASendThatDoesNotReturnHoldsUpNothingElse) {
   board->wait_active();
   bench.here->hold = true;
   EXPECT_THROW(board->send("O:358,1,1", milliseconds(50)), Error);
-  board.reset();  // returns although send() still waits
+  board.reset();  // must return although send() still waits
   bench.here->hold = false;
   bench.here->hold.notify_all();
 }

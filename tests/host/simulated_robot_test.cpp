@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Events around a simulated board while a program drives it, made by the program's own test.
+// Events on a simulated board while a program drives it, caused by the test of the program.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -23,7 +23,7 @@ State await(Board& board, const std::function<bool(const State&)>& is_so) {
     state = board.next_state();
     if (is_so(state)) return state;
   }
-  ADD_FAILURE() << "no state came to be so";
+  ADD_FAILURE() << "no state fulfils the condition";
   return state;
 }
 
@@ -33,7 +33,7 @@ SimulatedRobot::Look await(Board& board, const SimulatedRobot& robot,
     if (is_so(robot.look())) return robot.look();
     board.next_state();
   }
-  ADD_FAILURE() << "the robot never looked so";
+  ADD_FAILURE() << "the robot never fulfilled the condition";
   return robot.look();
 }
 
@@ -66,7 +66,7 @@ TEST(SimulatedRobot, LetsTheHandleGoAndShowsThatTheMotorStops) {
   EXPECT_FALSE(robot.look().open);
 }
 
-// Its wheels turn at once, and its sensor shows the duty.
+// A robot whose wheels turn at once, and whose sensor shows the duty.
 struct LightRobot final : sim::RobotModel {
   void pass_millisecond(const sim::ChipPins& pins, bool supplied, Senses& senses) override {
     const int duty = supplied ? pins.osmc[1].pwm : 0;
@@ -88,7 +88,7 @@ TEST(SimulatedRobot, IsARobotOfTheProgramsOwn) {
   board.osmc(2).set_pwm(4000, Direction::forward);
   const State state = await(
       board, [](const State& now) { return now.distance_cm(3) == 77 && now.encoder(4) < -10; });
-  EXPECT_EQ(state.encoder(1), 0) << "the motor of the bench is not there";
+  EXPECT_EQ(state.encoder(1), 0) << "this robot has no motor of the default bench";
   EXPECT_NEAR(state.volts(Analog::ainsteer), 4.0, 0.02);
 }
 
@@ -115,7 +115,7 @@ TEST(SimulatedRobot, AMotorThatIsHeldFastStandsAndDrawsItsFullCurrent) {
   const auto idle = [&] {
     return await(board, robot, [](const auto& now) { return now.analog_cv[0] < 2400; });
   };
-  EXPECT_EQ(idle().encoder[0], 0) << "30 A through 20 mOhm, and no turn";
+  EXPECT_EQ(idle().encoder[0], 0) << "a stalled motor draws 30 A through 20 mOhm and does not turn";
   robot.happen("motor 1 free");
   await(board, robot, [](const auto& now) { return now.encoder[0] > 100; });
 }
@@ -161,7 +161,7 @@ TEST(BadLink, LosesDoublesAndDamagesDatagramsOfAnyBoard) {
   EXPECT_GT(statistics.packets.duplicate, 3U);
   EXPECT_GT(statistics.damaged, 1U);
   board.osmc(1).set_pwm(358, Direction::forward,
-                        std::chrono::seconds{10});  // it is repeated until it is confirmed
+                        std::chrono::seconds{10});  // the event is repeated until it is confirmed
   EXPECT_EQ(robot.look().pins.osmc[0].pwm, 358);
 }
 

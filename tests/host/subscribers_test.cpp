@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Callbacks and their handles; with a board's threads in board_thread_test.cpp.
+// Callbacks and their handles. board_thread_test.cpp tests them with the threads of a board.
 #include "host/subscribers.hpp"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 namespace r4::test {
 namespace {
 
-// What a callback captures, and what ends the callback when it goes.
+// An object that a callback captures. Its destructor cancels the callback.
 struct Captured {
   Subscription subscription;
   int* gone = nullptr;
@@ -41,7 +41,7 @@ TEST(Subscribers, EndedWithinTheCallLetGoWhenItIsOver) {
   captured->subscription = kind.add([captured, inside, &calls, &gone] {
     ++calls;
     inside->subscription.cancel();
-    EXPECT_EQ(gone, 0) << "it is still needed";
+    EXPECT_EQ(gone, 0) << "the captured object is still in use";
   });
   captured.reset();
   const auto call = [](auto& one) { one(); };

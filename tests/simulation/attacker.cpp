@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t memory = 4096;
 
-// The fields of a datagram, and those in front of its signature.
+// The fields of a datagram without the fields before its signature.
 std::string fields_of(const std::string& bytes) { return bytes.substr(0, bytes.find('^')); }
 std::string unsigned_fields_of(const std::string& bytes) {
   const std::string fields = fields_of(bytes);
@@ -46,7 +46,8 @@ const char* to_text(Attack::Kind kind) {
   return "?";
 }
 
-// Stops and questions are obeyed from anyone, and anyone may watch.
+// Keeps only datagrams that need a signature. A board obeys a stop and answers a question without
+// one.
 void Attacker::keep(std::vector<Heard>& list, Origin from, std::string_view bytes) {
   Datagram datagram;
   if (!read_datagram(Text(bytes), datagram) || asks_to_stop(datagram)) return;
@@ -64,7 +65,7 @@ void Attacker::on_board(std::string_view bytes) {
   echo_ = is_connecting_heartbeat(datagram) ? "0" : fmt::format("{}", board_t_);
 }
 
-// Numbered as the next of that host's.
+// With the next packet number of that host.
 std::string Attacker::own(const std::string& field, const Heard& like, Random& random) const {
   Datagram datagram;
   read_datagram(Text(like.bytes), datagram);
@@ -75,11 +76,11 @@ std::string Attacker::own(const std::string& field, const Heard& like, Random& r
 Attack Attacker::next(Random& random) {
   Attack attack;
   attack.kind = static_cast<Attack::Kind>(random.below(static_cast<int>(Attack::Kind::count)));
-  // A stop ends most of what a schedule is for.
+  // Few stops: after a stop the schedule tests little.
   if (attack.kind == Attack::Kind::stop && !random.chance(0.05)) attack.kind = Attack::Kind::replay;
   const std::vector<Heard>& heard_of = attack.kind == Attack::Kind::replay ? received_ : sent_;
   if (heard_of.empty()) return attack;
-  // The newest as likely as all others together.
+  // The newest datagram is as likely as all the other datagrams together.
   const Heard* const heard =
       random.chance(0.5) ? &heard_of.back() : &heard_of[random.below(heard_of.size())];
   attack.like = heard->from;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Somebody on the network of a board with a key, but without that key: hears all that is sent both
-// ways, and sends the board what it likes, from any address, whole and in time.
+// An attacker on the network of a board with a key. It does not have the key. It hears all
+// datagrams in both directions, and sends the board datagrams from any address, whole and in time.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace r4::simulation {
 
-// Whose it is, and when it was sent.
+// The host that sent a datagram, and when.
 struct Origin {
   int host = -1;
   std::uint32_t incarnation = 0;
@@ -22,26 +22,26 @@ struct Origin {
 
 struct Attack {
   enum class Kind : std::uint8_t {
-    replay,     // what the board has received before, be it just now
-    change,     // what a host has sent, with a digit changed
+    replay,     // a datagram that the board received, perhaps just now
+    change,     // a datagram of a host, with one digit changed
     strip,      // … without its signature
-    heartbeat,  // one of its own, with the right echo
-    command,    // one of its own, unsigned or with a made-up signature
-    other_key,  // … signed with a key of its own, at the highest counter
-    stop,       // E:STOP: that one is obeyed
+    heartbeat,  // a heartbeat by the attacker, with the right echo
+    command,    // a command by the attacker, unsigned or with a made-up signature
+    other_key,  // … signed with another key, at the highest counter
+    stop,       // E:STOP: the board obeys it
     count,
   };
   Kind kind = Kind::replay;
-  std::string bytes;  // empty: it knows nothing to send
-  int host = -1;      // whose address it takes; -1: one of its own
-  Origin like;        // of what it has heard and sends again, changed or not
+  std::string bytes;  // empty: the attacker knows nothing to send
+  int host = -1;      // whose address it takes; -1: its own address
+  Origin like;        // the datagram that it sends again, changed or not
 };
 const char* to_text(Attack::Kind kind);
 
 class Attacker {
  public:
-  // What goes over the network: a host sends, the board has received what a host sent, the board
-  // sends.
+  // The datagrams on the network: sent by a host; received by the board from a host; sent by the
+  // board.
   void on_sent(Origin from, std::string_view bytes) { keep(sent_, from, bytes); }
   void on_received(Origin from, std::string_view bytes) { keep(received_, from, bytes); }
   void on_board(std::string_view bytes);
@@ -55,10 +55,10 @@ class Attacker {
   static void keep(std::vector<Heard>& list, Origin from, std::string_view bytes);
   std::string own(const std::string& field, const Heard& like, Random& random) const;
 
-  // What needs a signature.
+  // Only datagrams that need a signature.
   std::vector<Heard> sent_;
   std::vector<Heard> received_;
-  std::string nonce_;  // of the board, and the T of its newest heartbeat and datagram
+  std::string nonce_;  // of the board; below: the T of its newest heartbeat
   std::string echo_ = "0";
   std::uint32_t board_t_ = 0;
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A working day of one board in virtual time: the application and the chip drivers on the model of
-// the board, every millisecond of it, with a host that drives it and an incident every few minutes.
-// Both the clock in milliseconds and the clock in microseconds wrap during the day. R4_DAY_HOURS
-// sets its length (8 by default), and R4_SEED its incidents.
+// the board, every millisecond of it, with a host that drives the board and an incident every few
+// minutes. The clock in milliseconds and the clock in microseconds both wrap during the day.
+// R4_DAY_HOURS sets its length (8 by default), and R4_SEED its incidents.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace {
 using firmware::BoardState;
 using firmware::Chip;
 
-// What can go wrong, and what the board calls it.
+// The incidents, and the cause that the board reports for each.
 enum class Incident {
   chip_off,
   chip_reset,
@@ -40,7 +40,8 @@ constexpr SafeReason reasons[] = {SafeReason::fault,  SafeReason::fault,     Saf
                                   SafeReason::handle, SafeReason::proximity, SafeReason::link,
                                   SafeReason::stop,   SafeReason::watchdog};
 
-// From the incident to the outputs safe: how the board learns of it.
+// The time from the incident until the outputs are safe. It depends on how the board detects the
+// incident.
 std::uint32_t limit_ms(Incident incident) {
   switch (incident) {
     case Incident::chip_off:
@@ -85,7 +86,7 @@ class Day final : private firmware::Port {
     live(300);
     ASSERT_EQ(application_.state(), BoardState::active);
   }
-  // Drives something else than before.
+  // Commands outputs at random.
   void drive() {
     command("R:1,On");  // the motors have supply
     for (int i = 0; i < 8; ++i) {
@@ -108,7 +109,7 @@ class Day final : private firmware::Port {
     }
   }
 
-  // An incident, its end, and the board is driven again.
+  // One incident and its end; then the board is driven again.
   void suffer(Incident incident) {
     const SafeReason reason = reasons[static_cast<int>(incident)];
     drive();
@@ -116,7 +117,7 @@ class Day final : private firmware::Port {
     const Chip chip = static_cast<Chip>(random_.below(firmware::chip_count));
     begin(incident, chip);
     const std::uint64_t began_ms = passed_ms_;
-    do {  // that a stepper stands is known a millisecond later
+    do {  // the stop of a stepper shows one millisecond later
       pass_millisecond();
       ASSERT_LE(passed_ms_ - began_ms, limit_ms(incident) + 1) << static_cast<int>(incident);
     } while (!all_off());
@@ -151,7 +152,7 @@ class Day final : private firmware::Port {
       EXPECT_EQ(state_.raw.encoder_index_counts[i] % sim::BoardModel::counts_a_turn, 0) << i;
       const std::int32_t beyond = state_.raw.encoder_counts[i] - state_.raw.encoder_index_counts[i];
       EXPECT_TRUE(std::abs(beyond) < sim::BoardModel::counts_a_turn) << i << ": " << beyond;
-      EXPECT_NEAR(state_.raw.encoder_hz[i], 0, 10) << i << ": it has run out";
+      EXPECT_NEAR(state_.raw.encoder_hz[i], 0, 10) << i << ": the wheel has stopped turning";
     }
   }
 
@@ -160,7 +161,7 @@ class Day final : private firmware::Port {
 
   int incidents[static_cast<int>(Incident::count)] = {};
   std::uint64_t states = 0;
-  int wrong_states = 0;  // not 10 ms after the one before
+  int wrong_states = 0;  // states that do not come 10 ms after their predecessor
   int unsafe_ms = 0;     // outputs live while the board is not ACTIVE
   std::uint64_t watched_ms = 0;
 
@@ -191,7 +192,7 @@ class Day final : private firmware::Port {
     }
   }
 
-  // Where the stepper motors are.
+  // The positions of the stepper motors.
   std::array<std::int32_t, stepper_channels> shafts() const {
     std::array<std::int32_t, stepper_channels> steps{};
     for (int i = 0; i < stepper_channels; ++i) steps[i] = board_.stepper_shaft(i + 1);
@@ -235,8 +236,9 @@ class Day final : private firmware::Port {
     hangs_ = false;
     ended_ms_ = passed_ms_;
   }
-  // Does everything that can still be reached stand? A chip that does not answer keeps doing what it
-  // did, and so do all on a held bus: the handle's relay and the emergency switch are there for that.
+  // True if every output that the board can still reach is off. A chip that does not answer keeps
+  // its outputs, and so do all chips on a held bus: the relay of the dead-man's handle and the
+  // emergency switch are there for that case.
   bool all_off() {
     sim::ChipPins pins = board_.pins();
     const sim::ChipPins safe = sim::ChipPins::safe();
@@ -298,7 +300,7 @@ class Day final : private firmware::Port {
   bool held_ = false;
   bool stand_ = true;  // no stepper has moved in the last millisecond
   std::uint64_t ended_ms_ =
-      0;  // the last incident; a chip that is back is reached with the next try
+      0;  // of the last incident; the next try reaches a chip that answers again
   Chip silent_ = Chip::count;
   std::uint32_t pnum_ = 7;
   std::uint32_t heard_t_ = 0;
@@ -321,7 +323,7 @@ TEST(BoardDay, EveryIncidentEndsSafeAndTheBoardDrivesAgain) {
   std::printf("%llu states in %llu ms, %d off the grid; %d incidents\n",
               static_cast<unsigned long long>(day.states),
               static_cast<unsigned long long>(day.passed_ms()), day.wrong_states, next);
-  // Off the grid: once after each outage of the link or the loop.
+  // The grid of 10 ms may be missed once after each outage of the link or the loop.
   EXPECT_LE(day.wrong_states, 1 + day.incidents[static_cast<int>(Incident::silence)] +
                                   day.incidents[static_cast<int>(Incident::hang)]);
 }

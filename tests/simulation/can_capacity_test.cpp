@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How many boards one bus carries, on a bus that is exact to the bit.
+// The number of boards that one bus carries, on a bus that is exact to the bit.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@ void print(const char* what, const BackboneResult& result) {
       result.commands.sent, result.commands.lost(), result.commands.max_late_us / 1e3);
 }
 
-// `replaced`: states that may give way to newer ones, of a thousand.
+// `replaced`: states per thousand that newer states may replace.
 void expect_all_there(const BackboneResult& result, std::uint32_t replaced = 0) {
   EXPECT_LE(result.load, 0.90);
   EXPECT_EQ(result.telemetry.lost(), 0U);
@@ -31,7 +31,7 @@ void expect_all_there(const BackboneResult& result, std::uint32_t replaced = 0) 
   EXPECT_LT(result.max_silence_us, link_timeout_us) << "a false trip";
 }
 
-FieldSet confirmed_fields() {  // what our host selects
+FieldSet confirmed_fields() {  // the fields that our host selects
   FieldSet fields = FieldSet::paper_default();
   fields.add(StateField::safe);
   fields.add(StateField::cmd);
@@ -48,8 +48,8 @@ TEST(CanCapacity, EightBoardsInPackedFormFitOneClassicBus) {
   }
 }
 
-// Ten times a second, all that there is wants the bus at once: more than a state's period of work.
-// The boards that lose the arbitration skip a state then.
+// Ten times a second, everything that can be sent wants the bus at once: more than the bus carries
+// in one state period. Boards that lose the arbitration then skip a state.
 constexpr std::uint32_t replaced_in_step = 12;
 
 TEST(CanCapacity, EightBoardsFitWhenAllOfThemSpeakAtTheSameInstant) {
@@ -120,7 +120,7 @@ TEST(CanCapacity, EightBoardsAtAKilohertzFitAnFdBusInPackedForm) {
   }
 }
 
-// Damaged frames are sent again by the controllers: they cost time, and no datagram.
+// The controllers repeat damaged frames: that costs time, but no datagram.
 TEST(CanCapacity, OneDamagedFrameInAHundredLosesNothing) {
   BackboneOptions options;
   options.bus.corrupted = 0.01;
@@ -129,7 +129,7 @@ TEST(CanCapacity, OneDamagedFrameInAHundredLosesNothing) {
   expect_all_there(result);
 }
 
-// Frames that a listener misses are gone: a datagram of n frames arrives with 0.99^n.
+// Frames that a listener misses are lost: a datagram of n frames arrives with probability 0.99^n.
 TEST(CanCapacity, OneMissedFrameInAHundredCostsTheDatagramsItBelongsTo) {
   BackboneOptions options;
   options.bus.missed = 0.01;

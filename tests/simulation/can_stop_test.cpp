@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How long an emergency stop takes on a bus that is exact to the bit: eight boards at work, each the
-// firmware's application behind its CAN node, and a host that stops them all with one frame.
+// How long an emergency stop takes on a bus that is exact to the bit. Eight boards work, each the
+// firmware's application on its CAN node. A host stops all of them with one frame.
 //
-// The host's controller has a mailbox that nothing but the stop uses, or it is a FIFO, in which the stop
-// comes behind all that waits. A board's loop takes the frames
-// that came, lets the application do what is due and fills its controller, at least once a
-// millisecond and at its own times; it keeps one mailbox free of telemetry.
+// The host's controller either has a mailbox that only the stop uses, or it is a FIFO, in which the
+// stop comes after all frames that wait. A board's loop takes the frames that came, lets the
+// application do what is due, and fills its controller. It does so at least once a millisecond, at
+// its own times. It keeps one mailbox free of telemetry.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -36,7 +36,7 @@ CanFrame stop_frame() {
 
 std::uint32_t to_ms(std::uint64_t ns) { return static_cast<std::uint32_t>(ns / ms_ns) + 500000; }
 
-// One board: application, CAN node and controller, and its loop.
+// One board: application, CAN node, controller, and the loop.
 class StoppedBoard final : private firmware::Port {
  public:
   StoppedBoard(CanBusModel& bus, std::uint8_t number, std::uint64_t seed)
@@ -178,8 +178,8 @@ class StoppingHost {
     CanNode node;
     std::deque<std::string> waiting;
     std::uint32_t pnum = 12345;
-    std::uint64_t board_t = 0;  // of its newest heartbeat: what ours echo
-    std::int32_t cause = 0;     // of that too
+    std::uint64_t board_t = 0;  // of the board's newest heartbeat: our heartbeats echo it
+    std::int32_t cause = 0;     // of the same heartbeat
   };
 
   void heartbeats() {
@@ -207,8 +207,9 @@ class StoppingHost {
 
 using Boards = std::vector<std::unique_ptr<StoppedBoard>>;
 
-// Lets all boards drive again. A board obeys an E:CLEAR that names the stop that it has told of; what
-// says so may be lost when all boards tell of their stop at once, and is repeated.
+// Lets all boards drive again. A board obeys an E:CLEAR only if it names the newest stop that the
+// board has reported. The report may be lost when all boards report their stop at once, so the
+// E:CLEAR is repeated.
 void drive(CanBusModel& bus, const Boards& boards, StoppingHost& host) {
   for (int attempt = 0; attempt < 20; ++attempt) {
     for (int board = 0; board < board_count; ++board) {
@@ -225,7 +226,8 @@ void drive(CanBusModel& bus, const Boards& boards, StoppingHost& host) {
   }
 }
 
-// The stop is on the bus after `frames_before` frames at most, and every board safe a millisecond later.
+// The stop is on the bus after at most `frames_before` frames, and every board is safe a
+// millisecond later.
 void expect_stops(CanQueue queue, std::uint64_t frames_before) {
   constexpr int stops = 1000;
   CanBusModel bus({.rate = {1000000, 0}, .seed = 1});
@@ -259,7 +261,7 @@ void expect_stops(CanQueue queue, std::uint64_t frames_before) {
       max_board_ns = std::max(max_board_ns, board->safe_ns - host.stop_sent_ns);
     }
   }
-  // Frames that are the longest that there are, each with its intermission, and its own.
+  // The longest possible frames, each with its intermission, and the stop's own frame.
   const std::uint64_t longest_us =
       frames_before * total(worst_can_bits(max_classic_size, false, false));
   const std::uint64_t own_us = total(can_bits(stop_frame())) - can_intermission_bits;
@@ -275,11 +277,12 @@ void expect_stops(CanQueue queue, std::uint64_t frames_before) {
   std::printf("%u transfers timed out in %.1f s\n", timeouts,
               static_cast<double>(bus.now_ns()) / 1e9);
   EXPECT_LE(max_bus_ns, (longest_us + own_us) * 1000);
-  EXPECT_GT(max_bus_ns, (longest_us + own_us) * 1000 / 2) << "no stop met a frame in progress";
+  EXPECT_GT(max_bus_ns, (longest_us + own_us) * 1000 / 2)
+      << "no stop was sent while a frame was in progress";
   EXPECT_LE(max_board_ns, ms_ns);
 }
 
-// The one in progress.
+// The one frame is the frame in progress.
 TEST(CanStop, WaitsForOneFrameAtMostAndEveryBoardIsSafeAMillisecondLater) {
   expect_stops(CanQueue::mailboxes, 1);
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board on a network where a crowd sends to it: up to 60 addresses, before the 16 places that a UDP
-// port has for its peers. Whoever is in control keeps it, whatever the others send, and when they have
-// left another gets it. R4_CROWDS sets how many crowds there are, R4_SEED replays one.
+// A board on a network where a crowd sends to it: up to 60 addresses, while a UDP port has 16
+// places for its peers. The host in control keeps control, whatever the crowd sends. After that
+// host has left, another host gets control. R4_CROWDS sets the number of crowds, R4_SEED replays
+// one crowd.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -27,16 +28,16 @@ namespace {
 
 constexpr int most_strangers = 60;
 constexpr int places = 16;
-constexpr std::uint64_t leaves_ms = 10'000;  // the first host
+constexpr std::uint64_t leaves_ms = 10'000;  // when the first host leaves
 constexpr std::uint64_t ends_ms = 30'000;
 
 struct CrowdReport {
-  std::string violation;  // empty: none
+  std::string violation;  // empty: every promise held
   std::uint64_t hash = 0xcbf29ce484222325U;
   std::uint32_t strangers_sent = 0;
-  std::uint32_t renumbered = 0;  // hosts that were not in control, by the crowd
-  // How long it took until the host was in control: the first, and the second when it was there and the
-  // first had left.
+  std::uint32_t renumbered = 0;  // hosts without control that got a new number because of the crowd
+  // The time until the host was in control. For the second host it counts from when that host was
+  // there and the first host had left.
   std::uint32_t first_ms = 0;
   std::uint32_t second_ms = 0;
 };
@@ -58,7 +59,7 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
 
     Crowd& crowd;
     int address;
-    std::uint32_t number = 0;  // as the port has it
+    std::uint32_t number = 0;  // in the port's table
     std::unique_ptr<test::DrivenSession> session;
   };
   struct Packet {
@@ -107,8 +108,8 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
   std::uint32_t boot_ms_;
   bool with_key_;
   int strangers_;
-  std::uint64_t per_second_;  // what they send, all together
-  std::uint64_t burst_;       // … so many at once
+  std::uint64_t per_second_;  // datagrams of the whole crowd
+  std::uint64_t burst_;       // … sent at once
   std::unique_ptr<firmware::Application> application_;
   firmware::Outputs outputs_;
   Peers peers_;
@@ -117,10 +118,10 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
   std::uint64_t second_comes_ms_;
   std::deque<Packet> to_board_;
   std::deque<Packet> to_host_;
-  std::string overheard_;  // what the board has received of a host
-  int receiving_ = 0;      // from that address
+  std::string overheard_;  // a datagram of a host that the board received
+  int receiving_ = 0;      // the address of that datagram
   bool was_in_control_ = false;
-  std::uint64_t expected_ms_ = 0;  // until then, a command of the host in control
+  std::uint64_t expected_ms_ = 0;  // until then, a command of the host in control must come
 };
 
 Crowd::Crowd(std::uint64_t seed)
@@ -193,7 +194,7 @@ void Crowd::pass_millisecond() {
   check();
 }
 
-// Several of them, one after the other, on average so many a second.
+// Some datagrams one after the other, at this average rate per second.
 void Crowd::crowd_sends() {
   const double bursts = static_cast<double>(per_second_) / static_cast<double>(burst_) / 1000;
   const int most = static_cast<int>(bursts) + 1;
@@ -208,10 +209,11 @@ void Crowd::crowd_sends() {
   }
 }
 
-// Anything but a stop, which everybody may ask for. While nobody is in control of a board without a key,
-// a heartbeat would take it: then no stranger knows what to echo. And while nobody is, they ask for it
-// twice as often as is answered, no more. Without a key, whoever hears the host's datagrams can pass for it: there
-// nobody does.
+// Anything but a stop, because any program may ask for a stop. While a board without a key has no
+// controlling host, a heartbeat with a right echo would take control, so then the crowd knows no
+// right echo. In that time the crowd asks for control at most twice as often as the board answers.
+// Without a key, a program that hears the host's datagrams can pass for the host; in this test the
+// crowd hears none.
 std::string Crowd::say_something() {
   const std::string number = std::to_string(random_.below(1ULL << 32));
   const std::string sid = fmt::format(";SID:{:016x}", random_.next());

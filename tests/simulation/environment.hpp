@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How much is simulated, and which of it: numbers from the environment.
+// The number of simulations and the choice of one: numbers from the environment.
 #pragma once
 
 #include <cstdint>

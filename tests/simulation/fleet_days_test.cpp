@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Days of a fleet of a hundred boards in virtual time: each board's application and its host's session, joined by a
-// network that loses a tenth of the datagrams, with faults of one link and of all at once. No memory grows, no board
-// trips but for a fault, each is safe in time and comes back. R4_FLEET_HOURS makes it longer (168 are seven days),
-// R4_SEED makes it another.
+// Days of a fleet of a hundred boards in virtual time: the application of each board and the
+// session of its host. The network between them loses a tenth of the datagrams. Faults hit one link
+// or all links. The memory does not grow, a board trips only after a fault, and each board is safe
+// in time and comes back. R4_FLEET_HOURS sets the length (168 are seven days), R4_SEED another run.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <malloc.h>
@@ -31,14 +31,16 @@ using firmware::BoardState;
 constexpr std::size_t fleet_size = 100;
 constexpr std::uint64_t second_us = 1'000'000;
 constexpr std::uint64_t silence_limit_us = 1'020'000;           // the timeout and 20 ms
-constexpr std::uint64_t comes_back_within_us = 15 * second_us;  // through all that is lost
-// A board that has begun anew is fed by a host that echoes its second heartbeat, after half a second. Where that one is
-// lost, the first connection ends after a second, and there is another at once.
+constexpr std::uint64_t comes_back_within_us = 15 * second_us;  // although datagrams are lost
+// A board that has restarted is active when a host echoes its second heartbeat, after half a
+// second. If that heartbeat is lost, the first connection ends after a second, and the next
+// connection starts at once.
 constexpr std::uint64_t connecting_us = 2 * second_us;
 constexpr double lost = 0.1, twice = 0.01, damaged = 0.001;
 
 struct Packet {
-  std::uint64_t came_us = 0;  // to who gets it at `at_us`: what waits stays in order
+  // at the receiver, which gets it at `at_us`: waiting packets stay in order
+  std::uint64_t came_us = 0;
   std::uint64_t at_us = 0;
   bool to_board = false;
   bool intact = true;
@@ -46,7 +48,7 @@ struct Packet {
   std::array<char, 512> bytes;
 };
 
-// What is under way, and what waits for a host that does nothing for half a minute.
+// The datagrams under way, and those that wait for a host that is held up for half a minute.
 class Path {
   auto later() const {
     return [this](std::uint8_t a, std::uint8_t b) {
@@ -63,7 +65,7 @@ class Path {
     std::pop_heap(order_.begin(), order_.begin() + count_, later());
     return packets_[order_[static_cast<std::size_t>(--count_)]];
   }
-  // False: it holds no more.
+  // False: the path is full.
   bool put(const Packet& packet) {
     if (count_ == static_cast<std::ptrdiff_t>(packets_.size())) return false;
     packets_[order_[static_cast<std::size_t>(count_++)]] = packet;
@@ -73,7 +75,7 @@ class Path {
 
  private:
   std::array<Packet, 128> packets_;
-  std::array<std::uint8_t, 128> order_;  // those of the packets first, a heap; then the free ones
+  std::array<std::uint8_t, 128> order_;  // a heap of the packets in use, then the free packets
   std::ptrdiff_t count_ = 0;
 };
 
@@ -111,7 +113,7 @@ class FleetLink final : firmware::Hal, firmware::Port, test::DrivenSession::Hand
   // --- faults
 
   void cut(std::uint64_t length_us) { cut_until_us_ = now_us_ + length_us; }
-  // The thread of all hosts does nothing; what comes waits.
+  // The thread of all hosts does nothing; datagrams that arrive wait.
   void hold_up(std::uint64_t length_us) { held_until_us_ = now_us_ + length_us; }
   void restart_board() {
     restarted_us_ = now_us_;
@@ -164,7 +166,7 @@ class FleetLink final : firmware::Hal, firmware::Port, test::DrivenSession::Hand
     const Time due = session_->poll(time());
     host_due_us_ = std::max(now_us_ + 1, static_cast<std::uint64_t>(due.count()) - second_us);
   }
-  // What the board makes of the silence.
+  // Checks how the board handles the silence.
   void look() {
     const bool active = application_->state() == BoardState::active;
     if (active && now_us_ > heartbeat_us_ + silence_limit_us) ++late_ms;
@@ -183,7 +185,7 @@ class FleetLink final : firmware::Hal, firmware::Port, test::DrivenSession::Hand
     if (now_us_ < cut_until_us_) return;
     for (int copies = random_.chance(twice) ? 2 : 1; copies > 0; --copies) {
       if (random_.chance(lost)) continue;
-      // Up to 20 ms: some overtake others.
+      // Up to 20 ms, so some datagrams overtake others.
       Packet packet{};
       packet.at_us = packet.came_us = now_us_ + 500 + random_.below(20'000);
       packet.to_board = to_board;
@@ -254,7 +256,7 @@ TEST(FleetDays, NothingGrowsAndNothingTripsButForAFault) {
   for (std::size_t i = 0; i < fleet_size; ++i) {
     fleet.push_back(std::make_unique<FleetLink>(random.next()));
   }
-  // A fault of all and one of each in an hour; a short run has them sooner.
+  // In each hour one fault of all links and one of each link; in a short run they come sooner.
   const std::uint64_t interval = std::min<std::uint64_t>(3600, seconds / 3);
   std::uint64_t faults = 0, restarts = 0;
   std::size_t heap = 0;
@@ -301,7 +303,7 @@ TEST(FleetDays, NothingGrowsAndNothingTripsButForAFault) {
       "in the second half\n",
       board_days, faults, restarts, trips, connecting, false_trips, confirmed, asked,
       static_cast<std::int64_t>(heap_after - heap));
-  EXPECT_EQ(late, 0U) << "a board was not safe in time";
+  EXPECT_EQ(late, 0U) << "a board's outputs were not safe in time";
   EXPECT_EQ(away, 0U) << "a link did not come back";
   EXPECT_EQ(over, 0U);
   EXPECT_LT(static_cast<double>(false_trips), std::max(1.0, board_days / 10));
@@ -309,7 +311,8 @@ TEST(FleetDays, NothingGrowsAndNothingTripsButForAFault) {
   EXPECT_GT(restarts, 10U);
   EXPECT_GT(trips, 2 * fleet_size);
   EXPECT_GT(confirmed * 100, asked * 90);
-  // What a session makes when it is needed first; a byte a datagram would be more.
+  // The session allocates some memory when it needs it first. A leak of one byte per datagram would
+  // exceed the limit.
   EXPECT_LT(static_cast<std::int64_t>(heap_after - heap), 1024 * std::int64_t{fleet_size});
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The promises of docs/design/safety-argument.md under random faults. R4_SCHEDULES sets how many schedules are run
-// (30,000 by default). A fifth as many are run with standstills, and a tenth with several paths.
-// Their seeds are from R4_FIRST_SEED on (1 by default), so that a long run can go on where another ended.
-// R4_SEED replays one schedule and prints its trace.
+// The promises of docs/design/safety-argument.md under random faults. R4_SCHEDULES sets the number
+// of schedules (30,000 by default). A fifth as many run with standstills, and a tenth with several
+// paths. Their seeds start at R4_FIRST_SEED (1 by default), so that a long run can continue where
+// another run ended. R4_SEED replays one schedule and prints its trace.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ std::string tail_of(const Report& report, std::size_t lines) {
   return text;
 }
 
-// Into `sum`: what happened.
+// Adds the counts of one report to `sum`.
 void add(Report& sum, const Report& report) {
   sum.executed += report.executed;
   sum.executed_groups += report.executed_groups;
@@ -69,8 +69,8 @@ void add(Report& sum, const Report& report) {
   sum.worst_silence_us = std::max(sum.worst_silence_us, report.worst_silence_us);
 }
 
-// How many schedules to run: R4_SCHEDULES or the default, divided by `part`. With 200 or more,
-// every event that is under test occurs.
+// The number of schedules: R4_SCHEDULES or the default, divided by `part`. With 200 or more, every
+// event under test occurs.
 std::uint64_t schedules_for(std::uint64_t part) {
   return std::max<std::uint64_t>(from_environment("R4_SCHEDULES", 30'000) / part, 200);
 }
@@ -82,7 +82,7 @@ void replay(World::Beside beside) {
   EXPECT_EQ(report.sampled_wrongly, 0U);
 }
 
-// Runs so many schedules; no promise may be broken.
+// Runs this number of schedules; no promise may be broken.
 Report run_all(std::uint64_t schedules, World::Beside beside) {
   const std::uint64_t first = from_environment("R4_FIRST_SEED", 1);
   std::atomic<std::uint64_t> next{first};
@@ -133,7 +133,7 @@ Report run_all(std::uint64_t schedules, World::Beside beside) {
                   << (i < 3 ? "; the end of its trace:\n" + tail_of(report, 60) : "");
   }
   EXPECT_EQ(failing.size(), 0U);
-  // The schedules must reach what they are to test.
+  // The schedules must reach the events under test.
   EXPECT_GT(sum.executed, schedules);
   EXPECT_GT(sum.executed_groups, schedules / 2);
   EXPECT_LT(sum.groups_apart, sum.executed_groups / 100);
@@ -150,7 +150,7 @@ Report run_all(std::uint64_t schedules, World::Beside beside) {
   EXPECT_GT(sum.executed_signed, schedules / 10);
   EXPECT_GT(sum.strangers, 5 * schedules);
   EXPECT_GT(sum.strangers_sessions, schedules / 100);
-  // Rare: at a few hundred schedules it is only seen to occur.
+  // Rare: with a few hundred schedules this only shows that the event occurs.
   EXPECT_GT(sum.strangers_executed, schedules < 4000 ? 0 : schedules / 400);
   EXPECT_GT(sum.leases, schedules / 10);
   EXPECT_GT(sum.watched, schedules);
@@ -194,15 +194,17 @@ TEST(LinkSimulation, KeepsEveryPromiseOverSeveralPaths) {
   EXPECT_GT(sum.served_us, schedules * 500'000);
 }
 
-// What was mended stays so.
+// Regression test: seeds that once broke a promise, and why.
 TEST(LinkSimulation, KeepsEveryPromiseOfSeedsThatBrokeOneOnce) {
-  // The last BUSY of one that lags made the others wait for longer than what they had been told (415); a BUSY from
-  // before a path had joined counted beside those of the others, and held the commands back (18012, which the mend
-  // of 415 mends as well).
-  // Before the session's first heartbeat one path's answer was from before a restart, which another showed: each path
-  // had a clock of its own (98796, 103256). One that said late that the board was booting made the host begin again,
-  // beside others that had said so earlier and nothing since (104104, 115880), or while they were silent (271382, 446043).
-  // A heartbeat of the millisecond of a state that the farewell came behind passed for its confirmation (756480).
+  // The last BUSY of a lagging path made the other paths wait longer than their own BUSY asked
+  // (415). A BUSY from before a path had joined counted beside those of the other paths, and held
+  // the commands back (18012, with the same cause as 415). Before the session's first heartbeat one
+  // path's answer was from before a restart that another path showed: each path had a separate
+  // clock (98796, 103256). A path that reported late that the board was booting made the host begin
+  // anew, although other paths had reported that earlier and nothing since (104104, 115880), or
+  // were silent (271382, 446043). A heartbeat was taken for the confirmation of a farewell,
+  // although the heartbeat was of the same millisecond as a state sent before the farewell
+  // (756480).
   for (const std::uint64_t seed :
        {415U, 18012U, 98796U, 103256U, 104104U, 115880U, 271382U, 446043U, 756480U}) {
     EXPECT_EQ(World(seed, false, World::Beside::paths).run().violation, "") << "seed " << seed;
@@ -227,7 +229,7 @@ TEST(LinkSimulation, TripsFalselyLessThanOnceADayAtTenPercentLoss) {
   day.settings.state_rate_hz = 1;
   day.to_board.loss = day.to_host.loss = 0.1;
   day.command_interval_us = 3'600'000'000U;
-  day.board_drift_ppm = Schedule::most_drift_ppm;  // less time for the host
+  day.board_drift_ppm = Schedule::most_drift_ppm;  // leaves the host less time
   const Report report = World(1, day, false).run();
   fmt::print("false trips in a day at 10 % loss: {}\n", report.link_losses);
   EXPECT_EQ(report.violation, "");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// docs/examples/openpodcar with joystick, cmd_vel and goals, in virtual time: who drives, and how far it rolls when they
-// go.
+// docs/examples/openpodcar with joystick, cmd_vel and goals, in virtual time: which input drives,
+// and how far the car rolls when that input disappears.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -27,11 +27,11 @@ using control::Twist;
 using Mode = Pilot::Mode;
 
 constexpr VirtualRobot::Link pilot_link{.delay_us = 5000, .jitter_us = 2000, .loss = 0.01};
-constexpr int joy_period_ms = 50;       // as joy_node repeats itself
-constexpr int cmd_vel_period_ms = 100;  // as teleop_twist_keyboard's and others'
+constexpr int joy_period_ms = 50;       // joy_node repeats its message with this period
+constexpr int cmd_vel_period_ms = 100;  // the period of teleop_twist_keyboard and similar nodes
 constexpr double nan_number = std::numeric_limits<double>::quiet_NaN();
 
-// The program in main_ros2.cpp, on a session in place of a board, and who publishes.
+// The program in main_ros2.cpp, on a session in place of a board, and the publishers.
 class PilotRun {
  public:
   explicit PilotRun(std::uint64_t seed = 1)
@@ -46,14 +46,14 @@ class PilotRun {
   void pass(int ms) {
     for (; ms > 0; --ms) pass_millisecond();
   }
-  // Start is pressed, and let go; the board is armed, if it lets itself be.
+  // Presses and releases Start. Then the board is armed, unless it refuses.
   void press_start() {
     start = true;
     pass(200);
     start = false;
     pass(300);
   }
-  // How far it rolls until it stands; it must, within so many seconds, and stay there for two.
+  // How far the car rolls until it stands. It must stop within `seconds` and stand for two seconds.
   double rolls_m(int seconds = 10) {
     const double from_m = model.travelled_m();
     int standing_ms = 0;
@@ -74,7 +74,8 @@ class PilotRun {
   }
   bool driving() const { return phase_ == Phase::driving; }
 
-  // What is published, again and again; and by the joystick, unless it is gone.
+  // The messages that are published periodically. Those of the joystick stop if `joystick` is
+  // false.
   bool joystick = true;
   bool hold = false, start = false, stop = false;
   float speed_axis = 0, steering_axis = 0;
@@ -161,11 +162,11 @@ class PilotRun {
 
   control::LoopGuard guard_;
   Phase phase_ = Phase::waiting;
-  int phase_ms_ = 0;  // when that began
+  int phase_ms_ = 0;  // when the phase began
   int ms_ = 0;
 };
 
-// At 1.2 m/s by the joystick; how fast it is.
+// Drives at 1.2 m/s with the joystick. Returns the speed.
 double hold_and_drive(PilotRun& run) {
   run.press_start();
   run.hold = true;
@@ -258,7 +259,7 @@ TEST(OpenPodcarPilot, GivesTheJoystickThePrecedenceAndTakesNothingBackByItself) 
   run.pass(3000);
   run.cmd_vel = Twist{0.4, 0.1};
   run.pass(3000);
-  EXPECT_NEAR(run.podcar.speed_m_s(), 0.4, 0.05);  // not 0.8, which the goal wishes
+  EXPECT_NEAR(run.podcar.speed_m_s(), 0.4, 0.05);  // not 0.8, the speed of the goal
   EXPECT_EQ(run.to_goal(50, 0), "cmd_vel drives");
   run.hold = true;
   run.speed_axis = -0.25F;
@@ -266,7 +267,7 @@ TEST(OpenPodcarPilot, GivesTheJoystickThePrecedenceAndTakesNothingBackByItself) 
   EXPECT_NEAR(run.podcar.speed_m_s(), -0.3, 0.05);
   EXPECT_FALSE(run.to_goal(50, 0).empty());
   run.hold = false;
-  run.rolls_m();  // although cmd_vel goes on
+  run.rolls_m();  // although cmd_vel is still published
   EXPECT_FALSE(run.moves_within(2000));
   run.press_start();
   EXPECT_TRUE(run.moves_within(2000));
@@ -275,11 +276,11 @@ TEST(OpenPodcarPilot, GivesTheJoystickThePrecedenceAndTakesNothingBackByItself) 
   EXPECT_FALSE(run.moves_within(2000));
 }
 
-// What ends the drive, and how it is put right again.
+// An event that ends the drive, and how to recover from it.
 struct PilotMishap {
   const char* name;
   void (*set)(PilotRun&, bool happens);
-  double most_m;  // that it may roll, from 1.22 m/s
+  double most_m;  // the car may roll so far from 1.22 m/s
 };
 
 TEST(OpenPodcarPilot, WaitsForStartAfterWhateverEndedTheDrive) {
@@ -307,7 +308,7 @@ TEST(OpenPodcarPilot, WaitsForStartAfterWhateverEndedTheDrive) {
     EXPECT_LE(rolled_m, mishap.most_m) << mishap.name;
     EXPECT_TRUE(run.robot.model().pins().is_safe()) << mishap.name;
     run.hold = false;
-    run.press_start();  // refused, or ended again
+    run.press_start();  // refused, or the drive ends again
     EXPECT_FALSE(run.moves_within(2000)) << mishap.name;
     mishap.set(run, false);
     EXPECT_FALSE(run.moves_within(3000)) << mishap.name;
@@ -326,7 +327,7 @@ TEST(OpenPodcarPilot, StopsWhenTheJoystickIsGoneWhileItsButtonWasHeld) {
   EXPECT_LE(rolled_m, allowed_m);
   EXPECT_EQ(run.pilot.why(), "the joystick is silent");
   EXPECT_TRUE(run.robot.model().pins().is_safe());
-  run.joystick = true;  // its button is held still
+  run.joystick = true;  // its button is still held
   EXPECT_FALSE(run.moves_within(3000));
 }
 
@@ -356,7 +357,7 @@ TEST(OpenPodcarPilot, ArmsOnceByAStartThatIsHeldDown) {
   PilotRun run;
   run.joystick = false;
   run.pass(1000);
-  run.start = run.joystick = true;  // down when it is heard for the first time
+  run.start = run.joystick = true;  // pressed when the first message arrives
   run.pass(1000);
   EXPECT_EQ(run.pilot.mode(), Mode::off);
   run.start = false;
@@ -369,7 +370,7 @@ TEST(OpenPodcarPilot, ArmsOnceByAStartThatIsHeldDown) {
   run.robot.model().hold_handle(true);
   EXPECT_FALSE(run.moves_within(3000));
   EXPECT_FALSE(run.driving());
-  run.press_start();  // was down, and is
+  run.press_start();  // pressed before and still pressed
   run.press_start();
   EXPECT_TRUE(run.moves_within(2000));
 }
@@ -384,7 +385,7 @@ TEST(OpenPodcarPilot, EndsAndDoesNotBeginWhereThereAreTwoJoysticks) {
   run.pass(100);
   EXPECT_FALSE(run.driving());
   EXPECT_EQ(run.pilot.why(), "there are two joysticks");
-  run.start = true;  // held on the one, while the other says that it is up
+  run.start = true;  // pressed on one joystick, while the other joystick reports it released
   for (int ms = 0; ms < 1000; ms += 10) {
     run.pilot.on_joy(axes, buttons, run.robot.clock(), 7);
     run.pass(10);
@@ -393,13 +394,13 @@ TEST(OpenPodcarPilot, EndsAndDoesNotBeginWhereThereAreTwoJoysticks) {
   run.start = false;
   run.pass(400);
   run.press_start();
-  EXPECT_TRUE(run.driving()) << "the other one is gone";
+  EXPECT_TRUE(run.driving()) << "the other joystick has stopped publishing";
 }
 
 TEST(OpenPodcarPilot, BeginsADriveWithNothingOfTheOneBefore) {
   Podcar podcar;
   podcar.begin_drive();
-  for (int i = 0; i < 200; ++i) podcar.drive({1, 0}, 0.01);  // its encoder's cable is off
+  for (int i = 0; i < 200; ++i) podcar.drive({1, 0}, 0.01);  // the cable of the encoder is off
   ASSERT_EQ(podcar.drive({1, 0}, 0.01)[0].value, pwm_max);
   podcar.begin_drive();
   EXPECT_EQ(podcar.drive({0.1, 0}, 0)[0].value, 0);
@@ -416,7 +417,7 @@ TEST(OpenPodcarPilot, EndsWhenTheSteeringDoesNotFollow) {
   podcar.begin_drive();
   EXPECT_TRUE(podcar.obeys());
   for (int ms = 0; ms < 5000; ms += 10) podcar.drive({0, 0}, 0.01);
-  EXPECT_TRUE(podcar.obeys()) << "it is not told to steer while it stands";
+  EXPECT_TRUE(podcar.obeys()) << "the car does not steer while it stands";
 }
 
 TEST(OpenPodcarPilot, KeepsOnlyAStopOfWhatCameWhileItWasArmed) {
@@ -467,7 +468,7 @@ TEST(OpenPodcarPilot, RefusesWhatIsNoNumber) {
   run.press_start();
   EXPECT_TRUE(run.driving());
   run.speed_axis = 7;
-  run.stop = true;  // counts nevertheless
+  run.stop = true;  // the stop counts nevertheless
   run.pass(100);
   EXPECT_EQ(run.pilot.why(), "the stop button");
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// docs/examples/openpodcar in virtual time: its control and its model, joined by the firmware, the session and a link
-// that delays. How well it keeps to its course, and how far it rolls when something happens at speed.
+// docs/examples/openpodcar in virtual time: its control and its model, joined by the firmware, the
+// session and a link with a delay. Measures how well the car keeps to its course, and how far it
+// rolls after an incident at speed.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -26,7 +27,8 @@ using control::LoopEnd;
 constexpr VirtualRobot::Link podcar_link{.delay_us = 5000, .jitter_us = 2000, .loss = 0.01};
 constexpr double board_timeout_s = 1.0;
 
-// The program in main.cpp, on a session in place of a board; its steps are the program's own.
+// The program in main.cpp, on a session in place of a board. Its steps are the steps of the
+// program.
 class PodcarRun {
  public:
   explicit PodcarRun(Course given, std::uint64_t seed = 1)
@@ -46,7 +48,7 @@ class PodcarRun {
     begun_ = true;
   }
 
-  // A millisecond; false once the loop has ended.
+  // One millisecond; false after the loop has ended.
   bool pass() {
     robot.pass_millisecond();
     if (!robot.host_lives) return false;
@@ -60,7 +62,8 @@ class PodcarRun {
   double deviation() const {
     return std::abs(course.deviation_m(model.place().x_m, model.place().y_m));
   }
-  // How far it rolls until it stands; it must, within ten seconds, and stay there for two.
+  // How far the car rolls until it stands. It must stop within ten seconds and stand for two
+  // seconds.
   double rolls_m() {
     const double from_m = model.travelled_m();
     int standing_ms = 0;
@@ -146,11 +149,11 @@ TEST(OpenPodcar, PassesItsWaypoints) {
   EXPECT_LE(nearest_m.back(), 0.25);
 }
 
-// What happens at 1 m/s, and how far it may roll.
+// An incident at 1 m/s, and how far the car may roll.
 struct Mishap {
   const char* name;
   void (*happen)(PodcarRun&);
-  double reaction_s;  // until the board has its outputs safe
+  double reaction_s;  // until the board's outputs are safe
 };
 
 const Mishap mishaps[] = {
@@ -184,7 +187,7 @@ TEST(OpenPodcar, StandsBeforeAWall) {
   while (run.model.place().x_m < sensor_m && run.pass()) {
   }
   const double rolled_m = run.rolls_m();
-  // Four sensors take turns, and two echoes have to agree.
+  // Four sensors take turns, and two echoes must agree.
   const double allowed_m = PodcarModel::braking_distance_m(1.02) + 1.02 * 0.5;
   fmt::print("wall: {:.3f} m beyond the threshold of 1.5 m, of {:.3f} m\n", rolled_m, allowed_m);
   EXPECT_LE(rolled_m, allowed_m);
@@ -227,7 +230,8 @@ TEST(OpenPodcar, DoesNotDriveByASteeringSensorThatIsOff) {
   EXPECT_NE(run.guard.why().find("AINSTEER"), std::string::npos) << run.guard.why();
 }
 
-// Its clock shows no restart: it ran for longer than before, until the host heard it again.
+// The clock does not show this restart: the board ran longer after it than before, until the host
+// heard it again.
 TEST(OpenPodcar, StaysWhereItIsWhenTheBoardRestarts) {
   Podcar podcar;
   State state;
@@ -242,7 +246,7 @@ TEST(OpenPodcar, StaysWhereItIsWhenTheBoardRestarts) {
   sense(120'000, 0);
   EXPECT_EQ(podcar.pose().x_m, 0);
   sense(120'010, 20);
-  EXPECT_GT(podcar.pose().x_m, 0) << "and it counts on from there";
+  EXPECT_GT(podcar.pose().x_m, 0) << "the pose continues from there";
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ class Random {
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
     return z ^ (z >> 31);
   }
-  // Uniform in [0, below); 0 for below 0.
+  // Uniform in [0, below); 0 if below is 0.
   std::uint64_t below(std::uint64_t below) { return below == 0 ? 0 : next() % below; }
   std::uint64_t between(std::uint64_t low, std::uint64_t high) {
     return low + below(high - low + 1);

@@ -49,7 +49,7 @@ Schedule Schedule::random(Random& random) {
     s.happenings.push_back(h);
   }
   s.shared_place = random.chance(0.3);
-  // Stops that cross an E:CLEAR of the stop before them.
+  // Stops that cross an E:CLEAR of an earlier stop.
   if (random.chance(0.3)) {
     Happening stop;
     stop.kind = random.chance(0.5) ? Happening::Kind::stop : Happening::Kind::stopper;
@@ -82,7 +82,7 @@ Schedule Schedule::random(Random& random) {
   return s;
 }
 
-// They come and go; some are more than the board has places for.
+// Watchers come and go; sometimes there are more than the board has places for.
 void Schedule::add_watchers(Random& random) {
   watchers = static_cast<int>(random.between(1, 6));
   for (int i = 0; i < watchers; ++i) {
@@ -126,8 +126,8 @@ const ChannelFaults& Schedule::faults(int path, bool toward_board) const {
   return toward_board ? faults.to_board : faults.to_host;
 }
 
-// Mostly one of them is good as long as nothing happens to it; what happens to paths happens to one of them, or to
-// several at once.
+// In most schedules one path is good except for its happenings. A happening hits one path or
+// several paths at once.
 void Schedule::add_paths(Random& random) {
   for (std::uint64_t n = random.between(1, 2); n != 0; --n) {
     more_paths.push_back({random_faults(random), random_faults(random)});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What decides in place of chance what happens in a world: who runs, who commands, and what becomes
-// of each datagram (search/play.hpp).
+// A script decides in place of chance what happens in a world: which processes run, which host
+// commands, and what happens to each datagram (search/play.hpp).
 #pragma once
 
 #include <cstdint>
@@ -12,9 +12,9 @@ namespace r4::simulation {
 
 class World::Script {
  public:
-  // All hosts are there, and none runs.
+  // All hosts exist, and none of them runs.
   virtual void begin() = 0;
-  // The time of the schedule is over, and no promise was broken.
+  // The time of the schedule is over, and every promise held.
   virtual void end() = 0;
   // An event that the script asked for.
   virtual void on_event(int index) = 0;
@@ -27,14 +27,14 @@ class World::Script {
 
   // A host or the board has sent this datagram. The script delivers it.
   virtual void on_sent(const Packet& sent) = 0;
-  // A datagram has arrived. True if its receiver does not get it now.
+  // A datagram has arrived. True if the script keeps it from its receiver for now.
   virtual bool takes(const Packet& arrived) = 0;
   virtual void before_board(const Packet& packet) = 0;
   virtual void after_board(const Packet& packet) = 0;
-  // The board sends. True if this does not go to the hosts directly.
+  // The board sends. True if the script keeps this datagram from going to the hosts directly.
   virtual bool on_board_sent(std::uint8_t port, std::uint32_t peer, Priority priority,
                              std::string_view bytes) = 0;
-  // The board has executed a command. False if it is a stranger's.
+  // The board has executed a command. False if it is a command of a stranger.
   virtual bool on_executed(const Command& command) = 0;
   // The board has become SAFE(link).
   virtual void on_link_lost() = 0;

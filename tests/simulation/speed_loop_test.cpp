@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A wheel's speed, controlled from a host at 100 Hz over a link that delays and loses, in virtual time: what
-// docs/how-to/control.md promises.
+// A wheel's speed, controlled from a host at 100 Hz over a link with delay and loss, in virtual
+// time: the values that docs/how-to/control.md promises.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -49,7 +49,7 @@ class SpeedLoop {
       guard.check(robot.session().link().state, robot.session().disarmed_by(), robot.clock());
       const double rate = (robot.model().shaft_count(1) - counts_) * 1.0;
       counts_ = robot.model().shaft_count(1);
-      smooth_ += (rate - smooth_) / 20;  // counts a millisecond, as the shaft really turns
+      smooth_ += (rate - smooth_) / 20;  // counts a millisecond of the real shaft
       speeds.push_back(smooth_ * 1000 * wheel.metres_a_count());
     }
   }
@@ -59,7 +59,7 @@ class SpeedLoop {
     guard.start(robot.clock());
     began = true;
   }
-  // Seconds until the speed stays within 5 % of what is wanted.
+  // Seconds until the speed stays within 5 % of the wanted speed.
   double settled_s() const {
     std::size_t last = 0;
     for (std::size_t i = 0; i < speeds.size(); ++i) {
@@ -75,7 +75,7 @@ class SpeedLoop {
   control::Pid pid{{.kp = 0.8, .ki = 3.2, .feed_forward = 0.2}};
   double wanted = 0;
   bool began = false;
-  std::vector<double> speeds;  // each millisecond
+  std::vector<double> speeds;  // one for each millisecond
 
  private:
   void on_state(const ReceivedState& state) {

@@ -92,7 +92,7 @@ std::string Stranger::say(Random& random, std::uint32_t next) {
   std::uint64_t t = echo_;
   if (random.chance(0.1)) t = 0;
   if (random.chance(0.1)) t -= random.below(2000);
-  if (random.chance(0.1)) t = random.next() >> 24;  // a clock of its own
+  if (random.chance(0.1)) t = random.next() >> 24;  // another clock
   return test::with_crc(fmt::format("{};{}{}T:{};", field, name, number, t));
 }
 

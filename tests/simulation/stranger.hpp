@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A stranger has no key and hears no host, so it knows the id of no session. It knows what the board
-// sends to watchers and to everyone, and the answers to its own datagrams. It guesses packet numbers
-// well.
+// A stranger has no key and does not hear any host, so it knows the id of no session. It knows what
+// the board sends to watchers and to everyone, and the answers to its own datagrams. It guesses
+// packet numbers well.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +15,9 @@ namespace r4::simulation {
 class Stranger {
  public:
   static constexpr std::uint32_t address = 0xFFFD;
-  // The position that its commands ask of a stepper. No command of a host asks for it.
+  // The stranger's commands ask a stepper for this position. No command of a host asks for it.
   static constexpr int target = -7777;
-  // The field SID of a session of its own.
+  // The field SID of the stranger's own session.
   static constexpr const char* own_name = "SID:00c0ffee00c0ffee;";
 
   // The board has sent this datagram to the stranger.
@@ -26,15 +26,16 @@ class Stranger {
   // A datagram of any kind but E:STOP. `next`: the number that the host in control uses next.
   std::string say(Random& random, std::uint32_t next);
 
-  // `next`, if the stranger knows a number that is near. Else a number that the stranger makes up.
+  // Returns `next` if the stranger knows a number near it. Otherwise it returns a made-up number.
   std::uint32_t guess(std::uint32_t next) const;
   // The T of the newest heartbeat; 0 before the first.
   std::uint32_t echo() const { return echo_; }
-  // The newest cause that the board has named.
+  // The newest cause that the board has reported.
   std::int32_t cause() const { return cause_; }
-  // What the stranger has to echo for its lease.
+  // The token that the stranger must echo for its lease.
   std::uint32_t lease() const { return lease_; }
-  // The field SID with which the stranger may pass for the host; empty if the board has sent it none.
+  // The field SID with which the stranger may pass for the host; empty if the board has sent it no
+  // SID.
   const std::string& name() const { return name_; }
 
  private:

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Eight boards on one bus, in virtual time: clocks that drift apart, the application that ships, and for each a session
-// at the host. What they tell of when their states were sampled is one time axis.
+// Eight boards on one bus, in virtual time: clocks that drift apart, the shipped application, and a
+// session at the host for each board. The sampling times that the sessions report form one time
+// axis.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +20,7 @@ namespace r4::simulation {
 namespace {
 
 constexpr std::size_t axis_boards = 8;
-constexpr std::uint64_t axis_settled_us = 10'000'000;  // what docs/design/architecture.md promises
+constexpr std::uint64_t axis_settled_us = 10'000'000;  // docs/design/architecture.md promises this
 
 class SharedBus {
  public:
@@ -30,8 +31,8 @@ class SharedBus {
     std::string bytes;
   };
 
-  // One after the other, at 1 Mbit/s: 32 characters to a packed frame, which takes 110 us, and up to half of that until
-  // it is read. With that the load is that of docs/how-to/can.md.
+  // One after the other, at 1 Mbit/s. A packed frame has 32 characters and takes 110 us. Reading it
+  // takes up to half of that again. This gives the load of docs/how-to/can.md.
   void put(std::uint64_t now_us, std::size_t board, bool to_board, std::string_view bytes) {
     const std::uint64_t frames = bytes.size() / 32 + 1;
     free_us_ = std::max(free_us_, now_us) + 110 * frames;
@@ -61,7 +62,7 @@ struct AxisClock {
   }
 };
 
-// A board, and its session.
+// A board and its session.
 class AxisLink final : public firmware::Hal,
                        public firmware::Port,
                        public test::DrivenSession::Handler {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A robot, its board and its host in virtual time: the firmware on the models of its chips, the session that ships, and
-// between them a link that delays and loses. One seed is one run.
+// A robot, its board and its host in virtual time: the firmware on the models of its chips, the
+// shipped session, and between them a link with delay and loss. One seed gives one run.
 #pragma once
 
 #include <functional>
@@ -20,27 +20,27 @@ class VirtualRobot final : public firmware::Port, public test::DrivenSession::Ha
   using Clock = ReceivedState::Clock;
   struct Link {
     std::uint64_t delay_us = 5000;
-    std::uint64_t jitter_us = 2000;  // more or less than the delay, evenly
+    std::uint64_t jitter_us = 2000;  // added to or taken from the delay, uniform
     double loss = 0;                 // in each direction
   };
 
-  // `fields`: as in F. `robot`: in place of the vehicle on the bench.
+  // `fields`: as in F. `robot`: replaces the vehicle on the bench.
   VirtualRobot(std::uint64_t seed, const Link& link, const std::string& fields,
                sim::RobotModel* robot = nullptr);
 
-  // Until the board is ACTIVE under our control and armed.
+  // Waits until the board is ACTIVE under our control and armed.
   bool arm();
-  // A millisecond passes at all ends.
+  // One millisecond passes for robot, board, link and host.
   void pass_millisecond();
   void pass(std::uint64_t ms) {
     while (ms-- != 0) pass_millisecond();
   }
 
-  // Told each state as it comes.
+  // Called with each state when it arrives.
   std::function<void(const ReceivedState&)> state_came;
-  bool link_cut = false;     // nothing passes, in either direction
-  bool host_lives = true;    // a killed process says nothing any more
-  bool states_stop = false;  // the board's states are lost, and nothing else
+  bool link_cut = false;     // loses everything in both directions
+  bool host_lives = true;    // false: the process is killed and sends nothing
+  bool states_stop = false;  // only the states of the board are lost
 
   test::DrivenSession& session() { return session_; }
   Time now() const { return Time{static_cast<std::int64_t>(now_us_)}; }

@@ -1,48 +1,55 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The link simulator: the board's application and the host's session, the very code that ships,
-// joined by a faulty channel in virtual time. One seed is one run, to the last byte.
+// The link simulator: the board's application and the host's session, exactly as they ship, joined
+// by a faulty channel in virtual time. One seed gives one run, to the last byte.
 //
-// While it runs it checks the promises of docs/design/safety-argument.md and stops at the first one broken:
-//   silence    outputs are live only while intact heartbeats of the host in control arrive: the last
-//              one at most timeout + 20 ms ago, however long it waited to be read, and sent at most
-//              2 timeouts + 20 ms ago; or the board stands still, until its first turn
-//   once       no command is executed twice, ever, board reboots included
-//   whole      a group of commands is executed wholly or not at all, and reaches the hardware in one go
-//   order      never one older than the newest executed, nor one from before an executed stop
-//   intact     what is executed is what a host sent, by the host that controls the board
-//   fresh      and sent at most 2 timeouts + 250 ms before
-//   late       nor one that a heartbeat which fed overtook more than 250 ms before
-//   truth      confirmed means executed; refused means not executed, then and later
-//   stop       a stop that is confirmed was obeyed: that one, not another; and no E:CLEAR takes away a
-//              stop that came after it was asked for
-//   farewell   is obeyed of the process in control alone, and at once; one that is confirmed was obeyed
-//   restore    outputs that come back belong to a host that was alive a timeout ago
-//   forged     of a board with a key: nothing that an attacker sends is executed, feeds or takes
-//              control, but a stop
-//   stranger   a stranger (stranger.hpp) takes, keeps and resumes no session but its own: in the session of a
-//              host nothing of the stranger is executed, makes a path or spends a number. While no host is in
-//              control, the stranger may begin a session as any host may. The session belongs to the process
-//              whose heartbeat began it, and each SID of the stranger, and each address without a SID, counts
-//              as a process of its own. A new session has executed no command, and its SESSION is the number of
-//              the heartbeat that began it; a session that has another one was resumed
-//   kept       a host keeps the board while its heartbeats arrive in time with new numbers and fresh echoes.
-//              With keys (a signature may be late) it keeps the board while its heartbeats feed. Not checked
-//              with standstills, because a heartbeat may have waited
-//   owned      outputs that are live were commanded by the process in control
-//   watch      states go to the host in control, and to four places at most that have echoed, at most a
-//              lease ago, what they were told themselves, to each once; without a host they tell that the
-//              board is safe.
-//              Who watches sends no heartbeat and no command: what it feeds or drives breaks silence or
-//              intact
-//   joined     a peer becomes a path of a session only by what that session's host has sent to it, and nothing
-//              that was recorded an hour ago feeds
-//   paths      a path meets the limits while it loses, damages and holds back nothing, takes at most 100 ms each
-//              way, is not disturbed, and both ends go on. One that both ends have used for a second and that
-//              meets them is used on; while there is one, there is no false trip, no command times out for
-//              which there was time on that path alone, and the newest state is never older than the newest
-//              that it has brought, nor than two periods and its delay. Beside one, another that meets them
-//              for 2.5 s is used. The host tells no BUSY beside one that it has used for 0.4 s without being told
-//              any there
+// While it runs it checks the promises of docs/design/safety-argument.md and stops at the first
+// broken one:
+//    silence    outputs are live only while intact heartbeats of the host in control arrive. The
+//               last heartbeat came at most timeout + 20 ms ago, even if it waited before it was
+//               read, and was sent at most 2 timeouts + 20 ms ago. Exception: a board that stands
+//               still, until its first turn
+//    once       no command is executed twice, board restarts included
+//    whole      a group of commands is executed wholly or not at all, and reaches the hardware at
+//               once
+//    order      no command is executed that is older than the newest executed command or from
+//               before an executed stop
+//    intact     an executed command is as a host sent it, and that host controls the board
+//    fresh      an executed command was sent at most 2 timeouts + 250 ms before
+//    late       no command is executed that was overtaken more than 250 ms before by a heartbeat
+//               that fed
+//    truth      confirmed means executed; refused means not executed, then and later
+//    stop       a confirmed stop was obeyed: that stop, not another. No E:CLEAR clears a stop that
+//               came after the E:CLEAR was asked for
+//    farewell   the board obeys only the farewell of the process in control, and at once. A
+//               confirmed farewell was obeyed
+//    restore    outputs that come back belong to a host that was alive a timeout ago
+//    forged     of a board with a key: nothing that an attacker sends is executed, feeds or takes
+//               control, except a stop
+//    stranger   a stranger (stranger.hpp) takes, keeps and resumes only its own session: in the
+//               session of a host, no datagram of the stranger is executed, makes a path or uses
+//               up a number. While no host is in control, the stranger may begin a session as any
+//               host may. The session belongs to the process whose heartbeat began it. Each SID of
+//               the stranger, and each address without a SID, counts as a separate process. A new
+//               session has executed no command, and its SESSION is the number of the heartbeat
+//               that began it; a session with another SESSION was resumed
+//    kept       a host keeps the board while its heartbeats arrive in time with new numbers and
+//               fresh echoes. With keys (a signature may be late) it keeps the board while its
+//               heartbeats feed. Not checked with standstills, because a heartbeat may have waited
+//    owned      the process in control commanded the outputs that are live
+//    watch      states go to the host in control and to at most four other places, to each once.
+//               Each of these places has echoed, at most a lease ago, a token that the board sent
+//               to it. Without a host, states report that the board is safe. A watcher sends no
+//               heartbeat and no command: a watcher that feeds or drives breaks silence or intact
+//    joined     a peer becomes a path of a session only by a datagram of that session's host. No
+//               datagram recorded an hour ago feeds
+//    paths      a path meets the limits while it loses, damages and holds back nothing, takes at
+//               most 100 ms each way, is not disturbed, and both ends run. A path that both ends
+//               have used for a second and that meets the limits stays in use. While there is such
+//               a path, there is no false trip, and no command times out that had enough time on
+//               that path alone. The newest state is never older than the newest state of that
+//               path, nor older than two periods and its delay. Another path that meets the limits
+//               for 2.5 s is used, too. The host does not report BUSY while it has used such a
+//               path for 0.4 s without a BUSY there
 #pragma once
 
 #include <compare>
@@ -67,53 +74,54 @@ struct Report {
   std::uint64_t seed = 0;
   std::string violation;           // empty: every promise held
   std::uint64_t trace_hash = 0;    // over every datagram and event with its time
-  std::vector<std::string> trace;  // only when asked for
-  // What happened, to see that the schedules reach what they are to test.
+  std::vector<std::string> trace;  // only if a trace was asked for
+  // Counts of events, to check that the schedules reach the events under test.
   std::uint32_t executed = 0;
   std::uint32_t executed_groups = 0;
-  std::uint32_t groups_apart = 0;  // sent command by command
+  std::uint32_t groups_apart = 0;  // groups that were sent command by command
   std::uint32_t confirmed = 0;
   std::uint32_t refused = 0;
   std::uint32_t timed_out = 0;
-  std::uint32_t link_losses = 0;  // SAFE with reason link
-  std::uint32_t restores = 0;     // outputs came back by recovery=last
+  std::uint32_t link_losses = 0;  // SAFE with cause link
+  std::uint32_t restores = 0;     // outputs came back because of recovery=last
   std::uint32_t stops = 0;
   std::uint32_t stops_confirmed = 0;
   std::uint32_t clears = 0;
-  std::uint32_t clears_refused = 0;  // by the board: a stop had come since
-  std::uint32_t farewells = 0;       // obeyed
+  std::uint32_t clears_refused = 0;  // by the board, because a newer stop had come
+  std::uint32_t farewells = 0;       // obeyed by the board
   std::uint32_t farewells_confirmed = 0;
   std::uint32_t busy = 0;
   std::uint32_t stale = 0;
   std::uint32_t duplicate = 0;
   std::uint32_t attacks = 0;   // datagrams of an attacker
-  std::uint32_t rejected = 0;  // for their signatures
+  std::uint32_t rejected = 0;  // by the board, because of their signatures
   std::uint32_t executed_signed = 0;
   std::uint32_t strangers = 0;           // datagrams of a stranger
-  std::uint32_t strangers_sessions = 0;  // of its own, begun
-  std::uint32_t strangers_executed = 0;  // commands in these
-  std::uint32_t leases = 0;              // begun
+  std::uint32_t strangers_sessions = 0;  // the stranger's own sessions that began
+  std::uint32_t strangers_executed = 0;  // commands in these sessions
+  std::uint32_t leases = 0;              // that began
   std::uint32_t watched = 0;             // states that came to watchers
   std::uint32_t forged_leases = 0;
-  std::uint32_t sampled = 0;  // states whose time on the host's clock was told with its error
-  std::uint32_t sampled_wrongly = 0;  // and was farther from the truth
+  std::uint32_t sampled = 0;          // states reported with a sampling time and its error
+  std::uint32_t sampled_wrongly = 0;  // … whose time was wrong by more than that error
   std::uint32_t standstills = 0;
-  std::uint32_t waited = 0;            // datagrams that arrived meanwhile
+  std::uint32_t waited = 0;            // datagrams that arrived during a standstill
   std::uint32_t waited_to_feed = 0;    // … and fed
-  std::uint64_t worst_silence_us = 0;  // last heartbeat in to outputs safe
-  // Of several paths.
+  std::uint64_t worst_silence_us = 0;  // from the last heartbeat to safe outputs
+  // With several paths.
   std::uint32_t joins = 0;
-  std::uint32_t path_losses = 0;    // of sessions that went on
-  std::uint32_t failovers = 0;      // a path that served was disturbed, and another served on
-  std::uint32_t timed_on_good = 0;  // commands that ended while a path met the limits all the time
-  std::uint64_t copies = 0;         // that came to hosts
-  std::uint32_t replayed = 0;       // datagrams of an hour ago
-  std::uint64_t served_us = 0;      // for so long there was a path that met the limits
+  std::uint32_t path_losses = 0;  // of sessions that continued
+  std::uint32_t failovers = 0;    // a path in use was disturbed, and another path stayed in use
+  // commands that ended while a path met the limits all the time
+  std::uint32_t timed_on_good = 0;
+  std::uint64_t copies = 0;     // duplicates that reached hosts
+  std::uint32_t replayed = 0;   // datagrams recorded an hour ago
+  std::uint64_t served_us = 0;  // total time with a path that met the limits
 };
 
 class World : public firmware::Hal, public firmware::Observer {
  public:
-  // What is beside the usual: the board's loop stands still now and then, or there are several paths.
+  // Additions to a schedule: the board's loop stands still at times, or there are several paths.
   enum class Beside : std::uint8_t { nothing, standstills, paths };
 
   World(std::uint64_t seed, bool keep_trace, Beside beside = Beside::nothing);
@@ -156,10 +164,10 @@ class World : public firmware::Hal, public firmware::Observer {
   struct Packet {
     bool to_board = false;
     int host = 0;
-    int place = 0;                  // which of the host's
-    std::uint8_t port = 0;          // the board's
-    std::uint32_t peer = 0;         // the host's address when it was sent
-    std::uint32_t incarnation = 0;  // of the host when it was sent
+    int place = 0;                  // the index in the host's places
+    std::uint8_t port = 0;          // of the board
+    std::uint32_t peer = 0;         // the host's address when the datagram was sent
+    std::uint32_t incarnation = 0;  // of the host when the datagram was sent
     bool intact = true;
     bool heartbeat = false;
     bool recorded = false;  // an hour ago
@@ -173,7 +181,7 @@ class World : public firmware::Hal, public firmware::Observer {
     std::uint64_t arrived_us = 0;
     std::string bytes;
   };
-  // One run of a host process: numbers of different ones do not compare.
+  // One run of a host process. Numbers of different runs do not compare.
   struct Process {
     int host = -1;
     std::uint32_t incarnation = 0;
@@ -187,17 +195,17 @@ class World : public firmware::Hal, public firmware::Observer {
     std::uint64_t at_us;
     HostId id;
   };
-  // One command that a host asked for, named by its stepper target: that of channel 1, or, if it is a
-  // group, of all.
+  // One command that a host asked for. The stepper target is its name: the target of channel 1, or
+  // of all channels for a group.
   struct Sent {
     int host = 0;
     std::uint32_t incarnation = 0;
     std::uint64_t asked_us = 0;
-    std::uint64_t transmitted_us = 0;  // the last time
+    std::uint64_t transmitted_us = 0;  // the last time that it was sent
     int executed = 0;
     bool group = false;
-    bool apart = false;  // its host takes the board for one without groups: so bad is the line
-    std::uint8_t channels = 0;  // bit n-1: it was executed on that one
+    bool apart = false;  // its host takes the board for one without groups, because the line is bad
+    std::uint8_t channels = 0;  // bit n-1: executed on channel n
     bool dead = false;          // a refusal was reported
   };
 
@@ -219,13 +227,13 @@ class World : public firmware::Hal, public firmware::Observer {
   void handle(const Event& event);
   void at(std::uint64_t time_us, Event::Kind kind, int index, std::uint32_t generation = 0);
   std::uint32_t board_ms() const;
-  // Since its boot: when its clock began, or begins, to show that.
+  // When, after its boot, the board's clock shows this time.
   std::uint64_t when_board_shows(std::uint32_t t_ms) const;
   void mix(const void* data, std::size_t size);
   void note(const std::string& line);
   void show(const std::string& line);
   void violate(const std::string& what);
-  // world_board.cpp, with what is overridden above
+  // world_board.cpp, with the overridden functions above
   void boot_board();
   void poll_board();
   void send(std::uint8_t port, Text datagram, Priority priority, std::uint32_t peer);
@@ -270,7 +278,7 @@ class World : public firmware::Hal, public firmware::Observer {
   std::uint8_t port_of(int path) const {
     return static_cast<std::uint8_t>(schedule_.one_port ? 0 : path);
   }
-  // For so long both ends have used a path before it must not be given up.
+  // When both ends have used a path for this time, the path must stay in use.
   static constexpr std::uint64_t settled_us = 1'000'000;
   bool has_keys() const { return schedule_.keys || schedule_.attack_interval_us != 0; }
   bool several() const { return schedule_.paths() > 1; }
@@ -295,12 +303,12 @@ class World : public firmware::Hal, public firmware::Observer {
   void check_lost();
 
   Random random_;
-  Random loop_random_;  // of the standstills: what else happens is as without them
+  Random loop_random_;  // of the standstills: the other events stay the same with and without them
   Schedule schedule_;
   Report report_;
   bool keep_trace_;
   Script* script_ = nullptr;
-  std::uint64_t handled_ = 0;  // events so far
+  std::uint64_t handled_ = 0;  // number of events so far
   bool over_ = false;
   std::uint64_t now_us_ = 0;
   std::uint64_t order_ = 0;
@@ -310,7 +318,7 @@ class World : public firmware::Hal, public firmware::Observer {
 
   std::unique_ptr<firmware::Application> board_;
   std::uint32_t boot_offset_ms_ = 0;
-  std::vector<std::uint32_t> first_times_;  // of the boots so far
+  std::vector<std::uint32_t> first_times_;  // of each boot so far
   std::uint64_t boot_us_ = 0;
   std::uint32_t board_generation_ = 0;
   bool handle_held_ = true;
@@ -318,39 +326,39 @@ class World : public firmware::Hal, public firmware::Observer {
   firmware::Outputs outputs_;
   bool live_ = false;
   bool was_lost_ = false;
-  bool standing_ = false;  // the loop
+  bool standing_ = false;  // the board's loop stands still
   std::set<std::uint8_t> ports_lost_meanwhile_;
-  std::vector<int> waiting_;  // packets that arrived meanwhile
+  std::vector<int> waiting_;  // packets that arrived during the standstill
   std::map<std::uint32_t, std::uint64_t>
       heard_us_;                         // when the newest intact heartbeat of a peer came
-  std::uint64_t heartbeat_in_us_ = 0;    // the newest intact one to arrive
-  std::uint64_t heartbeat_sent_us_ = 0;  // when the newest to arrive was sent
-  std::vector<Fed> fed_;                 // by this boot of the board
-  Process delivering_;                   // whose packet the board has before it
+  std::uint64_t heartbeat_in_us_ = 0;    // the newest intact heartbeat that arrived
+  std::uint64_t heartbeat_sent_us_ = 0;  // when that heartbeat was sent
+  std::vector<Fed> fed_;                 // during this boot of the board
+  Process delivering_;                   // the sender of the packet that the board now handles
   Source delivering_at_;
   Process stop_from_;  // of the last stop executed
   std::uint32_t stop_pnum_ = 0;
   int newest_executed_ = -1;
   bool stopped_ = false;
-  std::uint64_t new_stop_us_ = 0;  // when one came that is no repetition of the one before
+  std::uint64_t new_stop_us_ = 0;  // when the newest stop came that does not repeat an earlier stop
   std::map<Process, std::uint64_t> clear_asked_us_;
   std::uint32_t next_peer_ = 1;
 
-  // What this boot of the board sent a place to echo, each with the time when it was sent or last
-  // echoed, and the lease that the place has by that. The board may forget one at any time: then
-  // another one renews the lease.
+  // The tokens that this boot of the board sent to a place, each with the time when it was sent or
+  // last echoed, and the lease that the place has. The board may forget a lease at any time: then
+  // another token renews it.
   struct Lease {
     std::map<std::uint32_t, std::uint64_t> tokens_us;
-    std::uint32_t token = 0;  // the newest echoed; 0: none yet
+    std::uint32_t token = 0;  // the newest echoed token; 0: none yet
     std::uint64_t renewed_us = 0;
   };
   std::map<std::uint32_t, Lease> leases_;
   std::uint32_t newest_token_ = 0;
   std::set<std::uint32_t>
-      streamed_;  // where states went at streamed_us_, besides to the host in control
+      streamed_;  // the receivers of states at streamed_us_, except the host in control
   std::uint64_t streamed_us_ = 0;
-  std::uint64_t went_on_us_ = 0;  // behind a standstill of the board
-  // When a path of the session was sent a state last, and after how many heartbeats that fed.
+  std::uint64_t went_on_us_ = 0;  // after a standstill of the board
+  // When a path of the session was last sent a state, and how many heartbeats had fed by then.
   using Streamed = std::pair<std::uint64_t, std::size_t>;
   std::map<std::pair<std::uint8_t, std::uint32_t>, Streamed> owner_streamed_;  // by port and peer
 
@@ -358,13 +366,13 @@ class World : public firmware::Hal, public firmware::Observer {
   std::vector<Sent> commands_;
   Attacker attacker_;
   bool attacking_ = false;
-  std::set<std::uint32_t> attacker_stops_;  // their numbers
+  std::set<std::uint32_t> attacker_stops_;  // the numbers of these stops
   Stranger stranger_;
   Random stranger_random_;
-  std::uint64_t good_us_ = 0;         // when a heartbeat that has to feed came last
-  std::vector<std::uint32_t> shown_;  // the T of the newest heartbeats of the board
-  bool had_owner_ = false;            // after the event before this one
-  bool may_be_lost_ = false;          // in this event, by a farewell or with a port of the board
+  std::uint64_t good_us_ = 0;         // when a heartbeat that must feed last came
+  std::vector<std::uint32_t> shown_;  // the T of the board's newest heartbeats
+  bool had_owner_ = false;            // after the previous event
+  bool may_be_lost_ = false;          // in this event, by a farewell or a lost port of the board
 
   struct BoardPort final : firmware::Port {
     BoardPort(World& w, std::uint8_t n) : world(w), number(n) {}
@@ -382,19 +390,19 @@ class World : public firmware::Hal, public firmware::Observer {
     std::uint64_t cut_to_host_until_us = 0;
     std::uint64_t stalled_until_us = 0;
     std::uint64_t unplugged_until_us = 0;
-    // Of the first host.
+    // Of the first host's path.
     std::uint64_t disturbed_until_us = 0;
-    bool fine = false;  // meets the limits
+    bool fine = false;  // the path meets the limits
     std::uint64_t fine_since_us = 0;
-    bool serves = false;  // … and both ends use it
+    bool serves = false;  // the path meets the limits and both ends use it
     std::uint64_t serves_since_us = 0;
-    std::uint64_t told_busy_us = 0;  // the board last answered BUSY there
+    std::uint64_t told_busy_us = 0;  // when the board last answered BUSY on this path
     bool brought_state = false;
-    std::uint32_t newest_t = 0;  // of the states that it has brought
+    std::uint32_t newest_t = 0;  // of the states that came on this path
   };
   Path paths_[most_paths];
   Random paths_random_;
-  std::uint64_t start_us_ = 0;  // of the schedule: an hour after what was recorded
+  std::uint64_t start_us_ = 0;  // start of the schedule: an hour after the recording
   std::uint64_t looked_us_ = 0;
   struct Recorded {
     std::uint64_t at_us;

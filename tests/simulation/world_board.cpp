@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The simulated board: the application on a HAL that only remembers, and the promises that are checked
-// where the board acts.
+// The simulated board: the application on a HAL that only remembers its outputs, and the promises
+// that are checked where the board acts.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,8 +19,9 @@ bool driven(const firmware::Outputs& outputs) { return outputs != firmware::Outp
 
 }  // namespace
 
-// The board's clock begins at random. By chance, once in 200,000 times, it is within 10 s of where it was before, and what
-// is played again of that boot passes for one of this (docs/design/safety-argument.md): no mistake to look for.
+// The board's clock begins at random. Once in 200,000 boots it is by chance within 10 s of the
+// earlier clock. A replay from the earlier boot then passes for a datagram of this boot
+// (docs/design/safety-argument.md). This is not an error.
 std::uint32_t World::first_time() {
   constexpr std::int32_t apart_ms = 60'000;
   std::uint32_t first = 0;
@@ -84,8 +85,8 @@ void World::stand_still(const Standstill& standstill) {
   at(now_us_ + standstill.length_us, Event::Kind::go_on, 0, ++board_generation_);
 }
 
-// As a process does that has several sockets: its timer may come before what has arrived is read, or
-// in the midst of it, and it may not know that it has read all.
+// Models a process with several sockets: its timer may come before, between or after the arrived
+// datagrams, and the process may not know that it has read all of them.
 void World::go_on() {
   note("board goes on");
   standing_ = false;
@@ -128,7 +129,7 @@ void World::apply(const firmware::Outputs& outputs) {
   live_ = driven(outputs);
   if (report_.groups_apart == 0) check_steppers();
   if (!came_back) return;
-  // Of a group that went command by command another may be the first.
+  // If a group was sent command by command, another channel may be the first.
   const auto first = std::find_if(std::begin(outputs.stepper), std::end(outputs.stepper),
                                   [](const firmware::StepperTarget& each) { return each.enabled; });
   const int id = first != std::end(outputs.stepper) ? first->position : 0;
@@ -143,7 +144,8 @@ void World::apply(const firmware::Outputs& outputs) {
   }
 }
 
-// Steppers 2 to 4 are told by groups alone, which tell them all the same, and stepper 1, too.
+// Steppers 2 to 4 are commanded only by groups, which give all steppers the same target, including
+// stepper 1.
 void World::check_steppers() {
   const firmware::StepperTarget(&steppers)[stepper_channels] = outputs_.stepper;
   for (int i = 2; i < stepper_channels; ++i) {
@@ -252,7 +254,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
   }
   Sent& sent = commands_[static_cast<std::size_t>(id)];
   sent.channels = static_cast<std::uint8_t>(sent.channels | 1U << (command.channel - 1));
-  if (command.channel != 1) {  // the others of a group come behind its first
+  if (command.channel != 1) {  // the other channels of a group come after its first
     if (!sent.group || (sent.executed == 0 && !sent.apart))
       violate("intact: executed a command that nobody sent");
     return;
@@ -278,7 +280,7 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
   }
   const std::uint32_t unseen_ms =
       schedule_.standstills.empty() ? 0 : firmware::Application::standstill_ms;
-  // By the board's clock, which may be slow.
+  // Measured by the board's clock, which may be slow.
   const std::uint64_t overtaken_us = (BoardLink::late_limit_ms + unseen_ms + 1) * 1001U;
   for (const Fed& fed : fed_) {
     const bool overtook = fed.from == delivering_ && newer(fed.pnum, pnum);
@@ -293,12 +295,12 @@ void World::on_executed(std::uint32_t, std::uint32_t pnum, const Command& comman
   newest_executed_ = std::max(newest_executed_, id);
 }
 
-// Has the board a host, and is it that process?
+// True if the board has a host and it is that process.
 bool World::controls(const Process& process) const {
   return board_->link().has_owner() && !fed_.empty() && fed_.back().from == process;
 }
 
-// A command that was handed over: was it executed as a whole, if it was?
+// After a command was handed over: if it was executed, it must have been executed as a whole.
 void World::check_whole(int id) {
   const Sent& sent = commands_[static_cast<std::size_t>(id)];
   const std::uint8_t all = sent.group ? (1U << stepper_channels) - 1 : 1;
@@ -307,8 +309,8 @@ void World::check_whole(int id) {
   }
 }
 
-// A stop that is obeyed. A repetition of the last one adds nothing to it, nor does an attacker's that
-// copies its number.
+// The board obeys a stop. A repetition of the last stop changes nothing, and neither does an
+// attacker's stop that repeats its number.
 void World::on_stop(std::uint32_t pnum) {
   if (attacking_ && stopped_ && stop_pnum_ == pnum) return;
   if (!stopped_ || stop_from_ != delivering_ || stop_pnum_ != pnum) new_stop_us_ = now_us_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The channel: loses, doubles, delays, damages and cuts.
+// The channel: it loses, duplicates, delays, damages and cuts.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ int World::take_slot() {
   return slot;
 }
 
-// What it is, of one that a host sends.
+// Finds out what kind of datagram a host sent.
 void World::describe(Packet& packet) {
   Datagram datagram;
   if (!read_datagram(Text(packet.bytes), datagram)) return;
@@ -104,7 +104,7 @@ void World::transfer(bool to_board, int host, int place, std::string_view bytes)
           packet.bytes.erase(random_.below(packet.bytes.size()), 1);
           break;
       }
-      // Still intact if only the case of a checksum digit changed: the content is as it was sent.
+      // Still intact if only the case of a checksum digit changed: the content is unchanged.
       Datagram changed;
       const std::size_t content = bytes.find('^');
       packet.intact = read_datagram(Text(packet.bytes), changed) &&
@@ -132,10 +132,10 @@ void World::deliver(int slot) {
 }
 
 void World::hand_over(int slot) {
-  // Receiving may transfer, and so move packets_: take the packet out first.
+  // Take the packet out first: receiving may transfer, which may move packets_.
   Packet packet = std::move(packets_[static_cast<std::size_t>(slot)]);
   if (script_ != nullptr && script_->takes(packet)) {
-    // A bridge has it, or a host that does not run keeps it.
+    // A bridge has the packet, or a host that does not run keeps it.
   } else if (packet.to_board) {
     if (keep_trace_) show(fmt::format("board receives {}", packet.bytes));
     const std::uint32_t peer = packet.peer;

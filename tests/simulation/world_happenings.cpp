@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What comes from outside: the happenings of the schedule, and the attacker.
+// Events from outside: the happenings of the schedule, and the attacker.
 #include <fmt/format.h>
 
 #include <utility>
@@ -57,7 +57,7 @@ void World::happen(const Happening& happening, bool over) {
       handle_held_ = over;
       break;
     case Happening::Kind::obstacle:
-      // The threshold is set by command, so that it goes the way of all commands.
+      // The threshold is set by a command, which can be lost or delayed like any command.
       if (!over && host.alive)
         host.session->post(Command::proximity(1, Centimetres(50)), host.time());
       distance_cm_ = over ? 200 : 10;
@@ -103,7 +103,7 @@ void World::leave(Host& host) {
   poll_host(host.index);
 }
 
-// Somebody who has seen what there is to clear asks for it.
+// A host that has seen the causes of the safe state asks to clear them.
 void World::clear_stop(Host& host) {
   if (!host.session->knows_cause() || host.clear_ticket != 0) return;
   clear_asked_us_[{host.index, host.incarnation}] = now_us_;
@@ -138,7 +138,7 @@ void World::attack() {
   }
   const BoardLink& link = board_->link();
   const BoardLinkState state = link.state();
-  board_->poll(board_ms());  // so that silence is not taken for the attacker's doing
+  board_->poll(board_ms());  // so that a link lost by silence does not count for the attacker
   const bool lost = link.state() != state;
   const std::uint32_t fed_ms = link.fed_ms();
   const Source source{port, address};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host of the link simulator: the session that ships, and an application that commands through it.
+// A host of the link simulator: the shipped session, and an application that commands through it.
 #pragma once
 
 #include <fmt/format.h>
@@ -30,7 +30,7 @@ struct World::Host final : test::DrivenSession::Handler {
     stops.clear();
     clear_ticket = farewell_ticket = 0;
     SessionOptions options;
-    options.arming = Arming::off;  // so that more is sent that must not be executed
+    options.arming = Arming::off;  // so that more commands are sent that must not be executed
     if (watcher) options.watch_rate_hz = static_cast<int>(world.random_.between(1, 100));
     if (world.script_ != nullptr) world.script_->set(options);
     if (world.has_keys() && !stopper && !watcher) {
@@ -63,7 +63,7 @@ struct World::Host final : test::DrivenSession::Handler {
     Datagram datagram;
     if (priority == Priority::stop && read_datagram(Text(bytes), datagram))
       stop_pnum = datagram.pnum();
-    // Who shares a place with the host in control sends nothing but a stop (docs/reference/can.md).
+    // A host that shares a place with the host in control sends only stops (docs/reference/can.md).
     if (stopper && world.schedule_.shared_place && priority != Priority::stop) {
       return SendResult::busy;
     }
@@ -75,13 +75,13 @@ struct World::Host final : test::DrivenSession::Handler {
     world.report_.watched += watcher;
     look_at_clock(state);
   }
-  // Does the instant that it tells of the sample, and its error, hold what was?
+  // Checks that the reported sampling time is right within its reported error.
   void look_at_clock(const ReceivedState& state) {
     if (state.sampled_error == ReceivedState::unknown) return;
     const auto age_ms = static_cast<std::int32_t>(world.board_ms() - state.t_ms);
     const auto since_boot_ms = static_cast<std::int32_t>(state.t_ms - world.boot_offset_ms_);
     if (age_ms < 0 || age_ms > 60'000 || since_boot_ms < 0)
-      return;  // of a boot before, by another clock
+      return;  // of an earlier boot, with another clock
     const Time truth{
         static_cast<std::int64_t>(world.when_board_shows(state.t_ms) + clock_offset_us)};
     const Time off = std::chrono::round<Time>(state.sampled.time_since_epoch()) - truth;
@@ -104,20 +104,20 @@ struct World::Host final : test::DrivenSession::Handler {
   World& world;
   int index;
   std::uint32_t incarnation = 0;
-  std::uint32_t began_as = 0;  // its incarnation when this process began. A sleep ends one, too
+  std::uint32_t began_as = 0;  // the incarnation when this process began; a sleep ends it, too
   bool alive = false;
   bool frozen = false;
   bool suspended = false;  // the process does not run
   bool stopper = false;
   bool watcher = false;
-  bool leaving = false;  // ends at its next turn: its stop is confirmed, or its farewell over
+  bool leaving = false;  // ends at its next turn: its stop is confirmed, or its farewell has ended
   struct Place {
     int path = 0;
-    std::uint32_t peer = 0;        // its address there
-    std::uint32_t other_peer = 0;  // the one before or next; 0: none yet
+    std::uint32_t peer = 0;        // its address on this path
+    std::uint32_t other_peer = 0;  // an earlier or later address; 0: none yet
   };
   std::vector<Place> places;  // the paths of its session
-  // None: where it is not.
+  // nullptr if the host is not on that path.
   const Place* on(int path) const {
     for (const Place& each : places) {
       if (each.path == path) return &each;
@@ -135,9 +135,9 @@ struct World::Host final : test::DrivenSession::Handler {
     bool executed = false;
   };
   std::map<Ticket, Stop> stops;
-  std::uint32_t stop_pnum = 0;  // of the newest that was sent
+  std::uint32_t stop_pnum = 0;  // of the newest stop that was sent
   std::uint32_t next_pnum = 0;  // of the next datagram
-  Ticket clear_ticket = 0;      // 0: none is under way
+  Ticket clear_ticket = 0;      // 0: no E:CLEAR is under way
   Ticket farewell_ticket = 0;
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hosts: when they poll, what they command, and whether what they are told is true.
+// The hosts: when they poll, which commands they send, and whether the results that they get are
+// true.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,7 +26,7 @@ void World::Host::on_result(Ticket ticket, const CommandResult& result) {
     world.note(fmt::format("host {} stop outcome {}", index, static_cast<int>(result.outcome)));
     if (result.outcome == Outcome::confirmed) {
       ++world.report_.stops_confirmed;
-      // An attacker may have guessed its number: the board's words are not signed anyway.
+      // An attacker may have guessed the number: the board's datagrams are not signed.
       const bool guessed = world.attacker_stops_.count(stop->second.pnum) != 0;
       if (!stop->second.executed && !guessed) world.violate("stop: confirmed but not obeyed");
       leaving = stopper && world.random_.chance(0.5);
@@ -50,7 +51,8 @@ void World::Host::on_result(Ticket ticket, const CommandResult& result) {
     case Outcome::refused:
       ++world.report_.refused;
       sent.dead = true;
-      // Of a group that went command by command, some may have been executed before one was refused.
+      // If a group was sent command by command, some commands may have been executed before one was
+      // refused.
       if (sent.executed != 0 && !sent.apart) {
         world.violate(fmt::format("truth: command {} refused but executed", id));
       }

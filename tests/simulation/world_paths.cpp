@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Several paths: where the hosts are on them, what happens to them, what comes over them that no host has sent now,
-// and the promises about them.
+// Several paths: the places of the hosts on them, the events that hit them, the old datagrams that
+// are replayed on them, and the promises about them.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ bool is_fine(const ChannelFaults& faults) {
 
 }  // namespace
 
-// The first host is on all paths, others on some.
+// The first host is on all paths, the other hosts on some.
 void World::place(Host& host) {
   const bool bus_stopper = host.stopper && schedule_.shared_place;
   for (int w = 0; w < schedule_.paths(); ++w) {
@@ -47,7 +47,7 @@ void World::place(Host& host) {
   host.places.push_back(place);
 }
 
-// --- what happens to a path
+// --- events of a path
 
 void World::disturb(int index, Happening::Kind kind, std::uint64_t end_us) {
   Path& path = paths_[index];
@@ -103,7 +103,7 @@ void World::unplug(const Happening& happening, bool over) {
   }
 }
 
-// --- what nobody has sent now
+// --- replayed datagrams
 
 void World::record() {
   hosts_.push_back(std::make_unique<Host>(*this, 0));
@@ -158,14 +158,14 @@ void World::on_path(std::uint32_t, Source path, bool joined) {
   if (!joined) {
     ++report_.path_losses;
     if (board_->paths().size() == 0) return;
-    // What it brought has fed, though it is the session's no longer.
+    // A datagram of this peer has fed, although the peer is no longer a path of the session.
     std::uint64_t& heard_us = heard_us_[board_->paths()[0].peer];
     heard_us = std::max(heard_us, heard_us_[path.peer]);
     return;
   }
   ++report_.joins;
   if (!fed_.empty() && fed_.back().from.host < 0)
-    return;  // a stranger's session, with what paths it likes
+    return;  // a stranger's session may have any paths
   const bool of_host = !fed_.empty() && delivering_ == fed_.back().from;
   if (!of_host) violate(fmt::format("joined: peer {} is not of the session's host", path.peer));
 }
@@ -181,9 +181,10 @@ bool World::serves_since(std::uint64_t at_us) const {
   });
 }
 
-// A good path served when the command was asked for, and so long before that the host knew that it has the board: no
-// BUSY from before counts any more, and its F has been confirmed. The command goes there, and the state that shows it
-// or the answer to a copy comes back.
+// True if a good path was in use when the command was asked for, and long enough before that the
+// host knows that it has control: no earlier BUSY counts any more, and its F has been confirmed.
+// The command goes to that path, and the state that confirms it, or the answer to a duplicate,
+// comes back.
 bool World::should_be_confirmed(const Sent& sent) const {
   const std::uint64_t there_and_back_us =
       2 * most_delay_us + schedule_.settings.state_period_ms() * 1000U;
@@ -198,7 +199,7 @@ void World::check_paths() {
                           host.farewell_ticket == 0 && controls({0, host.incarnation});
   if (serves_since(now_us_)) report_.served_us += now_us_ - looked_us_;
   looked_us_ = now_us_;
-  // Another one that both ends have used so long that this one has had its time to join.
+  // Another path that both ends have used so long that this path had time to join.
   const bool alone = !serves_since(now_us_ - std::min(now_us_, used_again_us));
   const bool crowded = schedule_.attack_interval_us != 0;
   for (int w = 0; w < schedule_.paths(); ++w) {
@@ -236,7 +237,7 @@ void World::on_told_state(int index, std::string_view bytes) {
   path.brought_state = true;
 }
 
-// Of the newest state that the host has.
+// Checks the age of the newest state that the host has.
 void World::check_age(int index) {
   const Path& path = paths_[index];
   const ReceivedState& state = hosts_.front()->session->state();

@@ -15,7 +15,8 @@ constexpr std::uint64_t slack_of_loss_us = 20'000;
 
 }  // namespace
 
-// It hears all states and heartbeats, as a watcher does, and the answers to itself.
+// The stranger hears all states and heartbeats, as a watcher does, and the answers to its own
+// datagrams.
 void World::tell_stranger(std::uint32_t peer, Priority priority, std::string_view bytes) {
   if (schedule_.stranger_interval_us == 0) return;
   const bool heartbeat = bytes.substr(0, 2) == "H:";
@@ -36,12 +37,12 @@ void World::on_board_heartbeat(std::string_view bytes) {
   if (shown_.size() > most_shown) shown_.erase(shown_.begin());
 }
 
-// Its datagrams arrive whole and at once, some from the address of a host.
+// The stranger's datagrams arrive whole and at once, some from the address of a host.
 void World::stranger() {
   at(now_us_ + stranger_random_.between(1, 2ULL * schedule_.stranger_interval_us),
      Event::Kind::stranger, 0);
   if (standing_) return;
-  board_->poll(board_ms());  // so that silence is not taken for the stranger's doing
+  board_->poll(board_ms());  // so that a link lost by silence does not count for the stranger
   const BoardLink& link = board_->link();
   const bool had_owner = link.has_owner();
   const Process owner = fed_.empty() ? Process() : fed_.back().from;
@@ -95,7 +96,7 @@ void World::stranger() {
   good_us_ = heartbeat_in_us_ = heartbeat_sent_us_ = heard_us_[packet.peer] = now_us_;
 }
 
-// In a session of its own, it commands as any host does.
+// In its own session, the stranger commands as any host does.
 void World::on_strangers(const Command& command) {
   ++report_.strangers_executed;
   if (fed_.empty() || fed_.back().from != delivering_) {
@@ -104,9 +105,9 @@ void World::on_strangers(const Command& command) {
   if (command.kind == CommandKind::clear) stopped_ = board_->reason() == SafeReason::stop;
 }
 
-// True if this is a heartbeat of the host in control that comes in time, is the newest one, and echoes
-// one of the last heartbeats of the board, which is younger than the timeout. False with keys and
-// with standstills: there it is not certain.
+// True if this is the newest heartbeat of the host in control, it comes in time, and it echoes a
+// recent heartbeat of the board that is younger than the timeout. False with keys and with
+// standstills, because it is not certain then.
 bool World::has_to_feed(const Packet& packet) const {
   if (has_keys() || !schedule_.standstills.empty() || packet.host < 0) return false;
   if (!packet.intact || !packet.heartbeat) return false;
@@ -119,7 +120,7 @@ bool World::has_to_feed(const Packet& packet) const {
          board_ms() - t < board_->settings().timeout_ms;
 }
 
-// The command of live outputs is of the process in control.
+// Checks that the process in control commanded the live outputs.
 void World::check_owner_of_outputs() {
   const firmware::StepperTarget& stepper = outputs_.stepper[0];
   if (script_ != nullptr || !stepper.enabled || fed_.empty()) return;
@@ -132,7 +133,7 @@ void World::check_owner_of_outputs() {
   if (!owned) violate("owned: live outputs are of a process that is not in control");
 }
 
-// True if the link may not be lost by silence.
+// True if silence must not end the link.
 bool World::is_in_time() const {
   return now_us_ - good_us_ < board_->settings().timeout_ms * 1000ULL - slack_of_loss_us;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Programs that watch the board, somebody who asks for leases in the name of others, and the promise about
-// whom the board streams to.
+// Programs that watch the board, a program that asks for leases in the name of other programs, and
+// the promise about the receivers of the board's states.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace r4::simulation {
 namespace {
 
 constexpr std::uint64_t lease_us = 2'000'000;
-constexpr std::uint64_t slack_us = 25'000;  // until the board looks again
+constexpr std::uint64_t slack_us = 25'000;  // until the board checks again
 constexpr std::uint32_t bystander = 0xFFFE;
 
 }  // namespace
@@ -25,7 +25,7 @@ World::Host& World::watcher(int number) {
   return *hosts_[static_cast<std::size_t>(schedule_.hosts) + 1 + static_cast<std::size_t>(number)];
 }
 
-// Some are at the place of a host, as on a bus.
+// Some watchers are at the place of a host, as on a bus.
 void World::add_watchers() {
   for (int i = 0; i < schedule_.watchers; ++i) {
     hosts_.push_back(std::make_unique<Host>(*this, schedule_.hosts + 1 + i));
@@ -45,7 +45,7 @@ void World::watch(Host& watcher, bool over) {
   watcher.die();
 }
 
-// It knows the board's clock, and what other places were told.
+// The forger knows the board's clock, and the tokens that were sent to other places.
 void World::forge_lease() {
   at(now_us_ + random_.between(1, 2ULL * schedule_.forge_interval_us), Event::Kind::forge, 0);
   if (standing_) return;
@@ -69,7 +69,7 @@ void World::forge_lease() {
     case 3:
       echo = newest_token_ + (random_.chance(0.5) ? 1U : 0U);
       break;
-    case 4:  // what would keep the link of the host in control
+    case 4:  // an echo that would keep the link of the host in control
       victim = hosts_.front()->on(0)->peer;
       echo = stranger_.echo();
       pnum = hosts_.front()->next_pnum;
@@ -80,7 +80,7 @@ void World::forge_lease() {
       }
       break;
   }
-  if (leases_[victim].tokens_us.contains(echo)) return;  // that is what it cannot know
+  if (leases_[victim].tokens_us.contains(echo)) return;  // the forger cannot know this token
   ++report_.forged_leases;
   const std::string bytes =
       test::with_crc(fmt::format("W:{};PNum:{};T:{};", random_.below(1001), pnum, echo));
@@ -103,7 +103,7 @@ void World::on_told(std::uint32_t peer, const Datagram& datagram) {
   newest_token_ = nack.lease;
 }
 
-// Notes a W that the board may take for a lease.
+// Notes a W that may begin or renew a lease at the board.
 void World::on_lease(std::uint32_t peer, std::string_view bytes) {
   Datagram datagram;
   if (schedule_.watchers == 0 || !read_datagram(Text(bytes), datagram)) return;
@@ -128,7 +128,7 @@ void World::check_stream(std::uint8_t port, std::uint32_t peer, const Datagram& 
     violate("watch: a state tells nothing of being safe, and there is no host");
   }
   if (link.has_owner() && board_->paths().has(Source{port, peer})) {
-    // A session that begins in the very instant of a state is sent one of its own.
+    // A session that begins in the instant of a state gets a state immediately.
     const Streamed now{now_us_, fed_.size()};
     Streamed& before = owner_streamed_[{port, peer}];
     const bool twice = before == now && schedule_.standstills.empty();
@@ -140,7 +140,7 @@ void World::check_stream(std::uint8_t port, std::uint32_t peer, const Datagram& 
   if (streamed_us_ != now_us_) streamed_.clear();
   streamed_us_ = now_us_;
   streamed_.insert(peer);
-  // A board that goes on works off in an instant what it would have had time for, and a place may change meanwhile.
+  // After a standstill a board does several turns in one instant, and a place may change meanwhile.
   if (streamed_.size() > 4 && now_us_ != went_on_us_)
     violate("watch: states go to more than four places");
   const auto lease = leases_.find(peer);

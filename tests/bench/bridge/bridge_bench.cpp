@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `r4 bridge` costs, beside a bare forwarder that polls, reads and writes, and does nothing else. Both are
-// processes of their own, and run at the same time, in turns.
+// The cost of `r4 bridge`, compared with a bare forwarder that only polls, reads and writes. Both
+// are separate processes that run at the same time and are measured in turns.
 //
 //     r4_bridge_bench [R4, default build/r4] [datagrams, default 4000]
 //
-// Exit code 1 if a bar of the plan is missed: UDP to a pty and back with datagrams of 170 bytes, one way at most 1.15
-// times as long (median), and 1.3 times the processor time; 100,000 datagrams a second from UDP to UDP, none reordered.
+// Exit code 1 if a limit is missed. UDP to a pty and back with datagrams of 170 bytes: at most 1.15
+// times the forwarder's median one-way time, and 1.3 times its processor time. UDP to UDP: 100,000
+// datagrams a second, none reordered.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -46,7 +47,7 @@ const char* verdict(bool met) {
   return met ? "met" : "MISSED";
 }
 
-// --- what travels
+// --- datagrams
 
 std::string datagram(bool of_board, std::uint32_t number) {
   std::string fields = of_board ? "AIN24:24.28;AIN12:12.18;" : "H:ROS2-R4;";
@@ -158,7 +159,7 @@ class Forwarder {
     require(false, r4.c_str());
   }
 
-  // Between a socket and whatever `board` is; `line_end` where that is a stream.
+  // Forwards between a socket and `board`. `line_end`: `board` is a stream, so add line ends.
   void run_bare(std::uint16_t port, int board, bool line_end) {
     std::fflush(stdout);
     pid_ = ::fork();
@@ -207,17 +208,17 @@ class Forwarder {
   pid_t pid_ = -1;
 };
 
-// A forwarder with both of its ends, which are ours.
+// A forwarder and both ends of its path, which this process owns.
 struct Path {
   int host;   // a connected socket
   int board;  // a pty's master, or a socket
   bool stream;
   Forwarder& by;
   std::uint32_t number = 0;
-  std::array<std::vector<double>, 2> took_us{};  // towards the board, towards the host
+  std::array<std::vector<double>, 2> took_us{};  // index 0: to the board, 1: to the host
   std::array<double, 2> cpu_us{};
 
-  // Sends one and waits until it has arrived; false if it does not within `limit_ms`.
+  // Sends one datagram and waits for it. False if it does not arrive within `limit_ms`.
   bool carry(bool to_host, int limit_ms, double* took) {
     std::string bytes = datagram(to_host, ++number);
     const std::size_t expected = bytes.size();
@@ -238,7 +239,7 @@ struct Path {
     return true;
   }
 
-  // Until the forwarder is there.
+  // Waits until the forwarder works.
   void begin() {
     double ignored = 0;
     for (int i = 0; i < 100; ++i) {
@@ -314,7 +315,7 @@ void compare(const std::string& r4, int datagrams) {
   }
 }
 
-// As fast as they go through, with so many under way.
+// Sends as fast as possible, with this many datagrams under way.
 void flood(const std::string& r4, bool to_host, std::uint32_t count) {
   constexpr std::uint32_t under_way = 128;
   const Socket host;
@@ -328,7 +329,7 @@ void flood(const std::string& r4, bool to_host, std::uint32_t count) {
   sockaddr_in back{};
   socklen_t size = sizeof back;
   bool there = false;
-  for (int i = 0; i < 100 && !there; ++i) {  // the board learns where the bridge hears it
+  for (int i = 0; i < 100 && !there; ++i) {  // the board's socket learns the address of the bridge
     const std::string heartbeat = datagram(false, 0);
     if (::write(host.number(), heartbeat.data(), heartbeat.size()) < 0) continue;
     pollfd end{board.number(), POLLIN, 0};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the frames of ISO-TP cost a program at least: CAN_RAW sockets with nothing above them,
-// which exchange as many frames as ISO-TP would, in as few system calls as there are.
+// The least cost of ISO-TP frames for a program: plain CAN_RAW sockets that exchange as many frames
+// as ISO-TP would, in as few system calls as possible.
 #pragma once
 
 #include <cstddef>
@@ -11,31 +11,32 @@
 
 namespace r4::bench {
 
-// Frames that classic ISO-TP cuts a datagram into.
+// The number of frames into which classic ISO-TP splits a datagram.
 constexpr int frames_of(std::size_t size) {
   return size <= 7 ? 1 : 1 + static_cast<int>((size - 6 + 6) / 7);
 }
 
-// How a program waits for a frame: it sleeps, or looks again and again, for which a processor must be
-// to spare.
+// How a program waits for a frame. `sleeping`: in a system call. `looking`: by polling, which needs
+// a free processor.
 enum class Wait { sleeping, looking };
 const char* to_text(Wait wait);
 
-// The end that answers: flow control for a question's first frame, then the answer's frames.
+// The answering end: flow control after the first frame of a question, then the frames of the
+// answer.
 class BareEchoProcess : public ChildProcess {
  public:
   BareEchoProcess(Wait wait, int question_frames, int answer_frames);
 };
 
-// Seconds of each of `count` round trips with a BareEchoProcess of the same numbers.
+// Seconds of each of `count` round trips with a BareEchoProcess with the same numbers of frames.
 std::vector<double> bare_round_trips(Wait wait, int question_frames, int answer_frames, int count);
 
-// Sends datagrams of so many frames, as many as go; in the dialogue it waits for flow control behind
-// the first frame of each. It looks for it.
+// Sends datagrams of this many frames as fast as possible. In the dialogue it waits for flow
+// control after the first frame of each datagram, by polling.
 class BareSenderProcess : public ChildProcess {
  public:
   BareSenderProcess(Lane lane, int frames);
-  // Datagrams a second, of `count` that this process takes.
+  // Datagrams a second, measured over `count` datagrams that this process receives.
   double rate(std::uint32_t count) const;
 
  private:

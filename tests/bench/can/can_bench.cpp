@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CAN bus against the kernel's own ISO-TP (CAN_ISOTP with CAN_ISOTP_FRAME_TXTIME_ZERO), on vcan0:
+// A CAN bus, compared with the kernel's own ISO-TP (CAN_ISOTP with CAN_ISOTP_FRAME_TXTIME_ZERO), on
+// vcan0:
 //
 //     tools/with-can build/tests/bench/r4_can_bench [rounds, default 9
 //                  [part: round-trip or throughput]]
 //
-// Round trip: a command and the state that answers it, beside blocking sockets that send as many
-// bytes to and fro, with our carriers in the place of the sockets. Throughput: datagrams of 170 bytes
-// one way. Ours packed on the bus by both ends, as is the default (fewer frames for the same datagrams
-// of the program), against the kernel carrying the plain ones. They take turns; the ratio is that of
-// a round, and the median of the rounds counts. Exit code 1 if a bar is missed: round trip p50 at most
-// 1.2 times the kernel's, throughput no less than the kernel's.
+// Round trip: a command and the state that answers it. The reference is a pair of blocking sockets
+// with messages of the same sizes; then our carriers replace the sockets. Throughput: datagrams of
+// 170 bytes in one direction. Our two ends use the packed form, the default, which needs fewer
+// frames for the same datagrams; the kernel carries the plain datagrams. Both take turns. A ratio
+// is that of one round, and the median of all rounds counts. Exit code 1 if a limit is missed:
+// round trip p50 at most 1.2 times the kernel's, throughput at least the kernel's.
 //
-// Without a bar, to know where the time goes: ours plain (pack=0); bare frames are what a program that
-// does ISO-TP itself could reach at best; async_send has all of the stack above the carriers, and at
-// the board simulated chips.
+// Also measured without a limit, to show where the time is spent: our plain form (pack=0); bare
+// frames, the best that a program with its own ISO-TP can reach; async_send, with the whole stack
+// above the carriers and simulated chips on the board.
 #include <algorithm>
 #include <array>
 #include <asio/io_context.hpp>
@@ -44,7 +45,7 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 using Passed = CanBoardProcess::Passed;
 
-constexpr int trips = 150;  // a round
+constexpr int trips = 150;  // per round
 constexpr std::uint32_t datagrams = 300;
 constexpr std::size_t datagram_size = 170;
 
@@ -79,7 +80,8 @@ void run_until(asio::io_context& io, Done done) {
   }
 }
 
-// A board's state, made up to 170 bytes by its packet number: not all checksums have eight digits.
+// A state of the board, filled up to 170 bytes by its packet number, because not every checksum has
+// eight digits.
 std::string make_datagram() {
   constexpr Text fields(
       "AIN24:24.28;AIN12:12.12;AIN5:5.12;AINDMH:12.11;DMHSTA:1;AINSTEER:1.03;DHB1A:4095,1;"
@@ -105,7 +107,8 @@ std::string make_command() {
 
 // --- round trip
 
-// Commands one after the other; each is sent when the state that confirms the one before has come.
+// Sends commands one after the other. Each is sent after the state that confirms its predecessor
+// has come.
 class Host {
  public:
   explicit Host(const std::string& url) : board_(io_, url, test::at_will()) { board_.open(); }
@@ -135,7 +138,7 @@ class Host {
   struct Confirmed {
     Host& host;
     void operator()(const CommandResult& result) const {
-      // A state that was lost is not repeated while the board's clock stands still.
+      // A lost state is not repeated while the board's clock stands still.
       if (result.outcome == Outcome::confirmed) {
         host.seconds_.push_back(seconds_since(host.start_));
         --host.left_;
@@ -159,7 +162,7 @@ class Host {
   Clock::time_point start_;
 };
 
-// Carriers alone, with nothing above them: the same exchange as the kernel's sockets have.
+// Carriers without a session or a board: the same exchange as with the kernel's sockets.
 class Carriers : Carrier::Handler {
  public:
   Carriers(Form form, const std::string& command, const std::string& state)
@@ -215,11 +218,11 @@ std::vector<double> kernel_round_trips(test::KernelIsotp& dialogue, test::Kernel
   return seconds;
 }
 
-// Our two ends of a form, and what was measured.
+// Both our ends of one form, and their results.
 struct Ours {
   explicit Ours(Form which) : form(which), board(which), host(host_url(which)) {}
 
-  // One round's times.
+  // The times of one round.
   std::vector<double> measure() {
     board.let_time_pass(true);
     host.await_control();
@@ -270,7 +273,7 @@ void compare_round_trips(int rounds) {
     if (round != 0) theirs.insert(theirs.end(), kernel.begin(), kernel.end());
     for (Row& row : rows) {
       const std::vector<double> times = row.measure();
-      if (round == 0) continue;  // what is made once has been made
+      if (round == 0) continue;  // the first round also includes one-time setup
       row.seconds.insert(row.seconds.end(), times.begin(), times.end());
       row.ratios.push_back(median(times) / median(kernel));
     }
@@ -298,7 +301,7 @@ std::size_t packed_size(const std::string& datagram) {
   return pack(Text(datagram.data(), datagram.size()), bytes, sizeof bytes);
 }
 
-// Our end that receives.
+// The receiving end of our stack.
 class Receiver : Carrier::Handler {
  public:
   Receiver(Form form, Lane lane)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The other ends of the CAN benchmark, each in a process of its own on vcan0: a board of ours, a
-// carrier of ours alone, a plain program on the kernel's ISO-TP sockets, and senders of both kinds.
+// The other ends of the CAN benchmark, each in a separate process on vcan0: our board, our carrier
+// alone, a plain program on the kernel's ISO-TP sockets, and senders of both kinds.
 #pragma once
 
 #include <cstddef>
@@ -13,27 +13,27 @@
 
 namespace r4::bench {
 
-// Who is who on the bus; the ids of each are those of can_ids.hpp.
+// The nodes on the bus; can_ids.hpp defines the ids of each.
 constexpr std::uint8_t kernel_node = 6;
 
-// How ours travel. The kernel's end carries the plain datagrams beside both.
+// The form of our datagrams. The kernel's end carries plain datagrams in both cases.
 enum class Form { plain, packed };
 const char* to_text(Form form);
-// What uses a carrier: a session and a board, or the benchmark itself. Each has nodes of its own.
+// The user of a carrier: a session and a board, or only the benchmark. Each has separate nodes.
 enum class Above { all, nothing };
 std::string host_url(Form form, Above above = Above::all);
 std::string board_url(Form form,
-                      Above above = Above::all);  // whether a board packs is no matter of its URL
+                      Above above = Above::all);  // a URL does not contain whether a board packs
 
 // The kernel's sockets for the two lanes of a node, from either end.
 test::KernelIsotp kernel_dialogue(bool board);
 test::KernelIsotp kernel_telemetry(bool board);
 
-// A simulated board whose clock stands still while a round trip is measured, but for every command
-// that it executes: that takes it to the time of the next state, which confirms the command.
+// A simulated board whose clock stands still while a round trip is measured. Each command that it
+// executes advances the clock to the time of the next state, which confirms the command.
 class CanBoardProcess : public ChildProcess {
  public:
-  // Datagrams that passed, as the program has them: not packed.
+  // Datagrams that passed, in the plain form that the program uses.
   struct Passed {
     std::uint64_t datagrams = 0, bytes = 0;
     Passed operator-(const Passed& before) const {
@@ -52,7 +52,7 @@ class CanBoardProcess : public ChildProcess {
   [[noreturn]] void serve(Form form) const;
 };
 
-// A carrier of ours as a board has it, which answers each datagram of a host with `state`.
+// A carrier of ours on the board's side. It answers each datagram of a host with `state`.
 class CarrierEchoProcess : public ChildProcess {
  public:
   CarrierEchoProcess(Form form, const std::string& state);
@@ -61,7 +61,8 @@ class CarrierEchoProcess : public ChildProcess {
   [[noreturn]] static void serve(Form form, const std::string& state, int ready);
 };
 
-// Answers each datagram of the dialogue with one in the telemetry, as long as the question says.
+// Answers each datagram of the dialogue with a telemetry datagram of the length that the question
+// names.
 class KernelEchoProcess : public ChildProcess {
  public:
   KernelEchoProcess();
@@ -71,17 +72,17 @@ class KernelEchoProcess : public ChildProcess {
 
 enum class Lane { telemetry, dialogue };
 
-// A sender of the telemetry, which has no flow control, keeps at most so many datagrams ahead of their
-// receiver, so that nothing is lost: it is told of each.
+// The telemetry has no flow control. A sender stays at most this many datagrams ahead of its
+// receiver, so that no datagram is lost. The receiver reports each datagram to the sender.
 constexpr std::uint32_t ahead = 8;
 void await_room(const SharedCount& received, std::uint32_t sent);
-// How many datagrams a sender is to send next.
+// The number of datagrams that a sender sends next.
 std::uint32_t next_count(int control);
 
-// Sends datagrams, as many as go.
+// Sends datagrams as fast as possible.
 class CanSenderProcess : public ChildProcess {
  public:
-  // On our stack, or (no form) on the kernel's.
+  // On our stack, or without a form on the kernel's.
   CanSenderProcess(std::optional<Form> ours, Lane lane, const std::string& datagram);
 
   void begin(std::uint32_t count) const;

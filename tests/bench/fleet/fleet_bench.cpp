@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a fleet costs, against the number of its boards: simulated boards in a process of their own, over UDP, at
-// 100 Hz each, opposite r4::Fleet on one core.
+// The cost of a fleet, measured for several numbers of boards: simulated boards in a separate
+// process, over UDP, at 100 Hz each, with r4::Fleet on one core.
 //
 //     r4_fleet_bench [boards, default 1, 10, 100 and 1000] [seconds, default 5]
-//     r4_fleet_bench INTERFACE [seconds]      eight boards on a CAN bus, at 1000 Hz or as fast as it goes: a fleet, which
-//                                             has one socket, beside a Board each, which have one each
+//     r4_fleet_bench INTERFACE [seconds]      eight boards on a CAN bus, at 1000 Hz or as fast as
+//                                             possible: a fleet, which has one socket, compared
+//                                             with eight Boards, which have one socket each
 //
-// Exit code 1 if a bar of the plan is missed, of a thousand boards: none of their datagrams is lost, a datagram costs
-// the host at most 1.25 times that of one board as fast as it goes and no heap, a board costs the host at most 24 kB
-// and a simulated one 64 kB and 6 us a state, and the silence of one is noticed within the same 20 ms as alone.
+// Exit code 1 if a limit is missed. With a thousand boards: no datagram is lost. A datagram costs
+// the host no heap and at most 1.25 times the datagram of one board as fast as possible. A board
+// costs the host at most 24 kB. A simulated board costs 64 kB and 6 us a state. The silence of one
+// board is noticed at most 20 ms later than with one board.
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -69,10 +71,10 @@ struct BoardsUsage {
   double cpu_s = 0;
   std::uint64_t sent = 0;
   double kb_a_board = 0;
-  Clock::time_point now{};  // CLOCK_MONOTONIC: the host's, too
+  Clock::time_point now{};  // CLOCK_MONOTONIC, which host and boards share
 };
 
-// Boards in a process, on one loop.
+// Boards in one process, on one loop.
 class BoardsProcess : public ChildProcess {
  public:
   BoardsProcess(const std::vector<std::string>& urls, std::uint16_t rate_hz) : ports_(urls.size()) {
@@ -81,7 +83,7 @@ class BoardsProcess : public ChildProcess {
   }
   explicit BoardsProcess(std::size_t count)
       : BoardsProcess(std::vector<std::string>(count, "udp://127.0.0.1:0"), 100) {}
-  // Of boards over UDP, for their host.
+  // The URLs of boards over UDP, for their host.
   std::vector<std::string> urls() const {
     std::vector<std::string> urls;
     for (const std::uint16_t port : ports_) {
@@ -90,7 +92,7 @@ class BoardsProcess : public ChildProcess {
     return urls;
   }
   BoardsUsage usage() const { return ask('u'); }
-  // The first board says nothing any more; when that was.
+  // The first board falls silent. Returns the time of that.
   Clock::time_point silence() const { return ask('s').now; }
 
  private:
@@ -146,7 +148,7 @@ class BoardsProcess : public ChildProcess {
   std::vector<std::uint16_t> ports_;
 };
 
-// Microseconds a datagram of one board as fast as it goes.
+// Microseconds per datagram of one board as fast as possible.
 double alone_us() {
   BoardProcess process(Transport::udp, true);
   asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE};
@@ -175,7 +177,7 @@ Sums sums_of(const Fleet& fleet) {
   return sums;
 }
 
-// Milliseconds from when the first board falls silent to when the host says so.
+// Milliseconds from the silence of the first board until the host reports it.
 double time_to_notice_ms(Fleet& fleet, const BoardsProcess& process) {
   while (fleet.next_event()) {
   }
@@ -184,7 +186,7 @@ double time_to_notice_ms(Fleet& fleet, const BoardsProcess& process) {
   while (Clock::now() < deadline) {
     const std::optional<FleetEvent> event = fleet.next_event(1s);
     if (event && event->kind == FleetEvent::Kind::link && !is_heard(event->link.state)) {
-      if (event->board != 0) return -1;  // another one
+      if (event->board != 0) return -1;  // another board
       return std::chrono::duration<double, std::milli>(Clock::now() - silent).count();
     }
   }
@@ -200,7 +202,7 @@ void measure(std::size_t count, std::chrono::seconds seconds, double reference_u
                  count);
     std::exit(1);
   }
-  std::this_thread::sleep_for(2s);  // what is made once has been made
+  std::this_thread::sleep_for(2s);  // one-time setup is finished after this
   const Sums before = sums_of(fleet);
   const BoardsUsage boards_before = process.usage();
   const double cpu_before = own_usage().cpu_s;
@@ -219,7 +221,8 @@ void measure(std::size_t count, std::chrono::seconds seconds, double reference_u
   const std::uint64_t lost = after.lost - before.lost;
   const auto length = static_cast<double>(seconds.count());
 
-  // Until the last of them has left; and a stop until the last board has confirmed it.
+  // The time until the last post was sent, and the time of a stop until the last board has
+  // confirmed it.
   const auto posting = Clock::now();
   std::vector<BoardSetpoints> setpoints;
   for (std::size_t i = 0; i < count; ++i) {
@@ -236,7 +239,7 @@ void measure(std::size_t count, std::chrono::seconds seconds, double reference_u
               received / length, static_cast<unsigned long long>(lost), host_us,
               host_us / reference_us, cpu_s / length * 100, host_kb, board_us,
               boards_after.kb_a_board, post_ms, stop_ms, stopped ? "" : "!", notice_ms);
-  // What Asio keeps of timers, and the queue of events, grow once in a while.
+  // The timers of Asio and the queue of events grow occasionally.
   if (heap != 0) std::printf("       %llu allocations\n", static_cast<unsigned long long>(heap));
   static const double alone_ms = notice_ms;
   if (count < 1000) return;
@@ -255,7 +258,7 @@ struct Counts {
   std::uint64_t received = 0, lost = 0;
 };
 
-// What `counts()` and the processors have done in that time.
+// The datagrams of `counts()` and the processor time within this time.
 void measure_bus(const char* what, const BoardsProcess& boards, std::chrono::seconds seconds,
                  const std::function<Counts()>& counts) {
   std::this_thread::sleep_for(1s);
@@ -267,7 +270,7 @@ void measure_bus(const char* what, const BoardsProcess& boards, std::chrono::sec
   const Counts after = counts();
   const std::uint64_t sent = boards.usage().sent - sent_before;
   const auto received = static_cast<double>(after.received - before.received);
-  // One that was counted as lost may come late.
+  // A datagram that was counted as lost may come late.
   std::printf("%-22s %9.0f %9.0f %8lld %10.2f\n", what,
               static_cast<double>(sent) / static_cast<double>(seconds.count()),
               received / static_cast<double>(seconds.count()),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The other ends of the benchmarks, each in a process of its own: a simulated board, and the plain
-// program that answers every packet or line, against which the board's round trip is measured.
-// Both are forked; make them before any thread.
+// The other ends of the benchmarks, each in a separate process: a simulated board, and a plain
+// program that answers every packet or line, the reference for the board's round trip. Both are
+// forked: construct them before the first thread.
 #pragma once
 
 #include <cstdint>
@@ -11,19 +11,19 @@
 
 namespace r4::bench {
 
-// What a process has used so far.
+// The resources that a process has used so far.
 struct Usage {
   double cpu_s = 0;               // user and system
   std::uint64_t allocations = 0;  // calls of operator new
-  std::uint64_t sent = 0;         // datagrams, by the board
+  std::uint64_t sent = 0;         // datagrams sent by the board
 };
 Usage own_usage();
 
 enum class Transport { udp, pty };
 const char* to_text(Transport path);
 
-// A simulated board. With `unbound` its clock runs as fast as it can be served, so that its 1000 Hz
-// become as many as go.
+// A simulated board. With `unbound` its clock runs as fast as possible, so that it sends states as
+// fast as possible instead of at 1000 Hz.
 class BoardProcess : public ChildProcess {
  public:
   BoardProcess(Transport path, bool unbound);
@@ -35,11 +35,11 @@ class BoardProcess : public ChildProcess {
   std::string url_;
 };
 
-// Answers each packet (line) with one of `answer_size` bytes, with blocking calls and nothing else.
+// Answers each packet (line) with `answer_size` bytes, with blocking calls only.
 class EchoProcess : public ChildProcess {
  public:
   EchoProcess(Transport path, std::size_t question_size, std::size_t answer_size);
-  // Seconds from the question to the answer, by blocking calls.
+  // Seconds from the question to the answer, with blocking calls.
   double round_trip();
 
  private:

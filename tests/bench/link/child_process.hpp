@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A process that a benchmark forks, for the other end of what it measures; make it before any thread.
-// What the system refuses ends the benchmark.
+// A forked process for the other end of a measurement; construct it before the first thread. The
+// benchmark ends if the system refuses a call.
 #pragma once
 
 #include <sys/types.h>
@@ -11,20 +11,20 @@
 
 namespace r4::bench {
 
-// Where the two processes run: on a core each, or sharing one. Left to itself, the scheduler moves
-// between the two, which differ by more than anything that is measured here.
+// The cores of the two processes: one core each, or a shared core. Otherwise the scheduler moves
+// between the two, and the difference is greater than the effects that are measured.
 enum class Placement { two_cores, one_core };
 const char* to_text(Placement placement);
-// Of this process, and of those forked from now on.
+// Applies to this process, and to processes that are forked later.
 void place(Placement placement);
 
-// With perror() of `what` if not `ok`.
+// Ends the process with perror(what) if not `ok`.
 void require(bool ok, const char* what);
-// All of it, however long that takes.
+// Writes all bytes, however long that takes.
 void write_all(int fd, const void* data, std::size_t size);
 void read_all(int fd, void* data, std::size_t size);
 
-// A number that this process shares with those that it forks afterwards.
+// A number that this process shares with processes that it forks later.
 class SharedCount {
  public:
   SharedCount();
@@ -52,7 +52,7 @@ class ChildProcess {
   bool fork_child();
   [[noreturn]] static void end_child();
   pid_t pid_ = -1;
-  int control_ = -1;  // a socket to the other of parent and child
+  int control_ = -1;  // a socket between parent and child
 };
 
 }  // namespace r4::bench

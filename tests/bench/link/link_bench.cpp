@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The link between two processes: round trip against a plain ping-pong, heap, and streaming.
+// The link between two processes: round trip compared with a plain ping-pong, heap, and streaming.
 //
 //     r4_link_bench [round-trips a path, default 20000 [part: round-trip, heap or stream]]
 //
-// The three ways of asking take turns in blocks, so that what else the machine does meets all of
-// them. Exit code 1 if a bar of the plan is missed: asynchronous p50 at most 1.3 times the plain
-// one, each process on a core of its own; no allocation per datagram; at 100 Hz at most 2 % of a
-// core on either side.
+// The three ways of asking take turns in blocks, so that other load of the machine affects all of
+// them. Exit code 1 if a limit is missed: asynchronous p50 at most 1.3 times the plain p50, each
+// process on a separate core; no allocation per datagram; at 100 Hz at most 2 % of a core on either
+// side.
 #include <algorithm>
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
@@ -47,7 +47,7 @@ Percentiles percentiles(std::vector<double>& seconds) {
   return {seconds[seconds.size() / 2] * 1e6, seconds[seconds.size() * 99 / 100] * 1e6};
 }
 
-// A board with its loop, in this thread.
+// A board and its loop, in this thread.
 struct AsyncHost {
   explicit AsyncHost(const std::string& url) : board(io, url, test::at_will()) {
     board.open();
@@ -71,7 +71,7 @@ struct AsyncHost {
     timer.async_wait([&](const std::error_code&) { over = true; });
     while (!over) io.run_one();
   }
-  // `count` questions one after the other; appends the seconds that each took.
+  // Asks `count` questions one after the other; appends the seconds that each took.
   void round_trips(int count, std::vector<double>& seconds) {
     int left = count;
     Clock::time_point start;
@@ -98,7 +98,7 @@ struct AsyncHost {
     io.restart();
   }
 
-  // One thread: Asio's locks can go.
+  // One thread only, so Asio needs no locks.
   asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE};
   AsyncBoard board;
 };
@@ -106,7 +106,7 @@ struct AsyncHost {
 // --- (a)
 
 void compare_round_trips(Transport path, int count, bool judged) {
-  // Sizes of Q:ID and of the simulated board's answer, as sent; a line has CR LF behind it.
+  // Sizes of Q:ID and of the simulated board's answer, as sent; a line ends with CR LF.
   const std::size_t line_end = path == Transport::udp ? 0 : 2;
   EchoProcess plain(path, 42 + line_end, 55 + line_end);
   BoardProcess board_for_async(path, false);
@@ -162,9 +162,9 @@ void count_allocations(Transport path) {
     std::uint64_t states = 0;
     host.board.on_state([&](const State&, const Datagram&) { ++states; });
     host.round_trips(500, seconds);
-    host.run_for(1200ms);  // what is made once has been made
+    host.run_for(1200ms);  // one-time setup is finished after this
 
-    // Begun and ended on the loop, so that what this function allocates is not counted.
+    // Starts and ends on the loop, so that the allocations of this function do not count.
     struct Count {
       AsyncHost& host;
       std::uint64_t before = 0, made = 0;
@@ -182,7 +182,7 @@ void count_allocations(Transport path) {
       host.io.run();
       host.io.restart();
     };
-    // The first time makes what is made once.
+    // The first call includes one-time setup.
     const auto measure = [&](const char* what, auto start) {
       run_counted(start);
       const Usage board_before = process.usage();
@@ -242,7 +242,7 @@ void count_allocations(Transport path) {
   BoardProcess other(path, false);
   Board board(other.url(), test::at_will());
   board.wait_active();
-  for (int i = 0; i < 300; ++i) {  // also the deques of the loop have their size now
+  for (int i = 0; i < 300; ++i) {  // after this the deques of the loop have their final size
     board.post(Command::osmc(1, Pwm(i), Direction::forward));
     if (i % 10 == 0) board.next_state();
   }

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How long a state takes from the link to a subscriber of ROS, beside a sample of the same size that a program of
-// Cyclone DDS alone writes.
+// The time of a state from the link to a ROS 2 subscriber, compared with a sample of the same size
+// that a program with Cyclone DDS alone writes.
 //
 //     r4_ros2_bench [SAMPLES]      exit code 1 if a state takes more than 1.3 times as long
 //
-// Two processes on loopback: one publishes as r4 ros2 does, by way of the outbox, all topics of a board; the other
-// subscribes. In turns, every 5 ms, goes a state and a plain sample; each carries the time at which it was there.
+// Two processes on loopback. One publishes all topics of a board through the outbox, as r4 ros2
+// does; the other subscribes. Every 5 ms a state and a plain sample are sent in turns. Each carries
+// the time at which it was ready.
 #include <dds/dds.h>
 #include <fmt/format.h>
 #include <sys/wait.h>
@@ -32,7 +33,7 @@ using namespace std::chrono_literals;
 using tool::ros2::StringMessage;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t size = 170;  // of a state, usually
+constexpr std::size_t size = 170;  // the usual size of a state
 constexpr auto period = 5ms;
 
 std::int64_t now_ns() { return Clock::now().time_since_epoch() / 1ns; }
@@ -48,7 +49,7 @@ tool::ros2::Domain domain() {
       [](const char* name) { return std::string(name) == "ROS_DOMAIN_ID" ? "97" : ""; });
 }
 
-// How long each sample of a topic took, in ns.
+// The delay of each sample of a topic, in ns.
 class Delays {
  public:
   Delays(tool::ros2::Graph& graph, const char* topic)
@@ -122,7 +123,7 @@ void publish(std::size_t samples) {
   for (std::size_t i = 0; i < samples; ++i) {
     std::this_thread::sleep_until(next += period);
     ++state.raw.analog_cv[0];
-    // As BoardNode does.
+    // The same code as in BoardNode.
     outbox.push([topics, state, line = stamped(), sampled = std::chrono::system_clock::now()] {
       topics->on_datagram(line);
       topics->on_state(state, sampled, 0);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which datagrams pass a bridge to a board that has a key, or that obeys its cable without one.
+// The datagrams that pass a bridge to a board with a key, or to a board that obeys its cable
+// without a key.
 #include "host/bridge/bridge_guard.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +22,7 @@ const std::string nonce = "0123456789abcdef";
 const std::string board_with_key = "H:R4-ROS2;PNum:3;T:5000;SAFE:1;AN:" + nonce + ";";
 const std::string board_without_key = "H:R4-ROS2;PNum:3;T:5000;SAFE:1;";
 
-// A bridge with these keys, of which the board has told how it is.
+// A bridge with these keys. The board has reported whether it has a key.
 struct GuardedBridge : ScriptedBridge {
   GuardedBridge(std::vector<Key> keys, bool trusted, const std::string& heard)
       : ScriptedBridge(std::move(keys), trusted) {
@@ -42,7 +43,7 @@ TEST(BridgeGuard, WithAKeyOnlySignedHeartbeatsAndCommandsPass) {
     EXPECT_EQ(bridge.passed(), Texts{});
     const std::string heartbeat = GuardedBridge::sign("H:ROS2-R4;PNum:1;T:0;", 1);
     bridge.hosts->say(heartbeat, keyholder);
-    EXPECT_EQ(bridge.passed(), Texts{heartbeat}) << "its bytes as they are";
+    EXPECT_EQ(bridge.passed(), Texts{heartbeat}) << "a signed datagram must pass unchanged";
     bridge.hosts->take();
     bridge.hosts->say("O:1,1,1;PNum:2;T:0;", keyholder);
     EXPECT_EQ(bridge.passed(), Texts{});
@@ -52,7 +53,7 @@ TEST(BridgeGuard, WithAKeyOnlySignedHeartbeatsAndCommandsPass) {
     EXPECT_EQ(bridge.passed(), Texts{command});
     bridge.hosts->say(GuardedBridge::sign("O:2,1,1;PNum:4;T:0;", 3, 5000, key_of(3, 9)), keyholder);
     bridge.hosts->say(command, second_host);
-    EXPECT_EQ(bridge.passed(), Texts{}) << "another key, and a replay";
+    EXPECT_EQ(bridge.passed(), Texts{}) << "a datagram with another key and a replay must not pass";
     bridge.hosts->say("C:key,1:off;PNum:5;T:0;", keyholder);
     bridge.hosts->say(GuardedBridge::sign("C:key,1:off;PNum:6;T:0;", 4), keyholder);
     EXPECT_EQ(bridge.passed(), Texts{});
@@ -78,7 +79,7 @@ TEST(BridgeGuard, WhatWasSignedTooLongAgoDoesNotPass) {
   bridge.hosts->say(GuardedBridge::sign("H:ROS2-R4;PNum:2;T:0;", 2), keyholder);
   EXPECT_EQ(bridge.passed(), Texts{});
   bridge.hosts->say(GuardedBridge::sign("H:ROS2-R4;PNum:3;T:0;", 3, 9000), keyholder);
-  EXPECT_EQ(bridge.passed(), Texts{}) << "nor what is signed for a time to come";
+  EXPECT_EQ(bridge.passed(), Texts{}) << "a signature for a later time must not pass";
 }
 
 TEST(BridgeGuard, AStateThatWasLongOnItsWayDoesNotSetTheBoardsClockBack) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which hosts a bridge serves, and what strangers can do to them and by them.
+// The hosts that a bridge serves, and the effects that strangers can have on them.
 #include "host/bridge/bridge_hosts.hpp"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ class BridgeHostsTest : public testing::Test, protected ScriptedBridge {
     board->say(streamed);
   }
   static std::string sid(int i) { return ";SID:00000000000001" + std::to_string(10 + i); }
-  // An echo of the board's newest T.
+  // A heartbeat that echoes the board's newest T.
   void heartbeat(const std::string& of, Peer from, int t = 100) {
     hosts->say("H:ROS2-R4" + of + ";PNum:50;T:" + std::to_string(t) + ";", from);
   }
@@ -45,7 +45,7 @@ class BridgeHostsTest : public testing::Test, protected ScriptedBridge {
     pass(BridgeHosts::patience);
     take();
   }
-  // Drops what was sent to either side.
+  // Drops the datagrams sent to both sides.
   void take() {
     hosts->take();
     board->take();
@@ -72,11 +72,11 @@ TEST_F(BridgeHostsTest, SeveralHostsPassAndTheBoardDecides) {
 TEST_F(BridgeHostsTest, AHostIsServedWhenTheBoardHasHadTheTimeToRefuseIt) {
   heartbeat(owner_sid, owner, 0);
   pass(BridgeHosts::patience);
-  EXPECT_FALSE(hears_states(owner)) << "without an echo the board does not judge it";
+  EXPECT_FALSE(hears_states(owner)) << "the board does not judge a heartbeat without an echo";
   board->say("H:R4-ROS2;PNum:0;T:0;");
   heartbeat(owner_sid, owner, 1);
   pass(BridgeHosts::patience);
-  EXPECT_FALSE(hears_states(owner)) << "a board that has no host tells no time";
+  EXPECT_FALSE(hears_states(owner)) << "a board without a host has sent no T to echo";
   heartbeat(owner_sid, owner);
   EXPECT_FALSE(hears_states(owner));
   pass(BridgeHosts::patience);
@@ -119,11 +119,13 @@ TEST_F(BridgeHostsTest, ThePeersThatAreHeldFollowTheHostsThatAreServed) {
   begin();
   heartbeat(owner_sid, newcomer);
   EXPECT_EQ(hosts->held, owner);
-  EXPECT_EQ(hosts->also_held, std::vector<Peer>{newcomer}) << "another path of the session";
+  EXPECT_EQ(hosts->also_held, std::vector<Peer>{newcomer})
+      << "the newcomer is another path of the session";
   pass(900ms);
   heartbeat(owner_sid, newcomer);
   pass(100ms);
-  EXPECT_EQ(hosts->held, newcomer) << "the first path is silent";
+  EXPECT_EQ(hosts->held, newcomer)
+      << "the session keeps its other path when the first path is silent";
   heartbeat(other_sid, waiting);
   pass(BridgeHosts::patience);
   busy(owner_sid);
@@ -189,7 +191,7 @@ TEST_F(BridgeHostsTest, StrangersKeepNobodyOut) {
   }
   EXPECT_TRUE(hears_states(owner));
   heartbeat(owner_sid, 4);
-  EXPECT_TRUE(hears_states(4)) << "a path of the served session from a new address";
+  EXPECT_TRUE(hears_states(4)) << "a served session may come from a new address";
 }
 
 TEST_F(BridgeHostsTest, SixteenServedHostsKeepTheirPlaces) {
@@ -199,7 +201,7 @@ TEST_F(BridgeHostsTest, SixteenServedHostsKeepTheirPlaces) {
   heartbeat(owner_sid, newcomer);
   EXPECT_EQ(passed(), Texts{});
   EXPECT_EQ(hosts->take(), Texts{"N:50,BUSY" + owner_sid + ";PNum:7;T:600;@3"})
-      << "an answer of the bridge names the session, too";
+      << "the answer of the bridge must name the session";
 }
 
 TEST_F(BridgeHostsTest, AHostThatWasServedComesBackAtOnceAfterASilenceThoughStrangersAskMeanwhile) {
@@ -293,14 +295,14 @@ TEST_F(BridgeHostsTest, APeerGetsOneCopyWhateverItIs) {
   board->say(streamed);
   EXPECT_EQ(hosts->take(), (Texts{board_heartbeat + "@1", board_heartbeat + "@2", streamed + "@1",
                                   streamed + "@2"}))
-      << "two sessions at one peer";
+      << "a peer with two sessions gets states once";
   busy(other_sid);
   busy(sid(0));
   hosts->say("E:STOP;PNum:70;T:0;", waiting);
   hosts->take();
   board->say(board_heartbeat);
   EXPECT_EQ(hosts->take(), (Texts{board_heartbeat + "@1", board_heartbeat + "@2"}))
-      << "a refused host that has stopped the board";
+      << "a refused host that has stopped the board hears heartbeats";
 }
 
 TEST_F(BridgeHostsTest, APaperHostWithoutNumbersIsNotServedBesideAnotherHost) {
@@ -308,7 +310,7 @@ TEST_F(BridgeHostsTest, APaperHostWithoutNumbersIsNotServedBesideAnotherHost) {
   hosts->say("H:ROS2-R4;T:0;", waiting);
   EXPECT_EQ(passed().size(), 1U);
   pass(BridgeHosts::patience);
-  EXPECT_FALSE(hears_states(waiting)) << "the board cannot refuse it";
+  EXPECT_FALSE(hears_states(waiting)) << "the board cannot refuse a host without numbers";
 }
 
 TEST_F(BridgeHostsTest, HostsThatWaitShareTheHeartbeatsThatTheBudgetAllows) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which datagrams pass a bridge, in which order, and to whom.
+// The datagrams that pass a bridge, their order, and their receivers.
 #include "host/bridge/bridged_pair.hpp"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ constexpr Peer first = 1, second = 2, third = 3;
 class BridgedPairTest : public testing::Test, protected ScriptedBridge {
  protected:
   void SetUp() override { pair->open(); }
-  // The first host is served, and the board streams.
+  // Begins with the first host served and a board that streams states.
   void begin() {
     board->say(board_state);
     hosts->say(heartbeat, first);
@@ -117,7 +117,7 @@ TEST_F(BridgedPairTest, AStopOfAnyonePassesBeforeEverything) {
   board->say("H:R4-ROS2;PNum:8;T:101;SAFE:2;STOP:70;");
   EXPECT_EQ(hosts->take(), (Texts{"H:R4-ROS2;PNum:8;T:101;SAFE:2;STOP:70;@1",
                                   "H:R4-ROS2;PNum:8;T:101;SAFE:2;STOP:70;@3"}))
-      << "the peer that stopped it hears that";
+      << "the peer that stopped the board hears the confirmation";
   pass(1s);
   board->say("H:R4-ROS2;PNum:9;T:601;SAFE:2;STOP:70;");
   EXPECT_EQ(hosts->take(), Texts{"H:R4-ROS2;PNum:9;T:601;SAFE:2;STOP:70;"});
@@ -128,7 +128,7 @@ TEST_F(BridgedPairTest, AStopWaitsForNothingWhereStatesDoNotGetThrough) {
   hosts->result = SendResult::full;
   for (int i = 0; i < 1000; ++i) board->say(board_state);
   hosts->say("E:STOP;PNum:70;T:0;", third);
-  ASSERT_EQ(board->sent.size(), 1U) << "it has left within the call that brought it";
+  ASSERT_EQ(board->sent.size(), 1U) << "the stop must leave within the call that received it";
   EXPECT_EQ(board->sent.front().priority, Priority::stop);
   EXPECT_EQ(from_board().undelivered, 1000U);
 }
@@ -158,11 +158,11 @@ TEST_F(BridgedPairTest, WhatCameWhileTheBridgeWasStoppedIsDroppedButAStop) {
   hosts->drained();
   board->say(board_state);
   EXPECT_EQ(passed(), Texts{"E:STOP;PNum:4;T:0;"});
-  EXPECT_EQ(hosts->take(), Texts{}) << "nor is an old state";
+  EXPECT_EQ(hosts->take(), Texts{}) << "an old state must not pass";
   EXPECT_EQ(from_hosts().late, 2U);
   EXPECT_EQ(from_board().late, 1U);
   hosts->say(heartbeat, first);
-  EXPECT_EQ(passed(), Texts{heartbeat}) << "it was read after everything that had waited";
+  EXPECT_EQ(passed(), Texts{heartbeat}) << "the heartbeat came after the datagrams that had waited";
 }
 
 TEST_F(BridgedPairTest, TheFirstDatagramAfterAStandstillOrAnIdleHourPasses) {
@@ -185,7 +185,7 @@ TEST_F(BridgedPairTest, ABoardThatIsAwayIsWaitedFor) {
   other.hosts->say(heartbeat, first);
   EXPECT_EQ(other.from_hosts().undelivered, 1U);
   other.pass(3s);
-  EXPECT_EQ(other.events, (Texts{"hosts up", "board down"})) << "told once";
+  EXPECT_EQ(other.events, (Texts{"hosts up", "board down"})) << "the event must be reported once";
   other.board->absence.reset();
   other.pass(500ms);
   EXPECT_EQ(other.events.back(), "board up");
@@ -204,7 +204,7 @@ TEST_F(BridgedPairTest, WhatNoWaitingMendsIsAnError) {
 
 TEST_F(BridgedPairTest, CountsWhatDidNotGetThrough) {
   begin();
-  hosts->counted.tx_dropped = 5;  // states that newer ones have replaced
+  hosts->counted.tx_dropped = 5;  // states that newer states have replaced
   board->result = SendResult::full;
   hosts->say("O:1,1,1;SID:00000000000000aa;PNum:2;T:0;", first);
   EXPECT_EQ(from_hosts().undelivered, 1U);
@@ -230,7 +230,8 @@ TEST_F(BridgedPairTest, AnAnswerGoesToThePeerThatAsked) {
                                   "N:2,RANGE;SID:00000000000000aa;PNum:11;T:101;@1"}));
   hosts->say("Q:ID;", second);
   board->say("I:R4,1,id,udp;PNum:12;T:101;");
-  EXPECT_EQ(hosts->take(), Texts{"I:R4,1,id,udp;PNum:12;T:101;@2"}) << "also without a number";
+  EXPECT_EQ(hosts->take(), Texts{"I:R4,1,id,udp;PNum:12;T:101;@2"})
+      << "a question without a number gets an answer, too";
 }
 
 TEST_F(BridgedPairTest, AnAnswerToAHostsCommandGoesToThatHostThoughAnotherAsksWithItsNumber) {
@@ -294,23 +295,24 @@ TEST_F(BridgedPairTest, AWatcherBesideAHostHearsEverythingAfterAnEchoAndForTwoSe
   hosts->say("W:50;PNum:900;T:0;", second);
   const std::string token = lease_in(hosts->take());
   board->say(board_state);
-  EXPECT_EQ(hosts->take(), Texts{std::string(board_state) + "@1"}) << "not yet";
+  EXPECT_EQ(hosts->take(), Texts{std::string(board_state) + "@1"})
+      << "the peer has not echoed its token yet";
   hosts->say("W:50;PNum:901;T:" + token + ";", third);
   hosts->take();
   hosts->say("W:50;PNum:901;T:" + token + ";", second);
   board->say(board_state);
   EXPECT_EQ(hosts->take(),
             (Texts{std::string(board_state) + "@1", std::string(board_state) + "@2"}))
-      << "the echo of another proves nothing";
-  EXPECT_EQ(passed(), Texts{}) << "the board would take it for the first host's";
+      << "the token of another peer proves nothing";
+  EXPECT_EQ(passed(), Texts{}) << "the board would take the W for one of the first host";
   pass(2s);
   hosts->say(heartbeat, first);
   board->say(board_state);
   EXPECT_EQ(hosts->take(), Texts{std::string(board_state) + "@1"});
 }
 
-// The newest W that the bridge has sent since the last call: its text before the number, and its
-// number.
+// The newest W that the bridge has sent since the last call: the text before the packet number, and
+// the packet number.
 struct OwnLease {
   std::string text;
   std::string pnum;
@@ -332,13 +334,13 @@ TEST_F(BridgedPairTest, WhileItServesNoHostTheBridgeItselfWatchesTheBoard) {
   EXPECT_EQ(first_one.text, "W:10");
   hosts->take();
   board->say("N:" + first_one.pnum + ",STALE;LEASE:77;PNum:4;T:100;");
-  EXPECT_EQ(hosts->take(), Texts{}) << "that is for the bridge";
+  EXPECT_EQ(hosts->take(), Texts{}) << "the answer is for the bridge";
   pass(25ms);
   const Texts echoed = board->take();
   ASSERT_EQ(echoed.size(), 1U);
   EXPECT_TRUE(echoed[0].ends_with(";T:77;")) << echoed[0];
   board->say("AIN24:24.28;SAFE:1;PNum:7;T:100;");
-  EXPECT_EQ(hosts->take(), Texts{}) << "nobody has asked for it";
+  EXPECT_EQ(hosts->take(), Texts{}) << "no host has asked for states";
   hosts->say(heartbeat, first);
   pass(BridgeHosts::patience);
   const Texts begun = board->take();
@@ -374,7 +376,7 @@ TEST_F(BridgedPairTest, WithoutAHostWatchersHearWhatTheNewestWatcherAskedFor) {
   hosts->take();
   hosts->say("W:50,AIN24,SAFE;PNum:900;T:0;", second);
   const std::string token = lease_in(hosts->take());
-  EXPECT_EQ(passed(), Texts{}) << "the board would take it for the bridge's";
+  EXPECT_EQ(passed(), Texts{}) << "the board would take the W for one of the bridge";
   hosts->say("W:50,AIN24,SAFE;PNum:901;T:" + token + ";", second);
   pass(25ms);
   EXPECT_EQ(own_lease(*board).text, "W:50,AIN24,SAFE");
@@ -398,7 +400,7 @@ TEST_F(BridgedPairTest, FourMayWatch) {
   for (Peer stranger = 100; stranger < 140; ++stranger) hosts->say("E:STOP;", stranger);
   hosts->take();
   board->say(board_state);
-  EXPECT_EQ(hosts->take().size(), 5U) << "strangers take no watcher's place";
+  EXPECT_EQ(hosts->take().size(), 5U) << "a stranger must not take the place of a watcher";
 }
 
 // --- for weeks

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A bridge between two transports that do what a test says, in virtual time.
+// A bridge between two scripted transports, in virtual time.
 #pragma once
 
 #include <chrono>
@@ -57,7 +57,8 @@ class ScriptedCarrier final : public Carrier, public BoardEnd {
   void report(CarrierEvent::Kind kind) {
     handler_->on_carrier_event({kind, Problem{ErrorKind::open, name_, "gone", ""}});
   }
-  // The datagrams sent since the last call, without checksums; with "@peer" if sent to one peer.
+  // The datagrams sent since the last call, without checksums. "@peer" is added if sent to one
+  // peer.
   std::vector<std::string> take() {
     std::vector<std::string> texts;
     for (const Sent& each : std::exchange(sent, {})) {
@@ -67,11 +68,11 @@ class ScriptedCarrier final : public Carrier, public BoardEnd {
     return texts;
   }
 
-  std::optional<Problem> absence;  // why it cannot be opened
+  std::optional<Problem> absence;  // the reason if it cannot be opened
   SendResult result = SendResult::sent;
   CarrierCounters counted;
   bool shared = false;
-  bool keeps = true;  // keeps sent datagrams, which takes memory
+  bool keeps = true;  // keeps sent datagrams, which uses memory
   std::vector<Sent> sent;
   Peer held = everyone;
   std::vector<Peer> also_held;
@@ -104,14 +105,14 @@ class ScriptedBridge {
     pair = std::make_unique<BridgedPair>(std::move(setup));
   }
 
-  // Time passes, and the loop runs.
+  // Time passes while the loop runs.
   void pass(std::chrono::milliseconds time) {
     for (const auto end = now + time; now < end;) {
       now += std::min<std::chrono::steady_clock::duration>(WaitingTime::tick_interval, end - now);
       pair->tick();
     }
   }
-  // Time passes in which the process is stopped.
+  // Time passes while the process is stopped.
   void sleep(std::chrono::milliseconds time) { now += time; }
   // The datagrams that have passed to the board since the last call, without the bridge's own W.
   Texts passed() {

@@ -57,7 +57,8 @@ TEST(CommandHelp, ShowsTheValuesThatASettingTakes) {
   }
 }
 
-// Section 3 of docs/reference/protocol.md has a row for each kind, with the form and the ranges of the tables.
+// Section 3 of docs/reference/protocol.md has a row for each kind of command, with the form and the
+// ranges of the tables.
 TEST(CommandHelp, HasTheFormsAndRangesOfTheDocumentedProtocol) {
   std::ifstream file(R4_TEST_DATA "/../../docs/reference/protocol.md");
   std::map<std::string, std::string> documented;
@@ -69,13 +70,13 @@ TEST(CommandHelp, HasTheFormsAndRangesOfTheDocumentedProtocol) {
   }
   for (const CommandHelp& each : all_command_help()) {
     ASSERT_EQ(documented.count(each.form), 1U) << each.form;
-    if (each.kind == CommandKind::setting) continue;  // it has tables of its own
+    if (each.kind == CommandKind::setting) continue;  // settings have separate tables
     EXPECT_EQ(documented[each.form], each.ranges) << each.form;
   }
-  EXPECT_EQ(documented.size(), all_command_help().size()) << "a row of no command";
+  EXPECT_EQ(documented.size(), all_command_help().size()) << "a documented row has no command";
 }
 
-// The tables of settings there have the range and the default of each.
+// The tables of settings on that page have the range and the default of each setting.
 TEST(CommandHelp, TakesTheDocumentedSettings) {
   std::ifstream file(R4_TEST_DATA "/../../docs/reference/protocol.md");
   std::map<std::string, std::string> documented;

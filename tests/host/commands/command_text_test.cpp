@@ -59,7 +59,8 @@ TEST(CommandText, IsParsedWrittenAndDescribedForEveryKind) {
     EXPECT_EQ(describe(command), c.words);
     kinds.insert(Command(command).kind);
   }
-  EXPECT_EQ(kinds.size(), static_cast<std::size_t>(CommandKind::watch) + 1) << "every kind";
+  EXPECT_EQ(kinds.size(), static_cast<std::size_t>(CommandKind::watch) + 1)
+      << "every kind of command must be tested";
 }
 
 TEST(CommandText, OfAnOwnCommandOutlivesTheTextItIsParsedFrom) {
@@ -95,12 +96,13 @@ TEST(CommandText, ShowsNoKeyAndNoPassword) {
   };
   for (const auto& c : cases) {
     EXPECT_EQ(shown(c.text), c.shown);
-    EXPECT_EQ(shown(c.shown), c.shown) << "once more";
+    EXPECT_EQ(shown(c.shown), c.shown) << "a shown text must be shown unchanged";
   }
   const OwnCommand key = parse_command_text("C:key,3:" + digits);
   EXPECT_EQ(shown(key), "C:key,3:...");
   EXPECT_EQ(describe(key), "setting key 3:...");
-  EXPECT_EQ(describe(Command::setting("rate", "5;0")), "setting ") << "no datagram can carry it";
+  EXPECT_EQ(describe(Command::setting("rate", "5;0")), "setting ")
+      << "no datagram can carry this value";
 }
 
 }  // namespace

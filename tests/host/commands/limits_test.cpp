@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Options and times that make no sense are refused before anything is sent.
+// Options and times without a valid meaning are refused before anything is sent.
 #include "host/commands/limits.hpp"
 
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ TEST(Limits, OfEverySessionOption) {
   for (const auto wrong : {0ms, -1ms, std::chrono::milliseconds::max()}) {
     refused("command_retry", [wrong](SessionOptions& o) { o.command_retry = wrong; });
     refused("stop_retry", [wrong](SessionOptions& o) { o.stop_retry = wrong; });
-    if (wrong == 0ms) continue;  // off
+    if (wrong == 0ms) continue;  // 0 turns this option off
     refused("identify_interval", [wrong](SessionOptions& o) { o.identify_interval = wrong; });
   }
 }
@@ -77,7 +77,7 @@ TEST(Limits, OfEveryTimeout) {
     });
   }
   expect_usage("wait_active()", [&] { board.wait_active(-1ms); });
-  board.wait_active(0ms);  // only looks
+  board.wait_active(0ms);  // does not wait
   EXPECT_EQ(board.next_state().osmc(1).pwm, 0);
 }
 

@@ -51,7 +51,8 @@ TEST(ServoCalibration, RefusesAnAngleBeyondAnEnd) {
   }
   EXPECT_EQ(problem_of([] { elbow.pulse(Degrees(60)); }).text(),
             "60 degrees: the angle is outside of the servo's calibration; give -45 to 45");
-  EXPECT_TRUE(elbow.is_in_range(Degrees(45.01))) << "less than half a microsecond beyond";
+  EXPECT_TRUE(elbow.is_in_range(Degrees(45.01)))
+      << "less than half a microsecond outside of the range";
 }
 
 TEST(ServoCalibration, TakesTheAngleOfEveryPulseBack) {
@@ -62,7 +63,8 @@ TEST(ServoCalibration, TakesTheAngleOfEveryPulseBack) {
 
 TEST(ServoCalibration, HasNoAngleOfAServoThatIsOff) {
   EXPECT_FALSE(elbow.degrees(0));
-  EXPECT_DOUBLE_EQ(elbow.degrees(2500)->value, 90) << "a pulse that another program has set";
+  EXPECT_DOUBLE_EQ(elbow.degrees(2500)->value, 90)
+      << "another program may set a pulse outside of the calibration";
 }
 
 TEST(ServoCalibration, NeedsTwoEndsThatDiffer) {

@@ -47,7 +47,7 @@ TEST(Setpoints, CanBeSentAsTheyAre) {
         Command::setting("rate", "50"), Command::identify()}) {
     EXPECT_TRUE(contains(refusal_of(command).reason, "no output"));
   }
-  EXPECT_EQ(setpoints.size(), 1U) << "what was refused is not in it";
+  EXPECT_EQ(setpoints.size(), 1U) << "a refused command must not be in the group";
   for (int i = 1; i <= 15; ++i) setpoints.add(Command::servo(i, Microseconds(1500)));
   EXPECT_TRUE(contains(refusal_of(Command::servo(16, Microseconds(1500))).reason, "16"));
   EXPECT_EQ(setpoints.size(), 16U);

@@ -50,7 +50,8 @@ TEST(Ackermann, SteersForThePathAndBackAgain) {
   for (const Twist& twist : {Twist{1, 0.5}, Twist{-1, 0.5}, Twist{0.3, -0.1}}) {
     expect_near(car.twist(car.command(twist)), twist);
   }
-  EXPECT_LT(car.command({-1, 0.5}).steering_rad, 0) << "backwards it steers the other way";
+  EXPECT_LT(car.command({-1, 0.5}).steering_rad, 0)
+      << "a car that drives backwards steers the other way";
 }
 
 TEST(Ackermann, TurnsAsNarrowAsItCanAndNeverOnTheSpot) {

@@ -44,8 +44,10 @@ TEST(LoopGuard, StepsWhenAllOfAStateIsThere) {
   };
   EXPECT_FALSE(step(part(1010, {StateField::enc1})));
   EXPECT_EQ(step(part(1010, {StateField::ainsteer})), 0.0);
-  EXPECT_FALSE(step(part(1010, {StateField::enc1, StateField::ainsteer}))) << "that was done";
-  EXPECT_FALSE(step(part(1020, {StateField::ainsteer}))) << "the other is of before";
+  EXPECT_FALSE(step(part(1010, {StateField::enc1, StateField::ainsteer})))
+      << "this state was handled before";
+  EXPECT_FALSE(step(part(1020, {StateField::ainsteer})))
+      << "the other field is from an earlier state";
   EXPECT_EQ(step(part(1030, {StateField::enc1, StateField::ainsteer})), 0.02);
 }
 
@@ -60,7 +62,7 @@ TEST(LoopGuard, EndsWhenTheWholeStateIsLateAndStaysEnded) {
   EXPECT_TRUE(contains(guard.why(), "more than 50 ms ago with all of ENC1")) << guard.why();
   EXPECT_FALSE(guard.on_state(part(1061, {StateField::enc1}), DisarmCause::none, at(1061)));
 
-  // It comes, but has been under way too long.
+  // Arrives, but was under way for too long.
   LoopGuard delayed = begun({.late = 50ms});
   EXPECT_FALSE(delayed.on_state(part(1010, {}), DisarmCause::none, at(1070)));
   EXPECT_EQ(delayed.ended(), LoopEnd::late);
@@ -104,12 +106,12 @@ TEST(LoopGuard, EndsWhereADrivenMotorStands) {
     }
     return guard.ended();
   };
-  EXPECT_EQ(pass(50, 0), LoopEnd::none) << "nothing is driven";
+  EXPECT_EQ(pass(50, 0), LoopEnd::none) << "no output is driven";
   guard.on_commanded(Setpoints{Command::dhb12(2, Pwm(399), Direction::forward)});
-  EXPECT_EQ(pass(50, 0), LoopEnd::none) << "too little to turn it";
+  EXPECT_EQ(pass(50, 0), LoopEnd::none) << "the duty is too small to turn the motor";
   guard.on_commanded(Setpoints{Command::dhb12(2, Pwm(400), Direction::forward),
                                Command::dhb12(1, Pwm(0), Direction::forward)});
-  EXPECT_EQ(pass(50, -1), LoopEnd::none) << "it turns";
+  EXPECT_EQ(pass(50, -1), LoopEnd::none) << "the wheel turns";
   EXPECT_EQ(pass(6, 0), LoopEnd::none);
   EXPECT_EQ(pass(50, 0), LoopEnd::standstill);
   EXPECT_TRUE(contains(guard.why(),
@@ -133,7 +135,7 @@ class RunLoop : public ::testing::Test {
       : board(robot.url(), with_fields(options)) {
     loop.fields = "ENC1";
     loop.rest.add(Command::osmc(1, Pwm(0), Direction::forward));
-    loop.late = 500ms;  // this machine may be busy
+    loop.late = 500ms;  // the machine may be busy
     board.wait_active();
     if (options.session.arming == Arming::required) board.arm();
   }
@@ -164,7 +166,7 @@ TEST_F(RunLoop, RunsByTheStatesUntilTheStepEndsItAndLeavesTheMotorsAtRest) {
   EXPECT_GT(report.steps, 3U);
   EXPECT_GT(counts, 10);
   expect_rest();
-  EXPECT_EQ(board.disarmed_by(), DisarmCause::none) << "another may begin";
+  EXPECT_EQ(board.disarmed_by(), DisarmCause::none) << "another loop may begin";
 }
 
 TEST_F(RunLoop, ComesToRestBeforeItPassesAnExceptionOn) {
@@ -182,7 +184,7 @@ TEST_F(RunLoop, StopsTheHeartbeatsWhenAStepHangs) {
   bool safe = false;
   const LoopReport report = run_loop(board, loop, [&](const LoopStep& step) {
     if (step.state.encoder(1) > 5 && !safe) {
-      // It waits for something that only comes when the board has gone safe.
+      // Waits until the board is safe. Only the watchdog can cause that.
       for (int ms = 0; ms < 10'000 && !safe; ++ms) {
         std::this_thread::sleep_for(1ms);
         safe = robot.look().pins.is_safe();
@@ -190,7 +192,7 @@ TEST_F(RunLoop, StopsTheHeartbeatsWhenAStepHangs) {
     }
     return drive(step);
   });
-  EXPECT_TRUE(safe) << "the motor went on, with nobody to look after it";
+  EXPECT_TRUE(safe) << "the motor kept turning without control";
   EXPECT_NE(report.end, LoopEnd::asked);
   EXPECT_TRUE(robot.look().pins.is_safe());
 }
@@ -205,7 +207,7 @@ TEST_F(RunLoopWithoutArming, DrivesAndComesToRest) {
   const auto drive_four_times = [&](const LoopStep& step) {
     return ++steps < 5 ? drive(step) : std::nullopt;
   };
-  // Its options say that the board must be armed: it does not run, and yet leaves nothing driven.
+  // The loop's options require an armed board: the loop does not run, and leaves no output driven.
   const LoopReport untold = run_loop(board, loop, drive_four_times);
   EXPECT_EQ(untold.end, LoopEnd::disarmed);
   EXPECT_TRUE(contains(untold.why, "not yet; call arm() first")) << untold.why;

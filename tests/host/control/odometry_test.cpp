@@ -37,7 +37,8 @@ TEST(Odometry, GoesBackwardsAndStartsAtAGivenPose) {
   EXPECT_NEAR(odometry.pose().yaw_rad, std::numbers::pi / 2, 1e-12);
 }
 
-// The wheels of many robots err as the noise says. The spread of their poses is the covariance.
+// Many robots whose wheels err as the noise model says. The spread of their poses must match the
+// covariance.
 TEST(Odometry, KnowsHowFarItMayBeWrong) {
   constexpr OdometryNoise noise{
       .length_per_m = 0.0003, .turn_per_m = 0.0003, .turn_per_rad = 0.001};

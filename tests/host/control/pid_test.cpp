@@ -21,7 +21,7 @@ TEST(Pid, AddsItsTermsUp) {
 TEST(Pid, DoesNotWindUpWhileTheOutputIsAtItsLimit) {
   Pid pid({.kp = 1, .ki = 10});
   for (int i = 0; i < 1000; ++i) EXPECT_EQ(pid.step(5, 0, 0.01), 1);
-  // What it has wanted in vain it does not make up for: it lets go at once.
+  // The output must leave the limit at once: the integral must not grow at the limit.
   EXPECT_LT(pid.step(5, 5.5, 0.01), 0);
   for (int i = 0; i < 1000; ++i) EXPECT_EQ(pid.step(-5, 0, 0.01), -1);
   EXPECT_GT(pid.step(-5, -5.5, 0.01), 0);
@@ -31,19 +31,21 @@ TEST(Pid, ChangesItsOutputNoFasterThanItsRate) {
   Pid pid({.kp = 1, .ki = 1, .rate = 2});
   EXPECT_DOUBLE_EQ(pid.step(1, 0, 0.1), 0.2);
   EXPECT_DOUBLE_EQ(pid.step(1, 0, 0.1), 0.4);
-  EXPECT_DOUBLE_EQ(pid.integral(), 0) << "held by the rate, it does not wind up either";
+  EXPECT_DOUBLE_EQ(pid.integral(), 0)
+      << "the integral must not grow while the rate limits the output";
   EXPECT_DOUBLE_EQ(pid.step(-1, 0, 0.05), 0.3);
 }
 
 TEST(Pid, TakesTheDerivativeOfTheMeasuredValueAndSmoothsIt) {
   Pid pid({.kd = 0.1, .minimum = -10, .maximum = 10});
-  EXPECT_EQ(pid.step(0, 1, 0.1), 0) << "there is no slope of one value";
-  EXPECT_EQ(pid.step(100, 1, 0.1), 0) << "a new setpoint gives no kick";
+  EXPECT_EQ(pid.step(0, 1, 0.1), 0) << "one value has no slope";
+  EXPECT_EQ(pid.step(100, 1, 0.1), 0) << "a new setpoint must not change the output suddenly";
   EXPECT_DOUBLE_EQ(pid.step(100, 3, 0.1), -2);
 
   Pid smooth({.kd = 0.1, .minimum = -10, .maximum = 10, .derivative_filter_s = 0.3});
   smooth.step(0, 1, 0.1);
-  EXPECT_DOUBLE_EQ(smooth.step(0, 3, 0.1), -0.5) << "a quarter of it, for 0.1 of 0.4 s";
+  EXPECT_DOUBLE_EQ(smooth.step(0, 3, 0.1), -0.5)
+      << "a quarter of the slope, because 0.1 s is a quarter of 0.4 s";
 }
 
 TEST(Pid, TakesOverWithoutAJump) {
@@ -61,7 +63,7 @@ TEST(Pid, RefusesValuesThatAreNotFinite) {
   pid.step(0.3, 0, 0.1);
   EXPECT_THROW(pid.step(nan, 0, 0.1), Error);
   EXPECT_THROW(pid.step(0, std::numeric_limits<double>::infinity(), 0.1), Error);
-  EXPECT_DOUBLE_EQ(pid.step(0.3, 0, nan), 0.3) << "no time, as far as is known";
+  EXPECT_DOUBLE_EQ(pid.step(0.3, 0, nan), 0.3) << "an unknown time counts as no time";
   EXPECT_THROW(Pid({.kp = nan}), Error);
   EXPECT_THROW(Pid({.minimum = 1, .maximum = 1}), Error);
   EXPECT_THROW(Pid({.rate = 0}), Error);

@@ -26,9 +26,9 @@ State seen(std::uint32_t t_ms, std::int32_t counts) {
 
 TEST(Wheel, SumsUpTheRolledDistance) {
   Wheel wheel(metre_wheel);
-  EXPECT_EQ(wheel.advance(seen(1000, 500)), 0) << "that was before";
+  EXPECT_EQ(wheel.advance(seen(1000, 500)), 0) << "the first state has no earlier position";
   EXPECT_NEAR(wheel.advance(seen(1010, 510)), 0.010, 1e-12);
-  EXPECT_EQ(wheel.advance(seen(1010, 510)), 0) << "another part of the same state";
+  EXPECT_EQ(wheel.advance(seen(1010, 510)), 0) << "a second part of one state must not count twice";
   EXPECT_NEAR(wheel.advance(seen(1030, 490)), -0.020, 1e-12);
   WheelGeometry other_way = metre_wheel;
   other_way.reversed = true;
@@ -68,7 +68,7 @@ TEST(Wheel, KnowsItsSpeedOverTheLastWindow) {
   for (std::uint32_t t_ms = 0; t_ms <= 200; t_ms += 10) wheel.advance(seen(t_ms, counts += 20));
   EXPECT_NEAR(wheel.speed_m_s(), 2.0, 1e-9);
   for (std::uint32_t t_ms = 210; t_ms <= 250; t_ms += 10) wheel.advance(seen(t_ms, counts));
-  EXPECT_NEAR(wheel.speed_m_s(), 0, 1e-9) << "what is older than the window is forgotten";
+  EXPECT_NEAR(wheel.speed_m_s(), 0, 1e-9) << "values older than the window must not count";
   State state = seen(0, 0);
   state.raw.encoder_hz[1] = -1500;
   EXPECT_NEAR(wheel.measured_m_s(state), -1.5, 1e-9);
@@ -86,7 +86,7 @@ TEST(SteeringSensor, KnowsTheAngleBetweenItsEndsAndNoneBeyond) {
   EXPECT_NEAR(*at(100), -0.5, 1e-9);
   EXPECT_NEAR(*at(250), 0.05, 1e-9);
   EXPECT_TRUE(at(85).has_value() && at(415).has_value());
-  EXPECT_FALSE(at(0).has_value()) << "its cable is off";
+  EXPECT_FALSE(at(0).has_value()) << "a value at the limit means a disconnected cable";
   EXPECT_FALSE(at(500).has_value());
   EXPECT_NEAR(sensor.volts(0.05), 2.5, 1e-9);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Described devices on the bus of a simulated board, set up by r4::AsyncBoard.
+// Described devices on the bus of a simulated board, attached through r4::AsyncBoard.
 #include <gtest/gtest.h>
 
 #include <asio/bind_cancellation_slot.hpp>
@@ -18,14 +18,14 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Its set-up waits for 5 s after a write.
+// A device whose setup waits 5 s after a write.
 Device slow() {
   return Device::parse("slow@0x68",
                        "device slow\ntitle a test\naddress 0x68\ncheck x75 x68\n"
                        "write x6b00 wait 5000\npoll all x3b 2 10\nvalue a all 0 i16be\n");
 }
 
-// A board that has an MPU-6050 at 0x68 and an INA219 at 0x40.
+// A board with an MPU-6050 at 0x68 and an INA219 at 0x40.
 class AsyncAttach : public testing::Test, protected OnALoop {
  protected:
   explicit AsyncAttach(const BoardOptions& options = at_will()) : board_(io, "sim:", options) {
@@ -46,19 +46,19 @@ TEST_F(AsyncAttach, HasTheBoardReadItAndSendItsFieldsBesideThoseThatWereChosen) 
   EXPECT_EQ(result.step, 0);
   ASSERT_TRUE(run_until([&] { return imu.reading(board_.state(), "accel_z").number.has_value(); }));
   EXPECT_NEAR(imu.reading(board_.state(), "accel_z").number.value(), 9.80665, 1e-9);
-  EXPECT_TRUE(board_.state().present.has(StateField::ain24)) << "the fields of before";
+  EXPECT_TRUE(board_.state().present.has(StateField::ain24)) << "earlier fields must stay selected";
   const std::uint64_t before = commands();
   EXPECT_EQ(attach(Device::from("ina219@0x40:5")).outcome, Outcome::confirmed);
-  EXPECT_EQ(commands() - before, 4U) << "is it there, two readings, and their fields";
+  EXPECT_EQ(commands() - before, 4U) << "one check, two readings and the choice of fields";
   EXPECT_EQ(attach(Device::from("ina219@0x40:5")).outcome, Outcome::confirmed);
-  EXPECT_EQ(commands() - before, 7U) << "its fields are sent already";
+  EXPECT_EQ(commands() - before, 7U) << "the fields are selected already";
 }
 
 TEST_F(AsyncAttach, GivesNoSlotAwayUntilItsHolderIsGivenUp) {
   const auto problem_with = [&](const char* device) {
     return problem_of([&] {
       board_.async_attach(Device::from(device), 5s,
-                          [](const CommandResult&) { ADD_FAILURE() << "it was begun"; });
+                          [](const CommandResult&) { ADD_FAILURE() << "attach must not begin"; });
     });
   };
   EXPECT_EQ(attach(Device::from("ina219@0x40")).outcome, Outcome::confirmed);
@@ -69,11 +69,14 @@ TEST_F(AsyncAttach, GivesNoSlotAwayUntilItsHolderIsGivenUp) {
             "ina219@0x41:1: ina219@0x40 has slot 1; name a free one, ina219@0x41:3, or give the "
             "other up first: X:OFF,1 X:OFF,2");
   EXPECT_EQ(problem_with("mpu6050@0x68:2").reason, "ina219@0x40 has slot 2");
-  EXPECT_EQ(commands(), before) << "nothing was sent";
+  EXPECT_EQ(commands(), before) << "a refused attach must not send";
 
-  EXPECT_EQ(attach(Device::from("ina219@0x40")).outcome, Outcome::confirmed) << "the same again";
-  EXPECT_EQ(attach(Device::from("ina219@0x40:7")).outcome, Outcome::confirmed) << "it moves";
-  EXPECT_EQ(attach(Device::from("mpu6050@0x68:2")).outcome, Outcome::confirmed) << "it is free";
+  EXPECT_EQ(attach(Device::from("ina219@0x40")).outcome, Outcome::confirmed)
+      << "the same device may be attached again";
+  EXPECT_EQ(attach(Device::from("ina219@0x40:7")).outcome, Outcome::confirmed)
+      << "a device may move to another slot";
+  EXPECT_EQ(attach(Device::from("mpu6050@0x68:2")).outcome, Outcome::confirmed)
+      << "the earlier slot is free";
   result_of([&](auto off) { board_.async_send(Command::i2c_poll_off(2), 5s, off); });
   EXPECT_EQ(attach(Device::from("ina219@0x40:1")).outcome, Outcome::confirmed);
 }
@@ -117,7 +120,7 @@ TEST_F(AsyncAttach, RefusesADeviceThatDoesNotAnswer) {
 
 TEST_F(AsyncAttach, IsGivenUpByItsCancellationSlotWhileItWaitsForTheDevice) {
   asio::cancellation_signal signal;
-  std::optional<std::uint32_t> first;  // the check's
+  std::optional<std::uint32_t> first;  // of the check
   const ScopedSubscription states =
       board_.on_state([&](const ReceivedState& state, const Datagram&) {
         const std::uint32_t answered = state.i2c_answer.pnum;
@@ -143,7 +146,7 @@ TEST_F(AsyncAttach, EndsWithTheBoard) {
 }
 
 TEST_F(AsyncAttach, RefusesATimeoutOfNothingAndAWatcherAtOnce) {
-  const auto ignored = [](const CommandResult&) { ADD_FAILURE() << "it was begun"; };
+  const auto ignored = [](const CommandResult&) { ADD_FAILURE() << "attach must not begin"; };
   EXPECT_EQ(problem_of([&] { board_.async_attach(slow(), 0s, ignored); }).kind, ErrorKind::usage);
   BoardOptions options;
   options.role = BoardRole::watch;
@@ -173,7 +176,7 @@ TEST_F(AsyncAttachUnarmed, WritesOnlyAfterArm) {
   EXPECT_EQ(result.step, 2);
   EXPECT_TRUE(explain(imu, result, board_.link()).thing.starts_with("mpu6050@0x68: X:WRITE,104,"));
   EXPECT_EQ(attach(Device::from("ina219@0x40:3")).outcome, Outcome::confirmed)
-      << "nothing is written";
+      << "nothing may be written to the device";
   result_of([&](auto armed) { board_.async_arm(5s, armed); });
   EXPECT_EQ(attach(imu).outcome, Outcome::confirmed);
 }

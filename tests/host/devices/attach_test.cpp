@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The descriptions that are shipped, against the models of their devices on a simulated board.
+// The shipped descriptions with the models of their devices on a simulated board.
 #include <gtest/gtest.h>
 
 #include <numbers>
@@ -18,7 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// With this script all devices are on the bus.
+// This script connects all devices to the bus.
 constexpr const char* all_connected =
     "0 device icm20948 on\n0 device bno055 on\n0 device vl53l0x on\n0 device as5600 on\n";
 
@@ -26,7 +26,7 @@ class DescribedDevice : public testing::Test {
  protected:
   DescribedDevice() { board_.wait_active(); }
 
-  // Waits for a value; fails the test if it does not come.
+  // Waits for a value. The test fails if the value does not come.
   double wait_for(const Device& device, std::string_view value) {
     for (int i = 0; i < 300; ++i) {
       const auto reading = device.reading(board_.next_state(), value);
@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(Attach, ShippedDevice, testing::ValuesIn(all_measured),
 TEST_P(ShippedDevice, MeasuresWhateverItWasSetToBefore) {
   for (const auto& bytes : {Board::I2c::Bytes{0x7F, 0x20}, Board::I2c::Bytes{0x14, 0x07},
                             Board::I2c::Bytes{0x7F, 0x00}}) {
-    board_.i2c().write(0x69, bytes);  // the ICM-20948: 16 g
+    board_.i2c().write(0x69, bytes);  // sets the ICM-20948 to 16 g
   }
   const Device device = Device::from(GetParam().device);
   board_.attach(device);

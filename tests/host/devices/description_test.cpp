@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The text of a device description, and the errors of a wrong one.
+// The text of a device description, and the errors of an invalid description.
 #include "r4link/devices/description.hpp"
 
 #include <gtest/gtest.h>
@@ -60,13 +60,13 @@ TEST(DeviceDescription, DecodesEachKindOfNumber) {
   const auto decode = [&](std::size_t value, const Bytes& bytes) {
     return device.values[value].decode(bytes.data(), bytes.size());
   };
-  EXPECT_EQ(decode(0, {0x19, 0x1F, 0, 0, 0, 0}), 24.0625) << "the four bits below do not count";
+  EXPECT_EQ(decode(0, {0x19, 0x1F, 0, 0, 0, 0}), 24.0625) << "the lowest four bits do not count";
   EXPECT_EQ(decode(0, {0xFF, 0xF0, 0, 0, 0, 0}), -1.0625);
-  EXPECT_FALSE(decode(0, {0x7F, 0xFF, 0, 0, 0, 0})) << "126.9 is beyond its range";
-  EXPECT_FALSE(decode(0, {0x80, 0x00, 0, 0, 0, 0})) << "so is -129";
+  EXPECT_FALSE(decode(0, {0x7F, 0xFF, 0, 0, 0, 0})) << "126.9 is outside of the range";
+  EXPECT_FALSE(decode(0, {0x80, 0x00, 0, 0, 0, 0})) << "-129 is outside of the range";
   EXPECT_EQ(decode(1, {0, 0, 0x01, 0x02, 0x83, 0}), 0x830201 * 50.0);
   EXPECT_NEAR(*decode(2, {0, 0, 0, 0, 0, 0xA6}), -M_PI / 2, 1e-12);
-  EXPECT_FALSE(decode(2, {0, 0, 0, 0, 0}).has_value()) << "its byte is missing";
+  EXPECT_FALSE(decode(2, {0, 0, 0, 0, 0}).has_value()) << "the byte of this value is missing";
 }
 
 TEST(Device, HasNoMeasurementOfAValueThatDoesNotCount) {
@@ -103,7 +103,7 @@ TEST(Device, HasNoMeasurementUntilItIsSetUp) {
   State state;
   state.raw.i2c[0].data.size = 1;
   state.raw.i2c[0].data.bytes[0] = 0;
-  EXPECT_FALSE(device.is_set_up(state).has_value()) << "its modes were not read yet";
+  EXPECT_FALSE(device.is_set_up(state).has_value()) << "the modes were not read yet";
   EXPECT_FALSE(device.reading(state, "height").number);
   I2cReading& modes = state.raw.i2c[1];
   modes.data.size = 2;
@@ -114,7 +114,8 @@ TEST(Device, HasNoMeasurementUntilItIsSetUp) {
   };
   EXPECT_FALSE(set_up_with(0, 5));
   EXPECT_FALSE(device.reading(state, "height").number);
-  EXPECT_EQ(device.reading(state, "mode").number, 0) << "what tells it is still told";
+  EXPECT_EQ(device.reading(state, "mode").number, 0)
+      << "the value that shows the setup is still reported";
   EXPECT_FALSE(set_up_with(1, 0));
   EXPECT_FALSE(device.reading(state, "height").number);
   EXPECT_TRUE(set_up_with(1, 5));
@@ -170,7 +171,7 @@ TEST(Device, CountsByAScaledValueAsItIsWritten) {
 }
 
 TEST(Device, TakesThePlaceOfWhatHasItsAddressOrASlotOfIt) {
-  const Device ina = Device::from("ina219@0x40:1");  // slots 1 and 2
+  const Device ina = Device::from("ina219@0x40:1");  // uses slots 1 and 2
   EXPECT_TRUE(ina.takes_place_of(Device::from("ina219@0x40:5")));
   EXPECT_TRUE(ina.takes_place_of(Device::from("ina219@0x41:2")));
   EXPECT_FALSE(ina.takes_place_of(Device::from("ina219@0x41:3")));
@@ -181,7 +182,7 @@ TEST(Device, WithoutItsMagnetAnEncoderHasNoAngle) {
   State state;
   state.raw.i2c[0].data.size = 2;
   state.raw.i2c[0].data.bytes[0] = state.raw.i2c[0].data.bytes[1] = 0;
-  EXPECT_FALSE(encoder.reading(state, "angle").number) << "its status was not read yet";
+  EXPECT_FALSE(encoder.reading(state, "angle").number) << "the status was not read yet";
   state.raw.i2c[1].data.size = 1;
   state.raw.i2c[1].data.bytes[0] = 0x20;
   EXPECT_EQ(encoder.reading(state, "angle").number, 0);
@@ -208,7 +209,7 @@ TEST(DeviceDescription, TakesNumbersOfEveryWidthAndOrder) {
 }
 
 struct WrongText {
-  int line;  // 0: none
+  int line;  // 0: no line number
   std::string text;
   const char* problem;
 };
@@ -380,7 +381,7 @@ TEST(Device, DecodesTheSlotsOfAState) {
   EXPECT_DOUBLE_EQ(power.reading(state, "current").number.value(), 0.2);
   EXPECT_EQ(power.readings(state).size(), power.description().values.size());
   put(3, {0x07}, 1000);
-  EXPECT_FALSE(power.reading(state, "current").number) << "somebody else's reading";
+  EXPECT_FALSE(power.reading(state, "current").number) << "the reading is of another device";
   EXPECT_THROW(power.reading(state, "amps"), Error);
 }
 

@@ -29,7 +29,7 @@ TEST(AsyncDiscover, CallsItsHandlerOnTheLoopWithWhatWasFound) {
   boards.add("0.1", {identity("b-1")});
   asio::io_context io;
   std::optional<Discovery> found;
-  // The handler may be one that can only be moved.
+  // The handler may be a type that can only be moved.
   async_discover(io.get_executor(), at_port_by_udp(boards.port()),
                  [&, only = std::make_unique<int>()](std::exception_ptr error, Discovery all) {
                    EXPECT_FALSE(error);
@@ -55,7 +55,7 @@ TEST(AsyncDiscover, ALoopThatIsDestroyedEndsTheSearchWithoutTheHandler) {
   {
     asio::io_context io;
     for (int i = 0; i < 2; ++i) {
-      // The second handler waits, and owns a timer, which must not outlive the loop.
+      // The second handler waits and owns a timer. The timer must not outlive the loop.
       async_discover(io.get_executor(), at_port_by_udp(2018),
                      [&called, held, timer = asio::steady_timer(io)](std::exception_ptr,
                                                                      Discovery) { called = true; });

@@ -51,7 +51,7 @@ TEST(Discovery, WithoutABoardTheErrorSaysWhatWasSearched) {
   all.ports.resize(2);
   all.ports[0].path = "/dev/ttyACM0";
   all.ports[0].asked = true;
-  all.ports[1].path = "/dev/ttyS0";  // it was not asked
+  all.ports[1].path = "/dev/ttyS0";  // this port was not searched
   all.buses.resize(1);
   all.buses[0].interface = "can0";
   all.buses[0].trouble = Problem{ErrorKind::open, "can0", "it is down", ""};
@@ -65,7 +65,7 @@ TEST(Discovery, WithoutABoardTheErrorSaysWhatWasSearched) {
 TEST(Discovery, SeveralBoardsAreAnErrorThatNamesTheirUrls) {
   for (const Discovery& all :
        {discovery_of({found_board("udp:?id=b-1", "b-1"), found_board("udp:?id=b-2", "b-2")}),
-        // The same id twice on one transport, or no id, may be two boards.
+        // The same id twice on one transport, or no id, may mean two boards.
         discovery_of({found_board("udp:?id=b-1", "b-1"), found_board("udp:?id=b-2", "b-1")}),
         discovery_of({found_board("udp:?id=b-1", ""), found_board("udp:?id=b-2", "")})}) {
     const Problem problem = problem_of([&] { all.only(); });
@@ -100,7 +100,7 @@ TEST(Discovery, FirstOpensTheOnlyBoard) {
   AnsweringBoards boards;
   boards.add("0.1", {identity("b-1")});
   BoardOptions watching;
-  watching.role = BoardRole::watch;  // a free port, not that of hosts
+  watching.role = BoardRole::watch;  // uses a free port, not the port of hosts
   Board board = Board::first(watching, by_udp(boards.port()));
   EXPECT_EQ(board.name().find("udp://127.0.0.1"), 0U) << board.name();
   boards.remove("0.1");

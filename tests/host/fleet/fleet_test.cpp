@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Fleet opposite simulated boards, in its own process and over UDP.
+// r4::Fleet with simulated boards, in its own process and over UDP.
 #include "r4link/fleet.hpp"
 
 #include <gtest/gtest.h>
@@ -102,7 +102,7 @@ TEST(Fleet, SendsSetpointsOfSeveralBoards) {
   ActiveFleet fleet({"sim:?node=0-7"}, at_will());
   std::vector<BoardSetpoints> setpoints;
   for (std::size_t i = 0; i < 8; ++i) setpoints.push_back({i, motor(100 + static_cast<int>(i))});
-  // A group goes out when the board has reported that it executes groups.
+  // A group is sent after the board has reported that it executes groups.
   ASSERT_TRUE(comes([&] {
     for (const PostResult each : fleet.post(setpoints)) {
       if (!each) return false;
@@ -143,7 +143,7 @@ TEST(Fleet, ReportsASilentBoardAndDrivesTheOtherBoards) {
 }
 
 TEST(Fleet, RepeatsAStopAfterItsCallHasReturned) {
-  const std::string url = BoardInAThread("udp").url();  // there is no board now
+  const std::string url = BoardInAThread("udp").url();  // the board does not run any more
   Fleet fleet({url}, at_will());
   EXPECT_EQ(fleet.stop(50ms).failed(), Boards{0});
   BoardInAThread late(url.substr(0, url.find('?')));
@@ -152,7 +152,7 @@ TEST(Fleet, RepeatsAStopAfterItsCallHasReturned) {
 
 TEST(Fleet, CountsTheEventsThatTheProgramDoesNotTake) {
   ActiveFleet fleet({"sim:?node=0-31"});
-  // Each stop and its end are two events of a board, at least.
+  // Each stop and its end are at least two events of a board.
   for (int i = 0; i < 70; ++i) {
     ASSERT_TRUE(fleet.stop().all_confirmed());
     fleet.send(Command::clear()).require();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's clock as the host knows it, against a clock whose truth the test knows.
+// The host's estimate of the board's clock, compared with the true clock of the test.
 #include "host/measurement/board_clock.hpp"
 
 #include <gtest/gtest.h>
@@ -15,12 +15,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A board, a link with a random delay each way, and a host that asks; in virtual time.
+// A board, a link with a random delay in each direction, and a host that asks; in virtual time.
 struct ClockBench {
   struct Options {
-    double drift_ppm = 0;  // the board's clock is slower
+    double drift_ppm = 0;  // the board's clock is slower by this
     double least_us = 100, most_us = 300;
-    double least_back_us = -1, most_back_us = -1;  // of the board's datagrams, where it is another
+    double least_back_us = -1, most_back_us = -1;  // of the board's datagrams, if it differs
     unsigned seed = 1;
   };
 
@@ -45,7 +45,7 @@ struct ClockBench {
   }
   static Time time(double us) { return Time{static_cast<std::int64_t>(us)}; }
 
-  // The state at that time of the board's has come. Its error, us, against the truth.
+  // A state arrives that was sampled at this time of the board. Returns its error in us.
   double state(int board_ms) {
     const double sent = host_us(board_ms * 1000.0);
     clock.heard(first_t + static_cast<std::uint32_t>(board_ms), time(sent + delay(true)));
@@ -64,8 +64,8 @@ struct ClockBench {
     clock.heard(t_ms, time(came + delay(true)));
     clock.answered(t_ms, time(sent));
   }
-  // States a hundred times a second, and questions as a session asks. Returns the greatest error
-  // after `settled_ms`.
+  // States at 100 Hz, and questions as a session asks them. Returns the greatest error after
+  // `settled_ms`.
   double run(int from_ms, int to_ms, int settled_ms) {
     double worst = 0;
     for (int ms = from_ms; ms < to_ms; ms += 10) {
@@ -80,7 +80,7 @@ struct ClockBench {
     return worst;
   }
 
-  static constexpr std::uint32_t first_t = 0xffffff00U;  // it wraps at once
+  static constexpr std::uint32_t first_t = 0xffffff00U;  // wraps soon
   Options options;
   std::mt19937 random;
   double offset_us;
@@ -100,7 +100,7 @@ TEST(BoardClock, WithoutAnAnswerTheFastestDatagramDecides) {
   EXPECT_NEAR(static_cast<double>(clock.at(1020).at.count()), 5'022'000, 2);
   clock.heard(1020, 5s + 100ms);
   EXPECT_NEAR(static_cast<double>(clock.at(1020).at.count()), 5'022'000, 3)
-      << "one that was held up";
+      << "a delayed state must not move the clock";
 }
 
 TEST(BoardClock, ARoundTripBoundsItFromBothSides) {
@@ -108,11 +108,13 @@ TEST(BoardClock, ARoundTripBoundsItFromBothSides) {
   clock.heard(1000, 5s);
   clock.answered(1000, 4999ms);
   ASSERT_TRUE(clock.at(1000).error);
-  EXPECT_EQ(clock.at(1000).at, 4999ms) << "between 4998, asked less T's millisecond, and 5000";
+  EXPECT_EQ(clock.at(1000).at, 4999ms)
+      << "the middle of 4998 (the question, less 1 ms of T) and 5000";
   EXPECT_NEAR(static_cast<double>(clock.at(1000).error->count()), 1000, 2);
 }
 
-// With every seed and drift, the clock is as exact as that, and within the error that it reports.
+// For every seed and drift, the clock is at least this exact, and its error is within the reported
+// error.
 void expect_exact(ClockBench::Options options, int until_ms, int settled_ms, double error_us,
                   double bound_us) {
   for (options.seed = 1; options.seed <= 200; ++options.seed) {
@@ -129,8 +131,8 @@ TEST(BoardClock, OnAFastPathItIsWithinSevenTenthsOfAMillisecond) {
   expect_exact({}, 20'000, 2'000, 700, 1'000);
 }
 
-// A question takes one frame there. A state takes many back, after the states of seven other boards
-// (docs/how-to/can.md).
+// A question takes one frame to the board. A state takes many frames to the host, after the states
+// of seven other boards (docs/how-to/can.md).
 TEST(BoardClock, OnALoadedCanBusItIsWithinSevenTenthsOfAMillisecond) {
   expect_exact({.least_us = 150, .most_us = 600, .least_back_us = 700, .most_back_us = 2'800},
                20'000, 10'000, 700, 1'500);
@@ -143,7 +145,8 @@ TEST(BoardClock, WithADelayOfUpTo20MillisecondsItIsWithinTwoAfterTenSeconds) {
 TEST(BoardClock, TheBoundCoversALinkThatIsSlowerOneWay) {
   ClockBench bench(
       {.least_us = 100, .most_us = 300, .least_back_us = 30'000, .most_back_us = 30'200});
-  EXPECT_GE(bench.run(0, 20'000, 10'000), 10'000) << "nothing could know";
+  EXPECT_GE(bench.run(0, 20'000, 10'000), 10'000)
+      << "no estimate can detect different delays of the two directions";
   EXPECT_EQ(bench.honest, bench.bounded);
 }
 

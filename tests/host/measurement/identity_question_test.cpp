@@ -24,7 +24,7 @@ TEST(IdentityQuestion, IsAnsweredByTheAnswerThatNamesIt) {
   question.asked(8, 200ms);
   EXPECT_FALSE(question.answered(answer_to(9)));
   EXPECT_EQ(question.answered(answer_to(7)), 100ms);
-  EXPECT_FALSE(question.answered(answer_to(7))) << "a second answer";
+  EXPECT_FALSE(question.answered(answer_to(7))) << "a second answer must not count";
   EXPECT_EQ(question.answered(answer_to(8)), 200ms);
 }
 
@@ -32,7 +32,8 @@ TEST(IdentityQuestion, CountsFromItsFirstSendingIfItIsRepeated) {
   IdentityQuestion question;
   question.asked(7, 100ms);
   question.asked(7, 200ms);
-  EXPECT_EQ(question.answered(answer_to(7)), 100ms) << "it may have been on its way for so long";
+  EXPECT_EQ(question.answered(answer_to(7)), 100ms)
+      << "the answer may have been under way for so long";
   EXPECT_FALSE(question.answered(answer_to(7)));
 }
 

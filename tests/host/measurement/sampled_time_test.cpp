@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// When states were sampled, as a program hears it over a socket and a terminal.
+// The sampling times of states that a program receives over a socket and a terminal.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

@@ -40,7 +40,8 @@ TEST(Statistics, RateIsRightFromTheFirstTenthOfASecond) {
   EXPECT_NEAR(collector.report(now).state_rate_hz, 100, 5);
 }
 
-// RFC 3550 6.4.1: J += (|D| - J) / 16, D the difference of transit times of neighbours.
+// RFC 3550, 6.4.1: J += (|D| - J) / 16. D is the difference between the transit times of two
+// successive states.
 TEST(Statistics, JitterIsThatOfRfc3550) {
   StatisticsCollector even;
   Micros now = 500s;
@@ -88,7 +89,7 @@ TEST(Statistics, LossIsTheShareOfTheBoardsDatagrams) {
   ConnectedLink link;
   for (int i = 0; i < 100; ++i) {
     link.pass(10ms);
-    if (i % 4 == 3) ++link.board_pnum;  // one in five is lost
+    if (i % 4 == 3) ++link.board_pnum;  // one in five datagrams is lost
     link.executed(1);
   }
   const Statistics report = link.session.statistics(link.now);

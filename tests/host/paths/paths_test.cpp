@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which datagrams the paths of a session admit, and which of them are new: one path, without a session.
-// tests/host/session/session_paths_test.cpp has two and more paths.
+// The datagrams that one path of a session admits, and which of them are new; without a session.
+// tests/host/session/session_paths_test.cpp tests two and more paths.
 #include "host/paths/paths.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ struct OnePath : testing::Test {
     if (admission != Admission::no) paths.is_newest(0, board_t(), now);
     return admission;
   }
-  // Handled as by a session. True if the heartbeat is new.
+  // Handled as by a session. Returns true if the heartbeat is new.
   bool heartbeat(std::uint32_t t_ms, std::uint32_t pnum) {
     const Admission admission = paths.admit(0, pnum, t_ms, now);
     if (admission == Admission::restarted) link.on_restart();
@@ -56,7 +56,7 @@ struct OnePath : testing::Test {
 
 TEST_F(OnePath, TheSessionSpeaksAsSoonAsTheTransportIsUp) {
   EXPECT_EQ(paths.speaking(), 1);
-  EXPECT_EQ(paths.to_ask(now), 0) << "there is no other path to compare the board with";
+  EXPECT_EQ(paths.to_ask(now), 0) << "there is no other path whose board to compare";
   paths.on_transport(0, false, true, now);
   EXPECT_EQ(paths.speaking(), 0);
   EXPECT_TRUE(paths.all_down());
@@ -65,8 +65,8 @@ TEST_F(OnePath, TheSessionSpeaksAsSoonAsTheTransportIsUp) {
 TEST_F(OnePath, NumbersOrderTheHeartbeatsOfOneMillisecond) {
   EXPECT_TRUE(heartbeat());
   EXPECT_TRUE(heartbeat());
-  EXPECT_FALSE(heartbeat(board_t(), board_pnum - 1)) << "the same";
-  EXPECT_FALSE(heartbeat(board_t(), board_pnum - 2)) << "late";
+  EXPECT_FALSE(heartbeat(board_t(), board_pnum - 1)) << "the same heartbeat again";
+  EXPECT_FALSE(heartbeat(board_t(), board_pnum - 2)) << "a late heartbeat";
 }
 
 TEST_F(OnePath, OlderDatagramsAndDuplicatesAreDropped) {
@@ -78,7 +78,7 @@ TEST_F(OnePath, OlderDatagramsAndDuplicatesAreDropped) {
   FieldSet fields;
   fields.add(StateField::safe);
   ASSERT_TRUE(paths.news().take_state(0, board_t(), fields));
-  EXPECT_FALSE(paths.news().take_state(0, board_t(), fields)) << "it has come";
+  EXPECT_FALSE(paths.news().take_state(0, board_t(), fields)) << "this state has come already";
   EXPECT_FALSE(paths.news().is_newest_state(0, board_t() - 1));
 }
 
@@ -93,9 +93,9 @@ TEST_F(OnePath, LostDatagramsAreCountedAndLateOnesAreTakenBack) {
   heartbeat(board_t() - 5, 12);
   EXPECT_EQ(paths.counters().duplicate, 1U);
   EXPECT_TRUE(paths.admit_answer(0, 17, board_t(), true, now));
-  EXPECT_EQ(paths.counters().lost, 4U) << "an answer counts in the numbers of the states";
+  EXPECT_EQ(paths.counters().lost, 4U) << "the numbers of answers and states are one sequence";
   EXPECT_TRUE(paths.admit_answer(0, 3, board_t(), false, now));
-  EXPECT_EQ(paths.counters().received, 4U) << "one to a host without control does not";
+  EXPECT_EQ(paths.counters().received, 4U) << "an answer to a host without control does not count";
 }
 
 TEST_F(OnePath, ARestartIsNoticedWhenItsFirstHeartbeatsAreLost) {
@@ -104,14 +104,14 @@ TEST_F(OnePath, ARestartIsNoticedWhenItsFirstHeartbeatsAreLost) {
   reboot();
   EXPECT_EQ(state(), Admission::restarted);
   pass(10);
-  EXPECT_EQ(state(), Admission::yes) << "once";
-  EXPECT_EQ(paths.counters().lost, 0U) << "new numbers are no loss";
+  EXPECT_EQ(state(), Admission::yes) << "a restart must be reported once";
+  EXPECT_EQ(paths.counters().lost, 0U) << "numbers that begin anew are not a loss";
 }
 
 TEST_F(OnePath, ABoardWithoutAnswersIsBelievedWhenItSaysThatItBoots) {
   EXPECT_TRUE(booting());
   EXPECT_TRUE(booting());
-  EXPECT_EQ(state(), Admission::yes) << "the first boot that is heard is no restart";
+  EXPECT_EQ(state(), Admission::yes) << "the first boot heard is not a restart";
   pass(500);
   reboot();
   EXPECT_TRUE(booting());
@@ -125,7 +125,7 @@ TEST_F(OnePath, ALateBootHeartbeatIsNotARestart) {
   state();
   booting();
   pass(10);
-  EXPECT_EQ(state(), Admission::yes) << "the clock goes on";
+  EXPECT_EQ(state(), Admission::yes) << "the clock shows no restart";
 }
 
 TEST_F(OnePath, ARestartIsNoticedIfTheBoardCountsItsTimeFromZero) {
@@ -146,7 +146,7 @@ TEST_F(OnePath, ADelayOfSecondsIsNotARestart) {
   pass(10);
   EXPECT_EQ(state(), Admission::yes);
   ask();
-  EXPECT_EQ(answer(), Admission::yes) << "the earlier datagrams were late, the answer is not";
+  EXPECT_EQ(answer(), Admission::yes) << "only the earlier datagrams were late";
 }
 
 TEST_F(OnePath, TheBoardsClockMayWrap) {
@@ -187,7 +187,7 @@ TEST_F(OnePath, AnAnswerToAnotherProgramProvesNoRestart) {
   ask();
   ASSERT_EQ(answer(), Admission::yes);
   reboot();
-  EXPECT_EQ(answer(), Admission::yes) << "the board is known";
+  EXPECT_EQ(answer(), Admission::yes) << "an answer to another program is admitted";
   EXPECT_EQ(state(), Admission::no) << "the restart is not proved";
 }
 
@@ -203,7 +203,7 @@ TEST_F(OnePath, ABoardThatStopsAnsweringIsBelievedAfterTenQuestions) {
     ask();
     ++questions;
   }
-  EXPECT_EQ(questions, 10) << "another firmware may run now";
+  EXPECT_EQ(questions, 10) << "firmware without answers may run after the restart";
 }
 
 TEST_F(OnePath, AQuestionWhileNothingComesIsNotCounted) {
@@ -214,7 +214,8 @@ TEST_F(OnePath, AQuestionWhileNothingComesIsNotCounted) {
     pass(100);
     ask();
   }
-  EXPECT_EQ(paths.admit(0, 5, board_t() - 3'600'000, now), Admission::no) << "a replay comes first";
+  EXPECT_EQ(paths.admit(0, 5, board_t() - 3'600'000, now), Admission::no)
+      << "a replay must not be believed";
 }
 
 TEST_F(OnePath, AQuestionThatTheTransportDidNotTakeIsRepeatedAndNotCounted) {
@@ -260,7 +261,7 @@ TEST_F(OnePath, BusyEndsWhenAStateNamesACommandOfThisSession) {
   EXPECT_TRUE(paths.all_busy(now));
   pass(10);
   paths.on_own_state(board_t(), now);
-  EXPECT_FALSE(paths.all_busy(now)) << "the state is newer than BUSY";
+  EXPECT_FALSE(paths.all_busy(now)) << "a state after BUSY proves control";
   paths.on_busy(0, {}, now);
   EXPECT_TRUE(paths.all_busy(now)) << "the transport hears another host";
   pass(300);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What tests of recordings share: what a reader has read, and a full disk.
+// Shared by the tests of recordings: the records that a reader has read, and a full disk.
 #pragma once
 
 #include <sys/resource.h>
@@ -33,7 +33,7 @@ struct Heard final : RecordingVisitor {
   }
   void on_header() override { ++headers; }
 
-  std::string records;  // as lines
+  std::string records;  // one line for each record
   int count = 0;
   int headers = 0;
   std::vector<std::string> events;
@@ -42,7 +42,7 @@ struct Heard final : RecordingVisitor {
   std::vector<Damage> damage;
 };
 
-// Everything that can be read, fed in pieces of that size.
+// Reads `bytes` in pieces of this size and returns everything that can be read.
 inline Heard heard_in(std::string_view bytes, std::size_t piece = 1000) {
   Heard heard;
   RecordingReader reader(heard, "test");
@@ -53,7 +53,7 @@ inline Heard heard_in(std::string_view bytes, std::size_t piece = 1000) {
   return heard;
 }
 
-// The process may write no more than so many bytes into a file.
+// While this object lives, the process can write at most this number of bytes into a file.
 struct FileLimit {
   explicit FileLimit(rlim_t bytes) {
     ::getrlimit(RLIMIT_FSIZE, &before);

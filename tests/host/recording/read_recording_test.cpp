@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// read_recording(): a recording for a program of C++.
+// read_recording(): a recording read by a C++ program.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -88,7 +88,7 @@ TEST(RecordedStates, MergeTheStatesOfEachPath) {
   EXPECT_EQ(states.datagram().pnum(), 8U);
   const State* const other = states.take(record_of(2, RecordKind::from_board, relays));
   ASSERT_NE(other, nullptr);
-  EXPECT_EQ(other->raw.analog_cv[0], 0) << "another board's";
+  EXPECT_EQ(other->raw.analog_cv[0], 0) << "the state of another board must not be used";
   EXPECT_EQ(states.take(record_of(1, RecordKind::from_board, heartbeat)), nullptr);
   EXPECT_EQ(states.take(record_of(1, RecordKind::to_board, volts)), nullptr);
   EXPECT_EQ(states.take(record_of(1, RecordKind::from_board, volts + "x")), nullptr);

@@ -34,7 +34,7 @@ RC_GTEST_PROP(RecordLine, TimesAreReadBackFromTheirText, ()) {
   const Time time{*rc::gen::inRange<std::int64_t>(0, 253402300799999999)};
   const std::string text = record_time_text(time);
   RC_ASSERT(read_record_time(text) == time);
-  // By the second, without what is not needed.
+  // The shortest form, to the second.
   RC_ASSERT(read_record_time(text.substr(0, 19)) == std::chrono::floor<std::chrono::seconds>(time));
 }
 
@@ -50,7 +50,7 @@ TEST(RecordLine, RejectsATextThatIsNotATime) {
 }
 
 TEST(RecordLine, OfAStateHasTwoHundredBytesAtMost) {
-  // With what a host in control asks for besides the paper's fields, after a day.
+  // With the fields that a host in control adds to those of the paper, after a day.
   const std::string state =
       "AIN24:24.56;AIN12:12.15;AIN5:5.11;AINDMH:12.16;DMHSTA:1;AINSTEER:0.95;DHB1A:4095,1;"
       "OSMC1:358,1;STEP1POS:-100;SERVO1POS:2000;CMD:2541659426;PNum:8640000;T:86400000;^"
@@ -80,7 +80,7 @@ TEST(RecordLine, GivesEveryByteBackInTheLongestRecord) {
   EXPECT_LE(line.size(), max_record_line);
   RecordLine read;
   ASSERT_TRUE(read_record_line(line, read));
-  EXPECT_EQ(read.record.bytes, bytes) << "what is longer is cut";
+  EXPECT_EQ(read.record.bytes, bytes) << "longer data must be cut";
 }
 
 TEST(RecordLine, RejectsALineThatIsNotOneOfARecording) {
@@ -147,7 +147,7 @@ TEST(RecordLine, IsMadeOfARecordWithoutItsSecrets) {
     std::string bytes, kept;
   } cases[] = {
       {RecordKind::to_board, setting, masked},
-      {RecordKind::from_board, setting, masked},  // an echo
+      {RecordKind::from_board, setting, masked},  // a setting echoed by the board
       {RecordKind::event, "oversize noiseC:password,letmein!", "oversize noiseC:password,..."},
       {RecordKind::event, "up serial:///dev/pci-0000:0C:00.0,1",
        "up serial:///dev/pci-0000:0C:00.0,1"},
@@ -175,7 +175,7 @@ TEST(RecordLine, OfADeviceHasItsPlaceAndTheTextOfItsDescription) {
   EXPECT_EQ(read.device.path, 3);
   EXPECT_EQ(read.device.place, "my one@0x28:1");
   EXPECT_EQ(read.device.description, "device mine\naddress 0x40\n# \\\xff\n");
-  // The longest is a line that is read.
+  // The longest line must be readable.
   text.clear();
   write_device(text, {65535, "mine@0x28:1", std::string(5000, '\n')});
   EXPECT_LE(text.size(), max_record_line);
@@ -184,7 +184,7 @@ TEST(RecordLine, OfADeviceHasItsPlaceAndTheTextOfItsDescription) {
   EXPECT_EQ(read.device.description, std::string(max_record_bytes, '\n'));
 
   ASSERT_TRUE(read_record_line("# device was changed at noon", read));
-  EXPECT_EQ(read.kind, LineKind::comment) << "a person's";
+  EXPECT_EQ(read.kind, LineKind::comment) << "a comment of a person";
   for (const char* const line :
        {"# device 0 bno055@0x28:1 device x", "# device 1 a\\x1b[2J@0x28:1 device x",
         "# device 70000 x", "# device 1 x \\x2"}) {

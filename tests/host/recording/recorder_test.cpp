@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board's link is recorded as it runs, and runs on whatever becomes of the recording.
+// A board's link is recorded while it runs. No fault of the recording may disturb the link.
 #include "host/recording/recorder.hpp"
 
 #include <gtest/gtest.h>
@@ -132,7 +132,7 @@ TEST_F(RecordingOfABoard, TakesADatagramWithoutMemoryAndCountsTheDroppedOnes) {
   const std::uint16_t path = recorder.add_path("sim:");
   const std::string datagram(1000, 'x');
   const std::uint64_t before = bench::allocations_of_this_thread();
-  // Sooner than any disk takes them.
+  // Faster than a disk can write.
   for (int i = 0; i < 50'000; ++i) recorder.record(path, RecordKind::from_board, datagram);
   EXPECT_EQ(bench::allocations_of_this_thread(), before);
   recorder.close();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads recordings in every state: damage has a place, and the rest is read.
+// Reads recordings in every state: damage is reported with its place, and the rest is read.
 #include "r4link/recordings/recording_reader.hpp"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ std::string head(const std::string& url = "udp://robot") {
 const std::string other_head = head("udp://another-robot");
 const std::string end_of_it = "1795468299.000000 0! end\n";
 
-// Records that differ, as lines.
+// Different records, one line each.
 std::string lines(int from, int count) {
   std::string text;
   for (int i = from; i < from + count; ++i) {
@@ -187,7 +187,7 @@ TEST(RecordingReader, NamesTheFormOfAnotherFileAndTheProgramThatReadsIt) {
 
 TEST(RecordingReader, ReadsTheArchivesOfZstdsOwnPrograms) {
   const std::string text = head() + lines(0, 50);
-  // What --long=27 and --ultra -22 ask for, and what pzstd writes in front of each frame.
+  // The options --long=27 and --ultra -22, and the bytes that pzstd writes before each frame.
   std::string archive(ZSTD_compressBound(text.size()), '\0');
   const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(),
                                                                      &ZSTD_freeCCtx);
@@ -209,7 +209,7 @@ TEST(RecordingReader, ReadsTheArchivesOfZstdsOwnPrograms) {
 }
 
 TEST(RecordingReader, RefusesAFrameThatNeedsMuchMemoryAndNamesTheProgramThatUnpacksIt) {
-  // A window of 2 GiB.
+  // A frame with a window of 2 GiB.
   const std::string frame = std::string("\x28\xb5\x2f\xfd\x00\xa8", 6) + std::string(100, '\0');
   const Heard heard = heard_in(compressed(head() + lines(0, 3)) + frame);
   EXPECT_EQ(heard.records, lines(0, 3));
@@ -220,7 +220,7 @@ TEST(RecordingReader, RefusesAFrameThatNeedsMuchMemoryAndNamesTheProgramThatUnpa
   EXPECT_TRUE(contains(problem.fix, "zstd -d --long=31"));
 }
 
-// As `sort -m` makes it of two recordings.
+// Merges two recordings as `sort -m` does.
 std::string merged_by_sort(const std::string& a, const std::string& b) {
   std::vector<std::string> all;
   for (const std::string& file : {a, b}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Records become files, within given limits. Time is that of the records.
+// Writes records to files within given limits. The time is the time of the records.
 #include "host/recording/recording_writer.hpp"
 
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ struct RecordingWriterTest : testing::Test {
     for (const std::string& name : names()) sum += fs::file_size(path(name));
     return sum;
   }
-  // A state, 10 ms after the one before.
+  // Appends a state, 10 ms after the previous state.
   void append(RecordingWriter& writer) {
     const std::string bytes = "AIN24:24.28;OSMC1:" + std::to_string(number * 7919 % 4096) +
                               ",1;PNum:" + std::to_string(number) + ";T:1;^0x0^";
@@ -58,7 +58,7 @@ struct RecordingWriterTest : testing::Test {
 
   const fs::path folder = fs::path(testing::TempDir()) / ("r4-rec-" + std::to_string(::getpid()));
   int number = 0;
-  std::string all;  // the lines of what was appended
+  std::string all;  // the lines of all appended records
 };
 
 TEST_F(RecordingWriterTest, WritesNoSecretOfAnyHost) {
@@ -161,14 +161,14 @@ TEST_F(RecordingWriterTest, BeginsAFileAnewThatWasMovedRemovedOrTruncatedAndRepo
       EXPECT_EQ(trouble->kind, what == "moved" ? ErrorKind::open : ErrorKind::data);
       EXPECT_EQ(trouble->thing, file);
       EXPECT_TRUE(contains(trouble->reason, "was " + what));
-      EXPECT_FALSE(writer.take_trouble()) << "it is reported once";
+      EXPECT_FALSE(writer.take_trouble()) << "trouble must be reported once";
       append(writer);
       writer.close();
       const Heard before = heard_in(content("moved" + ending));
       const Heard anew = heard_in(content("a" + ending));
       EXPECT_EQ(before.records + anew.records, all);
       EXPECT_TRUE((what != "moved" || before.damage.empty()) && anew.damage.empty());
-      EXPECT_EQ(anew.paths.back().name, "left") << "each file is whole in itself";
+      EXPECT_EQ(anew.paths.back().name, "left") << "each file must be complete";
       fs::remove(file);
       fs::remove(moved);
     }
@@ -231,7 +231,7 @@ TEST_F(RecordingWriterTest, BeginsANewFileAfterASize) {
   for (const std::string& name : names()) {
     EXPECT_LE(fs::file_size(path(name)), 30'000) << name;
     const Heard heard = heard_in(content(name));
-    EXPECT_EQ(heard.headers, 1) << "each is whole in itself: " << name;
+    EXPECT_EQ(heard.headers, 1) << "each file must be complete: " << name;
     EXPECT_EQ(heard.paths.back().name, "left") << name;
     (name.ends_with(".zst") ? read_zst : read) += heard.records;
   }
@@ -291,7 +291,7 @@ TEST_F(RecordingWriterTest, KeepsWhatItMayAndNoMore) {
   for (const std::string& name : names()) {
     if (name != "drive-notes.r4log") read += heard_in(content(name)).records;
   }
-  EXPECT_TRUE(all.ends_with(read)) << "the newest is kept";
+  EXPECT_TRUE(all.ends_with(read)) << "the newest records must be kept";
   EXPECT_EQ(content("drive-notes.r4log"), "of somebody else");
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A recording is a transport.
+// Recordings used as a transport.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -65,7 +65,7 @@ TEST_F(Replay, GivesTheBoardsDatagramsAndTheEventsOfItsTransport) {
   EXPECT_EQ(heard.datagrams[2].text, "two");
   EXPECT_EQ(counters.rx_datagrams, 3);
   EXPECT_EQ(counters.ups, 2);
-  EXPECT_EQ(counters.downs, 2) << "and one at the end";
+  EXPECT_EQ(counters.downs, 2) << "one in the recording and one at its end";
   EXPECT_GE(heard.drained, 1);
 }
 
@@ -114,7 +114,7 @@ TEST_F(Replay, LeavesTurnsOfTheLoopToOthersHoweverMuchIsDue) {
   play("");
   EXPECT_EQ(heard.datagrams.size(), all);
   EXPECT_LT(at_the_turn_of_others, all / 10);
-  EXPECT_EQ(heard.drained, 1) << "before the end";
+  EXPECT_EQ(heard.drained, 1) << "the queue must be drained before the end";
 }
 
 TEST_F(Replay, ReportsDamageFarBehindTheRecordThatIsPlayed) {

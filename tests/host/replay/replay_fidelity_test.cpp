@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program gets from a recording the same as it got when the recording was made.
+// During a replay a program receives the same data as during the recording.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -26,7 +26,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Everything that a program gets from the board.
+// Everything that a program receives from the board.
 struct ToldOfABoard {
   explicit ToldOfABoard(AsyncBoard& board) {
     board.on_state(
@@ -51,7 +51,7 @@ struct ToldOfABoard {
     return {datagram.bytes().data(), datagram.bytes().size()};
   }
 
-  // Every field, also those that this datagram does not have.
+  // Every field, including fields that this datagram does not have.
   static std::string text_of(const State& state) {
     char buffer[4 * max_datagram];
     DatagramWriter writer(buffer, sizeof buffer);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A host session over several paths to real boards in virtual time, in steps of a millisecond. Each
-// path has its own delay, and can be cut in one direction or both, with or without notice.
+// path has its own delay. The test can cut it in one direction or both, with or without notice.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -26,10 +26,10 @@ class RobotOnPaths final : private DrivenSession::Handler {
         : lag_ms(its_lag_ms), board(its_board) {}
     std::uint32_t lag_ms;
     std::size_t board;
-    bool listens = false;  // a bus, on which a watcher sends no questions
+    bool listens = false;  // a bus, on which a watcher must not send questions
     bool cut_to_board = false, cut_to_host = false;
     std::vector<std::string> sent;                    // by the host
-    std::vector<std::string> all(char letter) const;  // those that begin with it
+    std::vector<std::string> all(char letter) const;  // the datagrams that begin with this letter
   };
 
   using Cables = std::vector<Cable>;
@@ -39,21 +39,21 @@ class RobotOnPaths final : private DrivenSession::Handler {
   ~RobotOnPaths();
   static SessionOptions at_will();
 
-  // The transports of all paths come up, and half a second passes.
+  // Brings the transports of all paths up, and lets half a second pass.
   void connect();
   void run(std::uint32_t ms);
-  // The host's computer sleeps: its clock stands still, and datagrams that come meanwhile are lost.
-  // When it wakes, its other clock shows the sleep.
+  // The host's computer sleeps: its clock stands still, and datagrams that arrive meanwhile are
+  // lost. After waking, its boot clock shows the sleep.
   void sleep(std::uint32_t ms);
   // The same for a paused virtual machine: no clock shows the pause.
   void pause(std::uint32_t ms);
-  // Without notice: as a cable that is cut somewhere in a network.
+  // Without notice, like a cable that is cut somewhere in a network.
   void cut(std::size_t path, bool is_cut = true);
   // With notice of the transport.
   void plug(std::size_t path, bool in);
-  // The board restarts, with another clock.
+  // The board restarts, and its clock begins at `t_ms`.
   void reboot(std::size_t board, std::uint32_t t_ms = 50);
-  // Gives a datagram to the host, as if that path had brought it.
+  // Delivers a datagram to the host as if it came over that path.
   void bring(std::size_t path, std::string_view bytes);
   // Waits for the end of a command.
   CommandResult finish(Ticket ticket, std::uint32_t most_ms = 2000);
@@ -64,7 +64,7 @@ class RobotOnPaths final : private DrivenSession::Handler {
   Time now() const { return Time{(now_ms_ - slept_ms_) * 1000}; }
   std::uint32_t board_ms(std::size_t board) const;
   firmware::Application& board(std::size_t index);
-  // How often each number was executed.
+  // How often each packet number was executed.
   const std::map<std::uint32_t, int>& executed(std::size_t board) const;
 
   static constexpr Time timeout = std::chrono::milliseconds{1000};
@@ -73,15 +73,15 @@ class RobotOnPaths final : private DrivenSession::Handler {
 
   std::vector<ReceivedState> states;
   bool keeps_states = true;
-  std::uint32_t oldest_age_ms = 0;  // of the states when they were reported
+  std::uint32_t oldest_age_ms = 0;  // the greatest age of a state when it was reported
   std::int64_t longest_gap_ms = 0;  // between two states
   std::uint64_t told_states = 0;
-  bool went_back = false;  // a state was reported that is older than its predecessor
+  bool went_back = false;  // a state was reported that is older than an earlier reported state
   std::vector<LinkStatus> links;
   std::vector<Nack> nacks;
   std::map<Ticket, CommandResult> results;
   int restarts = 0;
-  int trips = 0;  // a board was safe that had been active
+  int trips = 0;  // how often a board changed from active to safe
 
  private:
   struct Board;

@@ -27,11 +27,11 @@ SessionOptions ScriptedLink::must_arm() {
 
 void ScriptedLink::pass(Time duration) {
   const Time end = now + duration;
-  due_ = session.poll(now);  // the test may have asked for something
+  due_ = session.poll(now);  // the test may have sent a command
   while (due_ <= end) {
     now = std::max(now, due_);
     due_ = session.poll(now);
-    ASSERT_GT(due_, now) << "the session asks for the same moment again";
+    ASSERT_GT(due_, now) << "poll() must return a later time";
   }
   now = end;
 }
@@ -102,7 +102,7 @@ std::string ScriptedLink::asker() const {
 void ScriptedLink::connect() {
   heartbeat();
   pass(std::chrono::milliseconds{10});
-  ASSERT_EQ(count('F'), 1U) << "the session chooses its fields as soon as the link is up";
+  ASSERT_EQ(count('F'), 1U) << "the session must choose its fields when the link comes up";
   executed(last('F').pnum);
   session_pnum = last('H').pnum;
   ASSERT_TRUE(session.in_control(now));
@@ -120,7 +120,7 @@ std::vector<ScriptedLink::Sent> ScriptedLink::all(char letter) const {
 ScriptedLink::Sent ScriptedLink::last(char letter) const {
   const std::vector<Sent> found = all(letter);
   if (found.empty()) {
-    ADD_FAILURE() << "nothing was sent with the letter " << letter;
+    ADD_FAILURE() << "no datagram was sent with the letter " << letter;
     return {};
   }
   return found.back();

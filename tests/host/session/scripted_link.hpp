@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host session in virtual time, opposite a board whose every datagram the test writes.
+// A host session in virtual time with a board whose every datagram the test writes.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 
 namespace r4::test {
 
-// What tests send that need any command.
+// A command for tests that need any command.
 inline const Command turn_motor = Command::osmc(1, Pwm(358), Direction::forward);
 
 class ScriptedLink : private DrivenSession::Handler {
@@ -31,7 +31,7 @@ class ScriptedLink : private DrivenSession::Handler {
 
   explicit ScriptedLink(SessionOptions options = without_questions(),
                         BoardRole role = BoardRole::control);
-  // Options with which the session sends only heartbeats and its choice of fields by itself, and
+  // Options with which the session by itself sends only heartbeats and its choice of fields, and
   // sends commands without being armed.
   static SessionOptions without_questions();
   // The same, but the session must be armed.
@@ -40,7 +40,7 @@ class ScriptedLink : private DrivenSession::Handler {
   DrivenSession session;
   Time now = std::chrono::seconds{5000};
 
-  // What the session has sent and reported, in order.
+  // Everything that the session has sent and reported, in order.
   std::vector<Sent> sent;
   std::map<Ticket, CommandResult> results;
   std::vector<LinkStatus> links;
@@ -52,35 +52,36 @@ class ScriptedLink : private DrivenSession::Handler {
   std::vector<Nack> nacks;
   std::string board_id;
 
-  // True if another host sends from our place, so that the carrier takes only stops.
+  // True if another host sends from the same place, so that the carrier takes only stops.
   bool place_taken = false;
   TransportTrouble frames = TransportTrouble::none;  // the trouble with frames on the bus
 
-  // Time passes; poll() is called exactly when the session asked for it.
+  // Lets time pass. poll() is called exactly when the session asked for it.
   void pass(Time duration);
 
-  // The board speaks. Its clock runs with the host's; its packet numbers count by themselves.
+  // The board sends. Its clock runs with the host's clock; its packet numbers count by themselves.
   void boot_heartbeat();  // H:R4-ROS2;PNum:0;T:0;
   void heartbeat(SafeReason reason = SafeReason::none);
-  void stopped(std::uint32_t stop, int cause = 1);  // SAFE:2 of the E:STOP with that number
-  // "AIN24:24.28;CMD:7;"; the safe reason is a field as any other.
+  void stopped(std::uint32_t stop, int cause = 1);  // SAFE:2 after the E:STOP with this number
+  // Fields such as "AIN24:24.28;CMD:7;". The safe reason is a field like any other.
   void state(std::string_view fields);
   void executed(std::uint32_t pnum);  // a state with SAFE 0 and this CMD
-  // To the host of the session that began with its heartbeat session_pnum, or with 0 to another.
+  // Addressed to the host of the session that began with heartbeat session_pnum; 0: to another
+  // host.
   void nack(std::uint32_t pnum, std::string_view code);
-  std::uint32_t session_pnum = 0;       // connect() begins one
+  std::uint32_t session_pnum = 0;       // set by connect()
   SessionId host_session = no_session;  // of the host's newest datagram; answers name it
-  // The answer to our newest question, or of a board that does not name the question.
+  // The answer to the host's newest question. Older boards do not name the question.
   void identity(std::string_view capabilities = "udp", bool names_question = true);
   void answer(std::uint32_t question, std::string_view capabilities = "udp");
   std::string asker() const;  // "SID:…;"
   void raw(std::string_view bytes);
-  // It restarts, with another clock and new numbers; nothing is sent.
+  // The board restarts, with another clock and new packet numbers; nothing is sent.
   void reboot();
   std::uint32_t board_ms() const { return board_clock(); }
   std::uint32_t board_pnum = 5000;
 
-  // Heartbeat, echo, our F executed: commands go out from now on. Forgets what was sent.
+  // Heartbeat, echo, and a confirmed F: commands can be sent after this. Clears the sent datagrams.
   void connect();
 
   // The host's datagrams with commands of this letter, and the newest of them.
@@ -127,7 +128,7 @@ struct NewSession : testing::Test {
       : link(std::move(options), role) {}
   bool under_way(Ticket ticket) const { return !link.results.contains(ticket); }
   CommandResult result(Ticket ticket) const {
-    EXPECT_FALSE(under_way(ticket)) << "command " << ticket << " has not ended";
+    EXPECT_FALSE(under_way(ticket)) << "command " << ticket << " must have ended";
     return under_way(ticket) ? CommandResult{Outcome::none} : link.results.at(ticket);
   }
   Outcome outcome(Ticket ticket) const { return result(ticket).outcome; }

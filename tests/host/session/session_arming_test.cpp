@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session that must be armed: the commands that it holds back, the causes that disarm it, and
+// A session that must be armed: the commands that it does not send, the causes that disarm it, and
 // arm().
 #include <gtest/gtest.h>
 
@@ -38,8 +38,8 @@ struct SessionArming : ConnectedSession {
     link.sent.clear();
   }
   PostResult post() { return link.session.post(turn_motor, link.now); }
-  // The link is lost, and the board is heard again. Its relay 1 shows whether it brought its
-  // outputs back.
+  // The link is lost, and the board is heard again. Relay 1 shows whether the board has restored
+  // its outputs.
   void outage(bool relay) {
     link.pass(1500ms);
     EXPECT_EQ(post(), PostResult::no_link);
@@ -81,9 +81,9 @@ TEST_F(SessionArming, HoldsBackOutputCommandsOnly) {
 TEST_F(SessionArming, ClosesTheMotorSupplyAndIsArmedOnceTheBoardShowsIt) {
   const Ticket ticket = arm();
   EXPECT_EQ(link.last('R').command, "R:1,On");
-  EXPECT_EQ(link.count('E'), 0U) << "there is nothing to clear";
+  EXPECT_EQ(link.count('E'), 0U) << "no cause has to be cleared";
   EXPECT_EQ(link.results.count(ticket), 0U);
-  EXPECT_EQ(post(), PostResult::not_armed) << "not before the board says so";
+  EXPECT_EQ(post(), PostResult::not_armed) << "the board must confirm relay 1 first";
   execute('R', SafeReason::none, true);
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::none);
@@ -108,10 +108,11 @@ TEST_F(SessionArming, EveryCauseButTheLinkDisarms) {
     link.heartbeat(reason);
     EXPECT_EQ(link.session.disarmed_by(), cause);
     EXPECT_EQ(post(), PostResult::not_armed);
-    // It ends by itself, or by another program's E:CLEAR.
+    // The cause ends by itself, or by another program's E:CLEAR.
     state(SafeReason::none, cmd, false);
-    EXPECT_EQ(post(), PostResult::not_armed) << "and nothing drives off";
-    EXPECT_EQ(link.session.disarmed_by(), cause) << "the first cause is told, not what followed";
+    EXPECT_EQ(post(), PostResult::not_armed) << "no motor may start";
+    EXPECT_EQ(link.session.disarmed_by(), cause)
+        << "the first cause must be reported, not a later one";
   }
 }
 
@@ -123,7 +124,7 @@ TEST_F(SessionArming, StaysArmedOverAnOutageAfterWhichTheBoardBringsItsOutputsBa
 
 TEST_F(SessionArming, AnOutageAfterWhichTheOutputsStayOffDisarms) {
   armed();
-  outage(false);  // recovery=rearm, or another host was there
+  outage(false);  // recovery=rearm, or another host had control
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::link);
   EXPECT_EQ(post(), PostResult::not_armed);
 }
@@ -156,10 +157,10 @@ TEST_F(SessionArming, ClearsAStopAndEachHiddenCauseOnce) {
   const Ticket ticket = arm();
   EXPECT_EQ(link.count('E'), 1U);
   execute('E', SafeReason::fault);
-  EXPECT_EQ(link.count('E'), 2U) << "the stop has hidden a fault";
+  EXPECT_EQ(link.count('E'), 2U) << "the stop had hidden a fault";
   execute('E', SafeReason::watchdog);
   EXPECT_EQ(link.count('E'), 3U);
-  EXPECT_EQ(link.count('R'), 0U) << "not before all is clear";
+  EXPECT_EQ(link.count('R'), 0U) << "all causes must be cleared first";
   execute('E');
   execute('R', SafeReason::none, true);
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
@@ -186,7 +187,7 @@ TEST_F(SessionArming, DoesNotWaitForAnEClearThatWasAskedForAfterIt) {
   const Ticket ticket = link.session.arm(1s, link.now);
   const Ticket clear = link.session.send(Command::clear(), 1s, link.now);
   link.pass(1ms);
-  ASSERT_EQ(link.count('E'), 1U) << "the step of arm()";
+  ASSERT_EQ(link.count('E'), 1U) << "arm() must clear the cause";
   execute('E');
   execute('R', SafeReason::none, true);
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
@@ -224,9 +225,9 @@ TEST_F(SessionArming, AnOvertakenStateIsNoProofOfAnOpenMotorSupply) {
 
 struct EarlierCause : NewSession {
   EarlierCause() : NewSession(ScriptedLink::must_arm()) {}
-  // A program begins, and its board, which obeys it, is safe for that reason.
+  // A program starts. Its board obeys it and is safe for this reason.
   void begin(SafeReason reason) {
-    link.heartbeat();  // held back by the network since before the cause: it proves nothing
+    link.heartbeat();  // delayed by the network since before the cause: it proves nothing
     link.heartbeat(reason);
     link.pass(10ms);
     says(reason);
@@ -286,7 +287,7 @@ TEST_F(EarlierCause, IsWaitedForWhereItIsBeingCleared) {
   link.session.send(Command::clear(), 1s, link.now);
   const Ticket ticket = link.session.arm(1s, link.now);
   link.pass(1ms);
-  EXPECT_EQ(link.results.count(ticket), 0U) << "it has not failed";
+  EXPECT_EQ(link.results.count(ticket), 0U) << "the command must not have failed";
   cmd = link.last('E').pnum;
   says(SafeReason::none);
   EXPECT_EQ(link.count('R'), 1U);
@@ -304,7 +305,7 @@ TEST_F(EarlierCause, MayBeHiddenByALaterStop) {
   says(SafeReason::stop);  // pressed meanwhile
   const Ticket ticket = link.session.arm(1s, link.now);
   link.pass(1ms);
-  ASSERT_EQ(link.count('E'), 1U) << "that stop came while the program was there";
+  ASSERT_EQ(link.count('E'), 1U) << "the stop came while the program was running";
   cmd = link.last('E').pnum;
   says(SafeReason::fault);
   EXPECT_EQ(link.results[ticket].disarmed, DisarmCause::earlier_fault);
@@ -322,7 +323,7 @@ TEST_F(EarlierCause, IsAnyOneAfterASleep) {
   begin(SafeReason::none);
   link.session.on_sleep(link.now);
   link.heartbeat(SafeReason::stop);
-  link.pass(300ms);  // until it asks for its fields again
+  link.pass(300ms);  // until the session selects its fields again
   says(SafeReason::stop);
   EXPECT_EQ(arm().disarmed, DisarmCause::earlier_stop);
 }
@@ -359,7 +360,7 @@ TEST_F(SessionArming, SendsNothingAfterItsDeadlineItsCancellationOrAStop) {
     link.heartbeat();
     link.pass(500ms);
     link.heartbeat();
-    EXPECT_EQ(link.count('R'), 0U) << "an abandoned call is not repeated";
+    EXPECT_EQ(link.count('R'), 0U) << "an abandoned call must not be repeated";
   };
   const Ticket late = arm();
   link.pass(500ms);
@@ -448,11 +449,12 @@ TEST_F(SessionArming, CanBeTurnedOff) {
   free.heartbeat(SafeReason::stop);
   free.heartbeat();
   EXPECT_EQ(free.session.post(turn_motor, free.now), PostResult::sent)
-      << "the way of the paper's clients";
+      << "the paper's clients command without arming";
   const Ticket ticket = free.session.arm(1s, free.now);
   free.pass(1ms);
   free.executed(free.last('R').pnum);
-  EXPECT_EQ(free.results[ticket].outcome, Outcome::confirmed) << "arm() does what it does";
+  EXPECT_EQ(free.results[ticket].outcome, Outcome::confirmed)
+      << "arm() works without a duty to arm";
 }
 
 // --- posts that the board refuses
@@ -483,7 +485,7 @@ TEST_F(SessionArming, ARefusalOverAnOutageProvesNothingOfAPost) {
   post();
   const std::uint32_t pnum = link.last('O').pnum;
   outage(true);
-  link.session_pnum = link.last('H').pnum;  // the board has begun another
+  link.session_pnum = link.last('H').pnum;  // the board has begun another session
   link.nack(pnum, "STALE");
   EXPECT_TRUE(link.refused.empty());
 }

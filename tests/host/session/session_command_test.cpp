@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How commands end: confirmed by the board's own state, refused, timed out, cancelled.
+// How commands end: confirmed by the board's state, refused, timed out, cancelled.
 #include <gtest/gtest.h>
 
 #include "host/session/session.hpp"
@@ -29,7 +29,7 @@ TEST_F(SessionCommand, GoesOutAtOnceAndIsConfirmedByItsNumberInTheState) {
   link.pass(7ms);
   link.executed(sent.pnum - 1);
   link.state("OSMC1:358,1;SAFE:0;CMD:1;");
-  EXPECT_TRUE(under_way(ticket)) << "its value alone is no proof";
+  EXPECT_TRUE(under_way(ticket)) << "the value alone does not prove it";
   link.executed(sent.pnum);
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
   EXPECT_EQ(result(ticket).elapsed, 7ms);
@@ -40,12 +40,12 @@ TEST_F(SessionCommand, GoesOutAtOnceAndIsConfirmedByItsNumberInTheState) {
 TEST_F(NewSession, HoldsCommandsUntilTheLinkIsUpAndKeepsTheirOrder) {
   const Ticket first = link.session.send(turn_motor, 5s, link.now);
   const Ticket second = link.session.send(Command::servo(2, Microseconds(1500)), 5s, link.now);
-  EXPECT_FALSE(link.session.post(turn_motor, link.now)) << "what is sent once does not wait";
+  EXPECT_FALSE(link.session.post(turn_motor, link.now)) << "a post must not wait";
   link.pass(200ms);
   EXPECT_EQ(link.count('O') + link.count('S'), 0U);
   link.heartbeat();
   link.pass(10ms);
-  EXPECT_EQ(link.count('O'), 0U) << "not before the board has obeyed once";
+  EXPECT_EQ(link.count('O'), 0U) << "the board must obey once first";
   link.executed(link.last('F').pnum);
   ASSERT_EQ(link.count('O'), 1U);
   ASSERT_EQ(link.count('S'), 1U);
@@ -78,12 +78,13 @@ TEST_F(SessionCommand, EndsAtItsDeadline) {
   EXPECT_EQ(outcome(ticket), Outcome::timed_out);
   EXPECT_EQ(result(ticket).elapsed, 120ms);
   link.pass(1s);
-  EXPECT_EQ(link.count('O'), 3U) << "and is not sent again";
+  EXPECT_EQ(link.count('O'), 3U) << "the command must not be sent again";
 
   ScriptedLink silent;
   const Ticket waiting = silent.session.send(turn_motor, 120ms, silent.now);
   silent.pass(120ms);
-  EXPECT_EQ(silent.results.at(waiting).outcome, Outcome::timed_out) << "also without a link";
+  EXPECT_EQ(silent.results.at(waiting).outcome, Outcome::timed_out)
+      << "a command must time out without a link, too";
 }
 
 TEST_F(SessionCommand, IsRefusedWithTheBoardsCode) {
@@ -105,8 +106,8 @@ TEST_F(SessionCommand, AsksAtOnceIfItWasOvertakenAndEndsByTheAnswer) {
     link.session.send(Command::servo(2, Microseconds(1500)), 1s, link.now);
     link.pass(10ms);
     link.executed(link.last('S').pnum);  // the state between them was lost
-    EXPECT_TRUE(under_way(first)) << "CMD past it proves nothing";
-    EXPECT_EQ(link.count('O'), 2U) << "it asks without waiting for the 50 ms";
+    EXPECT_TRUE(under_way(first)) << "a CMD with a later number proves nothing";
+    EXPECT_EQ(link.count('O'), 2U) << "the command must be repeated at once, not after 50 ms";
     link.nack(link.last('O').pnum, answer);
     const bool stale = *answer == 'S';
     EXPECT_EQ(outcome(first), stale ? Outcome::refused : Outcome::confirmed);
@@ -118,7 +119,7 @@ TEST_F(SessionCommand, IsNotConfirmedByDuplicateBeforeTheState) {
   const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   link.pass(60ms);
   link.nack(link.last('O').pnum, "DUPLICATE");
-  EXPECT_TRUE(under_way(ticket)) << "confirmed only when the board's state says so";
+  EXPECT_TRUE(under_way(ticket)) << "only the board's state confirms";
   link.executed(link.last('O').pnum);
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
 }
@@ -130,10 +131,10 @@ TEST_F(NewSession, ConfirmsACommandByItsValueIfTheBoardHasNoCmd) {
     link.pass(10ms);
     link.state("AIN24:24.28;OSMC1:0,0;");
   }
-  ASSERT_GE(link.count('O'), 1U) << "at the end it believes in the paper's board";
+  ASSERT_GE(link.count('O'), 1U) << "after a while the session must treat it as the paper's board";
   EXPECT_TRUE(under_way(ticket));
   link.state("AIN24:24.28;OSMC1:358,0;");
-  EXPECT_TRUE(under_way(ticket)) << "the other direction";
+  EXPECT_TRUE(under_way(ticket)) << "the direction differs";
   link.state("AIN24:24.28;OSMC1:358,1;");
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
 }
@@ -152,7 +153,7 @@ TEST_F(NewSession, AsksForFieldsUntilTheBoardKnowsHoweverManyAreLost) {
   link.executed(link.last('F').pnum);
   const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   link.state("AIN24:24.28;CMD:7;OSMC1:358,1;");
-  EXPECT_TRUE(under_way(ticket)) << "its value is no proof where there is CMD";
+  EXPECT_TRUE(under_way(ticket)) << "the value does not prove it if the board sends CMD";
   link.executed(link.last('O').pnum);
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
 }
@@ -166,7 +167,7 @@ TEST_F(SessionCommand, IsRefusedOutsideItsRanges) {
         Command::fields("A;B"), Command::setting("rate", "1^2")}) {
     try {
       link.session.send(wrong, 1s, link.now);
-      ADD_FAILURE() << to_text(wrong) << " was taken";
+      ADD_FAILURE() << to_text(wrong) << " must be refused";
     } catch (const Error& error) {
       EXPECT_EQ(error.kind(), ErrorKind::usage);
       EXPECT_FALSE(error.problem().fix.empty()) << error.what();
@@ -184,7 +185,7 @@ TEST_F(NewSession, TakesAtMostSixtyFourCommands) {
   }
   EXPECT_EQ(link.session.send(turn_motor, 1s, link.now), 0U);
   EXPECT_EQ(link.session.send(Command::identify(), 1s, link.now), 0U);
-  EXPECT_NE(link.session.send(Command::stop(), 1s, link.now), 0U) << "a stop always is";
+  EXPECT_NE(link.session.send(Command::stop(), 1s, link.now), 0U) << "a stop must always be taken";
   EXPECT_EQ(link.results.size(), Session::max_pending);
 }
 
@@ -195,7 +196,7 @@ TEST_F(SessionCommand, SentOnceIsNotRepeatedAndDoesNotOvertakeEarlierCommands) {
   EXPECT_LT(link.last('O').pnum, link.last('S').pnum);
   link.pass(1s);
   EXPECT_EQ(link.count('S'), 1U);
-  EXPECT_EQ(link.results.size(), 1U) << "only the sent command has an end";
+  EXPECT_EQ(link.results.size(), 1U) << "only the command that was sent has a result";
 }
 
 TEST_F(NewSession, ConfirmsIdentifyByTheAnswerInAnyState) {
@@ -233,14 +234,14 @@ TEST_F(SessionStop, CannotBeCancelled) {
   link.session.cancel(stop, link.now);
   EXPECT_TRUE(link.results.empty());
   link.pass(100ms);
-  EXPECT_GT(link.count('E'), 3U) << "repeated";
+  EXPECT_GT(link.count('E'), 3U) << "the stop must be repeated";
 }
 
 TEST_F(SessionCommand, EndsWithTheSession) {
   const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   const Ticket stop = link.session.send(Command::stop(), 1s, link.now);
   link.session.end_all(link.now);
-  EXPECT_EQ(outcome(ticket), Outcome::cancelled) << "by the stop";
+  EXPECT_EQ(outcome(ticket), Outcome::cancelled) << "the stop must cancel it";
   EXPECT_EQ(outcome(stop), Outcome::closed);
 }
 
@@ -265,7 +266,7 @@ TEST_F(SessionStop, IsRepeatedEveryTwentyMillisecondsUntilTheBoardReportsIt) {
     EXPECT_EQ(sent[i].bytes, sent[0].bytes);
   }
   link.heartbeat(SafeReason::stop);
-  EXPECT_TRUE(under_way(ticket)) << "of whose stop that speaks is not known";
+  EXPECT_TRUE(under_way(ticket)) << "the heartbeat does not name the stop";
   link.stopped(sent[0].pnum);
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
 }
@@ -276,7 +277,7 @@ TEST_F(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
   link.pass(1s);
   EXPECT_EQ(link.count('E'), 10U) << "every 20 ms for 200 ms";
   EXPECT_EQ(link.session.statistics(link.now).confirmed, 1U);
-  EXPECT_EQ(link.session.statistics(link.now).timed_out, 0U) << "it ends only once";
+  EXPECT_EQ(link.session.statistics(link.now).timed_out, 0U) << "a command must end only once";
   EXPECT_EQ(link.last('E').bytes, link.all('E').front().bytes);
 
   link.executed(link.last('E').pnum);  // in control again after a second of silence
@@ -292,7 +293,7 @@ TEST_F(SessionStop, IsRepeatedForAWhileAfterItsConfirmation) {
     ASSERT_EQ(link.last('E').command.substr(0, 7), "E:CLEAR");
     const std::size_t stops = link.count('E');
     link.pass(40ms);
-    EXPECT_EQ(link.count('E'), stops) << "not past an E:CLEAR of its own";
+    EXPECT_EQ(link.count('E'), stops) << "a stop must not be repeated after the host's own E:CLEAR";
     link.executed(link.last('E').pnum);
   }
 }
@@ -302,10 +303,10 @@ TEST_F(SessionStop, IsNotConfirmedByTheReportOfAnotherStop) {
   const std::uint32_t number = link.last('E').pnum;
   link.stopped(number);
   EXPECT_EQ(outcome(first), Outcome::confirmed);
-  link.heartbeat();  // another program has cleared it
+  link.heartbeat();  // another program has cleared the stop
 
   const Ticket ticket = link.session.send(Command::stop(), 1s, link.now);
-  link.stopped(number);  // a late copy, of a board that drives
+  link.stopped(number);  // a late duplicate from an active board
   link.heartbeat(SafeReason::stop);
   link.state("SAFE:2;");
   link.nack(1, "STALE");
@@ -345,7 +346,7 @@ TEST_F(SessionClear, IsGivenUpWhenTheBoardReportsANewerCause) {
   EXPECT_EQ(outcome(sent), Outcome::cancelled);
   const std::size_t clears = link.count('E');
   link.pass(500ms);
-  EXPECT_EQ(link.count('E'), clears) << "it is not repeated";
+  EXPECT_EQ(link.count('E'), clears) << "the E:CLEAR must not be repeated";
 }
 
 TEST_F(NewSession, DoesNotSendAWaitingClearPastANewerCause) {
@@ -372,13 +373,13 @@ TEST_F(SessionRefusal, ProvesNothingOfASessionThatBeganAfterTheCommand) {
   const Ticket ticket = link.session.send(turn_motor, 5s, link.now);
   const std::uint32_t pnum = link.last('O').pnum;
   link.pass(100ms);
-  link.session_pnum = 0;  // the board takes us for a stranger: our address has changed
+  link.session_pnum = 0;  // the board takes the host for a stranger: its address has changed
   link.nack(pnum, "SAFE");
   EXPECT_TRUE(under_way(ticket));
-  link.session_pnum = pnum + 1;  // a heartbeat of ours that came after an outage
+  link.session_pnum = pnum + 1;  // the host's first heartbeat after an outage
   link.nack(pnum, "STALE");
   EXPECT_TRUE(under_way(ticket));
-  link.session_pnum = 99;  // not ours
+  link.session_pnum = 99;  // the number of another session
   link.nack(pnum, "STALE");
   EXPECT_TRUE(under_way(ticket));
   link.session_pnum = 100;
@@ -439,7 +440,7 @@ TEST_F(NewSession, HoldsCommandsUntilTheOtherHostHasLeft) {
   }
   EXPECT_EQ(link.count('O'), 0U);
   link.pass(301ms);
-  EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy)) << "the board refuses no more";
+  EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy)) << "the board has stopped refusing";
   link.heartbeat();
   link.pass(10ms);
   link.executed(link.last('F').pnum);
@@ -458,7 +459,8 @@ TEST_F(SessionBusy, ARefusalAfterAnOutageProvesNothingUnlessTheSessionIsTheSame)
   link.session_pnum = link.last('H').pnum;
   link.nack(pnum, "STALE");
   EXPECT_TRUE(under_way(ticket)) << "the board may have executed it before the outage";
-  link.session_pnum = before;  // the line was cut towards us only: the board remembers
+  // only the direction to the host was cut: the board remembers the session
+  link.session_pnum = before;
   link.nack(pnum, "STALE");
   EXPECT_EQ(outcome(ticket), Outcome::refused);
 }

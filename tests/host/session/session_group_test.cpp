@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Groups of commands: one datagram if the board executes groups, otherwise one after the other.
+// Groups of commands: one datagram if the board executes groups, otherwise one command after the
+// other.
 #include <gtest/gtest.h>
 
 #include "r4link/commands/command_text.hpp"
@@ -29,7 +30,7 @@ struct SessionGroup : NewSession {
   static std::string fields(const ScriptedLink::Sent& sent) {
     return sent.bytes.substr(0, sent.bytes.find("SID:"));
   }
-  // The board answers with the command of a group that it refuses.
+  // The board refuses one command of a group and names it.
   void nack_at(std::uint32_t pnum, const std::string& code, int at) {
     link.raw(with_crc("N:" + std::to_string(pnum) + "," + code + ";AT:" + std::to_string(at) +
                       ";SESSION:" + std::to_string(link.session_pnum) + ";" + link.asker() +
@@ -45,7 +46,7 @@ TEST_F(SessionGroup, IsOneDatagramAndOneCommand) {
   EXPECT_EQ(fields(link.sent[0]), "O:358,1,1;O:359,1,2;S:1500,3;");
   link.pass(60ms);
   ASSERT_EQ(link.all('O').size(), 2U);
-  EXPECT_EQ(link.all('O')[1].bytes, link.sent[0].bytes) << "repeated with the same bytes";
+  EXPECT_EQ(link.all('O')[1].bytes, link.sent[0].bytes) << "a repetition must have the same bytes";
   link.executed(link.last('O').pnum);
   EXPECT_EQ(result(ticket).outcome, Outcome::confirmed);
   EXPECT_EQ(result(ticket).at, 0);
@@ -74,7 +75,7 @@ TEST_F(SessionGroup, ARefusalNamesTheCommandAndThatNoneWasExecuted) {
 
   const Ticket wrong = send();
   nack_at(link.last('O').pnum, "RANGE", 4);
-  EXPECT_EQ(result(wrong).at, 0) << "it has no fourth command";
+  EXPECT_EQ(result(wrong).at, 0) << "the group has no fourth command";
 }
 
 TEST_F(SessionGroup, AsksFirstWhetherTheBoardExecutesGroups) {
@@ -84,11 +85,11 @@ TEST_F(SessionGroup, AsksFirstWhetherTheBoardExecutesGroups) {
   EXPECT_EQ(link.count('Q'), 1U);
   const Ticket behind = link.session.send(Command::servo(1, Microseconds(1)), 1s, link.now);
   EXPECT_EQ(link.session.post(Command::servo(1, Microseconds(0)), link.now), PostResult::queue_full)
-      << "it would overtake them";
+      << "the post would overtake the waiting commands";
   EXPECT_EQ(post(), PostResult::queue_full);
   link.pass(250ms);
   EXPECT_EQ(link.count('Q'), 3U) << "the first questions may have been lost";
-  EXPECT_EQ(link.count('S'), 0U) << "the order is kept";
+  EXPECT_EQ(link.count('S'), 0U) << "the order of commands must be kept";
   link.identity("group");
   ASSERT_EQ(link.count('O'), 1U);
   ASSERT_EQ(link.count('S'), 1U);
@@ -107,15 +108,15 @@ TEST_F(SessionGroup, OfABoardWithoutGroupsGoesOneAfterTheOther) {
   EXPECT_EQ(fields(link.sent.back()), "O:358,1,1;");
   const Ticket behind = link.session.send(Command::servo(7, Microseconds(7)), 1s, link.now);
   link.pass(60ms);
-  EXPECT_EQ(link.sent.size(), 2U) << "the first, twice";
+  EXPECT_EQ(link.sent.size(), 2U) << "the first command was sent twice";
   link.executed(link.last('O').pnum);
   EXPECT_EQ(fields(link.sent.back()), "O:359,1,2;");
   EXPECT_TRUE(under_way(ticket));
   EXPECT_EQ(link.session.post(Command::osmc(1, Pwm(0), Direction::forward), link.now),
             PostResult::queue_full)
-      << "the commands that are left would come after it";
+      << "the remaining commands would come after the post";
   link.executed(link.last('O').pnum);
-  EXPECT_EQ(link.count('S'), 2U) << "behind the last nothing need wait";
+  EXPECT_EQ(link.count('S'), 2U) << "later commands need not wait after the last command was sent";
   link.executed(link.all('S')[0].pnum);
   link.executed(link.all('S')[1].pnum);
   EXPECT_EQ(result(ticket).outcome, Outcome::confirmed);
@@ -164,7 +165,8 @@ TEST_F(SessionGroup, OfABoardThatAnswersNothingGoesOneAfterTheOther) {
   EXPECT_EQ(fields(link.last('O')), "O:358,1,1;");
   EXPECT_EQ(link.count('Q'), 5U);
   link.state("AIN24:24.28;OSMC1:358,1;");
-  EXPECT_EQ(fields(link.last('O')), "O:359,1,2;") << "confirmed by its value";
+  EXPECT_EQ(fields(link.last('O')), "O:359,1,2;")
+      << "the command before it was confirmed by its value";
 }
 
 TEST_F(SessionGroup, WaitsForAnotherAnswerAfterARestartOfTheBoard) {
@@ -210,7 +212,7 @@ TEST_F(SessionGroup, IsPostedOnceAndItsRefusalIsReported) {
 
 TEST_F(SessionGroup, IsPostedOneByOneToABoardWithoutGroups) {
   link.connect();
-  EXPECT_EQ(post(), PostResult::no_link) << "not known yet";
+  EXPECT_EQ(post(), PostResult::no_link) << "it is not known yet whether the board executes groups";
   EXPECT_EQ(link.count('Q'), 1U);
   link.identity("udp");
   EXPECT_TRUE(post());
@@ -222,7 +224,8 @@ TEST_F(SessionGroup, IsPostedOneByOneToABoardWithoutGroups) {
 TEST_F(SessionGroup, OfOneCommandIsThatCommandAndOfNoneIsThrownBack) {
   link.connect();
   link.session.send(Setpoints{Command::osmc(1, Pwm(358), Direction::forward)}, 1s, link.now);
-  EXPECT_EQ(fields(link.sent.back()), "O:358,1,1;") << "whatever the board knows";
+  EXPECT_EQ(fields(link.sent.back()), "O:358,1,1;")
+      << "a group of one command must be sent as a command";
   EXPECT_TRUE(link.session.post(Setpoints{Command::servo(1, Microseconds(5))}, link.now));
   EXPECT_THROW(link.session.send(Setpoints{}, 1s, link.now), Error);
   EXPECT_THROW(link.session.post(Setpoints{}, link.now), Error);
@@ -240,7 +243,7 @@ TEST(SessionGroupArming, IsHeldBackUntilTheProgramIsArmed) {
 }
 
 TEST_F(SessionGroup, IsNotPostedAsOneDatagramWhenTheBoardIsFoundToKnowNoGroups) {
-  link.heartbeat();  // of a board that answers nothing
+  link.heartbeat();  // from a board that answers no question
   PostResult last = PostResult::no_link;
   for (int i = 0; i < 100; ++i) {
     link.pass(100ms);
@@ -250,7 +253,7 @@ TEST_F(SessionGroup, IsNotPostedAsOneDatagramWhenTheBoardIsFoundToKnowNoGroups) 
     EXPECT_EQ(link.count('O'), 0U);
   }
   EXPECT_EQ(last, PostResult::sent);
-  ASSERT_EQ(link.count('O'), 2U) << "one after the other";
+  ASSERT_EQ(link.count('O'), 2U) << "the commands must be sent one after the other";
   EXPECT_EQ(fields(link.all('O')[0]), "O:358,1,1;");
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session with a key, and a session without a key whose board asks for one.
+// A session with a key, and a session without a key whose board requires a key.
 #include <gtest/gtest.h>
 
 #include "host/session/session.hpp"
@@ -25,7 +25,7 @@ SessionOptions keyed() {
   return options;
 }
 
-// A board's heartbeat with a nonce.
+// A heartbeat of the board with a nonce.
 void keyed_heartbeat(ScriptedLink& link, const std::string& its_nonce = nonce,
                      const std::string& reason = "") {
   link.raw(with_crc("H:R4-ROS2;PNum:" + std::to_string(link.board_pnum++) +
@@ -42,7 +42,7 @@ void connect_keyed(ScriptedLink& link) {
   link.sent.clear();
 }
 
-// The board reports for two seconds that it is booting, with its nonce.
+// The board reports with its nonce for two seconds that it is booting.
 void boot_with_a_key(ScriptedLink& link) {
   for (int i = 0; i < 4; ++i) {
     link.raw(
@@ -59,14 +59,14 @@ struct SessionWithKey : SessionKey {
   SessionWithKey() { connect_keyed(link); }
 };
 
-// The field A of a datagram; empty if it has none.
+// The field A of a datagram; empty if there is none.
 std::string signature_of(const ScriptedLink::Sent& sent) {
   Datagram datagram;
   EXPECT_TRUE(read_datagram(sent.bytes, datagram));
   return str(datagram.find("A").values());
 }
 
-// As the board finds it.
+// The verdict of the board on this datagram.
 Verdict verdict(const ScriptedLink& link, const ScriptedLink::Sent& sent,
                 const std::string& its_nonce = nonce) {
   Datagram datagram;
@@ -97,7 +97,7 @@ TEST_F(SessionKey, SignsTheAnswerToAConnectingBoard) {
       with_crc("H:R4-ROS2;PNum:0;T:" + std::to_string(link.board_ms()) + ";AN:" + nonce + ";"));
   EXPECT_EQ(link.session.link().state, HostLinkState::connecting);
   const auto heartbeat = link.last('H');
-  EXPECT_EQ(heartbeat.t, 0U) << "it echoes nothing yet";
+  EXPECT_EQ(heartbeat.t, 0U) << "no heartbeat was heard to echo";
   EXPECT_EQ(verdict(link, heartbeat), Verdict::authentic);
 }
 
@@ -178,7 +178,7 @@ TEST_F(SessionKey, TakesTheBoardAsSoonAsItHasAKey) {
   EXPECT_EQ(verdict(link, link.last('H')), Verdict::authentic);
 }
 
-// The board may have executed the first of two signed copies, and refused the second.
+// The board may have executed the first of two signed duplicates, and refused the second.
 TEST_F(SessionWithKey, AnAuthDoesNotProveThatTheCommandWasNotExecuted) {
   const Ticket ticket = link.session.send(turn_motor, 500ms, link.now);
   const std::uint32_t pnum = link.last('O').pnum;
@@ -204,7 +204,7 @@ TEST_F(SessionKey, FindsOutThatTheBoardTakesNoneOfItsHeartbeats) {
   EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
 }
 
-// The earlier host ended with a stop: the board's reason hides whether it has a host.
+// The earlier host ended with a stop, so the board's cause hides whether it has a host.
 TEST_F(SessionKey, FindsOutThatAStoppedBoardTakesNoneOfItsHeartbeatsWhileItIsHeard) {
   for (int i = 0; i < 12; ++i) {
     keyed_heartbeat(link, nonce, ";SAFE:2");
@@ -216,7 +216,8 @@ TEST_F(SessionKey, FindsOutThatAStoppedBoardTakesNoneOfItsHeartbeatsWhileItIsHea
   EXPECT_FALSE(link.session.in_control(link.now));
   link.pass(1100ms);
   EXPECT_EQ(link.session.link().state, HostLinkState::lost);
-  EXPECT_TRUE(link.session.link().causes.empty()) << "its silence is no sign of a wrong key";
+  EXPECT_TRUE(link.session.link().causes.empty())
+      << "the board's silence is not a sign of a wrong key";
 }
 
 TEST_F(SessionKey, TakesAStoppedBoardThatAnswersBusyForOneWithAnotherHost) {
@@ -229,7 +230,8 @@ TEST_F(SessionKey, TakesAStoppedBoardThatAnswersBusyForOneWithAnotherHost) {
   EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
 }
 
-// At the lowest rate heartbeats are sent between two states, and none of them is in vain.
+// At the lowest rate the host sends several heartbeats between two states. None of them may be in
+// vain.
 TEST_F(SessionWithKey, IsTakenByAStoppedBoardThatSendsAStateASecond) {
   for (int i = 0; i < 10; ++i) {
     link.state("SAFE:2;CMD:0;");
@@ -239,14 +241,14 @@ TEST_F(SessionWithKey, IsTakenByAStoppedBoardThatSendsAStateASecond) {
       EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
     }
   }
-  for (int j = 0; j < 20; ++j) {  // and then it sends none any more
+  for (int j = 0; j < 20; ++j) {  // the board sends no state after this
     keyed_heartbeat(link, nonce, ";SAFE:2");
     link.pass(100ms);
   }
   EXPECT_EQ(link.session.link().cause(), LinkCause::key_not_taken);
 }
 
-// The paper's release answers nothing, and is commanded all the same. It has no keys.
+// The paper's release answers no question, but it obeys commands. It has no keys.
 TEST_F(SessionKey, DoesNotTakeABoardWithAKeyForThePapersRelease) {
   for (int i = 0; i < 30; ++i) {
     keyed_heartbeat(link);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One session over several paths to a board that restarts, or seems to (docs/how-to/redundancy.md).
+// One session over several paths to a board that restarts or seems to restart
+// (docs/how-to/redundancy.md).
 #include <gtest/gtest.h>
 
 #include "robot_on_paths.hpp"
@@ -92,7 +93,7 @@ TEST_F(TwoPaths, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
   robot.bring(0, with_crc("H:R4-ROS2;PNum:0;T:0;"));
   robot.run(110);
   EXPECT_EQ(robot.cables[0].all('Q').size(), robot.cables[1].all('Q').size() + 1)
-      << "that path is asked besides";
+      << "the session must ask on that path, too";
   EXPECT_EQ(robot.restarts, 0);
   robot.reboot(0);
   robot.run(1500);
@@ -100,7 +101,8 @@ TEST_F(TwoPaths, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
-// No answer shows another clock: there is none, or the board restarted with nearly the same clock.
+// No answer shows another clock: there is no answer, or the board restarted with nearly the same
+// clock.
 TEST(SessionPaths, BeginAnewIfTheBoardOnlySaysThatItBoots) {
   for (const bool answers : {false, true}) {
     RobotOnPaths robot(Cables{{1}, {1}});

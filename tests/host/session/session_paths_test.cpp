@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One session over several paths, opposite the real board (docs/how-to/redundancy.md).
+// One session over several paths, with the real board (docs/how-to/redundancy.md).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -78,7 +78,7 @@ TEST(SessionPaths, LetNoLaggingPathReplaceANewerState) {
   EXPECT_NEAR(static_cast<double>(robot.told_states), 200, 2);
   EXPECT_LE(robot.oldest_age_ms, 3U);
   EXPECT_EQ(robot.restarts, 0);
-  robot.cut(0);  // the slow one goes on by itself
+  robot.cut(0);  // only the slow path is left
   robot.run(3000);
   EXPECT_EQ(robot.trips, 0);
   EXPECT_FALSE(robot.went_back);
@@ -86,7 +86,7 @@ TEST(SessionPaths, LetNoLaggingPathReplaceANewerState) {
   EXPECT_TRUE(executed_once(robot));
 }
 
-// The bar of the plan: one of two cut under full load, 1000 times.
+// One of two paths is cut under full load, 1000 times.
 TEST(SessionPaths, MissNothingWhileOnePathIsCutAThousandTimes) {
   RobotOnPaths robot(Cables{{1}, {2}});
   robot.connect();
@@ -110,7 +110,7 @@ TEST(SessionPaths, MissNothingWhileOnePathIsCutAThousandTimes) {
   EXPECT_EQ(unconfirmed, 0);
   EXPECT_TRUE(executed_once(robot));
   EXPECT_EQ(robot.trips, 0);
-  EXPECT_LE(robot.longest_gap_ms, 20) << "two periods";
+  EXPECT_LE(robot.longest_gap_ms, 20) << "at most two state periods";
   EXPECT_LE(robot.oldest_age_ms, 20U);
   EXPECT_FALSE(robot.went_back);
   EXPECT_EQ(robot.session->statistics(robot.now()).timed_out, 0U);
@@ -170,17 +170,19 @@ TEST_F(TwoPaths, ConfirmACommandThatOneCarriesAndAnotherAnswers) {
 TEST_F(TwoPaths, ReportARefusalOnce) {
   robot.nacks.clear();
   robot.drive(1);
-  EXPECT_TRUE(robot.nacks.empty()) << "that a copy was executed before is nothing to tell";
+  EXPECT_TRUE(robot.nacks.empty()) << "the answer to a duplicate must not be reported";
   const Ticket ticket =
       robot.session->send(Command::setting("timeout", "100"), RobotOnPaths::timeout, robot.now());
-  const CommandResult result = robot.finish(ticket);  // not above the heartbeat interval
+  // out of range: the timeout must exceed the heartbeat interval
+  const CommandResult result = robot.finish(ticket);
   EXPECT_EQ(result.outcome, Outcome::refused);
   EXPECT_EQ(result.code, Refusal::range);
   robot.run(50);
   EXPECT_EQ(robot.nacks.size(), 1U);
 }
 
-// AUTH refuses one copy of a command. While another path speaks, its copy may be executed.
+// AUTH refuses one duplicate of a command. While another path is heard, the duplicate there may be
+// executed.
 TEST_F(TwoPaths, EndACommandByAuthOnlyWhenNoOtherPathSpeaks) {
   for (const std::size_t path : {0U, 1U}) robot.cut(path);
   const Ticket ticket =
@@ -215,7 +217,7 @@ TEST_F(TwoPaths, AreRefusedWhenAllOfThemAreUntilAStateShowsControl) {
 
 TEST_F(TwoPaths, AreNotRefusedByABusyThatIsOlderThanTheProofOfControl) {
   const std::string busy = busy_for(robot);
-  robot.run(50);  // states with CMD
+  robot.run(50);  // the board's states have CMD
   robot.bring(0, busy);
   robot.bring(1, busy);
   EXPECT_FALSE(robot.session->link().causes.has(LinkCause::busy));
@@ -234,10 +236,11 @@ TEST(SessionPaths, AreRefusedIfTheyLeadToTwoBoards) {
   robot.run(1000);
   for (const Cable& cable : robot.cables) {
     ASSERT_FALSE(cable.sent.empty());
-    EXPECT_EQ(cable.all('Q').size(), cable.sent.size()) << "nothing but questions";
+    EXPECT_EQ(cable.all('Q').size(), cable.sent.size())
+        << "only questions may be sent to another board";
   }
   robot.plug(1, false);
-  robot.cables[1].board = 0;  // the right one after all
+  robot.cables[1].board = 0;  // plugged into the right board
   robot.run(500);
   EXPECT_TRUE(robot.session->link().causes.empty());
   EXPECT_TRUE(robot.session->in_control(robot.now()));
@@ -248,7 +251,7 @@ TEST(SessionPaths, TakeTheBoardToWhichAllOfThemLeadWhicheverAnsweredFirst) {
   robot.connect();
   ASSERT_EQ(robot.session->path(1, robot.now()).state, PathState::other_board);
   robot.plug(0, false);
-  robot.cables[0].board = 1;  // that was the wrong one
+  robot.cables[0].board = 1;  // plugged into the wrong board
   robot.plug(0, true);
   robot.run(1000);
   EXPECT_TRUE(robot.session->link().causes.empty());
@@ -290,7 +293,7 @@ TEST_F(TwoPaths, TakeAStateInPartsFromWhicheverBringsThem) {
   robot.bring(1, with_crc("AIN24:1.00;SAFE:0;PNum:70001;T:" + t + ";"));
   robot.bring(1, with_crc("AIN12:2.00;SAFE:0;PNum:70002;T:" + t + ";"));
   robot.bring(0, with_crc("AIN12:2.00;SAFE:0;PNum:90002;T:" + t + ";"));
-  ASSERT_EQ(robot.states.size(), 2U) << "each part once";
+  ASSERT_EQ(robot.states.size(), 2U) << "each part must be reported once";
   EXPECT_EQ(robot.states[1].raw.analog_cv[static_cast<int>(StateField::ain12)], 200);
   EXPECT_EQ(robot.states[1].raw.analog_cv[static_cast<int>(StateField::ain24)], 100);
 }
@@ -329,7 +332,8 @@ TEST(SessionPaths, AllCarryAStopEvenToAnUnknownBoard) {
   robot.plug(1, true);
   const Ticket early = robot.session->send(Command::stop(), RobotOnPaths::timeout, robot.now());
   for (const std::size_t path : {0U, 1U}) {
-    EXPECT_EQ(robot.cables[path].all('E').size(), 1U) << "also before its board is known";
+    EXPECT_EQ(robot.cables[path].all('E').size(), 1U)
+        << "a stop goes to every path, even before its board is known";
   }
   EXPECT_EQ(robot.finish(early).outcome, Outcome::confirmed);
   robot.run(1000);
@@ -356,7 +360,7 @@ TEST_F(TwoPaths, AreNotLeftByAHeartbeatFromBeforeTheFarewell) {
   const auto safe = [](std::uint32_t t_ms) {
     return with_crc("H:R4-ROS2;PNum:9;T:" + std::to_string(t_ms) + ";SAFE:1;");
   };
-  robot.bring(0, safe(newest_ms));  // of the millisecond of a state: which was first?
+  robot.bring(0, safe(newest_ms));  // of the millisecond of a state: the order is not known
   EXPECT_EQ(robot.results.count(ticket), 0U);
   robot.bring(0, safe(robot.board_ms(0) + 2));
   ASSERT_EQ(robot.results.count(ticket), 1U);
@@ -365,10 +369,10 @@ TEST_F(TwoPaths, AreNotLeftByAHeartbeatFromBeforeTheFarewell) {
 
 TEST(SessionPaths, AreLeftBeforeAStateHasCome) {
   RobotOnPaths robot(Cables{{1}, {1}});
-  robot.reboot(0, 0xC0000000U);  // a T that is not newer than 0
+  robot.reboot(0, 0xC0000000U);  // this T is not newer than 0
   robot.plug(0, true);
   robot.plug(1, true);
-  robot.run(2);  // each path's board has sent its identity
+  robot.run(2);  // the board has sent its identity on each path
   for (const std::size_t path : {0U, 1U}) robot.cut(path);
   const auto at = [&](std::uint32_t later_ms) {
     return ";PNum:9;T:" + std::to_string(robot.board_ms(0) + later_ms) + ";";

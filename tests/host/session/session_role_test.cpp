@@ -30,8 +30,8 @@ TEST_F(SessionRole, TakingControlBeginsAsAHostThatOpensTheBoard) {
   link.heartbeat(SafeReason::link);
   link.sent.clear();
   change(BoardRole::control);
-  ASSERT_EQ(link.count('H'), 1U) << "at once";
-  EXPECT_EQ(link.last('H').t, 0U) << "the board has sent this session nothing that it could echo";
+  ASSERT_EQ(link.count('H'), 1U) << "the heartbeat must be sent at once";
+  EXPECT_EQ(link.last('H').t, 0U) << "the board has sent this session no T to echo";
   EXPECT_NE(link.host_session, no_session);
   EXPECT_FALSE(link.session.in_control(link.now));
   link.connect();
@@ -39,7 +39,7 @@ TEST_F(SessionRole, TakingControlBeginsAsAHostThatOpensTheBoard) {
   EXPECT_EQ(link.session.post(turn_motor, link.now), PostResult::not_armed);
   link.pass(2s);
   EXPECT_EQ(link.count('W'), 0U);
-  EXPECT_EQ(link.session.state().raw.analog_cv[0], 2428) << "what is known stays";
+  EXPECT_EQ(link.session.state().raw.analog_cv[0], 2428) << "known values must stay";
   EXPECT_EQ(link.restarts, 0);
 }
 
@@ -55,7 +55,7 @@ TEST_F(SessionRole, ReleasingControlSaysFarewellUntilTheBoardAnswersAndThenWatch
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
   link.sent.clear();
   change(BoardRole::watch);
-  EXPECT_EQ(link.count('W'), 1U) << "at once";
+  EXPECT_EQ(link.count('W'), 1U) << "the W must be sent at once";
   EXPECT_EQ(link.host_session, no_session);
   link.state("AIN24:24.28;SAFE:1;");
   link.pass(2s);
@@ -77,11 +77,12 @@ TEST_F(SessionRole, ArmingEndsAsSoonAsControlIsReleased) {
   change(BoardRole::watch);
   link.sent.clear();
   take();
-  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::not_yet) << "relay 1 is closed, it says";
+  EXPECT_EQ(link.session.disarmed_by(), DisarmCause::not_yet)
+      << "relay 1 is closed, but the session was not armed";
   EXPECT_EQ(link.session.post(turn_motor, link.now), PostResult::not_armed);
 }
 
-// The motor must not run for a command whose caller has given it up.
+// The motor must not run for a command whose caller has given up.
 TEST_F(SessionRole, NothingThatWasAskedForBeforeIsSentAfterAChange) {
   change(BoardRole::control);
   const Ticket early = link.session.send(Command::fields("ENC1"), 60s, link.now);
@@ -91,7 +92,8 @@ TEST_F(SessionRole, NothingThatWasAskedForBeforeIsSentAfterAChange) {
   for (const Ticket each : {early, arms, behind}) EXPECT_EQ(outcome(each), Outcome::cancelled);
   const Ticket late = link.session.send(Command::fields("ENC1"), 60s, link.now);
   change(BoardRole::watch);
-  EXPECT_EQ(outcome(late), Outcome::cancelled) << "asked for while control was being released";
+  EXPECT_EQ(outcome(late), Outcome::cancelled)
+      << "the command came while control was being released";
   const SessionId earlier = link.host_session;
   link.sent.clear();
   take();
@@ -113,7 +115,7 @@ TEST_F(SessionRole, EachControlIsASessionOfItsOwn) {
   link.heartbeat();
   link.pass(10ms);
   link.executed(of_first);
-  EXPECT_FALSE(link.session.in_control(link.now)) << "that number is of the session before";
+  EXPECT_FALSE(link.session.in_control(link.now)) << "the number is of the earlier session";
 }
 
 TEST_F(SessionRole, AStopGoesOnOverEveryChange) {
@@ -146,7 +148,7 @@ TEST_F(SessionRole, HeartbeatsThatAreHeldStayHeld) {
 TEST_F(SessionRole, AnExpiredWatchdogHoldsTheHeartbeatsUntilItIsFed) {
   link.session.watchdog(50ms, link.now);
   link.pass(200ms);
-  EXPECT_FALSE(link.session.link().gated()) << "it sends none anyway";
+  EXPECT_FALSE(link.session.link().gated()) << "a watcher sends no heartbeats";
   change(BoardRole::control);
   link.pass(200ms);
   EXPECT_EQ(link.count('H'), 0U);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host whose computer slept, opposite the real board: its clock stood still, and it begins
-// another session.
+// A host whose computer slept, with the real board. The host's clock stood still during the sleep,
+// and the host begins another session.
 #include <gtest/gtest.h>
 
 #include "robot_on_paths.hpp"
@@ -18,14 +18,14 @@ class SleepingHost : public ::testing::TestWithParam<Cables> {
   void cut_all(RobotOnPaths& of, bool is_cut = true) {
     for (std::size_t path = 0; path < of.cables.size(); ++path) of.cut(path, is_cut);
   }
-  // Longer than the board waits for its host, and shorter or longer than the tolerance of a board's
-  // clock.
+  // All longer than the board waits for its host; shorter or longer than the tolerance of the
+  // board's clock.
   static constexpr std::uint32_t naps_ms[] = {1500, 9000, 60'000};
 
   RobotOnPaths robot{GetParam()};
 };
 
-// The board's setting `recovery` is `last`: it drives on where a session goes on.
+// The board's setting `recovery` is `last`: it restores its outputs if a session continues.
 TEST_P(SleepingHost, FindsTheMotorsOffAndLeavesThemOff) {
   for (const std::uint32_t nap_ms : naps_ms) {
     RobotOnPaths sleeper(GetParam());
@@ -35,11 +35,12 @@ TEST_P(SleepingHost, FindsTheMotorsOffAndLeavesThemOff) {
     ASSERT_FALSE(drives(sleeper));
     for (int ms = 0; ms < 5000; ++ms) {
       sleeper.run(1);
-      ASSERT_FALSE(drives(sleeper)) << ms << " ms after its waking from " << nap_ms << " ms";
+      ASSERT_FALSE(drives(sleeper)) << ms << " ms after waking from " << nap_ms << " ms";
     }
     EXPECT_EQ(sleeper.restarts, 1);
     EXPECT_TRUE(sleeper.session->in_control(sleeper.now()));
-    EXPECT_EQ(sleeper.drive(50).outcome, Outcome::confirmed) << "it is obeyed again";
+    EXPECT_EQ(sleeper.drive(50).outcome, Outcome::confirmed)
+        << "the board must obey the host again";
   }
 }
 
@@ -49,14 +50,14 @@ TEST_P(SleepingHost, FindsTheMotorsOffAlsoAfterAPauseOfItsVirtualMachine) {
   robot.pause(60'000);
   for (int ms = 0; ms < 5000; ++ms) {
     robot.run(1);
-    ASSERT_FALSE(drives(robot)) << ms << " ms after it goes on";
+    ASSERT_FALSE(drives(robot)) << ms << " ms after the pause";
   }
   EXPECT_EQ(robot.restarts, 1);
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
-// The commands were asked for before the sleep and were not sent: before the board was heard, while
-// the link was lost, or before the board restarted.
+// These commands were not sent before the sleep: the board was not heard yet, the link was lost, or
+// the board had restarted.
 TEST_P(SleepingHost, CancelsACommandAndAnArmThatItAskedForBefore) {
   enum class Link { never_heard, lost, restarted };
   for (const Link link : {Link::never_heard, Link::lost, Link::restarted}) {
@@ -73,7 +74,7 @@ TEST_P(SleepingHost, CancelsACommandAndAnArmThatItAskedForBefore) {
     cut_all(armed, false);
     for (int ms = 0; ms < 5000; ++ms) {
       armed.run(1);
-      ASSERT_FALSE(drives(armed)) << ms << " ms after its waking";
+      ASSERT_FALSE(drives(armed)) << ms << " ms after waking";
     }
     EXPECT_EQ(armed.finish(arm).outcome, Outcome::cancelled);
     EXPECT_EQ(armed.finish(drive).outcome, Outcome::cancelled);
@@ -90,7 +91,7 @@ TEST_P(SleepingHost, SwitchesTheMotorsOffAtOnceWhereTheBoardWaitsForLonger) {
   patient.connect();
   ASSERT_EQ(patient.drive(100).outcome, Outcome::confirmed);
   patient.sleep(3000);
-  ASSERT_TRUE(drives(patient)) << "the board has not missed its host yet";
+  ASSERT_TRUE(drives(patient)) << "the board's timeout has not ended yet";
   patient.run(100);
   for (int ms = 0; ms < 3000; ++ms) {
     ASSERT_FALSE(drives(patient)) << ms << " ms later";
@@ -99,7 +100,7 @@ TEST_P(SleepingHost, SwitchesTheMotorsOffAtOnceWhereTheBoardWaitsForLonger) {
   EXPECT_TRUE(patient.session->in_control(patient.now()));
 }
 
-// It was on its way when the lid was closed, and may come late or never.
+// The command was under way when the computer went to sleep. It may arrive late or never.
 TEST_P(SleepingHost, RepeatsNothingThatItHadSent) {
   for (const std::uint32_t later_ms : {0U, 10U, 60U}) {
     RobotOnPaths sender(GetParam());
@@ -112,7 +113,7 @@ TEST_P(SleepingHost, RepeatsNothingThatItHadSent) {
     cut_all(sender, false);
     for (int ms = 0; ms < 5000; ++ms) {
       sender.run(1);
-      ASSERT_FALSE(drives(sender)) << ms << " ms behind its waking";
+      ASSERT_FALSE(drives(sender)) << ms << " ms after waking";
     }
     EXPECT_EQ(sender.finish(ticket).outcome, Outcome::cancelled);
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state that a session keeps of its board, its age, and how a restart of the board clears it.
+// The state that a session keeps of its board, the age of that state, and how a restart of the
+// board clears it.
 #include <gtest/gtest.h>
 
 #include "scripted_link.hpp"
@@ -12,7 +13,7 @@ using namespace std::chrono_literals;
 using Clock = ReceivedState::Clock;
 using SessionState = ConnectedSession;
 
-// How old the session's state is now.
+// The present age of the session's state.
 Clock::duration age(const ScriptedLink& link) {
   return link.session.state().age(Clock::time_point(link.now));
 }
@@ -24,7 +25,8 @@ TEST_F(NewSession, ReportsTheAgeOfItsStateAlsoWhileTheLinkIsLost) {
   link.state("AIN24:24.28;SAFE:0;CMD:1;");
   EXPECT_EQ(link.session.state().received, Clock::time_point(link.now));
   EXPECT_EQ(age(link), 0s);
-  EXPECT_EQ(link.states.back().received, Clock::time_point(link.now)) << "on_state is told it too";
+  EXPECT_EQ(link.states.back().received, Clock::time_point(link.now))
+      << "on_state must get the time, too";
   link.pass(5s);
   EXPECT_EQ(link.session.link().state, HostLinkState::lost);
   EXPECT_EQ(age(link), 5s);
@@ -47,7 +49,7 @@ TEST_F(SessionState, NamesTheFieldsReportedSinceTheBoardStarted) {
     return link.session.state().reported.has(field);
   };
   link.state("ENC1:7;SAFE:0;CMD:1;");
-  link.state("OSMC1:358,1;");  // another part of a state that is too long for one datagram
+  link.state("OSMC1:358,1;");  // another part of a state that needs several datagrams
   EXPECT_TRUE(reported(StateField::enc1) && reported(StateField::osmc1));
   EXPECT_FALSE(link.session.state().present.has(StateField::enc1));
   EXPECT_FALSE(reported(StateField::enc2));
@@ -57,14 +59,15 @@ TEST_F(SessionState, NamesTheFieldsReportedSinceTheBoardStarted) {
   EXPECT_TRUE(reported(StateField::ain24));
   EXPECT_FALSE(reported(StateField::enc1));
   link.heartbeat(SafeReason::link);
-  EXPECT_TRUE(reported(StateField::safe)) << "heartbeats report it, too";
+  EXPECT_TRUE(reported(StateField::safe)) << "heartbeats report the safe reason, too";
 }
 
 TEST_F(SessionState, ForgetsAChipFaultThatTheBoardReportsNoMore) {
   link.state("SAFE:6;FAULT:97,1;CMD:1;");
   EXPECT_EQ(link.session.state().fault.address, 97);
   link.state("SAFE:2;FAULT:97,1;CMD:1;");
-  EXPECT_TRUE(link.session.state().fault.any()) << "a graver cause hides the reason, not the chip";
+  EXPECT_TRUE(link.session.state().fault.any())
+      << "a more serious cause hides the reason, not the faulty chip";
   link.state("SAFE:0;CMD:1;");
   EXPECT_FALSE(link.session.state().fault.any());
   link.state("SAFE:5;CMD:1;");
@@ -91,7 +94,7 @@ TEST_F(SessionState, IsOfOneBootOnly) {
 TEST_F(SessionState, BeginsWithTheStateThatShowsTheRestart) {
   link.state("OSMC1:358,1;ENC1:7;SAFE:0;CMD:1;");
   link.reboot();
-  link.state("ENC2:5;SAFE:3;");  // the datagrams before it were lost
+  link.state("ENC2:5;SAFE:3;");  // the earlier datagrams were lost
   EXPECT_EQ(link.restarts, 1);
   const ReceivedState& state = link.states.back();
   EXPECT_EQ(state.encoder(2), 5);
@@ -114,11 +117,12 @@ TEST_F(SessionState, IsTheNewestButKeepsTheReasonOfAHeartbeatThatOvertookIt) {
   for (const std::uint32_t earlier_ms : {0U, 5U}) {
     ConnectedLink each;
     each.pass(20ms);
-    const std::uint32_t number = each.board_pnum++;  // the state's, sent before the heartbeat
+    // number of the state, which was sent before the heartbeat
+    const std::uint32_t number = each.board_pnum++;
     each.heartbeat(SafeReason::stop);
     each.raw(with_crc("AIN24:24.28;SAFE:0;PNum:" + std::to_string(number) +
                       ";T:" + std::to_string(each.board_ms() - earlier_ms) + ";"));
-    EXPECT_EQ(each.states.back().raw.analog_cv[0], 2428) << "it is the newest state";
+    EXPECT_EQ(each.states.back().raw.analog_cv[0], 2428) << "this is the newest state";
     EXPECT_EQ(each.states.back().safe, SafeReason::stop) << earlier_ms;
     EXPECT_EQ(each.session.link().reason, SafeReason::stop) << earlier_ms;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The link: how it comes up, stays alive and ends, and how the session reports it.
+// The link: how it comes up, stays alive and ends, and how the session reports this.
 #include "host/session/session.hpp"
 
 #include <gtest/gtest.h>
@@ -21,11 +21,11 @@ using SessionFarewell = ConnectedSession;
 TEST_F(NewSession, SendsAHeartbeatAtOnceAndThenTenASecond) {
   ASSERT_EQ(link.count('H'), 1U);
   EXPECT_EQ(link.sent[0].command, "H:ROS2-R4");
-  EXPECT_EQ(link.sent[0].t, 0U) << "nothing heard, nothing to echo";
+  EXPECT_EQ(link.sent[0].t, 0U) << "no heartbeat was heard to echo";
   EXPECT_NE(link.host_session, no_session);
   link.pass(10s);
   EXPECT_EQ(link.count('H'), 101U);
-  EXPECT_EQ(link.sent.size(), 101U) << "and nothing else";
+  EXPECT_EQ(link.sent.size(), 101U) << "only heartbeats may be sent";
   for (std::size_t i = 1; i < link.sent.size(); ++i) {
     EXPECT_EQ(link.sent[i].pnum, link.sent[i - 1].pnum + 1);
     EXPECT_EQ(link.sent[i].at - link.sent[i - 1].at, 100ms);
@@ -35,9 +35,9 @@ TEST_F(NewSession, SendsAHeartbeatAtOnceAndThenTenASecond) {
 TEST_F(NewSession, IsConnectingWhileTheBoardBoots) {
   link.boot_heartbeat();
   EXPECT_EQ(link.session.link().state, HostLinkState::connecting);
-  EXPECT_EQ(link.count('H'), 2U) << "it answers";
+  EXPECT_EQ(link.count('H'), 2U) << "the session must answer the first heartbeat";
   link.pass(1s);
-  EXPECT_EQ(link.count('F'), 0U) << "no command before the board knows us";
+  EXPECT_EQ(link.count('F'), 0U) << "no command may be sent before the board knows the host";
 }
 
 TEST_F(SessionLink, BecomesActiveWithTheBoardsStateAndSaysSoOnce) {
@@ -76,24 +76,24 @@ TEST_F(SessionFarewell, EndsHeartbeatsAndIsRepeatedUntilTheBoardReportsThatItIsF
   ASSERT_EQ(link.sent.size(), 1U);
   EXPECT_EQ(link.sent[0].command, "E:LEAVE");
   link.pass(45ms);
-  ASSERT_EQ(link.sent.size(), 3U) << "every 20 ms, and nothing else";
+  ASSERT_EQ(link.sent.size(), 3U) << "the farewell must be repeated every 20 ms, alone";
   EXPECT_EQ(link.sent[2].bytes, link.sent[0].bytes);
   link.heartbeat(SafeReason::link);
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
   link.pass(2s);
-  EXPECT_EQ(link.sent.size(), 3U) << "a heartbeat would take the board again";
+  EXPECT_EQ(link.sent.size(), 3U) << "a heartbeat would take control again";
 }
 
 TEST_F(SessionFarewell, IsConfirmedByTheAnswerToARepetitionToo) {
   link.identity("leave");
   const Ticket ticket = link.session.leave(100ms, link.now);
-  link.heartbeat(SafeReason::stop);  // graver than the lost link
+  link.heartbeat(SafeReason::stop);  // more serious than the lost link
   EXPECT_EQ(link.results.count(ticket), 0U);
   link.nack(link.last('E').pnum, "DUPLICATE");
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
 }
 
-// T is a whole millisecond, and a farewell is said somewhere in it.
+// T has a resolution of one millisecond, and a farewell may be sent at any time within it.
 TEST_F(SessionFarewell, IsConfirmedByAHeartbeatOfTheSameMillisecond) {
   for (const int us : {0, 200, 400, 600, 800, 999}) {
     ConnectedLink each;
@@ -113,7 +113,8 @@ TEST_F(SessionFarewell, IsNotConfirmedByAHeartbeatThatMayBeOfBefore) {
   const std::string before = std::to_string(robot.board_ms(0) - 20);
   const Ticket ticket = robot.session->leave(RobotOnPaths::timeout, robot.now());
   robot.bring(0, with_crc("H:R4-ROS2;PNum:400;T:" + before + ";SAFE:1;"));
-  EXPECT_EQ(robot.session->link().state, HostLinkState::safe) << "it counts, but not for that";
+  EXPECT_EQ(robot.session->link().state, HostLinkState::safe)
+      << "the heartbeat shows the safe state, but does not confirm";
   EXPECT_EQ(robot.results.count(ticket), 0U);
   EXPECT_EQ(robot.finish(ticket).outcome, Outcome::confirmed);
   EXPECT_FALSE(robot.board(0).link().has_owner());
@@ -146,7 +147,8 @@ TEST_F(SessionFarewell, IsNotSaidToABoardThatDoesNotKnowItOrIsNotThere) {
   rebooted.identity("leave");
   rebooted.reboot();
   rebooted.heartbeat();
-  EXPECT_EQ(rebooted.session.leave(100ms, rebooted.now), 0U) << "it may have other firmware now";
+  EXPECT_EQ(rebooted.session.leave(100ms, rebooted.now), 0U)
+      << "the firmware may be another after the restart";
 }
 
 TEST_F(SessionFarewell, IsSentToABoardOfUnknownIdentityIfItConfirmsCommands) {
@@ -195,7 +197,7 @@ TEST_F(SessionLink, IsLostWhenTheBoardFallsSilentAndComesBackByItself) {
   EXPECT_EQ(link.session.link().state, HostLinkState::lost);
   EXPECT_LE(link.now - heard, 1001ms);
   link.pass(3s);
-  EXPECT_GE(link.count('H'), 39U) << "it goes on knocking";
+  EXPECT_GE(link.count('H'), 39U) << "the session must keep sending heartbeats";
   link.heartbeat(SafeReason::link);
   EXPECT_EQ(link.session.link(),
             (LinkStatus{.state = HostLinkState::safe, .reason = SafeReason::link, .carrying = 1}));
@@ -204,7 +206,7 @@ TEST_F(SessionLink, IsLostWhenTheBoardFallsSilentAndComesBackByItself) {
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
 }
 
-// T wraps after 49 days: after half of that it cannot be compared.
+// T wraps after 49 days. After half of that, two values cannot be compared.
 TEST_F(SessionLink, HearsABoardAgainAfterAMonthOfSilence) {
   for (int day = 0; day < 30; ++day) {
     link.now += 24h;
@@ -215,7 +217,7 @@ TEST_F(SessionLink, HearsABoardAgainAfterAMonthOfSilence) {
   EXPECT_EQ(link.session.link().state, HostLinkState::lost);
   link.heartbeat();
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
-  EXPECT_EQ(link.restarts, 1) << "T is new, and not a second restart";
+  EXPECT_EQ(link.restarts, 1) << "the new T must not count as a second restart";
 }
 
 TEST_F(NewSession, AsksForItsFieldsWhenTheLinkComesUpAndAgainWhenTheyAreMissing) {
@@ -224,16 +226,16 @@ TEST_F(NewSession, AsksForItsFieldsWhenTheLinkComesUpAndAgainWhenTheyAreMissing)
   ASSERT_EQ(link.count('F'), 1U);
   EXPECT_EQ(link.last('F').command, "F:DEFAULT,SAFE,CMD");
   link.pass(250ms);
-  link.state("AIN24:24.28;");  // it got lost
+  link.state("AIN24:24.28;");  // without CMD: the F was lost
   EXPECT_EQ(link.count('F'), 2U);
-  EXPECT_GT(link.last('F').pnum, link.all('F')[0].pnum) << "a new number each time";
+  EXPECT_GT(link.last('F').pnum, link.all('F')[0].pnum) << "each repetition must have a new number";
   link.executed(link.last('F').pnum);
   for (int i = 0; i < 20; ++i) {
     link.pass(100ms);
     link.executed(link.all('F')[1].pnum);
   }
-  EXPECT_EQ(link.count('F'), 2U) << "the board obeys: no more of it";
-  for (int i = 0; i < 4; ++i) {  // another chose other fields
+  EXPECT_EQ(link.count('F'), 2U) << "F must not be repeated when the board obeys";
+  for (int i = 0; i < 4; ++i) {  // another host has selected other fields
     link.pass(100ms);
     link.state("ENC1:5;");
   }
@@ -245,9 +247,9 @@ TEST_F(SessionLink, AddsItsOwnFieldsToTheUsersAndKeepsThem) {
   EXPECT_EQ(link.last('F').command, "F:ENC1,ENC2,SAFE,CMD");
   link.executed(link.last('F').pnum);
   link.session.send(Command::fields("CMD,ENC1,SAFE"), 1s, link.now);
-  EXPECT_EQ(link.last('F').command, "F:CMD,ENC1,SAFE") << "nothing is missing there";
+  EXPECT_EQ(link.last('F').command, "F:CMD,ENC1,SAFE") << "the user's fields already contain all";
   link.executed(link.last('F').pnum);
-  link.pass(2s);  // lost; the board has forgotten
+  link.pass(2s);  // the link is lost, and the board has forgotten the fields
   link.boot_heartbeat();
   link.heartbeat();
   link.pass(10ms);
@@ -281,7 +283,7 @@ TEST_F(SessionLink, KeepsTheFieldsOfEarlierDatagrams) {
   EXPECT_EQ(state.raw.analog_cv[0], 2428);
   EXPECT_EQ(state.raw.analog_cv[1], 1201);
   EXPECT_EQ(state.encoder(1), 7);
-  EXPECT_FALSE(state.present.has(StateField::ain24)) << "present is of the newest datagram";
+  EXPECT_FALSE(state.present.has(StateField::ain24)) << "`present` belongs to the newest datagram";
 }
 
 TEST_F(SessionLink, LetsNoOlderStateReplaceANewerOne) {
@@ -330,8 +332,8 @@ TEST_F(SessionLink, AnswersToAnotherHostChangeNothing) {
   EXPECT_TRUE(link.session.link().causes.has(LinkCause::busy));
 }
 
-// It answers each question after `delay`. How often it was asked in the last five seconds of
-// twenty.
+// The board answers each question after `delay`. Returns the number of questions in the last five
+// of twenty seconds.
 std::size_t questions_of(ScriptedLink& link, Time delay, bool answers, bool names_question) {
   if (!link.session.in_control(link.now)) link.connect();
   std::size_t asked = 0, before = 0;
@@ -361,7 +363,7 @@ TEST(SessionQuestions, ComeMoreOftenIfTheBoardsClockIsHardToKnow) {
   EXPECT_NEAR(static_cast<double>(questions_of(old, 3ms, true, false)), 5, 1);
   EXPECT_EQ(silent.session.state().sampled_error, ReceivedState::unknown);
   EXPECT_EQ(old.session.state().sampled_error, ReceivedState::unknown)
-      << "it is not known which question it answered";
+      << "the answer does not name its question";
   EXPECT_GT(old.session.statistics(old.now).round_trip_us, 2000);
 }
 
@@ -381,13 +383,13 @@ TEST(SessionQuestions, ShowWhenAStateWasSampled) {
   EXPECT_NEAR(statistics.clock_drift_ppm, 0, statistics.clock_drift_error_ppm);
   EXPECT_GT(statistics.clock_drift_error_ppm, 0);
   link.reboot();
-  link.state("AIN24:24;SAFE:1;CMD:1;");  // which the answer to a question has to bear out
+  link.state("AIN24:24;SAFE:1;CMD:1;");  // the answer to a question must confirm the restart
   EXPECT_NE(link.session.state().sampled_error, ReceivedState::unknown);
   link.pass(100ms);
   link.identity();
   link.state("AIN24:24;SAFE:1;CMD:1;");
   EXPECT_EQ(link.restarts, 1);
-  EXPECT_GT(state.sampled_error, 1300us) << "it is another clock";
+  EXPECT_GT(state.sampled_error, 1300us) << "the clock changed with the restart";
   EXPECT_LE(std::chrono::abs(state.received - state.sampled), state.sampled_error);
 }
 

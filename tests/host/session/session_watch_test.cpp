@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A session that only watches: it keeps its lease, hears the board, and commands nothing.
+// A session that only watches: it keeps its lease, hears the board, and sends no command.
 #include <gtest/gtest.h>
 
 #include "host/session/session.hpp"
@@ -14,7 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 
 struct SessionWatch : testing::Test {
-  // The board answers a W that echoes nothing of it.
+  // The board answers a W that does not echo a valid token.
   void tell(std::uint32_t token) {
     link.nack(link.last('W').pnum, "STALE;LEASE:" + std::to_string(token));
   }
@@ -25,9 +25,9 @@ struct SessionWatch : testing::Test {
 TEST_F(SessionWatch, AsksForALeaseTwiceASecondAndSendsNothingElse) {
   link.pass(1900ms);
   EXPECT_EQ(link.count('W'), 4U);
-  EXPECT_EQ(link.sent.size(), 4U) << "no heartbeat";
+  EXPECT_EQ(link.sent.size(), 4U) << "a watcher must not send heartbeats";
   EXPECT_EQ(link.last('W').command, "W:100");
-  EXPECT_EQ(link.last('W').t, 0U) << "it has heard nothing";
+  EXPECT_EQ(link.last('W').t, 0U) << "no token was heard to echo";
 }
 
 TEST_F(SessionWatch, EchoesALeaseAtOnce) {
@@ -41,13 +41,13 @@ TEST_F(SessionWatch, EchoesALeaseAtOnce) {
   link.heartbeat(SafeReason::link);
   link.pass(500ms);
   EXPECT_EQ(link.count('W'), 4U);
-  EXPECT_EQ(link.last('W').t, 3912005417) << "as long as the board does not tell another";
+  EXPECT_EQ(link.last('W').t, 3912005417) << "the token stays until the board sends another token";
   tell(7);
   link.pass(1ms);
   EXPECT_EQ(link.last('W').t, 7U);
 }
 
-// So it hears the board again when the program whose path it shared has ended.
+// So the watcher hears the board again after the program whose path it shared has ended.
 TEST_F(SessionWatch, AsksAtOnceOnATransportThatHasComeUp) {
   link.place_taken = true;
   link.pass(600ms);
@@ -88,7 +88,8 @@ TEST_F(SessionWatch, AHeartbeatForHostsDoesNotHideTheStates) {
 
 TEST_F(SessionWatch, ABoardWithoutRoomIsAskedLessOften) {
   link.nack(link.last('W').pnum, "BUSY");
-  EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy)) << "nobody said who controls it";
+  EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy))
+      << "no datagram showed another host in control";
   EXPECT_EQ(link.session.link().cause(), LinkCause::watchers_full);
   link.sent.clear();
   link.pass(3050ms);
@@ -101,7 +102,7 @@ TEST_F(SessionWatch, ReportsThatTheFirmwareServesNoWatchers) {
   EXPECT_EQ(link.session.link().cause(), LinkCause::not_watchable);
   link.nack(link.last('W').pnum, "STALE;LEASE:9");
   link.pass(1ms);
-  EXPECT_EQ(link.last('W').t, 9U) << "another firmware has come";
+  EXPECT_EQ(link.last('W').t, 9U) << "the new firmware must be asked anew";
   link.state("SAFE:1;");
   EXPECT_TRUE(link.session.link().causes.empty());
 }
@@ -130,7 +131,7 @@ TEST_F(SessionWatch, MayStopAndIdentifyTheBoardAndCommandsNothing) {
 
 TEST_F(SessionWatch, EndsItsLeaseWhenItEnds) {
   link.state("SAFE:0;");
-  EXPECT_EQ(link.session.leave(100ms, link.now), 0U) << "nothing to wait for";
+  EXPECT_EQ(link.session.leave(100ms, link.now), 0U) << "a watcher's end needs no answer";
   EXPECT_EQ(link.last('W').command, "W:0");
   const std::size_t count = link.sent.size();
   link.pass(2s);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The application watchdog, and the words of the link's status.
+// The watchdog of the application, and the texts of the link's status.
 #include <gtest/gtest.h>
 
 #include "r4link/link.hpp"
@@ -19,11 +19,12 @@ TEST_F(SessionWatchdog, HoldsCommandsBackOfAProgramThatDoesNotFeed) {
   link.session.watchdog(300ms, link.now);
   const Time begin = link.now;
   const Ticket lost =
-      link.session.send(turn_motor, 1s, link.now);  // a call that waits, and is not heard
+      // a call that waits for a board that does not answer
+      link.session.send(turn_motor, 1s, link.now);
   link.pass(400ms);
   const std::size_t sent = link.count('O');
   EXPECT_GT(sent, 3U);
-  EXPECT_LE(link.last('O').at - begin, 310ms) << "nobody looks after what it would do";
+  EXPECT_LE(link.last('O').at - begin, 310ms) << "commands must stop when the program hangs";
   EXPECT_TRUE(link.session.link().gated());
   EXPECT_FALSE(link.session.in_control(link.now));
   const Ticket late = link.session.send(turn_motor, 5s, link.now);
@@ -33,7 +34,7 @@ TEST_F(SessionWatchdog, HoldsCommandsBackOfAProgramThatDoesNotFeed) {
 
   link.session.send(Command::stop(), 1s, link.now);
   link.pass(100ms);
-  EXPECT_GE(link.count('E'), 4U) << "a stop is never held back";
+  EXPECT_GE(link.count('E'), 4U) << "a stop must always be sent";
   EXPECT_EQ(link.results.at(late).outcome, Outcome::cancelled);
 }
 
@@ -50,7 +51,7 @@ TEST_F(SessionWatchdog, FedAgainGivesControlBack) {
 
 TEST_F(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
   link.session.hold(true, link.now);
-  EXPECT_EQ(link.links.back().cause(), LinkCause::callback) << "on_link tells";
+  EXPECT_EQ(link.links.back().cause(), LinkCause::callback) << "on_link must report it";
   EXPECT_FALSE(link.session.in_control(link.now));
   EXPECT_EQ(link.session.post(turn_motor, link.now), PostResult::no_link);
   const Ticket waits = link.session.send(turn_motor, 5s, link.now);
@@ -67,14 +68,14 @@ TEST_F(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
   EXPECT_FALSE(link.session.link().gated());
   link.pass(1ms);
   EXPECT_EQ(link.count('H'), 1U);
-  EXPECT_EQ(link.count('O'), 1U) << "whose caller still waits";
+  EXPECT_EQ(link.count('O'), 1U) << "the command whose caller still waits must be sent";
   EXPECT_EQ(link.count('S'), 0U);
   EXPECT_EQ(link.results.count(waits), 0U);
 
   link.session.hold(true, link.now);
   link.session.send(Command::stop(), 1s, link.now);
   link.pass(100ms);
-  EXPECT_GE(link.count('E'), 4U) << "a stop is never held back";
+  EXPECT_GE(link.count('E'), 4U) << "a stop must always be sent";
 }
 
 TEST_F(SessionHold, AndWatchdogBothHaveToBeOver) {
@@ -93,11 +94,11 @@ TEST_F(SessionHold, AndWatchdogBothHaveToBeOver) {
 
 TEST_F(SessionLink, SendsNoCommandAfterItsDeadline) {
   link.place_taken = true;
-  link.session.post(Command::servo(1, Microseconds(1500)), link.now);  // finds the place taken
-  link.session.send(turn_motor, 100ms, link.now);                      // waits for it
+  link.session.post(Command::servo(1, Microseconds(1500)), link.now);  // the place is taken
+  link.session.send(turn_motor, 100ms, link.now);                      // waits for the place
   link.place_taken = false;
-  link.now += 750ms;                     // the loop was held up
-  link.executed(link.session_pnum + 1);  // its choice of fields
+  link.now += 750ms;                     // the loop was delayed
+  link.executed(link.session_pnum + 1);  // confirms the choice of fields
   EXPECT_TRUE(link.session.link().in_control);
   EXPECT_EQ(link.count('O'), 0U);
 }
@@ -110,7 +111,7 @@ TEST_F(NewSession, ReportsWhenTheBoardTakesCommands) {
   EXPECT_TRUE(contains(explain("board", link.session.link()).reason, "confirmed no command"));
   link.executed(link.last('F').pnum);
   EXPECT_TRUE(link.session.link().in_control);
-  EXPECT_TRUE(link.links.back().in_control) << "on_link tells";
+  EXPECT_TRUE(link.links.back().in_control) << "on_link must report it";
   EXPECT_EQ(explain("board", link.session.link()).reason,
             "the board is active and takes our commands");
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A watcher of a board over a bus beside another path. On a bus it may not send questions.
+// A watcher of a board over a bus and another path. On a bus a watcher must not send questions.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -13,7 +13,7 @@ namespace {
 
 using Cables = RobotOnPaths::Cables;
 
-// Two paths, of which the second, or both, are buses.
+// Two paths, of which the second or both are buses.
 class WatchedBus : public testing::Test {
  protected:
   explicit WatchedBus(std::size_t board_of_bus = 0, bool first_is_asked = true) {
@@ -47,7 +47,7 @@ TEST_F(WatchedBus, IsBelievedAgainAfterARestartOfTheBoard) {
   robot().run(2000);
   for (const bool alone : {false, true}) {
     robot().cut(0, alone);
-    robot().run(12'000);  // or its clock would be near the clock before the restart
+    robot().run(12'000);  // the clock must differ from the clock before the restart
     const int restarts = robot().restarts;
     robot().reboot(0);
     robot().run(3000);
@@ -69,7 +69,8 @@ TEST_F(WatchedBusOfAnother, IsNeverUsed) {
   robot().cut(0);
   robot().told_states = 0;
   robot().run(3000);
-  EXPECT_EQ(robot().told_states, 0U) << "nor when the right one is silent";
+  EXPECT_EQ(robot().told_states, 0U)
+      << "a wrong board must not be heard when the right board is silent";
   EXPECT_EQ(robot().restarts, 0);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's UARTs, by r4::Board: bytes put together from states.
+// The user's UARTs through r4::Board: bytes joined from states.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -36,13 +36,14 @@ TEST(UartStream, DeliversEachByteOnceAndCountsWhatIsMissing) {
   EXPECT_FALSE(stream.take(field(103, 7, "de"), data));
   EXPECT_FALSE(stream.take(field(105, 7, ""), data));
   EXPECT_EQ(text(data), "abcde");
-  EXPECT_EQ(data.lost, 0U) << "what the board lost before does not count";
+  EXPECT_EQ(data.lost, 0U) << "earlier losses of the board must not count";
   EXPECT_TRUE(stream.take(field(109, 7, "j"), data));
   EXPECT_EQ(text(data), "abcdej");
   EXPECT_EQ(data.lost, 4U);
-  EXPECT_TRUE(stream.take(field(109, 10, "j"), data)) << "the board has lost some";
+  EXPECT_TRUE(stream.take(field(109, 10, "j"), data))
+      << "the gap must be accepted, because the board has lost bytes";
   EXPECT_EQ(data.lost, 7U);
-  EXPECT_FALSE(stream.take(field(100, 7, "abc"), data)) << "late";
+  EXPECT_FALSE(stream.take(field(100, 7, "abc"), data)) << "a late state must not count";
   EXPECT_EQ(text(data), "abcdej");
 }
 
@@ -68,7 +69,7 @@ TEST(UartStream, HoldsItsCapacityAndCountsOlderBytesAsLost) {
   EXPECT_EQ(data.bytes.size() + data.lost, 2000U * 64);
 }
 
-// With the board's side of the stream.
+// Includes the board's side of the stream.
 TEST(UartStream, DeliversOrCountsEachByteOverALinkThatLosesStates) {
   struct Line final : firmware::UserUartPort {
     void set_up(const UartMode&) override {}
@@ -84,7 +85,7 @@ TEST(UartStream, DeliversOrCountsEachByteOverALinkThatLosesStates) {
     std::size_t due = 0;
     std::uint32_t said = 0;
   };
-  for (const unsigned most : {60U, 150U}) {  // bytes of a period
+  for (const unsigned most : {60U, 150U}) {  // bytes per period
     std::mt19937 random(most);
     Line line;
     firmware::UserUart uart(line);
@@ -121,7 +122,7 @@ TEST(UartStream, DeliversOrCountsEachByteOverALinkThatLosesStates) {
 
 struct DrivenUart : DrivenBoard {
   std::mutex mutex;
-  Board::UartData reported;  // under the mutex
+  Board::UartData reported;  // protected by the mutex
 };
 
 TEST_F(DrivenUart, ReadsWhatAReceiverSendsAndCallsBack) {
@@ -164,7 +165,7 @@ TEST(BoardUart, WritesBytesAndVoltagesOnlyAfterArm) {
   board.uart(2).write({'a', 'b'});
   EXPECT_THROW(board.uart(2).write({}), Error);
   EXPECT_THROW(board.uart(2).write(std::vector<std::uint8_t>(49)), Error);
-  EXPECT_THROW(board.uart(1).write({'a'}), Error) << "it is off";
+  EXPECT_THROW(board.uart(1).write({'a'}), Error) << "the UART is off";
   board.fields("DAC1,GPIO");
   board.dac(1, Millivolts(1650));
   ReceivedState state = board.next_state();

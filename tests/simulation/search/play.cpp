@@ -69,7 +69,7 @@ void Play::after(std::uint64_t us, std::function<void()> call) {
 }
 
 void Play::on_event(int index) {
-  // Take the call out first: it may add calls, which moves calls_.
+  // Take the call out first: it may add calls, which may move the elements of calls_.
   const std::function<void()> call = std::move(calls_[static_cast<std::size_t>(index)]);
   call();
 }
@@ -96,7 +96,8 @@ bool Play::applies(Fault fault) const {
   const Step& step = steps_[static_cast<std::size_t>(fault.step)];
   if (step.at_us >= story_.faults_until_ms * 1000ULL) return false;
   if (is_of_datagram(fault.kind)) {
-    // The host does not run. So these faults change nothing, but one that comes late may find it.
+    // The host does not run, so these faults change nothing. But a late datagram may find the host
+    // running.
     const bool same =
         !step.to_board && !step.alive &&
         (fault.kind == Kind::lost || fault.kind == Kind::twice || fault.kind == Kind::overtaken);
@@ -116,7 +117,7 @@ bool Play::applies(Fault fault) const {
     case Kind::dies:
     case Kind::sleeps:
     case Kind::pauses:
-      // The program that only stops the board ends soon in any case.
+      // The program that only stops the board ends soon anyway.
       return step.first_of_host && step.alive && step.host != story_.hosts;
     case Kind::moves:
       return step.first_of_path && step.alive && is_host;

@@ -5,15 +5,15 @@
 // which they are sent. A fault happens to a datagram or, right after it was sent and before it
 // arrives, to a path, a host or the board.
 //
-// It checks the promises of the world (world.hpp). By the board's behaviour alone it also checks:
-//   silence   outputs of a host are live only while intact heartbeats of the same process arrive
-//   joined    only the heartbeats of its own host keep a session
-//   resumed   only its own host resumes a session
-//   stranger  only commands of its own host are executed in a session
-//   pushed    strangers do not take the board from a host whose heartbeats arrive in time with a
-//             fresh echo
-//   served    while a host is in control, strangers do not prevent the confirmation of its commands
-//   returns   at the end of a run without strangers, a host that runs is in control
+// It checks the promises of the world (world.hpp). From the board's behaviour alone it also checks:
+//    silence   outputs of a host are live only while intact heartbeats of the same process arrive
+//    joined    only the heartbeats of its own host keep a session
+//    resumed   only its own host resumes a session
+//    stranger  only commands of its own host are executed in a session
+//    pushed    strangers do not take the board from a host whose heartbeats arrive in time with a
+//              fresh echo
+//    served    while a host is in control, strangers do not prevent that its commands are confirmed
+//    returns   at the end of a run without strangers, a host that runs is in control
 //
 // With a key, the first copy of a signed datagram that reaches the board counts as its host's,
 // whatever its peer is (docs/design/safety-argument.md). Any further copy counts as the stranger's.
@@ -39,10 +39,10 @@ struct Step {
   bool to_board = false;
   int host = 0;
   int path = 0;
-  bool passes = false;        // no cut loses it
-  bool first = false;         // the first datagram of its event of the world
-  bool first_of_host = true;  // the first one of its event from or to this host
-  bool first_of_path = true;  // the first one of its event from or to this host on this path
+  bool passes = false;        // no cut loses this datagram
+  bool first = false;         // the first datagram of its event in the world
+  bool first_of_host = true;  // the first of its event from or to this host
+  bool first_of_path = true;  // the first of its event from or to this host on this path
   bool alive = false;         // its host runs
   std::string text;           // only with a trace
 };
@@ -50,7 +50,7 @@ struct Step {
 class Play final : World::Script {
  public:
   // `confirmed`: the number of commands that are confirmed without faults, if that is known.
-  // `always_pushed`: check `pushed` also without strangers.
+  // `always_pushed`: check `pushed` without strangers, too.
   Play(const Story& story, std::vector<Fault> faults, bool keep_trace,
        std::optional<std::uint32_t> confirmed = {}, bool always_pushed = false);
 
@@ -135,7 +135,7 @@ class Play final : World::Script {
   std::vector<std::function<void()>> calls_;
   std::vector<Packet> overtaken_;  // each waits for the next datagram in its direction
   struct Suspended {
-    bool keeps = false;  // true: what arrives waits, false: it is lost
+    bool keeps = false;  // true: arriving datagrams wait; false: they are lost
     std::vector<Packet> arrived;
     std::vector<std::function<void()>> calls;
   };
@@ -146,24 +146,25 @@ class Play final : World::Script {
   bool has_controller_ = false;
   bool executed_ = false;  // the board has executed a command of the process in control
   bool stranger_controlled_ = false;
-  bool lost_now_ = false;     // the link was lost in this event
+  bool lost_now_ = false;     // in this event
   bool may_be_lost_ = false;  // in this event, by a farewell or with the transport
   bool had_owner_ = false;
   std::uint32_t fed_before_ = 0;
-  std::uint64_t good_us_ = 0;  // when the newest heartbeat came that has to feed
+  std::uint64_t good_us_ = 0;  // when the newest heartbeat that must feed came
   std::map<Process, std::uint64_t> heard_us_;
-  std::map<Process, std::uint32_t> newest_;  // number of a heartbeat
+  std::map<Process, std::uint32_t> newest_;  // the number of the newest heartbeat
   struct Signed {
     Process signer;
     bool has_arrived = false;
   };
-  std::map<std::string, Signed> copied_;  // the datagrams that a stranger has copied
+  std::map<std::string, Signed> copied_;  // datagrams that a stranger has copied
 
   Stranger stranger_;
-  std::uint32_t stranger_pnum_ = 0;                     // of its own datagrams
-  std::uint32_t first_peer_ = 0;                        // the address that the first host had first
-  std::uint32_t campaign_pnum_ = 0;                     // of its datagrams that pass for the host's
-  static constexpr std::uint32_t bridge_peer = 0xFFFB;  // as the board knows it
+  std::uint32_t stranger_pnum_ = 0;  // of the stranger's own datagrams
+  std::uint32_t first_peer_ = 0;     // the first address of the first host
+  // of the stranger's datagrams that pass for the host's
+  std::uint32_t campaign_pnum_ = 0;
+  static constexpr std::uint32_t bridge_peer = 0xFFFB;  // the bridge, for the board
   std::unique_ptr<test::ScriptedBridge> bridge_;
   World world_;
 };

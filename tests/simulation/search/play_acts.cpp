@@ -194,7 +194,7 @@ void Play::sleep(int index) {
     it.suspended = false;
     it.clock_offset_us -= sleep_us;
     it.session->on_sleep(it.time());
-    // The promises treat the host as another process, because nothing of its session goes on.
+    // The promises treat the host as another process, because its session has ended.
     it.died_us = slept_from;
     ++it.incarnation;
     world_.poll_host(index);

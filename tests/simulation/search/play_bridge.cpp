@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A story with the bridge that ships: hosts and strangers on one side, the board on the other.
+// A story with the shipped bridge: hosts and strangers on one side, the board on the other.
 #include <utility>
 
 #include "play.hpp"

@@ -70,7 +70,7 @@ void Play::say_once(Fault::Kind kind) {
       port, Stranger::address);
 }
 
-// Sends a copy of a host's datagram from the stranger's address.
+// Sends a duplicate of a host's datagram from the stranger's address.
 void Play::repeat(const std::string& bytes, Process signer) {
   copied_.try_emplace(bytes, Signed{signer});
   say_bytes(bytes, world_.port_of(story_.paths - 1), Stranger::address);
@@ -97,7 +97,7 @@ void Play::carry_on(Fault::Kind kind, std::uint8_t port, std::uint32_t peer) {
     return;
   }
   if (kind == Fault::Kind::stranger_competes) {
-    // Alternately with a SID of its own and as a paper host.
+    // Alternately with its own SID and as a paper host.
     const char* const own = stranger_pnum_ % 4 < 2 ? "" : Stranger::own_name;
     const std::uint32_t first = 0x9000'0000U;
     say(fmt::format("{}H:ROS2-R4;PNum:{};T:{};", own, first + ++stranger_pnum_, echo), port, peer);

@@ -15,7 +15,7 @@
 namespace r4::simulation {
 namespace {
 
-// What may come next in that run.
+// The faults that may come next in that run.
 std::vector<Fault> next_faults(const Play& play, const std::vector<Fault>& faults) {
   std::vector<Fault> next;
   Fault first{0, Fault::Kind::lost};
@@ -61,7 +61,7 @@ class Searcher {
   Search found;
 
  private:
-  // What delays and losses do to a link, they do without strangers as well.
+  // True if the finding needs strangers: delays and losses alone do not have the same effect.
   bool is_strangers_doing(std::vector<Fault> faults) const {
     std::erase_if(faults, [](const Fault& fault) { return is_strangers(fault.kind); });
     return Play(story_, faults, false, {}, true).run().violation.empty();
@@ -120,7 +120,7 @@ std::map<std::string, FoundKind> kinds_of(const std::vector<Finding>& findings) 
   using Kinds = std::multiset<Fault::Kind>;
   std::map<std::string, FoundKind> kinds;
   std::vector<std::pair<std::size_t, Kinds>> before;
-  for (const Finding& finding : findings) {  // those of few faults come first
+  for (const Finding& finding : findings) {  // findings with few faults come first
     const bool strange = std::any_of(finding.faults.begin(), finding.faults.end(),
                                      [](const Fault& fault) { return is_strangers(fault.kind); });
     Kinds all;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every combination of few faults in a story, each a run of its own.
+// Every combination of few faults in a story, each in a separate run.
 //
-// The second fault happens at a step of the run with the first, and so on: faults come in the order
-// of their steps, and of their kinds where they happen at the same step. A datagram has one fault
-// of its own at most. A schedule that breaks a promise gets no further faults. So what is searched
-// is finite, and complete for these kinds.
+// The second fault happens at a step of the run with the first fault, and so on. Faults come in the
+// order of their steps; at the same step, in the order of their kinds. A datagram has at most one
+// fault. A schedule that breaks a promise gets no further faults. Therefore the search is finite,
+// and complete for these kinds of faults.
 #pragma once
 
 #include <cstdint>
@@ -24,19 +24,19 @@ struct Finding {
 
 struct Search {
   std::size_t steps = 0;                 // of the story without faults
-  std::vector<std::uint64_t> schedules;  // with no fault, one, two, …
-  std::vector<Finding> findings;         // in order
+  std::vector<std::uint64_t> schedules;  // with no fault, one fault, two faults, …
+  std::vector<Finding> findings;         // in the order of the search
 };
 
-// On all processors.
+// Uses all processors.
 Search search(const Story& story, int most_faults);
 
-// The story of a schedule: what happens in it, the faults in plain words, what breaks, and how to
-// run it again.
+// Describes a schedule: the events and faults in plain words, the broken promise, and the command
+// that runs it again.
 std::string tell(const Story& story, const Finding& finding);
-// What is broken and by which kinds of faults, of strangers alone if they have a part in it:
-// "joined: stranger-joins"; with how many schedules that is, and the first of them. Without those
-// to which fewer faults of a part of these kinds lead already.
+// The broken promise and the kinds of faults that break it, for example "joined: stranger-joins".
+// If strangers take part, only their faults are listed. Also the number of such schedules, and the
+// first of them. Omitted if fewer faults of these kinds already break the same promise.
 struct FoundKind {
   std::size_t schedules = 0;
   Finding first;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The promises of docs/design/safety-argument.md under every combination of few faults in short stories. R4_FAULTS
+// The promises of docs/design/safety-argument.md with every combination of few faults in short stories. R4_FAULTS
 // sets how many faults at once. Without it that is 1, but 2 where R4_SCHEDULES asks for 100,000
 // schedules of the random simulator or more, or for 10,000 and the story is short. R4_STORY and
 // R4_STORY_FAULTS run one schedule again and print its trace.

@@ -10,7 +10,7 @@
 
 namespace r4::simulation {
 
-// Something that a story's people do.
+// Something that a program or a person in the story does.
 struct Act {
   enum class Kind : std::uint8_t {
     start,    // the host process begins
@@ -18,15 +18,15 @@ struct Act {
     group,    // … several at once
     stop,     // the host asks for an emergency stop
     clear,    // … and clears it
-    leave,    // the host says farewell and ends
+    leave,    // the host sends a farewell and ends
     kill,     // the host process dies
     reboot,   // the board restarts
     sleep,    // the host's computer sleeps for 1.5 s
-    cut,      // that path carries nothing for 1.3 s
+    cut,      // the path carries nothing for 1.3 s
   };
   std::uint32_t at_ms;
   Kind kind;
-  int whose = 0;  // a host, or of a path its number
+  int whose = 0;  // the number of a host, or of a path
 };
 
 struct Story {
@@ -39,30 +39,32 @@ struct Story {
   static constexpr std::uint32_t recovery_ms = 3000;
   int hosts = 1;
   int paths = 1;
-  bool one_port = false;      // the paths are peers at one port of the board; else each has its own
-  int paths_of_first = 0xFF;  // bit n: the first host is on path n. The others are on the last path
-  bool one_address = false;   // the board hears all hosts from one peer
-  bool watched = false;       // a program watches, which is the last host
-  bool keys = false;          // the board has a key of each host
-  bool is_short = false;      // it has few schedules
-  bool bridge = false;        // hosts and strangers reach the board through a bridge
+  // true: all paths are peers at one port of the board; false: each has its own port
+  bool one_port = false;
+  // bit n: the first host is on path n. Other hosts are on the last path
+  int paths_of_first = 0xFF;
+  bool one_address = false;  // the board hears all hosts from one peer
+  bool watched = false;      // the last host only watches
+  bool keys = false;         // the board has a key for each host
+  bool is_short = false;     // the story has few schedules
+  bool bridge = false;       // hosts and strangers reach the board through a bridge
 };
 
 const std::vector<Story>& stories();
-// For GoogleTest, which would print its bytes.
+// For GoogleTest, which would otherwise print the bytes.
 inline void PrintTo(const Story& story, std::ostream* out) { *out << story.name; }
 
 struct Fault {
   enum class Kind : std::uint8_t {
-    // Of a datagram.
+    // Faults of a datagram.
     lost,
-    twice,           // comes twice, one right behind the other
-    again_late,      // comes, and 300 ms later again
-    again_too_late,  // … 1.3 s later
-    late,            // comes after 300 ms
-    too_late,        // … 1.3 s
-    overtaken,       // comes behind the next in its direction
-    // Of the path that the datagram is sent on.
+    twice,           // arrives twice in a row
+    again_late,      // arrives, and again 300 ms later
+    again_too_late,  // … and again 1.3 s later
+    late,            // arrives after 300 ms
+    too_late,        // … after 1.3 s
+    overtaken,       // arrives after the next datagram in its direction
+    // Faults of the path on which the datagram is sent.
     cut,
     cut_to_board,
     cut_to_host,
@@ -70,7 +72,7 @@ struct Fault {
     held,
     unplugged,
     port_lost,
-    // Of the host that sends it, or that it is for.
+    // Faults of the host that sends or receives the datagram.
     restarts,
     dies,
     sleeps,
@@ -78,12 +80,13 @@ struct Fault {
     moves,
     stops,
     clears,
-    // Of all.
+    // Faults of the board and all hosts.
     reboots,
     stands_still,
     other_stops,
     bridge_restarts,
-    // Of a stranger, who knows what the board tells to all, and to those that watch.
+    // Acts of a stranger, which knows the datagrams that the board sends to everyone and to
+    // watchers.
     stranger_beats,
     stranger_drives,
     stranger_leaves,
@@ -96,18 +99,18 @@ struct Fault {
     stranger_copies,
     count,
   };
-  int step;  // which datagram of the run, from 0
+  int step;  // the number of the datagram in the run, from 0
   Kind kind;
   friend bool operator==(const Fault&, const Fault&) = default;
 };
 
-// A word for a command line, and what happens, in plain words.
+// A word for the command line, and a description in plain words.
 const char* word_of(Fault::Kind kind);
 const char* text_of(Fault::Kind kind);
 constexpr bool is_of_datagram(Fault::Kind kind) { return kind <= Fault::Kind::overtaken; }
 constexpr bool is_strangers(Fault::Kind kind) { return kind >= Fault::Kind::stranger_beats; }
 
-// "17:lost 31:restarts", and back. Throws std::invalid_argument.
+// Between faults and text such as "17:lost 31:restarts". Throws std::invalid_argument.
 std::string to_text(const std::vector<Fault>& faults);
 std::vector<Fault> faults_from(std::string_view text);
 

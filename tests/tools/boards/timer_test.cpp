@@ -46,7 +46,8 @@ TEST(CommandTimer, ATaskMayReplaceItself) {
   EXPECT_EQ(ran, "ab");
 }
 
-// The time has come for both, and the loop calls the first: the second is cancelled, or its timer is gone.
+// Both tasks are due, and the loop calls the first. The first task cancels the second, or destroys
+// its timer.
 TEST(CommandTimer, RunsNoTaskAfterItWasCancelledThoughItsTimeHadCome) {
   for (const bool destroyed : {false, true}) {
     asio::io_context io;

@@ -13,14 +13,14 @@
 namespace r4::tool {
 namespace {
 
-// A dump in the making, and what is printed of it.
+// A dump that the test writes, and the lines that are printed for it.
 struct Dump {
   void frame(std::uint32_t id, std::string_view hex, const char* interface = "can0") {
     log.on_line(++line, fmt::format("({}.{:06}) {} {:03X}#{}", at_us / 1000000, at_us % 1000000,
                                     interface, id, hex));
     at_us += 250;
   }
-  // The frames of a datagram, those with an answer of `flow_control_id` after the first.
+  // The frames of a datagram, those after the first with an answer of `flow_control_id`.
   void datagram(std::uint32_t id, const std::string& bytes, std::uint32_t flow_control_id = 0,
                 std::size_t lose = 999) {
     std::vector<std::string> frames{fmt::format("1{:03X}", bytes.size())};
@@ -166,12 +166,12 @@ TEST(BusLog, TellsOfTransfersThatFailed) {
 
 TEST(BusLog, CountsWhatItDoesNotPrint) {
   Dump dump;
-  dump.frame(0x403, "2148656C6C6F");  // begun before the dump
+  dump.frame(0x403, "2148656C6C6F");  // the datagram began before the dump
   dump.frame(0x123, "00");
   dump.log.on_line(++dump.line, "(1436509052.5) can0 00000403#00");
   dump.log.on_line(++dump.line, "(1436509052.5) can0 20000004#0004000000000000");
   dump.log.on_line(++dump.line, "\tcontroller-problem{}");
-  dump.frame(0x403, "100A48656C6C6F2C");  // the dump ends in it
+  dump.frame(0x403, "100A48656C6C6F2C");  // the dump ends within this datagram
   EXPECT_TRUE(dump.printed.empty());
   EXPECT_FALSE(dump.log.any_bad());
   const Json summary = dump.summary();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `r4 bus` computes against the same machine run on the bus model, which shares only the count
-// of a frame's bits with it.
+// The results of `r4 bus`, compared with the bus model. The two share only the function that counts
+// the bits of a frame.
 #include "tools/r4/bus/bus_plan.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ FieldSet confirmed_fields() {
   return fields;
 }
 
-// Both loads, printed; true if they are within 2 % of each other.
+// Prints both loads, and fails unless they are within 2 % of each other.
 void expect_agreement(const char* what, const BusPlan& plan) {
   test::BackboneOptions options;
   options.boards = static_cast<int>(plan.boards);
@@ -101,7 +101,7 @@ TEST(BusPlan, ABusThatCannotEvenCarryTheHeartbeatsCarriesNoBoard) {
   EXPECT_EQ(highest_rate(plan, 0.8), 0U);
 }
 
-// Longer than one datagram can be: in parts, as the board sends it.
+// Longer than one datagram can be: sent in parts, as the board sends it.
 TEST(BusPlan, AllFieldsAreSplitWhereTheBoardSplitsThem) {
   BusPlan plan = plan_for(1, false);
   plan.fields = FieldSet::all();

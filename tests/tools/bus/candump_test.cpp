@@ -175,7 +175,8 @@ TEST(Candump, BearsAnyBytes) {
     for (auto n = random() % 4; n != 0 && !text.empty(); --n) {
       text[random() % text.size()] = static_cast<char>(random());
     }
-    const std::vector<char> exact(text.begin(), text.end());  // one beyond it is caught
+    // an exact copy, so that a sanitizer finds a read beyond its end
+    const std::vector<char> exact(text.begin(), text.end());
     CandumpLine line;
     if (read_candump_line({exact.data(), exact.size()}, line) == CandumpError::none) {
       EXPECT_TRUE(has_valid_size(line.frame)) << text;

@@ -57,7 +57,8 @@ TEST(DoctorCan, AControllerThatNeverComesBackAndAShortQueueAreWarnings) {
   CanInterface interface = good_interface();
   interface.restart_ms = 0;
   EXPECT_EQ(only_finding(interface).check, "can.restart");
-  EXPECT_EQ(only_finding(interface).mending, Mending::by_hand) << "it takes the interface down";
+  EXPECT_EQ(only_finding(interface).mending, Mending::by_hand)
+      << "the command takes the interface down";
   interface = good_interface();
   interface.tx_queue = 10;
   EXPECT_EQ(only_finding(interface).check, "can.queue");
@@ -84,7 +85,7 @@ TEST(DoctorCan, FramesOfAnotherProtocolOnAnIdOfTheBoardAreNamed) {
     survey.on_frame(frame, 0);
   }
   const Findings findings = check_foreign_frames(survey, "can0", 5);
-  ASSERT_EQ(findings.size(), 1U) << "the other ids are none of board 5";
+  ASSERT_EQ(findings.size(), 1U) << "the other ids do not belong to board 5";
   EXPECT_EQ(findings[0].severity, Severity::warning);
   EXPECT_EQ(findings[0].reason,
             "1 frames with id 185, which is one of board 5, make no R4 datagram: CANopen TPDO1 of "

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The verdict on a link that was listened to.
+// The findings about a link that was heard for a while.
 #include "tools/r4/doctor/link_check.hpp"
 
 #include <gtest/gtest.h>

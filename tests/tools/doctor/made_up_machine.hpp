@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A machine of files in a directory of its own, for the checks of r4 doctor.
+// A simulated machine for the checks of r4 doctor: files in a temporary directory.
 #pragma once
 
 #include <unistd.h>
@@ -42,10 +42,10 @@ class MadeUpMachine {
   }
 
   Machine machine;
-  std::map<std::string, std::string> says;  // what commands print
+  std::map<std::string, std::string> says;  // the output of each command
 };
 
-// The finding of that check; an empty one if there is none.
+// The finding of this check; an empty finding if there is none.
 inline Finding found_by(const Findings& findings, const std::string& check) {
   for (const Finding& each : findings) {
     if (each.check == check) return each;

@@ -13,7 +13,8 @@ namespace {
 
 constexpr const char* giga = "/dev/ttyACM0";
 
-// The port belongs to root and the group dialout, whose id is that of the files of this test.
+// The port belongs to root and to the group dialout. The group's id is the id of the files of this
+// test.
 void add_port(const MadeUpMachine& made_up, const std::string& members) {
   made_up.file(giga);
   made_up.mode(giga, 0660);
@@ -48,9 +49,9 @@ TEST(DoctorSerial, WhoMayOpenThePortIsFine) {
   made_up.machine.user.groups.insert(::getegid());
   EXPECT_EQ(permission(made_up).severity, Severity::ok);
   made_up.mode(giga, 0640);
-  EXPECT_EQ(permission(made_up).severity, Severity::error) << "reading alone is not enough";
+  EXPECT_EQ(permission(made_up).severity, Severity::error) << "permission to read is not enough";
   made_up.machine.user.id = 0;
-  EXPECT_EQ(permission(made_up).severity, Severity::ok) << "root may";
+  EXPECT_EQ(permission(made_up).severity, Severity::ok) << "root may open every port";
 }
 
 TEST(DoctorSerial, APortOfAnotherGroupIsGivenToIt) {
@@ -93,7 +94,7 @@ TEST(DoctorSerial, NamesWhoHasThePortOpenButNotWhoSharesIt) {
   EXPECT_EQ(findings[1].severity, Severity::warning);
   EXPECT_NE(findings[1].reason.find("minicom (pid 71)"), std::string::npos);
   EXPECT_EQ(findings[1].fix, "kill 71");
-  EXPECT_EQ(findings[1].mending, Mending::by_hand) << "it may be somebody's work";
+  EXPECT_EQ(findings[1].mending, Mending::by_hand) << "the other program may be in use";
 }
 
 TEST(DoctorSerial, AnAdapterThatKeepsBytesIsToldNotTo) {
@@ -121,7 +122,7 @@ TEST(DoctorSerial, RulesOfUdevAreMissingOldOrThere) {
   made_up.file("/usr/lib/udev/rules.d/70-r4.rules", udev_rules);
   EXPECT_EQ(udev().severity, Severity::ok);
   made_up.file("/etc/udev/rules.d/70-r4.rules", "# old\n");
-  EXPECT_EQ(udev().severity, Severity::warning) << "what is in /etc counts";
+  EXPECT_EQ(udev().severity, Severity::warning) << "a file in /etc takes precedence";
   EXPECT_NE(udev().reason.find("another version"), std::string::npos);
 }
 
@@ -130,7 +131,7 @@ TEST(DoctorSerial, ModemManagerIsTroubleWhileNoRuleKeepsItOff) {
   const auto modems = [&] {
     return found_by(check_udev_rules(made_up.machine, udev_rules), "serial.modemmanager");
   };
-  EXPECT_EQ(modems().severity, Severity::ok) << "it does not run";
+  EXPECT_EQ(modems().severity, Severity::ok) << "ModemManager does not run";
   made_up.file("/proc/88/comm", "ModemManager\n");
   EXPECT_EQ(modems().severity, Severity::warning);
   made_up.file("/etc/udev/rules.d/70-r4.rules", udev_rules);
@@ -143,20 +144,20 @@ TEST(DoctorSerial, ARuleOfBrlttyThatTakesTheAdapterIsFound) {
     return found_by(check_brltty(made_up.machine, ports), "serial.brltty");
   };
   const std::string gone = "/dev/ttyUSB7";
-  EXPECT_EQ(brltty({gone}).severity, Severity::ok) << "it is not installed";
+  EXPECT_EQ(brltty({gone}).severity, Severity::ok) << "brltty is not installed";
   const std::string rules = "/usr/lib/udev/rules.d/85-brltty.rules";
   made_up.file(rules,
                "# ENV{PRODUCT}==\"403/6001/*\", GOTO=\"brltty_usb_run\"\n"
                "ENV{PRODUCT}==\"10c4/ea60/*\", ATTRS{manufacturer}==\"Silicon Labs\", "
                "GOTO=\"brltty_usb_run\"\n");
-  EXPECT_EQ(brltty({gone}).severity, Severity::ok) << "it takes braille displays alone";
+  EXPECT_EQ(brltty({gone}).severity, Severity::ok) << "the rules match only braille displays";
   made_up.file(rules,
                "ENV{PRODUCT}==\"1a86/7523/*\", ENV{BRLTTY_BRAILLE_DRIVER}=\"bm\"\n"
                "ENV{PRODUCT}==\"403/6001/*\", ENV{BRLTTY_BRAILLE_DRIVER}=\"at\"\n");
   EXPECT_EQ(brltty({}).severity, Severity::note);
   EXPECT_EQ(brltty({"/dev/ttyACM0"}).severity, Severity::note);
   EXPECT_EQ(brltty({gone}).severity, Severity::warning);
-  EXPECT_EQ(brltty({gone}).mending, Mending::by_hand) << "somebody may need it to read";
+  EXPECT_EQ(brltty({gone}).mending, Mending::by_hand) << "a blind user may need brltty";
   EXPECT_NE(brltty({gone}).reason.find("CH340, FT232"), std::string::npos);
   EXPECT_EQ(brltty({gone}).fix,
             "sudo sh -c 'ln -s /dev/null /etc/udev/rules.d/85-brltty.rules && udevadm control "
@@ -171,7 +172,7 @@ TEST(DoctorSerial, ARuleOfBrlttyThatTakesTheAdapterIsFound) {
     EXPECT_EQ(brltty({"/dev/ttyUSB0"}).severity, severity) << product;
   }
   made_up.file("/etc/udev/rules.d/85-brltty.rules");
-  EXPECT_EQ(brltty({gone}).severity, Severity::ok) << "it is masked";
+  EXPECT_EQ(brltty({gone}).severity, Severity::ok) << "the rules file is masked";
 }
 
 TEST(DoctorFinding, TheExitCodeIsThatOfTheFirstErrorAndOneForWarnings) {

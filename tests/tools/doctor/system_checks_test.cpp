@@ -35,9 +35,9 @@ TEST(DoctorSystem, AFirewallThatDropsAndNamesNoPortOfOursIsAWarning) {
     return found_by(check_network(made_up.machine), "network.firewall");
   };
   made_up.file("/proc/sys/net/netfilter/nf_log_all_netns", "0\n");
-  EXPECT_EQ(firewall().severity, Severity::note) << "only root can tell";
+  EXPECT_EQ(firewall().severity, Severity::note) << "only root can read the rules";
   made_up.machine.user.id = 0;
-  EXPECT_EQ(firewall().severity, Severity::note) << "neither program is there to tell";
+  EXPECT_EQ(firewall().severity, Severity::note) << "neither program is installed";
   made_up.says["nft --version"] = "nftables v1.0.6\n";
   EXPECT_EQ(firewall().severity, Severity::ok);
   const std::string chain =
@@ -49,7 +49,7 @@ TEST(DoctorSystem, AFirewallThatDropsAndNamesNoPortOfOursIsAWarning) {
   made_up.says["nft list ruleset"] = chain + "drop;\n  udp sport 2018 accept\n }\n}\n";
   EXPECT_EQ(firewall().severity, Severity::ok);
   made_up.says["nft list ruleset"] = chain + "accept;\n }\n chain forward { policy drop; }\n}\n";
-  EXPECT_EQ(firewall().severity, Severity::ok) << "another chain's policy";
+  EXPECT_EQ(firewall().severity, Severity::ok) << "the policy belongs to another chain";
   made_up.says["iptables -S INPUT"] = "-P INPUT DROP\n-A INPUT -p tcp -j ACCEPT\n";
   EXPECT_EQ(firewall().thing, "iptables");
 }

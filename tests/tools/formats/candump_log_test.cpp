@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CAN frames to records, and records to the frames that carry them.
+// Converts CAN frames to records, and records to the frames that carry them.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 namespace r4::test {
 namespace {
 
-// The lines of a recording that have datagrams.
+// The lines of a recording that contain datagrams.
 std::string datagram_lines(const std::string& native) {
   std::string lines;
   for (std::size_t at = 0, end = 0; at < native.size(); at = end + 1) {
@@ -60,7 +60,7 @@ TEST(CandumpLog, TellsThePlaceOfWhatCannotBeRead) {
   const std::string log = converted(recorded_capture("can://can0"), ".r4log", ".log").bytes;
   const std::size_t second = log.find('\n') + 1;
   const std::size_t third = log.find('\n', second) + 1;
-  // A line that is none, one without a time, and a frame that is lost.
+  // An invalid line, a line without a time, and a missing frame.
   const Converted result =
       converted("x\n can0 010#\n" + log.substr(0, second) + log.substr(third), ".log", ".r4log");
   ASSERT_EQ(result.damage.size(), 3);
@@ -74,7 +74,7 @@ TEST(CandumpLog, TellsThePlaceOfWhatCannotBeRead) {
       datagram_lines(recorded_capture()).substr(datagram_lines(recorded_capture()).find('\n') + 1));
 }
 
-// The log with its times, in microseconds, as `time_of(time, time before)` counts them.
+// The log with other times, in microseconds: time_of(time, earlier time) gives each time.
 template <class TimeOf>
 std::string counted(const std::string& log, TimeOf time_of) {
   std::string out;

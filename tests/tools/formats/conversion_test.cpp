@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The native format as a source and a sink, and what all formats have in common.
+// The native format as a source and a sink, and the properties that all formats share.
 #include "tools/r4/formats/conversion.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ TEST(Conversion, GivesANativeRecordingAsItWas) {
   }
 }
 
-// Of whichever program the recording is, also where it has no line that would say so.
+// For a recording of any program, including a recording without a line that names its program.
 TEST(Conversion, CopiesNoSecretIntoAnotherFile) {
   std::string native;
   write_record_header(native);
@@ -132,7 +132,7 @@ TEST(Conversion, TellsOfDamagedCompressionWhateverIsCompressed) {
   std::string archive;
   ZstdWriter writer;
   writer.write(packets.substr(0, packets.size() / 2), true, archive);
-  archive.back() ^= 0x55;  // of the checksum
+  archive.back() ^= 0x55;  // a byte of the checksum
   writer.write(packets.substr(packets.size() / 2), true, archive);
   const Converted read = converted(archive, ".pcapng.zst", ".r4log");
   ASSERT_FALSE(read.damage.empty());

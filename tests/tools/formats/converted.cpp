@@ -44,7 +44,8 @@ std::string generated_recording(unsigned seed, int records) {
     if (what == 5) {
       bytes.clear();
       for (unsigned size = below(3000); size > 0; --size) bytes += static_cast<char>(below(256));
-      std::replace(bytes.begin(), bytes.end(), 'C', 'c');  // no setting, which might be a secret
+      // not a setting, because its value might be a secret
+      std::replace(bytes.begin(), bytes.end(), 'C', 'c');
     }
     if (what == 6) native += "# a comment \xff \\x20\n";
     if (what == 7) write_path(native, {path, url_of(path), "arm-" + std::to_string(i % 100)});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Recordings for tests, and what the formats make of them.
+// Recordings for tests, and the conversions of the formats.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +30,8 @@ struct Converted {
   std::vector<Damage> damage;
 };
 
-// What `r4 convert` makes of the bytes of a file, by the endings of both; fed in pieces of that size.
+// The result of `r4 convert` for the bytes of a file. `from` and `to` are the endings of both
+// files. The bytes are fed in pieces of this size.
 inline Converted converted(std::string_view bytes, const std::string& from, const std::string& to,
                            std::size_t piece = 1000, std::vector<Device> devices = {},
                            const tool::SourceOptions& options = {}) {
@@ -59,16 +60,17 @@ inline Converted converted(std::string_view bytes, const std::string& from, cons
   return result;
 }
 
-// There and back again.
+// Converts to the format `by` and back.
 inline std::string and_back(const std::string& native, const std::string& by) {
   return converted(converted(native, ".r4log", by).bytes, by, ".r4log").bytes;
 }
 
-// The paper's capture as a recording of one board, of both directions, with the two damaged datagrams.
+// The paper's capture as a recording of one board, in both directions, with the two damaged
+// datagrams.
 std::string recorded_capture(const std::string& url = "udp://192.168.0.125");
 
-// A recording of that many records of three paths, by a seed: datagrams, damaged ones, any bytes, events, comments,
-// paths that get a name, times that go back.
+// A recording of this many records of three paths, generated from a seed: datagrams, damaged
+// datagrams, random bytes, events, comments, paths that get a name, and times that go back.
 std::string generated_recording(unsigned seed, int records);
 
 }  // namespace r4::test

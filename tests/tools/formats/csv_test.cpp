@@ -36,7 +36,7 @@ TEST(Csv, HasARowForEachStateAndAColumnForEachValue) {
   EXPECT_EQ(lines[1],
             "1795468293.414765,1,left-arm,7434,79090,24.28,12.12,5.12,12.11,1,1.03,4095,1,400,1,"
             "-100,2000");
-  // What is damaged, and what is none, is counted.
+  // Damaged datagrams and datagrams that are not states are counted.
   const auto states = lines.size() - 1;
   EXPECT_EQ(csv.left_out,
             std::to_string(paper_capture().size() + 2 - states) + " that are not states");
@@ -89,7 +89,7 @@ TEST(Csv, HasNoCellThatASpreadsheetTakesForAFormula) {
 }
 
 TEST(Csv, HasNoRowForAStateWhoseValuesAreNone) {
-  // The checksum is right: a column of numbers stays one.
+  // The checksum is right, but the column must contain only numbers.
   const Converted csv = converted(one_state("AIN24:abc;PNum:1;T:2;"), ".r4log", ".csv");
   EXPECT_EQ(lines_of(csv.bytes).size(), 1);
   EXPECT_EQ(csv.left_out, "1 that are not states");
@@ -104,7 +104,7 @@ TEST(Csv, HasWhatDescribedDevicesMeasured) {
   ASSERT_EQ(lines.size(), 3);
   EXPECT_TRUE(lines[0].ends_with(",ina219@0x40 voltage [V],ina219@0x40 current [A]")) << lines[0];
   EXPECT_TRUE(lines[1].ends_with(",x5d98,11.98,0.2")) << lines[1];
-  EXPECT_TRUE(lines[2].ends_with(",,")) << lines[2] << ": nothing was read yet";
+  EXPECT_TRUE(lines[2].ends_with(",,")) << lines[2] << ": the device was not read yet";
   const Converted json =
       converted(recording, ".r4log", ".jsonl", 1000, {Device::from("ina219@0x40:3")});
   EXPECT_NE(json.bytes.find(R"("devices":{"ina219@0x40":{"voltage":11.98,"current":0.2)"),
@@ -114,7 +114,7 @@ TEST(Csv, HasWhatDescribedDevicesMeasured) {
                Error);
 }
 
-// Of path 1 and 2 at different slots.
+// Path 1 and path 2 have devices in different slots.
 std::string recording_of_two_with_devices() {
   std::string all = "# r4log 1 by r4 0.1.0\n# path 1 udp://a\n# path 2 udp://b\n";
   write_device(all, {1, "ina219@0x40:3", std::string(DeviceDescription::text_of("ina219"))});
@@ -139,9 +139,10 @@ TEST(Csv, HasTheDevicesThatTheRecordingTellsOfEachOfItsPath) {
       << lines[0];
   EXPECT_TRUE(lines[1].ends_with(",11.98,0.2")) << lines[1];
   EXPECT_TRUE(lines[2].ends_with(",11.984,0.2")) << lines[2];
-  EXPECT_TRUE(lines[3].ends_with(",x5d98,,")) << lines[3] << ": those slots are the other board's";
+  EXPECT_TRUE(lines[3].ends_with(",x5d98,,"))
+      << lines[3] << ": these slots belong to the other board";
   EXPECT_TRUE(csv.left_out.find("odd@0x40:5, line 1") != std::string::npos) << csv.left_out;
-  // Named ones count instead, of every path.
+  // Devices named on the command line replace the recorded devices, on every path.
   const Converted named =
       converted(recording, ".r4log", ".csv", 1000, {Device::from("ina219@0x40:3")});
   EXPECT_TRUE(lines_of(named.bytes)[2].ends_with(",,,,"));
@@ -174,8 +175,8 @@ TEST(Csv, WhatADeviceCountsIsSaidByItsOwnPath) {
     write_record(all, {Time{1795468293000000 + path}, path, RecordKind::from_board,
                        with_crc(fields + "PNum:1;T:1010;")});
   };
-  state(1, "I2C2:1000,0,x20;");    // its magnet is there
-  state(2, "I2C1:1000,0,x0400;");  // what it says of its magnet was not read yet
+  state(1, "I2C2:1000,0,x20;");    // the magnet is detected
+  state(2, "I2C1:1000,0,x0400;");  // the status of this magnet was not read yet
   const auto lines = lines_of(converted(all, ".r4log", ".csv").bytes);
   ASSERT_EQ(lines.size(), 3U);
   EXPECT_NE(lines[2].find("x0400,"), std::string::npos) << lines[2];
@@ -189,7 +190,7 @@ TEST(Csv, SaysWhatIsToldTooLateForAColumnOfIt) {
   tool::Conversion conversion(*sink, [](const RecordingDamage&) {});
   std::string all = one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;PNum:1;T:1010;");
   write_device(all, {1, "ina219@0x40:3", std::string(DeviceDescription::text_of("ina219"))});
-  const auto source = tool::make_source("test.r4log", conversion);  // not surveyed, as of a pipe
+  const auto source = tool::make_source("test.r4log", conversion);  // not surveyed, like a pipe
   source->feed(all);
   source->finish();
   conversion.finish();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// MCAP of a recording, and back. Its checksums and indexes: tests/integration/test_convert.py.
+// MCAP of a recording, and back. tests/integration/test_convert.py tests the checksums and indexes.
 #include "tools/r4/formats/mcap/mcap.hpp"
 
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ TEST(Mcap, GoesOnWithTheNextChunkBehindDamage) {
   const std::size_t second = chunk(1);
   const std::size_t third = chunk(2);
   ASSERT_LT(third, mcap.size());
-  // In the record's head, its sizes, its checksum, and what is compressed.
+  // Damage in the head of the record, its sizes, its checksum, and the compressed data.
   for (const std::size_t at :
        {second, second + 4, second + 27, second + 34, second + 50, (second + third) / 2}) {
     std::string damaged = mcap;
@@ -73,7 +73,7 @@ TEST(Mcap, NamesATopicByTheBoardFromTheBeginning) {
   write_path(native, {2, "serial:b", "arm"});
   write_record(native, {Time{6}, 1, RecordKind::event, "up"});
   const std::string mcap = converted(native, ".r4log", ".mcap").bytes;
-  // Channels are repeated behind the data: id, schema, topic.
+  // The channels are repeated after the data: id, schema, topic.
   for (const std::string topic : {"/arm", "/arm_2", "/board3", "/r4log"}) {
     EXPECT_NE(mcap.find(static_cast<char>(topic.size()) + std::string(3, '\0') + topic),
               std::string::npos)
@@ -101,7 +101,7 @@ using tool::append_number;
 using tool::mcap::Fields;
 using tool::mcap::Op;
 
-// The schemas, channels and messages of a file of McapSink, as records.
+// The schemas, channels and messages in a file of McapSink, as records.
 struct McapRecord {
   Op op;
   std::string content;
@@ -253,7 +253,7 @@ TEST(Mcap, RefusesRecordingsThatWereMerged) {
       mixed.push_back(left[i]);
       mixed.push_back(right[i]);
     }
-    std::vector<McapRecord> filtered = mixed;  // without the lines
+    std::vector<McapRecord> filtered = mixed;  // the messages without the recorded lines
     std::erase_if(filtered, [](const McapRecord& each) {
       return each.op == Op::message && (each.content[0] == 1 || each.content[0] == 11);
     });

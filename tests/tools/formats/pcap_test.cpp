@@ -14,7 +14,7 @@ namespace {
 using tool::append_number;
 using tool::ByteOrder;
 
-// A packet of a pcap.
+// A packet record of a pcap file.
 std::string in_pcap(ByteOrder order, const std::string& packet, std::uint32_t us = 404765,
                     std::uint32_t cut_from = 0) {
   std::string file;
@@ -26,7 +26,7 @@ std::string in_pcap(ByteOrder order, const std::string& packet, std::uint32_t us
   return file + packet;
 }
 
-// A pcap in that order of bytes, of one packet of that link type.
+// A pcap file in this byte order, with one packet of this link type.
 std::string pcap(ByteOrder order, std::uint32_t link, const std::string& packet,
                  std::uint32_t magic = 0xA1B2C3D4, std::uint32_t cut_from = 0) {
   std::string file;
@@ -77,7 +77,8 @@ TEST(Pcapng, LosesTheDamagedBlocksAlone) {
   const std::string native = recorded_capture();
   const std::string packets = converted(native, ".r4log", ".pcapng").bytes;
   const auto lines = std::count(native.begin(), native.end(), '\n');
-  // Wherever a byte is wrong behind the interfaces: at most two records are missing, and it is told.
+  // A wrong byte at any place after the interfaces: at most two records are missing, and the damage
+  // is reported.
   for (std::size_t at = packets.find("AIN24"); at < packets.size(); at += 7) {
     std::string damaged = packets;
     damaged[at] = static_cast<char>(damaged[at] ^ 0x55);
@@ -129,7 +130,7 @@ TEST(Pcap, ReadsBothDirectionsAndPassesOverOthers) {
     return native_of(pcap(ByteOrder::little, 228, ipv4(udp(from, to, "x")), 0xA1B23C4D));
   };
   EXPECT_TRUE(contains(one(2390, 2018), "# path 1 udp://10.0.0.9\n"));
-  EXPECT_TRUE(contains(one(2390, 2018), "1795468293.000404 1> x\n"));  // in nanoseconds
+  EXPECT_TRUE(contains(one(2390, 2018), "1795468293.000404 1> x\n"));  // a capture in nanoseconds
 }
 
 TEST(Pcap, RefusesACaptureWithoutADatagramOfABoardAndSaysWhatIsThere) {
@@ -149,7 +150,7 @@ TEST(Pcap, RefusesACaptureWithoutADatagramOfABoardAndSaysWhatIsThere) {
   EXPECT_TRUE(contains(problem(empty), "0 packets"));
 }
 
-// A frame of SocketCAN whose id has that order.
+// A SocketCAN frame whose id has this byte order.
 std::string can_frame(std::uint32_t id, const std::string& data, ByteOrder order) {
   std::string packet;
   append_number(packet, id, order);
@@ -177,7 +178,7 @@ TEST(Pcap, ReadsCanFramesOfCookedCapturesWhateverTheOrderOfTheirIds) {
       EXPECT_TRUE(contains(native, fmt::format("# path 1 can://if4?node={}\n", node))) << native;
       EXPECT_TRUE(contains(native, " 1> abc\n")) << node;
     }
-    // The number of a stop fits in either order: the frame before tells.
+    // The number of a stop is valid in either byte order: an earlier frame shows the order.
     const std::string stop = can_frame(0x80400083, "", order);
     const std::string native =
         native_of(pcap(ByteOrder::little, 276, cooked(4, can_frame(0x183, data, order))) +
@@ -218,11 +219,11 @@ TEST(Pcap, TellsAPacketOnceThatPassedTwoInterfaces) {
   };
   std::string same = ipv4(udp(2018, 2390, "PNum:1;"));
   EXPECT_EQ(count_of(same, 404800), 1);
-  same[8] = '\x3F';  // forwarded: its time to live is less
+  same[8] = '\x3F';  // a forwarded packet: smaller time to live
   EXPECT_EQ(count_of(same, 404800), 1);
   EXPECT_EQ(count_of(same, 504800), 2);  // the same text again
   EXPECT_EQ(count_of(ipv4(udp(2018, 2390, "PNum:2;")), 404800), 2);
-  same[5] = '\x07';  // the id of IP
+  same[5] = '\x07';  // the id of the IP packet
   EXPECT_EQ(count_of(same, 404800), 2);
 }
 
@@ -237,7 +238,7 @@ std::string block(std::uint32_t type, std::string body) {
   return bytes;
 }
 
-// One packet in an obsolete block. `options`: of its interface.
+// One packet in an obsolete block. `options`: the options of its interface.
 std::string pcapng_at(std::uint64_t ticks, const std::string& options) {
   std::string section, interface, packet;
   append_number(section, std::uint32_t{0x1A2B3C4D});
@@ -246,7 +247,7 @@ std::string pcapng_at(std::uint64_t ticks, const std::string& options) {
   append_number(interface, std::uint64_t{228});
   const std::string bytes = ipv4(udp(2018, 2390, "PNum:1;"));
   append_number(packet, std::uint16_t{0});
-  append_number(packet, std::uint16_t{9});  // packets that were lost
+  append_number(packet, std::uint16_t{9});  // number of lost packets
   append_number(packet, static_cast<std::uint32_t>(ticks >> 32));
   append_number(packet, static_cast<std::uint32_t>(ticks));
   append_number(packet, static_cast<std::uint32_t>(bytes.size()));
@@ -271,7 +272,7 @@ TEST(Pcapng, ReadsTimesOfEveryResolutionExactly) {
   EXPECT_TRUE(contains(native_at(0, 1795468293), "1795468293.000000 1<"));
   EXPECT_TRUE(contains(native_at(9, 1795468293404765999), "1795468293.404765 1<"));
   EXPECT_TRUE(contains(native_at(0x80 | 20, (one << 50) + (one << 18)), "1073741824.250000 1<"));
-  // With the finest ticks, 64 bits reach a few seconds past 1970.
+  // With the finest ticks, 64 bits end a few seconds after 1970.
   EXPECT_TRUE(contains(native_at(18, 1'500'000'000'000'000'000), "1.500000 1<"));
   EXPECT_TRUE(contains(native_at(18, 1'000'001'000'000'000'000), "1.000001 1<"));
   EXPECT_TRUE(contains(native_at(0x80 | 62, 7 * (one << 60)), "1.750000 1<"));
@@ -287,8 +288,8 @@ std::vector<std::string> blocks_of(const std::string& file) {
   return blocks;
 }
 
-// The packets of the two in turn, as mergecap puts those of the same times; with interfaces of their own, or with those
-// of the first for both.
+// The packets of two captures in turn, in the order in which mergecap writes packets with equal
+// times. Each capture has its own interfaces, or both share the interfaces of the first.
 std::string merged_by_mergecap(const std::string& a, const std::string& b, bool own) {
   std::string head = blocks_of(a)[0], packets;
   std::vector<std::string> left, right;
@@ -327,7 +328,7 @@ TEST(Pcapng, RefusesRecordingsThatMergecapHasMixed) {
       EXPECT_TRUE(contains(problem.reason, "several recordings are mixed")) << problem.reason;
     }
   }
-  // A capture has numbers of its own for its paths.
+  // Each capture numbers its paths separately.
   const std::string recording = packets("udp://192.168.0.125");
   std::string interface, packet;
   append_number(interface, std::uint64_t{228});
@@ -342,7 +343,7 @@ TEST(Pcapng, RefusesRecordingsThatMergecapHasMixed) {
     EXPECT_TRUE(contains(problem_of([&] { converted(file, ".pcapng", ".r4log"); }).reason,
                          "several recordings are mixed"));
   }
-  // One after the other they are read, in a section each.
+  // Concatenated recordings can be read, one section each.
   EXPECT_EQ(native_of(packets("udp://a") + packets("udp://b")),
             recorded_capture("udp://a") + recorded_capture("udp://b"));
 }

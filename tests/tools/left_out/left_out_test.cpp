@@ -9,7 +9,7 @@
 namespace r4::tool {
 namespace {
 
-// The kind and the text of what `call` throws.
+// The kind and the text of the error that `call` throws.
 template <class Call>
 std::string thrown_by(const Call& call) {
   try {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every form of a limit that is taken, and what is refused.
+// Every accepted form of a limit, and refused forms.
 #include "tools/r4/recording/limits.hpp"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ TEST(RecordingLimits, AreSizesAndTimes) {
   EXPECT_EQ(options.rotate_after, 10min);
   take_rotation("1h", options);
   EXPECT_EQ(options.rotate_after, 1h);
-  EXPECT_EQ(options.rotate_bytes, 2'000'000'000) << "both may be given";
+  EXPECT_EQ(options.rotate_bytes, 2'000'000'000) << "both limits may be given";
   EXPECT_EQ(read_size("--keep", "10M"), 10'000'000);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `r4 info` tells of a recording.
+// The summary that `r4 info` prints for a recording.
 #include "tools/r4/recording/recording_summary.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ struct RecordingSummaryTest : testing::Test {
   void add(RecordKind kind, const std::string& bytes, std::uint16_t path = 1) {
     summary.on_record({now, path, kind, bytes});
   }
-  // From the board, 10 ms after the one before.
+  // A datagram from the board, 10 ms after the previous datagram.
   void hear(const std::string& fields) {
     now += 10ms;
     add(RecordKind::from_board,

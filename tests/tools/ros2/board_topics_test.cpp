@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What of a board's topics does not show over a link that carries a whole state at once.
+// The topics of a board whose states arrive in several datagrams. A link that carries whole states
+// cannot test this.
 #include "tools/r4/ros2/board_topics.hpp"
 
 #include <gtest/gtest.h>
@@ -24,7 +25,7 @@ class JointStates : public ::testing::Test {
     }
     return options;
   }
-  // A part of the state with that T.
+  // A part of the state with this T.
   void part(std::uint32_t t_ms, std::initializer_list<StateField> fields) {
     state.t_ms = t_ms;
     state.present = FieldSet();
@@ -71,12 +72,12 @@ class JointStates : public ::testing::Test {
   std::uint32_t boot = 0;
 };
 
-// 508 bytes, over the Giga's WiFi.
+// 508 bytes, the limit on the Giga's WiFi.
 TEST_F(JointStates, AreOneSampleOfAStateThatComesInSeveralDatagrams) {
   state.raw.encoder_hz[0] = 4096;
   state.raw.encoder_hz[1] = 2048;
   part(1010, {StateField::enc1, StateField::enc2});
-  EXPECT_TRUE(told().empty()) << "the other half is yet to come";
+  EXPECT_TRUE(told().empty()) << "the other half has not come yet";
   part(1010, {StateField::enc1hz, StateField::enc2hz});
   const auto all = told();
   ASSERT_EQ(all.size(), 1U);
@@ -110,9 +111,11 @@ TEST_F(JointStates, GoOnWhereTheyWereWhenCountsWrapAndTheBoardRestarts) {
     return all.size() == 1 ? all[0].positions[0] : std::nan("");
   };
   EXPECT_NEAR(position(1000, last - 9), (last - 9.0) * turn, 1e-3);
-  EXPECT_NEAR(position(1010, -last), (last + 2.0) * turn, 1e-3) << "12 counts more, with a wrap";
+  EXPECT_NEAR(position(1010, -last), (last + 2.0) * turn, 1e-3)
+      << "the counter moved by 12 counts, with a wrap";
   boot = 1;
-  EXPECT_NEAR(position(500, 3), (last + 2.0) * turn, 1e-3) << "it counts from 0 again";
+  EXPECT_NEAR(position(500, 3), (last + 2.0) * turn, 1e-3)
+      << "after a restart the counter begins at 0";
   EXPECT_NEAR(position(510, -7), (last - 8.0) * turn, 1e-3);
 }
 

@@ -42,7 +42,7 @@ TEST(Ros2Drivers, StopWhatASilentPublisherDrove) {
   EXPECT_EQ(driven.to_stop(), Texts{});
   driven.now += 1ms;
   EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,2"});
-  EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,2"}) << "until the board has confirmed it";
+  EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,2"}) << "repeated until the board has confirmed it";
   driven.drivers.stopped(driven.drivers.to_stop(driven.now));
   EXPECT_EQ(driven.to_stop(), Texts{});
   EXPECT_FALSE(driven.drivers.any());
@@ -53,7 +53,7 @@ TEST(Ros2Drivers, StopAtOnceWhatSomebodyDroveWhoHasGone) {
   driven.sent(Command::osmc(1, Pwm(1), Direction::forward), 7);
   driven.sent(Command::dhb12(3, Pwm(1), Direction::reverse), 8);
   driven.drivers.on_publishers(&driven.other_topic, {});
-  EXPECT_EQ(driven.to_stop(), Texts{}) << "of another topic";
+  EXPECT_EQ(driven.to_stop(), Texts{}) << "the publisher belongs to another topic";
   driven.drivers.on_publishers(&driven.topic, {8});
   EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,1"});
 }
@@ -96,7 +96,7 @@ TEST(Ros2Drivers, NoStepperGoesBackToWhereItWasLongAgo) {
   driven.now += 251ms;
   EXPECT_EQ(driven.to_stop(), Texts{});
   driven.told(3, 5);
-  EXPECT_EQ(driven.to_stop(), Texts{}) << "that of another one";
+  EXPECT_EQ(driven.to_stop(), Texts{}) << "the position belongs to another stepper";
   driven.told(2, 1500);
   EXPECT_EQ(driven.to_stop(), Texts{"P:1500,1000,2"});
 }
@@ -109,7 +109,7 @@ TEST(Ros2Drivers, APositionOfBeforeItWasSetToZeroIsNone) {
   driven.drivers.on_publishers(&driven.topic, {});
   EXPECT_EQ(driven.to_stop(), Texts{});
   driven.now += 20ms;
-  driven.told(2, 50020);  // on its way when the board was told
+  driven.told(2, 50020);  // sent before the board executed the zero command
   EXPECT_EQ(driven.to_stop(), Texts{});
   driven.now += 80ms;
   driven.told(2, 3);
@@ -133,10 +133,11 @@ TEST(Ros2Drivers, ACommandThatStopsIsRepeatedUntilTheBoardHasConfirmedIt) {
   driven.sent(Command::osmc(1, Pwm(358), Direction::forward));
   driven.sent(Command::osmc(1, Pwm(0), Direction::forward));
   const Drivers::Stop stop = driven.drivers.to_stop(driven.now);
-  ASSERT_EQ(stop.commands.size(), 1U) << "it may have been lost on its way";
+  ASSERT_EQ(stop.commands.size(), 1U) << "the first stop may have been lost";
   EXPECT_EQ(to_text(stop.commands[0]), "O:0,1,1");
-  EXPECT_FALSE(stop.missed) << "nobody has gone";
-  driven.sent(Command::osmc(1, Pwm(0), Direction::forward));  // as who drives by 0 repeats it
+  EXPECT_FALSE(stop.missed) << "no publisher has disappeared";
+  // a publisher that drives with 0 repeats its command
+  driven.sent(Command::osmc(1, Pwm(0), Direction::forward));
   driven.drivers.stopped(stop);
   EXPECT_EQ(driven.to_stop(), Texts{});
   EXPECT_FALSE(driven.drivers.any());
@@ -160,7 +161,7 @@ TEST(Ros2Drivers, AVoltageGoesToZeroBehindTheOthersWhichABoardWithoutOneWouldRef
   driven.drivers.stopped(others);
   EXPECT_EQ(driven.to_stop(), Texts{"X:DAC,2,0"});
   driven.drivers.forget(Command::dac(2, Millivolts(3300)));
-  EXPECT_FALSE(driven.drivers.any()) << "the board has none";
+  EXPECT_FALSE(driven.drivers.any()) << "an output that the board does not have must be forgotten";
 }
 
 TEST(Ros2Drivers, AnotherCommandEndsTheStopping) {
@@ -172,7 +173,7 @@ TEST(Ros2Drivers, AnotherCommandEndsTheStopping) {
   EXPECT_EQ(driven.to_stop(), Texts{});
   driven.drivers.on_publishers(&driven.topic, {});
   driven.drivers.stopped(stop);
-  EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,1"}) << "the confirmation is of what was before";
+  EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,1"}) << "the confirmation belongs to an earlier stop";
   driven.drivers.forget();
   EXPECT_FALSE(driven.drivers.any());
 }

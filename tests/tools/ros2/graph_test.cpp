@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What of the graph needs no DDS: names, environment, releases, delays, the outbox.
+// The parts of the graph that do not need DDS: names, environment, releases, delays, the outbox.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -96,14 +96,14 @@ TEST(Ros2Transit, IsJudgedByTheFastestWhateverTheClocksSay) {
   EXPECT_EQ(delay(10s, 3ms), 0ms);
   EXPECT_EQ(delay(11s, 1ms), 0ms);
   EXPECT_NEAR(static_cast<double>(delay(12s, 301ms).count()), 300e6, 2e6);
-  EXPECT_GT(delay(20s, 30s), 29s) << "a network that stood still: what comes first is old";
+  EXPECT_GT(delay(20s, 30s), 29s) << "after an outage of the network the first sample is old";
   EXPECT_LT(delay(50s, 5ms), 10ms);
 }
 
 TEST(Ros2Transit, IsNoFreerOfWhoWasSilentForLong) {
   Transit transit(Transit::Clocks::two);
   EXPECT_EQ(transit.delay(100s, 100s), 0s);
-  EXPECT_GT(transit.delay(100s + 24h, 103s + 24h), 2400ms) << "the network held it back";
+  EXPECT_GT(transit.delay(100s + 24h, 103s + 24h), 2400ms) << "the network has delayed the sample";
   EXPECT_LT(transit.delay(104s + 24h, 104s + 24h + 2ms), 5ms);
 }
 
@@ -115,7 +115,7 @@ TEST(Ros2Transit, BelievesOneWhoSpeaksSeldomToo) {
     const auto now = 100s + i * 5s;
     if (transit.delay(now - 3s, now) > 250ms) ++old;
   }
-  EXPECT_EQ(old, 9) << "its clock was set";
+  EXPECT_EQ(old, 9) << "the sender's clock was set";
 }
 
 TEST(Ros2Transit, ABacklogOfALongSilenceIsNoClockThatWasSet) {
@@ -133,7 +133,7 @@ TEST(Ros2Transit, IsKnownOfTheFirstSampleWhereThereIsOneClock) {
     const auto now = 100s + i * 100ms;
     EXPECT_EQ(transit.delay(now - 300ms, now), 300ms) << i;
   }
-  EXPECT_EQ(transit.delay(500s, 90s), 0s) << "it was set back meanwhile";
+  EXPECT_EQ(transit.delay(500s, 90s), 0s) << "the sender's clock was set back meanwhile";
 }
 
 TEST(Ros2Transit, BelievesInAClockThatIsSetAfterTenSeconds) {
@@ -144,7 +144,7 @@ TEST(Ros2Transit, BelievesInAClockThatIsSetAfterTenSeconds) {
     EXPECT_GT(transit.delay(now - 5s, now), 4s) << i;
   }
   EXPECT_EQ(transit.delay(105s + 100ms, 110s + 100ms), 0s);
-  EXPECT_EQ(transit.delay(500s, 90s), 0s) << "ours was set back";
+  EXPECT_EQ(transit.delay(500s, 90s), 0s) << "our clock was set back";
 }
 
 TEST(Ros2Outbox, LosesTheOldestAndWaitsForNobody) {
@@ -180,12 +180,12 @@ TEST(Ros2Outbox, TriesAgainForAWhileWhileTheOthersGoOn) {
     if (last) given_up.set_value(jobs);
     return last;
   });
-  EXPECT_GE(given_up.get_future().get(), 1) << "between two tries";
+  EXPECT_GE(given_up.get_future().get(), 1) << "other jobs must run between two tries";
   outbox.push_attempt([&](bool) { return ++tries > 0; });
   std::promise<void> end;
   outbox.push([&] { end.set_value(); });
   end.get_future().wait();
-  EXPECT_EQ(tries, jobs + 1) << "who has succeeded is not tried again";
+  EXPECT_EQ(tries, jobs + 1) << "a job that has succeeded must not be tried again";
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What comes from the graph, as the loop is handed it: by Cyclone DDS within this process.
+// Samples of the graph as the loop receives them, sent by Cyclone DDS within this process.
 #include "tools/r4/ros2/graph/inbox.hpp"
 
 #include <gtest/gtest.h>
@@ -66,7 +66,7 @@ class InboxTest : public ::testing::Test {
     const BoolMessage message{1};
     ASSERT_EQ(dds_write(writer.get(), &message), 0);
   }
-  // Lets the loop run until that is true.
+  // Runs the loop until is_so() is true.
   bool until(const std::function<bool()>& is_so) {
     const auto deadline = Clock::now() + 10s;
     while (!is_so() && Clock::now() < deadline) {
@@ -117,12 +117,13 @@ TEST_F(InboxTest, TellsWhoWroteASample) {
   EXPECT_EQ(writers[0], id_of(writer.get()));
 }
 
-// However many stops there were, what comes behind them waits for one turn, and not for one for each of them.
+// Even after many stops, a later sample waits for one turn of the loop only, not for one turn per
+// stop.
 TEST_F(InboxTest, IsNotHeldUpByStops) {
   const Entity stops = writer_of<BoolMessage>("rt/stop");
   const Entity duties = writer_of<Float32Message>("rt/duty");
   ASSERT_TRUE(until([&] { return is_matched(stops) && has("left 1"); }));
-  constexpr int many = 500;  // 5 s, if each took a turn
+  constexpr int many = 500;  // 5 s if each needed a turn
   for (int i = 0; i < many; ++i) {
     taken.clear();
     write_stop(stops);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is wrong with readers and writers of others, as it is announced. And a graph of many nodes.
+// Faults of other programs' readers and writers, found in their announcements. Also a graph of many
+// nodes.
 #include "tools/r4/ros2/discovery/mismatches.hpp"
 
 #include <gtest/gtest.h>
@@ -42,7 +43,7 @@ TEST(GraphMismatch, NamesAPublisherOfAnotherType) {
             "not heard; publish geometry_msgs/msg/Twist");
   EXPECT_EQ(wrong->weight, Mismatch::Weight::lost);
   EXPECT_FALSE(mismatch_of(own, other_of(EndpointKind::reader, "anything")))
-      << "it reads what others command";
+      << "a subscriber to a command topic must not be reported";
 }
 
 TEST(GraphMismatch, NamesASubscriberOfAnotherType) {
@@ -144,7 +145,7 @@ TEST(GraphMismatch, IsWithdrawnWhenItHasGone) {
   EXPECT_EQ(told, (std::vector<std::string>{"cmd_vel: a pub", "relay1/command", "none"}));
 }
 
-// Cyclone DDS can make 16383 things for a participant.
+// Cyclone DDS can make 16383 entities for a participant.
 TEST(GraphOfManyNodes, HasRoomForAllTopicsOfEach) {
   Graph graph(own_test_domain());
   for (int n = 0; n < 80; ++n) {

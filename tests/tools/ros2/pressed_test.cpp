@@ -14,8 +14,8 @@ TEST(Ros2Pressed, CountsOnceUntilItIsLetGo) {
   Pressed pressed;
   EXPECT_FALSE(pressed.on(number(1), false));
   EXPECT_TRUE(pressed.on(number(1), true));
-  EXPECT_FALSE(pressed.on(number(1), true)) << "it repeats itself";
-  EXPECT_TRUE(pressed.on(number(2), true)) << "somebody else";
+  EXPECT_FALSE(pressed.on(number(1), true)) << "a repeated message is not a new press";
+  EXPECT_TRUE(pressed.on(number(2), true)) << "another publisher has pressed";
   EXPECT_FALSE(pressed.on(number(1), false));
   EXPECT_TRUE(pressed.on(number(1), true));
 }
@@ -24,10 +24,10 @@ TEST(Ros2Pressed, ForgetsWhomItHasNotHeardForLongest) {
   Pressed pressed;
   for (int n = 0; n < static_cast<int>(Pressed::most); ++n)
     EXPECT_TRUE(pressed.on(number(n), true));
-  EXPECT_FALSE(pressed.on(number(0), true)) << "the newest now";
+  EXPECT_FALSE(pressed.on(number(0), true)) << "this publisher is the newest";
   EXPECT_TRUE(pressed.on(number(1000), true));
   EXPECT_FALSE(pressed.on(number(0), true));
-  EXPECT_TRUE(pressed.on(number(1), true)) << "forgotten";
+  EXPECT_TRUE(pressed.on(number(1), true)) << "the oldest publisher must be forgotten";
 }
 
 }  // namespace

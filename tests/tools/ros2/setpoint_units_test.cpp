@@ -43,7 +43,7 @@ TEST(Ros2Units, AServoTurnsByItsCalibration) {
   EXPECT_EQ(to_us(usual, 0), 1500);
   EXPECT_EQ(to_us(usual, M_PI / 2), 2500);
   EXPECT_EQ(to_us(usual, -M_PI / 2), 500);
-  EXPECT_EQ(to_us(usual, static_cast<float>(M_PI / 2)), 2500) << "as a topic carries it";
+  EXPECT_EQ(to_us(usual, static_cast<float>(M_PI / 2)), 2500) << "a topic carries a float";
   for (const double wrong : {1.6, not_a_number, infinite, std::numeric_limits<double>::max()}) {
     EXPECT_FALSE(to_pulse(usual, wrong)) << wrong;
   }
@@ -70,7 +70,7 @@ TEST(Ros2Units, ATwistDrivesTwoWheelsAndKeepsTheirRatio) {
   EXPECT_EQ(to_text(*drive.setpoints(1, 0)), "O:2048,1,1;O:2048,0,2");
   EXPECT_EQ(to_text(*drive.setpoints(0, 2)), "O:1024,0,1;O:1024,0,2");
   EXPECT_EQ(to_text(*drive.setpoints(4, 0)), "O:4095,1,1;O:4095,0,2");
-  EXPECT_EQ(to_text(*drive.setpoints(4, 8)), "O:1365,1,1;O:4095,0,2") << "1 to 3, as wanted";
+  EXPECT_EQ(to_text(*drive.setpoints(4, 8)), "O:1365,1,1;O:4095,0,2") << "the ratio stays 1 to 3";
   EXPECT_FALSE(drive.setpoints(not_a_number, 0));
   EXPECT_FALSE(drive.setpoints(0, infinite));
   EXPECT_EQ(to_text(*differential_drive("dhb12_3,dhb12_4", 1, 1).setpoints(0.5, 0)),
@@ -121,9 +121,9 @@ TEST(StampOfACommand, IsOldBehindTheDeadlineAndSaysNothingIfItIsZero) {
   const WallTime now(1000s);
   EXPECT_FALSE(is_outdated(stamp_time(999, 500'000'000), now, 500ms));
   EXPECT_TRUE(is_outdated(stamp_time(999, 499'999'999), now, 500ms));
-  EXPECT_FALSE(is_outdated(stamp_time(1001, 0), now, 500ms)) << "a clock that is ahead";
+  EXPECT_FALSE(is_outdated(stamp_time(1001, 0), now, 500ms)) << "the sender's clock is ahead";
   EXPECT_FALSE(is_outdated(stamp_time(0, 0), now, 500ms));
-  EXPECT_FALSE(is_outdated(stamp_time(1, 0), now, 0ms)) << "no deadline";
+  EXPECT_FALSE(is_outdated(stamp_time(1, 0), now, 0ms)) << "0 ms means no deadline";
 }
 
 TEST(PositionOfACounter, BeginsWithTheCountAndFollowsItBothWays) {
@@ -131,7 +131,7 @@ TEST(PositionOfACounter, BeginsWithTheCountAndFollowsItBothWays) {
   EXPECT_EQ(position.advance(-5, 7), -5);
   EXPECT_EQ(position.advance(10, 7), 10);
   EXPECT_EQ(position.advance(-20, 7), -20);
-  EXPECT_EQ(position.advance(3, 8), -20) << "the board has restarted";
+  EXPECT_EQ(position.advance(3, 8), -20) << "a restart of the board must not move the position";
   EXPECT_EQ(position.advance(2, 8), -21);
 }
 

@@ -18,7 +18,7 @@
 namespace r4::tool {
 namespace {
 
-// Standard output is a pipe, as long as this lives.
+// Standard output is a pipe while this object lives.
 class PipedOutput {
  public:
   explicit PipedOutput(int flags = 0) {
@@ -34,7 +34,7 @@ class PipedOutput {
   PipedOutput(const PipedOutput&) = delete;
   PipedOutput& operator=(const PipedOutput&) = delete;
 
-  // All as far as `end`.
+  // Reads everything up to `end`.
   std::string read_to(std::string_view end) const {
     std::string text;
     std::array<char, 4096> buffer;
@@ -83,7 +83,7 @@ void print_to_nobody() {
   PipedOutput pipe;
   pipe.close_reader();
   print_text("the board has stopped\n");
-  print_text("more\n");  // what failed once is not tried again, and stops nobody
+  print_text("more\n");  // after one failure, output is not tried again and does not throw
   try {
     require_output();
   } catch (const Error& error) {

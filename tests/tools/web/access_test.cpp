@@ -66,7 +66,7 @@ TEST(WebAccess, ReadsTheNameByWhichItIsAsked) {
   }
 }
 
-// A proxy in front passes the name on that the browser asked for, or asks by the address that it was given.
+// A proxy passes on the name that the browser asked for, or uses the address that it was given.
 TEST(WebAccess, ServesThePagesOfTheNamesThatItWasGiven) {
   const Access access("127.0.0.1", {"robot.example", "lab.example:8443"}, "secret", {});
   for (const char* host :

@@ -38,7 +38,7 @@ TEST(WebClientQueue, ForgetsStatesThatAreOldAndTellsHowMany) {
     EXPECT_TRUE(
         queue.push(message_of("state " + std::to_string(i), Kind::state), begin + i * 100ms));
   }
-  EXPECT_EQ(popped(queue), "state 7");  // 200 ms older than the newest
+  EXPECT_EQ(popped(queue), "state 7");  // 200 ms older than the newest state
   EXPECT_EQ(queue.take_lost(), 7U);
   EXPECT_EQ(queue.take_lost(), 0U);
 }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How long an emergency stop takes through a bridge from UDP to a CAN bus that is full: a board says states as fast as
-// the bus carries them, each of which the bridge passes on, and a host commands meanwhile.
+// How long an emergency stop takes through a bridge from UDP to a full CAN bus. A board sends
+// states as fast as the bus carries them, and the bridge passes on each of them. Meanwhile a host
+// sends commands.
 //
-// The bridge, its carriers, UDP and the loop are the real ones; the bus is exact to the bit, and its time stands still
-// while the bridge does something.
+// The bridge, its carriers, UDP and the loop are real. The bus is exact to the bit; its time stands
+// still while the bridge works.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -30,9 +31,9 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::uint8_t number = 3;
 constexpr std::uint64_t ms_ns = 1000000;
-constexpr std::chrono::seconds patience{60};  // of the machine
+constexpr std::chrono::seconds patience{60};  // for a slow machine
 
-// Says a state after the other, and takes what it is told.
+// Sends one state after the other, and counts the datagrams that it receives.
 class TalkingBoard {
  public:
   explicit TalkingBoard(CanBusModel& bus) : bus_(bus), node_(CanEnd::board, number, false) {
@@ -56,7 +57,7 @@ class TalkingBoard {
       node_.begin(Text(state()), bus_.now_us());
       ++said;
     }
-    // A transfer's frames are one behind the other.
+    // The frames of a transfer come one after the other.
     CanFrame frame{};
     while (bus_.waiting(controller_) < 1 && node_.offer(bus_.now_us(), frame)) {
       bus_.send(controller_, frame);
@@ -75,7 +76,7 @@ class TalkingBoard {
   int controller_ = 0;
 };
 
-// The bus, the bridge to it, and a socket from which hosts send.
+// The bus, the bridge to the bus, and a socket of a host.
 class BridgeToAFullBus {
  public:
   explicit BridgeToAFullBus(const ControllerOptions& options) : controller(bus, options) {
@@ -101,13 +102,13 @@ class BridgeToAFullBus {
     const auto* const to = reinterpret_cast<const sockaddr*>(&to_);
     ::sendto(socket_.get(), bytes.data(), bytes.size(), 0, to, sizeof to_);
   }
-  // The bridge does all that there is to do; the bus's time stands still.
+  // The bridge does all pending work; the time of the bus stands still.
   void settle() {
     pair->tick();
     do controller.pump();
     while (io.poll() != 0);
   }
-  // The bus goes on to then, and the bridge does what follows at the time at which it follows.
+  // The bus runs until then_ns. The bridge reacts to each event at the time of that event.
   void run_until(std::uint64_t then_ns) {
     while (bus.next_ns() <= then_ns) {
       bus.run_until(bus.next_ns());
@@ -119,7 +120,8 @@ class BridgeToAFullBus {
   testing::AssertionResult comes(Predicate true_now) {
     const Clock::time_point give_up = Clock::now() + patience;
     while (!true_now()) {
-      if (Clock::now() > give_up) return testing::AssertionFailure() << "it does not come";
+      if (Clock::now() > give_up)
+        return testing::AssertionFailure() << "the awaited event does not come";
       run_until(bus.now_ns() + ms_ns);
     }
     return testing::AssertionSuccess();
@@ -143,13 +145,14 @@ bool is_bare_stop(const CanFrame& frame) {
   return !frame.extended && frame.id == emergency_stop_id;
 }
 
-// The frame in progress ends, then come `frames_between` of the bridge's own at most, and the stop.
+// The stop comes after the frame in progress and at most `frames_between` other frames of the
+// bridge.
 void expect_stops(const ControllerOptions& options, std::uint64_t frames_between) {
   constexpr std::uint64_t stops = 400;
   BridgeToAFullBus world(options);
   ASSERT_TRUE(world.comes([&] {
     world.say("H:ROS2-R4");
-    return world.board.told != 0;  // the bridge has listened before it spoke
+    return world.board.told != 0;  // a host is heard, so the bridge listens on the bus
   }));
   simulation::Random random(2);
   std::uint64_t max_ns = 0;
@@ -162,7 +165,7 @@ void expect_stops(const ControllerOptions& options, std::uint64_t frames_between
   for (std::uint64_t i = 0; i < stops; ++i) {
     world.say("H:ROS2-R4");
     world.say("S:1500,1");
-    // At any time, or while there is more to send than the controller takes.
+    // Half of the stops come at any time, half while more frames wait than the controller takes.
     const bool at_any_time = i % 2 == 0;
     for (int frames = 0; frames < 100 && !at_any_time; ++frames) {
       if (world.controller.waiting() >= options.room) break;
@@ -205,11 +208,12 @@ void expect_stops(const ControllerOptions& options, std::uint64_t frames_between
       static_cast<int>(longest_us + own_us), static_cast<int>(max_between));
   EXPECT_EQ(status.hosts.from.stops, stops);
   EXPECT_LE(max_ns, (longest_us + own_us) * 1000);
-  EXPECT_GT(max_ns, (longest_us + own_us) * 1000 / 2) << "no stop met a frame in progress";
-  EXPECT_GT(full, stops / 4) << "the bridge had little to send";
+  EXPECT_GT(max_ns, (longest_us + own_us) * 1000 / 2)
+      << "no stop was sent while a frame was in progress";
+  EXPECT_GT(full, stops / 4) << "the controller was rarely full";
   EXPECT_GT(static_cast<double>(world.bus.busy_ns()),
             0.99 * static_cast<double>(world.bus.now_ns()));
-  // A transfer may be given up while the machine stands still.
+  // Transfers may be given up while the machine stands still.
   EXPECT_GT(passed, said / 2);
   EXPECT_GT(said, (world.bus.now_ns() - began_ns) / (10 * ms_ns));
 }

@@ -20,7 +20,7 @@ static_assert(std::is_trivially_copyable_v<CanFrame>);
 
 ModelledController* interface = nullptr;
 
-// True: there was one, or there was room for it.
+// take: true if there was a frame. put: true if there was room for the frame.
 bool take(int socket, CanFrame& frame) {
   return ::recv(socket, &frame, sizeof frame, MSG_DONTWAIT) == sizeof frame;
 }
@@ -28,7 +28,7 @@ bool put(int socket, const CanFrame& frame) {
   return ::send(socket, &frame, sizeof frame, MSG_DONTWAIT | MSG_NOSIGNAL) == sizeof frame;
 }
 
-// A program's end and the kernel's, with the least buffer that there is from the one to the other.
+// The end of the program and the end of the kernel, with the smallest possible buffer between them.
 std::pair<FileDescriptor, FileDescriptor> make_socket() {
   std::array<int, 2> ends{};
   const int least = 1;
@@ -81,7 +81,7 @@ Problem CanSocket::problem(int error) const {
 }
 
 void CanSocket::open() {
-  static_cast<void>(fd_);  // the model does not tell classic CAN from CAN FD
+  static_cast<void>(fd_);  // the model does not distinguish classic CAN from CAN FD
   auto [first, first_of_kernel] = test::make_socket();
   auto [rest, rest_of_kernel] = test::make_socket();
   first_ = std::move(first);

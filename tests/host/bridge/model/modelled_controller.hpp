@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CanSocket on a bus that is exact to the bit: this program has it in place of the kernel's
+// CanSocket on a bus that is exact to the bit. In this program it replaces the kernel's socket
 // (transports/can/can_socket.cpp).
 //
-//     a socket for what is urgent, one for the rest, few frames each --> the controller --> the bus
+//     a socket for urgent frames, a socket for the other frames --> the controller --> the bus
 //
-// As the kernel's, a socket takes no more than its buffer holds, and what is urgent gets to the controller first.
+// As in the kernel, a socket takes no more frames than its small buffer holds, and urgent frames
+// reach the controller first.
 #pragma once
 
 #include <cstddef>
@@ -16,11 +17,11 @@ namespace r4::test {
 
 struct ControllerOptions {
   CanQueue queue = CanQueue::mailboxes;
-  std::size_t room = 3;  // for the frames of the second socket
-  std::size_t kept = 1;  // besides, for those of the first
+  std::size_t room = 3;  // for frames of the second socket
+  std::size_t kept = 1;  // additional room, only for frames of the first socket
 };
 
-// The one interface that there is, whatever its name.
+// The only CAN interface, whatever its name.
 class ModelledController {
  public:
   ModelledController(CanBusModel& bus, const ControllerOptions& options);
@@ -28,9 +29,9 @@ class ModelledController {
   ModelledController(const ModelledController&) = delete;
   ModelledController& operator=(const ModelledController&) = delete;
 
-  // A program has opened it: the ends of its sockets that are the kernel's.
+  // A program has opened the interface. The parameters are the kernel's ends of its sockets.
   void connect(FileDescriptor first, FileDescriptor rest);
-  // Takes what the sockets have and the controller has room for.
+  // Moves frames from the sockets to the controller while the controller has room.
   void pump();
   std::size_t waiting() const { return bus_.waiting(node_); }
   const ControllerOptions& options() const { return options_; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How the stops of a program get to a CAN bus: which of them are one, and how each is confirmed.
-// The carriers and the loop are the real ones, the bus is exact to the bit.
+// How the stops of a program reach a CAN bus: which stops are merged into one, and how each is
+// confirmed. The carriers and the loop are real, and the bus is exact to the bit.
 #include <gtest/gtest.h>
 
 #include <asio/io_context.hpp>
@@ -22,7 +22,7 @@ namespace {
 
 using Texts = std::vector<std::string>;
 
-// The hosts of the boards 3 and 4 in one program, and what is said on their bus.
+// The hosts of the boards 3 and 4 in one program, and the frames on their bus.
 class ProgramOnABus : public testing::Test, private Carrier::Handler {
  protected:
   ProgramOnABus() {
@@ -39,7 +39,7 @@ class ProgramOnABus : public testing::Test, private Carrier::Handler {
     const std::string bytes = with_crc("E:STOP;PNum:" + std::to_string(pnum) + ";");
     EXPECT_EQ(hosts_[host]->send(bytes, Priority::stop), SendResult::sent);
   }
-  // The loop has its turns, and the bus carries what there is.
+  // Runs the loop and the bus until nothing is pending.
   void settle() {
     for (int i = 0; i < 4; ++i) {
       io_.restart();
@@ -52,7 +52,7 @@ class ProgramOnABus : public testing::Test, private Carrier::Handler {
     io_.restart();
     io_.run_for(time);
   }
-  // The stops on the bus since this was asked last: "bare", or "numbered".
+  // The stops on the bus since the last call: "bare", or "numbered".
   Texts stops() {
     settle();
     Texts stops;
@@ -63,7 +63,7 @@ class ProgramOnABus : public testing::Test, private Carrier::Handler {
     }
     return stops;
   }
-  // The board says that it has obeyed the stop of the number that came last; what its host hears.
+  // The board reports that it has obeyed the last stop. Returns the datagrams that its host hears.
   Texts confirmed_by(std::uint8_t board) {
     const std::string says = heartbeat(number_);
     CanNode node(CanEnd::board, board, false);
@@ -114,14 +114,15 @@ TEST_F(ProgramOnABus, AStopOfALaterTurnIsAnotherOne) {
   EXPECT_EQ(stops(), (Texts{"bare", "numbered"}));
   EXPECT_NE(number_, first);
   EXPECT_EQ(confirmed_by(4), Texts{heartbeat(2)});
-  EXPECT_EQ(confirmed_by(3), Texts{heartbeat(number_)}) << "this is not the stop of its host";
+  EXPECT_EQ(confirmed_by(3), Texts{heartbeat(number_)})
+      << "the report names the stop of another host";
 }
 
 TEST_F(ProgramOnABus, TwoStopsOfOneBoardAreTwoAlsoInOneTurn) {
   stop(0, 1);
   stop(0, 2);
   EXPECT_EQ(stops(), (Texts{"bare", "bare", "numbered", "numbered"}))
-      << "in the order of their ids";
+      << "the stops come in the order of their ids";
   EXPECT_EQ(confirmed_by(3), Texts{heartbeat(2)});
 }
 
