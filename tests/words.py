@@ -24,7 +24,7 @@ TEXT = re.compile(r'"((?:[^"\\\n]|\\.)*)"|\'((?:[^\'\\\n]|\\.)*)\'')
 def sources(root):
     for room in ROOMS:
         for path in sorted((root / room).rglob('*')):
-            if path.suffix in COMMENT and 'node_modules' not in path.parts:
+            if path.suffix in COMMENT and 'node_modules' not in path.parts and path != pathlib.Path(__file__).resolve():
                 yield path
 
 
