@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tools/m7 runs in virtual time or only measures: the tests that run on the M7 itself, instructions and sizes."""
+"""The parts of tools/m7 that run in virtual time or only measure: tests on the M7 itself, instructions and sizes."""
 import importlib.machinery
 import importlib.util
 import json
@@ -25,7 +25,7 @@ def test_what_the_protocol_costs_is_what_the_table_says():
     result = m7('--instructions')
     print(result.stdout)
     assert result.returncode == 0, result
-    assert m7('--instructions').stdout == result.stdout  # to the last instruction
+    assert m7('--instructions').stdout == result.stdout  # exactly the same number of instructions
 
 
 @pytest.fixture(name='tool')
