@@ -388,7 +388,7 @@ def test_garbage_on_every_id_of_ours_harms_nobody(board):
 
 
 def listed_interfaces(is_told):
-    """Repeats r4 list until `is_told` accepts the boards at vcan0: it waits at most 1.3 s, and this machine may be slower."""
+    """Repeats r4 list until `is_told` is true for each board at vcan0: it waits 1.3 s, and the guest may be slower."""
     deadline = time.monotonic() + PATIENCE_S
     while True:
         listed = {each.get('interface'): each for each in objects(run('list', '--json', timeout=60).stdout)}

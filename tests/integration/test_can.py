@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The link over CAN: boards and hosts as processes on buses; r4 doctor with interfaces that are set up wrong; r4
-against a host and a board on python-can; buses that lose frames; faults of a bus, of its controllers and of the programs at its
-ends; a board with two buses; r4 bridge; our ISO-TP engine and the code that reads SocketCAN (can_test); the pytest
-plugin; tools/with-can on a kernel that has CAN.
+against a host and a board on python-can; buses that lose frames; faults of a bus, of its controllers and of the
+programs at its ends; a board with two buses; r4 bridge; our ISO-TP engine and the code that reads SocketCAN
+(can_test); the pytest plugin; tools/with-can on a kernel that has CAN.
 
 All tests run in one guest, because its start takes ten seconds. Under a sanitizer only a part of them runs:
 the other tests assert times that a slow program in a guest does not keep.

@@ -213,7 +213,7 @@ def test_commands_by_mouse_and_by_keyboard_are_confirmed_by_the_board(browser):
             page.focus('[data-channel=servo2] input[type=range]')
             page.press('PageUp')
         drives(page, key_up, 'Number(document.querySelector("[data-channel=servo2] .reported").textContent) > 0')
-        drives(page, lambda: page.click(f'{OSMC1} .choice'), is_confirmed('osmc1'))  # the motor stops before it reverses
+        drives(page, lambda: page.click(f'{OSMC1} .choice'), is_confirmed('osmc1'))  # it stops before it reverses
         board.executed('O:0,0,1')
 
         def switch_off():

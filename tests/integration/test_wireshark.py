@@ -97,7 +97,7 @@ def test_the_papers_capture_is_shown_field_by_field(tmp_path):
     assert shown[7] == ['8', 'board', 'state', '24.28', '358', '-100', '7440', '79150', '', '7', '0.010000000',
                         'the state shows it']
     assert shown[13][1:3] == ['board', 'heartbeat'] and shown[15][1:3] == ['host', 'heartbeat']
-    assert [row[9] for row in shown if row[9]] == [row[0] for row in shown if row[2] == 'command'], 'one is not confirmed'
+    assert [row[9] for row in shown if row[9]] == [row[0] for row in shown if row[2] == 'command'], 'unconfirmed'
 
 
 def test_a_dissector_that_is_found_twice_is_loaded_once(tmp_path):
