@@ -12,7 +12,7 @@ from running import OFFLINE, ROOT, run
 
 
 def test_types_are_strict():
-    """One run for all files, because most of the time goes into the types of the standard library, which mypy caches."""
+    """One run for all files, because the types of the standard library take most of the time, and mypy caches them."""
     package, examples = ROOT / 'host/python/r4link', ROOT / 'docs/examples'
     sources = [*package.glob('*.py'), package / '_core.pyi', *(examples / 'python').glob('*.py'),
                examples / 'openscout/openscout.py']

@@ -30,7 +30,7 @@ def is_overload(function):
 
 
 def functions_of(path):
-    """Yields each public function with the docstrings that may describe its arguments: its own and that of its class."""
+    """Yields each public function with the docstrings that may describe its arguments: its own and its class's."""
     for node in ast.parse(path.read_text()).body:
         for each in node.body if isinstance(node, ast.ClassDef) else [node]:
             if isinstance(each, (ast.FunctionDef, ast.AsyncFunctionDef)) and not (
