@@ -30,7 +30,7 @@ def test_what_the_protocol_costs_is_what_the_table_says():
 
 @pytest.fixture(name='tool')
 def tool_as_a_module(tmp_path):
-    """tools/m7 with a table of its own: 1000 instructions, and 2000 with a bar of 2050."""
+    """tools/m7 with a separate table: 1000 instructions, and 2000 with a bar of 2050."""
     loader = importlib.machinery.SourceFileLoader('m7_tool', M7)
     tool = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
     loader.exec_module(tool)
