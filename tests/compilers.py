@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compiles the product with other compilers than the default one: tests/compilers.py FOLDER [JOBS] [COMPILER...]
 
-All warnings are errors, and no code is generated: what only an optimizer sees is left to the build. Without a COMPILER,
-such as g++-11, the oldest GCC that is installed reads all sources, and the newest GCC and the oldest clang read the public
+All warnings are errors. No code is generated, so warnings of the optimizer come only in the build. Without a COMPILER
+(such as g++-11) the oldest installed GCC reads all sources, and the newest GCC and the oldest clang read the public
 headers. tools/test builds the tree with the default compiler and with the newest clang. FOLDER is where each compiler
-gets a configured build of its own.
+gets a separate configured build.
 """
 import concurrent.futures
 import json
@@ -19,11 +19,11 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 OPTIONS = ['-DR4_TESTS=OFF', '-DR4_UNITY=ON', '-DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON']
-OLDEST = {'g++': 11, 'clang++': 14}  # that are supported
+OLDEST = {'g++': 11, 'clang++': 14}  # the oldest supported versions
 
 
 def version_of(compiler):
-    """(kind, major version) of a command."""
+    """Returns (kind, major version) of a command."""
     text = subprocess.run([compiler, '--version'], capture_output=True, text=True, check=True).stdout
     return ('clang++' if 'clang' in text else 'g++', int(re.search(r' (\d+)\.\d+\.\d+', text)[1]))
 
@@ -50,7 +50,7 @@ def chosen():
 
 
 def run(command, folder=ROOT):
-    """What a command says if it fails, else nothing."""
+    """Returns the output of a command if it fails, else an empty text."""
     ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     return f'{shlex.join(map(str, command))}\n{ended.stdout}{ended.stderr}' if ended.returncode else ''
 
@@ -64,7 +64,7 @@ def configured(compiler, build):
     for entry in json.loads((build / 'compile_commands.json').read_text()):
         command = shlex.split(entry['command'])
         file = pathlib.Path(entry['directory'], entry['file'])
-        if file.suffix in ('.cpp', '.cxx') and file.exists():  # not page_content.cpp, which is data
+        if file.suffix in ('.cpp', '.cxx') and file.exists():  # except page_content.cpp, which is data
             at = command.index('-o')
             yield entry['directory'], [*command[:at], *command[at + 2:], '-Werror', '-fsyntax-only']
 

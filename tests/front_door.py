@@ -1,10 +1,10 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a visitor meets first is true. Usage: front_door.py TREE
+"""Checks the first things a visitor meets. Usage: front_door.py TREE
 
-Workflows, actions and issue forms are YAML of the shape that their reader wants; the tools that they and the pages at
-the top name are there and know the options; the changelog and the packages are of this version; the site can be made,
-so that no link leads nowhere and Doxygen understands the headers.
+Workflows, actions and issue forms are valid for GitHub. The tools that they and the pages at the top name exist, and
+know the options. The changelog and the packages have this version. The site can be made: every link has a target, and
+Doxygen understands the headers.
 """
 import pathlib
 import re
@@ -15,7 +15,7 @@ import tempfile
 import yaml
 
 TOOL = re.compile(r'(?<![\w/.])((?:tools|\.ci)/[\w-]+)(?![\w/])([^`|;&\n]*)')
-RUNNERS = {'tools/on', 'tools/with-can'}  # they run a command, which has options of its own
+RUNNERS = {'tools/on', 'tools/with-can'}  # they run a command, which has its own options
 FIELDS = {'dropdown', 'textarea', 'input', 'checkboxes', 'markdown'}
 
 
@@ -32,7 +32,7 @@ def workflow_faults(content):
                 yield f'job {name}: a step either runs or uses something'
         used = set(re.findall(r'matrix\.([\w-]+)', str(job)))
         rows = job.get('strategy', {}).get('matrix', {})
-        known = set(rows).union(*rows.get('include', ()))  # a row may lack what is empty then
+        known = set(rows).union(*rows.get('include', ()))  # a row without a key has an empty value
         if not used <= known:
             yield f'job {name}: its matrix has no {", ".join(sorted(used - known))}'
         if job.get('needs') and job['needs'] not in content['jobs']:

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fails when a source includes what its room may not. Usage: layers.py TREE
+"""Fails when a source includes a file that its room (folder) may not include. Usage: layers.py TREE
 
 tools > host > transports > protocol, tools > firmware > transports/framing > protocol, and within each of them
-the rooms in the order of ALLOWED; host/standard_registry.cpp alone may include firmware/ports/sim. What is
-public, include/r4link, is below all of them. The portable rooms (protocol, transports/framing, firmware without
-its ports, the chip models), and what they include of what is public, include nothing a C++14 board lacks.
+the rooms in the order of ALLOWED; only host/standard_registry.cpp may include firmware/ports/sim. The public
+headers, include/r4link, are below all of them. The portable rooms (protocol, transports/framing, firmware without
+its ports, the chip models), and the public headers that they include, use only headers that a C++14 board has.
 A room holds at most 20 sources, a source at most 430 lines.
 """
 import collections
@@ -27,11 +27,11 @@ HOST = TRANSPORTS | {'host', 'host/arming', 'host/async', 'host/blocking', 'host
                      'host/discovery', 'host/link', 'host/measurement', 'host/paths', 'host/recording', 'host/replay', 'host/session', 'host/uart'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = PUBLIC | {'tools/r4/boards', 'tools/r4/shell'}
-# Tools use the public interface alone. These rooms may look below it: the analysis of frames (bus) and the simulated
-# board's own room (sim). Single files: EXCEPTIONS.
+# Tools use only the public interface. Two rooms may include internal headers: the analysis of frames (bus) and the
+# simulated board (sim). For single files see EXCEPTIONS.
 BELOW = SIMULATED | SHELL
 FORMATS = {'tools/r4/formats', 'tools/r4/formats/mcap', 'tools/r4/formats/packets'}
-# room: the rooms it may include besides itself
+# room: the other rooms that it may include
 ALLOWED = {
     'include/r4link': PUBLIC,
     'include/r4link/can': {'include/r4link', 'include/r4link/discovery', 'include/r4link/messages'},
@@ -118,32 +118,32 @@ ALLOWED = {
     'tools/r4/web': SHELL | FORMATS | {'tools/r4/devices', 'tools/r4/watch', 'tools/r4/web/server'},
     'tools/r4': SHELL | {'tools/r4/ros2'},
 }
-# What a file may include although its room may not.
+# file: the rooms that it may include although its own room may not
 EXCEPTIONS = {
     'transports/registry.cpp': CARRIERS,
     'host/standard_registry.cpp': {'firmware/ports/sim'},
-    # Every part of a datagram, as the wire has it.
+    # Prints every part of a datagram as it is sent.
     'tools/r4/watch/decode.cpp': BELOW,
-    # It makes the frames of the ends of a CAN bus, flow control included, by the node of both.
+    # Makes the frames of both ends of a CAN bus, including flow control, with the node of each end.
     'tools/r4/formats/candump_log.cpp': {'transports', 'transports/framing/can'},
 }
-# What a room may not include although it is in a room that it may.
+# room: the files that it may not include although it may include their room
 FORBIDDEN = {room: {'transports/registry.hpp'} for room in CARRIERS}
 PORTABLE = (FIRMWARE - PUBLIC) | {'firmware/ports/sim/chips', 'firmware/ports/sim/devices'}
-# Those public headers that the board has, too.
+# The public headers that the board uses, too.
 PORTABLE_PUBLIC = {f'include/r4link/{name}.hpp' for name in (
     'can/can_bits', 'can/can_frame', 'can/can_ids', 'command', 'config', 'datagram', 'key', 'messages/datagram_writer',
     'messages/message', 'messages/packed_form', 'messages/packet_tracker', 'simulated_pins', 'state', 'tables/commands',
     'tables/settings', 'tables/state_fields', 'text', 'vocabulary')} | {'include/r4link/tables/board.def'}
-# No heap, no I/O, no clock, nothing GCC 7 in C++14 lacks; C headers in both spellings.
+# Without heap, I/O and clock, and available in GCC 7 with C++14; C headers in both spellings.
 PORTABLE_STANDARD = {
     'algorithm', 'array', 'atomic', 'cassert', 'climits', 'cmath', 'cstddef', 'cstdint', 'cstring',
     'initializer_list', 'iterator', 'limits', 'new', 'numeric', 'type_traits', 'utility',
     'limits.h', 'stddef.h', 'stdint.h', 'string.h',
 }
 PORTABLE_EXCEPTIONS = {
-    ('protocol/datagram/crc32.cpp', 'libdeflate.h'),  # only where R4_CRC32_LIBDEFLATE
-    ('protocol/datagram/grammar.cpp', 'emmintrin.h'),  # only where __SSE2__
+    ('protocol/datagram/crc32.cpp', 'libdeflate.h'),  # only with R4_CRC32_LIBDEFLATE
+    ('protocol/datagram/grammar.cpp', 'emmintrin.h'),  # only with __SSE2__
 }
 MOST_SOURCES = 20
 MOST_LINES = 430

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// main() of the test programs. Some tests set bounds to real time, as the promises that they test
-// do. A machine that stands still in the middle (a virtual one that is paused) breaks them all. A
-// thread that only looks at the clock tells: a failure during a standstill says nothing and is
-// repeated, one without counts. integration/repeat.py has a rule like it.
+// main() of the test programs. Some tests set bounds to real time, because they test promises about
+// real time. A machine that stands still (such as a paused virtual machine) breaks all bounds. A
+// thread that only reads the clock detects this. A failure during a standstill proves nothing, so the
+// test is repeated; any other failure counts. integration/repeat.py has the same rule.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -18,11 +18,11 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr milliseconds standstill{20};  // as exact as the promises are
+constexpr milliseconds standstill{20};  // the precision of the promises
 constexpr int most_runs = 3;
 constexpr const char* run_variable = "R4_TEST_RUN";
 
-// The longest that this process was kept from running since begin().
+// Measures the longest time that this process was kept from running since begin().
 class Watch {
  public:
   ~Watch() {
@@ -49,10 +49,10 @@ class Watch {
   std::thread thread_{[this] { look(); }};
 };
 
-// Which tests failed while the machine stood still, and whether another did.
+// Records which tests failed while the machine stood still, and whether any other test failed.
 class Failures final : public testing::EmptyTestEventListener {
  public:
-  std::string to_repeat;  // as --gtest_filter has it
+  std::string to_repeat;  // in the form of --gtest_filter
   bool count = false;
 
  private:
@@ -77,7 +77,7 @@ class Failures final : public testing::EmptyTestEventListener {
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
-  auto* const failures = new Failures;  // GoogleTest's from here on
+  auto* const failures = new Failures;  // GoogleTest takes ownership
   testing::UnitTest::GetInstance()->listeners().Append(failures);
   const int status = RUN_ALL_TESTS();
   const char* variable = std::getenv(run_variable);

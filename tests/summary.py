@@ -4,9 +4,9 @@
 
 Reads BUILD/results/*.xml (ctest), BUILD/[asan|tsan/]junit/*.xml (pytest, in place of the one
 ctest entry of the file) and BUILD/results/checks.txt. Names every failed and every skipped test;
-a skipped test counts as failed. Names what was repeated since the machine stood still (main.cpp,
-integration/repeat.py), and what failed beside other tests and was repeated alone (NAME.alone.xml, which counts
-in place of what NAME.xml has of it). The last line is `N passed, N failed`.
+a skipped test counts as failed. Names the tests that were repeated because the machine stood still
+(main.cpp, integration/repeat.py), and the tests that failed beside other tests and were repeated alone (the
+result in NAME.alone.xml replaces that in NAME.xml). The last line is `N passed, N failed`.
 """
 import pathlib
 import sys
@@ -27,7 +27,7 @@ def cases(file):
 
 
 def alone(report):
-    """Of a report: the outcomes of what was repeated with nothing beside it."""
+    """The outcomes of the tests of a report that were repeated alone."""
     again = report.with_suffix('.alone.xml')
     return dict(cases(again)) if again.exists() else {}
 
@@ -62,7 +62,7 @@ def outcomes(build):
             file = junit / f'{name}.xml'
             inner = list(cases(file)) if file.exists() else []
             if outcome == 'failed' and all(each == 'passed' for _, each in inner):
-                inner = []  # the process failed, whatever its tests say
+                inner = []  # the process failed although all its tests passed
             for each, its_outcome in [(f'{name}.{case}', o) for case, o in inner] or [(name, outcome)]:
                 yield f'{preset}: {each}', its_outcome
 

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """clang-tidy over the product's sources: tests/tidy.py BUILD [JOBS] [--all]
 
-Without --all: those in folders where something differs from origin/main or, on main itself, from 20 commits ago.
-BUILD is configured with -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DR4_UNITY=ON. What is one source for the compiler
-(cmake/layers.cmake) is one for clang-tidy, which then reads its headers once instead of a dozen times. Its files are
-written one behind the other, not included: the analyzer follows only what is in the file that it is given.
+Without --all: only sources in folders that differ from origin/main or, on main itself, from 20 commits ago.
+BUILD is configured with -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DR4_UNITY=ON. Files that are one source for the
+compiler (cmake/layers.cmake) are one source for clang-tidy, which then reads the headers once instead of a dozen times.
+Their texts are joined, not included, because the analyzer follows only code in the file that it is given.
 """
 import collections
 import concurrent.futures
@@ -17,19 +17,19 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 CHECKED = tuple(f"{ROOT / folder}/" for folder in ("protocol", "transports", "firmware", "host", "tools"))
-# clang 14 has coroutines, but neither libstdc++ nor Asio know that. The analyzer follows the paths of a function up to
-# a tenth of its usual limit: half the time, still thousands of them.
+# clang 14 has coroutines, but libstdc++ and Asio do not detect them. The analyzer gets a tenth of its usual limit of
+# paths per function: this takes half the time, and still follows thousands of paths.
 EXTRA = ["-D__cpp_impl_coroutine=201902L", "-DASIO_HAS_CO_AWAIT", "-DASIO_HAS_STD_COROUTINE",
          "-Xclang", "-analyzer-config", "-Xclang", "max-nodes=20000"]
 UNKNOWN_TO_CLANG = " -fno-gnu-unique"
 
 
 class Source:
-    """What clang-tidy is given: a file, or several as one."""
+    """An input of clang-tidy: one file, or several files joined."""
 
     def __init__(self, files):
         self.files = files
-        self.lines = []  # of the one: (file, number in it)
+        self.lines = []  # of a joined source: (file, number in it)
 
     def write(self, path):
         with path.open("w") as out:
@@ -39,7 +39,7 @@ class Source:
                     self.lines.append((file, number))
 
     def told(self, path, text):
-        """`text` with the places as they are in the tree."""
+        """Returns `text` with the places of the joined source replaced by those in the tree."""
         def place(match):
             file, number = self.lines[int(match[1]) - 1]
             return f"{file}:{number}:"
@@ -47,7 +47,7 @@ class Source:
 
 
 def files_of(entry):
-    """The files of the tree that an entry of the compilation database is of."""
+    """The files of the tree that an entry of the compilation database compiles."""
     path = pathlib.Path(entry["directory"], entry["file"])
     if path.parent.name != "Unity":
         return [path]
@@ -55,7 +55,7 @@ def files_of(entry):
 
 
 def sources_of(build):
-    """Writes what clang-tidy is to read to BUILD/tidy, with a database of its own; path -> Source."""
+    """Writes the inputs of clang-tidy and their compilation database to BUILD/tidy; returns path -> Source."""
     folder = build / "tidy"
     folder.mkdir(exist_ok=True)
     sources, database, seen = {}, [], set()
@@ -80,7 +80,7 @@ def sources_of(build):
 
 
 def changed_folders():
-    """The folders of the tree in which something changed, or None if that is not known."""
+    """The folders of the tree with changes, or None if the changes are unknown."""
     def git(*arguments):
         result = subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True)
         return result.stdout.strip() if result.returncode == 0 else None
@@ -92,14 +92,14 @@ def changed_folders():
 
 
 def included_twice(file):
-    """A check of clang-tidy that has no meaning where files follow each other. A .def gives other rows each time."""
+    """Replaces clang-tidy's check for duplicate includes, which fails on joined files. A .def may occur repeatedly."""
     lines = collections.Counter(line for line in file.read_text().splitlines()
                                 if line.startswith("#include") and not line.endswith('.def"'))
     return [f"{file}: {line} is there twice\n" for line, times in lines.items() if times > 1]
 
 
 def check(command, build, path, source):
-    """What clang-tidy says of it; empty: nothing."""
+    """Returns the findings of clang-tidy; empty if there are none."""
     arguments = [command, "-quiet", f"-p={build / 'tidy'}", f"--config-file={ROOT / '.clang-tidy'}"]
     if len(source.files) > 1:
         arguments.append("-checks=-readability-duplicate-include")
@@ -107,7 +107,7 @@ def check(command, build, path, source):
     result = subprocess.run([*arguments, str(path)], capture_output=True, text=True)
     told = source.told(path, result.stdout)
     if result.returncode != 0 and not told:
-        told = result.stderr  # it did not get so far
+        told = result.stderr  # clang-tidy itself failed
     return told + "".join(line for file in source.files if len(source.files) > 1 for line in included_twice(file))
 
 
@@ -122,7 +122,7 @@ def main():
     if changed is not None:
         sources = {path: source for path, source in sources.items()
                    if any(file.parent in changed for file in source.files)}
-    # What takes longest, first.
+    # The largest sources first, because they take longest.
     order = sorted(sources, key=lambda path: -sum(file.stat().st_size for file in sources[path].files))
     found = 0
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reason why a command cannot run: the thing, the reason, the fix."""
+"""An error that stops a command: the thing, the reason, the fix."""
 
-UNSUPPORTED = 6  # the exit code, as that of r4: what the kernel or the machine has not
+UNSUPPORTED = 6  # the exit code, as in r4: the kernel or the machine lacks something
 
 
 class Trouble(Exception):

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Drives the winch of docs/design/contributing.md on the simulated board: add_an_output.py compiles this with
-// the edit of that page. Prints what is wrong.
+// the edit of that page. Prints the faults.
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -27,7 +27,7 @@ void expect(bool condition, const std::string& what) {
 
 std::string str(Text text) { return {text.data(), text.size()}; }
 
-// A board with a host that stands beside it.
+// A simulated board with its host in the same program.
 class Host final : public firmware::Port {
  public:
   Host() : hardware_(model), application_(hardware_.hal(), firmware::Application::Config()) {
@@ -52,7 +52,7 @@ class Host final : public firmware::Port {
 
   std::size_t max_size() const override { return max_datagram; }
 
-  // With a heartbeat each 100 ms.
+  // Runs the board with a heartbeat every 100 ms.
   void run(int ms) {
     for (int i = 0; i < ms; ++i, ++now_ms_) {
       if (i % 100 == 0) receive("H:ROS2-R4");
@@ -67,8 +67,8 @@ class Host final : public firmware::Port {
 
   sim::BoardModel model{1};
   State state;
-  std::string text;     // of the newest state
-  std::string refusal;  // the newest
+  std::string text;     // the newest state
+  std::string refusal;  // the newest refusal
 
  private:
   void receive(Text field) {

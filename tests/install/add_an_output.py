@@ -10,7 +10,7 @@ import tempfile
 
 MOST_FILES = 3
 COPIED = ('docs', 'include', 'protocol', 'transports', 'firmware', 'host')
-# The board, the codec with its packed form, and the words of commands: no carriers, no links of a host.
+# The board, the codec with its packed form, and the words of commands, without transports and host links.
 PORTABLE = ('protocol/*/*.cpp', 'transports/framing/can/*pack*.cpp', 'firmware/*.cpp', 'firmware/application/*.cpp',
             'firmware/devices/*.cpp', 'firmware/drivers/*.cpp', 'firmware/ports/sim/chips/*.cpp',
             'firmware/ports/sim/devices/*.cpp', 'firmware/ports/sim/robot/*.cpp', 'firmware/ports/sim/simulated_hardware.cpp')
@@ -18,7 +18,7 @@ HOST = ('host/commands/command_*.cpp', 'host/commands/setpoints.cpp', 'transport
 
 
 def edits(page):
-    """Of the page's first block of diff: (path, old text, new text) of each hunk. Only what follows `@@` counts."""
+    """(path, old text, new text) of each hunk in the page's first diff. Only the lines after `@@` count."""
     path = None
     for part in re.split(r'^(?=\+\+\+ |@@)', re.search(r'^```diff\n(.*?)^```', page, re.M | re.S)[1], flags=re.M):
         head, _, body = part.partition('\n')

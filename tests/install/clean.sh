@@ -1,6 +1,6 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What FOLDER has for this system is installed, used and removed: the wheel, the .debs, or both. Usage: clean.sh FOLDER
+# Installs, uses and removes the files in FOLDER for this system: the wheel, the .debs, or both. Usage: clean.sh FOLDER
 # As root in a minimal system: tools/on debian13/arm64 --clean --see FOLDER tests/install/clean.sh FOLDER
 set -euo pipefail
 tree=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../..")
@@ -32,7 +32,7 @@ release=$(. /etc/os-release && printf '%s%s' "$ID" "$VERSION_ID")
 arch=$(dpkg --print-architecture)
 if compgen -G "$folder/*.deb" >/dev/null; then
   cp "$folder"/*+"$release"_"$arch".deb "$tree/tests/install/packages_inside.sh" "$work"
-  # A cross build makes no documentation, which is the same for each architecture.
+  # A cross build makes no documentation package: one package is for all architectures.
   find "$folder" -maxdepth 1 -name "r4link-doc_*+${release}_all.deb" -exec cp {} "$work" \;
   cp -r "$tree/docs/examples/drive" "$work"
   "$work/packages_inside.sh" --apt

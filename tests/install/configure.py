@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""ctest `configure`: what CMake says where a library is missing or too old. Usage: configure.py TREE"""
+"""ctest `configure`: the errors of CMake for a missing or too old library. Usage: configure.py TREE"""
 import json
 import pathlib
 import platform
@@ -18,7 +18,7 @@ def without(*packages):
 
 
 def configure(*options):
-    """(True if it works, what it said in one line)."""
+    """Returns (True if it works, its output in one line)."""
     with tempfile.TemporaryDirectory() as folder:
         ended = subprocess.run(['cmake', '-G', 'Ninja', '-S', TREE, '-B', folder, '-DR4_TESTS=OFF', *options],
                                capture_output=True, text=True, check=False)
@@ -55,7 +55,7 @@ def an_asio_that_is_too_old_is_named():
 
 
 def the_oldest_cmake_is_enough():
-    """By what the files ask for: this CMake is a newer one."""
+    """Checks the versions in the files, because the installed CMake is newer."""
     assert json.loads((TREE / 'CMakePresets.json').read_text())['version'] <= 3
     files = subprocess.run(['find', TREE, '-name', 'build', '-prune', '-o', '-name', 'CMakeLists.txt', '-print', '-o', '-name',
                             '*.cmake', '-print'], capture_output=True, text=True, check=True).stdout.split('\n')[:-1]

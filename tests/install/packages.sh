@@ -1,9 +1,9 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# The Debian packages are as they should be. Usage: packages.sh SOURCE BUILD
-# Packs what is built in BUILD, asks lintian, installs the packages into a copy of this system (its files, with an
-# overlay over them, which takes root or namespaces for users), uses them there (packages_inside.sh), and purges them:
-# nothing is left.
+# Tests the Debian packages. Usage: packages.sh SOURCE BUILD
+# Makes packages of the build in BUILD, runs lintian, installs the packages into a copy of this system, uses them there
+# (packages_inside.sh), and purges them: no file is left. The copy is an overlay over the files of this system, which
+# needs root or user namespaces.
 set -euo pipefail
 
 source_tree=$(realpath "$1")
@@ -15,7 +15,7 @@ if [[ -z "${R4_INSIDE_NAMESPACE-}" ]]; then
   echo 'packages: lintian finds nothing'
   as_root=()
   ((EUID == 0)) || as_root=(--map-root-user)
-  # A network of its own: the ports and boards of this one are not to be found.
+  # A new network namespace, which cannot reach the ports and boards of this network.
   R4_INSIDE_NAMESPACE=1 exec unshare "${as_root[@]}" --mount --net --pid --fork --kill-child "$0" "$@"
 fi
 
@@ -31,7 +31,7 @@ for folder in tmp run dev; do
   mount -t tmpfs tmpfs "$copy/root/$folder"
 done
 mount -t proc proc "$copy/root/proc"
-# Devices of its own: what is installed and purged there is at this system's no more than its files are.
+# Its own devices, so that the packages cannot reach the devices of this system.
 for device in null zero full random urandom; do
   touch "$copy/root/dev/$device"
   mount --bind "/dev/$device" "$copy/root/dev/$device"
@@ -44,12 +44,12 @@ ip link set lo up
 mkdir "$copy/root/tmp/packages"
 cp "$build_tree"/packed/*.deb "$source_tree/tests/install/packages_inside.sh" "$copy/root/tmp/packages"
 cp -r "$source_tree/docs/examples/drive" "$copy/root/tmp/packages"
-# Small images are told to leave pages of manuals out.
+# Small images configure dpkg to leave manual pages out.
 rm -f "$copy"/root/etc/dpkg/dpkg.cfg.d/*
 
 env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 chroot "$copy/root" /tmp/packages/packages_inside.sh
 
-# What the tools of the system write for themselves: lists of packages, of libraries and of manuals.
+# The tools of the system themselves write lists of packages, of libraries and of manual pages.
 left=$(cd "$copy/changed" && find . \( -type f -o -type l \) ! -path './var/lib/dpkg/*' ! -path './var/log/*' \
   ! -path './var/cache/*' ! -path './etc/ld.so.cache' ! -path './etc/.pwd.lock' ! -path './root/*')
 if [[ -n "$left" ]]; then

@@ -1,11 +1,11 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Installs the packages that lie beside it, uses each, and purges them. packages.sh runs it in a copy of the system,
-# clean.sh with --apt in a minimal one, which gets what the packages depend on and what the steps use.
+# Installs the packages in its folder, uses each, and purges them. packages.sh runs it in a copy of the system. clean.sh
+# runs it with --apt in a minimal system, and installs the dependencies and the programs that the steps use.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
-# step NAME COMMAND...: what it printed is shown if it fails.
+# step NAME COMMAND...: shows the output of the command if it fails.
 step() {
   local name=$1
   shift
@@ -44,12 +44,12 @@ step 'r4-record@.service and r4-bridge@.service are whole, and expose little' un
 udev_rules_are_valid() {
   local rules=/usr/lib/udev/rules.d/70-r4.rules
   grep -q 'MODE="0660"' "$rules"
-  # Of systemd 254 and newer.
+  # Since systemd 254.
   ! udevadm verify --help >/dev/null || udevadm verify "$rules"
 }
 step 'udev rules' udev_rules_are_valid
 wireshark_knows_it() {
-  # Wireshark 4.4 loads no Lua for root, and lists more columns.
+  # Wireshark 4.4 loads no Lua for root, and prints more columns.
   setpriv --reuid=65534 --regid=65534 --clear-groups tshark -G protocols | grep -P '\tr4(\t|$)'
 }
 step 'Wireshark' wireshark_knows_it
@@ -84,7 +84,7 @@ if [[ " ${packages[*]} " == *' r4link-doc '* ]]; then
   test -s /usr/share/doc/r4link-doc/html/api/board_8hpp.html
 fi
 
-# What it measures is only true where nobody else needs the processors (3): integration/test_demo.py asserts that.
+# Exit code 3 is accepted: the demo's bounds hold only on an idle machine, and integration/test_demo.py asserts them.
 demo() {
   r4 demo >demo.txt || [[ $? == 3 ]] || return 1
   [[ $(grep -cE '^  (in process|UDP|serial)  .* (ok|NOT OK)$' demo.txt) == 3 ]]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Python package's types, and that it is built and installed with what Debian has, without a network."""
+"""The types of the Python package, and its build and installation with Debian's packages and without a network."""
 import os
 import pathlib
 import shutil
@@ -12,7 +12,7 @@ from running import OFFLINE, ROOT, run
 
 
 def test_types_are_strict():
-    """In one run, because most of its time goes into the types of the standard library, which the build folder keeps."""
+    """One run for all files, because the types of the standard library take most of the time, and mypy caches them."""
     package, examples = ROOT / 'host/python/r4link', ROOT / 'docs/examples'
     sources = [*package.glob('*.py'), package / '_core.pyi', *(examples / 'python').glob('*.py'),
                examples / 'openscout/openscout.py']
@@ -33,7 +33,7 @@ def test_installs_into_a_venv_and_builds_a_source_distribution(tmp_path):
     with tarfile.open(source) as archive:
         names = archive.getnames()
         archive.extractall(tmp_path / 'source')
-    # The source distribution is whole: it configures in a folder of its own, as a build without R4_BUILD does.
+    # The source distribution is complete: it configures in a new folder, as a build without R4_BUILD does.
     run(sys.executable, '-c', 'import build_backend; build_backend.configure("build")',
         cwd=tmp_path / 'source' / f'r4link-{r4link.__version__}',
         env={**OFFLINE, 'PYTHONPATH': 'host/python'})
@@ -53,7 +53,7 @@ def test_a_wheel_has_the_same_bytes_twice_and_carries_its_libraries(tmp_path):
 
 
 def test_no_reference_is_lost_or_left():
-    """On the interpreter that counts them, such as python3.11-dbg, with the module built for it."""
+    """Runs on an interpreter that counts references, such as python3.11-dbg, with the module built for it."""
     build = pathlib.Path(os.environ['R4_BUILD'])
     ended = subprocess.run([f'/usr/bin/python3.{sys.version_info.minor}-dbg', ROOT / 'tests/python/reference_counts.py'],
                            capture_output=True, text=True, timeout=120, check=False,

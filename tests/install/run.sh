@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The installed library is enough for a program outside the tree. Usage: run.sh SOURCE BUILD
 # Installs BUILD into a new prefix, copies docs/examples elsewhere, builds drive with find_package (static)
-# and with pkg-config (shared), openpodcar and teleop with find_package, runs them, programs that have an Asio of
-# their own, and what the documentation shows. Compiles every installed header alone, and compares what
-# the library exports with exports.txt.
+# and with pkg-config (shared), openpodcar and teleop with find_package, and runs them. Also runs programs with
+# a separate Asio, and the programs in the documentation. Compiles every installed header alone, and compares the
+# exported symbols of the library with exports.txt.
 set -euo pipefail
 
 source_tree=$(realpath "$1")
@@ -22,7 +22,7 @@ cp -r "$source_tree/docs/examples/drive" "$source_tree/docs/examples/openpodcar"
   "$work"
 cd "$work/drive"
 
-# check NAME COMMAND...: the program must end well and say what the README promises.
+# check NAME COMMAND...: the program must succeed and print the lines that the README shows.
 check() {
   local name=$1
   shift
@@ -56,7 +56,7 @@ cmake --build ../teleop/build >>"$work/cmake.log" || {
 }
 R4=$build_tree/r4 /usr/bin/python3 "$source_tree/tests/install/teleop.py" ../teleop/build/teleop
 
-# r4 finds the part of it that is a program of its own.
+# r4 finds its part that is a separate program.
 ros2=
 grep -q '^R4_ROS2:BOOL=ON' "$build_tree/CMakeCache.txt" && ros2=yes
 [[ -z $ros2 ]] || ROS_LOCALHOST_ONLY=1 "$prefix/bin/r4" ros2 sim: --duration 0.1 >"$work/out" 2>&1 || {
@@ -97,7 +97,7 @@ for program in beside shared_with; do
 done
 echo 'install: an Asio of its own disturbs nobody'
 
-# A project that takes the tree in gets the library alone: no library of the tools is needed, and nothing is installed.
+# A project that includes the tree gets only the library: it needs no library of the tools, and installs nothing.
 without=(CLI11=ON nlohmann_json=ON CycloneDDS=ON GTest=ON rapidcheck=ON)
 cmake -G Ninja -S "$source_tree/tests/install/subproject" -B "$work/subproject" -DR4LINK_SOURCE="$source_tree" \
   -DCMAKE_CXX_COMPILER="$cxx" "${without[@]/#/-DCMAKE_DISABLE_FIND_PACKAGE_}" >"$work/cmake.log" 2>&1 ||
@@ -121,7 +121,7 @@ read -ra flags <<<"$(pkg-config --cflags --libs r4link)"
 "$cxx" -std=c++20 -O1 main.cpp "${flags[@]}" -o drive
 check pkg-config ./drive sim:?node=1
 
-# program_of PAGE: the C++ that the page shows, as a whole program.
+# program_of PAGE: the C++ that the page shows, as a complete program.
 program_of() {
   awk '/^```/ { inside = /cpp/; next } inside' "$1" >shown.txt
   grep '^#include' shown.txt
@@ -184,7 +184,7 @@ if [[ $status != 2 ]] || ! grep -q 'udp://HOST' "$work/err"; then
   exit 1
 fi
 
-# Every installed header, of all folders, alone.
+# Every installed header compiles alone.
 read -ra flags <<<"$(pkg-config --cflags r4link-asio)"
 headers=0
 mapfile -t installed < <(find "$prefix/include/r4link" -name '*.hpp' | sort)
@@ -208,14 +208,14 @@ if grep -rl asio "$prefix"/include/r4link | grep -vE '/async_[a-z]+\.hpp$' |
 fi
 echo "install: $headers headers"
 
-# What the shared library exports: our names, and templates of the standard library, as any program does.
+# The shared library exports only our names, and templates of the standard library, as any program does.
 nm -DC --defined-only "$LD_LIBRARY_PATH/libr4link.so" | cut -d' ' -f3- |
   grep -vE '^((typeinfo|typeinfo name|vtable|guard variable) for |[a-z]+ )?std::' | LC_ALL=C sort -u >exports.txt
 diff "$source_tree/tests/install/exports.txt" exports.txt || {
   echo 'install: the shared library exports other names than tests/install/exports.txt lists'
   exit 1
 }
-# The static one has no others that the linker could take for the program's.
+# The static library has no other names, which the linker could confuse with names of the program.
 nm -C --defined-only -g "$LD_LIBRARY_PATH/libr4link.a" | grep -E '^[0-9a-f]+ ' | cut -d' ' -f3- |
   grep -vE '^((typeinfo|typeinfo name|vtable|guard variable) for |[a-z]+ )?std::' | LC_ALL=C sort -u >globals.txt
 strangers=$(comm -13 exports.txt globals.txt)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/examples/teleop drives a simulated robot, and is safe. Usage: teleop.py TELEOP; env R4 = the r4 command.
 
-Keys go to it through a terminal; what the robot does is what the chips' pins and the encoders say."""
+It gets keys through a terminal. The pins of the simulated chips and the encoders show what the robot does."""
 import os
 import pathlib
 import pty
@@ -22,7 +22,7 @@ SPEED = 614  # 0.15 of 4095
 
 
 class Teleop:
-    """The program, with somebody at its keyboard."""
+    """The program in a terminal, with simulated key presses."""
 
     def __init__(self, program, url):
         self.keyboard, terminal = pty.openpty()
@@ -48,7 +48,7 @@ class Teleop:
                 seen.append(self.lines.get(timeout=max(0, deadline - time.monotonic())))
             except queue.Empty:
                 raise AssertionError(f'it does not say {pattern!r}: {seen}') from None
-            assert seen[-1], f'it has ended without {pattern!r}: {seen}'
+            assert seen[-1], f'the program ended without {pattern!r}: {seen}'
             if re.search(pattern, seen[-1]):
                 return seen[-1]
 
@@ -67,7 +67,7 @@ def stands(each):
 def arm_and_drive(teleop, board):
     teleop.press('e')
     while not teleop.says('^armed|handle was released').startswith('armed'):
-        teleop.press('e')  # it has not heard yet that the handle is held
+        teleop.press('e')  # repeated, because teleop may not know yet that the handle is held
     board.next(lambda each: each.get('supply') and stands(each))
     teleop.press('w')
     each = board.next(lambda each: 'outputs' in each and not stands(each))
@@ -82,11 +82,11 @@ def main(program):
     with Board('udp://127.0.0.1:0', options=['--stdin', '--sensors', '0.05'], stdin=subprocess.PIPE) as board:
         teleop = Teleop(program, board.host_url)
         teleop.says(r'^not armed \(not yet\)')
-        teleop.press('w')  # before it is armed: nothing
+        teleop.press('w')  # ignored before the board is armed
         arm_and_drive(teleop, board)
         moved = board.next(lambda each: each['type'] == 'sensors' and each['enc'][0] > 50)
         assert moved['supply'] and moved['enc'][1] > 0
-        board.next(driven(0, 0))  # nobody holds the key any more
+        board.next(driven(0, 0))  # the key is released
         teleop.press('a')
         board.next(driven(-SPEED, SPEED))
 
@@ -97,15 +97,15 @@ def main(program):
         world('handle held')
         board.next(lambda each: each.get('happened') == 'handle held')
         board.next(lambda each: each.get('reason') == 'none')
-        teleop.press('w')  # goes on commanding, and nothing comes of it until it is armed again
+        teleop.press('w')  # without effect until the board is armed again
         arm_and_drive(teleop, board)
 
-        teleop.press('w ')  # the stop counts, whatever else waits
+        teleop.press('w ')  # the stop wins over the other key
         teleop.says('^stopped')
         board.next(lambda each: each.get('reason') == 'stop')
         arm_and_drive(teleop, board)
 
-        teleop.process.send_signal(signal.SIGSTOP)  # it hangs
+        teleop.process.send_signal(signal.SIGSTOP)  # the program hangs
         board.next(lambda each: each.get('reason') == 'link')
         teleop.process.send_signal(signal.SIGCONT)
         teleop.says(r'^not armed')
@@ -114,7 +114,7 @@ def main(program):
         os.close(teleop.keyboard)  # the terminal is closed
         board.next(lambda each: each.get('reason') == 'stop')
         assert teleop.process.wait(PATIENCE_S) == 0
-        teleop = Teleop(program, board.host_url)  # begins while that stop is latched
+        teleop = Teleop(program, board.host_url)  # starts while that stop is latched
         teleop.says(r'^not armed')
         teleop.press('e')
         teleop.says(r'not armed: stopped before this program began')

@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Installs the wheel that lies beside this script into a new environment, and drives a simulated board with it.
-# Usage: wheel_inside.sh [PYTHON], in a system that has Python and its venv, and need have nothing else
+# Installs the wheel in the folder of this script into a new environment, and drives a simulated board with it.
+# Usage: wheel_inside.sh [PYTHON], in a system that needs only Python and its venv
 # (tools/on debian13 --clean …; docs/how-to/packages.md).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"

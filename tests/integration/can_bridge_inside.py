@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can.py runs where SocketCAN is: r4 bridge between UDP and a bus."""
+"""Tests that test_can.py runs where SocketCAN exists: r4 bridge between UDP and a bus."""
 from can_inside import EMERGENCY, Dump, ip
 from r4_process import PATIENCE_S, Board, Running, driving, run
 
@@ -17,7 +17,7 @@ def test_a_whole_bus_is_driven_by_udp_and_stopped_by_its_raw_frame():
                 stopped = run('stop', 'udp://127.0.0.1:2100?listen=0', timeout=3 * PATIENCE_S)
                 assert stopped.returncode == 0, stopped.stderr
                 assert [data for number, data in dump.frames if number == EMERGENCY]
-            safe = set()  # the frame is for all boards of the bus
+            safe = set()  # the frame of the emergency stop is for all boards of the bus
             while safe != {'sim-0', 'sim-1'}:
                 safe.add(boards.next(lambda each: each.get('reason') == 'stop')['board'])
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can.py runs where SocketCAN is: interfaces are made wrong, and r4 doctor tells and mends it."""
+"""Tests that test_can.py runs where SocketCAN exists: r4 doctor reports and mends interfaces that are set up wrong."""
 import pathlib
 import subprocess
 
@@ -15,13 +15,13 @@ def ip(*arguments):
 
 
 def doctor(*arguments, listen='0.01'):
-    """The exit code, and the findings by their checks."""
+    """Returns the exit code, and the findings by their checks."""
     result = run('doctor', *arguments, '--duration', listen, '--json', timeout=60)
     return result.returncode, {each['check']: each for each in objects(result.stdout) if each['type'] == 'finding'}
 
 
 def doctor_that_finds(check, words, url):
-    """As doctor(), listening for longer until it has found that."""
+    """As doctor(), but listens longer and longer until the check reports the words."""
     for listen in (2, 4, 8, 16):
         code, found = doctor(url, listen=str(listen))
         if words in found.get(check, {}).get('reason', ''):
@@ -35,7 +35,7 @@ def queue(name):
 
 @pytest.fixture(name='controller')
 def can0():
-    """can0, which is as the guest has set it up again in the end."""
+    """can0; restores the guest's setup at the end."""
     yield 'can0'
     ip('set', 'can0', 'down')
     ip('set', 'can0', 'up', 'txqueuelen', '1000', 'type', 'can', 'bitrate', '1000000', 'restart-ms', '100')

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can.py runs where SocketCAN is: a board and hosts on a bus with bit time and errors.
+"""Tests that test_can.py runs where SocketCAN exists: a board and hosts on a bus with bit time and errors.
 
 slcan0, the board's controller, and slcan1, the host's, are nodes of slcan_bus: error frames, error
-counters, bus-off and the states that the kernel tells of are those of ISO 11898-1.
+counters, bus-off and the states that the kernel reports are those of ISO 11898-1.
 """
 import os
 import pathlib
@@ -38,14 +38,14 @@ def running_board(bus):
 
 
 def driving_host(board):
-    """A host that has a motor run and stays."""
+    """A host that runs a motor and stays connected."""
     host = driving(HOST, 'O:358,1,1')
     board.outputs(lambda outputs: outputs['osmc'][0] == DRIVING)
     return host
 
 
 def told(reason):
-    """A host's event of trouble with the transport, with that reason and a fix."""
+    """Matches a host's error event that has the reason and a fix."""
     return lambda each: each['type'] == 'error' and reason in each['fields'].get('reason', '')
 
 
@@ -61,7 +61,7 @@ def goes_safe(board):
 
 
 def drives_again(board, since):
-    """The session goes on by itself, with what it had commanded."""
+    """The session resumes by itself, with the outputs that it commanded before."""
     back = board.outputs(lambda outputs: outputs['osmc'][0] == DRIVING)
     print(f'drives again after {(back["came"] - since) * 1000:.0f} ms')
 
@@ -82,13 +82,13 @@ def test_a_board_obeys_on_a_bus_with_bit_time_and_the_load_that_is_shown_is_the_
         after = bus.status()
     busy_us, frames = (after[each] - before[each] for each in ('busy_us', 'frames'))
     print(f'a frame {1e6 * shown["load"] / shown["frames"]:.2f} us, by the bus {busy_us / frames:.2f} us')
-    assert shown['bitrate'] == BITRATE  # as the controller has it: nobody said
+    assert shown['bitrate'] == BITRATE  # read from the controller: no option gives it
     assert after['failed'] == 0
     assert abs(1e6 * shown['load'] / shown['frames'] / (busy_us / frames) - 1) < 0.01
 
 
 def test_a_bit_rate_that_an_adapter_does_not_tell_is_asked_for():
-    """As slcand sets one up: it tells the adapter its bit rate, and not the kernel."""
+    """As after slcand, which sets the bit rate in the adapter but does not report it to the kernel."""
     near, far = pty.openpty()
     try:
         name = SlcanBus.attach(os.ttyname(far))
@@ -163,7 +163,7 @@ def test_errors_are_told_with_a_fix_and_that_they_are_over(bus):
                 bus.order('errors', node, errors, 0)
                 each = end.next(where(reason))
                 assert 'wiring' in str(each)
-            end.next(where('the trouble is over'))  # by frames that went well, one error each
+            end.next(where('the trouble is over'))  # each frame without an error lowers the error counter by one
         streams_again(host, time.monotonic())
     assert not any(each.get('reason') == 'link' for each in board.log)
 
@@ -199,10 +199,10 @@ def test_damaged_frames_cost_time_and_no_datagram(bus):
     failed, frames = (status[each] - before[each] for each in ('failed', 'frames'))
     transfers = next(each['fields'] for each in log if each['type'] == 'transfers')
     print(f'{failed} of {frames} frames damaged, {transfers}')
-    assert frames >= 500 and failed >= 5  # it is a matter of chance: five times as many are likely
+    assert frames >= 500 and failed >= 5  # random; five times as many are likely
     assert transfers['packed'] >= 100
-    # Neither timed_out nor interrupted: where an end stands still for more than the 20 ms of N_Bs, and the guest's do,
-    # the other gives its transfer up and begins the next, with noise or without.
+    # timed_out and interrupted are not asserted. An end in the guest may stand still for longer than N_Bs (20 ms);
+    # then the other end gives up its transfer and begins the next, with or without noise.
     lost = ('wrong_sequence', 'overflow', 'malformed', 'bad_form', 'dropped_frames')
     assert sum(transfers[each] for each in lost) <= failed / 4, transfers
 
@@ -250,7 +250,7 @@ def test_a_full_queue_drops_old_states_and_no_frame_within_a_datagram():
 
 
 def wait_for_sockets(interface, identifier, count):
-    """Until that many sockets hear the id on the interface."""
+    """Waits until `count` sockets receive the id on the interface."""
     entry = re.compile(rf'^\s*{interface}\s+{identifier:x}\s', re.MULTILINE)
     deadline = time.monotonic() + PATIENCE_S
     while len(entry.findall(pathlib.Path('/proc/net/can/rcvlist_sff').read_text(encoding='ascii'))) < count:
@@ -264,7 +264,7 @@ def test_a_stop_overtakes_a_full_queue():
             bus.order('stall', 1)
             flood = subprocess.Popen(['cangen', 'slcan1', '-g', '0', '-i', '-I', f'{FLOOD:X}', '-L', '8'])
             stop = Running('stop', HOST, '--timeout', '20')
-            wait_for_sockets('slcan1', TELEMETRY, 2)  # the driving host's, and that of the stop
+            wait_for_sockets('slcan1', TELEMETRY, 2)  # the driving host's, and that of r4 stop
             lasts(0.3)
             went_on = time.time()
             bus.order('go', 1)
@@ -278,4 +278,4 @@ def test_a_stop_overtakes_a_full_queue():
             stop.process.stderr.close()
         ids = [frame for at, (frame, _) in zip(dump.times, dump.frames) if at > went_on and frame in OF_HOST]
         print(f'{ids.index(STOP)} frames before the stop')
-        assert ids.index(STOP) <= 4, ids  # three mailboxes and the frame that the driver holds
+        assert ids.index(STOP) <= 4, ids  # before it: three mailboxes and the frame that the driver holds

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can.py runs where SocketCAN is: boards and hosts as processes on a CAN bus.
+"""Tests that test_can.py runs where SocketCAN exists: boards and hosts as processes on a CAN bus.
 
 vcan0 is a bus in the kernel, can0 and can1 are two controllers with their driver on one bus.
 """
@@ -25,16 +25,16 @@ def ip(*arguments):
     subprocess.run(['ip', *arguments], check=True)
 
 
-# Every frame costs the emulated machine some 100 us, and a state in plain text has 25. A rate that leaves it time is
-# enough where the rate is not what is tested: 100 Hz is tests/simulation/can_capacity_test.cpp's, in virtual time.
+# A frame takes the emulated machine about 100 us, and a state in plain text has 25 frames. So tests that do not
+# test the rate use a lower one. tests/simulation/can_capacity_test.cpp tests 100 Hz, in virtual time.
 PERIOD_MS = 50
 SLOWLY = ('--set', f'rate,{1000 // PERIOD_MS}')
-# The emulated machine stands still for a second now and then. Where the board's timeout is not what is tested, it is longer.
+# The emulated machine sometimes stands still for a second. Tests that do not test the board's timeout use a longer one.
 PATIENTLY = (*SLOWLY, '--set', 'timeout,5000')
 
 
 def on_vcan():
-    """A board on a bus in the kernel, whose hosts speak plain text."""
+    """A board on a bus in the kernel; its hosts use plain text."""
     board = Board(BUS, options=PATIENTLY)
     board.bus, board.packs = 'vcan0', False
     board.host_url = IN_PLAIN_TEXT
@@ -42,7 +42,7 @@ def on_vcan():
 
 
 def on_controllers(options=PATIENTLY):
-    """A board at one of two controllers with their driver, whose hosts are at the other and speak the packed form."""
+    """A board at one of two controllers with their driver; its hosts are at the other and use the packed form."""
     board = Board('can://can0?node=3', options=options)
     board.bus, board.packs = 'can1', True
     board.host_url = 'can://can1?node=3'
@@ -75,7 +75,7 @@ def beside_its_hosts():
 
 @contextlib.contextmanager
 def beside(*command, **options):
-    """A program that runs as long as the block, or less."""
+    """Runs a program until the block ends, or until the program ends."""
     with subprocess.Popen(command, **options) as process:
         try:
             yield process
@@ -84,9 +84,9 @@ def beside(*command, **options):
 
 
 class Dump:
-    """candump: every frame on an interface, as (id, data), seen by something we did not write.
+    """Every frame on an interface, as (id, data), as candump receives it: a program that shares no code with r4.
 
-    `times` has when the kernel got each, as time.time().
+    `times`: when the kernel received each frame, as time.time().
     """
 
     def __init__(self, interface):
@@ -106,7 +106,7 @@ class Dump:
             self.came.set()
 
     def more(self, count):
-        """Waits until that many more frames have come."""
+        """Waits for `count` more frames."""
         wanted = len(self.frames) + count
         deadline = time.monotonic() + PATIENCE_S
         while len(self.frames) < wanted:
@@ -203,9 +203,9 @@ def test_another_host_is_refused_while_the_first_is_there(board):
             assert result.returncode == 3 and why in result.stderr, result
         first.skip_past()
         first.next(is_state)
-        assert not any(each['type'] == 'nack' for each in first.log), 'the other one did not even try'
+        assert not any(each['type'] == 'nack' for each in first.log), 'the second host did not send a command'
         assert not any(each.get('state') == 'SAFE' for each in board.log)
-        assert run('stop', board.host_url, timeout=60).returncode == 0, 'but it may stop the board'
+        assert run('stop', board.host_url, timeout=60).returncode == 0, 'a host without control may stop the board'
         first.next(is_link('safe', 'stop'))
         assert first.end() == 0
     assert not any(each.get('executed', {}).get('command') == 'O:358,1,1' for each in board.log)
@@ -234,7 +234,7 @@ def test_packed_and_fd_take_fewer_frames(vcan_board):
             for _ in range(10):
                 host.next(is_state)
             count = len([data for frame, data in dump.frames if frame == TELEMETRY])
-            assert host.end() == 0, host.errors  # control is free for the next
+            assert host.end() == 0, host.errors  # gives up control, so that the next host can take it
             return count / 10
 
     plain = frames_a_state(IN_PLAIN_TEXT)
@@ -242,9 +242,9 @@ def test_packed_and_fd_take_fewer_frames(vcan_board):
     measured = objects(run('bench', vcan_board.host_url, '--duration', '1', '--json', timeout=60).stdout)[0]
     assert measured['transfers']['packed'] > 5 and measured['transfers']['bad_form'] == 0
     print(f'{plain:.1f} frames a state plain, {packed:.1f} packed')
-    assert 3 * packed < plain  # 24 and 5, some of them of heartbeats
+    assert 3 * packed < plain  # about 24 and 5 frames, some of them heartbeats
     assert send(BUS, 'C:pack,0').returncode == 0
-    assert 3 * packed < frames_a_state(BUS), 'the board packs, and was told not to'
+    assert 3 * packed < frames_a_state(BUS), 'the board sends the packed form after C:pack,0'
 
 
 def test_can_fd_carries_a_plain_state_in_three_frames_and_a_packed_one_in_one():
@@ -259,7 +259,7 @@ def test_can_fd_carries_a_plain_state_in_three_frames_and_a_packed_one_in_one():
         dump.frames.clear()
         result = send(board.host_url, 'O:358,1,1')
         assert result.returncode == 0, result
-    # Flags, the length behind a zero, and the head of a default state (docs/reference/packed.md, layouts 2 and 3).
+    # Flags, the length after a zero, and the head of a default state (docs/reference/packed.md, layouts 2 and 3).
     assert any(frame == TELEMETRY and re.match('.00..9', data) for frame, data in dump.frames)
 
 
@@ -309,7 +309,7 @@ def test_first_steps_in_either_order():
         assert send(BUS, 'E:CLEAR', 'O:1,1,1').returncode == 0
 
 
-# As of two computers, where the bus has two ends: they share no path.
+# Where the bus has two ends, the hosts share no path, as on two computers.
 @pytest.mark.parametrize('url, host_url', [(BUS, BUS), ('can://can0?node=3', 'can://can1?node=3')])
 def test_who_watches_sends_a_frame_of_its_own_and_only_while_nobody_drives(url, host_url):
     with Board(url, options=PATIENTLY), watch(url) as watcher, Dump(url.split('/')[2].split('?')[0]) as dump:
@@ -349,9 +349,9 @@ def test_bus_off_is_safe_at_once_and_a_restart_brings_it_back(vcan_board):
         error_frame(0x040)  # CAN_ERR_BUSOFF
         safe = vcan_board.state('SAFE', 'link')
         print(f'safe {(safe["came"] - off_at) * 1000:.0f} ms after bus-off')
-        assert safe['silence'] < 5000, 'it waited for the timeout'
+        assert safe['silence'] < 5000, 'the safe state came only with the timeout'
         host.next(lambda each: each['type'] == 'link' and not each['fields']['up'])
-        subprocess.run(['cansend', 'vcan0', f'{COMMAND:x}#00'], check=True)  # of this machine
+        subprocess.run(['cansend', 'vcan0', f'{COMMAND:x}#00'], check=True)  # a command from this machine
         vcan_board.never('ACTIVE', 1)
         error_frame(0x100)  # CAN_ERR_RESTARTED
         back_at = time.monotonic()
@@ -388,7 +388,7 @@ def test_garbage_on_every_id_of_ours_harms_nobody(board):
 
 
 def listed_interfaces(is_told):
-    """r4 list, again until `is_told` of each board at vcan0: it waits 1.3 s at most, and this machine may be slower."""
+    """Repeats r4 list until `is_told` is true for each board at vcan0: it waits 1.3 s, and the guest may be slower."""
     deadline = time.monotonic() + PATIENCE_S
     while True:
         listed = {each.get('interface'): each for each in objects(run('list', '--json', timeout=60).stdout)}
@@ -455,7 +455,7 @@ def test_a_recording_is_a_board_on_the_bus(tmp_path):
     states = [(each['pnum'], each['fields']) for each in shown if each['type'] == 'state']
     assert len(states) == 5 and all(was[pnum] == fields for pnum, fields in states), states
     frames = {frame for frame, _ in dump.frames}
-    assert TELEMETRY in frames and EMERGENCY not in frames, 'what hosts sent then is not sent again'
+    assert TELEMETRY in frames and EMERGENCY not in frames, 'datagrams sent during the fault were sent again'
 
 
 def test_prometheus_is_told_how_busy_a_bus_is_and_for_whom():
@@ -471,7 +471,7 @@ def test_prometheus_is_told_how_busy_a_bus_is_and_for_whom():
             deadline = time.monotonic() + PATIENCE_S
             while busy_seconds().get(3, 0) < 0.01:
                 assert time.monotonic() < deadline, busy_seconds()
-            assert busy_seconds()[3] > busy_seconds().get(2, 0), 'the one that nobody drives sends few states'
+            assert busy_seconds()[3] > busy_seconds().get(2, 0), 'the board without a controlling host sends few states'
 
 
 def test_r4_bus_tells_that_it_needs_the_data_bit_rate():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can.py runs where SocketCAN is: frames lost, late and corrupt, ends that vanish.
+"""Tests that test_can.py runs where SocketCAN exists: lost, late and corrupt frames, and ends that vanish.
 
-netem loses and delays on the pair vxcan0, vxcan1; cangw corrupts what it carries from vcan0 to vcan1.
+netem loses and delays frames on the pair vxcan0, vxcan1; cangw corrupts frames that it carries from vcan0 to vcan1.
 """
 import collections
 import contextlib
@@ -27,7 +27,7 @@ COMMAND, REPLY = 0x180 + NODE, 0x200 + NODE
 
 @contextlib.contextmanager
 def netem(*how, ends=('vxcan0', 'vxcan1')):
-    """What `how` says of each frame that leaves there."""
+    """Applies the netem options `how` to each frame that leaves the `ends`."""
     for interface in ends:
         subprocess.run(['tc', 'qdisc', 'add', 'dev', interface, 'root', 'netem', 'limit', '10000', *how],
                        check=True)
@@ -43,13 +43,13 @@ def executed(log):
 
 
 def told_of(results, commands):
-    """What r4 send said of each command: it ends at the first that is not confirmed."""
+    """The result of each command by r4 send, which ends at the first command that is not confirmed."""
     told = ['confirmed' if each['confirmed'] else each['reason'] for each in results if each['type'] == 'result']
     return told + ['not sent'] * (len(commands) - len(told))
 
 
 def agrees_with_the_board(told, commands, log):
-    """What was confirmed was executed once; what was not confirmed or not sent, not twice or not at all."""
+    """A confirmed command was executed once, an unconfirmed one at most once, and one that was not sent never."""
     pnums = [each['pnum'] for each in executed(log)]
     assert len(pnums) == len(set(pnums))
     times = collections.Counter(each['command'] for each in executed(log))
@@ -70,7 +70,7 @@ def test_a_confirmed_command_was_executed_exactly_once(loss, count):
         result = run('send', HOST, '--json', '--timeout', '10', *commands, timeout=200)
         log = board.rest()
     told = told_of(objects(result.stdout), commands)
-    # The first frames of commands (docs/reference/packed.md, layout 7), but for the F that the host sends first.
+    # The first frames of commands (docs/reference/packed.md, layout 7), except the F that the host sends first.
     firsts = [data for _, data in dump.frames if re.match('10..B8', data)]
     begun = sum(first != firsts[0] for first in firsts)
     print(f'{told.count("confirmed")} of {count} confirmed, begun {begun} times')
@@ -78,7 +78,7 @@ def test_a_confirmed_command_was_executed_exactly_once(loss, count):
     if loss == '1%':
         assert result.returncode == 0 and told == ['confirmed'] * count, result
     else:  # ten heartbeats in a row may be lost
-        assert begun > count - told.count('not sent'), 'nothing was repeated'
+        assert begun > count - told.count('not sent'), 'no command was repeated'
 
 
 def test_a_command_that_is_not_confirmed_is_reported_and_those_behind_it_are_not_sent():
@@ -98,7 +98,7 @@ def test_a_command_that_is_not_confirmed_is_reported_and_those_behind_it_are_not
     assert sum(each.startswith('not confirmed within 3') for each in told) == 1 and told[-1] == 'not sent', told
 
 
-# The frames with 29-bit ids that begin with the emergency stop's, as a filter of candump.
+# A filter for candump: frames whose 29-bit id begins with the id of the emergency stop.
 NUMBERED_STOPS = f'{EMERGENCY << 18:08x}:{0x7FF << 18:08x}'
 
 
@@ -118,7 +118,7 @@ def test_a_stop_whose_first_frames_are_lost_is_repeated_until_the_board_confirms
 
 
 class Gateway:
-    """vcan0 and vcan1 as one bus, whose frames are as they should or not."""
+    """Joins vcan0 and vcan1 to one bus, and corrupts frames on request."""
 
     def __init__(self):
         ip('link', 'add', 'vcan1', 'type', 'vcan')
@@ -145,7 +145,7 @@ def test_nothing_corrupt_is_ever_applied(form, corrupt):
     with Gateway() as gateway, Board(f'can://vcan0?node={NODE}', options=PATIENTLY) as board:
         with Running('send', host_url, '--timeout', '20', '--json', *commands) as sender, Dump('vcan1') as dump:
             board.executed(commands[0], timeout=20)
-            for byte in corrupt:  # of each frame's eight
+            for byte in corrupt:  # of the eight bytes of a frame
                 mask = bytearray(8)
                 mask[byte] = 0x01 if byte % 2 == 0 else 0x20
                 gateway.carry('-m', f'XOR:D:0.0.{mask.hex().upper()}')
@@ -162,11 +162,11 @@ def test_nothing_corrupt_is_ever_applied(form, corrupt):
     assert servos == commands[:len(servos)]
     assert all(each.startswith(('F:', 'Q:', 'E:LEAVE')) for each in others), others
     widths = {us for each in log if 'outputs' in each for us in each['outputs']['servo']}
-    assert widths <= {0, *range(997, 1403)}  # the chip counts in 4.88 us
+    assert widths <= {0, *range(997, 1403)}  # one count of the PWM chip is 4.88 us
 
 
 class RawHost:
-    """A host of our own making on vcan0: ISO-TP by hand, so that it can end anywhere."""
+    """A host on vcan0 that does ISO-TP by hand, so that it can end within a transfer."""
 
     def __init__(self):
         self.socket = socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
@@ -184,7 +184,7 @@ class RawHost:
         self.socket.send(struct.pack('=IB3x8s', COMMAND, len(data), data))
 
     def send(self, datagram, frames=99):
-        """Sends that many of its frames, its first awaiting flow control."""
+        """Sends at most `frames` frames of a datagram; waits for flow control after the first frame."""
         self.frame(bytes([0x10, len(datagram)]) + datagram[:6])
         while self.socket.recv(16)[8] >> 4 != 3:
             pass
@@ -208,7 +208,7 @@ def test_the_datagram_after_a_broken_one_is_taken(break_off):
             ip('link', 'set', 'vcan0', 'up')
             board.next(lambda each: each.get('transport', {}).get('event') == 'up')
             with contextlib.suppress(OSError):
-                host.socket.recv(16)  # tells that it was down
+                host.socket.recv(16)  # fails once, because the interface was down
         since = time.monotonic()
         host.send(host.heartbeat())
         active = board.state('ACTIVE')
@@ -218,7 +218,7 @@ def test_the_datagram_after_a_broken_one_is_taken(break_off):
 def test_an_end_that_is_killed_within_a_transfer_is_followed_by_the_next_one():
     url = f'can://vcan0?node={NODE}'
     plain = url + '&pack=0'
-    options = ('--set', 'rate,500')  # of 26 frames each: there is always one on its way
+    options = ('--set', 'rate,500')  # a state has 26 frames: one is always being sent
     with monitor_of_several(url, plain) as host:
         for _ in range(2):
             with Board(url, options=options) as board:

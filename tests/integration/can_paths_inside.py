@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can.py runs where SocketCAN is: a board on two buses, of which either is switched off or breaks, and
-on one beside a cable."""
+"""Tests that test_can.py runs where SocketCAN exists: a board on two buses, one of which is switched off or breaks,
+and a board on a bus and a cable."""
 import contextlib
 import fcntl
 import signal
@@ -26,7 +26,7 @@ def ip(*arguments):
 
 
 def switch(interface, up):
-    """At once: the guest takes a quarter of a second to start a program."""
+    """Sets the flag by ioctl, because the guest takes a quarter of a second to start a program."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
         request = bytearray(struct.pack('16s24x', interface.encode()))
         fcntl.ioctl(any_socket, SIOCGIFFLAGS, request)
@@ -95,7 +95,7 @@ def test_commands_are_executed_once_each_while_buses_come_and_go():
                 ip('link', 'set', bus, 'down')
                 confirmed(commands[40 * i + 20:40 * i + 40])
                 ip('link', 'set', bus, 'up')
-                board.next(has_joined(2))  # before that there is only one, which must not go
+                board.next(has_joined(2))  # before that the board has only one path, which must not fail
             confirmed(commands[80:])
         executed = [each['executed']['command'] for each in board.rest() if 'executed' in each]
     assert [each for each in executed if each.startswith('S:')] == commands
@@ -123,7 +123,7 @@ def test_a_cable_beside_a_bus(tmp_path_factory):
                     board.next(has_left(1))
                     host.has_again(place, back)
                     board.next(has_joined(2))
-                # What was held up brings old states when it goes on.
+                # When the stopped cable resumes, it delivers old states.
                 host.loses_by_silence('/host', lambda: cable.signal(signal.SIGSTOP))
                 board.next(has_left(1))
                 host.has_again('/host', lambda: cable.signal(signal.SIGCONT))
@@ -134,7 +134,7 @@ def test_a_cable_beside_a_bus(tmp_path_factory):
 
 
 def test_two_buses_of_which_one_breaks_at_either_end():
-    """can0 and can1 are on a bus of their own, the ends of the other have error counters and bus-off."""
+    """can0 and can1 are one bus; the ends of the other bus have error counters and bus-off."""
     boards, hosts = (('can0', 'slcan0'), ('can1', 'slcan1'))
     with SlcanBus(2, 500000) as bus, \
             Board(*(f'can://{each}?node=3' for each in boards), options=PATIENTLY) as board, \
@@ -147,7 +147,7 @@ def test_two_buses_of_which_one_breaks_at_either_end():
 
         def heal(node):
             bus.order('heal', node)
-            switch(f'slcan{node}', up=False)  # for which the kernel takes more than a second now and then
+            switch(f'slcan{node}', up=False)  # the kernel sometimes takes more than a second for this
             return lambda: switch(f'slcan{node}', up=True)
 
         host.loses('//slcan1', lambda: spoil(1))

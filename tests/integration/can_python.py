@@ -2,8 +2,7 @@
 """A host and a board on a CAN bus, frame by frame on python-can.
 
 A second implementation, written from docs/reference/protocol.md, docs/reference/can.md and
-docs/reference/packed.md: it shares no code
-with r4. Nothing here sleeps; everything waits for frames until a deadline.
+docs/reference/packed.md: it shares no code with r4. Nothing here sleeps; everything waits for frames until a deadline.
 """
 import random
 import threading
@@ -17,7 +16,7 @@ import packed_form
 N_BS_S, N_CR_S = 0.020, 0.100
 EMERGENCY_STOP, WENT_SAFE, TO_BOARD, REPLIES, TELEMETRY = 0x010, 0x020, 0x180, 0x200, 0x400
 FD_SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
-# What proves that a command was not executed; DUPLICATE proves nothing by itself.
+# Refusals that prove that a command was not executed. DUPLICATE alone proves nothing.
 CODES = 'UNKNOWN FORMAT RANGE CHANNEL STALE SAFE BUSY AUTH'.split()
 STATE_PERIOD_S, HEARTBEAT_S, HOST_HEARTBEAT_S, RETRY_S = 0.05, 0.5, 0.1, 0.05
 
@@ -36,7 +35,7 @@ def heartbeat(fields, pnum, time_ms, safe=''):
 
 
 def read(text):
-    """The fields by name; None if the checksum is wrong."""
+    """Returns the fields by name, or None if the checksum is wrong."""
     body, _, checksum = text[:-1].rpartition('^0x')
     if zlib.crc32((body + '^').encode()) != int(checksum, 16):
         return None
@@ -46,7 +45,7 @@ def read(text):
 # --- ISO-TP (can.md)
 
 class Receiver:
-    """Joins the frames of one id. `answer` sends flow control; None: it only listens."""
+    """Joins the frames of one id. `answer` sends flow control; with None, the receiver only listens."""
 
     def __init__(self, answer=None, block_size=0, stmin=0):
         self.answer, self.block_size, self.stmin = answer, block_size, stmin
@@ -54,7 +53,7 @@ class Receiver:
         self.failed = self.answered = 0
 
     def on_frame(self, data, now):
-        """The message that the frame completes, or None."""
+        """Returns the message that the frame completes, or None."""
         kind = data[0] >> 4 if data else 15
         if kind == 0:
             size, start = (data[0] & 15, 1) if len(data) <= 8 else (data[1], 2)
@@ -83,7 +82,7 @@ class Receiver:
         if self.answer:
             self.answered += 1
             self.answer(bytes([0x30, self.block_size, self.stmin]))
-            self.last = time.time()  # as the frames' own times are
+            self.last = time.time()  # the same clock as the times of the frames
 
 
 class Peer:
@@ -112,7 +111,7 @@ class Peer:
                                   data=bytes(data).ljust(size, b'\xcc')))
 
     def send_message(self, identifier, message, flow_control=True):
-        """Sends a whole message; takes what comes in meanwhile. False: nobody took it."""
+        """Sends a whole message, and handles frames that arrive meanwhile. False if no receiver took it."""
         longest = 64 if self.fd else 8
         if len(message) <= 7:
             self.send_frame(identifier, bytes([len(message)]) + message)
@@ -201,7 +200,7 @@ class Host(Peer):
         self.session = f'{random.randrange(1, 2 ** 64):016x}'
         self.pnum = random.randrange(2 ** 32)
         self.board_time = 0
-        self.cause = 0  # as the newest heartbeat told it
+        self.cause = 0  # from the newest heartbeat
         self.beats = True
         self.echoed = False
         self.packs = packs
@@ -221,10 +220,10 @@ class Host(Peer):
         if fields.get('H') == 'R4-ROS2':
             self.board_time = int(fields['T'])
             self.cause = int(fields.get('CAUSE', 0))
-            self.next_beat = 0.0  # each is answered at once
+            self.next_beat = 0.0  # answer each heartbeat at once
 
     def send(self, fields):
-        """A new datagram; its number and bytes."""
+        """Sends a new datagram; returns its number and bytes."""
         self.pnum = (self.pnum + 1) % 2 ** 32
         text = datagram(fields, self.pnum, self.board_time, self.session)
         self._send_text(text)
@@ -237,7 +236,7 @@ class Host(Peer):
         self.send_frame(EMERGENCY_STOP, b'', raw=True)
 
     def run_until(self, done, timeout=10.0, retry=None):
-        """Keeps the link until `done()`; sends the text `retry` again and again."""
+        """Keeps the link until `done()`; repeats the datagram `retry`."""
         deadline = time.monotonic() + timeout
         next_retry = time.monotonic() + RETRY_S
         while not done():
@@ -257,19 +256,19 @@ class Host(Peer):
         return next((fields for _, fields, _ in self.heard[start:] if is_it(fields)), None)
 
     def next(self, is_it, timeout=10.0, retry=None):
-        """The fields of the next datagram of that kind."""
+        """Returns the fields of the next datagram for which `is_it` is true."""
         start = len(self.heard)
         self.run_until(lambda: self.find(is_it, start), timeout, retry)
         return self.find(is_it, start)
 
     def take_control(self):
-        """Until the board executes commands: it has seen an echo of its T."""
+        """Waits until the board executes commands, which it does after it has received an echo of its T."""
         self.next(lambda fields: 'AIN24' in fields)
         self.run_until(lambda: self.echoed)
         assert self.command('F:DEFAULT,SAFE,CMD') == 'done'
 
     def command(self, fields):
-        """'done', or the code with which it was refused. STALE: overtaken, so it is sent as a new one."""
+        """Returns 'done', or the code of the refusal. After STALE (overtaken), sends the command as a new one."""
         answer = {'N': 'STALE'}
         while answer.get('N', '').endswith('STALE'):
             pnum, self.newest_command = self.send(fields)
@@ -288,16 +287,16 @@ class Board(Peer):
         super().__init__(interface, REPLIES + node, TO_BOARD + node, [EMERGENCY_STOP, TO_BOARD + node], fd)
         self.receivers = {TO_BOARD + node: Receiver(lambda data: self.send_frame(self.own_id, data))}
         self.node, self.packs, self.obeys, self.refuses = node, packs, obeys, refuses
-        self.host_packs = False  # its newest datagram was packed
+        self.host_packs = False  # true if the newest datagram of the host was packed
         self.offset = random.randrange(2 ** 31)
         self.began = time.monotonic()
         self.state, self.safe, self.pnum = 'CONNECTING', 0, 0
         self.echoable, self.armed, self.host_heard, self.newest = [], False, 0.0, None
-        self.session = 0     # the number of the heartbeat that began it
+        self.session = 0     # the number of the heartbeat that began the session
         self.cause, self.stop_number = random.randrange(2 ** 30), None
         self.fields, self.osmc, self.last_command = [], '0,0', 0
         self.next_state = self.next_beat = 0.0
-        self.answers = []    # what is to be sent
+        self.answers = []    # datagrams to send
         self.executed, self.stops, self.heard_packed = [], 0, []
         self.ends = threading.Event()
         self.thread = threading.Thread(target=self._run)

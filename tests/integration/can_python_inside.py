@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can.py runs where SocketCAN is: r4 against the host and the board of can_python.py."""
+"""Tests that test_can.py runs where SocketCAN exists: r4 against the host and the board of can_python.py."""
 import contextlib
 import socket
 import struct
@@ -15,7 +15,7 @@ from paper_client import PaperClient
 from r4_process import PATIENCE_S, Board, is_state, monitor, objects, run, send
 
 BOARD_URL, HOST_URL = 'can://vcan0?node=3', 'can://vcan0?node=4'
-# Python takes half a millisecond a frame in an emulated machine, which stands still for a second now and then.
+# In the emulated machine Python takes half a millisecond for a frame. The machine sometimes stands still for a second.
 PATIENTLY = ('--set', 'rate,20', '--set', 'timeout,5000')
 
 
@@ -29,7 +29,7 @@ def threads_that_take_turns_often():
 
 @contextlib.contextmanager
 def recording(path):
-    """candump -L of vcan0 from before the block to after it."""
+    """Records vcan0 with candump -L, from before the block until after it."""
     with open(path, 'w', encoding='ascii') as file, \
             subprocess.Popen(['candump', '-L', 'vcan0'], stdout=file) as process:
         try:
@@ -61,7 +61,7 @@ def test_host_connects_commands_and_sees_it_in_the_state(board, tmp_path, packs)
         host.beats = False
         host.next(lambda fields: 'H' in fields)
         assert host.heard[-1][0] == 'H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^'
-        assert not host.heard[-1][2], 'a board without a host is read by all'
+        assert not host.heard[-1][2], 'a board without a host sends text, which every host can read'
         host.beats = True
         host.take_control()
         in_control = len(host.heard)
@@ -73,7 +73,7 @@ def test_host_connects_commands_and_sees_it_in_the_state(board, tmp_path, packs)
     board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
     executed = [each['executed']['command'] for each in board.log if 'executed' in each]
     assert executed == ['F:DEFAULT,SAFE,CMD', 'O:358,1,1']
-    # What candump saw, r4 decodes to the same datagrams. (candump may have begun within one.)
+    # r4 decodes the recording of candump to the same datagrams. (candump may have begun within a datagram.)
     *decoded, summary = objects(run('decode', '--candump', str(tmp_path / 'bus.log'), timeout=60).stdout)
     assert summary['damaged_lines'] == 0 and summary['bad'] == 0 and summary['other'] == 0
     of_board = {each['text'] for each in decoded if each.get('from') == 'board' and 'text' in each}
@@ -103,7 +103,7 @@ def test_the_board_obeys_blocks_and_gaps_of_the_hosts_flow_control(board):
         assert host.next(lambda fields: 'I' in fields, retry=question)['I'].startswith('R4,')
         text, _, packed = host.heard[-1]
         assert packed
-        frames = -(-(len(packed_form.pack(text)) - 6) // 7)  # of which the gap is within each pair
+        frames = -(-(len(packed_form.pack(text)) - 6) // 7)  # the gap is between the frames of each pair
         assert frames >= 3
         assert time.monotonic() - asked >= frames // 2 * 0.003
         assert replies.answered >= -(-frames // 2)
@@ -137,7 +137,7 @@ def test_a_host_that_falls_silent_leaves_the_board_safe_and_comes_back(board):
         print(f'silence to the went-safe frame {(at - silent) * 1000:.0f} ms')
         assert reason == 1 and 0.85 <= at - silent
         assert host.next(lambda fields: 'H' in fields)['SAFE'] == '1'
-        assert not host.heard[-1][2], 'who comes now may know the text only'
+        assert not host.heard[-1][2], 'the board sends text, because a new host may not know the packed form'
         host.beats = True
         assert host.next(lambda fields: 'OSMC1' in fields)['SAFE'] == '0'
         assert host.heard[-1][2]
@@ -171,7 +171,7 @@ def kernel_isotp(hears, own, flags=0):
 
 
 def test_the_papers_client_drives_a_board_as_it_is_delivered_by_the_kernels_iso_tp():
-    # Seven commands for each datagram that comes take the emulated machine long.
+    # The emulated machine takes long for seven commands for each received datagram.
     options, listen_mode, states = ('--set', 'rate,2', '--set', 'timeout,5000'), 1, 6
     with Board(BOARD_URL, options=options) as board, \
             contextlib.closing(kernel_isotp(0x403, 0x7FF, listen_mode)) as telemetry, \
@@ -218,7 +218,7 @@ def test_send_is_confirmed_by_a_python_board(options, url):
         result = send(url, 'O:358,1,1', 'Q:ID')
     assert set(board.heard_packed) == {'pack=0' not in url}
     assert result.returncode == 0 and 'second' in result.stdout, result
-    # Fields may be asked for again where the board's states are late.
+    # The host may ask for fields again if the board's states are late.
     assert board.executed[0] == 'F:DEFAULT,RELAYS,SAFE,CMD'
     assert [each for each in board.executed if not each.startswith('F:')] == ['O:358,1,1']
 

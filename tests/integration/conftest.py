@@ -4,7 +4,7 @@ import signal
 import own_network
 from repeat import pytest_runtest_protocol  # noqa: F401
 
-# What the tests run is interrupted; under nohup, or in the background of a shell, it would ignore that.
+# The tests interrupt programs with SIGINT. Under nohup or in the background of a shell, the programs would ignore it.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 

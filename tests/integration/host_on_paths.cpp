@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A host with several paths to its board that is at work, as a process: it commands all the time, each when the one
-// before it has ended, and tells of every state and of what becomes of its paths. For host_on_paths.py.
+// A host program with several paths to its board, for host_on_paths.py. It sends one command after the other, and
+// reports every state, the end of every command and every change of its paths.
 //
-//     host_on_paths URL...                     ends when its input does
+//     host_on_paths URL...                     ends when its input ends
 //
-//     {"type":"state","at":12.345678,"t":…}                       as it was received, by the monotonic clock
+//     {"type":"state","at":12.345678,"t":…}                       at: time of reception, monotonic clock
 //     {"type":"command","command":"S:1000,1","confirmed":true}
 //     {"type":"path","at":…,"name":…,"carries":true}
 //     {"type":"link","at":…,"active":true}
@@ -39,7 +39,7 @@ void print(const Json& object) {
   std::fflush(stdout);
 }
 
-// Until the other end of our input is closed.
+// True until the other end of our input is closed.
 bool wanted() {
   pollfd input{0, POLLIN, 0};
   return ::poll(&input, 1, 0) == 0;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One session over several paths that drives all the time (host_on_paths.cpp): what it misses while they come and go."""
+"""One session over several paths that drives all the time (host_on_paths.cpp), while paths are lost and come back."""
 import collections
 import pathlib
 import subprocess
@@ -11,14 +11,14 @@ from r4_process import R4, Running
 
 PROGRAM = pathlib.Path(R4).parent / 'tests' / 'host_on_paths'
 RELAY = pathlib.Path(__file__).resolve().parents[1] / 'support' / 'relay.py'
-REPORTED_WITHIN_S = 0.05  # where the system tells
-TIMEOUT_S = 1  # where it does not
+REPORTED_WITHIN_S = 0.05  # if the system reports the loss of a path
+TIMEOUT_S = 1  # if only silence shows the loss
 BACK_WITHIN_S = 1
 LONGEST_GAP_S = 0.1  # states come every 10 ms
 
 
 class Relay:
-    """A path of its own to a board; `url` is its host's end."""
+    """One path to a board; `url` is the host's end."""
 
     def __init__(self, kind, *where):
         self.kind, self.where = kind, where
@@ -40,7 +40,7 @@ class Relay:
 
 
 class HostOnPaths(Running):
-    """`places`: what the name of each path has, in the order of the URLs."""
+    """`places`: a part of the name of each path, in the order of the URLs."""
 
     def __init__(self, urls, places, **process):
         super().__init__(*urls, program=PROGRAM, stdin=subprocess.PIPE, **process)
@@ -53,7 +53,7 @@ class HostOnPaths(Running):
         self.ended = None
 
     def loses(self, place, take_away, within_s=REPORTED_WITHIN_S):
-        """That is told in time: from when `take_away` says that it happened, or from before it began."""
+        """Asserts that the loss is reported in time. `take_away` may return the time of the loss; otherwise its call counts."""
         self._tells(place, False, take_away, within_s)
 
     def loses_by_silence(self, place, take_away):
@@ -66,7 +66,7 @@ class HostOnPaths(Running):
         began = time.monotonic()
         at = action() or began
         took = self.next(is_path(place, carries))['at'] - at
-        assert took <= within(within_s), f'{place}: told after {took:.3f} s'
+        assert took <= within(within_s), f'{place}: reported after {took:.3f} s'
         self.told.append(f'{place} {"used again" if carries else "told of"} after {took * 1e3:.0f} ms')
 
     def goes_on(self, commands=10):
@@ -74,7 +74,7 @@ class HostOnPaths(Running):
             self.next(is_command)
 
     def ends(self, board):
-        """Nothing was missed: no state, no command; none was executed twice, and the board never went safe."""
+        """No state and no command was missed, no command was executed twice, and the board never went safe."""
         commands = self.commands_at_its_end()
         log = board.rest()
         require_executed_as_told(commands, log)
@@ -82,7 +82,7 @@ class HostOnPaths(Running):
         assert not safe, safe
 
     def commands_at_its_end(self):
-        """The same as far as the host can tell: the commands and what became of each."""
+        """Checks what the host alone can see; returns the commands and their results."""
         self.goes_on()
         self.ended = time.monotonic()
         self.process.stdin.close()
@@ -96,9 +96,9 @@ class HostOnPaths(Running):
         print(f'{"; ".join(self.told)}; {len(commands)} commands, {rate:.0f} states a second, '
               f'the longest gap between them {gap * 1e3:.0f} ms')
         times = [each['t'] for each in states]
-        assert times == sorted(set(times)), 'a state was told twice, or after a newer one'
+        assert times == sorted(set(times)), 'a state was reported twice, or after a newer one'
         missed = [each for each in log if self.began < each.get('at', 0) < self.ended and each.get('active') is False]
-        # A busy machine may hold a command up until it is too old.
+        # A busy machine may delay a command until it is too old.
         missed += [each for each in commands if not each['confirmed'] and 'STALE' not in each['error']]
         assert not missed, missed
         assert gap <= within(LONGEST_GAP_S)
@@ -106,7 +106,7 @@ class HostOnPaths(Running):
 
 
 def require_executed_as_told(commands, log):
-    """The board has executed each command once at most, and in order: all that were confirmed, and none that was refused.
+    """The board has executed each command at most once, and in order: all confirmed commands, and no refused command.
     `log` is the board's."""
     executed = [each['executed']['command'] for each in log if 'executed' in each]
     executed = collections.deque(each for each in executed if each.startswith('S:'))
@@ -128,10 +128,10 @@ def is_path(place, carries=True):
 
 
 def has_joined(paths, event='joined'):
-    """Of a board: it has so many paths to its host, with one that it did not have."""
+    """Matches the board's event that a path joined, after which it has `paths` paths to its host."""
     return lambda each: each.get('path', {}).get('event') == event and each['path']['paths'] == paths
 
 
 def has_left(paths):
-    """It has so many, without one that it had."""
+    """Matches the board's event that a path left, after which it has `paths` paths."""
     return has_joined(paths, 'left')

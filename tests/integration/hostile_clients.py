@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clients of r4 web that send damaged requests and frames, slowly, or no more after the beginning, and read nothing.
+"""Clients of r4 web that send damaged requests and frames, send slowly, or stop after the beginning, and read nothing.
 
-    python3 hostile_clients.py PORT SEED SECONDS        prints how many there were
+    python3 hostile_clients.py PORT SEED SECONDS        prints the number of clients
 """
 import contextlib
 import random
@@ -14,7 +14,7 @@ from web_client import CLOSE, frame
 
 
 def hostile_bytes(rng, port):
-    """A request, or the frames of a client, damaged."""
+    """A damaged request, or damaged frames of a client."""
     handshake = (f'GET /live HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
                  'Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n'
                  'Sec-WebSocket-Protocol: r4.web.v1\r\n\r\n').encode()
@@ -33,14 +33,14 @@ def hostile_bytes(rng, port):
 
 
 def attack(port, rng, until, done):
-    held = []  # half open: they say no more, and read nothing
+    held = []  # half open: these clients neither send nor read
     while time.monotonic() < until:
         with contextlib.suppress(OSError):
             connection = socket.create_connection(('127.0.0.1', port), 1)
             connection.settimeout(0.05)
             held.append(connection)
             data = hostile_bytes(rng, port)
-            if rng.random() < 0.1:  # slowly
+            if rng.random() < 0.1:  # send slowly
                 for i in range(min(len(data), 20)):
                     connection.sendall(data[i:i + 1])
             else:

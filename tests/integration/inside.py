@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run test files where SocketCAN is: in the guest of tools/with-can, or here if this is the guest.
+"""Runs test files where SocketCAN exists: in the guest of tools/with-can, or here if this is the guest.
 
-Nowhere else: on a machine's own CAN interfaces there may be motors.
-A run in which one of their tests was not executed fails.
+They run nowhere else, because a machine's own CAN interfaces may be connected to motors.
+A run fails if one of the tests was not executed.
 """
 import os
 import pathlib
@@ -20,7 +20,7 @@ LONGEST_S = 900
 PACKAGE = pathlib.Path(R4).resolve().parent / 'python'
 PYTEST = ['/usr/bin/python3', '-X', f'pycache_prefix={HERE.parents[1] / "build/pycache"}', '-m', 'pytest', '-q',
           '-p', 'no:cacheprovider']
-# Looking for plugins reads the metadata of every installed package, which takes the guest seconds.
+# The search for plugins reads the metadata of every installed package, which takes seconds in the guest.
 PLAIN = {**os.environ, 'PYTEST_DISABLE_PLUGIN_AUTOLOAD': '1', 'PYTHONPATH': str(PACKAGE), 'PYTHONDONTWRITEBYTECODE': '1'}
 
 
@@ -32,7 +32,7 @@ def compile_here(files):
 
 
 def run_inside(*names):
-    """`names`: files beside this one."""
+    """`names`: files in this folder."""
     files = [HERE / name for name in names]
     compile_here(files)
     inside = subprocess.run(

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Computers on a network of their own: a network namespace each, with TAP interfaces on one hub.
+"""Computers on a separate network: each is a network namespace, with TAP interfaces on one hub.
 
-Nothing of it reaches the networks of this machine. It takes root, or a kernel that gives users namespaces
-of their own, and /dev/net/tun.
+No frame reaches the networks of this machine. It needs root, or a kernel that lets users make namespaces,
+and /dev/net/tun.
 """
 import contextlib
 import ctypes
@@ -30,10 +30,10 @@ def interface(number):
 
 
 def _be_a_computer(handed_over, *addresses):
-    """In the namespace: makes the interfaces, gives them away, and stays until standard input ends."""
+    """Runs in the namespace: makes the interfaces, hands their descriptors over, waits until standard input ends."""
     taps = []
     subprocess.run(['ip', 'link', 'set', 'lo', 'up'], check=True)
-    # Each interface answers for its own address only, also where several are on one network.
+    # Each interface answers only for its own address, even if several are on one network.
     for name, value in ('arp_ignore', '1'), ('arp_announce', '2'):
         pathlib.Path(f'/proc/sys/net/ipv4/conf/all/{name}').write_text(value)
     for number, address in enumerate(addresses):
@@ -49,7 +49,7 @@ def _be_a_computer(handed_over, *addresses):
 
 
 class Computer:
-    """One of them. `inside` is for what starts a process: run(…, **computer.inside)."""
+    """A computer on the network. `inside`: arguments that start a process on it, as in run(…, **computer.inside)."""
 
     def __init__(self, *addresses):
         ours, theirs = socket.socketpair()
@@ -76,18 +76,18 @@ class Computer:
                 raise OSError(ctypes.get_errno(), 'setns')
 
     def move(self, address):
-        """It has another address, as after a new lease of DHCP."""
+        """Changes the address, as a new DHCP lease does."""
         for order in (f'addr del {self.addresses[0]}/24 dev {INTERFACE}', f'addr add {address}/24 dev {INTERFACE}'):
             subprocess.run(['ip', *order.split()], check=True, **self.inside)
         self.addresses[0] = address
 
     def switch(self, number, state):
-        """That interface is made 'up' or 'down'; when the kernel told of it."""
+        """Sets the interface 'up' or 'down'; returns the time of the kernel's report."""
         return self._reported(number, lambda: subprocess.run(['ip', 'link', 'set', interface(number), state], check=True,
                                                              **self.inside))
 
     def plug(self, number, there):
-        """Its cable is pulled, or plugged in; when the kernel told of it, which it does once a second at most."""
+        """Pulls or plugs in the cable; returns the time of the kernel's report, at most one per second."""
         return self._reported(number, lambda: fcntl.ioctl(self.taps[number], TUNSETCARRIER, struct.pack('i', there)))
 
     def _reported(self, number, change):
@@ -136,7 +136,7 @@ class Lan:
                     frame = os.read(tap, FRAME)
                     for other in taps:
                         if other != tap:
-                            with contextlib.suppress(OSError):  # it is down
+                            with contextlib.suppress(OSError):  # the interface is down
                                 os.write(other, frame)
 
     def __enter__(self):

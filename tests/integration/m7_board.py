@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tools/m7 as it runs, and who stands between its board and a host."""
+"""A running tools/m7, watchers of its board, and a relay between the board and a host."""
 import collections
 import json
 import os
@@ -17,7 +17,7 @@ import tty
 from r4_process import PATIENCE_S
 
 M7 = str(pathlib.Path(__file__).resolve().parents[2] / 'tools/m7')
-FIRST_BUILD_S = 240  # and the packages, where tools/test has not installed them
+FIRST_BUILD_S = 240  # includes the packages, if tools/test has not installed them
 
 
 def m7(*arguments):
@@ -26,9 +26,9 @@ def m7(*arguments):
 
 
 def steps_of(states, period_ms):
-    """The steps of T, in the grid of the period. A board that was never late (LATE) leaves nothing out, and nothing is
-    lost. Where a busy machine made it late, each late period is left out, and may have cost one more state: one that
-    still waited to be sent gives way to the next."""
+    """Checks and returns the steps of T, which are multiples of the period. A board that was never late (LATE) leaves
+    no state out. On a busy machine the board leaves out each late period. Each late period may cost one more state,
+    because a newer state replaces one that still waits to be sent."""
     steps = [(later['t'] - earlier['t']) % 2**32 for earlier, later in zip(states, states[1:])]
     assert all(step != 0 and step % period_ms == 0 for step in steps), steps
     missing = sum(steps) // period_ms - len(steps)
@@ -39,14 +39,14 @@ def steps_of(states, period_ms):
 
 
 class M7Board:
-    """A board on the emulated M7; with --pins it tells what its pins do."""
+    """A board on the emulated M7; with --pins it reports its pins."""
 
     def __init__(self, *options):
         self.process = subprocess.Popen([M7, *options], stdout=subprocess.PIPE, text=True)
         self.serial = self.process.stdout.readline().strip()
         self.udp = self.process.stdout.readline().strip()
         self.events = queue.Queue()
-        self.log = []  # what was taken off the queue
+        self.log = []  # all events taken from the queue
         self.reader = threading.Thread(target=self._read, daemon=True)
         self.reader.start()
 
@@ -55,7 +55,7 @@ class M7Board:
             self.events.put(json.loads(line))
 
     def pins(self, is_it, timeout=PATIENCE_S):
-        """The next event for which it is true."""
+        """Returns the next event for which `is_it` is true."""
         deadline = time.monotonic() + timeout
         while True:
             try:
@@ -81,7 +81,7 @@ def fields_of(datagram):
 
 
 class Watcher:
-    """A UDP socket that the board has heard: what the board tells everyone is told to it."""
+    """A UDP socket that the board has heard: the board's broadcasts go to it."""
 
     def __init__(self, url):
         address, port = re.match(r'udp://(.+):(\d+)', url).groups()
@@ -91,7 +91,7 @@ class Watcher:
         self.ask()
 
     def ask(self):
-        self.socket.send(b'T:1;^0x1ef9abf^')  # valid, and no more
+        self.socket.send(b'T:1;^0x1ef9abf^')  # valid, but without a command
 
     def next(self, is_it):
         while True:
@@ -108,7 +108,7 @@ class Watcher:
 
 
 class LineWatcher:
-    """The end of the board's serial line: what the board tells everyone is told there, too."""
+    """The end of the board's serial line, to which the board's broadcasts go, too."""
 
     def __init__(self, url):
         self.file = os.open(url[len('serial://'):], os.O_RDWR | os.O_NOCTTY)
@@ -136,7 +136,7 @@ class LineWatcher:
 
 
 class Relay(threading.Thread):
-    """Between a host and the board: notes when, by the board's clock, the host was heard last."""
+    """Relays between a host and the board, and records the board's time at which it last heard the host."""
 
     def __init__(self, url):
         super().__init__(daemon=True)

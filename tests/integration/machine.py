@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Real time on a machine that has other work too.
+"""Bounds of real time on a machine that also does other work.
 
-A program keeps a promise of milliseconds only while it has a processor. So within() adds to a bound the time for which the
-kernel kept the programs of the test waiting for one. On a machine that has nothing else to do it adds nothing.
+A program keeps a promise of milliseconds only while it has a processor. So within() adds to a bound the time that the
+programs of the test waited for a processor. On an idle machine it adds nothing.
 """
 import contextlib
 import math
@@ -10,16 +10,16 @@ import os
 import threading
 import time
 
-# Sanitizers make everything slower and bigger; promises about time and memory are for release builds.
+# Sanitizers make programs slower and bigger; promises about time and memory are for release builds.
 SANITIZED = 'R4_SANITIZER' in os.environ
-# Where a promise of milliseconds can be kept; the guest of tools/with-can emulates its processor. Elsewhere a test holds
-# what must not come too early, and what comes after what.
+# True if promises of milliseconds can be kept: not in the guest of tools/with-can, which emulates its processor.
+# If false, a test asserts only the order of events, and that none comes too early.
 PROMPT = not SANITIZED and 'R4_CAN_GUEST' not in os.environ
-LOOK_S = 0.1  # what a program waits between the last look and its end is not counted
+LOOK_S = 0.1  # the wait between the last look and the end of a program is not counted
 
 
 def waits_of(process, waits):
-    """Puts into `waits` how long each thread of a process and of its descendants has waited for a processor, in ns."""
+    """Puts into `waits` how long each thread of a process and its descendants has waited for a processor, in ns."""
     with contextlib.suppress(OSError):
         for thread in os.listdir(f'/proc/{process}/task'):
             folder = f'/proc/{process}/task/{thread}'
@@ -31,10 +31,10 @@ def waits_of(process, waits):
 
 
 class Account:
-    """What one test did not have of the machine, from begin() on."""
+    """The time that the machine kept the programs of one test waiting, since begin()."""
 
     def __init__(self):
-        self.standstill_s = 0.0  # the longest that this thread was kept from running
+        self.standstill_s = 0.0  # the longest time that this thread was kept from running
         self._lock = threading.Lock()
         self._before = {}
         self._waits = {}
@@ -50,7 +50,7 @@ class Account:
             self._thread.start()
 
     def waited_s(self):
-        """The sum over all threads, also of programs that have ended."""
+        """The sum over all threads, including those of programs that have ended."""
         with self._lock:
             if PROMPT:
                 waits_of(os.getpid(), self._waits)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// docs/examples/openpodcar's topics with a joystick in the same process, in a graph that nobody else is in.
+// The topics of docs/examples/openpodcar, with a joystick in the same process and no other participants.
 #include <dds/dds.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ constexpr const char* alone =
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces>"
     "<AllowMulticast>false</AllowMulticast></General><Discovery>"
     "<ParticipantIndex>none</ParticipantIndex></Discovery></Domain></CycloneDDS>";
-constexpr dds_domainid_t domain = 231;  // others' tests have those to 200
+constexpr dds_domainid_t domain = 231;  // other tests use the domains up to 200
 
 class Joystick {
  public:
@@ -63,7 +63,7 @@ class Joystick {
   dds_entity_t writer_ = 0;
 };
 
-// On a slow machine what was heard before is too old for a press, and it is done again.
+// Repeats the press: on a slow machine the messages heard before it may be too old.
 bool press_start(Topics& topics, Pilot& pilot, Joystick& joystick) {
   const auto deadline = std::chrono::steady_clock::now() + 10s;
   while (pilot.mode() != Pilot::Mode::automatic && std::chrono::steady_clock::now() < deadline) {
@@ -92,7 +92,7 @@ TEST(OpenPodcarTopics, StopsByAStopBehindWhichMuchHasComeWhileItWasNotTaken) {
   ASSERT_TRUE(press_start(topics, pilot, joystick));
   for (int i = 0; i < 63; ++i) joystick.publish();
   topics.take(pilot, {});
-  EXPECT_EQ(pilot.mode(), Pilot::Mode::automatic) << "none is lost of so few";
+  EXPECT_EQ(pilot.mode(), Pilot::Mode::automatic) << "a message was lost";
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of tests that run at the same time must not meet at UDP ports: each has a network of its own, a loopback."""
+"""Gives each test file its own loopback network, so that files that run at the same time do not share UDP ports."""
 import ctypes
 import fcntl
 import os
@@ -13,9 +13,9 @@ held = []
 
 
 def enter():
-    """Called once, before any test. Only root may make a network: for other users one file runs after another.
+    """Called once, before any test. Only root may make a network; for other users the files run one after the other.
 
-    The interfaces of the guest of tools/with-can are in its own network.
+    In the guest of tools/with-can it does nothing, because a new network would not have the guest's CAN interfaces.
     """
     if 'R4_CAN_GUEST' in os.environ:
         return

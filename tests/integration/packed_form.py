@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A second implementation of the packed form, written from docs/reference/packed.md alone.
 
-pack(datagram) -> bytes, or None if it travels plain; unpack(bytes) -> datagram, ValueError if malformed.
+pack(datagram) -> bytes, or None if it is sent as text; unpack(bytes) -> datagram, ValueError if malformed.
 """
 import re
 
@@ -49,7 +49,7 @@ def count(value):
 
 
 def in_form(form, text):
-    """The digits of the values, or None if the form would not write exactly them."""
+    """Returns the digits of the values, or None if the form would not reproduce the text exactly."""
     def match(pattern):
         found = re.fullmatch(pattern, text)
         return found and [int(group) for group in found.groups()]
@@ -117,7 +117,7 @@ def value_digits(name, values):
 
 
 def size_of(first, second):
-    """S for the two fields, or None."""
+    """Returns S for the two fields, or None."""
     if (first[0], second[0]) != ('PNum', 'T') or not all(re.fullmatch(PLAIN, v) for _, v in (first, second)):
         return None
     pnum, time = int(first[1]), int(second[1])
@@ -125,14 +125,14 @@ def size_of(first, second):
 
 
 def layout_of(fields):
-    """Layout, S, the digits of PNum, T and SID, the other fields."""
+    """Returns the layout, S, the digits of PNum, T and SID, and the other fields."""
     def is_session(field):
         return field[0] == 'SID' and SESSION.fullmatch(field[1])
 
     def digits(size, numbers):
         return ''.join(f'{int(number):0{width}x}' for (_, number), width in zip(numbers, SIZES[size]) if width)
     for layout, word in HEARTBEATS.items():
-        at = 1 if layout == 5 else 2  # where PNum stands
+        at = 1 if layout == 5 else 2  # index of PNum
         if len(fields) < at + 2 or fields[0] != ['H', word] or (at == 2 and not is_session(fields[1])):
             continue
         size = size_of(*fields[at:at + 2])

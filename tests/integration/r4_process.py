@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The r4 command as real processes: run to its end, or running with its lines awaited.
+"""The r4 command as real processes: run to the end, or kept running while the test awaits its lines.
 
 Nothing here sleeps to wait: everything awaits an event until a deadline.
 """
@@ -27,13 +27,13 @@ ERROR = re.compile(r'^r4: .+: .+; .+$', re.MULTILINE)
 
 
 def run(*arguments, stdin='', timeout=PATIENCE_S, **options):
-    """Runs r4 to its end; text in and out."""
+    """Runs r4 to its end, with text as input and output."""
     return subprocess.run([R4, *arguments], input=stdin, capture_output=True, text=True,
                           timeout=timeout, check=False, **options)
 
 
 def send(*arguments, timeout=60):
-    """r4 send. Again where a machine that stood still has made a command too old for the board."""
+    """Runs r4 send. Repeats it if the machine stood still and a command became too old for the board."""
     for _ in range(5):
         result = run('send', *arguments, timeout=timeout)
         if 'STALE' not in result.stderr:
@@ -41,7 +41,7 @@ def send(*arguments, timeout=60):
     return result
 
 
-# It is a process of its own: what a child has had counts the memory of whoever started it, too.
+# A separate process measures, because the peak memory of a child includes that of the process that started it.
 MEASURE = '''
 import os, sys
 child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ)
@@ -52,7 +52,7 @@ sys.exit(os.waitstatus_to_exitcode(status) % 256)
 
 
 def run_measured(*arguments, **options):
-    """As run(); `peak_mib` of the result is the most memory that r4 had."""
+    """As run(); `peak_mib` of the result is the peak memory of r4."""
     result = subprocess.run([sys.executable, '-S', '-c', MEASURE, R4, *arguments], capture_output=True, text=True,
                             timeout=6 * PATIENCE_S, check=False, **options)
     result.stderr, _, peak_kib = result.stderr.rpartition('\n')
@@ -61,12 +61,12 @@ def run_measured(*arguments, **options):
 
 
 def objects(text):
-    """The JSON objects of an output, one a line."""
+    """The JSON objects of an output, one per line."""
     return [json.loads(line) for line in text.splitlines()]
 
 
 def free_port():
-    """A UDP port that is free, and none of those that Linux gives to who asks for any (from 32768)."""
+    """A free UDP port below 32768, where Linux begins to assign ports to sockets that ask for any port."""
     while True:
         port = random.randrange(30_000, 32_768)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, contextlib.suppress(OSError):
@@ -75,12 +75,12 @@ def free_port():
 
 
 def lasts(seconds):
-    """A fault that is that long: nothing is waited for."""
+    """The length of a fault in real time; the test does not wait for an event."""
     time.sleep(seconds)
 
 
 def text_of(path):
-    """What can be read of a recording."""
+    """The readable part of a recording."""
     if path.suffix != '.zst':
         return path.read_bytes().decode('ascii')
     unpacked = subprocess.run(['zstd', '-dcq', path], capture_output=True, check=False).stdout
@@ -88,7 +88,7 @@ def text_of(path):
 
 
 def wait_for(path, pattern):
-    """Until a line of the recording has it."""
+    """Waits until the recording matches `pattern`."""
     deadline = time.monotonic() + PATIENCE_S
     while not (path.exists() and re.search(pattern, text_of(path), re.MULTILINE)):
         assert time.monotonic() < deadline, f'{pattern} is not in {path}'
@@ -99,7 +99,7 @@ STOP_WITHIN_MS = 5
 
 
 def stop_takes_ms(url):
-    """From the time at which r4 stop has opened `url` to safe outputs: the best of three, for others want the machine."""
+    """The time from opening `url` to safe outputs in r4 stop: the best of three, because the machine may be busy."""
     stops = [run('stop', url, '--json') for _ in range(3)]
     assert all(stop.returncode == 0 for stop in stops), stops
     best = min(objects(stop.stdout)[0]['ms'] for stop in stops)
@@ -109,8 +109,8 @@ def stop_takes_ms(url):
 
 
 def again(write, wait):
-    """Writes, as a host that drives does, until `wait` has its result: on a busy machine a command may be too old when it
-    comes. Returns the time of the last write, and the result."""
+    """Repeats `write` until `wait` has its result, because on a busy machine a command may be too old when it arrives.
+    Returns the time of the last write, and the result."""
     deadline = time.monotonic() + PATIENCE_S
     while True:
         write()
@@ -123,13 +123,13 @@ def again(write, wait):
 
 
 class Running:
-    """r4 as it runs, or another program. Each line of its stdout is kept with the time at which it came."""
+    """A running r4, or another program. Keeps each line of its stdout with the time of its arrival."""
 
     def __init__(self, *arguments, program=R4, **options):
         self.process = subprocess.Popen([program, *arguments], stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE, text=True, **options)
         self.lines = queue.Queue()
-        self.log = []  # what was taken off the queue
+        self.log = []  # all objects taken from the queue
         self.errors = ''
         self._readers = [threading.Thread(target=self._read_lines, daemon=True),
                          threading.Thread(target=self._read_errors, daemon=True)]
@@ -145,7 +145,7 @@ class Running:
         self.errors = self.process.stderr.read()
 
     def next(self, is_it=lambda each: True, timeout=PATIENCE_S):
-        """The next object for which `is_it` is true, with the time at which it came as `came`."""
+        """Returns the next object for which `is_it` is true; `came` is the time of its arrival."""
         deadline = time.monotonic() + timeout
         while True:
             try:
@@ -165,12 +165,12 @@ class Running:
                 return each
 
     def skip_past(self):
-        """Forgets what has come so far."""
+        """Drops the objects that have arrived so far."""
         while not self.lines.empty():
             self.lines.get()
 
     def stall(self, seconds):
-        """Holds it up and forgets what came before; returns the time at which it went on."""
+        """Stops the program for a time and drops the objects from before; returns the time at which it resumed."""
         self.signal(signal.SIGSTOP)
         lasts(seconds)
         self.skip_past()
@@ -181,18 +181,18 @@ class Running:
         return time.monotonic()
 
     def end(self):
-        """Ends it as Ctrl-C does; returns its exit code."""
+        """Ends the program as Ctrl-C does; returns its exit code."""
         self.process.send_signal(signal.SIGCONT)
         self.process.send_signal(signal.SIGINT)
         return self.wait()
 
     def rest(self):
-        """Ends it; all that it has printed."""
+        """Ends the program; returns all that it has printed."""
         assert self.end() == 0, self.errors
         return self.left()
 
     def left(self):
-        """It has ended; all that it has printed."""
+        """Returns all that the program has printed, once it has ended."""
         while True:
             came, line = self.lines.get()
             if line is None:
@@ -200,7 +200,7 @@ class Running:
             self.log.append({**json.loads(line), 'came': came})
 
     def cpu_seconds(self):
-        """What it has used of a processor so far."""
+        """The processor time that the program has used so far, in seconds."""
         with open(f'/proc/{self.process.pid}/stat', encoding='ascii') as stat:
             fields = stat.read().rsplit(')', 1)[1].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
@@ -223,24 +223,24 @@ class Running:
 
 
 class Board(Running):
-    """A simulated board. `url` is where it listens, `host_url` how a host opens that."""
+    """A simulated board. `url` is where it listens, `host_url` the URL by which a host opens it."""
 
     def __init__(self, *urls, options=(), listens=None, **process):
-        """`listens`: at how many places, if that is not the number of URLs."""
+        """`listens`: the number of places at which it listens, if that is not the number of URLs."""
         super().__init__('sim', '--json', *urls, *options, **process)
         listening = [self.next(lambda each: each['type'] == 'listening') for _ in range(listens or len(urls))]
         self.url = listening[0]['url']
         self.host_url = listening[0]['host_url']
         if self.host_url.startswith('udp:'):
-            self.host_url += '?listen=0'  # the port of hosts is one, and the tests have several
+            self.host_url += '?listen=0'  # the tests have several hosts, which cannot share the standard port of hosts
 
     def state(self, state, reason=None, timeout=PATIENCE_S):
-        """The next event of that state."""
+        """Returns the next event that reports that state."""
         return self.next(lambda each: each.get('state') == state and 'outputs' not in each and
                          reason in (None, each['reason']), timeout)
 
     def never(self, state, seconds, meanwhile=lambda: None):
-        """For that long it does not come to that state; `meanwhile` is called all the time."""
+        """Asserts that the board does not reach `state` within `seconds`; calls `meanwhile` repeatedly."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             meanwhile()
@@ -259,11 +259,11 @@ class Board(Running):
 
 
 def driving(url, *commands, **process):
-    """A host that has closed the motors' supply and driven the outputs, and stays."""
+    """A host that has closed the motors' supply and driven the outputs, and stays connected."""
     host = Running('send', url, 'R:1,On', *commands, '--hold', '60', '--json', **process)
     for command in ('R:1,On', *commands):
         result = host.next()
-        if result.get('code') == 'STALE':  # as in send()
+        if result.get('code') == 'STALE':  # the command was too old, as in send()
             host.__exit__()
             return driving(url, *commands, **process)
         assert result['confirmed'] and result['command'] == command, result
@@ -271,7 +271,7 @@ def driving(url, *commands, **process):
 
 
 def monitor(url, *options, **process):
-    """As a host that controls the board and commands nothing."""
+    """A monitor that controls the board but sends no commands."""
     return Running('monitor', url, '--json', '--control', *options, **process)
 
 

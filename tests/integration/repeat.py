@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A test that fails while the machine stood still is run once more: links time out then, as they should.
+"""Runs a test once more if it failed while the machine stood still, because links time out then, as they should.
 
-Each repeat is a line of build/results/repeats.txt, which tests/summary.py shows at the end of a run.
+Each repeat is a line in build/results/repeats.txt, which tests/summary.py shows at the end of a run.
 """
 import pathlib
 import time
@@ -11,8 +11,8 @@ from _pytest.runner import runtestprotocol
 
 from machine import account
 
-LONGEST_S = 80  # what takes longer runs in the guest, where its tests are repeated one by one
-STANDSTILL_S = 0.2  # bounds of milliseconds allow for less (machine.py); a link is lost after half a second
+LONGEST_S = 80  # longer tests run in the guest, which repeats its tests one by one
+STANDSTILL_S = 0.2  # shorter ones are allowed for by machine.py; a link is lost after 0.5 s
 REPEATS = pathlib.Path(__file__).resolve().parents[2] / 'build/results/repeats.txt'
 
 

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Somebody else in a ROS 2 graph, by Fast DDS: what it reads and writes are bytes, whose form the test knows. For
-// integration/test_ros2.py, which drives it by lines on stdin and reads JSON, one object a line, on stdout:
+// Another participant in a ROS 2 graph, by Fast DDS. It reads and writes bytes, whose form the test knows.
+// integration/test_ros2.py drives it by lines on stdin and reads JSON, one object per line, on stdout:
 //
 //     reader TOPIC TYPE RELIABILITY DURABILITY USERDATA    {"type":"sample","topic":…,"bytes":"0001…"}
 //     writer TOPIC TYPE RELIABILITY DURABILITY USERDATA    {"type":"matched","topic":…,"readers":1}
 //     write TOPIC BYTES              {"type":"written","topic":…}
 //     remove TOPIC                   {"type":"removed","topic":…}
-//     crowd TOPIC TYPE COUNT         so many readers more, whose samples are counted
-//     count TOPIC                    {"type":"counted","topic":…,"least":3,"most":4}: of a reader of the crowd
+//     crowd TOPIC TYPE COUNT         COUNT more readers, whose samples are counted
+//     count TOPIC                    {"type":"counted","topic":…,"least":3,"most":4}: samples per reader
 //
-// RELIABILITY is reliable or best_effort, DURABILITY volatile or transient_local, USERDATA a text or -. What others
-// have it tells of itself: {"type":"endpoint","kind":"writer","topic":…,"of":…,"user_data":…,"gid":…}, and when it
-// goes, "gone":true; of participants {"type":"participant","user_data":…,"gone":…}. Its domain is ROS_DOMAIN_ID's,
-// on 127.0.0.1 alone.
+// RELIABILITY is reliable or best_effort, DURABILITY volatile or transient_local, USERDATA a text or -. The peer also
+// reports the endpoints of other participants, {"type":"endpoint","kind":"writer","topic":…,"of":…,"user_data":…,
+// "gid":…}, with "gone":true when they end, and the participants, {"type":"participant","user_data":…,"gone":…}.
+// Its domain is ROS_DOMAIN_ID, only on 127.0.0.1.
 #if __has_include(<fastdds/utils/IPLocator.hpp>)
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.hpp>
 #include <fastdds/utils/IPLocator.hpp>
@@ -90,7 +90,7 @@ std::string in_quotes(const std::string& text) {
   return quoted + '"';
 }
 
-// A type whose samples are bytes, the four of the encapsulation included.
+// A type whose samples are bytes, including the four bytes of the encapsulation.
 class RawType final : public TopicDataType {
  public:
 #ifdef FAST_DDS_3

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Somebody else in a ROS 2 graph: ros2_peer (ros2_peer.cpp) on Fast DDS, and CDR by hand."""
+"""Another participant in a ROS 2 graph: ros2_peer (ros2_peer.cpp) on Fast DDS, and CDR by hand."""
 import contextlib
 import itertools
 import json
@@ -13,11 +13,11 @@ import time
 from r4_process import PATIENCE_S, R4, Board, Running, again
 
 PROGRAM = os.path.join(os.path.dirname(R4), 'tests', 'ros2_peer')
-# Of ROS; each graph has its own, for who was killed stays in the old one for a while.
+# ROS domains: one per graph, because a killed participant stays in its graph for a while.
 DOMAINS = itertools.count(os.getpid() * 8)
 ENVIRONMENT = {name: value for name, value in os.environ.items()
                if not name.startswith('ROS_') and name != 'CYCLONEDDS_URI'}
-# What ROS 2 calls its messages in DDS, and what releases since Iron compare (measured).
+# The DDS names of ROS 2's messages, and the hashes that releases since Iron compare (measured).
 STRING, BOOL, FLOAT32, INT32, UINT32, TWIST, TWIST_STAMPED = (f'{package}::msg::dds_::{name}_' for package, name in (
     ('std_msgs', 'String'), ('std_msgs', 'Bool'), ('std_msgs', 'Float32'), ('std_msgs', 'Int32'), ('std_msgs', 'UInt32'),
     ('geometry_msgs', 'Twist'), ('geometry_msgs', 'TwistStamped')))
@@ -29,12 +29,12 @@ HEAD = bytes((0, 1, 0, 0))  # little-endian XCDR1
 
 
 def own_domain():
-    """The environment of a graph of its own. Its ports, 7400 + 250 per domain, are below those that Linux hands out."""
+    """The environment of a new graph. Its ports, 7400 + 250 per domain, are below those that Linux assigns."""
     return {**ENVIRONMENT, 'ROS_DOMAIN_ID': str(1 + next(DOMAINS) % 100)}
 
 
 class Ros2(Running):
-    """r4 ros2. `ready` is what it says of itself."""
+    """A running r4 ros2. `ready` is its first report."""
 
     def __init__(self, domain, *arguments):
         super().__init__('ros2', '--json', *arguments, env=domain)
@@ -45,7 +45,7 @@ class Ros2(Running):
         return self.next(lambda each: each['type'] == 'log' and each['text'] == 'armed', timeout)
 
     def logged_both(self, *texts):
-        """In either order."""
+        """Waits until all texts are logged, in any order."""
         missing = set(texts)
         while missing:
             missing.discard(self.next(lambda each: each['type'] == 'log')['text'])
@@ -62,7 +62,7 @@ class Peer:
         self.process = subprocess.Popen([PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
                                         env=domain)
         self.lines = queue.Queue()
-        self.endpoints = {}  # (kind, topic): what is there
+        self.endpoints = {}  # (kind, topic): the endpoint that exists
         self.reader = threading.Thread(target=self._read, daemon=True)
         self.reader.start()
 
@@ -86,11 +86,11 @@ class Peer:
         self.say('write', topic, (HEAD + payload).hex())
 
     def write_raw(self, topic, data):
-        """The four bytes of the encapsulation are in `data`, or are not."""
+        """Writes `data` as it is: with or without the four bytes of the encapsulation."""
         self.say('write', topic, data.hex())
 
     def counted(self, topic):
-        """The fewest samples that one of the crowd has had."""
+        """The fewest samples that a reader of the crowd has received."""
         self.say('count', topic)
         return self.next(lambda each: each['type'] == 'counted')['least']
 
@@ -111,7 +111,7 @@ class Peer:
                 return each
 
     def sample(self, topic, is_it=lambda payload: True, timeout=PATIENCE_S):
-        """The payload of the next sample for which `is_it` is true."""
+        """Returns the payload of the next sample for which `is_it` is true."""
         found = []
 
         def matches(each):
@@ -125,7 +125,7 @@ class Peer:
         return Payload(found[-1], each['came'])
 
     def endpoint(self, kind, topic, timeout=PATIENCE_S):
-        """What is told of a reader or writer of others, now or when it comes."""
+        """Returns the report on a reader or writer of another participant; waits until it exists."""
         if (kind, topic) not in self.endpoints:
             self.next(lambda each: (kind, topic) in self.endpoints, timeout)
         return self.endpoints[kind, topic]
@@ -147,7 +147,7 @@ class Peer:
 
 @contextlib.contextmanager
 def armed(*arguments, options=()):
-    """A board, its node, armed, and a peer."""
+    """A board, its armed node, and a peer."""
     domain = own_domain()
     with Board('udp://127.0.0.1:0', options=options) as board, Peer(domain) as peer:
         with Ros2(domain, board.host_url, '--arm', *arguments) as ros2:
@@ -158,13 +158,13 @@ def armed(*arguments, options=()):
 
 
 def join(ros2, peer, topic, of):
-    """A publisher of the peer, known at both ends: what is written now is read."""
+    """Makes a publisher of the peer, and waits until both ends know it, so that samples are received from then on."""
     peer.writer(f'rt/{topic}', of)
     ros2.logged(f'{topic}: 1 publishers')
 
 
 def arm(ros2, peer):
-    """Presses the button until that arms: a sample may be lost, or come too late."""
+    """Presses the button until the board is armed: a sample may be lost, or arrive too late."""
     def press():
         for pressed in (b'\x00', b'\x01'):
             peer.write('rt/arm', pressed)
@@ -172,7 +172,7 @@ def arm(ros2, peer):
 
 
 def drive(board, peer, topic, payload, is_it):
-    """Writes it until the board has such outputs: when it was written last, and those."""
+    """Repeats the sample until the board has such outputs; returns the time of the last write, and the outputs."""
     written, came = again(lambda: peer.write(topic, payload), lambda timeout: board.outputs(is_it, timeout))
     return written, came['outputs']
 
@@ -184,7 +184,7 @@ def pwm(outputs, channel):
 
 
 class Payload(bytes):
-    """A sample's bytes behind the encapsulation, with the time at which they came."""
+    """A sample's bytes after the encapsulation, with the time of their arrival."""
 
     def __new__(cls, data, came=0.0):
         self = super().__new__(cls, data)
@@ -238,12 +238,12 @@ def twist(linear, angular):
 
 
 def stamped(stamp, payload):
-    """A message that begins with a header: of that stamp, in seconds, and without a frame."""
+    """A message that begins with a header, with that stamp in seconds and an empty frame."""
     return struct.pack('<iIIB3x', int(stamp), int(stamp % 1 * 1e9), 1, 0) + payload
 
 
 def health_of(payload):
-    """(level, name, message, hardware id, values) of the one that is told of in /diagnostics."""
+    """(level, name, message, hardware id, values) of the only status in a message of /diagnostics."""
     cdr = Cdr(payload)
     cdr.header()
     assert cdr.take('I') == 1
@@ -252,7 +252,7 @@ def health_of(payload):
 
 
 def nodes_of(payload, gid_size):
-    """{node: (readers, writers)} of a ros_discovery_info, whose ids have that many bytes."""
+    """{node: (readers, writers)} of a ros_discovery_info whose ids have `gid_size` bytes."""
     cdr = Cdr(payload)
 
     def gid():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A second implementation of authentication, written from docs/reference/protocol.md: Python's hashlib and a socket.
 
-Nothing of r4 is used here.
+It shares no code with r4.
 """
 import base64
 import hashlib
@@ -13,13 +13,13 @@ import zlib
 
 
 def closed(fields):
-    """Fields, each ended by a semicolon, with the checksum behind them."""
+    """Appends the checksum to fields, each of which ends with a semicolon."""
     body = fields.encode() + b'^'
     return body + f'0x{zlib.crc32(body):x}^'.encode()
 
 
 def tag_of(key, nonce, before):
-    """The tag of a datagram whose bytes before it are `before`, the comma in front of it included."""
+    """The tag of a datagram. `before`: the bytes before the tag, including the comma."""
     host_to_board = hashlib.blake2s(b'R4 host to board', key=key).digest()
     digest = hashlib.blake2s(b'R4A1' + nonce.encode() + before.encode(), key=host_to_board,
                              digest_size=8).digest()
@@ -27,7 +27,7 @@ def tag_of(key, nonce, before):
 
 
 class SigningHost:
-    """A host that signs, on UDP."""
+    """A host that signs its datagrams, on UDP."""
 
     def __init__(self, board_url, key_id, key):
         port = int(re.search(r':(\d+)', board_url.removeprefix('udp://')).group(1))
@@ -40,12 +40,12 @@ class SigningHost:
         self.pnum = 4711
         self.counter = time.time_ns() // 1000
         self.nonce = None
-        self.board_t = 0   # of the newest datagram
-        self.echo = 0      # of the newest heartbeat; 0 while the board is connecting
+        self.board_t = 0   # T of the newest datagram
+        self.echo = 0      # T of the newest heartbeat; 0 while the board is connecting
         self.state = {}
         self.refused = []  # (PNum, code)
-        self.reasons = []  # of the heartbeats, as they came
-        self.cause = 0  # of the newest
+        self.reasons = []  # of the heartbeats, in the order of their arrival
+        self.cause = 0  # of the newest heartbeat
 
     def close(self):
         self.socket.close()
@@ -71,7 +71,7 @@ class SigningHost:
         return self.pnum, bytes_
 
     def heartbeat(self):
-        if self.nonce is None:  # it asks for the nonce
+        if self.nonce is None:  # an unsigned heartbeat asks for the nonce
             bytes_ = closed(self.fields('H:ROS2-R4'))
         else:
             bytes_ = self.signed(self.fields('H:ROS2-R4'))
@@ -79,7 +79,7 @@ class SigningHost:
         return bytes_
 
     def echo_of(self, heartbeat):
-        """The T for our next heartbeat: of one that says CONNECTING there is none to echo (section 4.2)."""
+        """The T to echo in our next heartbeat: a heartbeat that reports CONNECTING has none to echo (section 4.2)."""
         connecting = heartbeat['PNum'] == '0' and (heartbeat['T'] == '0' or 'AN' in heartbeat)
         return 0 if connecting else int(heartbeat['T'])
 
@@ -101,7 +101,7 @@ class SigningHost:
             self.state.update(fields)
 
     def run(self, until=lambda: False, seconds=10.0, beats=True):
-        """Takes part in the link until that is so; False if it was not in time."""
+        """Takes part in the link until `until()` is true; False if `seconds` passed before."""
         deadline = time.monotonic() + seconds
         next_beat = 0
         while not until():
@@ -119,7 +119,7 @@ class SigningHost:
         return True
 
     def executed(self, number, seconds=10.0):
-        """The board's state says that it has executed that command."""
+        """True if the board's state reports that command as executed."""
         return self.run(lambda: self.state.get('CMD') == str(number), seconds)
 
     def connect(self):

@@ -60,7 +60,7 @@ class SlcanBus:
             (self.states if each['type'] == 'state' else self.answers).put(each)
 
     def order(self, *words):
-        """Gives an order; returns its answer."""
+        """Sends an order to slcan_bus; returns the answer."""
         self.process.stdin.write(' '.join(map(str, words)) + '\n')
         self.process.stdin.flush()
         answer = self.answers.get(timeout=PATIENCE_S)
@@ -71,7 +71,7 @@ class SlcanBus:
         return self.order('status')
 
     def state(self, node, state, timeout=PATIENCE_S):
-        """Awaits a node's change to that state."""
+        """Waits until the node changes to that state."""
         deadline = time.monotonic() + timeout
         while True:
             each = self.states.get(timeout=max(0, deadline - time.monotonic()))
@@ -79,7 +79,7 @@ class SlcanBus:
                 return each
 
     def reset(self, node):
-        """What there is on Linux for an slcan controller that is bus-off."""
+        """Restarts an slcan controller that is bus-off, in the only way that Linux offers."""
         ip('link', 'set', self.interfaces[node], 'down')
         ip('link', 'set', self.interfaces[node], 'up')
 
@@ -87,7 +87,7 @@ class SlcanBus:
         return self
 
     def __exit__(self, *_):
-        for interface in self.interfaces:  # while somebody answers the kernel
+        for interface in self.interfaces:  # before slcan_bus ends, because it has to answer the kernel
             subprocess.run(['ip', 'link', 'set', interface, 'down'], check=False)
         self.process.stdin.close()
         self.process.wait(PATIENCE_S)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A board with a key: a second implementation drives it, an attacker does not; r4 with keys."""
+"""A board with a key: a second implementation drives it, an attacker cannot; r4 with keys."""
 import os
 import pathlib
 import pwd
@@ -32,7 +32,7 @@ def board():
 def host(board):
     it = SigningHost(board.url, 3, KEY)
     it.connect()
-    it.run(seconds=0.15)  # its first, unsigned heartbeat was answered: the next answer may be given now
+    it.run(seconds=0.15)  # the first, unsigned heartbeat was answered; after this the board may answer again
     yield it
     it.close()
 
@@ -78,7 +78,7 @@ def test_a_replay_does_nothing_and_is_not_answered_elsewhere(board, host, strang
     board.skip_past()
     host.send(bytes_, host.socket)
     board.next(lambda each: each.get('refused', {}).get('code') == 'DUPLICATE'
-               or each.get('rejected') == 'replayed')  # where the machine is slow, it is too old
+               or each.get('rejected') == 'replayed')  # on a slow machine the replayed datagram is too old
     host.send(bytes_, stranger)
     board.next(lambda each: each.get('rejected') == 'replayed')
     stranger.settimeout(0.3)
@@ -100,7 +100,7 @@ def test_every_changed_byte_is_found(board, host):
         if i % 8 == 0:
             host.run(seconds=0.02)
     assert tried > 60
-    number, _ = host.command('S:1500,1')  # all that was sent before has been looked at then
+    number, _ = host.command('S:1500,1')  # when it is executed, the board has checked all earlier datagrams
     assert host.executed(number)
     assert pwm(host) == '0,0'
     assert not [each for each in board.log if each.get('executed', {}).get('command', '').startswith('O')]
@@ -142,7 +142,7 @@ def test_a_stop_needs_no_signature_and_is_cleared_with_one(board, host, stranger
     host.send(closed('E:STOP;'), stranger)
     board.state('SAFE', 'stop')
     assert host.run(lambda: host.reasons and host.reasons[-1] == 2)
-    assert host.nonce != nonce, 'another nonce for the safe state'
+    assert host.nonce != nonce, 'the safe state has the same nonce as before'
     host.send(closed('E:CLEAR;PNum:1;T:1;'), stranger)
     board.next(lambda each: each.get('rejected') == 'missing')
     number, _ = host.command(f'E:CLEAR,{host.cause}')
@@ -215,7 +215,7 @@ def test_a_key_is_made_and_given_over_a_cable_and_taken_away_there(tmp_path):
         board.executed('C:key,7:...')
         assert file.read_text(encoding='ascii').strip()[2:] not in str(board.log)
         driven_by_cable = run('send', cable, 'O:358,1,1')
-        assert driven_by_cable.returncode == 0, 'who is at the cable needs no key'
+        assert driven_by_cable.returncode == 0, 'a host on the cable needed a key'
         board.state('SAFE', 'link')
         assert run('send', network, 'O:1,1,1', '--timeout', '1.5').returncode == 3
         signed = run('send', network, 'O:1,1,1', '--key', str(file))
@@ -268,7 +268,7 @@ def test_a_key_file_of_somebody_else_is_told_from_one_that_is_missing():
         key = write_key(pathlib.Path(folder, 'key'), f'3:{KEY.hex()}')
         program = [R4]
         options = {}
-        if os.geteuid() == 0:  # root may read anything: somebody else asks, in whose reach r4 must be
+        if os.geteuid() == 0:  # root may read anything, so another user runs r4 from a folder that it can read
             program = [shutil.copy(R4, os.path.join(folder, 'r4'))]
             nobody = pwd.getpwnam('nobody')
             options = {'user': nobody.pw_uid, 'group': nobody.pw_gid, 'extra_groups': []}

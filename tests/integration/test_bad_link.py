@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 sim --link: what becomes of the datagrams, and of the link."""
+"""r4 sim --link: the effects on the datagrams and on the link."""
 import pytest
 
 from machine import within_ms
@@ -11,7 +11,7 @@ def behind(link, url='udp://127.0.0.1:0'):
 
 
 def suffered(board):
-    """What the board tells of it at its end: of the datagrams to it, and of its own."""
+    """The impairments that the board reports at its end: of the datagrams to it, and of its own."""
     [told] = [each for each in board.rest() if each['type'] == 'impairment']
     return told['received'], told['sent']
 
@@ -37,7 +37,7 @@ def test_loss_is_counted_at_both_ends_and_commands_come_through():
         received, sent = suffered(board)
     assert 0.1 < share('lost', sent) < 0.3 and received['lost'] > 0, (received, sent)
     missing = (times[-1] - times[0]) / 10 + 1 - len(times)
-    assert missing > 5, 'states that were lost'
+    assert missing > 5, 'too few states were lost'
     assert sent['duplicated'] == sent['corrupted'] == sent['cut'] == sent['overflow'] == 0
 
 

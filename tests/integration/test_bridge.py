@@ -10,13 +10,13 @@ from machine import SANITIZED, within
 from paper_client import PaperClient
 from r4_process import ERROR, Board, Running, again, driving, is_state, lasts, monitor, run, watch
 
-# The board's timeout, and what docs/reference/safety.md promises on top; a busy machine as much again.
+# The board's timeout, and the margin that docs/reference/safety.md promises; then a margin for a busy machine.
 SAFE_WITHIN_S = 1.02 + 0.08
 LASTS_S = 2
 
 
 class Bridge(Running):
-    """`url`: where it listens."""
+    """A running r4 bridge. `url`: where it listens."""
 
     def __init__(self, hosts, board, *options):
         super().__init__('bridge', hosts, board, '--json', '--every', '0.1', *options)
@@ -56,10 +56,11 @@ def test_the_papers_udp_client_drives_a_board_on_a_serial_port(board):
     peer = f'127.0.0.1:{listening.getsockname()[1]}'
     with listening, sending, Bridge(f'udp://127.0.0.1:0?peer={peer}', f'serial://{board.tty}') as bridge:
         port = int(bridge.url.split('?')[0].rsplit(':', 1)[1])
-        # A machine that stands still for a moment makes some late. None vanishes.
+        # If the machine stands still for a moment, some datagrams are late, but none vanishes.
         fates = ('passed', 'late', 'undelivered', 'kept_out')
         client = PaperClient(lambda data: sending.sendto(data, ('127.0.0.1', port)))
-        bridge.counters('board', lambda each: each['passed'] or each['undelivered'])  # the board has told that it has no key
+        # After this the bridge knows that the board has no key.
+        bridge.counters('board', lambda each: each['passed'] or each['undelivered'])
         end = time.monotonic() + LASTS_S
         while time.monotonic() < end:
             try:
@@ -70,12 +71,12 @@ def test_the_papers_udp_client_drives_a_board_on_a_serial_port(board):
             bridge.counters('hosts', lambda each: sum(each[name] for name in fates) == client.pnum_sent)
         log = board.rest()
         told = bridge.rest()
-    assert not [each for each in log if each.get('state') == 'SAFE'], 'while the client was there'
+    assert not [each for each in log if each.get('state') == 'SAFE'], 'safe although the client was connected'
     assert [each for each in log if each.get('state') == 'ACTIVE']
     assert len(client.states) >= 50 * LASTS_S or SANITIZED
     assert ';DHB1A:1000,1;' in client.states[-1] and ';SERVO1POS:300;' in client.states[-1]
     hosts = [each for each in told if each.get('side') == 'hosts' and each['type'] == 'counters'][-1]
-    # Before the client is served, 16 pass at once.
+    # Before the bridge serves the client, up to 16 datagrams of other hosts pass.
     assert hosts['kept_out'] <= 16 or SANITIZED
     assert hosts['passed'] > 0.95 * client.pnum_sent
     assert hosts['damaged'] == hosts['misdirected'] == hosts['refused'] == 0
@@ -121,7 +122,7 @@ def test_a_death_on_the_way_makes_the_board_safe_in_time(bridge, board, end):
 
 
 def test_what_waited_in_a_stopped_bridge_is_not_executed(bridge, board):
-    """Of the paper's clients, whose heartbeats prove nothing, the board could not tell what is old."""
+    """Uses the paper's client: its heartbeats prove nothing, so the board cannot recognise its old datagrams."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
         address = ('127.0.0.1', int(bridge.url.rsplit(':', 1)[1]))
         client = PaperClient(lambda data: sending.sendto(data, address))

@@ -13,7 +13,7 @@ DOCS = os.path.join(os.path.dirname(__file__), '..', '..', 'docs')
 
 
 def planned(*arguments):
-    """The rows of a plan by name, and its exit code."""
+    """Returns the rows of a plan by name, and the exit code."""
     result = run('bus', '--json', *arguments)
     return {each['name']: each for each in objects(result.stdout) if 'name' in each}, result
 
@@ -42,13 +42,13 @@ def test_the_rows_add_up_to_the_total():
 
 
 def test_frames_are_those_of_iso_tp():
-    """The board's plain heartbeat: a first frame of 6 bytes, then 7 a frame."""
+    """The board's plain heartbeat: 6 bytes in the first frame, 7 in each consecutive frame."""
     rows, _ = planned('--plain', '--boards', '1')
     heartbeat = rows['board heartbeat']
     assert math.isclose(heartbeat['frames'] / heartbeat['datagrams'],
                         1 + math.ceil((heartbeat['bytes'] - 6) / 7), abs_tol=1)
     rows, _ = planned('--plain', '--boards', '1', '--fd')
-    assert rows['board heartbeat']['frames'] == rows['board heartbeat']['datagrams']  # one FD frame
+    assert rows['board heartbeat']['frames'] == rows['board heartbeat']['datagrams']  # one FD frame per datagram
 
 
 def test_above_80_percent_it_warns_and_still_fits():

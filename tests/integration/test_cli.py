@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line: bad input with its exit code and message, and what surrounds a program."""
+"""The command line: exit codes and messages for bad input, and programs with closed pipes, full disks and signals."""
 import json
 import os
 import pty
@@ -20,7 +20,7 @@ from ros2_peer import own_domain
 DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION, UNSUPPORTED = 1, 2, 3, 4, 5, 6
 
 
-# Of a fleet, one board after the other.
+# With a fleet, the command handles one board after the other.
 @pytest.mark.parametrize('command', [
     ['monitor', 'udp://127.1.0.{1-100}'], ['monitor', 'udp://127.1.0.{1-100}?listen=0'],
     ['record', 'udp://127.1.0.{1-100}', '-o', 'fleet.r4log'], ['metrics', 'udp://127.1.0.{1-100}?listen=0'],
@@ -183,9 +183,9 @@ def test_a_stop_goes_out_although_another_program_has_the_port_of_hosts():
         try:
             other.bind(('0.0.0.0', 2390))
         except OSError:
-            pass  # somebody has it: as well
+            pass  # another program has the port, which also serves the test
         run('stop', f'udp://127.0.0.1:{board.getsockname()[1]}', '--timeout', '0.3')
-        # A heartbeat may come first.
+        # A heartbeat may arrive first.
         assert any(board.recv(2000).startswith(b'E:STOP;') for _ in range(2))
 
 
@@ -194,7 +194,7 @@ def test_permission_denied_is_named_with_the_fix():
     device = os.ttyname(slave)
     os.chmod(device, 0)
     options = {}
-    # Root may open anything: as root, somebody else asks. The build may be out of that one's reach.
+    # Root may open anything, so root runs a copy of r4 as another user, which may be unable to read the build.
     with tempfile.TemporaryDirectory() as folder:
         os.chmod(folder, 0o755)
         program = shutil.copy(R4, os.path.join(folder, 'r4'))
@@ -225,7 +225,7 @@ def test_output_that_cannot_be_written_is_an_error(arguments):
         result = subprocess.run([R4, *arguments], input='AIN:1;^0x1^\n', stdout=full, stderr=subprocess.PIPE,
                                 text=True, check=False)
     assert result.returncode == OPEN
-    lost_errno = 'Input/output error'  # stdio does not keep it
+    lost_errno = 'Input/output error'  # stdio does not keep errno
     reason = 'No space left on device' if arguments[0] == 'sim' else f'(No space left on device|{lost_errno})'
     assert re.match(f'r4: standard output: {reason}; ', result.stderr), result.stderr
 
@@ -241,7 +241,7 @@ def test_a_standard_error_that_cannot_be_written_changes_no_exit_code(closed):
 
 
 def test_a_board_does_not_wait_for_whoever_reads_its_log():
-    """The pipe holds 64 KB, and nobody empties it; each command is a line or two."""
+    """No program reads the pipe, which holds 64 KB; each command logs a line or two."""
     with subprocess.Popen([R4, 'sim', 'udp://127.0.0.1:0', '--json', '--duration', '20'],
                           stdout=subprocess.PIPE, text=True) as board:
         url = json.loads(board.stdout.readline())['host_url'] + '?listen=0'
@@ -252,7 +252,7 @@ def test_a_board_does_not_wait_for_whoever_reads_its_log():
         assert len(states) == 60
         board.terminate()
         written = board.stdout.read()
-    events = objects(written)  # whole lines, nothing torn
+    events = objects(written)  # objects() fails if a line is not whole
     assert sum('executed' in each for each in events) > 100
 
 
@@ -268,7 +268,7 @@ def test_nothing_that_is_opened_takes_the_place_of_a_closed_output():
 
 
 def signals_of(pid, kind):
-    """The signals that a process catches (SigCgt) or ignores (SigIgn)."""
+    """The signals that a process catches (`kind` SigCgt) or ignores (SigIgn)."""
     with open(f'/proc/{pid}/status', encoding='ascii') as status:
         mask = next(int(line.split()[1], 16) for line in status if line.startswith(kind))
     return {number for number in signal.Signals if mask >> (number - 1) & 1}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 convert as a program, and its files as others read them: pandas, Wireshark, and npm's reader of MCAP."""
+"""r4 convert as a program, and its files as other programs read them: pandas, Wireshark, and npm's reader of MCAP."""
 import json
 import os
 import pathlib
@@ -40,7 +40,7 @@ def a_capture(tmp_path):
 
 
 def convert(source, target, *options, code=0):
-    """Runs it; what it says."""
+    """Runs r4 convert; returns what it prints."""
     result = run('convert', str(source), '-o', str(target), *options)
     assert result.returncode == code, result
     assert not list(target.parent.glob('*.part'))
@@ -61,13 +61,13 @@ def test_pandas_reads_csv_with_the_right_types(native, tmp_path):
 
 
 def tshark(*arguments):
-    """The lines that it prints."""
+    """Runs tshark; returns the lines that it prints."""
     result = subprocess.run(['tshark', *map(str, arguments)], capture_output=True, text=True, check=True)
     return result.stdout.splitlines()
 
 
 def datagrams(path):
-    """Of a native recording: its lines, without the times."""
+    """The lines of a native recording, without the times."""
     lines = path.read_text().splitlines()
     return [line.split(' ', 1)[1] for line in lines if line[0] != '#' and '! ' not in line]
 
@@ -80,7 +80,7 @@ def test_wireshark_reads_the_datagrams_and_the_events(native, tmp_path):
     rows = [line.split('\t') for line in read]
     assert [(bytes.fromhex(row[3]).decode(), '<' if row[1] == '2018' else '>') for row in rows] == \
         [(line.split(' ', 1)[1], line[1]) for line in datagrams(native)]
-    assert rows[0][0] == '1795468293.500000000' and {row[2] for row in rows} == {'1'}, 'checksums are right'
+    assert rows[0][0] == '1795468293.500000000' and {row[2] for row in rows} == {'1'}, 'a checksum is wrong'
     assert not tshark('-r', packets, '-Y', '_ws.malformed')
     events = tshark('-r', packets, '-Y', 'syslog.msg contains "! "', '-T', 'fields', '-e', 'syslog.msg')
     assert events == [line for line in native.read_text().splitlines() if '! ' in line and line[0] != '#']
@@ -92,7 +92,7 @@ def test_what_wireshark_writes_is_read(native, tmp_path):
     tshark('-r', packets, '-w', again)
     convert(again, tmp_path / 'again.r4log')
     assert (tmp_path / 'again.r4log').read_bytes() == native.read_bytes()
-    # A capture that knows nothing of recordings: one link, and no names.
+    # A capture without the comments of a recording: one link, and no names.
     subprocess.run(['editcap', '-F', 'pcap', '-T', 'rawip4', '-r', packets, tmp_path / 'plain.pcap', '5-75'],
                    check=True)
     convert(tmp_path / 'plain.pcap', tmp_path / 'plain.r4log')
@@ -100,7 +100,7 @@ def test_what_wireshark_writes_is_read(native, tmp_path):
 
 
 def read_mcap(path):
-    """What @mcap/core reads of it; all that it says if it does not."""
+    """Returns the records that @mcap/core reads in the file, or its error text."""
     assert NODE_MODULES.is_dir(), f'{NODE_MODULES} is missing; tools/setup --can installs it'
     return subprocess.run(['node', HERE.parent / 'npm/read_mcap.cjs', path], capture_output=True, text=True,
                           env={**os.environ, 'NODE_PATH': str(NODE_MODULES)}, check=False)
@@ -108,7 +108,7 @@ def read_mcap(path):
 
 @pytest.fixture(name='two_boards')
 def in_several_chunks(native):
-    """The capture's lines again and again, and a second board."""
+    """A recording that repeats the capture's lines and adds a second board."""
     lines = native.read_text().splitlines(True)
     native.write_text(''.join(lines[:2]) + '# path 2 can://can0?node=2\n' +
                       ''.join(lines[2:-1] + [line.replace(' 1', ' 2', 1) for line in lines[4:-1]]) * 40 + lines[-1])
@@ -241,7 +241,7 @@ def test_what_cannot_be_written_is_said(native, tmp_path, target, code):
 def test_what_is_broken_off_leaves_nothing(native, tmp_path):
     with subprocess.Popen([R4, 'convert', '-', '-o', str(tmp_path / 'drive.csv')], stdin=subprocess.PIPE) as process:
         text = native.read_bytes()
-        for _ in range(2 * 65536 // len(text) + 1):  # more than a pipe holds: it has begun
+        for _ in range(2 * 65536 // len(text) + 1):  # more than a pipe holds, so r4 has begun to read
             process.stdin.write(text)
         process.stdin.flush()
         process.send_signal(signal.SIGINT)
@@ -251,7 +251,7 @@ def test_what_is_broken_off_leaves_nothing(native, tmp_path):
 
 
 def claims(ending):
-    """Of files whose headers claim 100 GB, or as much as they can: what is there, and what is said of it."""
+    """Files whose headers claim 100 GB, or the format's limit: (the bytes, the reason in the error)."""
     much, most = 100_000_000_000, 0xFFFFFFFC
     line = b'# r4log 1 by r4\n1795468293.404765 1! up x\n'
     mcap = b'\x89MCAP0\r\n\x01' + struct.pack('<QI', 14, 5) + b'r4log' + struct.pack('<I', 1) + b'x'
@@ -266,7 +266,7 @@ def claims(ending):
         '.pcapng': [(section + struct.pack('<II', 6, most) + bytes(100), 'no block of pcapng')],
         '.pcap': [(struct.pack('<IIQIIIIII', 0xA1B2C3D4, 0x40002, 0, most, 228, 1, 0, most, most) + bytes(100),
                    'no packet is that long')],
-        # Of that size; with a window of that size; with a line of 100 MB in it.
+        # A frame of that size, a frame with a window of that size, a line of 100 MB.
         '.r4log.zst': [(begins + frame + b'\xe0' + struct.pack('<Q', much) + bytes(100), 'a zstd frame that needs a window'),
                        (begins + frame + b'\0\xa8' + bytes(100), 'a zstd frame that needs a window'),
                        (endless, 'the last line is not whole')],
@@ -286,7 +286,7 @@ def test_a_size_that_a_header_claims_takes_no_memory(tmp_path, ending):
 
 @pytest.fixture(name='eight_boards', scope='module')
 def two_minutes_of_eight_boards(tmp_path_factory):
-    """On a CAN bus, each with a hundred states a second: 24 MB of text."""
+    """Eight boards on a CAN bus, each with 100 states a second: 24 MB of text."""
     path = tmp_path_factory.mktemp('long') / 'drive.r4log'
     lines = ['# r4log 1 by r4 0.1.0', *(f'# path {1 + node} can://can0?node={node}' for node in range(8))]
     for number in range(20_000 if SANITIZED else 120_000):
@@ -308,7 +308,7 @@ def test_a_long_recording_takes_little_memory_and_comes_back(eight_boards, tmp_p
         assert result.returncode == 0 and not result.stderr, result
         print(f'{source.suffix} to {target.suffix}: {result.peak_mib:.1f} MiB')
         assert SANITIZED or result.peak_mib < MOST_MIB
-    if ending == '.log':  # its paths are told before their first records
+    if ending == '.log':  # this format writes paths before their first records
         assert datagrams(back) == datagrams(eight_boards)
     elif len(ways) == 2:
         assert back.read_bytes() == eight_boards.read_bytes()
@@ -323,7 +323,7 @@ def test_a_terminal_shows_how_far_it_is(eight_boards, tmp_path):
         try:
             while piece := os.read(terminal, 4096):
                 shown += piece
-        except OSError:  # it has ended
+        except OSError:  # r4 has ended
             pass
     os.close(terminal)
     assert process.returncode == 0

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 decode --candump: what candump printed in, the datagrams of the bus out.
+"""r4 decode --candump: turns the output of candump into the datagrams of the bus.
 
-can_python_inside.py decodes what real boards and hosts said.
+can_python_inside.py decodes the frames of real boards and hosts.
 """
 import random
 import subprocess

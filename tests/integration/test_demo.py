@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The demonstration, the live status on a terminal, and what board and monitor cost."""
+"""The demonstration, the live status on a terminal, and the processor time of board and monitor."""
 import os
 import pty
 import re
@@ -40,7 +40,7 @@ def test_the_demonstration_is_true_on_every_transport_and_short_and_so_are_its_n
     assert [each['transport'] for each in results] == TRANSPORTS
     for each in results:
         assert each['ok'], each
-        # In this process it is measured from when the host knew that it had sent its last heartbeat, at the latest.
+        # The measured time begins, at the latest, when the host knew that it had sent its last heartbeat.
         assert each['safe_ms'] <= within_ms(1020)
         assert each['safe_ms'] >= 980 or each['transport'] == 'in process'
         assert each['lost'] == 0
@@ -61,13 +61,13 @@ def test_no_board_is_left_behind_by_the_demonstration():
     while os.path.exists(f'/proc/{child}') and time.monotonic() < deadline:
         with open(f'/proc/{child}/stat', encoding='ascii') as file:
             if file.read().rsplit(')', 1)[1].split()[0] == 'Z':
-                return  # ended; nobody has asked for its exit code
+                return  # ended, but its parent has not read the exit code
         time.sleep(0.02)
     assert not os.path.exists(f'/proc/{child}')
 
 
 def read_screen(master, until, timeout=PATIENCE_S):
-    """What was drawn until a text stands there."""
+    """Reads the screen until the text `until` is drawn; returns all that was drawn."""
     screen = ''
     deadline = time.monotonic() + timeout
     while not re.search(until, screen):
@@ -105,5 +105,5 @@ def test_neither_a_board_nor_a_monitor_at_100_hz_spins():
         took = time.monotonic() - began
         shares = {name: (each.cpu_seconds() - before[name]) / took for name, each in processes.items()}
     print(f'{300 / took:.0f} Hz; of a core', ', '.join(f'{name} {share:.1%}' for name, share in shares.items()))
-    # 0.5 % on an idle machine (docs/design/benchmarks.md); what a processor is charged with on a busy one is another matter.
+    # 0.5 % on an idle machine (docs/design/benchmarks.md). On a busy machine the same work takes more processor time.
     assert SANITIZED or max(shares.values()) <= 0.25

@@ -57,7 +57,7 @@ def test_monitor_sets_devices_up_and_shows_what_they_measure(board, tmp_path):
         assert monitor.next(is_reading('bno055@0x28', 'accel_z'))['fields']['accel_z'] == pytest.approx(9.81)
         assert monitor.next(is_reading('as5600@0x36', 'angle'))['fields']['angle'] == pytest.approx(1.5708, abs=1e-4)
         assert monitor.next(is_reading('mine@0x40', 'volts'))['fields']['volts'] == pytest.approx(12.16)
-        # A second one has no control, and shows what the first has set up.
+        # A second monitor has no control, and shows the devices that the first has set up.
         with Running('monitor', board.host_url, *devices, '--json') as beside:
             assert beside.next(is_reading('bno055@0x28', 'heading'))['fields']['heading'] == 270
     wrong = run('monitor', board.host_url, '--device', 'icm20948@0x68', '--duration', '2')
@@ -95,7 +95,7 @@ def test_a_recording_becomes_columns_with_units(board, tmp_path):
 
 
 def test_a_recording_tells_what_the_bytes_of_its_devices_mean(board, tmp_path):
-    """Also of a description of one's own, which is not there any more."""
+    """Also for a user's own description, whose file has been deleted."""
     mine, log, table = tmp_path / 'mine.device', tmp_path / 'drive.r4log', tmp_path / 'drive.csv'
     mine.write_text(MINE)
     devices = ['--device', 'bno055@0x28:1', '--device', f'{mine}@0x40:7']

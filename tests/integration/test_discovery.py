@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Boards are found: r4 list, udp:auto and udp:?id=NAME on a network with several computers."""
+"""Discovery of boards: r4 list, udp:auto and udp:?id=NAME on a network with several computers."""
 import contextlib
 import re
 import subprocess
@@ -14,7 +14,7 @@ from r4_process import ERROR, Board, driving, is_link, is_state, monitor, object
 
 USAGE, REFUSED, OPEN = 2, 3, 4
 
-# Answers each question of a search, at the board's port, with what its first argument makes of it.
+# Answers each question of a search, at the board's port, with the text that its first argument computes.
 STRANGER = '''
 import socket, sys, zlib
 def good(fields):
@@ -40,7 +40,7 @@ def a_lan():
 
 @pytest.fixture(name='boards')
 def boards_on_it(lan):
-    """Puts a simulated board on the LAN, at a computer of its own."""
+    """Returns a function that puts a simulated board on the LAN, at a new computer."""
     with contextlib.ExitStack() as stack:
         def add(address, board_id, *options):
             computer = lan.computer(address)
@@ -64,7 +64,7 @@ def stranger(lan, address, answers):
 
 
 def found(computer, *options):
-    """The boards that r4 list finds there by UDP, by their addresses."""
+    """The boards that r4 list finds by UDP from that computer, by their addresses."""
     result = run('list', '--json', *options, **computer.inside)
     assert result.returncode == 0, result
     networks = [each for each in objects(result.stdout) if each['type'] == 'udp']
@@ -75,7 +75,7 @@ def test_every_board_is_listed_with_its_name_who_controls_it_and_its_url(lan, bo
     boards('10.77.0.2', 'b-2', '--set', 'name,left')
     boards('10.77.0.3', 'b-3', '--set', 'name,right')
     boards('10.77.0.4', 'b-4')
-    # A program that has the port of hosts does not keep others from searching.
+    # A program that holds the port of hosts does not prevent other programs from searching.
     with monitor('udp:?id=right', **lan.host.inside) as host:
         host.next(is_link('active'))
         listed = found(lan.host)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 doctor: a link that is well, and links that are not."""
+"""r4 doctor: a healthy link, and faulty links."""
 import os
 import pathlib
 import socket
@@ -16,7 +16,7 @@ HOLDER = 'import os, sys; os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY); print("
 
 
 def doctor(*arguments):
-    """The exit code, and the findings by their checks."""
+    """Returns the exit code, and the findings by their checks."""
     result = run('doctor', *arguments, '--json', timeout=2 * PATIENCE_S)
     assert not result.stderr
     printed = objects(result.stdout)
@@ -45,7 +45,7 @@ def state(number, damage=0):
 
 
 def asks_to_watch(board):
-    """The address of who asks next, twice a second."""
+    """Waits for the next request to watch, which a host sends twice a second; returns the host's address."""
     while True:
         bytes_, host = board.recvfrom(2048)
         if bytes_.startswith(b'W:'):
@@ -53,7 +53,7 @@ def asks_to_watch(board):
 
 
 def speak(board):
-    """To who asks: first a state, then many of which each fifth is missing, and each seventh is damaged."""
+    """Sends one state to the host that asks, then many: each fifth is missing, and each seventh is damaged."""
     board.sendto(state(1), asks_to_watch(board))
     host = asks_to_watch(board)
     for number in range(2, 100):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whatever the documentation and the help show that drives a motor: it is run, and the motor must turn. The
-simulated motors have supply only while relay 1 is closed, as on a real robot."""
+"""Runs each command of the documentation and the help that drives a motor: the motor must turn. The simulated
+motors have supply only while relay 1 is closed, as on a real robot."""
 import pathlib
 import re
 import subprocess
@@ -12,12 +12,12 @@ from r4_process import Board, run
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
 SENDS = re.compile(r'r4 send (.*)')
-COMMANDS = re.compile(r'(?<![\w/:;])[A-Z]:[\w,.-]+(?:;[A-Z]:[\w,.-]+)*')  # a group is one
+COMMANDS = re.compile(r'(?<![\w/:;])[A-Z]:[\w,.-]+(?:;[A-Z]:[\w,.-]+)*')  # a group is one match
 DRIVES = re.compile(r'[ODPB]:')
 
 
 def shown_commands():
-    """(where, the commands of the datagrams) of each `r4 send` that drives a motor."""
+    """Yields the commands of each shown `r4 send` that drives a motor; the id names its place."""
     texts = [(page.name, page.read_text()) for page in PAGES]
     texts += [(f'r4 {" ".join(words)}', run(*words).stdout)
               for words in (['--help'], ['send', '--help'], ['key', '--help'], ['stop', '--help'])]
@@ -27,7 +27,8 @@ def shown_commands():
             if shown is None:
                 continue
             commands = COMMANDS.findall(shown[1])
-            if any(map(DRIVES.match, commands)) and 'O:358,1,5' not in commands:  # the mistake in quick-start.md
+            # quick-start.md shows O:358,1,5 as a mistake.
+            if any(map(DRIVES.match, commands)) and 'O:358,1,5' not in commands:
                 yield pytest.param(commands, id=f'{where}: {" ".join(commands)}')
 
 
@@ -46,7 +47,7 @@ def test_what_is_shown_moves_a_robot(commands):
 
 
 def test_a_motor_turns_only_while_relay_1_is_closed_and_the_handle_held(tmp_path):
-    """As the sensors of the simulated world tell it."""
+    """As the sensors of the simulated world report it."""
     script = tmp_path / 'script'
     script.write_text('2.5 handle released\n')
     with Board('udp://127.0.0.1:0', options=['--sensors', '0.05', '--script', str(script)]) as board:
@@ -85,7 +86,7 @@ def test_what_is_written_to_a_board_happens_around_it_at_once():
         assert run('send', board.host_url, 'R:1,On', 'O:4095,1,1', '--hold', '1').returncode == 0
         driven = board.next(lambda each: each['type'] == 'sensors' and each['supply'])
         assert driven['enc'][0] == 0
-        board.process.stdin.write('fault')  # without an end of line
+        board.process.stdin.write('fault')  # without a newline
         board.process.stdin.close()
         board.next(lambda each: each.get('reason') == 'fault')
-        assert board.next(lambda each: each['type'] == 'sensors'), 'it goes on'
+        assert board.next(lambda each: each['type'] == 'sensors'), 'the board has stopped'

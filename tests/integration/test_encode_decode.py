@@ -108,7 +108,7 @@ def test_decode_of_10_mb_without_a_terminator_needs_little_memory():
         process.stdin.write(b'x' * 10_000_000)
         process.stdin.flush()
         with open(f'/proc/{process.pid}/status', encoding='ascii') as status:
-            # Without the program and its libraries, which are files.
+            # Anonymous memory: without the program and its libraries, which are mapped files.
             own_kib = int(re.search(r'RssAnon:\s*(\d+)', status.read()).group(1))
         output, _ = process.communicate()
     assert process.returncode == DATA_BAD

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What r4 says of itself: help, version, completion, manual pages."""
+"""The texts of r4 about itself: help, version, completion, manual pages."""
 import os
 import re
 import subprocess
@@ -59,7 +59,7 @@ def test_list_names_ports_and_urls():
 
 
 def complete(*words):
-    """What bash offers for the last word."""
+    """The completions that bash offers for the last word."""
     script = '''
         source "$1"; shift
         COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1))
@@ -134,7 +134,7 @@ def test_manual_pages_say_what_the_help_says_and_checkers_find_nothing(tmp_path)
         command = page.stem.removeprefix('r4').removeprefix('-')
         shown = subprocess.run(['mandoc', '-T', 'utf8', '-O', 'width=500', page], capture_output=True, text=True,
                                check=True).stdout
-        shown = re.sub('.\b', '', shown)  # what is bold or underlined is printed twice
+        shown = re.sub('.\b', '', shown)  # bold or underlined characters are printed twice
         told = run(*command.split(), '--help').stdout
         assert words_of(told) - words_of(shown) <= {'usage', 'codes', 'excludes'}, command
     assert run('man').stdout == (tmp_path / 'r4.1').read_text()

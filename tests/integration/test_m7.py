@@ -16,7 +16,7 @@ SAFE_WITHIN_MS = 1020
 
 @pytest.fixture(scope='module', name='urls')
 def running_board():
-    """One board for all tests: it goes on as a real one does."""
+    """One board for all tests: it runs all the time, as a real board does."""
     with M7Board() as board:
         yield board
 
@@ -30,8 +30,8 @@ marks = itertools.cycle(['ENC1', 'ENC2'])
 
 
 def states_of(url, count):
-    """That many states in a row, behind the choice of fields, which is another each time: what the host before has
-    chosen is sent until then."""
+    """Returns `count` states in a row, after the choice of fields. Each call chooses another field, because the board
+    sends the fields that the previous host chose until it receives the choice."""
     mark = next(marks)
     with monitor(url, '--fields', f'LATE,{mark}') as host:
         host.next(is_link('active'))
@@ -45,7 +45,7 @@ def test_streams_at_100_hz_with_nothing_lost(url):
 
 
 def test_streams_at_1000_hz_over_udp_with_nothing_lost(urls):
-    """What a busy machine keeps the board from is left out, and told; tests/m7/board_state_test.cpp has the bar."""
+    """On a busy machine the board leaves states out, and reports it; tests/m7/board_state_test.cpp has the bar."""
     assert run('send', urls.udp, 'C:rate,1000').returncode == 0
     steps = steps_of(states_of(urls.udp, 2000), 1)
     assert run('send', urls.udp, 'C:rate,100').returncode == 0
@@ -64,14 +64,14 @@ def test_every_kind_of_command_is_executed(url):
 
 def test_what_is_set_is_in_the_state_until_the_board_is_stopped(urls):
     with driving(urls.serial, 'O:358,1,1', 'S:1500,1') as host:
-        # A host that does not control the board watches what it tells everyone.
+        # A host that does not control the board watches its broadcasts.
         with Watcher(urls.udp) as watcher:
             state = watcher.next(lambda fields: fields.get('OSMC1') == '358,1')
             assert state['SERVO1POS'] == '1500'
             stopped = run('stop', urls.udp)
             assert stopped.returncode == 0, stopped
             print(stopped.stdout.splitlines()[0])
-            watcher.ask()  # again the last that was heard
+            watcher.ask()  # makes this watcher the newest peer that the board has heard
             watcher.next(lambda fields: fields.get('OSMC1') == '0,0' and fields.get('SAFE') == '2')
     assert run('send', urls.serial, 'E:CLEAR').returncode == 0
 
@@ -89,7 +89,7 @@ def test_a_key_given_over_the_uart_is_asked_for_over_udp(urls, tmp_path):
     given = run('key', 'give', key, urls.serial)
     assert given.returncode == 0, given.stderr
     try:
-        # The UART's session has to end first.
+        # The session on the UART has to end first.
         signed = run('send', urls.udp, 'O:358,1,1', 'E:STOP', 'E:CLEAR', 'O:358,1,1', '--key', key, timeout=30)
         assert signed.returncode == 0, signed.stderr
         refused = run('send', urls.udp, 'O:1,1,1', '--timeout', '2.5')
@@ -111,7 +111,7 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(u
     print(f'safe {silence} ms after the last heartbeat, by the board\'s clock')
     assert silence >= 1000
     assert silence <= within_ms(SAFE_WITHIN_MS)
-    # Another host finds the outputs off, and gets them on again.
+    # The next host finds the outputs off, and can switch them on again.
     with monitor(urls.udp) as host:
         host.next(is_link('active'))
         assert host.next(is_state)['fields']['OSMC1'] == [0, 0]
@@ -132,7 +132,7 @@ def test_a_serial_host_that_does_not_read_holds_nothing_up(urls):
     unread = os.open(urls.serial[len('serial://'):], os.O_RDWR | os.O_NOCTTY)
     try:
         steps_of(states_of(urls.udp, 150), 10)
-        # Far more than the line and the board can hold has been said; what is heard now is new.
+        # The board has sent far more than the line can hold, so the next states are new.
         assert run('stop', urls.serial).returncode == 0
         assert run('send', urls.serial, 'E:CLEAR').returncode == 0
     finally:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tools/m7 runs in virtual time or only measures: the tests that run on the M7 itself, instructions and sizes."""
+"""The parts of tools/m7 that run in virtual time or only measure: tests on the M7 itself, instructions and sizes."""
 import importlib.machinery
 import importlib.util
 import json
@@ -25,12 +25,12 @@ def test_what_the_protocol_costs_is_what_the_table_says():
     result = m7('--instructions')
     print(result.stdout)
     assert result.returncode == 0, result
-    assert m7('--instructions').stdout == result.stdout  # to the last instruction
+    assert m7('--instructions').stdout == result.stdout  # exactly the same number of instructions
 
 
 @pytest.fixture(name='tool')
 def tool_as_a_module(tmp_path):
-    """tools/m7 with a table of its own: 1000 instructions, and 2000 with a bar of 2050."""
+    """tools/m7 with a separate table: 1000 instructions, and 2000 with a bar of 2050."""
     loader = importlib.machinery.SourceFileLoader('m7_tool', M7)
     tool = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
     loader.exec_module(tool)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the pins of the board on the emulated M7 do (tools/m7 --pins): the chips' registers, not what the
-board believes, by the board's own clock."""
+"""The pins of the board on the emulated M7 (tools/m7 --pins): the chips' registers, not what the board
+reports, by the board's own clock."""
 import signal
 
 import pytest
@@ -16,10 +16,10 @@ STREAM_S = 20
 
 
 def channels(steps):
-    """Every channel of the board: the command, what its pins do then, and the state's field."""
+    """Every channel of the board: the command, the check of its pins, and the field of the state with its value."""
     relays = [(f'R:{n},On', lambda o, n=n: o['relays'] == 2**n - 1, 'RELAYS', None) for n in range(1, 9)]
     return [
-        *relays,  # the first of them closes the motors' supply, which leaves no setpoint of theirs
+        *relays,  # relay 1 closes the motors' supply, which clears the setpoints of the motors
         *((f'O:{1000 + n},1,{n}', lambda o, n=n: o['osmc'][n - 1] == [1000 + n, 1], f'OSMC{n}', f'{1000 + n},1')
           for n in range(1, 5)),
         *((f'D:{2000 + n},0,{n}', lambda o, n=n: o['dhb'][n - 1] == [2000 + n, 0], field, f'{2000 + n},0')
@@ -41,7 +41,7 @@ def running_board():
 
 @pytest.fixture(scope='module', name='streamed', autouse=True)
 def states_of_twenty_seconds():
-    """From another board, while the tests go on: a function that waits for them."""
+    """States of a second board, received while the tests run. The fixture is a function that waits for them."""
     with M7Board() as board, monitor(board.serial, '--fields', 'LATE', '--duration', str(STREAM_S + 5)) as host:
         host.next(is_link('active'))
         host.next(lambda each: is_state(each) and 'LATE' in each['fields'])
@@ -50,14 +50,14 @@ def states_of_twenty_seconds():
 
 @pytest.fixture(params=['serial', 'udp'], name='link')
 def either_link(board, request):
-    """(the host's URL, what listens to the board on the other link)"""
+    """(the host's URL, a function that makes a watcher on the other link)"""
     if request.param == 'serial':
         return board.serial, lambda: Watcher(board.udp)
     return board.udp, lambda: LineWatcher(board.serial)
 
 
 def drive(url, *commands):
-    """A host that has driven the outputs and stays."""
+    """A host that has driven the outputs and stays connected."""
     host = Running('send', url, *commands, '--hold', '120', '--json')
     for _ in commands:
         assert host.next()['confirmed']
@@ -86,7 +86,8 @@ def test_a_board_that_is_just_on_is_safe(board):
 
 def test_every_command_reaches_its_pins_and_every_state_field_comes_from_one(board, link):
     url, listener = link
-    table = channels(50 if url == board.serial else -50)  # steppers stay where they were before
+    # Opposite signs, because the steppers stay where the other test left them.
+    table = channels(50 if url == board.serial else -50)
     with listener() as others, drive(url, 'F:ALL', *(command for command, *_ in table)):
         for command, is_done, *_ in table:
             event = board.pins(lambda event, is_done=is_done: is_done(event['outputs']))
@@ -109,7 +110,7 @@ def test_every_output_is_safe_in_time_when_the_host_is_killed(board, link):
         print(f'safe {silence_ms} ms after the last heartbeat, by the board\'s clock')
         assert silence_ms >= TIMEOUT_MS
         assert silence_ms <= within_ms(TIMEOUT_MS + SAFE_WITHIN_MS)
-        # The steppers stand where they were then.
+        # The steppers stand where they were at the start of the safe state.
         stand = board.pins(lambda event: not any(stepping for _, stepping in event['outputs']['stepper']))
         assert stand['outputs']['stepper'] == [[position, 0] for position, _ in safe['outputs']['stepper']]
         assert stand['safe']
@@ -129,7 +130,7 @@ def test_every_output_is_safe_soon_after_the_last_byte_of_a_stop(board, link):
         assert run('send', url, 'E:CLEAR').returncode == 0
     took_us.sort()
     print('us from the last byte of E:STOP to the last safe register:', took_us)
-    # A busy machine holds the emulator up now and then; tests/m7/board_test.cpp has the exact bound.
+    # A busy machine sometimes delays the emulator; tests/m7/board_test.cpp has the exact bound.
     assert took_us[len(took_us) // 2] <= 1e6 * within(STOP_WITHIN_US / 1e6)
 
 
@@ -137,4 +138,4 @@ def test_streams_at_100_hz_for_twenty_seconds_with_nothing_lost_and_every_period
     states = streamed()
     steps = steps_of(states, 10)
     left_out = states[-1]['fields']['LATE'] - states[0]['fields']['LATE']
-    assert 10 * left_out <= within_ms(10 * len(steps) / 50)  # of an idle machine none
+    assert 10 * left_out <= within_ms(10 * len(steps) / 50)  # an idle machine leaves none out

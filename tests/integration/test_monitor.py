@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The monitor against what a hostile network sends it and a reader who does not read."""
+"""The monitor with hostile datagrams, and with a reader that does not read its output."""
 import json
 import os
 import pty
@@ -28,7 +28,7 @@ def test_noise_and_a_stalled_pipe_do_not_stall_the_heartbeats():
                              stdout=subprocess.PIPE, stderr=subprocess.PIPE) as host:
         assert host.stdout.readline()
         board.state('ACTIVE')
-        # Nobody reads on: the pipe of 64 kB is full after some 250 states, half a second.
+        # The test stops reading: the pipe of 64 kB is full after about 250 states, half a second.
 
         def make_noise():
             for _ in range(10):
@@ -63,7 +63,7 @@ def test_shows_many_boards_by_one_pattern():
 
 
 def read_screen(master, until):
-    """Reads what is drawn until that is there."""
+    """Reads the screen until the text `until` is drawn."""
     screen = ''
     deadline = time.monotonic() + PATIENCE_S
     while until not in screen:
@@ -91,7 +91,7 @@ def test_the_status_on_a_terminal_is_bounded_whatever_fields_a_state_has():
                 fields = ''.join(f'X{pnum}x{i}:1;' for i in range(60))
                 board.sendto(datagram(f'{fields}PNum:{pnum};T:{pnum};'), host)
                 if pnum % 50 == 0:
-                    read_screen(master, f'PNum {pnum} ')  # it has come so far
+                    read_screen(master, f'PNum {pnum} ')  # the monitor has shown this state
                     sizes.append(resident_kib(process))
             process.kill()
         os.close(master)

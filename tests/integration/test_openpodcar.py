@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/examples/openpodcar: the program at a terminal, with the vehicle on the bench of r4 sim."""
+"""docs/examples/openpodcar: the program at a terminal, with the vehicle model of r4 sim."""
 import os
 import pty
 import queue
@@ -16,7 +16,7 @@ PROGRAM = os.path.join(os.path.dirname(R4), 'tests', 'openpodcar')
 
 
 class Podcar:
-    """The program; `typed` is in its terminal before it begins."""
+    """The running program. `typed`: the input in its terminal before it begins."""
 
     def __init__(self, url, typed=b''):
         self.keyboard, terminal = pty.openpty()
@@ -75,7 +75,7 @@ def is_driven(each):
 def test_a_board_that_began_again_while_it_waited_is_guarded(board):
     with Podcar(board.host_url) as podcar:
         podcar.says('press Enter')
-        happen(board, 'reboot')  # its threshold of US 1 is forgotten
+        happen(board, 'reboot')  # the restarted board has forgotten the threshold of US 1
         board.next(lambda each: each.get('happened') == 'reboot')
         board.state('ACTIVE')
         podcar.enter()

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/examples/openpodcar with ROS 2: openpodcar_ros2 with the model of its vehicle, and Fast DDS, which publishes what
-joy_node and others do and reads /odom.
+"""docs/examples/openpodcar with ROS 2: openpodcar_ros2 with the model of its vehicle, and a Fast DDS peer. The peer
+publishes the messages of joy_node and other nodes, and reads /odom.
 
-On a machine that has no time a joystick is silent for longer than its timeout, and the vehicle stops, as it has to:
-start is pressed until it drives."""
+On a busy machine the joystick may be silent for longer than its timeout. The vehicle then stops, as it must, so the
+tests press start again until it drives."""
 import math
 import os
 import queue
@@ -53,7 +53,7 @@ class Odometry:
 
 
 class Scene:
-    """The program, who publishes to it, and what it has told."""
+    """The program, a peer that publishes to it, and the lines that the program has printed."""
 
     def __init__(self, domain, peer):
         self.peer, self.said, self.lines = peer, [], queue.Queue()
@@ -72,8 +72,8 @@ class Scene:
 
     def publish_until(self, is_it, press=False, joystick=True, cmd_vel=None, goal_pose=None, timeout=PATIENCE_S,
                       **buttons):
-        """Publishes that again and again, until `is_it` is true; the lines that it says from now on are in `said`.
-        `press`: start, every second time."""
+        """Repeats the messages until `is_it` is true; collects the lines that the program prints from now on in `said`.
+        `press`: every second message presses start."""
         self.said.clear()
         deadline, start = time.monotonic() + timeout, False
         while time.monotonic() < deadline:
@@ -100,14 +100,14 @@ class Scene:
         assert self.publish_until(lambda: abs(self.odometry.speed) > 0.2, press=True, **published), self.said
 
     def stands(self, **published):
-        """It comes to a stand, and stays there for a second."""
+        """Asserts that the vehicle stops, and stays in its place for a second."""
         assert self.publish_until(lambda: self.odometry.speed == 0, **published), self.said
         place = self.odometry.x, self.odometry.y
         self.publish_until(lambda: False, timeout=1, **published)
         assert math.dist(place, (self.odometry.x, self.odometry.y)) < 0.01
 
     def stops(self, why, before, **published):
-        """While it drives by `before`, `published` stops it; again where it had stopped already, for something else."""
+        """`published` stops the vehicle that drives by `before`. Repeats this if another reason stopped it first."""
         deadline = time.monotonic() + 3 * PATIENCE_S
         while True:
             self.drives(**before)
@@ -143,7 +143,7 @@ def test_types_and_frames_are_those_of_ros(scene):
     assert (odometry.frame, odometry.child) == ('odom', 'base_link')
     assert abs(odometry.stamp - time.time()) < PATIENCE_S
     assert math.hypot(*odometry.orientation) == pytest.approx(1)
-    assert odometry.covariance[14] == 1e6  # of z it knows nothing
+    assert odometry.covariance[14] == 1e6  # z is unknown
 
 
 def test_nothing_drives_before_start_is_pressed(scene):
@@ -172,7 +172,7 @@ def test_the_stop_button_stops_it(scene):
 
 
 def test_it_drives_to_a_goal_in_its_own_frame(scene):
-    scene.publish_until(lambda: False, timeout=0.6)  # until cmd_vel is old
+    scene.publish_until(lambda: False, timeout=0.6)  # until cmd_vel has timed out
     other = goal(3, 0, 'map')
     assert scene.publish_until(lambda: any('not in the frame odom' in line for line in scene.said), goal_pose=other)
     there = goal(scene.odometry.x + 3, scene.odometry.y)

@@ -17,7 +17,7 @@ def captured_lines():
     with open(os.path.join(DATA, 'paper_capture.tsv'), encoding='ascii') as file:
         return [line.rstrip('\n').split('\t')[1] for line in file]
 
-NAMES = [name for name in packed_form.NAMES if name != 'SID']  # r4 checks the values of that one
+NAMES = [name for name in packed_form.NAMES if name != 'SID']  # r4 checks the values of SID
 
 
 def with_crc(fields):
@@ -54,7 +54,7 @@ def any_fields(rng):
 
 
 def decoded(packed):
-    """What r4 makes of packed datagrams: the plain one, or None."""
+    """The plain text to which r4 decodes each packed datagram, or None if it is malformed."""
     result = run('decode', stdin=''.join(f'packed:{each.hex()}\n' for each in packed))
     assert result.stderr == ''
     return [None if each.get('error') == 'packed' else without_escapes(each['text'])
@@ -62,7 +62,7 @@ def decoded(packed):
 
 
 def without_escapes(text):
-    """A backslash in a name is told as \\x5c."""
+    """Undoes the escapes of r4 decode, which shows a backslash in a name as \\x5c."""
     return re.sub(r'\\x([0-9a-f]{2})', lambda found: chr(int(found[1], 16)), text)
 
 
@@ -74,7 +74,7 @@ def expected(packed):
 
 
 def may_be_masked(text):
-    """True if `r4 decode` may take a part of it for the value of a setting, which it shows as dots."""
+    """True if `r4 decode` may take a part of the text for the value of a setting, which it shows as dots."""
     return 'C:' in text
 
 
@@ -107,7 +107,7 @@ def test_r4_writes_what_the_second_implementation_packs_byte_for_byte():
     for line in lines:
         fields, pnum, t = form.match(line).groups()
         if re.search(r'(^|;)(PNum|T):', fields):
-            continue  # encode adds them itself
+            continue  # encode adds PNum and T itself
         result = run('encode', fields, '--pnum', pnum, '--time', t, '--packed', '--force')
         packed = packed_form.pack(line)
         assert result.stdout.strip() == (f'packed:{packed.hex()}' if packed else line), line

@@ -7,7 +7,7 @@ import time
 from paper_client import PaperClient
 from r4_process import PATIENCE_S, Board
 
-STATES, HEARTBEATS = 300, 5  # of three seconds
+STATES, HEARTBEATS = 300, 5  # the number within three seconds
 
 
 def test_the_papers_python_client_drives_the_board_without_a_safe_state():
@@ -17,7 +17,7 @@ def test_the_papers_python_client_drives_the_board_without_a_safe_state():
     server_socket.setblocking(False)
     listens_at = server_socket.getsockname()[1]
     with Board(f'udp://127.0.0.1:0?peer=127.0.0.1:{listens_at}') as board:
-        # The board's port stands in front of its options.
+        # The board's port comes before the options of its URL.
         address = ('127.0.0.1', int(board.url.split('?')[0].rsplit(':', 1)[1]))
         client = PaperClient(lambda data: client_socket.sendto(data, address))
         deadline = time.monotonic() + 2 * PATIENCE_S
@@ -40,7 +40,7 @@ def test_the_papers_python_client_drives_the_board_without_a_safe_state():
     assert active and any('outputs' in each for each in active)
     for state in client.states[-100:]:
         assert ';DHB1A:1000,1;' in state and ';SERVO1POS:300;' in state
-        assert len(state) <= 256 - len('0x12345678^'), 'the client reads 256 bytes'
+        assert len(state) <= 256 - len('0x12345678^'), 'a state is longer than the 256 bytes that the client reads'
     outputs = [each['outputs'] for each in active if 'outputs' in each][-1]
     assert outputs['dhb'] == [[1000, 1], [1000, 0], [1000, 1], [1000, 0]]
-    assert outputs['servo'][:3] == [298, 98, 1000]  # the nearest that the chip has
+    assert outputs['servo'][:3] == [298, 98, 1000]  # the nearest values that the chip can produce

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several paths to one board, as real ones: two UDP paths and a pty, pulled and plugged in while a host drives."""
+"""Several real paths to one board: two UDP paths and a pty, which are pulled and plugged in while a host drives."""
 import contextlib
 import os
 import pathlib
@@ -41,7 +41,7 @@ def wired(*kinds):
 
 
 def is_path(path, carries=True):
-    """Of the monitor: that path begins to carry, or ceases to."""
+    """Matches the monitor's event that the path begins to carry, or ceases to carry."""
     place = re.search(r'[\d.]+:\d+|/[^?]+', path.url)[0]
     return lambda each: (each['type'] == 'path' and place in each['fields']['name'] and
                          (each['fields']['state'] == 'carrying') == carries)
@@ -52,7 +52,7 @@ def of_two(paths):
 
 
 def carried(paths):
-    """A host that has control of a board, as a process; all paths carry."""
+    """A host process that controls a board; all paths carry."""
     host = monitor('+'.join(path.url for path in paths))
     host.next(is_link('active'))
     for path in paths:
@@ -63,7 +63,7 @@ def carried(paths):
 
 
 def judge(host, began, what):
-    """Nothing was missed since then."""
+    """Asserts that the host has missed no state since `began`."""
     for _ in range(20):
         host.next(is_state)
     states = [each for each in host.log if is_state(each)]
@@ -71,7 +71,7 @@ def judge(host, began, what):
     gap = max(later - earlier for earlier, later in zip(came, came[1:]))
     print(f'{what}; longest gap between states {gap * 1e3:.0f} ms')
     times = [each['t'] for each in states]
-    assert times == sorted(set(times)), 'a state was told twice, or after a newer one'
+    assert times == sorted(set(times)), 'a state was reported twice, or after a newer one'
     assert not [each for each in host.log if each['type'] == 'link' and each['came'] > began and
                 each['fields']['state'] != 'active']
     assert gap <= within(LONGEST_GAP_S)
@@ -100,13 +100,13 @@ def test_a_cable_is_pulled_and_plugged_in_again_and_nothing_is_missed():
 def test_a_path_that_is_held_up_and_then_brings_what_is_old_disturbs_nothing():
     with wired('udp', 'udp') as (board, paths), carried(paths) as host:
         began = time.monotonic()
-        paths[0].signal(signal.SIGSTOP)  # the system cannot tell
+        paths[0].signal(signal.SIGSTOP)  # the system does not report this loss
         lost = host.next(is_path(paths[0], carries=False))['came'] - began
         went_on = time.monotonic()
         paths[0].signal(signal.SIGCONT)
         back = host.next(is_path(paths[0]))['came'] - went_on
         judge(host, began, f'told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
-        paths[0].pull()  # and the other one has it alone
+        paths[0].pull()  # the other path carries alone
         host.next(is_path(paths[0], carries=False))
         judge(host, began, 'the other one pulled')
         board.never('SAFE', 0.2)
@@ -114,8 +114,8 @@ def test_a_path_that_is_held_up_and_then_brings_what_is_old_disturbs_nothing():
 
 
 class Sends:
-    """r4 send of one command after the other, each with a value of its own. A busy machine may cost the link, which ends
-    r4 send: then another one goes on with the next command, at most twice."""
+    """r4 send with one command after the other, each with a different value. On a busy machine the link may be lost,
+    which ends r4 send. Then a new r4 send continues with the next command, at most twice."""
 
     def __init__(self, urls, most):
         self.urls, self.most = urls, most
@@ -160,7 +160,7 @@ def test_commands_are_executed_once_each_while_paths_come_and_go():
             paths[0].pull()
             sends.until(120)
             paths[0].plug_in()
-            board.next(has_joined(2))  # before that there is only one, which must not go
+            board.next(has_joined(2))  # before that the board has only one path, which must not fail
             sends.until(190)
             paths[1].signal(signal.SIGSTOP)
             sends.until(260)
@@ -212,7 +212,7 @@ def test_a_board_of_one_address_has_a_path_by_each_interface_of_this_computer():
                 host.loses(place, gone)
                 host.goes_on()
                 host.has_again(place, there)
-                host.goes_on(50)  # until the board, too, has joined them
+                host.goes_on(50)  # until the board has joined the paths, too
             host.ends(board)
 
 
@@ -237,7 +237,7 @@ def test_each_command_takes_the_paths_of_a_board(tmp_path):
 
         stop = run('stop', *urls)
         assert stop.returncode == 0 and f'r4 send {joined} E:CLEAR' in stop.stdout, stop
-        # One that works is enough.
+        # One path that works is enough.
         paths[0].pull()
         assert run('stop', *urls).returncode == 0
         assert run('stop', 'serial:///dev/nothing', urls[1]).returncode == 0
@@ -255,7 +255,7 @@ def test_paths_that_lead_to_two_boards_are_refused_with_both_names():
         for board in boards:
             board.skip_past()
         assert run('stop', left.host_url, right.host_url).returncode == 3
-        for board in boards:  # each is stopped all the same
+        for board in boards:  # each board is stopped nevertheless
             board.executed('E:STOP')
 
 

@@ -15,7 +15,7 @@ SVG = '{http://www.w3.org/2000/svg}'
 
 
 def good(fields):
-    """A datagram of those fields."""
+    """A datagram with those fields and a valid checksum."""
     return f'{fields}^{hex(zlib.crc32((fields + "^").encode()))}^'
 
 
@@ -64,11 +64,11 @@ def test_draws_curves_safe_states_and_gaps(native, tmp_path):
                      'V', 'pwm [±4095]', 'seconds'):
         assert expected in texts, (expected, texts)
     assert not any('right-arm OSMC1' in text or 'right-arm safe' in text for text in texts)
-    assert len(curve(picture, 'left-arm AIN24')) == 2, 'it is broken where the board said nothing'
+    assert len(curve(picture, 'left-arm AIN24')) == 2, 'the curve is not broken where the board was silent'
     assert len(curve(picture, 'right-arm AIN24')) == 1
     assert len([each for each in picture.iter(f'{SVG}g') if (each.get('id') or '').startswith('span ')]) == 2 * 2
     heights = [float(y) for _, y in curve(picture, 'left-arm OSMC1')[0]]
-    assert heights[4] < heights[0] < heights[6], 'forward is above zero, backward below it'
+    assert heights[4] < heights[0] < heights[6], 'forward is not above zero, or backward not below it'
 
 
 def test_shows_names_of_others_and_of_files_as_they_are(native, tmp_path):

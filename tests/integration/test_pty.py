@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulated board and hosts as separate processes over a pseudo-terminal, which stands for USB."""
+"""A simulated board and hosts as separate processes over a pseudo-terminal, which takes the place of USB."""
 import os
 import pty
 import random
@@ -74,7 +74,7 @@ def test_a_port_without_a_board_is_listed_as_one(tmp_path):
 
 
 def listed(path):
-    """What r4 list tells of the pty of a board."""
+    """The report of r4 list on the pty of a board."""
     result = run('list', '--serial', path, '--json')
     return next(each for each in objects(result.stdout) if each.get('path') == path)
 
@@ -207,7 +207,7 @@ def test_a_board_throws_10_mb_without_a_terminator_away(board):
 
 
 class Noise:
-    """A device that talks at another speed: what a host reads there is garbage."""
+    """A device that sends at another bit rate, so that a host reads garbage."""
 
     def __enter__(self):
         self.master, slave = pty.openpty()
@@ -226,7 +226,7 @@ class Noise:
                 try:
                     act()
                 except BlockingIOError:
-                    time.sleep(0.001)  # it is the device that takes its time
+                    time.sleep(0.001)  # the pause of the device
 
     def __exit__(self, *_):
         self.going = False
@@ -269,7 +269,7 @@ def test_a_stalled_reader_gets_a_young_state_first(board):
             before = host.next(is_state)
         host.stall(0.7)
         first = host.next(is_state)
-        # Longer than the heartbeats may stay away: the board goes safe, and the link comes back.
+        # Longer than the board's timeout: the board goes safe, and the link comes back.
         host.signal(signal.SIGSTOP)
         board.state('SAFE', 'link')
         host.signal(signal.SIGCONT)
@@ -285,7 +285,7 @@ def test_a_stalled_pipe_does_not_stall_the_heartbeats(path):
                              stderr=subprocess.PIPE, text=True) as host:
         assert host.stdout.readline()
         board.state('ACTIVE')
-        # Nobody reads on: the pipe of 64 kB is full after some 250 states, half a second.
+        # The test stops reading: the pipe of 64 kB is full after about 250 states, half a second.
         board.never('SAFE', 1.8)
         host.send_signal(signal.SIGINT)
         host.stdout.read()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recordings: r4 record beside a program that drives, killed, on a full disk; r4 info of what came of it."""
+"""Recordings: r4 record beside a program that drives, killed, and on a full disk; r4 info on the result."""
 import contextlib
 import datetime
 import re
@@ -30,7 +30,7 @@ def record(*arguments, **options):
 
 
 def info(*paths):
-    """The objects of r4 info, and its exit code."""
+    """Returns the objects of r4 info, and its exit code."""
     told = run('info', '--json', *map(str, paths))
     return objects(told.stdout), told.returncode
 
@@ -39,7 +39,7 @@ def test_has_what_a_program_sends_by_the_path_that_both_share(tmp_path):
     path = tmp_path / 'drive.r4log'
     with Board(f'pty:{tmp_path}/r4') as board, record(board.host_url, '-o', path) as recorder:
         wait_for(path, r'^[0-9.]+ 1< AIN24')
-        # It hears those that are sent when it has come to the program that has taken the path.
+        # The recorder receives only commands sent after it has connected to the program that holds the path.
         commands = [f'O:{pwm},1,1' for pwm in range(319, 359)]
         with driving(board.host_url, *commands) as host:
             wait_for(path, r'^[0-9.]+ 1> H:ROS2-R4')
@@ -68,7 +68,7 @@ def test_records_beside_a_program_that_drives(board, tmp_path, name):
     assert heard['name'] == 'sim-1' and heard['url'].startswith('udp://127.0.0.1:')
     assert heard['damaged'] == 0 and heard['lost'] == 0 and heard['states'] >= 10, heard
     assert heard['safe']['link'] >= 1
-    assert heard['heartbeats'] == 0, 'a watcher sends none'
+    assert heard['heartbeats'] == 0, 'a watcher sent a heartbeat'
     lines = [line for line in text_of(path).splitlines() if ' 1< ' in line]
     assert run('decode', stdin='\n'.join(line.split('< ', 1)[1] for line in lines)).returncode == 0
     assert lines == sorted(lines, key=lambda line: float(line.split(' ')[0]))
@@ -118,7 +118,7 @@ def test_a_replay_is_faster_when_asked(tmp_path):
     result = run('replay', str(path), 'udp://127.0.0.1:0', '--speed', '5')
     took = time.monotonic() - began
     assert result.returncode == 0 and '6 datagrams' in result.stdout, result
-    assert 1 <= took < 3, 'five seconds in one'
+    assert 1 <= took < 3, 'the replay of 5 s at speed 5 did not take about 1 s'
 
 
 def test_a_replay_goes_step_by_step_from_anywhere_and_tells_damage(recorded):
@@ -169,7 +169,7 @@ def test_records_many_boards_by_one_pattern(tmp_path, name, most_bytes):
 
 
 def newest_states(path):
-    """When the newest state of each path was heard."""
+    """The time of the newest state of each path."""
     found = re.findall(r'^([\d.]+) (\d+)< AIN24.*\^$', text_of(path), re.MULTILINE) if path.exists() else []
     return {path: float(when) for when, path in found}
 
@@ -204,7 +204,7 @@ def test_who_is_killed_under_load_has_lost_a_second_at_most(tmp_path, name):
                 path.unlink()
 
 
-@pytest.mark.parametrize('limit', [10, 20_000])  # the first does not even hold the header
+@pytest.mark.parametrize('limit', [10, 20_000])  # the header alone is longer than 10 bytes
 def test_a_limit_of_the_files_size_is_an_error_and_no_end_by_sigxfsz(board, tmp_path, limit):
     full = run('record', board.host_url, '-o', str(tmp_path / 'drive.r4log'), '--duration', '20', timeout=15,
                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
@@ -234,12 +234,12 @@ def test_a_file_that_others_take_away_is_begun_anew_and_the_exit_code_tells_a_lo
 
 
 def test_a_disk_without_space_ends_the_recording_with_a_reason(board, tmp_path):
-    # A file system of its own, which goes with the namespace; where that is refused, unshare says why.
+    # A file system in a new namespace, with which it ends; if that is refused, unshare reports why.
     script = ('mount -t tmpfs -o size=16k none "$1" && cd "$1" && "$2" record "$3" -o drive.r4log; echo $?;'
               ' "$2" info drive.r4log')
     full = subprocess.run(['unshare', '--map-root-user', '--mount', 'sh', '-c', script, 'sh', tmp_path, R4,
                            board.host_url], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
-    assert full.stdout, f'there is no file system to fill: {full.stderr}'
+    assert full.stdout, f'the test could not make a file system to fill: {full.stderr}'
     code, *told = full.stdout.splitlines()
     assert int(code) == OPEN and 'the recording has ended: No space left on device' in full.stderr, full
     assert ERROR.search(full.stderr) and full.returncode == 0, full

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tools/release makes the same bytes twice, and refuses a tree that is not the version that it is asked for."""
+"""tools/release makes the same bytes twice, and refuses a tree whose version is not the requested one."""
 import hashlib
 import os
 import pathlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 ros2 in a graph with somebody else, who is Fast DDS and knows the bytes of ROS 2's messages."""
+"""r4 ros2 in a graph with a Fast DDS peer, which knows the bytes of ROS 2's messages."""
 import math
 import os
 import pathlib
@@ -28,7 +28,7 @@ SEND, SENT = (f'diagnostic_msgs::srv::dds_::AddDiagnostics_{half}_' for half in 
 
 @pytest.fixture(scope='module', name='graph')
 def make_graph():
-    """A board, its node, armed, and a peer."""
+    """A board, its armed node, and a peer."""
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer:
         with Ros2(domain, board.host_url, '--arm', '--counts-per-turn', '4096', '--drive', 'osmc1,-osmc2',
@@ -70,10 +70,10 @@ def test_what_is_commanded_as_text_is_executed_together(graph):
     join(ros2, peer, 'R4_Command', STRING)
     _, outputs = drive(board, peer, 'rt/R4_Command', text('O:358,1,3; S:1500,2 ;'), lambda each: pwm(each, 3) == 358)
     assert outputs['servo'][1] == pytest.approx(1500, abs=5)
-    peer.write('rt/R4_Command', text('O:100,1,3;O:5000,1,4'))  # one is wrong: neither is executed
+    peer.write('rt/R4_Command', text('O:100,1,3;O:5000,1,4'))  # one of two commands is invalid: neither is executed
     _, outputs = drive(board, peer, 'rt/R4_Command', text('O:200,0,3'), lambda each: pwm(each, 3) != 358)
     assert pwm(outputs, 3) == -200
-    peer.say('remove', 'rt/R4_Command')  # and what it drove is off
+    peer.say('remove', 'rt/R4_Command')  # its outputs go off
     outputs = board.outputs(lambda each: pwm(each, 3) == 0)['outputs']
     assert outputs['servo'][1] == 0
 
@@ -86,7 +86,7 @@ def test_a_component_is_commanded_and_told_in_the_units_of_ros(graph):
     assert pwm(outputs, 1) == -2048
     told = peer.sample('rt/osmc1/state', lambda payload: struct.unpack('<f', payload)[0] < -0.4)
     assert struct.unpack('<f', told)[0] == pytest.approx(-2048 / 4095, abs=1e-6)
-    # Silent, but there: off after the deadline of 1 s.
+    # A publisher that is silent but exists: off after the deadline of 1 s.
     off = board.outputs(lambda each: pwm(each, 1) == 0)
     assert 0.9 < off['came'] - written < within(1.4)
     for wrong in (math.nan, math.inf, 1.5):
@@ -106,12 +106,12 @@ def test_a_component_is_commanded_and_told_in_the_units_of_ros(graph):
 def test_cmd_vel_drives_two_wheels_until_it_is_silent(graph):
     board, ros2, peer = graph
     join(ros2, peer, 'cmd_vel', TWIST)
-    # Wheels 0.5 and 1.5 m/s of 2, the right one reversed.
+    # The wheels have 0.5 and 1.5 m/s of at most 2 m/s; the right wheel is reversed.
     _, outputs = drive(board, peer, 'rt/cmd_vel', twist(1.0, 2.0), lambda each: pwm(each, 2) != 0)
     assert pwm(outputs, 1) == 1024 and pwm(outputs, 2) == -3071
     peer.write('rt/cmd_vel', twist(math.nan, 0))
     outputs = board.outputs()['outputs']
-    assert pwm(outputs, 1) == 0 and pwm(outputs, 2) == 0  # both at once
+    assert pwm(outputs, 1) == 0 and pwm(outputs, 2) == 0  # both wheels go off at once
     peer.say('remove', 'rt/cmd_vel')
 
 
@@ -138,7 +138,7 @@ def test_sensors(graph):
     peer.read('rt/handle', BOOL)
     assert len(peer.sample('rt/encoder1')) == 4
     assert struct.unpack('<I', peer.sample('rt/relays'))[0] & 1 == 1
-    assert peer.sample('rt/handle')[:1] == ON  # and what fills it up to four bytes
+    assert peer.sample('rt/handle')[:1] == ON  # padding up to four bytes follows
 
 
 def test_diagnostics(graph):
@@ -150,7 +150,7 @@ def test_diagnostics(graph):
 
 
 def test_malformed_samples_change_nothing(graph):
-    """Whatever is subscribed gets what would drive, or stop, were it not damaged."""
+    """Sends to each subscription a sample that would drive or stop if it were not damaged."""
     board, ros2, peer = graph
     valid = {'String': text('O:900,1,1'), 'Bool': ON, 'Float32': float32(0.5), 'Int32': struct.pack('<i', 1000),
              'Twist': twist(1, 2), 'Trigger': struct.pack('<QqB', 1, 1, 0),
@@ -170,9 +170,10 @@ def test_malformed_samples_change_nothing(graph):
     mark = len(board.log)
     for topic, name in topics:
         good = valid[name]
-        bad = [good[:size] for size in range(0, len(good), 4)]  # what is shorter is filled up on the wire
+        # Multiples of 4, because shorter samples are padded on the wire.
+        bad = [good[:size] for size in range(0, len(good), 4)]
         bad += [good[:-len(text('O:900,1,1'))] + each for each in no_strings if name in ('String', 'AddDiagnostics')]
-        if name == 'AddDiagnostics':  # as rmw_fastrtps asks: what says whose request it is stands elsewhere
+        if name == 'AddDiagnostics':  # as rmw_fastrtps asks: the identity of the request is not in the payload
             bad += [text('O:900,1,1'), text('O:900,1,1;' * 9)]
         for payload in bad:
             peer.write(topic, payload)
@@ -181,7 +182,7 @@ def test_malformed_samples_change_nothing(graph):
     peer.write('rt/relay2/command', b'\x02\0')
     for payload in (math.nan, math.inf, -1e30):
         peer.write('rt/osmc1/command', float32(payload))
-    for topic, _ in topics:  # no sample at all: who sends that holds up what follows of its own, and nobody else
+    for topic, _ in topics:  # not a sample: it blocks later samples of the same writer, but no other writer
         peer.write_raw(topic, b'\0\x01')
         peer.say('remove', topic)
     join(ros2, peer, 'R4_Command', STRING)
@@ -210,7 +211,7 @@ def test_a_hundred_subscribers_slow_nothing_down(graph):
     begun = until(1)
     board.skip_past()
     before = peer.counted('rt/R4')
-    took = until(before + 100) - begun  # each of them has had a second of states
+    took = until(before + 100) - begun  # by then each reader has received the states of one second
     assert took < within(1.2)
     board.never('SAFE', 0.1)
 
@@ -239,7 +240,7 @@ def test_a_stop_is_a_stop_and_repeating_arm_does_not_arm_again(graph):
     assert pwm(board.outputs(lambda each: pwm(each, 1) != 2048)['outputs'], 1) == 0
     board.state('SAFE', 'stop')
     ros2.logged('E:STOP: confirmed')
-    peer.write('rt/arm', ON)  # the same publisher, still true
+    peer.write('rt/arm', ON)  # the same publisher repeats the value true
     again(lambda: peer.write('rt/osmc1/command', float32(0.5)),
           lambda timeout: ros2.logged('not armed (stop)', timeout=timeout))
     arm(ros2, peer)
@@ -250,8 +251,8 @@ def test_a_stop_is_a_stop_and_repeating_arm_does_not_arm_again(graph):
 
 
 def ask(peer, service, request):
-    """The answer of a service: whether the board confirmed, and a text. On a busy machine a request may be too old when it
-    comes: then it is sent again, at most twice."""
+    """Returns the answer of a service: whether the board confirmed, and a text. On a busy machine a request may be too
+    old when it arrives. Then it is sent again, at most twice."""
     for number in range(7, 10):
         peer.write(f'rq/r4/{service}Request', struct.pack('<Qq', CLIENT, number) + request)
         cdr = Cdr(peer.sample(f'rr/r4/{service}Reply'))
@@ -299,7 +300,7 @@ def test_the_service_send_answers_for_the_board(graph):
         confirmed, told = send(wrong)
         assert not confirmed and why in told and told, (wrong, told)
     assert send('Q:ID')[0]
-    # Silent for a second, it counts as gone, as whoever drives: what it drove is off.
+    # Like any publisher that drives, the client counts as ended after a second of silence: its outputs go off.
     outputs = board.outputs(lambda each: pwm(each, 3) != 900)['outputs']
     assert pwm(outputs, 3) == 0 and outputs['servo'][1] == 0
     assert send('O:900,1,3')[0]
@@ -321,7 +322,7 @@ def test_the_service_send_answers_for_the_board(graph):
 
 @pytest.mark.parametrize('user_data, gid_size', ((NODES_HASH, 16), ('-', 24)))
 def test_its_node_is_listed_for_every_release(user_data, gid_size):
-    """`user_data`: what a peer of that release has on its own list of nodes."""
+    """`user_data`: the user data that a peer of that release has on its writer of the list of nodes."""
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer, \
             Ros2(domain, board.host_url, '--namespace', 'robot') as ros2:
@@ -350,7 +351,7 @@ def test_its_node_is_listed_for_every_release(user_data, gid_size):
         peer.next(lambda each: each['type'] == 'participant' and each['gone'], timeout=8)
         assert ros2.wait() == 0
         assert time.monotonic() - left < within(1)
-        # And again, as after a restart.
+        # A second node, as after a restart.
         with Ros2(domain, board.host_url):
             assert '/r4' in nodes_of(peer.sample('ros_discovery_info', lambda data: b'r4\0' in data), gid_size)
 
@@ -399,7 +400,7 @@ def test_two_of_one_name_are_told_of_each_other():
                 told = here.logged(f'process {there.process.pid} on ')
                 assert told['level'] == 'warning' and 'has a node /r4, too' in told['text']
                 assert '--namespace' in told['text']
-            for _ in range(2):  # in either order
+            for _ in range(2):  # the two messages come in either order
                 assert peer.sample('rt/rosout', lambda data: b'has a node /r4, too' in data)[8] == 30
         with Ros2(domain, other.host_url, '--namespace', 'other') as third:
             third.logged('the board is there')
@@ -435,7 +436,7 @@ def test_the_example_of_a_robot_keeps_the_speeds_of_its_wheels():
     speeds, now = [0.0, 0.0], 0.0
 
     def drive(seconds, *command):
-        """Motors that reach three quarters of what the duty says, with the encoders of the two directions."""
+        """Motors that reach three quarters of the speed of their duty, and the encoders of both wheels."""
         nonlocal now
         for _ in range(int(seconds * 100)):
             now += 0.01
@@ -448,9 +449,9 @@ def test_the_example_of_a_robot_keeps_the_speeds_of_its_wheels():
     assert drive(5, 0.5, 1.0) == pytest.approx([(0.5 - 0.21) / 0.05, -(0.5 + 0.21) / 0.05], rel=0.02)
     drive(0.1, math.nan, 0)  # no command
     drive(0.6)
-    assert base.update(speeds, now) == [0, 0]  # silent: off
-    assert drive(10, 9.0, 0.0)[0] == pytest.approx(22.5, rel=0.02)  # all that there is
-    assert drive(5, 0.5, 0.0) == pytest.approx([10, -10], rel=0.05)  # and it comes back from there
+    assert base.update(speeds, now) == [0, 0]  # no new command: off
+    assert drive(10, 9.0, 0.0)[0] == pytest.approx(22.5, rel=0.02)  # the highest speed
+    assert drive(5, 0.5, 0.0) == pytest.approx([10, -10], rel=0.05)  # it recovers from saturation
     base.command(1, 0, now)
     assert base.update((math.nan, 0), now) == [0, 0]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 ros2 --device: what described devices measure, in the messages of ROS."""
+"""r4 ros2 --device: the values of described devices, in the messages of ROS."""
 import math
 import time
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 ros2, where it or somebody else in its graph is killed, stands still or is late."""
+"""r4 ros2, when it or another participant in its graph is killed, stands still or is late."""
 import signal
 import time
 
@@ -63,7 +63,7 @@ def test_a_command_that_was_held_up_is_not_executed():
         ros2.signal(signal.SIGSTOP)
         peer.write('rt/osmc1/command', float32(0.5))
         peer.next(lambda each: each['type'] == 'written')
-        lasts(0.3)  # the board waits for longer
+        lasts(0.3)  # shorter than the board's timeout
         ros2.signal(signal.SIGCONT)
         peer.sample('rt/diagnostics', lambda payload: int(health_of(payload)[-1]['commands too old']) > 0)
         drive(board, peer, 'rt/osmc1/command', float32(0.25), lambda each: pwm(each, 1) == 1024)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 ros2, where what ROS says is lost, overtaken, or of a kind that nobody could take back."""
+"""r4 ros2 with messages of ROS that are lost or overtaken, or whose effect could not be undone."""
 import signal
 import struct
 import time
@@ -19,7 +19,7 @@ def newest_outputs(board):
 
 
 def test_a_setpoint_that_rests_gets_there_though_it_is_said_once_and_lost():
-    # Without a deadline nothing but its repetition could end the drive. Of these ten a third would be lost.
+    # Without a deadline only the repeated command can end the drive. About a third of the ten would be lost.
     with armed('--deadline', '0', options=('--link', 'loss=30%,seed=7')) as (board, ros2, peer):
         join(ros2, peer, 'osmc1/command', FLOAT32)
         for _ in range(10):
@@ -36,7 +36,7 @@ def test_a_transfer_beside_an_output_ends_nothing():
             drive(board, peer, 'rt/R4_Command', text('O:0,1,1'), lambda each: pwm(each, 1) == 0)
 
 
-@pytest.mark.parametrize('_', range(3))  # whether both are taken in one turn is a matter of chance
+@pytest.mark.parametrize('_', range(3))  # several runs, because the node takes both in one turn only by chance
 def test_an_arm_that_was_written_before_a_stop_does_not_undo_it(_):
     with armed() as (board, ros2, peer):
         join(ros2, peer, 'arm', BOOL)
@@ -44,7 +44,7 @@ def test_an_arm_that_was_written_before_a_stop_does_not_undo_it(_):
         join(ros2, peer, 'osmc1/command', FLOAT32)
         peer.write('rt/arm', OFF)
         peer.write('rt/arm', ON)
-        peer.write('rt/stop', ON)  # in the same turn it is taken first
+        peer.write('rt/stop', ON)  # the node takes the stop first if both come in the same turn
         ros2.logged('E:STOP: confirmed')
         again(lambda: peer.write('rt/osmc1/command', float32(0.5)),
               lambda timeout: ros2.logged('not armed (stop)', timeout=timeout))
@@ -84,7 +84,7 @@ def test_a_stop_of_an_outage_is_obeyed_when_the_link_is_back():
         board.signal(signal.SIGSTOP)
         ros2.logged('silent')
         peer.write('rt/stop', ON)
-        ros2.logged('CUT THE POWER')  # nobody waits for it any longer
+        ros2.logged('CUT THE POWER')  # the request for the stop has timed out
         board.signal(signal.SIGCONT)
         board.state('SAFE', 'stop')
         assert pwm(newest_outputs(board), 1) == 0
@@ -149,8 +149,8 @@ def test_a_zero_of_an_outage_ends_the_drive_when_the_link_is_back():
         again(lambda: peer.write('rt/osmc1/command', float32(0)),
               lambda timeout: ros2.logged('a command was dropped', timeout=timeout))
         board.signal(signal.SIGCONT)
-        board.outputs(lambda each: pwm(each, 1) == 0)  # for want of a host
-        board.outputs(lambda each: pwm(each, 1) == 2048)  # it resumes
+        board.outputs(lambda each: pwm(each, 1) == 0)  # the board has no host
+        board.outputs(lambda each: pwm(each, 1) == 2048)  # the node resumes
         board.outputs(lambda each: pwm(each, 1) == 0)
 
 
@@ -232,7 +232,7 @@ def test_a_client_that_reads_no_answers_starves_no_topic():
         peer.read('rt/R4', STRING)
         peer.writer('rq/r4/sendRequest', 'diagnostic_msgs::srv::dds_::AddDiagnostics_Request_')
         ros2.logged('~/send: 1 publishers')
-        request = struct.pack('<Qq', 1, 1) + text('C:timeout,1000')  # answered at once
+        request = struct.pack('<Qq', 1, 1) + text('C:timeout,1000')  # the node answers at once
         peer.sample('rt/R4')
         came = [peer.sample('rt/R4').came]
         for _ in range(20):

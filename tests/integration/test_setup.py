@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tools/setup on releases that are made up of programs in place of apt's, and what tools/on says when it cannot."""
+"""tools/setup on simulated releases, with programs in place of apt's, and the errors of tools/on."""
 import os
 import pathlib
 import re
@@ -18,7 +18,7 @@ UNIT_TESTS = {'libgtest-dev', 'librapidcheck-dev', 'libbenchmark-dev', 'python3'
 
 
 class Release:
-    """A system with some packages installed, some in its archive, in a folder that comes first on the PATH."""
+    """A simulated system with some packages installed and some in its archive: its programs are first in PATH."""
 
     def __init__(self, folder, archive, installed=(), version='9.0'):
         self._log = folder / 'installed'
@@ -41,7 +41,7 @@ class Release:
         path.chmod(0o755)
 
     def set_up(self, *options, **variables):
-        """(The run, the packages that it would have installed)"""
+        """Runs tools/setup; returns the run and the packages that it would have installed."""
         ended = subprocess.run([TOOLS / 'setup', *options], capture_output=True, text=True, check=False,
                                env={**os.environ, 'PATH': f'{self._path}:/usr/bin:/bin', **variables})
         said = self._log.read_text() if self._log.exists() else ''
@@ -120,7 +120,7 @@ def test_on_names_the_package_of_a_program_that_is_missing(tmp_path):
 
 
 class Table:
-    """tools/on --all with a program in place of tools/on, which writes its words down, then does what `script` says."""
+    """tools/on --all with a program in place of tools/on, which logs its arguments and then runs `script`."""
 
     def __init__(self, folder, script=''):
         self.folder = folder
@@ -131,7 +131,7 @@ class Table:
         program.chmod(0o755)
 
     def run(self, *words):
-        """(The run, the commands that it gave)"""
+        """Runs the table; returns the run and the logged commands."""
         ended = subprocess.run([self.folder / 'tools/on.d/table', *words], capture_output=True, text=True, check=False,
                                env={**os.environ, 'R4_ON_DIR': str(self.folder / 'roots')})
         return ended, (self.folder / 'commands').read_text().splitlines()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Programs that share a transport: what one user runs in several terminals, on the same URL."""
+"""Programs that share a transport: one user runs them in several terminals, on the same URL."""
 import contextlib
 import itertools
 import os
@@ -18,7 +18,7 @@ from machine import within
 from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, free_port, is_state, objects, run, stop_takes_ms,
                         wait_for, watch)
 
-# The others take a path over within 100 ms; as much again is for a machine that is busy.
+# The other programs take a path over within 100 ms; a busy machine gets as much again.
 TAKEN_OVER_WITHIN_S = 0.2
 
 
@@ -34,7 +34,7 @@ def on_a_path(request, folder):
     url = f'pty:{folder}/tty' if request.param == 'pty' else 'udp://127.0.0.1:0'
     with Board(url) as board:
         if request.param == 'udp':
-            # One port for all, as the port of hosts is.
+            # One port for all hosts, as the standard port of hosts is.
             board.host_url = re.sub(r'\?listen=0$', f'?listen={free_port()}', board.host_url)
         yield board
 
@@ -82,14 +82,14 @@ def test_a_stop_from_the_second_terminal(board):
 
 
 def received(path):
-    """Of a recording: when it had each datagram of the board, its number, and itself."""
+    """(time, number, datagram) of each datagram of the board in a recording."""
     lines = [line.split(' ', 2) for line in path.read_text('ascii').splitlines() if not line.startswith('#')]
     return [(float(came), int(re.search(r';PNum:([0-9]+);', datagram)[1]), datagram)
             for came, what, datagram in lines if what == '1<']
 
 
 def from_to(datagrams, first, last):
-    """Those from the one with that text to the next with the other."""
+    """The datagrams from the first that has the text `first` to the next that has `last`."""
     texts = [datagram for _, _, datagram in datagrams]
     begin = next(i for i, text in enumerate(texts) if first in text)
     return datagrams[begin:next(i for i, text in enumerate(texts) if i > begin and last in text)]
@@ -107,7 +107,7 @@ def test_of_five_that_watch_one_sleeps_one_dies_and_nobody_else_loses_anything(b
             wait_for(path, 'OSMC1:358,1;')
         sleeper.signal(signal.SIGSTOP)
         victim.signal(signal.SIGKILL)
-        board.never('SAFE', 2.5)  # the sleeper was let go by then
+        board.never('SAFE', 2.5)  # by then the stopped program no longer holds the path
         sleeper.signal(signal.SIGCONT)
         sleeper.skip_past()
         sleeper.next(drives(358))
@@ -119,7 +119,7 @@ def test_of_five_that_watch_one_sleeps_one_dies_and_nobody_else_loses_anything(b
     for path in paths:
         datagrams = from_to(received(path), 'OSMC1:358,1;', 'SAFE:1;')
         pairs = list(itertools.pairwise(datagrams))
-        # Only while the dead one's path was nobody's something was lost.
+        # Datagrams were lost only between the death of the holder and the takeover of its path.
         holes = [(a, b) for a, b in pairs if b[1] != a[1] + 1]
         shown = [[(round(at - killed_at, 3), number) for at, number, _ in hole] for hole in holes]
         assert len(holes) <= 1 and all(b[0] > killed_at for _, b in holes), shown
@@ -129,7 +129,7 @@ def test_of_five_that_watch_one_sleeps_one_dies_and_nobody_else_loses_anything(b
 
 
 def with_a_stopped_holder(url, look, watchers=2):
-    """Some watch beside one that holds the transport, watches and is stopped: `look` is what to see of each then."""
+    """Stops a watcher that holds the transport, with other watchers beside it; calls `look` for each of these."""
     with watch(url) as holder, contextlib.ExitStack() as running:
         holder.next(is_state)
         others = [running.enter_context(watch(url)) for _ in range(watchers)]
@@ -158,7 +158,7 @@ def test_a_stopped_holder_that_watches_is_named_where_it_has_the_only_port():
 
 
 def test_a_stopped_holder_that_watches_keeps_nobody_from_a_board(folder):
-    # Only one program can have a serial port, so only one takes it from the stopped one.
+    # Only one program can open a serial port, so only one takes it over from the stopped program.
     for url, watchers in ('udp://127.0.0.1:0', 2), (f'pty:{folder}/tty', 1):
         with Board(url) as board:
             with_a_stopped_holder(board.host_url.removesuffix('?listen=0'), hears_on, watchers)
@@ -181,11 +181,11 @@ def test_a_stopped_holder_loses_the_serial_port_and_takes_no_byte_of_it_when_it_
                 holder.skip_past()
                 for _ in range(20):
                     holder.next(drives(358))
-                holder.signal(signal.SIGSTOP)  # it shares now, and keeps nobody from anything
+                holder.signal(signal.SIGSTOP)  # it shares a transport now, so its stop holds up no other program
                 assert recorder.end() == 0, recorder.errors
             numbers = [number for _, number, _ in received(path)]
             assert len(numbers) > 20 and numbers == sorted(set(numbers))
-            # A board that is held up leaves whole states out.
+            # A delayed board leaves whole states out.
             [told] = objects(run('info', '--json', str(path)).stdout)
             assert told['paths'][0]['damaged'] == 0, told
             path.unlink()
@@ -201,7 +201,7 @@ def test_two_spellings_of_a_board_are_one_path():
             refused = run('send', other_url, 'O:1,1,1')
             assert refused.returncode == 3, refused
             assert f'controlled by r4 (pid {host.process.pid})' in refused.stderr, refused
-            # One that only a resolver knows is another path, at the same port.
+            # An address that only a resolver understands is another path, at the same port.
             refused = run('send', url.replace('127.0.0.1', '127.1'), 'O:1,1,1')
             assert refused.returncode == 4, refused
             assert f'UDP port {listen} is in use by r4 (pid {host.process.pid})' in refused.stderr, refused
@@ -237,7 +237,7 @@ def test_a_driving_program_that_is_stopped_is_named(board):
 
 @pytest.fixture(name='nobody')
 def as_another_user(folder):
-    """Runs r4 as the user nobody, of the group nogroup alone."""
+    """Runs r4 as the user nobody, with only the group nogroup."""
     if os.geteuid() != 0:
         pytest.skip('only root may run programs as another user')
     r4 = shutil.copy(R4, folder)
@@ -268,7 +268,7 @@ def test_programs_of_another_user_that_connect_again_and_again_hold_up_neither_t
             others.callback(other.kill)
         board.never('SAFE', 2)
         assert host.process.poll() is None and all(each['type'] != 'error' for each in host.log)
-        # By the host's socket, where it waits in the queue with all of them.
+        # The stop goes through the host's socket, and waits in its queue with the other clients.
         stopped = run('stop', board.host_url, '--json')
         assert stopped.returncode == 0, stopped
         board.state('SAFE', 'stop')

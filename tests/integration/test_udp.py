@@ -13,7 +13,7 @@ import pytest
 from machine import SANITIZED, within, within_ms
 from r4_process import PATIENCE_S, Board, driving, free_port, is_link, is_state, lasts, monitor, objects, run
 
-# The board's timeout, and what docs/reference/safety.md promises on top.
+# The board's timeout, and the margin that docs/reference/safety.md promises.
 SAFE_WITHIN_MS = 1020
 
 
@@ -23,9 +23,9 @@ def port_of(board):
 
 @contextlib.contextmanager
 def flood(board, rate_hz, datagrams, at_once=0, places=0):
-    """Others send to the board: that many at once, then so many a second for as long as it is entered.
+    """Sends `datagrams` to the board during the block: `at_once` at the start, then `rate_hz` per second.
 
-    From so many ports by turns; 0: each from another. The list tells when they were sent.
+    `places`: the number of ports that send in turn; 0: a new port for each datagram. Yields the list of send times.
     """
     sent = []
     end = threading.Event()
@@ -56,7 +56,7 @@ def flood(board, rate_hz, datagrams, at_once=0, places=0):
 
 
 def stays_with_its_host_in(board, flooded):
-    """The host in control keeps the board in that flood; the next gets in when it has left."""
+    """The controlling host keeps the board during the flood; the next host gets control after it has left."""
     with monitor(board.host_url) as host:
         host.next(is_link('active'))
         board.state('ACTIVE')
@@ -69,7 +69,7 @@ def stays_with_its_host_in(board, flooded):
             assert all((each['fields']['state'], each['fields']['causes']) == ('active', [])
                        for each in during if each['type'] == 'link')
             assert not any(each['fields'].get('SAFE') for each in during if is_state(each))
-            assert not any(each['type'] == 'path' for each in host.log), 'the link reports as much of the only path'
+            assert not any(each['type'] == 'path' for each in host.log), 'the only path reports an event'
             steps = [later['t'] - earlier['t'] for earlier, later in itertools.pairwise(
                 each for each in during if is_state(each))]
             print(f'{len(sent)} datagrams of others; {len(steps) + 1} states, at most {max(steps)} ms apart')
@@ -96,15 +96,15 @@ def test_streams_its_state_at_100_hz(board):
         states = []
         while len(states) < 200:
             states.append(host.next(is_state))
-        states = states[20:]  # behind the choice of fields
+        states = states[20:]  # after the choice of fields
     numbers = [each['pnum'] for each in states]
     times = [each['t'] for each in states]
     steps = [later - earlier for earlier, later in zip(times, times[1:])]
     print(f'{len(states)} states in {times[-1] - times[0]} ms of the board')
-    # Of the same series are heartbeats, two a second, and answers to the host's questions of the board's clock:
-    # ten a second at first, as long as a busy machine leaves it uncertain.
+    # Heartbeats, two per second, and answers to the host's questions about the board's clock use the same numbers:
+    # ten per second at first, for as long as the clock is uncertain on a busy machine.
     assert len(states) - 1 <= numbers[-1] - numbers[0] <= len(states) + 4 + 20
-    # The grid of 10 ms is kept; a busy machine may leave periods out, but never shifts it.
+    # T stays in the grid of 10 ms; a busy machine may leave periods out, but never shifts the grid.
     assert all(step % 10 == 0 for step in steps)
     assert times[-1] - times[0] <= within_ms(11 * len(steps))
     assert states[0]['fields']['AIN24'] == pytest.approx(24.3, abs=1)
@@ -141,10 +141,10 @@ def test_the_commands_of_a_group_are_executed_together_or_not_at_all(board):
     assert result.returncode == 0, result
     assert objects(result.stdout)[1]['motor_supply'] == 'closed'
     first = board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
-    assert first['outputs']['osmc'] == [[358, 1], [358, 1], [358, 0], [358, 0]], 'not one before the others'
+    assert first['outputs']['osmc'] == [[358, 1], [358, 1], [358, 0], [358, 0]], 'the group was not executed at once'
     result = run('send', board.host_url, 'O:1,1,1;O:1,1,2')
     assert result.returncode == 3 and 'none of the 2 commands was executed' in result.stderr, result
-    # What another program makes of the rules, the board judges.
+    # The board itself checks groups, because other programs may not.
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.settimeout(PATIENCE_S)
         for fields, answer in (('O:1,1,1;O:1,1,5', 'N:5,CHANNEL;AT:2;'), ('O:1,1,1;C:rate,9', 'N:5,FORMAT;AT:2;')):
@@ -168,7 +168,7 @@ def test_a_command_is_refused_while_a_stop_is_latched(board):
 def test_a_stop_switches_every_output_off_and_nothing_comes_back(board):
     with monitor(board.host_url) as host:
         host.next(is_link('active'))
-        # The same socket's owner commands: through the monitor nobody can, so stop from outside.
+        # The monitor sends no commands, so another program stops the board.
         stopped = run('stop', board.host_url)
         assert stopped.returncode == 0 and 'SAFE (stop)' in stopped.stdout
         board.state('SAFE', 'stop')
@@ -205,7 +205,7 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(b
         killed = host.signal(signal.SIGKILL)
         off = board.outputs(lambda outputs: outputs['osmc'][0] == [0, 0])
         safe = board.state('SAFE', 'link')
-    # The guard switches off on the millisecond; the board's loop says so when it comes.
+    # The guard switches off on the millisecond; the board's loop reports it in its next turn.
     off_after = safe['silence'] - (safe['t'] - off['t']) % 2**32
     print(f"off {off_after} and said {safe['silence']} ms after the last heartbeat, "
           f"{(safe['came'] - killed) * 1000:.0f} ms after the kill")
@@ -215,7 +215,7 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(b
 
 
 def test_a_heartbeat_that_waited_while_the_board_stood_still_counts_from_before():
-    # A host of the paper's: that its heartbeats arrive is all that the board can know.
+    # A host as in the paper: the board knows only that its heartbeats arrive.
     with Board('udp://127.0.0.1:0', options=('--set', 'timeout,2000')) as board, \
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as host:
         host.connect(('127.0.0.1', int(board.url.rsplit(':', 1)[1])))
@@ -237,7 +237,7 @@ def test_a_heartbeat_that_waited_while_the_board_stood_still_counts_from_before(
         safe = board.state('SAFE', 'link')
     after_ms = (safe['came'] - delivered) * 1000
     print(f'SAFE {after_ms:.0f} ms after the heartbeat was delivered')
-    assert 1200 < after_ms <= within_ms(2020)  # it did feed: without it, 1000
+    assert 1200 < after_ms <= within_ms(2020)  # longer than 1000, so the program fed the watchdog
 
 
 def test_control_is_free_when_the_host_that_had_it_is_gone(board):
@@ -324,7 +324,7 @@ def test_measures_a_link(board):
     assert result.returncode == 0, result
     measured = objects(result.stdout)[0]
     print(result.stdout)
-    # What a busy machine keeps the board from is left out.
+    # The board leaves out states if the machine is busy.
     assert 2 * 97 / within(2) <= measured['state_hz'] <= 103
     assert measured['round_trip_us']['count'] > 20 and measured['unanswered'] == 0
     assert measured['confirmation_us']['count'] > 1 and measured['unconfirmed'] == 0
@@ -356,13 +356,13 @@ def test_the_same_seed_gives_the_same_inputs_and_another_board_id():
                 host.wait()
             assert 'board left,' in run('send', board.host_url, 'Q:ID').stdout
         boots.append(boot['t'])
-    # One of 2^32 values by the seed, and what passed until it was told.
+    # The seed chooses one of 2^32 start times; the difference is the time until the report.
     assert abs(boots[0] - boots[1]) < 1000
 
 
 def test_a_scenario_happens_to_the_board(tmp_path):
     script = tmp_path / 'scenario'
-    slow = 5 if SANITIZED else 1  # the host is there before the first
+    slow = 5 if SANITIZED else 1  # in s; the host has connected before the first line
     script.write_text(f'{slow} handle released\n{1.5 * slow} handle held\n{2 * slow} fault\n')
     with Board('udp://127.0.0.1:0', options=['--script', str(script)]) as board:
         with monitor(board.host_url) as host:
@@ -371,7 +371,7 @@ def test_a_scenario_happens_to_the_board(tmp_path):
                 board.state('SAFE', reason)
                 host.next(is_link('safe', reason))
             result = run('stop', board.host_url)
-            assert result.returncode == 0, 'fault and stop together'
+            assert result.returncode == 0, 'r4 stop failed with a fault and a stop together'
 
 
 def test_a_quiet_board_says_only_where_it_listens():
@@ -400,7 +400,7 @@ def test_an_older_client_without_heartbeats_gets_nothing_done(board):
 
 
 def test_a_process_has_a_thousand_boards():
-    last = 21049 if SANITIZED else 21999  # of more it has no time for each
+    last = 21049 if SANITIZED else 21999  # with more, the machine has no time for each board
     with Board(f'udp://127.0.0.1:21000-{last}', listens=last - 20999) as boards:
         for port in 21000, 21025, last:
             sent = run('send', f'udp://127.0.0.1:{port}?listen=0', '--timeout', '20', 'O:358,1,1', timeout=30)

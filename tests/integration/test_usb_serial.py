@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The serial transport on a USB serial port with its real driver, in the guest of tools/with-can.
 
-The board at the far end of the cable is simulated, outside. Inside runs usb_serial_inside.py, whose input and output
-are another path to that board.
+The board at the far end of the cable is simulated, outside of the guest. Inside runs usb_serial_inside.py, whose input
+and output are another path to that board.
 """
 import json
 import os
@@ -19,7 +19,7 @@ WITH_CAN = HERE.parents[1] / 'tools' / 'with-can'
 
 
 def carry(source, destination):
-    """All bytes, in a thread of its own, until either end is gone."""
+    """Copies all bytes, in a new thread, until either end is closed."""
     def run():
         try:
             while received := os.read(source, 4096):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The calendar's clock of a host is set by an hour under a running link."""
+"""The wall clock of a host is set forward by an hour while a link runs."""
 import os
 import subprocess
 
@@ -7,7 +7,7 @@ from machine import within_ms
 from r4_process import Board, is_link, is_state, monitor
 
 HOUR_S = 3600
-# Between r4 and the C library: as soon as the file is there, it is an hour later.
+# Preloaded between r4 and the C library: the wall clock is an hour later as soon as the file exists.
 ANOTHER_CLOCK = r'''
 #include <stdlib.h>
 #include <sys/syscall.h>
@@ -36,11 +36,11 @@ def test_a_step_of_the_wall_clock_disturbs_nothing(tmp_path):
         assert host.end() == 0
         since = host.log[host.log.index(before):]
     assert all(each['fields']['up'] and each['fields']['state'] == 'active' and not each['fields']['causes']
-               for each in since if each['type'] == 'link'), 'the link is as it was'
+               for each in since if each['type'] == 'link'), 'the link has changed'
     steps = [later['t'] - earlier['t'] for earlier, later in zip(after, after[1:])]
-    assert max(steps) < within_ms(500), 'states go on'
+    assert max(steps) < within_ms(500), 'the states were interrupted'
     last = after[-1]
     passed = (last['t'] - before['t']) / 1000
     error = (before['sampled_error_ms'] + last['sampled_error_ms']) / 1000 + 100e-6 * passed
-    assert abs(last['sampled'] - before['sampled'] - HOUR_S - passed) <= error + 5e-3, 'by the clock as it is set'
-    assert all(each['sampled_error_ms'] < 2 for each in after), 'what was known of the board\'s clock is known'
+    assert abs(last['sampled'] - before['sampled'] - HOUR_S - passed) <= error + 5e-3, 'not by the new wall clock'
+    assert all(each['sampled_error_ms'] < 2 for each in after), 'the host has lost its estimate of the board\'s clock'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Programs that watch a board: beside one that drives it, in either order, and without any."""
+"""Programs that watch a board: beside a program that drives it, in either order of start, and alone."""
 import itertools
 import re
 import signal
@@ -50,7 +50,7 @@ def test_a_monitor_and_a_send_in_either_order(board):
 
 
 def test_the_first_steps_of_the_help_work_as_printed():
-    """At the ports of the protocol, which are one each: on a computer where nobody else has them."""
+    """Uses the two ports of the protocol, on a computer where no other program has them."""
     with Lan() as lan:
         inside = lan.computer('10.77.0.1').inside
         with Board('udp://127.0.0.1', **inside):
@@ -125,14 +125,14 @@ def test_over_a_cable(tmp_path):
             with driving(network + '?listen=0', 'O:358,1,1'):
                 watcher.next(drives)
             watcher.next(is_safe_for_the_link)
-            # Lines of the watcher's own, such as a change of its link, have no number.
+            # The watcher's own events, such as a change of its link, have no number.
             numbers = [watcher.next(lambda each: each.get('pnum') is not None)['pnum'] for _ in range(50)]
             steps = [b - a for a, b in itertools.pairwise(numbers)]
-            assert set(steps) <= {1, 2} and sum(steps) < 60, 'of the line, all of one count; answers are not shown'
+            assert set(steps) <= {1, 2} and sum(steps) < 60, 'more numbers than those of the answers are missing'
 
 
 class Stranger:
-    """Asks by itself, from a port of its own."""
+    """A watcher with its own port, which asks the board without r4."""
 
     def __init__(self, board):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 web as a program: what a page gets, who controls, what makes the board safe, and whom it does not serve."""
+"""r4 web as a program: the data of a page, control, the causes of the safe state, and the clients that it refuses."""
 import contextlib
 import gzip
 import json
@@ -26,7 +26,7 @@ HOSTILE_S = float(os.environ.get('R4_HOSTILE_S', '3'))
 
 @contextlib.contextmanager
 def one_board(*options):
-    """A simulated board, and r4 web before it."""
+    """A simulated board, and r4 web that serves it."""
     with Board('udp://127.0.0.1:0') as board, Web(board.host_url, options=options) as web:
         yield board, web
 
@@ -291,7 +291,7 @@ def test_a_folder_of_files_takes_the_place_of_the_page(tmp_path):
 def test_a_proxy_in_front_is_named():
     with one_board('--host', 'robot.example') as (_, web):
         token = web.url.partition('#token=')[2]
-        assert len(token) == 32, 'a name is for other computers'
+        assert len(token) == 32, 'r4 web made no token although --host serves other computers'
         protocols = ('r4.web.v1', f'r4.token.{token}')
         for host in ('robot.example', f'127.0.0.1:{web.port}'):
             with WebSocket(web.port, protocols=protocols, Host=host, Origin='https://robot.example') as page:
@@ -379,7 +379,7 @@ def test_a_slow_browser_loses_old_states_and_costs_no_memory():
         states = page.states(150)
         assert states[-1]['time'] - states[0]['time'] < within_ms(2000)
         assert web.resident_kib() - before < 2048 or not PROMPT, (before, web.resident_kib())
-        # What is in the kernel is old; then it hears that it has missed some, and gets what is new.
+        # First come the old states in the kernel's buffer, then the report of lost states, then new states.
         lost = False
         while True:
             message = json.loads(slow.receive()[1])
@@ -404,7 +404,7 @@ def test_hostile_clients_disturb_nobody():
         page.drive()
         board.outputs(motor_is_driven)
         before = web.resident_kib()
-        # A program of its own, which waits for the others: it must not keep the page from saying that it is alive.
+        # A separate program of low priority, so that it does not prevent the page from reporting that it is alive.
         attack = ['nice', '-n', '19', sys.executable, TESTS / 'integration/hostile_clients.py', str(web.port), seed, str(HOSTILE_S)]
         with subprocess.Popen(attack, stdout=subprocess.PIPE, text=True) as attackers:
             board.never('SAFE', HOSTILE_S)
@@ -425,7 +425,7 @@ def test_foxglove_reads_records_links_and_events():
             reader = subprocess.Popen(['node', TESTS / 'npm/read_foxglove.cjs', f'ws://127.0.0.1:{web.port}', '200'],
                                       env={**os.environ, 'NODE_PATH': str(NODE_MODULES)}, stdout=subprocess.PIPE,
                                       stderr=subprocess.PIPE, text=True)
-            page.states(100)  # it begins
+            page.states(100)  # the page receives states while the reader starts
             page.ask(type='stop')
             output, errors = reader.communicate(timeout=PATIENCE_S)
             assert reader.returncode == 0, errors

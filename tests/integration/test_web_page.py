@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page of r4 web in Chromium, before simulated boards. Screenshots are left in build/results/web."""
+"""The page of r4 web in Chromium, with simulated boards. Leaves screenshots in build/results/web."""
 import contextlib
 import functools
 import http.server
@@ -15,7 +15,7 @@ from r4_process import Board, objects, run
 from web_client import Web
 
 RESULTS = pathlib.Path(__file__).resolve().parents[2] / 'build/results/web'
-# A machine of its own takes a third of this; others want this one.
+# An idle machine takes a third of this.
 FIRST_PLOT_MS = 3000
 ON_SCREEN_MS = 250
 STOP_MS = 100
@@ -36,16 +36,16 @@ def a_browser():
 
 @contextlib.contextmanager
 def one_board(browser, **options):
-    """A simulated board, r4 web before it, and a page that shows it."""
+    """A simulated board, r4 web that serves it, and a page that shows it."""
     with Board('udp://127.0.0.1:0') as board, Web(board.host_url) as web, browser.open(web.url, **options) as page:
         page.until('globalThis.r4_measured?.first_plot_ms > 0')
         yield board, web, page
 
 
 def does(page, act, shows, refused='false', again=lambda: None):
-    """Acts until the page shows that. On a busy machine the browser may be silent for half a second, which ends its control,
-    or a command may be too old. The page says so, as `refused` does, and a person acts again: at most twice here. An act
-    without any effect is a failure."""
+    """Acts until the page shows `shows`. On a busy machine the browser may be silent for half a second, which ends its
+    control, or a command may be too old. Then the page shows `refused`, and the test acts again as a person would, at
+    most twice. An act without any effect is a failure."""
     for _ in range(3):
         act()
         if page.until(f'({shows}) ? "shown" : !{IN_CONTROL} || {refused} ? "refused" : ""') == 'shown':
@@ -55,7 +55,7 @@ def does(page, act, shows, refused='false', again=lambda: None):
 
 
 def ask_for_control(page):
-    """Presses the button for control, and returns what the page says then."""
+    """Presses the button for control, and returns the text that the page shows then."""
     page.evaluate('document.querySelector("#holder").textContent = ""')
     page.click('#control')
     return page.until('document.querySelector("#holder").textContent')
@@ -77,10 +77,10 @@ def press(page, button):
 
 
 def arm(page):
-    """With control, which is taken where the page does not have it."""
+    """Arms the board; takes control first if the page does not have it."""
     def ask():
         take_control(page)
-        if 'press Clear' in press(page, ARM):  # of a stop that is older than this control
+        if 'press Clear' in press(page, ARM):  # the latched stop is older than this control
             press(page, CLEAR)
             press(page, ARM)
     does(page, ask, ARMED, 'document.querySelector(".card output.bad")')
@@ -95,7 +95,7 @@ def drives(page, act, shows):
 
 
 def type_in(page, value):
-    """By the keyboard alone, once the number is reached."""
+    """Types the value; uses only the keyboard once the number field has the focus."""
     page.focus(f'{OSMC1} input[type=number]')
     page.do('click', selector=f'{OSMC1} input[type=number]', count=3)
     page.do('type', text=value)
@@ -144,7 +144,7 @@ def test_plots_are_paused_zoomed_and_read(browser):
         page.until_text('#pause', 'Go on')
         before = page.evaluate(PICTURES)
         seen = page.evaluate('r4_measured.states')
-        page.until(f'r4_measured.states > {seen} + 20')  # what comes meanwhile is kept
+        page.until(f'r4_measured.states > {seen} + 20')  # the page keeps the new states meanwhile
         assert page.evaluate(PICTURES) == before
         page.click('#zoom-in')
         page.until(f'{PICTURES} !== {before!r}')
@@ -159,7 +159,7 @@ def test_plots_are_paused_zoomed_and_read(browser):
         assert 23 < float(page.text('.readout b')) < 26
         page.evaluate('document.querySelector("#fields-body input").focus()')
         rows = page.evaluate('document.querySelectorAll(".readout li").length')
-        page.press('Enter')  # the keyboard takes a field out of the plot
+        page.press('Enter')  # Enter removes a field from the plot
         page.until(f'document.querySelectorAll(".readout li").length === {rows} - 1')
         assert page.errors() == []
 
@@ -199,7 +199,7 @@ def test_what_is_told_does_not_move_the_buttons_under_a_finger(browser, width):
 
 def test_commands_by_mouse_and_by_keyboard_are_confirmed_by_the_board(browser):
     with one_board(browser) as (board, _, page):
-        assert page.evaluate('document.querySelector("fieldset").disabled')  # off until asked for
+        assert page.evaluate('document.querySelector("fieldset").disabled')  # disabled until the page is armed
         arm(page)
         x, y, width = page.evaluate(f'(({{x, y, width, height}}) => [x, y + height / 2, width])'
                                     f'(document.querySelector("{OSMC1} input[type=range]").getBoundingClientRect())')
@@ -213,7 +213,7 @@ def test_commands_by_mouse_and_by_keyboard_are_confirmed_by_the_board(browser):
             page.focus('[data-channel=servo2] input[type=range]')
             page.press('PageUp')
         drives(page, key_up, 'Number(document.querySelector("[data-channel=servo2] .reported").textContent) > 0')
-        drives(page, lambda: page.click(f'{OSMC1} .choice'), is_confirmed('osmc1'))  # the other way: it stands first
+        drives(page, lambda: page.click(f'{OSMC1} .choice'), is_confirmed('osmc1'))  # it stops before it reverses
         board.executed('O:0,0,1')
 
         def switch_off():
@@ -246,7 +246,7 @@ def test_space_and_escape_stop_wherever_the_focus_is(browser):
             took_ms.append(1000 * (board.outputs(stands)['came'] - pressed))
             page.until_text('.card .state', 'Safe')
             page.until(f'document.querySelector("{OSMC1} input[type=range]").value === "0"')
-            arm(page)  # and nothing moves
+            arm(page)  # arming moves no motor
             assert page.text(f'{OSMC1} .reported') == '0'
         assert not page.evaluate('gave_back')  # the button that had the focus was not pressed
         print('safe after', [f'{each:.0f} ms' for each in took_ms])
@@ -300,7 +300,7 @@ def test_a_second_browser_watches_and_may_stop(browser):
         for _ in range(3):
             if 'another browser' in (told := ask_for_control(second)):
                 break
-            if second.evaluate(IN_CONTROL):  # the first was silent for too long, on a busy machine
+            if second.evaluate(IN_CONTROL):  # on a busy machine the first page was silent for too long
                 second.click('#control')
             arm(page)
         assert 'another browser' in told
@@ -317,7 +317,7 @@ def test_the_button_records_and_tells_where(browser, tmp_path):
     with Board('udp://127.0.0.1:0') as board, Web(board.host_url, options=('--record-to', str(tmp_path))) as web, \
             browser.open(web.url) as page:
         page.until('!document.querySelector("#control").disabled')
-        assert page.evaluate('document.querySelector("#record").disabled'), 'it belongs to control'
+        assert page.evaluate('document.querySelector("#record").disabled'), 'recording is possible without control'
         take_control(page)
         does(page, lambda: page.click('#record'),
              f'document.querySelector("#recording").textContent.includes("recording {tmp_path}/")',

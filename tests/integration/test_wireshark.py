@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The dissector of tools/wireshark, as tshark runs it: on the paper's capture, on recordings, on CAN, on rubbish."""
+"""The dissector of tools/wireshark in tshark, with the paper's capture, recordings, CAN, and damaged datagrams."""
 import os
 import pathlib
 import random
@@ -18,14 +18,14 @@ from r4_process import DATA, Board, Running, driving, run, wait_for
 DISSECTOR = pathlib.Path(__file__).resolve().parents[2] / 'tools/wireshark'
 BOARD, HOST = (192, 168, 0, 125), (192, 168, 0, 10)
 RAW_IP, SOCKETCAN = 101, 227
-# Wireshark 4.4 loads no Lua for root. Who reads the files of the test instead may read all.
+# Wireshark 4.4 loads no Lua for root. So another user runs tshark, with the right to read all files.
 TSHARK = ['tshark'] if os.geteuid() != 0 else [
     'setpriv', '--reuid=65534', '--regid=65534', '--clear-groups', '--inh-caps=+dac_override', '--ambient-caps=+dac_override',
     'tshark']
 
 
 def tshark(*arguments, plugin=True, **options):
-    """The lines that it prints."""
+    """Runs tshark; returns the lines that it prints."""
     load = ['-X', f'lua_script:{DISSECTOR}/r4.lua'] if plugin else []
     result = subprocess.run([*TSHARK, *load, *map(str, arguments)], capture_output=True, check=False, **options)
     output, errors = result.stdout.decode('utf-8', 'replace'), result.stderr.decode('utf-8', 'replace')
@@ -35,14 +35,14 @@ def tshark(*arguments, plugin=True, **options):
 
 
 def fields(path, *names, only=None, options=()):
-    """A list for each packet: of each field its values, joined by commas."""
+    """A list per packet, with the values of each field joined by commas."""
     chosen = [part for name in names for part in ('-e', name)]
     lines = tshark('-r', path, '-T', 'fields', *chosen, *(['-Y', only] if only else []), *options)
     return [line.split('\t') for line in lines]
 
 
 def write_pcap(path, link_type, packets):
-    """`packets`: seconds and bytes."""
+    """`packets`: (seconds, bytes) of each."""
     with open(path, 'wb') as file:
         file.write(struct.pack('<IHHiIII', 0xA1B2C3D4, 2, 4, 0, 0, 65535, link_type))
         for seconds, packet in packets:
@@ -69,7 +69,7 @@ def can(ident, data=b'', extended=False, remote=False, fd=False):
 
 
 def isotp(message, full=8):
-    """The data of its frames."""
+    """The data of the frames of a message."""
     if len(message) < full:
         return [bytes([len(message)]) + message] if full == 8 else [bytes([0, len(message)]) + message]
     frames = [struct.pack('>H', 0x1000 | len(message)) + message[:full - 2]]
@@ -97,7 +97,7 @@ def test_the_papers_capture_is_shown_field_by_field(tmp_path):
     assert shown[7] == ['8', 'board', 'state', '24.28', '358', '-100', '7440', '79150', '', '7', '0.010000000',
                         'the state shows it']
     assert shown[13][1:3] == ['board', 'heartbeat'] and shown[15][1:3] == ['host', 'heartbeat']
-    assert [row[9] for row in shown if row[9]] == [row[0] for row in shown if row[2] == 'command'], 'all are confirmed'
+    assert [row[9] for row in shown if row[9]] == [row[0] for row in shown if row[2] == 'command'], 'unconfirmed'
 
 
 def test_a_dissector_that_is_found_twice_is_loaded_once(tmp_path):
@@ -121,7 +121,7 @@ def test_a_wrong_checksum_is_told_with_the_right_one_and_leaves_a_gap(tmp_path):
 
 def test_other_ports_are_recognised_by_the_checksum(tmp_path):
     path = paper_capture(tmp_path / 'paper.pcap', port=4711)
-    assert len(fields(path, 'r4.pnum', only='r4')) == len(paper()), 'port 2390 is a host\'s'
+    assert len(fields(path, 'r4.pnum', only='r4')) == len(paper()), 'port 2390 is not taken for a host\'s'
     path = write_pcap(tmp_path / 'other.pcap', RAW_IP,
                       [(0, udp('board', paper()[0][1].encode(), 4711)[:20] + struct.pack('>HHHH', 4711, 4712,
                         8 + len(text), 0) + text) for text in (paper()[0][1].encode(), b'AIN24:1;^0x1^')])
@@ -162,7 +162,8 @@ def test_a_recording_of_a_serial_link_shows_when_its_commands_were_confirmed(tmp
         recorder.end()
     assert run('convert', str(log), '-o', str(packets)).returncode == 0
     sent = fields(packets, 'r4.o.pwm', 'r4.response_in', only='r4.o.pwm > 0', options=['-2'])
-    commands = [each for each in sent if each[1]]  # of the first the answer may be in the gap when the wire is handed over
+    # The answer to the first command may be missing, because the path changes its holder.
+    commands = [each for each in sent if each[1]]
     assert commands and 300 <= int(commands[0][0]) < 320
     confirmed = dict(fields(packets, 'frame.number', 'r4.response_by', only='r4.response_time', options=['-2']))
     assert confirmed[commands[0][1]].startswith('CMD')
@@ -244,7 +245,7 @@ def names_by_filter(installed):
 
 
 def test_fields_and_units_are_those_of_the_product(shown, tmp_path):
-    # Of a pipe, CSV has the columns of all fields that there are.
+    # If the input is a pipe, the CSV file has the columns of all known fields.
     assert run('convert', '-', '-o', str(tmp_path / 'all.csv'), stdin='# r4log 1 by r4 0.1.0\n').returncode == 0
     columns = (tmp_path / 'all.csv').read_text(encoding='ascii').strip().split(',')[5:]
     assert len(columns) > 70
@@ -254,12 +255,12 @@ def test_fields_and_units_are_those_of_the_product(shown, tmp_path):
 
 
 def test_commands_are_those_of_r4_send(shown, tmp_path):
-    # A word, as in E:STOP, is a value of its own; the values of X have no names.
+    # A word, as in E:STOP, is a separate value; the values of X have no names.
     forms = re.findall(r'^  ([A-WYZ]):(?:[A-Z]{2,})?(\S*) ', run('send', '--help').stdout, re.MULTILINE)
     assert len(forms) >= 12
     for letter, form in forms:
         for value in re.findall(r'[a-z]+', form):
-            words = {'n': 'on', 'ff': 'on'}  # of R: On or Off
+            words = {'n': 'on', 'ff': 'on'}  # from the help's On and Off of R
             assert f'r4.{letter.lower()}.{words.get(value, value)}' in shown, (letter, form)
     text = 'O:1,0,2;D:3,1,4;S:1500,16;R:8,Off;P:-7,2;P:-7,20,3;Z:1;B:4,1,0,2;PNum:1;T:1;'
     path = write_pcap(tmp_path / 'group.pcap', RAW_IP, [(0, udp('host', datagram(each))) for each in (
@@ -290,7 +291,7 @@ def test_rubbish_makes_no_error_of_the_dissector(tmp_path):
         'CMD:-1;SAFE:4294967296;FAULT:1;', 'STOP:1;', ':;', 'H:;')]
     rubbish = [damaged(rng, rng.choice(texts)) for _ in range(1000)] + texts
     rubbish += [rng.randbytes(rng.randrange(0, 1500)) for _ in range(100)]
-    for each in list(rubbish):  # what is refused only behind the checksum
+    for each in list(rubbish):  # with a valid checksum, so that only later checks can reject it
         if rng.random() < 0.3 and b'^' not in each and each:
             rubbish.append(datagram(each.decode('latin-1')))
     network = write_pcap(tmp_path / 'network.pcap', RAW_IP, [(0, udp(rng.choice(['board', 'host']), each))

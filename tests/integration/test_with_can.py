@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tools/with-can: a command in its guest is as one that runs here, and the guest leaves nothing."""
+"""tools/with-can: a command in its guest behaves as one that runs here, and the guest leaves nothing."""
 import os
 import pathlib
 import pty
@@ -15,7 +15,7 @@ import pytest
 
 TOOLS = pathlib.Path(__file__).resolve().parents[2] / 'tools'
 WITH_CAN = [str(TOOLS / 'with-can'), '--guest']
-PATIENCE_S = 600  # of the guest, on a machine that is busy
+PATIENCE_S = 600  # for the guest on a busy machine
 ERROR = 'tools/with-can: '
 
 
@@ -32,7 +32,7 @@ def children(pid):
 
 
 def await_guest(process):
-    """QEMU's number as soon as it runs: what it boots does not matter."""
+    """Returns the process id of QEMU as soon as it runs; it need not have booted."""
     deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
         for pid in children(process.pid):
@@ -54,7 +54,7 @@ def await_end(pid):
 
 @pytest.fixture(scope='module', autouse=True)
 def kernel():
-    """The first run ever downloads the kernel."""
+    """Prepares the kernel, which the first run downloads."""
     subprocess.run(['/usr/bin/python3', '-B', '-c', 'import kernel; kernel.prepared()'], check=True, timeout=300,
                    env={**os.environ, 'PYTHONPATH': f'{TOOLS}:{TOOLS}/with-can.d'})
 
@@ -104,7 +104,7 @@ def folder_of_the_command(tmp_path_factory):
 
 @pytest.fixture(scope='module', name='result')
 def what_a_command_has_done(folder):
-    """A boot takes long: four tests look at what one command has done. It leaves what its programs say in `folder`."""
+    """Runs one command for four tests, because a boot takes long. It leaves the output of its programs in `folder`."""
     (folder / 'frames.sh').write_text(FRAMES)
     return run('sh', '-c', r"""/usr/bin/python3 -S -c "$0" "$@" </dev/null >told 2>&1
 sh frames.sh </dev/null >frames 2>&1; printf 'a\r\n\000b\nc' >&2; cat; exit 255""", NEEDS, *ARGUMENTS, cwd=folder,
@@ -158,7 +158,7 @@ def test_a_killed_wrapper_leaves_no_guest():
 def test_a_terminal_is_a_terminal_inside():
     process, terminal = pty.fork()
     if process == 0:
-        termios.tcsetwinsize(0, (33, 99))  # here: the parent may come too late to it
+        termios.tcsetwinsize(0, (33, 99))  # set in the child, because the parent may be too late
         os.execv(WITH_CAN[0], [*WITH_CAN, 'sh', '-c', 'tty; stty size; sleep 60'])
     seen = b''
     while b'33 99' not in seen:
@@ -178,7 +178,7 @@ def test_an_ordinary_user_has_it_too_with_his_own_ids_and_the_status_is_the_sign
         assert (result.stdout, result.stderr) == (b'%d\n' % os.geteuid(), b'')
         assert result.returncode == 128 + signal.SIGSEGV
         return
-    # Not one of pytest's folders: every pytest that starts keeps them from other users.
+    # Not one of pytest's folders, because every start of pytest closes them to other users.
     with tempfile.TemporaryDirectory(prefix='r4-user-') as name:
         folder = pathlib.Path(name)
         os.chmod(folder, 0o755)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_usb_serial.py runs inside the guest; fails by an exception.
+"""The part of test_usb_serial.py that runs inside the guest; fails by an exception.
 
-The USB serial port is real to everything here: the kernel's driver, sysfs, libserialport. Our input and output are
-another path to the same board; what there is to tell goes to the errors.
+The USB serial port is real for the kernel's driver, sysfs and libserialport. Our standard input and output are
+another path to the same board, so messages go to standard error.
 """
 import json
 import os
@@ -28,7 +28,7 @@ PORT = '/dev/ttyUSB0'
 
 
 def kernel_reports():
-    """A queue of (time, action) of the port, as the kernel tells of it."""
+    """A queue of (time, action) of the port, as the kernel reports them."""
     reports = queue.Queue()
     events = socket.socket(socket.AF_NETLINK, socket.SOCK_DGRAM, NETLINK_KOBJECT_UEVENT)
     events.bind((0, 1))
@@ -44,7 +44,7 @@ def kernel_reports():
 
 
 def other_path():
-    """A terminal that leads to the board by our input and output, which are used for nothing else from now on."""
+    """A terminal that reaches the board by our standard input and output, which have no other use from now on."""
     near, far = pty.openpty()
     tty.setraw(far)
     carry(0, near)
@@ -58,7 +58,7 @@ def is_down(each):
 
 
 def listed(*options):
-    """The port in r4 list; with `--serial` the board at it is asked, though its USB id is not a board's."""
+    """The port in r4 list. With `--serial`, r4 asks the board at it although its USB id is not that of a board."""
     ports = [each for each in objects(run('list', '--json', *options).stdout) if each['type'] == 'port']
     port = next(each for each in ports if each['path'] == PORT)
     assert (port['usb'], port['serial_number']) == ('0403:6001', 'R4-0001'), port
@@ -66,7 +66,7 @@ def listed(*options):
 
 
 def listed_with_who_controls_it():
-    assert 'board_id' not in listed(), 'whatever it is, it was asked nothing'
+    assert 'board_id' not in listed(), 'r4 list asked an unknown device'
     free = listed('--serial', PORT)
     assert free['board_id'] == 'sim-1' and free['firmware'] and free['busy'] is False, free
     with driving(f'serial://{PORT}', 'O:358,1,1') as host:
@@ -82,7 +82,7 @@ def streams_at_the_boards_rate():
         host.next(is_state)
         rate = subprocess.run(['stty', '-F', PORT, 'speed'], capture_output=True, text=True,
                               check=False)
-        # To all but root the port is r4's alone.
+        # Only root can open the port while r4 has it.
         assert rate.stdout == '1000000\n' if os.geteuid() == 0 else 'busy' in rate.stderr, rate
         states = [host.next(is_state) for _ in range(200)]
         assert host.end() == 0
@@ -134,7 +134,7 @@ def shared_by_programs():
 
 
 def one_of_two_paths(terminal, commands):
-    """The other is UDP, by a gateway; `commands`: the file for what became of each command."""
+    """Drives over two paths, the port and UDP by a gateway. `commands`: the file for the result of each command."""
     reports = kernel_reports()
     port = free_port()
 
@@ -152,7 +152,7 @@ def one_of_two_paths(terminal, commands):
     with gateway() as first, HostOnPaths([f'serial://{PORT}', f'udp://127.0.0.2:{port}?listen=0'],
                                        [PORT, '127.0.0.2']) as host:
         def both():
-            host.goes_on(50)  # until the board, too, has joined them
+            host.goes_on(50)  # until the board has joined both paths, too
 
         both()
         for _ in range(2):

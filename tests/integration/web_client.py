@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 web as a program, and what comes to it: requests of HTTP, byte for byte, and WebSockets as RFC 6455 has them."""
+"""r4 web as a program, and its clients: HTTP requests, byte for byte, and WebSockets by RFC 6455."""
 import base64
 import hashlib
 import json
@@ -21,7 +21,7 @@ class Web(Running):
         self.port = int(self.url.split('/')[2].rsplit(':', 1)[1])
 
     def request(self, data):
-        """What comes back, until the server closes the connection."""
+        """Returns all bytes of the answer, until the server closes the connection."""
         with socket.create_connection(('127.0.0.1', self.port), PATIENCE_S) as connection:
             connection.sendall(data)
             answer = b''
@@ -30,7 +30,7 @@ class Web(Running):
             return answer
 
     def get(self, path, headers=''):
-        """The status, and the whole answer."""
+        """Returns the status, and the whole answer."""
         answer = self.request(f'GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}\r\nConnection: close\r\n{headers}\r\n'
                               .encode())
         return int(answer.split()[1]), answer
@@ -41,7 +41,7 @@ class Web(Running):
 
 
 class Refused(Exception):
-    """The handshake was; `status` is the answer's."""
+    """The server refused the handshake; `status` is that of its answer."""
 
     def __init__(self, status):
         super().__init__(f'the handshake was refused: {status}')
@@ -88,12 +88,12 @@ class WebSocket:
         self.socket.sendall(frame(data, opcode))
 
     def receive(self):
-        """The next message: opcode and bytes. A ping is answered, as browsers do."""
+        """Returns the opcode and bytes of the next message. Answers a ping, as browsers do."""
         while True:
             head = self.file.read(2)
             if len(head) < 2:
                 raise ConnectionResetError('the server has closed the connection')
-            assert head[0] & 0x80, 'in parts'
+            assert head[0] & 0x80, 'the message is fragmented'
             size = head[1] & 127
             if size == 126:
                 size, = struct.unpack('>H', self.file.read(2))
@@ -106,7 +106,7 @@ class WebSocket:
             return head[0] & 15, data
 
     def close(self):
-        """As a browser that is killed: without a farewell."""
+        """Closes the connection without a farewell, as a killed browser does."""
         self.file.close()
         self.socket.close()
 
@@ -118,13 +118,13 @@ class WebSocket:
 
 
 class Page(WebSocket):
-    """As the page of r4 web: it reads all the time; `newest` is the time that it was told last."""
+    """Acts as the page of r4 web: it reads all the time. `newest`: the newest time that it has received."""
 
     def __init__(self, web, **options):
         super().__init__(web.port, **options)
         self.messages = []
         self.newest = 0
-        self.closed = None  # why
+        self.closed = None  # the reason
         self._news = threading.Condition()
         self._alive = None
         self._write = threading.Lock()
@@ -157,7 +157,7 @@ class Page(WebSocket):
                 self._news.notify_all()
 
     def next(self, kind, is_it=lambda each: True, timeout=PATIENCE_S):
-        """The next message of that type for which `is_it` is true; those before it are forgotten."""
+        """Returns the next message of that type for which `is_it` is true; drops the messages before it."""
         deadline = time.monotonic() + timeout
         with self._news:
             while True:
@@ -176,7 +176,7 @@ class Page(WebSocket):
             return self.closed
 
     def states(self, count):
-        """So many states of the first board, as dictionaries by field."""
+        """Returns `count` states of the first board, as dictionaries by field."""
         all_of_them = []
         while len(all_of_them) < count:
             for board in self.next('states')['boards']:
@@ -185,7 +185,7 @@ class Page(WebSocket):
         return all_of_them
 
     def live(self):
-        """From now on it says that it is alive, until let()."""
+        """Reports from now on that the page is alive, until freeze()."""
         self._alive = threading.Event()
         ended = self._alive
 
@@ -198,7 +198,7 @@ class Page(WebSocket):
         threading.Thread(target=repeat, daemon=True).start()
 
     def freeze(self):
-        """It says so no more."""
+        """Stops reporting that the page is alive."""
         self._alive.set()
 
     def control(self):
@@ -207,7 +207,7 @@ class Page(WebSocket):
         return self.next('control', lambda each: each['you'] or each['why'])
 
     def ask(self, **message):
-        """Its result."""
+        """Sends a request; returns its result."""
         number = time.monotonic_ns()
         self.say(request=number, **message)
         return self.next('result', lambda each: each['request'] == number)

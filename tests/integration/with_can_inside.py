@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_can.py runs where the kernel has CAN: tools/with-can runs a command on that kernel."""
+"""Tests that test_can.py runs where the kernel has CAN: tools/with-can runs a command on that kernel."""
 import os
 import pathlib
 import pty
@@ -18,7 +18,7 @@ WITH_CAN = TOOLS / 'with-can'
 NOBODY = 65534
 PATIENCE_S = 30
 BOOT_ID = '/proc/sys/kernel/random/boot_id'
-# Tells each Ctrl-C that it gets, and ends when the one is not followed by another.
+# Reports each Ctrl-C, and ends if no second one follows the first.
 COUNTS_CTRL_C = '''
 import signal
 signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
@@ -38,7 +38,7 @@ def run(*command, **options):
 
 
 def index(interface):
-    """What tells an interface from a later one of the same name; None: there is none."""
+    """The index of the interface: a later one with the same name has another. None if it does not exist."""
     file = pathlib.Path(f'/sys/class/net/{interface}/ifindex')
     return int(file.read_text(encoding='ascii')) if file.exists() else None
 
@@ -89,7 +89,7 @@ def test_ctrl_c_of_a_terminal_comes_once():
             seen += os.read(terminal, 4096)
 
     await_word(b'begun')
-    os.kill(process, signal.SIGSTOP)  # so that one which it passed on would come apart from the terminal's
+    os.kill(process, signal.SIGSTOP)  # so that a passed-on signal would arrive apart from the terminal's
     os.write(terminal, b'\x03')
     await_word(b'one')
     os.kill(process, signal.SIGCONT)
@@ -114,7 +114,7 @@ def test_what_was_made_is_removed_by_the_last_that_uses_it(without_vcan):
 
 
 def test_an_ordinary_user_has_a_vcan0_that_is_there():
-    # /run/tmp is everybody's to read; the tree may not be.
+    # Every user can read /run/tmp, but perhaps not the tree.
     with tempfile.TemporaryDirectory(dir='/run/tmp') as folder:
         os.chmod(folder, 0o755)
         shutil.copy(WITH_CAN, folder)

@@ -33,6 +33,6 @@ def until():
     def wait(done):
         deadline = time.monotonic() + PATIENCE_S
         while not done():
-            assert time.monotonic() < deadline, 'it did not come'
+            assert time.monotonic() < deadline, 'the condition did not become true in time'
             time.sleep(0.005)
     return wait

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What integration/test_can.py runs where SocketCAN is: the pytest plugin, by the example of docs/how-to/testing.md."""
+"""Tests that integration/test_can.py runs where SocketCAN exists: the pytest plugin, with the example of testing.md."""
 from test_pytest_plugin import run_step, steps
 
 

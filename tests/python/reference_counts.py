@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Uses the package again and again; as a program, on an interpreter that counts all references, ends with 1 if they
-grow. Without r4link.read(): numpy is built for the other interpreter, and what it does is not counted."""
+"""Uses the package repeatedly. Run as a program on an interpreter that counts all references, it ends with 1 if their
+number grows. Leaves out r4link.read(), because numpy is built for the other interpreter and would not be counted."""
 import gc
 import os
 import sys
@@ -47,8 +47,8 @@ def main():
     sim = r4link.SimBoard()
     counts = []
     grown = None
-    # Caches fill in the first rounds (Python 3.13 takes four), and a count moves by ten or so. One reference that is lost
-    # in each use is 30 in a window of three rounds of ten uses, in every one of them.
+    # Caches fill in the first rounds (four in Python 3.13), and a count varies by about ten. If each use loses one
+    # reference, every window of three rounds of ten uses grows by 30.
     while len(counts) < MOST_ROUNDS and (grown is None or grown >= 2 * USES):
         for _ in range(USES):
             use_all_of_it(sim)

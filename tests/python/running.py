@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How tests of the Python package run other programs."""
+"""Functions by which the tests of the Python package run other programs."""
 import os
 import pathlib
 import subprocess

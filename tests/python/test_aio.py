@@ -88,7 +88,7 @@ def test_loses_no_state_while_the_loop_is_busy(sim, tmp_path):
             board.record(path)
             await board.wait_active()
             states = board.states(lossless=True)
-            time.sleep(0.3)  # of the whole loop
+            time.sleep(0.3)  # blocks the whole event loop
             async for state in board.states():
                 newest = state.pnum
                 break
@@ -293,7 +293,7 @@ def test_a_loop_that_ends_with_calls_under_way_leaves_the_board_well(sim, wait):
 
     asyncio.run(leave())
     received = board.statistics.received
-    wait(lambda: board.statistics.received > received + 5)  # states come for a loop that is closed
+    wait(lambda: board.statistics.received > received + 5)  # states arrive while the event loop is closed
     asyncio.run(go_on())
 
 

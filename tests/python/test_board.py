@@ -27,7 +27,7 @@ def test_drives_and_tells_what_the_chips_do(sim, board, wait):
     board.stepper(1).move_to(100, speed=5000)
     assert board.state.osmc1 == (358, FORWARD) and board.state.osmc1.duty == pytest.approx(358 / 4095)
     assert board.state.relay(1) and not board.state.relay(3)
-    wait(lambda: sim.look().bldc[3].speed == 2000)  # it is 10 ms old
+    wait(lambda: sim.look().bldc[3].speed == 2000)  # the look is up to 10 ms old
     look = sim.look()
     assert look.osmc[0] == (358, FORWARD) and look.dhb12[1] == (700, REVERSE) and look.bldc[3].speed == 2000
     assert look.servo_us[2] == pytest.approx(1500, abs=3) and look.relays[1] and look.supply and not look.is_safe
@@ -49,7 +49,7 @@ def test_a_group_is_executed_as_one_or_not_at_all(sim, board, wait):
     with pytest.raises(r4link.UsageError, match='channel'):
         Setpoints(Command.osmc(1, duty=0), Command.osmc(5, duty=0))
     assert board.post(Setpoints(Command.osmc(1, pwm=7)).add(Command.osmc(2, pwm=8)))
-    board.osmc(3).set_pwm(1)  # after the group
+    board.osmc(3).set_pwm(1)  # executed after the group
     wait(lambda: [each.pwm for each in sim.look().osmc[:3]] == [7, 8, 1])
 
 
@@ -326,7 +326,7 @@ def test_takes_control_and_releases_it(sim, wait):
         board.on_state(states.append)
         board.wait_active()
         board.take_control()
-        board.take_control()  # that is no change
+        board.take_control()  # not a change: the board has control already
         board.wait_active()
         board.arm()
         board.osmc(1).set_pwm(358)
@@ -347,7 +347,7 @@ def test_over_udp_the_program_that_controls_has_the_port_of_hosts():
     with r4link.SimBoard('udp://127.0.0.1:0') as sim, r4link.Board(sim.url.split('?')[0], role='watch') as board:
         for _ in range(2):
             board.wait_active()
-            assert '?listen=' in board.name, 'a port of its own'
+            assert '?listen=' in board.name, 'the watcher has the port of hosts'
             board.take_control()
             board.wait_active()
             assert '?listen=' not in board.name
@@ -446,7 +446,7 @@ def test_settings_proximity_and_link_timing(sim, board, wait):
     board.watchdog(0.02)
     silent = time.monotonic()
     wait(lambda: sim.look().is_safe)
-    assert time.monotonic() - silent < within(0.95), 'after the timeout that was set'
+    assert time.monotonic() - silent < within(0.95), 'later than the timeout that was set'
     board.watchdog(0)
     board.wait_active()
     board.proximity(1, cm=30)

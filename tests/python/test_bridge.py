@@ -20,7 +20,7 @@ def test_a_host_drives_the_board_behind_a_bridge():
         counters = bridge.status()[0].hosts.counters
         assert counters.passed > counters.stops >= 1
         assert counters.damaged == counters.kept_out == 0
-    assert bridge.status()[0].hosts.counters.passed >= counters.passed, 'how it was when it was closed'
+    assert bridge.status()[0].hosts.counters.passed >= counters.passed, 'a closed bridge has lost its counters'
     bridge.close()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4link.control: what tests/host/control asserts of C++ holds here for each class once, and a loop on a board."""
+"""r4link.control: one test per class, as tests/host/control has more for C++, and a control loop on a board."""
 import math
 import time
 

@@ -54,7 +54,7 @@ def test_a_recording_has_columns_for_what_they_measured(sim, board, wait, tmp_pa
     imu, power = r4link.Device('bno055@0x28:1'), r4link.Device('ina219@0x40:5')
     board.attach(imu)
     wait(lambda: imu.reading(board.state, 'accel_z').number == 9.81)
-    board.attach(power)  # later, so that rows before have none
+    board.attach(power)  # attached later, so that earlier rows have no value
     wait(lambda: power.reading(board.state, 'current').number is not None)
     board.close()
     states = r4link.read(tmp_path / 'drive.r4log').boards[0].states

@@ -28,7 +28,7 @@ def test_the_state_brings_what_the_board_reads_by_itself(board, wait):
     board.fields('DEFAULT,I2C1,I2CBUS')
     wait(lambda: board.state.i2c1.data == b'\x68')
     state = board.next_state()
-    # A board that comes late reads behind the T of its state.
+    # A board that is late reads the device after the T of its state.
     assert state.i2c1.errors == 0 and abs(state.t_ms - state.i2c1.t_ms) <= 40
     assert state.i2cbus == ('done', 0, 0)
     board.i2c.poll_off(1)
@@ -70,8 +70,8 @@ def test_a_uart_brings_each_byte_once(board):
         board.uart[3].read()
 
 
-# What is written to a UART whose ends are joined comes back. A receiver goes on talking while a busy machine has no time
-# for its board, which then loses bytes, and says so.
+# A UART whose ends are joined returns all written bytes. A receiver sends all the time: if a busy machine delays the
+# board, the board loses bytes and reports it.
 SAID = bytes(range(256)) * 2
 PIECES = [SAID[at:at + 32] for at in range(0, len(SAID), 32)]
 

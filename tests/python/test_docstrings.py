@@ -11,8 +11,8 @@ from running import ROOT
 SOURCES = sorted(path for path in (ROOT / 'host/python/r4link').glob('*.py*')
                  if path.name not in ('__init__.py', 'py.typed', 'pytest_plugin.py'))
 SECONDS = {'timeout', 'within'}  # in the whole package: docs/how-to/python.md
-UNITS = {'us', 'degrees', 'cm', 'millivolts'}  # their name is their unit
-# What has to follow the name of a number.
+UNITS = {'us', 'degrees', 'cm', 'millivolts'}  # these names are units
+# One of these must follow the name of a number.
 UNIT_OR_RANGE = re.compile(r'\d|FORWARD|\b(seconds?|time\.monotonic|volts?|metres?|m/s|radians?|rad|steps|counts'
                            r'|bytes|index|ratio|per|a (second|metre|turn)|units? of)\b')
 REACH = 160  # characters
@@ -20,7 +20,7 @@ REACH = 160  # characters
 
 def is_public(path, names):
     if path.name == '_core.pyi' and getattr(getattr(r4link, names[0], None), '__module__', '') != 'r4link._core':
-        return False  # the package wraps it
+        return False  # internal: the package wraps it
     return names[-1] == '__init__' or not any(name.startswith('_') for name in names)
 
 
@@ -30,7 +30,7 @@ def is_overload(function):
 
 
 def functions_of(path):
-    """Each public one, with the texts that may describe its arguments: its own, and its class's."""
+    """Yields each public function with the docstrings that may describe its arguments: its own and its class's."""
     for node in ast.parse(path.read_text()).body:
         for each in node.body if isinstance(node, ast.ClassDef) else [node]:
             if isinstance(each, (ast.FunctionDef, ast.AsyncFunctionDef)) and not (

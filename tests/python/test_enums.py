@@ -18,7 +18,7 @@ MEMBERS = [pytest.param(each, id=repr(each)) for enum in ENUMS for each in enum]
 
 @pytest.mark.parametrize('enum', ENUMS, ids=lambda enum: enum.__name__)
 def test_an_enumeration_has_the_values_of_cpp_in_their_order(enum):
-    newer = [enums.I2cOutcome.UNKNOWN] if enum is enums.I2cOutcome else []  # has no enumerator in C++
+    newer = [enums.I2cOutcome.UNKNOWN] if enum is enums.I2cOutcome else []  # UNKNOWN has no enumerator in C++
     assert [*_core.ENUMS[enum.__name__], *newer] == list(enum)
 
 

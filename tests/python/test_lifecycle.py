@@ -67,7 +67,7 @@ board.wait_active(); board.arm(); board.osmc(1).set(0.1)
                 assert errors == '' or 'KeyboardInterrupt' in errors
             ended = time.monotonic()
             assert any('"state":"SAFE"' in line or '"reason":"link"' in line for line in sim.stdout)
-            assert time.monotonic() - ended < within(0.9), 'by its timeout, not by a farewell'
+            assert time.monotonic() - ended < within(0.9), 'the board was safe by its timeout, not by a farewell'
         finally:
             sim.kill()
 
@@ -89,7 +89,7 @@ def test_a_board_of_the_parent_is_none_of_a_fork(board):
 
 
 def in_a_fork(action):
-    """The exit code of a child that does that; a child that hangs is ended."""
+    """Returns the exit code of a forked child that runs `action`; ends a child that hangs."""
     child = os.fork()
     if child == 0:
         signal.alarm(20)
@@ -144,7 +144,7 @@ def test_in_a_fork_each_call_is_refused_or_does_nothing_and_none_hangs(tmp_path)
         subscription.cancel()
         board.identify()
         fleet.wait_active()
-        assert other.look().open, 'the child has ended it'
+        assert other.look().open, 'the child has closed the board of its parent'
 
 
 def test_a_fork_may_end_while_a_callback_runs_in_its_parent():
@@ -172,7 +172,7 @@ signal.alarm(15)
 def test_a_board_in_a_circle_is_collected(sim):
     board = r4link.Board(sim.url)
     circle = []
-    board.on_state(lambda state, circle=circle: circle)  # the board knows the function, the function the board
+    board.on_state(lambda state, circle=circle: circle)  # a cycle: board -> function -> board
     board.wait_active()
     circle += [board, board.states()]
     gone = weakref.ref(board)
@@ -180,7 +180,7 @@ def test_a_board_in_a_circle_is_collected(sim):
     for _ in range(3):
         gc.collect()
     assert gone() is None
-    with r4link.Board(sim.url) as again:  # its transport is free
+    with r4link.Board(sim.url) as again:  # the transport is free
         again.wait_active()
 
 
@@ -216,7 +216,7 @@ def test_calls_that_wait_end_when_another_thread_closes_the_board():
     threads = [threading.Thread(target=call, args=(each,)) for each in calls]
     for each in threads:
         each.start()
-    time.sleep(0.05)  # most of them wait by then; those that do not end in the same way
+    time.sleep(0.05)  # most threads wait by then; the others end in the same way
     board.close()
     for each in threads:
         each.join(10)
@@ -288,7 +288,7 @@ def test_a_board_may_be_let_go_in_its_own_callback(sim, wait):
     again = []
 
     def is_open():
-        with contextlib.suppress(r4link.OpenError):  # the link ends when its callback does
+        with contextlib.suppress(r4link.OpenError):  # the link ends when its callback returns
             again.append(r4link.Board(sim.url))
         return again
 
@@ -344,7 +344,7 @@ def test_nothing_grows(sim):
         use()
     gc.collect()
     objects, threads = len(gc.get_objects()), threading.active_count()
-    kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # the most so far
+    kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # peak memory so far
     for _ in range(60):
         use()
     gc.collect()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/examples/openscout: its own tests pass, and the program drives its model."""
+"""docs/examples/openscout: the tests of the example pass, and the program drives its model."""
 import os
 import pathlib
 import re

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the package has, and what its documentation shows."""
+"""The contents of the package, and the programs in its documentation."""
 import ast
 import os
 import pathlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Boards of several paths: one of them is pulled and plugged in again while a program drives."""
+"""Boards with several paths: one path is unplugged and plugged in again while a program drives."""
 import asyncio
 import json
 import os
@@ -19,7 +19,7 @@ LONGEST_GAP_S = 0.1  # states come every 10 ms
 
 
 class Pty:
-    """A cable between a host and a board."""
+    """A pseudo-terminal as the cable between a host and a board."""
 
     def __init__(self, folder):
         self.ends = [f'{folder}/host', f'{folder}/board']
@@ -38,7 +38,7 @@ class Pty:
 
 @pytest.fixture(name='paths')
 def udp_and_pty(tmp_path):
-    """The URLs of a board's two paths, and the cable of the second."""
+    """The URLs of a board's two paths, and the cable of the second path."""
     cable = Pty(tmp_path)
     with subprocess.Popen([os.environ['R4'], 'sim', 'udp://127.0.0.1:0', f'pty:{tmp_path}/board', '--json'],
                           stdout=subprocess.PIPE, text=True) as sim:

@@ -29,7 +29,7 @@ def test_a_copy_of_an_error_tells_the_same(kind):
 
 
 class OwnError(r4link.RefusedError):
-    """An error of a program's own."""
+    """An error class that a program defines."""
 
     def __init__(self, arm):
         super().__init__(arm, 'it does not move')
@@ -77,7 +77,7 @@ def test_a_state_comes_from_another_process(pool):
 
 
 def told(value):
-    """All that a value tells."""
+    """All public data of a value."""
     if hasattr(value, 'as_dict'):
         return value.as_dict()
     names = [name for name in dir(value) if not name.startswith('_')]

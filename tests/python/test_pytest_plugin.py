@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pytest plugin, by the example of docs/how-to/testing.md and tests that fail."""
+"""The pytest plugin, with the example of docs/how-to/testing.md and with tests that fail."""
 import os
 import pathlib
 import re
@@ -37,7 +37,7 @@ def written(*names):
 
 
 def run_step(step, folder, *files):
-    """As its workflow runs it; `files`: those alone. Nothing of them is left out."""
+    """Runs a step of the example's workflow; `files`: only these tests. Asserts that no test is skipped."""
     project = shutil.copytree(EXAMPLE, folder / 'project')
     env = {**os.environ, 'R4LINK': str(ROOT), 'PATH': f'{pathlib.Path(sys.executable).parent}:{os.environ["PATH"]}',
            'PYTHONPATH': f'{ROOT / "tests/integration"}:{os.environ["PYTHONPATH"]}',
@@ -50,7 +50,7 @@ def run_step(step, folder, *files):
     assert 'skipped' not in ended.stdout and ('deselected' in ended.stdout) != everything
 
 
-# The last one is pytest_plugin_can_inside.py's.
+# pytest_plugin_can_inside.py runs the last step.
 @pytest.mark.parametrize('step', steps()[:-1])
 def test_the_example_passes_in_this_process_and_over_udp(step, tmp_path):
     run_step(step, tmp_path)
@@ -117,7 +117,7 @@ def test_the_workers_of_xdist_have_nodes_of_their_own_on_a_bus(monkeypatch):
 
 @pytest.mark.parametrize('broken', [False, True])
 def test_a_package_that_cannot_be_loaded_fails_only_the_tests_that_use_it(broken, tmp_path):
-    """As pytest loads it where it is installed: by its entry point."""
+    """Loads the plugin by its entry point, as pytest does after an installation."""
     site = tmp_path / 'site'
     shutil.copytree(pathlib.Path(pytest_plugin.__file__).parent, site / 'r4link')
     shutil.copy(ROOT / 'host/python/r4link_pytest.py', site)

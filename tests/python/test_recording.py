@@ -113,7 +113,7 @@ def test_a_device_that_another_has_replaced_measures_nothing_any_more(tmp_path):
     assert board.states['as5600_angle'][0] == pytest.approx(np.pi / 2)
     assert np.isnan(board.states['as5600_angle'][1:]).all()
     assert board.states['ina219_current'][1] == pytest.approx(0.2)
-    assert np.isnan(board.states['ina219_current'][[0, 2]]).all(), 'the last is of another recording'
+    assert np.isnan(board.states['ina219_current'][[0, 2]]).all(), 'a value of another recording was used'
 
 
 def test_each_number_of_a_field_has_a_column(tmp_path):

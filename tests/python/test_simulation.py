@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4link.SimBoard: what happens around a simulated board, in this process and in one of its own."""
+"""r4link.SimBoard: events around a simulated board, in this process and in a separate one."""
 import pathlib
 import re
 import subprocess
@@ -29,7 +29,7 @@ def now(board, name, value):
     return getattr(board.state, name) == value
 
 
-# (what happens, when it is to be seen, what ends it)
+# (the event, the condition that shows it, the event that ends it)
 HAPPENINGS = [
     ('handle released', safe('handle'), 'handle held'),
     ('us 1 15', lambda _, board: now(board, 'us1', 15), 'us 1 0'),

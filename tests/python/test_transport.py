@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transports of a program's own: r4link.Transport and r4link.CanTransport (docs/how-to/python.md)."""
+"""Transports that a program defines: r4link.Transport and r4link.CanTransport (docs/how-to/python.md)."""
 import asyncio
 import gc
 import os
@@ -13,11 +13,11 @@ import can
 import pytest
 
 import r4link
-import can_python  # of tests/integration: conftest.py
+import can_python  # from tests/integration, by conftest.py
 
 
 class Forward(r4link.Transport):
-    """To a board on UDP."""
+    """A transport to a board on UDP."""
 
     def __init__(self, url):
         self.address = url.split('//')[1].split('?')[0].split(':')
@@ -56,7 +56,7 @@ def to_a_simulated_board():
 
 
 class Silent(r4link.Transport):
-    """Nobody is at its other end."""
+    """A transport without a board at its other end."""
 
     def send(self, datagram):
         pass
@@ -242,7 +242,7 @@ def test_a_can_bus_carries_a_node(bus, can_board):
         assert can_board.osmc == '358,1'
         board.stop()
         assert can_board.stops > 0 and can_board.heard_packed
-    bus.send(can.Message())  # it is still open
+    bus.send(can.Message())  # the bus is still open
 
 
 def test_a_full_queue_of_a_can_bus_is_waited_for(bus, can_board, monkeypatch):

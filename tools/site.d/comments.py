@@ -1,12 +1,12 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Doxygen's input filter: a public header whose comments are for people, as Doxygen wants them. Usage: comments.py FILE
+"""Doxygen's input filter: converts the plain comments of a public header to Doxygen's. Usage: comments.py FILE
 
-    // what is above a declaration     becomes     /// …
-    declaration;  // what is behind it             ///< …, also where it goes on in the next lines
-    // after the licence, of the file              /// \\file, then the text
+    // above a declaration             becomes     /// …
+    declaration;  // after it                      ///< …, also on the lines that continue it
+    // after the licence, about the file           /// \\file, then the text
 
-What would be markup is escaped, and rows of board.def are written out. The number of lines stays.
+Escapes markup, and writes rows of board.def out. The number of lines stays the same.
 """
 import pathlib
 import re
@@ -33,7 +33,7 @@ def with_rows(path):
 
 
 def documented(lines):
-    behind = None  # the column of the comment behind a declaration that may go on
+    behind = None  # the column of a comment after a declaration, which the next line may continue
     for line in lines:
         alone = ALONE.match(line)
         if alone and 'SPDX' in line:

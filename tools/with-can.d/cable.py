@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The USB cable between the guest's serial port and a tty or a Unix socket here.
 
-The port is a USB device of QEMU, which is plugged in while somebody is connected to its socket. So this
-connects and disconnects, and carries the bytes. What comes from the far end while nobody is connected is lost, as from a
-cable that is unplugged.
+The port is a USB device of QEMU, which is plugged in while its socket has a connection. So this module connects and
+disconnects, and copies the bytes. Bytes from the far end are lost while the socket has no connection, as with an
+unplugged cable.
 """
 import os
 import secrets
@@ -19,7 +19,7 @@ SERIAL_NUMBER = 'R4-0001'
 
 
 def far_end(path):
-    """A descriptor of it."""
+    """Opens the far end; returns its descriptor."""
     try:
         mode = os.stat(path).st_mode
         if stat.S_ISCHR(mode):
@@ -38,12 +38,12 @@ def far_end(path):
 
 
 class Cable:
-    """Unplugged at first."""
+    """The cable, which is unplugged at first."""
 
     def __init__(self, path):
         self._far = far_end(path)
         self._name = f'\0r4-usb-{secrets.token_hex(16)}'
-        self.listener = socket.socket(socket.AF_UNIX)  # QEMU's
+        self.listener = socket.socket(socket.AF_UNIX)  # of QEMU
         self.listener.bind(self._name)
         self.listener.listen(1)
         self._near = None
@@ -51,7 +51,7 @@ class Cable:
         threading.Thread(target=self._from_far_end, daemon=True).start()
 
     def arguments(self):
-        """QEMU's words for its end."""
+        """The arguments of QEMU for its end."""
         return ['-device', 'qemu-xhci', '-chardev', f'socket,id=usb,fd={self.listener.fileno()},server=on,wait=off',
                 '-device', f'usb-serial,chardev=usb,serial={SERIAL_NUMBER}']
 
@@ -87,5 +87,5 @@ class Cable:
                 while read:
                     read = read[os.write(self._far, read):]
         except OSError:
-            pass  # one of them has ended
+            pass  # one of the two ends is closed
         near.close()

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A command in a guest under QEMU whose kernel has CAN, as if it ran here.
+"""Runs a command in a guest under QEMU whose kernel has CAN, as if it ran here.
 
 The guest sees the host's root file system by 9p. The command's input and outputs go over virtio
 serial ports, each a socket pair between QEMU and here, so that nothing is translated and no file is
-left behind. `init` is the guest's side, and says what the control port carries.
+left. `init` is the guest's side, and documents the lines on the control port.
 """
 import ctypes
 import fcntl
@@ -28,7 +28,7 @@ from kernel import Cpio, prepared
 from trouble import Trouble
 
 QEMU = 'qemu-system-x86_64'
-# A boot takes 4 s, and a busy machine may give it that processor time slowly.
+# A boot takes 4 s of processor time, and much longer on a busy machine.
 BOOT_S = 60
 BOOT_CPU_S = 30
 LONGEST_BOOT_S = 600
@@ -36,8 +36,8 @@ KILL_AFTER_S = 2  # after the time limit's SIGTERM
 TIME_LIMIT_EXIT = 124  # as timeout(1)
 KERNEL_ARGUMENTS = ('console=ttyS0 quiet panic=-1 mitigations=off no_timer_check tsc=reliable '
                     'net.ifnames=0 random.trust_cpu=on')
-# Page tables of four levels, and no protection of the kernel that each access to memory pays for: a guest has a quarter
-# less to calculate.
+# Page tables of four levels, and no kernel protection that costs time at each access to memory: this saves a quarter
+# of the guest's time.
 MACHINE = ('-M pc -accel tcg,thread=multi -cpu max,-la57,-smap,-smep,-umip,-pku -m 768M -smp 2 '
            '-nodefaults -no-user-config -vga none -display none -no-reboot -device virtio-serial-pci,max_ports=8').split()
 CAN = ('-object can-bus,id=bus -device kvaser_pci,canbus=bus '
@@ -48,7 +48,7 @@ HERE = pathlib.Path(__file__).parent
 
 
 def job(command):
-    """The shell script that becomes the command, in the guest's own root."""
+    """The shell script in the guest's own root that becomes the command."""
     variables = dict(os.environb)
     variables[b'PATH'] = b'/run/r4/bin:' + variables.get(b'PATH', os.fsencode(os.defpath))
     variables[b'TMPDIR'] = b'/run/tmp'
@@ -59,21 +59,21 @@ def job(command):
         groups = os.getgroups()
         words += ['/usr/bin/setpriv', f'--reuid={os.geteuid()}', f'--regid={os.getegid()}',
                   '--groups=' + ','.join(map(str, groups)) if groups else '--clear-groups',
-                  # The guest's network is its own: no harm in the right to set it up.
+                  # The right to set up the network is harmless, because the guest has its own network.
                   '--inh-caps=+net_admin,+net_raw', '--ambient-caps=+net_admin,+net_raw']
     words += command
     return os.fsencode('echo $$ >/pid.job\nexec chroot /host ' + shlex.join(words) + '\n')
 
 
 def die_with_us():
-    """The kernel kills QEMU if this process ends without having done it."""
+    """Lets the kernel kill QEMU if this process ends without ending it."""
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     if os.getppid() == 1:
         os._exit(1)
 
 
 class Interrupted(Exception):
-    """The guest is given up; the command's exit status is this."""
+    """Ends the guest early; the argument is the exit status of the command."""
 
     def __init__(self, status):
         super().__init__()
@@ -81,7 +81,7 @@ class Interrupted(Exception):
 
 
 class Output(threading.Thread):
-    """Bytes from a port to a file of ours, up to the mark."""
+    """Copies the bytes of a port to a file of this process, up to the mark."""
 
     def __init__(self, port, descriptor, mark, on_closed, on_done):
         super().__init__(daemon=True)
@@ -94,7 +94,7 @@ class Output(threading.Thread):
         self.start()
 
     def run(self):
-        kept = b''  # what may be the beginning of the mark
+        kept = b''  # bytes that may be the beginning of the mark
         while not kept.endswith(self._mark):
             received = self._port.recv(1 << 18)
             if not received:
@@ -124,13 +124,13 @@ class Output(threading.Thread):
                 selector = selectors.DefaultSelector()
                 selector.register(self._descriptor, selectors.EVENT_WRITE)
                 selector.select()
-            except OSError:  # nobody reads: the command is told by SIGPIPE, as it would be here
+            except OSError:  # no reader: the command gets SIGPIPE, as it would here
                 self._descriptor = None
                 self._on_closed()
 
 
 def feed(port):
-    """Our stdin to a port, in a thread of its own."""
+    """Copies our stdin to a port, in a new thread."""
     def run():
         try:
             while True:
@@ -139,7 +139,7 @@ def feed(port):
                     break
                 port.sendall(received)
             port.shutdown(socket.SHUT_WR)
-        except OSError:  # no stdin, or the guest is gone
+        except OSError:  # no stdin, or the guest has ended
             try:
                 port.shutdown(socket.SHUT_WR)
             except OSError:
@@ -148,7 +148,7 @@ def feed(port):
 
 
 class Lines:
-    """The received lines of a socket."""
+    """Splits the bytes that a socket receives into lines."""
 
     def __init__(self, source):
         self._source = source
@@ -206,16 +206,16 @@ class Guest:
                 termios.tcsetattr(0, termios.TCSAFLUSH, saved)
 
     def _take_signals(self):
-        """They are read in the loop, from a socket."""
+        """Directs the signals to a socket, which the loop reads."""
         self._woken, self._waking = socket.socketpair()
         self._waking.setblocking(False)
         for number in (*PASSED_ON, signal.SIGWINCH):
-            if signal.getsignal(number) != signal.SIG_IGN:  # nohup, or in the background of a shell
+            if signal.getsignal(number) != signal.SIG_IGN:  # it is ignored under nohup, or in the background of a shell
                 signal.signal(number, lambda *_: None)
         signal.set_wakeup_fd(self._waking.fileno(), warn_on_full_buffer=False)
 
     def _channel(self, name):
-        """A chardev of QEMU; our end of it."""
+        """Adds a chardev to QEMU; returns our end of it."""
         ours, qemus = socket.socketpair()
         self._ends.append(qemus)
         self._arguments += ['-chardev', f'socket,id={name},fd={qemus.fileno()}']
@@ -243,7 +243,7 @@ class Guest:
             self._arguments += self._cable.arguments()
             self._ends.append(self._cable.listener)
             self._cable.plug()
-        # Made before QEMU is, so that no other child of ours inherits it half-made.
+        # Made before QEMU starts, so that no other child inherits it incomplete.
         initrd = os.memfd_create('initrd')
         with open(initrd, 'wb', closefd=False) as file:
             file.write(self._kernel.initrd.read_bytes())
@@ -287,10 +287,10 @@ class Guest:
         try:
             self._control.sendall(line.encode() + b'\n')
         except OSError:
-            pass  # it has ended
+            pass  # QEMU has ended
 
     def _watch(self):
-        """Everything but the command's own bytes, until its end."""
+        """Handles all events except the bytes of the command, until the command ends."""
         control = Lines(self._control)
         ended = os.pidfd_open(self._qemu.pid)
         selector = selectors.DefaultSelector()
@@ -367,7 +367,7 @@ class Guest:
         return (int(user) + int(system)) / os.sysconf('SC_CLK_TCK')
 
     def _on_end(self):
-        """QEMU has ended by itself, and it was not told to."""
+        """Handles an end of QEMU that was not requested."""
         reason = self._qemu.stderr.read().decode(errors='replace').strip().splitlines()
         if reason:
             raise Trouble(QEMU, reason[-1], 'is it the version that the system has packaged? '

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A command on this kernel, where it has CAN: vcan0 and a vxcan pair are made if they are missing.
+"""Runs a command on this kernel if it has CAN: makes vcan0 and a vxcan pair if they are missing.
 
-What was made is removed by the last of the programs that use it.
+The last program that uses the interfaces removes those that were made.
 """
 import fcntl
 import os
@@ -17,13 +17,13 @@ TIME_LIMIT_EXIT = 124  # as timeout(1)
 INTERFACES = {'vcan0': 'link add dev vcan0 type vcan',
               'vxcan0': 'link add dev vxcan0 type vxcan peer name vxcan1'}
 UP = 'mtu 72 txqueuelen 1000 up'
-SI_KERNEL = 0x80  # of a signal that a terminal sent, to the command as well
+SI_KERNEL = 0x80  # origin of a signal from a terminal, which the command gets, too
 PASSED_ON = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1,
              signal.SIGUSR2}
 
 
 def ip(order):
-    """True if ip has done it."""
+    """True if ip succeeded."""
     return subprocess.run(['ip', *order.split()], stdin=subprocess.DEVNULL, check=False,
                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
 
@@ -41,10 +41,10 @@ def is_up(interface):
 
 
 class Interfaces:
-    """vcan0 and the pair, as long as this lives. Those that were there are left as they are."""
+    """Provides vcan0 and the pair while this object exists. Leaves existing interfaces as they are."""
 
     def __init__(self):
-        # A network namespace has its own interfaces, so its own locks.
+        # A network namespace has its own interfaces, so it has its own locks.
         name = f'/run/lock/r4-with-can.{os.stat("/proc/self/ns/net").st_ino}'
         self._changing = self._users = None
         if os.geteuid() != 0 or shutil.which('ip') is None:
@@ -71,7 +71,7 @@ class Interfaces:
         try:
             fcntl.flock(self._users, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            return  # another one uses them
+            return  # another program uses them
         for interface in os.pread(self._users, 4096, 0).decode().split():
             ip(f'link del {interface}')
         os.ftruncate(self._users, 0)
@@ -80,7 +80,7 @@ class Interfaces:
 
 
 def run(command, limit):
-    """The command's exit status; None if this kernel has no CAN for it."""
+    """Runs the command; returns its exit status, or None if it cannot have CAN on this kernel."""
     interfaces = Interfaces()
     try:
         return status_of(command, limit) if interfaces.usable() else None
@@ -89,7 +89,7 @@ def run(command, limit):
 
 
 def status_of(command, limit):
-    # Signals are taken one by one below; the command has them as they were.
+    # Signals are handled one by one below; the command gets the original signal mask.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, PASSED_ON | {signal.SIGCHLD})
     try:
         child = subprocess.Popen(

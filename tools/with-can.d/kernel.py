@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Debian's own kernel, made ready for QEMU once and kept in the user's cache.
+"""Debian's kernel, prepared for QEMU once and kept in the user's cache.
 
-The package is fetched by apt-get download, which needs no root. Kept are the kernel as an ELF file
-(booted directly, that halves the time to boot) and an initial RAM disk with busybox and the modules.
-Whoever comes first makes them, under a lock, in a folder that gets its name when it is complete.
+apt-get download fetches the package, which needs no root. The cache has the kernel as an ELF file
+(QEMU boots it directly, in half the time) and an initial RAM disk with busybox and the modules.
+The first program makes them, under a lock, in a folder that gets its name when it is complete.
 """
 import fcntl
 import glob
@@ -23,7 +23,7 @@ import time
 
 from trouble import Trouble
 
-FORMAT = 2  # of the cached folder: a new one where older programs cannot use it
+FORMAT = 2  # of the cached folder: a new number if older programs cannot use it
 PACKAGE = 'linux-image-amd64'
 BUSYBOX = '/bin/busybox'
 BASE_MODULES = ('virtio_pci', '9pnet_virtio', '9p', 'virtio_console')
@@ -50,7 +50,7 @@ def cache_folder():
 
 
 def prepared():
-    """The kernel, made ready if nobody has done it before."""
+    """Returns the kernel; prepares it if the cache does not have it."""
     cache = cache_folder()
     ready = cache / (f'kernel-{FORMAT}' + mark_of_given())
     if not ready.is_dir():
@@ -67,7 +67,7 @@ def prepared():
 
 
 def mark_of_given():
-    """A suffix that distinguishes the kernel of R4_CAN_KERNEL from other kernels, of that file too."""
+    """A suffix that distinguishes the kernel of R4_CAN_KERNEL from others, also from an earlier version of the file."""
     given = os.environ.get('R4_CAN_KERNEL')
     if not given:
         return ''
@@ -103,7 +103,7 @@ def prepare(cache, ready):
 
 
 def fetched(cache):
-    """The package's file."""
+    """Returns the file of the package; downloads it if it is missing."""
     given = os.environ.get('R4_CAN_KERNEL')
     if given:
         if not os.path.isfile(given):
@@ -120,7 +120,7 @@ def fetched(cache):
                       'sudo apt-get update; on another system than Debian set R4_CAN_KERNEL to the '
                       'path of a Debian linux-image-*-amd64 package')
     print(f'with-can: downloading {names[0]} (70 MB, once)', file=sys.stderr)
-    for pause in (5, 15, 30, 0):  # a name that cannot be resolved now may be a minute later
+    for pause in (5, 15, 30, 0):  # a name that cannot be resolved now may be resolved a minute later
         done = subprocess.run(['apt-get', '-q', '-o', 'Acquire::Retries=3', 'download', names[0]], cwd=cache,
                               check=False, stdin=subprocess.DEVNULL, capture_output=True, text=True,
                               errors='replace')
@@ -138,7 +138,7 @@ def fetched(cache):
 
 
 def unpacked(package):
-    """The compressed kernel, the modules by name, and the names of those that are a part of the kernel."""
+    """Returns the compressed kernel, the modules by name, and the names of the modules built into the kernel."""
     image = None
     modules = {}
     built_in = set()
@@ -164,12 +164,12 @@ def unpacked(package):
 
 
 def name_of(path):
-    """A module's name: dri-ver.ko.xz is dri_ver."""
+    """The name of a module: dri_ver for dri-ver.ko.xz."""
     return os.path.basename(path).split('.', 1)[0].replace('-', '_')
 
 
 def elf_inside(package, image):
-    """The kernel proper: bzImage carries it compressed by xz (Debian 12) or zstd (Debian 13)."""
+    """Returns the kernel itself, which bzImage contains, compressed by xz (Debian 12) or zstd (Debian 13)."""
     # Documentation/arch/x86/boot.rst: setup_sects, payload_offset, payload_length
     payload = b''
     if len(image) > 0x250:
@@ -185,7 +185,7 @@ def elf_inside(package, image):
     elif payload.startswith(ZSTD_MAGIC):
         if shutil.which('zstd') is None:
             raise Trouble('zstd', 'it is not installed', 'tools/setup --can')
-        # The last four bytes are the kernel's own: its size.
+        # The kernel's build appends four bytes: the size.
         elf = subprocess.run(['zstd', '-dcq'], input=payload[:-4], capture_output=True, check=False).stdout
     if not elf.startswith(b'\x7fELF'):
         raise Trouble(str(package), 'its kernel is not compressed by xz or zstd', DEBIANS)
@@ -193,7 +193,7 @@ def elf_inside(package, image):
 
 
 def in_loading_order(modules, built_in, names):
-    """Those modules that are not a part of the kernel, each after what it depends on."""
+    """The modules that are not built into the kernel, each after the modules that it depends on."""
     order = []
 
     def add(name):

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program with Asio that uses the blocking Board, which has another Asio inside.
+// A program with Asio that uses the blocking Board, which has a separate Asio inside.
 #include <asio.hpp>
 #include <cstdio>
 #include <r4link/r4link.hpp>

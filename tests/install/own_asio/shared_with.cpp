@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program with Asio that uses an AsyncBoard on its own loop.
+// A program with Asio that uses an AsyncBoard on the program's event loop.
 #include <asio.hpp>
 #include <cstdio>
 #include <r4link/async_board.hpp>
