@@ -53,7 +53,7 @@ class HostOnPaths(Running):
         self.ended = None
 
     def loses(self, place, take_away, within_s=REPORTED_WITHIN_S):
-        """Asserts that the loss is reported in time. `take_away` may return the time of the loss; otherwise its call counts."""
+        """Asserts a timely report of the loss: from the time that `take_away` returns or, for None, from its call."""
         self._tells(place, False, take_away, within_s)
 
     def loses_by_silence(self, place, take_away):
