@@ -87,7 +87,7 @@ def test_flash_ram_and_stacks_are_within_their_bars():
 
 
 @pytest.mark.parametrize('arguments, code, words', [
-    (['--udp', '0'], 2, ['--udp 0', 'no port']),
+    (['--udp', '0'], 2, ['--udp 0', 'not a valid port']),
     (['--nothing'], 2, ['--nothing']),
     (['--update'], 2, ['--instructions']),
 ])

@@ -295,7 +295,7 @@ def test_the_service_send_answers_for_the_board(graph):
     outputs = board.outputs(lambda each: pwm(each, 3) == 900)['outputs']
     assert outputs['servo'][1] == pytest.approx(1500, abs=5)
     for wrong, why in (('O:100,1,3;O:5000,1,4', '5000'), ('O:100,1,3;E:CLEAR', 'E:CLEAR'), ('', ''),
-                       ('C:timeout,1000', 'settings'), ('F:AIN24', '--fields'), ('O:1,1,1' * 200, 'no text'),
+                       ('C:timeout,1000', 'settings'), ('F:AIN24', '--fields'), ('O:1,1,1' * 200, 'not a valid command'),
                        ('O:1,1,ü', 'ASCII')):
         confirmed, told = send(wrong)
         assert not confirmed and why in told and told, (wrong, told)

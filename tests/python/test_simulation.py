@@ -61,7 +61,7 @@ def test_what_happens_to_a_board_in_a_process_is_seen(wait):
         for each in HAPPENINGS:
             if each[0] in ('us 1 15', 'analog AIN24 21.5', 'chip dac off', 'handle released'):
                 happens_and_is_seen(sim, board, wait, *each)
-        with pytest.raises(r4link.DataError, match='no ultrasonic sensor'):
+        with pytest.raises(r4link.DataError, match='not a valid ultrasonic sensor'):
             sim.happen('us 5 1')
 
 

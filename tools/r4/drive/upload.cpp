@@ -206,9 +206,11 @@ void write(const UploadOptions& options) {
 
 void wait_for_board(const UploadOptions& options, Clock::time_point deadline) {
   constexpr std::chrono::milliseconds pause{200};
+  BoardOptions watching;
+  watching.role = BoardRole::watch;
   for (;;) {
     try {
-      Board board(options.url, {.role = BoardRole::watch});
+      Board board(options.url, watching);
       const BoardIdentity identity = board.identify();
       return report(
           options,
