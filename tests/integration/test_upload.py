@@ -18,8 +18,8 @@ echo "$*" >>"$R4_TEST_DFU/calls"
 case "$*" in
 *-l*)
   echo 'dfu-util 0.11'
-  [[ ! -e $R4_TEST_DFU/denied ]] || { echo 'Cannot open DFU device 2341:0366 found on devnum 9 (LIBUSB_ERROR_ACCESS)'; exit 74; }
   [[ $(grep -c -e -l "$R4_TEST_DFU/calls") -ge $(cat "$R4_TEST_DFU/there") ]] || exit 0
+  [[ ! -e $R4_TEST_DFU/denied ]] || { echo 'Cannot open DFU device 2341:0366 found on devnum 9 (LIBUSB_ERROR_ACCESS)'; exit 74; }
   for device in $(cat "$R4_TEST_DFU/paths"); do
     echo "Found DFU: [2341:0366] ver=0200, devnum=9, cfg=1, intf=0, path=\\"$device\\", alt=1, name=\\"@External\\""
     echo "Found DFU: [2341:0366] ver=0200, devnum=9, cfg=1, intf=0, path=\\"$device\\", alt=0, name=\\"@Internal\\""
@@ -28,6 +28,7 @@ case "$*" in
 *)
   printf 'Download\\t[            ]   0%%            0 bytes\\rDownload\\t[=====       ]  45%%        24576 bytes\\r'
   printf 'Download\\t[============] 100%%        65536 bytes\\nDownload done.\\n'
+  ln -sf board "$R4_TEST_DFU/cable"
   [[ ! -e $R4_TEST_DFU/fails ]] || { printf 'dfu-util: \\033[31mverify failed\\n'; exit 74; }
   echo 'File downloaded successfully'
   exit 74
@@ -70,8 +71,8 @@ def test_stops_the_board_writes_the_sketch_and_reports_the_version(place):
 
 def test_a_board_in_its_boot_loader_is_written_at_once(place):
     (place / 'there').write_text('1')
-    with Board(f'pty:{place}/board') as board:
-        done = run('upload', str(place / 'sketch.bin'), board.host_url)
+    with Board(f'pty:{place}/board'):
+        done = run('upload', str(place / 'sketch.bin'), f'serial://{place}/cable')
     assert done.returncode == 0 and 'is written' in done.stdout and 'outputs are off\n' in done.stdout
     assert 'the board reports that its outputs' not in done.stdout
     assert len(calls(place)) == 3 and calls(place)[-1].startswith(WRITE)
@@ -123,14 +124,20 @@ def test_what_keeps_it_from_writing_is_named(place):
     (place / 'there').write_text('999')
     done = upload(place)
     assert done.returncode == 4 and 'it was not found; press the board' in done.stderr
-    (place / 'there').write_text('0')
+    (place / 'there').write_text('1')
+    done = upload(place)
+    assert done.returncode == 2 and 'another board waits in it' in done.stderr
+    (place / 'calls').unlink()
+    (place / 'there').write_text('2')
     (place / 'paths').write_text('1-2 1-3')
     done = upload(place)
     assert done.returncode == 2 and 'several boards' in done.stderr
+    (place / 'calls').unlink()
     (place / 'denied').touch()
     done = upload(place)
     assert done.returncode == 5 and 'udev' in done.stderr
     (place / 'denied').unlink()
+    (place / 'calls').unlink()
     (place / 'paths').write_text('1-2')
     (place / 'fails').touch()
     done = upload(place)

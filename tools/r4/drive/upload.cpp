@@ -11,6 +11,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <optional>
@@ -84,7 +85,10 @@ std::optional<std::string> port_of(const std::string& url) {
     throw Error(ErrorKind::usage, url, "a sketch goes over the board's USB cable alone",
                 "give serial:auto, serial:?sn=... or serial:///dev/ttyACM0");
   }
-  if (!parsed.path().empty() && parsed.path() != "auto") return parsed.path();
+  if (!parsed.path().empty() && parsed.path() != "auto") {
+    if (!std::filesystem::exists(parsed.path())) return std::nullopt;
+    return parsed.path();
+  }
   const Discovery found = discover({.can = false, .udp = false});
   const std::optional<std::string> number = parsed.get("sn");
   std::optional<std::string> path;
@@ -229,7 +233,13 @@ void wait_for_board(const UploadOptions& options, Clock::time_point deadline) {
 int upload(const UploadOptions& options) {
   check_image(options.file);
   const std::optional<std::string> port = port_of(options.url);
-  if (look_for_boot_loader() == BootLoaders::none) {
+  const bool waits = look_for_boot_loader() != BootLoaders::none;
+  if (waits && port) {
+    throw Error(
+        ErrorKind::usage, "the boot loader", "another board waits in it",
+        fmt::format("unplug that board to write the one at {}, or the other way round", *port));
+  }
+  if (!waits) {
     if (!port) {
       throw Error(ErrorKind::open, options.url, "no board was found at USB",
                   "plug it in; or press its reset button twice, until its green light pulses");
@@ -247,8 +257,8 @@ int upload(const UploadOptions& options) {
 constexpr const char* upload_footer =
     R"(FILE is what the Arduino IDE makes by Sketch > Export Compiled Binary. The command stops the board,
 starts its boot loader (1200 baud), writes the sketch with dfu-util, and waits until the board reports
-its version. A board that waits in its boot loader already (reset button pressed twice) is written at once.
-Keep the wheels off the ground: a sketch that is not R4's may drive outputs.
+its version. A board that waits in its boot loader (reset button pressed twice) is written at once, if no
+other board is at USB. Keep the wheels off the ground: a sketch that is not R4's may drive outputs.
 
 Examples:
   r4 upload R4Board.ino.bin
