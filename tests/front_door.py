@@ -114,6 +114,11 @@ def site_faults(root):
             yield made.stderr.strip()
         elif not (pathlib.Path(folder) / 'api/classr4_1_1Board.html').is_file():
             yield 'tools/site: the reference has no page of r4::Board'
+        else:
+            page = (pathlib.Path(folder) / 'api/python.html').read_text(encoding='utf-8')
+            yield from (f'tools/site: the Python reference lacks {name}' for name in
+                        ('Board', 'Board.arm', 'Command.servo', 'LinkState', 'OpenError', 'wait_active')
+                        if f'>{name}' not in page and f'{name}(' not in page)
 
 
 def main():

@@ -15,7 +15,7 @@ import sys
 
 PUBLIC = {'include/r4link', 'include/r4link/can', 'include/r4link/commands', 'include/r4link/control',
           'include/r4link/devices', 'include/r4link/discovery', 'include/r4link/messages', 'include/r4link/recordings',
-          'include/r4link/tables', 'include/r4link/transports'}
+          'include/r4link/simulation', 'include/r4link/tables', 'include/r4link/transports'}
 PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
 CARRIERS = {'transports/can', 'transports/impaired', 'transports/own', 'transports/serial', 'transports/share', 'transports/udp',
@@ -41,6 +41,7 @@ ALLOWED = {
     'include/r4link/discovery': {'include/r4link'},
     'include/r4link/messages': {'include/r4link'},
     'include/r4link/recordings': {'include/r4link', 'include/r4link/messages'},
+    'include/r4link/simulation': {'include/r4link'},
     'include/r4link/tables': {'include/r4link'},
     'include/r4link/transports': {'include/r4link'},
     'protocol/datagram': PUBLIC,
@@ -133,7 +134,7 @@ PORTABLE = (FIRMWARE - PUBLIC) | {'firmware/ports/sim/chips', 'firmware/ports/si
 # The public headers that the board uses, too.
 PORTABLE_PUBLIC = {f'include/r4link/{name}.hpp' for name in (
     'can/can_bits', 'can/can_frame', 'can/can_ids', 'command', 'config', 'datagram', 'key', 'messages/datagram_writer',
-    'messages/message', 'messages/packed_form', 'messages/packet_tracker', 'simulated_pins', 'state', 'tables/commands',
+    'messages/message', 'messages/packed_form', 'messages/packet_tracker', 'simulation/simulated_pins', 'state', 'tables/commands',
     'tables/settings', 'tables/state_fields', 'text', 'vocabulary')} | {'include/r4link/tables/board.def'}
 # Without heap, I/O and clock, and available in GCC 7 with C++14; C headers in both spellings.
 PORTABLE_STANDARD = {

@@ -37,7 +37,7 @@ def faults_of_text(text):
 
 
 def faults_of_source(path):
-    """Yields (line, reason). `own`: the rules bind tests less, whose comments may ask."""
+    """Yields (line, reason). Comments of tests may be long and may ask."""
     product = 'tests' not in path.parts
     for number, line in enumerate(path.read_text(encoding='utf-8').splitlines(), 1):
         match = COMMENT[path.suffix].search(line)
@@ -89,7 +89,7 @@ def main():
               for line, reason in faults_of_source(path)]
     index = (root / 'docs/README.md').read_text(encoding='utf-8')
     total = 0
-    for page in [root / 'README.md', *sorted((root / 'docs').rglob('*.md'))]:
+    for page in [*sorted(root.glob('*.md')), *sorted((root / 'docs').rglob('*.md'))]:
         name = str(page.relative_to(root))
         faults += [f'{name}:{line}: {reason}' for line, text in prose_of(page) for reason in faults_of_text(text)]
         if page.parent.parent == root / 'docs' and f'({page.relative_to(root / "docs")}' not in index:

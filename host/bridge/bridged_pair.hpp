@@ -39,10 +39,10 @@
 #include "bridge_guard.hpp"
 #include "bridge_hosts.hpp"
 #include "bridge_watch.hpp"
+#include "r4link/bridge.hpp"
 #include "r4link/carrier.hpp"
 #include "r4link/control/boot_clock.hpp"
 #include "r4link/datagram.hpp"
-#include "r4link/fleet.hpp"
 #include "r4link/messages/datagram_writer.hpp"
 #include "waiting_time.hpp"
 

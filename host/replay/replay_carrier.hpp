@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A recording as a transport: `replay:FILE[?speed=1&path=1&from=0]`.
-//     speed   speed factor, 0.01-1000
+//     speed   speed factor, 0.01-1,000,000
 //     path    number of the path in the recording
 //     from    seconds of the recording to skip, or a UTC time: 2026-11-23T21:20:00
 //

@@ -15,14 +15,13 @@
 
 namespace r4 {
 
-// The value is the exit code of `r4` (docs/reference/transports.md).
-enum class ErrorKind : int {
-  data = 1,         // an invalid datagram, recording or file
-  usage = 2,        // a wrong URL, option or command
-  refused = 3,      // the board refused, or did not confirm in time
-  open = 4,         // the transport cannot be opened or is down
-  permission = 5,   // the system denies access
-  unsupported = 6,  // kernel support or an interface is missing
+enum class ErrorKind : std::uint8_t {
+  data,         // an invalid datagram, recording or file
+  usage,        // a wrong URL, option or command
+  refused,      // the board refused, or did not confirm in time
+  open,         // the transport cannot be opened or is down
+  permission,   // the system denies access
+  unsupported,  // kernel support or an interface is missing
 };
 
 enum class Outcome : std::uint8_t {

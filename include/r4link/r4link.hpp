@@ -4,6 +4,7 @@
 #pragma once
 
 #include "board.hpp"
+#include "bridge.hpp"
 #include "can/can_bits.hpp"
 #include "can/can_frame.hpp"
 #include "can/can_ids.hpp"
@@ -45,8 +46,8 @@
 #include "recordings/recording_visitor.hpp"
 #include "recordings/zstd_stream.hpp"
 #include "setpoints.hpp"
-#include "simulated_pins.hpp"
 #include "simulation.hpp"
+#include "simulation/simulated_pins.hpp"
 #include "state.hpp"
 #include "subscription.hpp"
 #include "tables/commands.hpp"

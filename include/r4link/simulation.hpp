@@ -18,7 +18,7 @@
 
 #include "carrier.hpp"
 #include "config.hpp"
-#include "simulated_pins.hpp"
+#include "simulation/simulated_pins.hpp"
 #include "state.hpp"
 
 namespace r4::sim {

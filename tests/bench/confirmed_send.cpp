@@ -26,6 +26,6 @@ int main(int argc, char** argv) {
     std::printf("%.1f\n", us[us.size() / 2]);
   } catch (const r4::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
-    return static_cast<int>(error.kind());
+    return 1;
   }
 }

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <optional>
+
 #include "fake_giga.hpp"
 #include "firmware/ports/giga/chip/board_clock.hpp"
 #include "firmware/ports/giga/pins.hpp"
@@ -27,6 +30,24 @@ class Bus {
     return result;
   }
   std::uint64_t now_us() const { return chip.now_ns() / 1000; }
+  // Writes four bytes to 0x40, with one interrupt after `at_us`. Empty if the write ended before.
+  std::optional<I2cResult> write_interrupted(std::uint64_t at_us,
+                                             const std::function<void()>& interrupt) {
+    bool interrupted = false;
+    chip.ticker.period_ns = ~0ULL / 4;
+    chip.ticker.next_ns = chip.now_ns() + at_us * 1000;
+    chip.ticker.action = [&] {
+      interrupted = true;
+      interrupt();
+    };
+    const I2cResult result = write(0x40, {0x06, 0x00, 0x10, 0x00});
+    return interrupted ? std::optional(result) : std::nullopt;
+  }
+  // All outputs of the chips off: the interrupts of the tests write this.
+  I2cResult write_off() {
+    const std::uint8_t off[] = {0xFD, 0x10};
+    return bus.write(0x70, off, 2);
+  }
 
   fake::Giga chip;
   giga::I2cController bus{
@@ -191,18 +212,12 @@ TEST(I2cController, ATransferThatLostTheBusIsRepeatedOnce) {
 TEST(I2cController, AnAttemptThatWasTakenOverIsNotRepeated) {
   for (std::uint64_t at_us = 1; at_us < 260; ++at_us) {
     Bus bus;
-    bool interrupted = false;
-    bus.chip.ticker.period_ns = ~0ULL / 4;
-    bus.chip.ticker.next_ns = bus.chip.now_ns() + at_us * 1000;
-    bus.chip.ticker.action = [&] {
-      interrupted = true;
-      const std::uint8_t off[] = {0xFD, 0x10};
-      EXPECT_EQ(bus.bus.write(0x70, off, 2), I2cResult::ok) << at_us;
-      bus.chip.i2c.log.clear();
-    };
     bus.chip.i2c.lose_after(3, 1);
-    const I2cResult result = bus.write(0x40, {0x06, 0x00, 0x10, 0x00});
-    if (!interrupted) break;
+    const auto result = bus.write_interrupted(at_us, [&] {
+      EXPECT_EQ(bus.write_off(), I2cResult::ok) << at_us;
+      bus.chip.i2c.log.clear();
+    });
+    if (!result) break;
     if (result == I2cResult::timeout) {
       EXPECT_TRUE(bus.chip.i2c.log.empty()) << at_us << ": nothing was sent afterwards";
     }
@@ -213,18 +228,12 @@ TEST(I2cController, AnAttemptThatWasTakenOverIsNotRepeated) {
 TEST(I2cController, ATransferThatWasTakenOverDoesNotGoOn) {
   for (std::uint64_t at_us = 1; at_us < 130; ++at_us) {
     Bus bus;
-    bool interrupted = false;
-    bus.chip.ticker.period_ns = ~0ULL / 4;
-    bus.chip.ticker.next_ns = bus.chip.now_ns() + at_us * 1000;
-    bus.chip.ticker.action = [&] {
-      interrupted = true;
+    const auto result = bus.write_interrupted(at_us, [&] {
       EXPECT_TRUE(bus.bus.recover());
-      const std::uint8_t off[] = {0xFD, 0x10};
-      EXPECT_EQ(bus.bus.write(0x70, off, 2), I2cResult::ok);
+      EXPECT_EQ(bus.write_off(), I2cResult::ok);
       bus.chip.i2c.log.clear();
-    };
-    const I2cResult result = bus.write(0x40, {0x06, 0x00, 0x10, 0x00});
-    if (!interrupted) break;
+    });
+    if (!result) break;
     EXPECT_EQ(result, I2cResult::timeout) << at_us;
     EXPECT_TRUE(bus.chip.i2c.log.empty()) << at_us << ": nothing was sent afterwards";
     EXPECT_EQ(bus.write(0x42, {0x01, 0x04}), I2cResult::ok) << at_us;
@@ -235,17 +244,11 @@ TEST(I2cController, ATransferThatWasTakenOverDoesNotGoOn) {
 TEST(I2cController, ATransferInAnInterruptTakesTheBusOver) {
   for (std::uint64_t at_us = 1; at_us < 130; ++at_us) {
     Bus bus;
-    bool interrupted = false;
-    bus.chip.ticker.period_ns = ~0ULL / 4;
-    bus.chip.ticker.next_ns = bus.chip.now_ns() + at_us * 1000;
-    bus.chip.ticker.action = [&] {
-      interrupted = true;
-      const std::uint8_t off[] = {0xFD, 0x10};
+    const auto result = bus.write_interrupted(at_us, [&] {
       bus.chip.i2c.log.clear();
-      EXPECT_EQ(bus.bus.write(0x70, off, 2), I2cResult::ok) << at_us;
-    };
-    const I2cResult result = bus.write(0x40, {0x06, 0x00, 0x10, 0x00});
-    if (!interrupted) break;
+      EXPECT_EQ(bus.write_off(), I2cResult::ok) << at_us;
+    });
+    if (!result) break;
     if (result == I2cResult::timeout) {
       EXPECT_EQ(bus.chip.i2c.log, (std::vector<Bytes>{{0xE0, 0xFD, 0x10}})) << at_us;
     }

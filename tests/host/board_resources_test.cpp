@@ -10,6 +10,7 @@
 
 #include "r4link/async_board.hpp"
 #include "r4link/board.hpp"
+#include "r4link/bridge.hpp"
 #include "r4link/error.hpp"
 #include "r4link/fleet.hpp"
 #include "r4link/recording.hpp"

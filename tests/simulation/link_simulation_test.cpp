@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The promises of docs/design/safety-argument.md under random faults. R4_SCHEDULES sets the number
-// of schedules (30,000 by default). A fifth as many run with standstills, and a tenth with several
-// paths. Their seeds start at R4_FIRST_SEED (1 by default), so that a long run can continue where
-// another run ended. R4_SEED replays one schedule and prints its trace.
+// of schedules (30,000 by default; tools/test sets it). A fifth as many run with standstills, and a
+// tenth with several paths. Their seeds start at R4_FIRST_SEED (1 by default), so that a long run
+// can continue where another run ended. R4_SEED replays one schedule and prints its trace.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

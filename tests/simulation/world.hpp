@@ -390,9 +390,8 @@ class World : public firmware::Hal, public firmware::Observer {
     std::uint64_t cut_to_host_until_us = 0;
     std::uint64_t stalled_until_us = 0;
     std::uint64_t unplugged_until_us = 0;
-    // Of the first host's path.
-    std::uint64_t disturbed_until_us = 0;
-    bool fine = false;  // the path meets the limits
+    std::uint64_t disturbed_until_us = 0;  // the path of the first host
+    bool fine = false;                     // the path meets the limits
     std::uint64_t fine_since_us = 0;
     bool serves = false;  // the path meets the limits and both ends use it
     std::uint64_t serves_since_us = 0;

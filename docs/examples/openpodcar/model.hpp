@@ -4,7 +4,7 @@
 #pragma once
 
 #include <cstdint>
-#include <r4link/simulated_pins.hpp>
+#include <r4link/simulation/simulated_pins.hpp>
 
 struct PodcarPlace {
   double x_m = 0;  // of the middle of the rear axle

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "r4link/bridge.hpp"
+
 #include <pybind11/stl.h>
 
 #include <chrono>
@@ -9,7 +11,6 @@
 #include <vector>
 
 #include "process.hpp"
-#include "r4link/fleet.hpp"
 #include "r4link/options.hpp"
 
 namespace r4::python {

@@ -48,7 +48,8 @@ class Transport:
         return type(self).__name__
 
     def open(self) -> None:
-        """Begins to receive. If the first call raises, the Board raises OpenError."""
+        """Begins to receive. Opening a Board waits for the first call, without limit; if it raises, the Board raises
+        OpenError."""
 
     def send(self, datagram: bytes) -> None:
         """Sends one datagram. Later datagrams wait for it: 100 ms, a stop without a limit."""

@@ -11,7 +11,8 @@
 //
 // An exception (std::exception) from a call takes the transport down: an event reports it, close()
 // is called, and then open() five times a second until it returns. An exception from the first
-// open() is thrown where the board is opened. The end of a link waits at most 1 s for these calls.
+// open() is thrown where the board is opened. Opening a board waits for the first open(), without
+// limit; the end of a link waits at most 1 s for these calls.
 // A class that must not have a thread of its own implements Carrier (carrier.hpp).
 #pragma once
 

@@ -336,6 +336,6 @@ int main(int argc, char** argv) {
     return bus ? r4::bench::run_bus(argv[1], seconds) : r4::bench::run(counts, seconds);
   } catch (const r4::Error& error) {
     std::fprintf(stderr, "r4_fleet_bench: %s\n", error.what());
-    return static_cast<int>(error.kind());
+    return 1;
   }
 }

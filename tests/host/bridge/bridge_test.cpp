@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4::Bridge between real transports: a host, a bridge and a simulated board in one process.
+#include "r4link/bridge.hpp"
+
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -7,7 +9,6 @@
 #include <thread>
 
 #include "r4link/board.hpp"
-#include "r4link/fleet.hpp"
 #include "tests/support/problems.hpp"
 
 namespace r4::test {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "r4link/bridge.hpp"
+
 #include <fmt/format.h>
 
 #include <array>
@@ -16,7 +18,6 @@
 #include "../shell/key_file.hpp"
 #include "../shell/options.hpp"
 #include "../shell/subcommands.hpp"
-#include "r4link/fleet.hpp"
 
 namespace r4::tool {
 namespace {

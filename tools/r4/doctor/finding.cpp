@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "../shell/exit_code.hpp"
+
 namespace r4::tool {
 
 const char* to_text(Severity severity) {
@@ -24,7 +26,7 @@ int exit_code(const Findings& findings) {
     return [severity](const Finding& each) { return each.severity == severity; };
   };
   const auto error = std::find_if(findings.begin(), findings.end(), is(Severity::error));
-  if (error != findings.end()) return static_cast<int>(error->kind);
+  if (error != findings.end()) return exit_code(error->kind);
   return std::any_of(findings.begin(), findings.end(), is(Severity::warning)) ? 1 : 0;
 }
 

@@ -11,12 +11,12 @@
 #include <chrono>
 #include <cstdint>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "../shell/json.hpp"
 #include "../shell/options.hpp"
@@ -78,17 +78,14 @@ void check_image(const std::string& path) {
 
 // --- the port
 
-// The port of `url`; empty if this computer has no such port.
+// The port of `url`. Empty if any board will do (serial:auto) and none runs.
 std::optional<std::string> port_of(const std::string& url) {
   const Url parsed = Url::parse(url);
   if (parsed.scheme() != "serial") {
     throw Error(ErrorKind::usage, url, "a sketch goes over the board's USB cable alone",
                 "give serial:auto, serial:?sn=... or serial:///dev/ttyACM0");
   }
-  if (!parsed.path().empty() && parsed.path() != "auto") {
-    if (!std::filesystem::exists(parsed.path())) return std::nullopt;
-    return parsed.path();
-  }
+  if (!parsed.path().empty() && parsed.path() != "auto") return parsed.path();
   const Discovery found = discover({.can = false, .udp = false});
   const std::optional<std::string> number = parsed.get("sn");
   std::optional<std::string> path;
@@ -100,23 +97,28 @@ std::optional<std::string> port_of(const std::string& url) {
     }
     path = port.path;
   }
+  if (number && !path) {
+    throw Error(ErrorKind::open, url, "no board with this number runs at USB",
+                "plug it in; if it waits in its boot loader, give serial:auto");
+  }
   return path;
 }
 
 // Opens the port for this program alone.
 class Port {
  public:
-  explicit Port(const std::string& path)
-      : number_(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
+  explicit Port(std::string path)
+      : path_(std::move(path)),
+        number_(::open(path_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
     const int error = number_ < 0 ? errno : 0;
     const bool denied = error == EACCES || error == EPERM;
     if (error != 0 && error != EBUSY) {
-      throw Error(denied ? ErrorKind::permission : ErrorKind::open, path, std::strerror(error),
+      throw Error(denied ? ErrorKind::permission : ErrorKind::open, path_, std::strerror(error),
                   "r4 doctor serial:auto");
     }
     if (error == EBUSY || ::flock(number_, LOCK_EX | LOCK_NB) != 0) {
       close();
-      throw Error(ErrorKind::open, path, "another program uses the port",
+      throw Error(ErrorKind::open, path_, "another program uses the port",
                   "close it: r4 list shows which one");
     }
   }
@@ -125,13 +127,13 @@ class Port {
   Port& operator=(const Port&) = delete;
 
   // 1200 baud: the firmware switches its outputs off and waits for the port to close.
-  void ask_for_upload(const std::string& path) const {
+  void ask_for_upload() const {
     constexpr std::chrono::milliseconds held{400};  // the core resets after 200 ms at the earliest
     termios settings{};
     const bool set = ::tcgetattr(number_, &settings) == 0 && ::cfsetspeed(&settings, B1200) == 0 &&
                      (::cfmakeraw(&settings), ::tcsetattr(number_, TCSANOW, &settings)) == 0;
     if (!set) {
-      throw Error(ErrorKind::open, path, std::strerror(errno), "unplug the board and plug it in");
+      throw Error(ErrorKind::open, path_, std::strerror(errno), "unplug the board and plug it in");
     }
     const int ready = TIOCM_DTR;
     ::ioctl(number_, TIOCMBIS, &ready);  // a pseudo-terminal has no such line
@@ -143,6 +145,7 @@ class Port {
     if (number_ >= 0) ::close(number_);
     number_ = -1;
   }
+  std::string path_;
   int number_;
 };
 
@@ -156,17 +159,18 @@ void report(const UploadOptions& options, const Json& object, const std::string&
   }
 }
 
-// Other firmware, or none, does not answer: it cannot be asked to switch anything off.
+// Throws if a board with R4 firmware does not confirm the stop. Other firmware does not answer.
 void switch_off(const UploadOptions& options) {
+  Board board(options.url);
   try {
-    Board board(options.url);
-    board.stop();
-    report(options, {{"type", "stopped"}}, "the board reports that its outputs are off");
+    board.identify();
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::refused) throw;
-    report(options, {{"type", "silent"}},
-           "no R4 firmware answers: this command cannot switch outputs off");
+    return report(options, {{"type", "silent"}},
+                  "no R4 firmware answers: this command cannot switch outputs off");
   }
+  board.stop();
+  report(options, {{"type", "stopped"}}, "the board reports that its outputs are off");
 }
 
 void wait_for_boot_loader(Clock::time_point deadline) {
@@ -233,20 +237,20 @@ void wait_for_board(const UploadOptions& options, Clock::time_point deadline) {
 int upload(const UploadOptions& options) {
   check_image(options.file);
   const std::optional<std::string> port = port_of(options.url);
+  if (port) const Port free(*port);  // before anything is stopped
   const bool waits = look_for_boot_loader() != BootLoaders::none;
-  if (waits && port) {
+  if (port && waits) {
     throw Error(
         ErrorKind::usage, "the boot loader", "another board waits in it",
         fmt::format("unplug that board to write the one at {}, or the other way round", *port));
   }
-  if (!waits) {
-    if (!port) {
-      throw Error(ErrorKind::open, options.url, "no board was found at USB",
-                  "plug it in; or press its reset button twice, until its green light pulses");
-    }
-    { const Port free(*port); }  // before anything is stopped
+  if (!port && !waits) {
+    throw Error(ErrorKind::open, options.url, "no board was found at USB",
+                "plug it in; or press its reset button twice, until its green light pulses");
+  }
+  if (port) {
     switch_off(options);
-    Port(*port).ask_for_upload(*port);
+    Port(*port).ask_for_upload();
   }
   wait_for_boot_loader(Clock::now() + options.timeout);
   write(options);
@@ -257,16 +261,17 @@ int upload(const UploadOptions& options) {
 constexpr const char* upload_footer =
     R"(FILE is what the Arduino IDE makes by Sketch > Export Compiled Binary. The command stops the board,
 starts its boot loader (1200 baud), writes the sketch with dfu-util, and waits until the board reports
-its version. A board that waits in its boot loader (reset button pressed twice) is written at once, if no
-other board is at USB. Keep the wheels off the ground: a sketch that is not R4's may drive outputs.
+its version. With serial:auto and no running board at USB, the board that waits in its boot loader (reset
+button pressed twice) is written at once. Keep the wheels off the ground: a sketch that is not R4's may
+drive outputs.
 
 Examples:
   r4 upload R4Board.ino.bin
   r4 upload R4Board.ino.bin serial:///dev/ttyACM0
 
 Exit codes: 0 the board runs the sketch; 1 the file is not a sketch for the Giga; 2 usage, also a URL that
-is not a cable; 3 the sketch is written, but no R4 firmware answers; 4 no board, no boot loader, or
-dfu-util failed; 5 permission denied; 6 dfu-util is not installed.)";
+is not a cable; 3 the board did not confirm the stop, or the sketch is written, but no R4 firmware answers;
+4 no board, no boot loader, or dfu-util failed; 5 permission denied; 6 dfu-util is not installed.)";
 
 }  // namespace
 

@@ -15,6 +15,7 @@
 #include <system_error>
 #include <vector>
 
+#include "exit_code.hpp"
 #include "help.hpp"
 #include "json.hpp"
 #include "r4link/config.hpp"
@@ -109,7 +110,7 @@ int report(Problem problem, bool json) {
   if (problem.thing.empty()) problem.thing = "''";
   print_trouble("r4: " + problem.text());
   if (json) print_line(problem_json(problem));
-  return static_cast<int>(problem.kind);
+  return exit_code(problem.kind);
 }
 
 // If a standard stream is closed, the next opened port would get its number, and printed text would

@@ -8,30 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "exit_code.hpp"
 #include "r4link/messages/message.hpp"
 #include "r4link/messages/packed_form.hpp"
 #include "r4link/recordings/record_line.hpp"
 
 namespace r4::tool {
 namespace {
-
-const char* name_of(ErrorKind kind) {
-  switch (kind) {
-    case ErrorKind::data:
-      return "data";
-    case ErrorKind::usage:
-      return "usage";
-    case ErrorKind::refused:
-      return "refused";
-    case ErrorKind::open:
-      return "open";
-    case ErrorKind::permission:
-      return "permission";
-    case ErrorKind::unsupported:
-      return "unsupported";
-  }
-  return "unknown";
-}
 
 std::string_view view(Text text) { return {text.data(), text.size()}; }
 
@@ -136,7 +119,7 @@ Json counters_json(const CarrierCounters& counters) {
 
 Json problem_json(const Problem& problem) {
   Json object{{"type", "error"},
-              {"kind", name_of(problem.kind)},
+              {"kind", row_of(problem.kind).name},
               {"thing", problem.thing},
               {"reason", problem.reason},
               {"fix", problem.fix}};

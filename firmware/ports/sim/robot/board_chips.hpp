@@ -9,7 +9,7 @@
 #include "../chips/mcp23017_model.hpp"
 #include "../chips/mcp4728_model.hpp"
 #include "../chips/pca9685_model.hpp"
-#include "r4link/simulated_pins.hpp"
+#include "r4link/simulation/simulated_pins.hpp"
 
 namespace r4 {
 namespace sim {

@@ -25,7 +25,7 @@
 #include "board_chips.hpp"
 #include "motor_model.hpp"
 #include "pin_models.hpp"
-#include "r4link/simulated_pins.hpp"
+#include "r4link/simulation/simulated_pins.hpp"
 #include "ultrasonic_model.hpp"
 
 namespace r4 {

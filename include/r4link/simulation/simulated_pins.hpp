@@ -4,9 +4,9 @@
 
 #include <cstdint>
 
-#include "config.hpp"
-#include "state.hpp"
-#include "vocabulary.hpp"
+#include "../config.hpp"
+#include "../state.hpp"
+#include "../vocabulary.hpp"
 
 namespace r4 {
 namespace sim {

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4::Bridge: joins two transports (docs/how-to/bridge.md).
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "carrier.hpp"
+#include "config.hpp"
+#include "key.hpp"
+
+namespace r4 {
+
+enum class BridgeSide : std::uint8_t { hosts, board };
+
+// Counts of the datagrams from one side of a bridge.
+struct BridgeCounters {
+  std::uint64_t passed = 0;  // sent to the other side
+  std::uint64_t stops = 0;   // emergency stops among them
+  // Dropped:
+  std::uint64_t damaged = 0;      // a wrong checksum, too long, or not a datagram
+  std::uint64_t misdirected = 0;  // only a board sends it but a host did, or the reverse
+  std::uint64_t kept_out = 0;     // from hosts that are not served: docs/how-to/bridge.md
+  std::uint64_t refused =
+      0;                   // an unsigned command that must be signed, or a setting for a cable only
+  std::uint64_t late = 0;  // the bridge was held up: may have waited for more than 100 ms
+  std::uint64_t undelivered = 0;  // the other side is down or full, or its peer is not known
+  // Of `passed`: replaced by a newer state while it waited, or dropped after 100 ms.
+  std::uint64_t outdated = 0;
+};
+
+struct BridgeEnd {
+  std::string name;  // of the transport
+  bool up = false;
+  BridgeCounters from;
+};
+
+struct BridgeStatus {
+  BridgeEnd hosts;
+  BridgeEnd board;
+};
+
+struct BridgeEvent {
+  std::size_t pair = 0;  // which board, from 0
+  BridgeSide side = BridgeSide::hosts;
+  CarrierEvent event;
+};
+
+struct BridgeOptions {
+  // The board's keys, at most four (load_key()). With a key, only heartbeats and commands signed
+  // with it pass, as on a radio; stops and questions always do.
+  std::vector<Key> keys;
+  // A board obeys its own cable unsigned. So by default a bridge to a cable passes nothing unsigned
+  // to a board with a key, and is refused on a network without `keys`. True: everyone who reaches
+  // the hosts' side may drive the board. Not together with `keys`.
+  bool open = false;
+  // How long a served host may be silent before another is served; at least the board's timeout.
+  std::chrono::milliseconds timeout{1000};
+  // Called on the bridge's thread; must not block.
+  std::function<void(const BridgeEvent&)> on_event;
+};
+
+// Passes the datagrams of hosts to a board and back, unchanged, on its own thread. Thread-safe.
+//
+//     r4::Bridge bridge("udp://0.0.0.0:2018", "can://can0?node=3");
+//     r4::Bridge bus("udp://0.0.0.0:2100-2107", "can://can0?node=0-7");
+//
+// It makes no heartbeats: if the host dies, the board goes safe. One host at a time is served, but
+// any E:STOP passes. Waits for a missing device. Cable-only settings (C:key …) never pass.
+class R4LINK_API Bridge {
+ public:
+  // `hosts`: the URL to listen on, as for r4 sim; `board`: the board's URL. Patterns of equal size
+  // (docs/reference/transports.md) are paired in order. Throws Error: usage, permission, and as the
+  // transports do.
+  Bridge(std::string_view hosts, std::string_view board, BridgeOptions options = {});
+  ~Bridge();
+  Bridge(const Bridge&) = delete;
+  Bridge& operator=(const Bridge&) = delete;
+
+  // Stops at once; the boards go safe by their timeouts. Idempotent.
+  void close();
+
+  std::size_t size() const;  // number of boards
+  // The status of each pair, in order; after close(), the last one.
+  std::vector<BridgeStatus> status() const;
+
+ private:
+  struct R4LINK_PRIVATE Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace r4
