@@ -11,7 +11,7 @@ namespace {
 using Bench = test::BoardBench;
 using test::full;
 
-TEST(BoardHardware, IsSafeFromAnyTransferOfAnyUseOn) {
+TEST(BoardHardware, CanBeMadeSafeDuringEveryTransfer) {
   // make_safe() runs in an interrupt at every transfer of set-up, apply and verification. The
   // transfer is cut short, or it completes afterwards with old values.
   for (const bool cuts : {true, false}) {
@@ -35,7 +35,7 @@ TEST(BoardHardware, IsSafeFromAnyTransferOfAnyUseOn) {
   }
 }
 
-TEST(BoardHardware, ATransferThatTheSafeStateCutShortIsNoTroubleOfItsChip) {
+TEST(BoardHardware, ATransferCutShortByTheSafeStateIsNotAChipFault) {
   for (int at = 0; at < 60; ++at) {
     Bench bench;
     bench.boot();
@@ -56,7 +56,7 @@ TEST(BoardHardware, ATransferThatTheSafeStateCutShortIsNoTroubleOfItsChip) {
   }
 }
 
-TEST(BoardHardware, ABusThatIsHeldWhenTheSafeStateCutsIntoATransferIsTrouble) {
+TEST(BoardHardware, ABusHeldWhenTheSafeStateCutsATransferIsAFault) {
   Bench bench;
   bench.boot();
   bench.line.what = [&] {
@@ -145,7 +145,7 @@ constexpr ChipAt chips_at[] = {{Chip::osmc_pwm, 0x40},
                                {Chip::dac, 0x61},
                                {Chip::servo_pwm, 0x42}};
 
-TEST(BoardHardware, ASilentChipIsAFaultWithItsNameAndEverythingElseGoesSafe) {
+TEST(BoardHardware, ASilentChipIsReportedByNameAndAllOutputsGoSafe) {
   for (const ChipAt& at : chips_at) {
     Bench bench;
     bench.boot();
@@ -165,7 +165,7 @@ TEST(BoardHardware, ASilentChipIsAFaultWithItsNameAndEverythingElseGoesSafe) {
   }
 }
 
-TEST(BoardHardware, ComesBackWithOutputsOffAndObeysAgainWhenTheFaultIsCleared) {
+TEST(BoardHardware, OutputsStayOffAfterAChipFaultUntilItIsCleared) {
   for (const ChipAt& at : chips_at) {
     Bench bench;
     bench.boot();
@@ -184,7 +184,7 @@ TEST(BoardHardware, ComesBackWithOutputsOffAndObeysAgainWhenTheFaultIsCleared) {
   }
 }
 
-TEST(BoardHardware, AChipThatWasResetIsNoticedWithinATurnOfVerification) {
+TEST(BoardHardware, NoticesAChipResetWithinOneVerificationCycle) {
   for (const ChipAt& at : chips_at) {
     Bench bench;
     bench.boot();
@@ -202,7 +202,7 @@ TEST(BoardHardware, AChipThatWasResetIsNoticedWithinATurnOfVerification) {
   }
 }
 
-TEST(BoardHardware, AChipThatIsResetAtAnyByteNeverLeavesAnythingRunningUnnoticed) {
+TEST(BoardHardware, AChipResetAtAnyByteIsNoticedOrHarmless) {
   for (std::size_t after = 1; after < 120; after += 3) {
     for (const ChipAt& at : chips_at) {
       Bench bench;
@@ -236,7 +236,7 @@ void disturb_chip(Bench& bench, int chip, const Disturbance& by) {
   chips[chip]->disturb_mode2(by.mode2);
 }
 
-TEST(BoardFaults, AChipWhoseModesWereDisturbedIsResetAndTold) {
+TEST(BoardFaults, ResetsAndReportsAChipWithDisturbedModes) {
   for (const Disturbance& by : disturbances) {
     for (int chip = 0; chip < 3; ++chip) {
       Bench bench;
@@ -256,7 +256,7 @@ TEST(BoardFaults, AChipWhoseModesWereDisturbedIsResetAndTold) {
   }
 }
 
-TEST(BoardFaults, ASafeStateLooksWhetherOffMeansOff) {
+TEST(BoardFaults, TheSafeStateAlsoTurnsOffAChipWithDisturbedModes) {
   for (const Disturbance& by : disturbances) {
     for (int chip = 0; chip < 3; ++chip) {
       Bench bench;
@@ -270,7 +270,7 @@ TEST(BoardFaults, ASafeStateLooksWhetherOffMeansOff) {
   }
 }
 
-TEST(BoardFaults, APowerUpResetsChipsWhoseModesWereDisturbedBefore) {
+TEST(BoardFaults, PowerUpResetsChipsWithDisturbedModes) {
   for (const Disturbance& by : disturbances) {
     Bench bench;
     bench.boot();
@@ -288,7 +288,7 @@ TEST(BoardFaults, APowerUpResetsChipsWhoseModesWereDisturbedBefore) {
   }
 }
 
-TEST(BoardFaults, AChipThatDoesNotHearItsResetIsResetAgain) {
+TEST(BoardFaults, ResetsAChipAgainIfItMissedItsReset) {
   Bench bench;
   bench.boot();
   bench.apply(full());
@@ -316,7 +316,7 @@ TEST(BoardHardware, AHeldBusIsFreedAndEverythingIsSafeAtOnce) {
   }
 }
 
-TEST(BoardHardware, NothingThatWasStillToBeWrittenComesAfterASafeStateThatTheBusCutShort) {
+TEST(BoardHardware, DropsWaitingWritesIfAHeldBusInterruptsTheSafeState) {
   // Most of the applied values still wait when the bus is held in the middle of make_safe() and
   // cannot be freed. A moment later the bus is free again.
   for (int polls = 0; polls < 3; ++polls) {
@@ -340,7 +340,7 @@ TEST(BoardHardware, NothingThatWasStillToBeWrittenComesAfterASafeStateThatTheBus
   }
 }
 
-TEST(BoardHardware, ABusThatStaysHeldCostsTheLoopLittle) {
+TEST(BoardHardware, AHeldBusDelaysTheLoopOnlyBriefly) {
   Bench bench;
   bench.boot();
   bench.apply(full());
@@ -385,7 +385,7 @@ class HeldByOne final : public I2cBus {
   bool held_ = false;
 };
 
-TEST(BoardFaults, AChipThatHoldsTheBusWheneverItIsAddressedKeepsNoOtherFromTheSafeState) {
+TEST(BoardFaults, OtherChipsGoSafeIfOneChipHoldsTheBus) {
   for (const Chip chip : {Chip::dac, Chip::expander, Chip::osmc_pwm, Chip::servo_pwm}) {
     test::BoardParts board;
     HeldByOne line(board.bus, address_of(chip));

@@ -38,7 +38,7 @@ rc::Gen<Outputs> any_outputs() {
   });
 }
 
-TEST(BoardHardware, OutputsAreOffBeforeAnythingElseAtPowerUp) {
+TEST(BoardHardware, PowerUpTurnsTheOutputsOffFirst) {
   Bench bench;
   bench.hardware.power_up(bench.now());
   EXPECT_EQ(
@@ -53,7 +53,7 @@ TEST(BoardHardware, OutputsAreOffBeforeAnythingElseAtPowerUp) {
   EXPECT_TRUE(bench.hardware.ready());
 }
 
-TEST(BoardHardware, AWarmStartTurnsOffWhatTheLastProgramLeftOn) {
+TEST(BoardHardware, AWarmStartTurnsOffOutputsThatWereLeftOn) {
   Bench bench;
   bench.boot();
   bench.apply(full());
@@ -73,7 +73,7 @@ TEST(BoardHardware, EveryChannelReachesItsPin) {
   EXPECT_NEAR(bench.board.osmc.frequency_hz(), 1000, 20);
 }
 
-TEST(BoardHardware, OneChannelIsOneShortTransfer) {
+TEST(BoardHardware, ChangingOneChannelTakesOneShortTransfer) {
   Bench bench;
   bench.boot();
   Outputs outputs;
@@ -139,7 +139,7 @@ TEST(BoardHardware, AChannelNeverShowsADutyWithTheOldDirection) {
   EXPECT_EQ(test::outputs_of(bench.board), test::as_pins(outputs));
 }
 
-TEST(BoardHardware, NoCallCarriesMoreThanItsBudget) {
+TEST(BoardHardware, NoPollWritesMoreThanItsByteBudget) {
   Bench bench;
   bench.boot();
   Outputs outputs = full();
@@ -158,7 +158,7 @@ TEST(BoardHardware, NoCallCarriesMoreThanItsBudget) {
   EXPECT_FALSE(bench.hardware.fault().any());
 }
 
-TEST(BoardHardware, NoChipIsLeftBehindWhenOthersChangeAllTheTime) {
+TEST(BoardHardware, WritesEveryChipWhileOtherChipsKeepChanging) {
   Bench bench;
   bench.boot();
   Outputs outputs = full();
@@ -171,7 +171,7 @@ TEST(BoardHardware, NoChipIsLeftBehindWhenOthersChangeAllTheTime) {
   EXPECT_EQ(test::outputs_of(bench.board).servo_us[15], test::as_pins(outputs).servo_us[15]);
 }
 
-TEST(BoardHardware, SafeStateCostsWhatTheDocumentationSays) {
+TEST(BoardHardware, TheSafeStateTakesTheDocumentedBusTime) {
   Bench bench;
   bench.boot();
   bench.apply(full());
@@ -186,7 +186,7 @@ TEST(BoardHardware, SafeStateCostsWhatTheDocumentationSays) {
   for (const auto& step : bench.board.step) EXPECT_FALSE(step.high);
 }
 
-TEST(BoardHardware, AChipThatIsNotFittedIsLeftAlone) {
+TEST(BoardHardware, DoesNotAccessAChipThatIsNotFitted) {
   BoardHardware::Config config;
   config.chips_fitted = 1U << static_cast<int>(Chip::osmc_pwm);
   Bench bench(config);
@@ -199,7 +199,7 @@ TEST(BoardHardware, AChipThatIsNotFittedIsLeftAlone) {
   EXPECT_FALSE(bench.hardware.fault().any());
 }
 
-TEST(BoardHardware, TheHandleCountsAsHeldAfterAWhileAndAsReleasedAtOnce) {
+TEST(BoardHardware, DebouncesAHeldHandleButNoticesAReleaseAtOnce) {
   Bench bench;
   bench.boot();
   Inputs inputs;
@@ -254,7 +254,7 @@ TEST(BoardHardware, InputsComeFromPinsAndInterrupts) {
   EXPECT_EQ(inputs.stepper_steps[3], 0);
 }
 
-TEST(BoardHardware, SteppersStandInTheSafeState) {
+TEST(BoardHardware, SteppersStopInTheSafeState) {
   Bench bench;
   bench.boot();
   bench.hardware.apply(full());
@@ -269,7 +269,7 @@ TEST(BoardHardware, SteppersStandInTheSafeState) {
   for (int i = 0; i < 4; ++i) EXPECT_EQ(after.stepper_steps[i], before.stepper_steps[i]);
 }
 
-TEST(BoardHardware, ChangesCostWhatTheDocumentationSays) {
+TEST(BoardHardware, ChangesTakeTheDocumentedBusTime) {
   Bench bench;
   bench.boot();
   Outputs outputs;
@@ -297,7 +297,7 @@ TEST(BoardHardware, ChangesCostWhatTheDocumentationSays) {
   EXPECT_EQ(cost_of({0x200, Direction::reverse}).us, 185);
 }
 
-TEST(BoardHardware, WhatIsAppliedBeforeEveryChipIsReadyWaits) {
+TEST(BoardHardware, OutputsAppliedBeforeTheChipsAreReadyWait) {
   Bench bench;
   for (int i = 0; i < sim::Mcp4728Model::channels; ++i) {
     bench.board.dac.set_eeprom(i, {true, 0, false, 2000});
@@ -317,7 +317,7 @@ TEST(BoardHardware, WhatIsAppliedBeforeEveryChipIsReadyWaits) {
   EXPECT_EQ(bench.board.step[0].rises, 0);
 }
 
-TEST(BoardHardware, TheSafeStateForgetsWhatWasWaiting) {
+TEST(BoardHardware, TheSafeStateDropsWaitingOutputs) {
   Bench bench;
   bench.hardware.power_up(bench.now());
   bench.hardware.apply(full());
@@ -327,7 +327,7 @@ TEST(BoardHardware, TheSafeStateForgetsWhatWasWaiting) {
   EXPECT_TRUE(bench.board.pins().is_safe());
 }
 
-TEST(BoardHardware, SetsItsVoltagesAndTakesThemAwayInTheSafeState) {
+TEST(BoardHardware, SetsDacVoltagesAndZeroesThemInTheSafeState) {
   Bench bench;
   bench.boot();
   Outputs outputs;
@@ -341,7 +341,7 @@ TEST(BoardHardware, SetsItsVoltagesAndTakesThemAwayInTheSafeState) {
   EXPECT_EQ(bench.board.analog_output[1].millivolts, 0);
 }
 
-TEST(BoardHardware, SeesItsSpareInputs) {
+TEST(BoardHardware, ReadsTheSpareInputs) {
   Bench bench;
   bench.boot();
   firmware::Inputs inputs;

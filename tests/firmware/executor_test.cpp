@@ -15,7 +15,7 @@ bool same(const Setpoints& a, const Setpoints& b) {
          a.settings.recovery == b.settings.recovery && a.settings.pack == b.settings.pack;
 }
 
-TEST(Executor, ChangesWhatTheCommandNamesAndNothingElse) {
+TEST(Executor, ChangesOnlyWhatTheCommandNames) {
   Setpoints setpoints;
   Setpoints expected;
   auto expect = [&](const Command& command) {

@@ -46,10 +46,10 @@ TEST_F(GuardTest, FeedsTheWatchdogOnlyWhenEveryDutyHasCheckedIn) {
   EXPECT_EQ(run(10), 0);
 }
 
-TEST_F(GuardTest, WithoutDutiesThereIsNothingToWaitFor) { EXPECT_EQ(run(3), 3); }
+TEST_F(GuardTest, FeedsTheWatchdogIfThereAreNoDuties) { EXPECT_EQ(run(3), 3); }
 
 // Outputs must not be live without a guard. A developer who adds too many duties sees it at once.
-TEST_F(GuardTest, ADutyTooManyKeepsTheOutputsSafeAndStarvesTheWatchdog) {
+TEST_F(GuardTest, TooManyDutiesKeepOutputsSafeAndTheWatchdogUnfed) {
   for (int i = 0; i < Guard::max_duties; ++i) EXPECT_EQ(guard.add_duty(20), i);
   EXPECT_EQ(run(1, {0, 1, 2, 3, 4, 5, 6, 7}), 1);
   EXPECT_FALSE(guard.tripped());
@@ -74,7 +74,7 @@ TEST_F(GuardTest, AHangingDutyTripsAfterFiveDeadlines) {
   EXPECT_FALSE(guard.tripped());
 }
 
-TEST_F(GuardTest, AMissNowAndThenIsCountedAndForgiven) {
+TEST_F(GuardTest, OccasionalMissesAreCountedButDoNotTrip) {
   const Guard::Duty loop = guard.add_duty(20);
   for (int i = 0; i < 100; ++i) {
     run(480, {loop});
@@ -84,7 +84,7 @@ TEST_F(GuardTest, AMissNowAndThenIsCountedAndForgiven) {
   EXPECT_FALSE(guard.tripped());
 }
 
-TEST_F(GuardTest, MissesThatComeTooOftenTripInTheEnd) {
+TEST_F(GuardTest, FrequentMissesTripTheGuard) {
   const Guard::Duty loop = guard.add_duty(20);
   int periods = 0;
   for (; !guard.tripped() && periods < 100; ++periods) {
@@ -106,7 +106,7 @@ TEST_F(GuardTest, MakesTheOutputsSafeAtTheDeadlineAndNotBefore) {
   EXPECT_EQ(hal.made_safe, 1);  // exactly once
 }
 
-TEST_F(GuardTest, ADeadlineIsPutOffOrTakenBack) {
+TEST_F(GuardTest, ADeadlineCanBePostponedOrCancelled) {
   guard.arm(now_ms + 100);
   run(99);
   guard.arm(now_ms + 100);
@@ -124,7 +124,7 @@ TEST_F(GuardTest, RemembersTheGraverOfTwoCauses) {
   EXPECT_EQ(hal.made_safe, 2);
 }
 
-TEST_F(GuardTest, AStopIsDoneAtTheNextTickAndNothingIsGraver) {
+TEST_F(GuardTest, ExecutesAStopAtTheNextTickAsTheGravestCause) {
   guard.add_duty(20);
   guard.stop();
   EXPECT_EQ(hal.made_safe, 0);
@@ -159,7 +159,7 @@ struct GuardedBoard : testing::Test {
   TestHost host{board, our_session, Source{0, 4}};
 };
 
-TEST_F(GuardedBoard, SilenceIsSeenWhileTheLoopHangsEvenIfAHeartbeatWaits) {
+TEST_F(GuardedBoard, SilenceMakesAHungLoopSafeDespiteAWaitingHeartbeat) {
   const std::uint32_t fed_ms = board.application->link().fed_ms();
   board.now_ms = fed_ms + 990;  // 10 ms are left, and the loop hangs for 11 ms
   guard().tick(board.now_ms);
@@ -171,7 +171,7 @@ TEST_F(GuardedBoard, SilenceIsSeenWhileTheLoopHangsEvenIfAHeartbeatWaits) {
   EXPECT_EQ(board.log.states.front(), "SAFE link");
 }
 
-TEST_F(GuardedBoard, AStopThatAnInterruptHasHeardIsDoneBeforeTheLoopReadsIt) {
+TEST_F(GuardedBoard, AStopHeardByAnInterruptActsBeforeTheLoopReadsIt) {
   guard().stop();
   guard().tick(board.now_ms);
   EXPECT_TRUE(board.safe());
@@ -187,7 +187,7 @@ TEST_F(GuardedBoard, AStopThatAnInterruptHasHeardIsDoneBeforeTheLoopReadsIt) {
   EXPECT_EQ(board.outputs().osmc[0].pwm, 400);
 }
 
-TEST_F(GuardedBoard, RepetitionsOfAStopThatAnInterruptHasHeardAreNoNewCause) {
+TEST_F(GuardedBoard, ARepeatedStopHeardByAnInterruptIsNotANewCause) {
   const auto heard = [&](std::uint32_t number) {
     guard().stop();
     guard().tick(board.now_ms);
@@ -232,7 +232,7 @@ class StopWithoutDatagram : public GuardedBoard {
   static constexpr std::uint32_t lost_ms = firmware::Application::catch_up_ms;
 };
 
-TEST_F(StopWithoutDatagram, IsNoStopOfSomebodyElseThatComesLater) {
+TEST_F(StopWithoutDatagram, DiffersFromALaterStopOfAnotherHost) {
   hear();
   const std::int32_t heard = cause();
   host.resend("E:STOP", host.pnum++);
@@ -241,7 +241,7 @@ TEST_F(StopWithoutDatagram, IsNoStopOfSomebodyElseThatComesLater) {
   EXPECT_TRUE(clears(cause()));
 }
 
-TEST_F(StopWithoutDatagram, IsANewCauseOnABoardThatIsStoppedAlready) {
+TEST_F(StopWithoutDatagram, IsANewCauseOnAStoppedBoard) {
   host.resend("E:STOP", host.pnum++);
   const std::int32_t first = cause();
   hear();
@@ -252,7 +252,7 @@ TEST_F(StopWithoutDatagram, IsANewCauseOnABoardThatIsStoppedAlready) {
   EXPECT_TRUE(clears(cause()));
 }
 
-TEST_F(StopWithoutDatagram, IsANewCauseAlsoIfARepetitionOfTheFirstStopIsRead) {
+TEST_F(StopWithoutDatagram, IsANewCauseEvenIfTheFirstStopIsRepeated) {
   const std::uint32_t number = host.pnum++;
   host.resend("E:STOP", number);
   const std::int32_t first = cause();
@@ -264,7 +264,7 @@ TEST_F(StopWithoutDatagram, IsANewCauseAlsoIfARepetitionOfTheFirstStopIsRead) {
   EXPECT_NE(cause(), first);
 }
 
-TEST_F(GuardedBoard, WhatTheGuardTookOffStaysOffUntilTheApplicationKnows) {
+TEST_F(GuardedBoard, OutputsStayOffAfterTheGuardTripsDuringACommand) {
   // The guard trips after the loop has read the time and before the loop executes its command.
   class Trip final : public firmware::Observer {
    public:

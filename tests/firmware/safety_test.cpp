@@ -16,7 +16,7 @@ TEST(Safety, BeginsWithoutACause) {
   EXPECT_EQ(safety.reason(), SafeReason::none);
 }
 
-TEST(Safety, IsSafeWhileAnyCauseIsThere) {
+TEST(Safety, StaysSafeWhileAnyCauseRemains) {
   Safety safety;
   EXPECT_TRUE(safety.enter(SafeReason::link));
   EXPECT_FALSE(safety.enter(SafeReason::link));
@@ -41,7 +41,7 @@ TEST(Safety, ReportsTheGravestOfAnyTwo) {
   }
 }
 
-TEST(Safety, ClearTakesAwayTheReportedCauseIfItIsLatched) {
+TEST(Safety, ClearRemovesTheReportedCauseIfItIsLatched) {
   Safety safety;
   for (const SafeReason cause : gravest_first) safety.enter(cause);
   for (const SafeReason next : {SafeReason::fault, SafeReason::watchdog, SafeReason::handle}) {

@@ -21,7 +21,7 @@ int stops_in(StopDetector& detector, const std::string& bytes) {
   return stops;
 }
 
-TEST(StopDetector, HearsAStopWhereverItStandsAndNothingElse) {
+TEST(StopDetector, DetectsOnlyStopsAndAtAnyPositionOfADatagram) {
   const struct {
     const char* fields;
     bool stop;
@@ -43,7 +43,7 @@ TEST(StopDetector, HearsAStopWhereverItStandsAndNothingElse) {
   }
 }
 
-TEST(StopDetector, OneWrongBitIsNoStop) {
+TEST(StopDetector, IgnoresAStopWithOneWrongBit) {
   const std::string datagram = with_crc("E:STOP;PNum:7;T:79146;");
   for (std::size_t i = 0; i < datagram.size() * 8; ++i) {
     std::string damaged = datagram;
@@ -56,7 +56,7 @@ TEST(StopDetector, OneWrongBitIsNoStop) {
   }
 }
 
-TEST(StopDetector, HearsASignedStopOfTheLongestNumbers) {
+TEST(StopDetector, DetectsASignedStopWithTheLongestNumbers) {
   const std::string fields =
       test::with_signature("E:STOP;PNum:4294967295;T:18446744073709551615;",
                            test::key_of(max_key_id), "0123456789abcdef", UINT64_MAX, UINT32_MAX);
@@ -68,7 +68,7 @@ TEST(StopDetector, HearsASignedStopOfTheLongestNumbers) {
   EXPECT_EQ(stops_in(detector, datagram + "\r\n" + datagram + "\n"), 2) << datagram;
 }
 
-TEST(StopDetector, FindsTheNextLineAfterOneThatIsTooLong) {
+TEST(StopDetector, DetectsAStopAfterALineThatIsTooLong) {
   StopDetector detector;
   const std::string stop = with_crc("E:STOP;PNum:7;T:79146;");
   EXPECT_EQ(stops_in(detector, std::string(5000, 'x') + stop + "\n"), 0);

@@ -27,7 +27,7 @@ TEST(GigaPowerUp, SwitchesEveryOutputOffBeforeAnythingElse) {
   EXPECT_TRUE(bench.pins().is_safe());
 }
 
-TEST(GigaPowerUp, StepAndTriggerPinsStandLow) {
+TEST(GigaPowerUp, StepAndTriggerPinsAreLow) {
   GigaBench bench;
   bench.boot();
   for (const giga::Pin pin : giga::step_pins) EXPECT_FALSE(bench.giga.pin(pin.port, pin.number));
@@ -51,7 +51,7 @@ TEST(GigaUsb, DrivesAMotorAndStreamsTheStateAt100Hz) {
   EXPECT_NEAR(static_cast<double>(states), 100, 2);
 }
 
-TEST(GigaUsb, AHostThatStopsReadingNeverHoldsTheLoop) {
+TEST(GigaUsb, AHostThatStopsReadingDoesNotBlockTheLoop) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -79,7 +79,7 @@ TEST(GigaUsb, AHostThatStopsReadingNeverHoldsTheLoop) {
   EXPECT_LT(giga::BoardClock::now_ms() - static_cast<std::uint32_t>(datagram.time_ms()), 100U);
 }
 
-TEST(GigaUsb, AnUploadAt1200BaudFindsEverythingOffBeforeTheCoreResets) {
+TEST(GigaUsb, AnUploadAt1200BaudTurnsOutputsOffBeforeTheReset) {
   GigaBench bench;
   bench.giga.usb_open = false;
   bench.boot();
@@ -109,7 +109,7 @@ TEST(GigaUsb, AnUploadAt1200BaudFindsEverythingOffBeforeTheCoreResets) {
   bench.drive(host, bench.can());
 }
 
-TEST(GigaUsb, ACommandRightBehindAClearDoesNotDriveDuringAnUpload) {
+TEST(GigaUsb, ACommandAfterAClearDoesNotDriveDuringAnUpload) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -122,7 +122,7 @@ TEST(GigaUsb, ACommandRightBehindAClearDoesNotDriveDuringAnUpload) {
   EXPECT_EQ(bench.reason(), SafeReason::fault);
 }
 
-TEST(GigaUsb, AnUnpluggedCableIsTheEndOfTheSession) {
+TEST(GigaUsb, UnpluggingTheCableEndsTheSession) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -133,7 +133,7 @@ TEST(GigaUsb, AnUnpluggedCableIsTheEndOfTheSession) {
   EXPECT_TRUE(bench.pins().is_safe());
 }
 
-TEST(GigaUsb, AProgramThatOpensThePortHearsThePresentFromItsFirstLineOn) {
+TEST(GigaUsb, AProgramThatOpensThePortGetsNoOldDatagrams) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -153,7 +153,7 @@ TEST(GigaUsb, AProgramThatOpensThePortHearsThePresentFromItsFirstLineOn) {
   EXPECT_LE(giga::BoardClock::now_ms() - static_cast<std::uint32_t>(datagram.time_ms()), 600U);
 }
 
-TEST(GigaUsb, APortThatWasClosedWhileAPacketWasUnderWaySendsToTheNextProgram) {
+TEST(GigaUsb, APortClosedDuringAPacketServesTheNextProgram) {
   for (const std::uint64_t closed_ms : {0U, 1U, 200U}) {
     GigaBench bench;
     bench.boot();
@@ -171,7 +171,7 @@ TEST(GigaUsb, APortThatWasClosedWhileAPacketWasUnderWaySendsToTheNextProgram) {
   }
 }
 
-TEST(GigaUsb, AnEndpointIsNotOpenedBeforeAComputerHasFoundTheBoard) {
+TEST(GigaUsb, OpensItsEndpointOnlyWhenConfigured) {
   GigaBench bench;
   bench.boot();
   bench.giga.usb_close_under_way();
@@ -183,7 +183,7 @@ TEST(GigaUsb, AnEndpointIsNotOpenedBeforeAComputerHasFoundTheBoard) {
   EXPECT_TRUE(bench.giga.usb_endpoint_open());
 }
 
-TEST(GigaUsb, AFloodOfInputTakesItsTurn) {
+TEST(GigaUsb, AFloodOfInputDoesNotDisturbTheSession) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -223,7 +223,7 @@ TEST(GigaUsb, EndsNoBurstWithAFullPacket) {
   }
 }
 
-TEST(GigaUsb, KeepsTheNameThatItIsGivenAndTellsIt) {
+TEST(GigaUsb, StoresAndReportsItsName) {
   GigaBench bench;
   bench.giga.stored["r4-settings"] = "name,left-arm\n";
   bench.boot();
@@ -259,7 +259,7 @@ TEST(GigaLink, ASilentHostMakesEverythingSafeInTheTimerInterrupt) {
 class GigaCanForm : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(PackedAndPlain, GigaCanForm, testing::Bool());
 
-TEST_P(GigaCanForm, DrivesAMotorAndTellsItsStateInTheHostsForm) {
+TEST_P(GigaCanForm, DrivesAMotorAndReportsInTheHostsForm) {
   GigaBench bench;
   bench.can_node.use_packed_form(GetParam());
   bench.boot();
@@ -294,7 +294,7 @@ TEST(GigaCan, LeavesBusOffByItself) {
   EXPECT_FALSE(bench.can_datagrams.empty());
 }
 
-TEST(GigaCan, TellsAtOnceThatItWentSafe) {
+TEST(GigaCan, ReportsAtOnceThatItWentSafe) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -355,7 +355,7 @@ TEST(GigaWiFi, AThreadThatHangsInTheLibraryDoesNotDisturbTheLoop) {
   EXPECT_NEAR(static_cast<double>(bench.usb_lines().size()), 204, 6);
 }
 
-TEST(GigaWiFi, IsJoinedAgainWhenItIsLostAndAWrongPasswordIsTriedAgain) {
+TEST(GigaWiFi, RejoinsALostNetworkAndRetriesAWrongPassword) {
   GigaBench bench;
   bench.giga.stored["r4-settings"] = "network,lab\npassword,wrong-one\n";
   bench.boot();
@@ -382,7 +382,7 @@ TEST(GigaWiFi, IsJoinedAgainWhenItIsLostAndAWrongPasswordIsTriedAgain) {
   ASSERT_TRUE(bench.run_until([&] { return joins() > before && up(); }));
 }
 
-TEST(GigaWiFi, LosingItMakesTheOutputsOfItsHostSafeAtOnce) {
+TEST(GigaWiFi, LosingTheNetworkMakesTheOutputsSafeAtOnce) {
   GigaBench bench;
   ASSERT_TRUE(bench.boot_in_network());
   PlainHost host;
@@ -409,7 +409,7 @@ TEST(GigaWiFi, LosingItMakesTheOutputsOfItsHostSafeAtOnce) {
   EXPECT_EQ(bench.reason(), SafeReason::link);
 }
 
-TEST(GigaWiFi, AnotherCalibrationDoesNotDropIt) {
+TEST(GigaWiFi, ANewCalibrationDoesNotDropTheNetwork) {
   GigaBench bench;
   bench.giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
   bench.boot();
@@ -430,7 +430,7 @@ TEST(GigaWiFi, AnotherCalibrationDoesNotDropIt) {
   EXPECT_EQ(joins(), 1);
 }
 
-TEST(GigaStop, ByANumberedFrameIsObeyed) {
+TEST(GigaStop, ANumberedStopFrameIsObeyed) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -444,7 +444,7 @@ TEST(GigaStop, ByANumberedFrameIsObeyed) {
   EXPECT_TRUE(bench.pins().is_safe());
 }
 
-TEST(GigaReport, IsThePapersFigure3) {
+TEST(GigaReport, MatchesFigure3OfThePaper) {
   GigaBench bench;
   ASSERT_TRUE(bench.boot_in_network());
   bench.run_ms(20);
@@ -608,7 +608,7 @@ TEST_P(GigaWiring, AnEncoderCountsItsOwnLines) {
   }
 }
 
-TEST_P(GigaWiring, AnEchoIsOfTheSensorThatWasTriggered) {
+TEST_P(GigaWiring, AnEchoBelongsToTheTriggeredSensor) {
   command("F:US1,US2,US3,US4");
   bool answered = false;
   for (int i = 0; i < 600 && !answered; ++i) {
@@ -627,7 +627,7 @@ TEST_P(GigaWiring, AnEchoIsOfTheSensorThatWasTriggered) {
 
 INSTANTIATE_TEST_SUITE_P(Channels, GigaWiring, testing::Range(1, 5));
 
-TEST(GigaLight, TellsTheState) {
+TEST(GigaLight, ShowsTheState) {
   GigaBench bench;
   bench.boot();
   PlainHost host;

@@ -39,7 +39,7 @@ TEST(DatagramRing, GivesDatagramsWholeAndInOrder) {
   EXPECT_FALSE(ring.take(taken, buffer, text));
 }
 
-TEST(DatagramRing, RefusesWhatDoesNotFitAndGoesOnAroundItsEnd) {
+TEST(DatagramRing, RefusesADatagramThatDoesNotFitAndWrapsAround) {
   giga::DatagramRing<256> ring;
   giga::DatagramNote note;
   char buffer[max_datagram];
@@ -57,7 +57,7 @@ TEST(DatagramRing, RefusesWhatDoesNotFitAndGoesOnAroundItsEnd) {
   EXPECT_FALSE(ring.put(note, "x", 250)) << "some room is reserved";
 }
 
-TEST(DatagramRing, CarriesBetweenThreadsWithoutLosingAnyByte) {
+TEST(DatagramRing, TransfersDatagramsBetweenThreadsWithoutLoss) {
   static giga::DatagramRing<1024> ring;
   std::thread producer([] {
     giga::DatagramNote note;
@@ -85,7 +85,7 @@ TEST(DatagramRing, CarriesBetweenThreadsWithoutLosingAnyByte) {
   producer.join();
 }
 
-TEST(HandOver, GivesTheNewestOnceAndNeverAMixture) {
+TEST(HandOver, GivesTheNewestValueOnceAndNeverAMixture) {
   struct Pair {
     std::uint32_t a;
     std::uint32_t b;
@@ -113,7 +113,7 @@ TEST(HandOver, GivesTheNewestOnceAndNeverAMixture) {
 // A valid datagram.
 const std::string hello = with_crc("H:ROS2-R4;");
 
-TEST(UdpLink, TellsTheNetworkThreadWhoIsInControl) {
+TEST(UdpLink, GivesTheNetworkThreadThePeerInControl) {
   giga::UdpLink link;
   giga::UdpPort port(link, &clock_ms);
   EXPECT_EQ(link.held(0), everyone);
@@ -129,7 +129,7 @@ TEST(UdpLink, TellsTheNetworkThreadWhoIsInControl) {
   EXPECT_EQ(link.held(1), everyone);
 }
 
-TEST(UdpPeers, SendToThePapersClientWhereItListensAndWhereItAsks) {
+TEST(UdpPeers, SendToBothPortsOfThePapersClient) {
   giga::UdpPeers peers;
   giga::UdpAddress to[2];
   EXPECT_EQ(peers.find(everyone, to), 0) << "no peer is known";
@@ -150,7 +150,7 @@ TEST(UdpPeers, SendToThePapersClientWhereItListensAndWhereItAsks) {
   EXPECT_EQ(to[0].port, 50001);
 }
 
-TEST(UdpPeers, SendToAWatcherAloneBesideThePapersClient) {
+TEST(UdpPeers, SendToAWatcherOnlyAtItsPort) {
   giga::UdpPeers peers;
   giga::UdpAddress to[2];
   peers.set_host(77);
@@ -159,7 +159,7 @@ TEST(UdpPeers, SendToAWatcherAloneBesideThePapersClient) {
   EXPECT_EQ(to[0].port, 50000);
 }
 
-TEST(UdpLink, StatesForWatchersLeaveRoomForThoseOfTheHost) {
+TEST(UdpLink, StatesForWatchersLeaveRoomForTheHost) {
   giga::UdpLink link;
   giga::UdpPort port(link, &clock_ms);
   link.set_up(true);
@@ -175,7 +175,7 @@ TEST(UdpLink, StatesForWatchersLeaveRoomForThoseOfTheHost) {
   EXPECT_EQ(port.dropped(), dropped) << "room for answers remains";
 }
 
-TEST(UdpLink, AThreadThatWasAwaySendsThePresent) {
+TEST(UdpLink, ADelayedThreadSendsNoOldStates) {
   giga::UdpLink link;
   giga::UdpPort port(link, &clock_ms);
   link.set_up(true);
@@ -201,7 +201,7 @@ TEST(UdpLink, AThreadThatWasAwaySendsThePresent) {
   EXPECT_EQ(str(text), "AIN24:24.29;");
 }
 
-TEST(UdpLink, TellsTheLoopOnceThatTheNetworkHasGone) {
+TEST(UdpLink, NotifiesTheLoopOnceThatTheNetworkIsLost) {
   giga::UdpLink link;
   giga::UdpPort port(link, &clock_ms);
   const auto receive = [&] { return port.receive([](std::uint32_t, Text) {}); };

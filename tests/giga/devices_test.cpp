@@ -75,7 +75,7 @@ TEST(GigaPins, TheUsersBusIsTheCoresWire1) {
   EXPECT_EQ(giga::user_sda_function, 4U);
 }
 
-TEST_F(GigaDevices, AreReadAtTheirRateBesideTheChips) {
+TEST_F(GigaDevices, AreReadAtTheirRateOnTheirOwnBus) {
   read_all();
   bench.giga.i2c.log.clear();
   bench.giga.user_i2c.log.clear();
@@ -97,7 +97,7 @@ TEST_F(GigaDevices, AreReadAtTheirRateBesideTheChips) {
   for (const auto& transfer : bench.giga.i2c.log) EXPECT_NE(transfer[0] >> 1, 0x68);
 }
 
-TEST_F(GigaDevices, OneThatIsNotThereIsToldAndAScanFindsTheOthers) {
+TEST_F(GigaDevices, AMissingDeviceIsReportedAndAScanFindsTheOthers) {
   command("F:I2CX,I2CBUS");
   command("X:READ,0x50,x00,1");
   states(30);
@@ -110,7 +110,7 @@ TEST_F(GigaDevices, OneThatIsNotThereIsToldAndAScanFindsTheOthers) {
   EXPECT_EQ(state.i2c_answer.data.bytes[1], 0x68);
 }
 
-TEST_F(GigaDevices, AByteBehindOneThatWasRefusedIsNotTheFirstOfTheNextTransfer) {
+TEST_F(GigaDevices, ARefusedTransferLeavesNoByteForTheNext) {
   command("F:I2CX,I2CBUS");
   bench.giga.user_i2c.refuse_after(1);
   command("X:WRITE,0x40,x051122");
@@ -124,7 +124,7 @@ TEST_F(GigaDevices, AByteBehindOneThatWasRefusedIsNotTheFirstOfTheNextTransfer) 
             (std::vector<std::vector<std::uint8_t>>{{0x68 << 1, 0x6B, 0x00}}));
 }
 
-TEST_F(GigaDevices, AReadingThatIsKeptAsASettingNeedsNoRecoveryAtBoot) {
+TEST_F(GigaDevices, AReadingFromSettingsNeedsNoBusRecoveryAtBoot) {
   command("C:i2c1,0x68:x75:1:50");
   bench.run_ms(1000, host, bench.usb());
   bench.restart();
@@ -136,7 +136,7 @@ TEST_F(GigaDevices, AReadingThatIsKeptAsASettingNeedsNoRecoveryAtBoot) {
   EXPECT_EQ(state.i2c_bus.recoveries, 0U);
 }
 
-TEST_F(GigaDevices, ADeviceThatWasCutOffIsClockedFree) {
+TEST_F(GigaDevices, FreesTheBusFromACutOffDevice) {
   read_all();
   bench.giga.user_i2c.hold_sda(9);
   states(200);
@@ -144,7 +144,7 @@ TEST_F(GigaDevices, ADeviceThatWasCutOffIsClockedFree) {
   EXPECT_LE(state.t_ms - state.raw.i2c[0].t_ms, 20U) << "the device is read again";
 }
 
-TEST_F(GigaDevices, ALineThatIsHeldCostsTheBoardNothing) {
+TEST_F(GigaDevices, AHeldBusDoesNotDelayTheBoard) {
   read_all();
   for (const bool scl : {false, true}) {
     bench.giga.user_i2c.hold_sda(scl ? 0 : 1'000'000);
@@ -172,7 +172,7 @@ TEST_F(GigaDevices, ALineThatIsHeldCostsTheBoardNothing) {
 
 // --- UARTs, DAC and spare inputs
 
-TEST(UserUartTiming, IsWithinOnePercentAtEveryRateAndClock) {
+TEST(UserUartTiming, IsWithin1Point5PercentAtEveryRateAndClock) {
   for (std::uint32_t mhz = 16; mhz <= 250; ++mhz) {
     for (const std::uint32_t baud : {1200U, 9600U, 38400U, 115200U, 230400U, 460800U}) {
       const giga::UartTiming timing = giga::user_uart_timing(mhz * 1000000, baud);
@@ -197,7 +197,7 @@ TEST(GigaPins, TheUsersUartsAreTheCoresSerial2AndSerial3) {
 }
 
 // From the same commit: A12 PA_4 (DAC1_OUT1), A13 PA_5 (DAC1_OUT2).
-TEST(GigaPins, TheUsersVoltagesAreA12AndA13) {
+TEST(GigaPins, TheDacOutputsAreA12AndA13) {
   EXPECT_TRUE(giga::dac_pins[0] == (giga::Pin{'A', 4}));
   EXPECT_TRUE(giga::dac_pins[1] == (giga::Pin{'A', 5}));
 }
@@ -211,7 +211,7 @@ TEST(GigaPins, TheSpareInputsAreD6AndD44AndD8ToD13) {
   }
 }
 
-TEST_F(GigaDevices, AUartHearsEachByteOnceAndSendsWhatItIsTold) {
+TEST_F(GigaDevices, AUartReceivesEachByteOnceAndSendsItsWrites) {
   told = "UART1";
   command("F:UART1,UART2");
   command("C:uart1,115200:8N1");
@@ -235,7 +235,7 @@ TEST_F(GigaDevices, AUartHearsEachByteOnceAndSendsWhatItIsTold) {
   EXPECT_EQ(state.raw.uart[0].position + state.raw.uart[0].data.size, 60U);
 }
 
-TEST_F(GigaDevices, WhatAUartHasNotSentWhenAStopComesIsDropped) {
+TEST_F(GigaDevices, AStopDropsUnsentUartBytes) {
   command("C:uart1,1200:8N1");
   command("X:UART,1,x" + std::string(96, '4'));
   bench.run_ms(30);
@@ -245,7 +245,7 @@ TEST_F(GigaDevices, WhatAUartHasNotSentWhenAStopComesIsDropped) {
   EXPECT_LE(bench.giga.uart[0].sent.size(), sent + 1) << "at most the byte on the wire";
 }
 
-TEST_F(GigaDevices, NoDamagedByteIsToldAndNoOtherIsLost) {
+TEST_F(GigaDevices, DropsOnlyTheDamagedUartBytes) {
   told = "UART1";
   command("F:UART1");
   command("C:uart1,9600:8N1");
@@ -258,7 +258,7 @@ TEST_F(GigaDevices, NoDamagedByteIsToldAndNoOtherIsLost) {
   EXPECT_EQ(state.raw.uart[0].position + state.raw.uart[0].data.size, bench.giga.uart[0].said);
 }
 
-TEST_F(GigaDevices, NoiseOnTheUartsCostsTheBoardNothing) {
+TEST_F(GigaDevices, NoiseOnTheUartsDoesNotDelayTheBoard) {
   told = "UART1";
   command("F:UART1,UART2");
   command("C:uart1,460800:8N1");
@@ -282,7 +282,7 @@ TEST_F(GigaDevices, NoiseOnTheUartsCostsTheBoardNothing) {
   EXPECT_TRUE(bench.pins().is_safe()) << "the host is silent";
 }
 
-TEST_F(GigaDevices, AVoltageIsSetAndIsZeroInTheSafeState) {
+TEST_F(GigaDevices, ADacVoltageIsSetAndZeroInTheSafeState) {
   command("X:DAC,1,1650");
   command("X:DAC,2,3300");
   EXPECT_EQ(DAC1->DHR12R1.value, 2048U);

@@ -55,13 +55,13 @@ TEST(CanBitTiming, SamplesAt86Point7Percent) {
   EXPECT_FALSE(giga::can_bit_timing(60500000, 1000000).valid) << "not a whole number";
 }
 
-TEST(Fdcan, WritesTheTimingAsTheRegisterWantsIt) {
+TEST(Fdcan, WritesTheTimingInTheFormatOfTheRegister) {
   Controller c;
   EXPECT_EQ(FDCAN2->NBTP.value, 7U << 25 | 0U << 16 | 50U << 8 | 7U);
   EXPECT_EQ(FDCAN2->CCCR.value & 3U, 0U) << "the controller is on the bus";
 }
 
-TEST(Fdcan, DoesNotStartWithoutAFittingClock) {
+TEST(Fdcan, DoesNotStartWithAnUnsuitableClock) {
   fake::Giga chip;
   Fdcan can(*FDCAN2, r4_fake_message_ram);
   EXPECT_FALSE(can.start(giga::can_bit_timing(10000000, 1000000), 0x010, 0x187, 0x607));
@@ -71,7 +71,7 @@ TEST(Fdcan, DoesNotStartWithoutAFittingClock) {
   EXPECT_FALSE(can.receive(out));
 }
 
-TEST(Fdcan, TakesOnlyTheStopAndItsOwnCommands) {
+TEST(Fdcan, AcceptsOnlyTheStopAndItsOwnCommands) {
   Controller c;
   for (std::uint32_t id = 0; id <= max_can_id; ++id) {
     EXPECT_EQ(c.chip.can.deliver(frame(id)), id == 0x010 || id == 0x187 || id == 0x607) << id;
@@ -80,7 +80,7 @@ TEST(Fdcan, TakesOnlyTheStopAndItsOwnCommands) {
   }
 }
 
-TEST(Fdcan, GivesAFrameAsItCame) {
+TEST(Fdcan, ReceivesAFrameUnchanged) {
   Controller c;
   c.chip.can.deliver(frame(0x187, 0x21));
   CanFrame taken;
@@ -90,7 +90,7 @@ TEST(Fdcan, GivesAFrameAsItCame) {
   EXPECT_FALSE(c.can.receive(taken));
 }
 
-TEST(Fdcan, KeepsABurstOfSevenMillisecondsAndTellsWhatItLost) {
+TEST(Fdcan, KeepsABurstOf7MillisecondsAndCountsLostFrames) {
   Controller c;
   for (int i = 0; i < 70; ++i) c.chip.can.deliver(frame(0x187, static_cast<std::uint8_t>(i)));
   c.can.poll(c.now_us());
@@ -103,7 +103,7 @@ TEST(Fdcan, KeepsABurstOfSevenMillisecondsAndTellsWhatItLost) {
   EXPECT_FALSE(c.can.receive(taken));
 }
 
-TEST(Fdcan, AStopIsHeardBehindAFullQueue) {
+TEST(Fdcan, AStopPassesAFullReceiveQueue) {
   Controller c;
   for (int i = 0; i < 70; ++i) c.chip.can.deliver(frame(0x187));
   c.chip.can.deliver(frame(0x010));
@@ -112,7 +112,7 @@ TEST(Fdcan, AStopIsHeardBehindAFullQueue) {
   EXPECT_EQ(taken.id, 0x010U);
 }
 
-TEST(Fdcan, SendsInOrderAndSaysWhenItIsFull) {
+TEST(Fdcan, SendsInOrderAndRefusesFramesWhenFull) {
   Controller c;
   for (int i = 0; i < 8; ++i) {
     EXPECT_TRUE(c.can.send(frame(0x407, static_cast<std::uint8_t>(i)))) << i;
@@ -127,7 +127,7 @@ TEST(Fdcan, SendsInOrderAndSaysWhenItIsFull) {
   EXPECT_TRUE(c.can.send(frame(0x407)));
 }
 
-TEST(Fdcan, WhatIsUrgentOvertakesTheQueue) {
+TEST(Fdcan, AnUrgentFrameOvertakesTheQueue) {
   Controller c;
   for (int i = 0; i < 8; ++i) c.can.send(frame(0x407));
   EXPECT_TRUE(c.can.send_urgent(frame(0x027)));
@@ -137,7 +137,7 @@ TEST(Fdcan, WhatIsUrgentOvertakesTheQueue) {
   EXPECT_EQ(c.chip.can.sent.size(), 9U);
 }
 
-TEST(Fdcan, LeavesBusOffAfterAWhileAndForgetsWhatWaited) {
+TEST(Fdcan, LeavesBusOffAfterAWhileAndDropsWaitingFrames) {
   Controller c;
   for (int i = 0; i < 8; ++i) c.can.send(frame(0x407));
   c.chip.can.go_bus_off();
@@ -157,7 +157,7 @@ TEST(Fdcan, LeavesBusOffAfterAWhileAndForgetsWhatWaited) {
   EXPECT_EQ(c.can.counters().bus_offs, 1U);
 }
 
-TEST(Fdcan, ThrowsAwayWhatNobodyAcknowledges) {
+TEST(Fdcan, DropsFramesThatAreNotAcknowledged) {
   Controller c;
   c.chip.can.acknowledged = false;
   c.can.send(frame(0x407));
@@ -168,7 +168,7 @@ TEST(Fdcan, ThrowsAwayWhatNobodyAcknowledges) {
   EXPECT_TRUE(c.chip.can.sent.empty());
 }
 
-TEST(Fdcan, AFullBusIsNoStandstill) {
+TEST(Fdcan, AFullBusIsNotReportedAsStale) {
   Controller c;
   for (int i = 0; i < 200; ++i) {
     while (c.can.send(frame(0x407))) {
@@ -177,7 +177,7 @@ TEST(Fdcan, AFullBusIsNoStandstill) {
   }
 }
 
-TEST(Fdcan, TellsItsErrorState) {
+TEST(Fdcan, ReportsItsErrorState) {
   Controller c;
   EXPECT_EQ(c.can.state(), CanState::active);
   FDCAN2->PSR.value = 1U << 6;

@@ -93,7 +93,7 @@ TEST(I2cController, ReadsAfterARepeatedStart) {
   EXPECT_EQ(bus.chip.i2c.log, (std::vector<Bytes>{{0x80, 0x00}, {0x81}}));
 }
 
-TEST(I2cController, TellsThatNobodyAnswers) {
+TEST(I2cController, ReportsThatNoChipAnswers) {
   Bus bus;
   EXPECT_EQ(bus.write(0x55, {1, 2, 3}), I2cResult::no_acknowledge);
   EXPECT_LE(bus.took_us, 60U);
@@ -102,19 +102,19 @@ TEST(I2cController, TellsThatNobodyAnswers) {
   EXPECT_EQ(bus.write(0x40, {0x00}), I2cResult::ok) << "the bus still works";
 }
 
-TEST(I2cController, AsksWhoIsThereWithoutBytes) {
+TEST(I2cController, ProbesAnAddressWithoutSendingBytes) {
   Bus bus;
   EXPECT_EQ(bus.write(0x61, {}), I2cResult::ok);
   EXPECT_EQ(bus.write(0x62, {}), I2cResult::no_acknowledge);
 }
 
-TEST(I2cController, RefusesWhatItCannotSendAtOnce) {
+TEST(I2cController, RefusesATransferOfMoreThan255Bytes) {
   Bus bus;
   EXPECT_EQ(bus.write(0x40, Bytes(256)), I2cResult::no_acknowledge);
   EXPECT_TRUE(bus.chip.i2c.log.empty());
 }
 
-TEST(I2cController, TheByteBehindOneThatWasRefusedIsNotSentLater) {
+TEST(I2cController, ARefusedTransferLeavesNoByteForTheNext) {
   for (int after = 0; after < 4; ++after) {
     Bus bus;
     bus.chip.i2c.refuse_after(after);
@@ -125,7 +125,7 @@ TEST(I2cController, TheByteBehindOneThatWasRefusedIsNotSentLater) {
   }
 }
 
-TEST(I2cController, ARecoveryGivesAChipThatHoldsNothingNoBits) {
+TEST(I2cController, ARecoveryOfAFreeBusSendsOnlyAStopCondition) {
   Bus bus;
   const int before = bus.chip.rises(giga::i2c_scl_pin.port, giga::i2c_scl_pin.number);
   EXPECT_TRUE(bus.bus.recover());
@@ -133,7 +133,7 @@ TEST(I2cController, ARecoveryGivesAChipThatHoldsNothingNoBits) {
       << "SCL is released, then STOP";
 }
 
-TEST(I2cController, WaitsForAHeldLineNoLongerThanItPromises) {
+TEST(I2cController, AHeldLineTimesOutWithinTheLimit) {
   Bus bus;
   bus.chip.i2c.hold_sda(9);
   for (const std::size_t size : {0U, 1U, 5U, 65U}) {
@@ -142,7 +142,7 @@ TEST(I2cController, WaitsForAHeldLineNoLongerThanItPromises) {
   }
 }
 
-TEST(I2cController, WaitsNoLongerWhenALineIsHeldOnTheWay) {
+TEST(I2cController, ALineHeldDuringATransferTimesOutWithinTheLimit) {
   Bus bus;
   for (int after = 0; after < 6; ++after) {
     bus.chip.i2c.hold_after(after, 9);
@@ -163,7 +163,7 @@ TEST(I2cController, FreesAChipThatWasCutOffWithNineClocks) {
   EXPECT_EQ(bus.write(0x40, {0x00}), I2cResult::timeout);
 }
 
-TEST(I2cController, GivesUpSoonWhenTheClockIsHeld) {
+TEST(I2cController, ARecoveryFailsSoonIfTheClockIsHeld) {
   Bus bus;
   bus.chip.i2c.hold_scl(true);
   const std::uint64_t before_us = bus.now_us();
@@ -171,7 +171,7 @@ TEST(I2cController, GivesUpSoonWhenTheClockIsHeld) {
   EXPECT_LT(bus.now_us() - before_us, 100U);
 }
 
-TEST(I2cController, GivesThePinsBackToThePeripheral) {
+TEST(I2cController, ARecoveryReturnsThePinsToThePeripheral) {
   Bus bus;
   bus.bus.recover();
   EXPECT_EQ(GPIOB->MODER.value >> 22 & 3U, 2U);
@@ -181,7 +181,7 @@ TEST(I2cController, GivesThePinsBackToThePeripheral) {
   EXPECT_EQ(GPIOH->AFR[0].value >> 16 & 0xFU, 4U);
 }
 
-TEST(I2cController, ABusErrorThatDidNotOccurChangesNothing) {
+TEST(I2cController, IgnoresAFalseBusError) {
   for (int after = 0; after < 4; ++after) {
     Bus bus;
     bus.chip.i2c.report_bus_error_after(after);
@@ -194,7 +194,7 @@ TEST(I2cController, ABusErrorThatDidNotOccurChangesNothing) {
   }
 }
 
-TEST(I2cController, ATransferThatLostTheBusIsRepeatedOnce) {
+TEST(I2cController, RepeatsATransferOnceAfterALostArbitration) {
   for (int after = 0; after < 4; ++after) {
     Bus bus;
     bus.chip.i2c.lose_after(after, 1);
@@ -209,7 +209,7 @@ TEST(I2cController, ATransferThatLostTheBusIsRepeatedOnce) {
 
 // An interrupt at every microsecond of two attempts switches everything off. The second attempt
 // must not undo that.
-TEST(I2cController, AnAttemptThatWasTakenOverIsNotRepeated) {
+TEST(I2cController, DoesNotRepeatATransferAfterAnInterruptUsedTheBus) {
   for (std::uint64_t at_us = 1; at_us < 260; ++at_us) {
     Bus bus;
     bus.chip.i2c.lose_after(3, 1);
@@ -225,7 +225,7 @@ TEST(I2cController, AnAttemptThatWasTakenOverIsNotRepeated) {
 }
 
 // An interrupt at every microsecond of a transfer recovers the bus and uses it.
-TEST(I2cController, ATransferThatWasTakenOverDoesNotGoOn) {
+TEST(I2cController, ATransferDoesNotContinueAfterAnInterruptUsedTheBus) {
   for (std::uint64_t at_us = 1; at_us < 130; ++at_us) {
     Bus bus;
     const auto result = bus.write_interrupted(at_us, [&] {
@@ -241,7 +241,7 @@ TEST(I2cController, ATransferThatWasTakenOverDoesNotGoOn) {
   }
 }
 
-TEST(I2cController, ATransferInAnInterruptTakesTheBusOver) {
+TEST(I2cController, ATransferInAnInterruptTakesOverTheBus) {
   for (std::uint64_t at_us = 1; at_us < 130; ++at_us) {
     Bus bus;
     const auto result = bus.write_interrupted(at_us, [&] {

@@ -15,7 +15,7 @@ std::uint32_t* lowest_word(bool own) { return own ? r4_giga_own_stack : __StackL
 
 class GigaStacks : public testing::TestWithParam<bool> {};
 
-TEST_P(GigaStacks, OneThatIsFullSwitchesEverythingOffWithinAMillisecondAndStaysAFault) {
+TEST_P(GigaStacks, AFullStackMakesTheBoardSafeWithinAMillisecond) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -39,7 +39,7 @@ TEST_P(GigaStacks, OneThatIsFullSwitchesEverythingOffWithinAMillisecondAndStaysA
   EXPECT_TRUE(has_line(bench.report(), "Last boot ended by: a full stack of the interrupts"));
 }
 
-TEST_P(GigaStacks, OneThatIsFullEndsAHungBoardToo) {
+TEST_P(GigaStacks, AFullStackMakesAHungBoardSafe) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -53,7 +53,7 @@ TEST_P(GigaStacks, OneThatIsFullEndsAHungBoardToo) {
 
 INSTANTIATE_TEST_SUITE_P(Each, GigaStacks, testing::Bool());
 
-TEST(GigaStacksReport, TellsTheMostThatTheyHaveHeld) {
+TEST(GigaStacksReport, ShowsThePeakUseOfEachStack) {
   GigaBench bench;
   bench.boot();
   r4_giga_own_stack[924] = 0;  // a hundred words

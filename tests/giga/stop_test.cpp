@@ -66,7 +66,7 @@ void emergency_frame(GigaBench& bench) {
 
 constexpr std::uint64_t bar_us = 1000;
 
-TEST(GigaStop, OverUsbAndByCansFrameIsObeyedWhileTheLoopHangs) {
+TEST(GigaStop, AStopOverUsbOrByCanFrameWorksWhileTheLoopHangs) {
   for (const bool over_usb : {true, false}) {
     StopBench bench;
     const auto stop = [&] {
@@ -82,7 +82,7 @@ TEST(GigaStop, OverUsbAndByCansFrameIsObeyedWhileTheLoopHangs) {
   }
 }
 
-TEST(GigaStop, OverUsbAndByCansFrameIsObeyedAtAnyMomentOfATurn) {
+TEST(GigaStop, AStopOverUsbOrByCanFrameWorksAtAnyMomentOfATurn) {
   for (const bool over_usb : {true, false}) {
     StopBench bench;
     const auto stop = [&] {
@@ -107,7 +107,7 @@ TEST(GigaStop, OverUsbAndByCansFrameIsObeyedAtAnyMomentOfATurn) {
 
 // The loop assembles a datagram from CAN frames, so its stop waits for the end of a turn. Our hosts
 // send the frame.
-TEST(GigaStop, OverCanAsADatagramIsObeyedInTheNextTurn) {
+TEST(GigaStop, AStopByCanDatagramWorksInTheNextTurn) {
   StopBench bench;
   std::uint64_t longest_us = 0;
   for (std::uint64_t after_us = 7; after_us < 3000; after_us += 131) {
@@ -122,7 +122,7 @@ TEST(GigaStop, OverCanAsADatagramIsObeyedInTheNextTurn) {
   EXPECT_LE(longest_us, 5000U);
 }
 
-TEST(GigaStop, OverUsbIsHeardBehindInputThatTheLoopHasNotRead) {
+TEST(GigaStop, AUsbStopPassesUnreadInput) {
   StopBench bench;
   const auto stop = [&] {
     for (int i = 0; i < 10; ++i) bench.usb()(bench.host.command("O:100,1,1"));
@@ -131,7 +131,7 @@ TEST(GigaStop, OverUsbIsHeardBehindInputThatTheLoopHasNotRead) {
   EXPECT_LE(bench.us_to_safe(stop, 300, [&] { bench.giga.pass_us(20); }), bar_us);
 }
 
-TEST(GigaStop, OverUsbIsHeardAsTheFirstLineOfAProgramAfterOneThatWasCutOff) {
+TEST(GigaStop, AUsbStopWorksAfterAnotherProgramsUnfinishedLine) {
   StopBench bench;
   bench.giga.usb_send("O:358,1");
   bench.run_ms(5);
@@ -145,7 +145,7 @@ TEST(GigaStop, OverUsbIsHeardAsTheFirstLineOfAProgramAfterOneThatWasCutOff) {
   EXPECT_LE(bench.us_to_safe(stop, 300, [&] { bench.giga.pass_us(20); }), bar_us);
 }
 
-TEST(GigaStop, OverUsbPassesADeadLoopWithAFullRing) {
+TEST(GigaStop, TheGuardMakesAHungLoopWithAFullUsbRingSafe) {
   // The host keeps the bytes that the board cannot take. The guard notices that the loop hangs.
   StopBench bench;
   for (int i = 0; i < 200; ++i) bench.giga.usb_send(std::string(64, 'x'));
@@ -156,7 +156,7 @@ TEST(GigaStop, OverUsbPassesADeadLoopWithAFullRing) {
   EXPECT_TRUE(bench.pins().is_safe());
 }
 
-TEST(GigaStop, OverUdpIsObeyedWhenTheThreadHasItWhileTheLoopHangs) {
+TEST(GigaStop, AUdpStopWorksWhileTheLoopHangs) {
   GigaBench bench;
   ASSERT_TRUE(bench.boot_in_network());
   PlainHost host;

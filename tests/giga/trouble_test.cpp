@@ -32,7 +32,7 @@ void expect_safe_soon_and_reset(GigaBench& bench, Turn turn) {
   EXPECT_LE(bench.giga.now_ms() - failed_ms, 450U);
 }
 
-TEST(GigaWatchdog, ALoopThatHangsIsSafeSoonAndResetsTheBoardWhichStaysSafe) {
+TEST(GigaWatchdog, AHungLoopGoesSafeAndResetsTheBoard) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -55,7 +55,7 @@ TEST(GigaWatchdog, ALoopThatHangsIsSafeSoonAndResetsTheBoardWhichStaysSafe) {
   EXPECT_EQ(bench.pins().osmc[0].pwm, 358);
 }
 
-TEST(GigaWatchdog, AStepTimerThatIsDeadStopsTheBoardAndResetsItWhichStaysSafe) {
+TEST(GigaWatchdog, ADeadStepTimerMakesTheBoardSafeAndResetsIt) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -74,7 +74,7 @@ TEST(GigaWatchdog, AStepTimerThatIsDeadStopsTheBoardAndResetsItWhichStaysSafe) {
   EXPECT_EQ(bench.giga.rises('A', 3), 20) << "the timer runs again";
 }
 
-TEST(GigaWatchdog, ADeadlineThatTheLoopMissesIsCountedInTheReport) {
+TEST(GigaWatchdog, TheReportCountsMissedDeadlinesOfTheLoop) {
   GigaBench bench;
   bench.boot();
   bench.run_ms(20);
@@ -84,7 +84,7 @@ TEST(GigaWatchdog, ADeadlineThatTheLoopMissesIsCountedInTheReport) {
   EXPECT_EQ(bench.reason(), SafeReason::none) << "two missed deadlines are forgiven";
 }
 
-TEST(GigaWatchdog, BitesWhenEvenTheTimerInterruptIsDead) {
+TEST(GigaWatchdog, ResetsTheBoardIfTheTimerInterruptIsDead) {
   GigaBench bench;
   bench.boot();
   EXPECT_TRUE(bench.giga.reset_by([&] {
@@ -95,7 +95,7 @@ TEST(GigaWatchdog, BitesWhenEvenTheTimerInterruptIsDead) {
   EXPECT_EQ(bench.reason(), SafeReason::watchdog);
 }
 
-TEST(GigaFault, AProcessorFaultSwitchesEverythingOffAndIsReportedByTheNextBoot) {
+TEST(GigaFault, AProcessorFaultTurnsOutputsOffAndTheNextBootReportsIt) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -109,7 +109,7 @@ TEST(GigaFault, AProcessorFaultSwitchesEverythingOffAndIsReportedByTheNextBoot) 
   EXPECT_TRUE(has_line(bench.report(), "fault, exception 3, pc 0x00, status 0x8200"));
 }
 
-TEST(GigaFault, InTheMiddleOfATransferEverythingIsSwitchedOffAllTheSame) {
+TEST(GigaFault, AFaultDuringATransferTurnsAllOutputsOff) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -132,7 +132,7 @@ TEST(GigaFault, InTheMiddleOfATransferEverythingIsSwitchedOffAllTheSame) {
   }
 }
 
-TEST(GigaFault, AnErrorOfTheCoreEndsTheBootInsteadOfBlinkingForEver) {
+TEST(GigaFault, AnErrorOfTheCoreResetsTheBoard) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -155,7 +155,7 @@ TEST(GigaFault, AWarningOfTheCoreChangesNothing) {
   EXPECT_NE(bench.reason(), SafeReason::fault);
 }
 
-TEST(GigaFault, ASettingsStoreThatEndsTheBootIsLeftOutOfTheNext) {
+TEST(GigaFault, TheNextBootSkipsASettingsStoreThatFailed) {
   GigaBench bench;
   bench.giga.stored["r4-settings"] = "rate,20\n";
   bench.giga.flash_hangs = true;
@@ -179,7 +179,7 @@ TEST(GigaFault, ASettingsStoreThatEndsTheBootIsLeftOutOfTheNext) {
       << "the next boot uses the store again";
 }
 
-TEST(GigaFault, AfterTheStoreHasStartedDoesNotCostTheSettings) {
+TEST(GigaFault, AFaultAfterTheStoreStartedKeepsTheSettings) {
   GigaBench bench;
   bench.giga.stored["r4-settings"] = "rate,20\n";
   bench.boot();
@@ -203,7 +203,7 @@ TEST(GigaTimers, LateTicksInOneInterruptWakeTheLoopOnce) {
   EXPECT_LE(bench.giga.now_ms() - before_ms, 12U) << "each tick wakes the loop again";
 }
 
-TEST(GigaBus, AStuckBusCostsTheLoopAtMostItsBound) {
+TEST(GigaBus, AStuckBusDelaysTheLoopWithinItsLimit) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -253,7 +253,7 @@ TEST(GigaSettings, SurviveARestart) {
   EXPECT_TRUE(has_line(bench.usb_lines(), "AIN24:16.50;"));
 }
 
-TEST(GigaSettings, CalibrateTheirAnalogInputAtOnceAndNoOther) {
+TEST(GigaSettings, CalibrateOnlyTheirAnalogInputAtOnce) {
   const std::vector<std::string> names = {"AIN24", "AIN12", "AIN5", "AINDMH", "AINSTEER", "AIN6"};
   for (const std::string& calibrated : names) {
     GigaBench bench;
@@ -275,7 +275,7 @@ TEST(GigaSettings, CalibrateTheirAnalogInputAtOnceAndNoOther) {
   }
 }
 
-TEST(GigaSettings, AreNotKeptWhereAUsersFilesMayBe) {
+TEST(GigaSettings, AreNotStoredOnAPartitionForUserFiles) {
   GigaBench bench;
   bench.giga.partition_size = 8 * 1024 * 1024;
   bench.boot();
@@ -287,7 +287,7 @@ TEST(GigaSettings, AreNotKeptWhereAUsersFilesMayBe) {
   EXPECT_TRUE(has_line(bench.report(), "Settings: not kept"));
 }
 
-TEST(GigaSettings, ThatCouldNotBeReadInTimeAreNotOverwritten) {
+TEST(GigaSettings, AreNotOverwrittenIfTheyCouldNotBeRead) {
   GigaBench bench;
   bench.giga.stored["r4-settings"] = "network,mine\nrate,20\n";
   bench.giga.flash_hangs = true;
@@ -307,7 +307,7 @@ TEST(GigaSettings, ThatCouldNotBeReadInTimeAreNotOverwritten) {
   EXPECT_TRUE(has_line(bench.report(), "Settings: not kept: the key-value store was not ready"));
 }
 
-TEST(GigaSettings, AKeySurvivesARestartAndIsAskedForOnCan) {
+TEST(GigaSettings, AKeySurvivesARestartAndIsRequiredOnCan) {
   GigaBench bench;
   bench.boot();
   PlainHost host;
@@ -354,7 +354,7 @@ TEST(GigaReport, ReportsHowManyPathsTheSessionHas) {
   EXPECT_TRUE(has_line(bench.report(), "Paths: 2; joined 1, lost 0"));
 }
 
-TEST(GigaSettings, TellWhichChipsAreFitted) {
+TEST(GigaSettings, SelectTheFittedChips) {
   GigaBench bench;
   bench.giga.stored["r4-settings"] = "chips,17\n";  // OSMC and servos
   bench.boot();
@@ -367,7 +367,7 @@ TEST(GigaSettings, TellWhichChipsAreFitted) {
   }
 }
 
-TEST(GigaSettings, ForTheNetworkAreRefusedOverCan) {
+TEST(GigaSettings, NetworkSettingsAreRefusedOverCan) {
   GigaBench bench;
   bench.boot();
   PlainHost host;

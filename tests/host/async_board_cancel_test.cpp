@@ -48,7 +48,7 @@ struct AsyncBoardUnanswered : OnALoop {
 };
 struct AsyncBoardCancellation : testing::Test, AsyncBoardUnanswered {};
 
-TEST(AsyncBoardCancellations, EndACommandAnArmASettingAndAWait) {
+TEST(AsyncBoardCancellations, CancelACommandAnArmALinkTimingAndAWait) {
   const auto expect_cancelled = [](auto start) {
     AsyncBoardUnanswered each;
     const auto result = each.cancelled([&](auto token) { start(each.board, token); });
@@ -62,7 +62,7 @@ TEST(AsyncBoardCancellations, EndACommandAnArmASettingAndAWait) {
   expect_cancelled([](AsyncBoard& board, auto token) { board.async_wait_active(1h, token); });
 }
 
-TEST_F(AsyncBoardCancellation, EndsTheWaitForAStopThatGoesOn) {
+TEST_F(AsyncBoardCancellation, EndsTheWaitForAStopButTheStopIsRepeated) {
   asio::cancellation_signal signal;
   const CommandResult result = result_of([&](auto note) {
     board.async_send(Command::stop(), 1h, asio::bind_cancellation_slot(signal.slot(), note));
@@ -74,7 +74,7 @@ TEST_F(AsyncBoardCancellation, EndsTheWaitForAStopThatGoesOn) {
       << "the stop must be repeated";
 }
 
-TEST(AsyncBoardCancel, IsNotLostBetweenTheSettingsOfALinkTiming) {
+TEST(AsyncBoardCancel, WorksBetweenTheTwoSettingsOfALinkTiming) {
   asio::io_context io;
   AsyncBoard board(io, "sim:", at_will());
   asio::cancellation_signal signal;
@@ -100,7 +100,7 @@ TEST(AsyncBoardCancel, IsNotLostBetweenTheSettingsOfALinkTiming) {
   EXPECT_EQ(result->outcome, Outcome::cancelled) << "the first of three commands had been sent";
 }
 
-TEST_F(AsyncBoardCancellation, LetsACoroutineWaitForTheFirstOfTwo) {
+TEST_F(AsyncBoardCancellation, LetsACoroutineWaitForTheFirstOfTwoOperations) {
   using namespace asio::experimental::awaitable_operators;
   std::optional<std::size_t> first;
   const auto race = [&]() -> asio::awaitable<void> {
@@ -115,7 +115,7 @@ TEST_F(AsyncBoardCancellation, LetsACoroutineWaitForTheFirstOfTwo) {
   EXPECT_EQ(first, 1U) << "the timer ends first: the command must not delay it";
 }
 
-TEST(AsyncBoardCancel, ReportsTheNumberByWhichTheCommandWasSent) {
+TEST(AsyncBoardCancel, ReportsThePacketNumberOfTheCommand) {
   asio::io_context io;
   AsyncBoard board(io, "sim:", at_will());
   asio::cancellation_signal signal;

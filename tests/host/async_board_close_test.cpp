@@ -46,7 +46,7 @@ TEST_F(AsyncBoardClose, IsConfirmedWhenTheBoardIsSafe) {
   EXPECT_TRUE(simulated.is_without_host());
 }
 
-TEST_F(AsyncBoardClose, ReportsNothingFromTheCallOnAndTakesNothing) {
+TEST_F(AsyncBoardClose, EndsCallbacksAndRefusesCommandsAtOnce) {
   drive();
   board->on_state([](const State&, const Datagram&) { ADD_FAILURE() << "a state"; });
   board->on_link([](const LinkStatus&) { ADD_FAILURE() << "the link"; });
@@ -61,7 +61,7 @@ TEST_F(AsyncBoardClose, ReportsNothingFromTheCallOnAndTakesNothing) {
   EXPECT_TRUE(simulated.is_without_host());
 }
 
-TEST_F(AsyncBoardClose, EndsWhatIsUnderWay) {
+TEST_F(AsyncBoardClose, EndsCommandsUnderWay) {
   drive();
   std::optional<CommandResult> waits;
   board->async_send(Command::servo(1, Microseconds(1500)), 3s,
@@ -72,7 +72,7 @@ TEST_F(AsyncBoardClose, EndsWhatIsUnderWay) {
   EXPECT_EQ(end->outcome, Outcome::confirmed);
 }
 
-TEST_F(AsyncBoardClose, TimesOutWhereTheBoardIsSilent) {
+TEST_F(AsyncBoardClose, TimesOutIfTheBoardIsSilent) {
   drive();
   simulated.switch_off();
   EXPECT_NE(close(60ms), Outcome::confirmed);

@@ -33,7 +33,7 @@ INSTANTIATE_TEST_SUITE_P(AsyncBoard, ThrownIn,
                            return std::string(std::get<0>(p.param)) + "Over" + std::get<1>(p.param);
                          });
 
-TEST_P(ThrownIn, LeavesTheLoopAndTheBoardGoesOn) {
+TEST_P(ThrownIn, PassesItsExceptionToTheLoopAndTheBoardContinues) {
   BoardInAThread simulated(transport, place == "restart" ? "0.3 reboot\n" : "");
   asio::io_context io;
   AsyncBoard board(io, simulated.url(), at_will());

@@ -49,7 +49,7 @@ TEST(SleepWatchTest, ReportsASleepThatIsLongerThanTheLimitOnce) {
   EXPECT_FALSE(watch.slept(steady_time(), 2s));
 }
 
-TEST(SleepWatchTest, DoesNotTakeAThreadThatGetsNoProcessorForASleep) {
+TEST(SleepWatchTest, DoesNotMistakeABusyProcessorForASleep) {
   SleepWatch watch;
   const Time before = steady_time() - 5s;  // the steady clock was read 5 s before the boot clock
   EXPECT_FALSE(watch.slept(before, 1s));

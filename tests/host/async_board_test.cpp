@@ -44,7 +44,7 @@ struct Overhearing final : IdleCarrier {
   void overhear(std::string_view bytes) { handler_->on_overheard(bytes); }
 };
 
-TEST_F(AsyncBoardTest, ReportsNoSecretOfAnotherHost) {
+TEST_F(AsyncBoardTest, MasksTheSecretsOfAnotherHost) {
   auto path = std::make_unique<Overhearing>();
   Overhearing& other = *path;
   AsyncBoard watching(io, std::move(path), at_will());
@@ -82,7 +82,7 @@ TEST_F(AsyncBoardTest, SendsItsFirstHeartbeatWhenItOpens) {
   EXPECT_EQ(sent[0].substr(0, 9), "H:ROS2-R4");
 }
 
-TEST_F(AsyncBoardTest, OnlyListensAsAWatcherOnABusButForLeasesAndStops) {
+TEST_F(AsyncBoardTest, AWatcherOnABusSendsOnlyLeasesAndStops) {
   std::vector<std::string> sent;
   BoardOptions options;
   options.role = BoardRole::watch;
@@ -98,7 +98,7 @@ TEST_F(AsyncBoardTest, OnlyListensAsAWatcherOnABusButForLeasesAndStops) {
   EXPECT_EQ(sent[0].substr(0, 7), "E:STOP;");
 }
 
-TEST_F(AsyncBoardTest, SendsAStopWhateverItsTimeoutAndRepeatsOneThatIsPosted) {
+TEST_F(AsyncBoardTest, SendsAStopWithAnyTimeoutAndRepeatsAPostedStop) {
   std::vector<std::string> sent;
   BoardOptions options;
   options.role = BoardRole::watch;
@@ -127,7 +127,7 @@ TEST_F(AsyncBoardTest, ReportsStatesOfATransportThatIsNeverDrained) {
   EXPECT_TRUE(run_until([&] { return states >= 3; }));
 }
 
-TEST_F(AsyncBoardTest, WarnsOfAHoldUpOnceHoweverMuchFollowsIt) {
+TEST_F(AsyncBoardTest, WarnsOnceWhenTheLoopWasHeldUp) {
   int warnings = 0;
   board.on_event([&](const CarrierEvent& event) {
     if (event.kind != CarrierEvent::Kind::warning) return;
@@ -252,7 +252,7 @@ TEST_F(AsyncBoardTest, RefusesTheSixtyFifthCommand) {
             static_cast<long>(Session::max_pending));
 }
 
-TEST_F(AsyncBoardTest, CancelsWhenItClosesAndNoCallbackFollows) {
+TEST_F(AsyncBoardTest, CloseCancelsCommandsAndEndsAllCallbacks) {
   std::vector<Outcome> outcomes;
   const auto note = [&](const CommandResult& result) { outcomes.push_back(result.outcome); };
   board.open();
@@ -283,7 +283,7 @@ struct Obstructed final : IdleCarrier {
   std::optional<Problem> trouble;
 };
 
-TEST_F(AsyncBoardTest, IsNotOpenIfNoPathOpensThoughOneOpenedInAnEarlierAttempt) {
+TEST_F(AsyncBoardTest, OpenFailsIfNoPathOpensAfterAPartialAttempt) {
   auto first = std::make_unique<Obstructed>();
   auto second = std::make_unique<Obstructed>();
   Obstructed* const ends[] = {first.get(), second.get()};
@@ -303,7 +303,7 @@ INSTANTIATE_TEST_SUITE_P(AsyncBoard, DestroyedIn,
                          testing::Values("handler", "state", "heartbeat", "link", "nack"),
                          [](const auto& place) { return std::string(place.param); });
 
-TEST_P(DestroyedIn, TheBoardMayBeDestroyedInAnyCallback) {
+TEST_P(DestroyedIn, MayDestroyTheBoard) {
   const std::string place = GetParam();
   BoardInAThread over_udp("udp");
   for (const std::string& url : {std::string("sim:"), over_udp.url()}) {
@@ -333,7 +333,7 @@ TEST_P(DestroyedIn, TheBoardMayBeDestroyedInAnyCallback) {
 }
 
 // The transport is up at once, and reports that inside open().
-TEST(AsyncBoardEnd, MayComeInsideAnEventOfOpening) {
+TEST(AsyncBoardEnd, MayBeClosedOrDestroyedInAnEventOfOpen) {
   asio::io_context io;
   AsyncBoard closed(io, "sim:");
   closed.on_event([&](const CarrierEvent&) { closed.close(); });
@@ -345,7 +345,7 @@ TEST(AsyncBoardEnd, MayComeInsideAnEventOfOpening) {
   io.run();  // returns: no timer is left
 }
 
-TEST(AsyncBoardEnd, IsDestroyedBeforeOrWithoutItsLoop) {
+TEST(AsyncBoardEnd, MayBeDestroyedBeforeItsLoopRuns) {
   asio::io_context io;
   bool called = false;
   {
@@ -366,7 +366,7 @@ TEST(AsyncBoardEnd, IsDestroyedBeforeOrWithoutItsLoop) {
   EXPECT_EQ(outcome, Outcome::closed);
 }
 
-TEST(AsyncBoardEnd, DestroysTheHandlersWithTheLoop) {
+TEST(AsyncBoardEnd, DestroyingTheLoopDestroysTheHandlers) {
   const auto payload = std::make_shared<int>(1);
   {
     asio::io_context io;
@@ -378,7 +378,7 @@ TEST(AsyncBoardEnd, DestroysTheHandlersWithTheLoop) {
   EXPECT_EQ(payload.use_count(), 1);
 }
 
-TEST_F(AsyncBoardTest, GatesItsHeartbeatsAndFeedsFromAnyThread) {
+TEST_F(AsyncBoardTest, WatchdogHoldsHeartbeatsAndAnyThreadMayFeed) {
   board.watchdog(30ms);
   board.open();
   ASSERT_TRUE(run_until([&] { return board.link().gated(); }));

@@ -50,7 +50,7 @@ class Stream {
 
 int driven(Board& board) { return board.next_state().osmc(1).pwm; }
 
-TEST(BoardArming, AStreamDoesNotStartTheMotorsAfterAStopThatIsCleared) {
+TEST(BoardArming, AStreamOfPostsDoesNotStartMotorsAfterAClearedStop) {
   BoardInAThread simulated("udp");
   Board board(simulated.url());
   board.wait_active();
@@ -72,7 +72,7 @@ TEST(BoardArming, AStreamDoesNotStartTheMotorsAfterAStopThatIsCleared) {
   EXPECT_EQ(driven(board), 500);
 }
 
-TEST(BoardArming, ReportsWhatPreventsIt) {
+TEST(BoardArming, NamesTheCauseThatPreventsArming) {
   BoardInAThread simulated("pty", "0 handle released\n");
   Board board(simulated.url());
   const Problem arming = problem_of([&] { board.arm(); });
@@ -93,7 +93,7 @@ TEST(BoardArming, ArmsABoardThatIsStopped) {
   board.osmc(1).set_pwm(358, Direction::forward);
 }
 
-TEST(BoardArming, ClosingTheSupplyStartsNothingThatWasCommandedBefore) {
+TEST(BoardArming, ArmDoesNotExecuteEarlierSetpoints) {
   Board board("sim:", at_will());
   board.wait_active();
   board.osmc(1).set_pwm(500, Direction::forward);  // like a datagram that the network delayed
@@ -102,7 +102,7 @@ TEST(BoardArming, ClosingTheSupplyStartsNothingThatWasCommandedBefore) {
   EXPECT_EQ(driven(board), 0);
 }
 
-TEST(BoardArming, CountsThePostsThatAreRefusedAndReportsThoseThatTheBoardRefuses) {
+TEST(BoardArming, CountsRefusedPostsAndReportsThoseTheBoardRefuses) {
   BoardInAThread simulated("pty");
   Board guarded(simulated.url(), at_will());
   const First<RefusedPost> refused;

@@ -88,7 +88,7 @@ double skew_of(const std::string& transport, int osmc, Drive before, Drive wante
   return skew_ms;
 }
 
-TEST(BoardGroup, FourWheelsOfOneChipChangeAtOnceAndOfTwoWithinAMillisecond) {
+TEST(BoardGroup, FourMotorsChangeWithinAMillisecond) {
   const Drive off;
   const Drive ahead{358, forward};
   const Drive back{4000, Direction::reverse};
@@ -106,7 +106,7 @@ TEST(BoardGroup, FourWheelsOfOneChipChangeAtOnceAndOfTwoWithinAMillisecond) {
 
 struct DrivenGroup : DrivenBoard {};
 
-TEST_F(DrivenGroup, IsConfirmedAsOneAndRefusedAsOne) {
+TEST_F(DrivenGroup, IsConfirmedOrRefusedAsAWhole) {
   board.fields("DEFAULT,OSMC2,SERVO3POS,DAC2");
   board.send(Setpoints{Command::osmc(1, Pwm(358), forward), Command::osmc(2, Pwm(359), forward),
                        Command::servo(3, Microseconds(1500)), Command::dac(2, Millivolts(1650))});

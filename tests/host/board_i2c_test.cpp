@@ -29,7 +29,7 @@ TEST_F(BoardI2c, ReadsWritesAndScans) {
   EXPECT_EQ(read(0x168).kind, ErrorKind::usage);
 }
 
-TEST_F(BoardI2c, RefusesATransferThatIsNoTransfer) {
+TEST_F(BoardI2c, RefusesACommandThatIsNotATransfer) {
   const Problem problem = problem_of([&] { board.i2c().transfer(Command::relay(2, false)); });
   EXPECT_EQ(problem.kind, ErrorKind::usage);
   EXPECT_EQ(problem.reason, "is not a transfer on the I2C bus");

@@ -67,7 +67,7 @@ TEST(BoardPaths, LeadToOneBoardOverUdpAndAPty) {
   EXPECT_EQ(board.link().reason, SafeReason::stop);
 }
 
-TEST(BoardPaths, AreRefusedWithBothNamesIfTheyLeadToTwoBoards) {
+TEST(BoardPaths, TheErrorForTwoBoardsNamesBoth) {
   BoardInAThread left(std::vector<std::string>{"udp"}, "", "left-board");
   BoardInAThread right(std::vector<std::string>{"pty"}, "", "right-board");
   Board board({left.url(), right.url()}, at_will());
@@ -100,7 +100,7 @@ TEST(BoardPaths, AreRefusedIfTheyCannotLeadToOneBoard) {
   AsyncBoard(io, {"can://can0", "can://can1", "can://can1?node=2", "udp://10.0.0.1"});
 }
 
-TEST(BoardPaths, AreOpenedLaterIfTheyCannotBeOpenedYet) {
+TEST(BoardPaths, ReopenAPathThatCouldNotBeOpened) {
   const std::string link = temporary_path("path-");
   BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
   EXPECT_EQ(problem_of([&] {
@@ -123,7 +123,7 @@ TEST(BoardPaths, AreOpenedLaterIfTheyCannotBeOpenedYet) {
 
 // Models a second device that "serial:auto" cannot distinguish from the board: an Error of kind
 // usage.
-TEST(BoardPaths, AreNotDisturbedByAPathThatHasAnotherDevice) {
+TEST(BoardPaths, ContinueIfALaterDeviceOfAPathIsInvalid) {
   const std::string link = temporary_path("odd-");
   BoardInAThread simulated(std::vector<std::string>{"udp", "pty"});
   std::atomic<bool> wrong{false};
@@ -193,7 +193,7 @@ struct BoardPathsInMemory : testing::Test, OnALoop {
   std::unique_ptr<AsyncBoard> board;
 };
 
-TEST_F(BoardPathsInMemory, AreReportedWhenTheyBeginOrCeaseToCarry) {
+TEST_F(BoardPathsInMemory, ReportWhenAPathBeginsOrStopsCarrying) {
   std::vector<PathStatus> told;
   const Subscription keep = board->on_path([&](const PathStatus& path) { told.push_back(path); });
   paths[0]->plug(false);
@@ -211,7 +211,7 @@ TEST_F(BoardPathsInMemory, AreReportedWhenTheyBeginOrCeaseToCarry) {
   EXPECT_TRUE(board->in_control());
 }
 
-TEST_F(BoardPathsInMemory, CostNoHeapPerDatagram) {
+TEST_F(BoardPathsInMemory, AllocateNothingPerDatagram) {
   run_for(300ms);
   const std::uint64_t before = bench::allocations();
   const std::uint64_t states = board->statistics().states;

@@ -35,7 +35,7 @@ std::string error_where(const RefusedCall& refused, const std::function<void()>&
   return text;
 }
 
-TEST(BoardResources, WithoutAThreadLeftIsAnError) {
+TEST(BoardResources, ReportsThatNoThreadIsLeft) {
   const std::string no_thread =
       ": this user may have no more threads; end some programs, or allow more: ulimit -u shows how "
       "many";
@@ -50,7 +50,7 @@ TEST(BoardResources, WithoutAThreadLeftIsAnError) {
   std::filesystem::remove(file);
 }
 
-TEST(BoardResources, WithoutAWatchLeftIsAnError) {
+TEST(BoardResources, ReportsThatTheSystemRefusesToWatchAFile) {
   const auto is_told = [](const std::string& error) {
     return error.find("wait for as many files and sockets as they may") != std::string::npos;
   };

@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(Transports, BoardRoles, testing::ValuesIn(kinds_of_path
                            return paths.param.size() > 1 ? "both" : paths.param[0];
                          });
 
-TEST_P(BoardRoles, AreTakenAndGivenBackAgainAndAgain) {
+TEST_P(BoardRoles, TakeAndReleaseControlRepeatedly) {
   const ScopedSubscription linked = board.on_link([](const LinkStatus& link) {
     EXPECT_NE(link.state, HostLinkState::lost);
     EXPECT_FALSE(link.causes.has(LinkCause::transport_down));
@@ -115,7 +115,7 @@ TEST_P(BoardRoles, KeepRecordingsStatisticsAndIdentity) {
   std::filesystem::remove(path);
 }
 
-TEST_P(BoardRoles, TakeNothingWhileControlIsBeingReleased) {
+TEST_P(BoardRoles, RefuseCommandsWhileControlIsBeingReleased) {
   board.open();
   drive();
   std::optional<CommandResult> released;
@@ -150,7 +150,7 @@ TEST_P(BoardRoles, MayChangeInACallback) {
       << "the callback takes control at each state";
 }
 
-TEST_P(BoardRoles, OfABoardThatIsSilentEndAtTheTimeout) {
+TEST_P(BoardRoles, ReleaseTimesOutOnASilentBoard) {
   board.open();
   drive();
   simulated.switch_off();
@@ -183,7 +183,7 @@ struct Contested final : IdleCarrier {
   std::vector<BoardRole> roles;
 };
 
-TEST(BoardRole, IsRefusedAsAWholeWhereOneOfThePathsIsTaken) {
+TEST(BoardRole, TakeControlFailsOnAllPathsIfOnePathIsTaken) {
   asio::io_context io;
   std::vector<std::unique_ptr<Carrier>> paths;
   auto free = std::make_unique<Contested>(false);
@@ -199,7 +199,7 @@ TEST(BoardRole, IsRefusedAsAWholeWhereOneOfThePathsIsTaken) {
   EXPECT_EQ(board.role(), BoardRole::watch);
 }
 
-TEST(BoardRole, IsRefusedByNameWhereAnotherProgramControlsAndTheBoardIsWatchedOn) {
+TEST(BoardRole, TakeControlNamesTheControllingProgramAndKeepsWatching) {
   BoardInAThread simulated("pty");
   Board watcher(simulated.url(), watching());
   watcher.wait_active();

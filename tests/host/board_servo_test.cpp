@@ -25,7 +25,7 @@ static_assert(PostsServo<Microseconds> && PostsServo<Degrees> && !PostsServo<int
 
 using BoardServo = DrivenBoard;
 
-TEST_F(BoardServo, IsDrivenInDegreesByItsOwnCalibration) {
+TEST_F(BoardServo, TurnsToDegreesByItsCalibration) {
   board.servo(3).calibrate(gripper);
   board.servo(16).calibrate({{Microseconds(2000), Degrees(0)}, {Microseconds(1000), Degrees(180)}});
   board.fields("DEFAULT,SERVO3POS,SERVO16POS");
@@ -41,7 +41,7 @@ TEST_F(BoardServo, IsDrivenInDegreesByItsOwnCalibration) {
       << "a servo that is off has no angle";
 }
 
-TEST_F(BoardServo, RefusesDegreesThatItsCalibrationDoesNotHave) {
+TEST_F(BoardServo, RefusesDegreesOutsideItsCalibration) {
   board.servo(1).set(Microseconds(1200));
   EXPECT_EQ(
       problem_of([&] { board.servo(1).set(Degrees(30)); }).text(),

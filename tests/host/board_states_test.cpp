@@ -40,7 +40,7 @@ std::vector<std::uint32_t> numbers_of(States& states) {
   return numbers;
 }
 
-TEST(BoardStates, HaveNoHolesWhileACallbackAndTheLoopSleep) {
+TEST(BoardStates, AreCompleteWhileACallbackAndTheLoopSleep) {
   const std::string path = testing::TempDir() + "r4-states-" + std::to_string(::getpid());
   BoardOptions options = at_will();
   options.callback_limit = 0ms;
@@ -67,7 +67,7 @@ TEST(BoardStates, HaveNoHolesWhileACallbackAndTheLoopSleep) {
   EXPECT_EQ(taken, all);
 }
 
-TEST(BoardStates, EndWithTheBoardAndOutliveIt) {
+TEST(BoardStates, EndWithTheBoardAndMayBeUsedAfterIt) {
   std::optional<Board> board("udp://127.0.0.1:9?listen=0");
   States states = board->states();
   EXPECT_FALSE(states.take(1ms)) << "the board has sent no state";
@@ -82,7 +82,7 @@ TEST(BoardStates, EndWithTheBoardAndOutliveIt) {
   EXPECT_FALSE(states.take(60s));
 }
 
-TEST(BoardStates, EndTheWaitWithWhatOnWaitThrows) {
+TEST(BoardStates, AnExceptionOfOnWaitEndsTheWait) {
   struct EnoughWaited {};
   BoardOptions options;
   options.on_wait = [] { throw EnoughWaited(); };
@@ -92,7 +92,7 @@ TEST(BoardStates, EndTheWaitWithWhatOnWaitThrows) {
 }
 
 // Compared with a deque, for any order of puts and takes.
-TEST(BoardStates, ComeInOrderAndReportEachGapOnceHoweverTheyArePutAndTaken) {
+TEST(BoardStates, ComeInOrderAndReportEachGapOnce) {
   for (std::uint32_t seed = 0; seed < 40; ++seed) {
     std::mt19937 random(seed);
     const bool lossless = seed % 2 == 0;

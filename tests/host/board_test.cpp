@@ -32,7 +32,7 @@ class BoardOver : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Transports, BoardOver, testing::Values("udp", "pty"),
                          [](const auto& transport) { return std::string(transport.param); });
 
-TEST_P(BoardOver, ConfirmsEveryCommandOnceExecuted) {
+TEST_P(BoardOver, ConfirmsEveryCommandAfterItsExecution) {
   BoardInAThread simulated(GetParam());
   Board board(simulated.url(), at_will());
   board.wait_active();
@@ -153,7 +153,7 @@ TEST(Board, ReportsARestartBeforeTheNewState) {
   EXPECT_EQ(four.get(), (std::vector<int>{0, 358, -1, 0}));
 }
 
-TEST(Board, ReportsWhatIsWrongWithAUrl) {
+TEST(Board, ReportsAnInvalidUrl) {
   const Problem scheme = problem_of([] { Board("fax:123"); });
   EXPECT_EQ(scheme.kind, ErrorKind::usage);
   EXPECT_TRUE(contains(scheme.fix, "udp://HOST"));
@@ -164,7 +164,7 @@ TEST(Board, ReportsWhatIsWrongWithAUrl) {
   EXPECT_EQ(problem_of([] { Board("sim:?node=99"); }).kind, ErrorKind::usage);
 }
 
-TEST(Board, ReportsTheLinkIfItIsNotActive) {
+TEST(Board, ErrorsNameTheReasonOfAnInactiveLink) {
   Board board("udp://127.0.0.1:9?listen=0", at_will());
   const Problem nobody = problem_of([&] { board.wait_active(30ms); });
   EXPECT_EQ(nobody.kind, ErrorKind::refused);
@@ -218,7 +218,7 @@ TEST_F(DrivenBoard, PostsCommandsAndGroupsAndWaitsForStatesWithoutTheHeap) {
 
 // --- commands
 
-TEST_F(DrivenBoard, SendsNoKeyAndNoPasswordWhereOthersSeeIt) {
+TEST_F(DrivenBoard, RefusesToSendSecretsExceptOverACable) {
   const std::string secret = "1:" + std::string(2 * key_size, 'e');
   for (const Problem& problem :
        {problem_of([&] { board.setting("key", secret); }),
@@ -314,7 +314,7 @@ TEST(Board, TakesCommandsFromSeveralThreadsAtOnce) {
   EXPECT_EQ(state.osmc(1).pwm, 49);
 }
 
-TEST(Board, LetsAStopCancelWhatOtherThreadsWaitFor) {
+TEST(Board, AStopCancelsTheCallsOfOtherThreads) {
   Board board("udp://127.0.0.1:9?listen=0", at_will());
   auto waiting = std::async(std::launch::async, [&] {
     return problem_of([&] { board.osmc(1).set_pwm(1, Direction::forward, 20s); });
@@ -341,7 +341,7 @@ TEST(Board, CallsBackInAnotherThreadUntilTheSubscriptionEnds) {
   EXPECT_EQ(states, seen) << "no state may come after the callback was ended";
 }
 
-TEST(Board, ObeysACallbackThatWaits) {
+TEST(Board, AllowsBlockingCallsInACallback) {
   Board board("sim:", at_will());
   const First<std::string> end;
   board.on_state([&, end, done = false](const State&) mutable {
@@ -363,7 +363,7 @@ TEST(Board, ObeysACallbackThatWaits) {
   EXPECT_EQ(end.get(), "all: is done");
 }
 
-TEST(Board, LetsACallbackEndItself) {
+TEST(Board, ACallbackMayCancelItsOwnSubscription) {
   Board board("sim:", at_will());
   const First<int> captured;
   const auto payload = std::make_shared<int>(42);
@@ -384,7 +384,7 @@ TEST(Board, LetsACallbackEndItself) {
 
 // --- the end
 
-TEST(Board, ClosesTwiceAndThenRefusesEverything) {
+TEST(Board, MayBeClosedTwiceAndRefusesLaterCalls) {
   Board board("sim:", at_will());
   board.wait_active();
   board.close();
@@ -402,7 +402,7 @@ TEST(Board, ClosesTwiceAndThenRefusesEverything) {
 }
 
 // close() and the destructor.
-TEST(Board, WakesAllCallsThatWaitWhenItEnds) {
+TEST(Board, CloseEndsAllWaitingCalls) {
   for (const bool destroyed : {false, true}) {
     auto board = std::make_unique<Board>("udp://127.0.0.1:9?listen=0", at_will());
     std::atomic<int> begun{0};
@@ -431,7 +431,7 @@ TEST(Board, WakesAllCallsThatWaitWhenItEnds) {
   }
 }
 
-TEST(Board, IsDestroyedInACallback) {
+TEST(Board, MayBeDestroyedInACallback) {
   auto board = std::make_unique<Board>("sim:", at_will());
   const First<bool> destroyed;
   // Destroyed in the thread of the board's callbacks, which must end, too.

@@ -58,7 +58,7 @@ struct BoardThread : testing::Test {
   Board board{hold.at(simulated.url()), options()};
 };
 
-TEST_F(BoardThread, NeverSendsACommandWhoseCallHasThrown) {
+TEST_F(BoardThread, NeverSendsACommandAfterItsCallHasThrown) {
   hold_up();
   const auto begin = std::chrono::steady_clock::now();
   const Problem problem = problem_of([&] { board.send("O:777,1,1", 50ms); });
@@ -71,7 +71,7 @@ TEST_F(BoardThread, NeverSendsACommandWhoseCallHasThrown) {
   EXPECT_FALSE(has_executed("O:777,1,1"));
 }
 
-TEST_F(BoardThread, EndsACallWithWhatOnWaitThrowsAndSendsNothingAfterwards) {
+TEST_F(BoardThread, AnExceptionOfOnWaitEndsTheCallAndNothingIsSent) {
   hold_up();
   enough = true;
   const auto begin = std::chrono::steady_clock::now();
@@ -83,7 +83,7 @@ TEST_F(BoardThread, EndsACallWithWhatOnWaitThrowsAndSendsNothingAfterwards) {
   EXPECT_FALSE(has_executed("O:777,1,1"));
 }
 
-TEST_F(BoardThread, SendsAStopHoweverLate) {
+TEST_F(BoardThread, SendsAStopEvenAfterItsCallHasTimedOut) {
   hold_up();
   const Problem problem = problem_of([&] { board.stop(20ms); });
   EXPECT_TRUE(contains(problem.reason, "not confirmed"));
@@ -93,7 +93,7 @@ TEST_F(BoardThread, SendsAStopHoweverLate) {
 }
 
 // The name of the transport changes each time a USB board is plugged in.
-TEST(BoardName, IsWholeHoweverOftenTheBoardIsPluggedIn) {
+TEST(BoardName, IsNeverTornWhileTheTransportReopens) {
   const std::string path = "/tmp/r4-board-name-" + std::to_string(::getpid());
   auto simulated = std::make_unique<BoardInAThread>("pty:" + path);
   Board board("serial://" + path);
@@ -129,7 +129,7 @@ TEST(BoardName, IsWholeHoweverOftenTheBoardIsPluggedIn) {
 
 // --- callbacks
 
-TEST(BoardCallbacks, AreCalledFirstWithTheUpOfTheTransport) {
+TEST(BoardCallbacks, OnEventIsCalledFirstWithTheUpEvent) {
   for (int i = 0; i < 20; ++i) {
     Board board("sim:");
     const First<CarrierEvent::Kind> first;
@@ -139,7 +139,7 @@ TEST(BoardCallbacks, AreCalledFirstWithTheUpOfTheTransport) {
 }
 
 // Each board has a separate loop and thread, but hosts listen on one port.
-TEST(TwoBoards, OfOneProgramShareThePortAndGetTheirOwnDatagrams) {
+TEST(TwoBoards, InOneProgramShareThePortAndGetTheirOwnDatagrams) {
   BoardInAThread left("udp");
   BoardInAThread right("udp");
   Board first(left.url());
@@ -157,7 +157,7 @@ TEST(TwoBoards, OfOneProgramShareThePortAndGetTheirOwnDatagrams) {
             "this program has that board open already");
 }
 
-TEST(BoardCallbacks, AreCalledFirstWithTheLinkAndTheNewestStateOfASilentBoard) {
+TEST(BoardCallbacks, ANewCallbackGetsTheLinkAndNewestStateOfASilentBoard) {
   BoardInAThread simulated("udp");
   BoardOptions options;
   options.session.timing.timeout_ms = 50;
@@ -177,7 +177,7 @@ TEST(BoardCallbacks, AreCalledFirstWithTheLinkAndTheNewestStateOfASilentBoard) {
   EXPECT_EQ(state.get(), board.state().t_ms);
 }
 
-TEST(BoardCallbacks, AreNotCalledWithAStateThatNeverCame) {
+TEST(BoardCallbacks, OnStateIsNotCalledBeforeTheFirstState) {
   Board board("udp://127.0.0.1:9?listen=0");
   std::atomic<bool> called{false};
   board.on_state([&](const State&) { called = true; });
@@ -185,7 +185,7 @@ TEST(BoardCallbacks, AreNotCalledWithAStateThatNeverCame) {
   EXPECT_FALSE(called);
 }
 
-TEST(BoardCallbacks, GetEveryNoticeIfTheyAreThereBeforeTheTransport) {
+TEST(BoardCallbacks, GivenToTheConstructorGetEveryNotification) {
   std::mutex mutex;
   std::vector<std::string> told;
   const auto note = [&](const std::string& text) {
@@ -206,7 +206,7 @@ TEST(BoardCallbacks, GetEveryNoticeIfTheyAreThereBeforeTheTransport) {
   EXPECT_EQ(told.back(), "active");
 }
 
-TEST(BoardCallbacks, ThatAreEmptyAreNone) {
+TEST(BoardCallbacks, AnEmptyCallbackIsIgnored) {
   Board board("sim:");
   board.on_state(nullptr).cancel();
   board.on_link({}).cancel();
@@ -231,14 +231,14 @@ struct HangingCallbacks : testing::Test {
   Board board{simulated.url(), options()};
 };
 
-TEST_F(HangingCallbacks, EndTheHeartbeatsWhenTheyAreAddedToo) {
+TEST_F(HangingCallbacks, StopTheHeartbeatsEvenWhileTheyAreBeingAdded) {
   board.on_arming([release = released.get_future().share()](DisarmCause) { release.wait(); });
   EXPECT_TRUE(simulated.wait_for(BoardState::safe, SafeReason::link));
   released.set_value();
   board.wait_active();
 }
 
-TEST(BoardCallbacks, NoneFollowsTheOneThatClosesTheBoard) {
+TEST(BoardCallbacks, NoCallbackFollowsTheOneThatClosesTheBoard) {
   std::promise<void> closed;
   std::atomic<bool> called{false};
   Board board("sim:");
@@ -261,7 +261,7 @@ TEST(BoardCallbacks, NoneFollowsTheOneThatClosesTheBoard) {
   EXPECT_FALSE(called);
 }
 
-TEST(BoardCallbacks, OfOneKindAreCalledInTheirOrderAndEndedOneByOne) {
+TEST(BoardCallbacks, AreCalledInSubscriptionOrderAndEndOneByOne) {
   const First<std::string> calls;
   std::string order;
   Board board("sim:");
@@ -275,7 +275,7 @@ TEST(BoardCallbacks, OfOneKindAreCalledInTheirOrderAndEndedOneByOne) {
 }
 
 // cancel() waits in another thread until a running callback has returned.
-TEST(BoardCallbacks, AreNotRunningWhenTheirEndHasReturned) {
+TEST(BoardCallbacks, AreNotRunningAfterCancelHasReturned) {
   Board board("sim:");
   std::promise<void> running;
   std::atomic<bool> over{false};
@@ -295,7 +295,7 @@ TEST(BoardCallbacks, AreNotRunningWhenTheirEndHasReturned) {
 
 struct DrivenCallbacks : DrivenBoard {};
 
-TEST_F(DrivenCallbacks, CostNoHeartbeatWhileTheyRun) {
+TEST_F(DrivenCallbacks, DoNotDelayHeartbeatsWhileTheyRun) {
   const First<std::uint64_t> sent;
   board.on_state([this, sent, done = false](const State&) mutable {
     if (std::exchange(done, true)) return;
@@ -310,7 +310,7 @@ TEST_F(DrivenCallbacks, CostNoHeartbeatWhileTheyRun) {
   EXPECT_EQ(board.link().state, HostLinkState::active);
 }
 
-TEST_F(HangingCallbacks, EndTheHeartbeatsUntilTheyReturn) {
+TEST_F(HangingCallbacks, StopTheHeartbeatsUntilTheyReturn) {
   const First<Problem> warning;
   board.on_event([warning](const CarrierEvent& event) {
     if (event.kind == CarrierEvent::Kind::warning) warning.set(event.problem);
@@ -324,7 +324,7 @@ TEST_F(HangingCallbacks, EndTheHeartbeatsUntilTheyReturn) {
   board.wait_active();
 }
 
-TEST(BoardCallbacks, GetTheNewestOfTheStatesThatCameMeanwhile) {
+TEST(BoardCallbacks, ALateCallbackGetsTheNewestState) {
   Board board("sim:");
   board.send("F:DEFAULT");  // no other news comes after this
   std::promise<void> late;
@@ -355,7 +355,7 @@ struct BoardLoop : DrivenBoard {
   }
 };
 
-TEST_F(BoardLoop, TakesWorkForTheAsyncBoardWithoutWaiting) {
+TEST_F(BoardLoop, RunsAsyncBoardCallsWithoutBlockingTheCaller) {
   board.arm();
   const auto set = [](AsyncBoard& async, auto end) {
     async.async_send(Command::osmc(1, Pwm(100), Direction::forward), 1s, std::move(end));
@@ -364,7 +364,7 @@ TEST_F(BoardLoop, TakesWorkForTheAsyncBoardWithoutWaiting) {
   EXPECT_EQ(board.state().raw.osmc[0].pwm, 100);
 }
 
-TEST_F(BoardLoop, EndsItsWorkAsClosedAndThenTakesNoMore) {
+TEST_F(BoardLoop, EndsPendingCallsAsClosedAndAcceptsNoMore) {
   board.release_control();
   simulated.switch_off();
   std::future<Outcome> late = begin([](AsyncBoard& async, auto end) {

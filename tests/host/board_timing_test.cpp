@@ -28,7 +28,7 @@ Settings settings_of(BoardInAThread& simulated) {
   return settings;
 }
 
-TEST(BoardTiming, IsSetInOneStepInEitherDirection) {
+TEST(BoardTiming, IsRaisedOrLoweredByOneCall) {
   BoardInAThread simulated("udp");
   BoardOptions options;
   options.session.timing.heartbeat_ms = 30;
@@ -45,7 +45,7 @@ TEST(BoardTiming, IsSetInOneStepInEitherDirection) {
   }
 }
 
-TEST(BoardTiming, ThatCannotBeIsRefusedBeforeAnythingIsSent) {
+TEST(BoardTiming, RefusesImpossibleTimesBeforeSendingAnything) {
   Board board("sim:");
   for (const auto& wrong :
        {std::pair(99ms, 50ms), std::pair(10001ms, 50ms), std::pair(300ms, 49ms),
@@ -61,7 +61,7 @@ TEST(BoardTiming, ThatCannotBeIsRefusedBeforeAnythingIsSent) {
 
 struct AsyncBoardActive : testing::Test, OnALoop {};
 
-TEST_F(AsyncBoardActive, MeansThatTheFirstPostGoesOut) {
+TEST_F(AsyncBoardActive, SendsAPostMadeAsSoonAsTheBoardIsActive) {
   BoardInAThread simulated("udp");
   AsyncBoard board(io, simulated.url());
   board.open();
@@ -88,7 +88,7 @@ TEST_F(AsyncBoardActive, EndsAtItsDeadlineOrWithTheBoard) {
   EXPECT_EQ(closed->outcome, Outcome::closed);
 }
 
-TEST(BoardStop, AdvisesToCutThePowerIfTheBoardIsSilentWhateverTheWatchdogSays) {
+TEST(BoardStop, AdvisesToCutThePowerWhenTheBoardIsSilent) {
   Board board("udp://127.0.0.1:9?listen=0");
   board.watchdog(10ms);
   const Problem problem = problem_of([&] { board.stop(100ms); });

@@ -33,7 +33,7 @@ CommandResult timed_out_command() {
   return result;
 }
 
-TEST(LinkCauses, AreASetThatIsReadFromTheGravestOn) {
+TEST(LinkCauses, AreReadMostSevereFirst) {
   constexpr LinkCauses some{LinkCause::busy, LinkCause::transport_down, LinkCause::other_board};
   static_assert(some.first() == LinkCause::transport_down);
   static_assert(some.has(LinkCause::busy) && !some.has(LinkCause::watchdog));
@@ -47,7 +47,7 @@ TEST(LinkCauses, AreASetThatIsReadFromTheGravestOn) {
                                           LinkCause::other_board}));
 }
 
-TEST(LinkCauses, ThatAreSetAndClearedAgainAreGone) {
+TEST(LinkCauses, CanBeSetAndCleared) {
   LinkCauses causes;
   for (const LinkCause cause : all_causes()) {
     causes.set(cause);
@@ -57,7 +57,7 @@ TEST(LinkCauses, ThatAreSetAndClearedAgainAreGone) {
   }
 }
 
-TEST(Explain, HasATextAndWordsForEachCauseThatNoOtherCauseHas) {
+TEST(Explain, HasAnOwnReasonForEachCause) {
   ASSERT_EQ(all_causes().size(), 13U);
   EXPECT_EQ(all_causes().back(), LinkCause::other_board);
   std::set<std::string> texts, reasons;
@@ -75,7 +75,7 @@ TEST(Explain, HasATextAndWordsForEachCauseThatNoOtherCauseHas) {
   EXPECT_EQ(reasons.count(reason_of_link(well_but_for({}))), 0U);
 }
 
-TEST(Explain, NamesTheGraverOneOfEachPairOfCauses) {
+TEST(Explain, NamesTheMoreSevereOfTwoCauses) {
   const std::vector<LinkCause> all = all_causes();
   for (std::size_t i = 0; i < all.size(); ++i) {
     for (std::size_t j = i + 1; j < all.size(); ++j) {
@@ -85,7 +85,7 @@ TEST(Explain, NamesTheGraverOneOfEachPairOfCauses) {
   }
 }
 
-TEST(Explain, NamesAPathToAnotherBoardOnlyWhereAllElseIsWell) {
+TEST(Explain, NamesAPathToAnotherBoardOnlyWithoutOtherCauses) {
   LinkStatus link{.state = HostLinkState::safe,
                   .reason = SafeReason::stop,
                   .causes = {LinkCause::other_board},
@@ -114,7 +114,7 @@ TEST(Explain, SaysThatFlowControlIsLate) {
   }
 }
 
-TEST(Explain, BlamesNoFramesForAStopWhichIsAFrameOfItsOwn) {
+TEST(Explain, DoesNotBlameLateFramesForAnUnconfirmedStop) {
   const LinkStatus link{.state = HostLinkState::safe,
                         .reason = SafeReason::handle,
                         .causes = {LinkCause::late_frames}};
@@ -127,7 +127,7 @@ TEST(Explain, NamesACommandWithoutItsSecret) {
   EXPECT_EQ(explain(Command::setting("password", "eeeeeeee"), refused, {}).thing, "C:password,...");
 }
 
-TEST(Explain, ALinkThatCannotBeginIsNotARefusalOfTheBoard) {
+TEST(Explain, ALinkToTwoBoardsIsNotReportedAsARefusal) {
   const CommandResult refused{Outcome::refused, Refusal::none, Time{0}};
   const LinkStatus link{.causes = {LinkCause::two_boards}};
   const Problem problem = explain("async_wait_active()", refused, link);
@@ -135,14 +135,14 @@ TEST(Explain, ALinkThatCannotBeginIsNotARefusalOfTheBoard) {
   EXPECT_NE(problem.fix, "");
 }
 
-TEST(Explain, AStopThatIsOneTooManyHasBeenSent) {
+TEST(Explain, ReportsThatAStopBeyondTheLimitWasSentOnce) {
   const CommandResult full{Outcome::full, Refusal::none, Time{0}};
   const Problem problem = explain(Command::stop(), full, {});
   EXPECT_NE(problem.reason.find("sent once"), std::string::npos) << problem.reason;
   EXPECT_TRUE(problem.fix.starts_with(stop_last_resort)) << problem.fix;
 }
 
-TEST(Explain, TakesTheNameOfARequestForNoCommand) {
+TEST(Explain, DoesNotConfuseTheNameOfACallWithACommand) {
   const CommandResult refused{Outcome::refused, Refusal::range, Time{0}};
   EXPECT_EQ(explain("arm()", refused, {}).thing, "arm()");
   EXPECT_NE(explain("arm()", refused, {}).fix, "");

@@ -23,14 +23,14 @@ struct KeyFile : testing::Test {
   const std::string text = "3:" + std::string(2 * key_size, 'e') + "\n";
 };
 
-TEST_F(KeyFile, HoldsAKeyForItsOwnerAlone) {
+TEST_F(KeyFile, IsLoadedIfOnlyItsOwnerMayReadIt) {
   write(text, 0600);
   const Key key = load_key(path);
   EXPECT_EQ(key.id, 3);
   EXPECT_EQ(key.bytes[0], 0xee);
 }
 
-TEST_F(KeyFile, IsRefusedWhereOthersMayReadOrWriteIt) {
+TEST_F(KeyFile, IsRefusedIfOtherUsersMayReadOrWriteIt) {
   for (const mode_t mode : {0644, 0604, 0620, 0602}) {
     write(text, mode);
     const Problem problem = problem_of([&] { load_key(path); });
@@ -40,7 +40,7 @@ TEST_F(KeyFile, IsRefusedWhereOthersMayReadOrWriteIt) {
   }
 }
 
-TEST_F(KeyFile, MayBeReadByItsGroupIfItIsRoots) {
+TEST_F(KeyFile, MayBeReadableByItsGroupIfRootOwnsIt) {
   write(text, 0640);
   if (::geteuid() == 0) {
     EXPECT_EQ(load_key(path).id, 3);
@@ -49,7 +49,7 @@ TEST_F(KeyFile, MayBeReadByItsGroupIfItIsRoots) {
   EXPECT_EQ(problem_of([&] { load_key(path); }).kind, ErrorKind::permission);
 }
 
-TEST_F(KeyFile, IsNamedWhereItHoldsNoKey) {
+TEST_F(KeyFile, IsNamedInTheErrorIfItHoldsNoValidKey) {
   for (const std::string& wrong : {std::string(), std::string("3:ee\n"), text + text}) {
     write(wrong, 0600);
     const Problem problem = problem_of([&] { load_key(path); });
@@ -59,7 +59,7 @@ TEST_F(KeyFile, IsNamedWhereItHoldsNoKey) {
   }
 }
 
-TEST_F(KeyFile, IsNamedWhereItIsMissing) {
+TEST_F(KeyFile, ReportsAMissingFileAndADirectory) {
   EXPECT_EQ(problem_of([&] { load_key(path); }).kind, ErrorKind::open);
   EXPECT_TRUE(contains(problem_of([] { load_key("/tmp"); }).reason, "directory"));
   EXPECT_TRUE(contains(problem_of([] { load_key("~/no"); }).fix, "$HOME/no"));

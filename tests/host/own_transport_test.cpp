@@ -64,7 +64,7 @@ class BoardBehindASocket {
   std::thread thread_;
 };
 
-TEST(OwnTransport, CarriesABoardThatIsDrivenAndStopped) {
+TEST(OwnTransport, CarriesCommandsAndStopsToABoard) {
   BoardBehindASocket simulated;
   Board board(simulated.host_end(), at_will());
   board.wait_active();
@@ -73,7 +73,7 @@ TEST(OwnTransport, CarriesABoardThatIsDrivenAndStopped) {
   EXPECT_NO_THROW(board.stop());
 }
 
-TEST(OwnTransport, ReportsThatItIsDownWhenTheOtherEndIsClosed) {
+TEST(OwnTransport, IsDownWhenTheOtherProgramCloses) {
   BoardBehindASocket simulated;
   const First<std::string> down;
   BoardCallbacks callbacks;
@@ -86,7 +86,7 @@ TEST(OwnTransport, ReportsThatItIsDownWhenTheOtherEndIsClosed) {
   EXPECT_EQ(down.get(), "the other end was closed");
 }
 
-TEST(OwnTransport, IsShownInTheDocumentationAsItIsTested) {
+TEST(OwnTransport, DocumentationShowsTheTestedCode) {
   const auto text_of = [](const char* path) {
     const std::filesystem::path root =
         std::filesystem::path(__FILE__).parent_path().parent_path().parent_path();

@@ -174,7 +174,7 @@ bool comes(Condition condition) {
   return condition();
 }
 
-TEST(OwnTransports, CarryABoardThatIsDrivenAndStopped) {
+TEST(OwnTransports, CarryCommandsAndStopsToABoard) {
   ModemBench bench;
   {
     Board board(carrier_on(bench.here), at_will());
@@ -188,7 +188,7 @@ TEST(OwnTransports, CarryABoardThatIsDrivenAndStopped) {
   EXPECT_EQ(bench.here->closings, 1);
 }
 
-TEST(OwnTransports, WhatTheFirstOpenThrowsIsThrownWhereTheBoardIsOpened) {
+TEST(OwnTransports, AnErrorOfTheFirstOpenIsThrownByTheBoardConstructor) {
   const auto modem = std::make_shared<Modem>();
   modem->opens = true;
   try {
@@ -201,7 +201,7 @@ TEST(OwnTransports, WhatTheFirstOpenThrowsIsThrownWhereTheBoardIsOpened) {
   EXPECT_EQ(modem->closings, 0);
 }
 
-TEST(OwnTransports, ASendThatThrowsIsDownUntilItCanBeOpenedAgain) {
+TEST(OwnTransports, ATransportIsDownAfterItsSendThrewUntilItReopens) {
   ModemBench bench;
   const First<std::string> down;
   BoardCallbacks callbacks;
@@ -232,7 +232,7 @@ TEST(OwnTransports, APathThatCannotBeOpenedAtFirstJoinsLater) {
   EXPECT_TRUE(comes([&] { return late->sent > 0; }));
 }
 
-TEST(OwnTransports, ASendThatDoesNotReturnHoldsUpNothingElse) {
+TEST(OwnTransports, ASendThatDoesNotReturnDoesNotBlockTheBoard) {
   ModemBench bench;
   std::optional<Board> board(std::in_place, carrier_on(bench.here), at_will());
   board->wait_active();
@@ -243,14 +243,14 @@ TEST(OwnTransports, ASendThatDoesNotReturnHoldsUpNothingElse) {
   bench.here->hold.notify_all();
 }
 
-TEST(OwnTransports, ADatagramThatIsTooLongIsRefusedWhereItIsHandedOver) {
+TEST(OwnTransports, RefuseTooLongADatagramFromTheDevice) {
   ModemBench bench;
   const Board board(carrier_on(bench.here), at_will());
   EXPECT_THROW(bench.here->hand_over(std::string(max_datagram + 1, 'x')), Error);
   EXPECT_NO_THROW(bench.here->hand_over(std::string(max_datagram, '\0')));
 }
 
-TEST(OwnTransports, ACanBusCarriesANodeAndItsEmergencyStop) {
+TEST(OwnTransports, ACanBusCarriesCommandsAndTheEmergencyStopOfANode) {
   for (const bool fd : {false, true}) {
     CanBench bench({.node = 3, .fd = fd});
     Board board(carrier_on(bench.here, {.node = 3, .fd = fd}), at_will());
@@ -264,7 +264,7 @@ TEST(OwnTransports, ACanBusCarriesANodeAndItsEmergencyStop) {
   }
 }
 
-TEST(OwnTransports, ACanBusThatFailsIsDownUntilItCanBeOpenedAgain) {
+TEST(OwnTransports, ACanBusIsDownAfterAFailureUntilItReopens) {
   CanBench bench;
   const First<std::string> down;
   BoardCallbacks callbacks;
@@ -284,7 +284,7 @@ TEST(OwnTransports, ACanBusThatFailsIsDownUntilItCanBeOpenedAgain) {
   EXPECT_EQ(bench.here->openings, 2);
 }
 
-TEST(OwnTransports, ACanFrameThatIsTooLongAndANodeOutOfRangeAreRefused) {
+TEST(OwnTransports, RefuseTooLongACanFrameAndANodeOutOfRange) {
   CanBench bench;
   const Board board(carrier_on(bench.here), at_will());
   const std::string nine(9, 'x');

@@ -43,7 +43,7 @@ void drive(Board& board) {
   board.osmc(1).set_pwm(4095, Direction::forward);
 }
 
-TEST(SimulatedRobot, LetsTheHandleGoAndShowsThatTheMotorStops) {
+TEST(SimulatedRobot, ReleasesTheHandleAndShowsThatTheMotorsAreOff) {
   const SimulatedRobot never_opened;
   SimulatedRobot robot;
   EXPECT_FALSE(robot.look().open);
@@ -76,7 +76,7 @@ struct LightRobot final : sim::RobotModel {
   }
 };
 
-TEST(SimulatedRobot, IsARobotOfTheProgramsOwn) {
+TEST(SimulatedRobot, AcceptsARobotModelOfTheProgram) {
   LightRobot light;
   SimulatedRobot robot(light);
   Board board(robot.url());
@@ -107,7 +107,7 @@ TEST(SimulatedRobot, MakesObstaclesVoltagesAndFaults) {
   await(board, [](const State& state) { return state.safe == SafeReason::fault; });
 }
 
-TEST(SimulatedRobot, AMotorThatIsHeldFastStandsAndDrawsItsFullCurrent) {
+TEST(SimulatedRobot, AStalledMotorDrawsItsFullCurrent) {
   SimulatedRobot robot;
   robot.happen("motor 1 stalled");  // before the board is opened
   Board board(robot.url());
@@ -120,7 +120,7 @@ TEST(SimulatedRobot, AMotorThatIsHeldFastStandsAndDrawsItsFullCurrent) {
   await(board, robot, [](const auto& now) { return now.encoder[0] > 100; });
 }
 
-TEST(SimulatedRobot, MayBeUsedInACallbackAndByBoardsOneAfterTheOther) {
+TEST(SimulatedRobot, WorksInACallbackAndForOneBoardAfterAnother) {
   SimulatedRobot robot;
   for (int i = 0; i < 2; ++i) {
     Board board(robot.url());
@@ -131,7 +131,7 @@ TEST(SimulatedRobot, MayBeUsedInACallbackAndByBoardsOneAfterTheOther) {
   }
 }
 
-TEST(SimulatedRobot, ReportsWhatIsWrong) {
+TEST(SimulatedRobot, ReportsInvalidEventsAndUrls) {
   SimulatedRobot robot;
   EXPECT_EQ(test::problem_of([&] { robot.happen("us 5 10"); }).text(),
             robot.url() + ": '5' is not a valid ultrasonic sensor; there are 1 to 4");
@@ -150,7 +150,7 @@ TEST(SimulatedRobot, ReportsWhatIsWrong) {
                              "no such SimulatedRobot"));
 }
 
-TEST(BadLink, LosesDoublesAndDamagesDatagramsOfAnyBoard) {
+TEST(BadLink, LosesDuplicatesAndDamagesDatagramsOfAnyBoard) {
   sim::SimulatedRobot robot;
   Board board(sim::with_link(robot.url(), "loss=20%,duplicate=20%,corrupt=10%,seed=3"),
               test::at_will());
@@ -165,7 +165,7 @@ TEST(BadLink, LosesDoublesAndDamagesDatagramsOfAnyBoard) {
   EXPECT_EQ(robot.look().pins.osmc[0].pwm, 358);
 }
 
-TEST(BadLink, RefusesWrongWords) {
+TEST(BadLink, RefusesInvalidImpairments) {
   for (const char* link : {"", "loss", "loss=120%", "speed=3"}) {
     EXPECT_EQ(test::problem_of([&] { sim::with_link("sim:", link); }).kind, ErrorKind::usage)
         << link;

@@ -19,7 +19,7 @@ struct Captured {
   }
 };
 
-TEST(Subscribers, LetGoOfWhatTheyHaveCapturedOnceAlsoWhereThatEndsThem) {
+TEST(Subscribers, ReleaseCapturedObjectsOnceEvenIfThatCancelsThem) {
   int gone = 0;
   Subscribers<> kind;
   auto captured = std::make_shared<Captured>();
@@ -31,7 +31,7 @@ TEST(Subscribers, LetGoOfWhatTheyHaveCapturedOnceAlsoWhereThatEndsThem) {
   EXPECT_EQ(gone, 1);
 }
 
-TEST(Subscribers, EndedWithinTheCallLetGoWhenItIsOver) {
+TEST(Subscribers, CancelledDuringACallReleaseCapturesAfterIt) {
   int gone = 0;
   Subscribers<> kind;
   auto captured = std::make_shared<Captured>();

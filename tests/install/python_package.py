@@ -11,7 +11,7 @@ import r4link
 from running import OFFLINE, ROOT, run
 
 
-def test_types_are_strict():
+def test_the_package_and_examples_pass_strict_type_checks():
     """One run for all files, because the types of the standard library take most of the time, and mypy caches them."""
     package, examples = ROOT / 'host/python/r4link', ROOT / 'docs/examples'
     sources = [*package.glob('*.py'), package / '_core.pyi', *(examples / 'python').glob('*.py'),
@@ -41,7 +41,7 @@ def test_installs_into_a_venv_and_builds_a_source_distribution(tmp_path):
     assert not any('__pycache__' in each or each.endswith('.so') for each in names)
 
 
-def test_a_wheel_has_the_same_bytes_twice_and_carries_its_libraries(tmp_path):
+def test_a_wheel_is_reproducible_and_contains_its_libraries(tmp_path):
     for folder in (tmp_path / 'one', tmp_path / 'two'):
         made = run(ROOT / 'tools/wheel', '--built', os.environ['R4_BUILD'], '--into', folder)
         assert '-manylinux_2_' in made and not list(folder.glob('*-linux_*')), made
@@ -52,7 +52,7 @@ def test_a_wheel_has_the_same_bytes_twice_and_carries_its_libraries(tmp_path):
     assert 'drives a board; 6 libraries are its own' in told, told
 
 
-def test_no_reference_is_lost_or_left():
+def test_the_module_leaks_no_reference():
     """Runs on an interpreter that counts references, such as python3.11-dbg, with the module built for it."""
     build = pathlib.Path(os.environ['R4_BUILD'])
     ended = subprocess.run([f'/usr/bin/python3.{sys.version_info.minor}-dbg', ROOT / 'tests/python/reference_counts.py'],

@@ -4,7 +4,7 @@ from can_inside import EMERGENCY, Dump, ip
 from r4_process import PATIENCE_S, Board, Running, driving, run
 
 
-def test_a_whole_bus_is_driven_by_udp_and_stopped_by_its_raw_frame():
+def test_a_udp_host_drives_a_bus_and_its_stop_reaches_every_board():
     with Board('can://vcan0?node=0-1', listens=2) as boards, \
             Running('bridge', 'udp://127.0.0.1:2100-2101', 'can://vcan0?node=0-1', '--json') as bridge:
         joined = [bridge.next(lambda each: each['type'] == 'bridge')['board'] for _ in range(2)]
@@ -22,7 +22,7 @@ def test_a_whole_bus_is_driven_by_udp_and_stopped_by_its_raw_frame():
                 safe.add(boards.next(lambda each: each.get('reason') == 'stop')['board'])
 
 
-def test_an_interface_that_vanishes_is_told_and_waited_for():
+def test_a_bridge_reports_a_missing_interface_and_waits_for_it():
     ip('link', 'add', 'vcan7', 'type', 'vcan')
     ip('link', 'set', 'vcan7', 'up')
     with Running('bridge', 'udp://127.0.0.1:0', 'can://vcan7', '--json') as bridge:

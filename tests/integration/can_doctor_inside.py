@@ -41,7 +41,7 @@ def can0():
     ip('set', 'can0', 'up', 'txqueuelen', '1000', 'type', 'can', 'bitrate', '1000000', 'restart-ms', '100')
 
 
-def test_a_controller_without_restart_and_with_a_short_queue(controller):
+def test_doctor_warns_about_a_missing_restart_and_a_short_queue(controller):
     ip('set', controller, 'down')
     ip('set', controller, 'up', 'txqueuelen', '10', 'type', 'can', 'bitrate', '500000', 'restart-ms', '0')
     _, found = doctor(f'can://{controller}?node=1')
@@ -55,7 +55,7 @@ def test_a_controller_without_restart_and_with_a_short_queue(controller):
     assert found['can.interface']['reason'] == 'up, error-active, 500 kbit/s'
 
 
-def test_a_controller_that_is_down_is_mended(controller):
+def test_doctor_fix_brings_a_controller_up(controller):
     ip('set', controller, 'down')
     code, found = doctor(f'can://{controller}?node=1')
     assert code == OPEN and 'its bit rate is' in found['can.down']['reason'], found
@@ -63,12 +63,12 @@ def test_a_controller_that_is_down_is_mended(controller):
     assert 'can.down' not in found and found['can.interface']['severity'] == 'ok'
 
 
-def test_an_interface_that_is_missing():
+def test_doctor_reports_a_missing_interface():
     code, found = doctor('can://can7?node=1')
     assert code == UNSUPPORTED and found['can.missing']['severity'] == 'error'
 
 
-def test_a_virtual_bus_is_brought_up_and_its_board_heard():
+def test_doctor_fix_brings_a_virtual_bus_up():
     ip('set', 'vcan0', 'down')
     code, found = doctor('can://vcan0?node=1')
     assert code == OPEN and found['can.down']['automatic']
@@ -79,7 +79,7 @@ def test_a_virtual_bus_is_brought_up_and_its_board_heard():
     assert found['can.load']['severity'] == 'ok' and found['can.interface']['reason'] == 'up, virtual'
 
 
-def test_frames_of_another_protocol_on_an_id_of_the_board_are_told():
+def test_doctor_names_another_protocol_on_an_id_of_the_board():
     words = 'make no R4 datagram'
     with Board('can://vcan0?node=5'):
         with subprocess.Popen(['cangen', 'vcan0', '-I', '185', '-L', '8', '-D', 'i', '-g', '10']) as other:
@@ -91,7 +91,7 @@ def test_frames_of_another_protocol_on_an_id_of_the_board_are_told():
     assert 'CANopen TPDO1 of node 5' in found['can.foreign']['reason'], found
 
 
-def test_a_bus_that_holds_frames_back_is_told():
+def test_doctor_reports_a_bus_that_delays_frames():
     with Board('can://vxcan1?node=1'):
         for name in ('vxcan0', 'vxcan1'):
             subprocess.run(f'tc qdisc replace dev {name} root netem delay 30ms limit 2000', shell=True, check=True)

@@ -72,7 +72,7 @@ def streams_again(host, since):
     print(f'streams again after {(state["came"] - since) * 1000:.0f} ms')
 
 
-def test_a_board_obeys_on_a_bus_with_bit_time_and_the_load_that_is_shown_is_the_time_that_the_bus_was_taken(bus, board):
+def test_the_reported_load_equals_the_busy_time_of_the_bus(bus, board):
     result = send(HOST, 'O:358,1,1', 'S:1500,16', 'Q:ID')
     assert result.returncode == 0, result
     with monitor(HOST) as host:
@@ -87,7 +87,7 @@ def test_a_board_obeys_on_a_bus_with_bit_time_and_the_load_that_is_shown_is_the_
     assert abs(1e6 * shown['load'] / shown['frames'] / (busy_us / frames) - 1) < 0.01
 
 
-def test_a_bit_rate_that_an_adapter_does_not_tell_is_asked_for():
+def test_r4_bus_asks_for_a_bit_rate_that_the_adapter_does_not_report():
     """As after slcand, which sets the bit rate in the adapter but does not report it to the kernel."""
     near, far = pty.openpty()
     try:
@@ -105,7 +105,7 @@ def test_a_bit_rate_that_an_adapter_does_not_tell_is_asked_for():
     assert re.search(f'{name} .* no bit rate', listed.stdout) and listed.stderr == '', listed
 
 
-def test_who_opens_a_controller_that_is_bus_off_is_told(bus):
+def test_a_host_reports_a_controller_that_is_already_bus_off(bus):
     bus.order('spoil', 1)
     subprocess.run(['cansend', 'slcan1', f'{FLOOD:X}#00'], check=True)
     bus.state(1, 'bus-off')
@@ -114,7 +114,7 @@ def test_who_opens_a_controller_that_is_bus_off_is_told(bus):
     assert 'ip link set slcan1' in down['fields']['fix'], down
 
 
-def test_bus_off_of_the_boards_controller(bus, board):
+def test_a_board_reports_bus_off_goes_safe_and_recovers(bus, board):
     with driving_host(board):
         bus.order('spoil', 0)
         off = bus.state(0, 'bus-off')
@@ -128,7 +128,7 @@ def test_bus_off_of_the_boards_controller(bus, board):
         drives_again(board, since)
 
 
-def test_bus_off_of_the_hosts_controller(bus, board):
+def test_the_board_goes_safe_when_the_hosts_controller_is_bus_off(bus, board):
     with driving_host(board):
         bus.order('spoil', 1)
         off = bus.state(1, 'bus-off')
@@ -140,7 +140,7 @@ def test_bus_off_of_the_hosts_controller(bus, board):
         drives_again(board, since)
 
 
-def test_a_host_tells_of_its_bus_off_and_goes_on_by_itself(bus, board):
+def test_a_host_reports_its_bus_off_and_recovers_by_itself(bus, board):
     with monitor(HOST) as host:
         in_control(host)
         bus.order('spoil', 1)
@@ -155,7 +155,7 @@ def test_a_host_tells_of_its_bus_off_and_goes_on_by_itself(bus, board):
         streams_again(host, since)
 
 
-def test_errors_are_told_with_a_fix_and_that_they_are_over(bus):
+def test_board_and_host_report_bus_errors_and_their_end(bus):
     with Board(BOARD, options=PATIENTLY) as board, monitor(HOST) as host:
         in_control(host)
         for node, where, end in ((0, board_told, board), (1, told, host)):
@@ -168,7 +168,7 @@ def test_errors_are_told_with_a_fix_and_that_they_are_over(bus):
     assert not any(each.get('reason') == 'link' for each in board.log)
 
 
-def test_a_host_alone_is_told_that_nobody_acknowledges(bus, board):
+def test_a_host_alone_on_the_bus_reports_missing_acknowledgements(bus, board):
     with monitor(HOST) as host:
         in_control(host)
         bus.order('away', 0)
@@ -183,7 +183,7 @@ def test_a_host_alone_is_told_that_nobody_acknowledges(bus, board):
         assert bus.status()['nodes'][1]['state'] != 'b'
 
 
-def test_damaged_frames_cost_time_and_no_datagram(bus):
+def test_the_bus_repeats_damaged_frames_of_a_datagram(bus):
     with Board(BOARD):
         with monitor(HOST, '--duration', '30') as host:
             in_control(host)
@@ -218,7 +218,7 @@ def test_a_babbling_node_of_top_priority_leaves_the_board_safe():
         drives_again(board, since)
 
 
-def test_a_full_queue_drops_old_states_and_no_frame_within_a_datagram():
+def test_a_full_queue_drops_old_states_but_damages_no_datagram():
     with SlcanBus(2, BITRATE, txqueuelen=10) as bus, Board(BOARD) as board, monitor(HOST) as host:
         in_control(host)
         # Another program keeps the queue of the board's interface full.

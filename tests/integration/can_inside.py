@@ -128,7 +128,7 @@ def in_control(host):
     return host.next(lambda each: is_state(each) and 'CMD' in each['fields'])
 
 
-def test_streams_its_state_on_the_grid(either_board):
+def test_the_times_of_states_are_whole_periods_apart(either_board):
     with monitor(either_board.host_url) as host:
         in_control(host)
         states = [host.next(is_state) for _ in range(20)]
@@ -138,7 +138,7 @@ def test_streams_its_state_on_the_grid(either_board):
     assert states[0]['transport'] == either_board.host_url
 
 
-def test_commands_are_confirmed_by_the_boards_state_and_a_refusal_comes_back(either_board):
+def test_states_confirm_commands_and_refusals_are_reported(either_board):
     result = send(either_board.host_url, 'O:358,1,1', 'S:1500,16', 'Q:ID')
     assert result.returncode == 0, result
     assert 'board sim-1' in result.stdout
@@ -157,7 +157,7 @@ def test_the_next_host_need_not_wait_for_the_timeout(board):
         board.state('SAFE', 'link')
 
 
-def test_a_host_that_was_held_up_goes_on_by_itself_and_a_killed_one_leaves_the_board_safe(impatient_board):
+def test_a_suspended_host_recovers_and_a_killed_host_leaves_it_safe(impatient_board):
     board = impatient_board
     with monitor(board.host_url) as host:
         in_control(host)
@@ -173,7 +173,7 @@ def test_a_host_that_was_held_up_goes_on_by_itself_and_a_killed_one_leaves_the_b
     assert safe['silence'] >= 1000
 
 
-def test_a_stop_is_one_frame_of_top_priority_and_is_told_in_one(board):
+def test_a_stop_and_its_report_are_one_frame_each(board):
     with monitor(board.host_url) as host, Dump(board.bus) as dump:
         in_control(host)
         result = run('stop', board.host_url, timeout=60)
@@ -184,14 +184,14 @@ def test_a_stop_is_one_frame_of_top_priority_and_is_told_in_one(board):
     assert dump.frames.index((WENT_SAFE, '02')) > stop
 
 
-def test_a_stop_of_a_foreign_program_is_obeyed(board):
+def test_the_board_obeys_a_stop_frame_from_another_program(board):
     with monitor(board.host_url) as host:
         in_control(host)
         subprocess.run(['cansend', board.bus, '010#'], check=True)
         board.state('SAFE', 'stop')
 
 
-def test_another_host_is_refused_while_the_first_is_there(board):
+def test_a_second_host_is_refused_while_the_first_has_control(board):
     with monitor(board.host_url) as first:
         in_control(first)
         # From this computer, and from another on the same bus.
@@ -213,7 +213,7 @@ def test_another_host_is_refused_while_the_first_is_there(board):
     assert result.returncode == 0, f'control is free again: {result}'
 
 
-def test_a_restarted_board_is_taken_up_again():
+def test_a_host_reconnects_to_a_restarted_board():
     with contextlib.ExitStack() as stack:
         first = stack.enter_context(on_controllers())
         host = stack.enter_context(monitor(first.host_url))
@@ -225,7 +225,7 @@ def test_a_restarted_board_is_taken_up_again():
         host.next(is_link('active'), timeout=20)
 
 
-def test_packed_and_fd_take_fewer_frames(vcan_board):
+def test_the_packed_form_and_can_fd_need_fewer_frames(vcan_board):
     def frames_a_state(url):
         with Dump('vcan0') as dump, monitor(url) as host:
             in_control(host)
@@ -247,7 +247,7 @@ def test_packed_and_fd_take_fewer_frames(vcan_board):
     assert 3 * packed < frames_a_state(BUS), 'the board sends the packed form after C:pack,0'
 
 
-def test_can_fd_carries_a_plain_state_in_three_frames_and_a_packed_one_in_one():
+def test_can_fd_needs_three_frames_for_a_plain_state_one_if_packed():
     with Board('can://vcan0?node=3&fd=1', options=PATIENTLY) as board, Dump('vcan0') as dump:
         with monitor(board.host_url + '&pack=0') as host:
             in_control(host)
@@ -263,7 +263,7 @@ def test_can_fd_carries_a_plain_state_in_three_frames_and_a_packed_one_in_one():
     assert any(frame == TELEMETRY and re.match('.00..9', data) for frame, data in dump.frames)
 
 
-def test_an_interface_that_goes_down_is_told_of_and_comes_back(impatient_board):
+def test_a_host_reports_an_interface_that_is_down_and_recovers(impatient_board):
     board = impatient_board
     with monitor(board.host_url) as host:
         in_control(host)
@@ -287,7 +287,7 @@ def drives(pwm):
     return lambda each: is_state(each) and each['fields'].get('OSMC1') == [pwm, 1]
 
 
-def test_first_steps_in_either_order():
+def test_monitor_and_send_work_in_either_order():
     def nobody_drives(watcher):
         watcher.skip_past()
         watcher.next(lambda each: is_state(each) and each['fields'].get('SAFE') == 1)
@@ -311,7 +311,7 @@ def test_first_steps_in_either_order():
 
 # Where the bus has two ends, the hosts share no path, as on two computers.
 @pytest.mark.parametrize('url, host_url', [(BUS, BUS), ('can://can0?node=3', 'can://can1?node=3')])
-def test_who_watches_sends_a_frame_of_its_own_and_only_while_nobody_drives(url, host_url):
+def test_a_watcher_sends_its_own_frame_only_while_no_host_drives(url, host_url):
     with Board(url, options=PATIENTLY), watch(url) as watcher, Dump(url.split('/')[2].split('?')[0]) as dump:
         watcher.next(is_state)
         assert {(frame, data) for frame, data in dump.frames if frame in (COMMAND, WATCH)} <= {(WATCH, '')}
@@ -327,7 +327,7 @@ def test_who_watches_sends_a_frame_of_its_own_and_only_while_nobody_drives(url, 
         assert any(frame == WATCH for frame, _ in dump.frames)
 
 
-def test_what_a_host_of_another_computer_says_is_recorded(tmp_path):
+def test_record_includes_datagrams_of_a_host_on_another_computer(tmp_path):
     path = tmp_path / 'drive.r4log'
     said = [re.compile(rf'^[0-9.]+ 1> {what};SID:[0-9a-f]{{16}};PNum:\d+;(T:\d+;)?\^0x', re.MULTILINE) for what in ('H:ROS2-R4', 'Q:ID')]
     with Board('can://can0?node=3', options=PATIENTLY), monitor('can://can0?node=3'), \
@@ -339,7 +339,7 @@ def test_what_a_host_of_another_computer_says_is_recorded(tmp_path):
         assert recorder.end() == 0, recorder.errors
 
 
-def test_bus_off_is_safe_at_once_and_a_restart_brings_it_back(vcan_board):
+def test_bus_off_makes_the_board_safe_until_the_controller_restarts(vcan_board):
     def error_frame(classes):
         subprocess.run(['cansend', 'vcan0', f'{0x20000000 | classes:08x}#0000000000000000'], check=True)
 
@@ -366,13 +366,13 @@ def test_bus_off_is_safe_at_once_and_a_restart_brings_it_back(vcan_board):
     ('can://lo?node=1', 2, 'lo is not a CAN interface'),
     ('can://can0?fd=1', 4, 'not set up for CAN FD'),
 ])
-def test_what_cannot_be_opened_is_said_with_the_fix(url, code, message):
+def test_a_url_that_cannot_be_opened_is_reported_with_a_fix(url, code, message):
     result = run('monitor', url)
     assert result.returncode == code and message in result.stderr, result
     assert ERROR.fullmatch(result.stderr.strip()), result.stderr
 
 
-def test_garbage_on_every_id_of_ours_harms_nobody(board):
+def test_garbage_on_the_ids_of_the_board_has_no_effect(board):
     with monitor(board.host_url) as host:
         in_control(host)
         for identifier in (COMMAND, REPLY, TELEMETRY, WENT_SAFE):
@@ -396,7 +396,7 @@ def listed_interfaces(is_told):
             return listed
 
 
-def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
+def test_list_and_monitor_show_every_board_of_a_bus(tmp_path):
     with Board('can://vcan0?node=2-4', listens=3, options=PATIENTLY), monitor(IN_PLAIN_TEXT) as host:
         in_control(host)
         listed = listed_interfaces(is_told=lambda board: 'board_id' in board)
@@ -439,7 +439,7 @@ def test_a_bus_is_shown_with_all_of_its_boards(tmp_path):
     assert silent.returncode == 3 and 'no board was heard' in silent.stderr, silent
 
 
-def test_a_recording_is_a_board_on_the_bus(tmp_path):
+def test_replay_acts_as_a_board_on_the_bus(tmp_path):
     with open(f'{DATA}/paper_capture.tsv', encoding='ascii') as capture:
         said = [line.rstrip('\n').split('\t')[1] for line in capture if line.startswith('board')]
     path = tmp_path / 'drive.r4log'
@@ -458,7 +458,7 @@ def test_a_recording_is_a_board_on_the_bus(tmp_path):
     assert TELEMETRY in frames and EMERGENCY not in frames, 'datagrams sent during the fault were sent again'
 
 
-def test_prometheus_is_told_how_busy_a_bus_is_and_for_whom():
+def test_metrics_report_the_busy_time_of_a_bus_for_each_board():
     boards = 'can://vcan0?node=2-3'
     with Board(boards, listens=2, options=PATIENTLY), driving('can://vcan0?node=3', 'O:358,1,1'):
         with Running('metrics', boards, '--json', '--listen', '127.0.0.1:0') as metrics:
@@ -474,7 +474,7 @@ def test_prometheus_is_told_how_busy_a_bus_is_and_for_whom():
             assert busy_seconds()[3] > busy_seconds().get(2, 0), 'the board without a controlling host sends few states'
 
 
-def test_r4_bus_tells_that_it_needs_the_data_bit_rate():
+def test_r4_bus_asks_for_the_data_bit_rate():
     with beside('cangen', 'vcan0', '-b', '-g', '20'):
         warned = run('bus', 'can://vcan0', '--duration', '0.5', timeout=60)
         assert warned.returncode == 0 and '--dbitrate' in warned.stderr, warned
@@ -482,7 +482,7 @@ def test_r4_bus_tells_that_it_needs_the_data_bit_rate():
         assert told.returncode == 0 and told.stderr == '', told
 
 
-def test_the_load_of_a_bus_counts_by_its_controllers_bit_rate():
+def test_r4_bus_uses_the_bit_rate_of_the_controller():
     def set_to(rate):
         ip('link', 'set', 'can0', 'down')
         ip('link', 'set', 'can0', 'up', 'type', 'can', 'bitrate', str(rate))
@@ -500,7 +500,7 @@ def test_the_load_of_a_bus_counts_by_its_controllers_bit_rate():
     assert refused.returncode == 2 and '250000' in refused.stderr, refused
 
 
-def test_the_demo_plays_over_can_too():
+def test_the_demo_succeeds_over_can():
     result = run('demo', '--json', timeout=60)
     assert result.returncode == 0, result
     row = next(each for each in objects(result.stdout) if each.get('transport') == 'CAN')

@@ -63,7 +63,7 @@ def agrees_with_the_board(told, commands, log):
 
 
 @pytest.mark.parametrize('loss, count', [('1%', 20), ('5%', 20)])
-def test_a_confirmed_command_was_executed_exactly_once(loss, count):
+def test_a_confirmed_command_is_executed_exactly_once(loss, count):
     commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(count)]
     with netem('loss', loss, 'delay', '2ms'), Board(BOARD, options=PATIENTLY) as board, \
             Dump(f'vxcan1,{COMMAND_OF_2}:7FF') as dump:
@@ -81,7 +81,7 @@ def test_a_confirmed_command_was_executed_exactly_once(loss, count):
         assert begun > count - told.count('not sent'), 'no command was repeated'
 
 
-def test_a_command_that_is_not_confirmed_is_reported_and_those_behind_it_are_not_sent():
+def test_send_reports_an_unconfirmed_command_and_sends_none_after_it():
     commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(300)]
     with Board(BOARD, options=SLOWLY) as board, \
             Running('send', HOST, '--json', '--timeout', '3', *commands) as sender:
@@ -102,7 +102,7 @@ def test_a_command_that_is_not_confirmed_is_reported_and_those_behind_it_are_not
 NUMBERED_STOPS = f'{EMERGENCY << 18:08x}:{0x7FF << 18:08x}'
 
 
-def test_a_stop_whose_first_frames_are_lost_is_repeated_until_the_board_confirms_it():
+def test_a_lost_stop_is_repeated_until_the_board_confirms_it():
     with Board(BOARD, options=PATIENTLY) as board, monitor(HOST) as host, \
             Dump(f'vxcan1,{NUMBERED_STOPS}') as sent, Dump(f'vxcan0,{NUMBERED_STOPS}') as arrived:
         in_control(host)
@@ -139,7 +139,7 @@ class Gateway:
 
 
 @pytest.mark.parametrize('form, corrupt', [('plain', (0, 3, 6)), ('packed', (1, 4, 7))])
-def test_nothing_corrupt_is_ever_applied(form, corrupt):
+def test_a_corrupt_command_is_never_executed(form, corrupt):
     host_url = f'can://vcan1?node={NODE}' + ('&pack=0' if form == 'plain' else '')
     commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(400)]
     with Gateway() as gateway, Board(f'can://vcan0?node={NODE}', options=PATIENTLY) as board:
@@ -197,7 +197,7 @@ class RawHost:
 
 
 @pytest.mark.parametrize('break_off', ['falls silent', 'interface down', 'begins anew'])
-def test_the_datagram_after_a_broken_one_is_taken(break_off):
+def test_the_board_accepts_the_datagram_after_an_incomplete_one(break_off):
     with Board(f'can://vcan0?node={NODE}', options=SLOWLY) as board, contextlib.closing(RawHost()) as host:
         host.send(host.heartbeat(), frames=3)
         if break_off == 'falls silent':
@@ -215,7 +215,7 @@ def test_the_datagram_after_a_broken_one_is_taken(break_off):
         print(f'{break_off}: obeyed {(active["came"] - since) * 1000:.0f} ms after the next was begun')
 
 
-def test_an_end_that_is_killed_within_a_transfer_is_followed_by_the_next_one():
+def test_a_board_or_host_killed_within_a_transfer_can_be_restarted():
     url = f'can://vcan0?node={NODE}'
     plain = url + '&pack=0'
     options = ('--set', 'rate,500')  # a state has 26 frames: one is always being sent

@@ -56,7 +56,7 @@ def of_path(bus, carries):
                          (each['fields']['state'] == 'carrying') == carries)
 
 
-def test_either_of_two_buses_is_switched_off_and_nothing_is_missed():
+def test_no_state_is_lost_while_one_of_two_buses_is_off():
     with two_buses(), Board(*URLS, options=PATIENTLY) as board, monitor('+'.join(URLS)) as host:
         for bus in BUSES:
             if not any(of_path(bus, True)(each) for each in host.log):
@@ -80,7 +80,7 @@ def test_either_of_two_buses_is_switched_off_and_nothing_is_missed():
         board.never('SAFE', 0.1)
 
 
-def test_commands_are_executed_once_each_while_buses_come_and_go():
+def test_each_command_is_executed_once_while_buses_fail_and_recover():
     commands = [f'S:{1000 + i},{i % 16 + 1}' for i in range(120)]
     with two_buses(), Board(*URLS) as board:
         with Running('send', *URLS, *commands, '--json', '--hold', '60', '--timeout', '5') as host:
@@ -101,7 +101,7 @@ def test_commands_are_executed_once_each_while_buses_come_and_go():
     assert [each for each in executed if each.startswith('S:')] == commands
 
 
-def test_a_stop_by_either_bus_is_enough():
+def test_a_stop_over_one_of_two_buses_stops_the_board():
     with two_buses(), Board(*URLS) as board:
         assert send(*URLS, 'S:1500,1').returncode == 0
         ip('link', 'set', BUSES[0], 'down')
@@ -109,7 +109,7 @@ def test_a_stop_by_either_bus_is_enough():
         board.state('SAFE', 'stop')
 
 
-def test_a_cable_beside_a_bus(tmp_path_factory):
+def test_a_session_survives_the_loss_of_its_cable_or_its_bus(tmp_path_factory):
     folder = tmp_path_factory.mktemp('paths')
     with one_bus('vcan8') as bus, \
             Board(f'pty:{folder}/board', f'can://{bus}?node=3', options=PATIENTLY) as board:
@@ -133,7 +133,7 @@ def test_a_cable_beside_a_bus(tmp_path_factory):
             cable.pull()
 
 
-def test_two_buses_of_which_one_breaks_at_either_end():
+def test_a_session_survives_bus_off_at_the_board_or_at_the_host():
     """can0 and can1 are one bus; the ends of the other bus have error counters and bus-off."""
     boards, hosts = (('can0', 'slcan0'), ('can1', 'slcan1'))
     with SlcanBus(2, 500000) as bus, \

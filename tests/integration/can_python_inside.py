@@ -56,7 +56,7 @@ def running_board():
 # --- python is the host, r4 sim the board
 
 @pytest.mark.parametrize('packs', [True, False])
-def test_host_connects_commands_and_sees_it_in_the_state(board, tmp_path, packs):
+def test_a_python_host_drives_the_board_and_reads_its_state(board, tmp_path, packs):
     with recording(tmp_path / 'bus.log'), python_host(packs=packs) as host:
         host.beats = False
         host.next(lambda fields: 'H' in fields)
@@ -82,7 +82,7 @@ def test_host_connects_commands_and_sees_it_in_the_state(board, tmp_path, packs)
     assert [each['fields']['O'] for each in decoded if 'O' in each.get('fields', {})][:1] == [[358, 1, 1]]
 
 
-def test_host_is_refused_on_the_reply_lane_and_a_number_is_executed_once(board):
+def test_refusals_use_the_reply_lane_and_a_duplicate_is_not_executed(board):
     with python_host() as host:
         host.take_control()
         assert host.command('O:358,1,9') == 'CHANNEL'
@@ -95,7 +95,7 @@ def test_host_is_refused_on_the_reply_lane_and_a_number_is_executed_once(board):
     assert sum('executed' in each and each['executed']['command'] == 'O:100,1,1' for each in board.log) == 1
 
 
-def test_the_board_obeys_blocks_and_gaps_of_the_hosts_flow_control(board):
+def test_the_board_obeys_the_flow_control_of_the_host(board):
     with python_host(block_size=2, stmin=3) as host:
         host.take_control()
         asked, replies = time.monotonic(), host.receivers[0x203]
@@ -110,7 +110,7 @@ def test_the_board_obeys_blocks_and_gaps_of_the_hosts_flow_control(board):
         assert host.command('O:358,1,9') == 'CHANNEL'
 
 
-def test_the_emergency_frame_stops_is_told_in_one_frame_and_can_be_cleared(board):
+def test_an_emergency_frame_stops_the_board_until_it_is_cleared(board):
     with python_host() as host:
         host.take_control()
         assert host.command('O:358,1,1') == 'done'
@@ -127,7 +127,7 @@ def test_the_emergency_frame_stops_is_told_in_one_frame_and_can_be_cleared(board
     board.outputs(lambda outputs: outputs['osmc'][0] == [200, 0])
 
 
-def test_a_host_that_falls_silent_leaves_the_board_safe_and_comes_back(board):
+def test_the_board_is_safe_while_the_host_is_silent(board):
     with python_host() as host:
         host.take_control()
         assert host.command('C:timeout,1000') == 'done'
@@ -144,7 +144,7 @@ def test_a_host_that_falls_silent_leaves_the_board_safe_and_comes_back(board):
     assert board.state('SAFE', 'link')['silence'] >= 1000
 
 
-def test_the_board_speaks_in_the_form_in_which_it_is_spoken_to(board):
+def test_the_board_answers_in_the_form_that_the_host_uses(board):
     with python_host() as host:
         host.take_control()
         for packs, pwm in ((True, 358), (False, 359), (True, 360)):
@@ -170,7 +170,7 @@ def kernel_isotp(hears, own, flags=0):
     return peer
 
 
-def test_the_papers_client_drives_a_board_as_it_is_delivered_by_the_kernels_iso_tp():
+def test_the_papers_client_drives_a_board_over_the_kernels_iso_tp():
     # The emulated machine takes long for seven commands for each received datagram.
     options, listen_mode, states = ('--set', 'rate,2', '--set', 'timeout,5000'), 1, 6
     with Board(BOARD_URL, options=options) as board, \
@@ -188,7 +188,7 @@ def test_the_papers_client_drives_a_board_as_it_is_delivered_by_the_kernels_iso_
 
 
 @pytest.mark.parametrize('packs', [True, False])
-def test_a_host_that_speaks_fd_is_understood_and_hears_fd(packs):
+def test_the_board_answers_an_fd_host_in_fd(packs):
     with Board(BOARD_URL + '&fd=1', options=PATIENTLY) as board, python_host(fd=True, packs=packs) as host:
         host.take_control()
         assert host.command('O:358,1,1') == 'done'
@@ -200,7 +200,7 @@ def test_a_host_that_speaks_fd_is_understood_and_hears_fd(packs):
 
 # --- python is the board, r4 the host
 
-def test_monitor_follows_a_python_board():
+def test_monitor_shows_the_states_of_a_python_board():
     with can_python.Board('vcan0', 4) as board, monitor(HOST_URL) as host:
         host.next(lambda each: each['type'] == 'link' and each['fields']['state'] == 'active')
         state = host.next(lambda each: is_state(each) and 'CMD' in each['fields'])
@@ -223,21 +223,21 @@ def test_send_is_confirmed_by_a_python_board(options, url):
     assert [each for each in board.executed if not each.startswith('F:')] == ['O:358,1,1']
 
 
-def test_send_tells_of_a_refusal_of_a_python_board():
+def test_send_reports_a_refusal_of_a_python_board():
     with can_python.Board('vcan0', 4, refuses='S') as board:
         result = send(HOST_URL, 'S:1500,1')
     assert result.returncode == 3 and 'RANGE' in result.stderr, result
     assert board.executed == ['F:DEFAULT,SAFE,CMD']
 
 
-def test_a_python_board_that_never_confirms_is_no_success():
+def test_send_fails_if_a_python_board_never_confirms():
     with can_python.Board('vcan0', 4, obeys=False) as board:
         result = send(HOST_URL, '--timeout', '2', 'O:358,1,1')
         assert result.returncode == 3 and 'not confirmed' in result.stdout, result
     assert board.executed == []
 
 
-def test_stop_is_the_emergency_frame_and_a_python_board_confirms_it():
+def test_stop_sends_the_emergency_frame_and_waits_for_confirmation():
     with can_python.Board('vcan0', 4) as board, monitor(HOST_URL) as host:
         host.next(lambda each: is_state(each) and each['fields'].get('SAFE') == 0)
         result = run('stop', HOST_URL, timeout=60)

@@ -64,13 +64,13 @@ def test_a_second_implementation_drives_the_board(board, host):
     board.executed('O:358,1,1')
 
 
-def test_every_length_over_the_borders_of_the_hash_is_taken(host):
+def test_the_board_accepts_signed_datagrams_of_every_length(host):
     for size in range(0, 140):
         number, bytes_ = host.command(f'O:{size},1,1', more=f'PAD:{"x" * size};')
         assert host.executed(number), (size, len(bytes_))
 
 
-def test_a_replay_does_nothing_and_is_not_answered_elsewhere(board, host, stranger):
+def test_a_replay_is_not_executed_and_a_stranger_gets_no_answer(board, host, stranger):
     number, bytes_ = host.command('O:358,1,1')
     assert host.executed(number)
     number, _ = host.command('O:0,1,1')
@@ -88,7 +88,7 @@ def test_a_replay_does_nothing_and_is_not_answered_elsewhere(board, host, strang
     assert pwm(host) == '0,1' and {code for _, code in host.refused} <= {'DUPLICATE'}
 
 
-def test_every_changed_byte_is_found(board, host):
+def test_the_board_rejects_a_command_with_any_changed_byte(board, host):
     before = host.signed(host.fields('O:358,1,1')).split(b'^')[0].decode()
     tried = 0
     for i, byte in enumerate(before):
@@ -107,7 +107,7 @@ def test_every_changed_byte_is_found(board, host):
 
 
 @pytest.mark.parametrize('kind', ['old', 'future', 'foreign', 'unknown', 'cut', 'none', 'nonce'])
-def test_what_is_not_rightly_signed_does_nothing(board, host, kind):
+def test_a_command_without_a_valid_signature_is_not_executed(board, host, kind):
     fields = host.fields('O:358,1,1')
     if kind == 'old':
         bytes_, why = host.signed(fields, board_t=host.board_t - 300), 'old'
@@ -135,7 +135,7 @@ def test_what_is_not_rightly_signed_does_nothing(board, host, kind):
     assert [code for _, code in host.refused] == (['AUTH'] if answered else [])
 
 
-def test_a_stop_needs_no_signature_and_is_cleared_with_one(board, host, stranger):
+def test_a_stop_needs_no_signature_but_its_clear_does(board, host, stranger):
     number, _ = host.command('O:358,1,1')
     assert host.executed(number)
     nonce = host.nonce
@@ -163,13 +163,13 @@ def test_forged_heartbeats_do_not_keep_the_outputs_on(board, host):
         board.never('SAFE', 2, meanwhile=forge)
 
 
-def test_a_host_without_the_key_is_told_the_nonce(board, host, stranger):
+def test_the_board_sends_its_nonce_to_a_host_without_the_key(board, host, stranger):
     host.send(closed('H:ROS2-R4;PNum:7;T:0;'), stranger)
     stranger.settimeout(3)
     assert re.search(rb';AN:[0-9a-f]{16};', stranger.recv(2048))
 
 
-def test_r4_drives_a_board_with_its_key_and_not_without(board, tmp_path):
+def test_r4_drives_a_board_only_with_its_key(board, tmp_path):
     key = write_key(tmp_path / 'key', f'3:{KEY.hex()}\n')
     sent = run('send', board.host_url, 'O:358,1,1', 'D:1000,1,1', '--key', key)
     assert sent.returncode == 0, sent.stderr
@@ -185,7 +185,7 @@ def test_r4_drives_a_board_with_its_key_and_not_without(board, tmp_path):
     assert not [each for each in board.log if 'O:99,1,1' in str(each)]
 
 
-def test_r4_with_a_key_refuses_a_board_without_one(tmp_path):
+def test_r4_with_a_key_refuses_a_board_without_a_key(tmp_path):
     key = write_key(tmp_path / 'key', f'3:{KEY.hex()}\n')
     with Board('udp://127.0.0.1:0') as board:
         sent = run('send', board.host_url, 'O:358,1,1', '--timeout', '1.5', '--key', key)
@@ -197,7 +197,7 @@ def test_r4_with_a_key_refuses_a_board_without_one(tmp_path):
         assert not [each for each in board.rest() if 'O:358' in str(each)]
 
 
-def test_a_key_is_made_and_given_over_a_cable_and_taken_away_there(tmp_path):
+def test_r4_key_gives_and_removes_a_key_only_over_a_cable(tmp_path):
     file = tmp_path / 'key'
     made = run('key', 'new', str(file), '--id', '7')
     assert made.returncode == 0, made.stderr
@@ -234,7 +234,7 @@ def test_a_key_is_made_and_given_over_a_cable_and_taken_away_there(tmp_path):
     (0o600, '', 1, 'holds no key'),
     (0o600, f'3:{"0" * 64}' + 'x' * 10000, 1, 'holds no key'),
 ])
-def test_a_key_file_that_is_none_or_open_to_others_is_refused(tmp_path, mode, text, code, words):
+def test_a_key_file_that_is_invalid_or_readable_by_others_is_refused(tmp_path, mode, text, code, words):
     file = write_key(tmp_path / 'key', text, mode)
     for command in (('monitor',), ('send', 'O:1,1,1'), ('bench',)):
         done = run(command[0], 'udp://127.0.0.1:9', *command[1:], '--key', file)
@@ -242,7 +242,7 @@ def test_a_key_file_that_is_none_or_open_to_others_is_refused(tmp_path, mode, te
         assert words in done.stderr and ERROR.match(done.stderr)
 
 
-def test_a_key_file_that_is_not_there_is_named_but_does_not_hold_a_stop_back(board, tmp_path):
+def test_a_missing_key_file_is_named_but_does_not_prevent_a_stop(board, tmp_path):
     missing = str(tmp_path / 'missing')
     done = run('send', board.host_url, 'O:1,1,1', '--key', missing)
     assert done.returncode == 4 and missing in done.stderr
@@ -250,7 +250,7 @@ def test_a_key_file_that_is_not_there_is_named_but_does_not_hold_a_stop_back(boa
     assert stopped.returncode == 0, stopped.stderr
 
 
-def test_a_board_that_is_stopped_takes_a_key_and_loses_it(tmp_path):
+def test_a_stopped_board_accepts_a_key_and_its_removal(tmp_path):
     with Board(f'pty:{tmp_path}/cable') as board:
         cable = f'serial://{tmp_path}/cable'
         assert run('stop', cable).returncode == 0
@@ -262,7 +262,7 @@ def test_a_board_that_is_stopped_takes_a_key_and_loses_it(tmp_path):
         board.executed('C:key,3:off')
 
 
-def test_a_key_file_of_somebody_else_is_told_from_one_that_is_missing():
+def test_a_key_file_of_another_user_is_a_permission_error():
     with tempfile.TemporaryDirectory() as folder:
         os.chmod(folder, 0o755)
         key = write_key(pathlib.Path(folder, 'key'), f'3:{KEY.hex()}')
@@ -296,14 +296,14 @@ def test_a_key_file_of_somebody_else_is_told_from_one_that_is_missing():
     (['key', 'give', 'key', 'can://can0'], 2, 'over USB only'),
     (['key', 'take', 'key'], 2, 'use new or give'),
 ])
-def test_a_mistake_with_keys_is_named_with_its_fix(arguments, code, words):
+def test_wrong_uses_of_keys_are_refused_with_a_fix(arguments, code, words):
     done = run(*arguments)
     assert done.returncode == code, done.stderr
     assert words in done.stderr and ERROR.fullmatch(done.stderr.strip())
 
 
 @pytest.mark.parametrize('command', [f'C:key,1:{KEY.hex()}', 'C:password,letmein!'])
-def test_a_secret_goes_over_no_network(stranger, command):
+def test_a_key_or_password_is_never_sent_over_a_network(stranger, command):
     url = f'udp://127.0.0.1:{stranger.getsockname()[1]}?listen=0'
     done = run('send', url, 'O:1,1,1', command)
     assert done.returncode == 2 and 'over USB only' in done.stderr and ERROR.match(done.stderr)
@@ -313,7 +313,7 @@ def test_a_secret_goes_over_no_network(stranger, command):
         stranger.recv(2048)
 
 
-def test_two_hosts_with_a_key_each_are_told_apart(board, host):
+def test_a_second_host_with_its_own_key_is_refused_as_busy(board, host):
     other = SigningHost(board.url, 5, OTHER)
     assert other.run(lambda: other.nonce is not None)
     other.command('O:77,1,1')
@@ -324,7 +324,7 @@ def test_two_hosts_with_a_key_each_are_told_apart(board, host):
     other.close()
 
 
-def test_a_wrong_key_is_told_at_once_also_of_a_board_that_was_just_stopped(board, tmp_path):
+def test_a_wrong_key_is_reported_even_after_a_stop(board, tmp_path):
     key = write_key(tmp_path / 'key', f'3:{KEY.hex()}')
     wrong = write_key(tmp_path / 'wrong', f'3:{OTHER.hex()}')
     for _ in range(2):
@@ -338,6 +338,6 @@ def test_a_wrong_key_is_told_at_once_also_of_a_board_that_was_just_stopped(board
     assert not [each for each in board.log if 'O:99,1,1' in str(each)]
 
 
-def test_a_monitor_says_that_a_key_is_needed(board):
+def test_monitor_reports_that_the_board_needs_a_key(board):
     with monitor(board.host_url) as watcher:
         watcher.next(lambda each: each['type'] == 'link' and each['fields']['causes'] == ['key needed'])

@@ -27,7 +27,7 @@ def bench(board, *options):
     return objects(result.stdout)[0]
 
 
-def test_loss_is_counted_at_both_ends_and_commands_come_through():
+def test_loss_is_counted_and_commands_are_still_confirmed():
     with behind('loss=20%,seed=3') as board:
         assert run('send', board.host_url, 'R:1,On', 'O:358,1,1', '--timeout', '5').returncode == 0
         board.executed('O:358,1,1')
@@ -41,7 +41,7 @@ def test_loss_is_counted_at_both_ends_and_commands_come_through():
     assert sent['duplicated'] == sent['corrupted'] == sent['cut'] == sent['overflow'] == 0
 
 
-def test_delay_is_in_every_round_trip():
+def test_a_delay_lengthens_every_round_trip():
     with behind('delay=15ms+-5') as board:
         measured = bench(board)
         received, sent = suffered(board)
@@ -49,7 +49,7 @@ def test_delay_is_in_every_round_trip():
     assert share('lost', sent) == share('lost', received) == 0
 
 
-def test_a_repeated_command_is_executed_once():
+def test_a_duplicate_command_is_executed_once():
     with behind('duplicate=100%') as board:
         assert run('send', board.host_url, 'R:1,On', 'O:358,1,1').returncode == 0
         board.executed('O:358,1,1')
@@ -60,7 +60,7 @@ def test_a_repeated_command_is_executed_once():
 
 
 @pytest.mark.parametrize('transport', ['udp', 'pty'])
-def test_damage_is_noticed_and_never_executed(transport, tmp_path):
+def test_damaged_datagrams_are_reported_and_never_executed(transport, tmp_path):
     urls = {'udp': 'udp://127.0.0.1:0', 'pty': f'pty:{tmp_path}/board'}
     with behind('corrupt=20%,seed=5', urls[transport]) as board:
         assert run('send', board.host_url, 'R:1,On', 'O:358,1,1', '--timeout', '5').returncode == 0
@@ -74,7 +74,7 @@ def test_damage_is_noticed_and_never_executed(transport, tmp_path):
     assert {each for each in executed if each[0] in 'DOPRSB'} == {'R:1,On', 'O:358,1,1'}
 
 
-def test_a_cut_makes_the_board_safe_and_ends_by_itself():
+def test_the_board_is_safe_until_a_cut_of_the_link_ends():
     with behind('cut=1s+1.5s') as board, monitor(board.host_url) as host:
         host.next(is_link('active'))
         safe = board.state('SAFE', 'link')

@@ -82,7 +82,7 @@ def test_the_papers_udp_client_drives_a_board_on_a_serial_port(board):
     assert hosts['damaged'] == hosts['misdirected'] == hosts['refused'] == 0
 
 
-def test_one_drives_through_two_bridges_while_another_watches_and_a_third_stops(bridge, board):
+def test_hosts_drive_watch_and_stop_through_two_bridges(bridge, board):
     with Bridge('udp://127.0.0.1:0', bridge.host_url) as far:
         with driving(far.host_url, 'O:358,1,1'), watch(far.host_url) as watcher:
             watcher.next(lambda each: is_state(each) and each['fields'].get('OSMC1') == [358, 1])
@@ -92,13 +92,13 @@ def test_one_drives_through_two_bridges_while_another_watches_and_a_third_stops(
             board.state('SAFE', 'stop')
 
 
-def test_sends_follow_each_other_at_once(bridge):
+def test_consecutive_sends_need_no_pause(bridge):
     for pwm in (100, 200, 300):
         sent = run('send', bridge.host_url, 'R:1,On', f'O:{pwm},1,1')
         assert sent.returncode == 0, sent.stderr
 
 
-def test_either_side_may_be_away(tty):
+def test_a_bridge_reconnects_to_a_board_that_returns(tty):
     with Bridge('udp://127.0.0.1:0', f'serial://{tty}') as bridge:
         absent = bridge.transport('board', 'down')
         assert str(tty) in absent['thing'] and absent['fix']
@@ -112,7 +112,7 @@ def test_either_side_may_be_away(tty):
 
 
 @pytest.mark.parametrize('end', ['bridge', 'host'])
-def test_a_death_on_the_way_makes_the_board_safe_in_time(bridge, board, end):
+def test_the_board_is_safe_in_time_when_host_or_bridge_is_killed(bridge, board, end):
     with driving(bridge.host_url, 'O:358,1,1') as host:
         board.outputs(lambda outputs: outputs['osmc'][0][0] == 358)
         board.skip_past()
@@ -121,7 +121,7 @@ def test_a_death_on_the_way_makes_the_board_safe_in_time(bridge, board, end):
         assert safe['came'] - died <= within(SAFE_WITHIN_S)
 
 
-def test_what_waited_in_a_stopped_bridge_is_not_executed(bridge, board):
+def test_a_command_that_waited_in_a_suspended_bridge_is_not_executed(bridge, board):
     """Uses the paper's client: its heartbeats prove nothing, so the board cannot recognise its old datagrams."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
         address = ('127.0.0.1', int(bridge.url.rsplit(':', 1)[1]))
@@ -146,12 +146,12 @@ def test_what_waited_in_a_stopped_bridge_is_not_executed(bridge, board):
     assert not [each for each in log if each.get('executed', {}).get('command') == 'S:2000,1']
 
 
-def test_by_default_it_listens_to_this_computer_alone(board):
+def test_by_default_a_bridge_listens_on_this_computer_only(board):
     with Bridge('udp://:0', f'serial://{board.tty}') as bridge:
         assert bridge.url.startswith('udp://127.0.0.1:')
 
 
-def test_a_cable_is_not_opened_to_a_network_by_mistake(board):
+def test_a_bridge_from_a_network_to_a_cable_needs_the_option_open(board):
     refused = run('bridge', 'udp://0.0.0.0:0', f'serial://{board.tty}')
     assert refused.returncode == 2 and ERROR.match(refused.stderr) and '--open' in refused.stderr
     with Bridge('udp://0.0.0.0:0', f'serial://{board.tty}', '--open') as bridge:
@@ -159,7 +159,7 @@ def test_a_cable_is_not_opened_to_a_network_by_mistake(board):
         assert warning['side'] == 'hosts' and 'it is open' in warning['reason']
 
 
-def test_a_board_with_a_key_at_a_cable_obeys_only_who_has_it(tty, tmp_path):
+def test_a_board_with_a_key_needs_the_key_in_bridge_and_host(tty, tmp_path):
     key = tmp_path / 'key'
     assert run('key', 'new', str(key)).returncode == 0
     with Board(f'pty:{tty}', options=('--set', f'key,{key.read_text().strip()}')):
@@ -172,7 +172,7 @@ def test_a_board_with_a_key_at_a_cable_obeys_only_who_has_it(tty, tmp_path):
             assert run('stop', bridge.host_url).returncode == 0
 
 
-def test_no_key_goes_through_a_bridge(tty, tmp_path):
+def test_a_bridge_does_not_pass_a_key(tty, tmp_path):
     key = tmp_path / 'key'
     assert run('key', 'new', str(key)).returncode == 0
     with Board('udp://127.0.0.1:0') as board:
@@ -186,13 +186,13 @@ def test_no_key_goes_through_a_bridge(tty, tmp_path):
     ('udp://127.0.0.1:2018', 'udp://127.0.0.1', 2),
     ('udp://192.0.2.1:2018', 'udp://127.0.0.1:2019', 4),
 ])
-def test_two_sides_that_cannot_be_joined_are_one_clear_line(hosts, to, code):
+def test_a_bridge_that_cannot_open_its_urls_fails_with_one_line(hosts, to, code):
     ended = run('bridge', hosts, to)
     assert ended.returncode == code and ended.stdout == ''
     assert ERROR.fullmatch(ended.stderr.rstrip('\n')), ended.stderr
 
 
-def test_tells_what_passed_for_people_too(board):
+def test_a_bridge_reports_its_counters_in_readable_text(board):
     ended = run('bridge', 'udp://127.0.0.1:0', f'serial://{board.tty}', '--duration', '0.8', '--every', '0.1')
     assert ended.returncode == 0
     assert ended.stdout.count(' <-> ') == 1

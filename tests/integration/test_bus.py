@@ -18,7 +18,7 @@ def planned(*arguments):
     return {each['name']: each for each in objects(result.stdout) if 'name' in each}, result
 
 
-def test_eight_boards_in_packed_form_fit_and_in_plain_form_do_not():
+def test_eight_boards_fit_in_the_packed_form_but_not_in_plain_text():
     rows, result = planned()
     assert result.returncode == 0 and result.stderr == '' and rows['total']['packed'] is True
     assert rows['total']['boards'] == 8 and rows['total']['fits'] is True
@@ -41,7 +41,7 @@ def test_the_rows_add_up_to_the_total():
     assert math.isclose(total['load'], total['bits'] / total['bitrate'], rel_tol=1e-9)
 
 
-def test_frames_are_those_of_iso_tp():
+def test_the_number_of_frames_follows_iso_tp():
     """The board's plain heartbeat: 6 bytes in the first frame, 7 in each consecutive frame."""
     rows, _ = planned('--plain', '--boards', '1')
     heartbeat = rows['board heartbeat']
@@ -51,14 +51,14 @@ def test_frames_are_those_of_iso_tp():
     assert rows['board heartbeat']['frames'] == rows['board heartbeat']['datagrams']  # one FD frame per datagram
 
 
-def test_above_80_percent_it_warns_and_still_fits():
+def test_r4_bus_warns_above_a_load_of_80_percent():
     result = run('bus', '--boards', '13')
     assert result.returncode == 0
     assert re.fullmatch(r'r4: warning: the bus: .+; .+\n', result.stderr)
     assert run('bus', '--boards', '11').stderr == ''
 
 
-def test_what_it_says_fits_does_fit():
+def test_the_reported_most_boards_and_highest_rate_are_exact():
     rows, _ = planned()
     boards, rate = rows['total']['most_boards'], rows['total']['highest_rate']
     for more in (('--boards', str(boards)), ('--rate', str(rate))):
@@ -94,13 +94,13 @@ def test_load_follows_the_bit_rate():
     (['can://can0', '--bitrate', '500000', '--dbitrate', '250000'], 'below the nominal'),
     (['--duration', '2'], 'as in can://can0'),
 ])
-def test_wrong_options_are_told_with_the_fix(arguments, words):
+def test_wrong_options_are_refused_with_a_fix(arguments, words):
     result = run('bus', *arguments)
     assert result.returncode == USAGE and result.stdout == ''
     assert ERROR.search(result.stderr) and words in result.stderr
 
 
-def test_the_documentation_shows_what_is_printed():
+def test_the_documentation_shows_the_printed_output():
     with open(os.path.join(DOCS, 'how-to', 'can.md'), encoding='utf-8') as file:
         text = file.read()
     examples = re.findall(r'^    \$ r4 bus(?! can:)(.*)\n((?:    .*\n|\n(?=    (?!\$)))*)', text, re.MULTILINE)

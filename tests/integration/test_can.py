@@ -17,5 +17,5 @@ UNSANITIZED = ['can_inside.py', 'can_doctor_inside.py', 'can_python_inside.py', 
 PYTHON = ['../python/pytest_plugin_can_inside.py'] if PACKAGE.is_dir() else []
 
 
-def test_the_link_over_can():
+def test_the_can_tests_pass_in_a_guest():
     run_inside(*ALWAYS, *([] if SANITIZED else UNSANITIZED + PYTHON))

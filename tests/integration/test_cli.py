@@ -25,7 +25,7 @@ DATA_BAD, USAGE, REFUSED, OPEN, PERMISSION, UNSUPPORTED = 1, 2, 3, 4, 5, 6
     ['monitor', 'udp://127.1.0.{1-100}'], ['monitor', 'udp://127.1.0.{1-100}?listen=0'],
     ['record', 'udp://127.1.0.{1-100}', '-o', 'fleet.r4log'], ['metrics', 'udp://127.1.0.{1-100}?listen=0'],
     ['sim', 'udp://127.1.0.{1-100}:20180']])
-def test_a_program_that_may_open_no_more_files_says_so(command, tmp_path):
+def test_a_program_reports_the_limit_of_open_files(command, tmp_path):
     result = subprocess.run(['sh', '-c', 'ulimit -n 40; exec "$0" "$@"', R4, *command], capture_output=True, text=True,
                             timeout=PATIENCE_S, cwd=tmp_path, check=False)
     assert result.returncode == OPEN, result.stderr
@@ -134,7 +134,7 @@ def test_bad_input_has_its_exit_code_and_a_message_with_the_fix(arguments, code,
     assert ERROR.fullmatch(result.stderr.strip()), result.stderr
 
 
-def test_a_wrong_command_keeps_all_from_being_sent():
+def test_no_command_is_sent_if_one_of_them_is_wrong():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
         board.bind(('127.0.0.1', 0))
         board.setblocking(False)
@@ -144,7 +144,7 @@ def test_a_wrong_command_keeps_all_from_being_sent():
             board.recv(2000)
 
 
-def test_a_scenario_that_is_wrong_is_bad_data():
+def test_a_wrong_line_of_a_scenario_is_a_data_error():
     with tempfile.NamedTemporaryFile('w') as file:
         file.write('0.5 handle released\n1 explode\n')
         file.flush()
@@ -153,7 +153,7 @@ def test_a_scenario_that_is_wrong_is_bad_data():
     assert f'{file.name}:2' in result.stderr and ERROR.match(result.stderr)
 
 
-def test_a_board_tells_at_its_end_what_passed_over_its_transports(tmp_path):
+def test_a_board_reports_its_transport_counters_when_it_ends(tmp_path):
     urls = ['udp://127.0.0.1:0', f'pty:{tmp_path}/r4']
     result = run('sim', '--json', '--duration', '0.1', *urls)
     assert result.returncode == 0, result.stderr
@@ -175,7 +175,7 @@ def test_a_port_in_use_is_named(command):
     assert re.search(f'{port}.*in use', result.stderr) and ERROR.match(result.stderr)
 
 
-def test_a_stop_goes_out_although_another_program_has_the_port_of_hosts():
+def test_stop_works_while_another_program_has_the_port_of_hosts():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board, \
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         board.bind(('127.0.0.1', 0))
@@ -189,7 +189,7 @@ def test_a_stop_goes_out_although_another_program_has_the_port_of_hosts():
         assert any(board.recv(2000).startswith(b'E:STOP;') for _ in range(2))
 
 
-def test_permission_denied_is_named_with_the_fix():
+def test_a_denied_permission_is_reported_with_a_fix():
     master, slave = pty.openpty()
     device = os.ttyname(slave)
     os.chmod(device, 0)
@@ -210,7 +210,7 @@ def test_permission_denied_is_named_with_the_fix():
     assert objects(result.stdout)[-1]['kind'] == 'permission'
 
 
-def test_r4_alone_says_which_part_of_it_is_missing(tmp_path):
+def test_r4_names_a_missing_part_of_its_installation(tmp_path):
     program = shutil.copy(R4, tmp_path / 'r4')
     result = subprocess.run([program, 'ros2', 'sim:', '--duration', '1'], capture_output=True, text=True, timeout=30,
                             check=False)
@@ -240,7 +240,7 @@ def test_a_standard_error_that_cannot_be_written_changes_no_exit_code(closed):
     assert objects(result.stdout)[-1]['kind'] == 'refused'
 
 
-def test_a_board_does_not_wait_for_whoever_reads_its_log():
+def test_a_board_does_not_wait_for_the_reader_of_its_log():
     """No program reads the pipe, which holds 64 KB; each command logs a line or two."""
     with subprocess.Popen([R4, 'sim', 'udp://127.0.0.1:0', '--json', '--duration', '20'],
                           stdout=subprocess.PIPE, text=True) as board:
@@ -256,7 +256,7 @@ def test_a_board_does_not_wait_for_whoever_reads_its_log():
     assert sum('executed' in each for each in events) > 100
 
 
-def test_nothing_that_is_opened_takes_the_place_of_a_closed_output():
+def test_dev_null_replaces_closed_standard_streams():
     closed = f'exec "{R4}" sim --quiet udp://127.0.0.1:0 <&- >&-'
     with subprocess.Popen(['bash', '-c', closed], stderr=subprocess.DEVNULL) as process:
         deadline = time.monotonic() + PATIENCE_S
@@ -300,7 +300,7 @@ def test_a_signal_that_was_ignored_at_the_start_stays_ignored(command, tmp_path)
         program.process.stdin.close()
 
 
-def test_with_json_an_error_is_an_object_too():
+def test_with_json_an_error_is_also_a_json_object():
     result = run('monitor', 'serial:///dev/tty-that-is-not-there', '--json')
     error = objects(result.stdout)[-1]
     assert error['type'] == 'error' and error['kind'] == 'open'

@@ -86,7 +86,7 @@ def test_wireshark_reads_the_datagrams_and_the_events(native, tmp_path):
     assert events == [line for line in native.read_text().splitlines() if '! ' in line and line[0] != '#']
 
 
-def test_what_wireshark_writes_is_read(native, tmp_path):
+def test_convert_reads_files_that_wireshark_writes(native, tmp_path):
     packets, again = tmp_path / 'drive.pcapng', tmp_path / 'again.pcapng'
     convert(native, packets)
     tshark('-r', packets, '-w', again)
@@ -115,7 +115,7 @@ def in_several_chunks(native):
     return native
 
 
-def test_mcaps_own_reader_has_every_message_by_every_index(two_boards, tmp_path):
+def test_the_mcap_reader_finds_every_message_by_every_index(two_boards, tmp_path):
     convert(two_boards, tmp_path / 'drive.mcap')
     read = read_mcap(tmp_path / 'drive.mcap')
     assert read.returncode == 0, read.stderr
@@ -139,7 +139,7 @@ def test_mcaps_own_reader_has_every_message_by_every_index(two_boards, tmp_path)
     assert (tmp_path / 'again.r4log').read_bytes() == two_boards.read_bytes()
 
 
-def test_mcaps_own_reader_finds_a_byte_that_is_wrong(two_boards, tmp_path):
+def test_the_mcap_reader_finds_a_wrong_byte(two_boards, tmp_path):
     convert(two_boards, tmp_path / 'drive.mcap')
     whole = (tmp_path / 'drive.mcap').read_bytes()
     chunk = whole.index(b'\x04\0\0\0zstd') - 37
@@ -153,7 +153,7 @@ def test_mcaps_own_reader_finds_a_byte_that_is_wrong(two_boards, tmp_path):
         assert read.returncode != 0 and words in read.stderr, (place, read)
 
 
-def test_damage_has_a_place_and_the_rest_is_converted(native, tmp_path):
+def test_convert_locates_damage_and_converts_the_rest(native, tmp_path):
     good = native.read_text()
     native.write_text(good.replace('1795468293.520000', 'x') + '17954')
     result = convert(native, tmp_path / 'again.r4log', code=DATA_BAD)
@@ -166,7 +166,7 @@ def test_damage_has_a_place_and_the_rest_is_converted(native, tmp_path):
 
 
 @pytest.mark.parametrize('command', ['info', 'convert'])
-def test_of_a_pipe_whose_writer_is_gone_all_that_is_whole_is_read(native, tmp_path, command):
+def test_all_whole_lines_of_an_interrupted_pipe_are_read(native, tmp_path, command):
     pipe, target = tmp_path / 'pipe', tmp_path / 'again.r4log'
     os.mkfifo(pipe)
     output = ['-o', target] if command == 'convert' else []
@@ -181,7 +181,7 @@ def test_of_a_pipe_whose_writer_is_gone_all_that_is_whole_is_read(native, tmp_pa
 
 
 @pytest.mark.parametrize('ending', ['.pcapng', '.mcap', '.log'])
-def test_info_shows_a_file_of_another_format_whatever_its_name(tmp_path, ending):
+def test_info_recognises_a_format_whatever_the_file_name(tmp_path, ending):
     capture(tmp_path / 'drive.r4log', 'can://can0?node=3')
     convert(tmp_path / 'drive.r4log', tmp_path / f'drive{ending}')
     (tmp_path / f'drive{ending}').rename(tmp_path / 'drive.txt')
@@ -189,7 +189,7 @@ def test_info_shows_a_file_of_another_format_whatever_its_name(tmp_path, ending)
     assert [(path['url'], path['states']) for path in told['paths']] == [('can://can0?node=3', 60)]
 
 
-def test_what_mergecap_has_mixed_is_refused_and_what_it_appends_is_read(tmp_path):
+def test_mixed_files_of_mergecap_are_refused_appended_ones_are_read(tmp_path):
     for name, url in (('a', 'udp://192.168.0.125'), ('b', 'udp://192.168.0.126')):
         convert(capture(tmp_path / f'{name}.r4log', url), tmp_path / f'{name}.pcapng')
     both = [tmp_path / 'a.pcapng', tmp_path / 'b.pcapng']
@@ -203,7 +203,7 @@ def test_what_mergecap_has_mixed_is_refused_and_what_it_appends_is_read(tmp_path
         (tmp_path / f'{name}.r4log').read_text() for name in 'ab')
 
 
-def test_a_pipe_is_read_and_nothing_is_replaced_unasked(native, tmp_path):
+def test_convert_reads_a_pipe_and_replaces_a_file_only_with_force(native, tmp_path):
     target = tmp_path / 'piped.jsonl'
     assert run('convert', '-', '-o', str(target), stdin=native.read_text()).returncode == 0
     assert len(target.read_text().splitlines()) == 73
@@ -222,7 +222,7 @@ def test_a_pipe_is_read_and_nothing_is_replaced_unasked(native, tmp_path):
     ('x.r4log', 'directory', OPEN, 'Is a directory'),
     ('x.mcap', 'directory', OPEN, 'Is a directory'),
 ])
-def test_what_is_no_recording_makes_no_file(tmp_path, name, content, code, message):
+def test_an_invalid_recording_creates_no_output_file(tmp_path, name, content, code, message):
     if content == 'directory':
         (tmp_path / name).mkdir()
     elif content is not None:
@@ -233,12 +233,12 @@ def test_what_is_no_recording_makes_no_file(tmp_path, name, content, code, messa
 
 
 @pytest.mark.parametrize('target, code', [('x.xlsx', USAGE), ('.', OPEN), ('no/such/x.csv', OPEN)])
-def test_what_cannot_be_written_is_said(native, tmp_path, target, code):
+def test_an_output_that_cannot_be_written_is_reported(native, tmp_path, target, code):
     result = convert(native, tmp_path / target, code=code)
     assert ERROR.search(result.stderr), result
 
 
-def test_what_is_broken_off_leaves_nothing(native, tmp_path):
+def test_an_interrupted_conversion_leaves_no_file(native, tmp_path):
     with subprocess.Popen([R4, 'convert', '-', '-o', str(tmp_path / 'drive.csv')], stdin=subprocess.PIPE) as process:
         text = native.read_bytes()
         for _ in range(2 * 65536 // len(text) + 1):  # more than a pipe holds, so r4 has begun to read
@@ -274,7 +274,7 @@ def claims(ending):
 
 
 @pytest.mark.parametrize('ending', ['.mcap', '.pcapng', '.pcap', '.r4log.zst'])
-def test_a_size_that_a_header_claims_takes_no_memory(tmp_path, ending):
+def test_a_false_size_in_a_header_allocates_no_memory(tmp_path, ending):
     for number, (content, words) in enumerate(claims(ending)):
         source = tmp_path / f'{number}{ending}'
         source.write_bytes(content)
@@ -300,7 +300,7 @@ def two_minutes_of_eight_boards(tmp_path_factory):
 
 
 @pytest.mark.parametrize('ending', ['.r4log', '.r4log.zst', '.csv', '.jsonl', '.log', '.pcapng', '.mcap'])
-def test_a_long_recording_takes_little_memory_and_comes_back(eight_boards, tmp_path, ending):
+def test_a_long_recording_is_converted_and_back_in_little_memory(eight_boards, tmp_path, ending):
     there, back = tmp_path / f'there{ending}', tmp_path / 'back.r4log'
     ways = [(eight_boards, there)] + [(there, back)] * (ending not in ('.csv', '.jsonl'))
     for source, target in ways:
@@ -314,7 +314,7 @@ def test_a_long_recording_takes_little_memory_and_comes_back(eight_boards, tmp_p
         assert back.read_bytes() == eight_boards.read_bytes()
 
 
-def test_a_terminal_shows_how_far_it_is(eight_boards, tmp_path):
+def test_a_terminal_shows_the_progress_of_convert(eight_boards, tmp_path):
     terminal, its_end = pty.openpty()
     with subprocess.Popen([R4, 'convert', eight_boards, '-o', tmp_path / 'drive.jsonl'], stdout=subprocess.DEVNULL,
                           stderr=its_end) as process:

@@ -43,7 +43,7 @@ def decode(text, *options):
     return result.returncode, rest, summary
 
 
-def test_a_log_a_screen_and_their_mixture_say_the_same():
+def test_both_formats_of_candump_give_the_same_datagrams():
     frames = list(frames_of(with_crc(STATE)))
     log = log_lines(frames)
     screen = [f' {line.split()[0]}  can0  403   [{len(frame)}]  {frame.hex(" ").upper()}\n'
@@ -63,7 +63,7 @@ def test_a_log_a_screen_and_their_mixture_say_the_same():
     assert decode(''.join(log).replace('\n', '\r\n')) == expected
 
 
-def test_fd_and_packed_datagrams():
+def test_decodes_fd_frames_and_packed_datagrams():
     whole = with_crc(';'.join(f'SERVO{n}POS:1500' for n in range(1, 17)) + ';PNum:1;T:2;')
     *full, last = frames_of(whole, 64)
     padded = last.ljust(next(size for size in (8, 12, 16, 20, 24, 32, 48, 64) if size >= len(last)), b'\xcc')
@@ -75,7 +75,7 @@ def test_fd_and_packed_datagrams():
     assert code == 0 and state['packed'] == len(packed) and state['text'] == with_crc(STATE).decode()
 
 
-def test_commands_answers_and_raw_frames_of_eight_boards_at_once():
+def test_decodes_mixed_frames_of_eight_boards():
     lanes = []
     for node in range(8):
         lanes.append(log_lines(frames_of(with_crc(STATE)), 0x400 + node))
@@ -97,20 +97,20 @@ def test_commands_answers_and_raw_frames_of_eight_boards_at_once():
     (lambda lines: lines[:3] + log_lines(frames_of(with_crc(STATE))), 'interrupted by another transfer'),
     (lambda lines: lines[:3] + ['(1795248809.120000) can0 123#\n'], 'no consecutive frame in time (N_Cr)'),
 ])
-def test_a_transfer_that_failed_is_told_with_its_reason(change, reason):
+def test_a_failed_transfer_is_reported_with_its_reason(change, reason):
     code, printed, summary = decode(''.join(change(log_lines(frames_of(with_crc(STATE))))))
     assert code == DATA_BAD and summary['failed'] == 1
     assert (printed[0]['error'], printed[0]['reason'], printed[0]['frames']) == ('isotp', reason, 3)
 
 
-def test_a_datagram_with_a_wrong_checksum_is_told_with_both():
+def test_a_wrong_checksum_is_reported_with_the_right_one():
     damaged = with_crc(STATE).replace(b'24.28', b'24.29')
     code, (bad,), summary = decode(''.join(log_lines(frames_of(damaged))))
     assert code == DATA_BAD and summary['bad'] == 1
     assert bad['error'] == 'crc' and bad['expected'] != bad['found'] and bad['node'] == 3
 
 
-def test_a_damaged_line_is_told_with_its_number_and_the_fix_and_the_rest_is_read():
+def test_a_damaged_line_is_reported_and_the_rest_is_decoded():
     lines = ['what is this\n', *log_lines(frames_of(with_crc(STATE))), '(1795248809.1) can0 403#10']
     code, printed, summary = decode(''.join(lines)[:-1])
     assert code == DATA_BAD and summary['damaged_lines'] == 2
@@ -120,19 +120,19 @@ def test_a_damaged_line_is_told_with_its_number_and_the_fix_and_the_rest_is_read
     assert printed[2]['line'] == len(lines) and printed[2]['reason'] == 'the line is cut off'
 
 
-def test_a_dump_that_begins_and_ends_within_datagrams_is_good():
+def test_a_dump_may_begin_and_end_within_a_datagram():
     lines = log_lines(list(frames_of(with_crc(STATE))) * 2)
     code, printed, summary = decode(''.join(lines[3:-1]))
     assert (code, printed) == (0, [])
     assert summary['orphans'] == len(lines) // 2 - 3 and summary['unfinished'] == 1
 
 
-def test_nothing_is_a_summary_of_zeros():
+def test_an_empty_dump_gives_a_summary_of_zeros():
     code, printed, summary = decode('')
     assert (code, printed) == (0, []) and set(summary.values()) == {'summary', 0}
 
 
-def test_any_bytes_are_borne_within_little_memory():
+def test_arbitrary_bytes_are_decoded_in_little_memory():
     rng = random.Random(7)
     pieces = [rng.randbytes(200_000), b'x' * 10_000_000, b'(1.0) can0 403#' + b'0' * 5_000_000,
               *(f'(1.0) i{n} {n % 0x800:03X}#{rng.randbytes(8).hex()}'.encode() for n in range(20_000)),
@@ -147,6 +147,6 @@ def test_any_bytes_are_borne_within_little_memory():
     assert SANITIZED or (limited.returncode, limited.stderr) == (DATA_BAD, b'')
 
 
-def test_a_file_that_cannot_be_read_is_said():
+def test_a_file_that_cannot_be_read_is_named():
     result = run('decode', '--candump', '/no/such/file')
     assert result.returncode == OPEN and '/no/such/file' in result.stderr

@@ -28,14 +28,14 @@ def is_reading(device, value):
     return looks_right
 
 
-def test_those_that_are_shipped_are_listed():
+def test_r4_devices_lists_the_shipped_devices():
     listed = run('devices').stdout.splitlines()
     assert [line.split()[0] for line in listed] == ['as5600', 'bno055', 'icm20948', 'ina219', 'mpu6050', 'vl53l0x']
     assert objects(run('devices', 'ina219', '--json').stdout)[0]['values']['current'] == 'A'
     assert 'gyro_z           rad/s    every 20 ms' in run('devices', 'bno055').stdout
 
 
-def test_a_description_that_is_wrong_is_told_with_its_line(tmp_path):
+def test_a_wrong_description_is_reported_with_its_line(tmp_path):
     path = tmp_path / 'mine.device'
     path.write_text(MINE.replace('bus 0', 'bus 1'))
     result = run('devices', str(path))
@@ -49,7 +49,7 @@ def test_a_description_that_is_wrong_is_told_with_its_line(tmp_path):
         assert run(*command).returncode == 2, command
 
 
-def test_monitor_sets_devices_up_and_shows_what_they_measure(board, tmp_path):
+def test_monitor_sets_up_devices_and_shows_their_values(board, tmp_path):
     path = tmp_path / 'mine.device'
     path.write_text(MINE)
     devices = ['--device', 'bno055@0x28', '--device', 'as5600', '--device', f'{path}@0x40:7']
@@ -64,7 +64,7 @@ def test_monitor_sets_devices_up_and_shows_what_they_measure(board, tmp_path):
     assert 'icm20948@0x68: it is another device: its register x00 has x00, not xea' in wrong.stdout
 
 
-def test_a_device_that_is_reset_is_told_measures_nothing_and_is_set_up_again(tmp_path):
+def test_a_reset_device_is_reported_and_set_up_again(tmp_path):
     scenario = tmp_path / 'reset.txt'
     scenario.write_text('2.5 device mpu6050 reset\n')
     with Board('udp://127.0.0.1:0', options=('--script', str(scenario))) as board:
@@ -81,7 +81,7 @@ def test_a_device_that_is_reset_is_told_measures_nothing_and_is_set_up_again(tmp
             assert told['thing'] == 'mpu6050@0x68' and told['reason'].startswith('it is not set up, as after a reset')
 
 
-def test_a_recording_becomes_columns_with_units(board, tmp_path):
+def test_convert_writes_device_values_as_columns_with_units(board, tmp_path):
     log, table = tmp_path / 'drive.r4log', tmp_path / 'drive.csv'
     with Running('monitor', board.host_url, '--device', 'bno055', '--json') as monitor:
         monitor.next(is_reading('bno055@0x28', 'accel_z'))
@@ -94,7 +94,7 @@ def test_a_recording_becomes_columns_with_units(board, tmp_path):
     assert run('convert', str(log), '-o', str(tmp_path / 'drive.pcapng'), '--device', 'bno055').returncode == 2
 
 
-def test_a_recording_tells_what_the_bytes_of_its_devices_mean(board, tmp_path):
+def test_a_recording_includes_the_descriptions_of_its_devices(board, tmp_path):
     """Also for a user's own description, whose file has been deleted."""
     mine, log, table = tmp_path / 'mine.device', tmp_path / 'drive.r4log', tmp_path / 'drive.csv'
     mine.write_text(MINE)
@@ -111,7 +111,7 @@ def test_a_recording_tells_what_the_bytes_of_its_devices_mean(board, tmp_path):
     assert all(float(row['mine@0x40 volts [V]']) == pytest.approx(12.16) for row in rows)
 
 
-def test_a_page_shows_them_and_who_controls_sets_them_up(board):
+def test_a_controlling_page_sets_up_devices_and_shows_their_values(board):
     with Web(board.host_url, options=('--device', 'bno055')) as web, Page(web) as page:
         place = page.hello['fields'].index('bno055@0x28.gyro_z')
         assert page.hello['units'][place] == 'rad/s'

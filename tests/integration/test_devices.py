@@ -13,7 +13,7 @@ def a_simulated_board():
         yield board
 
 
-def test_a_scan_a_register_and_a_device_that_is_not_there(board):
+def test_send_scans_reads_and_writes_the_i2c_bus(board):
     result = run('send', board.host_url, 'X:SCAN', 'X:READ,0x68,x75,1', 'X:WRITE,0x68,x6b00', 'X:READ,0x40,x00,2')
     assert result.returncode == 0, result.stderr
     lines = result.stdout.splitlines()
@@ -24,7 +24,7 @@ def test_a_scan_a_register_and_a_device_that_is_not_there(board):
     assert (answer['confirmed'], answer['transfer'], answer['bytes']) == (False, 'no acknowledge', 'x')
 
 
-def test_readings_come_with_every_state_and_end_with_the_session(board):
+def test_states_contain_polled_readings_until_the_session_ends(board):
     commands = ['X:WRITE,0x68,x6b00', 'X:POLL,0x68,x3b,14,10,1', 'X:POLL,0x40,x02,2,50,2', 'F:I2C1,I2C2,I2CBUS']
     with Running('send', board.host_url, *commands, '--hold', '30', '--json') as host:
         for _ in commands:
@@ -42,7 +42,7 @@ def test_readings_come_with_every_state_and_end_with_the_session(board):
     assert after[0]['confirmed']
 
 
-def test_a_receiver_on_a_uart_a_voltage_and_inputs(board):
+def test_states_report_uart_bytes_voltages_and_inputs(board):
     commands = ['C:uart1,115200:8N1', 'F:UART1,DAC1,DAC2,GPIO', 'X:DAC,1,5', 'X:DAC,1,1650;S:1500,3;X:DAC,2,3300',
                 'X:UART,1,x2450']
     with Running('send', board.host_url, *commands, '--hold', '30', '--json') as host:
@@ -67,7 +67,7 @@ def test_a_receiver_on_a_uart_a_voltage_and_inputs(board):
     assert 'C:uart1,115200:8N1' in run('send', '--help').stdout
 
 
-def test_a_bus_that_is_held_stops_nothing(tmp_path):
+def test_a_stuck_i2c_bus_does_not_block_other_commands(tmp_path):
     scenario = tmp_path / 'held.txt'
     scenario.write_text('0 userbus held\n')
     with Board('udp://127.0.0.1:0', options=('--script', str(scenario))) as board:

@@ -71,7 +71,7 @@ def found(computer, *options):
     return {board['address']: board for network in networks for board in network['boards']}
 
 
-def test_every_board_is_listed_with_its_name_who_controls_it_and_its_url(lan, boards):
+def test_list_shows_each_board_with_name_url_and_whether_it_is_busy(lan, boards):
     boards('10.77.0.2', 'b-2', '--set', 'name,left')
     boards('10.77.0.3', 'b-3', '--set', 'name,right')
     boards('10.77.0.4', 'b-4')
@@ -94,7 +94,7 @@ def test_every_board_is_listed_with_its_name_who_controls_it_and_its_url(lan, bo
         assert objects(result.stdout)[0]['board_id'] == each['board_id'], (address, result)
 
 
-def test_auto_is_the_only_board(lan, boards):
+def test_udp_auto_opens_the_only_board(lan, boards):
     nothing = run('send', 'udp:auto', 'Q:ID', **lan.host.inside)
     assert nothing.returncode == OPEN and ERROR.search(nothing.stderr), nothing
     assert 'no R4 board answered (asked on lo, r4lan)' in nothing.stderr
@@ -112,7 +112,7 @@ def test_auto_is_the_only_board(lan, boards):
         assert 'udp:?id=b-2 (10.77.0.2)' in several.stderr and 'udp:?id=right (10.77.0.3)' in several.stderr
 
 
-def test_a_board_that_gets_another_address_is_found_again(lan, boards):
+def test_a_host_finds_a_board_again_at_a_new_address(lan, boards):
     board = boards('10.77.0.2', 'b-2', '--set', 'name,left')
     boards('10.77.0.3', 'b-3')
     with monitor('udp:?id=left', **lan.host.inside) as host:
@@ -128,7 +128,7 @@ def test_a_board_that_gets_another_address_is_found_again(lan, boards):
     board.state('ACTIVE')
 
 
-def test_two_boards_of_one_name_are_told_apart_by_their_ids(lan, boards):
+def test_two_boards_with_one_name_are_distinguished_by_their_ids(lan, boards):
     boards('10.77.0.2', 'b-2', '--set', 'name,left')
     boards('10.77.0.3', 'b-3', '--set', 'name,left')
     result = run('send', 'udp:?id=left', 'R:1,On', **lan.host.inside)
@@ -156,7 +156,7 @@ def test_garbage_and_forged_answers_hide_no_board(lan, boards):
         assert run('send', 'udp:?id=left', 'R:1,On', **lan.host.inside).returncode == 0
 
 
-def test_a_board_gets_its_name_over_its_own_cable_only(lan, tmp_path):
+def test_a_board_accepts_a_name_only_over_its_cable(lan, tmp_path):
     path = tmp_path / 'board'
     inside = lan.host.inside
     with Board(f'pty:{path}', 'udp://127.0.0.1:2018', **inside) as board:
@@ -181,7 +181,7 @@ def test_a_board_gets_its_name_over_its_own_cable_only(lan, tmp_path):
         assert board.executed('C:name,off') and name() == ''
 
 
-def test_a_board_at_another_port_is_found_where_it_is_asked_for(lan):
+def test_a_board_at_another_port_is_found_with_the_option_port(lan):
     with Board('udp://127.0.0.1:2019', **lan.host.inside):
         assert found(lan.host) == {}
         assert found(lan.host, '--port', '2019')['127.0.0.1']['url'] == 'udp:?id=sim-1&port=2019'

@@ -24,7 +24,7 @@ def doctor(*arguments):
     return result.returncode, {each['check']: each for each in printed if each['type'] == 'finding'}
 
 
-def test_a_serial_link_that_is_well_and_who_else_has_its_port(tmp_path):
+def test_doctor_names_another_program_that_uses_the_port(tmp_path):
     with Board(f'pty:{tmp_path}/r4') as board:
         port = os.path.realpath(tmp_path / 'r4')
         with subprocess.Popen([sys.executable, '-S', '-c', HOLDER, port], stdin=subprocess.PIPE,
@@ -61,7 +61,7 @@ def speak(board):
             board.sendto(state(number, damage=number % 7 == 0), host)
 
 
-def test_a_link_that_loses_and_damages():
+def test_doctor_reports_lost_and_damaged_datagrams():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
         board.bind(('127.0.0.1', 0))
         board.settimeout(PATIENCE_S)
@@ -73,14 +73,14 @@ def test_a_link_that_loses_and_damages():
     assert found['link.damaged']['severity'] == 'warning'
 
 
-def test_a_board_that_says_nothing_and_a_port_that_is_not_there(tmp_path):
+def test_doctor_reports_a_silent_board_and_a_missing_port(tmp_path):
     code, found = doctor('udp://127.0.0.1:9?listen=0', '--duration', '0.1')
     assert code == REFUSED and found['link.silent']['severity'] == 'error'
     code, found = doctor(f'serial://{tmp_path}/none', '--duration', '0.1')
     assert code == OPEN and found['serial.permission']['reason'] == 'there is no such port'
 
 
-def test_no_program_of_the_working_directory_is_run(tmp_path):
+def test_doctor_runs_no_program_of_the_working_directory(tmp_path):
     for name in ('iw', 'nft', 'iptables', 'sh'):
         (tmp_path / name).write_text(f'#!/bin/sh\n: > {tmp_path}/executed\n')
         (tmp_path / name).chmod(0o755)
@@ -90,7 +90,7 @@ def test_no_program_of_the_working_directory_is_run(tmp_path):
     assert not (tmp_path / 'executed').exists()
 
 
-def test_it_brings_its_rules_for_udev():
+def test_doctor_prints_the_udev_rules():
     assert run('doctor', '--udev-rules').stdout == RULES.read_text(encoding='ascii')
     if subprocess.run(['which', 'udevadm'], capture_output=True, check=False).returncode == 0:
         verify = subprocess.run(['udevadm', 'verify', str(RULES)], capture_output=True, text=True, check=False)

@@ -38,7 +38,7 @@ def drives(outputs):
 
 
 @pytest.mark.parametrize('commands', shown_commands())
-def test_what_is_shown_moves_a_robot(commands):
+def test_every_documented_drive_command_turns_a_motor(commands):
     with Board('udp://127.0.0.1:0') as board:
         result = run('send', board.host_url, *commands)
         assert result.returncode == 0, result.stderr
@@ -65,7 +65,7 @@ def test_a_motor_turns_only_while_relay_1_is_closed_and_the_handle_held(tmp_path
         assert not sensors(lambda each: each['handle'] == 'released')['supply']
 
 
-def test_what_is_written_to_a_board_happens_around_it_at_once():
+def test_events_from_standard_input_happen_at_once():
     with Board('udp://127.0.0.1:0', options=['--stdin', '--sensors', '0.05'], stdin=subprocess.PIPE) as board:
         def write(line):
             board.process.stdin.write(line + '\n')

@@ -69,7 +69,7 @@ def test_decodes_numbers_as_numbers_and_several_values_as_an_array():
     ('O:358,1,1', 'command'), ('H:ROS2-R4', 'heartbeat'), ('H:R4-ROS2', 'heartbeat'),
     ('N:66,RANGE', 'nack'), ('I:R4,0.1.0,sim-1,sim', 'identity'), ('AIN24:24.28;AIN12:1', 'state'),
     ('V:1', 'command'), ('O:358,1,1;O:358,1,2;S:1500,3', 'command')])
-def test_decode_takes_what_encode_writes_and_names_its_type(fields, kind):
+def test_decode_reads_the_output_of_encode_and_names_its_type(fields, kind):
     decoded = objects(run('decode', stdin=run('encode', fields).stdout).stdout)
     assert len(decoded) == 1 and decoded[0]['ok'] and decoded[0]['type'] == kind
     assert decoded[0]['pnum'] == 0 and decoded[0]['t'] > 1_600_000_000_000
@@ -86,7 +86,7 @@ def test_decodes_a_heartbeat_without_a_packet_number():
     assert decoded[0]['pnum'] is None and decoded[0]['t'] == 79201
 
 
-def test_decode_counts_lines_whatever_ends_them():
+def test_decode_counts_lines_with_any_line_ending():
     good = run('encode', 'Q:ID', '--time', '1').stdout.strip()
     result = run('decode', stdin=f'{good}\r\n{good}\n\n{good}\r{good}')
     assert result.returncode == 0
@@ -118,12 +118,12 @@ def test_decode_of_10_mb_without_a_terminator_needs_little_memory():
     assert SANITIZED or own_kib < 4_000
 
 
-def test_decode_of_nothing_is_no_error():
+def test_decode_of_empty_input_succeeds():
     result = run('decode')
     assert (result.returncode, result.stdout) == (0, '')
 
 
-def test_encode_force_writes_what_no_board_takes():
+def test_encode_force_writes_an_invalid_command():
     result = run('encode', 'O:5000,1,9', '--force', '--time', '1')
     assert result.returncode == 0 and result.stdout.startswith('O:5000,1,9;')
 

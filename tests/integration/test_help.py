@@ -14,7 +14,7 @@ COMMANDS = ['monitor', 'send', 'stop', 'list', 'doctor', 'bridge', 'bus', 'bench
             'upload']
 
 
-def test_version():
+def test_the_option_version_prints_the_version():
     result = run('--version')
     assert result.returncode == 0 and re.fullmatch(r'r4 \d+\.\d+\.\d+\n', result.stdout)
 
@@ -28,7 +28,7 @@ def test_help_names_every_command_url_and_exit_code():
         assert word in result.stdout
 
 
-def test_the_page_of_commands_says_what_the_help_says():
+def test_the_command_reference_matches_the_help():
     with open(os.path.join(DATA, '..', '..', 'docs', 'reference', 'commands.md'), encoding='utf-8') as page:
         rows = re.findall(r'^\| `(\w+)` \| ([^|]*) \|', page.read(), re.MULTILINE)
     commands = run('--help').stdout.split('\nCommands:\n')[1].split('\n\n')[0]
@@ -36,7 +36,7 @@ def test_the_page_of_commands_says_what_the_help_says():
 
 
 @pytest.mark.parametrize('command', COMMANDS)
-def test_help_of_every_command_teaches(command):
+def test_help_of_every_command_shows_usage_and_exit_codes(command):
     result = run(command, '--help')
     assert result.returncode == 0
     assert 'Usage: r4 ' + command in result.stdout and 'Exit codes' in result.stdout
@@ -120,7 +120,7 @@ def test_completion_scripts_are_valid_in_their_shell(shell):
     assert (result.returncode, result.stderr) == (0, '')
 
 
-def test_manual_pages_say_what_the_help_says_and_checkers_find_nothing(tmp_path):
+def test_manual_pages_match_the_help_and_pass_mandoc_lint(tmp_path):
     assert run('man', '--output', str(tmp_path)).returncode == 0
     pages = sorted(tmp_path.iterdir())
     assert {page.name for page in pages} >= {'r4.1', *(f'r4-{command}.1' for command in COMMANDS)}

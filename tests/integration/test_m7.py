@@ -62,7 +62,7 @@ def test_every_kind_of_command_is_executed(url):
         (command, True) for command in commands]
 
 
-def test_what_is_set_is_in_the_state_until_the_board_is_stopped(urls):
+def test_states_report_setpoints_until_the_board_is_stopped(urls):
     with driving(urls.serial, 'O:358,1,1', 'S:1500,1') as host:
         # A host that does not control the board watches its broadcasts.
         with Watcher(urls.udp) as watcher:
@@ -83,7 +83,7 @@ def test_commands_are_refused_while_a_stop_is_latched(url):
     assert run('send', url, 'E:CLEAR', 'O:358,1,1').returncode == 0
 
 
-def test_a_key_given_over_the_uart_is_asked_for_over_udp(urls, tmp_path):
+def test_a_key_given_over_the_uart_is_required_over_udp(urls, tmp_path):
     key = str(tmp_path / 'key')
     assert run('key', 'new', key).returncode == 0
     given = run('key', 'give', key, urls.serial)
@@ -100,7 +100,7 @@ def test_a_key_given_over_the_uart_is_asked_for_over_udp(urls, tmp_path):
     assert run('send', urls.udp, 'O:358,1,1').returncode == 0
 
 
-def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(urls):
+def test_the_board_is_safe_in_time_after_its_host_is_killed(urls):
     with Relay(urls.udp) as relay:
         with driving(relay.url, 'O:358,1,1') as host:
             relay.safe = None
@@ -118,7 +118,7 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(u
     assert run('send', urls.udp, 'O:358,1,1').returncode == 0
 
 
-def test_a_hung_host_loses_the_outputs_and_gets_them_back_when_it_wakes(urls):
+def test_the_outputs_are_off_while_the_host_is_suspended(urls):
     with driving(urls.serial, 'O:358,1,1') as host:
         with Watcher(urls.udp) as watcher:
             watcher.next(lambda fields: fields.get('OSMC1') == '358,1')
@@ -128,7 +128,7 @@ def test_a_hung_host_loses_the_outputs_and_gets_them_back_when_it_wakes(urls):
             watcher.next(lambda fields: fields.get('OSMC1') == '358,1')
 
 
-def test_a_serial_host_that_does_not_read_holds_nothing_up(urls):
+def test_an_unread_serial_port_does_not_delay_states_over_udp(urls):
     unread = os.open(urls.serial[len('serial://'):], os.O_RDWR | os.O_NOCTTY)
     try:
         steps_of(states_of(urls.udp, 150), 10)
@@ -139,7 +139,7 @@ def test_a_serial_host_that_does_not_read_holds_nothing_up(urls):
         os.close(unread)
 
 
-def test_a_port_that_is_in_use_is_told():
+def test_a_port_in_use_is_reported():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(('127.0.0.1', 0))
         result = m7('--udp', str(taken.getsockname()[1]))

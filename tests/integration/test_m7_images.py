@@ -21,7 +21,7 @@ def test_the_tests_that_run_on_the_m7_pass():
     assert int(re.search(r'stack of the tests: (\d+)', result.stdout)[1]) < 6144
 
 
-def test_what_the_protocol_costs_is_what_the_table_says():
+def test_the_instruction_counts_match_the_table():
     result = m7('--instructions')
     print(result.stdout)
     assert result.returncode == 0, result
@@ -49,7 +49,7 @@ def tool_as_a_module(tmp_path):
     ({'plain': 1000, 'barred': 2000, 'new': 1}, False, 'not in the table'),
     ({'plain': 1000}, False, 'no longer measured'),
 ])
-def test_what_costs_more_than_the_table_says_fails_and_so_does_what_it_has_not(tool, capsys, counts, good, word):
+def test_the_check_fails_on_a_higher_new_or_missing_count(tool, capsys, counts, good, word):
     before = tool.TABLE.read_text()
     tool.measured = lambda: counts
     assert tool.instructions(update=False) == good
@@ -57,7 +57,7 @@ def test_what_costs_more_than_the_table_says_fails_and_so_does_what_it_has_not(t
     assert tool.TABLE.read_text() == before
 
 
-def test_of_a_compiler_that_is_not_in_the_table_only_the_bars_hold(tool, capsys):
+def test_only_the_bars_apply_to_a_compiler_without_a_table_entry(tool, capsys):
     tool.compiler = lambda: '13'
     tool.measured = lambda: {'plain': 3000, 'barred': 2049}
     assert tool.instructions(update=False)
@@ -69,7 +69,7 @@ def test_of_a_compiler_that_is_not_in_the_table_only_the_bars_hold(tool, capsys)
     assert json.loads(tool.TABLE.read_text())['plain'] == {'instructions': {'12': 1000, '13': 3000}}
 
 
-def test_an_update_takes_what_there_is_but_nothing_above_a_bar(tool):
+def test_an_update_records_all_counts_unless_one_is_above_its_bar(tool):
     tool.measured = lambda: {'plain': 3000, 'barred': 2049, 'new': 7}
     assert tool.instructions(update=True)
     assert json.loads(tool.TABLE.read_text()) == {
@@ -91,7 +91,7 @@ def test_flash_ram_and_stacks_are_within_their_bars():
     (['--nothing'], 2, ['--nothing']),
     (['--update'], 2, ['--instructions']),
 ])
-def test_wrong_options_are_told_with_the_fix(arguments, code, words):
+def test_wrong_options_are_refused_with_a_fix(arguments, code, words):
     result = m7(*arguments)
     assert result.returncode == code
     assert re.match(r'tools/m7: m7: .+\n  fix: .+\n$', result.stderr), result.stderr

@@ -80,11 +80,11 @@ def us_between(earlier_us, later_us):
     return (later_us - earlier_us) % 2**32
 
 
-def test_a_board_that_is_just_on_is_safe(board):
+def test_a_board_is_safe_after_power_on(board):
     assert board.pins(lambda event: True)['safe']
 
 
-def test_every_command_reaches_its_pins_and_every_state_field_comes_from_one(board, link):
+def test_every_command_sets_its_pins_and_states_report_the_pins(board, link):
     url, listener = link
     # Opposite signs, because the steppers stay where the other test left them.
     table = channels(50 if url == board.serial else -50)
@@ -134,7 +134,7 @@ def test_every_output_is_safe_soon_after_the_last_byte_of_a_stop(board, link):
     assert took_us[len(took_us) // 2] <= 1e6 * within(STOP_WITHIN_US / 1e6)
 
 
-def test_streams_at_100_hz_for_twenty_seconds_with_nothing_lost_and_every_period_exact(streamed):
+def test_streams_at_exactly_100_hz_for_20_seconds_with_nothing_lost(streamed):
     states = streamed()
     steps = steps_of(states, 10)
     left_out = states[-1]['fields']['LATE'] - states[0]['fields']['LATE']

@@ -42,7 +42,7 @@ class Metrics(Running):
         return samples
 
 
-def test_tells_of_boards_what_a_host_knows():
+def test_metrics_report_the_link_and_states_of_every_board():
     with Board('udp://127.0.0.1:0') as left, Board('udp://127.0.0.1:0') as right:
         with Metrics(left.host_url, right.host_url) as metrics, driving(left.host_url, 'O:358,1,1'):
             def both_are_heard(samples):
@@ -67,7 +67,7 @@ def test_tells_of_boards_what_a_host_knows():
             assert ('r4_state_age_seconds',) not in silent and silent[('r4_states_total',)] > 0
 
 
-def test_what_was_lost_on_the_way_is_counted():
+def test_metrics_count_lost_datagrams():
     with Board('udp://127.0.0.1:0', options=('--link', 'loss=20%')) as board, Metrics(board.host_url) as metrics:
         def some_are_lost(samples):
             return any(each.get(('r4_lost_total',), 0) > 0 and each.get(('r4_states_total',), 0) > 0
@@ -75,7 +75,7 @@ def test_what_was_lost_on_the_way_is_counted():
         metrics.until(some_are_lost)
 
 
-def test_tells_of_each_of_several_paths(tmp_path):
+def test_metrics_report_every_path_of_a_board(tmp_path):
     with Board('udp://127.0.0.1:0', f'pty:{tmp_path}/board') as board:
         with Metrics(f'{board.host_url}+serial://{tmp_path}/board') as metrics:
             def of_the_paths(samples, name):
@@ -90,7 +90,7 @@ def test_tells_of_each_of_several_paths(tmp_path):
             assert any(key[1:] == (board.host_url,) for key in samples[f'{board.host_url}+serial://{tmp_path}/board'])
 
 
-def test_a_board_that_is_not_there_is_down():
+def test_a_missing_board_is_reported_as_down():
     with Metrics('udp://127.0.0.1:9?listen=0') as metrics:
         (samples,) = metrics.read().values()
         assert samples[('r4_up',)] == 0 and ('r4_safe', 'none') not in samples
@@ -98,7 +98,7 @@ def test_a_board_that_is_not_there_is_down():
             urllib.request.urlopen(metrics.url.replace('/metrics', '/other'), timeout=PATIENCE_S)
 
 
-def test_only_those_who_name_this_computer_are_answered():
+def test_requests_with_another_host_name_are_refused():
     with Metrics('sim:', '--host', 'robot.example') as metrics:
         port = int(metrics.url.split(':')[2].split('/')[0])
 
@@ -114,7 +114,7 @@ def test_only_those_who_name_this_computer_are_answered():
             assert status('GET', host) == 403, host
 
 
-def test_connections_that_say_nothing_hold_nobody_up():
+def test_silent_connections_do_not_delay_a_request():
     with Metrics('udp://127.0.0.1:9?listen=0') as metrics, contextlib.ExitStack() as stack:
         where = metrics.url.split('/')[2].split(':')
         for _ in range(20):

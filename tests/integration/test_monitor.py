@@ -41,7 +41,7 @@ def test_noise_and_a_stalled_pipe_do_not_stall_the_heartbeats():
         assert host.wait() == 0
 
 
-def test_shows_many_boards_by_one_pattern():
+def test_monitor_shows_the_boards_of_a_url_pattern():
     ports = 'udp://127.0.0.1:28620-28624'
     with Board(ports, listens=5):
         shown = subprocess.run([R4, 'monitor', f'{ports}?listen=0', '--duration', '1'], text=True, capture_output=True,
@@ -77,7 +77,7 @@ def resident_kib(process):
         return int(re.search(r'VmRSS:\s*(\d+)', status.read()).group(1))
 
 
-def test_the_status_on_a_terminal_is_bounded_whatever_fields_a_state_has():
+def test_new_field_names_do_not_grow_the_memory_of_monitor():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
         board.bind(('127.0.0.1', 0))
         board.settimeout(PATIENCE_S)

@@ -72,7 +72,7 @@ def is_driven(each):
     return each.get('outputs', {}).get('osmc', [[0]])[0][0] > 0
 
 
-def test_a_board_that_began_again_while_it_waited_is_guarded(board):
+def test_a_restarted_board_still_stops_at_an_obstacle(board):
     with Podcar(board.host_url) as podcar:
         podcar.says('press Enter')
         happen(board, 'reboot')  # the restarted board has forgotten the threshold of US 1
@@ -86,7 +86,7 @@ def test_a_board_that_began_again_while_it_waited_is_guarded(board):
         assert podcar.process.wait(PATIENCE_S) == 3
 
 
-def test_it_is_not_armed_where_something_is_in_the_way_already(board):
+def test_the_podcar_is_not_armed_in_front_of_an_obstacle(board):
     happen(board, 'us 1 100')
     with Podcar(board.host_url) as podcar:
         podcar.says('press Enter')
@@ -97,7 +97,7 @@ def test_it_is_not_armed_where_something_is_in_the_way_already(board):
     assert not any(each.get('outputs', {}).get('relays') for each in board.log)
 
 
-def test_an_enter_that_was_typed_before_it_asks_is_no_answer(board):
+def test_an_enter_typed_before_the_question_is_ignored(board):
     with Podcar(board.host_url, typed=b'\n') as podcar:
         podcar.says('press Enter')
         with pytest.raises(AssertionError, match='nothing of that kind'):

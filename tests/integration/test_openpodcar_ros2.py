@@ -134,7 +134,7 @@ def make_scene():
         peer.end()
 
 
-def test_types_and_frames_are_those_of_ros(scene):
+def test_topics_use_the_types_and_frames_of_ros(scene):
     for kind, topic, of, hashed in (('reader', 'joy', JOY, '0d356c79'), ('reader', 'cmd_vel', TWIST, '9c45bf16'),
                                     ('reader', 'goal_pose', GOAL, '10f3786d'), ('writer', 'odom', ODOMETRY, '3cc97dc7')):
         endpoint = scene.peer.endpoint(kind, f'rt/{topic}')
@@ -150,7 +150,7 @@ def test_nothing_drives_before_start_is_pressed(scene):
     scene.stands(hold=True, speed=0.5, cmd_vel=(0.5, 0))
 
 
-def test_a_joystick_that_is_silent_stops_it_until_start_is_pressed_again(scene):
+def test_a_silent_joystick_stops_the_podcar_until_start_is_pressed(scene):
     driving = {'hold': True, 'speed': 0.5}
     before = scene.odometry.x
     scene.stops('the joystick is silent', driving, joystick=False)
@@ -160,18 +160,18 @@ def test_a_joystick_that_is_silent_stops_it_until_start_is_pressed_again(scene):
     scene.drives(**driving)
 
 
-def test_cmd_vel_drives_it_until_it_is_silent(scene):
+def test_the_podcar_drives_while_cmd_vel_is_published(scene):
     scene.drives(cmd_vel=(0.5, 0.1))
     scene.stands()
 
 
-def test_the_stop_button_stops_it(scene):
+def test_the_stop_button_stops_the_podcar(scene):
     driving = {'cmd_vel': (0.5, 0)}
     scene.stops('the stop button', driving, stop=True)
     scene.stands(**driving)
 
 
-def test_it_drives_to_a_goal_in_its_own_frame(scene):
+def test_the_podcar_drives_to_a_goal_only_in_the_frame_odom(scene):
     scene.publish_until(lambda: False, timeout=0.6)  # until cmd_vel has timed out
     other = goal(3, 0, 'map')
     assert scene.publish_until(lambda: any('not in the frame odom' in line for line in scene.said), goal_pose=other)
@@ -181,7 +181,7 @@ def test_it_drives_to_a_goal_in_its_own_frame(scene):
 
 @pytest.mark.parametrize('arguments, environment, named', [
     (('fax:1',), {}, 'fax'), ((), {'ROS_DOMAIN_ID': '999'}, 'ROS_DOMAIN_ID'), (('sim:', 'more'), {}, 'more')])
-def test_what_cannot_be_is_said(arguments, environment, named):
+def test_an_invalid_configuration_is_refused(arguments, environment, named):
     result = subprocess.run([PROGRAM, *arguments], env={**own_domain(), **environment}, capture_output=True, text=True,
                             timeout=PATIENCE_S, check=False)
     assert result.returncode == 2 and named in result.stderr, result

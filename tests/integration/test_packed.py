@@ -78,14 +78,14 @@ def may_be_masked(text):
     return 'C:' in text
 
 
-def test_the_document_has_the_table_of_the_second_implementation():
+def test_the_document_lists_every_name_of_the_second_implementation():
     with open(os.path.join(DATA, '..', '..', 'docs', 'reference', 'packed.md'), encoding='utf-8') as file:
         text = file.read()
     for name in packed_form.NAMES:
         assert re.search(rf'\b{re.escape(name)}\b', text) or re.match(r'SERVO|ENC|US|BLDC|I2C', name), name
 
 
-def test_r4_reads_what_the_second_implementation_packs():
+def test_r4_unpacks_datagrams_of_the_second_implementation():
     rng = random.Random(4)
     datagrams = captured_lines() + [with_crc(any_fields(rng)) for _ in range(3000)]
     packed = [(each, packed_form.pack(each)) for each in datagrams if len(each) <= 1024]
@@ -95,7 +95,7 @@ def test_r4_reads_what_the_second_implementation_packs():
     assert all(packed_form.unpack(form) == each for each, form in packed)
 
 
-def test_r4_writes_what_the_second_implementation_packs_byte_for_byte():
+def test_r4_and_the_second_implementation_pack_the_same_bytes():
     rng = random.Random(5)
     form = re.compile(r'^(.*);PNum:(\d+);T:(\d+);\^')
     lines = [line for line in captured_lines() if form.match(line)][:12]
@@ -115,7 +115,7 @@ def test_r4_writes_what_the_second_implementation_packs_byte_for_byte():
     assert compared > 150
 
 
-def test_both_take_and_refuse_the_same_damaged_bytes():
+def test_both_implementations_accept_the_same_damaged_bytes():
     rng = random.Random(6)
     damaged = []
     for _ in range(4000):
@@ -133,7 +133,7 @@ def test_both_take_and_refuse_the_same_damaged_bytes():
     assert sum(each is not None for each in ours) > 100
 
 
-def test_encode_and_decode_go_together_through_a_pipe():
+def test_decode_reads_the_packed_output_of_encode():
     line = run('encode', 'O:358,1,1', '--pnum', '66', '--time', '1699276044383', '--packed').stdout
     assert line == 'packed:8d004218ba4beb85f3b358c1c1df7fefae81\n'
     result = run('decode', stdin=line)
@@ -147,14 +147,14 @@ def test_encode_and_decode_go_together_through_a_pipe():
     ('packed:', 'length'), ('packed:8', 'hex'), ('packed:8x', 'hex'), ('packed:80', 'length'),
     ('packed:' + b'O:1;^0x0^'.hex(), 'version'), ('packed:c000000000', 'version'),
     ('packed:806aff00000000', 'syntax')])
-def test_decode_says_why_a_packed_line_holds_no_datagram(line, reason):
+def test_decode_reports_why_a_packed_line_is_invalid(line, reason):
     result = run('decode', stdin=line + '\n')
     assert result.returncode == DATA_BAD
     assert objects(result.stdout) == [
         {'line': 1, 'ok': False, 'error': 'packed', 'reason': reason, 'text': line}]
 
 
-def test_what_would_not_get_shorter_is_written_plain():
+def test_encode_writes_plain_text_if_packing_does_not_shorten_it():
     assert run('encode', 'wxyz:wxyz', '--pnum', '4294967295', '--time', str(2 ** 64 - 1), '--packed',
                '--force').stdout.startswith('packed:')
     name = 'a-name-of-more-than-14-bytes'

@@ -77,7 +77,7 @@ def judge(host, began, what):
     assert gap <= within(LONGEST_GAP_S)
 
 
-def test_a_cable_is_pulled_and_plugged_in_again_and_nothing_is_missed():
+def test_no_state_is_lost_while_a_cable_is_unplugged():
     with wired('pty', 'udp') as (board, paths), carried(paths) as host:
         def told(event, **counts):
             path = board.next(lambda each: each.get('path', {}).get('event') == event)['path']
@@ -97,7 +97,7 @@ def test_a_cable_is_pulled_and_plugged_in_again_and_nothing_is_missed():
     assert lost <= within(REPORTED_WITHIN_S) and back <= within(BACK_WITHIN_S)
 
 
-def test_a_path_that_is_held_up_and_then_brings_what_is_old_disturbs_nothing():
+def test_old_datagrams_of_a_delayed_path_have_no_effect():
     with wired('udp', 'udp') as (board, paths), carried(paths) as host:
         began = time.monotonic()
         paths[0].signal(signal.SIGSTOP)  # the system does not report this loss
@@ -152,7 +152,7 @@ class Sends:
         self.host.__exit__()
 
 
-def test_commands_are_executed_once_each_while_paths_come_and_go():
+def test_each_command_is_executed_once_while_paths_fail_and_recover():
     with wired('pty', 'udp') as (board, paths):
         with Sends([path.url for path in paths], 400) as sends:
             board.next(has_joined(2))
@@ -174,7 +174,7 @@ def test_commands_are_executed_once_each_while_paths_come_and_go():
 
 
 @pytest.mark.parametrize('signals', [(signal.SIGSTOP, signal.SIGCONT), (signal.SIGKILL, None)])
-def test_a_bridge_that_is_one_of_two_paths_stands_still_or_dies(tmp_path, signals):
+def test_a_session_survives_a_suspended_or_killed_bridge_on_one_path(tmp_path, signals):
     tty = tmp_path / 'board'
     with Board('udp://127.0.0.1:0', f'pty:{tty}') as board, contextlib.ExitStack() as bridges:
         port = free_port()
@@ -198,7 +198,7 @@ def test_a_bridge_that_is_one_of_two_paths_stands_still_or_dies(tmp_path, signal
             host.ends(board)
 
 
-def test_a_board_of_one_address_has_a_path_by_each_interface_of_this_computer():
+def test_a_board_has_a_path_for_each_interface_of_this_computer():
     with Lan() as lan:
         robot, desk = lan.computer('10.77.0.1'), lan.computer('10.77.0.2', '10.77.0.3')
         by_switch, by_cable = desk.addresses
@@ -216,7 +216,7 @@ def test_a_board_of_one_address_has_a_path_by_each_interface_of_this_computer():
             host.ends(board)
 
 
-def test_each_command_takes_the_paths_of_a_board(tmp_path):
+def test_every_r4_command_accepts_several_paths(tmp_path):
     with wired('udp', 'pty') as (board, paths):
         urls = [path.url for path in paths]
         joined = of_two(paths)
@@ -243,7 +243,7 @@ def test_each_command_takes_the_paths_of_a_board(tmp_path):
         assert run('stop', 'serial:///dev/nothing', urls[1]).returncode == 0
 
 
-def test_paths_that_lead_to_two_boards_are_refused_with_both_names():
+def test_paths_to_two_boards_are_refused_with_both_names():
     boards = [Board('udp://127.0.0.1:0', options=('--board-id', name)) for name in ('left', 'right')]
     with boards[0] as left, boards[1] as right:
         for command in (('send', left.host_url, right.host_url, 'R:1,On'),
@@ -269,13 +269,13 @@ def test_paths_that_lead_to_two_boards_are_refused_with_both_names():
     (('monitor', 'serial:auto+upd://127.0.0.1'), "there is no transport 'upd'"),
     (('monitor', 'can://can0?node=0-3+udp://127.0.0.1:20-21'), 'its paths lead to 4 and to 2 boards'),
 ])
-def test_what_cannot_be_is_one_clear_line(arguments, told):
+def test_invalid_urls_and_paths_are_refused_with_one_line(arguments, told):
     refused = run(*arguments)
     assert refused.returncode == 2 and ERROR.search(refused.stderr) and told in refused.stderr, refused
     assert len(refused.stderr.splitlines()) == 1, refused
 
 
-def test_a_monitor_for_people_has_a_line_for_a_path_that_ceases_to_carry():
+def test_monitor_prints_a_line_when_a_path_goes_down():
     with wired('pty', 'udp') as (_, paths):
         with Running('monitor', of_two(paths), '--control') as host:
             came = []

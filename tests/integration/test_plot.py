@@ -71,7 +71,7 @@ def test_draws_curves_safe_states_and_gaps(native, tmp_path):
     assert heights[4] < heights[0] < heights[6], 'forward is not above zero, or backward not below it'
 
 
-def test_shows_names_of_others_and_of_files_as_they_are(native, tmp_path):
+def test_names_with_special_characters_are_drawn_unchanged(native, tmp_path):
     paths = native.read_text().replace('192.168.0.125 left-arm', r'$\x5cfoo$\x1b[2J&<b>').replace(' right-arm', '')
     (tmp_path / '$x^$.r4log').write_text(paths)
     result = run('plot', str(tmp_path / '$x^$.r4log'), 'AIN24', '-o', str(tmp_path / 'others.svg'))
@@ -81,7 +81,7 @@ def test_shows_names_of_others_and_of_files_as_they_are(native, tmp_path):
     assert any('$x^$.r4log' in text for text in texts), texts
 
 
-def test_draws_bitmaps_and_pages(native, tmp_path):
+def test_plot_writes_png_and_pdf_files(native, tmp_path):
     for name, begin in (('a.png', b'\x89PNG'), ('a.pdf', b'%PDF')):
         assert run('plot', str(native), 'AIN24', '-o', str(tmp_path / name)).returncode == 0
         assert (tmp_path / name).read_bytes().startswith(begin)
@@ -95,20 +95,20 @@ def test_draws_bitmaps_and_pages(native, tmp_path):
     (['middle-arm:AIN24', '-o', 'a.svg'], DATA_BAD, 'middle-arm:AIN24: is in no state of'),
     (['AIN24', '-o', '/nowhere/a.svg'], OPEN, 'No such file'),
 ])
-def test_says_what_cannot_be_drawn(native, tmp_path, arguments, code, message):
+def test_arguments_that_cannot_be_drawn_are_refused(native, tmp_path, arguments, code, message):
     result = run('plot', str(native), *arguments, cwd=tmp_path)
     assert result.returncode == code and message in result.stderr and ERROR.search(result.stderr), result
     assert [path.name for path in tmp_path.iterdir()] == ['drive.r4log']
 
 
-def test_damage_is_told_and_the_rest_is_drawn(native, tmp_path):
+def test_damage_is_reported_and_the_rest_is_drawn(native, tmp_path):
     native.write_text(native.read_text().replace('# path 2', 'path 2', 1))
     result = run('plot', str(native), 'AIN24', '-o', str(tmp_path / 'a.svg'))
     assert result.returncode == DATA_BAD and 'some of it could not be read' in result.stderr, result
     assert (tmp_path / 'a.svg').exists()
 
 
-def test_without_matplotlib_it_says_so(native, tmp_path):
+def test_a_missing_matplotlib_is_reported(native, tmp_path):
     (tmp_path / 'none').mkdir()
     (tmp_path / 'none' / 'matplotlib.py').write_text('raise ImportError("No module named matplotlib")')
     result = run('plot', str(native), 'AIN24', '-o', str(tmp_path / 'a.svg'), env={**os.environ, 'PYTHONPATH': str(tmp_path / 'none')})
@@ -116,7 +116,7 @@ def test_without_matplotlib_it_says_so(native, tmp_path):
     assert not list(tmp_path.glob('a.svg*'))
 
 
-def test_is_the_example_of_its_help(native, tmp_path):
+def test_the_example_of_the_help_works(native, tmp_path):
     packed = tmp_path / 'robot.r4log.zst'
     subprocess.run([R4, 'convert', str(native), '-o', str(packed)], check=True, stdout=subprocess.DEVNULL)
     result = run('plot', str(packed), 'left-arm:AIN24', 'right-arm:AIN24', '-o', str(tmp_path / 'arms.png'))

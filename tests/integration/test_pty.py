@@ -41,13 +41,13 @@ def test_streams_its_state_at_100_hz(board):
     assert times[-1] - times[0] <= within_ms(11 * len(steps))
 
 
-def test_a_pty_without_a_path_is_named():
+def test_a_pty_without_a_file_name_reports_its_device():
     with Board('pty:') as board:
         assert board.url.startswith('pty:/dev/pts/')
         assert run('monitor', board.host_url, '--count', '5').returncode == 0
 
 
-def test_commands_are_confirmed_refused_and_stopped(board):
+def test_commands_are_confirmed_until_a_stop_and_then_refused(board):
     assert run('send', board.host_url, 'O:358,1,1', 'D:1000,1,1').returncode == 0
     board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1] and outputs['dhb'][0] == [1000, 1])
     assert run('stop', board.host_url).returncode == 0
@@ -66,7 +66,7 @@ def test_the_next_host_need_not_wait_for_the_timeout(url):
             each.state('SAFE', 'link')
 
 
-def test_a_port_without_a_board_is_listed_as_one(tmp_path):
+def test_list_reports_a_port_without_a_board(tmp_path):
     path = tmp_path / 'nothing'
     listed = run('list', '--serial', path)
     assert listed.returncode == 0, listed
@@ -79,7 +79,7 @@ def listed(path):
     return next(each for each in objects(result.stdout) if each.get('path') == path)
 
 
-def test_a_board_is_listed_with_its_name_and_the_program_that_has_it(tmp_path):
+def test_list_shows_the_name_and_the_holder_of_a_board(tmp_path):
     path = str(tmp_path / 'tty')
     with Board(f'pty:{path}', options=['--board-id', 'b-1', '--set', 'name,left']) as board:
         url = board.host_url
@@ -104,7 +104,7 @@ def test_a_board_is_listed_with_its_name_and_the_program_that_has_it(tmp_path):
         assert missing['fix'] and 'board_id' not in missing, missing
 
 
-def test_settings_of_the_network_are_taken_over_the_cable_only(board):
+def test_network_settings_are_accepted_only_over_the_cable(board):
     assert run('send', board.host_url, 'C:network,My%2CNet', 'C:password,12345678').returncode == 0
     assert run('send', board.host_url, 'C:password,short').returncode == 2
     with Board('udp://127.0.0.1:0') as other:
@@ -112,7 +112,7 @@ def test_settings_of_the_network_are_taken_over_the_cable_only(board):
         assert refused.returncode == 3 and 'USB' in refused.stderr
 
 
-def test_a_second_host_is_told_who_controls_the_board_and_may_stop_it(board):
+def test_a_second_host_is_refused_but_can_stop_the_board(board):
     with monitor(board.host_url) as host:
         host.next(is_state)
         refused = run('send', board.host_url, 'O:1,1,1')
@@ -122,7 +122,7 @@ def test_a_second_host_is_told_who_controls_the_board_and_may_stop_it(board):
         host.next(is_state)
 
 
-def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(board):
+def test_the_board_is_safe_in_time_after_its_host_is_killed(board):
     with driving(board.host_url, 'O:358,1,1') as host:
         board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
         killed = host.signal(signal.SIGKILL)
@@ -133,7 +133,7 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(b
     assert safe['silence'] <= within_ms(SAFE_WITHIN_MS)
 
 
-def test_the_board_is_safe_within_its_timeout_of_a_hung_hosts_last_heartbeat(board):
+def test_the_board_is_safe_in_time_while_its_host_is_suspended(board):
     with driving(board.host_url, 'O:358,1,1') as host:
         host.signal(signal.SIGSTOP)
         safe = board.state('SAFE', 'link')
@@ -159,7 +159,7 @@ def test_a_session_goes_on_when_the_board_is_plugged_in_again(board, path):
         host.next(lambda each: each['type'] == 'link' and not each['fields']['up'])
 
 
-def test_a_board_goes_on_when_the_host_comes_back(board):
+def test_a_board_accepts_a_new_host_after_a_killed_host(board):
     for _ in range(3):
         with driving(board.host_url, 'O:358,1,1') as host:
             board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
@@ -180,7 +180,7 @@ def garbage(size):
     return random.Random(7).randbytes(size)
 
 
-def test_a_board_recovers_from_a_host_of_another_speed(board):
+def test_a_board_recovers_from_a_host_with_another_baud_rate(board):
     device = os.open(board.host_url[len('serial://'):], os.O_RDWR | os.O_NOCTTY)
     for _ in range(20):
         os.write(device, garbage(1000))
@@ -192,7 +192,7 @@ def test_a_board_recovers_from_a_host_of_another_speed(board):
         assert state['fields']['RXCRC'] > 10 and state['fields'].get('SAFE') == 0
 
 
-def test_a_board_throws_10_mb_without_a_terminator_away(board):
+def test_a_board_discards_10_mb_without_a_terminator(board):
     device = os.open(board.host_url[len('serial://'):], os.O_RDWR | os.O_NOCTTY)
     tty.setraw(device)
     for _ in range(1000):
@@ -235,7 +235,7 @@ class Noise:
         os.close(self.slave)
 
 
-def test_a_host_of_another_speed_says_so():
+def test_a_host_reports_a_different_baud_rate():
     with Noise() as device:
         result = run('monitor', f'serial://{device.path}', '--json', '--duration', '0.5')
     assert result.returncode == 3
@@ -243,7 +243,7 @@ def test_a_host_of_another_speed_says_so():
     assert '"type":"error"' in result.stdout and '"type":"state"' not in result.stdout
 
 
-def test_a_host_recovers_when_the_speed_is_right_again(board, path):
+def test_a_host_recovers_when_the_baud_rate_is_right_again(board, path):
     other, slave = pty.openpty()
     tty.setraw(slave)
     os.unlink(path)
@@ -263,7 +263,7 @@ def test_a_host_recovers_when_the_speed_is_right_again(board, path):
             host.next(is_state)
 
 
-def test_a_stalled_reader_gets_a_young_state_first(board):
+def test_a_host_reads_a_fresh_state_after_a_pause(board):
     with monitor(board.host_url) as host:
         for _ in range(50):
             before = host.next(is_state)

@@ -35,7 +35,7 @@ def info(*paths):
     return objects(told.stdout), told.returncode
 
 
-def test_has_what_a_program_sends_by_the_path_that_both_share(tmp_path):
+def test_record_includes_commands_of_a_program_on_the_same_path(tmp_path):
     path = tmp_path / 'drive.r4log'
     with Board(f'pty:{tmp_path}/r4') as board, record(board.host_url, '-o', path) as recorder:
         wait_for(path, r'^[0-9.]+ 1< AIN24')
@@ -74,7 +74,7 @@ def test_records_beside_a_program_that_drives(board, tmp_path, name):
     assert lines == sorted(lines, key=lambda line: float(line.split(' ')[0]))
 
 
-def test_a_recording_is_a_transport(board, tmp_path):
+def test_monitor_reads_a_recording_as_a_transport(board, tmp_path):
     path = tmp_path / 'drive.r4log.zst'
     with record(board.host_url, '-o', path) as recorder, driving(board.host_url, 'O:358,1,1'):
         wait_for(path, 'OSMC1:358,1;')
@@ -97,7 +97,7 @@ def a_recording(board, tmp_path):
 
 
 @pytest.mark.parametrize('where', ['udp://127.0.0.1:0', 'pty'])
-def test_a_recording_is_a_board_for_hosts_elsewhere(recorded, tmp_path, where):
+def test_replay_acts_as_a_board_for_other_hosts(recorded, tmp_path, where):
     was = re.findall(r' 1< AIN24.*PNum:(\d+)', recorded.read_text())
     url = f'pty:{tmp_path}/r4' if where == 'pty' else where
     with Running('replay', str(recorded), url, '--speed', '0.2', '--json') as replay:
@@ -111,7 +111,7 @@ def test_a_recording_is_a_board_for_hosts_elsewhere(recorded, tmp_path, where):
         assert replay.end() == 0, replay.errors
 
 
-def test_a_replay_is_faster_when_asked(tmp_path):
+def test_replay_obeys_the_option_speed(tmp_path):
     path = tmp_path / 'slow.r4log'
     path.write_text('# r4log 1 by r4\n' + ''.join(f'179546829{i}.000000 1< no datagram\n' for i in range(6)))
     began = time.monotonic()
@@ -121,7 +121,7 @@ def test_a_replay_is_faster_when_asked(tmp_path):
     assert 1 <= took < 3, 'the replay of 5 s at speed 5 did not take about 1 s'
 
 
-def test_a_replay_goes_step_by_step_from_anywhere_and_tells_damage(recorded):
+def test_replay_steps_from_any_time_and_reports_damage(recorded):
     with recorded.open('a') as file:
         file.write('no line of a recording\n' + recorded.read_text().splitlines()[-2] + '\n')
     was = re.findall(r'^[\d.]+ 1< (.*)$', recorded.read_text(), re.MULTILINE)
@@ -151,7 +151,7 @@ def test_records_several_boards_into_one_file(tmp_path):
 
 
 @pytest.mark.parametrize('name, most_bytes', [('many.r4log', 200), ('many.r4log.zst', 40)])
-def test_records_many_boards_by_one_pattern(tmp_path, name, most_bytes):
+def test_records_the_boards_of_a_url_pattern(tmp_path, name, most_bytes):
     path = tmp_path / name
     first = 28600
     ports = f'udp://127.0.0.1:{first}-{first + 9}'
@@ -175,7 +175,7 @@ def newest_states(path):
 
 
 @pytest.mark.parametrize('name', ['drive.r4log', 'drive.r4log.zst'])
-def test_who_is_killed_under_load_has_lost_a_second_at_most(tmp_path, name):
+def test_a_killed_recorder_loses_at_most_one_second(tmp_path, name):
     path = tmp_path / name
     ports = 'udp://127.0.0.1:28620-28627'
     with Board(ports, listens=8):
@@ -205,14 +205,14 @@ def test_who_is_killed_under_load_has_lost_a_second_at_most(tmp_path, name):
 
 
 @pytest.mark.parametrize('limit', [10, 20_000])  # the header alone is longer than 10 bytes
-def test_a_limit_of_the_files_size_is_an_error_and_no_end_by_sigxfsz(board, tmp_path, limit):
+def test_a_file_size_limit_ends_the_recording_with_an_error(board, tmp_path, limit):
     full = run('record', board.host_url, '-o', str(tmp_path / 'drive.r4log'), '--duration', '20', timeout=15,
                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
     assert full.returncode == OPEN and ERROR.search(full.stderr), full
     assert 'the recording has ended: File too large' in full.stderr
 
 
-def test_a_file_that_others_take_away_is_begun_anew_and_the_exit_code_tells_a_loss(board, tmp_path):
+def test_record_starts_a_new_file_when_its_file_is_moved_or_removed(board, tmp_path):
     path, moved = tmp_path / 'drive.r4log', tmp_path / 'drive.r4log.1'
     with record(board.host_url, '-o', path) as recorder:
         wait_for(path, ' 1< AIN24')
@@ -233,7 +233,7 @@ def test_a_file_that_others_take_away_is_begun_anew_and_the_exit_code_tells_a_lo
     assert code == 0 and told['ended'] and not told['damage'], told
 
 
-def test_a_disk_without_space_ends_the_recording_with_a_reason(board, tmp_path):
+def test_a_full_disk_ends_the_recording_with_a_reason(board, tmp_path):
     # A file system in a new namespace, with which it ends; if that is refused, unshare reports why.
     script = ('mount -t tmpfs -o size=16k none "$1" && cd "$1" && "$2" record "$3" -o drive.r4log; echo $?;'
               ' "$2" info drive.r4log')
@@ -246,7 +246,7 @@ def test_a_disk_without_space_ends_the_recording_with_a_reason(board, tmp_path):
     assert not any('damage' == line.split()[0] for line in told), told
 
 
-def test_keeps_the_beginning_of_what_is_too_long_for_a_datagram(tmp_path):
+def test_record_keeps_the_beginning_of_an_oversized_datagram(tmp_path):
     path = tmp_path / 'drive.r4log'
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as talker:
         talker.bind(('127.0.0.1', 0))
@@ -259,7 +259,7 @@ def test_keeps_the_beginning_of_what_is_too_long_for_a_datagram(tmp_path):
     assert told['paths'][0]['oversize'] == 1 and told['paths'][0]['damaged'] == 0, told
 
 
-def test_files_that_follow_one_another_are_whole_in_themselves(board, tmp_path):
+def test_every_rotated_file_is_a_complete_recording(board, tmp_path):
     with record(board.host_url, '-o', tmp_path / 'drive.r4log', '--rotate', '1s', '--rotate', '1M'):
         wait_for(tmp_path / 'drive-00003.r4log', ' 1< AIN24')
     told, _ = info(*sorted(tmp_path.glob('drive-*.r4log')))
@@ -267,12 +267,12 @@ def test_files_that_follow_one_another_are_whole_in_themselves(board, tmp_path):
     assert all(each['seconds'] <= 1.0 for each in told)
 
 
-def test_a_board_that_says_nothing_is_named(tmp_path):
+def test_record_fails_if_the_board_is_silent(tmp_path):
     silent = run('record', 'udp://127.0.0.1:9?listen=0', '-o', str(tmp_path / 'x.r4log'), '--duration', '0.3')
     assert silent.returncode == REFUSED and ERROR.search(silent.stderr), silent
 
 
-def test_damage_has_a_place_and_the_rest_is_read(tmp_path):
+def test_info_locates_damage_and_reads_the_rest(tmp_path):
     path = tmp_path / 'x.r4log'
     good = '1795468293.404765 1< H:R4-ROS2;PNum:0;T:0;^0x1^\n'
     path.write_text('# r4log 1 by r4\n' + good + '17954x\n' + good + good[:20])
@@ -290,7 +290,7 @@ def test_info_reads_a_pipe():
     assert result.stdout.startswith('standard input\n')
 
 
-def test_what_others_wrote_moves_no_terminal(tmp_path):
+def test_control_characters_of_a_recording_are_not_printed(tmp_path):
     path = tmp_path / 'others.r4log'
     path.write_text('# r4log 1 by r4 0.1.0\n# path 1 udp://x\\x1b]0;owned\\x07\\x0afake arm\\x1b]0;owned\\x07\n'
                     '1795468293.000000 1< garbage\\x1b]0;owned\\x07\n'

@@ -39,7 +39,7 @@ def make_graph():
             peer.end()
 
 
-def test_the_papers_topics(graph):
+def test_the_node_publishes_the_topics_of_the_paper(graph):
     _, _, peer = graph
     for topic in ('R4', 'R4_Heart_Beat', 'R4_Active'):
         peer.read(f'rt/{topic}', STRING)
@@ -54,7 +54,7 @@ def test_the_papers_topics(graph):
     assert second.came - first.came < 0.5
 
 
-def test_types_are_told_as_newer_releases_want_them(graph):
+def test_endpoints_announce_the_type_hashes_of_newer_releases(graph):
     _, _, peer = graph
     for kind, topic, of, hashed in (
             ('writer', 'R4', STRING, 'df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18'),
@@ -65,7 +65,7 @@ def test_types_are_told_as_newer_releases_want_them(graph):
         assert endpoint['of'] == of and endpoint['user_data'] == f'typehash=RIHS01_{hashed};'
 
 
-def test_what_is_commanded_as_text_is_executed_together(graph):
+def test_commands_in_one_text_are_executed_as_a_group(graph):
     board, ros2, peer = graph
     join(ros2, peer, 'R4_Command', STRING)
     _, outputs = drive(board, peer, 'rt/R4_Command', text('O:358,1,3; S:1500,2 ;'), lambda each: pwm(each, 3) == 358)
@@ -78,7 +78,7 @@ def test_what_is_commanded_as_text_is_executed_together(graph):
     assert outputs['servo'][1] == 0
 
 
-def test_a_component_is_commanded_and_told_in_the_units_of_ros(graph):
+def test_outputs_are_commanded_and_reported_in_the_units_of_ros(graph):
     board, ros2, peer = graph
     peer.read('rt/osmc1/state', FLOAT32)
     join(ros2, peer, 'osmc1/command', FLOAT32)
@@ -103,7 +103,7 @@ def test_a_component_is_commanded_and_told_in_the_units_of_ros(graph):
     board.outputs(lambda each: each['servo'][3] == 0)
 
 
-def test_cmd_vel_drives_two_wheels_until_it_is_silent(graph):
+def test_cmd_vel_drives_two_wheels_and_an_invalid_speed_stops_them(graph):
     board, ros2, peer = graph
     join(ros2, peer, 'cmd_vel', TWIST)
     # The wheels have 0.5 and 1.5 m/s of at most 2 m/s; the right wheel is reversed.
@@ -115,7 +115,7 @@ def test_cmd_vel_drives_two_wheels_until_it_is_silent(graph):
     peer.say('remove', 'rt/cmd_vel')
 
 
-def test_sensors(graph):
+def test_sensors_are_published_in_the_messages_of_ros(graph):
     _, _, peer = graph
     peer.read('rt/battery', 'sensor_msgs::msg::dds_::BatteryState_', 'best_effort')
     cdr = Cdr(peer.sample('rt/battery'))
@@ -141,7 +141,7 @@ def test_sensors(graph):
     assert peer.sample('rt/handle')[:1] == ON  # padding up to four bytes follows
 
 
-def test_diagnostics(graph):
+def test_diagnostics_report_the_health_of_the_board(graph):
     _, _, peer = graph
     peer.read('rt/diagnostics', DIAGNOSTICS)
     level, name, message, hardware, values = health_of(peer.sample('rt/diagnostics'))
@@ -198,7 +198,7 @@ def test_malformed_samples_change_nothing(graph):
     assert ros2.process.poll() is None
 
 
-def test_a_hundred_subscribers_slow_nothing_down(graph):
+def test_a_hundred_subscribers_do_not_slow_the_states(graph):
     board, _, peer = graph
     peer.say('crowd', 'rt/R4', STRING, '100')
 
@@ -216,7 +216,7 @@ def test_a_hundred_subscribers_slow_nothing_down(graph):
     board.never('SAFE', 0.1)
 
 
-def test_a_flood_of_commands_costs_no_heartbeat(graph):
+def test_a_flood_of_commands_does_not_make_the_board_safe(graph):
     board, ros2, peer = graph
     join(ros2, peer, 'R4_Command', STRING)
     for value in range(2000):
@@ -228,7 +228,7 @@ def test_a_flood_of_commands_costs_no_heartbeat(graph):
     assert ros2.process.poll() is None
 
 
-def test_a_stop_is_a_stop_and_repeating_arm_does_not_arm_again(graph):
+def test_after_a_stop_a_repeated_arm_does_not_arm(graph):
     board, ros2, peer = graph
     join(ros2, peer, 'arm', BOOL)
     join(ros2, peer, 'stop', BOOL)
@@ -281,7 +281,7 @@ def test_services_answer_with_the_boards_confirmation(graph):
         peer.say('remove', f'rq/r4/{name}Request')
 
 
-def test_the_service_send_answers_for_the_board(graph):
+def test_the_service_send_answers_with_the_boards_result(graph):
     board, ros2, peer = graph
     peer.read('rr/r4/sendReply', SENT, user_data='clientid=1;')
     peer.writer('rq/r4/sendRequest', SEND, user_data='clientid=1;')
@@ -321,7 +321,7 @@ def test_the_service_send_answers_for_the_board(graph):
 
 
 @pytest.mark.parametrize('user_data, gid_size', ((NODES_HASH, 16), ('-', 24)))
-def test_its_node_is_listed_for_every_release(user_data, gid_size):
+def test_the_node_is_listed_for_every_release_of_ros(user_data, gid_size):
     """`user_data`: the user data that a peer of that release has on its writer of the list of nodes."""
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer, \
@@ -356,7 +356,7 @@ def test_its_node_is_listed_for_every_release(user_data, gid_size):
             assert '/r4' in nodes_of(peer.sample('ros_discovery_info', lambda data: b'r4\0' in data), gid_size)
 
 
-def test_not_armed_nothing_drives():
+def test_no_output_is_driven_before_arming():
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer, \
             Ros2(domain, board.host_url, '--deadline', '0.3') as ros2:
@@ -373,7 +373,7 @@ def test_not_armed_nothing_drives():
         board.state('SAFE', 'stop')
 
 
-def test_several_boards_have_namespaces_and_a_lost_one_is_told():
+def test_each_board_has_a_namespace_and_a_lost_board_is_reported():
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as left, Board('udp://127.0.0.1:0') as right, Peer(domain) as peer:
         with Ros2(domain, left.host_url, right.host_url) as ros2:
@@ -390,7 +390,7 @@ def test_several_boards_have_namespaces_and_a_lost_one_is_told():
             peer.sample('rt/rosout', lambda payload: b'board2.r4\0' in payload and b'\0' in payload)
 
 
-def test_two_of_one_name_are_told_of_each_other():
+def test_two_nodes_with_one_name_warn_about_each_other():
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as one, Board('udp://127.0.0.1:0') as other, Peer(domain) as peer, \
             Ros2(domain, one.host_url) as first:
@@ -407,7 +407,7 @@ def test_two_of_one_name_are_told_of_each_other():
             assert not any(' too: ' in each.get('text', '') for each in third.log)
 
 
-def test_it_says_what_it_is():
+def test_r4_ros2_prints_its_node_domain_and_topics():
     domain = own_domain()
     result = run('ros2', 'sim:', '--namespace', 'robot', '--duration', '0.2', env=domain)
     lines = result.stdout.splitlines()
@@ -421,7 +421,7 @@ def example(name):
     return runpy.run_path(str(pathlib.Path(__file__).parents[2] / 'docs' / 'examples' / 'ros2' / name))
 
 
-def test_the_launch_example_starts_it(monkeypatch):
+def test_the_launch_example_starts_r4_ros2(monkeypatch):
     actions = types.SimpleNamespace(ExecuteProcess=lambda cmd, **options: (cmd, options))
     monkeypatch.setitem(sys.modules, 'launch', types.SimpleNamespace(LaunchDescription=list, actions=actions))
     monkeypatch.setitem(sys.modules, 'launch.actions', actions)
@@ -431,7 +431,7 @@ def test_the_launch_example_starts_it(monkeypatch):
     assert result.returncode == 0 and '  /robot/cmd_vel  geometry_msgs/msg/Twist' in result.stdout.splitlines()
 
 
-def test_the_example_of_a_robot_keeps_the_speeds_of_its_wheels():
+def test_the_wheel_speeds_example_keeps_the_commanded_speeds():
     base = example('wheel_speeds.py')['Base']()
     speeds, now = [0.0, 0.0], 0.0
 
@@ -456,7 +456,7 @@ def test_the_example_of_a_robot_keeps_the_speeds_of_its_wheels():
     assert base.update((math.nan, 0), now) == [0, 0]
 
 
-def test_it_says_so_where_other_open_files_leave_no_room_for_the_graph():
+def test_too_many_open_files_are_reported():
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     files = []
     try:

@@ -16,7 +16,7 @@ def doubles(cdr, count):
     return [cdr.take('d') for _ in range(count)]
 
 
-def test_each_role_has_its_message():
+def test_each_device_role_is_published_in_its_ros_message():
     domain = own_domain()
     connected = ('--device', 'bno055', '--device', 'vl53l0x', '--device', 'as5600')
     devices = [word for name in ('bno055', 'ina219', 'vl53l0x', 'as5600') for word in ('--device', name)]
@@ -51,7 +51,7 @@ def test_each_role_has_its_message():
 
 
 @pytest.mark.parametrize(('reach', 'told'), [('5 6', -math.inf), ('0.03 2', math.inf), ('0.03 5', 3.04)])
-def test_a_range_tells_too_near_from_nothing_within_reach(reach, told, tmp_path):
+def test_a_range_distinguishes_too_near_from_nothing_in_range(reach, told, tmp_path):
     mine, domain = tmp_path / 'mine.device', own_domain()
     mine.write_text('device mine\nrole range\naddress 0x40\npoll bus x02 2 20\n'
                     f'value distance bus 0 u16be bits 3..15 scale 0.001 unit m range {reach}\n')
@@ -65,7 +65,7 @@ def test_a_range_tells_too_near_from_nothing_within_reach(reach, told, tmp_path)
             peer.end()
 
 
-def test_nothing_is_written_before_the_board_is_armed():
+def test_a_device_is_not_set_up_before_the_board_is_armed():
     domain = own_domain()
     with Board('udp://127.0.0.1:0', options=('--device', 'bno055')) as board:
         with Ros2(domain, board.host_url, '--device', 'bno055') as ros2:

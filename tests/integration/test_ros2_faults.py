@@ -10,7 +10,7 @@ from ros2_peer import (DIAGNOSTICS, FLOAT32, STRING, Peer, Ros2, armed, drive, f
 from host_on_paths import Relay, has_joined, has_left
 
 
-def test_what_it_drove_is_safe_when_it_is_killed_and_it_begins_again():
+def test_outputs_go_off_when_the_node_is_killed_and_it_can_restart():
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer:
         with Ros2(domain, board.host_url, '--arm') as ros2:
@@ -28,7 +28,7 @@ def test_what_it_drove_is_safe_when_it_is_killed_and_it_begins_again():
         peer.end()
 
 
-def test_what_a_publisher_drove_is_off_after_the_deadline_when_it_is_killed():
+def test_outputs_of_a_killed_publisher_go_off_after_the_deadline():
     with armed('--deadline', '0.5') as (board, ros2, peer), Peer(ros2.domain) as other:
         join(ros2, other, 'osmc1/command', FLOAT32)
         drive(board, other, 'rt/osmc1/command', float32(0.5), lambda each: pwm(each, 1) == 2048)
@@ -40,7 +40,7 @@ def test_what_a_publisher_drove_is_off_after_the_deadline_when_it_is_killed():
         drive(board, peer, 'rt/osmc2/command', float32(0.5), lambda each: pwm(each, 2) == 2048)
 
 
-def test_a_subscriber_that_stands_still_holds_up_nobody():
+def test_a_suspended_subscriber_does_not_delay_other_subscribers():
     with armed() as (board, ros2, peer), Peer(ros2.domain) as other:
         for each in (peer, other):
             each.read('rt/R4', STRING)
@@ -56,7 +56,7 @@ def test_a_subscriber_that_stands_still_holds_up_nobody():
         assert not any(each.get('state') == 'SAFE' for each in board.log)
 
 
-def test_a_command_that_was_held_up_is_not_executed():
+def test_a_delayed_command_is_not_executed():
     with armed() as (board, ros2, peer):
         peer.read('rt/diagnostics', DIAGNOSTICS)
         join(ros2, peer, 'osmc1/command', FLOAT32)
@@ -71,7 +71,7 @@ def test_a_command_that_was_held_up_is_not_executed():
         assert not any(each.get('state') == 'SAFE' for each in board.log)
 
 
-def test_a_board_of_two_paths_is_driven_on_when_one_is_pulled():
+def test_the_drive_continues_when_one_of_two_paths_is_unplugged():
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer:
         port = board.url.rsplit(':', 1)[1]
@@ -90,7 +90,7 @@ def test_a_board_of_two_paths_is_driven_on_when_one_is_pulled():
         peer.end()
 
 
-def test_diagnostics_tell_at_once_why_the_board_is_safe():
+def test_diagnostics_report_the_cause_of_a_safe_state_at_once():
     with armed() as (_, ros2, peer):
         peer.read('rt/diagnostics', DIAGNOSTICS)
         peer.sample('rt/diagnostics', lambda payload: health_of(payload)[0] == 0)
@@ -107,7 +107,7 @@ def test_diagnostics_tell_at_once_why_the_board_is_safe():
               lambda timeout: peer.sample('rt/diagnostics', lambda payload: health_of(payload)[0] == 1, timeout))
 
 
-def test_a_pattern_is_a_namespace_for_each_of_its_boards():
+def test_a_url_pattern_gives_each_board_its_own_namespace():
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as left, Board('udp://127.0.0.1:0') as right, Peer(domain) as peer:
         ports = [board.url.rpartition(':')[2] for board in (left, right)]

@@ -18,7 +18,7 @@ def newest_outputs(board):
     return [each for each in board.log if 'outputs' in each][-1]['outputs']
 
 
-def test_a_setpoint_that_rests_gets_there_though_it_is_said_once_and_lost():
+def test_a_zero_published_once_arrives_over_a_link_with_loss():
     # Without a deadline only the repeated command can end the drive. About a third of the ten would be lost.
     with armed('--deadline', '0', options=('--link', 'loss=30%,seed=7')) as (board, ros2, peer):
         join(ros2, peer, 'osmc1/command', FLOAT32)
@@ -28,7 +28,7 @@ def test_a_setpoint_that_rests_gets_there_though_it_is_said_once_and_lost():
             board.outputs(lambda each: pwm(each, 1) == 0)
 
 
-def test_a_transfer_beside_an_output_ends_nothing():
+def test_a_transfer_and_a_setpoint_can_share_a_command_text():
     with armed() as (board, ros2, peer):
         join(ros2, peer, 'R4_Command', STRING)
         for first in ('X:UART,1,x41', 'X:WRITE,0x68,x6b00'):
@@ -37,7 +37,7 @@ def test_a_transfer_beside_an_output_ends_nothing():
 
 
 @pytest.mark.parametrize('_', range(3))  # several runs, because the node takes both in one turn only by chance
-def test_an_arm_that_was_written_before_a_stop_does_not_undo_it(_):
+def test_an_arm_published_before_a_stop_does_not_undo_the_stop(_):
     with armed() as (board, ros2, peer):
         join(ros2, peer, 'arm', BOOL)
         join(ros2, peer, 'stop', BOOL)
@@ -52,7 +52,7 @@ def test_an_arm_that_was_written_before_a_stop_does_not_undo_it(_):
         arm(ros2, peer)
 
 
-def test_an_arm_of_an_outage_does_not_arm_when_the_link_is_back():
+def test_an_arm_during_an_outage_has_no_effect_afterwards():
     with armed() as (board, ros2, peer):
         join(ros2, peer, 'arm', BOOL)
         join(ros2, peer, 'R4_Command', STRING)
@@ -76,7 +76,7 @@ def test_an_arm_of_an_outage_does_not_arm_when_the_link_is_back():
         ros2.armed()
 
 
-def test_a_stop_of_an_outage_is_obeyed_when_the_link_is_back():
+def test_a_stop_during_an_outage_is_executed_afterwards():
     with armed() as (board, ros2, peer):
         join(ros2, peer, 'osmc1/command', FLOAT32)
         join(ros2, peer, 'stop', BOOL)
@@ -90,7 +90,7 @@ def test_a_stop_of_an_outage_is_obeyed_when_the_link_is_back():
         assert pwm(newest_outputs(board), 1) == 0
 
 
-def test_a_stop_is_heard_of_who_does_not_publish_reliably_and_who_is_not_heard_is_told():
+def test_a_best_effort_stop_is_obeyed_and_a_qos_mismatch_is_reported():
     with armed() as (board, ros2, peer):
         peer.writer('rt/stop', BOOL, reliability='best_effort')
         ros2.logged('stop: 1 publishers')
@@ -102,7 +102,7 @@ def test_a_stop_is_heard_of_who_does_not_publish_reliably_and_who_is_not_heard_i
         ros2.logged('R4: a subscriber asks for more than this publisher offers, in durability')
 
 
-def test_a_publisher_of_another_type_is_told_until_it_has_gone():
+def test_a_publisher_of_another_type_is_reported_while_it_exists():
     with armed() as (_, ros2, peer):
         peer.read('rt/diagnostics', DIAGNOSTICS)
         peer.read('rt/rosout', LOG)
@@ -125,7 +125,7 @@ def test_a_publisher_of_another_type_is_told_until_it_has_gone():
             peer.sample('rt/diagnostics', lambda payload: health_of(payload)[0] == 0)
 
 
-def test_a_stamped_cmd_vel_drives_unless_its_stamp_is_older_than_the_deadline():
+def test_a_stamped_cmd_vel_is_obeyed_unless_its_stamp_is_too_old():
     with armed('--drive', 'osmc1,osmc2', '--wheel-separation', '0.5', '--full-speed', '2') as (board, ros2, peer):
         peer.writer('rt/cmd_vel', TWIST_STAMPED)
         ros2.logged('geometry_msgs/msg/TwistStamped, which is obeyed')
@@ -140,7 +140,7 @@ def test_a_stamped_cmd_vel_drives_unless_its_stamp_is_older_than_the_deadline():
         assert not any(pwm(each['outputs'], 1) == 4095 for each in board.log if 'outputs' in each)
 
 
-def test_a_zero_of_an_outage_ends_the_drive_when_the_link_is_back():
+def test_a_zero_during_an_outage_stops_the_drive_afterwards():
     with armed('--deadline', '0') as (board, ros2, peer):
         join(ros2, peer, 'osmc1/command', FLOAT32)
         drive(board, peer, 'rt/osmc1/command', float32(0.5), lambda each: pwm(each, 1) == 2048)
@@ -154,7 +154,7 @@ def test_a_zero_of_an_outage_ends_the_drive_when_the_link_is_back():
         board.outputs(lambda each: pwm(each, 1) == 0)
 
 
-def test_what_is_armed_as_soon_as_it_is_there_was_not_stopped_before():
+def test_the_option_arm_does_not_arm_after_an_earlier_stop():
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board:
         url, host_url = board.url, board.host_url
@@ -167,7 +167,7 @@ def test_what_is_armed_as_soon_as_it_is_there_was_not_stopped_before():
             board.state('SAFE', 'stop')
 
 
-def test_a_node_that_a_supervisor_restarts_does_not_clear_a_stop_that_came_before():
+def test_a_restarted_node_does_not_clear_an_earlier_stop():
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer:
         assert run('stop', board.host_url).returncode == 0
@@ -183,7 +183,7 @@ def test_a_node_that_a_supervisor_restarts_does_not_clear_a_stop_that_came_befor
             arm(ros2, peer)
 
 
-def test_when_the_motors_supply_is_switched_off_nothing_else_stays_on():
+def test_opening_relay_1_switches_every_output_off():
     with armed() as (board, ros2, peer):
         join(ros2, peer, 'relay3/command', BOOL)
         join(ros2, peer, 'R4_Command', STRING)
@@ -193,14 +193,14 @@ def test_when_the_motors_supply_is_switched_off_nothing_else_stays_on():
         assert newest_outputs(board)['relays'] == 0
 
 
-def test_a_stepper_whose_place_is_not_told_is_not_driven():
+def test_a_stepper_without_a_reported_position_is_not_driven():
     with armed('--fields', 'DEFAULT') as (_, ros2, peer):
         join(ros2, peer, 'stepper2/command', INT32)
         again(lambda: peer.write('rt/stepper2/command', (1000).to_bytes(4, 'little')),
               lambda timeout: ros2.logged('nobody could stop it; add STEP2POS to --fields', timeout=timeout))
 
 
-def test_nobody_has_the_board_tell_no_more_where_a_driven_stepper_is():
+def test_a_topic_cannot_change_the_reported_fields():
     with armed('--fields', 'DEFAULT,STEP2POS') as (board, ros2, peer):
         join(ros2, peer, 'stepper2/command', INT32)
         join(ros2, peer, 'R4_Command', STRING)
@@ -211,7 +211,7 @@ def test_nobody_has_the_board_tell_no_more_where_a_driven_stepper_is():
         board.outputs(lambda each: not each['stepper'][1][1])
 
 
-def test_beside_a_command_that_is_objected_to_none_is_executed():
+def test_a_text_with_one_refused_command_is_not_executed():
     with armed('--fields', 'DEFAULT') as (board, ros2, peer):
         join(ros2, peer, 'R4_Command', STRING)
         again(lambda: peer.write('rt/R4_Command', text('O:358,1,1;P:1,1000,2')),
@@ -220,14 +220,14 @@ def test_beside_a_command_that_is_objected_to_none_is_executed():
         assert not any(pwm(each['outputs'], 1) for each in board.log if 'outputs' in each)
 
 
-def test_what_is_too_much_at_once_is_not_left_out_without_a_word():
+def test_too_many_commands_in_one_text_are_reported():
     with armed() as (_, ros2, peer):
         join(ros2, peer, 'R4_Command', STRING)
         again(lambda: peer.write('rt/R4_Command', text('Q:ID;' * 4 + 'X:SCAN')),
               lambda timeout: ros2.logged('more than 4 at once that drive no output (X:SCAN)', timeout=timeout))
 
 
-def test_a_client_that_reads_no_answers_starves_no_topic():
+def test_a_client_that_reads_no_answers_does_not_delay_topics():
     with armed() as (board, ros2, peer):
         peer.read('rt/R4', STRING)
         peer.writer('rq/r4/sendRequest', 'diagnostic_msgs::srv::dds_::AddDiagnostics_Request_')
@@ -241,7 +241,7 @@ def test_a_client_that_reads_no_answers_starves_no_topic():
         assert sorted(b - a for a, b in zip(came, came[1:]))[-10] < within(0.05)
 
 
-def test_a_voltage_is_off_when_its_publisher_is_gone():
+def test_a_voltage_goes_off_when_its_publisher_is_removed():
     with armed('--fields', 'DEFAULT,DAC1') as (_, ros2, peer):
         peer.read('rt/R4', STRING)
         join(ros2, peer, 'R4_Command', STRING)
@@ -251,7 +251,7 @@ def test_a_voltage_is_off_when_its_publisher_is_gone():
         peer.sample('rt/R4', lambda payload: b'DAC1:0;' in payload)
 
 
-def test_a_stepper_is_stopped_though_its_state_comes_in_two_datagrams():
+def test_a_stepper_stops_although_its_state_needs_two_datagrams():
     with armed('--fields', 'ALL,I2C1,I2C2,I2C3,I2C4,UART1,UART2,I2CX,I2CBUS') as (board, ros2, peer):
         peer.read('rt/R4', STRING)
         join(ros2, peer, 'R4_Command', STRING)

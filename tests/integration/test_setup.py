@@ -48,46 +48,46 @@ class Release:
         return ended, set(said.partition('--no-install-recommends ')[2].split())
 
 
-def test_a_build_installs_only_what_the_product_needs(tmp_path):
+def test_a_build_installs_only_the_packages_of_the_product(tmp_path):
     ended, installed = Release(tmp_path, PRODUCT | UNIT_TESTS | {'libfastdds-dev'}).set_up()
     assert ended.returncode == 0, ended.stderr
     assert installed == PRODUCT
 
 
-def test_nothing_is_installed_where_all_is_there(tmp_path):
+def test_setup_installs_nothing_if_all_packages_are_installed(tmp_path):
     ended, installed = Release(tmp_path, (), PRODUCT).set_up()
     assert (ended.returncode, installed) == (0, set())
     assert f'all {len(PRODUCT)} packages are there' in ended.stdout
 
 
 @pytest.mark.parametrize('name', ['libfastdds-dev', 'libfastrtps-dev'])
-def test_a_package_is_taken_by_the_name_that_the_release_has(tmp_path, name):
+def test_setup_uses_the_package_name_of_the_release(tmp_path, name):
     ended, installed = Release(tmp_path, UNIT_TESTS | {name}, PRODUCT).set_up('--test')
     assert ended.returncode == 0, ended.stderr
     assert installed == UNIT_TESTS | {name}
 
 
-def test_a_peer_of_a_test_that_the_release_has_not_is_skipped_and_named(tmp_path):
+def test_setup_skips_and_names_a_missing_test_package(tmp_path):
     ended, installed = Release(tmp_path, UNIT_TESTS, PRODUCT).set_up('--test')
     assert ended.returncode == 0, ended.stderr
     assert installed == UNIT_TESTS
     assert re.search(r'skipped.*libfastdds-dev', ended.stderr)
 
 
-def test_what_the_product_needs_is_named_by_library_and_version_where_there_is_no_package(tmp_path):
+def test_a_missing_product_package_is_named_with_library_and_version(tmp_path):
     ended, installed = Release(tmp_path, PRODUCT - {'libfmt-dev'}).set_up()
     assert (ended.returncode, installed) == (1, set())
     assert re.match(r'tools/setup: this release has no package libfmt-dev, or too old a one\n  fix: install .*fmt 8\.1', ended.stderr,
                     re.DOTALL)
 
 
-def test_a_part_of_the_product_is_skipped_where_its_library_is_too_old(tmp_path):
+def test_setup_skips_a_part_whose_library_is_too_old(tmp_path):
     ended, installed = Release(tmp_path, {'cyclonedds-dev', 'cyclonedds-tools'}, PRODUCT - PARTS, '0.8.2').set_up()
     assert (ended.returncode, installed) == (0, set())
     assert re.search(r'skipped.*cyclonedds-dev cyclonedds-tools', ended.stderr)
 
 
-def test_for_another_architecture_the_compiler_is_a_cross_compiler_and_libraries_are_its_own(tmp_path):
+def test_setup_installs_a_cross_compiler_for_another_architecture(tmp_path):
     libraries = {each for each in PRODUCT if each.endswith('-dev')} - {'libasio-dev'}
     archive = PRODUCT | {f'{each}:arm64' for each in libraries} | {'g++-aarch64-linux-gnu'}
     ended, installed = Release(tmp_path, archive).set_up(R4_ARCH='arm64')
@@ -103,14 +103,14 @@ def test_for_another_architecture_the_compiler_is_a_cross_compiler_and_libraries
     (['debian12', '--dirty', 'true'], ['--dirty is not an option', '--help']),
     (['--all', 'debian11'], ['debian11 is neither', 'debian12']),
 ])
-def test_on_says_what_is_wrong_with_its_options(arguments, words):
+def test_tools_on_refuses_wrong_options_with_a_fix(arguments, words):
     ended = subprocess.run([TOOLS / 'on', *arguments], capture_output=True, text=True, check=False)
     assert ended.returncode == 2
     assert re.match(r'tools/on: .+\n  fix: .+\n$', ended.stderr), ended.stderr
     assert all(word in ended.stderr for word in words), ended.stderr
 
 
-def test_on_names_the_package_of_a_program_that_is_missing(tmp_path):
+def test_tools_on_names_the_package_of_a_missing_program(tmp_path):
     for program in ('bash', 'dirname', 'dpkg', 'uname'):
         (tmp_path / program).symlink_to(f'/usr/bin/{program}')
     ended = subprocess.run([TOOLS / 'on', 'debian12', 'true'], capture_output=True, text=True, check=False,
@@ -137,7 +137,7 @@ class Table:
         return ended, (self.folder / 'commands').read_text().splitlines()
 
 
-def test_packages_and_wheels_are_used_in_a_minimal_system_and_compiled_once(tmp_path):
+def test_packages_compile_once_and_are_tested_in_a_minimal_system(tmp_path):
     ended, commands = Table(tmp_path).run('debian13/arm64', 'package', 'wheel')
     assert ended.returncode == 0, ended.stderr
     packages, wheel = (f'{tmp_path}/roots/debian13-arm64/root/r4link/build/{made}' for made in ('packages', 'wheel'))
@@ -148,13 +148,13 @@ def test_packages_and_wheels_are_used_in_a_minimal_system_and_compiled_once(tmp_
         f'debian13/arm64 --clean --see {wheel} tests/install/clean.sh {wheel}']
 
 
-def test_packages_that_are_not_built_are_not_used(tmp_path):
+def test_packages_that_fail_to_build_are_not_tested(tmp_path):
     ended, commands = Table(tmp_path, 'exit 1').run('debian13/amd64', 'package')
     assert (ended.returncode, len(commands)) == (1, 1)
     assert re.search(r'\| debian13/amd64 +\|[ |]* FAILED ', ended.stdout), ended.stdout
 
 
-def test_a_build_with_a_warning_has_failed(tmp_path):
+def test_a_build_with_a_warning_fails(tmp_path):
     ended, _ = Table(tmp_path, "echo 'a.cpp:1:2: warning: unused variable'").run('debian13/amd64', 'build')
     assert ended.returncode == 1
     assert re.search(r'\| debian13/amd64 +\| FAILED ', ended.stdout), ended.stdout

@@ -47,7 +47,7 @@ def is_safe(each):
     return is_state(each) and each['fields'].get('SAFE') == 1
 
 
-def test_monitors_and_sends_in_any_order(board):
+def test_monitor_and_send_share_a_transport_in_any_order(board):
     with watch(board.host_url) as early:
         early.next(is_safe)
         for pwm in (100, 200, 300):
@@ -64,7 +64,7 @@ def test_monitors_and_sends_in_any_order(board):
         early.next(is_state)
 
 
-def test_a_third_is_refused_with_the_name_and_pid_of_who_controls(board):
+def test_a_refusal_names_the_controlling_program_and_its_pid(board):
     with watch(board.host_url), driving(board.host_url, 'O:358,1,1') as host:
         for command in (['send', board.host_url, 'O:1,1,1'], ['monitor', board.host_url, '--control']):
             refused = run(*command)
@@ -73,7 +73,7 @@ def test_a_third_is_refused_with_the_name_and_pid_of_who_controls(board):
         board.never('SAFE', 0.3)
 
 
-def test_a_stop_from_the_second_terminal(board):
+def test_a_stop_from_a_second_terminal_stops_the_board(board):
     with watch(board.host_url) as watcher, driving(board.host_url, 'O:358,1,1'):
         watcher.next(drives(358))
         stop_takes_ms(board.host_url)
@@ -95,7 +95,7 @@ def from_to(datagrams, first, last):
     return datagrams[begin:next(i for i, text in enumerate(texts) if i > begin and last in text)]
 
 
-def test_of_five_that_watch_one_sleeps_one_dies_and_nobody_else_loses_anything(board, folder):
+def test_recorders_lose_no_datagram_when_watchers_hang_or_are_killed(board, folder):
     paths = [pathlib.Path(folder, f'{i}.r4log') for i in range(3)]
     with contextlib.ExitStack() as running:
         sleeper, victim = [running.enter_context(watch(board.host_url)) for _ in range(2)]
@@ -149,7 +149,7 @@ def hears_on(watcher, _, stopped):
     assert heard['came'] - stopped < within(2)
 
 
-def test_a_stopped_holder_that_watches_is_named_where_it_has_the_only_port():
+def test_a_suspended_holder_of_the_only_port_is_named():
     def is_told(watcher, pid, _):
         told = watcher.next(lambda each: each['type'] == 'error')['fields']
         assert f'the program that holds it (pid {pid}) does not answer' == told['reason'], told
@@ -157,14 +157,14 @@ def test_a_stopped_holder_that_watches_is_named_where_it_has_the_only_port():
         with_a_stopped_holder(board.host_url.replace('?listen=0', f'?listen={free_port()}'), is_told)
 
 
-def test_a_stopped_holder_that_watches_keeps_nobody_from_a_board(folder):
+def test_a_suspended_watching_holder_does_not_block_a_board(folder):
     # Only one program can open a serial port, so only one takes it over from the stopped program.
     for url, watchers in ('udp://127.0.0.1:0', 2), (f'pty:{folder}/tty', 1):
         with Board(url) as board:
             with_a_stopped_holder(board.host_url.removesuffix('?listen=0'), hears_on, watchers)
 
 
-def test_a_stopped_holder_loses_the_serial_port_and_takes_no_byte_of_it_when_it_goes_on(folder):
+def test_a_resumed_holder_takes_no_bytes_from_the_new_holder(folder):
     path = pathlib.Path(folder, 'all.r4log')
     with Board(f'pty:{folder}/tty') as board, watch(board.host_url) as holder:
         holder.next(is_state)
@@ -191,7 +191,7 @@ def test_a_stopped_holder_loses_the_serial_port_and_takes_no_byte_of_it_when_it_
             path.unlink()
 
 
-def test_two_spellings_of_a_board_are_one_path():
+def test_two_spellings_of_one_address_share_a_path():
     with Board('udp://127.0.0.1:0') as board:
         listen = free_port()
         url = board.host_url.replace('?listen=0', f'?listen={listen}')
@@ -207,7 +207,7 @@ def test_two_spellings_of_a_board_are_one_path():
             assert f'UDP port {listen} is in use by r4 (pid {host.process.pid})' in refused.stderr, refused
 
 
-def test_where_as_many_share_it_as_may_a_stop_is_obeyed_and_control_is_taken(folder):
+def test_stop_and_control_work_at_the_limit_of_sharing_programs(folder):
     with Board(f'pty:{folder}/tty') as board, watch(board.host_url) as holder, contextlib.ExitStack() as others:
         holder.next(is_state)
         for _ in range(16):
@@ -223,7 +223,7 @@ def test_where_as_many_share_it_as_may_a_stop_is_obeyed_and_control_is_taken(fol
         assert sent.returncode == 0, sent
 
 
-def test_a_driving_program_that_is_stopped_is_named(board):
+def test_a_refusal_names_a_suspended_controlling_program(board):
     with driving(board.host_url, 'O:358,1,1') as host:
         host.signal(signal.SIGSTOP)
         os.waitid(os.P_PID, host.process.pid, os.WSTOPPED | os.WNOWAIT)
@@ -256,7 +256,7 @@ while True:
 """
 
 
-def test_programs_of_another_user_that_connect_again_and_again_hold_up_neither_the_host_nor_a_stop(folder):
+def test_connections_of_another_user_do_not_delay_the_host_or_a_stop(folder):
     if os.geteuid() != 0:
         pytest.skip('only root may run programs as another user')
     with Board(f'pty:{folder}/tty') as board, driving(board.host_url, 'O:358,1,1') as host, contextlib.ExitStack() as others:
@@ -274,7 +274,7 @@ def test_programs_of_another_user_that_connect_again_and_again_hold_up_neither_t
         board.state('SAFE', 'stop')
 
 
-def test_another_user_shares_a_path_where_both_say_so(board, nobody):
+def test_another_user_shares_a_path_if_both_users_allow_it(board, nobody):
     shared = board.host_url + ('&' if '?' in board.host_url else '?') + 'share=nogroup'
     with driving(shared, 'O:358,1,1') as host:
         watched = nobody('monitor', shared, '--json', '--count', '3')

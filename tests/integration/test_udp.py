@@ -165,7 +165,7 @@ def test_a_command_is_refused_while_a_stop_is_latched(board):
     assert run('send', board.host_url, 'E:CLEAR', 'O:358,1,1').returncode == 0
 
 
-def test_a_stop_switches_every_output_off_and_nothing_comes_back(board):
+def test_a_stop_is_confirmed_and_reported_to_the_host(board):
     with monitor(board.host_url) as host:
         host.next(is_link('active'))
         # The monitor sends no commands, so another program stops the board.
@@ -177,7 +177,7 @@ def test_a_stop_switches_every_output_off_and_nothing_comes_back(board):
         assert state['fields']['OSMC1'] == [0, 0]
 
 
-def test_a_stop_during_a_drive_switches_it_off(board):
+def test_a_stop_during_a_drive_switches_the_motor_off(board):
     with driving(board.host_url, 'O:358,1,1') as host:
         board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
         assert run('stop', board.host_url).returncode == 0
@@ -185,7 +185,7 @@ def test_a_stop_during_a_drive_switches_it_off(board):
         board.state('SAFE', 'stop')
 
 
-def test_a_second_host_is_told_that_the_board_is_busy_and_may_still_stop_it(board):
+def test_a_second_host_is_refused_as_busy_but_can_stop_the_board(board):
     with monitor(board.host_url) as first:
         first.next(is_link('active'))
         refused = run('send', board.host_url, 'O:358,1,1', '--timeout', '0.5')
@@ -199,7 +199,7 @@ def test_a_second_host_is_told_that_the_board_is_busy_and_may_still_stop_it(boar
                    for each in board.log)
 
 
-def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(board):
+def test_the_board_is_safe_in_time_after_its_host_is_killed(board):
     with driving(board.host_url, 'O:358,1,1') as host:
         board.outputs(lambda outputs: outputs['osmc'][0] == [358, 1])
         killed = host.signal(signal.SIGKILL)
@@ -214,7 +214,7 @@ def test_the_board_is_safe_within_its_timeout_of_a_killed_hosts_last_heartbeat(b
     assert safe['came'] - killed <= within(SAFE_WITHIN_MS / 1000 + 0.05)
 
 
-def test_a_heartbeat_that_waited_while_the_board_stood_still_counts_from_before():
+def test_a_heartbeat_counts_from_its_arrival_at_a_suspended_board():
     # A host as in the paper: the board knows only that its heartbeats arrive.
     with Board('udp://127.0.0.1:0', options=('--set', 'timeout,2000')) as board, \
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as host:
@@ -240,7 +240,7 @@ def test_a_heartbeat_that_waited_while_the_board_stood_still_counts_from_before(
     assert 1200 < after_ms <= within_ms(2020)  # longer than 1000, so the program fed the watchdog
 
 
-def test_control_is_free_when_the_host_that_had_it_is_gone(board):
+def test_control_is_free_after_the_controlling_host_is_killed(board):
     with monitor(board.host_url) as first:
         first.next(is_link('active'))
         first.signal(signal.SIGKILL)
@@ -248,7 +248,7 @@ def test_control_is_free_when_the_host_that_had_it_is_gone(board):
     assert result.returncode == 0, result
 
 
-def test_a_session_goes_on_when_the_board_comes_back(board):
+def test_a_session_continues_after_the_board_restarts(board):
     with monitor(board.host_url) as host:
         host.next(is_state)
         board.signal(signal.SIGKILL)
@@ -266,7 +266,7 @@ def test_a_monitor_may_be_started_before_the_board():
         assert host.wait() == 0
 
 
-def test_a_stalled_reader_gets_a_young_state_first(board):
+def test_a_host_reads_a_fresh_state_after_a_pause(board):
     with monitor(board.host_url) as host:
         for _ in range(50):
             before = host.next(is_state)
@@ -277,7 +277,7 @@ def test_a_stalled_reader_gets_a_young_state_first(board):
     assert age_ms < within_ms(50)
 
 
-def test_noise_from_others_does_no_harm(board):
+def test_noise_from_other_programs_has_no_effect(board):
     with monitor(board.host_url, '--fields', 'RXCRC') as host, \
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
         host.next(is_link('active'))
@@ -295,7 +295,7 @@ def test_noise_from_others_does_no_harm(board):
     assert not any('executed' in each and each['executed']['command'][0] in 'OE' for each in board.log)
 
 
-def test_noise_at_the_host_is_counted_and_shown_and_the_link_goes_on(board):
+def test_a_host_reports_noise_and_keeps_its_link(board):
     port = free_port()
     with monitor(f'{board.url}?listen={port}') as host, \
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
@@ -306,11 +306,11 @@ def test_noise_at_the_host_is_counted_and_shown_and_the_link_goes_on(board):
         host.next(is_state)
 
 
-def test_a_flood_of_bytes_from_ever_other_ports_takes_nothing_from_the_host_in_control(board):
+def test_a_flood_from_changing_ports_does_not_disturb_the_host(board):
     stays_with_its_host_in(board, flood(board, 45, itertools.repeat(b'x'), at_once=3000))
 
 
-def test_a_flood_of_valid_datagrams_takes_nothing_from_the_host_in_control(board):
+def test_a_flood_of_valid_datagrams_does_not_disturb_the_host(board):
     def commands():
         for number in itertools.count(1):
             fields = b'O:358,1,1;PNum:%d;T:%d;^' % (number, number)
@@ -319,7 +319,7 @@ def test_a_flood_of_valid_datagrams_takes_nothing_from_the_host_in_control(board
     stays_with_its_host_in(board, flood(board, 960, commands(), places=40))
 
 
-def test_measures_a_link(board):
+def test_bench_measures_the_link(board):
     result = run('bench', board.host_url, '--duration', '2', '--json', timeout=PATIENCE_S)
     assert result.returncode == 0, result
     measured = objects(result.stdout)[0]
@@ -332,12 +332,12 @@ def test_measures_a_link(board):
     assert run('bench', board.host_url, '--duration', '0.3').returncode == 0
 
 
-def test_bench_of_nothing_is_refused():
+def test_bench_fails_if_no_board_is_heard():
     result = run('bench', 'udp://127.0.0.1:9?listen=0', timeout=PATIENCE_S)
     assert result.returncode == 3 and 'nothing was heard' in result.stderr
 
 
-def test_a_board_ends_by_itself_or_by_a_signal():
+def test_a_board_ends_after_its_duration_or_at_a_signal():
     with Board('udp://127.0.0.1:0', options=['--duration', '0.2']) as board:
         assert board.wait() == 0
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -346,7 +346,7 @@ def test_a_board_ends_by_itself_or_by_a_signal():
             assert board.wait() == 0
 
 
-def test_the_same_seed_gives_the_same_inputs_and_another_board_id():
+def test_the_same_seed_gives_the_same_start_time():
     options = ['--seed', '7', '--board-id', 'left']
     boots = []
     for _ in range(2):
@@ -360,7 +360,7 @@ def test_the_same_seed_gives_the_same_inputs_and_another_board_id():
     assert abs(boots[0] - boots[1]) < 1000
 
 
-def test_a_scenario_happens_to_the_board(tmp_path):
+def test_the_events_of_a_scenario_happen_to_the_board(tmp_path):
     script = tmp_path / 'scenario'
     slow = 5 if SANITIZED else 1  # in s; the host has connected before the first line
     script.write_text(f'{slow} handle released\n{1.5 * slow} handle held\n{2 * slow} fault\n')
@@ -374,20 +374,20 @@ def test_a_scenario_happens_to_the_board(tmp_path):
             assert result.returncode == 0, 'r4 stop failed with a fault and a stop together'
 
 
-def test_a_quiet_board_says_only_where_it_listens():
+def test_a_quiet_board_prints_only_its_url():
     with Board('udp://127.0.0.1:0', options=['--quiet', '--duration', '0.5']) as board:
         run('send', board.host_url, 'O:358,1,1')
         board.wait()
         assert [each[1] for each in list(board.lines.queue)] == [None]
 
 
-def test_a_board_tells_how_a_host_opens_it():
+def test_a_board_prints_the_url_for_its_hosts():
     with Board('udp://0.0.0.0:0?peer=127.0.0.1:2390') as board:
         assert board.log[0]['host_url'].startswith('udp://127.0.0.1:')
         assert run('monitor', board.host_url, '--count', '5').returncode == 0
 
 
-def test_an_older_client_without_heartbeats_gets_nothing_done(board):
+def test_a_client_without_heartbeats_is_refused(board):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
         fields = b'O:358,1,1;PNum:1;T:1;^'
         client.settimeout(PATIENCE_S)
@@ -399,7 +399,7 @@ def test_an_older_client_without_heartbeats_gets_nothing_done(board):
     assert answer.startswith(b'N:1,SAFE;')
 
 
-def test_a_process_has_a_thousand_boards():
+def test_one_process_simulates_a_thousand_boards():
     last = 21049 if SANITIZED else 21999  # with more, the machine has no time for each board
     with Board(f'udp://127.0.0.1:21000-{last}', listens=last - 20999) as boards:
         for port in 21000, 21025, last:

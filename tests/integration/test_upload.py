@@ -25,6 +25,7 @@ case "$*" in
   done
   ;;
 *)
+  printf 'Erase\\t[============] 100%%        65536 bytes\\n'
   printf 'Download\\t[            ]   0%%            0 bytes\\rDownload\\t[=====       ]  45%%        24576 bytes\\r'
   printf 'Download\\t[============] 100%%        65536 bytes\\nDownload done.\\n'
   [[ ! -e $R4_TEST_DFU/fails ]] || { printf 'dfu-util: \\033[31mverify failed\\n'; exit 74; }
@@ -34,7 +35,7 @@ case "$*" in
 esac
 '''
 SKETCH = struct.pack('<II', 0x24080000, 0x080402c1) + bytes(1000)
-WRITE = '-d 2341:0366 -a 0 -s 0x08040000:leave -D '
+WRITE = '-d 2341:0366 -p 1-2 -a 0 -s 0x08040000:leave -D '
 
 
 @pytest.fixture(name='place')
@@ -67,7 +68,7 @@ def test_stops_the_board_writes_the_sketch_and_reports_the_version(place):
     assert lines[-1]['firmware'] and calls(place)[-1] == f'{WRITE}{place}/sketch.bin'
 
 
-def test_a_board_in_its_boot_loader_is_written_at_once_if_any_board_will_do(place):
+def test_serial_auto_writes_a_board_in_its_boot_loader_at_once(place):
     (place / 'there').write_text('1')
     done = run('upload', str(place / 'sketch.bin'), 'serial:auto', '--timeout', '0.2')
     assert done.returncode == 3 and 'is written' in done.stdout and 'no R4 firmware answers' in done.stderr
@@ -76,7 +77,7 @@ def test_a_board_in_its_boot_loader_is_written_at_once_if_any_board_will_do(plac
 
 
 @pytest.mark.parametrize('url', ['serial:///dev/ttyACM99', 'serial:?sn=12345'])
-def test_a_named_board_that_is_absent_is_never_taken_for_the_one_that_waits(place, url):
+def test_upload_writes_no_other_board_than_the_named_one(place, url):
     (place / 'there').write_text('1')
     done = run('upload', str(place / 'sketch.bin'), url)
     assert done.returncode == 4 and ERROR.search(done.stderr)
@@ -103,7 +104,7 @@ def test_a_board_with_other_firmware_is_opened_at_1200_baud(place):
     (struct.pack('<II', 0x30000000, 0x080402c1), 'not a sketch'),
     (SKETCH + bytes(1966080), 'do not fit'),
 ], ids=['empty', 'short', 'zeros', 'even', 'boot-loader', 'no-ram', 'long'])
-def test_a_file_that_is_not_a_sketch_is_refused_before_anything_is_stopped(place, content, reason):
+def test_an_invalid_sketch_is_refused_before_the_board_is_stopped(place, content, reason):
     (place / 'sketch.bin').write_bytes(content)
     done = run('upload', str(place / 'sketch.bin'), 'serial:///dev/null')
     assert done.returncode == 1 and reason in done.stderr and ERROR.search(done.stderr)
@@ -115,7 +116,7 @@ def upload(place, *options):
         return run('upload', str(place / 'sketch.bin'), board.host_url, '--timeout', '0.3', *options)
 
 
-def test_it_names_the_reason_for_not_writing(place):
+def test_upload_names_the_reason_for_a_failure(place):
     (place / 'there').write_text('999')
     done = upload(place)
     assert done.returncode == 4 and 'it was not found; press the board' in done.stderr
@@ -140,7 +141,7 @@ def test_it_names_the_reason_for_not_writing(place):
     assert run('upload', str(place / 'sketch.bin'), 'udp://127.0.0.1').returncode == 2
 
 
-def test_a_port_that_another_program_uses_is_not_taken(place):
+def test_upload_refuses_a_port_that_another_program_uses(place):
     with Board(f'pty:{place}/board') as board:
         assert run('send', board.host_url, 'R:1,On', 'O:358,1,1').returncode == 0
         with open(f'{place}/board', 'rb', buffering=0) as port:

@@ -29,7 +29,7 @@ def carry(source, destination):
     threading.Thread(target=run, daemon=True).start()
 
 
-def test_listed_streamed_unplugged_under_way_and_found_again_and_one_of_two_paths(tmp_path):
+def test_a_usb_serial_board_is_found_again_after_unplugging(tmp_path):
     cable, other, told, commands = (tmp_path / name for name in ('board', 'other', 'told', 'commands'))
     with Board(f'pty:{cable}', f'pty:{other}') as board, open(told, 'wb') as errors:
         end = os.open(other, os.O_RDWR | os.O_NOCTTY)

@@ -21,7 +21,7 @@ int clock_gettime(clockid_t id, struct timespec* now) {
 '''
 
 
-def test_a_step_of_the_wall_clock_disturbs_nothing(tmp_path):
+def test_a_step_of_the_wall_clock_does_not_affect_the_link(tmp_path):
     source, library, is_set = tmp_path / 'clock.c', tmp_path / 'clock.so', tmp_path / 'set'
     source.write_text(ANOTHER_CLOCK)
     subprocess.run(['gcc', '-shared', '-fPIC', '-o', library, source], check=True)

@@ -26,7 +26,7 @@ def is_safe_for_the_link(each):
     return is_state(each) and each['fields'].get('SAFE') == 1
 
 
-def test_a_robot_that_nobody_drives_is_shown(board):
+def test_monitor_shows_a_board_without_a_controlling_host(board):
     with watch(board.host_url) as watcher:
         watcher.next(is_safe_for_the_link)
         watcher.skip_past()
@@ -35,7 +35,7 @@ def test_a_robot_that_nobody_drives_is_shown(board):
     assert not [each for each in board.log if each.get('state') == 'ACTIVE']
 
 
-def test_a_monitor_and_a_send_in_either_order(board):
+def test_monitor_and_send_work_in_either_order(board):
     with watch(board.host_url) as early:
         early.next(is_safe_for_the_link)
         with driving(board.host_url, 'O:358,1,1') as host, watch(board.host_url) as late:
@@ -63,7 +63,7 @@ def test_the_first_steps_of_the_help_work_as_printed():
                 watcher.next(drives)
 
 
-def test_watchers_come_and_go_and_the_host_loses_nothing(board):
+def test_suspended_and_killed_watchers_do_not_disturb_the_host(board):
     with driving(board.host_url, 'O:358,1,1'), watch(board.host_url) as frozen:
         frozen.next(drives)
         frozen.signal(signal.SIGSTOP)
@@ -78,7 +78,7 @@ def test_watchers_come_and_go_and_the_host_loses_nothing(board):
         frozen.next(drives)
 
 
-def test_a_fifth_watcher_is_told_so_and_gets_a_place_that_becomes_free(board):
+def test_a_fifth_watcher_is_refused_until_another_watcher_ends(board):
     watchers = [watch(board.host_url) for _ in range(4)]
     try:
         for each in watchers:
@@ -93,7 +93,7 @@ def test_a_fifth_watcher_is_told_so_and_gets_a_place_that_becomes_free(board):
             each.__exit__()
 
 
-def test_a_stop_beside_a_driving_program(board):
+def test_stop_works_beside_a_controlling_program(board):
     with driving(board.host_url, 'O:358,1,1'), watch(board.host_url) as watcher:
         watcher.next(drives)
         assert run('stop', board.host_url).returncode == 0
@@ -107,7 +107,7 @@ def test_a_monitor_with_control_is_a_host(board):
         assert run('send', board.host_url, 'O:358,1,1').returncode == 3
 
 
-def test_a_watcher_finds_the_board_again_after_a_reboot():
+def test_a_watcher_finds_the_board_again_after_a_restart():
     with Board('udp://127.0.0.1:0', options=['--stdin'], stdin=-1) as board, watch(board.host_url) as watcher:
         watcher.next(is_safe_for_the_link)
         board.process.stdin.write('reboot\n')
@@ -117,7 +117,7 @@ def test_a_watcher_finds_the_board_again_after_a_reboot():
         watcher.next(is_safe_for_the_link)
 
 
-def test_over_a_cable(tmp_path):
+def test_a_watcher_on_a_cable_loses_no_state(tmp_path):
     with Board(f'pty:{tmp_path}/r4', 'udp://127.0.0.1:0') as board:
         cable, network = [each['host_url'] for each in board.log if each.get('type') == 'listening'][:2]
         with watch(cable) as watcher:
@@ -151,7 +151,7 @@ class Stranger:
             return ''
 
 
-def test_nothing_streams_to_who_has_not_echoed_what_it_was_told(board):
+def test_only_a_watcher_that_echoes_its_lease_gets_states(board):
     stranger, other = Stranger(board), Stranger(board)
     stranger.ask('1000', 0)
     answer = stranger.hears()
@@ -172,7 +172,7 @@ def test_nothing_streams_to_who_has_not_echoed_what_it_was_told(board):
         pass
 
 
-def test_who_is_killed_is_streamed_to_for_two_seconds_at_most(board):
+def test_a_silent_watcher_gets_states_for_at_most_two_seconds(board):
     stranger = Stranger(board)
     stranger.ask('50', 0)
     stranger.ask('50', int(re.search(r'LEASE:(\d+)', stranger.hears())[1]))
@@ -181,7 +181,7 @@ def test_who_is_killed_is_streamed_to_for_two_seconds_at_most(board):
     assert PATIENCE_S and 1900 <= times[-1] - times[0] <= 2020
 
 
-def test_beside_a_standing_host_of_the_same_machine_a_watcher_is_no_copy(board):
+def test_the_configured_peer_gets_only_heartbeats_beside_a_watcher(board):
     del board
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as standing:
         standing.bind(('127.0.0.1', 0))

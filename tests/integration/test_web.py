@@ -35,7 +35,7 @@ def motor_is_driven(outputs):
     return outputs['osmc'][0] != [0, 0]
 
 
-def test_a_page_is_told_of_each_of_several_paths(tmp_path):
+def test_a_page_receives_every_path_of_a_board(tmp_path):
     with Board('udp://127.0.0.1:0', f'pty:{tmp_path}/board') as board:
         url = f'{board.host_url}+serial://{tmp_path}/board'
         with Web(url) as web, Page(web) as page:
@@ -43,7 +43,7 @@ def test_a_page_is_told_of_each_of_several_paths(tmp_path):
             assert page.hello['boards'][0]['url'] == url
 
 
-def test_a_page_gets_every_state_with_its_names():
+def test_a_page_receives_every_state_with_its_field_names():
     with one_board() as (board, web), Page(web) as page:
         hello = page.hello
         assert hello['boards'] == [{'board': 0, 'url': board.host_url, 'name': ''}]
@@ -62,7 +62,7 @@ def test_a_page_gets_every_state_with_its_names():
         assert status['firmware'] and status['id'] == 'sim-1'
 
 
-def test_the_page_comes_with_what_keeps_foreign_scripts_out():
+def test_the_page_is_served_with_security_headers():
     with one_board() as (_, web):
         status, answer = web.get('/')
         head, _, plain = answer.partition(b'\r\n\r\n')
@@ -101,7 +101,7 @@ def test_one_browser_controls_and_the_others_watch():
         assert second.control()['you']
 
 
-def test_a_browser_that_falls_silent_is_missed_within_its_time():
+def test_the_board_is_safe_in_time_when_a_browser_falls_silent():
     with one_board() as (board, web), Page(web) as page:
         page.drive()
         board.outputs(motor_is_driven)
@@ -112,7 +112,7 @@ def test_a_browser_that_falls_silent_is_missed_within_its_time():
         assert '500 ms' in page.next('control', lambda each: not each['you'])['why']
 
 
-def test_a_browser_whose_words_are_old_is_missed_too():
+def test_a_browser_that_echoes_an_old_time_loses_control():
     with one_board() as (board, web), Page(web) as page:
         page.drive()
         page.freeze()
@@ -127,7 +127,7 @@ def test_a_browser_whose_words_are_old_is_missed_too():
         assert not page.ask(type='command', board=0, command='O:358,1,1')['ok']
 
 
-def test_a_browser_that_is_gone_leaves_the_board_safe_at_once():
+def test_the_board_is_safe_at_once_when_the_browser_disconnects():
     with one_board() as (board, web), Page(web) as other:
         with Page(web) as page:
             page.drive()
@@ -148,7 +148,7 @@ def test_the_board_is_safe_when_r4_web_ends(how):
         assert board.state('SAFE', 'link')['came'] - ended < within(limit)
 
 
-def test_who_watches_stops_the_board_at_once_and_it_stays_so():
+def test_a_watching_browser_stops_the_board_until_it_is_cleared():
     with one_board() as (board, web), Page(web) as page, Page(web) as watcher:
         page.drive()
         asked = time.monotonic()
@@ -181,7 +181,7 @@ def test_a_stop_under_way_while_control_is_taken_is_not_lost():
         board.state('SAFE', 'stop')
 
 
-def test_a_stop_of_a_board_that_is_not_there_is_not_confirmed():
+def test_a_stop_of_a_missing_board_is_not_confirmed():
     with Web('udp://127.0.0.1:9?listen=0') as web, Page(web) as page:
         result = page.ask(type='stop')
         assert not result['ok'] and 'CUT THE POWER' in result['text']
@@ -202,7 +202,7 @@ def test_several_boards_are_controlled_and_stopped_together():
             right.state('SAFE', 'stop')
 
 
-def test_a_program_that_drives_keeps_its_board():
+def test_a_page_cannot_take_control_from_another_program():
     with one_board() as (board, web), driving(board.host_url.split('?')[0]) as host:
         with Page(web) as page:
             assert page.states(20)[-1]['RELAYS'] == 1
@@ -214,7 +214,7 @@ def test_a_program_that_drives_keeps_its_board():
             assert host.process.poll() is None
 
 
-def test_a_page_records(tmp_path):
+def test_a_page_starts_and_ends_a_recording(tmp_path):
     with one_board('--record-to', str(tmp_path)) as (_, web), Page(web) as page:
         assert page.control()['you']
         page.say(type='record', on=True)
@@ -230,7 +230,7 @@ def test_a_page_records(tmp_path):
         assert 'nowhere' in page.next('recording', lambda each: each['why'])['why']
 
 
-def test_a_recording_belongs_to_whoever_controls_and_to_whoever_began_it(tmp_path):
+def test_only_a_controlling_page_starts_a_recording_and_ends_it(tmp_path):
     with one_board('--record-to', str(tmp_path)) as (_, web), Page(web) as first, Page(web) as second:
         second.say(type='record', on=True)
         refused = second.next('recording', lambda each: each['why'])
@@ -249,7 +249,7 @@ def test_a_recording_belongs_to_whoever_controls_and_to_whoever_began_it(tmp_pat
         assert [str(each) for each in tmp_path.iterdir()] == [path]
 
 
-def test_a_recording_whose_file_was_removed_goes_on_and_the_page_is_told(tmp_path):
+def test_a_page_is_notified_when_the_recording_file_is_removed(tmp_path):
     with one_board('--record-to', str(tmp_path)) as (_, web), Page(web) as page:
         assert page.control()['you']
         page.say(type='record', on=True)
@@ -262,7 +262,7 @@ def test_a_recording_whose_file_was_removed_goes_on_and_the_page_is_told(tmp_pat
         assert 'states' in run('info', path).stdout
 
 
-def test_a_refused_wish_for_control_is_told_to_nobody_else():
+def test_a_refused_control_request_is_reported_only_to_its_page():
     with one_board() as (_, web), Page(web) as page:
         assert page.control()['you']
         with Page(web) as other:
@@ -274,7 +274,7 @@ def test_a_refused_wish_for_control_is_told_to_nobody_else():
         assert page.next('control')['why'] == 'it was given back'
 
 
-def test_a_folder_of_files_takes_the_place_of_the_page(tmp_path):
+def test_the_option_page_serves_the_files_of_a_folder(tmp_path):
     (tmp_path / 'page/sub').mkdir(parents=True)
     (tmp_path / 'page/index.html').write_text('changed')
     (tmp_path / 'page.key').write_text('secret')
@@ -288,7 +288,7 @@ def test_a_folder_of_files_takes_the_place_of_the_page(tmp_path):
     assert nowhere.returncode == OPEN and ERROR.search(nowhere.stderr) and 'is not a folder' in nowhere.stderr
 
 
-def test_a_proxy_in_front_is_named():
+def test_the_option_host_allows_requests_through_a_proxy():
     with one_board('--host', 'robot.example') as (_, web):
         token = web.url.partition('#token=')[2]
         assert len(token) == 32, 'r4 web made no token although --host serves other computers'
@@ -304,7 +304,7 @@ def test_a_proxy_in_front_is_named():
     assert wrong.returncode == USAGE and ERROR.search(wrong.stderr)
 
 
-def test_wrong_hosts_and_origins_are_turned_away():
+def test_requests_with_a_wrong_host_or_origin_are_refused():
     with one_board() as (_, web):
         for host in ('evil.example', 'evil.example:8080', '192.168.0.1', '127.0.0.1.evil.example', '', 'localhost:x'):
             with pytest.raises(Refused) as refused:
@@ -339,7 +339,7 @@ def test_other_computers_need_the_token():
             assert foxglove.receive()[0] == 1
 
 
-def test_wrong_messages_end_the_connection_and_nothing_else():
+def test_a_wrong_message_ends_only_its_own_connection():
     with one_board() as (_, web), Page(web) as good:
         for wrong in (b'{', b'[]', b'{}', b'{"type":"fly"}', b'{"type":"control"}', b'{"type":"control","want":1}',
                       b'{"type":"command","request":-1,"board":0,"command":"E:STOP"}', b'[' * 4000,
@@ -372,7 +372,7 @@ def test_64_browsers_are_served():
             next_one.states(1)
 
 
-def test_a_slow_browser_loses_old_states_and_costs_no_memory():
+def test_a_slow_browser_loses_old_states_and_uses_little_memory():
     with Web('sim:?node=0-7') as web, WebSocket(web.port, buffer=4096) as slow, Page(web) as page:
         page.states(50)
         before = web.resident_kib()
@@ -390,7 +390,7 @@ def test_a_slow_browser_loses_old_states_and_costs_no_memory():
                 break
 
 
-def test_who_does_not_finish_a_request_is_cut_off():
+def test_a_client_with_an_unfinished_request_is_disconnected():
     with one_board() as (_, web):
         with (socket.create_connection(('127.0.0.1', web.port), PATIENCE_S) as silent,
               socket.create_connection(('127.0.0.1', web.port), PATIENCE_S) as slow):
@@ -398,7 +398,7 @@ def test_who_does_not_finish_a_request_is_cut_off():
             assert silent.recv(1) == slow.recv(1) == b''
 
 
-def test_hostile_clients_disturb_nobody():
+def test_hostile_clients_do_not_disturb_the_controlling_page():
     seed = os.environ.get('R4_SEED', '1')
     with one_board() as (board, web), Page(web) as page:
         page.drive()
@@ -446,7 +446,7 @@ def test_foxglove_reads_records_links_and_events():
         assert any('stop' in each['text'] for _, each in read['messages']['/left-arm/events'])
 
 
-def test_who_speaks_foxglove_may_only_read():
+def test_a_foxglove_client_can_only_read():
     with one_board() as (_, web):
         for names in (('foxglove.sdk.v1',), ('foxglove.sdk.v1', 'foxglove.websocket.v1')):
             with WebSocket(web.port, '/', names) as client:

@@ -123,7 +123,7 @@ def picture_moves(page):
     page.until(f'{PICTURES} !== {before!r}')
 
 
-def test_it_loads_fast_and_shows_every_state_at_once(browser):
+def test_the_page_loads_fast_and_shows_states_at_once(browser):
     with one_board(browser) as (_, _, page):
         picture_moves(page)
         page.until('r4_measured.frames() > 40')
@@ -138,7 +138,7 @@ def test_it_loads_fast_and_shows_every_state_at_once(browser):
         assert page.errors() == []
 
 
-def test_plots_are_paused_zoomed_and_read(browser):
+def test_plots_can_be_paused_zoomed_and_read(browser):
     with one_board(browser) as (_, _, page):
         page.click('#pause')
         page.until_text('#pause', 'Go on')
@@ -166,7 +166,7 @@ def test_plots_are_paused_zoomed_and_read(browser):
 
 @pytest.mark.parametrize('width, height, scheme', [
     (1280, 800, 'dark'), (390, 844, 'light'), (320, 640, 'dark')])
-def test_it_fits_its_screen_in_dark_and_light(browser, width, height, scheme):
+def test_the_page_fits_its_screen_in_dark_and_light(browser, width, height, scheme):
     RESULTS.mkdir(parents=True, exist_ok=True)
     with one_board(browser, width=width, height=height, scheme=scheme, touch=width < 1000) as (_, _, page):
         arm(page)
@@ -184,7 +184,7 @@ def test_it_fits_its_screen_in_dark_and_light(browser, width, height, scheme):
 
 
 @pytest.mark.parametrize('width', [1280, 390, 320])
-def test_what_is_told_does_not_move_the_buttons_under_a_finger(browser, width):
+def test_messages_do_not_move_the_buttons(browser, width):
     with one_board(browser, width=width, touch=width < 1000) as (_, _, page):
         def places(part='#holder', text=''):
             return page.evaluate(f'document.querySelector({part!r}).textContent = {text!r};'
@@ -253,7 +253,7 @@ def test_space_and_escape_stop_wherever_the_focus_is(browser):
         assert sorted(took_ms)[1] <= within_ms(STOP_MS)
 
 
-def test_a_lost_server_and_a_lost_board_are_told_in_words_and_come_back(browser):
+def test_the_page_reports_a_lost_server_or_board_and_reconnects(browser):
     with Board('udp://127.0.0.1:0') as board, browser.open('about:blank') as page:
         with Web(board.host_url) as web:
             page.evaluate(f'location.href = {web.url!r}')
@@ -293,7 +293,7 @@ def test_a_closed_or_hidden_page_makes_its_board_safe(browser):
         board.outputs(stands)
 
 
-def test_a_second_browser_watches_and_may_stop(browser):
+def test_a_second_browser_watches_and_can_stop_the_board(browser):
     with one_board(browser) as (board, web, page), browser.open(web.url) as second:
         arm(page)
         second.until_text('#holder', 'controls; you watch')
@@ -313,7 +313,7 @@ def test_a_second_browser_watches_and_may_stop(browser):
         page.until_text('.card .state', 'stop')
 
 
-def test_the_button_records_and_tells_where(browser, tmp_path):
+def test_the_record_button_records_and_shows_the_file(browser, tmp_path):
     with Board('udp://127.0.0.1:0') as board, Web(board.host_url, options=('--record-to', str(tmp_path))) as web, \
             browser.open(web.url) as page:
         page.until('!document.querySelector("#control").disabled')
@@ -331,7 +331,7 @@ def test_the_button_records_and_tells_where(browser, tmp_path):
         assert page.errors() == []
 
 
-def test_a_token_opens_the_page_and_does_not_stay_in_its_address(browser):
+def test_the_token_opens_the_page_and_is_removed_from_its_address(browser):
     with Board('udp://127.0.0.1:0') as board, Web(board.host_url, options=('--token',)) as web:
         with browser.open(web.url) as page:
             page.until('globalThis.r4_measured?.first_plot_ms > 0')

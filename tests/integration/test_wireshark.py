@@ -100,7 +100,7 @@ def test_the_papers_capture_is_shown_field_by_field(tmp_path):
     assert [row[9] for row in shown if row[9]] == [row[0] for row in shown if row[2] == 'command'], 'unconfirmed'
 
 
-def test_a_dissector_that_is_found_twice_is_loaded_once(tmp_path):
+def test_a_dissector_installed_twice_is_loaded_once(tmp_path):
     plugins = tmp_path / '.local/lib/wireshark/plugins'
     shutil.copytree(DISSECTOR, plugins)
     path = paper_capture(tmp_path / 'paper.pcap')
@@ -108,7 +108,7 @@ def test_a_dissector_that_is_found_twice_is_loaded_once(tmp_path):
     assert sum(' R4 ' in line for line in lines) == len(paper())
 
 
-def test_a_wrong_checksum_is_told_with_the_right_one_and_leaves_a_gap(tmp_path):
+def test_a_wrong_checksum_is_shown_and_counts_as_a_lost_datagram(tmp_path):
     path = paper_capture(tmp_path / 'paper.pcap')
     right = {line.split('PNum:')[1].split(';')[0]: zlib.crc32(line[:line.index('^') + 1].encode())
              for _, line in paper() if 'PNum:' in line}
@@ -119,7 +119,7 @@ def test_a_wrong_checksum_is_told_with_the_right_one_and_leaves_a_gap(tmp_path):
     assert len(fields(path, 'frame.number', only='r4.expert.crc && r4.expert.malformed')) == 0
 
 
-def test_other_ports_are_recognised_by_the_checksum(tmp_path):
+def test_datagrams_on_other_ports_are_recognised_by_their_checksum(tmp_path):
     path = paper_capture(tmp_path / 'paper.pcap', port=4711)
     assert len(fields(path, 'r4.pnum', only='r4')) == len(paper()), 'port 2390 is not taken for a host\'s'
     path = write_pcap(tmp_path / 'other.pcap', RAW_IP,
@@ -128,7 +128,7 @@ def test_other_ports_are_recognised_by_the_checksum(tmp_path):
     assert fields(path, 'frame.number', only='r4') == [['1']]
 
 
-def test_packet_numbers_that_come_late_or_twice_are_told(tmp_path):
+def test_lost_late_and_duplicate_packet_numbers_are_marked(tmp_path):
     numbers = [4294967294, 4294967295, 2, 0, 2, 3]
     path = write_pcap(tmp_path / 'numbers.pcap', RAW_IP,
                       [(0, udp('board', datagram(f'SAFE:0;PNum:{number};T:1;'))) for number in numbers])
@@ -137,7 +137,7 @@ def test_packet_numbers_that_come_late_or_twice_are_told(tmp_path):
     assert fields(path, 'frame.number', 'r4.copy_of', only='r4.expert.duplicate') == [['5', '3']]
 
 
-def test_what_nothing_confirms_and_what_is_refused_is_told(tmp_path):
+def test_unconfirmed_and_refused_commands_are_marked(tmp_path):
     said = [('host', 'O:1,1,1;PNum:2147483700;T:5;'), ('board', 'CMD:2147483700;SAFE:0;PNum:1;T:6;'),
             ('host', 'O:2,1,1;PNum:2147483701;T:5;'), ('host', 'O:2,1,1;PNum:2147483701;T:5;'),
             ('host', 'O:1,1,9;PNum:2147483702;T:5;'), ('board', 'N:2147483702,CHANNEL;PNum:2;T:7;'),
@@ -153,7 +153,7 @@ def test_what_nothing_confirms_and_what_is_refused_is_told(tmp_path):
     assert fields(path, 'r4.safe', 'r4.cause', 'r4.stop', only='r4.expert.safe') == [['2', '9', '77']]
 
 
-def test_a_recording_of_a_serial_link_shows_when_its_commands_were_confirmed(tmp_path):
+def test_a_serial_recording_shows_the_confirmation_of_its_commands(tmp_path):
     log, packets = tmp_path / 'drive.r4log', tmp_path / 'drive.pcapng'
     with Board(f'pty:{tmp_path}/r4') as board, Running('record', board.host_url, '-o', str(log)) as recorder:
         wait_for(log, ' 1! up ')
@@ -170,7 +170,7 @@ def test_a_recording_of_a_serial_link_shows_when_its_commands_were_confirmed(tmp
     assert all(row[0] == '1' for row in fields(packets, 'r4.crc.status', only='r4'))
 
 
-def test_a_can_bus_is_joined_unpacked_and_shown(tmp_path):
+def test_datagrams_of_a_can_bus_are_reassembled_and_unpacked(tmp_path):
     state = paper()[0][1]
     command = datagram('O:358,1,1;PNum:2147483700;T:1;').decode()
     confirmed = datagram('OSMC1:358,1;SAFE:0;CMD:2147483700;PNum:7435;T:79100;').decode()
@@ -203,7 +203,7 @@ def test_a_can_bus_is_joined_unpacked_and_shown(tmp_path):
     assert len(fields(path, 'frame.number', only='!r4')) == 2
 
 
-def test_every_value_of_the_packed_form_comes_out_as_it_went_in(tmp_path):
+def test_every_packed_value_is_unpacked_correctly(tmp_path):
     rng = random.Random(17)
     texts = []
     while len(texts) < 300:
@@ -220,7 +220,7 @@ def test_every_value_of_the_packed_form_comes_out_as_it_went_in(tmp_path):
     assert [row[0] for row in rows] == [re.search(r'PNum:(\d+)', text)[1] for text in texts]
 
 
-def test_a_frame_that_is_missing_is_told(tmp_path):
+def test_missing_and_invalid_can_frames_are_marked(tmp_path):
     frames = isotp(packed_form.pack(paper()[0][1]))
     damaged = [frames[0], frames[1], frames[3], frames[0], frames[0], b'\x00', b'\x10', b'\xf0']
     path = write_pcap(tmp_path / 'bus.pcap', SOCKETCAN, [(0, can(0x401, data)) for data in damaged] +
@@ -244,7 +244,7 @@ def names_by_filter(installed):
     return {part[2]: part[1] for part in (line.split('\t') for line in listed.splitlines()) if part[0] == 'F' and part[2].startswith('r4.')}
 
 
-def test_fields_and_units_are_those_of_the_product(shown, tmp_path):
+def test_fields_and_units_match_those_of_r4_convert(shown, tmp_path):
     # If the input is a pipe, the CSV file has the columns of all known fields.
     assert run('convert', '-', '-o', str(tmp_path / 'all.csv'), stdin='# r4log 1 by r4 0.1.0\n').returncode == 0
     columns = (tmp_path / 'all.csv').read_text(encoding='ascii').strip().split(',')[5:]
@@ -282,7 +282,7 @@ def damaged(rng, data):
     return bytes(data[:rng.randrange(len(data) + 1)] if rng.random() < 0.3 else data)
 
 
-def test_rubbish_makes_no_error_of_the_dissector(tmp_path):
+def test_rubbish_causes_no_error_in_the_dissector(tmp_path):
     rng = random.Random(18)
     texts = [line.encode() for _, line in paper()] + [datagram(text) for text in (
         'N:5,CHANNEL;PNum:1;T:1;', 'I:R4,1,2,a+b;PNum:1;', 'E:CLEAR,99999999999;PNum:99999999999;', 'P:1;PNum:7;T:-1;',
@@ -307,13 +307,13 @@ def test_rubbish_makes_no_error_of_the_dissector(tmp_path):
         assert len(tshark('-r', path, '-2', '-V')) > 5000
 
 
-def test_it_is_installed_by_copying_it(installed, tmp_path):
+def test_the_dissector_is_installed_by_copying(installed, tmp_path):
     path = paper_capture(tmp_path / 'paper.pcap')
     lines = tshark('-r', path, '-Y', 'r4.osmc1.pwm == 358', plugin=False, env=installed)
     assert len(lines) == sum('OSMC1:358' in line for _, line in paper())
 
 
-def test_a_long_capture_takes_no_longer_a_packet_than_a_short_one(tmp_path):
+def test_the_time_per_packet_does_not_grow_with_the_capture(tmp_path):
     def seconds_for(count):
         texts = []
         for index in range(count):

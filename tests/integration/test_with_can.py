@@ -111,7 +111,7 @@ sh frames.sh </dev/null >frames 2>&1; printf 'a\r\n\000b\nc' >&2; cat; exit 255"
                input=CONTENT, env={**os.environ, 'ODD': "x'\n$y", 'TOOL': str(TOOLS / 'with-can')})
 
 
-def test_bytes_pass_unchanged_in_all_three_streams_and_the_exit_status_with_them(result):
+def test_the_streams_and_the_exit_status_pass_unchanged(result):
     assert result.returncode == 255
     assert result.stdout == CONTENT
     assert result.stderr == b'a\r\n\0b\nc'
@@ -126,7 +126,7 @@ def test_what_tests_need_is_there(result, folder):
     assert (folder / 'told').read_text().splitlines()[2:] == ['1'], result.stderr
 
 
-def test_a_frame_passes_on_every_bus_and_inside_the_guest_the_interfaces_come_and_go(result, folder):
+def test_every_bus_of_the_guest_passes_frames_and_can_be_changed(result, folder):
     lines = [line.split() for line in (folder / 'frames').read_text().splitlines()]
     assert [line[0] for line in lines[:6]] == ['vcan0', 'vxcan1', 'vxcan0', 'can1', 'can0', 'vcan0'], result.stderr
     assert all(line[1:] == ['123', '[4]', 'DE', 'AD', 'BE', 'EF'] for line in lines[:5])
@@ -135,7 +135,7 @@ def test_a_frame_passes_on_every_bus_and_inside_the_guest_the_interfaces_come_an
         assert lines[6:] == [['72'], ['1000'], ['9'], ['can0'], ['can1'], ['lo']]
 
 
-def test_ctrl_c_is_the_commands_and_the_time_limit_ends_what_does_not_end():
+def test_ctrl_c_reaches_the_command_and_the_time_limit_ends_it():
     with subprocess.Popen([*WITH_CAN, '--time', '3', 'sh', '-c', 'trap "echo interrupted" INT; echo begun; '
                            'while :; do sleep 0.1; done'], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE) as process:
@@ -155,7 +155,7 @@ def test_a_killed_wrapper_leaves_no_guest():
         assert await_end(qemu)
 
 
-def test_a_terminal_is_a_terminal_inside():
+def test_the_command_has_the_terminal_of_the_caller():
     process, terminal = pty.fork()
     if process == 0:
         termios.tcsetwinsize(0, (33, 99))  # set in the child, because the parent may be too late
@@ -172,7 +172,7 @@ def test_a_terminal_is_a_terminal_inside():
     os.close(terminal)
 
 
-def test_an_ordinary_user_has_it_too_with_his_own_ids_and_the_status_is_the_signal_that_ends_the_command():
+def test_an_ordinary_user_can_run_a_command_with_his_own_ids():
     if os.geteuid() != 0:
         result = run('sh', '-c', 'id -u; ip link set can0 down; kill -SEGV $$')
         assert (result.stdout, result.stderr) == (b'%d\n' % os.geteuid(), b'')
@@ -205,7 +205,7 @@ def test_an_ordinary_user_has_it_too_with_his_own_ids_and_the_status_is_the_sign
     (['true'], {'XDG_CACHE_HOME': '{tmp}', 'R4_CAN_KERNEL': '/no/such.deb'}, 6, 'R4_CAN_KERNEL'),
     (['true'], {'XDG_CACHE_HOME': '{tmp}', 'PATH': '{bin}'}, 6, 'apt-get update'),
 ])
-def test_what_is_missing_is_told_with_the_fix(tmp_path, arguments, environment, code, words):
+def test_a_missing_requirement_is_reported_with_a_fix(tmp_path, arguments, environment, code, words):
     # A Debian whose package lists are empty.
     programs = tmp_path / 'bin'
     programs.mkdir()
@@ -218,14 +218,14 @@ def test_what_is_missing_is_told_with_the_fix(tmp_path, arguments, environment, 
     assert words in result.stderr and result.stdout == ''
 
 
-def test_a_package_of_the_user_that_is_none_is_named_and_not_to_be_removed():
+def test_an_invalid_kernel_package_of_the_user_is_named():
     result = run('true', env={**os.environ, 'R4_CAN_KERNEL': '/etc/passwd'}, text=True)
     assert result.returncode == 6 and result.stdout == ''
     assert f'{ERROR}/etc/passwd: it cannot be unpacked' in result.stderr
     assert '\n  fix: set R4_CAN_KERNEL to the path' in result.stderr
 
 
-def test_a_kernel_that_panics_is_told(tmp_path):
+def test_a_kernel_panic_is_reported(tmp_path):
     cache = os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')
     shutil.copytree(f'{cache}/r4link', tmp_path / 'r4link', copy_function=os.symlink)
     for initrd in tmp_path.glob('r4link/with-can/kernel-*/initrd'):
@@ -235,7 +235,7 @@ def test_a_kernel_that_panics_is_told(tmp_path):
     assert result.returncode == 6 and 'Kernel panic' in result.stderr and 'fix: ' in result.stderr
 
 
-def test_the_action_for_workflows_runs_its_commands_and_ends_with_the_first_that_fails():
+def test_the_workflow_action_ends_at_the_first_failed_command():
     program = TOOLS.parent / '.github/actions/with-can/run.sh'
     environment = {**os.environ, 'WITH_CAN_OPTIONS': '--guest --time 50',
                    'WITH_CAN_RUN': 'ip -br link show can1\nfalse\necho and on'}

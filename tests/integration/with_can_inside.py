@@ -51,7 +51,7 @@ def no_vcan():
     subprocess.run(['ip', 'link', 'set', 'vcan0', 'mtu', '72', 'txqueuelen', '1000', 'up'], check=True)
 
 
-def test_the_command_runs_on_this_kernel_with_the_interfaces_that_are_there(tmp_path):
+def test_the_command_runs_on_this_kernel_with_its_interfaces(tmp_path):
     before = index('vcan0')
     result = run('sh', '-c', f'cat {BOOT_ID} && pwd && echo words >&2 && cansend vcan0 123#11 && exit 9', cwd=tmp_path)
     assert result.returncode == 9 and result.stderr == 'words\n', result
@@ -65,7 +65,7 @@ def begun(process):
     return process
 
 
-def test_a_signal_is_the_commands_too():
+def test_a_signal_reaches_the_command():
     with begun(subprocess.Popen([WITH_CAN, 'sh', '-c', 'echo begun; exec sleep 60'], stdout=subprocess.PIPE,
                                 text=True)) as process:
         process.send_signal(signal.SIGINT)
@@ -77,7 +77,7 @@ def test_a_signal_is_the_commands_too():
         assert process.wait(PATIENCE_S) == 0
 
 
-def test_ctrl_c_of_a_terminal_comes_once():
+def test_ctrl_c_reaches_the_command_once():
     process, terminal = pty.fork()
     if process == 0:
         os.execv(WITH_CAN, [WITH_CAN, '/usr/bin/python3', '-c', COUNTS_CTRL_C])
@@ -99,7 +99,7 @@ def test_ctrl_c_of_a_terminal_comes_once():
     os.close(terminal)
 
 
-def test_what_was_made_is_removed_by_the_last_that_uses_it(without_vcan):
+def test_the_last_program_removes_the_created_interfaces(without_vcan):
     def user():
         return begun(subprocess.Popen([WITH_CAN, 'sh', '-c', 'echo begun; read end'], stdin=subprocess.PIPE,
                                       stdout=subprocess.PIPE, text=True))
@@ -113,7 +113,7 @@ def test_what_was_made_is_removed_by_the_last_that_uses_it(without_vcan):
     assert index('vcan0') is None
 
 
-def test_an_ordinary_user_has_a_vcan0_that_is_there():
+def test_an_ordinary_user_can_use_an_existing_vcan0():
     # Every user can read /run/tmp, but perhaps not the tree.
     with tempfile.TemporaryDirectory(dir='/run/tmp') as folder:
         os.chmod(folder, 0o755)

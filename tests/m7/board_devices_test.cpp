@@ -56,7 +56,7 @@ void expect_unhindered(Trouble trouble, Longest& longest) {
 
 }  // namespace
 
-TEST(Devices, AreReadAndToldWithTheirTime) {
+TEST(Devices, AreReadAndReportedWithTheirTime) {
   Bench& host = new_board();
   const Stepping steps(step_of_board);
   host.heartbeat();
@@ -73,7 +73,7 @@ TEST(Devices, AreReadAndToldWithTheirTime) {
 
 // Checks states, stop and silence with a free bus, a held bus and a bus with endless clock
 // stretching.
-TEST(Devices, ABusThatIsHeldCostsTheBoardNothing) {
+TEST(Devices, AHeldBusDoesNotDelayTheBoard) {
   Longest longest;
   for (const Fault fault : {Fault::none, Fault::held, Fault::stretched}) {
     expect_unhindered(
@@ -88,7 +88,7 @@ TEST(Devices, ABusThatIsHeldCostsTheBoardNothing) {
   EXPECT(longest.stop_us <= 2000 && longest.silence_ms <= timeout_ms + 3);
 }
 
-TEST(Devices, NoiseOnTheUartsAtFullRateCostsTheBoardNothing) {
+TEST(Devices, NoiseOnTheUartsAtFullRateDoesNotDelayTheBoard) {
   Longest longest;
   expect_unhindered(
       [](Bench& host) {
@@ -106,7 +106,7 @@ TEST(Devices, NoiseOnTheUartsAtFullRateCostsTheBoardNothing) {
   EXPECT(longest.stop_us <= 2000 && longest.silence_ms <= timeout_ms + 3);
 }
 
-TEST(Devices, AReceiverIsHeardAndAVoltageIsZeroBehindAStop) {
+TEST(Devices, AUartIsReceivedAndAStopZeroesADacVoltage) {
   Bench& host = new_board();
   const Stepping steps(step_of_board);
   host.heartbeat();

@@ -29,7 +29,7 @@ struct Heard {
 
 }  // namespace
 
-TEST(BoardState, BringsEveryInputExactly) {
+TEST(BoardState, ReportsEveryInputExactly) {
   Heard board;
   board.host.execute(Command::fields("ALL"));
   for (int i = 0; i < analog_channels; ++i) {
@@ -91,7 +91,7 @@ TEST(BoardState, AReleasedHandleSwitchesEverythingOff) {
   EXPECT(board.host.pins().relays == 1);
 }
 
-TEST(BoardState, AnObstacleBeforeEachSensorSwitchesEverythingOff) {
+TEST(BoardState, AnObstacleAtAnySensorSwitchesEverythingOff) {
   Heard board;
   for (int channel = 1; channel <= ultrasonic_channels; ++channel) {
     board.host.execute(Command::proximity(channel, Centimetres(60)));

@@ -80,7 +80,7 @@ TEST(Board, AGroupMovesFourWheelsAtOnce) {
   EXPECT(wheels.changed == 4 && skew_us <= 1000);
 }
 
-TEST(Board, TheSafeStateInAnInterruptHoldsWhateverTransferItCutsShort) {
+TEST(Board, TheSafeStateHoldsAfterItCutsAnyTransferShort) {
   Bench& host = new_board();
   std::uint32_t cut = 0;
   for (std::uint32_t at_us = 1; at_us < 1200; at_us += 31) {
@@ -116,7 +116,7 @@ TEST(Board, TheSafeStateInAnInterruptHoldsWhateverTransferItCutsShort) {
   EXPECT(cut >= 20);
 }
 
-TEST(Board, ALoopThatHangsIsMadeSafeByTheTimerAndStarvesTheWatchdog) {
+TEST(Board, TheTimerMakesAHungLoopSafeAndTheWatchdogIsNotFed) {
   Bench& host = new_board();
   const Stepping steps(step_of_board);
   host.drive_everything();
@@ -136,7 +136,7 @@ TEST(Board, ALoopThatHangsIsMadeSafeByTheTimerAndStarvesTheWatchdog) {
   EXPECT(host.chips_are_safe());
 }
 
-TEST(Board, SilenceIsNoticedInTheTimerInterruptWhileTheLoopIsElsewhere) {
+TEST(Board, TheTimerInterruptNoticesSilenceWhileTheLoopIsBusy) {
   Bench& host = new_board();
   const Stepping steps(step_of_board);
   host.drive_everything();
@@ -161,7 +161,7 @@ TEST(Board, SilenceIsNoticedInTheTimerInterruptWhileTheLoopIsElsewhere) {
 }
 
 // E:STOP at each moment while all outputs are written again, which is the busiest time of the bus.
-TEST(Board, AStopIsDoneWithinTwoMillisecondsOfItsLastByte) {
+TEST(Board, AStopTakesEffectWithinTwoMilliseconds) {
   Bench& host = new_board();
   const Stepping steps(step_of_board);
   std::uint32_t longest_us = 0;

@@ -44,14 +44,14 @@ bool round_trip(Number value, Text text) {
 
 }  // namespace
 
-TEST(Crc32, IsThatOfZlib) {
+TEST(Crc32, MatchesZlib) {
   EXPECT(crc32("123456789") == 0xCBF43926U);
   EXPECT(crc32("") == 0);
   EXPECT(crc32("6789", crc32("12345")) == 0xCBF43926U);
   EXPECT(crc32("O:358,1,1;PNum:66;T:1699276044383;^") == 0x7FEFAE81U);  // from the paper
 }
 
-TEST(AuthenticationTag, IsThatOfPythonsHashlib) {
+TEST(AuthenticationTag, MatchesPythonsHashlib) {
   Key key;
   key.id = 3;
   for (std::uint8_t i = 0; i < key_size; ++i) key.bytes[i] = i;
@@ -61,7 +61,7 @@ TEST(AuthenticationTag, IsThatOfPythonsHashlib) {
   EXPECT(Text(tag, tag_size) == "YDgO3-AnQVQ");
 }
 
-TEST(Numbers, SurviveTheirTexts) {
+TEST(Numbers, RoundTripThroughText) {
   EXPECT(round_trip<std::uint32_t>(0, "0"));
   EXPECT(round_trip<std::uint32_t>(4294967295U, "4294967295"));
   EXPECT(round_trip<std::int32_t>(-2147483647 - 1, "-2147483648"));
@@ -72,7 +72,7 @@ TEST(Numbers, SurviveTheirTexts) {
   EXPECT(parse_hundredths("-0.5", hundredths) && hundredths == -50);
 }
 
-TEST(StateDatagram, IsThatOfTheCapture) {
+TEST(StateDatagram, MatchesTheCapture) {
   char buffer[max_datagram];
   const Text datagram = whole(buffer, sizeof buffer);
   EXPECT(datagram.substr(0, sizeof captured - 1) == Text(captured));
@@ -97,7 +97,7 @@ TEST(StateDatagram, IsRefusedWithOneBitWrong) {
   EXPECT(read_datagram(datagram, seen));
 }
 
-TEST(LineFraming, FindsLinesInAnyCut) {
+TEST(LineFraming, FindsALineSplitAtAnyByte) {
   char buffer[max_datagram + 2];
   const Text datagram = whole(buffer, max_datagram);
   const std::size_t size = datagram.size() + line_end.size();
@@ -112,7 +112,7 @@ TEST(LineFraming, FindsLinesInAnyCut) {
   }
 }
 
-TEST(PackedForm, GivesTheSameBytesBack) {
+TEST(PackedForm, RestoresTheSameBytes) {
   char buffer[max_datagram];
   char back[max_datagram];
   std::uint8_t packed[max_datagram];

@@ -49,7 +49,7 @@ bool arrives(Text datagram, std::uint32_t lost) {
 
 }  // namespace
 
-TEST(Isotp, JoinsWhatItCut) {
+TEST(Isotp, ReassemblesTheDatagramsItSegmented) {
   static char bytes[max_datagram];
   for (std::size_t i = 0; i < sizeof bytes; ++i) bytes[i] = static_cast<char>(i * 7);
   const std::size_t sizes[] = {1, 7, 8, 62, 154, 170, max_datagram};

@@ -67,7 +67,7 @@ UdpAddress asker() {
 
 }  // namespace
 
-TEST(TransmitLines, KeepTheNewestStateOfAHostThatDoesNotRead) {
+TEST(TransmitLines, KeepTheNewestStateForAHostThatDoesNotRead) {
   static TransmitLines lines;
   static char out[8192];
   char state[] = "state 0000";
@@ -87,7 +87,7 @@ TEST(TransmitLines, KeepTheNewestStateOfAHostThatDoesNotRead) {
   EXPECT(all.substr(all.size() - newest.size()) == newest);
 }
 
-TEST(TransmitLines, KeepRoomForAnswersAndEachLineWhole) {
+TEST(TransmitLines, KeepRoomForAnswersAndSendWholeLines) {
   static TransmitLines lines;
   static char out[8192];
   static char state[500];
@@ -108,7 +108,7 @@ TEST(UdpFrames, AnswerArpForTheirAddressOnly) {
   EXPECT(end.board.take(end.frame, 42, end.reply).reply_size == 0);
 }
 
-TEST(UdpFrames, TakeADatagramAndAnswerWhereItCameFrom) {
+TEST(UdpFrames, ReceiveADatagramAndAnswerItsSender) {
   static End end;
   const std::size_t size = question(end.frame);
   const UdpFrames::Arrival arrival = end.board.take(end.frame, size, end.reply);
@@ -122,7 +122,7 @@ TEST(UdpFrames, TakeADatagramAndAnswerWhereItCameFrom) {
   EXPECT(host.bad() == 0);
 }
 
-TEST(UdpFrames, DropWhatIsDamagedCutOrForOthers) {
+TEST(UdpFrames, DropDamagedTruncatedAndForeignFrames) {
   static End end;
   const auto refused = [](std::size_t at, std::uint8_t value) {
     const std::size_t size = question(end.frame);

@@ -85,7 +85,7 @@ TEST(PaperCapture, EveryDatagramIsReadAndWrittenAgainByteForByte) {
   EXPECT_EQ(good, 69);
 }
 
-TEST(PaperCapture, TheTwoDamagedInPrintFailByTheirChecksum) {
+TEST(PaperCapture, TheTwoMisprintedDatagramsFailTheirChecksum) {
   std::size_t next = 0;
   for (const CapturedLine& line : paper_capture()) {
     Datagram datagram;
@@ -102,7 +102,7 @@ TEST(PaperCapture, TheTwoDamagedInPrintFailByTheirChecksum) {
   EXPECT_EQ(next, std::size(damaged_in_print));
 }
 
-TEST(PaperCapture, TheFirstStateHasTheValuesOfThePrint) {
+TEST(PaperCapture, TheFirstStateHasThePrintedValues) {
   const std::string bytes = test::captured_state();
   Datagram datagram;
   ASSERT_TRUE(read_datagram(bytes, datagram));

@@ -3,5 +3,5 @@
 from test_pytest_plugin import run_step, steps
 
 
-def test_the_boards_of_the_example_are_on_a_can_bus(tmp_path):
+def test_the_example_passes_on_a_can_bus(tmp_path):
     run_step(steps()[-1], tmp_path, 'test_bus.py')

@@ -13,7 +13,7 @@ from r4link import Command, Setpoints, aio
 SILENT = 'udp://127.0.0.1:9?listen=0'
 
 
-def test_drives(sim):
+def test_a_program_arms_and_drives_a_board(sim):
     async def main():
         async with aio.Board(sim.url) as board:
             await board.wait_active()
@@ -41,7 +41,7 @@ def test_drives(sim):
     asyncio.run(main())
 
 
-def test_a_forgotten_await_is_told_with_the_name_of_the_method(sim):
+def test_a_forgotten_await_warns_with_the_name_of_the_method(sim):
     async def main():
         async with aio.Board(sim.url) as board:
             for name, begin in (('stop', board.stop), ('take_control', board.take_control), ('send', lambda: board.relay(2).set(True))):
@@ -50,7 +50,7 @@ def test_a_forgotten_await_is_told_with_the_name_of_the_method(sim):
     asyncio.run(main())
 
 
-def test_commands_go_out_in_the_order_in_which_they_were_begun(sim):
+def test_commands_are_sent_in_the_order_of_their_calls(sim):
     async def main():
         async with aio.Board(sim.url) as board:
             await board.wait_active()
@@ -61,7 +61,7 @@ def test_commands_go_out_in_the_order_in_which_they_were_begun(sim):
     asyncio.run(main())
 
 
-def test_iterates_over_states_and_tells_callbacks_on_the_loop(sim):
+def test_iterates_over_states_and_calls_callbacks_on_the_loop(sim):
     async def main():
         loop_of = []
         async with aio.Board(sim.url) as board:
@@ -107,7 +107,7 @@ def test_loses_no_state_while_the_loop_is_busy(sim, tmp_path):
     assert len(numbers) > 10 and numbers == all_of_them[first:first + len(numbers)]
 
 
-def test_a_loop_over_states_that_always_wait_leaves_others_their_turn(sim):
+def test_a_loop_over_queued_states_lets_other_tasks_run(sim):
     async def main():
         async with aio.Board(sim.url) as board:
             await board.wait_active()
@@ -128,7 +128,7 @@ async def tick(turns):
         await asyncio.sleep(0)
 
 
-def test_records_watches_and_has_a_watchdog(sim, tmp_path):
+def test_a_program_records_watches_and_uses_the_watchdog(sim, tmp_path):
     async def main():
         async with aio.Board(sim.url) as board:
             board.record(tmp_path / 'drive.r4log', rotate_bytes=1 << 20)
@@ -171,7 +171,7 @@ def test_takes_control_and_releases_it(sim):
     asyncio.run(main())
 
 
-def test_with_a_key_it_drives_a_board_that_has_it_and_no_other(tmp_path):
+def test_a_board_with_a_key_is_driven_only_with_its_key(tmp_path):
     right, wrong = tmp_path / 'right', tmp_path / 'wrong'
     for path, digits in (right, '5a'), (wrong, '5b'):
         path.write_text(f'1:{digits * 32}\n')
@@ -204,7 +204,7 @@ async def count(states):
     return number
 
 
-def test_a_cancelled_task_ends_no_other_command_and_the_order_stays(sim):
+def test_a_cancelled_task_keeps_the_order_of_other_commands(sim):
     async def main():
         async with aio.Board(sim.url) as board:
             await board.wait_active()
@@ -221,7 +221,7 @@ def test_a_cancelled_task_ends_no_other_command_and_the_order_stays(sim):
     asyncio.run(main())
 
 
-def test_waiting_ends_at_once_when_it_is_cancelled_and_the_next_call_waits():
+def test_a_cancelled_wait_ends_at_once_and_can_be_repeated():
     async def main():
         async with aio.Board(SILENT) as board:
             for _ in range(3):
@@ -247,7 +247,7 @@ def test_no_call_needs_a_thread():
     asyncio.run(main())
 
 
-def test_a_board_that_is_closed_ends_what_is_under_way():
+def test_closing_a_board_ends_its_waiting_calls():
     async def main():
         board = aio.Board(SILENT)
         waiting = [asyncio.create_task(each) for each in (board.wait_active(60), board.identify(60), board.next_state(60))]
@@ -276,7 +276,7 @@ def test_a_stop_goes_on_when_its_task_is_cancelled(sim, begun):
     asyncio.run(main())
 
 
-def test_a_loop_that_ends_with_calls_under_way_leaves_the_board_well(sim, wait):
+def test_a_board_works_after_a_loop_that_ends_with_open_calls(sim, wait):
     board = aio.Board(sim.url)
 
     async def leave():
@@ -297,7 +297,7 @@ def test_a_loop_that_ends_with_calls_under_way_leaves_the_board_well(sim, wait):
     asyncio.run(go_on())
 
 
-def test_devices_on_the_bus_answer(sim):
+def test_a_program_reads_devices_on_the_i2c_bus(sim):
     async def main():
         async with aio.Board(sim.url) as board:
             await board.wait_active()

@@ -17,7 +17,7 @@ from r4link import FORWARD, REVERSE, Command, ServoCalibration, Setpoints, testi
 ARM = ServoCalibration(us=(1000, 2000), degrees=(-45, 45))
 
 
-def test_drives_and_tells_what_the_chips_do(sim, board, wait):
+def test_setpoints_reach_the_chips_and_are_reported_in_the_state(sim, board, wait):
     board.arm()
     board.osmc(1).set_pwm(358)
     board.dhb12(2).set_pwm(700, direction=REVERSE)
@@ -64,7 +64,7 @@ def test_a_group_is_executed_as_one_or_not_at_all(sim, board, wait):
     lambda _: ServoCalibration(us=1000, degrees=-45), lambda _: ServoCalibration(us=(1000.5, 2000), degrees=(-45, 45)),
     lambda _: ServoCalibration(us=(1000, 2000), degrees=('-45', 45)), lambda _: ARM.pulse(30),
     lambda _: ARM.degrees(1500), lambda _: ARM.pulse(degrees=True)])
-def test_a_value_without_its_name_or_of_another_type_is_a_type_error(board, call):
+def test_an_unnamed_value_or_a_wrong_type_is_a_type_error(board, call):
     with pytest.raises(TypeError):
         call(board)
 
@@ -90,7 +90,7 @@ def test_a_calibrated_servo_is_driven_in_degrees(sim, board, wait):
     assert board.next_state().servo3pos == 2000
 
 
-def test_degrees_that_a_servo_does_not_have_are_not_sent(board):
+def test_degrees_outside_the_calibration_are_not_sent(board):
     board.arm()
     board.servo(1).set(us=1200)
     for move in (board.servo(1).set, board.servo(1).post):
@@ -146,7 +146,7 @@ def test_errors_name_the_thing_the_reason_and_the_fix(board):
         r4link.Board('udp://127.0.0.1:9?listen=0').wait_active(timeout=0.05)
 
 
-def test_the_board_refuses(sim, board):
+def test_a_command_is_refused_after_the_handle_is_released(sim, board):
     board.arm()
     sim.happen('handle released')
     with pytest.raises(r4link.RefusedError) as refused:
@@ -158,7 +158,7 @@ def test_the_board_refuses(sim, board):
         sim.happen('no such thing')
 
 
-def test_a_state_is_all_that_the_board_says(board):
+def test_a_state_has_every_field_that_the_board_reports(board):
     board.fields('DEFAULT,ENC1,US1')
     state = board.next_state()
     assert 'enc1' in state.present and state.as_dict()['ain24'] == pytest.approx(24.28, abs=0.5)
@@ -181,7 +181,7 @@ def test_a_field_that_the_board_has_not_reported_is_an_error(board):
         testing.make_state(1).relay(1)
 
 
-def test_a_state_tells_when_it_was_sampled_and_how_well_that_is_known(board):
+def test_a_state_has_a_sample_time_with_an_error_bound(board):
     deadline = time.monotonic() + 10
     while (state := board.next_state()).sampled_error is None or state.sampled_error > 0.002:
         assert time.monotonic() < deadline, state.sampled_error
@@ -227,7 +227,7 @@ def test_loses_no_state_while_a_callback_and_the_loop_sleep(sim, tmp_path):
     assert numbers == all_of_them[first:first + len(numbers)]
 
 
-def test_what_is_lost_nevertheless_is_an_error_in_its_place(board):
+def test_lossless_iteration_raises_where_states_are_lost(board):
     states = board.states(5, lossless=True)
     for _ in range(8):
         board.next_state()
@@ -237,7 +237,7 @@ def test_what_is_lost_nevertheless_is_an_error_in_its_place(board):
     assert states.dropped >= 3 and next(states).pnum > numbers[-1] + 3
 
 
-def test_callbacks_come_on_a_thread_of_their_own(sim, board, wait):
+def test_callbacks_run_on_their_own_thread(sim, board, wait):
     told = {name: [] for name in ('state', 'link', 'event', 'arming', 'refused')}
     threads = set()
 
@@ -262,7 +262,7 @@ def test_callbacks_come_on_a_thread_of_their_own(sim, board, wait):
     assert len(told['state']) == count
 
 
-def test_what_a_callback_raises_is_told_and_it_is_called_again(board, monkeypatch, wait):
+def test_a_callback_that_raises_is_reported_and_called_again(board, monkeypatch, wait):
     raised = []
     monkeypatch.setattr(sys, 'unraisablehook', lambda each: raised.append(each.exc_value))
 
@@ -275,7 +275,7 @@ def test_what_a_callback_raises_is_told_and_it_is_called_again(board, monkeypatc
     board.next_state()
 
 
-def test_a_callback_may_command(sim, board, wait):
+def test_a_callback_may_send_a_command(sim, board, wait):
     board.arm()
     done = []
 
@@ -311,7 +311,7 @@ def test_without_feed_the_board_goes_safe(sim, board, wait):
     board.wait_active()
 
 
-def test_who_watches_commands_nothing(sim):
+def test_a_watcher_can_stop_but_not_arm(sim):
     with r4link.Board(sim.url, role='watch') as board:
         board.wait_active()
         assert board.next_state().safe == 'link'
@@ -343,7 +343,7 @@ def test_takes_control_and_releases_it(sim, wait):
         board.release_control()
 
 
-def test_over_udp_the_program_that_controls_has_the_port_of_hosts():
+def test_the_controlling_program_has_the_udp_port_of_hosts():
     with r4link.SimBoard('udp://127.0.0.1:0') as sim, r4link.Board(sim.url.split('?')[0], role='watch') as board:
         for _ in range(2):
             board.wait_active()
@@ -373,7 +373,7 @@ def test_an_error_names_the_program_that_controls_the_board():
         assert wrong.value.holder is None
 
 
-def test_records_and_plays_again(sim, tmp_path):
+def test_records_states_and_replays_them(sim, tmp_path):
     path = tmp_path / 'drive.r4log.zst'
     with r4link.Board(sim.url, arming=False) as board:
         board.record(path)
@@ -400,7 +400,7 @@ def test_records_and_plays_again(sim, tmp_path):
 KEY = '1:' + '5a' * 32
 
 
-def test_a_board_with_a_key_obeys_who_has_it(tmp_path, wait):
+def test_a_board_with_a_key_obeys_only_a_host_with_the_key(tmp_path, wait):
     path = tmp_path / 'key'
     path.write_text(KEY + '\n')
     path.chmod(0o600)
@@ -421,7 +421,7 @@ def test_a_board_with_a_key_obeys_who_has_it(tmp_path, wait):
         assert sim.look().is_safe
 
 
-def test_a_bad_link_loses_what_it_should(sim):
+def test_a_simulated_bad_link_loses_datagrams(sim):
     url = r4link.with_link(sim.url, 'loss=20%,seed=7')
     assert url == sim.url
     with r4link.Board(url) as board:
@@ -433,7 +433,7 @@ def test_a_bad_link_loses_what_it_should(sim):
         r4link.with_link(sim.url, 'lost=5%')
 
 
-def test_settings_proximity_and_link_timing(sim, board, wait):
+def test_a_program_sets_rate_link_timing_and_proximity(sim, board, wait):
     board.setting('rate', '200')
     wait(lambda: (board.next_state().t_ms - board.state.t_ms) % 5 == 0 and
          {b.t_ms - a.t_ms for a, b in pairs(board, 4)} == {5})
@@ -460,7 +460,7 @@ def pairs(board, count):
     return zip(numbers, numbers[1:])
 
 
-def test_a_stop_that_is_not_waited_for_and_a_restart_that_is_told(sim, board, wait):
+def test_stop_async_stops_the_board_and_a_restart_is_reported(sim, board, wait):
     restarts = []
     board.on_restart(lambda: restarts.append(True))
     board.arm()
@@ -471,7 +471,7 @@ def test_a_stop_that_is_not_waited_for_and_a_restart_that_is_told(sim, board, wa
     wait(lambda: restarts)
 
 
-def test_counts_packets(board):
+def test_statistics_count_packets(board):
     board.next_state()
     statistics = board.statistics
     assert statistics.packets_received >= statistics.states > 0 and statistics.old <= statistics.received

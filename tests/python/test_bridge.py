@@ -24,7 +24,7 @@ def test_a_host_drives_the_board_behind_a_bridge():
     bridge.close()
 
 
-def test_what_cannot_be_joined_is_an_error():
+def test_a_bridge_refuses_urls_that_it_cannot_join():
     with pytest.raises(r4link.UsageError, match='both sides of the bridge are the same'):
         r4link.Bridge('can://can0', 'can://can0?node=1')
     with pytest.raises(r4link.UsageError, match='everyone who reaches it'):
@@ -35,7 +35,7 @@ def test_what_cannot_be_joined_is_an_error():
             r4link.Bridge(bridge.status()[0].hosts.name, 'sim:')
 
 
-def test_with_a_key_it_passes_only_what_is_signed(tmp_path):
+def test_a_bridge_with_a_key_passes_only_signed_commands(tmp_path):
     files = [tmp_path / 'a', tmp_path / 'b']
     for number, file in enumerate(files, 1):
         file.write_text(f'{number}:' + f'{number}' * 64)
@@ -48,7 +48,7 @@ def test_with_a_key_it_passes_only_what_is_signed(tmp_path):
         assert bridge.status()[0].hosts.counters.refused > 0
 
 
-def test_a_fork_has_no_part_in_it():
+def test_a_bridge_is_closed_in_a_forked_process():
     with r4link.Bridge('udp://127.0.0.1:0', 'sim:') as bridge:
         reading, writing = os.pipe()
         child = os.fork()

@@ -23,7 +23,7 @@ from r4link import Command
     ('E:STOP', Command.stop(), 'stop every output'),
     ('E:CLEAR', Command.clear(), 'clear the safe state'),
 ])
-def test_a_command_is_a_text_and_words(text, made, words):
+def test_a_command_has_a_text_and_a_description(text, made, words):
     for command in (Command.parse(text), Command.parse(text + ';'), made):
         assert str(command) == text and command.describe() == words
 
@@ -35,7 +35,7 @@ def test_a_command_is_a_text_and_words(text, made, words):
     ('X:WRITE,104,x6B00', 'write x6B00 to I2C device 0x68'),
     ('C:name,a-name-that-is-longer-than-most', 'setting name a-name-that-is-longer-than-most'),
 ])
-def test_a_command_keeps_its_texts_and_so_do_its_copies(text, words):
+def test_copies_of_a_command_keep_its_text_and_description(text, words):
     command = Command.parse(text)
     for each in (command, copy.copy(command), copy.deepcopy(command), pickle.loads(pickle.dumps(command))):
         assert str(each) == text and each.describe() == words
@@ -50,7 +50,7 @@ def test_a_wrong_text_is_refused_with_a_reason(text, fault):
         Command.parse(text)
 
 
-def test_a_parsed_command_is_sent_and_joins_setpoints(board, sim, wait):
+def test_a_parsed_command_can_be_sent_and_added_to_setpoints(board, sim, wait):
     board.arm()
     board.send(Command.parse('O:358,1,1'))
     board.send(r4link.Setpoints(Command.parse('O:410,1,2')).add(Command.parse('S:1500,3')))

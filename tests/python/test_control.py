@@ -23,7 +23,7 @@ def test_pid_follows_its_gains_and_limits():
         pid.step(math.nan, 0, 0.1)
 
 
-def test_kinematics_go_both_ways():
+def test_kinematics_convert_in_both_directions():
     twist = control.Twist(1.0, 0.5)
     two = control.DifferentialDrive(0.5)
     assert two.wheels(twist) == control.SideSpeeds(0.875, 1.125)
@@ -38,7 +38,7 @@ def test_kinematics_go_both_ways():
     assert car.rear_wheels(car.command(twist)).right > 1
 
 
-def test_odometry_knows_where_it_is_and_how_well():
+def test_odometry_computes_the_pose_and_its_covariance():
     odometry = control.Odometry(turn_per_m=0)
     odometry.advance(math.pi, math.pi)
     assert odometry.pose == pytest.approx((0, 2, math.pi)) or odometry.pose.yaw == pytest.approx(-math.pi)
@@ -84,7 +84,7 @@ def test_a_loop_controls_a_speed_and_comes_to_rest(armed, sim):
     assert sim.look().osmc[0].pwm == 0
 
 
-def test_what_a_step_raises_comes_after_the_rest(armed, sim):
+def test_an_error_in_a_step_is_raised_after_the_outputs_rest(armed, sim):
     def step(state, dt):
         if state.enc1 > 5:
             raise RuntimeError('no path')
@@ -108,7 +108,7 @@ def test_a_loop_ends_when_the_handle_is_released(armed, sim):
     assert sim.look().is_safe
 
 
-def test_a_guard_is_there_for_loops_of_another_kind(armed):
+def test_a_loop_guard_ends_a_custom_loop_that_is_late(armed):
     guard = control.LoopGuard(fields='ENC1', late=0.2)
     guard.start(time.monotonic())
     state = armed.next_state()
@@ -123,7 +123,7 @@ def test_a_guard_is_there_for_loops_of_another_kind(armed):
         guard.check('well', 'none', now)
 
 
-def test_states_can_be_made_up_for_tests():
+def test_make_state_builds_states_for_tests():
     made = make_state(10, enc1=-5, enc3hz=7, ainsteer=2.5, osmc1=(400, 1), dhb2b=(5, 0), us4=9, dmhsta=True, safe='handle',
                       servo3pos=1500, bldc2=(1, 0, True), relays=3, step2pos=-4, enc4idx=1, ain6=0.5)
     assert made.as_dict() == {

@@ -16,7 +16,7 @@ value volts bus 0 u16be bits 3..15 scale 0.004 unit V
 """
 
 
-def test_one_that_is_shipped_is_set_up_and_decoded(sim, board, wait):
+def test_a_shipped_device_is_set_up_and_decoded(sim, board, wait):
     sim.happen('device bno055 on')
     imu = r4link.Device('bno055@0x28')
     assert (str(imu), imu.role, imu.fields, imu.units['gyro_z']) == ('bno055@0x28', 'imu', 'I2C1,I2C2', 'rad/s')
@@ -33,7 +33,7 @@ def test_one_that_is_shipped_is_set_up_and_decoded(sim, board, wait):
         imu.reading(state, 'yaw')
 
 
-def test_one_that_was_reset_measures_nothing_until_it_is_attached_again(sim, board, wait):
+def test_a_reset_device_has_no_values_until_it_is_attached_again(sim, board, wait):
     imu = r4link.Device('mpu6050')
     board.arm()
     assert imu.is_set_up(board.next_state()) is None
@@ -46,7 +46,7 @@ def test_one_that_was_reset_measures_nothing_until_it_is_attached_again(sim, boa
     wait(lambda: imu.is_set_up(board.state) and imu.reading(board.state, 'accel_z').number is not None)
 
 
-def test_a_recording_has_columns_for_what_they_measured(sim, board, wait, tmp_path):
+def test_a_recording_has_columns_for_device_values(sim, board, wait, tmp_path):
     for device in ('bno055 on', 'ina219 on'):
         sim.happen(f'device {device}')
     board.arm()
@@ -62,7 +62,7 @@ def test_a_recording_has_columns_for_what_they_measured(sim, board, wait, tmp_pa
     assert np.isnan(states['ina219_current'][0]) and states['ina219_current'][-1] == pytest.approx(1.25)
 
 
-def test_one_of_my_own_is_read_without_arming(board, wait, tmp_path):
+def test_a_user_described_device_is_read_without_arming(board, wait, tmp_path):
     path = tmp_path / 'mine.device'
     path.write_text(MINE)
     for device in (r4link.Device(f'{path}@0x40:3'), r4link.Device.parse(MINE, first_slot=4)):
@@ -70,7 +70,7 @@ def test_one_of_my_own_is_read_without_arming(board, wait, tmp_path):
         wait(lambda device=device: device.reading(board.state, 'volts').number == pytest.approx(12.16))
 
 
-def test_another_gets_a_slot_only_once_its_holder_is_given_up(sim, board, wait):
+def test_a_slot_in_use_is_refused_until_its_poll_is_off(sim, board, wait):
     sim.happen('device as5600 on')
     power, angle = r4link.Device('ina219@0x40'), r4link.Device('as5600')
     board.attach(power)
@@ -83,7 +83,7 @@ def test_another_gets_a_slot_only_once_its_holder_is_given_up(sim, board, wait):
     wait(lambda: angle.reading(board.state, 'angle').number is not None)
 
 
-def test_what_is_wrong_is_named(board, tmp_path):
+def test_wrong_descriptions_and_devices_are_refused(board, tmp_path):
     with pytest.raises(r4link.DataError, match='line 4: it ends behind the 2 bytes of its poll'):
         r4link.Device.parse(MINE.replace('bus 0', 'bus 1'))
     with pytest.raises(r4link.UsageError, match='no such device is described here'):
@@ -95,7 +95,7 @@ def test_what_is_wrong_is_named(board, tmp_path):
     assert devices.shipped() == ['as5600', 'bno055', 'icm20948', 'ina219', 'mpu6050', 'vl53l0x']
 
 
-def test_with_asyncio(sim):
+def test_asyncio_attaches_and_reads_a_device(sim):
     async def main():
         power = r4link.Device('ina219')
         async with aio.Board(sim.url) as board:

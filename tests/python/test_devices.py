@@ -9,7 +9,7 @@ import r4link
 from r4link import Command, Setpoints, aio
 
 
-def test_reads_writes_and_scans(board):
+def test_reads_writes_and_scans_the_i2c_bus(board):
     assert board.i2c.scan() == [0x40, 0x68]
     assert board.i2c.read(0x68, 0x75, 1) == b'\x68'
     with pytest.raises(r4link.NotArmedError):
@@ -23,7 +23,7 @@ def test_reads_writes_and_scans(board):
         board.i2c.read(3, 0, 1)
 
 
-def test_the_state_brings_what_the_board_reads_by_itself(board, wait):
+def test_states_contain_the_readings_of_a_poll(board, wait):
     board.i2c.poll(1, 0x68, 0x75, 1, period=0.02)
     board.fields('DEFAULT,I2C1,I2CBUS')
     wait(lambda: board.state.i2c1.data == b'\x68')
@@ -35,14 +35,14 @@ def test_the_state_brings_what_the_board_reads_by_itself(board, wait):
     wait(lambda: board.state.i2c1.data == b'')
 
 
-def test_a_held_bus_is_an_error_of_the_transfer_alone(sim, board):
+def test_a_stuck_bus_fails_the_transfer_but_not_the_link(sim, board):
     sim.happen('userbus held')
     with pytest.raises(r4link.RefusedError, match='bus stuck'):
         board.i2c.read(0x68, 0x75, 1)
     assert board.link.state == 'active'
 
 
-def test_for_asyncio(sim):
+def test_asyncio_reads_and_polls_the_i2c_bus(sim):
     async def main():
         async with aio.Board(sim.url) as board:
             await board.wait_active()
@@ -56,7 +56,7 @@ def test_for_asyncio(sim):
     asyncio.run(main())
 
 
-def test_a_uart_brings_each_byte_once(board):
+def test_a_uart_read_returns_each_byte_once(board):
     board.setting('uart1', '115200:8N1')
     board.fields('DEFAULT,UART1,DAC1,GPIO')
     text = b''
@@ -76,7 +76,7 @@ SAID = bytes(range(256)) * 2
 PIECES = [SAID[at:at + 32] for at in range(0, len(SAID), 32)]
 
 
-def test_a_uart_tells_each_byte_once_to_a_callback(sim, board, wait):
+def test_a_uart_callback_receives_each_byte_once(sim, board, wait):
     sim.happen('uart 1 loop')
     board.arm()
     board.setting('uart1', '115200:8N1')
@@ -99,7 +99,7 @@ def test_a_uart_tells_each_byte_once_to_a_callback(sim, board, wait):
         board.uart[3].on_bytes(told.append)
 
 
-def test_a_uart_tells_what_came_damaged(sim, board):
+def test_a_uart_reports_damaged_bytes(sim, board):
     board.setting('uart1', '115200:8N1')
     sim.happen('uart 1 noise')
     board.fields('DEFAULT,UART1')
@@ -111,7 +111,7 @@ def test_a_uart_tells_what_came_damaged(sim, board):
     assert seen > 0
 
 
-def test_a_uart_tells_of_a_gap_where_states_are_lost(sim):
+def test_a_uart_reports_a_gap_when_states_are_lost(sim):
     with r4link.Board(r4link.with_link(sim.url, 'loss=50%,seed=7')) as board:
         board.wait_active(10)
         board.setting('uart2', '115200:8N1', timeout=10)
@@ -119,7 +119,7 @@ def test_a_uart_tells_of_a_gap_where_states_are_lost(sim):
         assert any(lost for _, lost in itertools.islice(board.uart[2], 500))
 
 
-def test_the_bytes_of_a_uart_end_with_the_board(board):
+def test_uart_iteration_ends_when_the_board_is_closed(board):
     board.setting('uart2', '115200:8N1')
     board.fields('DEFAULT,UART2')
     for data, _ in board.uart[2]:
@@ -128,7 +128,7 @@ def test_the_bytes_of_a_uart_end_with_the_board(board):
     assert list(board.uart[2]) == []
 
 
-def test_a_uart_for_asyncio(sim):
+def test_asyncio_reads_and_writes_a_uart(sim):
     sim.happen('uart 1 loop')
 
     async def main():
@@ -161,7 +161,7 @@ async def count(received):
     return len([each async for each in received])
 
 
-def test_voltages_are_part_of_a_group(sim, board, wait):
+def test_a_group_may_contain_voltages(sim, board, wait):
     group = Setpoints(Command.osmc(1, pwm=100), Command.dac(1, millivolts=1650), Command.dac(2, millivolts=3300))
     with pytest.raises(r4link.NotArmedError):
         board.send(group)
@@ -181,7 +181,7 @@ def test_voltages_are_part_of_a_group(sim, board, wait):
     wait(lambda: (board.state.osmc1.pwm, board.state.dac1, board.state.dac2) == (0, 0, 0))
 
 
-def test_a_voltage_is_an_output_and_spare_inputs_are_bits(board, sim, wait):
+def test_states_report_a_voltage_and_spare_inputs(board, sim, wait):
     board.fields('DEFAULT,DAC1,GPIO')
     with pytest.raises(r4link.NotArmedError):
         board.dac(1, millivolts=1650)

@@ -16,7 +16,7 @@ def path_of(sim):
     return sim.url.removeprefix('serial://')
 
 
-def test_without_a_board_the_error_says_what_was_searched():
+def test_without_a_board_the_error_names_the_searched_networks():
     found = r4link.discover(serial=False, can=False)
     assert found.boards == [] and found.ports == [] and found.buses == [] and not found.more
     assert ('lo', '127.0.0.1', None) in [(each.interface, each.address, each.trouble) for each in found.networks]
@@ -37,7 +37,7 @@ def test_the_only_board_is_found_and_opened():
             assert r4link.discover(serial=False, can=False).only().busy is True
 
 
-def test_of_several_boards_the_error_names_the_urls(tmp_path):
+def test_with_several_boards_the_error_names_their_urls(tmp_path):
     with r4link.SimBoard(f'pty:{tmp_path}/left') as left, r4link.SimBoard(f'pty:{tmp_path}/right') as right:
         found = r4link.discover(udp=False, can=False, serial_ports=[path_of(left), path_of(right)])
         assert [board.url for board in found.boards] == [left.url, right.url]
@@ -45,7 +45,7 @@ def test_of_several_boards_the_error_names_the_urls(tmp_path):
             found.only()
 
 
-def test_a_board_that_a_program_controls_has_it_as_its_holder(tmp_path):
+def test_a_controlled_board_names_its_holder(tmp_path):
     with r4link.SimBoard(f'pty:{tmp_path}/board') as sim, r4link.Board(sim.url) as driver:
         driver.wait_active()
         board = r4link.discover(udp=False, can=False, serial_ports=[path_of(sim)]).only()
@@ -53,13 +53,13 @@ def test_a_board_that_a_program_controls_has_it_as_its_holder(tmp_path):
         assert board.holder_controls and board.busy is True
 
 
-def test_a_port_without_a_board_says_why(tmp_path):
+def test_a_port_without_a_board_has_a_reason(tmp_path):
     port, = [each for each in r4link.discover(udp=False, can=False, serial_ports=[f'{tmp_path}/none']).ports
              if each.path == f'{tmp_path}/none']
     assert port.asked and not port.is_r4 and 'no such device' in port.trouble
 
 
-def test_asyncio_goes_on_during_a_search():
+def test_other_tasks_run_during_a_search():
     async def main():
         search = asyncio.create_task(aio.discover(serial=False, can=False))
         turns = 0

@@ -22,13 +22,13 @@ def test_an_enumeration_has_the_values_of_cpp_in_their_order(enum):
     assert [*_core.ENUMS[enum.__name__], *newer] == list(enum)
 
 
-def test_each_enumeration_of_cpp_is_one_of_the_package():
+def test_the_package_has_every_enumeration_of_cpp():
     assert set(_core.ENUMS) == {enum.__name__ for enum in ENUMS}
     assert all(getattr(control if enum is enums.LoopEnd else r4link, enum.__name__) is enum for enum in ENUMS)
 
 
 @pytest.mark.parametrize('member', MEMBERS)
-def test_a_member_is_its_text(member):
+def test_an_enumeration_member_equals_its_text(member):
     enum, text = type(member), member.value
     assert type(text) is str and member.name == text.upper().replace(' ', '_')
     assert member == text and str(member) == f'{member}' == '%s' % member == text and f'{member:>20}' == f'{text:>20}'
@@ -38,7 +38,7 @@ def test_a_member_is_its_text(member):
 
 
 @pytest.mark.parametrize('member', MEMBERS)
-def test_a_member_says_what_it_means(member):
+def test_an_enumeration_member_has_a_docstring(member):
     assert member.__doc__ not in ('', str.__doc__, type(member).__doc__)
 
 
@@ -57,7 +57,7 @@ def test_a_text_that_is_not_a_member_is_refused(sim):
         board.expect_safe('handel')
 
 
-def test_a_match_takes_members_and_texts():
+def test_a_match_statement_accepts_members_and_texts():
     def words(reason):
         match reason:
             case r4link.SafeReason.STOP:
@@ -70,11 +70,11 @@ def test_a_match_takes_members_and_texts():
         'member', 'text', 'neither']
 
 
-def test_a_posted_command_that_was_sent_is_true():
+def test_only_the_post_result_sent_is_true():
     assert [each for each in r4link.PostResult if each] == [r4link.PostResult.SENT]
 
 
-def test_a_board_returns_members(sim, wait):
+def test_a_board_returns_enumeration_members(sim, wait):
     events, arming = [], []
     with r4link.Board(sim.url, role=r4link.BoardRole.CONTROL) as board:
         board.on_event(events.append)
@@ -94,7 +94,7 @@ def test_a_board_returns_members(sim, wait):
     assert r4link.Device('bno055@0x28').role is r4link.DeviceRole.IMU
 
 
-def test_a_fleet_returns_members():
+def test_a_fleet_returns_enumeration_members():
     with r4link.Fleet('sim:') as fleet:
         fleet.wait_active()
         assert fleet.health()[0].disarmed_by is r4link.DisarmCause.NOT_YET

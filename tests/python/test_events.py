@@ -21,7 +21,7 @@ def has(logged, level, text):
     return any(each == level and text in message for each, message in logged())
 
 
-def test_tells_what_happens_to_the_link_by_its_gravity(sim, wait, logged):
+def test_link_events_are_logged_by_severity(sim, wait, logged):
     with r4link.Board(sim.url) as board:
         board.wait_active()
         board.arm()
@@ -36,7 +36,7 @@ def test_tells_what_happens_to_the_link_by_its_gravity(sim, wait, logged):
     assert all(text.startswith(f'{name}: ') for _, text in logged())
 
 
-def test_tells_it_for_asyncio(sim, wait, logged):
+def test_an_asyncio_board_logs_link_events(sim, wait, logged):
     async def main():
         async with aio.Board(sim.url) as board:
             await board.wait_active()
@@ -44,11 +44,11 @@ def test_tells_it_for_asyncio(sim, wait, logged):
     wait(lambda: has(logged, 'INFO', 'link active'))
 
 
-def test_a_text_stays_one_line():
+def test_control_characters_are_replaced_in_log_texts():
     assert events._printable('a\nERROR b\x1b[2J') == 'a?ERROR b?[2J'
 
 
-def test_prints_nothing_by_itself():
+def test_the_package_prints_nothing_by_default():
     program = 'import r4link\nwith r4link.Board("sim:") as board:\n board.wait_active(); board.stop()'
     ended = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, check=True)
     assert (ended.stdout, ended.stderr) == ('', '')

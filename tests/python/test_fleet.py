@@ -14,7 +14,7 @@ def eight_boards():
         yield fleet
 
 
-def test_is_opened_by_a_pattern(fleet):
+def test_a_fleet_is_opened_by_a_url_pattern(fleet):
     assert len(fleet) == 8 and fleet.url(3) == 'sim:?node=3'
     assert fleet.index('sim:?node=3') == 3 and fleet.index(5) == 5
     assert [each.url for each in fleet.health()] == [f'sim:?node={node}' for node in range(8)]
@@ -22,7 +22,7 @@ def test_is_opened_by_a_pattern(fleet):
     assert fleet.health()[2].identity.board_id in ('', 'sim-2')
 
 
-def test_commands_have_a_result_each(fleet):
+def test_a_fleet_returns_one_result_for_each_board(fleet):
     fleet.arm().require()
     assert fleet.send('O:300,1,1')
     assert [state.osmc1.pwm for state in fleet.states()] == [300] * 8
@@ -35,7 +35,7 @@ def test_commands_have_a_result_each(fleet):
     fleet.send(Command.clear()).require()
 
 
-def test_setpoints_of_several_boards(fleet, wait):
+def test_a_fleet_sends_different_setpoints_to_each_board(fleet, wait):
     fleet.arm().require()
     setpoints = {board: Setpoints(Command.osmc(1, pwm=100 + board)) for board in range(8)}
     wait(lambda: all(fleet.post(setpoints)))
@@ -46,7 +46,7 @@ def test_setpoints_of_several_boards(fleet, wait):
         fleet.send(setpoints, boards=[1])
 
 
-def test_tells_what_happens_to_its_boards(fleet):
+def test_a_fleet_reports_the_events_of_its_boards(fleet):
     list(fleet.events())
     fleet.send('E:STOP', boards=[4]).require()
     kinds = {event.kind for event in fleet.events() if event.board == 4}
@@ -57,7 +57,7 @@ def test_tells_what_happens_to_its_boards(fleet):
         kinds.add(event.kind)
 
 
-def test_has_one_recording(fleet, tmp_path):
+def test_a_fleet_records_into_one_file(fleet, tmp_path):
     path = tmp_path / 'fleet.r4log'
     recording = r4link.Recording(path)
     fleet.record(recording)
@@ -67,7 +67,7 @@ def test_has_one_recording(fleet, tmp_path):
     assert len(r4link.read(path).boards) == 8
 
 
-def test_wrong_options_are_refused_as_a_boards_are(monkeypatch, tmp_path):
+def test_a_fleet_refuses_wrong_options(monkeypatch, tmp_path):
     with pytest.raises(r4link.UsageError, match="'drive': it is not a valid BoardRole"):
         r4link.Fleet('sim:', role='drive')
     with pytest.raises(r4link.UsageError, match='for a Board alone'):
@@ -82,7 +82,7 @@ def test_wrong_options_are_refused_as_a_boards_are(monkeypatch, tmp_path):
         r4link.Fleet('sim:', key='~/none')
 
 
-def test_one_that_watches_and_one_that_is_none():
+def test_a_watching_closed_or_silent_fleet_refuses_calls():
     with r4link.Fleet('sim:?node=0-1', role='watch') as fleet:
         fleet.wait_active()
         with pytest.raises(r4link.UsageError):

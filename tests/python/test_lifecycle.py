@@ -28,7 +28,7 @@ def run(program, *arguments):
                             stderr=subprocess.PIPE, text=True)
 
 
-def test_a_call_that_waits_obeys_ctrl_c():
+def test_ctrl_c_interrupts_a_waiting_call():
     program = f"""
 import r4link
 board = r4link.Board({SILENT!r})
@@ -72,7 +72,7 @@ board.wait_active(); board.arm(); board.osmc(1).set(0.1)
             sim.kill()
 
 
-def test_a_board_of_the_parent_is_none_of_a_fork(board):
+def test_a_board_is_closed_in_a_forked_process(board):
     board.arm()
     child = os.fork()
     if child == 0:
@@ -103,7 +103,7 @@ def in_a_fork(action):
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
-def test_in_a_fork_each_call_is_refused_or_does_nothing_and_none_hangs(tmp_path):
+def test_each_call_in_a_fork_is_refused_or_does_nothing(tmp_path):
     in_callback, go_on = threading.Event(), threading.Event()
 
     def hold(_):
@@ -169,7 +169,7 @@ signal.alarm(15)
             process.kill()
 
 
-def test_a_board_in_a_circle_is_collected(sim):
+def test_a_board_in_a_reference_cycle_is_collected(sim):
     board = r4link.Board(sim.url)
     circle = []
     board.on_state(lambda state, circle=circle: circle)  # a cycle: board -> function -> board
@@ -201,7 +201,7 @@ def r4link_is_closed(board):
     return False
 
 
-def test_calls_that_wait_end_when_another_thread_closes_the_board():
+def test_waiting_calls_end_when_another_thread_closes_the_board():
     board = r4link.Board(SILENT)
     ended = []
 
@@ -262,7 +262,7 @@ def test_handles_outlive_a_board_that_is_collected(sim, tmp_path):
     assert len(r4link.read(tmp_path / 'x.r4log').boards) == 1
 
 
-def test_a_loop_keeps_its_board(sim):
+def test_a_loop_over_states_keeps_its_board_open(sim):
     numbers = []
     for state in r4link.Board(sim.url).states():
         numbers.append(state.pnum)
@@ -280,7 +280,7 @@ def test_a_loop_keeps_its_board(sim):
     assert len(list(states)) >= 2 and states.ended
 
 
-def test_a_board_may_be_let_go_in_its_own_callback(sim, wait):
+def test_a_callback_may_drop_the_last_reference_to_its_board(sim, wait):
     last = [r4link.Board(sim.url)]
     gone = weakref.ref(last[0])
     last[0].on_state(lambda state: last.clear())
@@ -336,7 +336,7 @@ def drive_in_a_child(told):
     told.put(board.state.osmc1.pwm)
 
 
-def test_nothing_grows(sim):
+def test_repeated_use_leaks_no_objects_threads_or_memory(sim):
     def use():
         use_all_of_it(sim)
 

@@ -14,18 +14,18 @@ def run(*command):
                           env={**os.environ, 'PYTHONDONTWRITEBYTECODE': '1'}, timeout=120, check=False)
 
 
-def test_its_own_tests_pass():
+def test_the_tests_of_the_example_pass():
     ended = run('-m', 'pytest', '-q', '-s', '-p', 'no:cacheprovider')
     assert ended.returncode == 0 and re.search(r'^14 passed in', ended.stdout, re.MULTILINE), ended.stdout + ended.stderr
     print(ended.stdout)
 
 
-def test_it_drives_the_model():
+def test_the_example_drives_its_model():
     ended = run('openscout.py', 'model', '--course', '0.5,0')
     assert (ended.returncode, ended.stdout) == (0, 'armed: it drives\nthe step has ended it\n'), ended.stderr
 
 
-def test_it_says_what_is_wrong():
+def test_the_example_reports_wrong_arguments():
     ended = run('openscout.py', 'fax:1')
     assert ended.returncode == 3 and 'udp://HOST' in ended.stderr
     ended = run('openscout.py', 'model', '--gamepad', '/dev/input/none')

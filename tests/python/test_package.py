@@ -15,7 +15,7 @@ from r4link import _core
 from running import OFFLINE, ROOT, run
 
 
-def test_the_stub_has_what_the_module_has():
+def test_the_stub_matches_the_module():
     stub = ast.parse((ROOT / 'host/python/r4link/_core.pyi').read_text())
     classes = {each.name: each for each in stub.body if isinstance(each, ast.ClassDef)}
     runtime = {name: each for name, each in vars(_core).items() if isinstance(each, type)}
@@ -38,7 +38,7 @@ def test_examples_run(example, sim, tmp_path):
 
 
 @pytest.mark.parametrize('page', ['README.md', 'docs/how-to/control.md', 'docs/how-to/fleet.md', 'docs/how-to/python.md'])
-def test_what_the_documentation_shows_runs(page, tmp_path):
+def test_programs_in_the_documentation_run(page, tmp_path):
     shown = re.findall(r'^```python\n(.*?)^```', (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
     assert shown
     for program in shown:
@@ -49,13 +49,13 @@ def test_what_the_documentation_shows_runs(page, tmp_path):
         run(sys.executable, '-c', 'import r4link\n' + program, cwd=tmp_path)
 
 
-def test_a_folder_of_sources_says_what_is_missing():
+def test_importing_the_sources_reports_the_missing_module():
     ended = subprocess.run([sys.executable, '-B', '-c', 'import r4link'], cwd=ROOT / 'host/python', env=OFFLINE,
                            capture_output=True, text=True, check=False)
     assert 'ImportError: r4link: ' in ended.stderr and 'without the compiled module; build it' in ended.stderr, ended.stderr
 
 
-def test_an_editable_installation_says_what_to_do_instead(tmp_path):
+def test_an_editable_installation_is_refused_with_a_fix(tmp_path):
     ended = subprocess.run([sys.executable, '-c', 'import build_backend; build_backend.build_editable("x")'], cwd=tmp_path,
                            env={**OFFLINE, 'PYTHONPATH': str(ROOT / 'host/python')}, capture_output=True, text=True,
                            check=False)

@@ -56,7 +56,7 @@ def states_of(board):
     return [path.state for path in board.paths]
 
 
-def test_one_is_pulled_and_plugged_in_again_while_the_program_drives(paths, wait):
+def test_a_program_drives_while_a_path_is_unplugged(paths, wait):
     urls, cable = paths
     told, links = [], []
     with r4link.Board(urls) as board:
@@ -95,7 +95,7 @@ def test_one_is_pulled_and_plugged_in_again_while_the_program_drives(paths, wait
     assert first.loss == 0 and first.round_trip_us > 0 and first.board_id == 'sim-1' and first.as_dict()['busy'] is False
 
 
-def test_asyncio_has_them_too_and_a_text_joins_them(paths):
+def test_asyncio_accepts_paths_joined_in_one_url(paths):
     urls, cable = paths
 
     async def main():
@@ -112,7 +112,7 @@ def test_asyncio_has_them_too_and_a_text_joins_them(paths):
     asyncio.run(main())
 
 
-def test_a_fleet_has_boards_of_several(paths):
+def test_a_fleet_has_boards_with_several_paths(paths):
     urls, _ = paths
     with r4link.Fleet('+'.join(urls)) as fleet:
         fleet.wait_active()
@@ -120,7 +120,7 @@ def test_a_fleet_has_boards_of_several(paths):
         assert health.url == '+'.join(urls) and len(health.paths) == 2 and health.well
 
 
-def test_what_cannot_be_is_refused(sim):
+def test_invalid_combinations_of_paths_are_refused(sim):
     with pytest.raises(r4link.UsageError, match='a board of its own'):
         r4link.Board([sim.url, 'udp://127.0.0.1'])
     with pytest.raises(r4link.UsageError, match='one to 4 are possible'):

@@ -21,7 +21,7 @@ def copies(value):
 
 
 @pytest.mark.parametrize('kind', ERRORS, ids=lambda kind: kind.__name__)
-def test_a_copy_of_an_error_tells_the_same(kind):
+def test_a_copied_error_keeps_its_type_and_text(kind):
     error = kind('O:1,1,1', 'refused', 'arm it', outcome='refused', refusal='SAFE', at=2)
     error.add_note('on the left arm')
     for each in copies(error):
@@ -36,7 +36,7 @@ class OwnError(r4link.RefusedError):
         self.arm = arm
 
 
-def test_a_copy_of_an_error_of_ones_own_tells_the_same():
+def test_a_copied_user_error_keeps_its_type_and_text():
     for each in copies(OwnError('left')):
         assert type(each) is OwnError and each.arm == 'left' and str(each) == 'left: it does not move'
 
@@ -56,7 +56,7 @@ def pool_of_either_kind(request):
             yield lambda job, inputs: list(pool.map(job, inputs))
 
 
-def test_an_error_comes_from_another_process(pool):
+def test_another_process_can_return_an_error(pool):
     with pytest.raises(r4link.UsageError) as raised:
         pool(open_it, ['no URL'])
     assert raised.value.thing and raised.value.fix
@@ -71,7 +71,7 @@ def state_of_a_board(fields):
         return state
 
 
-def test_a_state_comes_from_another_process(pool):
+def test_another_process_can_return_a_state(pool):
     state, = pool(state_of_a_board, ['DEFAULT,ENC1,I2C1,UART1'])
     assert state.ain24 > 20 and state.enc1 == 0 and state.received is not None
 
@@ -85,7 +85,7 @@ def told(value):
             for name in names if not callable(each := getattr(value, name))}
 
 
-def test_copies_of_values_tell_the_same(sim, board):
+def test_copied_values_keep_their_contents(sim, board):
     board.arm()
     with r4link.Fleet('sim:') as fleet:
         fleet.wait_active()
@@ -103,7 +103,7 @@ def test_copies_of_values_tell_the_same(sim, board):
             assert not isinstance(value, r4link.ServoCalibration) or repr(each) == repr(value)
 
 
-def test_a_copy_of_setpoints_does_the_same(board, sim, wait):
+def test_copied_setpoints_have_the_same_effect(board, sim, wait):
     board.arm()
     setpoints = r4link.Setpoints(r4link.Command.osmc(1, pwm=5), r4link.Command.servo(3, us=1500))
     for number, each in enumerate(copies(setpoints), 1):

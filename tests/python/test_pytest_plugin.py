@@ -56,14 +56,14 @@ def test_the_example_passes_in_this_process_and_over_udp(step, tmp_path):
     run_step(step, tmp_path)
 
 
-def test_the_example_is_run_on_every_transport():
+def test_the_documented_steps_use_every_transport():
     assert [step for step in steps() if 'with-can' in step] == [steps()[-1]] and '--r4-transport can' in steps()[-1]
     assert any('--r4-transport udp' in step for step in steps())
     project = tomllib.loads((EXAMPLE / 'pyproject.toml').read_text())['project']
     assert project['dependencies'] == ['r4link'] and 'pytest' in project['optional-dependencies']['test']
 
 
-def test_what_is_not_as_expected_is_told(tmp_path):
+def test_a_failed_expectation_is_reported(tmp_path):
     (tmp_path / 'test_wrong.py').write_text('''
 import r4link
 
@@ -95,14 +95,14 @@ def test_can(request, tmp_path):
         assert words in ended.stdout.replace('\n', ' '), ended.stdout
 
 
-def test_without_the_command_it_is_told_how_to_get_it(tmp_path):
+def test_a_missing_r4_command_is_reported_with_a_fix(tmp_path):
     (tmp_path / 'test_it.py').write_text('def test_it(r4_board): pass\n')
     env = {'R4': '', 'PATH': str(tmp_path)}
     ended = run_pytest('test_it.py', '--r4-transport', 'udp', cwd=tmp_path, **env)
     assert 'the command r4: it is not on PATH; set R4=FILE' in ended.stdout, ended.stdout
 
 
-def test_the_workers_of_xdist_have_nodes_of_their_own_on_a_bus(monkeypatch):
+def test_xdist_workers_use_different_nodes_of_a_bus(monkeypatch):
     node = pytest_plugin._node
     assert [node(number) for number in range(3)] == [1, 2, 3]
     monkeypatch.setenv('PYTEST_XDIST_WORKER_COUNT', '4')
@@ -116,7 +116,7 @@ def test_the_workers_of_xdist_have_nodes_of_their_own_on_a_bus(monkeypatch):
 
 
 @pytest.mark.parametrize('broken', [False, True])
-def test_a_package_that_cannot_be_loaded_fails_only_the_tests_that_use_it(broken, tmp_path):
+def test_a_broken_package_fails_only_the_tests_that_use_it(broken, tmp_path):
     """Loads the plugin by its entry point, as pytest does after an installation."""
     site = tmp_path / 'site'
     shutil.copytree(pathlib.Path(pytest_plugin.__file__).parent, site / 'r4link')

@@ -19,7 +19,7 @@ def line(at, fields, path=1, direction='<'):
     return f'{1795468293 + at:.6f} {path}{direction} {body}0x{zlib.crc32(body.encode()):x}^\n'
 
 
-def test_a_file_that_was_removed_is_begun_anew_and_the_recording_tells(sim, tmp_path, wait):
+def test_a_removed_file_is_reported_and_replaced(sim, tmp_path, wait):
     path = tmp_path / 'drive.r4log'
     with r4link.Recording(path) as recording, r4link.Board(sim.url, arming=False) as board:
         board.record(recording)
@@ -32,7 +32,7 @@ def test_a_file_that_was_removed_is_begun_anew_and_the_recording_tells(sim, tmp_
     assert len(r4link.read(path).boards[0].states) > 0
 
 
-def test_what_was_recorded_is_there(sim, tmp_path):
+def test_a_recording_contains_every_received_state(sim, tmp_path):
     path = tmp_path / 'drive.r4log.zst'
     with r4link.Board(sim.url, arming=False, fields='DEFAULT,ENC1,BLDC1,US1') as board:
         board.record(path)
@@ -61,7 +61,7 @@ def test_what_was_recorded_is_there(sim, tmp_path):
     assert frame.osmc1_pwm.iloc[-1] == 0  # stopped
 
 
-def test_fields_that_come_later_two_boards_and_damage(tmp_path):
+def test_reads_late_fields_two_boards_and_damage(tmp_path):
     path = tmp_path / 'two.r4log'
     path.write_text(HEADER + '# path 2 serial:auto\n' + line(0.5, 'AIN24:24.10;PNum:1;T:10;')
                     + line(0.6, 'AIN24:24.20;STEP1POS:-7;SAFE:2;PNum:4294967295;T:4294967295;')
@@ -79,7 +79,7 @@ def test_fields_that_come_later_two_boards_and_damage(tmp_path):
         log['right-arm']  # pylint: disable=pointless-statement
 
 
-def test_an_error_shows_bytes_of_a_file_that_are_no_text(tmp_path):
+def test_an_error_escapes_bytes_that_are_not_text(tmp_path):
     path = tmp_path / 'later.r4log'
     path.write_bytes(b'# r4log 9 by r4 \xff\x1b]0;owned\x07 \xe2\x80\xae\n')
     with pytest.raises(r4link.DataError) as error:
@@ -88,7 +88,7 @@ def test_an_error_shows_bytes_of_a_file_that_are_no_text(tmp_path):
     assert r'by r4 \xff\x1b]0;owned\x07 \xe2\x80\xae' in str(error.value)
 
 
-def test_texts_of_a_recording_are_shown_whatever_bytes_they_are(tmp_path):
+def test_names_and_events_escape_bytes_that_are_not_text(tmp_path):
     path = tmp_path / 'others.r4log'
     path.write_text('# r4log 1 by r4 0.1.0\n# path 1 udp://\\xff\\x1b]0;owned arm\\xff\n'
                     '1795468293.000000 1! down \\xff\\x1b]0;owned\n')
@@ -102,7 +102,7 @@ def device(place, text, path=1):
     return f'# device {path} {place} {escaped}\n'
 
 
-def test_a_device_that_another_has_replaced_measures_nothing_any_more(tmp_path):
+def test_a_replaced_device_has_no_more_values(tmp_path):
     path = tmp_path / 'replaced.r4log'
     angle, power = ((DESCRIPTIONS / f'{name}.device').read_text() for name in ('as5600', 'ina219'))
     both = 'I2C1:5,0,x0400;I2C2:5,0,x20;'
@@ -128,7 +128,7 @@ def test_each_number_of_a_field_has_a_column(tmp_path):
         'uart1_lost': 2, 'fault_chip': 64, 'fault_trouble': 1}
 
 
-def test_values_may_be_called_as_other_columns_are(tmp_path):
+def test_device_values_may_have_the_names_of_other_columns(tmp_path):
     path = tmp_path / 'names.r4log'
     mine = 'device t\ntitle t\naddress 0x40\npoll all x00 1 100\nvalue ms all 0 u8\n'
     path.write_text(HEADER + device('t@0x40:1', mine) + line(0.1, 'I2C1:5,0,x07;PNum:1;T:10;'))
@@ -136,7 +136,7 @@ def test_values_may_be_called_as_other_columns_are(tmp_path):
     assert board.states['t_ms'].tolist() == [10] and board.states['t_ms_'].tolist() == [7]
 
 
-def test_more_values_than_devices_can_have_are_told(tmp_path):
+def test_too_many_device_values_are_reported(tmp_path):
     path = tmp_path / 'many.r4log'
     values = ''.join(f'value v{i} all 0 u8\n' for i in range(250))
     path.write_text(HEADER + ''.join(
@@ -149,7 +149,7 @@ def test_more_values_than_devices_can_have_are_told(tmp_path):
 
 @pytest.mark.parametrize('written, states, damaged', [
     (HEADER + line(0.5, 'AIN24:24.10;PNum:1;T:10;') + line(0.6, 'AIN24:24.20;PNum:2;T:20;')[:-9], 1, 1), ('', None, 0)])
-def test_a_fifo_whose_writer_goes_away(tmp_path, written, states, damaged):
+def test_a_fifo_is_read_until_its_writer_ends(tmp_path, written, states, damaged):
     path = tmp_path / 'fifo.r4log'
     os.mkfifo(path)
     writer = threading.Thread(target=path.write_text, args=(written,))
@@ -165,7 +165,7 @@ def test_a_fifo_whose_writer_goes_away(tmp_path, written, states, damaged):
 
 @pytest.mark.parametrize('content, error', [(b'\0' * 100_000, r4link.DataError), (b'', r4link.DataError),
                                             (b'# r4log 2 by r4 9\n', r4link.DataError), (None, r4link.OpenError)])
-def test_what_is_no_recording_is_told(tmp_path, content, error):
+def test_an_invalid_recording_is_reported(tmp_path, content, error):
     path = tmp_path / 'x.r4log'
     if content is not None:
         path.write_bytes(content)
@@ -176,7 +176,7 @@ def test_what_is_no_recording_is_told(tmp_path, content, error):
         r4link.read(tmp_path)
 
 
-def test_the_form_of_a_later_version_is_told(tmp_path):
+def test_a_recording_of_a_later_version_is_refused(tmp_path):
     path = tmp_path / 'x.r4log'
     path.write_text(HEADER.replace('r4log 1', 'r4log 2'))
     with pytest.raises(r4link.DataError, match='version') as raised:

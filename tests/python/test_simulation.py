@@ -50,11 +50,11 @@ HAPPENINGS = [
 
 
 @pytest.mark.parametrize('words, seen, end', HAPPENINGS, ids=[each[0] for each in HAPPENINGS])
-def test_what_happens_is_seen(words, seen, end, sim, board, wait):
+def test_a_board_reports_every_simulated_event(words, seen, end, sim, board, wait):
     happens_and_is_seen(sim, board, wait, words, seen, end)
 
 
-def test_what_happens_to_a_board_in_a_process_is_seen(wait):
+def test_a_board_in_another_process_reports_simulated_events(wait):
     with r4link.SimBoard('udp://127.0.0.1:0', settings={'name': 'left'}) as sim, r4link.Board(sim.url) as board:
         board.wait_active()
         assert board.identify().name == 'left'
@@ -85,7 +85,7 @@ def can_be_armed(board):
     return True
 
 
-def test_every_word_of_the_documentation_is_tried():
+def test_every_documented_event_is_tested():
     table = SCENARIO.read_text().split('    # TIME what\n')[1].split('\n\n')[0]
     words = re.findall(r'^    [\d.]+ +(\w+)', table, re.MULTILINE)
     assert len(words) > 10 and {each.split()[0] for each, _, _ in HAPPENINGS} == set(words)
@@ -93,7 +93,7 @@ def test_every_word_of_the_documentation_is_tried():
     assert {each.split()[1] for each, _, _ in HAPPENINGS if each.startswith('chip')} == set(chips)
 
 
-def test_what_has_types_is_the_same(sim, monkeypatch):
+def test_typed_methods_produce_valid_events(sim, monkeypatch):
     said = []
     monkeypatch.setattr(r4link.SimBoard, 'happen', lambda _, words: said.append(words))
     sim.handle(False)
@@ -113,7 +113,7 @@ def test_what_has_types_is_the_same(sim, monkeypatch):
 
 
 @pytest.mark.parametrize('url', [None, 'udp://127.0.0.1:0'])
-def test_a_bad_link(url):
+def test_a_bad_link_loses_datagrams(url):
     with r4link.SimBoard(url, link='loss=20%,seed=3') as sim, r4link.Board(sim.url) as board:
         board.wait_active()
         for _ in range(50):
@@ -121,7 +121,7 @@ def test_a_bad_link(url):
         assert board.statistics.lost > 2
 
 
-def test_what_cannot_be_is_told(tmp_path):
+def test_wrong_arguments_of_simboard_are_refused(tmp_path):
     for wrong, error in [({'link': 'lost=1%'}, r4link.UsageError), ({'settings': {'name': 'x'}}, r4link.UsageError),
                          ({'url': 'udp://192.0.2.1:2018'}, r4link.OpenError), ({'url': 'tcp://x'}, r4link.Error),
                          ({'url': 'udp://127.0.0.1:0', 'link': 'lost=1%'}, r4link.Error),
@@ -136,7 +136,7 @@ def test_what_cannot_be_is_told(tmp_path):
         sim.happen('reboot')
 
 
-def test_one_that_was_closed_leaves_nothing_open():
+def test_a_closed_simboard_leaves_no_file_open():
     program = """
 import gc, os, r4link
 files = len(os.listdir('/proc/self/fd'))

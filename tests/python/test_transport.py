@@ -62,7 +62,7 @@ class Silent(r4link.Transport):
         pass
 
 
-def test_it_carries_a_board_that_is_driven_and_stopped(forward):
+def test_a_board_is_driven_and_stopped_over_a_user_transport(forward):
     with r4link.Board(forward) as board:
         board.wait_active()
         assert board.name == 'Forward'
@@ -75,7 +75,7 @@ def test_it_carries_a_board_that_is_driven_and_stopped(forward):
     assert forward.closings == 1
 
 
-def test_it_is_one_of_several_paths(forward):
+def test_a_user_transport_is_one_of_several_paths(forward):
     with r4link.Board([forward, Silent()]) as board:
         board.wait_active()
         assert [path.name for path in board.paths] == ['Forward', 'Silent']
@@ -83,7 +83,7 @@ def test_it_is_one_of_several_paths(forward):
         r4link.Board([forward, 'sim:'])
 
 
-def test_what_the_first_open_raises_is_raised_where_the_board_is_opened(forward):
+def test_opening_a_board_raises_the_error_of_the_first_open(forward):
     forward.failure = ValueError('no modem')
     with pytest.raises(r4link.OpenError) as raised:
         r4link.Board(forward)
@@ -94,14 +94,14 @@ def test_what_the_first_open_raises_is_raised_where_the_board_is_opened(forward)
         board.wait_active()
 
 
-def test_a_class_without_send_says_so(wait):
+def test_a_transport_without_send_is_reported(wait):
     events = []
     with r4link.Board(r4link.Transport()) as board:
         board.on_event(events.append)
         wait(lambda: any('Transport has no send()' in event.reason for event in events))
 
 
-def test_a_send_that_raises_is_an_event_and_it_comes_back(forward, wait):
+def test_a_send_that_raises_is_reported_and_the_path_recovers(forward, wait):
     events = []
     with r4link.Board(forward) as board:
         board.on_event(events.append)
@@ -115,7 +115,7 @@ def test_a_send_that_raises_is_an_event_and_it_comes_back(forward, wait):
     assert forward.closings == 2
 
 
-def test_any_bytes_are_received_from_any_thread_and_none_is_too_long(wait):
+def test_a_transport_receives_datagrams_from_any_thread(wait):
     transport = Silent()
     transport.received(b'nobody listens')
     with r4link.Board(transport) as board:
@@ -135,7 +135,7 @@ def test_any_bytes_are_received_from_any_thread_and_none_is_too_long(wait):
     transport.received(b'nobody listens')
 
 
-def test_an_object_serves_one_board_at_a_time():
+def test_a_transport_serves_one_board_at_a_time():
     transport = Silent()
     with r4link.Board(transport):
         with pytest.raises(r4link.OpenError, match='another board'):
@@ -143,7 +143,7 @@ def test_an_object_serves_one_board_at_a_time():
     r4link.Board(transport).close()
 
 
-def test_a_board_that_is_collected_closes_it(forward):
+def test_a_collected_board_closes_its_transport(forward):
     board = r4link.Board(forward)
     board.wait_active()
     gone = weakref.ref(board)
@@ -153,7 +153,7 @@ def test_a_board_that_is_collected_closes_it(forward):
 
 
 @pytest.mark.parametrize('method', ['send', 'close'])
-def test_its_methods_may_close_the_board(method):
+def test_the_methods_of_a_transport_may_close_the_board(method):
     closed = threading.Event()
     opened = threading.Event()
 
@@ -171,7 +171,7 @@ def test_its_methods_may_close_the_board(method):
     assert closed.wait(10)
 
 
-def test_a_send_that_waits_holds_up_neither_calls_nor_close():
+def test_a_blocked_send_does_not_block_other_calls():
     sending, released = threading.Event(), threading.Event()
 
     class Waits(Silent):
@@ -189,7 +189,7 @@ def test_a_send_that_waits_holds_up_neither_calls_nor_close():
 
 @pytest.mark.parametrize('send', ['pass', 'raise OSError("gone")', 'time.sleep(0.3)', 'board.stop_async()',
                                   'while True: time.sleep(0.0005)'])
-def test_the_interpreter_may_end_with_it_open(send):
+def test_the_interpreter_may_end_with_an_open_transport(send):
     program = f"""
 import sys, threading, time, r4link
 sent = threading.Event()
@@ -209,7 +209,7 @@ sent.wait(10)
     assert (ended.returncode, ended.stderr) == (0, '')
 
 
-def test_asyncio_has_it(forward):
+def test_asyncio_drives_a_board_over_a_user_transport(forward):
     async def drive():
         async with r4link.aio.Board(forward) as board:
             await board.wait_active()
@@ -234,7 +234,7 @@ def a_board_on_the_bus(request):
         yield board
 
 
-def test_a_can_bus_carries_a_node(bus, can_board):
+def test_a_board_is_driven_over_a_python_can_bus(bus, can_board):
     with r4link.Board(r4link.CanTransport(bus, node=3), arming=False) as board:
         board.wait_active(5)
         assert board.name.endswith(', node 3')
@@ -245,7 +245,7 @@ def test_a_can_bus_carries_a_node(bus, can_board):
     bus.send(can.Message())  # the bus is still open
 
 
-def test_a_full_queue_of_a_can_bus_is_waited_for(bus, can_board, monkeypatch):
+def test_a_can_transport_waits_while_its_queue_is_full(bus, can_board, monkeypatch):
     refusals = [can.CanOperationError('Transmit buffer full')] * 3
     send = bus.send
 
@@ -262,7 +262,7 @@ def test_a_full_queue_of_a_can_bus_is_waited_for(bus, can_board, monkeypatch):
 
 
 @pytest.mark.parametrize('method', ['send', 'recv'])
-def test_a_can_bus_that_fails_is_down_and_comes_back(bus, wait, monkeypatch, method):
+def test_a_failed_can_bus_is_reported_and_recovers(bus, wait, monkeypatch, method):
     def fail(*_, **__):
         raise OSError('adapter unplugged')
 

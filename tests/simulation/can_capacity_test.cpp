@@ -52,7 +52,7 @@ TEST(CanCapacity, EightBoardsInPackedFormFitOneClassicBus) {
 // in one state period. Boards that lose the arbitration then skip a state.
 constexpr std::uint32_t replaced_in_step = 12;
 
-TEST(CanCapacity, EightBoardsFitWhenAllOfThemSpeakAtTheSameInstant) {
+TEST(CanCapacity, EightBoardsFitWhenAllSendAtTheSameInstant) {
   BackboneOptions options;
   options.in_step = true;
   const BackboneResult result = run_backbone(options);
@@ -130,7 +130,7 @@ TEST(CanCapacity, OneDamagedFrameInAHundredLosesNothing) {
 }
 
 // Frames that a listener misses are lost: a datagram of n frames arrives with probability 0.99^n.
-TEST(CanCapacity, OneMissedFrameInAHundredCostsTheDatagramsItBelongsTo) {
+TEST(CanCapacity, OneMissedFrameInAHundredLosesOnlyItsDatagrams) {
   BackboneOptions options;
   options.bus.missed = 0.01;
   options.commands_hz = options.host_heartbeats_hz = options.board_heartbeats_hz = 0;
@@ -142,7 +142,7 @@ TEST(CanCapacity, OneMissedFrameInAHundredCostsTheDatagramsItBelongsTo) {
   EXPECT_NEAR(delivered, std::pow(0.99, result.frames_per_second / states_per_second), 0.01);
 }
 
-TEST(CanCapacity, TheSameSeedIsTheSameRun) {
+TEST(CanCapacity, TheSameSeedGivesTheSameRun) {
   BackboneOptions options;
   options.seconds = 2;
   options.bus.corrupted = 0.01;

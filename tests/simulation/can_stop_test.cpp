@@ -283,11 +283,9 @@ void expect_stops(CanQueue queue, std::uint64_t frames_before) {
 }
 
 // The one frame is the frame in progress.
-TEST(CanStop, WaitsForOneFrameAtMostAndEveryBoardIsSafeAMillisecondLater) {
-  expect_stops(CanQueue::mailboxes, 1);
-}
+TEST(CanStop, WaitsForAtMostOneFrameIfTheHostHasMailboxes) { expect_stops(CanQueue::mailboxes, 1); }
 
-TEST(CanStop, WaitsBesidesForWhatAFifoHasTaken) { expect_stops(CanQueue::fifo, 1 + mailboxes); }
+TEST(CanStop, WaitsAlsoForTheFramesInAFifo) { expect_stops(CanQueue::fifo, 1 + mailboxes); }
 
 }  // namespace
 }  // namespace r4::test

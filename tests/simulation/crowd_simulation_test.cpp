@@ -308,7 +308,7 @@ void Crowd::check() {
   }
 }
 
-TEST(CrowdSimulation, StrangersTakeNobodysControlAndKeepNobodyFromIt) {
+TEST(CrowdSimulation, OtherProgramsNeitherTakeNorBlockControl) {
   const bool one = std::getenv("R4_SEED") != nullptr;
   const std::uint64_t from = one ? from_environment("R4_SEED", 0) : 1;
   const std::uint64_t to = one ? from : from_environment("R4_CROWDS", 150);
@@ -340,7 +340,7 @@ TEST(CrowdSimulation, StrangersTakeNobodysControlAndKeepNobodyFromIt) {
   EXPECT_GT(renumbered, to);
 }
 
-TEST(CrowdSimulation, RepeatsASeed) {
+TEST(CrowdSimulation, TheSameSeedGivesTheSameRun) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     EXPECT_EQ(Crowd(seed).run().hash, Crowd(seed).run().hash);
   }

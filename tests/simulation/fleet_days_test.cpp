@@ -249,7 +249,7 @@ double fleet_hours() {
   return value == nullptr ? 0.05 : std::strtod(value, nullptr);
 }
 
-TEST(FleetDays, NothingGrowsAndNothingTripsButForAFault) {
+TEST(FleetDays, MemoryDoesNotGrowAndFalseTripsAreRare) {
   Random random(from_environment("R4_SEED", 1));
   const auto seconds = static_cast<std::uint64_t>(fleet_hours() * 3600);
   std::vector<std::unique_ptr<FleetLink>> fleet;

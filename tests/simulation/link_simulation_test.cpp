@@ -165,7 +165,7 @@ TEST(LinkSimulation, KeepsEveryPromiseUnderRandomFaults) {
   run_all(schedules_for(1), World::Beside::nothing);
 }
 
-TEST(LinkSimulation, KeepsEveryPromiseOfABoardThatStandsStillNowAndThen) {
+TEST(LinkSimulation, KeepsEveryPromiseDuringStandstillsOfTheBoard) {
   if (std::getenv("R4_SEED") != nullptr) return replay(World::Beside::standstills);
   const std::uint64_t schedules = schedules_for(5);
   const Report sum = run_all(schedules, World::Beside::standstills);
@@ -195,7 +195,7 @@ TEST(LinkSimulation, KeepsEveryPromiseOverSeveralPaths) {
 }
 
 // Regression test: seeds that once broke a promise, and why.
-TEST(LinkSimulation, KeepsEveryPromiseOfSeedsThatBrokeOneOnce) {
+TEST(LinkSimulation, KeepsEveryPromiseForSeedsThatOnceFailed) {
   // The last BUSY of a lagging path made the other paths wait longer than their own BUSY asked
   // (415). A BUSY from before a path had joined counted beside those of the other paths, and held
   // the commands back (18012, with the same cause as 415). Before the session's first heartbeat one
@@ -211,7 +211,7 @@ TEST(LinkSimulation, KeepsEveryPromiseOfSeedsThatBrokeOneOnce) {
   }
 }
 
-TEST(LinkSimulation, RepeatsASeedToTheSameTrace) {
+TEST(LinkSimulation, TheSameSeedGivesTheSameTrace) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     const Report first = World(seed, true).run();
     const Report second = World(seed, true).run();

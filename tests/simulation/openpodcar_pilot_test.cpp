@@ -177,7 +177,7 @@ double hold_and_drive(PilotRun& run) {
   return run.model.place().speed_m_s * 1.02;
 }
 
-TEST(OpenPodcarPilot, DrivesAFigureByGoals) {
+TEST(OpenPodcarPilot, DrivesToSeveralGoals) {
   PilotRun run;
   run.press_start();
   const std::vector<Waypoint> goals = {{8, 0}, {10, 6}, {4, 6}, {0, 0}, {-4, 4}, {-3, 3}};
@@ -193,7 +193,7 @@ TEST(OpenPodcarPilot, DrivesAFigureByGoals) {
   }
 }
 
-TEST(OpenPodcarPilot, HasAWayToGoalsAllAround) {
+TEST(OpenPodcarPilot, FindsACourseToGoalsInEveryDirection) {
   for (int direction = 0; direction < 24; ++direction) {
     for (const double distance_m : {0.5, 2.0, 4.0, 8.0}) {
       const double angle = direction * std::numbers::pi / 12;
@@ -215,7 +215,7 @@ TEST(OpenPodcarPilot, HasAWayToGoalsAllAround) {
   }
 }
 
-TEST(OpenPodcarPilot, DrivesACircleByCmdVelAndStandsWhenItIsOld) {
+TEST(OpenPodcarPilot, DrivesACircleByCmdVelAndStopsWhenItIsOld) {
   PilotRun run;
   run.cmd_vel = Twist{0.8, 0.32};  // a radius of 2.5 m
   EXPECT_FALSE(run.moves_within(1000));
@@ -236,7 +236,7 @@ TEST(OpenPodcarPilot, DrivesACircleByCmdVelAndStandsWhenItIsOld) {
   EXPECT_TRUE(run.driving());
 }
 
-TEST(OpenPodcarPilot, KeepsToWhatTheVehicleCanDo) {
+TEST(OpenPodcarPilot, LimitsCommandsToWhatTheVehicleCanDo) {
   PilotRun run;
   run.press_start();
   for (const Twist& asked : {Twist{50, 0}, Twist{1, 90}, Twist{-5, 1}, Twist{0, 1}}) {
@@ -252,7 +252,7 @@ TEST(OpenPodcarPilot, KeepsToWhatTheVehicleCanDo) {
   }
 }
 
-TEST(OpenPodcarPilot, GivesTheJoystickThePrecedenceAndTakesNothingBackByItself) {
+TEST(OpenPodcarPilot, TheJoystickHasPrecedenceAndADroppedGoalStaysDropped) {
   PilotRun run;
   run.press_start();
   EXPECT_EQ(run.to_goal(50, 0), "");
@@ -283,7 +283,7 @@ struct PilotMishap {
   double most_m;  // the car may roll so far from 1.22 m/s
 };
 
-TEST(OpenPodcarPilot, WaitsForStartAfterWhateverEndedTheDrive) {
+TEST(OpenPodcarPilot, WaitsForStartAfterAnyEndOfADrive) {
   const double braking_m = PodcarModel::braking_distance_m(1.22);
   const PilotMishap mishaps[] = {
       {"handle let go", [](PilotRun& run, bool is) { run.robot.model().hold_handle(!is); },
@@ -317,7 +317,7 @@ TEST(OpenPodcarPilot, WaitsForStartAfterWhateverEndedTheDrive) {
   }
 }
 
-TEST(OpenPodcarPilot, StopsWhenTheJoystickIsGoneWhileItsButtonWasHeld) {
+TEST(OpenPodcarPilot, StopsWhenTheJoystickDisconnectsWithItsButtonHeld) {
   PilotRun run;
   const double speed = hold_and_drive(run);
   run.joystick = false;
@@ -331,7 +331,7 @@ TEST(OpenPodcarPilot, StopsWhenTheJoystickIsGoneWhileItsButtonWasHeld) {
   EXPECT_FALSE(run.moves_within(3000));
 }
 
-TEST(OpenPodcarPilot, StopsByTheStopButton) {
+TEST(OpenPodcarPilot, TheStopButtonStopsTheVehicle) {
   for (const bool manual : {true, false}) {
     PilotRun run;
     double speed = hold_and_drive(run);
@@ -353,7 +353,7 @@ TEST(OpenPodcarPilot, StopsByTheStopButton) {
   }
 }
 
-TEST(OpenPodcarPilot, ArmsOnceByAStartThatIsHeldDown) {
+TEST(OpenPodcarPilot, HoldingStartDownArmsOnlyOnce) {
   PilotRun run;
   run.joystick = false;
   run.pass(1000);
@@ -375,7 +375,7 @@ TEST(OpenPodcarPilot, ArmsOnceByAStartThatIsHeldDown) {
   EXPECT_TRUE(run.moves_within(2000));
 }
 
-TEST(OpenPodcarPilot, EndsAndDoesNotBeginWhereThereAreTwoJoysticks) {
+TEST(OpenPodcarPilot, DoesNotDriveWithTwoJoysticks) {
   PilotRun run;
   run.press_start();
   ASSERT_TRUE(run.driving());
@@ -397,7 +397,7 @@ TEST(OpenPodcarPilot, EndsAndDoesNotBeginWhereThereAreTwoJoysticks) {
   EXPECT_TRUE(run.driving()) << "the other joystick has stopped publishing";
 }
 
-TEST(OpenPodcarPilot, BeginsADriveWithNothingOfTheOneBefore) {
+TEST(OpenPodcarPilot, ANewDriveStartsWithAResetController) {
   Podcar podcar;
   podcar.begin_drive();
   for (int i = 0; i < 200; ++i) podcar.drive({1, 0}, 0.01);  // the cable of the encoder is off
@@ -420,7 +420,7 @@ TEST(OpenPodcarPilot, EndsWhenTheSteeringDoesNotFollow) {
   EXPECT_TRUE(podcar.obeys()) << "the car does not steer while it stands";
 }
 
-TEST(OpenPodcarPilot, KeepsOnlyAStopOfWhatCameWhileItWasArmed) {
+TEST(OpenPodcarPilot, KeepsOnlyAStopReceivedWhileArming) {
   using namespace std::chrono_literals;
   for (const bool stopped : {false, true}) {
     const JoyMap map;
@@ -448,7 +448,7 @@ TEST(OpenPodcarPilot, KeepsOnlyAStopOfWhatCameWhileItWasArmed) {
   }
 }
 
-TEST(OpenPodcarPilot, RefusesWhatIsNoNumber) {
+TEST(OpenPodcarPilot, RefusesInputsThatAreNotNumbers) {
   PilotRun run;
   run.press_start();
   run.cmd_vel = Twist{nan_number, 0};

@@ -162,7 +162,7 @@ const Mishap mishaps[] = {
     {"host killed", [](PodcarRun& run) { run.robot.host_lives = false; }, board_timeout_s + 0.02},
 };
 
-TEST(OpenPodcar, StandsWithinItsBrakingDistanceAndOneTimeout) {
+TEST(OpenPodcar, StopsWithinItsBrakingDistanceAndOneTimeout) {
   for (const Mishap& mishap : mishaps) {
     PodcarRun run(straight());
     run.drive_for(5);
@@ -179,7 +179,7 @@ TEST(OpenPodcar, StandsWithinItsBrakingDistanceAndOneTimeout) {
   }
 }
 
-TEST(OpenPodcar, StandsBeforeAWall) {
+TEST(OpenPodcar, StopsBeforeAWall) {
   PodcarRun run(straight());
   run.model.set_wall(12);
   run.drive_for(5);
@@ -194,7 +194,7 @@ TEST(OpenPodcar, StandsBeforeAWall) {
   EXPECT_EQ(run.robot.application().reason(), SafeReason::proximity);
 }
 
-TEST(OpenPodcar, ComesToRestWhenItSeesNothingAnyMore) {
+TEST(OpenPodcar, StopsWhenItReceivesNoMoreStates) {
   PodcarRun run(straight());
   run.drive_for(5);
   run.robot.states_stop = true;
@@ -205,7 +205,7 @@ TEST(OpenPodcar, ComesToRestWhenItSeesNothingAnyMore) {
   EXPECT_LE(rolled_m, allowed_m);
 }
 
-TEST(OpenPodcar, DoesNotDriveOffWhenTheLinkComesBackOrTheHandleIsHeldAgain) {
+TEST(OpenPodcar, DoesNotMoveAfterLinkAndHandleReturn) {
   PodcarRun run(straight());
   run.drive_for(5);
   run.robot.link_cut = true;
@@ -219,7 +219,7 @@ TEST(OpenPodcar, DoesNotDriveOffWhenTheLinkComesBackOrTheHandleIsHeldAgain) {
   EXPECT_EQ(run.model.travelled_m(), stands_m);
 }
 
-TEST(OpenPodcar, DoesNotDriveByASteeringSensorThatIsOff) {
+TEST(OpenPodcar, StopsWhenTheSteeringSensorFails) {
   PodcarRun run(straight());
   run.drive_for(3);
   run.robot.model().pin_analog(Analog::ainsteer, 0);
@@ -232,7 +232,7 @@ TEST(OpenPodcar, DoesNotDriveByASteeringSensorThatIsOff) {
 
 // The clock does not show this restart: the board ran longer after it than before, until the host
 // heard it again.
-TEST(OpenPodcar, StaysWhereItIsWhenTheBoardRestarts) {
+TEST(OpenPodcar, KeepsItsPoseWhenTheBoardRestarts) {
   Podcar podcar;
   State state;
   state.raw.analog_cv[static_cast<int>(Analog::ainsteer)] = 250;

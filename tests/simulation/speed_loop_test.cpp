@@ -95,7 +95,7 @@ class SpeedLoop {
   double smooth_ = 0;
 };
 
-TEST(SpeedLoop, SettlesWithinHalfASecondWithoutOvershootOverALinkThatDelays) {
+TEST(SpeedLoop, SettlesWithinHalfASecondOverADelayedLink) {
   double slowest_s = 0, highest = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     SpeedLoop loop(seed, slow_link);
@@ -111,7 +111,7 @@ TEST(SpeedLoop, SettlesWithinHalfASecondWithoutOvershootOverALinkThatDelays) {
   EXPECT_LE(highest, 0.05);
 }
 
-TEST(SpeedLoop, StaysStableWhereAFifthIsLost) {
+TEST(SpeedLoop, StaysStableWhenAFifthOfTheDatagramsIsLost) {
   double farthest = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SpeedLoop loop(seed, lossy_link);
@@ -127,7 +127,7 @@ TEST(SpeedLoop, StaysStableWhereAFifthIsLost) {
   EXPECT_LE(farthest, 0.1);
 }
 
-TEST(SpeedLoop, SettlesMoreSlowlyByTheFrequencyThatTheBoardMeasures) {
+TEST(SpeedLoop, SettlesWithin800MillisecondsOnTheMeasuredFrequency) {
   SpeedLoop loop(1, slow_link, SpeedLoop::By::frequency);
   ASSERT_TRUE(loop.robot.arm());
   loop.begin(1.0);
@@ -138,7 +138,7 @@ TEST(SpeedLoop, SettlesMoreSlowlyByTheFrequencyThatTheBoardMeasures) {
   EXPECT_LE(loop.overshoot(), 0.05);
 }
 
-TEST(SpeedLoop, EndsWhenTheHandleIsReleasedAndWhenTheEncoderStands) {
+TEST(SpeedLoop, EndsWhenTheHandleIsReleasedOrTheEncoderStops) {
   SpeedLoop let_go(1, slow_link);
   ASSERT_TRUE(let_go.robot.arm());
   let_go.begin(1.0);

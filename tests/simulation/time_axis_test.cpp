@@ -152,7 +152,7 @@ class AxisLink final : public firmware::Hal,
   std::unique_ptr<test::DrivenSession> session_;
 };
 
-TEST(TimeAxis, OfEightBoardsOnOneBusIsOneToAMillisecond) {
+TEST(TimeAxis, AgreesWithinAMillisecondForEightBoardsOnABus) {
   Random random(1);
   SharedBus bus;
   std::array<std::unique_ptr<AxisLink>, axis_boards> links;

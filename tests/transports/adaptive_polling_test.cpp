@@ -26,7 +26,7 @@ class AdaptivePollingTest : public testing::Test {
   AdaptivePolling::Time now{1h};
 };
 
-TEST_F(AdaptivePollingTest, SleepsAtFirst) {
+TEST_F(AdaptivePollingTest, SleepsBeforeTheFirstFrame) {
   EXPECT_FALSE(polling.worthwhile(now));
   EXPECT_FALSE(worthwhile_after(Silence::within, 0us));
   EXPECT_FALSE(worthwhile_after(Silence::between, 0us));
@@ -49,7 +49,7 @@ TEST_F(AdaptivePollingTest, SleepsAfterALongSilence) {
 }
 
 // A state every 10 ms, whose frames follow each other at once.
-TEST_F(AdaptivePollingTest, KnowsTheMiddleOfATransferFromItsEnd) {
+TEST_F(AdaptivePollingTest, DistinguishesASilenceWithinATransferFromOneBetween) {
   silence(Silence::within, 15us);
   silence(Silence::between, 10ms);
   EXPECT_FALSE(worthwhile_after(Silence::between, 0us));
@@ -57,7 +57,7 @@ TEST_F(AdaptivePollingTest, KnowsTheMiddleOfATransferFromItsEnd) {
   EXPECT_TRUE(worthwhile_after(Silence::within, 100us));
 }
 
-TEST_F(AdaptivePollingTest, ASilenceBeginsOnce) {
+TEST_F(AdaptivePollingTest, RepeatedReportsDoNotRestartASilence) {
   silence(Silence::between, 10us);
   polling.on_silence(Silence::between, now);
   polling.on_silence(Silence::between, now + 300us);

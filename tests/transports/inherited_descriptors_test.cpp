@@ -31,7 +31,7 @@ std::set<std::string> inherited() {
   return all;
 }
 
-TEST(Descriptors, OfNoTransportAreInherited) {
+TEST(Descriptors, AreNotInheritedByChildProcesses) {
   const std::set<std::string> before = inherited();
   asio::io_context io;
   Recorder events;

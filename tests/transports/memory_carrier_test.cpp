@@ -53,7 +53,7 @@ TEST_F(MemoryCarrierTest, AnswersFromTheHandler) {
   EXPECT_EQ(at_a.datagrams.back().text, "echo 99");
 }
 
-TEST_F(MemoryCarrierTest, IsDownUntilTheOtherEndIsOpen) {
+TEST_F(MemoryCarrierTest, IsDownUntilTheOtherCarrierIsOpen) {
   a->open(at_a);
   EXPECT_FALSE(a->up());
   EXPECT_EQ(a->send("lost", Priority::normal), SendResult::down);
@@ -69,7 +69,7 @@ TEST_F(MemoryCarrierTest, IsDownUntilTheOtherEndIsOpen) {
   EXPECT_EQ(a->send("lost", Priority::normal), SendResult::down);
 }
 
-TEST_F(MemoryCarrierTest, LetsStopOvertakeAndIsBounded) {
+TEST_F(MemoryCarrierTest, AStopOvertakesAndTheQueueIsLimited) {
   open_both();
   for (int i = 0; i < 128; ++i) {
     ASSERT_EQ(a->send("normal", Priority::normal), SendResult::sent);

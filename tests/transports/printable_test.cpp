@@ -48,7 +48,7 @@ RC_GTEST_PROP(Printable, ChangesNothingTheSecondTime, (const std::string& text))
   RC_ASSERT(printable(once) == once);
 }
 
-TEST(Printable, IsTheTextOfEveryError) {
+TEST(Printable, EveryErrorTextIsPrintable) {
   const Error error(ErrorKind::open, "port\x1b[2J", "in use by a\nb", "kill \u202E it");
   EXPECT_STREQ(error.what(), "port\\x1b[2J: in use by a\\x0ab; kill \\xe2\\x80\\xae it");
   EXPECT_EQ(error.problem().thing, "port\x1b[2J") << "programs get the unchanged text";

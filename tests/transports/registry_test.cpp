@@ -50,7 +50,7 @@ TEST(Registry, TakesFurtherTransports) {
   EXPECT_EQ(registry.make(io, "memory:", Role::host)->name(), "memory:");
 }
 
-TEST(Registry, ACarrierThatIsNotSharedIgnoresTheGroupOfItsUrl) {
+TEST(Registry, AnUnsharedHostCarrierIgnoresTheGroupOfItsUrl) {
   asio::io_context io;
   const Registry registry = Registry::standard();
   for (const char* url :
@@ -61,7 +61,7 @@ TEST(Registry, ACarrierThatIsNotSharedIgnoresTheGroupOfItsUrl) {
       << "a board does not share its transport";
 }
 
-TEST(Registry, SharesAPathWithAGroupThatIsThere) {
+TEST(Registry, SharesAPathOnlyWithAnExistingGroup) {
   asio::io_context io;
   const Registry registry = Registry::standard();
   EXPECT_NE(registry.make_shared(io, "can://can0?node=2&share=root", BoardRole::watch), nullptr);
@@ -84,7 +84,7 @@ struct Refusal {
   std::string reason;
 };
 
-TEST(Registry, RefusesAUrlThatItsTransportDoesNotTake) {
+TEST(Registry, RefusesAnInvalidUrlOfATransport) {
   const std::vector<Refusal> table = {
       {"udp:", Role::host, "it is not udp://HOST"},
       {"udp:192.168.1.77", Role::host, "it is not udp://HOST"},

@@ -51,7 +51,7 @@ TEST_F(SendQueueTest, ReplacesTheOldestState) {
   EXPECT_EQ(dropped, 2U);
 }
 
-TEST_F(SendQueueTest, RefusesANormalOneWhenFull) {
+TEST_F(SendQueueTest, RefusesANormalDatagramWhenFull) {
   for (const char* text : {"1", "2", "3", "4"}) push(text, Priority::normal);
   EXPECT_EQ(push("5", Priority::normal), SendResult::full);
   EXPECT_EQ(push("stop", Priority::stop), SendResult::sent);

@@ -19,7 +19,7 @@ Texts urls_of(std::string_view pattern) {
   return urls;
 }
 
-TEST(UrlPattern, AUrlStandsForItself) {
+TEST(UrlPattern, AUrlWithoutAPatternIsUnchanged) {
   for (const char* url :
        {"udp://192.168.0.125", "udp://[fe80::1]:2018", "serial:///dev/serial/by-id/usb-R4-1-if00",
         "can://can0?node=3&fd=1", "sim:", "udp:?id=arm-1-3", "udp://robot-1-3", "pty:/tmp/a-1-2"}) {
@@ -42,7 +42,7 @@ TEST(UrlPattern, RangesOfNodesAndPortsNeedNoBraces) {
   EXPECT_EQ(urls_of("udp://127.0.0.1:20000-20999").size(), 1000U);
 }
 
-TEST(UrlPattern, BracesHaveNumbersAndRangesAndTheLastCountsFastest) {
+TEST(UrlPattern, BracesTakeNumbersAndRangesAndTheLastCountsFastest) {
   EXPECT_EQ(urls_of("udp://arm-{1,3,09-11}"),
             (Texts{"udp://arm-1", "udp://arm-3", "udp://arm-09", "udp://arm-10", "udp://arm-11"}));
   const std::vector<PatternUrl> all = expand_urls("can://can{0-1}?node=0-2");
@@ -54,7 +54,7 @@ TEST(UrlPattern, BracesHaveNumbersAndRangesAndTheLastCountsFastest) {
   EXPECT_EQ(expand_urls("udp://10.0.0.{1-250}")[6].number, "7");
 }
 
-TEST(UrlPattern, APlusJoinsWhereAUrlFollows) {
+TEST(UrlPattern, APlusBeforeAUrlJoinsPaths) {
   struct Joined {
     const char* text;
     std::vector<std::string> urls;
@@ -78,7 +78,7 @@ TEST(UrlPattern, APlusJoinsWhereAUrlFollows) {
   }
 }
 
-TEST(UrlPattern, PathsOfOneBoardAreJoinedAndEachBoardHasTheNextOfEach) {
+TEST(UrlPattern, EachBoardGetsTheNextUrlOfEachJoinedPattern) {
   EXPECT_EQ(urls_of("serial:auto+udp://10.0.0.1"), (Texts{"serial:auto+udp://10.0.0.1"}));
   EXPECT_EQ(urls_of("can://can0?node=0-1+can://can1?node=2-3"),
             (Texts{"can://can0?node=0+can://can1?node=2", "can://can0?node=1+can://can1?node=3"}));

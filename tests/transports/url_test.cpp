@@ -47,7 +47,7 @@ const std::vector<Accepted> accepted = {
     {"replay:run.tsv?speed=2", "replay", "", -1, "run.tsv"},
 };
 
-TEST(Url, TakesEveryFormOfTheTable) {
+TEST(Url, AcceptsEveryValidFormOfTheTable) {
   for (const Accepted& row : accepted) {
     SCOPED_TRACE(row.text);
     const Url url = Url::parse(row.text);
@@ -100,7 +100,7 @@ const std::vector<Refused> refused = {
     {std::string("pty:/tmp\0x", 10), "control characters"},
 };
 
-TEST(Url, RefusesEveryFormOfTheTableWithItsReason) {
+TEST(Url, RefusesEveryInvalidFormOfTheTableWithAReason) {
   for (const Refused& row : refused) {
     SCOPED_TRACE(row.text);
     const Problem problem = problem_of([&] { Url::parse(row.text); });
@@ -111,7 +111,7 @@ TEST(Url, RefusesEveryFormOfTheTableWithItsReason) {
   }
 }
 
-TEST(Url, GivesTheValuesOfItsKeys) {
+TEST(Url, ReadsTheValuesOfItsKeys) {
   const Url url = Url::parse("udp://host?listen=2390&name=a%26b%3Dc&empty=&n=-5");
   EXPECT_EQ(url.get("listen"), "2390");
   EXPECT_EQ(url.get("name"), "a&b=c");
@@ -126,7 +126,7 @@ TEST(Url, GivesTheValuesOfItsKeys) {
   EXPECT_THROW(url.get_number("empty", 0, 10, 7), Error);
 }
 
-TEST(Url, TellsANumberThatIsNoneFromOneThatIsTooLarge) {
+TEST(Url, DistinguishesAnInvalidNumberFromATooLargeOne) {
   const auto text = [](const char* url) {
     return problem_of([&] { Url::parse(url).get_number("node", 0, 31, 1); }).text();
   };

@@ -57,7 +57,7 @@ TEST_F(WritableWaitTest, DoesNotCallAfterStop) {
   EXPECT_EQ(calls, 0);
 }
 
-TEST_F(WritableWaitTest, CallsAlsoWhenThereIsNoDescriptorLeftToWaitOn) {
+TEST_F(WritableWaitTest, CallsEvenIfNoDescriptorIsLeft) {
   WritableWait wait(io);
   rlimit before{};
   ASSERT_EQ(0, ::getrlimit(RLIMIT_NOFILE, &before));

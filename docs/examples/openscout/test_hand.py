@@ -25,7 +25,7 @@ def make_plugged(tmp_path):
     pad.close()
 
 
-def test_the_gamepad_drives_while_its_shoulder_is_held(plugged):
+def test_the_gamepad_drives_while_its_shoulder_button_is_held(plugged):
     pad, happens, unplug = plugged
     happens(3, Gamepad.ABS_Y, -32768)
     assert pad.wish().twist == (0, 0)
@@ -48,7 +48,7 @@ def test_the_gamepad_drives_while_its_shoulder_is_held(plugged):
     assert pad.wish().twist == (0, 0) and pad.ended
 
 
-def test_the_gamepad_stands_where_the_kernel_dropped_what_it_said(plugged):
+def test_the_gamepad_stops_when_the_kernel_drops_events(plugged):
     pad, happens, unplug = plugged
     happens(3, Gamepad.ABS_Y, -32768)
     happens(1, Gamepad.SHOULDER, 1)
@@ -119,7 +119,7 @@ def test_the_keyboard_drives_as_long_as_a_key_is_held(terminal):
     terminal.hang_up()
 
 
-def test_of_what_was_typed_before_it_is_armed_only_a_stop_counts(terminal):
+def test_only_a_stop_key_counts_before_arming(terminal):
     terminal.type(b'w')
     terminal.keyboard.begin()
     assert terminal.keyboard.wish().twist == (0, 0) and not terminal.keyboard.stop
@@ -129,7 +129,7 @@ def test_of_what_was_typed_before_it_is_armed_only_a_stop_counts(terminal):
     terminal.hang_up()
 
 
-def test_the_keyboard_ends_when_its_terminal_is_gone(terminal):
+def test_the_keyboard_ends_when_its_terminal_is_closed(terminal):
     assert terminal.type(b'w').twist == (hand.SPEED, 0)
     terminal.hang_up()
     assert terminal.keyboard.wish().twist == (0, 0) and terminal.keyboard.ended

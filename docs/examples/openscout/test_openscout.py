@@ -57,7 +57,7 @@ def follow(course, start):
     raise AssertionError('it does not arrive')
 
 
-def test_it_drives_a_figure_of_eight():
+def test_the_robot_drives_a_figure_of_eight():
     course = Course(figure_of_eight(1.5), CRUISE)
     worst, model = follow(course, control.Pose(0, 0, course.heading))
     print(f'{worst:.3f} m beside it at most, {math.hypot(model.x, model.y):.3f} m from its end')
@@ -65,7 +65,7 @@ def test_it_drives_a_figure_of_eight():
     assert math.hypot(model.x, model.y) <= 0.10
 
 
-def test_it_passes_its_waypoints():
+def test_the_robot_passes_its_waypoints():
     worst, model = follow(Course(WAYPOINTS, CRUISE), control.Pose(0, 0, 0))
     print(f'{worst:.3f} m beside them at most')
     assert worst <= 0.20
@@ -144,7 +144,7 @@ def drive(arguments, course):
 @pytest.mark.parametrize('arguments, places', [(('--eight', '0.7'), figure_of_eight(0.7)),
                                                (('--course', '0.5,0', '0.8,0.4'), [(0, 0), (0.5, 0), (0.8, 0.4)])],
                          ids=['eight', 'course'])
-def test_it_keeps_to_its_course_behind_the_simulated_board(arguments, places):
+def test_the_robot_keeps_its_course_with_a_simulated_board(arguments, places):
     for _ in range(3):
         told, code, worst, left = drive(arguments, Course(places, CRUISE))
         if 'newest state' not in told:  # as where this machine stood still
@@ -195,7 +195,7 @@ def cut(scene):
 @pytest.mark.parametrize('happens, notice_s, told', [(let_go, 0.0, 'handle'), (obstacle, 0.5, 'proximity'),
                                                      (killed, TIMEOUT_S, ''), (cut, TIMEOUT_S, 'newest state')],
                          ids=['handle let go', 'obstacle', 'killed', 'link lost'])
-def test_it_stands_within_its_braking_distance_and_one_timeout(happens, notice_s, told):
+def test_the_robot_stops_within_braking_distance_and_one_timeout(happens, notice_s, told):
     with r4link.SimBoard('udp://127.0.0.1:0') as sim, Behind(sim) as model, Relay(sim.url) as path:
         with at_speed(path.url, model) as program:
             speed, begun = model.speed, model.travelled
@@ -212,7 +212,7 @@ def test_it_stands_within_its_braking_distance_and_one_timeout(happens, notice_s
     assert rolled <= allowed
 
 
-def test_its_keys_move_the_wheels_and_the_arm_of_the_board():
+def test_keys_move_the_wheels_and_the_arm():
     keys, terminal = pty.openpty()
     with r4link.SimBoard('udp://127.0.0.1:0') as sim, Behind(sim) as model:
         with running(sim.url, stdin=terminal) as program:

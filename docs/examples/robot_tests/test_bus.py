@@ -26,7 +26,7 @@ def test_a_stop_button_on_the_bus_stops_every_board(r4_bus, button):
         board.expect_safe('stop')
 
 
-def test_each_board_obeys_its_own_host_alone(r4_bus):
+def test_each_board_obeys_only_its_own_host(r4_bus):
     left, right = r4_bus
     left.arm(timeout=3)
     left.osmc(1).set_pwm(500, timeout=3)

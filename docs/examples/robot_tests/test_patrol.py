@@ -14,7 +14,7 @@ def until(done, within=3.0):
         time.sleep(0.002)
 
 
-def test_it_goes_back_when_something_is_near(r4_robot):
+def test_the_robot_reverses_near_an_obstacle(r4_robot):
     program = threading.Thread(target=patrol.patrol, args=(r4_robot.url,))
     program.start()
     until(lambda: r4_robot.look().osmc[0].duty > 0.2)
@@ -44,7 +44,7 @@ def test_the_wheels_of_three_boards_turn(r4_bus):
 
 
 @pytest.mark.r4(link='loss=10%,delay=10ms±10,duplicate=5%,corrupt=5%,seed=7')
-def test_it_drives_over_a_bad_link(r4_link):
+def test_the_robot_drives_over_a_bad_link(r4_link):
     r4_link.arm(timeout=3)
     for pwm in (100, 200, 300):
         r4_link.osmc(1).set_pwm(pwm, timeout=3)
@@ -61,7 +61,7 @@ def test_the_motors_are_off_while_the_link_is_cut(r4_link):
 
 
 @pytest.mark.r4(transport='pty', link='corrupt=10%,seed=3')
-def test_damage_on_a_serial_line_is_noticed(r4_link):
+def test_damage_on_a_serial_line_is_counted(r4_link):
     r4_link.arm(timeout=3)
     for pwm in (100, 200, 300):
         r4_link.osmc(1).set_pwm(pwm, timeout=3)
@@ -70,7 +70,7 @@ def test_damage_on_a_serial_line_is_noticed(r4_link):
 
 
 @pytest.mark.r4(transport='pty')
-def test_over_a_serial_line(r4_board):
+def test_a_board_is_driven_and_stopped_over_a_serial_line(r4_board):
     r4_board.arm(timeout=3)
     r4_board.servo(3).set(us=1500, timeout=3)
     r4_board.expect(relays=1)

@@ -17,7 +17,7 @@ using Lines = std::vector<std::string>;
 
 using ApplicationCommand = test::BoardInControl;
 
-TEST_F(ApplicationCommand, EveryOutputDoesWhatItIsTold) {
+TEST_F(ApplicationCommand, EveryOutputFollowsItsCommand) {
   for (const char* field : {"R:1,On", "O:4095,1,1", "O:1,0,4", "D:7,1,2", "S:2500,16", "R:8,1",
                             "R:2,on", "R:2,Off", "P:-100,20000,1", "P:5,4", "B:4095,1,1,3"}) {
     host.command(field);
@@ -39,7 +39,7 @@ TEST_F(ApplicationCommand, EveryOutputDoesWhatItIsTold) {
   EXPECT_EQ(board.outputs(), expected);
 }
 
-TEST_F(ApplicationCommand, RefusesWhatIsNoCommandOfTheBoard) {
+TEST_F(ApplicationCommand, RefusesInvalidCommands) {
   const std::pair<const char*, const char*> cases[] = {
       {"X:1", "UNKNOWN"},        {"E:HALT", "UNKNOWN"},         {"H:HELLO", "UNKNOWN"},
       {"Q:WHO", "UNKNOWN"},      {"O:1,1", "FORMAT"},           {"O:1,1,1,1", "FORMAT"},
@@ -66,14 +66,14 @@ TEST_F(ApplicationCommand, RefusesWhatIsNoCommandOfTheBoard) {
   EXPECT_EQ(board.application->settings().state_rate_hz, before.state_rate_hz);
 }
 
-TEST_F(ApplicationCommand, ExecutesANumberOnce) {
+TEST_F(ApplicationCommand, ExecutesEachCommandNumberOnce) {
   const std::uint32_t number = host.command("P:100,1");
   for (int i = 0; i < 3; ++i) host.resend("P:100,1", number);
   EXPECT_EQ(board.log.executed, std::vector<std::uint32_t>{number});
   EXPECT_EQ(answers(), (Lines{"DUPLICATE", "DUPLICATE", "DUPLICATE"}));
 }
 
-TEST_F(ApplicationCommand, NothingSentBeforeTheSessionBeganIsExecuted) {
+TEST_F(ApplicationCommand, RefusesCommandsSentBeforeTheSession) {
   TestBoard fresh;
   TestHost again(fresh, our_session);
   again.heartbeat(0);
@@ -88,7 +88,7 @@ TEST_F(ApplicationCommand, NothingSentBeforeTheSessionBeganIsExecuted) {
   EXPECT_EQ(fresh.outputs().osmc[0].pwm, 2);
 }
 
-TEST_F(ApplicationCommand, AnEchoOfAnotherBootBeginsNothing) {
+TEST_F(ApplicationCommand, AnEchoOfAnotherBootStartsNoSession) {
   TestBoard fresh;
   TestHost again(fresh, our_session);
   again.heartbeat(0);
@@ -111,7 +111,7 @@ TEST_F(ApplicationCommand, ACommandRefusedInAnOutageStaysRefused) {
   EXPECT_EQ(answers(), Lines{"SAFE"});
 }
 
-TEST_F(ApplicationCommand, NeedsANumberForAllButStopHeartbeatAndQuestion) {
+TEST_F(ApplicationCommand, OnlyStopHeartbeatAndIdentifyNeedNoPacketNumber) {
   for (const char* field :
        {"O:1,1,1;", "E:CLEAR;", "F:ALL;", "C:rate,10;", "X:1;", "O:9999,1,1;"}) {
     board.receive(field, host.at);
@@ -134,7 +134,7 @@ TEST_F(ApplicationCommand, ReportsTheNewestExecutedNumber) {
   EXPECT_EQ(state_of(board.take(MessageKind::state).back()).last_command, number);
 }
 
-TEST_F(ApplicationCommand, AnswersWhereTheQuestionCameFrom) {
+TEST_F(ApplicationCommand, AnswersThePeerThatAsked) {
   TestBoard two(Settings(), 2);
   TestHost owner(two, our_session, Source{0, 4});
   owner.connect();
@@ -154,7 +154,7 @@ TEST_F(ApplicationCommand, AnswersWhereTheQuestionCameFrom) {
   EXPECT_EQ(second[1].peer, 9U);
 }
 
-TEST_F(ApplicationCommand, AnswersTheQuestionWhoItIsInAnyState) {
+TEST_F(ApplicationCommand, AnswersIdentifyInEveryState) {
   const std::string answer = "I:R4,1.2.3,R4-7,udp+serial+leave+group+watch+dac;";
   TestBoard fresh;
   fresh.take();
@@ -172,7 +172,7 @@ TEST_F(ApplicationCommand, AnswersTheQuestionWhoItIsInAnyState) {
   EXPECT_EQ(heard[0].bytes.rfind(answer, 0), 0U);
 }
 
-TEST_F(ApplicationCommand, LimitsTheLongAnswersToHostsThatHaveProvedNothing) {
+TEST_F(ApplicationCommand, LimitsIdentityAnswersToUnprovenHosts) {
   std::size_t identities = 0;
   for (int i = 0; i < 1000; ++i) {
     board.take();
@@ -204,7 +204,7 @@ TEST_F(ApplicationCommand, ObeysAndAnswersEveryStop) {
   }
 }
 
-TEST_F(ApplicationCommand, TellsWhoAsksWhetherAnotherHostIsInControl) {
+TEST_F(ApplicationCommand, TheIdentityReportsWhetherAnotherHostHasControl) {
   const auto identity = [this](Source from, SessionId sid = no_session) {
     board.take();
     board.receive("Q:ID;" + test::stamp_of(sid, 1, 1), from);
@@ -219,7 +219,7 @@ TEST_F(ApplicationCommand, TellsWhoAsksWhetherAnotherHostIsInControl) {
   EXPECT_NE(identity(stranger).find(";BUSY:0;"), std::string::npos);
 }
 
-TEST_F(ApplicationCommand, TellsWhoAsksWhichQuestionItAnswers) {
+TEST_F(ApplicationCommand, TheIdentityNamesThePacketNumberOfItsQuestion) {
   board.take();
   board.receive("Q:ID;PNum:4294967295;T:3;", host.at);
   board.receive("Q:ID;", host.at);
@@ -229,7 +229,7 @@ TEST_F(ApplicationCommand, TellsWhoAsksWhichQuestionItAnswers) {
   EXPECT_EQ(heard[1].bytes.find("ASKED"), std::string::npos) << "the question has no number";
 }
 
-TEST_F(ApplicationCommand, ListensToNoOtherBoard) {
+TEST_F(ApplicationCommand, IgnoresDatagramsOfOtherBoards) {
   for (const char* fields : {"H:R4-ROS2;PNum:1;T:1;", "N:5,SAFE;PNum:1;T:1;",
                              "I:R4,1,2,3;PNum:1;T:1;", "AIN24:24.28;PNum:1;T:1;", "PNum:1;T:1;"}) {
     board.receive(fields, host.at);
@@ -243,7 +243,7 @@ TEST_F(ApplicationCommand, ListensToNoOtherBoard) {
   EXPECT_EQ(board.reason(), SafeReason::link);
 }
 
-TEST_F(ApplicationCommand, ZeroCountsAnewAndHoldsTheStepper) {
+TEST_F(ApplicationCommand, ZeroResetsTheCountAndHoldsTheStepper) {
   host.command("P:1000,2");
   host.command("Z:2");
   EXPECT_EQ(board.hal.zeroed, std::vector<int>{2});
@@ -252,7 +252,7 @@ TEST_F(ApplicationCommand, ZeroCountsAnewAndHoldsTheStepper) {
   EXPECT_EQ(board.hal.zeroed.size(), 1U);
 }
 
-TEST_F(ApplicationCommand, CountsWhatItReceives) {
+TEST_F(ApplicationCommand, CountsReceivedLostDuplicateAndRefusedDatagrams) {
   host.command("F:RXOK,RXCRC,RXLOST,RXDUP,RXREF");
   board.take();
   board.run(10);
@@ -273,7 +273,7 @@ TEST_F(ApplicationCommand, CountsWhatItReceives) {
 
 // --- hosts whose heartbeats have no number, as in the paper's capture
 
-TEST(ApplicationNumberless, BeginsANewSessionAfterAnOutage) {
+TEST(ApplicationWithoutNumbers, BeginsANewSessionAfterAnOutage) {
   TestBoard board;
   board.receive("H:ROS2-R4;T:1;");
   board.receive("O:358,1,1;PNum:6600;T:1;");

@@ -41,7 +41,7 @@ class ApplicationDevices : public testing::Test {
   TestHost host{board, our_session};
 };
 
-TEST_F(ApplicationDevices, AnswersUnderTheNumberOfTheCommandForASecond) {
+TEST_F(ApplicationDevices, AnswersWithTheCommandNumberForOneSecond) {
   const std::uint32_t number = host.command("X:READ,0x68,x75,1");
   pass(20);
   State state = newest_state();
@@ -59,7 +59,7 @@ TEST_F(ApplicationDevices, AnswersUnderTheNumberOfTheCommandForASecond) {
   EXPECT_TRUE(state.present.has(StateField::i2cbus));
 }
 
-TEST_F(ApplicationDevices, IsExecutedOnce) {
+TEST_F(ApplicationDevices, ADeviceCommandIsExecutedOnce) {
   const std::uint32_t number = host.command("X:WRITE,0x68,x6b00");
   pass(20);
   const std::uint32_t transfers = devices.bus.transfers();
@@ -69,13 +69,13 @@ TEST_F(ApplicationDevices, IsExecutedOnce) {
   EXPECT_EQ(devices.bus.transfers(), transfers);
 }
 
-TEST_F(ApplicationDevices, OneWhileAnotherIsUnderWayIsRefused) {
+TEST_F(ApplicationDevices, RefusesADeviceCommandWhileOneIsInProgress) {
   host.command("X:SCAN");
   const std::uint32_t second = host.command("X:READ,0x68,x75,1");
   EXPECT_EQ(board.log.refused.back(), std::to_string(second) + " FULL");
 }
 
-TEST_F(ApplicationDevices, SafeRefusesWritesAndNothingElse) {
+TEST_F(ApplicationDevices, TheSafeStateRefusesOnlyWrites) {
   host.command("E:STOP");
   const std::uint32_t write = host.command("X:WRITE,0x68,x6b00");
   EXPECT_EQ(board.log.refused.back(), std::to_string(write) + " SAFE");
@@ -89,7 +89,7 @@ TEST_F(ApplicationDevices, SafeRefusesWritesAndNothingElse) {
   EXPECT_EQ(board.log.refused.size(), 1U);
 }
 
-TEST_F(ApplicationDevices, AStopDropsAWriteThatWaits) {
+TEST_F(ApplicationDevices, AStopDropsAWaitingWrite) {
   host.command("X:POLL,0x68,x3b,14,5,1");
   pass(1);  // the reading is on the wire
   const std::uint32_t write = host.command("X:WRITE,0x68,x6b00");
@@ -104,7 +104,7 @@ TEST_F(ApplicationDevices, AStopDropsAWriteThatWaits) {
   EXPECT_EQ(newest_state().i2c_answer.data.bytes[0], 0x40) << "the write was not carried out";
 }
 
-TEST_F(ApplicationDevices, ReadingsEndWithTheSessionAndThoseOfSettingsStay) {
+TEST_F(ApplicationDevices, OnlyReadingsFromSettingsOutlastTheSession) {
   host.command("C:i2c2,0x40:x02:2:20");
   host.command("X:POLL,0x68,x75,1,20,1");
   host.command("X:OFF,2");
@@ -127,7 +127,7 @@ TEST_F(ApplicationDevices, ReadingsEndWithTheSessionAndThoseOfSettingsStay) {
   EXPECT_NE(state.raw.i2c[1].t_ms, 0U);
 }
 
-TEST_F(ApplicationDevices, AReadingIsToldWithItsTimeInEveryState) {
+TEST_F(ApplicationDevices, EveryStateHasTheReadingAndItsTime) {
   host.command("F:I2C1");
   host.command("X:POLL,0x68,x75,1,50,1");
   board.take();
@@ -139,13 +139,13 @@ TEST_F(ApplicationDevices, AReadingIsToldWithItsTimeInEveryState) {
   }
 }
 
-TEST_F(ApplicationDevices, TheChipsOfTheBoardAreNotOnThisBus) {
+TEST_F(ApplicationDevices, TheUsersBusHasNoChipsOfTheBoard) {
   host.command("X:READ,0x41,x00,1");  // a PCA9685 of the board
   pass(20);
   EXPECT_EQ(newest_state().i2c_answer.outcome, I2cOutcome::no_acknowledge);
 }
 
-TEST(ApplicationWithoutDevices, KnowsNoX) {
+TEST(ApplicationWithoutDevices, RefusesDeviceCommandsAsUnknown) {
   TestBoard board;
   TestHost host(board, our_session);
   host.connect();

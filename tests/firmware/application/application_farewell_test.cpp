@@ -20,7 +20,7 @@ struct ApplicationFarewell : test::BoardInControl {
   TestHost other{board, another_session, Source{0, 5}};
 };
 
-TEST_F(ApplicationFarewell, MakesTheOutputsSafeAndTheBoardFreeAtOnce) {
+TEST_F(ApplicationFarewell, MakesTheOutputsSafeAndReleasesControlAtOnce) {
   host.command("O:358,1,1");
   const int made_safe = board.hal.made_safe;
   leave(host, host.pnum++);
@@ -37,7 +37,7 @@ TEST_F(ApplicationFarewell, MakesTheOutputsSafeAndTheBoardFreeAtOnce) {
   EXPECT_EQ(board.outputs().osmc[1].pwm, 5);
 }
 
-TEST_F(ApplicationFarewell, NothingComesBackWithTheSameHost) {
+TEST_F(ApplicationFarewell, RestoresNoOutputsForTheSameHost) {
   host.command("O:358,1,1");
   leave(host, host.pnum++);
   board.run(1);
@@ -49,7 +49,7 @@ TEST_F(ApplicationFarewell, NothingComesBackWithTheSameHost) {
   EXPECT_EQ(board.outputs().osmc[0].pwm, 0);
 }
 
-TEST_F(ApplicationFarewell, OfAnotherHostIsRefused) {
+TEST_F(ApplicationFarewell, IsRefusedFromAnotherHost) {
   host.command("O:358,1,1");
   forget();
   leave(other, other.pnum++);
@@ -57,7 +57,7 @@ TEST_F(ApplicationFarewell, OfAnotherHostIsRefused) {
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
 }
 
-TEST_F(ApplicationFarewell, LateOrRepeatedHasNoEffectOnTheNextSession) {
+TEST_F(ApplicationFarewell, DoesNotEndTheNextSessionIfLateOrRepeated) {
   const std::uint32_t number = host.pnum++;
   leave(host, number);
   forget();
@@ -77,7 +77,7 @@ TEST_F(ApplicationFarewell, LateOrRepeatedHasNoEffectOnTheNextSession) {
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationFarewell, OfAPaperHostIsRefused) {
+TEST_F(ApplicationFarewell, IsRefusedFromAPaperHost) {
   TestBoard paper_board;
   TestHost paper(paper_board, no_session);
   paper.heartbeat(5);
@@ -126,7 +126,7 @@ struct SignedFarewell : testing::Test {
   std::string nonce;
 };
 
-TEST_F(SignedFarewell, IsObeyedIfItIsSigned) {
+TEST_F(SignedFarewell, IsObeyedOnlyIfSigned) {
   drive();
   board.receive("E:LEAVE;" + test::stamp_of(sid, pnum, board.newest_t()), at);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
@@ -136,7 +136,7 @@ TEST_F(SignedFarewell, IsObeyedIfItIsSigned) {
   EXPECT_FALSE(board.application->link().has_owner());
 }
 
-TEST_F(SignedFarewell, ReplayedItEndsNoSession) {
+TEST_F(SignedFarewell, DoesNotEndASessionWhenReplayed) {
   drive();
   const std::string farewell = say("E:LEAVE", board.newest_t());
   board.run(10);

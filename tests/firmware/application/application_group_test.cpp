@@ -25,7 +25,7 @@ struct ApplicationGroup : test::BoardInControl {
   }
 };
 
-TEST_F(ApplicationGroup, ReachesTheHardwareInOneGo) {
+TEST_F(ApplicationGroup, ReachesTheHardwareInOneCall) {
   const int applied = board.hal.applied;
   const std::uint32_t number = host.command(
       "O:358,1,1;O:358,1,2;O:358,0,3;D:7,1,4;S:1500,16;R:8,On;P:-100,2;B:9,1,0,3;Z:4;X:DAC,2,1650");
@@ -47,7 +47,7 @@ TEST_F(ApplicationGroup, ReachesTheHardwareInOneGo) {
   EXPECT_EQ(board.application->link().last_executed(), number);
 }
 
-TEST_F(ApplicationGroup, OfWhichOneCommandIsWrongChangesNothing) {
+TEST_F(ApplicationGroup, ChangesNothingIfOneCommandIsWrong) {
   const int applied = board.hal.applied;
   const std::pair<const char*, const char*> cases[] = {
       {"O:1,1,1;O:4096,1,2", "RANGE AT:2"},
@@ -111,7 +111,7 @@ TEST_F(ApplicationGroup, IsRefusedAsAWholeWhileTheOutputsAreSafe) {
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationGroup, WithAStopInItIsAStop) {
+TEST_F(ApplicationGroup, StopsTheBoardIfItContainsAStop) {
   host.command("O:1,1,1;O:1,1,2");
   for (const char* fields : {"O:358,1,1;E:STOP;O:358,1,2", "E:STOP;C:rate,50", "X:1;E:STOP"}) {
     host.command(fields);
@@ -125,7 +125,7 @@ TEST_F(ApplicationGroup, WithAStopInItIsAStop) {
 
 // Closing the supply moves nothing (docs/reference/safety.md), but a command after it in the group
 // does.
-TEST_F(ApplicationGroup, HasTheEffectOfItsCommandsInTheirOrder) {
+TEST_F(ApplicationGroup, AppliesItsCommandsInOrder) {
   host.command("O:358,1,1;R:1,On");
   EXPECT_EQ(board.outputs().relays, 1);
   EXPECT_EQ(board.outputs().osmc[0].pwm, 0);

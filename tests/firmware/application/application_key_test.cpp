@@ -84,7 +84,7 @@ class ApplicationKey : public testing::Test {
   KeyHost host{board};
 };
 
-TEST_F(ApplicationKey, TellsItsNonceAndItsTimeInEveryHeartbeat) {
+TEST_F(ApplicationKey, SendsItsNonceAndItsTimeInEveryHeartbeat) {
   const std::vector<Heard> heard = board.take();
   ASSERT_EQ(heard.size(), 2U);
   EXPECT_EQ(heard[1].bytes, test::with_crc("H:R4-ROS2;PNum:0;T:500500;AN:" + host.nonce + ";"));
@@ -103,7 +103,7 @@ TEST_F(ApplicationKey, ObeysAHostThatSigns) {
   EXPECT_EQ(board.log.rejected, Lines());
 }
 
-TEST_F(ApplicationKey, ObeysNoHostThatDoesNot) {
+TEST_F(ApplicationKey, IgnoresAHostThatDoesNotSign) {
   board.take();
   board.receive("H:ROS2-R4;" + test::stamp_of(our_session, 1, 0));
   EXPECT_EQ(board.state(), BoardState::connecting);
@@ -157,7 +157,7 @@ TEST_F(ApplicationKey, AnswersAnUnsignedCommandWithAuth) {
 
 // docs/reference/protocol.md 4.2: the T of a CONNECTING heartbeat is for the signature only; a host
 // does not echo it.
-TEST_F(ApplicationKey, AnEchoOfWhatItSaysWhileConnectingStartsNothingButAZeroDoes) {
+TEST_F(ApplicationKey, AnEchoOfAConnectingHeartbeatStartsNoSession) {
   for (int i = 0; i < 20; ++i) {
     host.listen();
     ASSERT_NE(host.t, 0U);
@@ -173,7 +173,7 @@ TEST_F(ApplicationKey, AnEchoOfWhatItSaysWhileConnectingStartsNothingButAZeroDoe
   EXPECT_EQ(board.state(), BoardState::active);
 }
 
-TEST_F(ApplicationKey, AForgedHeartbeatOfTheOwnerDoesNotFeed) {
+TEST_F(ApplicationKey, AForgedHeartbeatDoesNotKeepTheLinkAlive) {
   host.connect();
   host.command("O:358,1,1");
   for (int i = 0; i < 11; ++i) {
@@ -185,7 +185,7 @@ TEST_F(ApplicationKey, AForgedHeartbeatOfTheOwnerDoesNotFeed) {
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationKey, AReplayMovesNothingFromAnywhere) {
+TEST_F(ApplicationKey, AReplayFromAnyPeerHasNoEffect) {
   host.connect();
   host.command("O:358,1,1");
   const std::string command = host.last;
@@ -205,7 +205,7 @@ TEST_F(ApplicationKey, AReplayMovesNothingFromAnywhere) {
   ASSERT_EQ(board.reason(), SafeReason::link) << "replays do not keep the link alive";
 }
 
-TEST_F(ApplicationKey, WhatTheNetworkHeldBackForMoreThan250MsDoesNothing) {
+TEST_F(ApplicationKey, RejectsCommandsDelayedByMoreThan250Ms) {
   host.connect();
   const std::string late = host.signed_fields(host.fields("O:358,1,1", 1));
   board.run(250);
@@ -221,7 +221,7 @@ TEST_F(ApplicationKey, WhatTheNetworkHeldBackForMoreThan250MsDoesNothing) {
   EXPECT_EQ(board.log.rejected, (Lines{"old", "old"}));
 }
 
-TEST_F(ApplicationKey, ARetrySignedAnewIsExecutedOnce) {
+TEST_F(ApplicationKey, ACommandSignedTwiceIsExecutedOnce) {
   host.connect();
   const std::uint32_t pnum = host.pnum++;
   const std::string text = "O:358,1,1;" + test::stamp_of(our_session, pnum, 5);
@@ -240,7 +240,7 @@ TEST_F(ApplicationKey, AStopNeedsNoSignature) {
   EXPECT_EQ(board.log.rejected, Lines());
 }
 
-TEST_F(ApplicationKey, AnUnsignedStopProvesNothingOfTheOwnersCommands) {
+TEST_F(ApplicationKey, AnUnsignedStopConfirmsNoCommand) {
   host.connect();
   const std::uint32_t executed = host.command("O:358,1,1");
   // The stop has the number of a command that was kept from the board.
@@ -253,7 +253,7 @@ TEST_F(ApplicationKey, AnUnsignedStopProvesNothingOfTheOwnersCommands) {
   EXPECT_EQ(board.application->link().last_executed(), stop) << "a signed stop is a command";
 }
 
-TEST_F(ApplicationKey, TheOwnersStopIsNoRepetitionOfOneThatWasForgedUnderItsNumber) {
+TEST_F(ApplicationKey, ASignedStopIsANewCauseAfterAForgedStop) {
   host.connect();
   const std::uint32_t next = host.pnum + 1;
   board.receive("E:STOP;" + test::stamp_of(our_session, next, 0), host.at);
@@ -265,7 +265,7 @@ TEST_F(ApplicationKey, TheOwnersStopIsNoRepetitionOfOneThatWasForgedUnderItsNumb
   EXPECT_EQ(board.reason(), SafeReason::stop);
 }
 
-TEST_F(ApplicationKey, ACopyOfTheOwnersStopIsARepetitionWhateverItsSignatureIsWorth) {
+TEST_F(ApplicationKey, ADuplicateOfASignedStopIsNotANewCause) {
   host.connect();
   const std::string stop = host.signed_fields(host.fields("E:STOP", host.pnum++));
   board.receive(stop, host.at);
@@ -275,7 +275,7 @@ TEST_F(ApplicationKey, ACopyOfTheOwnersStopIsARepetitionWhateverItsSignatureIsWo
   EXPECT_EQ(board.newest_cause(), cause);
 }
 
-TEST_F(ApplicationKey, OnlyTheOwnerClearsAStop) {
+TEST_F(ApplicationKey, OnlyASignedClearClearsAStop) {
   host.connect();
   board.receive("E:STOP;", {0, 99});
   board.run(5);
@@ -287,14 +287,14 @@ TEST_F(ApplicationKey, OnlyTheOwnerClearsAStop) {
   EXPECT_EQ(board.reason(), SafeReason::none);
 }
 
-TEST_F(ApplicationKey, AnswersWhoItIsToAnyone) {
+TEST_F(ApplicationKey, AnswersIdentifyWithoutASignature) {
   board.take();
   board.receive("Q:ID;PNum:1;T:0;", {0, 99});
   EXPECT_EQ(board.take(MessageKind::identity).size(), 1U);
   EXPECT_EQ(board.log.rejected, Lines());
 }
 
-TEST_F(ApplicationKey, TakesAnotherNonceForEachCauseToBeSafe) {
+TEST_F(ApplicationKey, ChangesItsNonceForEachCauseOfTheSafeState) {
   host.connect();
   const std::string first = host.nonce;
   const std::string before = host.signed_fields(host.fields("O:358,1,1", 1));
@@ -311,7 +311,7 @@ TEST_F(ApplicationKey, TakesAnotherNonceForEachCauseToBeSafe) {
   EXPECT_EQ(pwm(), 358);
 }
 
-TEST_F(ApplicationKey, ACableOfItsOwnNeedsNoSignatureAndCanSetKeys) {
+TEST_F(ApplicationKey, TheBoardsOwnCableNeedsNoSignatureAndCanSetKeys) {
   board.ports[1].cable = true;
   test::TestHost cable(board, our_session, {1, 0});
   cable.connect();
@@ -322,14 +322,14 @@ TEST_F(ApplicationKey, ACableOfItsOwnNeedsNoSignatureAndCanSetKeys) {
   EXPECT_EQ(board.log.refused, Lines());
 }
 
-TEST_F(ApplicationKey, AKeyIsNotSetOverANetworkNotEvenBySomebodyWhoHasOne) {
+TEST_F(ApplicationKey, RefusesToSetAKeyOverANetworkEvenIfSigned) {
   host.connect();
   const std::uint32_t pnum = host.command("C:key,1:off");
   EXPECT_EQ(board.log.refused, Lines{std::to_string(pnum) + " AUTH"});
   EXPECT_TRUE(board.application->authentication().required());
 }
 
-TEST(ApplicationWithoutKey, AsksForASignatureAsSoonAsItIsGivenAKey) {
+TEST(ApplicationWithoutKey, RequiresASignatureAsSoonAsAKeyIsSet) {
   TestBoard board({}, 2);
   board.ports[0].cable = true;
   test::TestHost cable(board, our_session);
@@ -349,7 +349,7 @@ TEST(ApplicationWithoutKey, AsksForASignatureAsSoonAsItIsGivenAKey) {
   EXPECT_EQ(board.log.rejected.front(), "missing");
 }
 
-TEST(ApplicationWithoutKey, TakesASignedDatagramAsAnyOther) {
+TEST(ApplicationWithoutKey, AcceptsASignedDatagram) {
   TestBoard board;
   test::TestHost host(board, our_session);
   host.connect();
@@ -357,7 +357,7 @@ TEST(ApplicationWithoutKey, TakesASignedDatagramAsAnyOther) {
   EXPECT_EQ(board.outputs().osmc[0].pwm, 358);
 }
 
-TEST(ApplicationHeartbeat, NumberZeroMeansConnectingAndNothingElse) {
+TEST(ApplicationHeartbeat, OnlyAConnectingHeartbeatHasNumberZero) {
   TestBoard board(settings_with(key));
   KeyHost host(board);
   board.run(10);

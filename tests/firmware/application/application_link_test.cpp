@@ -30,7 +30,7 @@ TEST(ApplicationLink, SendsThePapersHeartbeatWhileConnecting) {
   EXPECT_EQ(board.hal.made_safe, 1);
 }
 
-TEST(ApplicationLink, OffersAHostWithNothingToEchoAHeartbeatOfItsOwn) {
+TEST(ApplicationLink, AnswersAHostWithoutAnEchoOnlyOnItsPort) {
   TestBoard board({}, 2);
   TestHost host(board, our_session, Source{0, 3});
   board.run(777);
@@ -49,7 +49,7 @@ TEST(ApplicationLink, OffersAHostWithNothingToEchoAHeartbeatOfItsOwn) {
   EXPECT_EQ(board.state(), BoardState::active);
 }
 
-TEST(ApplicationLink, StreamsFromTheHeartbeatOnThatBeginsTheSession) {
+TEST(ApplicationLink, StreamsAsSoonAsAHeartbeatStartsTheSession) {
   TestBoard board;
   TestHost host(board, no_session);
   board.run(777);
@@ -66,7 +66,7 @@ TEST(ApplicationLink, StreamsFromTheHeartbeatOnThatBeginsTheSession) {
   EXPECT_EQ(board.log.states, (Lines{"CONNECTING none", "ACTIVE none"}));
 }
 
-TEST(ApplicationLink, HearsAPaperHostsHeartbeatWithoutNumberOrTime) {
+TEST(ApplicationLink, AcceptsAPaperHeartbeatWithoutNumberOrTime) {
   for (const char* fields : {"H:ROS2-R4;", "H:ROS2-R4;T:79201;", "H:ROS2-R4;PNum:1;",
                              "T:5;PNum:1;H:ROS2-R4;", "X:1;H:ROS2-R4;"}) {
     TestBoard board;
@@ -92,7 +92,7 @@ TEST(ApplicationLink, GoesSafeExactlyAtTheTimeout) {
   EXPECT_EQ(board.log.state_ms, board.now_ms);
 }
 
-TEST(ApplicationLink, SilenceCountsBeforeTheHeartbeatThatEndsIt) {
+TEST(ApplicationLink, TheTimeoutAppliesBeforeALateHeartbeat) {
   TestBoard board;
   TestHost host(board, no_session);
   host.heartbeat(5);
@@ -128,14 +128,14 @@ struct ApplicationStandstill : testing::Test {
   TestHost host{board, no_session};
 };
 
-TEST_F(ApplicationStandstill, AHeartbeatThatWaitedCountsFromWhenTheLoopStoodStill) {
+TEST_F(ApplicationStandstill, AWaitingHeartbeatCountsFromTheStartOfTheStandstill) {
   board.now_ms += 300;  // nothing was polled, and the heartbeat came at the beginning
   host.heartbeat(6);
   EXPECT_FALSE(board.safe());
   EXPECT_EQ(safe_after(), 1000U - 300U);
 }
 
-TEST_F(ApplicationStandstill, SoItDoesBehindATurnOfTheLoop) {
+TEST_F(ApplicationStandstill, AWaitingHeartbeatReadAfterAPollCountsFromTheStart) {
   board.now_ms += 300;
   board.application->poll(board.now_ms);  // the timer came before the waiting datagrams were read
   board.run(20);
@@ -143,7 +143,7 @@ TEST_F(ApplicationStandstill, SoItDoesBehindATurnOfTheLoop) {
   EXPECT_EQ(safe_after(), 1000U - 320U);
 }
 
-TEST_F(ApplicationStandstill, AHeartbeatBehindTheBacklogCountsFromNow) {
+TEST_F(ApplicationStandstill, AHeartbeatAfterTheBacklogCountsFromItsArrival) {
   board.now_ms += 300;
   host.heartbeat(6);
   board.application->drained(0);
@@ -152,14 +152,14 @@ TEST_F(ApplicationStandstill, AHeartbeatBehindTheBacklogCountsFromNow) {
   EXPECT_EQ(safe_after(), 1000U);
 }
 
-TEST_F(ApplicationStandstill, APortThatCannotTellHasNoBacklogWhenTheLoopHasTurnedForAWhile) {
+TEST_F(ApplicationStandstill, TheBacklogOfAPortEndsAfterTheCatchUpTime) {
   board.now_ms += 300;
   board.run(firmware::Application::catch_up_ms);
   host.heartbeat(6);
   EXPECT_EQ(safe_after(), 1000U);
 }
 
-TEST_F(ApplicationStandstill, StandingStillAgainMakesNothingYounger) {
+TEST_F(ApplicationStandstill, ASecondStandstillAddsToTheFirst) {
   board.now_ms += 100;
   board.application->poll(board.now_ms);
   board.now_ms += 150;
@@ -167,13 +167,13 @@ TEST_F(ApplicationStandstill, StandingStillAgainMakesNothingYounger) {
   EXPECT_EQ(safe_after(), 1000U - 250U);
 }
 
-TEST_F(ApplicationStandstill, ALoopThatTurnsAsItShouldDoesNotStandStill) {
+TEST_F(ApplicationStandstill, AShortPauseIsNotAStandstill) {
   board.now_ms += firmware::Application::standstill_ms;
   host.heartbeat(6);
   EXPECT_EQ(safe_after(), 1000U);
 }
 
-TEST_F(ApplicationStandstill, EachPortHasABacklogOfItsOwn) {
+TEST_F(ApplicationStandstill, EachPortHasItsOwnBacklog) {
   TestBoard two({}, 2);
   TestHost driver(two, no_session, Source{1, 4});
   driver.heartbeat(5);
@@ -188,7 +188,7 @@ TEST_F(ApplicationStandstill, EachPortHasABacklogOfItsOwn) {
   two.application->drained(2);  // there is no port 2
 }
 
-TEST_F(ApplicationStandstill, AHeartbeatThatMayBeTooOldGivesNobodyControl) {
+TEST_F(ApplicationStandstill, AHeartbeatThatMayBeTooOldGivesNoControl) {
   board.now_ms += 5000;
   host.heartbeat(6);
   EXPECT_EQ(board.log.states.back(), "SAFE link");
@@ -202,7 +202,7 @@ TEST_F(ApplicationStandstill, AHeartbeatThatMayBeTooOldGivesNobodyControl) {
   EXPECT_TRUE(board.safe()) << "a paper host starts a new session";
 }
 
-TEST_F(ApplicationStandstill, TheGuardExpectsTheHostFromThen) {
+TEST_F(ApplicationStandstill, TheGuardsDeadlineCountsFromTheStandstill) {
   board.now_ms += 300;
   host.heartbeat(6);
   EXPECT_FALSE(board.application->guard().tripped());
@@ -212,7 +212,7 @@ TEST_F(ApplicationStandstill, TheGuardExpectsTheHostFromThen) {
   EXPECT_EQ(board.application->guard().take(), SafeReason::link);
 }
 
-TEST_F(ApplicationStandstill, AStopAppliesAtOnceAndAClearThatNamesNoneCountsFromBefore) {
+TEST_F(ApplicationStandstill, AStopActsAtOnceButAClearWithoutACauseMustWait) {
   board.now_ms += 300;
   board.receive("E:STOP;", Source{0, 9});
   EXPECT_EQ(board.log.states.back(), "SAFE stop");
@@ -230,14 +230,14 @@ TEST_F(ApplicationStandstill, AStopAppliesAtOnceAndAClearThatNamesNoneCountsFrom
   EXPECT_EQ(board.log.states.back(), "ACTIVE none");
 }
 
-TEST_F(ApplicationStandstill, ACommandBehindTheHeartbeatThatWaitedIsExecuted) {
+TEST_F(ApplicationStandstill, ACommandAfterAWaitingHeartbeatIsExecuted) {
   board.now_ms += 300;
   host.heartbeat(6);
   host.command("O:100,1,1");
   EXPECT_EQ(board.outputs().osmc[0].pwm, 100);
 }
 
-TEST_F(ApplicationStandstill, OneThatTheHeartbeatOvertookIsStale) {
+TEST_F(ApplicationStandstill, ACommandOvertakenByAWaitingHeartbeatIsStale) {
   const std::uint32_t overtaken = host.pnum++;
   board.now_ms += 300;
   host.heartbeat(6);
@@ -245,7 +245,7 @@ TEST_F(ApplicationStandstill, OneThatTheHeartbeatOvertookIsStale) {
   EXPECT_EQ(board.log.refused, (Lines{std::to_string(overtaken) + " STALE"}));
 }
 
-TEST(ApplicationLink, ACommandAfterTheSilenceComesTooLate) {
+TEST(ApplicationLink, RefusesACommandAfterTheTimeout) {
   TestBoard board;
   TestHost host(board, no_session);
   host.heartbeat(5);
@@ -255,7 +255,7 @@ TEST(ApplicationLink, ACommandAfterTheSilenceComesTooLate) {
   EXPECT_EQ(board.log.refused, (Lines{"12346 SAFE"}));
 }
 
-TEST(ApplicationLink, SendsHeartbeatsOnlyWhileTheLinkIsLost) {
+TEST(ApplicationLink, SendsOnlyHeartbeatsWhileTheLinkIsLost) {
   TestBoard board;
   TestHost host(board, our_session);
   host.connect();
@@ -272,7 +272,7 @@ TEST(ApplicationLink, SendsHeartbeatsOnlyWhileTheLinkIsLost) {
   }
 }
 
-TEST(ApplicationLink, KeepsTwoHeartbeatsASecondForAPaperHost) {
+TEST(ApplicationLink, SendsAPaperHostTwoHeartbeatsASecond) {
   TestBoard board;
   TestHost host(board, no_session);
   host.heartbeat(1);
@@ -284,7 +284,7 @@ TEST(ApplicationLink, KeepsTwoHeartbeatsASecondForAPaperHost) {
   EXPECT_EQ(board.take(MessageKind::board_heartbeat).size(), 4U);
 }
 
-TEST(ApplicationLink, APortTooManyIsRefusedAndWhatItWouldBringIsPassedOver) {
+TEST(ApplicationLink, RefusesAPortTooManyAndIgnoresItsDatagrams) {
   TestBoard board(Settings(), firmware::Application::max_ports);
   MemoryPort more;
   more.now_ms = &board.now_ms;
@@ -301,7 +301,7 @@ TEST(ApplicationLink, APortTooManyIsRefusedAndWhatItWouldBringIsPassedOver) {
       << "the last port is served";
 }
 
-TEST(ApplicationLink, TellsThePortWhoIsInControlAndWhenNobodyIs) {
+TEST(ApplicationLink, InformsThePortWhichPeerHasControl) {
   TestBoard board({}, 2);
   TestHost host(board, no_session, {1, 7});
   TestHost other(board, no_session, {1, 8});
@@ -372,7 +372,7 @@ TEST(ApplicationLink, RestoresNothingForAnotherHost) {
   EXPECT_EQ(board.log.refused.back(), std::to_string(first.pnum - 1) + " BUSY");
 }
 
-TEST(ApplicationLink, ARestartIsNoticedWithinTheTimeoutAndMakesTheOutputsSafe) {
+TEST(ApplicationLink, AHostRestartMakesTheOutputsSafeWithinTheTimeout) {
   TestBoard board;
   TestHost host(board, our_session);
   host.connect();
@@ -406,7 +406,7 @@ TEST(ApplicationLink, AnswersAHostThatHasNothingToEcho) {
   EXPECT_EQ(heard[0].t_ms, board.now_ms);
 }
 
-TEST(ApplicationLink, AnswersAHostThatEchoesWhatIsPast) {
+TEST(ApplicationLink, AnswersAHostThatEchoesAnOldTime) {
   // After a restart of the board.
   TestBoard board;
   TestHost host(board, our_session, Source{0, 3});
@@ -442,7 +442,7 @@ TEST(ApplicationLink, TheSamePeerNumberOnAnotherPortIsAnotherHost) {
   EXPECT_EQ(board.take(MessageKind::nack, 0).size(), 0U);
 }
 
-TEST(ApplicationLink, AnswersToOthersDoNotCountInTheOwnersNumbers) {
+TEST(ApplicationLink, AnswersToOtherHostsHaveTheirOwnNumbers) {
   TestBoard board;
   TestHost owner(board, our_session, Source{0, 1});
   TestHost other(board, another_session, Source{0, 2});
@@ -466,7 +466,7 @@ TEST(ApplicationLink, AnswersToOthersDoNotCountInTheOwnersNumbers) {
   EXPECT_GT(next, 100U);
 }
 
-TEST(ApplicationLink, StreamsOnEveryPortWithNumbersOfItsOwn) {
+TEST(ApplicationLink, StreamsOnEveryPortWithItsOwnNumbers) {
   TestBoard board(Settings(), 3);
   TestHost owner(board, our_session, Source{1, 6});
   owner.connect();
@@ -520,7 +520,7 @@ TEST(ApplicationLink, ServesThePapersPythonClient) {
   EXPECT_GT(board.log.executed.size(), 6900U);
 }
 
-TEST(ApplicationLink, TheClockWrapsInTheMiddleOfASession) {
+TEST(ApplicationLink, ASessionContinuesWhenTheClockWraps) {
   // Heartbeats are due on every half second, so one is due exactly when the clock wraps.
   TestBoard board({}, 1, 0U - 2000U);
   TestHost host{board, our_session, Source{0, 4}};

@@ -90,7 +90,7 @@ TEST_F(ApplicationPaths, ANewPathKeepsTheSessionAlive) {
   EXPECT_EQ(paths()[0], path_b);
 }
 
-TEST_F(ApplicationPaths, AStrangerStaysBusyAndNeverJoins) {
+TEST_F(ApplicationPaths, AnotherHostIsAnsweredBusyAndAddsNoPath) {
   TestHost host(board, our_session, path_a);
   host.connect();
   forget();
@@ -109,7 +109,7 @@ TEST_F(ApplicationPaths, AStrangerStaysBusyAndNeverJoins) {
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationPaths, AnEchoThatIsNotFreshMakesNoPath) {
+TEST_F(ApplicationPaths, AnOldEchoAddsNoPath) {
   TestHost host(board, our_session, path_a);
   host.connect();
   const std::uint32_t old = board.newest_t(0);
@@ -121,7 +121,7 @@ TEST_F(ApplicationPaths, AnEchoThatIsNotFreshMakesNoPath) {
   EXPECT_EQ(paths().size(), 1);
 }
 
-TEST_F(ApplicationPaths, NoMoreThanFour) {
+TEST_F(ApplicationPaths, ASessionHasAtMostFourPaths) {
   HostOnPaths host(board, {{path_a}, {path_b}, {path_c}, {Source{0, 5}}});
   host.connect();
   EXPECT_EQ(paths().size(), 4);
@@ -131,7 +131,7 @@ TEST_F(ApplicationPaths, NoMoreThanFour) {
   EXPECT_FALSE(paths().has(Source{3, 1}));
 }
 
-TEST_F(ApplicationPaths, APaperHostHasOne) {
+TEST_F(ApplicationPaths, APaperHostHasOnePath) {
   TestHost host(board, no_session, path_a);
   host.connect();
   forget();
@@ -142,7 +142,7 @@ TEST_F(ApplicationPaths, APaperHostHasOne) {
   EXPECT_EQ(paths().size(), 1);
 }
 
-TEST_F(ApplicationPaths, AnAnswerNamesTheSessionOfTheAskerAloneAndTellsOthersBusy) {
+TEST_F(ApplicationPaths, AnAnswerNamesOnlyTheAskersSession) {
   HostOnPaths host(board, {{path_a}, {path_b}});
   host.connect();
   forget();
@@ -162,7 +162,7 @@ TEST_F(ApplicationPaths, AnAnswerNamesTheSessionOfTheAskerAloneAndTellsOthersBus
 
 // --- commands over all paths
 
-TEST_F(ApplicationPaths, ACommandIsExecutedOnceWhicheverPathBringsIt) {
+TEST_F(ApplicationPaths, ACommandIsExecutedOnceOverAllPaths) {
   HostOnPaths host(board, {{path_a}, {path_b}});
   host.connect();
   forget();
@@ -179,7 +179,7 @@ TEST_F(ApplicationPaths, ACommandIsExecutedOnceWhicheverPathBringsIt) {
   EXPECT_EQ(state.rx_lost, 0U);
 }
 
-TEST_F(ApplicationPaths, WhatOnePathRepeatsIsCounted) {
+TEST_F(ApplicationPaths, CountsADuplicateOnOnePath) {
   HostOnPaths host(board, {{path_a}, {path_b}});
   host.connect();
   host.command("Z:1");
@@ -189,7 +189,7 @@ TEST_F(ApplicationPaths, WhatOnePathRepeatsIsCounted) {
   EXPECT_EQ(state.rx_refused, 1U);
 }
 
-TEST_F(ApplicationPaths, ACopyOfARefusedCommandIsToldTheSame) {
+TEST_F(ApplicationPaths, ADuplicateOfARefusedCommandGetsTheSameAnswer) {
   HostOnPaths host(board, {{path_a}, {path_b, 200}});
   host.connect();
   host.run(1000);
@@ -237,7 +237,7 @@ void expect_a_fast_path_takes_over(TestBoard& board, HostOnPaths& host, std::uin
   EXPECT_EQ(board.application->paths()[0], path_a);
 }
 
-TEST_F(ApplicationPaths, AFastPathTakesOverFromOneThatLagsAtAnyRateOfCommands) {
+TEST_F(ApplicationPaths, AFastPathTakesOverFromALaggingPathAtAnyCommandRate) {
   HostOnPaths host(board, {{path_a}, {path_b}});
   expect_a_fast_path_takes_over(board, host, 500);
 }
@@ -263,7 +263,7 @@ class ApplicationPathsWithAKey : public testing::Test {
   HostOnPaths host{board, {{path_a}, {path_b, 100}}};
 };
 
-TEST_F(ApplicationPathsWithAKey, EachPathHasASignatureOfItsOwnAndACommandIsExecutedOnce) {
+TEST_F(ApplicationPathsWithAKey, ACommandSignedForEachPathIsExecutedOnce) {
   host.run(1000);
   EXPECT_EQ(board.state(), BoardState::active);
   ASSERT_EQ(paths().size(), 2);
@@ -279,7 +279,7 @@ TEST_F(ApplicationPathsWithAKey, EachPathHasASignatureOfItsOwnAndACommandIsExecu
   EXPECT_EQ(paths().losses(), 0U);
 }
 
-TEST_F(ApplicationPathsWithAKey, ADuplicateFromAnotherPlaceIsAReplay) {
+TEST_F(ApplicationPathsWithAKey, ADuplicateFromAnotherPeerIsAReplay) {
   host.command("O:358,1,1");
   const std::string command = host.last;
   host.heartbeat();
@@ -296,13 +296,13 @@ TEST_F(ApplicationPathsWithAKey, ADuplicateFromAnotherPlaceIsAReplay) {
   EXPECT_EQ(board.log.rejected.back(), "missing") << "the SID alone proves nothing";
 }
 
-TEST_F(ApplicationPathsWithAKey, AFastPathTakesOverFromOneThatLagsAtAnyRateOfCommands) {
+TEST_F(ApplicationPathsWithAKey, AFastPathTakesOverFromALaggingPathAtAnyCommandRate) {
   expect_a_fast_path_takes_over(board, host, 200);
 }
 
 // --- the end of paths
 
-TEST_F(ApplicationPaths, ALostPortTakesTheLinkOnlyWithTheLastPath) {
+TEST_F(ApplicationPaths, ALostPortEndsTheLinkOnlyWithTheLastPath) {
   HostOnPaths host(board, {{path_a}, {path_b}});
   host.connect();
   host.command("O:358,1,1");
@@ -318,7 +318,7 @@ TEST_F(ApplicationPaths, ALostPortTakesTheLinkOnlyWithTheLastPath) {
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationPaths, ASessionIsResumedFromAnyOfItsPaths) {
+TEST_F(ApplicationPaths, ASessionResumesOverAnyOfItsPaths) {
   for (const std::size_t first : {0U, 1U}) {
     TestBoard fresh({}, 4);
     HostOnPaths host(fresh, {{path_a}, {path_b}});
@@ -339,7 +339,7 @@ TEST_F(ApplicationPaths, ASessionIsResumedFromAnyOfItsPaths) {
   }
 }
 
-TEST_F(ApplicationPaths, TheFarewellByAllPathsIsObeyedOnce) {
+TEST_F(ApplicationPaths, AFarewellOverAllPathsIsExecutedOnce) {
   HostOnPaths host(board, {{path_a}, {path_b, 80}});
   host.connect();
   host.command("O:358,1,1");
@@ -358,7 +358,7 @@ TEST_F(ApplicationPaths, TheFarewellByAllPathsIsObeyedOnce) {
 
 // --- the stop
 
-TEST_F(ApplicationPaths, TheSameStopByAllPathsIsOneCause) {
+TEST_F(ApplicationPaths, AStopOverAllPathsIsOneCause) {
   HostOnPaths host(board, {{path_a}, {path_b, 50}, {path_c, 90}});
   host.connect();
   host.command("O:358,1,1");
@@ -379,7 +379,7 @@ TEST_F(ApplicationPaths, TheSameStopByAllPathsIsOneCause) {
 
 // --- states and answers
 
-TEST_F(ApplicationPaths, TwoPlacesOnOnePortGetTheSame) {
+TEST_F(ApplicationPaths, TwoPathsOnOnePortGetTheSameDatagrams) {
   const Source other{0, 5};
   HostOnPaths host(board, {{path_a}, {other}});
   host.connect();
@@ -407,7 +407,7 @@ TEST_F(ApplicationPaths, TwoPlacesOnOnePortGetTheSame) {
 }
 
 // An answer carries the SID of its question, and only the host of that session may know it.
-TEST_F(ApplicationPaths, AnotherHostAtAPathGetsItsAnswersAlone) {
+TEST_F(ApplicationPaths, AnswersToAnotherHostGoOnlyToItsPath) {
   const Source other{0, 5};
   HostOnPaths host(board, {{path_a}, {other}});
   host.connect();
@@ -423,7 +423,7 @@ TEST_F(ApplicationPaths, AnotherHostAtAPathGetsItsAnswersAlone) {
   EXPECT_EQ(answers, 2);
 }
 
-TEST_F(ApplicationPaths, AWatcherBecomesAPathAndNeedsNoLeaseAnyMore) {
+TEST_F(ApplicationPaths, AWatcherThatBecomesAPathNeedsNoLease) {
   TestHost host(board, our_session, path_a);
   host.connect();
   const Source place{2, 6};

@@ -68,7 +68,7 @@ TEST_F(ApplicationSafety, AStopIsLatchedUntilItIsCleared) {
   expect_nothing_restored();
 }
 
-TEST_F(ApplicationSafety, AStopIsObeyedFromAnyone) {
+TEST_F(ApplicationSafety, AStopIsObeyedFromAnyPeer) {
   board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});
   EXPECT_TRUE(board.safe());
   clear();
@@ -78,7 +78,7 @@ TEST_F(ApplicationSafety, AStopIsObeyedFromAnyone) {
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationSafety, AStopIsObeyedWhateverElseIsInItsDatagram) {
+TEST_F(ApplicationSafety, AStopIsObeyedAmongOtherCommands) {
   host.command("O:1,1,1");
   EXPECT_FALSE(board.safe());
   board.receive("O:2,1,1;E:STOP;PNum:1;T:1;", Source{0, 99});
@@ -86,7 +86,7 @@ TEST_F(ApplicationSafety, AStopIsObeyedWhateverElseIsInItsDatagram) {
   EXPECT_TRUE(board.log.refused.empty());
 }
 
-TEST_F(ApplicationSafety, AStopIsObeyedHoweverOldItIs) {
+TEST_F(ApplicationSafety, AnOldStopIsObeyed) {
   const std::uint32_t old = host.pnum++;
   for (int i = 0; i < 100; ++i) host.command("S:1,1");
   host.stay(500);
@@ -98,7 +98,7 @@ TEST_F(ApplicationSafety, AStopIsObeyedHoweverOldItIs) {
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationSafety, AStopOvertakesTheCommandsBeforeIt) {
+TEST_F(ApplicationSafety, AStopMakesEarlierCommandsStale) {
   const std::uint32_t before = host.pnum++;
   host.command("E:STOP");
   clear();
@@ -107,7 +107,7 @@ TEST_F(ApplicationSafety, AStopOvertakesTheCommandsBeforeIt) {
   EXPECT_EQ(board.log.refused, Lines{std::to_string(before) + " STALE"});
 }
 
-TEST_F(ApplicationSafety, AStopOfAnotherProgramAtTheOwnersPlaceSpendsNoneOfItsNumbers) {
+TEST_F(ApplicationSafety, AStopWithoutASessionUsesUpNoCommandNumber) {
   const std::uint32_t executed = host.command("O:1,1,1");
   board.receive("E:STOP;PNum:" + std::to_string(host.pnum + 1000) + ";T:0;", host.at);
   EXPECT_EQ(board.reason(), SafeReason::stop);
@@ -126,7 +126,7 @@ TEST_F(ApplicationSafety, AStopOfAnotherProgramAtTheOwnersPlaceSpendsNoneOfItsNu
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationSafety, AStopIsAnsweredToEveryoneAndToWhoAsked) {
+TEST_F(ApplicationSafety, AStopIsAnsweredOnEveryPortAndToItsSender) {
   TestBoard two(Settings(), 2);
   TestHost owner(two, our_session, Source{0, 4});
   owner.connect();
@@ -155,7 +155,7 @@ TEST_F(ApplicationSafety, AStopIsAnsweredToEveryoneAndToWhoAsked) {
   EXPECT_EQ(second[0].peer, 99U);
 }
 
-TEST_F(ApplicationSafety, AStopIsObeyedBeforeThereIsAHost) {
+TEST_F(ApplicationSafety, AStopIsObeyedBeforeAHostConnects) {
   TestBoard fresh;
   fresh.receive("E:STOP;PNum:1;T:1;", Source{0, 99});
   EXPECT_EQ(fresh.reason(), SafeReason::stop);
@@ -183,14 +183,14 @@ TEST_F(ApplicationSafety, AStopIsObeyedWhileTheLinkIsLost) {
   expect_nothing_restored();
 }
 
-TEST_F(ApplicationSafety, OnlyTheOwnerClears) {
+TEST_F(ApplicationSafety, OnlyTheControllingHostClearsAStop) {
   host.command("E:STOP");
   board.receive("E:CLEAR;PNum:9;T:1;", Source{0, 99});
   EXPECT_EQ(board.reason(), SafeReason::stop);
   EXPECT_EQ(board.log.refused, Lines{"9 BUSY"});
 }
 
-TEST_F(ApplicationSafety, ANewHostDoesNotClearByTakingControl) {
+TEST_F(ApplicationSafety, TakingControlDoesNotClearAStop) {
   host.command("E:STOP");
   board.run(1500);
   TestHost other(board, another_session, Source{0, 5});
@@ -206,7 +206,7 @@ TEST_F(ApplicationSafety, ARepeatedClearDoesNotClearALaterStop) {
   EXPECT_EQ(board.reason(), SafeReason::stop);
 }
 
-TEST_F(ApplicationSafety, AClearOnItsWayDoesNotClearWhatCameMeanwhile) {
+TEST_F(ApplicationSafety, ADelayedClearDoesNotClearANewerStop) {
   host.command("E:STOP");
   const std::string asked = host.clear_field();
   board.receive("E:STOP;PNum:1;T:1;", Source{0, 99});  // pressed again, by another person
@@ -223,7 +223,7 @@ TEST_F(ApplicationSafety, AClearOnItsWayDoesNotClearWhatCameMeanwhile) {
   EXPECT_EQ(board.state(), BoardState::active);
 }
 
-TEST_F(ApplicationSafety, AClearOnItsWayDoesNotClearAFaultThatCameMeanwhile) {
+TEST_F(ApplicationSafety, ADelayedClearDoesNotClearANewerFault) {
   for (const SafeReason cause : {SafeReason::fault, SafeReason::watchdog}) {
     host.command("E:STOP");
     const std::string asked = host.clear_field();
@@ -241,7 +241,7 @@ TEST_F(ApplicationSafety, AClearOnItsWayDoesNotClearAFaultThatCameMeanwhile) {
   }
 }
 
-TEST_F(ApplicationSafety, ARepetitionOfAStopIsNoNewCause) {
+TEST_F(ApplicationSafety, ARepeatedStopIsNotANewCause) {
   const std::uint32_t stop = host.command("E:STOP");
   const std::string asked = host.clear_field();
   host.resend("E:STOP", stop);
@@ -263,7 +263,7 @@ TEST_F(ApplicationSafety, AStopWithoutANumberIsANewCauseEachTime) {
   EXPECT_EQ(board.state(), BoardState::active);
 }
 
-TEST_F(ApplicationSafety, AClearThatNamesNoneMustComeLaterThanTheTimeoutAfterTheCause) {
+TEST_F(ApplicationSafety, AClearWithoutACauseWorksOnlyAfterTheTimeout) {
   TestBoard fresh;
   TestHost paper(fresh, no_session);
   paper.heartbeat(4000);
@@ -280,7 +280,7 @@ TEST_F(ApplicationSafety, AClearThatNamesNoneMustComeLaterThanTheTimeoutAfterThe
   EXPECT_EQ(fresh.state(), BoardState::active);
 }
 
-TEST_F(ApplicationSafety, AClearOfNothingIsExecutedWhereThereIsNothingElse) {
+TEST_F(ApplicationSafety, AClearOfCauseZeroIsExecutedButClearsNoStop) {
   host.command("E:CLEAR,0");
   EXPECT_EQ(board.log.refused, Lines{});
   host.command("E:STOP");
@@ -288,7 +288,7 @@ TEST_F(ApplicationSafety, AClearOfNothingIsExecutedWhereThereIsNothingElse) {
   EXPECT_EQ(board.reason(), SafeReason::stop);
 }
 
-TEST_F(ApplicationSafety, CausesAreNumberedOtherwiseAtEachBoot) {
+TEST_F(ApplicationSafety, EachBootNumbersItsCausesDifferently) {
   board.receive("E:STOP;", Source{0, 99});
   TestBoard other(Settings(), 1, 123'456'789);
   other.receive("E:STOP;", Source{0, 99});
@@ -320,14 +320,14 @@ TEST_F(ApplicationSafety, HeartbeatsNameTheNewestStop) {
   EXPECT_FALSE(newest().has_stop);
 }
 
-TEST_F(ApplicationSafety, AStopIsConfirmedByItsNumberToo) {
+TEST_F(ApplicationSafety, TheStateConfirmsAStopByItsNumber) {
   host.command("F:CMD");
   const std::uint32_t number = host.command("E:STOP");
   board.run(10);
   EXPECT_EQ(state_of(board.take(MessageKind::state).back()).last_command, number);
 }
 
-TEST_F(ApplicationSafety, EveryCauseIsToldOfAtOnce) {
+TEST_F(ApplicationSafety, EveryCauseIsReportedAtOnce) {
   auto told = [&](const char* reason) {
     const std::vector<Heard> heard = board.take(MessageKind::board_heartbeat);
     return heard.size() == 1 && heard[0].bytes.find(reason) != std::string::npos;
@@ -349,7 +349,7 @@ TEST_F(ApplicationSafety, EveryCauseIsToldOfAtOnce) {
   EXPECT_TRUE(told(";SAFE:2;"));
 }
 
-TEST_F(ApplicationSafety, ClearTakesAwayOnlyWhatIsReported) {
+TEST_F(ApplicationSafety, ClearRemovesOnlyTheReportedCause) {
   board.application->fail(SafeReason::watchdog, board.now_ms);
   board.application->fail(SafeReason::fault, board.now_ms);
   host.command("E:STOP");
@@ -378,7 +378,7 @@ TEST_F(ApplicationSafety, StateKeepsComingWhileStopped) {
 
 // --- fault and watchdog
 
-TEST_F(ApplicationSafety, AFaultIsLatchedAndLeavesNothing) {
+TEST_F(ApplicationSafety, AFaultIsLatchedAndRestoresNoOutputs) {
   for (const SafeReason cause : {SafeReason::fault, SafeReason::watchdog}) {
     host.command("O:358,1,1");
     EXPECT_FALSE(board.safe());
@@ -394,7 +394,7 @@ TEST_F(ApplicationSafety, AFaultIsLatchedAndLeavesNothing) {
 
 // --- handle
 
-TEST_F(ApplicationSafety, AReleasedHandleIsSafeUntilItIsHeldAgain) {
+TEST_F(ApplicationSafety, TheBoardIsSafeUntilTheHandleIsHeldAgain) {
   handle(false);
   EXPECT_TRUE(board.safe());
   EXPECT_EQ(board.log.states, Lines{"SAFE handle"});
@@ -414,14 +414,14 @@ TEST_F(ApplicationSafety, AReleasedHandleIsNoticedWithin10Ms) {
   EXPECT_TRUE(board.safe());
 }
 
-TEST_F(ApplicationSafety, AHandleReleasedSinceTheLastLookStopsTheNextCommand) {
+TEST_F(ApplicationSafety, AHandleReleasedSinceTheLastPollBlocksACommand) {
   board.hal.inputs.handle_held = false;
   host.command("O:400,1,1");
   EXPECT_TRUE(board.safe());
   EXPECT_EQ(board.reason(), SafeReason::handle);
 }
 
-TEST_F(ApplicationSafety, AHandleReleasedBeforeTheHostComesKeepsItSafe) {
+TEST_F(ApplicationSafety, AHandleReleasedBeforeConnectingKeepsTheBoardSafe) {
   TestBoard fresh;
   fresh.hal.inputs.handle_held = false;
   fresh.run(20);
@@ -432,7 +432,7 @@ TEST_F(ApplicationSafety, AHandleReleasedBeforeTheHostComesKeepsItSafe) {
   EXPECT_EQ(fresh.log.states.back(), "SAFE handle");
 }
 
-TEST_F(ApplicationSafety, AHandleReleasedDuringAnOutageLeavesNothing) {
+TEST_F(ApplicationSafety, AHandleReleasedDuringAnOutageRestoresNoOutputs) {
   board.run(1500);
   handle(false);
   EXPECT_EQ(board.reason(), SafeReason::handle);
@@ -442,7 +442,7 @@ TEST_F(ApplicationSafety, AHandleReleasedDuringAnOutageLeavesNothing) {
   expect_nothing_restored();
 }
 
-TEST_F(ApplicationSafety, AHandleReleasedAtTheMomentOfRecoveryLeavesNothing) {
+TEST_F(ApplicationSafety, AHandleReleasedAtRecoveryRestoresNoOutputs) {
   board.run(1500);
   board.hal.inputs.handle_held = false;
   const int changes = board.log.outputs;
@@ -455,7 +455,7 @@ TEST_F(ApplicationSafety, AHandleReleasedAtTheMomentOfRecoveryLeavesNothing) {
 
 // --- proximity
 
-TEST_F(ApplicationSafety, AnObstacleIsSafeUntilItHasBeenFiveCentimetresBeyondForAWhile) {
+TEST_F(ApplicationSafety, AnObstacleKeepsTheBoardSafeUntil5CmBeyondTheThreshold) {
   host.command("U:30,1");
   distance(30);
   EXPECT_FALSE(board.safe());
@@ -476,13 +476,13 @@ TEST_F(ApplicationSafety, AnObstacleIsSafeUntilItHasBeenFiveCentimetresBeyondFor
   expect_nothing_restored();
 }
 
-TEST_F(ApplicationSafety, NoEchoIsNoObstacle) {
+TEST_F(ApplicationSafety, AMissingEchoIsNotAnObstacle) {
   host.command("U:30,1");
   distance(0);
   EXPECT_FALSE(board.safe());
 }
 
-TEST_F(ApplicationSafety, AMissedEchoDoesNotTakeAnObstacleAway) {
+TEST_F(ApplicationSafety, AMissedEchoDoesNotEndAnObstacle) {
   host.command("U:30,1");
   distance(20);
   for (int turn = 0; turn < 10; ++turn) {
@@ -497,7 +497,7 @@ TEST_F(ApplicationSafety, AMissedEchoDoesNotTakeAnObstacleAway) {
   EXPECT_EQ(board.reason(), SafeReason::none);
 }
 
-TEST_F(ApplicationSafety, EachSensorHasItsThreshold) {
+TEST_F(ApplicationSafety, EachSensorHasItsOwnThreshold) {
   host.command("U:30,1");
   host.command("U:10,4");
   board.hal.inputs.ultrasonic_cm[3] = 10;
@@ -509,7 +509,7 @@ TEST_F(ApplicationSafety, EachSensorHasItsThreshold) {
   EXPECT_EQ(board.reason(), SafeReason::proximity);
 }
 
-TEST_F(ApplicationSafety, AThresholdIsSetAtOnceAndTurnedOffAtOnce) {
+TEST_F(ApplicationSafety, AThresholdChangeTakesEffectAtOnce) {
   distance(20);
   host.command("U:21,1");
   EXPECT_TRUE(board.safe());
@@ -540,7 +540,7 @@ TEST_F(ApplicationSafety, TheReasonIsInEveryHeartbeatAndState) {
 
 // --- a fault of a chip
 
-TEST_F(ApplicationSafety, AChipsFaultIsToldWithChipAndTrouble) {
+TEST_F(ApplicationSafety, AChipFaultIsReportedWithChipAndTrouble) {
   board.hal.inputs.fault = {64, ChipTrouble::no_acknowledge};
   board.hal.broken = true;
   host.stay(100);
@@ -566,7 +566,7 @@ TEST_F(ApplicationSafety, AChipsFaultIsToldWithChipAndTrouble) {
   expect_nothing_restored();
 }
 
-TEST_F(ApplicationSafety, ASensorThatDoesNotAnswerIsAnObstacleIfItHasAThreshold) {
+TEST_F(ApplicationSafety, ASilentSensorWithAThresholdIsAnObstacle) {
   board.hal.inputs.ultrasonic_blind = 0b0010;
   board.run(10);
   EXPECT_FALSE(board.safe());

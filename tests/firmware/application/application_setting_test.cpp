@@ -36,7 +36,7 @@ TEST_F(ApplicationSetting, SettingsTakeEffectAtOnce) {
   EXPECT_EQ(board.reason(), SafeReason::link);
 }
 
-TEST_F(ApplicationSetting, ATimeoutThatIsAlreadyOverMakesTheOutputsSafeAtOnce) {
+TEST_F(ApplicationSetting, ATimeoutThatHasPassedMakesTheOutputsSafeAtOnce) {
   host.command("C:heartbeat,50");
   host.command("O:358,1,1");
   host.echo();
@@ -86,7 +86,7 @@ TEST_F(ApplicationSetting, SettingsOutlastTheSession) {
   EXPECT_EQ(board.reason(), SafeReason::proximity);
 }
 
-TEST_F(ApplicationSetting, MakesEveryPortSendThePackedForm) {
+TEST_F(ApplicationSetting, TheSettingPackTurnsThePackedFormOnAndOff) {
   EXPECT_TRUE(board.ports[0].packed);
   host.command("C:pack,0");
   EXPECT_FALSE(board.ports[0].packed);
@@ -97,7 +97,7 @@ TEST_F(ApplicationSetting, MakesEveryPortSendThePackedForm) {
 }
 
 // Another host, which knows the text only, may come next.
-TEST_F(ApplicationSetting, WithoutAHostABoardSpeaksPlainText) {
+TEST_F(ApplicationSetting, ABoardWithoutAHostSendsPlainText) {
   board.run(1000);
   ASSERT_EQ(board.reason(), SafeReason::link);
   EXPECT_FALSE(board.ports[0].packed);
@@ -119,7 +119,7 @@ TEST_F(ApplicationSetting, WithoutAHostABoardSpeaksPlainText) {
   EXPECT_FALSE(alone.ports[0].packed);
 }
 
-TEST_F(ApplicationSetting, ABoardThatWasStoppedSpeaksPlainTextWhenItsHostIsGone) {
+TEST_F(ApplicationSetting, AStoppedBoardWithoutItsHostSendsPlainText) {
   host.command("E:STOP");
   EXPECT_TRUE(board.ports[0].packed);
   board.run(1000);
@@ -127,7 +127,7 @@ TEST_F(ApplicationSetting, ABoardThatWasStoppedSpeaksPlainTextWhenItsHostIsGone)
   EXPECT_FALSE(board.ports[0].packed);
 }
 
-TEST_F(ApplicationSetting, ANameIsTakenFromTheBoardsOwnCableAndTold) {
+TEST_F(ApplicationSetting, TheNameIsSetOnlyOverTheBoardsOwnCable) {
   const auto identity = [this] {
     board.take();
     board.receive("Q:ID;", Source{0, 99});
@@ -150,7 +150,7 @@ TEST_F(ApplicationSetting, ANameIsTakenFromTheBoardsOwnCableAndTold) {
   EXPECT_EQ(identity().find("NAME"), std::string::npos);
 }
 
-TEST_F(ApplicationSetting, TellsHowTheBoardIsReachedOnlyOverItsOwnCable) {
+TEST_F(ApplicationSetting, TheNetworkIsSetOnlyOverTheBoardsOwnCable) {
   host.command("C:network,mine");
   EXPECT_EQ(board.log.refused.size(), 1U);
   EXPECT_NE(board.log.refused.back().find("AUTH"), std::string::npos);

@@ -35,7 +35,7 @@ TEST(ApplicationStream, SendsTheDatagramOfTheCapture) {
                            std::to_string(heard[0].pnum) + ";T:79100;"));
 }
 
-TEST(ApplicationStream, LeavesOutAndCountsWhatCameTooLate) {
+TEST(ApplicationStream, SkipsAndCountsLateStates) {
   TestBoard board;
   TestHost host(board, no_session);
   host.heartbeat(5);
@@ -50,7 +50,7 @@ TEST(ApplicationStream, LeavesOutAndCountsWhatCameTooLate) {
   EXPECT_EQ(state_of(heard[0]).late, 4U);
 }
 
-TEST(ApplicationStream, CarriesTheNewestInputs) {
+TEST(ApplicationStream, SendsTheNewestInputs) {
   TestBoard board;
   TestHost host(board, no_session);
   host.heartbeat(5);
@@ -121,7 +121,7 @@ TEST(ApplicationStream, SplitsAStateThatIsTooLongForThePort) {
   }
 }
 
-TEST(ApplicationStream, EveryPartOfASafeStateTellsTheReason) {
+TEST(ApplicationStream, EveryPartOfAStateReportsTheReason) {
   TestBoard board;
   board.ports[0].limit = 508;
   TestHost host(board, our_session);
@@ -154,7 +154,7 @@ TEST(ApplicationStream, EachPortGetsPartsOfItsOwnSize) {
   EXPECT_EQ(board.take(MessageKind::state, 1).size(), 6U);
 }
 
-TEST(ApplicationStream, SendsTheFieldsThatWereAskedFor) {
+TEST(ApplicationStream, SendsTheSelectedFields) {
   TestBoard board;
   TestHost host(board, our_session);
   host.connect();
@@ -170,7 +170,7 @@ TEST(ApplicationStream, SendsTheFieldsThatWereAskedFor) {
   EXPECT_TRUE(state_of(board.take(MessageKind::state).back()).present == FieldSet::paper_default());
 }
 
-TEST(ApplicationStream, MarksStatesAsReplaceableAndTheRestNot) {
+TEST(ApplicationStream, MarksOnlyStatesAsReplaceable) {
   TestBoard board;
   TestHost host(board, our_session);
   host.connect();
@@ -184,7 +184,7 @@ TEST(ApplicationStream, MarksStatesAsReplaceableAndTheRestNot) {
   }
 }
 
-TEST(ApplicationStream, AsksForTheNextCallNoLaterThanItsDuties) {
+TEST(ApplicationStream, AsksForTheNextPollBeforeItsNextDeadline) {
   TestBoard board;
   EXPECT_LE(board.application->poll(board.now_ms), 10U);
   TestHost host(board, no_session);

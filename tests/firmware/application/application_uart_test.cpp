@@ -46,7 +46,7 @@ class ApplicationUarts : public testing::Test {
   TestHost host{board, our_session};
 };
 
-TEST_F(ApplicationUarts, ASettingTurnsOneOnAndTheStateTellsWhatComes) {
+TEST_F(ApplicationUarts, ASettingTurnsAUartOnAndStatesReportItsBytes) {
   host.command("C:uart1,115200:8N1");
   host.command("F:UART1,UART2");
   pass(500);
@@ -65,7 +65,7 @@ TEST_F(ApplicationUarts, ASettingTurnsOneOnAndTheStateTellsWhatComes) {
   EXPECT_EQ(refused("C:uart1,460801:8N1"), "RANGE");
 }
 
-TEST_F(ApplicationUarts, EachByteIsToldOnceOrRepeatedAtItsPosition) {
+TEST_F(ApplicationUarts, ReportsEachByteAtItsPosition) {
   host.command("C:uart1,115200:8N1");
   host.command("F:UART1");
   pass(1);
@@ -80,7 +80,7 @@ TEST_F(ApplicationUarts, EachByteIsToldOnceOrRepeatedAtItsPosition) {
   EXPECT_GT(next, 5000U);
 }
 
-TEST_F(ApplicationUarts, WhatCameWhileTheLinkWasLostIsNotToldAsNew) {
+TEST_F(ApplicationUarts, SkipsBytesThatCameWhileTheLinkWasLost) {
   host.command("C:uart1,115200:8N1");
   host.command("F:UART1");
   pass(500);
@@ -143,7 +143,7 @@ TEST_F(ApplicationUarts, ADacIsAnOutputThatIsZeroInTheSafeState) {
   EXPECT_EQ(board.outputs().dac_mv[0], 0) << "the host is silent";
 }
 
-TEST_F(ApplicationUarts, SpareInputsAreBits) {
+TEST_F(ApplicationUarts, TheStateHasOneBitPerSpareInput) {
   host.command("F:GPIO");
   board.hal.inputs.gpio = 0x85;
   pass(20);
@@ -154,7 +154,7 @@ TEST_F(ApplicationUarts, SpareInputsAreBits) {
   EXPECT_FALSE(state.input(9));
 }
 
-TEST_F(ApplicationUarts, SaysSoInItsCapabilities) {
+TEST_F(ApplicationUarts, TheIdentityListsUartAndDac) {
   host.command("Q:ID");
   bool found = false;
   for (const Heard& heard : board.take()) {
@@ -163,7 +163,7 @@ TEST_F(ApplicationUarts, SaysSoInItsCapabilities) {
   EXPECT_TRUE(found);
 }
 
-TEST(ApplicationWithoutUarts, KnowsNoUart) {
+TEST(ApplicationWithoutUarts, RefusesAUartWriteAsUnknown) {
   TestBoard board;
   TestHost host(board, our_session);
   host.connect();

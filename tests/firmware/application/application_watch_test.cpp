@@ -61,7 +61,7 @@ struct TestWatcher {
   std::uint32_t token = 0;
 };
 
-TEST(ApplicationWatch, ABoardWithoutAHostStreamsToWhoWatchesItAndIsSafe) {
+TEST(ApplicationWatch, ABoardWithoutAHostStreamsToAWatcherAndStaysSafe) {
   TestBoard board;
   TestWatcher watcher{board, Source{0, 9}};
   board.run(100);
@@ -86,7 +86,7 @@ TEST(ApplicationWatch, ABoardWithoutAHostStreamsToWhoWatchesItAndIsSafe) {
 }
 
 // On a bus, a host also hears the datagrams for watchers.
-TEST(ApplicationWatch, WhatAHeartbeatShowsToWhoWatchesCanBeEchoed) {
+TEST(ApplicationWatch, AHostCanEchoAHeartbeatSentToAWatcher) {
   TestBoard board;
   TestWatcher watcher{board, Source{0, 9}};
   board.run(100);
@@ -101,7 +101,7 @@ TEST(ApplicationWatch, WhatAHeartbeatShowsToWhoWatchesCanBeEchoed) {
 }
 
 // On a bus, W shows only that there is a watcher (docs/reference/can.md).
-TEST(ApplicationWatch, OnABusABoardStreamsToWhoAsksUntilAHostIsThere) {
+TEST(ApplicationWatch, OnABusTheBoardStreamsToWatchersUntilAHostConnects) {
   TestBoard board({}, 2);
   board.ports[1].bus = true;
   board.run(100);
@@ -140,7 +140,7 @@ struct ApplicationWatched : BoardInControl {
   TestWatcher watcher{board, Source{0, 9}};
 };
 
-TEST_F(ApplicationWatched, AWatcherGetsStatesAtItsRateAndTheHostLosesNothing) {
+TEST_F(ApplicationWatched, AWatcherGetsItsRateAndTheHostLosesNothing) {
   watcher.watch("10");
   board.take();
   host.stay(1000);
@@ -163,7 +163,7 @@ TEST_F(ApplicationWatched, AWatcherChoosesItsFields) {
   EXPECT_EQ(states.back().bytes.rfind("ENC1:0;US1:0;PNum:", 0), 0U) << states.back().bytes;
 }
 
-TEST_F(ApplicationWatched, AWatcherCommandsNothingButStops) {
+TEST_F(ApplicationWatched, AWatcherCanCommandOnlyStops) {
   watcher.watch("10");
   host.command("O:358,1,1");
   board.take();
@@ -181,7 +181,7 @@ TEST_F(ApplicationWatched, AWatcherCommandsNothingButStops) {
 }
 
 // An attacker may forge the address of the host and use the number of an executed command.
-TEST_F(ApplicationWatched, AnAnswerToAWProvesNothingToTheHostOfTheSession) {
+TEST_F(ApplicationWatched, AnswersToAWatcherDoNotNameTheSession) {
   const std::uint32_t pnum = host.command("O:358,1,1");
   host.echo();
   board.run(1050);  // the link is lost
@@ -195,7 +195,7 @@ TEST_F(ApplicationWatched, AnAnswerToAWProvesNothingToTheHostOfTheSession) {
   }
 }
 
-TEST(ApplicationWatch, ABoardWithoutChanceServesNobody) {
+TEST(ApplicationWatch, ABoardWithoutRandomBytesRefusesWatchers) {
   test::MemoryHal hal;
   test::MemoryPort port;
   const std::uint32_t now_ms = 5;
@@ -209,14 +209,14 @@ TEST(ApplicationWatch, ABoardWithoutChanceServesNobody) {
   EXPECT_EQ(port.sent[0].bytes.rfind("N:5,UNKNOWN;", 0), 0U) << port.sent[0].bytes;
 }
 
-TEST_F(ApplicationWatched, OfAWatcherWithoutANumberNothingIsHeard) {
+TEST_F(ApplicationWatched, IgnoresAWatcherWithoutAPacketNumber) {
   board.take();
   board.receive("W:10;T:0;", watcher.at);
   EXPECT_TRUE(watcher.take().empty());
 }
 
 // As on a bus: host and watcher share one address.
-TEST_F(ApplicationWatched, AWatcherAtTheHostsPlaceCountsForNothing) {
+TEST_F(ApplicationWatched, AWatcherAtTheHostsAddressDoesNotAffectTheCounters) {
   TestWatcher beside{board, host.at, 1'000'000};
   for (int i = 0; i < 10; ++i) {
     beside.ask("10", 0);
@@ -231,7 +231,7 @@ TEST_F(ApplicationWatched, AWatcherAtTheHostsPlaceCountsForNothing) {
 }
 
 // On a serial line every datagram for everyone arrives anyway, with the numbers of the line.
-TEST(ApplicationWatch, OnALineEverythingHasTheNumbersOfTheLine) {
+TEST(ApplicationWatch, AllDatagramsOnASerialLineShareItsNumbers) {
   TestBoard board({}, 2);
   TestWatcher watcher{board, Source{1, everyone}};
   TestHost host(board, our_session, Source{0, 4});
@@ -260,7 +260,7 @@ TEST(ApplicationWatch, OnALineEverythingHasTheNumbersOfTheLine) {
   EXPECT_NEAR(static_cast<double>(states), 50, 1) << "no host is in control";
 }
 
-TEST_F(ApplicationWatched, AFifthIsToldThatThereIsNoRoom) {
+TEST_F(ApplicationWatched, AFifthWatcherIsAnsweredBusy) {
   for (std::uint32_t i = 0; i < 4; ++i) {
     TestWatcher each{board, Source{0, 20 + i}};
     host.stay(100);
@@ -272,7 +272,7 @@ TEST_F(ApplicationWatched, AFifthIsToldThatThereIsNoRoom) {
   EXPECT_EQ(answers(), (Lines{"BUSY"}));
 }
 
-TEST_F(ApplicationWatched, RefusesWhatIsNoLease) {
+TEST_F(ApplicationWatched, RefusesAnInvalidLease) {
   for (const auto& [lease, code] :
        std::vector<std::pair<std::string, std::string>>{{"1001", "RANGE"},
                                                         {"-1", "RANGE"},
@@ -285,7 +285,7 @@ TEST_F(ApplicationWatched, RefusesWhatIsNoLease) {
   }
 }
 
-TEST_F(ApplicationWatched, WhoTakesControlWatchesNoMore) {
+TEST_F(ApplicationWatched, TakingControlEndsTheLeaseOfAWatcher) {
   watcher.watch("10");
   host.echo();
   board.run(1000);  // the link is lost
@@ -297,7 +297,7 @@ TEST_F(ApplicationWatched, WhoTakesControlWatchesNoMore) {
       << "each state once";
 }
 
-TEST_F(ApplicationWatched, GoesOnWhenTheHostIsLost) {
+TEST_F(ApplicationWatched, StreamsToAWatcherAfterTheHostIsLost) {
   watcher.watch("100");
   host.echo();
   board.run(1050);
@@ -308,7 +308,7 @@ TEST_F(ApplicationWatched, GoesOnWhenTheHostIsLost) {
   EXPECT_EQ(state_of(states.back()).safe, SafeReason::link);
 }
 
-TEST(ApplicationWatch, NeedsNoKey) {
+TEST(ApplicationWatch, WatchingNeedsNoKey) {
   TestBoard board(test::settings_with(test::key_of(1)));
   TestWatcher watcher{board, Source{0, 9}};
   watcher.watch("50");

@@ -34,7 +34,7 @@ TEST(StateSchedule, LatenessDoesNotAddUp) {
   EXPECT_EQ(schedule.late(), 0U);
 }
 
-TEST(StateSchedule, LeavesOutWholePeriodsAndCountsThem) {
+TEST(StateSchedule, SkipsAndCountsWholePeriods) {
   StateSchedule schedule;
   schedule.start(0, 10);
   std::uint32_t t = 0;
@@ -48,7 +48,7 @@ TEST(StateSchedule, LeavesOutWholePeriodsAndCountsThem) {
   EXPECT_EQ(schedule.late(), 3U);
 }
 
-TEST(StateSchedule, ANewPeriodCountsFromTheNextStateOn) {
+TEST(StateSchedule, ANewPeriodAppliesFromTheNextState) {
   StateSchedule schedule;
   schedule.start(0, 10);
   std::uint32_t t = 0;
@@ -72,7 +72,7 @@ TEST(StateSchedule, StopsAndBeginsANewGrid) {
   EXPECT_EQ(schedule.late(), 0U);
 }
 
-TEST(StateSchedule, GoesOnOverTheWrapOfTheClock) {
+TEST(StateSchedule, ContinuesWhenTheClockWraps) {
   StateSchedule schedule;
   schedule.start(0xfffffff8U, 10);
   std::uint32_t t = 0;

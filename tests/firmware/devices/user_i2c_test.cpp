@@ -85,7 +85,7 @@ TEST_F(UserBus, ReadsWritesAndWritesThenReads) {
   EXPECT_EQ(bus.report().recoveries, 0U);
 }
 
-TEST_F(UserBus, OneTransferAtATime) {
+TEST_F(UserBus, AcceptsOneTransferAtATime) {
   EXPECT_TRUE(bus.ask(1, Command::i2c_read(0x68, "x75", 1)));
   EXPECT_FALSE(bus.ask(2, Command::i2c_read(0x68, "x75", 1)));
   pass(3);
@@ -93,14 +93,14 @@ TEST_F(UserBus, OneTransferAtATime) {
   EXPECT_TRUE(bus.ask(3, Command::i2c_read(0x68, "x75", 1)));
 }
 
-TEST_F(UserBus, AScanFindsWhoAnswersBesideReadings) {
+TEST_F(UserBus, AScanFindsDevicesDuringReadings) {
   bus.poll_slot(1, reads(0x68, 0x75, 1, 5), now_ms);
   EXPECT_EQ(answered(Command::i2c_scan(), 400), "done 64 104");
   EXPECT_EQ(bus.report().errors, 0U) << "an address without a device is not an error of a scan";
   EXPECT_EQ(bus.reading(1).errors, 0U);
 }
 
-TEST_F(UserBus, ReadsEachSlotOnItsGrid) {
+TEST_F(UserBus, ReadsEachSlotAtItsRate) {
   devices.mpu6050.feel({0, 0, 1000}, {0, 0, 0}, 2500);
   answered(Command::i2c_write(0x68, "x6b00"));
   const std::uint32_t began = devices.bus.transfers();
@@ -124,7 +124,7 @@ TEST_F(UserBus, ReadsEachSlotOnItsGrid) {
   EXPECT_EQ(bus.report().errors, 0U);
 }
 
-TEST_F(UserBus, ReadingsThatAskForMoreThanTheBusHasTakeTurns) {
+TEST_F(UserBus, ReadingsTakeTurnsOnAnOverloadedBus) {
   for (int slot = 1; slot <= 3; ++slot) bus.poll_slot(slot, reads(0x68, 0x3B, 32, 5), now_ms + 1);
   pass(300);
   for (int slot = 1; slot <= 3; ++slot) {
@@ -133,13 +133,13 @@ TEST_F(UserBus, ReadingsThatAskForMoreThanTheBusHasTakeTurns) {
   }
 }
 
-TEST_F(UserBus, TheTimeOfAReadingIsWhenItBegan) {
+TEST_F(UserBus, AReadingHasTheTimeOfItsStart) {
   bus.poll_slot(3, reads(0x68, 0x75, 1, 1000), now_ms + 1);
   pass(3);
   EXPECT_EQ(bus.reading(3).t_ms, 0xFFFFFF01U);
 }
 
-TEST_F(UserBus, OneThatHasNoTimeLeftIsLeftOutAndNotMadeUpFor) {
+TEST_F(UserBus, SkipsReadingsMissedDuringAStandstill) {
   bus.poll_slot(1, reads(0x68, 0x75, 1, 10), now_ms);
   pass(5);
   const std::uint32_t before = devices.bus.transfers();
@@ -150,7 +150,7 @@ TEST_F(UserBus, OneThatHasNoTimeLeftIsLeftOutAndNotMadeUpFor) {
   EXPECT_LE(devices.bus.transfers() - before, 2U);
 }
 
-TEST_F(UserBus, ADeviceThatIsGoneIsCountedAndKeepsItsLastReading) {
+TEST_F(UserBus, ADisconnectedDeviceKeepsItsLastReadingAndCountsErrors) {
   bus.poll_slot(1, reads(0x68, 0x75, 1, 10), now_ms + 1);
   pass(5);
   const std::uint32_t t_ms = bus.reading(1).t_ms;
@@ -166,7 +166,7 @@ TEST_F(UserBus, ADeviceThatIsGoneIsCountedAndKeepsItsLastReading) {
   EXPECT_EQ(bus.report().newest, I2cOutcome::done);
 }
 
-TEST_F(UserBus, ADeviceThatWasCutOffIsClockedFree) {
+TEST_F(UserBus, FreesTheBusFromACutOffDevice) {
   devices.bus.set_fault(UserBusModel::Fault::cut_off);
   EXPECT_EQ(answered(Command::i2c_read(0x68, "x75", 1)), "bus stuck");
   EXPECT_EQ(answered(Command::i2c_read(0x68, "x75", 1)), "done 104");
@@ -174,7 +174,7 @@ TEST_F(UserBus, ADeviceThatWasCutOffIsClockedFree) {
   EXPECT_EQ(bus.report().errors, 1U);
 }
 
-TEST_F(UserBus, IsClockedAsLongAsSdaIsHeldAndStopped) {
+TEST_F(UserBus, ClocksUntilSdaIsReleasedAndEndsWithAStopCondition) {
   for (const int held : {0, 1, 4, 9}) {
     LineLog lines;
     lines.held_clocks = held;
@@ -191,7 +191,7 @@ TEST_F(UserBus, IsClockedAsLongAsSdaIsHeldAndStopped) {
 }
 
 // Two programs, or two threads of a program, may ask.
-TEST_F(UserBus, AnAnswerStaysAsItWasUntilTheNextOneIsThere) {
+TEST_F(UserBus, AnAnswerStaysUntilTheNextAnswerIsReady) {
   EXPECT_EQ(answered(Command::i2c_read(0x68, "x75", 1)), "done 104");
   ASSERT_TRUE(bus.ask(9, Command::i2c_scan()));
   pass(40);  // the scan has found a device by this time
@@ -200,14 +200,14 @@ TEST_F(UserBus, AnAnswerStaysAsItWasUntilTheNextOneIsThere) {
   EXPECT_EQ(bus.answer().data.bytes[0], 104);
 }
 
-TEST_F(UserBus, TheNextSessionIsToldNoAnswerOfTheOneBefore) {
+TEST_F(UserBus, ANewSessionGetsNoAnswerOfThePreviousSession) {
   EXPECT_EQ(answered(Command::i2c_read(0x68, "x75", 1)), "done 104");
   bus.drop_all();
   EXPECT_EQ(bus.answer().pnum, 0U);
   EXPECT_EQ(bus.answer().data.size, 0);
 }
 
-TEST_F(UserBus, AHeldLineFailsWhatIsAskedForAndIsTriedAgain) {
+TEST_F(UserBus, AHeldLineFailsTransfersUntilItIsReleased) {
   for (const UserBusModel::Fault fault :
        {UserBusModel::Fault::held, UserBusModel::Fault::stretched}) {
     bus.poll_slot(1, reads(0x68, 0x75, 1, 50), now_ms + 1);
@@ -227,7 +227,7 @@ TEST_F(UserBus, AHeldLineFailsWhatIsAskedForAndIsTriedAgain) {
   }
 }
 
-TEST_F(UserBus, ALineThatIsTakenInTheMiddleOfATransferIsFound) {
+TEST_F(UserBus, NoticesALineHeldDuringATransfer) {
   ASSERT_TRUE(bus.ask(1, Command::i2c_read(0x68, "x3b", 14)));
   bus.poll(++now_ms);
   devices.bus.advance(300);
@@ -237,7 +237,7 @@ TEST_F(UserBus, ALineThatIsTakenInTheMiddleOfATransferIsFound) {
   EXPECT_EQ(bus.answer().outcome, I2cOutcome::bus_stuck);
 }
 
-TEST_F(UserBus, AWriteThatHasNotBegunIsDropped) {
+TEST_F(UserBus, DropsAWaitingWrite) {
   bus.poll_slot(1, reads(0x68, 0x3B, 14, 5), now_ms + 1);
   pass(1);  // a reading is on the wire
   ASSERT_TRUE(bus.ask(7, Command::i2c_write(0x68, "x6b00")));
@@ -257,7 +257,7 @@ TEST_F(UserBus, AReadIsNotDropped) {
   EXPECT_EQ(bus.answer().outcome, I2cOutcome::done);
 }
 
-TEST_F(UserBus, WhatIsDroppedUnderWayTellsNothingToTheNext) {
+TEST_F(UserBus, ADroppedTransferDoesNotAffectTheNextAnswer) {
   ASSERT_TRUE(bus.ask(7, Command::i2c_read(0x68, "x3b", 14)));
   bus.poll(++now_ms);
   bus.drop_all();
@@ -265,7 +265,7 @@ TEST_F(UserBus, WhatIsDroppedUnderWayTellsNothingToTheNext) {
   EXPECT_EQ(answered(Command::i2c_read(0x68, "x75", 1)), "done 104");
 }
 
-TEST_F(UserBus, ASlotThatIsSetAnewUnderWayForgetsWhatWasRead) {
+TEST_F(UserBus, ChangingASlotDiscardsItsUnfinishedReading) {
   bus.poll_slot(1, reads(0x68, 0x75, 1, 50), now_ms + 1);
   bus.poll(++now_ms);
   bus.poll_slot(1, I2cPoll(), now_ms);

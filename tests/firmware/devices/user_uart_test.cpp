@@ -67,7 +67,7 @@ class UserUartTest : public testing::Test {
   UserUart uart{line};
 };
 
-TEST_F(UserUartTest, TellsWhatIsNewAndOnceMoreWhatWasNewBefore) {
+TEST_F(UserUartTest, EachStateHasTheNewBytesAndRepeatsThePreviousOnes) {
   arrive("abc");
   EXPECT_EQ(state(), "0 0 abc");
   EXPECT_EQ(told(), "0 0 abc") << "every reader of one state gets the same";
@@ -77,14 +77,14 @@ TEST_F(UserUartTest, TellsWhatIsNewAndOnceMoreWhatWasNewBefore) {
   EXPECT_EQ(state(), "5 0 ");
 }
 
-TEST_F(UserUartTest, WhatIsNewGoesBeforeWhatIsRepeated) {
+TEST_F(UserUartTest, NewBytesTakePrecedenceOverRepeatedBytes) {
   arrive(std::string(64, 'a') + std::string(26, 'b'));
   EXPECT_EQ(state(), "0 0 " + std::string(64, 'a'));
   EXPECT_EQ(state(), "26 0 " + std::string(38, 'a') + std::string(26, 'b'));
   EXPECT_EQ(state(), "64 0 " + std::string(26, 'b'));
 }
 
-TEST_F(UserUartTest, CountsWhatFindsNoRoomOrCameDamaged) {
+TEST_F(UserUartTest, CountsDroppedAndDamagedBytes) {
   arrive(std::string(UserUart::backlog + 7, 'x'));
   line.lost = 5;
   uart.poll();
@@ -102,7 +102,7 @@ TEST_F(UserUartTest, CountsWhatFindsNoRoomOrCameDamaged) {
 }
 
 // As at 115200 baud, 8N1: 11.52 bytes a millisecond, and a state every 10 ms.
-TEST_F(UserUartTest, TellsABurstOf530BytesWhole) {
+TEST_F(UserUartTest, ReportsABurstOf530BytesWithoutLoss) {
   std::string sent;
   for (int i = 0; i < 530; ++i) sent += static_cast<char>('a' + i % 26);
   std::string heard;
@@ -120,7 +120,7 @@ TEST_F(UserUartTest, TellsABurstOf530BytesWhole) {
   EXPECT_EQ(heard, sent);
 }
 
-TEST_F(UserUartTest, KeepsTheOrderHoweverOftenItsRingIsPassed) {
+TEST_F(UserUartTest, KeepsTheOrderWhenTheRingWraps) {
   std::string sent;
   std::string heard;
   for (std::size_t i = 0; sent.size() < 10 * UserUart::capacity; ++i) {
@@ -136,7 +136,7 @@ TEST_F(UserUartTest, KeepsTheOrderHoweverOftenItsRingIsPassed) {
   EXPECT_EQ(heard, sent);
 }
 
-TEST_F(UserUartTest, ASessionDoesNotHearWhatCameBefore) {
+TEST_F(UserUartTest, ASessionGetsNoBytesFromBeforeItBegan) {
   arrive("old");
   state();
   arrive("older");
@@ -158,7 +158,7 @@ TEST_F(UserUartTest, IsSetUpOnlyWhenSomethingChanges) {
   EXPECT_EQ(line.waiting, "x") << "the UART is off";
 }
 
-TEST_F(UserUartTest, PositionsWrap) {
+TEST_F(UserUartTest, PositionsCountEveryByte) {
   std::uint32_t next = 0;
   for (int i = 0; i < 3000; ++i) {
     arrive(std::string(50, static_cast<char>('a' + i % 26)));
@@ -199,7 +199,7 @@ class UserUartOnTheModel : public testing::Test {
   std::uint32_t lost = 0;
 };
 
-TEST_F(UserUartOnTheModel, AReceiverAt10HzComesThroughWhole) {
+TEST_F(UserUartOnTheModel, ReceivesAGnssReceiverAt10HzWithoutLoss) {
   listen(115200, UartPeer::gnss, 5000);
   EXPECT_EQ(lost, 0U);
   int sentences = 0;
@@ -217,7 +217,7 @@ TEST_F(UserUartOnTheModel, AReceiverAt10HzComesThroughWhole) {
   EXPECT_GE(sentences, 49 * 5);
 }
 
-TEST_F(UserUartOnTheModel, ALidarAt100HzComesThroughWhole) {
+TEST_F(UserUartOnTheModel, ReceivesALidarAt100HzWithoutLoss) {
   listen(115200, UartPeer::lidar, 2000);
   EXPECT_EQ(lost, 0U);
   EXPECT_GE(heard.size(), 198U * 9);
@@ -229,7 +229,7 @@ TEST_F(UserUartOnTheModel, ALidarAt100HzComesThroughWhole) {
   }
 }
 
-TEST_F(UserUartOnTheModel, WhatDoesNotFitIsLostAndCounted) {
+TEST_F(UserUartOnTheModel, CountsBytesThatDoNotFit) {
   listen(uart_max_baud, UartPeer::noise, 1000);
   EXPECT_EQ(heard.size(), 6400U) << "64 in each state";
   // Each byte that the peer sent is in a state, counted as lost, or still waiting.
@@ -237,13 +237,13 @@ TEST_F(UserUartOnTheModel, WhatDoesNotFitIsLostAndCounted) {
   EXPECT_GE(heard.size() + lost + 256 + UserUart::backlog, model.said());
 }
 
-TEST_F(UserUartOnTheModel, AnotherRateThanThePeersDamagesAll) {
+TEST_F(UserUartOnTheModel, AWrongBaudRateDamagesEveryByte) {
   listen(9600, UartPeer::gnss, 1000);
   EXPECT_EQ(heard, "");
   EXPECT_GT(lost, 3000U);
 }
 
-TEST_F(UserUartOnTheModel, WhatIsSentTakesItsTimeAndWhatWaitsCanBeDropped) {
+TEST_F(UserUartOnTheModel, SendingTakesTimeAndWaitingBytesCanBeDropped) {
   model.connect(UartPeer::loop);
   uart.set_up(mode_of(9600));
   const std::string text(48, 'z');

@@ -10,21 +10,21 @@
 namespace r4::firmware {
 namespace {
 
-TEST(Analog, FiftyVoltsAtFullRangeAsItComes) {
+TEST(Analog, TheDefaultFullRangeIs50Volts) {
   const AnalogCalibration calibration;
   EXPECT_EQ(centivolts_of(0, calibration), 0);
   EXPECT_EQ(centivolts_of(65535, calibration), 5000);
   EXPECT_EQ(centivolts_of(32768, calibration), 2500);
 }
 
-TEST(Analog, ReadingsOutsideTheLineGoOnAlongIt) {
+TEST(Analog, ExtrapolatesBeyondTheCalibrationPoints) {
   AnalogCalibration calibration;
   ASSERT_TRUE(calibration.set(1000, 50, 2000, 150));
   EXPECT_EQ(centivolts_of(0, calibration), -50);
   EXPECT_EQ(centivolts_of(500, calibration), 0);
 }
 
-TEST(Analog, RefusesWhatNoDividerDoes) {
+TEST(Analog, RefusesACalibrationThatNoDividerCanHave) {
   AnalogCalibration calibration;
   const AnalogCalibration before = calibration;
   EXPECT_FALSE(calibration.set(100, 0, 100, 500));

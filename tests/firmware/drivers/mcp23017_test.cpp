@@ -53,7 +53,7 @@ TEST(Mcp23017, WritesTheLatchesBeforeTheDirections) {
   EXPECT_EQ(bench.chip.level(1), safe_b);
 }
 
-TEST(Mcp23017, NoPinIsEverDrivenToAnythingButItsSafeLevelInTheSetUp) {
+TEST(Mcp23017, SetUpDrivesEveryPinOnlyToItsSafeLevel) {
   Mcp23017Bench bench;
   bench.expander.begin();
   for (int i = 0; i < 10; ++i) {
@@ -65,7 +65,7 @@ TEST(Mcp23017, NoPinIsEverDrivenToAnythingButItsSafeLevelInTheSetUp) {
   EXPECT_TRUE(bench.expander.ready());
 }
 
-TEST(Mcp23017, BringsBackAChipOfTheOtherRegisterLayout) {
+TEST(Mcp23017, SetsUpAChipInTheOtherRegisterLayout) {
   Mcp23017Bench bench;
   const std::uint8_t bank[] = {0x0A, 0x80};
   bench.bus.write(0x20, bank, 2);
@@ -88,7 +88,7 @@ TEST(Mcp23017, WritesOnlyTheLatchThatChanged) {
   EXPECT_EQ(bench.verify(), ChipTrouble::none);
 }
 
-TEST(Mcp23017, SafeStateIsRightAlsoForAChipThatWasReset) {
+TEST(Mcp23017, TheSafeStateWorksOnAChipThatWasReset) {
   Mcp23017Bench bench;
   bench.set_up();
   bench.write(0x55, 0xFF);
@@ -108,7 +108,7 @@ TEST(Mcp23017, NoticesAReset) {
   EXPECT_EQ(bench.verify(), ChipTrouble::was_reset);
 }
 
-TEST(Mcp23017, NoticesALatchAndADirectionThatChangedByThemselves) {
+TEST(Mcp23017, NoticesAChangedLatchOrDirection) {
   for (const int number : {0x00, 0x01, 0x14, 0x15}) {
     Mcp23017Bench bench;
     bench.set_up();
@@ -118,7 +118,7 @@ TEST(Mcp23017, NoticesALatchAndADirectionThatChangedByThemselves) {
   }
 }
 
-TEST(Mcp23017, RefusedBytesAndAHeldBusAreTrouble) {
+TEST(Mcp23017, ReportsRefusedBytesAndAHeldBus) {
   Mcp23017Bench bench;
   bench.set_up();
   bench.bus.refuse(0x20, 1);

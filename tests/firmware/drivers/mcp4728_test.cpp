@@ -80,7 +80,7 @@ TEST(Mcp4728, LeavesAProvisionedEepromAlone) {
   EXPECT_EQ(bench.chip.eeprom_writes(), 0);
 }
 
-TEST(Mcp4728, DoesNotWearOutAnEepromThatKeepsNothing) {
+TEST(Mcp4728, DoesNotRewriteAnEepromThatKeepsNothing) {
   Mcp4728Bench bench;
   bench.chip.wear_out();
   for (int i = 0; i < 5; ++i) {
@@ -91,7 +91,7 @@ TEST(Mcp4728, DoesNotWearOutAnEepromThatKeepsNothing) {
   EXPECT_EQ(bench.chip.eeprom_writes(), 1);
 }
 
-TEST(Mcp4728, WaitsForAWriteThatWasUnderWayAtBoot) {
+TEST(Mcp4728, WaitsForAnEepromWriteInProgressAtBoot) {
   Mcp4728Bench bench;
   const std::uint8_t provision[] = {0x50, 0, 0, 0, 0, 0, 0, 0, 0};
   bench.bus.write(0x61, provision, sizeof provision);
@@ -121,7 +121,7 @@ TEST(Mcp4728, WritesOnlyTheChannelsThatChanged) {
   EXPECT_EQ(bench.verify(), ChipTrouble::none);
 }
 
-TEST(Mcp4728, SafeStateIsZeroVoltsOnAllFour) {
+TEST(Mcp4728, TheSafeStateIsZeroVoltsOnAllChannels) {
   Mcp4728Bench bench;
   bench.provisioned();
   bench.set_up();
@@ -150,7 +150,7 @@ TEST(Mcp4728, NoticesAResetAndAWrongRegister) {
   EXPECT_EQ(bench.verify(), ChipTrouble::wrong_register);
 }
 
-TEST(Mcp4728, RefusedBytesAndAHeldBusAreTrouble) {
+TEST(Mcp4728, ReportsRefusedBytesAndAHeldBus) {
   Mcp4728Bench bench;
   bench.provisioned();
   bench.set_up();

@@ -65,7 +65,7 @@ TEST(Pca9685, ComputesThePrescaleOfTheDataSheet) {
   EXPECT_EQ(Pca9685::prescale_for(24), 253);
 }
 
-TEST(Pca9685, TakesAChipThatIsDrivingToOffFirst) {
+TEST(Pca9685, SetUpTurnsOffADrivingChipFirst) {
   Pca9685Bench bench;
   bench.set_up();
   for (int i = 0; i < Pca9685::channels; ++i) bench.pwm.set_duty(i, 4095);
@@ -80,7 +80,7 @@ TEST(Pca9685, TakesAChipThatIsDrivingToOffFirst) {
   for (int i = 0; i < Pca9685::channels; ++i) EXPECT_EQ(bench.chip.duty(i), 0);
 }
 
-TEST(Pca9685, DutyUsesTheFullBitsAtBothEnds) {
+TEST(Pca9685, FullAndZeroDutyUseTheFullBits) {
   Pca9685Bench bench;
   bench.set_up();
   bench.pwm.set_duty(3, 0x5A3);
@@ -97,7 +97,7 @@ TEST(Pca9685, DutyUsesTheFullBitsAtBothEnds) {
   EXPECT_EQ(bench.chip.duty(3), 1);
 }
 
-TEST(Pca9685, PulsesAreInMicrosecondsToTheNearestCount) {
+TEST(Pca9685, APulseIsRoundedToTheNearestCount) {
   Pca9685Bench bench(50);
   bench.set_up();
   for (int us = 3; us <= 2500; ++us) {
@@ -120,7 +120,7 @@ TEST(Pca9685, WritesNothingWhenNothingChanged) {
   EXPECT_EQ(bench.write(), Lines{});
 }
 
-TEST(Pca9685, WritesNeighboursInOneBurstAndOthersInTheirOwn) {
+TEST(Pca9685, WritesNeighbouringChannelsInOneBurst) {
   Pca9685Bench bench;
   bench.set_up();
   bench.pwm.set_duty(0, 0x111);
@@ -142,7 +142,7 @@ TEST(Pca9685, DutyAndDirectionOfAGroupChangeInOneTransfer) {
   EXPECT_FALSE(bench.chip.high(3));
 }
 
-TEST(Pca9685, ASmallBudgetCutsBetweenGroupsOnly) {
+TEST(Pca9685, ASmallBudgetSplitsOnlyBetweenGroups) {
   Pca9685Bench bench(1000, 2);
   bench.set_up();
   for (int i = 0; i < 8; i += 2) {
@@ -186,7 +186,7 @@ TEST(Pca9685, AllOffReachesEveryChipInThreeBytes) {
   }
 }
 
-TEST(Pca9685, SafeStateIsOneTransferAndCleansUpForTheNextDuty) {
+TEST(Pca9685, TheSafeStateTakesOneTransferAndTheNextDutyWorks) {
   Pca9685Bench bench;
   bench.set_up();
   bench.pwm.set_duty(0, 4095);
@@ -205,7 +205,7 @@ TEST(Pca9685, SafeStateIsOneTransferAndCleansUpForTheNextDuty) {
   EXPECT_EQ(bench.chip.duty(5), 77);
 }
 
-TEST(Pca9685, AChipThatDoesNotAnswerIsTrouble) {
+TEST(Pca9685, ReportsAChipThatDoesNotAnswer) {
   Pca9685Bench bench;
   bench.set_up();
   bench.bus.refuse(0x40, 0, 1);
@@ -218,7 +218,7 @@ TEST(Pca9685, AChipThatDoesNotAnswerIsTrouble) {
   EXPECT_EQ(bench.pwm.trouble(), ChipTrouble::none);
 }
 
-TEST(Pca9685, AByteThatIsRefusedIsTroubleAtEachStepOfTheSetUp) {
+TEST(Pca9685, ReportsARefusedByteAtEachStepOfTheSetUp) {
   for (std::size_t after = 0; after < 5; ++after) {
     for (int step = 0; step < 6; ++step) {
       Pca9685Bench bench;
@@ -237,7 +237,7 @@ TEST(Pca9685, AByteThatIsRefusedIsTroubleAtEachStepOfTheSetUp) {
   }
 }
 
-TEST(Pca9685, NoticesAChipThatWasResetUnderWay) {
+TEST(Pca9685, NoticesAChipReset) {
   Pca9685Bench bench;
   bench.set_up();
   bench.verify();
@@ -247,7 +247,7 @@ TEST(Pca9685, NoticesAChipThatWasResetUnderWay) {
   EXPECT_EQ(bench.pwm.trouble(), ChipTrouble::was_reset);
 }
 
-TEST(Pca9685, AChipThatIsResetInATransferStopsAcknowledging) {
+TEST(Pca9685, ReportsAChipResetDuringATransfer) {
   Pca9685Bench bench;
   bench.set_up();
   bench.pwm.set_duty(4, 0x456);
@@ -257,7 +257,7 @@ TEST(Pca9685, AChipThatIsResetInATransferStopsAcknowledging) {
   EXPECT_EQ(bench.chip.duty(4), 0);
 }
 
-TEST(Pca9685, NoticesARegisterThatChangedByItself) {
+TEST(Pca9685, NoticesAChangedRegister) {
   Pca9685Bench bench;
   bench.set_up();
   const std::uint8_t bytes[] = {0x06 + 4 * 7 + 2, 0x55};
@@ -266,7 +266,7 @@ TEST(Pca9685, NoticesARegisterThatChangedByItself) {
   EXPECT_EQ(bench.pwm.trouble(), ChipTrouble::wrong_register);
 }
 
-TEST(Pca9685, AHeldBusIsToldApartFromASilentChip) {
+TEST(Pca9685, DistinguishesAHeldBusFromASilentChip) {
   Pca9685Bench bench;
   bench.set_up();
   bench.bus.hold();

@@ -24,7 +24,7 @@ struct Shaft {
   QuadratureEncoder encoder;
 };
 
-TEST(QuadratureEncoder, CountsFourACycleBothWays) {
+TEST(QuadratureEncoder, CountsFourPerCycleInBothDirections) {
   Shaft shaft;
   shaft.turn(8);
   EXPECT_EQ(shaft.encoder.count(), 8);
@@ -32,7 +32,7 @@ TEST(QuadratureEncoder, CountsFourACycleBothWays) {
   EXPECT_EQ(shaft.encoder.count(), -5);
 }
 
-TEST(QuadratureEncoder, TheFirstLevelsCountNothing) {
+TEST(QuadratureEncoder, TheFirstSampleCountsNothing) {
   for (int levels = 0; levels < 4; ++levels) {
     QuadratureEncoder encoder;
     encoder.sample((levels & 2) != 0, (levels & 1) != 0);
@@ -40,7 +40,7 @@ TEST(QuadratureEncoder, TheFirstLevelsCountNothing) {
   }
 }
 
-TEST(QuadratureEncoder, AJumpOverBothLinesCountsNothing) {
+TEST(QuadratureEncoder, AChangeOfBothLinesCountsNothing) {
   QuadratureEncoder encoder;
   encoder.sample(false, false);
   encoder.sample(true, true);
@@ -53,14 +53,14 @@ TEST(QuadratureEncoder, AJumpOverBothLinesCountsNothing) {
   EXPECT_EQ(encoder.count(), -1);
 }
 
-TEST(QuadratureEncoder, TheSameLevelsAgainCountNothing) {
+TEST(QuadratureEncoder, UnchangedLevelsCountNothing) {
   Shaft shaft;
   shaft.turn(3);
   for (int i = 0; i < 10; ++i) shaft.encoder.sample(shaft.a(), shaft.b());
   EXPECT_EQ(shaft.encoder.count(), 3);
 }
 
-TEST(QuadratureEncoder, TheIndexIsWhereItsLineRoseLast) {
+TEST(QuadratureEncoder, TheIndexIsTheCountAtItsLastRisingEdge) {
   Shaft shaft;
   shaft.turn(5);
   EXPECT_EQ(shaft.encoder.index_count(), 0) << "no index yet";
@@ -76,7 +76,7 @@ TEST(QuadratureEncoder, TheIndexIsWhereItsLineRoseLast) {
   EXPECT_EQ(shaft.encoder.index_count(), -2);
 }
 
-TEST(QuadratureEncoder, TheIndexStaysWhereItIsWhenCountingBeginsElsewhere) {
+TEST(QuadratureEncoder, ZeroKeepsThePhysicalPositionOfTheIndex) {
   Shaft shaft;
   shaft.encoder.zero();
   EXPECT_EQ(shaft.encoder.index_count(), 0);
@@ -91,7 +91,7 @@ TEST(QuadratureEncoder, TheIndexStaysWhereItIsWhenCountingBeginsElsewhere) {
   EXPECT_EQ(shaft.encoder.index_count(), -7);
 }
 
-TEST(QuadratureEncoder, FrequencyIsThatOfTheWindowAndZeroDoesNotDisturbIt) {
+TEST(QuadratureEncoder, ZeroDoesNotDisturbTheMeasuredFrequency) {
   Shaft shaft;
   std::uint32_t now_us = 0xFFFF0000U;  // the clock wraps
   shaft.encoder.measure(now_us);

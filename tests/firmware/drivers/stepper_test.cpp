@@ -66,7 +66,7 @@ TEST(Stepper, SpeedIsLimited) {
   EXPECT_EQ(step.rises, 500);
 }
 
-TEST(Stepper, DirectionIsThereATickBeforeTheStep) {
+TEST(Stepper, SetsTheDirectionOneTickBeforeTheStep) {
   StepperBench bench;
   bench.stepper.go(10, 20000);
   bench.tick(30);
@@ -81,7 +81,7 @@ TEST(Stepper, DirectionIsThereATickBeforeTheStep) {
   EXPECT_EQ(bench.stepper.position(), -10);
 }
 
-TEST(Stepper, StopEndsWithTheStepThatHasBegun) {
+TEST(Stepper, StopCompletesTheCurrentStep) {
   StepperBench bench;
   bench.stepper.go(1000, 20000);
   while (!bench.step.high) bench.tick(1);
@@ -92,7 +92,7 @@ TEST(Stepper, StopEndsWithTheStepThatHasBegun) {
   EXPECT_FALSE(bench.step.high);
 }
 
-TEST(Stepper, ZeroHoldsWhereItIs) {
+TEST(Stepper, ZeroHoldsTheStepperAtItsPosition) {
   StepperBench bench;
   bench.stepper.go(1000, 20000);
   bench.tick(100);
@@ -105,7 +105,7 @@ TEST(Stepper, ZeroHoldsWhereItIs) {
   EXPECT_EQ(bench.stepper.position(), 3);
 }
 
-TEST(Stepper, NoSpeedOrANegativeOneIsStandingStill) {
+TEST(Stepper, ASpeedOfZeroOrLessDoesNotMove) {
   StepperBench bench;
   for (const std::int32_t speed : {0, -1, -20000}) {
     bench.stepper.go(1000, speed);

@@ -43,7 +43,7 @@ struct UltrasonicBench {
   UltrasonicSensors sensors;
 };
 
-TEST(UltrasonicSensors, DistanceIsTheEchoBy58) {
+TEST(UltrasonicSensors, TheDistanceIsTheEchoTimeDividedBy58) {
   UltrasonicBench bench;
   bench.echo_us = {58 * 2, 58 * 100 + 57, 58 * 400, 58 * 4};
   bench.run(250);
@@ -80,7 +80,7 @@ TEST(UltrasonicSensors, TheTriggerLastsTenMicrosecondsOrMore) {
   EXPECT_FALSE(pins[0].high);
 }
 
-TEST(UltrasonicSensors, NothingInRangeASilentSensorAndAStuckLineAreToldApart) {
+TEST(UltrasonicSensors, DistinguishesNoEchoASilentSensorAndAStuckLine) {
   UltrasonicBench bench;
   bench.echo_us = {58 * 401, 39000, 0, 580};
   bench.run(200);
@@ -93,14 +93,14 @@ TEST(UltrasonicSensors, NothingInRangeASilentSensorAndAStuckLineAreToldApart) {
   for (int i = 0; i < 4; ++i) EXPECT_EQ(bench.sensors.distance_cm(i), 0);
 }
 
-TEST(UltrasonicSensors, SomethingRightAtTheSensorIsNotNothing) {
+TEST(UltrasonicSensors, AnObstacleAtTheSensorReadsOneCentimetre) {
   UltrasonicBench bench(0x01);
   bench.echo_us = {20, 0, 0, 0};
   bench.run(70);
   EXPECT_EQ(bench.sensors.distance_cm(0), 1);
 }
 
-TEST(UltrasonicSensors, OnlyThoseThatAreFittedHaveATurn) {
+TEST(UltrasonicSensors, TriggersOnlyFittedSensors) {
   UltrasonicBench bench(0b1010);
   bench.run(500);
   EXPECT_EQ(bench.trigger[0].rises, 0);
@@ -112,7 +112,7 @@ TEST(UltrasonicSensors, OnlyThoseThatAreFittedHaveATurn) {
   EXPECT_TRUE(none.turns.empty());
 }
 
-TEST(UltrasonicSensors, ALateEchoOfAnotherSensorIsNotTakenForOnesOwn) {
+TEST(UltrasonicSensors, IgnoresALateEchoOfAnotherSensor) {
   UltrasonicBench bench(0b0011);
   bench.echo_us = {0, 0, 0, 0};
   bench.run(65);

@@ -36,7 +36,7 @@ struct GuardedBridge : ScriptedBridge {
   }
 };
 
-TEST(BridgeGuard, WithAKeyOnlySignedHeartbeatsAndCommandsPass) {
+TEST(BridgeGuard, ABridgeWithAKeyPassesOnlySignedHeartbeatsAndCommands) {
   for (const bool trusted : {false, true}) {
     GuardedBridge bridge({key_of(3)}, trusted, board_with_key);
     bridge.hosts->say("H:ROS2-R4;PNum:1;T:0;", second_host);
@@ -64,13 +64,13 @@ TEST(BridgeGuard, WithAKeyOnlySignedHeartbeatsAndCommandsPass) {
   }
 }
 
-TEST(BridgeGuard, EachHostMayHaveAKeyOfItsOwn) {
+TEST(BridgeGuard, EachHostMayHaveItsOwnKey) {
   GuardedBridge bridge({key_of(3), key_of(5)}, true, board_with_key);
   bridge.hosts->say(GuardedBridge::sign("H:ROS2-R4;PNum:1;T:0;", 1, 5000, key_of(5)), keyholder);
   EXPECT_EQ(bridge.passed().size(), 1U);
 }
 
-TEST(BridgeGuard, WhatWasSignedTooLongAgoDoesNotPass) {
+TEST(BridgeGuard, DropsDatagramsSignedTooLongAgo) {
   GuardedBridge bridge({key_of(3)}, true, board_with_key);
   bridge.pass(200ms);
   bridge.hosts->say(GuardedBridge::sign("H:ROS2-R4;PNum:1;T:0;", 1), keyholder);
@@ -82,7 +82,7 @@ TEST(BridgeGuard, WhatWasSignedTooLongAgoDoesNotPass) {
   EXPECT_EQ(bridge.passed(), Texts{}) << "a signature for a later time must not pass";
 }
 
-TEST(BridgeGuard, AStateThatWasLongOnItsWayDoesNotSetTheBoardsClockBack) {
+TEST(BridgeGuard, ALateStateDoesNotSetTheBoardClockBack) {
   GuardedBridge bridge({key_of(3)}, true, board_with_key);
   bridge.pass(40ms);
   bridge.board->say("AIN24:24.28;PNum:4;T:5010;");
@@ -90,14 +90,14 @@ TEST(BridgeGuard, AStateThatWasLongOnItsWayDoesNotSetTheBoardsClockBack) {
   EXPECT_EQ(bridge.passed().size(), 1U);
 }
 
-TEST(BridgeGuard, AfterANewNonceWhatWasSignedForTheOldOneDoesNotPass) {
+TEST(BridgeGuard, DropsDatagramsSignedForAnEarlierNonce) {
   GuardedBridge bridge({key_of(3)}, true, board_with_key);
   bridge.board->say("H:R4-ROS2;PNum:4;T:5010;AN:fedcba9876543210;");
   bridge.hosts->say(GuardedBridge::sign("H:ROS2-R4;PNum:1;T:0;", 1), keyholder);
   EXPECT_EQ(bridge.passed(), Texts{});
 }
 
-TEST(BridgeGuard, WithoutAKeyNothingPassesToABoardAtItsCableThatHasOne) {
+TEST(BridgeGuard, ABridgeWithoutAKeyPassesOnlyStopsToAKeyedBoardOnACable) {
   GuardedBridge bridge({}, true, board_with_key);
   EXPECT_EQ(bridge.events.back(), "board warning");
   bridge.hosts->say("H:ROS2-R4;PNum:1;T:0;", keyholder);
@@ -108,7 +108,7 @@ TEST(BridgeGuard, WithoutAKeyNothingPassesToABoardAtItsCableThatHasOne) {
   EXPECT_EQ(bridge.passed(), Texts{"E:STOP;PNum:3;T:0;"});
 }
 
-TEST(BridgeGuard, NothingPassesToACableBeforeItsBoardHasToldWhetherItHasAKey) {
+TEST(BridgeGuard, PassesNothingToACableUntilTheBoardReportsItsKey) {
   GuardedBridge bridge({}, true, "");
   bridge.hosts->say("H:ROS2-R4;PNum:1;T:0;", keyholder);
   EXPECT_EQ(bridge.passed(), Texts{});
@@ -120,13 +120,13 @@ TEST(BridgeGuard, NothingPassesToACableBeforeItsBoardHasToldWhetherItHasAKey) {
   EXPECT_EQ(bridge.passed(), Texts{});
 }
 
-TEST(BridgeGuard, WithoutAKeySignaturesPassToABoardThatChecksThem) {
+TEST(BridgeGuard, ABridgeWithoutAKeyPassesHeartbeatsToACheckingBoard) {
   GuardedBridge bridge({}, false, board_with_key);
   bridge.hosts->say("H:ROS2-R4;PNum:1;T:0;", keyholder);
   EXPECT_EQ(bridge.passed().size(), 1U);
 }
 
-TEST(BridgeGuard, WithAKeyNothingPassesToABoardThatHasNone) {
+TEST(BridgeGuard, ABridgeWithAKeyPassesNothingToABoardWithoutAKey) {
   GuardedBridge bridge({key_of(3)}, true, board_without_key);
   EXPECT_EQ(bridge.events.back(), "board warning");
   bridge.hosts->say("H:ROS2-R4;PNum:1;T:0;", keyholder);
@@ -134,7 +134,7 @@ TEST(BridgeGuard, WithAKeyNothingPassesToABoardThatHasNone) {
   EXPECT_EQ(bridge.passed(), Texts{});
 }
 
-TEST(BridgeGuard, AHostWhoseHeartbeatIsRefusedHearsTheNonceThatItNeeds) {
+TEST(BridgeGuard, ARefusedHostGetsTheNonceThatItNeeds) {
   GuardedBridge bridge({key_of(3)}, true, board_with_key);
   bridge.hosts->say("H:ROS2-R4;PNum:1;T:0;", second_host);
   bridge.hosts->take();

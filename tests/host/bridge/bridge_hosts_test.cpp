@@ -58,7 +58,7 @@ class BridgeHostsTest : public testing::Test, protected ScriptedBridge {
   }
 };
 
-TEST_F(BridgeHostsTest, SeveralHostsPassAndTheBoardDecides) {
+TEST_F(BridgeHostsTest, PassesSeveralHostsAndTheBoardDecides) {
   begin();
   EXPECT_EQ(hosts->held, owner);
   heartbeat(other_sid, waiting, 0);
@@ -69,7 +69,7 @@ TEST_F(BridgeHostsTest, SeveralHostsPassAndTheBoardDecides) {
   EXPECT_EQ(hosts->take(), Texts{"N:50,BUSY" + other_sid + ";PNum:8;T:101;@2"});
 }
 
-TEST_F(BridgeHostsTest, AHostIsServedWhenTheBoardHasHadTheTimeToRefuseIt) {
+TEST_F(BridgeHostsTest, ServesAHostThatTheBoardDoesNotRefuseInTime) {
   heartbeat(owner_sid, owner, 0);
   pass(BridgeHosts::patience);
   EXPECT_FALSE(hears_states(owner)) << "the board does not judge a heartbeat without an echo";
@@ -84,7 +84,7 @@ TEST_F(BridgeHostsTest, AHostIsServedWhenTheBoardHasHadTheTimeToRefuseIt) {
   EXPECT_EQ(hosts->held, owner);
 }
 
-TEST_F(BridgeHostsTest, ARefusedHostIsNotServedUntilATimeoutWithoutAnotherRefusal) {
+TEST_F(BridgeHostsTest, ServesARefusedHostAfterATimeoutWithoutRefusals) {
   begin();
   heartbeat(other_sid, waiting);
   busy(other_sid);
@@ -103,7 +103,7 @@ TEST_F(BridgeHostsTest, ARefusedHostIsNotServedUntilATimeoutWithoutAnotherRefusa
   EXPECT_TRUE(hears_states(waiting));
 }
 
-TEST_F(BridgeHostsTest, ABoardThatHasNoHostRefusesNobody) {
+TEST_F(BridgeHostsTest, IgnoresAnEarlierBusyOfABoardWithoutAHost) {
   for (const std::string& free : {free_board, std::string("H:R4-ROS2;PNum:0;T:0;")}) {
     heartbeat(other_sid, waiting);
     busy(other_sid);
@@ -115,7 +115,7 @@ TEST_F(BridgeHostsTest, ABoardThatHasNoHostRefusesNobody) {
   }
 }
 
-TEST_F(BridgeHostsTest, ThePeersThatAreHeldFollowTheHostsThatAreServed) {
+TEST_F(BridgeHostsTest, HoldsThePeersOfTheServedHost) {
   begin();
   heartbeat(owner_sid, newcomer);
   EXPECT_EQ(hosts->held, owner);
@@ -134,7 +134,7 @@ TEST_F(BridgeHostsTest, ThePeersThatAreHeldFollowTheHostsThatAreServed) {
   EXPECT_EQ(hosts->held, everyone);
 }
 
-TEST_F(BridgeHostsTest, APaperHostKeepsItsPlaceLongerThanTheBoardWaitsForIt) {
+TEST_F(BridgeHostsTest, APaperHostKeepsItsSlotLongerThanTheBoardTimeout) {
   paper_heartbeat(owner);
   take();
   paper_heartbeat(waiting);
@@ -152,7 +152,7 @@ TEST_F(BridgeHostsTest, APaperHostKeepsItsPlaceLongerThanTheBoardWaitsForIt) {
   EXPECT_EQ(passed().size(), 1U);
 }
 
-TEST_F(BridgeHostsTest, StrangersWithIdsDoNotOpenThePlaceOfThePaperHost) {
+TEST_F(BridgeHostsTest, StrangersWithIdsDoNotFreeTheSlotOfThePaperHost) {
   paper_heartbeat(owner);
   for (int i = 0; i < 32; ++i) {
     pass(20ms);
@@ -163,7 +163,7 @@ TEST_F(BridgeHostsTest, StrangersWithIdsDoNotOpenThePlaceOfThePaperHost) {
   EXPECT_EQ(passed(), Texts{});
 }
 
-TEST_F(BridgeHostsTest, ACommandWithoutAHeartbeatBeforeItDoesNotPass) {
+TEST_F(BridgeHostsTest, DropsACommandOfAHostWithoutAHeartbeat) {
   command(owner_sid, owner);
   EXPECT_EQ(passed(), Texts{});
   EXPECT_EQ(from_hosts().kept_out, 1U);
@@ -171,7 +171,7 @@ TEST_F(BridgeHostsTest, ACommandWithoutAHeartbeatBeforeItDoesNotPass) {
 
 // --- strangers
 
-TEST_F(BridgeHostsTest, StrangersKeepNobodyOut) {
+TEST_F(BridgeHostsTest, StrangersDoNotKeepAHostOut) {
   for (const bool owned : {false, true}) {
     if (owned) begin();
     for (int ms = 0; ms < 3000; ms += 500) {
@@ -194,7 +194,7 @@ TEST_F(BridgeHostsTest, StrangersKeepNobodyOut) {
   EXPECT_TRUE(hears_states(4)) << "a served session may come from a new address";
 }
 
-TEST_F(BridgeHostsTest, SixteenServedHostsKeepTheirPlaces) {
+TEST_F(BridgeHostsTest, SixteenServedHostsKeepTheirSlots) {
   for (int i = 0; i < 16; ++i) heartbeat(sid(i), 100 + static_cast<Peer>(i));
   pass(500ms);
   take();
@@ -204,7 +204,7 @@ TEST_F(BridgeHostsTest, SixteenServedHostsKeepTheirPlaces) {
       << "the answer of the bridge must name the session";
 }
 
-TEST_F(BridgeHostsTest, AHostThatWasServedComesBackAtOnceAfterASilenceThoughStrangersAskMeanwhile) {
+TEST_F(BridgeHostsTest, AServedHostReturnsAtOnceDespiteStrangers) {
   begin();
   for (int ms = 0; ms < 5000; ms += 5) {
     pass(5ms);
@@ -216,7 +216,7 @@ TEST_F(BridgeHostsTest, AHostThatWasServedComesBackAtOnceAfterASilenceThoughStra
   EXPECT_TRUE(hears_states(1000));
 }
 
-TEST_F(BridgeHostsTest, AFloodOfAHostThatIsNotServedDoesNotReachTheBoardsPath) {
+TEST_F(BridgeHostsTest, AFloodOfAnUnservedHostDoesNotReachTheBoard) {
   begin();
   heartbeat(other_sid, waiting);
   busy(other_sid);
@@ -237,7 +237,7 @@ TEST_F(BridgeHostsTest, AFloodOfAHostThatIsNotServedDoesNotReachTheBoardsPath) {
   EXPECT_EQ(of_other, AnswerBudget::burst);
 }
 
-TEST_F(BridgeHostsTest, AnAnswerToAHostThatIsNotServedGoesToThePeerThatAskedAlone) {
+TEST_F(BridgeHostsTest, AnAnswerToAnUnservedHostGoesOnlyToTheAskingPeer) {
   begin();
   for (Peer peer = 100; peer < 110; ++peer) {
     pass(20ms);
@@ -250,7 +250,7 @@ TEST_F(BridgeHostsTest, AnAnswerToAHostThatIsNotServedGoesToThePeerThatAskedAlon
   EXPECT_EQ(hosts->take(), Texts{"N:60,BUSY" + other_sid + ";PNum:8;T:101;@105"});
 }
 
-TEST_F(BridgeHostsTest, ARefusalForTheServedPaperHostGoesToItThoughAnotherPeerAsksWithItsNumber) {
+TEST_F(BridgeHostsTest, ARefusalForThePaperHostGoesToItDespiteOtherPeers) {
   paper_heartbeat(owner);
   pass(BridgeHosts::patience);
   hosts->say("Q:ID;PNum:51;T:0;", waiting);
@@ -260,7 +260,7 @@ TEST_F(BridgeHostsTest, ARefusalForTheServedPaperHostGoesToItThoughAnotherPeerAs
   EXPECT_EQ(hosts->take(), Texts{"N:51,RANGE;PNum:8;T:101;@1"});
 }
 
-TEST_F(BridgeHostsTest, AForgedHeartbeatHasItsVictimSentFewDatagrams) {
+TEST_F(BridgeHostsTest, AForgedHeartbeatSendsFewDatagramsToItsVictim) {
   for (const int ids : {1, 15}) {
     begin();
     std::size_t forged = 0, sent = 0, states = 0;
@@ -285,7 +285,7 @@ TEST_F(BridgeHostsTest, AForgedHeartbeatHasItsVictimSentFewDatagrams) {
   }
 }
 
-TEST_F(BridgeHostsTest, APeerGetsOneCopyWhateverItIs) {
+TEST_F(BridgeHostsTest, APeerGetsEachDatagramOnce) {
   begin();
   heartbeat(other_sid, waiting);
   heartbeat(sid(0), waiting);
@@ -305,7 +305,7 @@ TEST_F(BridgeHostsTest, APeerGetsOneCopyWhateverItIs) {
       << "a refused host that has stopped the board hears heartbeats";
 }
 
-TEST_F(BridgeHostsTest, APaperHostWithoutNumbersIsNotServedBesideAnotherHost) {
+TEST_F(BridgeHostsTest, APaperHostWithoutNumbersIsNotServedNextToAnotherHost) {
   begin();
   hosts->say("H:ROS2-R4;T:0;", waiting);
   EXPECT_EQ(passed().size(), 1U);
@@ -313,7 +313,7 @@ TEST_F(BridgeHostsTest, APaperHostWithoutNumbersIsNotServedBesideAnotherHost) {
   EXPECT_FALSE(hears_states(waiting)) << "the board cannot refuse a host without numbers";
 }
 
-TEST_F(BridgeHostsTest, HostsThatWaitShareTheHeartbeatsThatTheBudgetAllows) {
+TEST_F(BridgeHostsTest, WaitingHostsShareTheHeartbeatBudget) {
   begin();
   std::vector<std::size_t> heard(12);
   for (int ms = 0; ms < 3000; ms += 20) {

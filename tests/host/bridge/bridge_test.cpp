@@ -52,7 +52,7 @@ TEST(Bridge, CanBeClosedTwiceAndKeepsItsStatus) {
   EXPECT_EQ(bridge.status().at(0).hosts.name, name);
 }
 
-TEST(Bridge, RefusesWhatCannotBeJoined) {
+TEST(Bridge, RefusesUrlsThatCannotBeJoined) {
   struct Case {
     const char* hosts;
     const char* board;
@@ -94,7 +94,7 @@ TEST(Bridge, RefusesWhatCannotBeJoined) {
   }
 }
 
-TEST(Bridge, ListensToANetworkForABoardAtACableWithItsKeyOrOnPurpose) {
+TEST(Bridge, OpensACableBoardToANetworkOnlyWithAKeyOrOnRequest) {
   const std::string away = "serial:///dev/r4-is-not-there";
   BridgeOptions keyed;
   keyed.keys.resize(1);

@@ -36,7 +36,7 @@ class BridgedPairTest : public testing::Test, protected ScriptedBridge {
   }
 };
 
-TEST_F(BridgedPairTest, BytesPassAsTheyAre) {
+TEST_F(BridgedPairTest, PassesDatagramsUnchanged) {
   begin();
   hosts->say(paper_heartbeat, first);
   pass(BridgeHosts::patience);
@@ -53,7 +53,7 @@ TEST_F(BridgedPairTest, BytesPassAsTheyAre) {
   }
 }
 
-TEST_F(BridgedPairTest, ASettingThatOnlyACableMayChangeNeverPasses) {
+TEST_F(BridgedPairTest, NeverPassesACableOnlySetting) {
   begin();
   passed();
   for (const char* const command :
@@ -70,7 +70,7 @@ TEST_F(BridgedPairTest, ASettingThatOnlyACableMayChangeNeverPasses) {
   EXPECT_EQ(passed(), Texts{"C:rate,50;SID:00000000000000aa;PNum:3;T:0;"});
 }
 
-TEST_F(BridgedPairTest, WhatIsDamagedIsDroppedAndCounted) {
+TEST_F(BridgedPairTest, DropsAndCountsDamagedDatagrams) {
   begin();
   std::string damaged = with_crc("O:358,1,1;PNum:2;T:0;");
   damaged[2] = '9';
@@ -85,7 +85,7 @@ TEST_F(BridgedPairTest, WhatIsDamagedIsDroppedAndCounted) {
   EXPECT_EQ(from_board().damaged, 1U);
 }
 
-TEST_F(BridgedPairTest, NothingOfTheWrongEndPasses) {
+TEST_F(BridgedPairTest, DropsDatagramsInTheWrongDirection) {
   begin();
   hosts->say("H:R4-ROS2;PNum:0;T:0;", second);
   hosts->say("N:66,BUSY;PNum:0;T:0;", second);
@@ -98,7 +98,7 @@ TEST_F(BridgedPairTest, NothingOfTheWrongEndPasses) {
   EXPECT_EQ(from_board().misdirected, 2U);
 }
 
-TEST_F(BridgedPairTest, ItMakesNoHeartbeatAndNoCommand) {
+TEST_F(BridgedPairTest, SendsNoHeartbeatOrCommandByItself) {
   begin();
   pass(10s);
   EXPECT_EQ(passed(), Texts{});
@@ -107,7 +107,7 @@ TEST_F(BridgedPairTest, ItMakesNoHeartbeatAndNoCommand) {
 
 // --- the emergency stop
 
-TEST_F(BridgedPairTest, AStopOfAnyonePassesBeforeEverything) {
+TEST_F(BridgedPairTest, AStopOfAnyPeerPassesAtOnceAndIsConfirmedToIt) {
   begin();
   hosts->say("E:STOP;PNum:70;T:0;", third);
   ASSERT_EQ(board->sent.size(), 1U);
@@ -123,7 +123,7 @@ TEST_F(BridgedPairTest, AStopOfAnyonePassesBeforeEverything) {
   EXPECT_EQ(hosts->take(), Texts{"H:R4-ROS2;PNum:9;T:601;SAFE:2;STOP:70;"});
 }
 
-TEST_F(BridgedPairTest, AStopWaitsForNothingWhereStatesDoNotGetThrough) {
+TEST_F(BridgedPairTest, AStopPassesAtOnceWhenStatesAreBlocked) {
   begin();
   hosts->result = SendResult::full;
   for (int i = 0; i < 1000; ++i) board->say(board_state);
@@ -133,7 +133,7 @@ TEST_F(BridgedPairTest, AStopWaitsForNothingWhereStatesDoNotGetThrough) {
   EXPECT_EQ(from_board().undelivered, 1000U);
 }
 
-TEST_F(BridgedPairTest, PrioritiesAreThoseOfTheEnds) {
+TEST_F(BridgedPairTest, SendsWithThePrioritiesOfHostAndBoard) {
   begin();
   hosts->say("O:1,1,1;SID:00000000000000aa;PNum:2;T:0;", first);
   hosts->say("O:1,1,1;E:STOP;PNum:70;T:0;", third);
@@ -148,7 +148,7 @@ TEST_F(BridgedPairTest, PrioritiesAreThoseOfTheEnds) {
 
 // --- nothing stale
 
-TEST_F(BridgedPairTest, WhatCameWhileTheBridgeWasStoppedIsDroppedButAStop) {
+TEST_F(BridgedPairTest, DropsDatagramsFromAStandstillExceptStops) {
   begin();
   pass(1s);
   sleep(500ms);
@@ -165,7 +165,7 @@ TEST_F(BridgedPairTest, WhatCameWhileTheBridgeWasStoppedIsDroppedButAStop) {
   EXPECT_EQ(passed(), Texts{heartbeat}) << "the heartbeat came after the datagrams that had waited";
 }
 
-TEST_F(BridgedPairTest, TheFirstDatagramAfterAStandstillOrAnIdleHourPasses) {
+TEST_F(BridgedPairTest, PassesTheFirstDatagramAfterAStandstillOrAnIdleHour) {
   begin();
   sleep(500ms);
   pass(50ms);
@@ -178,7 +178,7 @@ TEST_F(BridgedPairTest, TheFirstDatagramAfterAStandstillOrAnIdleHourPasses) {
 
 // --- the other side
 
-TEST_F(BridgedPairTest, ABoardThatIsAwayIsWaitedFor) {
+TEST_F(BridgedPairTest, WaitsForABoardThatIsNotConnected) {
   ScriptedBridge other;
   other.board->absence = Problem{ErrorKind::unsupported, "can:", "there is no such interface", ""};
   other.pair->open();
@@ -193,7 +193,7 @@ TEST_F(BridgedPairTest, ABoardThatIsAwayIsWaitedFor) {
   EXPECT_EQ(other.passed(), Texts{heartbeat});
 }
 
-TEST_F(BridgedPairTest, WhatNoWaitingMendsIsAnError) {
+TEST_F(BridgedPairTest, OpenThrowsAnErrorThatWaitingCannotFix) {
   ScriptedBridge other;
   other.board->absence = Problem{ErrorKind::permission, "can:", "denied", ""};
   EXPECT_THROW(other.pair->open(), Error);
@@ -202,7 +202,7 @@ TEST_F(BridgedPairTest, WhatNoWaitingMendsIsAnError) {
   EXPECT_THROW(deaf.pair->open(), Error);
 }
 
-TEST_F(BridgedPairTest, CountsWhatDidNotGetThrough) {
+TEST_F(BridgedPairTest, CountsUndeliveredAndOutdatedDatagrams) {
   begin();
   hosts->counted.tx_dropped = 5;  // states that newer states have replaced
   board->result = SendResult::full;
@@ -234,7 +234,7 @@ TEST_F(BridgedPairTest, AnAnswerGoesToThePeerThatAsked) {
       << "a question without a number gets an answer, too";
 }
 
-TEST_F(BridgedPairTest, AnAnswerToAHostsCommandGoesToThatHostThoughAnotherAsksWithItsNumber) {
+TEST_F(BridgedPairTest, AnAnswerGoesToItsHostDespiteOthersWithThatNumber) {
   begin();
   hosts->say("Q:ID;PNum:2;T:0;", second);
   hosts->say("O:1,1,1;SID:00000000000000aa;PNum:2;T:0;", first);
@@ -243,14 +243,14 @@ TEST_F(BridgedPairTest, AnAnswerToAHostsCommandGoesToThatHostThoughAnotherAsksWi
   EXPECT_EQ(hosts->take(), Texts{"N:2,RANGE;SID:00000000000000aa;PNum:8;T:101;@1"});
 }
 
-TEST_F(BridgedPairTest, AnotherHostCannotHaveACommandRefusedByAskingBadly) {
+TEST_F(BridgedPairTest, DropsAnInvalidQuestionWithTheNumberOfACommand) {
   begin();
   passed();
   hosts->say("Q:NO;PNum:2;T:0;", second);
   EXPECT_EQ(passed(), Texts{}) << "the board would answer N:2,UNKNOWN";
 }
 
-TEST_F(BridgedPairTest, WhatHostsThatHaveProvedNothingAreSentIsLimited) {
+TEST_F(BridgedPairTest, LimitsTheDatagramsSentToUnprovenPeers) {
   begin();
   hosts->take();
   passed();
@@ -290,7 +290,7 @@ std::string lease_in(const Texts& answers) {
   return answer.substr(at + 13, answer.find(";PNum") - at - 13);
 }
 
-TEST_F(BridgedPairTest, AWatcherBesideAHostHearsEverythingAfterAnEchoAndForTwoSeconds) {
+TEST_F(BridgedPairTest, AWatcherNextToAHostGetsStatesForTwoSecondsAfterAnEcho) {
   begin();
   hosts->say("W:50;PNum:900;T:0;", second);
   const std::string token = lease_in(hosts->take());
@@ -327,7 +327,7 @@ OwnLease own_lease(ScriptedCarrier& board) {
   return newest;
 }
 
-TEST_F(BridgedPairTest, WhileItServesNoHostTheBridgeItselfWatchesTheBoard) {
+TEST_F(BridgedPairTest, WatchesTheBoardItselfWhileItServesNoHost) {
   board->say("H:R4-ROS2;PNum:3;T:90;SAFE:1;");
   pass(25ms);
   const OwnLease first_one = own_lease(*board);
@@ -349,7 +349,7 @@ TEST_F(BridgedPairTest, WhileItServesNoHostTheBridgeItselfWatchesTheBoard) {
   EXPECT_TRUE(begun[1].starts_with("W:0;")) << "a host is served: " << begun[1];
 }
 
-TEST_F(BridgedPairTest, OnABusTheBridgesOwnLeaseRunsOutForOthersMayWatchThere) {
+TEST_F(BridgedPairTest, LetsItsOwnLeaseEndOnASharedBus) {
   board->shared = true;
   board->say("H:R4-ROS2;PNum:3;T:90;SAFE:1;");
   pass(25ms);
@@ -359,7 +359,7 @@ TEST_F(BridgedPairTest, OnABusTheBridgesOwnLeaseRunsOutForOthersMayWatchThere) {
   EXPECT_EQ(board->take(), Texts{heartbeat});
 }
 
-TEST_F(BridgedPairTest, ARefusalThatNamesASessionIsNoAnswerToTheBridgesOwnW) {
+TEST_F(BridgedPairTest, ARefusalWithASessionGoesToItsHostNotToTheBridge) {
   begin();
   pass(2s);
   const OwnLease own = own_lease(*board);
@@ -371,7 +371,7 @@ TEST_F(BridgedPairTest, ARefusalThatNamesASessionIsNoAnswerToTheBridgesOwnW) {
   EXPECT_EQ(hosts->take(), Texts{refusal + "@1"});
 }
 
-TEST_F(BridgedPairTest, WithoutAHostWatchersHearWhatTheNewestWatcherAskedFor) {
+TEST_F(BridgedPairTest, WithoutAHostSelectsTheFieldsOfTheNewestWatcher) {
   board->say("H:R4-ROS2;PNum:3;T:90;SAFE:1;");
   hosts->take();
   hosts->say("W:50,AIN24,SAFE;PNum:900;T:0;", second);
@@ -386,7 +386,7 @@ TEST_F(BridgedPairTest, WithoutAHostWatchersHearWhatTheNewestWatcherAskedFor) {
   EXPECT_EQ(hosts->take(), Texts{"N:902,UNKNOWN;PNum:7;T:100;@3"});
 }
 
-TEST_F(BridgedPairTest, FourMayWatch) {
+TEST_F(BridgedPairTest, ServesAtMostFourWatchers) {
   begin();
   for (Peer peer = 11; peer <= 15; ++peer) {
     const std::string number = std::to_string(900 + peer);
@@ -405,7 +405,7 @@ TEST_F(BridgedPairTest, FourMayWatch) {
 
 // --- for weeks
 
-TEST_F(BridgedPairTest, ItTakesNoMemoryForADatagramHoweverManyHostsThereAre) {
+TEST_F(BridgedPairTest, AllocatesNothingPerDatagramWithManyHosts) {
   begin();
   hosts->keeps = board->keeps = false;
   const std::string damaged = "O:358,1,1;PNum:2;T:0;^0x0^";

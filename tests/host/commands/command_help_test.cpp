@@ -15,7 +15,7 @@
 namespace r4::test {
 namespace {
 
-TEST(CommandHelp, ReportsAWrongKeyOrPasswordWithoutShowingIt) {
+TEST(CommandHelp, ReportsAnInvalidSecretWithoutShowingIt) {
   const std::string secret(2 * key_size - 1, 'e');
   for (const std::string& text : {"C:key,3:" + secret, "C:key," + secret, "C:kee,3:" + secret,
                                   "C:password," + secret + "e", "C:pass," + secret}) {
@@ -31,7 +31,7 @@ TEST(CommandHelp, ReportsAWrongKeyOrPasswordWithoutShowingIt) {
   EXPECT_NE(problem.fix.find("64 hexadecimal digits"), std::string::npos) << problem.fix;
 }
 
-TEST(CommandHelp, SendsASecretOnlyOverABoardsOwnCable) {
+TEST(CommandHelp, AllowsASecretOnlyOverACable) {
   const Command secret = Command::setting("password", "eeeeeeee");
   for (const char* url : {"serial:auto", "serial:///dev/ttyACM0", "sim:", "memory:"}) {
     EXPECT_NO_THROW(require_cable(url, secret)) << url;
@@ -44,7 +44,7 @@ TEST(CommandHelp, SendsASecretOnlyOverABoardsOwnCable) {
   }
 }
 
-TEST(CommandHelp, ShowsTheValuesThatASettingTakes) {
+TEST(CommandHelp, ShowsTheValidValuesOfASetting) {
   EXPECT_NE(bad_command("C:rate,0", Refusal::range).fix.find("1-1000"), std::string::npos);
   EXPECT_NE(bad_command("C:AINSTEER,x", Refusal::range).fix.find("volts"), std::string::npos);
   const std::string all = bad_command("C:colour,1", Refusal::unknown).fix;
@@ -101,7 +101,7 @@ TEST(CommandHelp, TakesTheDocumentedSettings) {
   }
 }
 
-TEST(CommandHelp, ShowsTheOneCommandThatAWrongTextBeginsAs) {
+TEST(CommandHelp, ShowsTheCommandThatAnInvalidTextBeginsWith) {
   EXPECT_EQ(bad_command("X:DAC,3,1", Refusal::channel).fix,
             "use X:DAC,channel,mV with channel 1-2, mV 0-3300");
   EXPECT_EQ(bad_command("E:GO", Refusal::unknown).fix, "use E:STOP, E:CLEAR[,cause], E:LEAVE");
@@ -110,7 +110,7 @@ TEST(CommandHelp, ShowsTheOneCommandThatAWrongTextBeginsAs) {
             std::string::npos);
 }
 
-TEST(CommandHelp, ShowsTheFormOfACommandWithAWrongValue) {
+TEST(CommandHelp, ShowsTheFormOfACommandWithAnInvalidValue) {
   EXPECT_EQ(bad_command(Command::dac(3, Millivolts(1)), Refusal::channel).fix,
             "use X:DAC,channel,mV with channel 1-2, mV 0-3300");
   EXPECT_EQ(bad_command(Command::stop(), Refusal::format).fix, "use E:STOP");

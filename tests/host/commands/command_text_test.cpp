@@ -12,7 +12,7 @@
 namespace r4::test {
 namespace {
 
-TEST(CommandText, IsParsedWrittenAndDescribedForEveryKind) {
+TEST(CommandText, ParsesWritesAndDescribesEveryKind) {
   const struct {
     std::string text;
     std::string words;
@@ -63,7 +63,7 @@ TEST(CommandText, IsParsedWrittenAndDescribedForEveryKind) {
       << "every kind of command must be tested";
 }
 
-TEST(CommandText, OfAnOwnCommandOutlivesTheTextItIsParsedFrom) {
+TEST(CommandText, AParsedCommandOutlivesItsText) {
   std::string text = "C:name,a-name-that-is-longer-than-most";
   OwnCommand parsed = parse_command_text(text);
   text.assign(text.size(), '!');
@@ -73,7 +73,7 @@ TEST(CommandText, OfAnOwnCommandOutlivesTheTextItIsParsedFrom) {
   EXPECT_EQ(to_text(taken), to_text(copy));
 }
 
-TEST(CommandText, ShowsNoKeyAndNoPassword) {
+TEST(CommandText, MasksKeysAndPasswords) {
   const std::string digits(2 * key_size, 'e');
   const struct {
     std::string text;

@@ -25,7 +25,7 @@ void expect_usage(const std::string& what, const std::function<void()>& action) 
   EXPECT_FALSE(problem.fix.empty()) << problem.text();
 }
 
-TEST(Limits, OfEverySessionOption) {
+TEST(Limits, CoverEverySessionOption) {
   const auto refused = [](const std::string& what, auto change) {
     BoardOptions options;
     change(options.session);
@@ -46,7 +46,7 @@ TEST(Limits, OfEverySessionOption) {
   }
 }
 
-TEST(Limits, OfTheWatchdog) {
+TEST(Limits, CoverTheWatchdog) {
   Board board("sim:");
   asio::io_context io;
   AsyncBoard async(io, "sim:");
@@ -58,7 +58,7 @@ TEST(Limits, OfTheWatchdog) {
   board.watchdog(0ms);
 }
 
-TEST(Limits, OfEveryTimeout) {
+TEST(Limits, CoverEveryTimeout) {
   Board board("sim:");
   board.wait_active();
   asio::io_context io;
@@ -81,7 +81,7 @@ TEST(Limits, OfEveryTimeout) {
   EXPECT_EQ(board.next_state().osmc(1).pwm, 0);
 }
 
-TEST(Limits, NeverHoldAStopBack) {
+TEST(Limits, NeverPreventAStop) {
   BoardInAThread simulated("udp");
   Board board(simulated.url());
   board.wait_active();

@@ -26,7 +26,7 @@ static_assert(!std::is_constructible_v<Degrees, bool>);
 static_assert(!std::is_constructible_v<Degrees, Microseconds>);
 static_assert(!std::is_default_constructible_v<ServoCalibration>, "there is no usual servo");
 
-TEST(ServoCalibration, IsALineBetweenItsEnds) {
+TEST(ServoCalibration, InterpolatesLinearlyBetweenItsEnds) {
   EXPECT_EQ(elbow.pulse(Degrees(-45)).value, 1000);
   EXPECT_EQ(elbow.pulse(Degrees(0)).value, 1500);
   EXPECT_EQ(elbow.pulse(Degrees(30)).value, 1833);
@@ -35,7 +35,7 @@ TEST(ServoCalibration, IsALineBetweenItsEnds) {
   EXPECT_DOUBLE_EQ(elbow.degrees(1250)->value, -22.5);
 }
 
-TEST(ServoCalibration, MayTurnBackAsThePulseGrows) {
+TEST(ServoCalibration, TheAngleMayDecreaseAsThePulseGrows) {
   const ServoCalibration back({Microseconds(2400), Degrees(0)}, {Microseconds(600), Degrees(180)});
   EXPECT_EQ(back.pulse(Degrees(0)).value, 2400);
   EXPECT_EQ(back.pulse(Degrees(45)).value, 1950);
@@ -55,13 +55,13 @@ TEST(ServoCalibration, RefusesAnAngleBeyondAnEnd) {
       << "less than half a microsecond outside of the range";
 }
 
-TEST(ServoCalibration, TakesTheAngleOfEveryPulseBack) {
+TEST(ServoCalibration, ConvertsEveryPulseToAnAngleAndBack) {
   const ServoCalibration odd({Microseconds(511), Degrees(-89.7)},
                              {Microseconds(2493), Degrees(93.1)});
   for (int us = 511; us <= 2493; ++us) EXPECT_EQ(odd.pulse(*odd.degrees(us)).value, us);
 }
 
-TEST(ServoCalibration, HasNoAngleOfAServoThatIsOff) {
+TEST(ServoCalibration, HasNoAngleForAServoThatIsOff) {
   EXPECT_FALSE(elbow.degrees(0));
   EXPECT_DOUBLE_EQ(elbow.degrees(2500)->value, 90)
       << "another program may set a pulse outside of the calibration";
@@ -79,7 +79,7 @@ TEST(ServoCalibration, NeedsTwoEndsThatDiffer) {
   }
 }
 
-TEST(Degrees, AreFinite) {
+TEST(Degrees, RefuseValuesThatAreNotFinite) {
   static_assert(Degrees(-30).value == -30);
   for (const double wrong :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {

@@ -9,7 +9,7 @@
 namespace r4::test {
 namespace {
 
-TEST(Setpoints, AreTheCommandsInTheirOrder) {
+TEST(Setpoints, KeepTheirCommandsInOrder) {
   const Setpoints all = {Command::osmc(1, Pwm(358), Direction::forward),
                          Command::dhb12(2, Duty(-0.1)),
                          Command::servo(3, Microseconds(1500)),
@@ -28,7 +28,7 @@ TEST(Setpoints, AreTheCommandsInTheirOrder) {
   EXPECT_TRUE(Setpoints{}.empty());
 }
 
-TEST(Setpoints, CanBeSentAsTheyAre) {
+TEST(Setpoints, RefuseInvalidCommandsWhenTheyAreAdded) {
   Setpoints setpoints{Command::osmc(1, Pwm(358), Direction::forward)};
   const auto refusal_of = [&](const Command& command) {
     return problem_of([&] { setpoints.add(command); });
@@ -53,7 +53,7 @@ TEST(Setpoints, CanBeSentAsTheyAre) {
   EXPECT_EQ(setpoints.size(), 16U);
 }
 
-TEST(Setpoints, InATextAreSeparatedBySemicolons) {
+TEST(Setpoints, AreSeparatedBySemicolonsInText) {
   EXPECT_EQ(std::get<Setpoints>(parse_text("O:1,1,1;O:1,1,2")).size(), 2U);
   EXPECT_TRUE(std::holds_alternative<OwnCommand>(parse_text("O:1,1,1;")));
   EXPECT_EQ(problem_of([] { parse_text("O:1,1,1;O:1,1,5"); }).thing, "O:1,1,5");

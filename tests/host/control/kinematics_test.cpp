@@ -24,7 +24,7 @@ TEST(DifferentialDrive, TurnsLeftByItsRightWheel) {
   }
 }
 
-TEST(DifferentialDrive, KeepsThePathWhereItsWheelsAreTooSlow) {
+TEST(DifferentialDrive, SlowsDownOnTheSamePathAtTheWheelSpeedLimit) {
   const DifferentialDrive drive({.separation_m = 0.5, .max_wheel_m_s = 1});
   const auto wheels = drive.wheels({2, -4});
   EXPECT_EQ(wheels, (DifferentialDrive::Wheels{1, 1.0 / 3}));
@@ -32,7 +32,7 @@ TEST(DifferentialDrive, KeepsThePathWhereItsWheelsAreTooSlow) {
   EXPECT_NEAR(slower.turn_rad_s / slower.forward_m_s, -2, 1e-12);
 }
 
-TEST(FourWheelDrive, NeedsMoreOfItsWheelsToTurnThanItsTrackSays) {
+TEST(FourWheelDrive, TurnsWithMoreWheelSpeedToAllowForSlip) {
   const FourWheelDrive drive({.track_m = 0.4, .slip = 1.5});
   const auto wheels = drive.wheels({1, 1});
   EXPECT_NEAR(wheels.front_left_m_s, 0.7, 1e-12);
@@ -42,7 +42,7 @@ TEST(FourWheelDrive, NeedsMoreOfItsWheelsToTurnThanItsTrackSays) {
   expect_near(drive.twist({0.6, 0.8, 1.4, 1.2}), {1, 1});
 }
 
-TEST(Ackermann, SteersForThePathAndBackAgain) {
+TEST(Ackermann, ConvertsATwistToSteeringAndBack) {
   const Ackermann car(
       {.wheelbase_m = 1, .track_m = 0.6, .max_steering_rad = 0.6, .max_speed_m_s = 2});
   const auto command = car.command({1, 0.5});
@@ -72,7 +72,7 @@ TEST(Ackermann, GivesEachWheelItsOwnAngleAndSpeed) {
   EXPECT_NEAR(rear.left_m_s + rear.right_m_s, 2, 1e-12);
 }
 
-TEST(Kinematics, RefusesLengthsThatAreNone) {
+TEST(Kinematics, RefusesInvalidLengths) {
   EXPECT_THROW(DifferentialDrive({.separation_m = 0}), Error);
   EXPECT_THROW(DifferentialDrive({.separation_m = 1, .max_wheel_m_s = -1}), Error);
   EXPECT_THROW(FourWheelDrive({.track_m = 0.4, .slip = 0}), Error);

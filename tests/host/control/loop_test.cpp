@@ -37,7 +37,7 @@ LoopGuard begun(LoopOptions options) {
   return guard;
 }
 
-TEST(LoopGuard, StepsWhenAllOfAStateIsThere) {
+TEST(LoopGuard, StepsOnceWhenAllFieldsOfAStateHaveCome) {
   LoopGuard guard = begun({.fields = "ENC1,AINSTEER"});
   const auto step = [&](const ReceivedState& state) {
     return guard.on_state(state, DisarmCause::none, state.received);
@@ -51,7 +51,7 @@ TEST(LoopGuard, StepsWhenAllOfAStateIsThere) {
   EXPECT_EQ(step(part(1030, {StateField::enc1, StateField::ainsteer})), 0.02);
 }
 
-TEST(LoopGuard, EndsWhenTheWholeStateIsLateAndStaysEnded) {
+TEST(LoopGuard, EndsForGoodWhenACompleteStateIsLate) {
   LoopGuard guard = begun({.fields = "ENC1", .late = 50ms});
   EXPECT_EQ(guard.deadline(), at(2000));
   guard.on_state(part(1010, {StateField::enc1}), DisarmCause::none, at(1015));
@@ -71,7 +71,7 @@ TEST(LoopGuard, EndsWhenTheWholeStateIsLateAndStaysEnded) {
   EXPECT_TRUE(contains(nothing.why(), "no state came within 300 ms")) << nothing.why();
 }
 
-TEST(LoopGuard, EndsWhenTheBoardDoesNotDriveOrHasRestarted) {
+TEST(LoopGuard, EndsWhenTheBoardIsSafeDisarmedLostOrRestarted) {
   LoopGuard safe = begun({});
   ReceivedState state = part(1010, {});
   state.safe = SafeReason::proximity;
@@ -92,7 +92,7 @@ TEST(LoopGuard, EndsWhenTheBoardDoesNotDriveOrHasRestarted) {
   EXPECT_EQ(again.ended(), LoopEnd::not_active);
 }
 
-TEST(LoopGuard, EndsWhereADrivenMotorStands) {
+TEST(LoopGuard, EndsWhenADrivenMotorDoesNotTurn) {
   LoopOptions options;
   options.standstill = {{.encoder = 3, .drive = CommandKind::dhb12, .channel = 2, .time = 100ms}};
   LoopGuard guard = begun(options);
@@ -119,7 +119,7 @@ TEST(LoopGuard, EndsWhereADrivenMotorStands) {
       << guard.why();
 }
 
-TEST(LoopGuard, RefusesOptionsThatCannotBe) {
+TEST(LoopGuard, RefusesInvalidOptions) {
   EXPECT_TRUE(contains(problem_of([] { LoopGuard({.fields = "ENC9"}); }).reason, "ENC9"));
   EXPECT_THROW(LoopGuard({.late = 0ms}), Error);
   EXPECT_THROW(LoopGuard({.standstill = {{.encoder = 0}}}), Error);
@@ -153,7 +153,7 @@ class RunLoop : public ::testing::Test {
   LoopOptions loop;
 };
 
-TEST_F(RunLoop, RunsByTheStatesUntilTheStepEndsItAndLeavesTheMotorsAtRest) {
+TEST_F(RunLoop, RunsOnceAStateUntilTheStepEndsItAndStopsTheMotors) {
   double time_s = 0;
   std::int32_t counts = 0;
   const LoopReport report = run_loop(board, loop, [&](const LoopStep& step) {
@@ -169,7 +169,7 @@ TEST_F(RunLoop, RunsByTheStatesUntilTheStepEndsItAndLeavesTheMotorsAtRest) {
   EXPECT_EQ(board.disarmed_by(), DisarmCause::none) << "another loop may begin";
 }
 
-TEST_F(RunLoop, ComesToRestBeforeItPassesAnExceptionOn) {
+TEST_F(RunLoop, StopsTheMotorsBeforeItRethrowsAnException) {
   EXPECT_THROW(run_loop(board, loop,
                         [&](const LoopStep& step) -> std::optional<Setpoints> {
                           if (step.state.encoder(1) > 5) throw std::runtime_error("no path");
@@ -201,7 +201,7 @@ struct RunLoopWithoutArming : RunLoop {
   RunLoopWithoutArming() : RunLoop(test::at_will()) {}
 };
 
-TEST_F(RunLoopWithoutArming, DrivesAndComesToRest) {
+TEST_F(RunLoopWithoutArming, DrivesAndStopsTheMotors) {
   board.osmc(1).set_pwm(1000, Direction::forward);
   int steps = 0;
   const auto drive_four_times = [&](const LoopStep& step) {
@@ -220,7 +220,7 @@ TEST_F(RunLoopWithoutArming, DrivesAndComesToRest) {
   expect_rest();
 }
 
-TEST(RunLoopOnALinkThatIsCut, SaysThatTheMotorsMayGoOn) {
+TEST(RunLoopOnACutLink, ReportsThatTheMotorsMayStillRun) {
   sim::SimulatedRobot robot;
   BoardOptions options;
   options.session.fields = "OSMC1,ENC1";

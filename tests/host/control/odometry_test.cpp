@@ -39,7 +39,7 @@ TEST(Odometry, GoesBackwardsAndStartsAtAGivenPose) {
 
 // Many robots whose wheels err as the noise model says. The spread of their poses must match the
 // covariance.
-TEST(Odometry, KnowsHowFarItMayBeWrong) {
+TEST(Odometry, CovarianceMatchesTheSpreadOfPoses) {
   constexpr OdometryNoise noise{
       .length_per_m = 0.0003, .turn_per_m = 0.0003, .turn_per_rad = 0.001};
   constexpr int robots = 20'000, steps = 4;
@@ -66,7 +66,7 @@ TEST(Odometry, KnowsHowFarItMayBeWrong) {
   }
 }
 
-TEST(Odometry, MarksTheAxesThatItDoesNotKnowForRos) {
+TEST(Odometry, RosCovarianceMarksUnknownAxes) {
   Odometry odometry;
   odometry.advance(3, 0.5);
   const auto ros = odometry.ros_covariance(9);

@@ -48,7 +48,7 @@ TEST(Pid, TakesTheDerivativeOfTheMeasuredValueAndSmoothsIt) {
       << "a quarter of the slope, because 0.1 s is a quarter of 0.4 s";
 }
 
-TEST(Pid, TakesOverWithoutAJump) {
+TEST(Pid, TakeOverDoesNotChangeTheOutput) {
   Pid pid({.kp = 0.5, .ki = 1, .feed_forward = 0.2});
   pid.take_over(0.7, 2, 1.8);
   EXPECT_NEAR(pid.step(2, 1.8, 1e-6), 0.7, 1e-6);

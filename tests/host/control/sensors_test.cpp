@@ -37,14 +37,14 @@ TEST(Wheel, SumsUpTheRolledDistance) {
   EXPECT_NEAR(reversed.advance(seen(10, 10)), -0.010, 1e-12);
 }
 
-TEST(Wheel, DoesNotMindThatCountsAndTimeWrap) {
+TEST(Wheel, FollowsCountsAndTimeOverAWrap) {
   Wheel wheel(metre_wheel);
   wheel.advance(seen(0xFFFFFFFB, std::numeric_limits<std::int32_t>::max()));
   EXPECT_NEAR(wheel.advance(seen(5, std::numeric_limits<std::int32_t>::min() + 9)), 0.010, 1e-12);
   EXPECT_NEAR(wheel.speed_m_s(), 1.0, 1e-9);
 }
 
-TEST(Wheel, StartsAgainAfterARestartOfTheBoard) {
+TEST(Wheel, RestartsAfterARestartOfTheBoard) {
   Wheel wheel(metre_wheel);
   wheel.advance(seen(600'000, 90'000));
   EXPECT_EQ(wheel.advance(seen(3'000, 0)), 0);
@@ -52,7 +52,7 @@ TEST(Wheel, StartsAgainAfterARestartOfTheBoard) {
   EXPECT_NEAR(wheel.advance(seen(3'010, 10)), 0.010, 1e-12);
 }
 
-TEST(Wheel, TakesAJumpForAnEncoderThatWasSet) {
+TEST(Wheel, IgnoresAJumpOfTheCount) {
   Wheel wheel(metre_wheel);
   wheel.advance(seen(0, 100'000));
   EXPECT_NEAR(wheel.advance(seen(10, 100'010)), 0.010, 1e-12);
@@ -62,7 +62,7 @@ TEST(Wheel, TakesAJumpForAnEncoderThatWasSet) {
   EXPECT_NEAR(wheel.speed_m_s(), 2.0, 1e-9);
 }
 
-TEST(Wheel, KnowsItsSpeedOverTheLastWindow) {
+TEST(Wheel, ReportsItsSpeedOverTheLastWindow) {
   Wheel wheel(metre_wheel, 50);
   std::int32_t counts = 0;
   for (std::uint32_t t_ms = 0; t_ms <= 200; t_ms += 10) wheel.advance(seen(t_ms, counts += 20));
@@ -74,7 +74,7 @@ TEST(Wheel, KnowsItsSpeedOverTheLastWindow) {
   EXPECT_NEAR(wheel.measured_m_s(state), -1.5, 1e-9);
 }
 
-TEST(SteeringSensor, KnowsTheAngleBetweenItsEndsAndNoneBeyond) {
+TEST(SteeringSensor, HasAnAngleOnlyBetweenItsEnds) {
   const SteeringSensor sensor(
       {.left_volts = 4, .left_rad = 0.6, .right_volts = 1, .right_rad = -0.5, .margin_volts = 0.2});
   const auto at = [&](std::int32_t centivolts) {

@@ -39,7 +39,7 @@ class AsyncAttach : public testing::Test, protected OnALoop {
   AsyncBoard board_;
 };
 
-TEST_F(AsyncAttach, HasTheBoardReadItAndSendItsFieldsBesideThoseThatWereChosen) {
+TEST_F(AsyncAttach, PollsTheDeviceAndAddsItsFieldsToTheSelectedOnes) {
   const Device imu = Device::from("mpu6050@0x68:3");
   const CommandResult result = attach(imu);
   EXPECT_EQ(result.outcome, Outcome::confirmed);
@@ -54,7 +54,7 @@ TEST_F(AsyncAttach, HasTheBoardReadItAndSendItsFieldsBesideThoseThatWereChosen) 
   EXPECT_EQ(commands() - before, 7U) << "the fields are selected already";
 }
 
-TEST_F(AsyncAttach, GivesNoSlotAwayUntilItsHolderIsGivenUp) {
+TEST_F(AsyncAttach, RefusesASlotOfAnotherDeviceUntilThatIsDetached) {
   const auto problem_with = [&](const char* device) {
     return problem_of([&] {
       board_.async_attach(Device::from(device), 5s,
@@ -81,7 +81,7 @@ TEST_F(AsyncAttach, GivesNoSlotAwayUntilItsHolderIsGivenUp) {
   EXPECT_EQ(attach(Device::from("ina219@0x40:1")).outcome, Outcome::confirmed);
 }
 
-TEST_F(AsyncAttach, ReservesTheSlotsFromTheBeginningOfTheSetUp) {
+TEST_F(AsyncAttach, ReservesItsSlotsAtTheBeginningOfTheSetUp) {
   board_.async_attach(slow(), 5s, [](const CommandResult&) {});
   EXPECT_EQ(problem_of([&] {
               board_.async_attach(Device::from("ina219"), 5s, [](const CommandResult&) {});
@@ -89,7 +89,7 @@ TEST_F(AsyncAttach, ReservesTheSlotsFromTheBeginningOfTheSetUp) {
             "slow@0x68 has slot 1");
 }
 
-TEST(DeviceSteps, LeaveTheBoardsChoiceOfFieldsAlone) {
+TEST(DeviceSteps, KeepTheSelectedFields) {
   const Device power = Device::from("ina219@0x40:3");
   EXPECT_EQ(fields_with("", power), "");
   EXPECT_EQ(fields_with("DEFAULT,I2C3", power), "DEFAULT,I2C3,I2C4");
@@ -118,7 +118,7 @@ TEST_F(AsyncAttach, RefusesADeviceThatDoesNotAnswer) {
   EXPECT_EQ(explain(missing, result, board_.link()).reason, "it does not answer: no acknowledge");
 }
 
-TEST_F(AsyncAttach, IsGivenUpByItsCancellationSlotWhileItWaitsForTheDevice) {
+TEST_F(AsyncAttach, CanBeCancelledWhileItWaitsForTheDevice) {
   asio::cancellation_signal signal;
   std::optional<std::uint32_t> first;  // of the check
   const ScopedSubscription states =
@@ -145,7 +145,7 @@ TEST_F(AsyncAttach, EndsWithTheBoard) {
   EXPECT_EQ(result->outcome, Outcome::closed);
 }
 
-TEST_F(AsyncAttach, RefusesATimeoutOfNothingAndAWatcherAtOnce) {
+TEST_F(AsyncAttach, RefusesAZeroTimeoutAndAWatcherAtOnce) {
   const auto ignored = [](const CommandResult&) { ADD_FAILURE() << "attach must not begin"; };
   EXPECT_EQ(problem_of([&] { board_.async_attach(slow(), 0s, ignored); }).kind, ErrorKind::usage);
   BoardOptions options;
@@ -181,7 +181,7 @@ TEST_F(AsyncAttachUnarmed, WritesOnlyAfterArm) {
   EXPECT_EQ(attach(imu).outcome, Outcome::confirmed);
 }
 
-TEST_F(AsyncAttach, EndsAsCancelledWhenControlIsReleasedWhileTheDeviceIsGivenTime) {
+TEST_F(AsyncAttach, IsCancelledWhenControlIsReleasedDuringADeviceDelay) {
   std::optional<CommandResult> attached, released;
   result_of([&](auto active) { board_.async_wait_active(5s, active); });
   const std::uint64_t before = commands();

@@ -64,7 +64,7 @@ INSTANTIATE_TEST_SUITE_P(Attach, ShippedDevice, testing::ValuesIn(all_measured),
                            return Device::from(each.param.device).description().name;
                          });
 
-TEST_P(ShippedDevice, MeasuresWhateverItWasSetToBefore) {
+TEST_P(ShippedDevice, MeasuresCorrectlyAfterAnyEarlierSetting) {
   for (const auto& bytes : {Board::I2c::Bytes{0x7F, 0x20}, Board::I2c::Bytes{0x14, 0x07},
                             Board::I2c::Bytes{0x7F, 0x00}}) {
     board_.i2c().write(0x69, bytes);  // sets the ICM-20948 to 16 g
@@ -79,7 +79,7 @@ TEST_P(ShippedDevice, MeasuresWhateverItWasSetToBefore) {
   }
 }
 
-TEST_F(DescribedDevice, IsNotWrittenToIfItMeasuresByItself) {
+TEST_F(DescribedDevice, IsNotWrittenToIfItNeedsNoSetUp) {
   board_.attach(Device::from("ina219"));
   const std::vector<std::string> executed = simulated_.executed();
   ASSERT_FALSE(executed.empty());
@@ -115,7 +115,7 @@ TEST_F(DescribedDevice, MeasuresNothingAfterAResetUntilItIsSetUpAgain) {
   }
 }
 
-TEST_F(DescribedDevice, IsReadBesideOtherDevices) {
+TEST_F(DescribedDevice, IsReadTogetherWithOtherDevices) {
   const auto devices = Device::from({"bno055", "ina219", "as5600@0x36:7"});
   for (const Device& each : devices) board_.attach(each);
   EXPECT_NEAR(wait_for(devices[2], "angle"), std::numbers::pi / 2, 1e-9);

@@ -69,7 +69,7 @@ TEST(DeviceDescription, DecodesEachKindOfNumber) {
   EXPECT_FALSE(decode(2, {0, 0, 0, 0, 0}).has_value()) << "the byte of this value is missing";
 }
 
-TEST(Device, HasNoMeasurementOfAValueThatDoesNotCount) {
+TEST(Device, HasNoMeasurementOfAnInvalidValue) {
   const Device lidar(DeviceDescription::load("vl53l0x"), 0x29);
   State state;
   I2cReading& read = state.raw.i2c[0];
@@ -122,7 +122,7 @@ TEST(Device, HasNoMeasurementUntilItIsSetUp) {
   EXPECT_EQ(device.reading(state, "height").number, 0);
 }
 
-TEST(Device, ReportsWhetherItIsSetUpIfItIsShippedAndHasWrites) {
+TEST(Device, AShippedDeviceWithWritesReportsThatItIsSetUp) {
   for (const std::string& name : DeviceDescription::shipped()) {
     const DeviceDescription device = DeviceDescription::load(name);
     EXPECT_EQ(device.ready.empty(), device.writes.empty()) << name;
@@ -141,7 +141,7 @@ std::string what_is_there(const Device& device, std::vector<std::uint8_t> identi
   return problem.reason + "; " + problem.fix;
 }
 
-TEST(Device, NamesAChipThatIsSoldInItsPlaceAndAdvises) {
+TEST(Device, NamesASubstituteChipAndAdvises) {
   const std::string clone = what_is_there(Device::from("mpu6050@0x68"), {0x70});
   EXPECT_EQ(clone.substr(0, clone.find(';')),
             "it is an MPU-6500, which has another scale of its temperature: its register x75 has "
@@ -156,7 +156,7 @@ TEST(Device, NamesAChipThatIsSoldInItsPlaceAndAdvises) {
             "it is another device");
 }
 
-TEST(Device, CountsByAScaledValueAsItIsWritten) {
+TEST(Device, ComparesAScaledConditionAsWritten) {
   const Device device(DeviceDescription::parse("device t\ntitle t\naddress 0x40\npoll s x00 2 100\n"
                                                "value mode s 0 u8 scale 0.1\n"
                                                "value x s 1 u8 only mode 0.3\n"),
@@ -170,14 +170,14 @@ TEST(Device, CountsByAScaledValueAsItIsWritten) {
   EXPECT_FALSE(device.reading(state, "x").number);
 }
 
-TEST(Device, TakesThePlaceOfWhatHasItsAddressOrASlotOfIt) {
+TEST(Device, ReplacesADeviceWithItsAddressOrSlot) {
   const Device ina = Device::from("ina219@0x40:1");  // uses slots 1 and 2
   EXPECT_TRUE(ina.takes_place_of(Device::from("ina219@0x40:5")));
   EXPECT_TRUE(ina.takes_place_of(Device::from("ina219@0x41:2")));
   EXPECT_FALSE(ina.takes_place_of(Device::from("ina219@0x41:3")));
 }
 
-TEST(Device, WithoutItsMagnetAnEncoderHasNoAngle) {
+TEST(Device, AnEncoderWithoutItsMagnetHasNoAngle) {
   const Device encoder(DeviceDescription::load("as5600"), 0x36);
   State state;
   state.raw.i2c[0].data.size = 2;
@@ -190,7 +190,7 @@ TEST(Device, WithoutItsMagnetAnEncoderHasNoAngle) {
   EXPECT_FALSE(encoder.reading(state, "angle").number);
 }
 
-TEST(DeviceDescription, TakesNumbersOfEveryWidthAndOrder) {
+TEST(DeviceDescription, DecodesNumbersOfEveryWidthAndByteOrder) {
   struct Case {
     const char* type;
     double number;
@@ -225,7 +225,7 @@ void expect_problem(const WrongText& wrong, const std::string& before = "") {
 
 const std::string description_head = "device a\naddress 0x28\npoll p x08 6 20\n";
 
-TEST(DeviceDescription, ReportsWhatIsWrongInALine) {
+TEST(DeviceDescription, ReportsTheErrorInALine) {
   for (const WrongText& each : {
            WrongText{4, "device b\n", "it has a name already"},
            WrongText{4, "check x000000 x00\n", "a register has 3 bytes"},
@@ -270,7 +270,7 @@ TEST(DeviceDescription, ReportsWhatIsWrongInALine) {
   }
 }
 
-TEST(DeviceDescription, ReportsWhatIsWrongAndInWhichLine) {
+TEST(DeviceDescription, ReportsAnErrorWithItsLineNumber) {
   std::string nine = description_head;
   for (int i = 0; i < 8; ++i) nine += "poll p" + std::to_string(i) + " x00 1 20\n";
   std::string many = description_head;
@@ -311,7 +311,7 @@ TEST(DeviceDescription, ReportsWhatIsWrongAndInWhichLine) {
   }
 }
 
-TEST(DeviceDescription, IsNamedAsItsFileAndHasARoleIfItIsShipped) {
+TEST(DeviceDescription, AShippedDescriptionHasTheNameOfItsFileAndARole) {
   const std::vector<std::string> names = DeviceDescription::shipped();
   EXPECT_EQ(names, (std::vector<std::string>{"as5600", "bno055", "icm20948", "ina219", "mpu6050",
                                              "vl53l0x"}));
@@ -323,7 +323,7 @@ TEST(DeviceDescription, IsNamedAsItsFileAndHasARoleIfItIsShipped) {
   }
 }
 
-TEST(DeviceDescription, NamesThoseThatAreShippedIfThereIsNoSuchName) {
+TEST(DeviceDescription, AnUnknownNameIsAnErrorThatListsTheShippedOnes) {
   const auto problem = [](const char* name) {
     return test::problem_of([&] { DeviceDescription::load(name); });
   };

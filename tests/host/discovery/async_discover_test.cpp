@@ -24,7 +24,7 @@ DiscoveryOptions at_port_by_udp(std::uint16_t port) {
   return options;
 }
 
-TEST(AsyncDiscover, CallsItsHandlerOnTheLoopWithWhatWasFound) {
+TEST(AsyncDiscover, CallsItsHandlerOnTheLoopWithTheFoundBoards) {
   AnsweringBoards boards;
   boards.add("0.1", {identity("b-1")});
   asio::io_context io;
@@ -41,7 +41,7 @@ TEST(AsyncDiscover, CallsItsHandlerOnTheLoopWithWhatWasFound) {
   EXPECT_EQ(found->only().identity->board_id, "b-1");
 }
 
-TEST(AsyncDiscover, ThrowsWhatDiscoverThrows) {
+TEST(AsyncDiscover, ThrowsTheSameErrorsAsDiscover) {
   asio::io_context io;
   std::future<Discovery> found =
       async_discover(io.get_executor(), at_port_by_udp(0), asio::use_future);
@@ -49,7 +49,7 @@ TEST(AsyncDiscover, ThrowsWhatDiscoverThrows) {
   EXPECT_THROW(found.get(), Error);
 }
 
-TEST(AsyncDiscover, ALoopThatIsDestroyedEndsTheSearchWithoutTheHandler) {
+TEST(AsyncDiscover, DestroyingTheLoopEndsTheSearchWithoutCallingTheHandler) {
   bool called = false;
   const auto held = std::make_shared<int>();
   {

@@ -33,20 +33,20 @@ DiscoveryOptions by_udp(std::uint16_t port) {
   return options;
 }
 
-TEST(Discovery, TheOnlyBoardIsTheOneThatWasFound) {
+TEST(Discovery, OnlyReturnsTheBoardThatWasFound) {
   EXPECT_EQ(discovery_of({found_board("udp:?id=b-1", "b-1")}).only().url, "udp:?id=b-1");
   EXPECT_EQ(discovery_of({found_board("serial:///dev/ttyACM0", "")}).only().url,
             "serial:///dev/ttyACM0");
 }
 
-TEST(Discovery, ABoardThatSeveralTransportsReachIsOneBoard) {
+TEST(Discovery, ABoardOnSeveralTransportsCountsAsOneBoard) {
   const Discovery all =
       discovery_of({found_board("serial:///dev/ttyACM0", "b-1"),
                     found_board("can://can0?node=1", "b-1"), found_board("udp:?id=b-1", "b-1")});
   EXPECT_EQ(all.only().url, "serial:///dev/ttyACM0");
 }
 
-TEST(Discovery, WithoutABoardTheErrorSaysWhatWasSearched) {
+TEST(Discovery, TheErrorForNoBoardNamesTheSearchedTransports) {
   Discovery all;
   all.ports.resize(2);
   all.ports[0].path = "/dev/ttyACM0";
@@ -62,7 +62,7 @@ TEST(Discovery, WithoutABoardTheErrorSaysWhatWasSearched) {
   EXPECT_EQ(problem.reason, "no R4 board was found (searched /dev/ttyACM0, can0 (it is down), lo)");
 }
 
-TEST(Discovery, SeveralBoardsAreAnErrorThatNamesTheirUrls) {
+TEST(Discovery, TheErrorForSeveralBoardsNamesTheirUrls) {
   for (const Discovery& all :
        {discovery_of({found_board("udp:?id=b-1", "b-1"), found_board("udp:?id=b-2", "b-2")}),
         // The same id twice on one transport, or no id, may mean two boards.
@@ -74,7 +74,7 @@ TEST(Discovery, SeveralBoardsAreAnErrorThatNamesTheirUrls) {
   }
 }
 
-TEST(Discovery, FindsABoardByUdpAndSearchesNothingElse) {
+TEST(Discovery, SearchesOnlyUdpOnRequest) {
   AnsweringBoards boards;
   boards.add("0.1", {identity("b-1", "NAME:left;BUSY:1;")});
   const Discovery all = discover(by_udp(boards.port()));

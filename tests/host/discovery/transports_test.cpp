@@ -12,7 +12,7 @@
 namespace r4 {
 namespace {
 
-TEST(Transports, EachIsListedWithItsHelp) {
+TEST(Transports, AreListedWithTheirHelp) {
   std::string schemes;
   for (const TransportHelp& each : transports()) {
     schemes += each.scheme + " ";
@@ -22,7 +22,7 @@ TEST(Transports, EachIsListedWithItsHelp) {
   EXPECT_EQ(schemes, "udp serial pty can sim replay ");
 }
 
-TEST(Transports, ACarrierOfOnesOwnLeavesThePortOfHostsToOthers) {
+TEST(Transports, AnOwnUdpCarrierDoesNotUseTheHostPort) {
   asio::io_context io;
   EXPECT_EQ(make_own_carrier(io, "udp://127.0.0.1?listen=2390")->name(),
             "udp://127.0.0.1?listen=0");

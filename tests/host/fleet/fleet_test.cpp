@@ -150,7 +150,7 @@ TEST(Fleet, RepeatsAStopAfterItsCallHasReturned) {
   EXPECT_TRUE(late.wait_for(firmware::BoardState::safe, SafeReason::stop));
 }
 
-TEST(Fleet, CountsTheEventsThatTheProgramDoesNotTake) {
+TEST(Fleet, CountsEventsThatTheProgramDoesNotRead) {
   ActiveFleet fleet({"sim:?node=0-31"});
   // Each stop and its end are at least two events of a board.
   for (int i = 0; i < 70; ++i) {
@@ -185,7 +185,7 @@ TEST(Fleet, StopsAllHeartbeatsByItsWatchdog) {
   EXPECT_EQ(fleet.wait_active(), Boards{});
 }
 
-TEST(Fleet, RefusesWrongUrlsBoardsAndCommands) {
+TEST(Fleet, RefusesInvalidUrlsBoardsAndCommands) {
   const auto problem = [](const std::vector<std::string>& urls) {
     return problem_of([&] { Fleet fleet(urls); });
   };
@@ -201,7 +201,7 @@ TEST(Fleet, RefusesWrongUrlsBoardsAndCommands) {
   EXPECT_EQ(problem_of([&] { fleet.send("O:1,1,9"); }).kind, ErrorKind::usage);
 }
 
-TEST(Fleet, IsClosedOnceAndForAll) {
+TEST(Fleet, EndsEveryCallAsClosedAfterClose) {
   ActiveFleet fleet({"sim:?node=0-7"});
   fleet.close();
   fleet.close();
@@ -210,7 +210,7 @@ TEST(Fleet, IsClosedOnceAndForAll) {
   EXPECT_EQ(problem_of([&] { fleet.wait_active(); }).outcome, Outcome::closed);
 }
 
-TEST(Fleet, GivesUpACallThatIsInterrupted) {
+TEST(Fleet, EndsACallWithTheExceptionOfOnWait) {
   BoardInAThread simulated("udp");
   bool interrupts = false;
   BoardOptions options = at_will();

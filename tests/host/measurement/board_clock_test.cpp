@@ -91,7 +91,7 @@ struct ClockBench {
   double bound_us = 1e9;
 };
 
-TEST(BoardClock, WithoutAnAnswerTheFastestDatagramDecides) {
+TEST(BoardClock, UsesTheFastestDatagramWithoutAnAnswer) {
   BoardClock clock;
   clock.heard(1000, 5s + 7ms);
   EXPECT_EQ(clock.at(1000).at, 5s + 7ms);
@@ -103,7 +103,7 @@ TEST(BoardClock, WithoutAnAnswerTheFastestDatagramDecides) {
       << "a delayed state must not move the clock";
 }
 
-TEST(BoardClock, ARoundTripBoundsItFromBothSides) {
+TEST(BoardClock, ARoundTripGivesAnErrorBound) {
   BoardClock clock;
   clock.heard(1000, 5s);
   clock.answered(1000, 4999ms);
@@ -127,22 +127,22 @@ void expect_exact(ClockBench::Options options, int until_ms, int settled_ms, dou
   }
 }
 
-TEST(BoardClock, OnAFastPathItIsWithinSevenTenthsOfAMillisecond) {
+TEST(BoardClock, IsWithinSevenTenthsOfAMillisecondOnAFastPath) {
   expect_exact({}, 20'000, 2'000, 700, 1'000);
 }
 
 // A question takes one frame to the board. A state takes many frames to the host, after the states
 // of seven other boards (docs/how-to/can.md).
-TEST(BoardClock, OnALoadedCanBusItIsWithinSevenTenthsOfAMillisecond) {
+TEST(BoardClock, IsWithinSevenTenthsOfAMillisecondOnALoadedCanBus) {
   expect_exact({.least_us = 150, .most_us = 600, .least_back_us = 700, .most_back_us = 2'800},
                20'000, 10'000, 700, 1'500);
 }
 
-TEST(BoardClock, WithADelayOfUpTo20MillisecondsItIsWithinTwoAfterTenSeconds) {
+TEST(BoardClock, IsWithin2MsAfter10SecondsWithDelaysUpTo20Ms) {
   expect_exact({.least_us = 0, .most_us = 20'000}, 60'000, 10'000, 2'000, 20'000);
 }
 
-TEST(BoardClock, TheBoundCoversALinkThatIsSlowerOneWay) {
+TEST(BoardClock, ErrorBoundCoversALinkThatIsSlowerInOneDirection) {
   ClockBench bench(
       {.least_us = 100, .most_us = 300, .least_back_us = 30'000, .most_back_us = 30'200});
   EXPECT_GE(bench.run(0, 20'000, 10'000), 10'000)
@@ -150,14 +150,14 @@ TEST(BoardClock, TheBoundCoversALinkThatIsSlowerOneWay) {
   EXPECT_EQ(bench.honest, bench.bounded);
 }
 
-TEST(BoardClock, TheDriftIsFoundWithinItsError) {
+TEST(BoardClock, MeasuresTheDriftWithinItsError) {
   ClockBench bench({.drift_ppm = 60});
   bench.run(0, 40'000, 0);
   EXPECT_NEAR(bench.clock.drift_ppm(), 60, bench.clock.drift_error_ppm());
   EXPECT_LE(bench.clock.drift_error_ppm(), 40);
 }
 
-TEST(BoardClock, ThroughAnOutageTheBoundGrowsAndStaysTrue) {
+TEST(BoardClock, ErrorBoundGrowsDuringAnOutageAndStaysTrue) {
   ClockBench bench({.drift_ppm = -80});
   bench.run(0, 10'000, 0);
   const double before = bench.bound_us;
@@ -169,7 +169,7 @@ TEST(BoardClock, ThroughAnOutageTheBoundGrowsAndStaysTrue) {
   EXPECT_EQ(bench.honest, bench.bounded);
 }
 
-TEST(BoardClock, AClockThatIsSetIsFollowedFromThen) {
+TEST(BoardClock, FollowsAClockThatWasSet) {
   for (const Time step : {Time{5s}, Time{-5s}}) {  // the host slept, or the board's clock was set
     BoardClock clock;
     clock.heard(1000, 100s);
@@ -183,7 +183,7 @@ TEST(BoardClock, AClockThatIsSetIsFollowedFromThen) {
   }
 }
 
-TEST(BoardClock, LateAndReorderedDatagramsDoNoHarm) {
+TEST(BoardClock, IsNotDisturbedByLateOrReorderedDatagrams) {
   ClockBench bench({.drift_ppm = 30});
   bench.run(0, 5'000, 0);
   const auto before = bench.clock.at(ClockBench::shown(5e6));
@@ -194,7 +194,7 @@ TEST(BoardClock, LateAndReorderedDatagramsDoNoHarm) {
   EXPECT_EQ(bench.honest, bench.bounded);
 }
 
-TEST(BoardClock, EightBoardsHaveOneTimeAxis) {
+TEST(BoardClock, PutsEightBoardsOnOneTimeAxis) {
   std::vector<ClockBench> boards;
   for (unsigned i = 0; i < 8; ++i) {
     boards.emplace_back(ClockBench::Options{

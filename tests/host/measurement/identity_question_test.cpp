@@ -18,7 +18,7 @@ Identity answer_to(std::uint32_t pnum) {
   return identity;
 }
 
-TEST(IdentityQuestion, IsAnsweredByTheAnswerThatNamesIt) {
+TEST(IdentityQuestion, MatchesTheAnswerThatNamesIt) {
   IdentityQuestion question;
   question.asked(7, 100ms);
   question.asked(8, 200ms);
@@ -28,7 +28,7 @@ TEST(IdentityQuestion, IsAnsweredByTheAnswerThatNamesIt) {
   EXPECT_EQ(question.answered(answer_to(8)), 200ms);
 }
 
-TEST(IdentityQuestion, CountsFromItsFirstSendingIfItIsRepeated) {
+TEST(IdentityQuestion, ARepeatedQuestionIsTimedFromItsFirstSending) {
   IdentityQuestion question;
   question.asked(7, 100ms);
   question.asked(7, 200ms);
@@ -44,7 +44,7 @@ TEST(IdentityQuestion, IsForgottenAfterEightNewerOnes) {
   EXPECT_EQ(question.answered(answer_to(1)), 100ms);
 }
 
-TEST(IdentityQuestion, IsTheNewestIfTheAnswerNamesNone) {
+TEST(IdentityQuestion, AnAnswerWithoutANumberMatchesTheNewestQuestion) {
   IdentityQuestion question;
   question.asked(7, 100ms);
   question.asked(8, 200ms);

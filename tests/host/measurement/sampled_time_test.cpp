@@ -16,7 +16,7 @@ class SampledTime : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Transports, SampledTime, testing::Values("udp", "pty"),
                          [](const auto& transport) { return std::string(transport.param); });
 
-TEST_P(SampledTime, IsWithinSevenTenthsOfAMillisecondAndWithinItsErrorAlways) {
+TEST_P(SampledTime, IsWithinSevenTenthsOfAMillisecondAndItsErrorBound) {
   BoardInAThread simulated(GetParam());
   const SampledTruth found = look_at_sampled(simulated, simulated.url(), 700us);
   fmt::print(

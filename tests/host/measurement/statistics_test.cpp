@@ -11,7 +11,7 @@ namespace {
 using namespace std::chrono_literals;
 using Micros = std::chrono::microseconds;
 
-TEST(Statistics, StartAtNothing) {
+TEST(Statistics, BeginAtZero) {
   const Statistics report = StatisticsCollector().report(10s);
   EXPECT_EQ(report.states, 0U);
   EXPECT_EQ(report.state_rate_hz, 0);
@@ -19,7 +19,7 @@ TEST(Statistics, StartAtNothing) {
   EXPECT_EQ(report.loss(), 0);
 }
 
-TEST(Statistics, RateIsThatOfTheLastSecond) {
+TEST(Statistics, RateCoversTheLastSecond) {
   StatisticsCollector collector;
   Micros now = 500s + 12345us;
   std::uint32_t t = 0;
@@ -42,7 +42,7 @@ TEST(Statistics, RateIsRightFromTheFirstTenthOfASecond) {
 
 // RFC 3550, 6.4.1: J += (|D| - J) / 16. D is the difference between the transit times of two
 // successive states.
-TEST(Statistics, JitterIsThatOfRfc3550) {
+TEST(Statistics, JitterFollowsRfc3550) {
   StatisticsCollector even;
   Micros now = 500s;
   for (std::uint32_t i = 0; i < 100; ++i, now += 10ms) even.on_state(i * 10, now);
@@ -69,14 +69,14 @@ TEST(Statistics, JitterSurvivesTheWrapOfTheBoardsClock) {
   EXPECT_EQ(collector.report(now).jitter_us, 0);
 }
 
-TEST(Statistics, AgeIsThatOfTheNewestState) {
+TEST(Statistics, AgeBelongsToTheNewestState) {
   StatisticsCollector collector;
   collector.on_state(0, 500s);
   collector.on_state(10, 500s + 10ms);
   EXPECT_EQ(collector.report(500s + 17ms).state_age_us, 7000);
 }
 
-TEST(Statistics, RoundTripHasNewestLeastAndMean) {
+TEST(Statistics, RoundTripHasNewestMinimumAndMean) {
   StatisticsCollector collector;
   for (const Micros each : {300us, 100us, 200us}) collector.on_round_trip(each);
   const Statistics report = collector.report(1s);
@@ -85,7 +85,7 @@ TEST(Statistics, RoundTripHasNewestLeastAndMean) {
   EXPECT_EQ(report.round_trip_mean_us, 200);
 }
 
-TEST(Statistics, LossIsTheShareOfTheBoardsDatagrams) {
+TEST(Statistics, LossIsAShareOfTheBoardDatagrams) {
   ConnectedLink link;
   for (int i = 0; i < 100; ++i) {
     link.pass(10ms);

@@ -54,7 +54,7 @@ struct OnePath : testing::Test {
   std::uint32_t question = 100;
 };
 
-TEST_F(OnePath, TheSessionSpeaksAsSoonAsTheTransportIsUp) {
+TEST_F(OnePath, SendsAsSoonAsTheTransportIsUp) {
   EXPECT_EQ(paths.speaking(), 1);
   EXPECT_EQ(paths.to_ask(now), 0) << "there is no other path whose board to compare";
   paths.on_transport(0, false, true, now);
@@ -62,7 +62,7 @@ TEST_F(OnePath, TheSessionSpeaksAsSoonAsTheTransportIsUp) {
   EXPECT_TRUE(paths.all_down());
 }
 
-TEST_F(OnePath, NumbersOrderTheHeartbeatsOfOneMillisecond) {
+TEST_F(OnePath, PacketNumbersOrderHeartbeatsOfOneMillisecond) {
   EXPECT_TRUE(heartbeat());
   EXPECT_TRUE(heartbeat());
   EXPECT_FALSE(heartbeat(board_t(), board_pnum - 1)) << "the same heartbeat again";
@@ -82,7 +82,7 @@ TEST_F(OnePath, OlderDatagramsAndDuplicatesAreDropped) {
   EXPECT_FALSE(paths.news().is_newest_state(0, board_t() - 1));
 }
 
-TEST_F(OnePath, LostDatagramsAreCountedAndLateOnesAreTakenBack) {
+TEST_F(OnePath, ALateDatagramIsSubtractedFromTheLostOnes) {
   heartbeat(board_t(), 10);
   pass(10);
   heartbeat(board_t(), 14);
@@ -108,7 +108,7 @@ TEST_F(OnePath, ARestartIsNoticedWhenItsFirstHeartbeatsAreLost) {
   EXPECT_EQ(paths.counters().lost, 0U) << "numbers that begin anew are not a loss";
 }
 
-TEST_F(OnePath, ABoardWithoutAnswersIsBelievedWhenItSaysThatItBoots) {
+TEST_F(OnePath, ABootHeartbeatProvesARestartOfABoardWithoutAnswers) {
   EXPECT_TRUE(booting());
   EXPECT_TRUE(booting());
   EXPECT_EQ(state(), Admission::yes) << "the first boot heard is not a restart";
@@ -157,7 +157,7 @@ TEST_F(OnePath, TheBoardsClockMayWrap) {
   EXPECT_TRUE(paths.is_newest(0, board_t(), now));
 }
 
-TEST_F(OnePath, ADatagramOfAnEarlierBootIsDroppedAndTheBoardIsAsked) {
+TEST_F(OnePath, ADatagramOfAnEarlierBootIsDroppedAndAsksForAnAnswer) {
   heartbeat();
   ask();
   ASSERT_EQ(answer(), Admission::yes);
@@ -182,7 +182,7 @@ TEST_F(OnePath, AnAnswerProvesARestart) {
   EXPECT_EQ(state(), Admission::yes);
 }
 
-TEST_F(OnePath, AnAnswerToAnotherProgramProvesNoRestart) {
+TEST_F(OnePath, AnAnswerToAnotherProgramDoesNotProveARestart) {
   heartbeat();
   ask();
   ASSERT_EQ(answer(), Admission::yes);
@@ -191,7 +191,7 @@ TEST_F(OnePath, AnAnswerToAnotherProgramProvesNoRestart) {
   EXPECT_EQ(state(), Admission::no) << "the restart is not proved";
 }
 
-TEST_F(OnePath, ABoardThatStopsAnsweringIsBelievedAfterTenQuestions) {
+TEST_F(OnePath, TenUnansweredQuestionsProveARestart) {
   heartbeat();
   ask();
   ASSERT_EQ(answer(), Admission::yes);
@@ -206,7 +206,7 @@ TEST_F(OnePath, ABoardThatStopsAnsweringIsBelievedAfterTenQuestions) {
   EXPECT_EQ(questions, 10) << "firmware without answers may run after the restart";
 }
 
-TEST_F(OnePath, AQuestionWhileNothingComesIsNotCounted) {
+TEST_F(OnePath, QuestionsDuringAnOutageDoNotProveARestart) {
   heartbeat();
   ask();
   ASSERT_EQ(answer(), Admission::yes);
@@ -218,7 +218,7 @@ TEST_F(OnePath, AQuestionWhileNothingComesIsNotCounted) {
       << "a replay must not be believed";
 }
 
-TEST_F(OnePath, AQuestionThatTheTransportDidNotTakeIsRepeatedAndNotCounted) {
+TEST_F(OnePath, AnUnsentQuestionIsRepeatedAndNotCounted) {
   heartbeat();
   ask();
   ASSERT_EQ(answer(), Admission::yes);
@@ -231,7 +231,7 @@ TEST_F(OnePath, AQuestionThatTheTransportDidNotTakeIsRepeatedAndNotCounted) {
   }
 }
 
-TEST_F(OnePath, AQuestionOfTheProgramThatTheTransportDidNotTakeIsNotRepeated) {
+TEST_F(OnePath, AnUnsentQuestionOfTheProgramIsNotRepeated) {
   heartbeat();
   ask();
   ASSERT_EQ(answer(), Admission::yes);
@@ -240,7 +240,7 @@ TEST_F(OnePath, AQuestionOfTheProgramThatTheTransportDidNotTakeIsNotRepeated) {
   EXPECT_EQ(paths.to_ask(now), 0);
 }
 
-TEST_F(OnePath, TheOnlyPathMayLeadToAnotherBoardLater) {
+TEST_F(OnePath, ANewBoardOnTheOnlyPathCountsAsARestart) {
   state();
   ask();
   ASSERT_EQ(answer(), Admission::yes);

@@ -42,7 +42,7 @@ struct VisitorOfAll final : RecordingVisitor {
   int from = 0, to = 0;
 };
 
-TEST(ReadRecording, VisitsAllThatWasRecorded) {
+TEST(ReadRecording, VisitsEveryRecord) {
   const std::string path = testing::TempDir() + "r4-read-" + std::to_string(::getpid());
   std::uint64_t received = 0;  // after record()
   {
@@ -74,7 +74,7 @@ Record record_of(std::uint16_t path, RecordKind kind, const std::string& bytes) 
   return record;
 }
 
-TEST(RecordedStates, MergeTheStatesOfEachPath) {
+TEST(RecordedStates, AreMergedPerPath) {
   RecordedStates states;
   const std::string volts = with_crc("AIN24:24.28;PNum:7;T:1;");
   const std::string relays = with_crc("RELAYS:3;PNum:8;T:2;");

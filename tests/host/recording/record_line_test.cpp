@@ -22,7 +22,7 @@ std::string line_of(const Record& record) {
   return line;
 }
 
-TEST(RecordLine, IsTimePathDirectionAndTheDatagramAsItStands) {
+TEST(RecordLine, HasTimePathDirectionAndTheUnchangedDatagram) {
   EXPECT_EQ(line_of({sample, 1, RecordKind::from_board, "AIN24:24.28;PNum:1;T:2;^0xf07cfd9a^"}),
             "1795468293.404765 1< AIN24:24.28;PNum:1;T:2;^0xf07cfd9a^");
   EXPECT_EQ(line_of({Time{5}, 12, RecordKind::to_board, ""}), "0.000005 12> ");
@@ -49,7 +49,7 @@ TEST(RecordLine, RejectsATextThatIsNotATime) {
   }
 }
 
-TEST(RecordLine, OfAStateHasTwoHundredBytesAtMost) {
+TEST(RecordLine, ForAStateHasAtMostTwoHundredBytes) {
   // With the fields that a host in control adds to those of the paper, after a day.
   const std::string state =
       "AIN24:24.56;AIN12:12.15;AIN5:5.11;AINDMH:12.16;DMHSTA:1;AINSTEER:0.95;DHB1A:4095,1;"
@@ -73,7 +73,7 @@ RC_GTEST_PROP(RecordLine, GivesAnyBytesBack, (const std::string& bytes, std::uin
   RC_ASSERT(read.record.bytes == bytes);
 }
 
-TEST(RecordLine, GivesEveryByteBackInTheLongestRecord) {
+TEST(RecordLine, PreservesEveryByteOfTheLongestRecord) {
   std::string bytes;
   for (std::size_t i = 0; i < max_record_bytes; ++i) bytes += static_cast<char>(i * 7);
   const std::string line = line_of({sample, 65535, RecordKind::from_board, bytes + "more"});
@@ -83,7 +83,7 @@ TEST(RecordLine, GivesEveryByteBackInTheLongestRecord) {
   EXPECT_EQ(read.record.bytes, bytes) << "longer data must be cut";
 }
 
-TEST(RecordLine, RejectsALineThatIsNotOneOfARecording) {
+TEST(RecordLine, RejectsALineThatIsNotARecordLine) {
   for (const char* const line : {
            "x",
            "1795468293.404765",
@@ -119,7 +119,7 @@ TEST(RecordLine, RejectsALineThatIsNotOneOfARecording) {
   }
 }
 
-TEST(RecordLine, OfAPathHasItsUrlAndTheBoardsNameIfABoardMayHaveIt) {
+TEST(RecordLine, ForAPathHasItsUrlAndAValidBoardName) {
   const std::string url = "udp:?id=a b\n\xff";
   for (const std::string& name :
        {std::string(), std::string("left-arm"), std::string("0042AF"),
@@ -139,7 +139,7 @@ TEST(RecordLine, OfAPathHasItsUrlAndTheBoardsNameIfABoardMayHaveIt) {
   }
 }
 
-TEST(RecordLine, IsMadeOfARecordWithoutItsSecrets) {
+TEST(RecordLine, MasksSecretsInARecord) {
   const std::string setting = test::with_crc("C:password,letmein!;PNum:1;T:2;");
   const std::string masked = test::with_crc("C:password,...;PNum:1;T:2;");
   const struct {
@@ -163,7 +163,7 @@ TEST(RecordLine, IsMadeOfARecordWithoutItsSecrets) {
   }
 }
 
-TEST(RecordLine, OfADeviceHasItsPlaceAndTheTextOfItsDescription) {
+TEST(RecordLine, ForADeviceHasItsAddressSlotAndDescription) {
   std::string text;
   write_device(text, {3, "my one@0x28:1", "device mine\naddress 0x40\n# \\\xff\n"});
   EXPECT_EQ(text,

@@ -43,7 +43,7 @@ bool has(const Heard& heard, const std::string& pattern) {
   return std::regex_search(heard.records, std::regex(pattern));
 }
 
-TEST_F(RecordingOfABoard, HasBothDirectionsAndWhatHappened) {
+TEST_F(RecordingOfABoard, HasBothDirectionsAndTheEvents) {
   {
     Board board("sim:", at_will());
     board.record(path());
@@ -66,7 +66,7 @@ TEST_F(RecordingOfABoard, HasBothDirectionsAndWhatHappened) {
   }
 }
 
-TEST_F(RecordingOfABoard, ReportsAFullDiskAndTheLinkGoesOn) {
+TEST_F(RecordingOfABoard, ReportsAFullDiskAndTheLinkContinues) {
   std::mutex mutex;
   std::condition_variable told;
   std::optional<Problem> problem;
@@ -96,7 +96,7 @@ TEST_F(RecordingOfABoard, ReportsAFullDiskAndTheLinkGoesOn) {
   EXPECT_TRUE(has(heard("next.r4log"), " 1< AIN24:"));
 }
 
-TEST_F(RecordingOfABoard, ThrowsAtTheCallIfItCannotBeOpened) {
+TEST_F(RecordingOfABoard, ThrowsFromRecordIfItsFileCannotBeOpened) {
   Board board("sim:", at_will());
   EXPECT_EQ(problem_of([&] { board.record(path("no/where")); }).kind, ErrorKind::open);
   board.wait_active();
@@ -113,7 +113,7 @@ TEST_F(RecordingOfABoard, MayEndBeforeTheBoard) {
   EXPECT_TRUE(has(heard(), " 0! end"));
 }
 
-TEST_F(RecordingOfABoard, IsInTheOrderOfTheRecordsTimesAndNotOfTheCalls) {
+TEST_F(RecordingOfABoard, IsOrderedByTheTimesOfItsRecords) {
   const Time began = std::chrono::duration_cast<Time>(
       (std::chrono::steady_clock::now() - 20ms).time_since_epoch());
   Recorder recorder(path(), {});
@@ -127,7 +127,7 @@ TEST_F(RecordingOfABoard, IsInTheOrderOfTheRecordsTimesAndNotOfTheCalls) {
   EXPECT_TRUE(std::regex_match(all.records, lines)) << all.records;
 }
 
-TEST_F(RecordingOfABoard, TakesADatagramWithoutMemoryAndCountsTheDroppedOnes) {
+TEST_F(RecordingOfABoard, AllocatesNothingPerDatagramAndCountsDropped) {
   Recorder recorder(path(), {});
   const std::uint16_t path = recorder.add_path("sim:");
   const std::string datagram(1000, 'x');

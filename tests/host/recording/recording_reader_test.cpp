@@ -47,7 +47,7 @@ std::string compressed(const std::string& text, bool end_frame = true) {
   return out;
 }
 
-TEST(RecordingReader, GivesEveryRecordHoweverTheBytesCome) {
+TEST(RecordingReader, ReadsEveryRecordFromPiecesOfAnySize) {
   const std::string text = lines(0, 50);
   for (const std::string& file : {head() + text, compressed(head() + text)}) {
     for (const std::size_t piece : {1, 2, 3, 7, 64, 100'000}) {
@@ -60,7 +60,7 @@ TEST(RecordingReader, GivesEveryRecordHoweverTheBytesCome) {
   }
 }
 
-TEST(RecordingReader, ReportsThePlaceOfADamagedLineAndGoesOn) {
+TEST(RecordingReader, ReportsTheLineAndByteOfADamagedLineAndContinues) {
   const std::string before = head() + lines(0, 3);
   const Heard heard = heard_in(before + "nonsense\n" + lines(3, 3), 10);
   EXPECT_EQ(heard.records, lines(0, 6));
@@ -91,7 +91,7 @@ TEST(RecordingReader, SkipsATooLongLineInLittleMemory) {
   }
 }
 
-TEST(RecordingReader, ReadsSeveralRecordingsOneAfterTheOtherAlsoWithOtherPaths) {
+TEST(RecordingReader, ReadsConcatenatedRecordingsWithDifferentPaths) {
   const std::string a = head() + lines(0, 2), b = other_head + lines(2, 2) + end_of_it;
   for (const std::string& file : {a + b + a, compressed(a) + compressed(b) + compressed(a)}) {
     const Heard heard = heard_in(file, 5);
@@ -101,7 +101,7 @@ TEST(RecordingReader, ReadsSeveralRecordingsOneAfterTheOtherAlsoWithOtherPaths) 
   }
 }
 
-TEST(RecordingReader, ReadsAllThatWasFlushedOfAFrameWithoutAnEnd) {
+TEST(RecordingReader, ReadsTheFlushedPartOfATornFrame) {
   const std::string cut = compressed(head() + lines(0, 20), false);
   const Heard heard = heard_in(cut);
   EXPECT_EQ(heard.records, lines(0, 20));
@@ -109,7 +109,7 @@ TEST(RecordingReader, ReadsAllThatWasFlushedOfAFrameWithoutAnEnd) {
   EXPECT_EQ(heard.damage[0].kind, DamageKind::torn);
 }
 
-TEST(RecordingReader, GoesOnWithTheNextFrameWhereOneHasNoEnd) {
+TEST(RecordingReader, ContinuesWithTheNextFrameAfterATornFrame) {
   for (const std::size_t piece : {1, 2, 3, 5, 1000}) {
     const Heard heard = heard_in(
         compressed(head() + lines(0, 20), false) + compressed(head() + lines(20, 5)), piece);
@@ -151,7 +151,7 @@ TEST(RecordingReader, RefusesALaterVersion) {
   EXPECT_TRUE(contains(problem.reason, "a later version: # r4log 2 by r4 9.0"));
 }
 
-TEST(RecordingReader, ReadsLinesThatEndInCrLfAfterTheMarkOfUtf8) {
+TEST(RecordingReader, ReadsLinesThatEndInCrLfAfterAByteOrderMark) {
   const std::string text = head() + lines(0, 20);
   std::string edited = "\xEF\xBB\xBF";
   for (const char c : text) edited += c == '\n' ? std::string("\r\n") : std::string(1, c);
@@ -164,7 +164,7 @@ TEST(RecordingReader, ReadsLinesThatEndInCrLfAfterTheMarkOfUtf8) {
   }
 }
 
-TEST(RecordingReader, NamesTheFormOfAnotherFileAndTheProgramThatReadsIt) {
+TEST(RecordingReader, NamesTheFormatOfAnotherFileAndAProgramThatReadsIt) {
   struct Other {
     std::string beginning, reason, fix;
   };
@@ -185,7 +185,7 @@ TEST(RecordingReader, NamesTheFormOfAnotherFileAndTheProgramThatReadsIt) {
   }
 }
 
-TEST(RecordingReader, ReadsTheArchivesOfZstdsOwnPrograms) {
+TEST(RecordingReader, ReadsFilesCompressedByZstdAndPzstd) {
   const std::string text = head() + lines(0, 50);
   // The options --long=27 and --ultra -22, and the bytes that pzstd writes before each frame.
   std::string archive(ZSTD_compressBound(text.size()), '\0');
@@ -208,7 +208,7 @@ TEST(RecordingReader, ReadsTheArchivesOfZstdsOwnPrograms) {
   }
 }
 
-TEST(RecordingReader, RefusesAFrameThatNeedsMuchMemoryAndNamesTheProgramThatUnpacksIt) {
+TEST(RecordingReader, RefusesAFrameThatNeedsTooMuchMemory) {
   // A frame with a window of 2 GiB.
   const std::string frame = std::string("\x28\xb5\x2f\xfd\x00\xa8", 6) + std::string(100, '\0');
   const Heard heard = heard_in(compressed(head() + lines(0, 3)) + frame);
@@ -252,7 +252,7 @@ TEST(RecordingReader, RefusesRecordingsThatAreMixed) {
   }
 }
 
-TEST(RecordingReader, ReadsRecordingsOneAfterTheOtherThoughTheHeaderBetweenThemIsDamaged) {
+TEST(RecordingReader, ReadsConcatenatedRecordingsOverADamagedHeader) {
   std::string damaged = other_head + lines(2, 2) + end_of_it;
   damaged[0] = '$';
   const Heard heard = heard_in(head() + lines(0, 2) + end_of_it + damaged);

@@ -61,7 +61,7 @@ struct RecordingWriterTest : testing::Test {
   std::string all;  // the lines of all appended records
 };
 
-TEST_F(RecordingWriterTest, WritesNoSecretOfAnyHost) {
+TEST_F(RecordingWriterTest, MasksTheSecretsOfEveryHost) {
   for (const char* name : {"a.r4log", "a.r4log.zst"}) {
     {
       RecordingWriter writer(path(name), {});
@@ -74,7 +74,7 @@ TEST_F(RecordingWriterTest, WritesNoSecretOfAnyHost) {
   }
 }
 
-TEST_F(RecordingWriterTest, WhatWasFlushedIsInTheFile) {
+TEST_F(RecordingWriterTest, FlushedRecordsAreInTheFile) {
   for (const char* const name : {"a.r4log", "a.r4log.zst"}) {
     all.clear();
     RecordingWriter writer(path(name), {});
@@ -122,7 +122,7 @@ TEST_F(RecordingWriterTest, GoesOnAfterATornLine) {
   EXPECT_EQ(heard.damage[0].kind, RecordingDamage::Kind::line);
 }
 
-TEST_F(RecordingWriterTest, WritesOverNothingElse) {
+TEST_F(RecordingWriterTest, DoesNotOverwriteOtherFiles) {
   for (const char* const name : {"notes.txt", "a.r4log.zst"}) {
     std::ofstream(path(name)) << "something else";
     const Problem problem = problem_of([&] { RecordingWriter(path(name), {}); });
@@ -139,7 +139,7 @@ TEST_F(RecordingWriterTest, WritesOverNothingElse) {
   EXPECT_EQ(problem_of([&] { RecordingWriter(path("no/where.r4log"), {}); }).kind, ErrorKind::open);
 }
 
-TEST_F(RecordingWriterTest, BeginsAFileAnewThatWasMovedRemovedOrTruncatedAndReportsALoss) {
+TEST_F(RecordingWriterTest, RestartsAMovedRemovedOrTruncatedFileAndReportsALoss) {
   for (const std::string ending : {".r4log", ".r4log.zst"}) {
     for (const std::string what : {"moved", "removed", "truncated"}) {
       const std::string file = path("a" + ending), moved = path("moved" + ending);
@@ -175,7 +175,7 @@ TEST_F(RecordingWriterTest, BeginsAFileAnewThatWasMovedRemovedOrTruncatedAndRepo
   }
 }
 
-TEST_F(RecordingWriterTest, AFileThatCannotBeBegunAnewEndsTheRecording) {
+TEST_F(RecordingWriterTest, EndsTheRecordingIfTheFileCannotBeRestarted) {
   RecordingWriter writer(path("a.r4log"), {});
   append(writer);
   writer.flush();
@@ -215,7 +215,7 @@ TEST_F(RecordingWriterTest, RecordsOnAFileSystemThatHasNoLocks) {
   });
 }
 
-TEST_F(RecordingWriterTest, BeginsANewFileAfterASize) {
+TEST_F(RecordingWriterTest, BeginsANewFileAtTheSizeLimit) {
   for (const char* const ending : {".r4log", ".r4log.zst"}) {
     RecordingOptions options;
     options.rotate_bytes = 20'000;
@@ -240,7 +240,7 @@ TEST_F(RecordingWriterTest, BeginsANewFileAfterASize) {
   EXPECT_EQ(read + read_zst, all);
 }
 
-TEST_F(RecordingWriterTest, BeginsANewFileAfterATime) {
+TEST_F(RecordingWriterTest, BeginsANewFileAtTheTimeLimit) {
   RecordingOptions options;
   options.rotate_after = 2s;
   RecordingWriter writer(path("drive.r4log"), options);
@@ -271,7 +271,7 @@ TEST_F(RecordingWriterTest, DeclaresItsDevicesInEachFile) {
   }
 }
 
-TEST_F(RecordingWriterTest, KeepsWhatItMayAndNoMore) {
+TEST_F(RecordingWriterTest, DeletesItsOldestFilesAboveTheKeepLimit) {
   std::ofstream(path("drive-notes.r4log")) << "of somebody else";
   RecordingOptions options;
   options.keep_bytes = 1 << 20;
@@ -295,7 +295,7 @@ TEST_F(RecordingWriterTest, KeepsWhatItMayAndNoMore) {
   EXPECT_EQ(content("drive-notes.r4log"), "of somebody else");
 }
 
-TEST_F(RecordingWriterTest, RefusesLimitsThatCannotBeKept) {
+TEST_F(RecordingWriterTest, RefusesImpossibleLimits) {
   RecordingOptions options;
   options.keep_bytes = 1000;
   EXPECT_EQ(problem_of([&] { RecordingWriter(path("a"), options); }).kind, ErrorKind::usage);
@@ -305,7 +305,7 @@ TEST_F(RecordingWriterTest, RefusesLimitsThatCannotBeKept) {
   EXPECT_TRUE(names().empty());
 }
 
-TEST_F(RecordingWriterTest, AFullDiskIsAnErrorAndWhatIsWrittenStaysWhole) {
+TEST_F(RecordingWriterTest, AFullDiskIsAnErrorAndKeepsTheFlushedRecords) {
   RecordingWriter writer(path("a.r4log"), {});
   std::string flushed;
   const auto handler = std::signal(SIGXFSZ, SIG_IGN);

@@ -47,7 +47,7 @@ struct Replay : testing::Test {
   CarrierCounters counters;
 };
 
-TEST_F(Replay, GivesTheBoardsDatagramsAndTheEventsOfItsTransport) {
+TEST_F(Replay, DeliversBoardDatagramsAndTransportEvents) {
   const std::string damaged("\x00\xff x", 4);
   add(0ms, "up udp://x", RecordKind::event);
   add(1ms, "one");
@@ -69,7 +69,7 @@ TEST_F(Replay, GivesTheBoardsDatagramsAndTheEventsOfItsTransport) {
   EXPECT_GE(heard.drained, 1);
 }
 
-TEST_F(Replay, KeepsThePaceThatIsAskedFor) {
+TEST_F(Replay, PlaysAtTheRequestedSpeed) {
   for (int i = 0; i <= 10; ++i) add(i * 1s, std::to_string(i));
   const auto began = std::chrono::steady_clock::now();
   play("?speed=100");
@@ -79,7 +79,7 @@ TEST_F(Replay, KeepsThePaceThatIsAskedFor) {
   EXPECT_LE(took, 5s);
 }
 
-TEST_F(Replay, BeginsWhereItIsAskedToAndWithThatPath) {
+TEST_F(Replay, PlaysTheRequestedPathFromTheRequestedTime) {
   for (int i = 0; i < 10; ++i)
     add(i * 1s, std::to_string(i), RecordKind::from_board, i % 2 == 0 ? 1 : 2);
   play("?speed=1000&from=4.5&path=2");
@@ -87,7 +87,7 @@ TEST_F(Replay, BeginsWhereItIsAskedToAndWithThatPath) {
   EXPECT_EQ(heard.datagrams[0].text, "5");
 }
 
-TEST_F(Replay, BeginsAtATimeOfTheRecordingsClock) {
+TEST_F(Replay, MayBeginAtAClockTimeOfTheRecording) {
   for (int i = 0; i < 10; ++i) add(i * 1s, std::to_string(i));
   play("?speed=1000&from=2026-11-23T21:11:37.5");  // 1795468293 is 21:11:33
   ASSERT_EQ(heard.datagrams.size(), 5);
@@ -103,7 +103,7 @@ TEST_F(Replay, BeginsAtATimeOfTheRecordingsClock) {
   }
 }
 
-TEST_F(Replay, LeavesTurnsOfTheLoopToOthersHoweverMuchIsDue) {
+TEST_F(Replay, DoesNotBlockTheLoopWhenManyRecordsAreDue) {
   constexpr std::size_t all = 1000;
   for (std::size_t i = 0; i < all; ++i) add(0ms, "at once");
   std::size_t at_the_turn_of_others = 0;
@@ -117,7 +117,7 @@ TEST_F(Replay, LeavesTurnsOfTheLoopToOthersHoweverMuchIsDue) {
   EXPECT_EQ(heard.drained, 1) << "the queue must be drained before the end";
 }
 
-TEST_F(Replay, ReportsDamageFarBehindTheRecordThatIsPlayed) {
+TEST_F(Replay, ReportsDamageFarAheadOfThePlayedRecord) {
   add(0ms, "one");
   for (int i = 0; i < 2000; ++i) add(0ms, std::string(200, 'x'), RecordKind::from_board, 2);
   text += "no record\n";

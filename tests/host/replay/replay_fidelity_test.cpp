@@ -69,7 +69,7 @@ struct ToldOfABoard {
   int restarts = 0;
 };
 
-TEST(ReplayFidelity, TheSameStatesEventsAndStatisticsAsLive) {
+TEST(ReplayFidelity, HasTheSameStatesEventsAndStatisticsAsLive) {
   const std::string path = testing::TempDir() + "r4-fidelity-" + std::to_string(::getpid());
   asio::io_context io;
   const Impairment bad = Impairment::parse("loss=4%,duplicate=4%,corrupt=6%,seed=7");

@@ -53,7 +53,7 @@ struct SessionArming : ConnectedSession {
   std::uint32_t cmd = 0;
 };
 
-TEST_F(SessionArming, BeginsDisarmedAndSaysWhyNothingIsSent) {
+TEST_F(SessionArming, ASessionBeginsDisarmedAndReportsThatToCommands) {
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::not_yet);
   EXPECT_EQ(post(), PostResult::not_armed);
   const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
@@ -78,7 +78,7 @@ TEST_F(SessionArming, HoldsBackOutputCommandsOnly) {
   }
 }
 
-TEST_F(SessionArming, ClosesTheMotorSupplyAndIsArmedOnceTheBoardShowsIt) {
+TEST_F(SessionArming, ClosesRelay1AndIsArmedWhenTheBoardReportsItClosed) {
   const Ticket ticket = arm();
   EXPECT_EQ(link.last('R').command, "R:1,On");
   EXPECT_EQ(link.count('E'), 0U) << "no cause has to be cleared";
@@ -91,7 +91,7 @@ TEST_F(SessionArming, ClosesTheMotorSupplyAndIsArmedOnceTheBoardShowsIt) {
   EXPECT_EQ(post(), PostResult::sent);
 }
 
-TEST_F(SessionArming, AsksForTheFieldThatShowsTheMotorSupply) {
+TEST_F(SessionArming, SelectsTheFieldThatReportsRelay1) {
   link.session.send(Command::fields("ENC1"), 1s, link.now);
   EXPECT_EQ(link.last('F').command, "F:ENC1,SAFE,CMD,RELAYS");
 }
@@ -116,13 +116,13 @@ TEST_F(SessionArming, EveryCauseButTheLinkDisarms) {
   }
 }
 
-TEST_F(SessionArming, StaysArmedOverAnOutageAfterWhichTheBoardBringsItsOutputsBack) {
+TEST_F(SessionArming, StaysArmedIfTheBoardRestoresItsOutputsAfterAnOutage) {
   armed();
   outage(true);
   EXPECT_EQ(post(), PostResult::sent);
 }
 
-TEST_F(SessionArming, AnOutageAfterWhichTheOutputsStayOffDisarms) {
+TEST_F(SessionArming, DisarmsIfTheOutputsStayOffAfterAnOutage) {
   armed();
   outage(false);  // recovery=rearm, or another host had control
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::link);
@@ -137,7 +137,7 @@ TEST_F(SessionArming, ARestartOfTheBoardDisarms) {
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::restart);
 }
 
-TEST_F(SessionArming, ACauseThatWasMissedIsSeenByTheOpenRelay) {
+TEST_F(SessionArming, AnOpenRelay1DisarmsEvenIfItsCauseWasMissed) {
   armed();
   state(SafeReason::none, cmd, true);
   EXPECT_EQ(post(), PostResult::sent);
@@ -145,7 +145,7 @@ TEST_F(SessionArming, ACauseThatWasMissedIsSeenByTheOpenRelay) {
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::supply);
 }
 
-TEST_F(SessionArming, AStopOfItsOwnDisarmsAtOnce) {
+TEST_F(SessionArming, AStopOfThisHostDisarmsAtOnce) {
   armed();
   link.session.send(Command::stop(), 1s, link.now);
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::stop);
@@ -170,7 +170,7 @@ struct ArmingMeanwhile : SessionArming, testing::WithParamInterface<SafeReason> 
 INSTANTIATE_TEST_SUITE_P(Causes, ArmingMeanwhile,
                          testing::Values(SafeReason::fault, SafeReason::stop));
 
-TEST_P(ArmingMeanwhile, DoesNotClearAStopThatIsPressed) {
+TEST_P(ArmingMeanwhile, DoesNotClearAStopPressedDuringArming) {
   link.heartbeat(GetParam());
   const Ticket ticket = arm();
   EXPECT_EQ(link.count('E'), 1U);
@@ -182,7 +182,7 @@ TEST_P(ArmingMeanwhile, DoesNotClearAStopThatIsPressed) {
   EXPECT_EQ(link.count('R'), 0U);
 }
 
-TEST_F(SessionArming, DoesNotWaitForAnEClearThatWasAskedForAfterIt) {
+TEST_F(SessionArming, DoesNotWaitForALaterEClear) {
   link.heartbeat(SafeReason::stop);
   const Ticket ticket = link.session.arm(1s, link.now);
   const Ticket clear = link.session.send(Command::clear(), 1s, link.now);
@@ -196,7 +196,7 @@ TEST_F(SessionArming, DoesNotWaitForAnEClearThatWasAskedForAfterIt) {
   EXPECT_EQ(outcome(clear), Outcome::confirmed);
 }
 
-TEST_F(SessionArming, AnArmThatFollowsARefusedOneAtOnceClearsAnew) {
+TEST_F(SessionArming, ARetryAfterARefusedArmSendsANewClear) {
   link.heartbeat(SafeReason::stop);
   const Ticket first = arm();
   link.nack(link.last('E').pnum, "CHANNEL");
@@ -208,7 +208,7 @@ TEST_F(SessionArming, AnArmThatFollowsARefusedOneAtOnceClearsAnew) {
   EXPECT_EQ(outcome(second), Outcome::confirmed);
 }
 
-TEST_F(SessionArming, AnOvertakenStateIsNoProofOfAnOpenMotorSupply) {
+TEST_F(SessionArming, AnOvertakenStateDoesNotProveThatRelay1IsOpen) {
   armed();
   link.pass(20ms);
   const std::uint32_t number =
@@ -263,7 +263,7 @@ TEST_F(EarlierCause, IsNotClearedByArming) {
   EXPECT_EQ(link.count('E') + link.count('R'), 0U);
 }
 
-TEST_F(EarlierCause, IsAlsoAWatchdogOrAFault) {
+TEST_F(EarlierCause, CanBeAWatchdogOrAFault) {
   begin(SafeReason::fault);
   EXPECT_EQ(arm().disarmed, DisarmCause::earlier_fault);
   says(SafeReason::watchdog);
@@ -271,7 +271,7 @@ TEST_F(EarlierCause, IsAlsoAWatchdogOrAFault) {
   EXPECT_EQ(link.count('E') + link.count('R'), 0U);
 }
 
-TEST_F(EarlierCause, IsClearedOnPurposeAndTheProgramIsArmedThen) {
+TEST_F(EarlierCause, AllowsArmingAfterAnExplicitClear) {
   begin(SafeReason::stop);
   link.session.send(Command::clear(), 1s, link.now);
   link.pass(1ms);
@@ -282,7 +282,7 @@ TEST_F(EarlierCause, IsClearedOnPurposeAndTheProgramIsArmedThen) {
   EXPECT_EQ(link.count('R'), 1U);
 }
 
-TEST_F(EarlierCause, IsWaitedForWhereItIsBeingCleared) {
+TEST_F(EarlierCause, ArmWaitsForAClearUnderWay) {
   begin(SafeReason::stop);
   link.session.send(Command::clear(), 1s, link.now);
   const Ticket ticket = link.session.arm(1s, link.now);
@@ -293,7 +293,7 @@ TEST_F(EarlierCause, IsWaitedForWhereItIsBeingCleared) {
   EXPECT_EQ(link.count('R'), 1U);
 }
 
-TEST_F(EarlierCause, StaysOneThoughTheStopIsPressedAgain) {
+TEST_F(EarlierCause, StaysEarlierIfTheStopIsPressedAgain) {
   begin(SafeReason::stop);
   link.stopped(1, 7);
   link.stopped(2, 8);
@@ -312,14 +312,14 @@ TEST_F(EarlierCause, MayBeHiddenByALaterStop) {
   EXPECT_EQ(link.count('E'), 1U);
 }
 
-TEST_F(EarlierCause, IsNoneThatComesWhileTheHandleIsReleased) {
+TEST_F(EarlierCause, DoesNotIncludeAStopWhileTheHandleIsReleased) {
   begin(SafeReason::handle);
   says(SafeReason::stop);
   arm();
   EXPECT_EQ(link.count('E'), 1U);
 }
 
-TEST_F(EarlierCause, IsAnyOneAfterASleep) {
+TEST_F(EarlierCause, IncludesEveryCauseFoundAfterASleep) {
   begin(SafeReason::none);
   link.session.on_sleep(link.now);
   link.heartbeat(SafeReason::stop);
@@ -352,7 +352,7 @@ TEST_F(SessionArming, IsNotArmedWhenTheBoardRefusesTheRelay) {
   EXPECT_EQ(post(), PostResult::not_armed);
 }
 
-TEST_F(SessionArming, SendsNothingAfterItsDeadlineItsCancellationOrAStop) {
+TEST_F(SessionArming, SendsNothingAfterATimeoutACancellationOrAStop) {
   const auto ends_as = [&](Ticket ticket, Outcome wanted) {
     EXPECT_EQ(outcome(ticket), wanted);
     EXPECT_GE(link.count('R'), 1U);
@@ -376,7 +376,7 @@ TEST_F(SessionArming, SendsNothingAfterItsDeadlineItsCancellationOrAStop) {
   EXPECT_EQ(link.session.disarmed_by(), DisarmCause::stop);
 }
 
-TEST_F(SessionArming, ThatIsAskedForBeforeAStopOfItsOwnIsConfirmedEnds) {
+TEST_F(SessionArming, ArmEndsIfItWasCalledBeforeAnOwnStopIsConfirmed) {
   link.session.send(Command::stop(), 1s, link.now);
   const std::uint32_t stop = link.last('E').pnum;
   Ticket ticket = arm();
@@ -390,7 +390,7 @@ TEST_F(SessionArming, ThatIsAskedForBeforeAStopOfItsOwnIsConfirmedEnds) {
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
 }
 
-TEST_F(SessionArming, AStopOfSomebodyElseThatComesMeanwhileEndsIt) {
+TEST_F(SessionArming, AStopOfAnotherHostDuringArmEndsIt) {
   link.stopped(1, 7);
   state(SafeReason::stop, cmd, false);
   const Ticket ticket = arm();
@@ -402,7 +402,7 @@ TEST_F(SessionArming, AStopOfSomebodyElseThatComesMeanwhileEndsIt) {
   EXPECT_EQ(link.count('E') + link.count('R'), 0U);
 }
 
-TEST_F(SessionArming, OutputCommandsAfterItWaitForIt) {
+TEST_F(SessionArming, OutputCommandsWaitForAnEarlierArm) {
   const Ticket ticket = link.session.arm(1s, link.now);
   const Ticket behind = link.session.send(turn_motor, 1s, link.now);
   link.pass(1ms);
@@ -423,14 +423,14 @@ TEST_F(SessionArming, OutputCommandsAfterAFailedArmAreRefused) {
   EXPECT_EQ(link.results[behind].disarmed, DisarmCause::handle);
 }
 
-TEST_F(SessionArming, IsConfirmedAtOnceWhenItIsArmedAlready) {
+TEST_F(SessionArming, ArmIsConfirmedAtOnceIfTheSessionIsArmed) {
   armed();
   const Ticket ticket = arm();
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
   EXPECT_EQ(link.count('R'), 0U);
 }
 
-TEST_F(SessionArming, WaitsForTheLink) {
+TEST_F(SessionArming, ArmWaitsForTheLink) {
   ScriptedLink fresh(ScriptedLink::must_arm());
   const Ticket ticket = fresh.session.arm(1s, fresh.now);
   fresh.pass(10ms);
@@ -480,7 +480,7 @@ TEST_F(SessionArming, APostThatWasExecutedIsNotRefused) {
   EXPECT_TRUE(link.refused.empty());
 }
 
-TEST_F(SessionArming, ARefusalOverAnOutageProvesNothingOfAPost) {
+TEST_F(SessionArming, IgnoresARefusalOfAPostFromBeforeAnOutage) {
   armed();
   post();
   const std::uint32_t pnum = link.last('O').pnum;

@@ -99,7 +99,7 @@ TEST_F(SessionCommand, IsRefusedWithTheBoardsCode) {
   EXPECT_EQ(link.session.statistics(link.now).refused, 1U);
 }
 
-TEST_F(SessionCommand, AsksAtOnceIfItWasOvertakenAndEndsByTheAnswer) {
+TEST_F(SessionCommand, IsRepeatedAtOnceIfOvertakenAndEndsByTheAnswer) {
   for (const char* answer : {"DUPLICATE", "STALE"}) {
     link.sent.clear();
     const Ticket first = link.session.send(turn_motor, 1s, link.now);
@@ -115,7 +115,7 @@ TEST_F(SessionCommand, AsksAtOnceIfItWasOvertakenAndEndsByTheAnswer) {
   }
 }
 
-TEST_F(SessionCommand, IsNotConfirmedByDuplicateBeforeTheState) {
+TEST_F(SessionCommand, WaitsForTheStateAfterADuplicateAnswer) {
   const Ticket ticket = link.session.send(turn_motor, 1s, link.now);
   link.pass(60ms);
   link.nack(link.last('O').pnum, "DUPLICATE");
@@ -139,7 +139,7 @@ TEST_F(NewSession, ConfirmsACommandByItsValueIfTheBoardHasNoCmd) {
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
 }
 
-TEST_F(NewSession, AsksForFieldsUntilTheBoardKnowsHoweverManyAreLost) {
+TEST_F(NewSession, RepeatsItsFieldsUntilTheBoardObeys) {
   link.heartbeat();
   const auto lose = [&](int states) {
     for (int i = 0; i < states; ++i) {
@@ -199,7 +199,7 @@ TEST_F(SessionCommand, SentOnceIsNotRepeatedAndDoesNotOvertakeEarlierCommands) {
   EXPECT_EQ(link.results.size(), 1U) << "only the command that was sent has a result";
 }
 
-TEST_F(NewSession, ConfirmsIdentifyByTheAnswerInAnyState) {
+TEST_F(NewSession, ConfirmsIdentifyByTheAnswer) {
   const Ticket ticket = link.session.send(Command::identify(), 1s, link.now);
   EXPECT_EQ(link.last('Q').command, "Q:ID");
   link.pass(2ms);
@@ -319,7 +319,7 @@ TEST_F(SessionStop, IsNotConfirmedByTheReportOfAnotherStop) {
 
 // --- E:CLEAR
 
-TEST_F(SessionClear, NamesTheCauseThatWasKnownWhenItWasAskedFor) {
+TEST_F(SessionClear, NamesTheCauseKnownAtTheCall) {
   link.stopped(1, 7);
   link.session.send(Command::clear(), 1s, link.now);
   EXPECT_EQ(link.last('E').command, "E:CLEAR,7");
@@ -337,7 +337,7 @@ TEST_F(NewSession, NamesTheFirstReportedCauseInAnEarlyClear) {
   EXPECT_TRUE(under_way(ticket));
 }
 
-TEST_F(SessionClear, IsGivenUpWhenTheBoardReportsANewerCause) {
+TEST_F(SessionClear, IsCancelledWhenTheBoardReportsANewerCause) {
   link.stopped(1, 7);
   const Ticket sent = link.session.send(Command::clear(), 1s, link.now);
   link.stopped(1, 7);
@@ -357,7 +357,7 @@ TEST_F(NewSession, DoesNotSendAWaitingClearPastANewerCause) {
   EXPECT_EQ(link.count('E'), 0U);
 }
 
-TEST_F(SessionClear, IsGivenUpIfItIsAskedForBeforeAnOwnStopIsConfirmed) {
+TEST_F(SessionClear, IsCancelledIfItWasCalledBeforeAnOwnStopIsConfirmed) {
   link.heartbeat();
   const Ticket stop = link.session.send(Command::stop(), 1s, link.now);
   const std::uint32_t number = link.last('E').pnum;
@@ -369,7 +369,7 @@ TEST_F(SessionClear, IsGivenUpIfItIsAskedForBeforeAnOwnStopIsConfirmed) {
 
 // --- refusals
 
-TEST_F(SessionRefusal, ProvesNothingOfASessionThatBeganAfterTheCommand) {
+TEST_F(SessionRefusal, OfALaterSessionDoesNotEndTheCommand) {
   const Ticket ticket = link.session.send(turn_motor, 5s, link.now);
   const std::uint32_t pnum = link.last('O').pnum;
   link.pass(100ms);
@@ -387,7 +387,7 @@ TEST_F(SessionRefusal, ProvesNothingOfASessionThatBeganAfterTheCommand) {
   EXPECT_EQ(outcome(ticket), Outcome::refused);
 }
 
-TEST_F(NewSession, CancelsEveryCommandByAStopAndSendsNoneAfterIt) {
+TEST_F(NewSession, AStopCancelsEveryCommand) {
   const Ticket queued = link.session.send(turn_motor, 5s, link.now);
   link.connect();
   const Ticket sent = link.session.send(Command::servo(2, Microseconds(1500)), 5s, link.now);
@@ -407,7 +407,7 @@ TEST_F(NewSession, SendsAStopEvenWhenSixteenAreUnderWay) {
   EXPECT_EQ(link.count('E'), Session::max_stops + 1);
 }
 
-TEST_F(SessionBusy, AHostThatLostItsPlaceOnTheBusMayOnlyStopTheBoard) {
+TEST_F(SessionBusy, AHostWithoutItsTurnOnTheBusMayOnlyStopTheBoard) {
   link.place_taken = true;
   const Ticket ticket = link.session.send(turn_motor, 5s, link.now);
   EXPECT_FALSE(link.session.post(turn_motor, link.now));
@@ -449,7 +449,7 @@ TEST_F(NewSession, HoldsCommandsUntilTheOtherHostHasLeft) {
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
 }
 
-TEST_F(SessionBusy, ARefusalAfterAnOutageProvesNothingUnlessTheSessionIsTheSame) {
+TEST_F(SessionBusy, ARefusalAfterAnOutageCountsOnlyInTheSameSession) {
   const Ticket ticket = link.session.send(turn_motor, 10s, link.now);
   const std::uint32_t pnum = link.last('O').pnum;
   link.pass(1100ms);

@@ -54,7 +54,7 @@ TEST_F(SessionGroup, IsOneDatagramAndOneCommand) {
   EXPECT_EQ(link.session.statistics(link.now).confirmed, 1U);
 }
 
-TEST_F(SessionGroup, ARefusalNamesTheCommandAndThatNoneWasExecuted) {
+TEST_F(SessionGroup, ARefusalNamesTheBadCommandAndExecutesNone) {
   connect("group");
   const Ticket ticket = send();
   nack_at(link.last('O').pnum, "CHANNEL", 2);
@@ -102,7 +102,7 @@ TEST_F(SessionGroup, AsksFirstWhetherTheBoardExecutesGroups) {
   EXPECT_EQ(link.count('Q'), 3U);
 }
 
-TEST_F(SessionGroup, OfABoardWithoutGroupsGoesOneAfterTheOther) {
+TEST_F(SessionGroup, IsSentOneByOneToABoardWithoutGroups) {
   connect("udp");
   const Ticket ticket = send();
   EXPECT_EQ(fields(link.sent.back()), "O:358,1,1;");
@@ -123,7 +123,7 @@ TEST_F(SessionGroup, OfABoardWithoutGroupsGoesOneAfterTheOther) {
   EXPECT_EQ(result(behind).outcome, Outcome::confirmed);
 }
 
-TEST_F(SessionGroup, OfABoardWithoutGroupsEndsAtTheFirstThatFails) {
+TEST_F(SessionGroup, EndsAtTheFirstFailureOnABoardWithoutGroups) {
   connect("udp");
   const Ticket ticket = send();
   link.executed(link.last('O').pnum);
@@ -143,7 +143,7 @@ TEST_F(SessionGroup, OfABoardWithoutGroupsEndsAtTheFirstThatFails) {
   EXPECT_EQ(result(late).executed, 0);
 }
 
-TEST_F(SessionGroup, IsNotTornApartWhereTheAnswerIsLostAgainAndAgain) {
+TEST_F(SessionGroup, IsNotSplitWhileAnswersAreLost) {
   link.connect();
   const Ticket ticket = send();
   link.pass(900ms);
@@ -154,7 +154,7 @@ TEST_F(SessionGroup, IsNotTornApartWhereTheAnswerIsLostAgainAndAgain) {
   EXPECT_TRUE(under_way(ticket));
 }
 
-TEST_F(SessionGroup, OfABoardThatAnswersNothingGoesOneAfterTheOther) {
+TEST_F(SessionGroup, IsSentOneByOneToABoardThatAnswersNothing) {
   link.heartbeat();
   send(20s);
   for (int i = 0; i < 300; ++i) {  // the paper's board knows neither F nor Q
@@ -169,7 +169,7 @@ TEST_F(SessionGroup, OfABoardThatAnswersNothingGoesOneAfterTheOther) {
       << "the command before it was confirmed by its value";
 }
 
-TEST_F(SessionGroup, WaitsForAnotherAnswerAfterARestartOfTheBoard) {
+TEST_F(SessionGroup, AsksAgainAfterARestartOfTheBoard) {
   connect("group");
   link.reboot();
   link.boot_heartbeat();
@@ -221,7 +221,7 @@ TEST_F(SessionGroup, IsPostedOneByOneToABoardWithoutGroups) {
   EXPECT_EQ(fields(link.last('S')), "S:1500,3;");
 }
 
-TEST_F(SessionGroup, OfOneCommandIsThatCommandAndOfNoneIsThrownBack) {
+TEST_F(SessionGroup, SendsOneCommandAloneAndRefusesAnEmptyGroup) {
   link.connect();
   link.session.send(Setpoints{Command::osmc(1, Pwm(358), Direction::forward)}, 1s, link.now);
   EXPECT_EQ(fields(link.sent.back()), "O:358,1,1;")
@@ -231,7 +231,7 @@ TEST_F(SessionGroup, OfOneCommandIsThatCommandAndOfNoneIsThrownBack) {
   EXPECT_THROW(link.session.post(Setpoints{}, link.now), Error);
 }
 
-TEST(SessionGroupArming, IsHeldBackUntilTheProgramIsArmed) {
+TEST(SessionGroupArming, RefusesAGroupUntilTheProgramIsArmed) {
   ConnectedLink link(ScriptedLink::must_arm());
   link.identity("group");
   EXPECT_EQ(link.session.post(two_motors, link.now), PostResult::not_armed);
@@ -242,7 +242,7 @@ TEST(SessionGroupArming, IsHeldBackUntilTheProgramIsArmed) {
   EXPECT_EQ(link.count('O'), 0U);
 }
 
-TEST_F(SessionGroup, IsNotPostedAsOneDatagramWhenTheBoardIsFoundToKnowNoGroups) {
+TEST_F(SessionGroup, IsNeverPostedAsOneDatagramToABoardWithoutGroups) {
   link.heartbeat();  // from a board that answers no question
   PostResult last = PostResult::no_link;
   for (int i = 0; i < 100; ++i) {

@@ -83,7 +83,7 @@ Verdict verdict(const ScriptedLink& link, const ScriptedLink::Sent& sent,
   return age <= 250 ? Verdict::authentic : Verdict::old;
 }
 
-TEST_F(SessionKey, AsksForTheNonceWithAnUnsignedHeartbeatAndThenSignsAll) {
+TEST_F(SessionKey, GetsTheNonceByAnUnsignedHeartbeatThenSignsAll) {
   ASSERT_EQ(link.count('H'), 1U);
   EXPECT_EQ(signature_of(link.last('H')), "");
   keyed_heartbeat(link);
@@ -101,7 +101,7 @@ TEST_F(SessionKey, SignsTheAnswerToAConnectingBoard) {
   EXPECT_EQ(verdict(link, heartbeat), Verdict::authentic);
 }
 
-TEST_F(SessionWithKey, ARetryHasTheSameNumberAndASignatureOfItsOwn) {
+TEST_F(SessionWithKey, ARetryHasTheSameNumberAndANewSignature) {
   link.session.send(turn_motor, 1s, link.now);
   link.pass(60ms);
   const auto sent = link.all('O');
@@ -133,13 +133,13 @@ TEST_F(SessionWithKey, ALateHeartbeatDoesNotBringTheOldNonceBack) {
   EXPECT_EQ(verdict(link, link.last('O'), "fedcba9876543210"), Verdict::authentic);
 }
 
-TEST_F(SessionWithKey, SignsInTimeAlsoWhileTheBoardSaysLittle) {
+TEST_F(SessionWithKey, SignsValidlyEvenAfterASilenceOfTheBoard) {
   link.pass(700ms);
   link.session.send(turn_motor, 1s, link.now);
   EXPECT_EQ(verdict(link, link.last('O')), Verdict::authentic);
 }
 
-TEST_F(SessionKey, RefusesABoardThatHasNone) {
+TEST_F(SessionKey, SendsNothingToABoardWithoutAKey) {
   link.heartbeat();
   link.sent.clear();
   const Ticket ticket = link.session.send(turn_motor, 500ms, link.now);
@@ -157,7 +157,7 @@ TEST_F(SessionKey, RefusesABoardThatHasNone) {
   EXPECT_NE(explain("board", link.session.link()).text().find("has no key"), std::string::npos);
 }
 
-TEST_F(SessionKey, SendsAnUnsignedStopBeforeItKnowsANonceAndToABoardWithoutAKey) {
+TEST_F(SessionKey, SendsAnUnsignedStopWithoutANonceOrABoardKey) {
   link.session.send(Command::stop(), 1s, link.now);
   EXPECT_EQ(signature_of(link.last('E')), "");
   link.heartbeat();
@@ -169,7 +169,7 @@ TEST_F(SessionKey, SendsAnUnsignedStopBeforeItKnowsANonceAndToABoardWithoutAKey)
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
 }
 
-TEST_F(SessionKey, TakesTheBoardAsSoonAsItHasAKey) {
+TEST_F(SessionKey, TakesControlAsSoonAsTheBoardHasAKey) {
   link.heartbeat();
   EXPECT_EQ(link.session.link().cause(), LinkCause::board_has_no_key);
   link.pass(300ms);
@@ -179,7 +179,7 @@ TEST_F(SessionKey, TakesTheBoardAsSoonAsItHasAKey) {
 }
 
 // The board may have executed the first of two signed duplicates, and refused the second.
-TEST_F(SessionWithKey, AnAuthDoesNotProveThatTheCommandWasNotExecuted) {
+TEST_F(SessionWithKey, ACommandMayBeConfirmedAfterAnAuth) {
   const Ticket ticket = link.session.send(turn_motor, 500ms, link.now);
   const std::uint32_t pnum = link.last('O').pnum;
   link.nack(pnum, "AUTH");
@@ -189,14 +189,14 @@ TEST_F(SessionWithKey, AnAuthDoesNotProveThatTheCommandWasNotExecuted) {
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::confirmed);
 }
 
-TEST_F(SessionWithKey, AnAuthForACablesSettingIsFinalAndSaysNothingOfKeys) {
+TEST_F(SessionWithKey, AnAuthForACableOnlySettingRefusesIt) {
   const Ticket ticket = link.session.send(Command::setting("node", "3"), 500ms, link.now);
   link.nack(link.last('C').pnum, "AUTH");
   EXPECT_EQ(link.results.at(ticket).outcome, Outcome::refused);
   EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
 }
 
-TEST_F(SessionKey, FindsOutThatTheBoardTakesNoneOfItsHeartbeats) {
+TEST_F(SessionKey, ReportsThatTheBoardDoesNotAcceptItsKey) {
   boot_with_a_key(link);
   EXPECT_EQ(link.session.link().cause(), LinkCause::key_not_taken);
   keyed_heartbeat(link);
@@ -205,7 +205,7 @@ TEST_F(SessionKey, FindsOutThatTheBoardTakesNoneOfItsHeartbeats) {
 }
 
 // The earlier host ended with a stop, so the board's cause hides whether it has a host.
-TEST_F(SessionKey, FindsOutThatAStoppedBoardTakesNoneOfItsHeartbeatsWhileItIsHeard) {
+TEST_F(SessionKey, ReportsThatAStoppedBoardDoesNotAcceptItsKey) {
   for (int i = 0; i < 12; ++i) {
     keyed_heartbeat(link, nonce, ";SAFE:2");
     link.pass(100ms);
@@ -220,7 +220,7 @@ TEST_F(SessionKey, FindsOutThatAStoppedBoardTakesNoneOfItsHeartbeatsWhileItIsHea
       << "the board's silence is not a sign of a wrong key";
 }
 
-TEST_F(SessionKey, TakesAStoppedBoardThatAnswersBusyForOneWithAnotherHost) {
+TEST_F(SessionKey, AStoppedBoardThatAnswersBusyHasAnotherHost) {
   for (int i = 0; i < 30; ++i) {
     keyed_heartbeat(link, nonce, ";SAFE:2");
     link.nack(link.last('H').pnum, "BUSY");
@@ -232,7 +232,7 @@ TEST_F(SessionKey, TakesAStoppedBoardThatAnswersBusyForOneWithAnotherHost) {
 
 // At the lowest rate the host sends several heartbeats between two states. None of them may be in
 // vain.
-TEST_F(SessionWithKey, IsTakenByAStoppedBoardThatSendsAStateASecond) {
+TEST_F(SessionWithKey, AStateASecondShowsThatAStoppedBoardAcceptsTheKey) {
   for (int i = 0; i < 10; ++i) {
     link.state("SAFE:2;CMD:0;");
     for (int j = 0; j < 10; ++j) {
@@ -249,7 +249,7 @@ TEST_F(SessionWithKey, IsTakenByAStoppedBoardThatSendsAStateASecond) {
 }
 
 // The paper's release answers no question, but it obeys commands. It has no keys.
-TEST_F(SessionKey, DoesNotTakeABoardWithAKeyForThePapersRelease) {
+TEST_F(SessionKey, ABoardWithAKeyIsNotMistakenForThePaperRelease) {
   for (int i = 0; i < 30; ++i) {
     keyed_heartbeat(link);
     link.pass(100ms);
@@ -274,7 +274,7 @@ TEST_F(NewSession, NeedsNoKeyOverACableOfTheBoard) {
   EXPECT_FALSE(link.session.link().causes.has_any(of_keys));
 }
 
-TEST(Explain, SaysThatABoardHoldsAsManyKeysAsItCan) {
+TEST(Explain, ReportsThatTheBoardHasNoRoomForAnotherKey) {
   const CommandResult refused{Outcome::refused, Refusal::range, Time{0}};
   EXPECT_NE(explain(Command::setting("key", "5:..."), refused, {}).reason.find("it holds 4 keys"),
             std::string::npos);
@@ -282,7 +282,7 @@ TEST(Explain, SaysThatABoardHoldsAsManyKeysAsItCan) {
             std::string::npos);
 }
 
-TEST(Explain, DistinguishesASettingForTheCableFromOneThatNeedsAKey) {
+TEST(Explain, DistinguishesACableOnlySettingFromAMissingKey) {
   const CommandResult refused{Outcome::refused, Refusal::auth, Time{0}};
   EXPECT_EQ(explain(Command::setting("key", "1:..."), refused, {}).fix,
             "send it over USB: serial:auto");

@@ -13,7 +13,7 @@ namespace {
 using Cable = RobotOnPaths::Cable;
 using Cables = RobotOnPaths::Cables;
 
-TEST(SessionPaths, ShowOneRestartOfTheBoardAndAreBack) {
+TEST(SessionPaths, ReportARestartOnceAndCarryAgain) {
   for (const std::uint32_t lag : {1U, 30U, 200U}) {
     RobotOnPaths robot(Cables{{1}, {lag}});
     robot.connect();
@@ -68,7 +68,7 @@ TEST(SessionPaths, SurviveALateHeartbeatOfABootingBoard) {
 }
 
 // With and without the other path.
-TEST(SessionPaths, AreNotEndedByALateWordThatTheBoardIsBooting) {
+TEST(SessionPaths, ALateBootHeartbeatDoesNotEndTheSession) {
   for (const bool alone : {false, true}) {
     RobotOnPaths robot(Cables{{1}, {1}});
     robot.connect();
@@ -87,7 +87,7 @@ TEST(SessionPaths, AreNotEndedByALateWordThatTheBoardIsBooting) {
   }
 }
 
-TEST_F(TwoPaths, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
+TEST_F(TwoPaths, RestartTheSessionWhenAnAnswerConfirmsABootHeartbeat) {
   robot.run(500);
   for (Cable& cable : robot.cables) cable.sent.clear();
   robot.bring(0, with_crc("H:R4-ROS2;PNum:0;T:0;"));
@@ -103,7 +103,7 @@ TEST_F(TwoPaths, BeginAnewWhenTheAnswerToAWordOfBootingSaysSo) {
 
 // No answer shows another clock: there is no answer, or the board restarted with nearly the same
 // clock.
-TEST(SessionPaths, BeginAnewIfTheBoardOnlySaysThatItBoots) {
+TEST(SessionPaths, RepeatedBootHeartbeatsRestartTheSession) {
   for (const bool answers : {false, true}) {
     RobotOnPaths robot(Cables{{1}, {1}});
     robot.connect();

@@ -29,7 +29,7 @@ std::string busy_for(const RobotOnPaths& robot) {
                   ",BUSY;SID:0000000000000065;PNum:1;T:" + std::to_string(robot.board_ms(0)) + ";");
 }
 
-TEST(SessionPaths, AskForTheBoardsIdentityFirst) {
+TEST(SessionPaths, AskForTheIdentityOfTheBoardFirst) {
   RobotOnPaths robot(Cables{{5}, {5}});
   robot.plug(0, true);
   robot.plug(1, true);
@@ -66,7 +66,7 @@ TEST_F(TwoPaths, BringEachStateOnce) {
   EXPECT_GT(robot.session->path(1, robot.now()).round_trip_us, 0);
 }
 
-TEST(SessionPaths, LetNoLaggingPathReplaceANewerState) {
+TEST(SessionPaths, DropAnOldStateFromASlowPath) {
   RobotOnPaths robot(Cables{{1}, {200}});
   robot.connect();
   robot.run(1000);
@@ -138,7 +138,7 @@ TEST_F(TwoPaths, ReportASilentPathWithinTheTimeout) {
   EXPECT_EQ(robot.session->link().state, HostLinkState::active);
 }
 
-TEST(SessionPaths, AreLostTogetherAndComeBackOneByOne) {
+TEST(SessionPaths, TheLinkIsLostOnlyWithAllPathsAndRecoversWithOne) {
   RobotOnPaths robot(Cables{{1}, {1}, {1}});
   robot.connect();
   for (std::size_t path = 0; path < 3; ++path) robot.cut(path);
@@ -160,7 +160,7 @@ TEST(SessionPaths, AreLostTogetherAndComeBackOneByOne) {
   EXPECT_TRUE(executed_once(robot));
 }
 
-TEST_F(TwoPaths, ConfirmACommandThatOneCarriesAndAnotherAnswers) {
+TEST_F(TwoPaths, ConfirmACommandSentOnOnePathAndAnsweredOnTheOther) {
   robot.cables[0].cut_to_host = true;
   robot.cables[1].cut_to_board = true;
   for (int i = 0; i < 10; ++i) EXPECT_EQ(robot.drive(i).outcome, Outcome::confirmed);
@@ -183,7 +183,7 @@ TEST_F(TwoPaths, ReportARefusalOnce) {
 
 // AUTH refuses one duplicate of a command. While another path is heard, the duplicate there may be
 // executed.
-TEST_F(TwoPaths, EndACommandByAuthOnlyWhenNoOtherPathSpeaks) {
+TEST_F(TwoPaths, AuthEndsACommandOnlyWithoutAnotherPath) {
   for (const std::size_t path : {0U, 1U}) robot.cut(path);
   const Ticket ticket =
       robot.session->send(Command::setting("node", "3"), RobotOnPaths::timeout, robot.now());
@@ -203,7 +203,7 @@ TEST_F(TwoPaths, EndACommandByAuthOnlyWhenNoOtherPathSpeaks) {
   EXPECT_EQ(robot.results[ticket].code, Refusal::auth);
 }
 
-TEST_F(TwoPaths, AreRefusedWhenAllOfThemAreUntilAStateShowsControl) {
+TEST_F(TwoPaths, AreBusyOnlyIfBusyOnBothUntilAStateShowsControl) {
   const std::string busy = busy_for(robot);
   robot.bring(1, busy);
   EXPECT_FALSE(robot.session->link().causes.has(LinkCause::busy));
@@ -215,7 +215,7 @@ TEST_F(TwoPaths, AreRefusedWhenAllOfThemAreUntilAStateShowsControl) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
-TEST_F(TwoPaths, AreNotRefusedByABusyThatIsOlderThanTheProofOfControl) {
+TEST_F(TwoPaths, IgnoreABusyOlderThanTheProofOfControl) {
   const std::string busy = busy_for(robot);
   robot.run(50);  // the board's states have CMD
   robot.bring(0, busy);
@@ -246,7 +246,7 @@ TEST(SessionPaths, AreRefusedIfTheyLeadToTwoBoards) {
   EXPECT_TRUE(robot.session->in_control(robot.now()));
 }
 
-TEST(SessionPaths, TakeTheBoardToWhichAllOfThemLeadWhicheverAnsweredFirst) {
+TEST(SessionPaths, AgreeOnTheirCommonBoardWhicheverAnsweredFirst) {
   RobotOnPaths robot(Cables{{1}, {1, 1}});
   robot.connect();
   ASSERT_EQ(robot.session->path(1, robot.now()).state, PathState::other_board);
@@ -259,7 +259,7 @@ TEST(SessionPaths, TakeTheBoardToWhichAllOfThemLeadWhicheverAnsweredFirst) {
   EXPECT_EQ(robot.session->path(0, robot.now()).board_id, "board-1");
 }
 
-TEST(SessionPaths, GoOnWhenOneIsPluggedIntoAnotherBoard) {
+TEST(SessionPaths, ContinueWhenOnePathLeadsToAnotherBoard) {
   RobotOnPaths robot(Cables{{1}, {1}, {1, 1}});
   robot.plug(0, true);
   robot.plug(1, true);
@@ -273,7 +273,7 @@ TEST(SessionPaths, GoOnWhenOneIsPluggedIntoAnotherBoard) {
   EXPECT_EQ(robot.cables[2].all('Q').size(), robot.cables[2].sent.size());
 }
 
-TEST(SessionPaths, BeginWithoutAPathThatDoesNotAnswer) {
+TEST(SessionPaths, TheSessionBeginsWithoutASilentPath) {
   RobotOnPaths robot(Cables{{1}, {1}});
   robot.cut(1);
   robot.connect();
@@ -285,7 +285,7 @@ TEST(SessionPaths, BeginWithoutAPathThatDoesNotAnswer) {
   EXPECT_EQ(robot.session->link().carrying, 3);
 }
 
-TEST_F(TwoPaths, TakeAStateInPartsFromWhicheverBringsThem) {
+TEST_F(TwoPaths, ReportEachPartOfAStateOnce) {
   robot.run(3);
   const std::string t = std::to_string(robot.board_ms(0) + 1);
   robot.states.clear();
@@ -309,7 +309,7 @@ TEST_F(TwoPaths, ReportOnlyTheFieldsOfTheNewestState) {
   EXPECT_FALSE(robot.session->state().present.has(StateField::cmd));
 }
 
-TEST_F(TwoPaths, CountADatagramAsLostOnlyIfNoPathBringsIt) {
+TEST_F(TwoPaths, CountADatagramAsLostOnlyIfBothPathsLoseIt) {
   robot.run(100);
   robot.cut(0);
   robot.run(100);
@@ -326,7 +326,7 @@ TEST_F(TwoPaths, CountADatagramAsLostOnlyIfNoPathBringsIt) {
   EXPECT_NEAR(robot.session->packets().lost, 10, 2);
 }
 
-TEST(SessionPaths, AllCarryAStopEvenToAnUnknownBoard) {
+TEST(SessionPaths, AllPathsCarryAStopEvenToAnUnknownBoard) {
   RobotOnPaths robot(Cables{{1}, {1}, {1}});
   robot.plug(0, true);
   robot.plug(1, true);
@@ -344,7 +344,7 @@ TEST(SessionPaths, AllCarryAStopEvenToAnUnknownBoard) {
             Outcome::confirmed);
 }
 
-TEST(SessionPaths, AreLeftTogether) {
+TEST(SessionPaths, TheFarewellEndsTheSessionOnEveryPath) {
   RobotOnPaths robot(Cables{{1}, {3}});
   robot.connect();
   robot.drive(1);
@@ -353,7 +353,7 @@ TEST(SessionPaths, AreLeftTogether) {
   EXPECT_FALSE(robot.board(0).link().has_owner());
 }
 
-TEST_F(TwoPaths, AreNotLeftByAHeartbeatFromBeforeTheFarewell) {
+TEST_F(TwoPaths, AHeartbeatFromBeforeTheFarewellDoesNotConfirmIt) {
   for (const std::size_t path : {0U, 1U}) robot.cut(path);
   const Ticket ticket = robot.session->leave(RobotOnPaths::timeout, robot.now());
   const std::uint32_t newest_ms = robot.session->state().t_ms;
@@ -367,7 +367,7 @@ TEST_F(TwoPaths, AreNotLeftByAHeartbeatFromBeforeTheFarewell) {
   EXPECT_EQ(robot.results.at(ticket).outcome, Outcome::confirmed);
 }
 
-TEST(SessionPaths, AreLeftBeforeAStateHasCome) {
+TEST(SessionPaths, TheFarewellIsConfirmedEvenBeforeTheFirstState) {
   RobotOnPaths robot(Cables{{1}, {1}});
   robot.reboot(0, 0xC0000000U);  // this T is not newer than 0
   robot.plug(0, true);
@@ -389,7 +389,7 @@ TEST(SessionPaths, AreLeftBeforeAStateHasCome) {
   EXPECT_EQ(robot.results.at(ticket).outcome, Outcome::confirmed);
 }
 
-TEST(SessionPaths, AreSignedEachByItsOwnSignature) {
+TEST(SessionPaths, EachPathSignsWithItsOwnSignature) {
   SessionOptions options = RobotOnPaths::at_will();
   options.key = key_of(1);
   options.clock_start = std::chrono::hours{24};
@@ -423,7 +423,7 @@ TEST(SessionPaths, AreArmedTogether) {
   EXPECT_EQ(robot.drive(4).outcome, Outcome::confirmed);
 }
 
-TEST(SessionPaths, HaveALeaseEachForAWatcher) {
+TEST(SessionPaths, AWatcherHasALeaseOnEachPath) {
   RobotOnPaths robot(Cables{{1}, {1}}, SessionOptions{}, BoardRole::watch);
   robot.connect();
   robot.run(2000);

@@ -25,7 +25,7 @@ struct SessionRole : NewSession {
   }
 };
 
-TEST_F(SessionRole, TakingControlBeginsAsAHostThatOpensTheBoard) {
+TEST_F(SessionRole, TakingControlBeginsANewDisarmedSession) {
   link.state("AIN24:24.28;SAFE:1;");
   link.heartbeat(SafeReason::link);
   link.sent.clear();
@@ -43,7 +43,7 @@ TEST_F(SessionRole, TakingControlBeginsAsAHostThatOpensTheBoard) {
   EXPECT_EQ(link.restarts, 0);
 }
 
-TEST_F(SessionRole, ReleasingControlSaysFarewellUntilTheBoardAnswersAndThenWatches) {
+TEST_F(SessionRole, ReleasingControlWatchesAfterTheConfirmedFarewell) {
   take();
   const Ticket ticket = link.session.release_control(100ms, link.now);
   EXPECT_TRUE(link.session.leaving());
@@ -83,7 +83,7 @@ TEST_F(SessionRole, ArmingEndsAsSoonAsControlIsReleased) {
 }
 
 // The motor must not run for a command whose caller has given up.
-TEST_F(SessionRole, NothingThatWasAskedForBeforeIsSentAfterAChange) {
+TEST_F(SessionRole, AChangeOfRoleCancelsEarlierCommands) {
   change(BoardRole::control);
   const Ticket early = link.session.send(Command::fields("ENC1"), 60s, link.now);
   const Ticket arms = link.session.arm(60s, link.now);
@@ -102,7 +102,7 @@ TEST_F(SessionRole, NothingThatWasAskedForBeforeIsSentAfterAChange) {
   EXPECT_EQ(link.count('O') + link.count('F') + link.count('R'), 0U);
 }
 
-TEST_F(SessionRole, EachControlIsASessionOfItsOwn) {
+TEST_F(SessionRole, TakingControlAgainBeginsANewSession) {
   take();
   const SessionId first = link.host_session;
   const std::uint32_t of_first =
@@ -118,7 +118,7 @@ TEST_F(SessionRole, EachControlIsASessionOfItsOwn) {
   EXPECT_FALSE(link.session.in_control(link.now)) << "the number is of the earlier session";
 }
 
-TEST_F(SessionRole, AStopGoesOnOverEveryChange) {
+TEST_F(SessionRole, AStopContinuesOverEveryChange) {
   link.state("SAFE:0;");
   const Ticket ticket = link.session.send(Command::stop(), 10s, link.now);
   const std::uint32_t pnum = link.last('E').pnum;
@@ -134,7 +134,7 @@ TEST_F(SessionRole, AStopGoesOnOverEveryChange) {
   EXPECT_EQ(outcome(ticket), Outcome::confirmed);
 }
 
-TEST_F(SessionRole, HeartbeatsThatAreHeldStayHeld) {
+TEST_F(SessionRole, HeldHeartbeatsStayHeldOverAChange) {
   link.session.hold(true, link.now);
   change(BoardRole::control);
   link.pass(500ms);

@@ -44,7 +44,7 @@ TEST_P(SleepingHost, FindsTheMotorsOffAndLeavesThemOff) {
   }
 }
 
-TEST_P(SleepingHost, FindsTheMotorsOffAlsoAfterAPauseOfItsVirtualMachine) {
+TEST_P(SleepingHost, FindsTheMotorsOffAfterAPauseOfItsVirtualMachine) {
   robot.connect();
   ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
   robot.pause(60'000);
@@ -58,7 +58,7 @@ TEST_P(SleepingHost, FindsTheMotorsOffAlsoAfterAPauseOfItsVirtualMachine) {
 
 // These commands were not sent before the sleep: the board was not heard yet, the link was lost, or
 // the board had restarted.
-TEST_P(SleepingHost, CancelsACommandAndAnArmThatItAskedForBefore) {
+TEST_P(SleepingHost, CancelsEarlierCommandsAndArms) {
   enum class Link { never_heard, lost, restarted };
   for (const Link link : {Link::never_heard, Link::lost, Link::restarted}) {
     RobotOnPaths armed(GetParam(), SessionOptions());
@@ -84,7 +84,7 @@ TEST_P(SleepingHost, CancelsACommandAndAnArmThatItAskedForBefore) {
   }
 }
 
-TEST_P(SleepingHost, SwitchesTheMotorsOffAtOnceWhereTheBoardWaitsForLonger) {
+TEST_P(SleepingHost, SwitchesTheMotorsOffBeforeALongBoardTimeout) {
   Settings settings;
   settings.timeout_ms = 10'000;
   RobotOnPaths patient(GetParam(), RobotOnPaths::at_will(), BoardRole::control, settings);
@@ -101,7 +101,7 @@ TEST_P(SleepingHost, SwitchesTheMotorsOffAtOnceWhereTheBoardWaitsForLonger) {
 }
 
 // The command was under way when the computer went to sleep. It may arrive late or never.
-TEST_P(SleepingHost, RepeatsNothingThatItHadSent) {
+TEST_P(SleepingHost, RepeatsNoEarlierCommand) {
   for (const std::uint32_t later_ms : {0U, 10U, 60U}) {
     RobotOnPaths sender(GetParam());
     sender.connect();
@@ -119,7 +119,7 @@ TEST_P(SleepingHost, RepeatsNothingThatItHadSent) {
   }
 }
 
-TEST_P(SleepingHost, StopsTheBoardAllTheSame) {
+TEST_P(SleepingHost, CompletesAStopSentBeforeTheSleep) {
   robot.connect();
   ASSERT_EQ(robot.drive(100).outcome, Outcome::confirmed);
   cut_all(robot);
@@ -130,7 +130,7 @@ TEST_P(SleepingHost, StopsTheBoardAllTheSame) {
   EXPECT_EQ(robot.board(0).reason(), SafeReason::stop);
 }
 
-TEST_P(SleepingHost, HasItsStatesAgainIfItOnlyWatches) {
+TEST_P(SleepingHost, GetsStatesAgainAsAWatcher) {
   RobotOnPaths watcher(GetParam(), RobotOnPaths::at_will(), BoardRole::watch);
   watcher.connect();
   watcher.run(1000);

@@ -18,7 +18,7 @@ Clock::duration age(const ScriptedLink& link) {
   return link.session.state().age(Clock::time_point(link.now));
 }
 
-TEST_F(NewSession, ReportsTheAgeOfItsStateAlsoWhileTheLinkIsLost) {
+TEST_F(NewSession, ReportsTheAgeOfTheStateEvenWhileTheLinkIsLost) {
   EXPECT_FALSE(link.session.state().any());
   EXPECT_EQ(age(link), Clock::duration::max());
   link.connect();
@@ -32,7 +32,7 @@ TEST_F(NewSession, ReportsTheAgeOfItsStateAlsoWhileTheLinkIsLost) {
   EXPECT_EQ(age(link), 5s);
 }
 
-TEST_F(SessionState, FollowsTheReasonOfHeartbeatsWhileNoStatesCome) {
+TEST_F(SessionState, TakesTheSafeReasonFromHeartbeatsWithoutStates) {
   link.state("ENC1:7;SAFE:0;CMD:1;");
   const auto received = link.session.state().received;
   link.pass(1500ms);
@@ -62,7 +62,7 @@ TEST_F(SessionState, NamesTheFieldsReportedSinceTheBoardStarted) {
   EXPECT_TRUE(reported(StateField::safe)) << "heartbeats report the safe reason, too";
 }
 
-TEST_F(SessionState, ForgetsAChipFaultThatTheBoardReportsNoMore) {
+TEST_F(SessionState, ForgetsAChipFaultWhenTheBoardStopsReportingIt) {
   link.state("SAFE:6;FAULT:97,1;CMD:1;");
   EXPECT_EQ(link.session.state().fault.address, 97);
   link.state("SAFE:2;FAULT:97,1;CMD:1;");
@@ -74,7 +74,7 @@ TEST_F(SessionState, ForgetsAChipFaultThatTheBoardReportsNoMore) {
   EXPECT_FALSE(link.session.state().fault.any()) << "a watchdog reset is not a fault of a chip";
 }
 
-TEST_F(SessionState, IsOfOneBootOnly) {
+TEST_F(SessionState, IsClearedByARestartOfTheBoard) {
   link.state("OSMC1:358,1;ENC1:7;SAFE:6;FAULT:97,1;CMD:1;");
   link.pass(300ms);
   link.reboot();
@@ -113,7 +113,7 @@ TEST_F(SessionState, StaysOverAnOutage) {
   EXPECT_EQ(link.session.state().encoder(1), 7);
 }
 
-TEST_F(SessionState, IsTheNewestButKeepsTheReasonOfAHeartbeatThatOvertookIt) {
+TEST_F(SessionState, KeepsTheSafeReasonOfAHeartbeatThatOvertookIt) {
   for (const std::uint32_t earlier_ms : {0U, 5U}) {
     ConnectedLink each;
     each.pass(20ms);

@@ -40,7 +40,7 @@ TEST_F(NewSession, IsConnectingWhileTheBoardBoots) {
   EXPECT_EQ(link.count('F'), 0U) << "no command may be sent before the board knows the host";
 }
 
-TEST_F(SessionLink, BecomesActiveWithTheBoardsStateAndSaysSoOnce) {
+TEST_F(SessionLink, BecomesActiveWithTheFirstStateAndReportsItOnce) {
   ASSERT_EQ(link.links.size(), 2U);
   EXPECT_EQ(link.links[0].state, HostLinkState::active);
   EXPECT_FALSE(link.links[0].in_control);
@@ -65,7 +65,7 @@ TEST_F(SessionLink, IgnoresAnswersToAnotherSession) {
   EXPECT_EQ(link.results.at(command).outcome, Outcome::refused);
 }
 
-TEST_F(SessionFarewell, EndsHeartbeatsAndIsRepeatedUntilTheBoardReportsThatItIsFree) {
+TEST_F(SessionFarewell, EndsHeartbeatsAndRepeatsUntilTheBoardIsFree) {
   link.identity("udp+leave");
   const Ticket command = link.session.send(Command::servo(1, Microseconds(1500)), 1s, link.now);
   link.pass(5ms);
@@ -106,7 +106,7 @@ TEST_F(SessionFarewell, IsConfirmedByAHeartbeatOfTheSameMillisecond) {
 }
 
 // The heartbeat is of a board that had lost its host for a while.
-TEST_F(SessionFarewell, IsNotConfirmedByAHeartbeatThatMayBeOfBefore) {
+TEST_F(SessionFarewell, IsNotConfirmedByAnEarlierHeartbeat) {
   RobotOnPaths robot(RobotOnPaths::Cables{{40}});
   robot.connect();
   robot.run(1500);
@@ -131,7 +131,7 @@ TEST_F(SessionFarewell, ReportsThatItWasRefusedOrNotAnswered) {
   }
 }
 
-TEST_F(SessionFarewell, IsNotSaidToABoardThatDoesNotKnowItOrIsNotThere) {
+TEST_F(SessionFarewell, IsNotSentToAnOlderOrSilentOrRestartedBoard) {
   ConnectedLink older;
   older.identity("udp+leaves");
   EXPECT_EQ(older.session.leave(100ms, older.now), 0U);
@@ -189,7 +189,7 @@ TEST_F(SessionLink, SaysWhyTheBoardIsSafe) {
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
 }
 
-TEST_F(SessionLink, IsLostWhenTheBoardFallsSilentAndComesBackByItself) {
+TEST_F(SessionLink, IsLostWhenTheBoardIsSilentAndRecoversByItself) {
   const Time heard = link.now;
   link.pass(999ms);
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
@@ -220,7 +220,7 @@ TEST_F(SessionLink, HearsABoardAgainAfterAMonthOfSilence) {
   EXPECT_EQ(link.restarts, 1) << "the new T must not count as a second restart";
 }
 
-TEST_F(NewSession, AsksForItsFieldsWhenTheLinkComesUpAndAgainWhenTheyAreMissing) {
+TEST_F(NewSession, SelectsItsFieldsWhenTheLinkBeginsAndWhenTheyAreMissing) {
   link.heartbeat();
   link.pass(1ms);
   ASSERT_EQ(link.count('F'), 1U);
@@ -242,7 +242,7 @@ TEST_F(NewSession, AsksForItsFieldsWhenTheLinkComesUpAndAgainWhenTheyAreMissing)
   EXPECT_EQ(link.count('F'), 4U) << "every 200 ms";
 }
 
-TEST_F(SessionLink, AddsItsOwnFieldsToTheUsersAndKeepsThem) {
+TEST_F(SessionLink, AddsItsOwnFieldsToTheFieldsOfTheUser) {
   link.session.send(Command::fields("ENC1,ENC2"), 1s, link.now);
   EXPECT_EQ(link.last('F').command, "F:ENC1,ENC2,SAFE,CMD");
   link.executed(link.last('F').pnum);
@@ -256,7 +256,7 @@ TEST_F(SessionLink, AddsItsOwnFieldsToTheUsersAndKeepsThem) {
   EXPECT_EQ(link.last('F').command, "F:CMD,ENC1,SAFE");
 }
 
-TEST(SessionFields, AreLeftAloneOnRequest) {
+TEST(SessionFields, AreNotSelectedOnRequest) {
   SessionOptions options = ScriptedLink::without_questions();
   options.fields = "";
   ScriptedLink link(options);
@@ -286,7 +286,7 @@ TEST_F(SessionLink, KeepsTheFieldsOfEarlierDatagrams) {
   EXPECT_FALSE(state.present.has(StateField::ain24)) << "`present` belongs to the newest datagram";
 }
 
-TEST_F(SessionLink, LetsNoOlderStateReplaceANewerOne) {
+TEST_F(SessionLink, DropsAStateOlderThanTheNewest) {
   link.board_pnum += 2;
   link.state("ENC1:2;SAFE:0;CMD:1;");
   const std::size_t known = link.states.size();
@@ -310,7 +310,7 @@ TEST_F(SessionLink, CountsDamagedDatagramsAndGoesOn) {
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
 }
 
-TEST_F(NewSession, PassesOverDatagramsThatAreNotOfABoard) {
+TEST_F(NewSession, IgnoresDatagramsThatAreNotFromABoard) {
   const auto before = link.sent.size();
   link.raw(with_crc("H:ROS2-R4;PNum:66;T:5;"));
   link.raw(with_crc("O:358,1,1;PNum:67;T:5;"));
@@ -356,7 +356,7 @@ TEST(SessionQuestions, AskForTheIdentityOnceASecondAndMeasureTheRoundTrip) {
   EXPECT_NEAR(link.session.statistics(link.now).round_trip_us, 1000, 1000);
 }
 
-TEST(SessionQuestions, ComeMoreOftenIfTheBoardsClockIsHardToKnow) {
+TEST(SessionQuestions, AreMoreFrequentWhileTheClockErrorIsLarge) {
   ScriptedLink slow{SessionOptions{}}, silent{SessionOptions{}}, old{SessionOptions{}};
   EXPECT_NEAR(static_cast<double>(questions_of(slow, 8ms, true, true)), 49, 2);
   EXPECT_NEAR(static_cast<double>(questions_of(silent, 0ms, false, false)), 5, 1);

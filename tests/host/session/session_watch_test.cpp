@@ -48,7 +48,7 @@ TEST_F(SessionWatch, EchoesALeaseAtOnce) {
 }
 
 // So the watcher hears the board again after the program whose path it shared has ended.
-TEST_F(SessionWatch, AsksAtOnceOnATransportThatHasComeUp) {
+TEST_F(SessionWatch, AsksAtOnceWhenATransportComesUp) {
   link.place_taken = true;
   link.pass(600ms);
   link.place_taken = false;
@@ -58,7 +58,7 @@ TEST_F(SessionWatch, AsksAtOnceOnATransportThatHasComeUp) {
   EXPECT_EQ(link.count('W'), 1U);
 }
 
-TEST_F(SessionWatch, OnALineAStopIsConfirmedByABoardWithoutAHost) {
+TEST_F(SessionWatch, ABoardWithoutAHostConfirmsAStopOfAWatcher) {
   link.state("AIN24:24.28;SAFE:1;");
   const Ticket ticket = link.session.send(Command::stop(), 1s, link.now);
   link.raw(with_crc(
@@ -67,7 +67,7 @@ TEST_F(SessionWatch, OnALineAStopIsConfirmedByABoardWithoutAHost) {
   EXPECT_EQ(link.results[ticket].outcome, Outcome::confirmed);
 }
 
-TEST_F(SessionWatch, HearsTheBoardAndIsNeverInControl) {
+TEST_F(SessionWatch, IsActiveButNeverInControl) {
   link.state("AIN24:24.28;SAFE:0;CMD:7;");
   EXPECT_EQ(link.session.link().state, HostLinkState::active);
   EXPECT_EQ(link.session.state().raw.analog_cv[0], 2428);
@@ -78,7 +78,7 @@ TEST_F(SessionWatch, HearsTheBoardAndIsNeverInControl) {
   EXPECT_EQ(link.session.link().state, HostLinkState::lost);
 }
 
-TEST_F(SessionWatch, AHeartbeatForHostsDoesNotHideTheStates) {
+TEST_F(SessionWatch, ABootHeartbeatDoesNotChangeTheLinkOfAWatcher) {
   link.state("AIN24:24.28;SAFE:1;");
   const LinkStatus before = link.session.link();
   link.boot_heartbeat();
@@ -86,7 +86,7 @@ TEST_F(SessionWatch, AHeartbeatForHostsDoesNotHideTheStates) {
   EXPECT_EQ(link.restarts, 0);
 }
 
-TEST_F(SessionWatch, ABoardWithoutRoomIsAskedLessOften) {
+TEST_F(SessionWatch, AsksLessOftenIfTheBoardHasNoFreeLease) {
   link.nack(link.last('W').pnum, "BUSY");
   EXPECT_FALSE(link.session.link().causes.has(LinkCause::busy))
       << "no datagram showed another host in control";
@@ -107,7 +107,7 @@ TEST_F(SessionWatch, ReportsThatTheFirmwareServesNoWatchers) {
   EXPECT_TRUE(link.session.link().causes.empty());
 }
 
-TEST_F(SessionWatch, MayStopAndIdentifyTheBoardAndCommandsNothing) {
+TEST_F(SessionWatch, MayOnlyStopAndIdentifyTheBoard) {
   link.state("SAFE:0;");
   EXPECT_NE(link.session.send(Command::stop(), 1s, link.now), 0U);
   EXPECT_EQ(link.count('E'), 1U);

@@ -15,7 +15,7 @@ using SessionLink = ConnectedSession;
 using SessionWatchdog = ConnectedSession;
 using SessionHold = ConnectedSession;
 
-TEST_F(SessionWatchdog, HoldsCommandsBackOfAProgramThatDoesNotFeed) {
+TEST_F(SessionWatchdog, HoldsCommandsOfAProgramThatDoesNotFeed) {
   link.session.watchdog(300ms, link.now);
   const Time begin = link.now;
   const Ticket lost =
@@ -38,7 +38,7 @@ TEST_F(SessionWatchdog, HoldsCommandsBackOfAProgramThatDoesNotFeed) {
   EXPECT_EQ(link.results.at(late).outcome, Outcome::cancelled);
 }
 
-TEST_F(SessionWatchdog, FedAgainGivesControlBack) {
+TEST_F(SessionWatchdog, FeedAfterExpiryRestoresControl) {
   link.session.watchdog(100ms, link.now);
   link.pass(200ms);
   link.heartbeat();
@@ -49,7 +49,7 @@ TEST_F(SessionWatchdog, FedAgainGivesControlBack) {
   EXPECT_EQ(link.count('O'), 1U);
 }
 
-TEST_F(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
+TEST_F(SessionHold, HoldsHeartbeatsAndCommandsButSendsStops) {
   link.session.hold(true, link.now);
   EXPECT_EQ(link.links.back().cause(), LinkCause::callback) << "on_link must report it";
   EXPECT_FALSE(link.session.in_control(link.now));
@@ -78,7 +78,7 @@ TEST_F(SessionHold, StopsHeartbeatsAndCommandsButNoStopUntilItEnds) {
   EXPECT_GE(link.count('E'), 4U) << "a stop must always be sent";
 }
 
-TEST_F(SessionHold, AndWatchdogBothHaveToBeOver) {
+TEST_F(SessionHold, HeartbeatsResumeAfterBothHoldAndWatchdogEnd) {
   link.session.watchdog(100ms, link.now);
   link.session.hold(true, link.now);
   link.pass(200ms);
@@ -153,7 +153,7 @@ TEST_F(SessionLink, ReportsTheChipThatFailed) {
   EXPECT_FALSE(link.session.link().chip.any());
 }
 
-TEST(Explain, OfAStopThatIsNotConfirmedSaysToCutThePower) {
+TEST(Explain, AdvisesToCutThePowerForAnUnconfirmedStop) {
   LinkStatus link;
   link.causes = {LinkCause::watchdog, LinkCause::busy, LinkCause::key_needed};
   const CommandResult unheard{Outcome::timed_out, Refusal::none, 1s};
@@ -167,7 +167,7 @@ TEST(Explain, OfAStopThatIsNotConfirmedSaysToCutThePower) {
   EXPECT_TRUE(drives.fix.starts_with("CUT THE POWER"));
 }
 
-TEST(Texts, NameOutcomesAndCarrierEvents) {
+TEST(Texts, ToTextNamesOutcomesAndCarrierEvents) {
   EXPECT_STREQ(to_text(Outcome::confirmed), "confirmed");
   EXPECT_STREQ(to_text(Outcome::timed_out), "timed out");
   EXPECT_STREQ(to_text(CarrierEvent::Kind::up), "up");

@@ -29,7 +29,7 @@ class WatchedBus : public testing::Test {
   std::optional<RobotOnPaths> robot_;
 };
 
-TEST_F(WatchedBus, CarriesBesideAPathThatWasAsked) {
+TEST_F(WatchedBus, CarriesNextToAnIdentifiedPath) {
   robot().connect();
   robot().run(2000);
   EXPECT_EQ(robot().session->link().carrying, 3);
@@ -42,7 +42,7 @@ TEST_F(WatchedBus, CarriesBesideAPathThatWasAsked) {
   EXPECT_EQ(robot().restarts, 0);
 }
 
-TEST_F(WatchedBus, IsBelievedAgainAfterARestartOfTheBoard) {
+TEST_F(WatchedBus, CarriesAgainAfterARestartOfTheBoard) {
   robot().connect();
   robot().run(2000);
   for (const bool alone : {false, true}) {
@@ -74,7 +74,7 @@ TEST_F(WatchedBusOfAnother, IsNeverUsed) {
   EXPECT_EQ(robot().restarts, 0);
 }
 
-TEST_F(WatchedBusOfAnother, EndsTheSessionBeforeItBeginsIfItBringsAnythingByThen) {
+TEST_F(WatchedBusOfAnother, PreventsTheSessionIfItIsHeardFirst) {
   for (const std::size_t path : {0U, 1U}) robot().plug(path, true);
   robot().bring(1, with_crc("AIN24:24;PNum:5;T:" + std::to_string(robot().board_ms(1)) + ";"));
   robot().run(1000);
@@ -87,7 +87,7 @@ struct TwoWatchedBuses : WatchedBus {
   TwoWatchedBuses() : WatchedBus(0, false) {}
 };
 
-TEST_F(TwoWatchedBuses, CarryBothAndAreBelievedAfterAPowerCycleOfTheirAdapters) {
+TEST_F(TwoWatchedBuses, BothCarryAgainAfterAPowerCycle) {
   robot().connect();
   robot().run(2000);
   EXPECT_EQ(robot().session->link().carrying, 3);

@@ -28,7 +28,7 @@ UartBytes field(std::uint32_t position, std::uint32_t lost, const std::string& b
 
 std::string text(const Board::UartData& data) { return {data.bytes.begin(), data.bytes.end()}; }
 
-TEST(UartStream, DeliversEachByteOnceAndCountsWhatIsMissing) {
+TEST(UartStream, DeliversEachByteOnceAndCountsMissingBytes) {
   UartStream stream;
   Board::UartData data;
   EXPECT_TRUE(stream.take(field(100, 7, "abc"), data));
@@ -47,7 +47,7 @@ TEST(UartStream, DeliversEachByteOnceAndCountsWhatIsMissing) {
   EXPECT_EQ(text(data), "abcdej");
 }
 
-TEST(UartStream, PositionsWrapAndARestartBeginsAnew) {
+TEST(UartStream, FollowsPositionsOverAWrapAndARestart) {
   UartStream stream;
   Board::UartData data;
   stream.take(field(0xFFFFFFFE, 0xFFFFFFFF, "abc"), data);
@@ -60,7 +60,7 @@ TEST(UartStream, PositionsWrapAndARestartBeginsAnew) {
   EXPECT_EQ(data.lost, 1U);
 }
 
-TEST(UartStream, HoldsItsCapacityAndCountsOlderBytesAsLost) {
+TEST(UartStream, KeepsTheNewestBytesAndCountsOlderBytesAsLost) {
   UartStream stream;
   Board::UartData data;
   for (std::uint32_t i = 0; i < 2000; ++i)
@@ -70,7 +70,7 @@ TEST(UartStream, HoldsItsCapacityAndCountsOlderBytesAsLost) {
 }
 
 // Includes the board's side of the stream.
-TEST(UartStream, DeliversOrCountsEachByteOverALinkThatLosesStates) {
+TEST(UartStream, DeliversOrCountsEachByteWhenStatesAreLost) {
   struct Line final : firmware::UserUartPort {
     void set_up(const UartMode&) override {}
     std::size_t receive(std::uint8_t* out, std::size_t size) override {
@@ -125,7 +125,7 @@ struct DrivenUart : DrivenBoard {
   Board::UartData reported;  // protected by the mutex
 };
 
-TEST_F(DrivenUart, ReadsWhatAReceiverSendsAndCallsBack) {
+TEST_F(DrivenUart, ReadsTheBytesOfAReceiverAndCallsBack) {
   const ScopedSubscription reports = board.uart(1).on_bytes([&](const Board::UartData& data) {
     const std::lock_guard lock(mutex);
     reported.bytes.insert(reported.bytes.end(), data.bytes.begin(), data.bytes.end());

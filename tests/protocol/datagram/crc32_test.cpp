@@ -9,14 +9,16 @@
 namespace r4 {
 namespace {
 
-TEST(Crc32, CheckValueOfTheCatalogue) {
+TEST(Crc32, MatchesTheCheckValueOfTheCatalogue) {
   EXPECT_EQ(crc32("123456789"), 0xCBF43926U);
   EXPECT_EQ(crc32_table("123456789"), 0xCBF43926U);
 }
 
-TEST(Crc32, HeartbeatOfThePaper) { EXPECT_EQ(crc32("H:R4-ROS2;PNum:0;T:0;^"), 0xB10B3A06U); }
+TEST(Crc32, MatchesTheHeartbeatOfThePaper) {
+  EXPECT_EQ(crc32("H:R4-ROS2;PNum:0;T:0;^"), 0xB10B3A06U);
+}
 
-TEST(Crc32, NoBytesLeaveItAsItIs) {
+TEST(Crc32, AnEmptyTextLeavesTheChecksumUnchanged) {
   EXPECT_EQ(crc32(Text()), 0U);
   EXPECT_EQ(crc32_table(Text()), 0U);
   EXPECT_EQ(crc32(Text(), 0x12345678U), 0x12345678U);

@@ -35,7 +35,7 @@ std::vector<std::string> values_of(const Field& field) {
   return strings;
 }
 
-TEST(Datagram, GivesItsFieldsInTheOrderOfTheWire) {
+TEST(Datagram, GivesItsFieldsInTheirOrder) {
   const std::string bytes = with_crc("T:5;A:;B:1,,2;PNum:9;C:x:y z;");
   Datagram datagram;
   ASSERT_TRUE(read_datagram(bytes, datagram));
@@ -59,7 +59,7 @@ TEST(Datagram, ValuesAreSplitAtCommas) {
   EXPECT_EQ(str(first), "x");
 }
 
-TEST(Datagram, TakesAnyLineTerminatorOrNone) {
+TEST(Datagram, AcceptsAnyLineTerminatorOrNone) {
   const std::string bytes = captured_state();
   for (const std::string end : {"", "\r", "\n", "\r\n"}) {
     const std::string line = bytes + end;
@@ -71,7 +71,7 @@ TEST(Datagram, TakesAnyLineTerminatorOrNone) {
   EXPECT_EQ(read_of(bytes + "\n\n").error, ReadError::syntax);
 }
 
-TEST(Datagram, TakesLeadingZerosAndCapitalsInTheChecksum) {
+TEST(Datagram, AcceptsLeadingZerosAndCapitalsInTheChecksum) {
   const std::string fields = "O:1,0,1;PNum:67;T:1699276044483;";  // its CRC has seven digits
   for (const std::string crc : {"a13d0ac", "0a13d0ac", "A13D0AC", "0A13d0aC"}) {
     EXPECT_TRUE(read_of(fields + "^0x" + crc + "^")) << crc;
@@ -79,7 +79,7 @@ TEST(Datagram, TakesLeadingZerosAndCapitalsInTheChecksum) {
   EXPECT_EQ(read_of(fields + "^0x00a13d0ac^").error, ReadError::syntax);
 }
 
-TEST(Datagram, ALineOfTheWrongLengthIsTold) {
+TEST(Datagram, ReportsALineOfTheWrongLength) {
   for (const std::string nothing : {"", "\r", "\n", "\r\n"}) {
     EXPECT_EQ(read_of(nothing).error, ReadError::length);
     EXPECT_EQ(read_of(nothing).position, 0U);
@@ -101,7 +101,7 @@ TEST(Datagram, ALineOfTheWrongLengthIsTold) {
   EXPECT_EQ(result.position, max_datagram);
 }
 
-TEST(Datagram, ADamagedTrailerIsTold) {
+TEST(Datagram, ReportsADamagedTrailer) {
   struct Case {
     const char* bytes;
     std::size_t position;
@@ -116,7 +116,7 @@ TEST(Datagram, ADamagedTrailerIsTold) {
   }
 }
 
-TEST(Datagram, AWrongChecksumIsToldWithBoth) {
+TEST(Datagram, ReportsTheExpectedAndTheWrongChecksum) {
   const ReadResult result = read_of("H:ROS2-R4;T:79201;^0xf390d9ae^");
   EXPECT_EQ(result.error, ReadError::crc);
   EXPECT_EQ(result.position, 21U);
@@ -125,7 +125,7 @@ TEST(Datagram, AWrongChecksumIsToldWithBoth) {
   EXPECT_FALSE(result);
 }
 
-TEST(Datagram, FieldsOutsideTheGrammarAreRefusedWhereTheyAre) {
+TEST(Datagram, ReportsThePositionOfAnInvalidField) {
   struct Case {
     std::string fields;
     std::size_t position;
@@ -146,14 +146,14 @@ TEST(Datagram, FieldsOutsideTheGrammarAreRefusedWhereTheyAre) {
   }
 }
 
-TEST(Datagram, LengthIsCheckedBeforeTheTrailerThenTheChecksumThenTheFields) {
+TEST(Datagram, ChecksLengthThenTrailerThenChecksumThenFields) {
   EXPECT_EQ(read_of(std::string(max_datagram + 1, 'x')).error, ReadError::length);
   EXPECT_EQ(read_of("A B;^0x1").error, ReadError::syntax);
   EXPECT_EQ(read_of("A B;^0x1^").error, ReadError::crc);
   EXPECT_EQ(read_of(with_crc("A B;")).error, ReadError::syntax);
 }
 
-TEST(Datagram, PacketNumberAndTimeAreWholeNumbersAndStandOnce) {
+TEST(Datagram, PacketNumberAndTimeAreWholeNumbersAndOccurOnce) {
   Datagram datagram;
   const std::string neither = with_crc("A:1;");
   ASSERT_TRUE(read_datagram(neither, datagram));
@@ -176,7 +176,7 @@ TEST(Datagram, PacketNumberAndTimeAreWholeNumbersAndStandOnce) {
   EXPECT_EQ(read_of(with_crc("T:1;A:2;T:1;")).position, 8U);
 }
 
-TEST(Datagram, OnlyThoseNamesAreThePacketNumberAndTheTime) {
+TEST(Datagram, OnlyPNumAndTNameThePacketNumberAndTheTime) {
   const std::string bytes = with_crc("pnum:x;t:x;PNUM:x;PNumber:x;TT:x;");
   Datagram datagram;
   ASSERT_TRUE(read_datagram(bytes, datagram));
@@ -184,7 +184,7 @@ TEST(Datagram, OnlyThoseNamesAreThePacketNumberAndTheTime) {
   EXPECT_FALSE(datagram.has_time());
 }
 
-TEST(Datagram, ARefusedLineLeavesTheResultAlone) {
+TEST(Datagram, ARefusedLineLeavesTheResultUnchanged) {
   const std::string good = captured_state();
   Datagram datagram;
   ASSERT_TRUE(read_datagram(good, datagram));
@@ -193,7 +193,7 @@ TEST(Datagram, ARefusedLineLeavesTheResultAlone) {
   EXPECT_EQ(datagram.pnum(), 7434U);
 }
 
-TEST(Datagram, AFieldAloneIsReadFromText) {
+TEST(Datagram, ReadsASingleFieldFromText) {
   Field field;
   ASSERT_TRUE(read_field("O:358,1,1", field));
   EXPECT_EQ(str(field.name()), "O");
@@ -207,14 +207,14 @@ TEST(Datagram, AFieldAloneIsReadFromText) {
   }
 }
 
-TEST(Datagram, ErrorsHaveTheirWords) {
+TEST(Datagram, EveryReadErrorHasAText) {
   EXPECT_STREQ(to_text(ReadError::none), "");
   EXPECT_STREQ(to_text(ReadError::length), "length");
   EXPECT_STREQ(to_text(ReadError::syntax), "syntax");
   EXPECT_STREQ(to_text(ReadError::crc), "crc");
 }
 
-TEST(Datagram, ReadsTheSessionIdWhereverItStands) {
+TEST(Datagram, ReadsTheSessionIdAtAnyPosition) {
   for (const char* fields :
        {"SID:0123456789abcdef;H:ROS2-R4;PNum:1;T:2;", "H:ROS2-R4;SID:0123456789abcdef;PNum:1;T:2;",
         "H:ROS2-R4;PNum:1;T:2;SID:0123456789abcdef;"}) {
@@ -232,7 +232,7 @@ TEST(Datagram, ReadsTheSessionIdWhereverItStands) {
   EXPECT_EQ(datagram.session_id(), no_session);
 }
 
-TEST(Datagram, RefusesASessionIdThatIsNone) {
+TEST(Datagram, RefusesAnInvalidSessionId) {
   for (const char* id :
        {"", "0", "0000000000000000", "0123456789abcde", "0123456789abcdef0", "0123456789abcdeg",
         "01234567,9abcdef", "0x23456789abcdef", "0123456789ABCDEF"}) {

@@ -46,7 +46,7 @@ TEST(DatagramWriter, WritesEveryKindOfValue) {
                      "D:a,b,c,,d;E:;F:;G:,;"));
 }
 
-TEST(DatagramWriter, NamesKnownBeforehandAreWrittenTheSame) {
+TEST(DatagramWriter, ConstantFieldNamesAreWrittenTheSame) {
   constexpr FieldName one("A");
   constexpr FieldName twelve("TWELVELETTER");
   static_assert(one.allowed() && twelve.allowed());
@@ -68,7 +68,7 @@ TEST(DatagramWriter, NamesKnownBeforehandAreWrittenTheSame) {
   }
 }
 
-TEST(DatagramWriter, NothingCanForgeAField) {
+TEST(DatagramWriter, NoValueCanForgeAField) {
   const std::string forgeries[] = {"1;E:STOP", "1^",   "1\r",   "1\n", std::string("1\0", 2),
                                    "\x7F",     "\x80", "\xC3²", "\t"};
   for (const std::string& text : forgeries) {
@@ -96,7 +96,7 @@ TEST(DatagramWriter, NothingCanForgeAField) {
   EXPECT_TRUE(writer.finish(1, 2).empty()) << "a comma would split the value into two";
 }
 
-TEST(DatagramWriter, ARefusalIsRememberedToTheEnd) {
+TEST(DatagramWriter, AnInvalidValueFailsTheWholeDatagram) {
   char buffer[max_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
   writer.field("A").value("bad;").field("B").value(1).hundredths(2).values("c");
@@ -123,7 +123,7 @@ TEST(DatagramWriter, ADatagramNeedsAField) {
   EXPECT_EQ(str(with_numbers.finish(1, 2)), with_crc("PNum:1;T:2;"));
 }
 
-TEST(DatagramWriter, IsFinishedOnce) {
+TEST(DatagramWriter, CanBeFinishedOnlyOnce) {
   char buffer[max_datagram];
   DatagramWriter writer(buffer, sizeof buffer);
   writer.field("A").value(1);
@@ -133,7 +133,7 @@ TEST(DatagramWriter, IsFinishedOnce) {
 
 // In a buffer of every size, finish() writes the whole datagram or nothing, and no byte after the
 // buffer.
-TEST(DatagramWriter, WhatDoesNotFitIsRefusedAsAWhole) {
+TEST(DatagramWriter, RefusesADatagramThatDoesNotFit) {
   const auto write = [](char* buffer, std::size_t capacity) {
     DatagramWriter writer(buffer, capacity);
     writer.field("OSMC1").value(400).value(1).field("AIN24").hundredths(2428);
@@ -152,7 +152,7 @@ TEST(DatagramWriter, WhatDoesNotFitIsRefusedAsAWhole) {
   }
 }
 
-TEST(DatagramWriter, TheTrailerNeedsAtMostTheRoomItSays) {
+TEST(DatagramWriter, TheTrailerFitsItsMaximumSize) {
   for (int i = 0; i < 64; ++i) {  // some of these checksums have all eight digits
     char buffer[max_datagram];
     DatagramWriter writer(buffer, sizeof buffer);
@@ -178,7 +178,7 @@ TEST(DatagramWriter, NoDatagramIsLongerThanTheLimit) {
   EXPECT_LE(longest, max_datagram);
 }
 
-TEST(DatagramWriter, AFieldThatWasTooLongCanBeTakenBack) {
+TEST(DatagramWriter, AFieldThatIsTooLongCanBeRemoved) {
   char buffer[32];
   DatagramWriter writer(buffer, sizeof buffer);
   writer.field("A").value(1).value(2);
@@ -191,7 +191,7 @@ TEST(DatagramWriter, AFieldThatWasTooLongCanBeTakenBack) {
   EXPECT_EQ(str(writer.finish()), with_crc("A:1,2;C:3;"));
 }
 
-TEST(DatagramWriter, TakingEverythingBackBeginsAnew) {
+TEST(DatagramWriter, RemovingEverythingAllowsANewDatagram) {
   char buffer[64];
   DatagramWriter writer(buffer, sizeof buffer);
   writer.field("A").value(1);

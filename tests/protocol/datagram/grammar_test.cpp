@@ -23,7 +23,7 @@ TEST(Grammar, EveryByteHasItsClasses) {
   }
 }
 
-TEST(Grammar, SeparatorsAreFoundAtEveryPlaceOfABlockOfEverySize) {
+TEST(Grammar, FindsSeparatorsAtEveryPositionOfEveryBlockSize) {
   for (std::size_t size = 1; size <= separators_block; ++size) {
     for (std::size_t at = 0; at < size; ++at) {
       const std::uint64_t bit = std::uint64_t{1} << at;

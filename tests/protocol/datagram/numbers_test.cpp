@@ -62,7 +62,7 @@ std::string hex_text(std::uint32_t value) {
 const char* const no_numbers[] = {"",     "-",   "+5", " 5",  "5 ",  "5,6", "5.", "0x5",
                                   "five", "--5", "5-", "1e3", "\t5", "5;",  "²",  "5\n"};
 
-TEST(Numbers, WhatIsNoNumberIsRefused) {
+TEST(Numbers, RefusesTextThatIsNotANumber) {
   for (const std::string text : no_numbers) {
     EXPECT_FALSE(parsed<std::uint32_t>(text)) << text;
     EXPECT_FALSE(parsed<std::uint64_t>(text)) << text;
@@ -73,7 +73,7 @@ TEST(Numbers, WhatIsNoNumberIsRefused) {
   EXPECT_FALSE(parsed<std::uint32_t>(std::string("5\0", 2)));
 }
 
-TEST(Numbers, UnsignedThirtyTwoBitsToItsLastValue) {
+TEST(Numbers, ParsesUnsigned32BitNumbersUpToTheMaximum) {
   EXPECT_EQ(parsed<std::uint32_t>("0"), 0U);
   EXPECT_EQ(parsed<std::uint32_t>("4294967295"), 4294967295U);
   EXPECT_EQ(parsed<std::uint32_t>("0000000000000000000000000000004294967295"), 4294967295U);
@@ -85,7 +85,7 @@ TEST(Numbers, UnsignedThirtyTwoBitsToItsLastValue) {
   EXPECT_FALSE(parsed<std::uint32_t>("-0"));
 }
 
-TEST(Numbers, UnsignedSixtyFourBitsToItsLastValue) {
+TEST(Numbers, ParsesUnsigned64BitNumbersUpToTheMaximum) {
   EXPECT_EQ(parsed<std::uint64_t>("1699276044383"), 1699276044383U);
   EXPECT_EQ(parsed<std::uint64_t>("18446744073709551615"), 18446744073709551615U);
   EXPECT_EQ(parsed<std::uint64_t>("00018446744073709551615"), 18446744073709551615U);
@@ -95,7 +95,7 @@ TEST(Numbers, UnsignedSixtyFourBitsToItsLastValue) {
   EXPECT_FALSE(parsed<std::uint64_t>("184467440737095516150"));
 }
 
-TEST(Numbers, SignedToBothEnds) {
+TEST(Numbers, ParsesSignedNumbersWithinTheirLimits) {
   EXPECT_EQ(parsed<std::int32_t>("-100"), -100);
   EXPECT_EQ(parsed<std::int32_t>("-0"), 0);
   EXPECT_EQ(parsed<std::int32_t>("2147483647"), 2147483647);
@@ -104,7 +104,7 @@ TEST(Numbers, SignedToBothEnds) {
   EXPECT_FALSE(parsed<std::int32_t>("-2147483649"));
 }
 
-TEST(Numbers, WholeNumbersOfAnySizeAreTold) {
+TEST(Numbers, RecognizesWholeNumbersOfAnySize) {
   for (const std::string text : {"0", "-0", "5", "-5", "99999999999999999999999999"}) {
     EXPECT_TRUE(is_whole_number(text)) << text;
   }
@@ -141,7 +141,7 @@ TEST(Numbers, BytesInHexadecimalAreTwoDigitsEach) {
   EXPECT_FALSE(parse_hex("000fx5", back, sizeof back));
 }
 
-TEST(Numbers, HexadecimalOfOneToEightDigitsInEitherCase) {
+TEST(Numbers, ParsesOneToEightHexadecimalDigitsInEitherCase) {
   EXPECT_EQ(hex("d9bd7e4"), 0x0D9BD7E4U);
   EXPECT_EQ(hex("0D9BD7E4"), 0x0D9BD7E4U);
   EXPECT_EQ(hex("0"), 0U);
@@ -168,7 +168,7 @@ TEST(Numbers, WritersGiveTheShortestForm) {
   EXPECT_EQ(hex_text(0xFFFFFFFFU), "ffffffff");
 }
 
-TEST(Numbers, WrittenAtEveryNumberOfDigitsAsTheStandardLibraryDoes) {
+TEST(Numbers, AgreeWithTheStandardLibraryAtEveryLength) {
   std::mt19937_64 random(1);
   for (int bits = 1; bits <= 64; ++bits) {
     for (int i = 0; i < 200; ++i) {

@@ -9,7 +9,7 @@ namespace {
 
 using test::str;
 
-TEST(Refusal, EveryCodeHasItsNameOnTheWire) {
+TEST(Refusal, EveryCodeHasItsProtocolName) {
   const std::pair<Refusal, const char*> codes[] = {
       {Refusal::unknown, "UNKNOWN"}, {Refusal::format, "FORMAT"}, {Refusal::range, "RANGE"},
       {Refusal::channel, "CHANNEL"}, {Refusal::stale, "STALE"},   {Refusal::duplicate, "DUPLICATE"},
@@ -24,7 +24,7 @@ TEST(Refusal, EveryCodeHasItsNameOnTheWire) {
   EXPECT_EQ(str(name_of(static_cast<Refusal>(200))), "NONE");
 }
 
-TEST(Refusal, OtherNamesAreNone) {
+TEST(Refusal, UnknownNamesAreNone) {
   for (const std::string name : {"", "NONE", "range", "RANGE ", "RANG"}) {
     EXPECT_EQ(refusal_from(name), Refusal::none) << name;
   }

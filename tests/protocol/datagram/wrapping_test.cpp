@@ -16,7 +16,7 @@ TEST(Wrapping, APastTimeStaysInThePastForever) {
   }
 }
 
-TEST(Wrapping, ARecentTimeAndOneThatIsStillToComeStayAsTheyAre) {
+TEST(Wrapping, RecentAndFutureTimesStayUnchanged) {
   for (const std::uint32_t now : {0U, 5U, 0x7FFFFFFFU, 0xFFFFFFFFU}) {
     for (const std::uint32_t apart : {0U, 1U, 200U, long_ago - 1}) {
       std::uint32_t past = now - apart;

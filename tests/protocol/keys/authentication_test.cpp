@@ -44,12 +44,12 @@ class TestAuthentication : public testing::Test {
   Authentication board{chance};
 };
 
-TEST(AuthenticationTag, IsThatOfAnotherImplementation) {  // computed by Python's hashlib
+TEST(AuthenticationTag, MatchesAnotherImplementation) {  // computed by Python's hashlib
   EXPECT_EQ(with_signature(fields, key_of(3), "0123456789abcdef", 1700000000000000, 79146),
             fields + "A:3,1700000000000000,79146,YDgO3-AnQVQ;");
 }
 
-TEST_F(TestAuthentication, TakesWhatIsSignedWithOneOfItsKeys) {
+TEST_F(TestAuthentication, AcceptsDatagramsSignedWithAnyOfItsKeys) {
   EXPECT_EQ(verdict(sign(1)), Verdict::authentic);
   EXPECT_EQ(verdict(sign(1, now, key_of(5, 100))), Verdict::authentic)
       << "each key has separate counters";
@@ -73,7 +73,7 @@ TEST_F(TestAuthentication, NeedsASignatureAsTheLastField) {
   EXPECT_EQ(verdict(fields + "A:9,9,9,9;A:3,1,79146,YDgO3-AnQVQ;"), Verdict::wrong_tag);
 }
 
-TEST_F(TestAuthentication, EveryChangedByteIsSeen) {
+TEST_F(TestAuthentication, RejectsEveryChangedByte) {
   const std::string good = sign(1);
   for (std::size_t i = 0; i < good.size(); ++i) {
     for (const char other : {'0', '1', 'Z', 'a', '_'}) {
@@ -90,7 +90,7 @@ TEST_F(TestAuthentication, EveryChangedByteIsSeen) {
       << "a datagram with a wrong tag uses up no counter value";
 }
 
-TEST_F(TestAuthentication, TakesEachCounterOnce) {
+TEST_F(TestAuthentication, AcceptsEachCounterValueOnce) {
   EXPECT_EQ(verdict(sign(0)), Verdict::replayed) << "the first counter is 1";
   EXPECT_EQ(verdict(sign(10)), Verdict::authentic);
   EXPECT_EQ(verdict(sign(10)), Verdict::replayed);
@@ -101,7 +101,7 @@ TEST_F(TestAuthentication, TakesEachCounterOnce) {
   EXPECT_EQ(verdict(sign(0xFFFFFFFFFFFFFFFF)), Verdict::replayed);
 }
 
-TEST_F(TestAuthentication, WhatIsBelowACounterThatWasForgottenWasUsed) {
+TEST_F(TestAuthentication, RejectsCounterValuesBelowAForgottenOne) {
   constexpr std::uint64_t remembered = Authentication::counters_remembered;
   for (std::uint64_t counter = 100; counter < 100 + remembered; ++counter) {
     EXPECT_EQ(verdict(sign(counter)), Verdict::authentic);
@@ -118,7 +118,7 @@ TEST_F(TestAuthentication, WhatIsBelowACounterThatWasForgottenWasUsed) {
 
 // Each key has separate counters. If one key is used much, the board forgets the counter values of
 // another key and then refuses them.
-TEST_F(TestAuthentication, ForgetsTheOldestOfAllKeysTogether) {
+TEST_F(TestAuthentication, ForgetsTheOldestCounterValueOfAllKeys) {
   const auto sign_other = [this](std::uint64_t counter) {
     return sign(counter, now, key_of(5, 100));
   };
@@ -134,7 +134,7 @@ TEST_F(TestAuthentication, ForgetsTheOldestOfAllKeysTogether) {
   EXPECT_EQ(verdict(sign_other(10)), Verdict::authentic);
 }
 
-TEST_F(TestAuthentication, TakesNothingOlderThan250MsNorOfTheFuture) {
+TEST_F(TestAuthentication, RejectsTimesOlderThan250MsOrInTheFuture) {
   EXPECT_EQ(verdict(sign(1, now - 250)), Verdict::authentic);
   EXPECT_EQ(verdict(sign(2, now - 251)), Verdict::old);
   EXPECT_EQ(verdict(sign(3, now + 1)), Verdict::old);
@@ -143,7 +143,7 @@ TEST_F(TestAuthentication, TakesNothingOlderThan250MsNorOfTheFuture) {
       << "across the wrap of the clock";
 }
 
-TEST_F(TestAuthentication, AnotherNonceEndsAllThatWasSignedBefore) {
+TEST_F(TestAuthentication, ANewNonceInvalidatesEarlierSignatures) {
   const std::string before = sign(100);
   const std::string old_nonce = nonce();
   board.renew();
@@ -152,7 +152,7 @@ TEST_F(TestAuthentication, AnotherNonceEndsAllThatWasSignedBefore) {
   EXPECT_EQ(verdict(sign(1)), Verdict::authentic) << "a new nonce restarts the counters";
 }
 
-TEST_F(TestAuthentication, NoncesAreSixteenDigitsAndNoneComesTwice) {
+TEST_F(TestAuthentication, NoncesHaveSixteenDigitsAndNeverRepeat) {
   std::set<std::string> seen;
   for (int i = 0; i < 10'000; ++i) {
     ASSERT_EQ(nonce().size(), 16U);
@@ -167,14 +167,14 @@ TEST_F(TestAuthentication, NoncesAreSixteenDigitsAndNoneComesTwice) {
   EXPECT_EQ(seen.count(str(rebooted.nonce())), 0U);
 }
 
-TEST_F(TestAuthentication, WithoutAKeyNothingIsRequiredAndNoNonceTold) {
+TEST_F(TestAuthentication, RequiresNoSignatureAndHasNoNonceWithoutAKey) {
   EXPECT_TRUE(board.required());
   use(Key());
   EXPECT_FALSE(board.required());
   EXPECT_EQ(nonce(), "");
 }
 
-TEST(AuthenticationWithoutChance, TakesNothing) {
+TEST(AuthenticationWithoutRandomBytes, AcceptsNothing) {
   Authentication board(nullptr);
   const Key keys[max_keys] = {key_of(3)};
   board.use(keys);
@@ -186,7 +186,7 @@ TEST(AuthenticationWithoutChance, TakesNothing) {
   EXPECT_EQ(board.verify(datagram, now), Verdict::missing);
 }
 
-TEST_F(TestAuthentication, DoesNotAnswerWhatTheNetworkRepeatedOrHeldBack) {
+TEST_F(TestAuthentication, DoesNotAnswerReplayedOrDelayedDatagrams) {
   EXPECT_TRUE(board.rejected(Verdict::missing));
   EXPECT_TRUE(board.rejected(Verdict::wrong_tag));
   EXPECT_TRUE(board.rejected(Verdict::unknown_key));
@@ -222,14 +222,14 @@ class TestSigner : public TestAuthentication {
   Signer signer{key_of(3)};
 };
 
-TEST_F(TestSigner, SignsWhatTheBoardTakes) {
+TEST_F(TestSigner, TheBoardAcceptsItsSignature) {
   const std::string bytes = signed_now(1'700'000'000'000'000, 1000);
   EXPECT_EQ(bytes.find("O:358,1,1;PNum:7;T:1699276044383;A:3,1700000000000000,79146,"), 0U)
       << bytes;
   EXPECT_EQ(verdict_of(bytes, now), Verdict::authentic);
 }
 
-TEST_F(TestSigner, CountsUpWhateverTheClockDoes) {
+TEST_F(TestSigner, TheCounterIncreasesEvenIfTheClockDoesNot) {
   EXPECT_NE(signed_now(500, 1000).find("A:3,500,"), std::string::npos);
   EXPECT_NE(signed_now(500, 1000).find("A:3,501,"), std::string::npos);
   EXPECT_NE(signed_now(400, 1000).find("A:3,502,"), std::string::npos);
@@ -245,7 +245,7 @@ TEST_F(TestSigner, IsReadyOnceItHasANonce) {
   EXPECT_FALSE(fresh.ready());
 }
 
-TEST_F(TestSigner, FollowsTheBoardsClockFromBelow) {
+TEST_F(TestSigner, NeverSignsATimeAheadOfTheBoardsClock) {
   std::uint64_t counter = 1;
   for (const std::uint32_t passed : {0U, 1U, 2U, 31U, 32U, 100U, 1000U, 5000U}) {
     // A host whose clock is 3 % fast does not send a time in the future.
@@ -255,7 +255,7 @@ TEST_F(TestSigner, FollowsTheBoardsClockFromBelow) {
   }
 }
 
-TEST_F(TestSigner, TheLongestSignatureIsAsLongAsPromised) {
+TEST_F(TestSigner, TheLongestSignatureHasTheMaximumSize) {
   Signer longest(key_of(9));
   longest.on_nonce("0123456789abcdef");
   longest.on_board_time(4294967295, 0);

@@ -73,7 +73,7 @@ TEST(Blake2s, PassesTheStandardsSelfTest) {
   EXPECT_EQ(hex(digest), "6a411f08ce25adcdfb02aba641451cec53c598b24f4fc787fbdc88797f4c1dfe");
 }
 
-TEST(Blake2s, DoesNotDependOnThePiecesThatItIsGiven) {
+TEST(Blake2s, GivesTheSameDigestForAMessageInPieces) {
   for (std::size_t size = 0; size <= 200; ++size) {
     const Bytes message = sequence(size, 7);
     const Bytes key = sequence(1 + size % 32, 9);
@@ -84,7 +84,7 @@ TEST(Blake2s, DoesNotDependOnThePiecesThatItIsGiven) {
   }
 }
 
-TEST(Blake2s, GivesTheSameByAPreparedKey) {
+TEST(Blake2s, GivesTheSameDigestWithAPreparedKey) {
   const Bytes key = sequence(32, 3);
   const Blake2sKey prepared(8, key.data(), key.size());
   for (std::size_t size = 1; size <= 200; ++size) {

@@ -24,7 +24,7 @@ TEST(Key, IsReadFromItsTextAndWrittenInLowerCase) {
             "7:00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff");
 }
 
-TEST(Key, EveryRefusedForm) {
+TEST(Key, RefusesInvalidForms) {
   struct Case {
     std::string text;
     Refusal refusal;

@@ -5,7 +5,7 @@
 namespace r4 {
 namespace {
 
-TEST_F(BoardLinkTest, APaperHostWithAClockOfItsOwnFeedsByArriving) {
+TEST_F(BoardLinkTest, APaperHostWithItsOwnClockKeepsTheLinkAlive) {
   EXPECT_EQ(heartbeat(0, 1699276044383, paper), HeartbeatEffect::new_session);
   EXPECT_EQ(command(1, paper), "execute");
   for (std::uint32_t i = 1; i < 5; ++i) {
@@ -17,7 +17,7 @@ TEST_F(BoardLinkTest, APaperHostWithAClockOfItsOwnFeedsByArriving) {
   EXPECT_EQ(heartbeat(100, 1699276044390, paper), HeartbeatEffect::new_session);
 }
 
-TEST_F(BoardLinkTest, AClockOfItsOwnMayHappenToShowATimeOfOurs) {
+TEST_F(BoardLinkTest, APaperHostsClockMayShowATimeOfTheBoard) {
   send_due();
   heartbeat(0, 4000, paper);
   const std::uint32_t ours = sent.back();
@@ -27,7 +27,7 @@ TEST_F(BoardLinkTest, AClockOfItsOwnMayHappenToShowATimeOfOurs) {
   EXPECT_EQ(heartbeat(2, ours, paper), HeartbeatEffect::fed);
 }
 
-TEST_F(BoardLinkTest, APaperHostThatEchoesMustGoOnEchoing) {
+TEST_F(BoardLinkTest, APaperHostThatEchoesMustKeepEchoing) {
   send_due();
   heartbeat(0, 0, paper);
   EXPECT_EQ(heartbeat(1, sent.back(), paper), HeartbeatEffect::fed);
@@ -40,7 +40,7 @@ TEST_F(BoardLinkTest, APaperHostThatEchoesMustGoOnEchoing) {
   EXPECT_EQ(heartbeat(4, old_echo, paper), HeartbeatEffect::stale);
 }
 
-TEST_F(BoardLinkTest, APaperHostThatEchoesBeginsAnewWithAnEchoFromAfterTheLoss) {
+TEST_F(BoardLinkTest, AnEchoingPaperHostReconnectsOnlyWithANewEcho) {
   send_due();
   heartbeat(0, 0, paper);
   heartbeat(1, sent.back(), paper);
@@ -81,7 +81,7 @@ TEST_F(BoardLinkTest, APaperHostWithoutNumbersBeginsANewSessionAfterALoss) {
   EXPECT_EQ(command(0, paper), "execute");
 }
 
-TEST_F(BoardLinkTest, NumbersThatComeOrGoAreAnotherHost) {
+TEST_F(BoardLinkTest, HeartbeatsThatGainOrLoseNumbersAreAnotherHost) {
   numberless(5);
   EXPECT_EQ(heartbeat(1, 6, paper), HeartbeatEffect::stale);
   run(1000);

@@ -29,12 +29,12 @@ TEST_F(BoardLinkTest, TheFirstHostThatEchoesIsInControl) {
   EXPECT_EQ(command(3, other), "execute");
 }
 
-TEST_F(BoardLinkTest, AnEchoOfAnotherBootBeginsNothing) {
+TEST_F(BoardLinkTest, AnEchoOfAnotherBootStartsNoSession) {
   EXPECT_EQ(heartbeat(first_number, 123), HeartbeatEffect::unheard);
   EXPECT_EQ(link.state(), BoardLinkState::connecting);
 }
 
-TEST_F(BoardLinkTest, AnotherSessionIsBusyWhateverItSends) {
+TEST_F(BoardLinkTest, AnotherSessionIsAlwaysAnsweredBusy) {
   connect();
   const HostId strangers[] = {other, {there, 0x2222}, paper, {there, no_session}};
   for (const HostId stranger : strangers) {
@@ -46,7 +46,7 @@ TEST_F(BoardLinkTest, AnotherSessionIsBusyWhateverItSends) {
   EXPECT_EQ(heartbeat(first_number + 2, sent.back()), HeartbeatEffect::fed);
 }
 
-TEST_F(BoardLinkTest, ASessionIsTheSameFromEveryPlace) {
+TEST_F(BoardLinkTest, ASessionIsTheSameFromEveryPeer) {
   connect();
   EXPECT_EQ(heartbeat(first_number + 2, sent.back(), {there, ours.sid}), HeartbeatEffect::fed);
   EXPECT_EQ(heartbeat(first_number + 2, sent.back()), HeartbeatEffect::repeated);
@@ -65,7 +65,7 @@ TEST_F(BoardLinkTest, OnlyTheSameSessionResumes) {
   }
 }
 
-TEST_F(BoardLinkTest, AReplacedSessionBeginsAnewOnlyWithAFreshEcho) {
+TEST_F(BoardLinkTest, AReplacedSessionReturnsOnlyWithAFreshEcho) {
   connect();
   command(first_number + 2);
   run(1000);
@@ -78,7 +78,7 @@ TEST_F(BoardLinkTest, AReplacedSessionBeginsAnewOnlyWithAFreshEcho) {
   EXPECT_EQ(command(first_number + 3), "STALE");
 }
 
-TEST_F(BoardLinkTest, ASessionThatWasLeftBeginsNoMore) {
+TEST_F(BoardLinkTest, ASessionCannotReturnAfterItsFarewell) {
   connect();
   link.leave(now);
   EXPECT_EQ(link.state(), BoardLinkState::lost);
@@ -89,7 +89,7 @@ TEST_F(BoardLinkTest, ASessionThatWasLeftBeginsNoMore) {
   EXPECT_EQ(heartbeat(1, echo, other), HeartbeatEffect::new_session);
 }
 
-TEST_F(BoardLinkTest, RemembersTheLastSessionsThatWereLeft) {
+TEST_F(BoardLinkTest, RemembersTheLastSessionsEndedByFarewell) {
   connect();
   for (SessionId sid = 1; sid <= BoardLink::left_memory + 1; ++sid) {
     link.leave(now);
@@ -103,12 +103,12 @@ TEST_F(BoardLinkTest, RemembersTheLastSessionsThatWereLeft) {
   }
 }
 
-TEST_F(BoardLinkTest, AHostWithASessionIdHasToNumberItsHeartbeats) {
+TEST_F(BoardLinkTest, AHostWithASessionIdMustNumberItsHeartbeats) {
   connect();
   EXPECT_EQ(numberless(sent.back(), ours), HeartbeatEffect::stale);
 }
 
-TEST_F(BoardLinkTest, LosesASilentOwnerExactlyAtTheTimeout) {
+TEST_F(BoardLinkTest, LosesASilentHostExactlyAtTheTimeout) {
   connect();
   const std::uint32_t fed = now;
   run(2000);
@@ -138,7 +138,7 @@ TEST_F(BoardLinkTest, TheSameHostResumesWithAnEchoFromAfterTheLoss) {
   EXPECT_EQ(heartbeat(first_number + 4, sent.back()), HeartbeatEffect::resumed);
 }
 
-TEST_F(BoardLinkTest, AHostThatSentVeryMuchDuringAnOutageResumes) {
+TEST_F(BoardLinkTest, AHostResumesAfterSendingMuchDuringAnOutage) {
   connect();
   run(1000);
   const std::uint32_t next = first_number + 2 + 3 * BoardLink::command_window;
@@ -149,7 +149,7 @@ TEST_F(BoardLinkTest, AHostThatSentVeryMuchDuringAnOutageResumes) {
 
 // A host can echo the heartbeat of the millisecond in which the link was lost both before and after
 // the loss.
-TEST_F(BoardLinkTest, ACopyOfAnOldHeartbeatDoesNotBeginTheSessionAnew) {
+TEST_F(BoardLinkTest, ADuplicateOfAnOldHeartbeatDoesNotResumeTheSession) {
   connect();
   command(first_number + 2);
   now += 400;
@@ -177,7 +177,7 @@ TEST_F(BoardLinkTest, AHostIsServedAfterWeeksOfSilence) {
 
 // --- fresh echoes
 
-TEST_F(BoardLinkTest, OnlyAFreshEchoFeeds) {
+TEST_F(BoardLinkTest, OnlyAFreshEchoKeepsTheLinkAlive) {
   connect();
   const std::uint32_t echoed = sent.back();
   run(999);
@@ -203,7 +203,7 @@ TEST_F(BoardLinkTest, AnEchoIsFreshUpToTheTimeout) {
   EXPECT_EQ(heartbeat(first_number + 4, echoed), HeartbeatEffect::stale);
 }
 
-TEST_F(BoardLinkTest, ARepeatedOrOvertakenHeartbeatDoesNotFeed) {
+TEST_F(BoardLinkTest, ARepeatedOrOvertakenHeartbeatDoesNotCount) {
   connect();
   run(400);
   EXPECT_EQ(heartbeat(first_number + 3, sent.back()), HeartbeatEffect::fed);
@@ -217,7 +217,7 @@ TEST_F(BoardLinkTest, ARepeatedOrOvertakenHeartbeatDoesNotFeed) {
 
 // --- heartbeats that may have waited before they are read
 
-TEST_F(BoardLinkTest, AHeartbeatFeedsFromWhenItMayHaveCome) {
+TEST_F(BoardLinkTest, AWaitingHeartbeatCountsFromItsEarliestArrival) {
   connect();
   run(900);
   const std::uint32_t read = now;
@@ -228,7 +228,7 @@ TEST_F(BoardLinkTest, AHeartbeatFeedsFromWhenItMayHaveCome) {
   EXPECT_EQ(lost_at, read + 700);
 }
 
-TEST_F(BoardLinkTest, AnEchoCameAfterWhatItEchoes) {
+TEST_F(BoardLinkTest, AHeartbeatCountsNoEarlierThanTheTimeItEchoes) {
   connect();
   run(900);
   ASSERT_LT(now - sent.back(), 300U);
@@ -236,7 +236,7 @@ TEST_F(BoardLinkTest, AnEchoCameAfterWhatItEchoes) {
   EXPECT_EQ(link.fed_ms(), sent.back());
 }
 
-TEST_F(BoardLinkTest, AHeartbeatThatWaitedMakesNothingOlder) {
+TEST_F(BoardLinkTest, AWaitingHeartbeatDoesNotShortenTheDeadline) {
   connect();
   run(100);
   const std::uint32_t fed = link.fed_ms();
@@ -244,7 +244,7 @@ TEST_F(BoardLinkTest, AHeartbeatThatWaitedMakesNothingOlder) {
   EXPECT_EQ(link.fed_ms(), fed);
 }
 
-TEST_F(BoardLinkTest, AHeartbeatThatMayHaveWaitedForTheTimeoutDoesNothing) {
+TEST_F(BoardLinkTest, AHeartbeatThatMayBeOlderThanTheTimeoutDoesNothing) {
   EXPECT_EQ(late(1000, 1, 5, paper), HeartbeatEffect::unheard);
   EXPECT_EQ(link.state(), BoardLinkState::connecting);
   ASSERT_EQ(late(999, 1, 5, paper), HeartbeatEffect::new_session);
@@ -258,7 +258,7 @@ TEST_F(BoardLinkTest, AHeartbeatThatMayHaveWaitedForTheTimeoutDoesNothing) {
   EXPECT_EQ(link.deadline_ms(), now + 600);
 }
 
-TEST_F(BoardLinkTest, ACommandIsNoYoungerForAHeartbeatThatWaited) {
+TEST_F(BoardLinkTest, LatenessCountsFromAHeartbeatsEarliestArrival) {
   heartbeat(1, 5, paper);
   run(400);
   late(251, 10, 6, paper);
@@ -271,7 +271,7 @@ TEST_F(BoardLinkTest, ACommandIsNoYoungerForAHeartbeatThatWaited) {
 
 // --- commands
 
-TEST_F(BoardLinkTest, ExecutesOnceAndNeverAnOlderOne) {
+TEST_F(BoardLinkTest, ExecutesEachCommandOnceAndNeverAnOlderOne) {
   connect();
   EXPECT_EQ(command(first_number + 5), "execute");
   EXPECT_EQ(command(first_number + 5), "DUPLICATE");
@@ -280,7 +280,7 @@ TEST_F(BoardLinkTest, ExecutesOnceAndNeverAnOlderOne) {
   EXPECT_EQ(command(first_number + 5), "DUPLICATE");
 }
 
-TEST_F(BoardLinkTest, TheWindowIs65536Ahead) {
+TEST_F(BoardLinkTest, AcceptsCommandsUpTo65536NumbersAhead) {
   connect();
   command(first_number + 2);
   EXPECT_EQ(command(first_number + 2 + 65537), "STALE");
@@ -300,7 +300,7 @@ TEST_F(BoardLinkTest, RemembersExactly64Numbers) {
   EXPECT_EQ(command(base), "STALE");
 }
 
-TEST_F(BoardLinkTest, CommandsGoOnOverTheWrap) {
+TEST_F(BoardLinkTest, CommandsContinueWhenTheNumbersWrap) {
   send_due();
   heartbeat(0xfffffffcU, 0);
   heartbeat(0xfffffffdU, answer());
@@ -322,7 +322,7 @@ TEST_F(BoardLinkTest, ACommandIsLate250MsAfterAHeartbeatOvertookIt) {
   EXPECT_EQ(command(first_number + 11), "execute");  // not overtaken
 }
 
-TEST_F(BoardLinkTest, TheFirstHeartbeatThatOvertookItCounts) {
+TEST_F(BoardLinkTest, LatenessCountsFromTheFirstOvertakingHeartbeat) {
   connect();
   for (std::uint32_t i = 0; i < 10; ++i) {
     heartbeat(first_number + 10 + 2 * i, sent.back());
@@ -332,7 +332,7 @@ TEST_F(BoardLinkTest, TheFirstHeartbeatThatOvertookItCounts) {
   EXPECT_EQ(command(first_number + 19), "execute");  // heartbeat 20 came 250 ms ago
 }
 
-TEST_F(BoardLinkTest, TheFirstHeartbeatThatOvertookItCountsAtAnyRate) {
+TEST_F(BoardLinkTest, LatenessCountsFromTheFirstHeartbeatAtAnyRate) {
   connect();
   std::uint32_t pnum = first_number + 10;
   const std::uint32_t held_back = pnum++;
@@ -345,14 +345,14 @@ TEST_F(BoardLinkTest, TheFirstHeartbeatThatOvertookItCountsAtAnyRate) {
   }
 }
 
-TEST_F(BoardLinkTest, ADeadHeartbeatOvertakesNothing) {
+TEST_F(BoardLinkTest, AStaleHeartbeatMakesNoCommandLate) {
   connect();
   heartbeat(first_number + 50, 0);  // stale
   now += 400;
   EXPECT_EQ(command(first_number + 10), "execute");
 }
 
-TEST_F(BoardLinkTest, ARefusedNumberIsSpent) {
+TEST_F(BoardLinkTest, ARefusedNumberIsUsedUp) {
   connect();
   link.refused(ours, first_number + 5, Refusal::range);
   EXPECT_EQ(command(first_number + 5), "RANGE")
@@ -366,7 +366,7 @@ TEST_F(BoardLinkTest, ARefusedNumberIsSpent) {
   EXPECT_EQ(link.last_executed(), first_number + 8);
 }
 
-TEST_F(BoardLinkTest, WhileLostItRefusesAllButTellsOfDuplicates) {
+TEST_F(BoardLinkTest, RefusesCommandsWhileLostButReportsDuplicates) {
   connect();
   command(first_number + 5);
   run(1000);
@@ -375,7 +375,7 @@ TEST_F(BoardLinkTest, WhileLostItRefusesAllButTellsOfDuplicates) {
   EXPECT_EQ(command(first_number + 6, other), "SAFE");
 }
 
-TEST_F(BoardLinkTest, ResumingSpendsWhatWasSentBefore) {
+TEST_F(BoardLinkTest, ResumingMakesEarlierCommandsStale) {
   connect();
   run(1000);
   heartbeat(first_number + 9, sent.back());
@@ -394,7 +394,7 @@ TEST_F(BoardLinkTest, ANewSessionForgetsTheNumbersOfTheOld) {
   EXPECT_EQ(command(first_number + 100'000'001, other), "execute");
 }
 
-TEST_F(BoardLinkTest, ReportsToTheSessionWithWhichHeartbeatItBegan) {
+TEST_F(BoardLinkTest, ReportsWhichHeartbeatStartedTheSession) {
   std::uint32_t first = 0;
   EXPECT_FALSE(link.first_heartbeat(ours, first));
   connect();
@@ -417,13 +417,13 @@ TEST_F(BoardLinkTest, ReportsToTheSessionWithWhichHeartbeatItBegan) {
 
 // --- the board's own heartbeats
 
-TEST_F(BoardLinkTest, SendsAtOnceAndThenEachInterval) {
+TEST_F(BoardLinkTest, SendsAHeartbeatAtOnceAndThenEachInterval) {
   send_due();
   run(2000);
   EXPECT_EQ(sent, (std::vector<std::uint32_t>{700'000, 700'500, 701'000, 701'500, 702'000}));
 }
 
-TEST_F(BoardLinkTest, SendsAtOnceOnEveryChange) {
+TEST_F(BoardLinkTest, SendsAHeartbeatAtOnceOnEveryChange) {
   send_due();
   run(123);
   connect();
@@ -435,7 +435,7 @@ TEST_F(BoardLinkTest, SendsAtOnceOnEveryChange) {
   EXPECT_EQ(sent.back(), 701'200U);  // ACTIVE again
 }
 
-TEST_F(BoardLinkTest, AsksAHostAgainWhileItsEchoStaysAway) {
+TEST_F(BoardLinkTest, RepeatsHeartbeatsWhileTheEchoIsMissing) {
   connect();
   sent.clear();
   const std::uint32_t start = now;
@@ -448,7 +448,7 @@ TEST_F(BoardLinkTest, AsksAHostAgainWhileItsEchoStaysAway) {
   EXPECT_EQ(sent.size(), 3U);
 }
 
-TEST_F(BoardLinkTest, AnswersToOthersDoNotDelayTheRegularOnes) {
+TEST_F(BoardLinkTest, AnswersDoNotDelayTheRegularHeartbeats) {
   connect();
   sent.clear();
   const std::uint32_t start = now;
@@ -480,7 +480,7 @@ TEST_F(BoardLinkTest, AHostThatMayHaveNothingToEchoIsAnswered) {
   EXPECT_EQ(heartbeat(1, 99, other), HeartbeatEffect::unheard);
 }
 
-TEST_F(BoardLinkTest, ManyQuestionsDoNotMakeTheBoardForgetTheEchoOfAnotherHost) {
+TEST_F(BoardLinkTest, ManyQuestionsDoNotInvalidateAnotherHostsEcho) {
   connect();
   run(1000);
   const std::uint32_t echo = answer();
@@ -492,7 +492,7 @@ TEST_F(BoardLinkTest, ManyQuestionsDoNotMakeTheBoardForgetTheEchoOfAnotherHost) 
   EXPECT_EQ(heartbeat(first_number + 2, echo), HeartbeatEffect::resumed);
 }
 
-TEST_F(BoardLinkTest, AnAnswerAfterALossCanBeEchoedAfterIt) {
+TEST_F(BoardLinkTest, AnAnswerSentAfterALossCanBeEchoed) {
   connect();
   answer();
   run(2);
@@ -500,7 +500,7 @@ TEST_F(BoardLinkTest, AnAnswerAfterALossCanBeEchoedAfterIt) {
   ASSERT_EQ(heartbeat(first_number + 2, answer()), HeartbeatEffect::resumed);
 }
 
-TEST_F(BoardLinkTest, TellsExactlyWhenItNeedsTime) {
+TEST_F(BoardLinkTest, ReportsExactlyWhenItIsDue) {
   connect();
   EXPECT_EQ(link.due_in(now), 500U);
   now += 499;
@@ -522,7 +522,7 @@ TEST_F(BoardLinkTest, TellsExactlyWhenItNeedsTime) {
   EXPECT_EQ(link.due_in(now), 500U);
 }
 
-TEST_F(BoardLinkTest, GoesOnOverTheWrapOfTheClock) {
+TEST_F(BoardLinkTest, ContinuesWhenTheClockWraps) {
   now = 0xffffffffU - 2500;
   connect();
   std::uint32_t pnum = first_number + 2;

@@ -37,7 +37,7 @@ std::uint32_t idle(BoardLink& link, std::uint32_t& now_ms, std::uint32_t pnum,
   return pnum;
 }
 
-TEST(BoardLink, TakesCommandsOfAHostThatOnlySentHeartbeatsForHours) {
+TEST(BoardLink, AcceptsACommandAfterHoursOfHeartbeats) {
   BoardLink link(BoardLink::Timing{});
   std::uint32_t now_ms = 5000;
   const std::uint32_t pnum = idle(link, now_ms, first_number, 3 * BoardLink::command_window);

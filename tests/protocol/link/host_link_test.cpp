@@ -30,7 +30,7 @@ struct HostLinkTest : testing::Test {
   std::uint32_t board_offset = 123'456;
 };
 
-TEST_F(HostLinkTest, BeginsConnectingAndSpeaksFirst) {
+TEST_F(HostLinkTest, StartsConnectingAndSendsTheFirstHeartbeat) {
   EXPECT_EQ(link.state(), HostLinkState::connecting);
   EXPECT_EQ(link.due_in(now), 0U);
   EXPECT_TRUE(send_due());
@@ -66,7 +66,7 @@ TEST_F(HostLinkTest, AnswersABoardHeartbeatAtOnceWithItsTime) {
 
 // A board that cannot use the answer sends the same T again. Board and host must not answer each
 // other for ever.
-TEST_F(HostLinkTest, AnswersEachTimeOfTheBoardAtOnceOnlyTheFirstTime) {
+TEST_F(HostLinkTest, AnswersEachBoardTimeAtOnceOnlyOnce) {
   heartbeat();
   ASSERT_TRUE(send_due());
   heartbeat();
@@ -111,7 +111,7 @@ TEST_F(HostLinkTest, LosesASilentBoardExactlyAtTheTimeout) {
   EXPECT_EQ(link.state(), HostLinkState::active);
 }
 
-TEST_F(HostLinkTest, AnAnswerShowsThatTheBoardIsThereButNotItsState) {
+TEST_F(HostLinkTest, AnAnswerKeepsTheLinkAliveAndTheStateUnchanged) {
   state(SafeReason::stop);
   now += 900;
   link.on_heard(now);
@@ -126,7 +126,7 @@ TEST_F(HostLinkTest, DoesNotLoseABoardThatItHasNotFound) {
   EXPECT_EQ(link.state(), HostLinkState::connecting);
 }
 
-TEST_F(HostLinkTest, ABootingBoardKnowsNothingOfUs) {
+TEST_F(HostLinkTest, ABootingBoardReturnsTheLinkToConnecting) {
   heartbeat();
   send_due();
   EXPECT_TRUE(link.echoed());
@@ -138,7 +138,7 @@ TEST_F(HostLinkTest, ABootingBoardKnowsNothingOfUs) {
   EXPECT_TRUE(link.heartbeat_due(now));
 }
 
-TEST_F(HostLinkTest, WantsANewSessionIfOnlyTheClockTellsOfARestart) {
+TEST_F(HostLinkTest, NeedsANewSessionIfOnlyTheClockShowsARestart) {
   ASSERT_TRUE(link.wants_session());
   link.begin_session(7);
   heartbeat();
@@ -157,7 +157,7 @@ TEST_F(HostLinkTest, WantsANewSessionIfOnlyTheClockTellsOfARestart) {
   EXPECT_FALSE(link.wants_session()) << "the board reported its restart";
 }
 
-TEST_F(HostLinkTest, KnowsNothingOfItsBoardAfterASleepOfItsComputer) {
+TEST_F(HostLinkTest, StartsAgainAfterTheComputerSlept) {
   heartbeat();
   send_due();
   const std::uint32_t before = link.take_pnum();
@@ -172,7 +172,7 @@ TEST_F(HostLinkTest, KnowsNothingOfItsBoardAfterASleepOfItsComputer) {
   EXPECT_TRUE(link.heartbeat_due(now));
 }
 
-TEST_F(HostLinkTest, TellsThatItsBoardHasBeenSilentForDays) {
+TEST_F(HostLinkTest, ReportsThatTheBoardHasBeenSilentForDays) {
   EXPECT_FALSE(link.long_silent(now)) << "nothing was heard yet";
   heartbeat();
   now += 12U * 24 * 3600 * 1000;
@@ -183,7 +183,7 @@ TEST_F(HostLinkTest, TellsThatItsBoardHasBeenSilentForDays) {
   EXPECT_FALSE(link.long_silent(now));
 }
 
-TEST_F(HostLinkTest, TheTransportsEndIsKnownAtOnce) {
+TEST_F(HostLinkTest, LosesTheLinkAtOnceWhenTheTransportFails) {
   link.on_transport(false);
   EXPECT_EQ(link.state(), HostLinkState::connecting);
   state();
@@ -210,7 +210,7 @@ TEST_F(HostLinkTest, TheWatchdogStopsTheHeartbeatsOfAHungApplication) {
   EXPECT_TRUE(send_due());
 }
 
-TEST_F(HostLinkTest, TheWatchdogOutlastsTheWrapOfTheClock) {
+TEST_F(HostLinkTest, TheWatchdogStaysExpiredWhenTheClockWraps) {
   link.watchdog(200, now);
   const std::uint32_t fed = now;
   for (; now - fed < 0xffff'0000U; now += 0x8000) link.poll(now);
@@ -236,7 +236,7 @@ TEST_F(HostLinkTest, NumbersEveryDatagramItSends) {
   EXPECT_EQ(link.last_pnum(), first_pnum + 1);
 }
 
-TEST_F(HostLinkTest, TellsExactlyWhenItNeedsTime) {
+TEST_F(HostLinkTest, ReportsExactlyWhenItIsDue) {
   state();
   send_due();
   EXPECT_EQ(link.due_in(now), 100U);

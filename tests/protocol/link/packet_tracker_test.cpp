@@ -29,7 +29,7 @@ TEST(Newer, ComparesBySerialNumber) {
   EXPECT_FALSE(newer(0x80000006U, 5));
 }
 
-TEST(PacketTracker, TellsTheExpectedFromAGap) {
+TEST(PacketTracker, DistinguishesTheNextNumberFromAGap) {
   PacketTracker tracker;
   EXPECT_FALSE(tracker.started());
   EXPECT_EQ(feed(tracker, {7434, 7435, 7436, 7440}),
@@ -40,7 +40,7 @@ TEST(PacketTracker, TellsTheExpectedFromAGap) {
   EXPECT_EQ(tracker.counters().lost, 3U);
 }
 
-TEST(PacketTracker, ALatePacketTakesItsLossBack) {
+TEST(PacketTracker, ALatePacketReducesTheLossCount) {
   PacketTracker tracker;
   EXPECT_EQ(feed(tracker, {1, 4, 2, 3}),
             (Arrivals{Arrival::first, Arrival::gap, Arrival::late, Arrival::late}));
@@ -49,7 +49,7 @@ TEST(PacketTracker, ALatePacketTakesItsLossBack) {
   EXPECT_EQ(tracker.counters().late, 2U);
 }
 
-TEST(PacketTracker, KnowsADuplicateOfTheNewestAndOfAnOlder) {
+TEST(PacketTracker, RecognizesDuplicatesOfNewAndOldPackets) {
   PacketTracker tracker;
   EXPECT_EQ(feed(tracker, {1, 1, 2, 3, 2, 3, 1}),
             (Arrivals{Arrival::first, Arrival::duplicate, Arrival::next, Arrival::next,
@@ -64,7 +64,7 @@ TEST(PacketTracker, ALatePacketIsADuplicateTheSecondTime) {
             (Arrivals{Arrival::first, Arrival::gap, Arrival::late, Arrival::duplicate}));
 }
 
-TEST(PacketTracker, RemembersTheLast64) {
+TEST(PacketTracker, RemembersTheLast64Numbers) {
   PacketTracker tracker;
   tracker.on(1000);
   tracker.on(1064);  // 1000 is now 64 numbers back, 1001 is 63
@@ -74,7 +74,7 @@ TEST(PacketTracker, RemembersTheLast64) {
   EXPECT_EQ(tracker.counters().old, 1U);
 }
 
-TEST(PacketTracker, WhatWasSentBeforeTheFirstIsOldAndNoLoss) {
+TEST(PacketTracker, NumbersBeforeTheFirstAreOldAndNotLost) {
   PacketTracker tracker;
   EXPECT_EQ(feed(tracker, {10, 15, 8, 9, 9, 11}),
             (Arrivals{Arrival::first, Arrival::gap, Arrival::old, Arrival::old, Arrival::old,
@@ -99,7 +99,7 @@ TEST(PacketTracker, TwoRisingNumbersFarOffAreARestartedSender) {
   }
 }
 
-TEST(PacketTracker, OldNumbersThatDoNotRiseAreNoRestart) {
+TEST(PacketTracker, OldNumbersThatDoNotRiseAreNotARestart) {
   PacketTracker tracker;
   EXPECT_EQ(feed(tracker, {1000, 5, 5, 4, 6, 1001, 7, 9, 8}),
             (Arrivals{Arrival::first, Arrival::old, Arrival::old, Arrival::old, Arrival::old,
@@ -115,7 +115,7 @@ TEST(PacketTracker, AJumpWithinTheLimitIsALossAndBeyondItARestart) {
   EXPECT_EQ(tracker.on(2 * PacketTracker::max_gap + 1), Arrival::old);
 }
 
-TEST(PacketTracker, GoesOnOverTheWrap) {
+TEST(PacketTracker, ContinuesWhenTheNumbersWrap) {
   PacketTracker tracker;
   EXPECT_EQ(feed(tracker, {0xfffffffeU, 0xffffffffU, 1, 0, 0xffffffffU, 2}),
             (Arrivals{Arrival::first, Arrival::next, Arrival::gap, Arrival::late,
@@ -123,7 +123,7 @@ TEST(PacketTracker, GoesOnOverTheWrap) {
   EXPECT_EQ(tracker.counters().lost, 0U);
 }
 
-TEST(PacketTracker, BeginsAnewWhenToldSo) {
+TEST(PacketTracker, RestartBeginsANewCount) {
   PacketTracker tracker;
   tracker.restart();  // before the first datagram
   EXPECT_EQ(tracker.counters().restarts, 0U);

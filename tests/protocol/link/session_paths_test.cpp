@@ -21,7 +21,7 @@ struct SessionPathsTest : testing::Test {
   Source left;
 };
 
-TEST_F(SessionPathsTest, BeginWithOne) {
+TEST_F(SessionPathsTest, BeginWithOnePath) {
   EXPECT_EQ(paths.size(), 1);
   EXPECT_EQ(paths[0], path_a);
   EXPECT_TRUE(paths.has(path_a));
@@ -37,7 +37,7 @@ TEST_F(SessionPathsTest, AreFourAtMost) {
   EXPECT_EQ(paths.joins(), 3U);
 }
 
-TEST_F(SessionPathsTest, ASilentPathLeavesButNotTheLast) {
+TEST_F(SessionPathsTest, RemovesASilentPathButNotTheLast) {
   paths.on_heartbeat(path_b, 500);
   EXPECT_EQ(left_by(999), 0);
   EXPECT_EQ(left_by(1000), 1);
@@ -53,7 +53,7 @@ TEST_F(SessionPathsTest, AHeartbeatKeepsItsPath) {
   EXPECT_EQ(left_by(1499), 0);
 }
 
-TEST_F(SessionPathsTest, ALostPortTakesAllItsPaths) {
+TEST_F(SessionPathsTest, ALostPortRemovesAllItsPaths) {
   paths.on_heartbeat(path_b, 1);
   paths.on_heartbeat(path_c, 1);
   EXPECT_FALSE(paths.take_port(2, left));
@@ -65,7 +65,7 @@ TEST_F(SessionPathsTest, ALostPortTakesAllItsPaths) {
   EXPECT_EQ(paths.size(), 0);
 }
 
-TEST_F(SessionPathsTest, CountWhatIsLostOverAllPathsAndRepeatedOnOne) {
+TEST_F(SessionPathsTest, CountLossOverAllPathsAndDuplicatesPerPath) {
   paths.on_heartbeat(path_b, 1);
   EXPECT_FALSE(paths.count(path_a, 10));
   EXPECT_TRUE(paths.count(path_b, 10)) << "another path brought this datagram";
@@ -81,7 +81,7 @@ TEST_F(SessionPathsTest, CountWhatIsLostOverAllPathsAndRepeatedOnOne) {
   EXPECT_TRUE(paths.count(path_b, 15));
 }
 
-TEST_F(SessionPathsTest, AResumedSessionKeepsItsCountButOnePathOnly) {
+TEST_F(SessionPathsTest, AResumedSessionKeepsItsCountButOnlyOnePath) {
   paths.on_heartbeat(path_b, 1);
   paths.count(path_a, 10);
   paths.resume(path_c, 3000);

@@ -47,7 +47,7 @@ TEST_F(WatchersTest, NothingStreamsBeforeTheEcho) {
   EXPECT_EQ(watchers.find(here)->period_ms, 20U);
 }
 
-TEST_F(WatchersTest, TheTokenOfAnotherPlaceProvesNothing) {
+TEST_F(WatchersTest, ATokenOfAnotherPeerIsNotAccepted) {
   const std::uint32_t echo = told(here);
   now += 30;
   EXPECT_EQ(ask(place(2), echo), Effect::unproven);
@@ -60,7 +60,7 @@ TEST_F(WatchersTest, TheTokenOfAnotherPlaceProvesNothing) {
       << "the token of another watcher does not prove an address either";
 }
 
-TEST_F(WatchersTest, ATokenIsGoodForTheTimeOfALease) {
+TEST_F(WatchersTest, ATokenIsValidForOneLeaseTime) {
   const std::uint32_t echo = told(here);
   now += Watchers::lease_ms;
   EXPECT_EQ(ask(here, echo), Effect::watching);
@@ -82,7 +82,7 @@ TEST_F(WatchersTest, AFloodIsAnsweredFiftyTimesASecond) {
   EXPECT_FALSE(watchers.any());
 }
 
-TEST_F(WatchersTest, AFloodEndsNoLease) {
+TEST_F(WatchersTest, AFloodDoesNotEndALease) {
   const std::uint32_t echo = watch(here);
   for (int ms = 0; ms < 5000; ++ms, ++now) {
     if (ask(place(100)) == Effect::unproven) watchers.tell(place(100), ++token, now);
@@ -109,7 +109,7 @@ TEST_F(WatchersTest, ALeaseLastsTwoSecondsFromItsRenewal) {
   EXPECT_FALSE(watchers.any());
 }
 
-TEST_F(WatchersTest, AWatcherEndsItsLeaseAndNobodyElseDoes) {
+TEST_F(WatchersTest, OnlyTheWatcherCanEndItsLease) {
   const std::uint32_t echo = watch(here);
   EXPECT_EQ(ask(here, 0, 0), Effect::ignored) << "a forged datagram";
   EXPECT_EQ(ask(place(2), echo, 0), Effect::ignored);
@@ -117,7 +117,7 @@ TEST_F(WatchersTest, AWatcherEndsItsLeaseAndNobodyElseDoes) {
   EXPECT_FALSE(watchers.any());
 }
 
-TEST_F(WatchersTest, AtAPlaceThatNobodyCanForgeNothingNeedBeEchoed) {
+TEST_F(WatchersTest, APeerThatCannotBeForgedNeedsNoEcho) {
   EXPECT_EQ(watchers.on_lease(here, 5, 0, true, now), Effect::watching);
   now += Watchers::lease_ms - 1;
   EXPECT_EQ(watchers.on_lease(here, 5, 0, true, now), Effect::watching);
@@ -126,7 +126,7 @@ TEST_F(WatchersTest, AtAPlaceThatNobodyCanForgeNothingNeedBeEchoed) {
   EXPECT_FALSE(watchers.any());
 }
 
-TEST_F(WatchersTest, ThereIsRoomForFour) {
+TEST_F(WatchersTest, HasRoomForFourWatchers) {
   for (std::uint32_t i = 1; i <= 4; ++i) watch(place(i));
   const std::uint32_t echo = told(place(5));
   EXPECT_EQ(ask(place(5), echo), Effect::full);
@@ -135,7 +135,7 @@ TEST_F(WatchersTest, ThereIsRoomForFour) {
   EXPECT_EQ(watchers.find(place(5))->pnum, 0U) << "the packet number restarts";
 }
 
-TEST_F(WatchersTest, EachGetsItsOwnRate) {
+TEST_F(WatchersTest, EachWatcherGetsItsOwnRate) {
   watch(here, 30);
   Watcher& watcher = *watchers.find(here);
   int states = 0;

@@ -20,7 +20,7 @@ TEST(ChipFault, EveryChipOfTheBoardHasItsName) {
   EXPECT_STREQ(chip_name(0x70), "unknown chip");
 }
 
-TEST(ChipFault, TheNumbersAreThoseOfTheField) {
+TEST(ChipFault, EachTroubleNumberHasItsText) {
   const char* const texts[] = {"none",           "no acknowledge", "bus stuck", "was reset",
                                "wrong register", "not ready",      "unknown"};
   for (std::uint8_t i = 0; i < std::size(texts); ++i) {

@@ -39,7 +39,7 @@ std::string commands(int count) {
   return fields;
 }
 
-TEST(CommandGroup, OutputsOfDifferentChannelsGoTogether) {
+TEST(CommandGroup, OutputsOfDifferentChannelsFormAGroup) {
   for (const char* fields :
        {"O:358,1,1;O:358,1,2;", "O:1,1,4;D:1,0,4;S:1500,4;R:4,On;P:-5,4;B:1,1,0,4;Z:4;PNum:5;T:1;",
         "X:DAC,1,1650;X:DAC,2,0;O:1,1,1;", "PNum:5;O:1,1,1;T:1;AIN24:1;O:1,1,2;A:1,2,3,4;",
@@ -49,7 +49,7 @@ TEST(CommandGroup, OutputsOfDifferentChannelsGoTogether) {
   EXPECT_EQ(judged(commands(16)), "ok");
 }
 
-TEST(CommandGroup, TheFirstThatCannotBeExecutedIsNamed) {
+TEST(CommandGroup, NamesTheFirstCommandThatCannotBeExecuted) {
   const std::pair<std::string, const char*> cases[] = {
       {"O:1,1,1;O:4096,1,2;O:1,1,5;", "RANGE 2"},
       {"O:1,1,1;O:1,1,2;O:1,1,5;", "CHANNEL 3"},
@@ -84,7 +84,7 @@ TEST(CommandGroup, TheFirstThatCannotBeExecutedIsNamed) {
   EXPECT_EQ(judged(commands(24)), "FORMAT 17");
 }
 
-TEST(CommandGroup, AsManyFieldsAsADatagramHoldsAreTooMany) {
+TEST(CommandGroup, RefusesADatagramFullOfFields) {
   std::string fields;
   while (fields.size() + 30 < max_datagram) fields += "Z:1;";
   EXPECT_EQ(judged(fields), "FORMAT 2");

@@ -84,7 +84,7 @@ TEST(Command, AlternativeFormsAreTheSameCommand) {
   EXPECT_EQ(again("O:0358,01,01"), "O:358,1,1");
 }
 
-TEST(Command, TheFactoriesMakeWhatIsWritten) {
+TEST(Command, EachFactoryMakesItsCommandText) {
   EXPECT_EQ(written(Command::heartbeat()), "H:ROS2-R4");
   EXPECT_EQ(written(Command::osmc(1, Pwm(358), Direction::forward)), "O:358,1,1");
   EXPECT_EQ(written(Command::dhb12(4, Pwm(4095), Direction::reverse)), "D:4095,0,4");
@@ -127,7 +127,7 @@ constexpr Ranged ranged[] = {
     {"P", ",20000", -2147483648LL, 2147483647LL, 4},
 };
 
-TEST(Command, ValuesAreTakenToTheEdgesOfTheirRangeAndNoFurther) {
+TEST(Command, AcceptsValuesOnlyWithinTheirRange) {
   for (const Ranged& c : ranged) {
     for (const long long value : {c.min, c.max}) {
       EXPECT_EQ(command_judged(c.text(std::to_string(value), "1")), Refusal::none)
@@ -141,7 +141,7 @@ TEST(Command, ValuesAreTakenToTheEdgesOfTheirRangeAndNoFurther) {
   }
 }
 
-TEST(Command, ChannelsBeginAtOneAndEndWithTheBoards) {
+TEST(Command, AcceptsOnlyChannelsOfTheBoard) {
   for (const Ranged& c : ranged) {
     for (int channel = -1; channel <= 17; ++channel) {
       const bool exists = channel >= 1 && channel <= c.channels;
@@ -175,7 +175,7 @@ TEST(Command, DirectionsBrakesAndSpeedsHaveTheirRange) {
   EXPECT_EQ(command_judged("P:1,20000,1"), Refusal::none);
 }
 
-TEST(Command, AWrongNumberOfValuesIsAWrongForm) {
+TEST(Command, AWrongNumberOfValuesIsAFormatError) {
   for (const std::string text :
        {"O:1",       "O:1,1",       "O:1,1,1,1",  "D:1,1",       "D:1,1,1,1",
         "S:1",       "S:1,1,1",     "R:1",        "R:1,On,1",    "P:1",
@@ -186,7 +186,7 @@ TEST(Command, AWrongNumberOfValuesIsAWrongForm) {
   }
 }
 
-TEST(Command, WhatIsNoNumberIsAWrongForm) {
+TEST(Command, AnInvalidNumberIsAFormatError) {
   for (const std::string bad : {"", "+5", " 5", "5 ", "x", "5.0", "0x5", "-", "1e3", "5:"}) {
     for (const Ranged& c : ranged) {
       EXPECT_EQ(command_judged(c.text(bad, "1")), Refusal::format) << c.letter << bad;
@@ -211,13 +211,13 @@ TEST(Command, OtherLettersAndWordsAreUnknown) {
   }
 }
 
-TEST(Command, TheFormComesBeforeTheChannelAndTheChannelBeforeTheRange) {
+TEST(Command, ChecksTheFormThenTheChannelThenTheRange) {
   EXPECT_EQ(command_judged("O:9999,x,9"), Refusal::format);
   EXPECT_EQ(command_judged("O:9999,1,9"), Refusal::channel);
   EXPECT_EQ(command_judged("O:9999,1,1"), Refusal::range);
 }
 
-TEST(Command, CommandsOfTheFactoriesAreCheckedTheSame) {
+TEST(Command, ChecksTheCommandsOfTheFactories) {
   EXPECT_EQ(check_command(Command::osmc(4, Pwm(4095), Direction::forward)), Refusal::none);
   EXPECT_EQ(check_command(Command::osmc(4, Pwm(4096), Direction::forward)), Refusal::range);
   EXPECT_EQ(check_command(Command::osmc(4, Pwm(-1), Direction::forward)), Refusal::range);
@@ -288,7 +288,7 @@ TEST(Command, TextsCannotForgeAField) {
   EXPECT_EQ(written(Command::setting("rate", "1,2")), "refused");
 }
 
-TEST(Command, OutputsAreDrivenBySevenOfThem) {
+TEST(Command, SevenCommandsDriveOutputs) {
   const std::string driving = "ODSRPBZ";
   for (const std::string text :
        {"O:1,1,1", "D:1,1,1", "S:1,1", "R:1,On", "P:1,1", "B:1,1,1,1", "Z:1", "H:ROS2-R4", "E:STOP",
@@ -301,7 +301,7 @@ TEST(Command, OutputsAreDrivenBySevenOfThem) {
   }
 }
 
-TEST(Command, TheCommandFieldIsTheOneWithALetterForItsName) {
+TEST(Command, TheCommandFieldHasAOneLetterName) {
   struct Case {
     const char* fields;
     int count;
@@ -321,7 +321,7 @@ TEST(Command, TheCommandFieldIsTheOneWithALetterForItsName) {
   }
 }
 
-TEST(Command, ListsOfFieldsAreSets) {
+TEST(Command, AListOfFieldsIsReadAsASet) {
   FieldSet set;
   EXPECT_EQ(parse_fields("DEFAULT", set), Refusal::none);
   EXPECT_EQ(set, FieldSet::paper_default());

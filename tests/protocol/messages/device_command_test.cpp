@@ -46,7 +46,7 @@ TEST(DeviceCommand, IsReadAndWrittenAgain) {
       << "data sheets write addresses in hexadecimal";
 }
 
-TEST(DeviceCommand, WhatIsWrongHasItsCode) {
+TEST(DeviceCommand, EachMistakeHasItsRefusalCode) {
   const std::pair<std::string, std::string> wrong[] = {
       {"X:", "FORMAT"},
       {"X:GO", "UNKNOWN"},
@@ -90,7 +90,7 @@ TEST(DeviceCommand, WhatIsWrongHasItsCode) {
   for (const auto& [text, code] : wrong) EXPECT_EQ(device_again(text), code) << text;
 }
 
-TEST(DeviceCommand, OnlyAWriteAndAVoltageMayMoveSomethingAndTheVoltageJoinsGroups) {
+TEST(DeviceCommand, OnlyWritesAndDacDriveOutputsAndOnlyDacJoinsGroups) {
   for (const CommandKind kind : {CommandKind::i2c_write, CommandKind::uart_write}) {
     EXPECT_TRUE(drives_output(kind));
     EXPECT_FALSE(joins_groups(kind));

@@ -26,7 +26,7 @@ struct Read {
   Datagram datagram;
 };
 
-TEST(Message, KindsAreToldByTheirField) {
+TEST(Message, RecognizesTheKindByItsField) {
   struct Case {
     const char* fields;
     MessageKind kind;
@@ -52,7 +52,7 @@ TEST(Message, KindsAreToldByTheirField) {
   }
 }
 
-TEST(Message, BoardHeartbeatIsThePapers) {
+TEST(Message, ABoardHeartbeatMatchesThePaper) {
   char buffer[max_datagram];
   EXPECT_EQ(str(write_board_heartbeat(buffer, sizeof buffer, 0, 0, SafeReason::none)),
             "H:R4-ROS2;PNum:0;T:0;^0xb10b3a06^");
@@ -61,7 +61,7 @@ TEST(Message, BoardHeartbeatIsThePapers) {
   EXPECT_TRUE(write_board_heartbeat(buffer, 10, 0, 0, SafeReason::none).empty());
 }
 
-TEST(Message, BoardHeartbeatCarriesTheReasonBehindTheTime) {
+TEST(Message, ABoardHeartbeatHasTheReasonAfterTheTime) {
   for (int reason = 1; reason < safe_reason_count; ++reason) {
     char buffer[max_datagram];
     const Text bytes =
@@ -73,7 +73,7 @@ TEST(Message, BoardHeartbeatCarriesTheReasonBehindTheTime) {
   }
 }
 
-TEST(Message, BoardHeartbeatCarriesWhatAStopAndAClearHaveToKnow) {
+TEST(Message, ABoardHeartbeatNamesTheCauseAndTheStop) {
   SafeReport report(SafeReason::stop);
   report.cause = 734003;
   report.has_stop = true;
@@ -90,7 +90,7 @@ TEST(Message, BoardHeartbeatCarriesWhatAStopAndAClearHaveToKnow) {
   EXPECT_EQ(again.stop, 4294967295U);
 }
 
-TEST(Message, ACauseOrAStopThatCannotBeReadIsNone) {
+TEST(Message, IgnoresAnInvalidCauseOrStop) {
   for (const char* value : {"", "-1", "x", "1,2", "4294967296"}) {
     const SafeReport report = heartbeat_report(
         Read("H:R4-ROS2;SAFE:2;CAUSE:" + std::string(value) + ";STOP:" + value + ";").datagram);
@@ -99,7 +99,7 @@ TEST(Message, ACauseOrAStopThatCannotBeReadIsNone) {
   }
 }
 
-TEST(Message, ARefusalTellsTheHostOfTheSessionWhichOneItIs) {
+TEST(Message, ARefusalNamesTheSession) {
   Nack nack;
   nack.pnum = 7;
   nack.code = Refusal::stale;
@@ -120,7 +120,7 @@ TEST(Message, ARefusalTellsTheHostOfTheSessionWhichOneItIs) {
   EXPECT_FALSE(again.has_session);
 }
 
-TEST(Message, ARefusalOfAGroupTellsWhichCommandItIs) {
+TEST(Message, ARefusalOfAGroupNamesTheCommand) {
   Nack nack;
   nack.pnum = 7;
   nack.code = Refusal::range;
@@ -143,7 +143,7 @@ TEST(Message, ARefusalOfAGroupTellsWhichCommandItIs) {
   }
 }
 
-TEST(Message, BoardHeartbeatCarriesTheNonceBehindTheReason) {
+TEST(Message, ABoardHeartbeatHasTheNonceAfterTheReason) {
   char buffer[max_datagram];
   const Text bytes =
       write_board_heartbeat(buffer, sizeof buffer, 12, 790, SafeReason::stop, "0123456789abcdef");
@@ -168,13 +168,13 @@ TEST(Message, AConnectingHeartbeatHasNumberZeroAndNoTimeOrANonce) {
   EXPECT_FALSE(connecting("H:R4-ROS2;PNum:1;T:79146;AN:0123456789abcdef;"));
 }
 
-TEST(Message, AHeartbeatWithoutAReasonHasNone) {
+TEST(Message, AMissingOrZeroReasonIsNone) {
   for (const char* fields : {"H:R4-ROS2;", "H:R4-ROS2;SAFE:0;"}) {
     EXPECT_EQ(heartbeat_reason(Read(fields).datagram), SafeReason::none) << fields;
   }
 }
 
-TEST(Message, AReasonThatIsNotKnownIsAFault) {
+TEST(Message, AnUnknownReasonIsReadAsAFault) {
   for (const char* fields : {"H:R4-ROS2;SAFE:7;", "H:R4-ROS2;SAFE:4294967295;", "H:R4-ROS2;SAFE:;",
                              "H:R4-ROS2;SAFE:1,2;", "H:R4-ROS2;SAFE:link;"}) {
     EXPECT_EQ(heartbeat_reason(Read(fields).datagram), SafeReason::fault) << fields;
@@ -195,7 +195,7 @@ TEST(Message, RefusalsRoundTripWithEveryCode) {
   }
 }
 
-TEST(Message, OtherRefusalsAreNotTaken) {
+TEST(Message, RejectsInvalidRefusals) {
   for (const char* fields :
        {"A:1;", "N:;", "N:66;", "N:66,;", "N:66,NONE;", "N:66,range;", "N:66,OTHER;",
         "N:66,RANGE,1;", "N:-1,RANGE;", "N:4294967296,RANGE;", "N:,RANGE;", "N:x,RANGE;"}) {
@@ -227,7 +227,7 @@ TEST(Message, IdentityRoundTrips) {
   }
 }
 
-TEST(Message, AnIdentityTellsTheNameWhetherAnotherHostIsInControlAndWhatWasAsked) {
+TEST(Message, AnIdentityHasTheNameTheBusyFlagAndTheQuestion) {
   char buffer[max_datagram];
   for (const bool busy : {false, true}) {
     DatagramWriter writer(buffer, sizeof buffer);
@@ -255,7 +255,7 @@ TEST(Message, AnIdentityTellsTheNameWhetherAnotherHostIsInControlAndWhatWasAsked
   }
 }
 
-TEST(Message, AnIdentityWhoseOtherFieldsCannotBeReadIsOneWithoutThem) {
+TEST(Message, AnIdentityIsReadWithoutItsInvalidFields) {
   for (const std::string& fields :
        {std::string(), std::string("NAME:;BUSY:;"), std::string("NAME:a b;BUSY:2;"),
         std::string("NAME:a,b;BUSY:1,0;ASKED:1,2;"), std::string("NAME:off;BUSY:-1;ASKED:-1;"),
@@ -269,7 +269,7 @@ TEST(Message, AnIdentityWhoseOtherFieldsCannotBeReadIsOneWithoutThem) {
   }
 }
 
-TEST(Message, OtherIdentitiesAreNotTaken) {
+TEST(Message, RejectsInvalidIdentities) {
   const std::string longest(board_id_max, 'n');
   for (const std::string& fields :
        {std::string("A:1;"), std::string("I:;"), std::string("I:R4;"), std::string("I:R4,a,b;"),

@@ -33,14 +33,14 @@ TEST(Secrets, AreTheDigitsOfAKeyAndAPassword) {
   EXPECT_EQ(str(secret_in("")), "");
 }
 
-TEST(Secrets, MayHaveAMisspelledNameInFrontOfThem) {
+TEST(Secrets, AreFoundAfterAMisspelledName) {
   for (const char* command :
        {"C:pasword,letmein!", "C:Key,letmein!", "C:password=letmein!", "C:key,letmein!"}) {
     EXPECT_EQ(str(secret_in(Text(std::string(command)))), "letmein!") << command;
   }
 }
 
-TEST(Secrets, AreReplacedInADatagramThatStaysOne) {
+TEST(Secrets, AreReplacedInADatagramThatStaysValid) {
   for (const std::string& end :
        {std::string("PNum:66;T:79146;"), std::string("PNum:1;T:2;A:3,17,79146,AbCdEfGhIjK;")}) {
     EXPECT_EQ(masked(with_crc("C:key,3:" + secret_digits + ";" + end)),
@@ -53,7 +53,7 @@ TEST(Secrets, AreReplacedInADatagramThatStaysOne) {
   EXPECT_EQ(masked(once), once);
 }
 
-TEST(Secrets, LeaveEveryOtherDatagramAsItIs) {
+TEST(Secrets, MaskingLeavesOtherDatagramsUnchanged) {
   for (const std::string& bytes :
        {captured_state(), with_crc("C:rate,50;PNum:1;T:2;"), with_crc("C:key,3:off;PNum:1;T:2;"),
         with_crc("X:C:key,1;PNum:1;T:2;"), with_crc("CC:password,letmein!;PNum:1;"),
@@ -65,7 +65,7 @@ TEST(Secrets, LeaveEveryOtherDatagramAsItIs) {
 }
 
 // The checksum of a damaged datagram could confirm a guess of the secret.
-TEST(Secrets, OfADamagedDatagramTakeTheRestWithThem) {
+TEST(Secrets, AreReplacedWithTheRestOfADamagedDatagram) {
   std::string damaged = with_crc("C:password,letmein!;PNum:66;T:79146;");
   damaged[15] = '\x07';
   EXPECT_EQ(masked(damaged), "C:password,...");
@@ -87,7 +87,7 @@ RC_GTEST_PROP(Secrets, AreGoneTheFirstTime, (bool is_valid)) {
   RC_ASSERT((";" + once).find(";C:password,letmein!") == std::string::npos);
 }
 
-TEST(Secrets, NeverMakeADatagramLongerThanTheRoomForIt) {
+TEST(Secrets, MaskingStaysWithinItsExtraRoom) {
   // The secret has one character, and the new checksum has more digits than the old one.
   for (int i = 0; i < 2000; ++i) {
     const std::string bytes = with_crc("C:x,1;PNum:" + std::to_string(i) + ";");

@@ -12,7 +12,7 @@ Refusal set_text(Settings& settings, const std::string& key, const std::string& 
   return set(settings, key, value);
 }
 
-TEST(Settings, DefaultsAreThePapersAndPackedOnCan) {
+TEST(Settings, DefaultsMatchThePaperAndPackIsOn) {
   const Settings settings;
   EXPECT_EQ(settings.state_rate_hz, 100);
   EXPECT_EQ(settings.heartbeat_ms, 500);
@@ -21,7 +21,7 @@ TEST(Settings, DefaultsAreThePapersAndPackedOnCan) {
   EXPECT_TRUE(settings.pack);
 }
 
-TEST(Settings, NumbersAreTakenToTheEdgesOfTheirRange) {
+TEST(Settings, AcceptsNumbersOnlyWithinTheirRange) {
   struct Case {
     const char* key;
     int min;
@@ -50,7 +50,7 @@ TEST(Settings, NumbersAreTakenToTheEdgesOfTheirRange) {
   }
 }
 
-TEST(Settings, TheHeartbeatStaysBelowTheTimeout) {
+TEST(Settings, TheHeartbeatIntervalStaysBelowTheTimeout) {
   Settings settings;
   EXPECT_EQ(set_text(settings, "timeout", "500"), Refusal::range);
   EXPECT_EQ(set_text(settings, "timeout", "501"), Refusal::none);
@@ -60,7 +60,7 @@ TEST(Settings, TheHeartbeatStaysBelowTheTimeout) {
   EXPECT_EQ(settings.timeout_ms, 501);
 }
 
-TEST(Settings, RecoveryIsOneOfTwoWords) {
+TEST(Settings, RecoveryIsEitherLastOrRearm) {
   Settings settings;
   EXPECT_EQ(set_text(settings, "recovery", "rearm"), Refusal::none);
   EXPECT_EQ(settings.recovery, Recovery::rearm);

@@ -41,7 +41,7 @@ TEST(SiteSettings, AnotherNetworkForgetsThePassword) {
   EXPECT_STREQ(settings.password, "");
 }
 
-TEST(SiteSettings, OffIsNoNetworkUnlessItIsWrittenOtherwise) {
+TEST(SiteSettings, OffMeansNoNetworkUnlessItIsEscaped) {
   SiteSettings settings;
   set_text(settings, "network", "one");
   EXPECT_EQ(set_text(settings, "network", "off"), Refusal::none);
@@ -50,7 +50,7 @@ TEST(SiteSettings, OffIsNoNetworkUnlessItIsWrittenOtherwise) {
   EXPECT_STREQ(settings.network, "off");
 }
 
-TEST(SiteSettings, EveryAcceptedAndRefusedForm) {
+TEST(SiteSettings, AcceptsValidFormsAndRefusesInvalidForms) {
   struct Case {
     const char* key;
     std::string value;
@@ -124,7 +124,7 @@ TEST(SiteSettings, EveryAcceptedAndRefusedForm) {
   }
 }
 
-TEST(SiteSettings, ANameIsReplacedWholeAndTakenAway) {
+TEST(SiteSettings, ANameCanBeReplacedAndRemoved) {
   SiteSettings settings;
   EXPECT_STREQ(settings.name, "");
   set_text(settings, "name", "a-long-name");
@@ -164,7 +164,7 @@ TEST(SiteSettings, PasswordAndKeysAreSecret) {
   EXPECT_FALSE(is_secret_setting("other"));
 }
 
-TEST(SiteSettings, AreToldFromTheOthers) {
+TEST(SiteSettings, AreDistinguishedFromOtherSettings) {
   for (const char* key :
        {"network", "password", "host", "port", "node", "chips", "name", "AINDMH", "key"}) {
     EXPECT_TRUE(is_site_setting(Text(key, std::string(key).size()))) << key;
@@ -174,7 +174,7 @@ TEST(SiteSettings, AreToldFromTheOthers) {
   }
 }
 
-TEST(KeptSettings, ComeBackAsTheyWere) {
+TEST(KeptSettings, RoundTripThroughText) {
   Settings settings;
   settings.state_rate_hz = 50;
   settings.heartbeat_ms = 1000;
@@ -197,7 +197,7 @@ TEST(KeptSettings, ComeBackAsTheyWere) {
   EXPECT_EQ(back.heartbeat_ms, 1000) << "heartbeat_ms is valid only after timeout_ms is set";
 }
 
-TEST(KeptSettings, AFirmwareWithOtherDefaultsTakesThemAsTheyWereKept) {
+TEST(KeptSettings, KeepTheirValuesInAFirmwareWithOtherDefaults) {
   Settings back;
   read_settings("rate,50\nrecovery,last\npack,0\n", back);
   EXPECT_FALSE(back.pack);
@@ -206,7 +206,7 @@ TEST(KeptSettings, AFirmwareWithOtherDefaultsTakesThemAsTheyWereKept) {
   EXPECT_TRUE(back.pack) << "the text comes from a firmware without this setting";
 }
 
-TEST(KeptSettings, TheLongestFit) {
+TEST(KeptSettings, TheLongestSettingsFit) {
   Settings settings;
   settings.state_rate_hz = 1000;
   settings.timeout_ms = 10000;
@@ -234,7 +234,7 @@ TEST(KeptSettings, TheLongestFit) {
   EXPECT_FALSE(write_settings(settings, small, sizeof small, text));
 }
 
-TEST(KeptSettings, WhatIsNotKnownIsPassedOver) {
+TEST(KeptSettings, UnknownLinesAreSkipped) {
   Settings settings;
   read_settings("rate,50\nfuture,1\nnonsense\n\n,\ntimeout,99\nnode,3", settings);
   EXPECT_EQ(settings.state_rate_hz, 50);

@@ -50,7 +50,7 @@ std::vector<std::string> names_in(const std::string& cell) {
   return names;
 }
 
-TEST(StateFields, AreThoseOfProtocolMd) {
+TEST(StateFields, MatchTheTableInProtocolMd) {
   std::ifstream file(R4_TEST_DATA "/../../docs/reference/protocol.md");
   std::string line;
   while (std::getline(file, line) && line != "### State fields") continue;
@@ -108,7 +108,7 @@ TEST(StateFields, AreFoundByKindAndChannel) {
   EXPECT_EQ(channels[static_cast<int>(FieldKind::servo)], servo_channels);
 }
 
-TEST(StateFields, OfTheAnalogInputsHaveTheirOrder) {
+TEST(StateFields, AnalogFieldsHaveTheOrderOfTheInputs) {
   State state;
   for (int i = 0; i < analog_channels; ++i) state.raw.analog_cv[i] = 100 * i;
   for (int i = 0; i < analog_channels; ++i) {
@@ -118,7 +118,7 @@ TEST(StateFields, OfTheAnalogInputsHaveTheirOrder) {
   EXPECT_EQ(state_field(FieldKind::analog, static_cast<int>(Analog::ain6) + 1), StateField::ain6);
 }
 
-TEST(StateFields, AreNotInAnySetAtTheirCount) {
+TEST(StateFields, NoSetContainsTheFieldCount) {
   FieldSet every;
   for (const StateFieldRow& row : state_fields) every.add(row.field);
   EXPECT_FALSE(every.has(StateField::count));

@@ -126,7 +126,7 @@ const char* const numbered_fields[] = {
     "I2CX:18,3,x",     "I2CBUS:2,19,20",  "UART1:9101,21,xe1", "UART2:9102,22,xe2",
     "DAC1:1601",       "DAC2:1602",       "GPIO:130",          "FAULT:64,1"};
 
-TEST(State, AReasonThatIsNotKnownIsAFault) {
+TEST(State, AnUnknownReasonIsReadAsAFault) {
   State state;
   ASSERT_TRUE(read_fields("SAFE:7;", state));
   EXPECT_EQ(state.safe, SafeReason::fault);
@@ -156,7 +156,7 @@ TEST(State, EveryFieldIsReadIntoTheMemberItIsWrittenFrom) {
   }
 }
 
-TEST(State, TheNumbersOfAFieldAreThoseOfTheWire) {
+TEST(State, TheNumbersOfAFieldMatchItsText) {
   const State state = numbered_state();
   for (const StateField field : every_field()) {
     const std::string text = numbered_fields[static_cast<int>(field)];
@@ -171,7 +171,7 @@ TEST(State, TheNumbersOfAFieldAreThoseOfTheWire) {
   }
 }
 
-TEST(State, NumbersAreSetWhereTheyAreReadFrom) {
+TEST(State, NumbersAreSetInTheMemberTheyAreReadFrom) {
   const State from = numbered_state();
   for (const StateField field : every_field()) {
     State state;
@@ -234,7 +234,7 @@ TEST(State, AllFieldsFitTwoDatagramsAndRoundTrip) {
   }
 }
 
-TEST(State, FieldsComeInAnyOrderWithUnknownOnesBetween) {
+TEST(State, ReadsFieldsInAnyOrderAndSkipsUnknownFields) {
   State state;
   ASSERT_TRUE(read_fields(
       "OSMC1:400,1;NEW:x;T:7;SAFE:2;Z9:;AIN24:1.50;PNum:3;ain24:x;SERVO17POS:99;A:sig;", state));
@@ -250,7 +250,7 @@ TEST(State, FieldsComeInAnyOrderWithUnknownOnesBetween) {
   EXPECT_EQ(state.t_ms, 7U);
 }
 
-TEST(State, WhatADatagramDoesNotBringKeepsItsValue) {
+TEST(State, MissingFieldsKeepTheirValues) {
   State state = numbered_state();
   ASSERT_TRUE(read_fields("PNum:1;T:2;RELAYS:3;", state));
   EXPECT_EQ(state.relays, 3);
@@ -260,7 +260,7 @@ TEST(State, WhatADatagramDoesNotBringKeepsItsValue) {
   EXPECT_EQ(state.t_ms, 2U);
 }
 
-TEST(State, ValuesAreTakenToTheEdgesOfTheirRange) {
+TEST(State, AcceptsValuesUpToTheLimitsOfTheirRange) {
   for (const char* fields : {"AIN24:-19999999.99;",
                              "AIN24:19999999.99;",
                              "DMHSTA:0;",
@@ -289,7 +289,7 @@ TEST(State, ValuesAreTakenToTheEdgesOfTheirRange) {
   }
 }
 
-TEST(State, AValueOutsideItsRangeOrFormRefusesTheWhole) {
+TEST(State, AnInvalidValueRefusesTheWholeDatagram) {
   for (const std::string field : {"AIN24:",
                                   "AIN24:x",
                                   "AIN24:1,2",
@@ -340,7 +340,7 @@ TEST(State, AValueOutsideItsRangeOrFormRefusesTheWhole) {
   EXPECT_FALSE(accepts("AIN24:1.00;T:4294967296;")) << "the clock of the board has 32 bits";
 }
 
-TEST(State, ARefusedDatagramLeavesEachFieldAsItWas) {
+TEST(State, ARefusedDatagramChangesNoField) {
   const State before = numbered_state();
   for (const StateField field : every_field()) {
     if (field == StateField::enc1) continue;
@@ -353,13 +353,13 @@ TEST(State, ARefusedDatagramLeavesEachFieldAsItWas) {
   }
 }
 
-TEST(State, AFieldThatStandsTwiceRefusesTheWhole) {
+TEST(State, ADuplicateFieldRefusesTheWholeDatagram) {
   EXPECT_FALSE(accepts("AIN24:1.00;AIN24:1.00;"));
   EXPECT_FALSE(accepts("OSMC1:1,1;AIN24:1.00;OSMC1:1,1;"));
   EXPECT_TRUE(accepts("NEW:1;NEW:1;")) << "unknown fields are ignored";
 }
 
-TEST(State, NamesAreFoundAndOthersAreNot) {
+TEST(State, FindsOnlyExactFieldNames) {
   std::set<std::string> names;
   for (const StateField field : every_field()) {
     const std::string name = str(name_of(field));

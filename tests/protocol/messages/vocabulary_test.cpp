@@ -6,7 +6,7 @@
 namespace r4 {
 namespace {
 
-TEST(Units, EverySafeReasonHasItsWord) {
+TEST(Units, EverySafeReasonHasAText) {
   EXPECT_STREQ(to_text(SafeReason::none), "none");
   EXPECT_STREQ(to_text(SafeReason::link), "link");
   EXPECT_STREQ(to_text(SafeReason::stop), "stop");

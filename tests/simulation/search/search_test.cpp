@@ -49,7 +49,7 @@ std::string name_of_case(const testing::TestParamInfo<Story>& info) {
 }
 INSTANTIATE_TEST_SUITE_P(Stories, EveryFault, testing::ValuesIn(stories()), name_of_case);
 
-TEST(EveryFaultOfAStory, IsRunAgainByItsName) {
+TEST(EveryFaultOfAStory, CanBeReplayedByName) {
   const char* const name = std::getenv("R4_STORY");
   const char* const faults = std::getenv("R4_STORY_FAULTS");
   bool any = false;

@@ -29,7 +29,7 @@ TEST(BoardSet, NumbersTheBoardsOfAllPatternsInTheirOrder) {
   EXPECT_THROW(BoardSet({"sim:?node=1", "sim:?node=1"}, driving()), Error);
 }
 
-TEST(BoardSet, LeavesAllBoardsFreeAtOnce) {
+TEST(BoardSet, EndsAllSessionsAtOnce) {
   BoardSet boards({"sim:?node=1", "sim:?node=2"}, driving());
   std::vector<int> states(boards.size());
   for (SetBoard& each : boards) {
@@ -63,7 +63,7 @@ TEST(BoardSet, NamesTheBoardThatWasNotHeard) {
   }
 }
 
-TEST(BoardSet, OfNoBoardsLeavesAtOnce) {
+TEST(BoardSet, WithoutBoardsEndsAtOnce) {
   BoardSet boards;
   boards.end_by_signal(10ms);
   boards.run();
@@ -79,7 +79,7 @@ TEST(BoardSet, AsksForTheFieldsOfTheDevicesToo) {
   EXPECT_EQ(watched.session.fields, "ENC1");
 }
 
-TEST(BoardSet, KnowsTheUrlOfAWholeBus) {
+TEST(BoardSet, RecognizesTheUrlOfAWholeBus) {
   EXPECT_EQ(whole_bus("can://can0"), "can0");
   for (const char* other :
        {"can://can0?node=3", "can://can0+can://can1", "udp://127.0.0.1", "serial:auto", "sim:"}) {

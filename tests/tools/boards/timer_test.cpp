@@ -13,7 +13,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(CommandTimer, RunsATaskAgainAndAgainUntilTheTaskEndsThat) {
+TEST(CommandTimer, RepeatsATaskUntilItCancelsTheTimer) {
   asio::io_context io;
   Timer timer(io);
   int runs = 0;
@@ -48,7 +48,7 @@ TEST(CommandTimer, ATaskMayReplaceItself) {
 
 // Both tasks are due, and the loop calls the first. The first task cancels the second, or destroys
 // its timer.
-TEST(CommandTimer, RunsNoTaskAfterItWasCancelledThoughItsTimeHadCome) {
+TEST(CommandTimer, RunsNoTaskAfterACancelEvenIfTheTaskWasDue) {
   for (const bool destroyed : {false, true}) {
     asio::io_context io;
     std::optional<Timer> first(std::in_place, io);

@@ -48,7 +48,7 @@ const std::string state = test::with_crc("AIN24:23.50;AIN12:12.10;OSMC1:358,1;PN
 const std::string command = test::with_crc("O:358,1,1;PNum:2147483650;T:81234;");
 const std::string answer = test::with_crc("N:2147483650,RANGE;PNum:78;T:81240;");
 
-TEST(BusLog, TellsWhoSaidWhatOnWhichLane) {
+TEST(BusLog, ShowsSenderLaneAndTypeOfEachDatagram) {
   Dump dump;
   dump.datagram(0x403, state);
   dump.datagram(0x183, command, 0x203);
@@ -74,7 +74,7 @@ TEST(BusLog, TellsWhoSaidWhatOnWhichLane) {
   EXPECT_EQ(dump.summary()["flow_control"], 2);
 }
 
-TEST(BusLog, KeepsInterfacesAndNodesApart) {
+TEST(BusLog, DistinguishesInterfacesAndNodes) {
   Dump dump;
   dump.frame(0x401, "100A48656C6C6F2C");
   dump.frame(0x402, "100A48656C6C6F2C");
@@ -106,7 +106,7 @@ TEST(BusLog, UnpacksThePackedForm) {
   EXPECT_TRUE(dump.log.any_bad());
 }
 
-TEST(BusLog, ShowsWhoWatches) {
+TEST(BusLog, ShowsWatchers) {
   Dump dump;
   dump.frame(0x605, "");
   ASSERT_EQ(dump.printed.size(), 1U);
@@ -132,7 +132,7 @@ TEST(BusLog, ShowsEmergencyStopsAndBoardsThatWentSafe) {
   EXPECT_EQ(dump.printed[3]["ok"], false);
 }
 
-TEST(BusLog, TellsOfTransfersThatFailed) {
+TEST(BusLog, ReportsFailedTransfers) {
   Dump dump;
   dump.datagram(0x403, state, 0, 3);
   ASSERT_EQ(dump.printed.size(), 1U);
@@ -164,7 +164,7 @@ TEST(BusLog, TellsOfTransfersThatFailed) {
   EXPECT_EQ(dump.summary()["failed"], 6);
 }
 
-TEST(BusLog, CountsWhatItDoesNotPrint) {
+TEST(BusLog, CountsFramesThatItDoesNotPrint) {
   Dump dump;
   dump.frame(0x403, "2148656C6C6F");  // the datagram began before the dump
   dump.frame(0x123, "00");

@@ -79,7 +79,7 @@ TEST(BusPlan, LoadGrowsWithBoardsAndFallsWithTheBitRate) {
   EXPECT_LT(one, load_of(plan_for(1, false)).total.load);
 }
 
-TEST(BusPlan, WhatFitsFitsAndOneMoreDoesNot) {
+TEST(BusPlan, FindsTheLargestRateAndNumberOfBoardsThatFit) {
   BusPlan plan = plan_for(8, true);
   const std::uint32_t boards = most_boards(plan, 0.8);
   const std::uint32_t rate = highest_rate(plan, 0.8);
@@ -94,7 +94,7 @@ TEST(BusPlan, WhatFitsFitsAndOneMoreDoesNot) {
   EXPECT_GT(load_of(plan).total.load, 0.8);
 }
 
-TEST(BusPlan, ABusThatCannotEvenCarryTheHeartbeatsCarriesNoBoard) {
+TEST(BusPlan, ABusThatCannotCarryTheHeartbeatsHasRoomForNoBoard) {
   BusPlan plan = plan_for(32, false);
   plan.bit_rate.nominal = 10000;
   EXPECT_EQ(most_boards(plan, 0.8), 0U);
@@ -102,7 +102,7 @@ TEST(BusPlan, ABusThatCannotEvenCarryTheHeartbeatsCarriesNoBoard) {
 }
 
 // Longer than one datagram can be: sent in parts, as the board sends it.
-TEST(BusPlan, AllFieldsAreSplitWhereTheBoardSplitsThem) {
+TEST(BusPlan, SplitsAllFieldsLikeTheBoard) {
   BusPlan plan = plan_for(1, false);
   plan.fields = FieldSet::all();
   const BusTraffic states = load_of(plan).traffic.front();

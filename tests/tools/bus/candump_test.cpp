@@ -52,7 +52,7 @@ TEST(Candump, ReadsBothFormatsWithTheExtrasOfItsOptions) {
   }
 }
 
-TEST(Candump, TellsFramesThatAreNoneOfOurs) {
+TEST(Candump, RecognizesFramesThatR4DoesNotUse) {
   CandumpLine line;
   ASSERT_EQ(read_candump_line("(1.0) can0 00000244#00", line), CandumpError::none);
   EXPECT_TRUE(line.frame.extended);
@@ -72,7 +72,7 @@ TEST(Candump, TellsFramesThatAreNoneOfOurs) {
             CandumpError::detail);
 }
 
-TEST(Candump, ReadsTheLinesOfNewerCandumpForFramesThatAreNoneOfOurs) {
+TEST(Candump, ReadsLinesOfNewerCandumpForFramesThatR4DoesNotUse) {
   for (const char* const text :
        {"(1.0) can0 244#R8", "(1.0) can0 244#R8_B", "(1.0) can0 123#81:00:12345678#112233",
         "(1.0) can0 12123#81:00:12345678#", "  can0  123  [0003]  11 22 33"}) {
@@ -92,7 +92,7 @@ TEST(Candump, ReadsTheLinesOfNewerCandumpForFramesThatAreNoneOfOurs) {
   }
 }
 
-TEST(Candump, TakesTheNamesThatPythonCanGivesToItsChannels) {
+TEST(Candump, AcceptsTheChannelNamesOfPythonCan) {
   for (const char* const name : {"PCAN_USBBUS1", "239.74.163.2", "/dev/ttyACM0",
                                  "ff15:7079:7468:6f6e:6465:6d6f:6d63:6173"}) {
     CandumpLine line;
@@ -119,7 +119,7 @@ TEST(Candump, ReadsTimesToTheMicrosecond) {
   EXPECT_FALSE(line.time_us);
 }
 
-TEST(Candump, SaysWhatIsWrongWithALine) {
+TEST(Candump, ReportsTheErrorInALine) {
   using E = CandumpError;
   for (const auto& [text, error] : std::vector<std::pair<std::string, CandumpError>>{
            {"H:ROS2-R4;T:79201;^0xf390d9ad^", E::no_frame},
@@ -167,7 +167,7 @@ TEST(Candump, SaysWhatIsWrongWithALine) {
   }
 }
 
-TEST(Candump, BearsAnyBytes) {
+TEST(Candump, AcceptsAnyBytesWithoutCrashing) {
   std::mt19937 random(4);
   const std::string whole = "(1436509052.249713)  vcan0  TX B -  244##1 [12] 2A 36 ' remote";
   for (int i = 0; i < 200000; ++i) {

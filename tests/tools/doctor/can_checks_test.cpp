@@ -26,7 +26,7 @@ Finding only_finding(const CanInterface& interface) {
   return findings.front();
 }
 
-TEST(DoctorCan, AnInterfaceAsItShouldBeIsFine) {
+TEST(DoctorCan, AHealthyInterfaceIsOk) {
   EXPECT_EQ(only_finding(good_interface()).severity, Severity::ok);
   CanInterface virtual_bus = good_interface();
   virtual_bus.has_controller = false;
@@ -34,14 +34,14 @@ TEST(DoctorCan, AnInterfaceAsItShouldBeIsFine) {
   EXPECT_EQ(only_finding(virtual_bus).severity, Severity::ok);
 }
 
-TEST(DoctorCan, AMissingInterfaceIsAnErrorOfItsOwnKind) {
+TEST(DoctorCan, AMissingInterfaceHasTheKindUnsupported) {
   CanInterface interface;
   interface.name = "can7";
   EXPECT_EQ(only_finding(interface).check, "can.missing");
   EXPECT_EQ(only_finding(interface).kind, ErrorKind::unsupported);
 }
 
-TEST(DoctorCan, WhatIsDownIsBroughtUpUnlessABitRateHasToBeChosen) {
+TEST(DoctorCan, BringsAnInterfaceUpUnlessItsBitRateIsUnknown) {
   CanInterface interface = good_interface();
   interface.up = false;
   EXPECT_EQ(only_finding(interface).check, "can.down");
@@ -53,7 +53,7 @@ TEST(DoctorCan, WhatIsDownIsBroughtUpUnlessABitRateHasToBeChosen) {
   EXPECT_NE(only_finding(interface).fix.find("bitrate 1000000"), std::string::npos);
 }
 
-TEST(DoctorCan, AControllerThatNeverComesBackAndAShortQueueAreWarnings) {
+TEST(DoctorCan, NoAutomaticRestartAndAShortQueueAreReported) {
   CanInterface interface = good_interface();
   interface.restart_ms = 0;
   EXPECT_EQ(only_finding(interface).check, "can.restart");
@@ -65,7 +65,7 @@ TEST(DoctorCan, AControllerThatNeverComesBackAndAShortQueueAreWarnings) {
   EXPECT_EQ(only_finding(interface).fix, "sudo ip link set can0 txqueuelen 1000");
 }
 
-TEST(DoctorCan, BusOffAndErrorsAreTold) {
+TEST(DoctorCan, BusOffAndErrorsAreReported) {
   CanInterface interface = good_interface();
   interface.state = "bus-off";
   interface.tx_errors = 248;
@@ -97,7 +97,7 @@ TEST(DoctorCan, AFullBusIsAWarning) {
   EXPECT_EQ(check_can_load("can0", 0.81).front().severity, Severity::warning);
 }
 
-TEST(DoctorCan, AKernelHasCanOrAModuleOrNone) {
+TEST(DoctorCan, AdvisesHowToGetCanInTheKernel) {
   const MadeUpMachine made_up;
   made_up.file("/proc/sys/kernel/osrelease", "6.1.0\n");
   EXPECT_EQ(check_can_kernel(made_up.machine).front().fix, "tools/with-can r4 list");

@@ -51,7 +51,7 @@ TEST(DoctorLink, JudgesLossDamageAndJitter) {
   EXPECT_EQ(judged(0, 0, 20000).check, "link.jitter");
 }
 
-TEST(DoctorLink, IsAnErrorWithoutAnyStateWhateverElseCame) {
+TEST(DoctorLink, IsAnErrorWithoutAnyState) {
   LinkSample sample = well();
   sample.states = 0;
   EXPECT_EQ(verdict(sample),
@@ -59,7 +59,7 @@ TEST(DoctorLink, IsAnErrorWithoutAnyStateWhateverElseCame) {
             "reason\n");
 }
 
-TEST(DoctorLink, IsAnErrorWhereTheBoardDoesNotAnswer) {
+TEST(DoctorLink, IsAnErrorIfTheBoardDoesNotAnswer) {
   LinkSample sample = well();
   sample.answered = Answered::no;
   sample.answer_us = 0;
@@ -70,7 +70,7 @@ TEST(DoctorLink, IsAnErrorWhereTheBoardDoesNotAnswer) {
   EXPECT_EQ(verdict(sample), "error link.answer: the link's reason\n");
 }
 
-TEST(DoctorLink, IsAWarningWhereTheBoardAnswersTooLate) {
+TEST(DoctorLink, IsAWarningIfTheBoardAnswersTooLate) {
   LinkSample sample = well();
   sample.answer_us = 251000;
   EXPECT_EQ(verdict(sample),
@@ -78,7 +78,7 @@ TEST(DoctorLink, IsAWarningWhereTheBoardAnswersTooLate) {
             "older than 250 ms\n");
 }
 
-TEST(DoctorLink, IsOnlyNotedWhereTheBoardWasNotAsked) {
+TEST(DoctorLink, IsANoteIfTheBoardWasNotAsked) {
   LinkSample sample = well();
   sample.answered = Answered::not_asked;
   sample.answer_us = 0;

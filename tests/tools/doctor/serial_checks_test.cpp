@@ -25,7 +25,7 @@ Finding permission(const MadeUpMachine& made_up) {
   return found_by(check_port_permission(made_up.machine, giga), "serial.permission");
 }
 
-TEST(DoctorSerial, SaysWhichGroupIsMissing) {
+TEST(DoctorSerial, NamesTheMissingGroup) {
   MadeUpMachine made_up;
   add_port(made_up, "olga");
   const Finding finding = permission(made_up);
@@ -35,7 +35,7 @@ TEST(DoctorSerial, SaysWhichGroupIsMissing) {
   EXPECT_EQ(finding.mending, Mending::automatic);
 }
 
-TEST(DoctorSerial, AMemberSinceTheLastLoginHasToLogInAgain) {
+TEST(DoctorSerial, ANewMemberOfTheGroupHasToLogInAgain) {
   MadeUpMachine made_up;
   add_port(made_up, "olga,mara");
   const Finding finding = permission(made_up);
@@ -43,7 +43,7 @@ TEST(DoctorSerial, AMemberSinceTheLastLoginHasToLogInAgain) {
   EXPECT_EQ(finding.fix, "newgrp dialout");
 }
 
-TEST(DoctorSerial, WhoMayOpenThePortIsFine) {
+TEST(DoctorSerial, AUserWhoMayOpenThePortIsOk) {
   MadeUpMachine made_up;
   add_port(made_up, "mara");
   made_up.machine.user.groups.insert(::getegid());
@@ -54,7 +54,7 @@ TEST(DoctorSerial, WhoMayOpenThePortIsFine) {
   EXPECT_EQ(permission(made_up).severity, Severity::ok) << "root may open every port";
 }
 
-TEST(DoctorSerial, APortOfAnotherGroupIsGivenToIt) {
+TEST(DoctorSerial, AdvisesToGiveThePortToTheGroupDialout) {
   MadeUpMachine made_up;
   add_port(made_up, "mara");
   made_up.file("/etc/group", fmt::format("dialout:x:{}:mara\n", ::getegid() + 1));
@@ -62,7 +62,7 @@ TEST(DoctorSerial, APortOfAnotherGroupIsGivenToIt) {
             "sudo sh -c 'chgrp dialout /dev/ttyACM0 && chmod g+rw /dev/ttyACM0'");
 }
 
-TEST(DoctorSerial, APortThatIsNotThereIsAnError) {
+TEST(DoctorSerial, AMissingPortIsAnError) {
   const MadeUpMachine made_up;
   EXPECT_EQ(permission(made_up).severity, Severity::error);
   EXPECT_EQ(permission(made_up).kind, ErrorKind::open);
@@ -81,7 +81,7 @@ TEST(DoctorSerial, FindsThePortsOfBoardsAndOfFtdiAdapters) {
   EXPECT_EQ(likely_ports(made_up.machine), (std::vector<std::string>{giga, "/dev/ttyUSB0"}));
 }
 
-TEST(DoctorSerial, NamesWhoHasThePortOpenButNotWhoSharesIt) {
+TEST(DoctorSerial, NamesAProgramThatHasThePortOpenButDoesNotShareIt) {
   const MadeUpMachine made_up;
   made_up.file("/proc/71/comm", "minicom\n");
   made_up.link("/proc/71/fd/3", giga);
@@ -97,7 +97,7 @@ TEST(DoctorSerial, NamesWhoHasThePortOpenButNotWhoSharesIt) {
   EXPECT_EQ(findings[1].mending, Mending::by_hand) << "the other program may be in use";
 }
 
-TEST(DoctorSerial, AnAdapterThatKeepsBytesIsToldNotTo) {
+TEST(DoctorSerial, ALongLatencyTimerOfAnAdapterIsAWarning) {
   const MadeUpMachine made_up;
   EXPECT_TRUE(check_latency_timer(made_up.machine, "/dev/ttyUSB0").empty());
   made_up.file("/sys/class/tty/ttyUSB0/device/latency_timer", "16\n");
@@ -109,7 +109,7 @@ TEST(DoctorSerial, AnAdapterThatKeepsBytesIsToldNotTo) {
   EXPECT_FALSE(check_latency_timer(made_up.machine, "/dev/ttyUSB0").front().is_trouble());
 }
 
-TEST(DoctorSerial, RulesOfUdevAreMissingOldOrThere) {
+TEST(DoctorSerial, ReportsMissingAndOutdatedUdevRules) {
   const MadeUpMachine made_up;
   const auto udev = [&] {
     return found_by(check_udev_rules(made_up.machine, udev_rules), "serial.udev");
@@ -126,7 +126,7 @@ TEST(DoctorSerial, RulesOfUdevAreMissingOldOrThere) {
   EXPECT_NE(udev().reason.find("another version"), std::string::npos);
 }
 
-TEST(DoctorSerial, ModemManagerIsTroubleWhileNoRuleKeepsItOff) {
+TEST(DoctorSerial, ModemManagerIsAWarningWithoutTheUdevRules) {
   const MadeUpMachine made_up;
   const auto modems = [&] {
     return found_by(check_udev_rules(made_up.machine, udev_rules), "serial.modemmanager");
@@ -175,7 +175,7 @@ TEST(DoctorSerial, ARuleOfBrlttyThatTakesTheAdapterIsFound) {
   EXPECT_EQ(brltty({gone}).severity, Severity::ok) << "the rules file is masked";
 }
 
-TEST(DoctorFinding, TheExitCodeIsThatOfTheFirstErrorAndOneForWarnings) {
+TEST(DoctorFinding, ExitCodeIsOneForWarningsAndElseThatOfTheFirstError) {
   Finding warning;
   warning.severity = Severity::warning;
   warning.kind = ErrorKind::unsupported;

@@ -29,7 +29,7 @@ TEST(DoctorSystem, PowerSavingOfWiFiIsAWarning) {
             "sudo iw dev wlan0 set power_save off");
 }
 
-TEST(DoctorSystem, AFirewallThatDropsAndNamesNoPortOfOursIsAWarning) {
+TEST(DoctorSystem, AFirewallThatDropsTheR4PortsIsAWarning) {
   MadeUpMachine made_up;
   const auto firewall = [&] {
     return found_by(check_network(made_up.machine), "network.firewall");
@@ -71,7 +71,7 @@ TEST(DoctorSystem, SlowAndBusyProcessorsAreWarnings) {
             Severity::warning);
 }
 
-TEST(DoctorSystem, AClockThatNobodyKeepsIsNotedAndOneThatIsSetMeanwhileAWarning) {
+TEST(DoctorSystem, AnUnsynchronizedClockIsANoteAndAClockStepIsAWarning) {
   EXPECT_EQ(check_clock(true).front().severity, Severity::ok);
   EXPECT_EQ(check_clock(false).front().severity, Severity::note);
   EXPECT_TRUE(check_clock_steps(0.001).empty());

@@ -21,7 +21,7 @@ std::string datagram_lines(const std::string& native) {
   return lines;
 }
 
-TEST(CandumpLog, CarriesEveryDatagramOfTheCaptureThereAndBack) {
+TEST(CandumpLog, PreservesEveryDatagramOfTheCapture) {
   for (const char* url : {"can://can0?node=3", "can://can0", "can://vcan1?pack=0&node=31",
                           "can://can0?node=0&fd=1"}) {
     const std::string native = recorded_capture(url);
@@ -44,7 +44,7 @@ TEST(CandumpLog, HasTheFramesThatAreOnTheBus) {
             "(1436509052.249713) can0 183#2178315E\n");
 }
 
-TEST(CandumpLog, TellsOfStopsAndOfBoardsThatWentSafe) {
+TEST(CandumpLog, KeepsStopsAndBoardsThatWentSafe) {
   const std::string native = converted(
                                  "(1436509052.249713) can0 010#\n"
                                  "(1436509052.250713) can0 023#02\n"
@@ -56,7 +56,7 @@ TEST(CandumpLog, TellsOfStopsAndOfBoardsThatWentSafe) {
   EXPECT_TRUE(contains(native, "# path 1 can://can0?node=3\n"));
 }
 
-TEST(CandumpLog, TellsThePlaceOfWhatCannotBeRead) {
+TEST(CandumpLog, ReportsTheLineThatCannotBeRead) {
   const std::string log = converted(recorded_capture("can://can0"), ".r4log", ".log").bytes;
   const std::size_t second = log.find('\n') + 1;
   const std::size_t third = log.find('\n', second) + 1;
@@ -120,7 +120,7 @@ TEST(CandumpLog, RefusesALogWithoutADatagramOfABoard) {
   EXPECT_TRUE(contains(problem.reason, "no whole datagram of a board"));
 }
 
-TEST(CandumpLog, KeepsTheChannelsOfPythonCanThereAndBack) {
+TEST(CandumpLog, PreservesTheChannelNamesOfPythonCan) {
   const std::string log = converted(recorded_capture("can://can0?node=3"), ".r4log", ".log").bytes;
   for (const std::string channel : {"/dev/ttyACM0", "239.74.163.2", "ff15:7079::6173", "a%20b"}) {
     std::string text = log;
@@ -132,7 +132,7 @@ TEST(CandumpLog, KeepsTheChannelsOfPythonCanThereAndBack) {
   }
 }
 
-TEST(CandumpLog, RefusesWhatIsNoneAndWhatItCannotHold) {
+TEST(CandumpLog, RefusesAFileWithoutFramesAndAUdpRecording) {
   for (const std::string& text :
        {std::string(), std::string("hello\n"), std::string(100'000, '\n')}) {
     EXPECT_EQ(problem_of([&] { converted(text, ".log", ".r4log"); }).reason,
@@ -144,7 +144,7 @@ TEST(CandumpLog, RefusesWhatIsNoneAndWhatItCannotHold) {
   EXPECT_TRUE(contains(problem.fix, ".pcapng"));
 }
 
-TEST(CandumpLog, LeavesOutWhatNoTransferCanHold) {
+TEST(CandumpLog, CountsDatagramsThatFitNoTransfer) {
   std::string native;
   write_record_header(native);
   write_path(native, {1, "can://can0", ""});

@@ -11,7 +11,7 @@
 namespace r4::test {
 namespace {
 
-TEST(Conversion, GivesANativeRecordingAsItWas) {
+TEST(Conversion, PreservesANativeRecording) {
   for (const std::string& native : {recorded_capture(), generated_recording(1, 100'000)}) {
     EXPECT_EQ(and_back(native, ".r4log"), native);
     EXPECT_EQ(and_back(native, ".r4log.zst"), native);
@@ -40,7 +40,7 @@ TEST(Conversion, CopiesNoSecretIntoAnotherFile) {
   }
 }
 
-TEST(Conversion, TellsThePlaceOfDamageAndConvertsTheRest) {
+TEST(Conversion, ReportsTheLineOfDamageAndConvertsTheRest) {
   const std::string native = recorded_capture();
   const std::size_t second = native.find('\n', native.find("AIN24")) + 1;
   const std::string damaged =
@@ -54,7 +54,7 @@ TEST(Conversion, TellsThePlaceOfDamageAndConvertsTheRest) {
   EXPECT_EQ(result.damage[1].reason, "the last line is not whole");
 }
 
-TEST(Conversion, MakesAFileThatCanBeReadOfRecordingsWhoseHeaderIsDamaged) {
+TEST(Conversion, WritesAReadableFileFromRecordingsWithADamagedHeader) {
   std::string second = recorded_capture("udp://another");
   second[0] = '$';
   for (const char* const form : {".r4log", ".pcapng", ".mcap"}) {
@@ -67,7 +67,7 @@ TEST(Conversion, MakesAFileThatCanBeReadOfRecordingsWhoseHeaderIsDamaged) {
   }
 }
 
-TEST(Conversion, GivesWhatHasNoHeaderOneAndAnEnd) {
+TEST(Conversion, AddsAMissingHeaderAndEnd) {
   StringOutput output;
   const auto sink = tool::make_sink("x.r4log", output);
   tool::Conversion conversion(*sink, {});
@@ -82,7 +82,7 @@ TEST(Conversion, GivesWhatHasNoHeaderOneAndAnEnd) {
                              "1795468293.404765 0! end\n"));
 }
 
-TEST(Conversion, RefusesEndingsThatAreNoFormat) {
+TEST(Conversion, RefusesUnknownFileEndings) {
   StringOutput output;
   for (const char* name : {"x", "x.zst", "x.xlsx", "-", "r4log/x"}) {
     const Problem problem = problem_of([&] { tool::make_sink(name, output); });
@@ -100,7 +100,7 @@ TEST(Conversion, RefusesEndingsThatAreNoFormat) {
   }
 }
 
-TEST(Conversion, ReadsAFileByWhatIsInItWhateverItsNameAndCompression) {
+TEST(Conversion, RecognizesAFileByItsContents) {
   const std::string native = recorded_capture("can://can0?node=3");
   for (const char* const form : {".r4log", ".log", ".pcapng", ".mcap"}) {
     const std::string file = converted(native, ".r4log", form).bytes;
@@ -119,7 +119,7 @@ TEST(Conversion, ReadsAFileByWhatIsInItWhateverItsNameAndCompression) {
   }
 }
 
-TEST(Conversion, SaysWhatAFileIsThatNoFormatReads) {
+TEST(Conversion, NamesTheKindOfAnUnsupportedFile) {
   for (const char* const name : {".r4log", ".log", ".pcapng", ".gz"}) {
     const std::string file = "\x1F\x8B\x08" + std::string(100, 'x');
     const Problem problem = problem_of([&] { converted(file, name, ".r4log"); });
@@ -127,7 +127,7 @@ TEST(Conversion, SaysWhatAFileIsThatNoFormatReads) {
   }
 }
 
-TEST(Conversion, TellsOfDamagedCompressionWhateverIsCompressed) {
+TEST(Conversion, ReportsDamagedCompressionOfAnyFormat) {
   const std::string packets = converted(generated_recording(7, 3000), ".r4log", ".pcapng").bytes;
   std::string archive;
   ZstdWriter writer;

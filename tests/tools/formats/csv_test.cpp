@@ -46,7 +46,7 @@ TEST(Csv, HasARowForEachStateAndAColumnForEachValue) {
   }
 }
 
-TEST(Csv, HasTheFieldsThatAreThereAndLeavesAPlaceWhereOneIsMissing) {
+TEST(Csv, HasTheRecordedFieldsAndAnEmptyCellForAMissingOne) {
   const std::string native = one_state("ENC1:-5;BLDC1:1,0,1;PNum:1;T:2;");
   std::string two = native;
   write_record(two, {Time{1795468293000002}, 1, RecordKind::from_board,
@@ -60,7 +60,7 @@ TEST(Csv, HasTheFieldsThatAreThereAndLeavesAPlaceWhereOneIsMissing) {
   EXPECT_EQ(lines[2], "1795468293.000002,1,left-arm,2,3,,30,,,");
 }
 
-TEST(Csv, HasNoCellThatASpreadsheetTakesForAFormula) {
+TEST(Csv, HasNoCellThatASpreadsheetReadsAsAFormula) {
   const struct {
     std::string url, cell;
   } cases[] = {
@@ -88,14 +88,14 @@ TEST(Csv, HasNoCellThatASpreadsheetTakesForAFormula) {
   }
 }
 
-TEST(Csv, HasNoRowForAStateWhoseValuesAreNone) {
+TEST(Csv, HasNoRowForAStateWithAnInvalidNumber) {
   // The checksum is right, but the column must contain only numbers.
   const Converted csv = converted(one_state("AIN24:abc;PNum:1;T:2;"), ".r4log", ".csv");
   EXPECT_EQ(lines_of(csv.bytes).size(), 1);
   EXPECT_EQ(csv.left_out, "1 that are not states");
 }
 
-TEST(Csv, HasWhatDescribedDevicesMeasured) {
+TEST(Csv, HasTheReadingsOfDescribedDevices) {
   const std::string recording = one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;PNum:1;T:1010;") +
                                 one_state("I2C3:0,0,x;PNum:2;T:1020;");
   const Converted csv =
@@ -130,7 +130,7 @@ std::string recording_of_two_with_devices() {
   return all;
 }
 
-TEST(Csv, HasTheDevicesThatTheRecordingTellsOfEachOfItsPath) {
+TEST(Csv, HasTheRecordedDevicesOfEachPath) {
   const std::string recording = recording_of_two_with_devices();
   const Converted csv = converted(recording, ".r4log", ".csv");
   const auto lines = lines_of(csv.bytes);
@@ -149,7 +149,7 @@ TEST(Csv, HasTheDevicesThatTheRecordingTellsOfEachOfItsPath) {
   EXPECT_TRUE(lines_of(named.bytes)[3].ends_with(",11.98,0.2"));
 }
 
-TEST(Csv, DevicesOfOneRecordingAreNotThoseOfTheNextInTheFile) {
+TEST(Csv, DevicesDoNotApplyToTheNextRecordingInTheFile) {
   const std::string two = recording_of_two_with_devices() +
                           "# r4log 1 by r4 0.1.0\n# path 1 udp://c\n" +
                           one_state("I2C3:1000,0,x07d0;I2C4:1002,0,x5d98;PNum:1;T:1010;");
@@ -158,7 +158,7 @@ TEST(Csv, DevicesOfOneRecordingAreNotThoseOfTheNextInTheFile) {
   EXPECT_TRUE(lines.back().ends_with(",x5d98,,")) << lines.back();
 }
 
-TEST(Csv, HasNoColumnOfTheRecordingsDevicesWhereOthersAreNamed) {
+TEST(Csv, NamedDevicesReplaceTheRecordedDevices) {
   const auto lines = lines_of(converted(recording_of_two_with_devices(), ".r4log", ".csv", 1000,
                                         {Device::from("as5600@0x36:3")})
                                   .bytes);
@@ -166,7 +166,7 @@ TEST(Csv, HasNoColumnOfTheRecordingsDevicesWhereOthersAreNamed) {
   EXPECT_NE(lines[0].find("as5600@0x36 angle [rad]"), std::string::npos) << lines[0];
 }
 
-TEST(Csv, WhatADeviceCountsIsSaidByItsOwnPath) {
+TEST(Csv, ConditionsOfADeviceUseItsOwnPath) {
   std::string all = "# r4log 1 by r4 0.1.0\n# path 1 udp://a\n# path 2 udp://b\n";
   for (const std::uint16_t path : {std::uint16_t{1}, std::uint16_t{2}}) {
     write_device(all, {path, "as5600@0x36:1", std::string(DeviceDescription::text_of("as5600"))});
@@ -184,7 +184,7 @@ TEST(Csv, WhatADeviceCountsIsSaidByItsOwnPath) {
   EXPECT_EQ(converted(all, ".r4log", ".jsonl").bytes.find("1.57"), std::string::npos);
 }
 
-TEST(Csv, SaysWhatIsToldTooLateForAColumnOfIt) {
+TEST(Csv, ReportsADeviceDeclaredTooLateForAColumn) {
   StringOutput output;
   const auto sink = tool::make_sink("test.csv", output, {});
   tool::Conversion conversion(*sink, [](const RecordingDamage&) {});
@@ -198,7 +198,7 @@ TEST(Csv, SaysWhatIsToldTooLateForAColumnOfIt) {
       << sink->left_out();
 }
 
-TEST(Csv, OtherFormatsHaveTheDevicesOfARecordingToo) {
+TEST(Csv, OtherFormatsKeepTheDevicesOfARecording) {
   const std::string recording = recording_of_two_with_devices();
   const char* const measured = R"("devices":{"ina219@0x40":{"voltage":11.984,"current":0.2)";
   EXPECT_NE(converted(recording, ".r4log", ".jsonl").bytes.find(measured), std::string::npos);
@@ -209,7 +209,7 @@ TEST(Csv, OtherFormatsHaveTheDevicesOfARecordingToo) {
   }
 }
 
-TEST(Csv, HasEveryColumnWhereTheFileCannotBeReadTwice) {
+TEST(Csv, HasEveryColumnIfTheInputCannotBeReadTwice) {
   StringOutput output;
   tool::CsvSink sink(output);
   sink.on_record({Time{1}, 1, RecordKind::event, "up"});

@@ -32,7 +32,7 @@ TEST(JsonLines, HasAnObjectForEachRecord) {
   EXPECT_EQ(bad, 2);
 }
 
-TEST(JsonLines, TakesAnyBytes) {
+TEST(JsonLines, AreValidForAnyBytes) {
   std::istringstream stream(converted(generated_recording(2, 2000), ".r4log", ".jsonl").bytes);
   int count = 0;
   for (std::string line; std::getline(stream, line); ++count) {

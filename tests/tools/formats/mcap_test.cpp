@@ -12,7 +12,7 @@
 namespace r4::test {
 namespace {
 
-TEST(Mcap, GivesTheRecordingBackByteByByte) {
+TEST(Mcap, RestoresTheRecordingByteByByte) {
   for (const std::string& native :
        {recorded_capture(), generated_recording(4, 5000), generated_recording(2, 100'000)}) {
     const std::string mcap = converted(native, ".r4log", ".mcap").bytes;
@@ -25,7 +25,7 @@ TEST(Mcap, GivesTheRecordingBackByteByByte) {
   }
 }
 
-TEST(Mcap, GoesOnWithTheNextChunkBehindDamage) {
+TEST(Mcap, ContinuesWithTheNextChunkAfterDamage) {
   const std::string native = generated_recording(5, 12'000);
   const std::string mcap = converted(native, ".r4log", ".mcap").bytes;
   const auto chunk = [&mcap](int n) {
@@ -82,7 +82,7 @@ TEST(Mcap, NamesATopicByTheBoardFromTheBeginning) {
   EXPECT_EQ(mcap.find("/board1"), std::string::npos);
 }
 
-TEST(Mcap, RefusesWhatItCannotReadOrHold) {
+TEST(Mcap, RefusesInvalidFilesAndTooLargeTimes) {
   for (const std::string& file : {std::string(), std::string("\x89MCAP"), std::string(100, 'x'),
                                   std::string("\x89MCAP0\r\n") + std::string(50, '\xFF')}) {
     EXPECT_EQ(problem_of([&] { converted(file, ".mcap", ".r4log"); }).reason, "no MCAP file");
@@ -174,7 +174,7 @@ std::string topic_in(const McapRecord& record) {
   return std::string(fields.string());
 }
 
-TEST(Mcap, ReadsWhatOtherToolsHaveCopiedOfIt) {
+TEST(Mcap, ReadsFilesRewrittenByOtherTools) {
   const std::string native = generated_recording(8, 30'000);
   const std::string records = as_records(records_in(converted(native, ".r4log", ".mcap").bytes));
   ASSERT_GT(records.size(), 4 << 20);
@@ -186,7 +186,7 @@ TEST(Mcap, ReadsWhatOtherToolsHaveCopiedOfIt) {
   }
 }
 
-TEST(Mcap, TellsADamagedChunkOfLz4AndReadsTheNextOne) {
+TEST(Mcap, ReportsADamagedLz4ChunkAndReadsTheNext) {
   const std::string native = recorded_capture();
   const std::string whole =
       as_chunk(as_records(records_in(converted(native, ".r4log", ".mcap").bytes)), "lz4");
@@ -198,7 +198,7 @@ TEST(Mcap, TellsADamagedChunkOfLz4AndReadsTheNextOne) {
   }
 }
 
-TEST(Mcap, ReadsATopicThatAFilterHasLeftWithTheNameOfItsBoard) {
+TEST(Mcap, KeepsTheBoardNameOfAFilteredTopic) {
   std::vector<McapRecord> records =
       records_in(converted(recorded_capture(), ".r4log", ".mcap").bytes);
   std::erase_if(records, [](const McapRecord& each) {
@@ -212,7 +212,7 @@ TEST(Mcap, ReadsATopicThatAFilterHasLeftWithTheNameOfItsBoard) {
   EXPECT_TRUE(contains(read.bytes, "1< AIN24:24.28"));
 }
 
-TEST(Mcap, PassesOverTheTopicsOfOtherPrograms) {
+TEST(Mcap, SkipsTheTopicsOfOtherPrograms) {
   std::vector<McapRecord> records =
       records_in(converted(recorded_capture(), ".r4log", ".mcap").bytes);
   std::string channel, message;

@@ -59,7 +59,7 @@ std::string native_of(const std::string& file) {
   return result.bytes;
 }
 
-TEST(Pcapng, GivesTheRecordingBackByteByByte) {
+TEST(Pcapng, RestoresTheRecordingByteByByte) {
   for (const std::string& native :
        {recorded_capture(), recorded_capture("can://can0?node=3"), generated_recording(3, 5000),
         generated_recording(2, 100'000)}) {
@@ -73,7 +73,7 @@ TEST(Pcapng, GivesTheRecordingBackByteByByte) {
   }
 }
 
-TEST(Pcapng, LosesTheDamagedBlocksAlone) {
+TEST(Pcapng, LosesOnlyDamagedBlocks) {
   const std::string native = recorded_capture();
   const std::string packets = converted(native, ".r4log", ".pcapng").bytes;
   const auto lines = std::count(native.begin(), native.end(), '\n');
@@ -91,7 +91,7 @@ TEST(Pcapng, LosesTheDamagedBlocksAlone) {
   }
 }
 
-TEST(Pcapng, ReadsAllThatIsThereOfATornFile) {
+TEST(Pcapng, ReadsTheWholeBlocksOfATornFile) {
   const std::string native = recorded_capture();
   const std::string packets = converted(native, ".r4log", ".pcapng").bytes;
   for (std::size_t size = packets.size() - 400; size < packets.size(); size += 3) {
@@ -102,7 +102,7 @@ TEST(Pcapng, ReadsAllThatIsThereOfATornFile) {
   }
 }
 
-TEST(Pcap, ReadsUdpOfEitherOrderFromEveryKindOfLink) {
+TEST(Pcap, ReadsUdpOfEitherByteOrderFromEveryLinkType) {
   const std::string state = captured_state();
   const std::string packet = ipv4(udp(2018, 2390, state + "\r\n"));
   const std::string ethernet = std::string(12, 'm') + std::string("\x08\0", 2) + packet;
@@ -125,7 +125,7 @@ TEST(Pcap, ReadsUdpOfEitherOrderFromEveryKindOfLink) {
   }
 }
 
-TEST(Pcap, ReadsBothDirectionsAndPassesOverOthers) {
+TEST(Pcap, ReadsBothDirectionsAndSkipsOtherPackets) {
   const auto one = [](std::uint16_t from, std::uint16_t to) {
     return native_of(pcap(ByteOrder::little, 228, ipv4(udp(from, to, "x")), 0xA1B23C4D));
   };
@@ -133,7 +133,7 @@ TEST(Pcap, ReadsBothDirectionsAndPassesOverOthers) {
   EXPECT_TRUE(contains(one(2390, 2018), "1795468293.000404 1> x\n"));  // a capture in nanoseconds
 }
 
-TEST(Pcap, RefusesACaptureWithoutADatagramOfABoardAndSaysWhatIsThere) {
+TEST(Pcap, RefusesACaptureWithoutABoardAndNamesItsContents) {
   const auto problem = [](const std::string& file) {
     const Problem found = problem_of([&] { converted(file, ".pcap", ".r4log"); });
     EXPECT_EQ(found.kind, ErrorKind::data);
@@ -164,7 +164,7 @@ std::string cooked(std::uint32_t interface, const std::string& frame) {
   return packet + std::string(12, '\0') + frame;
 }
 
-TEST(Pcap, ReadsCanFramesOfCookedCapturesWhateverTheOrderOfTheirIds) {
+TEST(Pcap, ReadsCanFramesOfCookedCapturesInEitherByteOrder) {
   const std::string data(
       "\x03"
       "abc",
@@ -187,7 +187,7 @@ TEST(Pcap, ReadsCanFramesOfCookedCapturesWhateverTheOrderOfTheirIds) {
   }
 }
 
-TEST(Pcap, KeepsTheInterfacesOfACookedCaptureApart) {
+TEST(Pcap, DistinguishesTheInterfacesOfACookedCapture) {
   const auto half = [](std::uint32_t interface, const std::string& data) {
     return cooked(interface, can_frame(0x403, data, ByteOrder::little));
   };
@@ -210,7 +210,7 @@ TEST(Pcap, KeepsTheInterfacesOfACookedCaptureApart) {
   EXPECT_TRUE(contains(native, " 2< abcdefgh\n"));
 }
 
-TEST(Pcap, TellsAPacketOnceThatPassedTwoInterfaces) {
+TEST(Pcap, ReadsAPacketOnceThatPassedTwoInterfaces) {
   const auto count_of = [](const std::string& second, std::uint32_t us) {
     const std::string first = ipv4(udp(2018, 2390, "PNum:1;"));
     const std::string native =
@@ -255,7 +255,7 @@ std::string pcapng_at(std::uint64_t ticks, const std::string& options) {
   return block(0x0A0D0D0A, section) + block(1, interface + options) + block(2, packet + bytes);
 }
 
-TEST(Pcapng, ReadsTheObsoleteBlockOfAPacket) {
+TEST(Pcapng, ReadsTheObsoletePacketBlock) {
   EXPECT_TRUE(
       contains(native_of(pcapng_at(1795468293404765, "")), "1795468293.404765 1< PNum:1;\n"));
 }
@@ -315,7 +315,7 @@ std::string merged_by_mergecap(const std::string& a, const std::string& b, bool 
   return head + packets;
 }
 
-TEST(Pcapng, RefusesRecordingsThatMergecapHasMixed) {
+TEST(Pcapng, RefusesRecordingsMergedByMergecap) {
   const auto packets = [](const std::string& url) {
     return converted(recorded_capture(url), ".r4log", ".pcapng").bytes;
   };
@@ -359,7 +359,7 @@ TEST(Pcap, ReadsFramesOfSocketCan) {
       contains(native_of(pcap(ByteOrder::little, 227, packet)), "1795468293.404765 1> abc\n"));
 }
 
-TEST(Pcap, TellsThePlaceOfWhatIsCutOrTooLong) {
+TEST(Pcap, ReportsTheOffsetOfACutOrTooLongPacket) {
   const std::string packet = ipv4(udp(2018, 2390, captured_state()));
   const Converted cut = converted(
       pcap(ByteOrder::little, 228, packet.substr(0, 90), 0xA1B2C3D4, 184), ".pcap", ".r4log");
@@ -372,7 +372,7 @@ TEST(Pcap, TellsThePlaceOfWhatIsCutOrTooLong) {
   EXPECT_TRUE(contains(none.damage[0].reason, "no packet is that long"));
 }
 
-TEST(Pcap, RefusesWhatIsNoCapture) {
+TEST(Pcap, RefusesAFileThatIsNotACapture) {
   for (const std::string& file :
        {std::string(), std::string("\x0A\x0D\x0D\x0A"), std::string(100, 'x'),
         std::string("\x0A\x0D\x0D\x0A") + std::string(100, '\0')}) {

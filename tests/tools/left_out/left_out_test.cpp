@@ -21,7 +21,7 @@ std::string thrown_by(const Call& call) {
   return "nothing";
 }
 
-TEST(LeftOut, Ros2NamesTheOptionThatItWasBuiltWithAndTheLibraryThatItNeeds) {
+TEST(LeftOut, Ros2NamesItsBuildOptionAndTheMissingLibrary) {
   const std::string text = thrown_by([] { ros2::run_bridge({}); });
   EXPECT_TRUE(text.starts_with("unsupported: r4 ros2: ")) << text;
   EXPECT_NE(text.find("R4_ROS2=OFF"), std::string::npos) << text;

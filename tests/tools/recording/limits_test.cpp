@@ -11,7 +11,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(RecordingLimits, AreSizesAndTimes) {
+TEST(RecordingLimits, ParseSizesAndTimes) {
   RecordingOptions options;
   take_rotation("500K", options);
   EXPECT_EQ(options.rotate_bytes, 500'000);
@@ -27,7 +27,7 @@ TEST(RecordingLimits, AreSizesAndTimes) {
   EXPECT_EQ(read_size("--keep", "10M"), 10'000'000);
 }
 
-TEST(RecordingLimits, AreRefusedInOtherForms) {
+TEST(RecordingLimits, RefuseOtherForms) {
   for (const char* const text :
        {"", "M", "0M", "-1M", "1", "1m", "1 M", "1.5G", "1MB", "1000001G", "1d"}) {
     RecordingOptions options;

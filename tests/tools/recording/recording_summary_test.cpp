@@ -38,7 +38,7 @@ struct RecordingSummaryTest : testing::Test {
   std::uint32_t pnum = 100;
 };
 
-TEST_F(RecordingSummaryTest, HasTheRateOfStatesAndWhatWasLostAndDamaged) {
+TEST_F(RecordingSummaryTest, ShowsTheStateRateAndLostAndDamagedDatagrams) {
   for (int i = 0; i < 101; ++i) hear("AIN24:24.28");
   pnum += 3;
   hear("AIN24:24.28");
@@ -49,7 +49,7 @@ TEST_F(RecordingSummaryTest, HasTheRateOfStatesAndWhatWasLostAndDamaged) {
   EXPECT_EQ(path()["damaged"], 1);
 }
 
-TEST_F(RecordingSummaryTest, HasTheSafeStatesAndHowLongTheyWere) {
+TEST_F(RecordingSummaryTest, ShowsTheSafeStatesAndTheirDurations) {
   hear("AIN24:24.28");
   for (int i = 0; i < 51; ++i) hear("AIN24:24.28;SAFE:2");
   hear("AIN24:24.28");
@@ -71,7 +71,7 @@ TEST_F(RecordingSummaryTest, HasTheGaps) {
   EXPECT_NEAR(path()["longest_gap_s"].get<double>(), 3.01, 0.001);
 }
 
-TEST_F(RecordingSummaryTest, HasWhatWasSentToTheBoard) {
+TEST_F(RecordingSummaryTest, CountsDatagramsSentToTheBoard) {
   add(RecordKind::to_board, test::with_crc("H:ROS2-R4;PNum:1;T:5;"));
   add(RecordKind::to_board, test::with_crc("E:STOP;PNum:2;T:5;"));
   EXPECT_EQ(path()["sent"], 2);
@@ -79,7 +79,7 @@ TEST_F(RecordingSummaryTest, HasWhatWasSentToTheBoard) {
   EXPECT_EQ(path()["stops"], 1);
 }
 
-TEST_F(RecordingSummaryTest, CountsARebootAsNoLoss) {
+TEST_F(RecordingSummaryTest, DoesNotCountARebootAsALoss) {
   hear("AIN24:24.28");
   add(RecordKind::from_board, test::with_crc("H:R4-ROS2;PNum:0;T:0;"));
   pnum = 5000;
@@ -87,7 +87,7 @@ TEST_F(RecordingSummaryTest, CountsARebootAsNoLoss) {
   EXPECT_EQ(path()["lost"], 0);
 }
 
-TEST_F(RecordingSummaryTest, SaysWhetherItWasEndedAndWhatTheDiskWasTooSlowFor) {
+TEST_F(RecordingSummaryTest, ShowsTheEndAndTheDroppedRecords) {
   EXPECT_FALSE(summary.json("x")["ended"]);
   add(RecordKind::event, "dropped 17", 0);
   add(RecordKind::event, "end", 0);
@@ -97,7 +97,7 @@ TEST_F(RecordingSummaryTest, SaysWhetherItWasEndedAndWhatTheDiskWasTooSlowFor) {
   EXPECT_EQ(path()["downs"], 1);
 }
 
-TEST_F(RecordingSummaryTest, TellsTwentyPlacesOfDamageAndCountsTheRest) {
+TEST_F(RecordingSummaryTest, ListsTwentyDamagedLinesAndCountsTheRest) {
   for (std::uint64_t i = 1; i <= 1000; ++i) {
     summary.on_damage({RecordingDamage::Kind::line, i, 10 * i, "it begins with no time"});
   }

@@ -73,7 +73,7 @@ class JointStates : public ::testing::Test {
 };
 
 // 508 bytes, the limit on the Giga's WiFi.
-TEST_F(JointStates, AreOneSampleOfAStateThatComesInSeveralDatagrams) {
+TEST_F(JointStates, AStateInSeveralDatagramsIsOneSample) {
   state.raw.encoder_hz[0] = 4096;
   state.raw.encoder_hz[1] = 2048;
   part(1010, {StateField::enc1, StateField::enc2});
@@ -87,7 +87,7 @@ TEST_F(JointStates, AreOneSampleOfAStateThatComesInSeveralDatagrams) {
   EXPECT_NEAR(all[0].velocities[1], 3.1416, 1e-3);
 }
 
-TEST_F(JointStates, OfAStateOfWhichAPartWasLostAreWhatCame) {
+TEST_F(JointStates, AStateWithALostPartIsPublishedWithoutIt) {
   part(1010, {StateField::enc1, StateField::enc2});
   part(1020, {StateField::enc1, StateField::enc2});
   auto all = told();
@@ -101,7 +101,7 @@ TEST_F(JointStates, OfAStateOfWhichAPartWasLostAreWhatCame) {
   EXPECT_FALSE(std::isnan(all[0].velocities[0]));
 }
 
-TEST_F(JointStates, GoOnWhereTheyWereWhenCountsWrapAndTheBoardRestarts) {
+TEST_F(JointStates, PositionIsContinuousOverAWrapAndARestart) {
   constexpr double turn = 2 * std::numbers::pi / 4096;
   constexpr std::int32_t last = std::numeric_limits<std::int32_t>::max();
   const auto position = [this](std::uint32_t t_ms, std::int32_t counts) {

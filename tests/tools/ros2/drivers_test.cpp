@@ -35,7 +35,7 @@ struct Driven {
 };
 using Texts = std::vector<std::string>;
 
-TEST(Ros2Drivers, StopWhatASilentPublisherDrove) {
+TEST(Ros2Drivers, StopTheOutputsOfASilentPublisher) {
   Driven driven;
   driven.sent(Command::osmc(2, Pwm(358), Direction::forward));
   driven.now += 999ms;
@@ -48,7 +48,7 @@ TEST(Ros2Drivers, StopWhatASilentPublisherDrove) {
   EXPECT_FALSE(driven.drivers.any());
 }
 
-TEST(Ros2Drivers, StopAtOnceWhatSomebodyDroveWhoHasGone) {
+TEST(Ros2Drivers, StopTheOutputsOfADisconnectedPublisherAtOnce) {
   Driven driven;
   driven.sent(Command::osmc(1, Pwm(1), Direction::forward), 7);
   driven.sent(Command::dhb12(3, Pwm(1), Direction::reverse), 8);
@@ -58,7 +58,7 @@ TEST(Ros2Drivers, StopAtOnceWhatSomebodyDroveWhoHasGone) {
   EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,1"});
 }
 
-TEST(Ros2Drivers, PutEachOutputWhereTheSafeStateHasIt) {
+TEST(Ros2Drivers, SetEachOutputAsInTheSafeState) {
   Driven driven;
   driven.sent(Command::dhb12(4, Pwm(9), Direction::reverse));
   driven.sent(Command::servo(16, Microseconds(1500)));
@@ -68,7 +68,7 @@ TEST(Ros2Drivers, PutEachOutputWhereTheSafeStateHasIt) {
   EXPECT_EQ(driven.to_stop(), (Texts{"D:0,1,4", "S:0,16", "R:8,Off", "B:0,1,1,1"}));
 }
 
-TEST(Ros2Drivers, AStepperIsStoppedWhereItIsOnceThatIsKnown) {
+TEST(Ros2Drivers, AStepperStopsAtItsReportedPosition) {
   Driven driven;
   driven.sent(Command::stepper(2, Steps(100000), StepsPerSecond(1000)));
   driven.now += 2s;
@@ -77,7 +77,7 @@ TEST(Ros2Drivers, AStepperIsStoppedWhereItIsOnceThatIsKnown) {
   EXPECT_EQ(driven.to_stop(), Texts{"P:1234,1000,2"});
 }
 
-TEST(Ros2Drivers, AStepperIsStoppedThoughTheNewestDatagramIsAnotherPartOfTheState) {
+TEST(Ros2Drivers, AStepperStopsWhenAnotherPartOfTheStateIsNewest) {
   Driven driven;
   driven.sent(Command::stepper(2, Steps(100000), StepsPerSecond(1000)));
   driven.told(2, 1234);
@@ -88,7 +88,7 @@ TEST(Ros2Drivers, AStepperIsStoppedThoughTheNewestDatagramIsAnotherPartOfTheStat
   EXPECT_EQ(driven.to_stop(), Texts{"P:1234,1000,2"});
 }
 
-TEST(Ros2Drivers, NoStepperGoesBackToWhereItWasLongAgo) {
+TEST(Ros2Drivers, AStepperDoesNotReturnToAnOldPosition) {
   Driven driven;
   driven.sent(Command::stepper(2, Steps(100000), StepsPerSecond(1000)));
   driven.told(2, 1234);
@@ -101,7 +101,7 @@ TEST(Ros2Drivers, NoStepperGoesBackToWhereItWasLongAgo) {
   EXPECT_EQ(driven.to_stop(), Texts{"P:1500,1000,2"});
 }
 
-TEST(Ros2Drivers, APositionOfBeforeItWasSetToZeroIsNone) {
+TEST(Ros2Drivers, IgnoreAStepperPositionFromBeforeItWasZeroed) {
   Driven driven;
   driven.sent(Command::stepper(2, Steps(100000), StepsPerSecond(1000)));
   driven.told(2, 50000);
@@ -116,7 +116,7 @@ TEST(Ros2Drivers, APositionOfBeforeItWasSetToZeroIsNone) {
   EXPECT_EQ(driven.to_stop(), Texts{"P:3,1000,2"});
 }
 
-TEST(Ros2Drivers, LeaveAloneWhatRestsAndTheMotorsSupply) {
+TEST(Ros2Drivers, DoNotStopIdleOutputsOrRelay1) {
   Driven driven;
   driven.sent(Command::osmc(1, Pwm(0), Direction::forward));
   driven.sent(Command::servo(1, Microseconds(0)));
@@ -128,7 +128,7 @@ TEST(Ros2Drivers, LeaveAloneWhatRestsAndTheMotorsSupply) {
   EXPECT_EQ(driven.to_stop(), Texts{});
 }
 
-TEST(Ros2Drivers, ACommandThatStopsIsRepeatedUntilTheBoardHasConfirmedIt) {
+TEST(Ros2Drivers, AStopOfAPublisherIsRepeatedUntilConfirmed) {
   Driven driven;
   driven.sent(Command::osmc(1, Pwm(358), Direction::forward));
   driven.sent(Command::osmc(1, Pwm(0), Direction::forward));
@@ -143,14 +143,14 @@ TEST(Ros2Drivers, ACommandThatStopsIsRepeatedUntilTheBoardHasConfirmedIt) {
   EXPECT_FALSE(driven.drivers.any());
 }
 
-TEST(Ros2Drivers, SayWhetherSomebodyIsMissed) {
+TEST(Ros2Drivers, ReportThatAPublisherIsMissing) {
   Driven driven;
   driven.sent(Command::osmc(1, Pwm(358), Direction::forward));
   driven.now += 2s;
   EXPECT_TRUE(driven.drivers.to_stop(driven.now).missed);
 }
 
-TEST(Ros2Drivers, AVoltageGoesToZeroBehindTheOthersWhichABoardWithoutOneWouldRefuse) {
+TEST(Ros2Drivers, AVoltageIsSetToZeroAfterTheOtherOutputs) {
   Driven driven;
   driven.sent(Command::dac(2, Millivolts(3300)));
   driven.sent(Command::osmc(1, Pwm(358), Direction::forward));
@@ -164,7 +164,7 @@ TEST(Ros2Drivers, AVoltageGoesToZeroBehindTheOthersWhichABoardWithoutOneWouldRef
   EXPECT_FALSE(driven.drivers.any()) << "an output that the board does not have must be forgotten";
 }
 
-TEST(Ros2Drivers, AnotherCommandEndsTheStopping) {
+TEST(Ros2Drivers, ANewCommandEndsTheStop) {
   Driven driven;
   driven.sent(Command::osmc(1, Pwm(358), Direction::forward), 7);
   driven.now += 2s;
@@ -178,7 +178,7 @@ TEST(Ros2Drivers, AnotherCommandEndsTheStopping) {
   EXPECT_FALSE(driven.drivers.any());
 }
 
-TEST(Ros2Drivers, WithoutADeadlineOnlyWhoHasGoneIsMissed) {
+TEST(Ros2Drivers, WithoutADeadlineStopOnlyForADisconnectedPublisher) {
   Driven driven(0ms);
   driven.sent(Command::osmc(1, Pwm(358), Direction::forward), 7);
   driven.now += 24h;
@@ -187,7 +187,7 @@ TEST(Ros2Drivers, WithoutADeadlineOnlyWhoHasGoneIsMissed) {
   EXPECT_EQ(driven.to_stop(), Texts{"O:0,1,1"});
 }
 
-TEST(Ros2Drivers, AGroupAtATime) {
+TEST(Ros2Drivers, StopOneGroupAtATime) {
   Driven driven;
   for (int n = 1; n <= servo_channels; ++n) driven.sent(Command::servo(n, Microseconds(1500)));
   for (int n = 1; n <= osmc_channels; ++n)
@@ -199,7 +199,7 @@ TEST(Ros2Drivers, AGroupAtATime) {
   EXPECT_EQ(driven.to_stop().size(), 4U);
 }
 
-TEST(Ros2Drivers, ToSetAStepperToZeroIsNoRest) {
+TEST(Ros2Drivers, ZeroingAStepperIsNotAStop) {
   EXPECT_TRUE(Drivers::rests(Command::osmc(1, Pwm(0), Direction::forward)));
   EXPECT_FALSE(Drivers::rests(Command::zero(1)));
 }

@@ -22,7 +22,7 @@ Domain with_variables(std::map<std::string, std::string> variables) {
   return domain_of([&variables](const char* name) { return variables[name]; });
 }
 
-TEST(Ros2Environment, StaysOnThisComputerUnlessItIsTold) {
+TEST(Ros2Environment, StaysOnThisComputerByDefault) {
   const Domain usual = with_variables({});
   EXPECT_EQ(usual.id, 0U);
   EXPECT_EQ(usual.reach, "this computer");
@@ -43,7 +43,7 @@ TEST(Ros2Environment, StaysOnThisComputerUnlessItIsTold) {
   EXPECT_EQ(with_variables({{"ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"}}).reach, "nobody");
 }
 
-TEST(Ros2Environment, TakesPeersADomainAndCyclonesOwnConfiguration) {
+TEST(Ros2Environment, AcceptsPeersADomainAndACycloneConfiguration) {
   const Domain peers = with_variables({{"ROS_STATIC_PEERS", "10.0.0.7;robot.local;"}});
   EXPECT_EQ(peers.reach, "this computer and 10.0.0.7, robot.local");
   EXPECT_FALSE(peers.one_computer);
@@ -62,7 +62,7 @@ TEST(Ros2Environment, TakesPeersADomainAndCyclonesOwnConfiguration) {
   }
 }
 
-TEST(Ros2Names, AreThoseOfRosAndOfDds) {
+TEST(Ros2Names, FollowRosAndDds) {
   const NodeName robot = node_name("robot/left", "r4");
   EXPECT_EQ(robot.full(), "/robot/left/r4");
   EXPECT_EQ(node_name("/", "r4"), node_name("", "r4"));
@@ -78,7 +78,7 @@ TEST(Ros2Names, AreThoseOfRosAndOfDds) {
   }
 }
 
-TEST(Ros2Releases, ChangedTheirIdsWithIron) {
+TEST(Ros2Releases, HaveOtherIdsSinceIron) {
   EXPECT_EQ(release_of(""), std::nullopt);
   EXPECT_EQ(release_of("foxy"), Release::before_iron);
   EXPECT_EQ(release_of("humble"), Release::before_iron);
@@ -87,7 +87,7 @@ TEST(Ros2Releases, ChangedTheirIdsWithIron) {
   EXPECT_EQ(release_of("rolling"), Release::since_iron);
 }
 
-TEST(Ros2Transit, IsJudgedByTheFastestWhateverTheClocksSay) {
+TEST(Ros2Transit, MeasuresDelayAgainstTheFastestSampleDespiteClockSkew) {
   Transit transit(Transit::Clocks::two);
   constexpr auto skew = 1h;
   const auto delay = [&](auto written, auto under_way) {
@@ -100,14 +100,14 @@ TEST(Ros2Transit, IsJudgedByTheFastestWhateverTheClocksSay) {
   EXPECT_LT(delay(50s, 5ms), 10ms);
 }
 
-TEST(Ros2Transit, IsNoFreerOfWhoWasSilentForLong) {
+TEST(Ros2Transit, DetectsALateSampleAfterALongSilence) {
   Transit transit(Transit::Clocks::two);
   EXPECT_EQ(transit.delay(100s, 100s), 0s);
   EXPECT_GT(transit.delay(100s + 24h, 103s + 24h), 2400ms) << "the network has delayed the sample";
   EXPECT_LT(transit.delay(104s + 24h, 104s + 24h + 2ms), 5ms);
 }
 
-TEST(Ros2Transit, BelievesOneWhoSpeaksSeldomToo) {
+TEST(Ros2Transit, AcceptsASetClockOfASeldomSender) {
   Transit transit(Transit::Clocks::two);
   EXPECT_EQ(transit.delay(100s, 100s), 0s);
   int old = 0;
@@ -118,7 +118,7 @@ TEST(Ros2Transit, BelievesOneWhoSpeaksSeldomToo) {
   EXPECT_EQ(old, 9) << "the sender's clock was set";
 }
 
-TEST(Ros2Transit, ABacklogOfALongSilenceIsNoClockThatWasSet) {
+TEST(Ros2Transit, ABacklogAfterALongSilenceIsNotAClockStep) {
   Transit transit(Transit::Clocks::two);
   EXPECT_EQ(transit.delay(100s, 100s), 0s);
   EXPECT_GT(transit.delay(101s, 105s), 3s);
@@ -127,7 +127,7 @@ TEST(Ros2Transit, ABacklogOfALongSilenceIsNoClockThatWasSet) {
   }
 }
 
-TEST(Ros2Transit, IsKnownOfTheFirstSampleWhereThereIsOneClock) {
+TEST(Ros2Transit, WithOneClockMeasuresTheFirstSample) {
   Transit transit(Transit::Clocks::one);
   for (int i = 0; i < 200; ++i) {
     const auto now = 100s + i * 100ms;
@@ -136,7 +136,7 @@ TEST(Ros2Transit, IsKnownOfTheFirstSampleWhereThereIsOneClock) {
   EXPECT_EQ(transit.delay(500s, 90s), 0s) << "the sender's clock was set back meanwhile";
 }
 
-TEST(Ros2Transit, BelievesInAClockThatIsSetAfterTenSeconds) {
+TEST(Ros2Transit, AcceptsASetClockAfterTenSeconds) {
   Transit transit(Transit::Clocks::two);
   EXPECT_EQ(transit.delay(100s, 100s), 0s);
   for (int i = 1; i < 100; ++i) {
@@ -147,7 +147,7 @@ TEST(Ros2Transit, BelievesInAClockThatIsSetAfterTenSeconds) {
   EXPECT_EQ(transit.delay(500s, 90s), 0s) << "our clock was set back";
 }
 
-TEST(Ros2Outbox, LosesTheOldestAndWaitsForNobody) {
+TEST(Ros2Outbox, DropsTheOldestJobAndNeverBlocks) {
   Outbox outbox(2);
   std::promise<void> begun;
   std::promise<void> go_on;
@@ -169,7 +169,7 @@ TEST(Ros2Outbox, LosesTheOldestAndWaitsForNobody) {
   EXPECT_EQ(done, "bc");
 }
 
-TEST(Ros2Outbox, TriesAgainForAWhileWhileTheOthersGoOn) {
+TEST(Ros2Outbox, RepeatsAnAttemptForAWhileBetweenOtherJobs) {
   Outbox outbox;
   std::promise<int> given_up;
   std::atomic<int> tries{0};

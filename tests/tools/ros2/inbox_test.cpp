@@ -94,7 +94,7 @@ class InboxTest : public ::testing::Test {
   Inbox inbox{io, Transit::Clocks::one, [this] { taken.emplace_back("-"); }};
 };
 
-TEST_F(InboxTest, HandsOverTheLastSampleOfAPublisherBeforeItsLeaving) {
+TEST_F(InboxTest, DeliversTheLastSampleOfAPublisherBeforeItsEnd) {
   Entity writer = writer_of<Float32Message>("rt/duty");
   ASSERT_TRUE(until([&] { return has("left 1"); }));
   taken.clear();
@@ -109,7 +109,7 @@ TEST_F(InboxTest, HandsOverTheLastSampleOfAPublisherBeforeItsLeaving) {
   EXPECT_EQ(taken, (std::vector<std::string>{"duty 7", "left 0"}));
 }
 
-TEST_F(InboxTest, TellsWhoWroteASample) {
+TEST_F(InboxTest, NamesThePublisherOfASample) {
   const Entity writer = writer_of<Float32Message>("rt/duty");
   ASSERT_TRUE(until([&] { return is_matched(writer); }));
   write_duty(writer, 1);
@@ -119,7 +119,7 @@ TEST_F(InboxTest, TellsWhoWroteASample) {
 
 // Even after many stops, a later sample waits for one turn of the loop only, not for one turn per
 // stop.
-TEST_F(InboxTest, IsNotHeldUpByStops) {
+TEST_F(InboxTest, StopsDoNotDelayOtherSamples) {
   const Entity stops = writer_of<BoolMessage>("rt/stop");
   const Entity duties = writer_of<Float32Message>("rt/duty");
   ASSERT_TRUE(until([&] { return is_matched(stops) && has("left 1"); }));

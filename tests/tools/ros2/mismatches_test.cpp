@@ -55,7 +55,7 @@ TEST(GraphMismatch, NamesASubscriberOfAnotherType) {
   EXPECT_EQ(wrong->weight, Mismatch::Weight::warning);
 }
 
-TEST(GraphMismatch, NamesThePolicyOfWhichAWriterOffersTooLittle) {
+TEST(GraphMismatch, NamesThePolicyThatAWriterDoesNotFulfil) {
   const Policies usual;
   EXPECT_EQ(unmatched_policy(usual, usual), nullptr);
   const auto with = [](auto member, auto value) {
@@ -87,7 +87,7 @@ TEST(GraphMismatch, NamesThePolicyOfWhichAWriterOffersTooLittle) {
             "receives nothing (process 7 on robot); subscribe as ROS does by default");
 }
 
-TEST(GraphMismatch, IsNoneWhereOneOfSeveralReadersMatches) {
+TEST(GraphMismatch, IsNotReportedIfOneOfSeveralReadersMatches) {
   auto own = own_of(EndpointKind::reader, "stop", twist);
   auto writer = other_of(EndpointKind::writer, twist);
   writer.policies.reliable = false;
@@ -105,7 +105,7 @@ TEST(GraphMismatch, NamesAServiceClientThatCannotBeAnswered) {
   EXPECT_FALSE(mismatch_of(own, client));
 }
 
-TEST(GraphMismatch, IsToldWhereNoReaderCanBeMadeForAnotherType) {
+TEST(GraphMismatch, IsReportedIfNoReaderCanBeMadeForAnotherType) {
   auto own = own_of(EndpointKind::reader, "stop", twist);
   own.name = "stop";
   own.other_type = [](const Announced&) -> std::optional<Mismatch> {
@@ -122,7 +122,7 @@ Domain own_test_domain() {
   });
 }
 
-TEST(GraphMismatch, IsWithdrawnWhenItHasGone) {
+TEST(GraphMismatch, IsWithdrawnWhenItsCauseDisappears) {
   Graph graph(own_test_domain());
   const std::size_t node = graph.add_node(node_name("", "r4"));
   graph.subscribe<TwistMessage>(node, "cmd_vel");
@@ -146,7 +146,7 @@ TEST(GraphMismatch, IsWithdrawnWhenItHasGone) {
 }
 
 // Cyclone DDS can make 16383 entities for a participant.
-TEST(GraphOfManyNodes, HasRoomForAllTopicsOfEach) {
+TEST(GraphWithManyNodes, HasRoomForAllTheirTopics) {
   Graph graph(own_test_domain());
   for (int n = 0; n < 80; ++n) {
     const std::size_t node = graph.add_node(node_name("board" + std::to_string(n), "r4"));

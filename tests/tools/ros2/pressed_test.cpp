@@ -10,7 +10,7 @@ EntityId number(int n) {
   return {static_cast<std::uint8_t>(n), static_cast<std::uint8_t>(n >> 8), 1};
 }
 
-TEST(Ros2Pressed, CountsOnceUntilItIsLetGo) {
+TEST(Ros2Pressed, CountsOnceUntilItIsReleased) {
   Pressed pressed;
   EXPECT_FALSE(pressed.on(number(1), false));
   EXPECT_TRUE(pressed.on(number(1), true));
@@ -20,7 +20,7 @@ TEST(Ros2Pressed, CountsOnceUntilItIsLetGo) {
   EXPECT_TRUE(pressed.on(number(1), true));
 }
 
-TEST(Ros2Pressed, ForgetsWhomItHasNotHeardForLongest) {
+TEST(Ros2Pressed, ForgetsThePublisherSilentForLongest) {
   Pressed pressed;
   for (int n = 0; n < static_cast<int>(Pressed::most); ++n)
     EXPECT_TRUE(pressed.on(number(n), true));

@@ -25,7 +25,7 @@ TEST(Ros2Units, ADutyOfAStateCommandsTheSamePwm) {
   }
 }
 
-TEST(Ros2Units, AMotorOutsideItsDutyIsNotCommanded) {
+TEST(Ros2Units, RefusesADutyOutsideItsRange) {
   const MotorChannel motor{CommandKind::osmc, 1, false};
   EXPECT_TRUE(motor.command(-1));
   for (const double wrong : {1.0001, -1.0001, not_a_number, infinite, -infinite}) {
@@ -81,7 +81,7 @@ TEST(Ros2Units, ATwistDrivesTwoWheelsAndKeepsTheirRatio) {
   }
 }
 
-TEST(Ros2CommandText, AStringEndsWithTheOnlyNulInIt) {
+TEST(Ros2CommandText, AStringMustEndWithItsOnlyNul) {
   EXPECT_EQ(text_of(std::string_view("O:1,1,1\0", 8)), "O:1,1,1");
   EXPECT_EQ(text_of(std::string_view("\0", 1)), "");
   for (const std::string& bad : {std::string(), std::string("O:1,1,1"),
@@ -90,7 +90,7 @@ TEST(Ros2CommandText, AStringEndsWithTheOnlyNulInIt) {
   }
 }
 
-TEST(Ros2CommandText, OfWhatIsNoTextNothingIsRepeated) {
+TEST(Ros2CommandText, AnErrorDoesNotRepeatInvalidCharacters) {
   for (const char* wrong : {"O:\xff", "O:1,1,1;\xc3", "\x01"}) {
     try {
       (void)commands_of(wrong);
@@ -102,7 +102,7 @@ TEST(Ros2CommandText, OfWhatIsNoTextNothingIsRepeated) {
   }
 }
 
-TEST(Ros2CommandText, SeveralCommandsStandBesideEachOther) {
+TEST(Ros2CommandText, ParsesSeveralCommandsAndRefusesOthers) {
   const auto commands = commands_of(" O:358,1,1 ;S:1500,2;\n");
   ASSERT_EQ(commands.size(), 2U);
   EXPECT_EQ(to_text(commands[0]), "O:358,1,1");
@@ -116,7 +116,7 @@ TEST(Ros2CommandText, SeveralCommandsStandBesideEachOther) {
   EXPECT_FALSE(asks_to_stop("E:STOPPED;E:CLEAR"));
 }
 
-TEST(StampOfACommand, IsOldBehindTheDeadlineAndSaysNothingIfItIsZero) {
+TEST(CommandStamp, IsOutdatedAfterTheDeadlineUnlessItIsZero) {
   using namespace std::chrono_literals;
   const WallTime now(1000s);
   EXPECT_FALSE(is_outdated(stamp_time(999, 500'000'000), now, 500ms));
@@ -126,7 +126,7 @@ TEST(StampOfACommand, IsOldBehindTheDeadlineAndSaysNothingIfItIsZero) {
   EXPECT_FALSE(is_outdated(stamp_time(1, 0), now, 0ms)) << "0 ms means no deadline";
 }
 
-TEST(PositionOfACounter, BeginsWithTheCountAndFollowsItBothWays) {
+TEST(CounterPosition, BeginsWithTheCountAndFollowsItBothWays) {
   Position position;
   EXPECT_EQ(position.advance(-5, 7), -5);
   EXPECT_EQ(position.advance(10, 7), 10);

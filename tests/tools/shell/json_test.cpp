@@ -19,7 +19,7 @@ TEST(Json, ShowsNumbersAsNumbersWithoutLosingADigit) {
   EXPECT_EQ(as_json("18446744073709551615"), "18446744073709551615");
 }
 
-TEST(Json, ShowsWhatOnlyLooksLikeANumberAsText) {
+TEST(Json, ShowsInvalidNumbersAsText) {
   for (const char* text : {"", "-", ".5", "5.", "007", "1e5", "0x10", "1-2", "1.2.3", "+1", "nan",
                            "18446744073709551616", "123456789012345678901234567890"}) {
     EXPECT_EQ(as_json(text), '"' + std::string(text) + '"');
@@ -34,27 +34,27 @@ TEST(Json, ShowsSeveralValuesAsAnArrayAndKeepsTheOrderOfFields) {
             R"({"DHB1A":[4095,1],"AIN24":24.28,"H":"R4-ROS2","E":""})");
 }
 
-TEST(Json, KeepsBothValuesOfANameThatStandsTwice) {
+TEST(Json, KeepsBothValuesOfADuplicateName) {
   const std::string bytes = test::with_crc("X:1;X:a;");
   Datagram datagram;
   ASSERT_TRUE(read_datagram(Text(bytes), datagram));
   EXPECT_EQ(fields_json(datagram).dump(), R"({"X":[1,"a"]})");
 }
 
-TEST(Json, EscapesBytesSoThatTheyCanBeTakenBack) {
+TEST(Json, EscapesBytesReversibly) {
   EXPECT_EQ(escaped(std::string_view("a\\b\0\n\xff ~", 8)), "a\\x5cb\\x00\\x0a\\xff ~");
 }
 
-TEST(Json, ReplacesWhatIsNoUtf8) {
+TEST(Json, ReplacesInvalidUtf8) {
   EXPECT_EQ(line_of({{"thing", "\xff"}}), "{\"thing\":\"\\ufffd\"}\n");
 }
 
-TEST(Json, IsALineOfAscii) {
+TEST(Json, PrintsOneLineOfAscii) {
   EXPECT_EQ(line_of({{"thing", "\x1b\u009b\x7f\u202eö"}}),
             "{\"thing\":\"\\u001b\\u009b\\u007f\\u202e\\u00f6\"}\n");
 }
 
-TEST(Json, OfADatagramHasNoSecret) {
+TEST(Json, MasksTheSecretsOfADatagram) {
   const auto json_of = [](const std::string& bytes) {
     Json object;
     add_datagram_json(object, bytes);
@@ -71,13 +71,13 @@ TEST(Json, OfADatagramHasNoSecret) {
                                   std::to_string(damaged.size()) + R"(,"text":"C:password,..."})");
 }
 
-TEST(Json, PrintsTextForPeopleLineByLine) {
+TEST(Json, PrintableLinesKeepsLineBreaks) {
   EXPECT_EQ(printable_lines("a\nb\x1b[2J\n\nc"), "a\nb\\x1b[2J\n\nc");
   EXPECT_EQ(printable_lines("a\n"), "a\n");
   EXPECT_EQ(printable_lines(""), "");
 }
 
-TEST(Json, TellsOfTransfersWhereThereAreSome) {
+TEST(Json, ShowsTransfersOnlyForATransportThatHasThem) {
   CarrierCounters counters;
   EXPECT_TRUE(transfers_json(counters).is_null());
   counters.rx_overflows = 3;
@@ -105,7 +105,7 @@ TEST(Json, CountsTheDatagramsOfATransport) {
   EXPECT_EQ(json["transfers"]["cancelled"], 4);
 }
 
-TEST(Json, OfAProblemTellsHowTheCommandEnded) {
+TEST(Json, ShowsTheOutcomeOfACommandInAProblem) {
   Problem problem{ErrorKind::refused, "O:1,1,9", "no such channel", "channels are 1-4"};
   EXPECT_FALSE(problem_json(problem).contains("outcome"));
   problem.outcome = Outcome::timed_out;

@@ -56,7 +56,7 @@ class PipedOutput {
   const int stdout_ = ::dup(STDOUT_FILENO);
 };
 
-TEST(Output, ArrivesWholeThoughThePipeIsFullAndDoesNotBlock) {
+TEST(Output, ArrivesCompletelyThroughAFullNonBlockingPipe) {
   std::string text;
   for (int i = 0; text.size() < 1'000'000; ++i) text += std::to_string(i) + "\n";
   text += "end\n";
@@ -71,7 +71,7 @@ TEST(Output, ArrivesWholeThoughThePipeIsFullAndDoesNotBlock) {
   EXPECT_EQ(read, text);
 }
 
-TEST(Output, ForPeopleIsPrintable) {
+TEST(Output, PrintsControlCharactersAsText) {
   const PipedOutput pipe;
   print_text("{}\n", "a\x1b[2Jb");
   print_text("{kept}\n");
@@ -92,11 +92,11 @@ void print_to_nobody() {
   std::_Exit(0);
 }
 
-TEST(Output, ThatHasLostItsReaderIsReportedAtTheEnd) {
+TEST(Output, ReportsAClosedReaderAtTheEnd) {
   EXPECT_EXIT(print_to_nobody(), testing::ExitedWithCode(7), "");
 }
 
-TEST(Output, OfALoopNeverWaitsForItsReaderAndCountsTheLinesThatAreMissing) {
+TEST(Output, OfALoopNeverBlocksAndCountsMissingLines) {
   const PipedOutput pipe;
   LineWriter lines(100'500, [](std::uint64_t count) { return fmt::format("{}\n", count); });
   const std::string line = std::string(999, 'x') + "\n";

@@ -21,7 +21,7 @@ TEST(MetricFamilies, WritesEachFamilyOnceWithItsHelpAndType) {
             "r4_up{url=\"udp://b\"} 0.25\n");
 }
 
-TEST(MetricFamilies, ABoardsNameCannotBreakOutOfItsLabel) {
+TEST(MetricFamilies, EscapesABoardNameInItsLabel) {
   MetricFamilies families;
   families.gauge("m", "h", {{"name", "a\"} 1\nb\\\xff"}}, 1);
   EXPECT_EQ(families.text(),

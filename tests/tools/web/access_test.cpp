@@ -10,7 +10,7 @@ namespace {
 
 const Access local("127.0.0.1", {}, "", {"https://app.example"});
 
-TEST(WebAccess, ReadsWhereToListen) {
+TEST(WebAccess, ParsesTheListenAddress) {
   EXPECT_EQ(listen_address("127.0.0.1:8080").host, "127.0.0.1");
   EXPECT_EQ(listen_address("127.0.0.1:8080").port, 8080);
   EXPECT_EQ(listen_address("[::1]:80").host, "::1");
@@ -22,7 +22,7 @@ TEST(WebAccess, ReadsWhereToListen) {
   }
 }
 
-TEST(WebAccess, KnowsWhatStaysOnThisComputer) {
+TEST(WebAccess, RecognizesLoopbackNames) {
   for (const char* host : {"127.0.0.1", "127.9.9.9", "::1", "localhost"})
     EXPECT_TRUE(is_loopback(host)) << host;
   for (const char* host :
@@ -31,7 +31,7 @@ TEST(WebAccess, KnowsWhatStaysOnThisComputer) {
   }
 }
 
-TEST(WebAccess, TurnsAwayNamesThatCouldHaveBeenMadeToPointHere) {
+TEST(WebAccess, RefusesForeignHostNames) {
   for (const char* host : {"127.0.0.1:8080", "localhost", "LOCALHOST:1", "[::1]:8080"}) {
     EXPECT_EQ(local.check(host, ""), Verdict::allowed) << host;
   }
@@ -48,7 +48,7 @@ TEST(WebAccess, TurnsAwayNamesThatCouldHaveBeenMadeToPointHere) {
             Verdict::allowed);
 }
 
-TEST(WebAccess, TurnsAwayPagesOfOtherSites) {
+TEST(WebAccess, RefusesPagesOfOtherSites) {
   EXPECT_EQ(local.check("localhost:8080", "http://localhost:8080"), Verdict::allowed);
   for (const char* origin :
        {"http://localhost", "http://localhost:8081", "https://localhost:8080", "null",
@@ -57,7 +57,7 @@ TEST(WebAccess, TurnsAwayPagesOfOtherSites) {
   }
 }
 
-TEST(WebAccess, ReadsTheNameByWhichItIsAsked) {
+TEST(WebAccess, ParsesHostNames) {
   EXPECT_EQ(host_name("Robot.example"), "robot.example");
   EXPECT_EQ(host_name("robot.example:8443"), "robot.example:8443");
   for (const char* wrong : {"", "https://robot.example", "robot.example/", "robot.example:https",
@@ -67,7 +67,7 @@ TEST(WebAccess, ReadsTheNameByWhichItIsAsked) {
 }
 
 // A proxy passes on the name that the browser asked for, or uses the address that it was given.
-TEST(WebAccess, ServesThePagesOfTheNamesThatItWasGiven) {
+TEST(WebAccess, ServesPagesUnderTheGivenNames) {
   const Access access("127.0.0.1", {"robot.example", "lab.example:8443"}, "secret", {});
   for (const char* host :
        {"robot.example", "Robot.Example:8080", "lab.example", "127.0.0.1:8080"}) {
@@ -84,14 +84,14 @@ TEST(WebAccess, ServesThePagesOfTheNamesThatItWasGiven) {
   EXPECT_EQ(access.check("evil.example", "https://robot.example"), Verdict::wrong_host);
 }
 
-TEST(WebAccess, AForeignPageMayReadIfItWasNamed) {
+TEST(WebAccess, ANamedForeignPageMayRead) {
   EXPECT_EQ(local.check_reader("localhost:8080", "https://app.example"), Verdict::allowed);
   EXPECT_EQ(local.check_reader("localhost:8080", "https://app.example.evil"),
             Verdict::wrong_origin);
   EXPECT_EQ(local.check_reader("evil.example", "https://app.example"), Verdict::wrong_host);
 }
 
-TEST(WebAccess, TakesTheTokenInAnyOfThreePlacesAndNothingLikeIt) {
+TEST(WebAccess, AcceptsOnlyTheExactTokenInAnyOfThreePositions) {
   const std::string token = random_token();
   EXPECT_EQ(token.size(), 32U);
   EXPECT_NE(token, random_token());

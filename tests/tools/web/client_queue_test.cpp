@@ -32,7 +32,7 @@ TEST(WebClientQueue, HandsOutInTheOrderOfArrival) {
   EXPECT_EQ(queue.bytes(), 0U);
 }
 
-TEST(WebClientQueue, ForgetsStatesThatAreOldAndTellsHowMany) {
+TEST(WebClientQueue, DropsOldStatesAndReportsHowMany) {
   ClientQueue queue;
   for (int i = 0; i < 10; ++i) {
     EXPECT_TRUE(
@@ -43,7 +43,7 @@ TEST(WebClientQueue, ForgetsStatesThatAreOldAndTellsHowMany) {
   EXPECT_EQ(queue.take_lost(), 0U);
 }
 
-TEST(WebClientQueue, NeverForgetsWhatIsNoState) {
+TEST(WebClientQueue, DropsOnlyStates) {
   ClientQueue queue;
   EXPECT_TRUE(queue.push(message_of("stopped", Kind::other), begin));
   EXPECT_TRUE(queue.push(message_of("state", Kind::state), begin + 1h));
@@ -63,7 +63,7 @@ TEST(WebClientQueue, IsBoundedInBytes) {
   EXPECT_EQ(queue.take_lost(), 5U);
 }
 
-TEST(WebClientQueue, SaysWhenThereIsNoRoomForAnEvent) {
+TEST(WebClientQueue, ReportsThatThereIsNoRoomForAnEvent) {
   ClientQueue queue;
   const std::string half(ClientQueue::most_other_bytes / 2, 'x');
   EXPECT_TRUE(queue.push(message_of(half, Kind::other), begin));

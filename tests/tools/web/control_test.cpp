@@ -8,7 +8,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(WebControl, IsNobodysUntilItIsTaken) {
+TEST(WebControl, IsFreeUntilItIsTaken) {
   Control control;
   EXPECT_FALSE(control.holder());
   EXPECT_FALSE(control.deadline());
@@ -17,7 +17,7 @@ TEST(WebControl, IsNobodysUntilItIsTaken) {
   EXPECT_FALSE(control.release(1));
 }
 
-TEST(WebControl, IsOfOneBrowserAtATime) {
+TEST(WebControl, BelongsToOneBrowserAtATime) {
   Control control;
   EXPECT_TRUE(control.take(1, 0ms));
   EXPECT_TRUE(control.take(1, 1ms));
@@ -26,7 +26,7 @@ TEST(WebControl, IsOfOneBrowserAtATime) {
   EXPECT_TRUE(control.is_held_by(1));
 }
 
-TEST(WebControl, IsFreeOnceAllBoardsHaveBeenLeft) {
+TEST(WebControl, IsFreeWhenAllBoardsHaveConfirmedTheFarewell) {
   Control control;
   EXPECT_TRUE(control.take(1, 0ms));
   EXPECT_TRUE(control.release(1));
@@ -46,7 +46,7 @@ TEST(WebControl, EndsWhenItsHolderIsSilent) {
   EXPECT_TRUE(control.expired(1900ms));
 }
 
-TEST(WebControl, EndsWhenWhatItsHolderSaysIsOld) {
+TEST(WebControl, EndsWhenTheMessagesOfItsHolderAreOld) {
   Control control;
   EXPECT_TRUE(control.take(1, 1000ms));
   EXPECT_TRUE(control.alive(1, 1100ms, 1110ms));
@@ -58,7 +58,7 @@ TEST(WebControl, EndsWhenWhatItsHolderSaysIsOld) {
   EXPECT_TRUE(control.expired(1600ms));
 }
 
-TEST(WebControl, TakesNoWordOfWhatItHasNotSaidYet) {
+TEST(WebControl, IgnoresAnAliveMessageFromTheFuture) {
   Control control;
   EXPECT_TRUE(control.take(1, 1000ms));
   EXPECT_FALSE(control.alive(1, 1101ms, 1100ms));

@@ -56,7 +56,7 @@ TEST(WebRows, HaveAColumnForEachValueOfADescribedDevice) {
   EXPECT_EQ(columns.units().back(), "A");
 }
 
-TEST(WebRows, ShowTheNumbersOfTheDatagramAndNullForTheRest) {
+TEST(WebRows, ShowTheNumbersOfADatagramAndNullForMissingOnes) {
   const Columns columns;
   const Json rows =
       rows_after(columns, {"AIN24:24.28;OSMC1:358,1;BLDC2:7,0,1;CMD:4294967295;X:5;PNum:1;T:10;"});
@@ -99,7 +99,7 @@ TEST(WebRows, KeepTheNewest64) {
   EXPECT_EQ(kept[63][0], 99);
 }
 
-TEST(WebChannels, NameColumnsThatThereAre) {
+TEST(WebChannels, NameExistingColumns) {
   const Columns columns;
   const std::set<std::string> names(columns.names().begin(), columns.names().end());
   const Json channels = channels_json();

@@ -23,7 +23,7 @@ TEST(WebPageRequest, ReadsEveryKind) {
   EXPECT_EQ(page_request(R"({"type":"clear","request":1,"board":0})")->kind, RequestKind::clear);
 }
 
-TEST(WebPageRequest, TakesAStopHoweverItIsSaid) {
+TEST(WebPageRequest, AcceptsAStopInAnyForm) {
   for (const char* text : {R"({"type":"stop"})", R"({"type":"stop","request":7})",
                            R"({"type":"stop","request":"x"})", R"({"board":[],"type":"stop"})"}) {
     const auto request = page_request(text);
@@ -32,7 +32,7 @@ TEST(WebPageRequest, TakesAStopHoweverItIsSaid) {
   }
 }
 
-TEST(WebPageRequest, TakesNothingElse) {
+TEST(WebPageRequest, RefusesInvalidRequests) {
   for (const std::string& text :
        {std::string(),
         std::string("{"),

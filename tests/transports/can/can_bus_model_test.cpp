@@ -49,7 +49,7 @@ struct Bench {
 
 using Ids = std::vector<std::uint32_t>;
 
-TEST(CanBusModel, AFrameTakesItsBitsAndTheNextOneFollowsItsIntermission) {
+TEST(CanBusModel, AFrameTakesItsBitTimesAndAnIntermission) {
   Bench bench;
   const int node = bench.sender();
   bench.bus.at(5000, [&] {
@@ -77,7 +77,7 @@ TEST(CanBusModel, TheLowestIdWinsAmongNodesAndWithinMailboxes) {
   EXPECT_EQ(bench.ids(), (Ids{0x010, 0x180, 0x200, 0x280, 0x300}));
 }
 
-TEST(CanBusModel, AnUrgentFrameWaitsInAFifo) {
+TEST(CanBusModel, AnUrgentFrameWaitsBehindOthersInAFifo) {
   Bench bench;
   const int fifo = bench.sender(1000, CanQueue::fifo);
   const int other = bench.sender();
@@ -114,7 +114,7 @@ TEST(CanBusModel, A29BitIdLosesToThe11BitsItBeginsWith) {
   EXPECT_EQ(bench.ids(), (Ids{lower.id, 0x100, longer.id}));
 }
 
-TEST(CanBusModel, AFullQueueRefuses) {
+TEST(CanBusModel, AFullQueueRefusesAFrame) {
   Bench bench;
   const int node = bench.sender(2);
   EXPECT_TRUE(bench.bus.send(node, frame(1)));
@@ -159,7 +159,7 @@ TEST(CanBusModel, ASenderBecomesPassiveAfter16ErrorsAndBusOffAfter32) {
   EXPECT_EQ(bench.bus.transmit_errors(node), 0U);
 }
 
-TEST(CanBusModel, AFrameInBetweenEndsARunOfRecessiveBits) {
+TEST(CanBusModel, AFrameEndsARunOfRecessiveBits) {
   Bench bench;
   const int node = bench.sender();
   const int other = bench.sender();
@@ -193,7 +193,7 @@ TEST(CanBusModel, ANodeThatStaysBusOffNeitherSendsNorHears) {
   EXPECT_EQ(heard, 0);
 }
 
-TEST(CanBusModel, AloneOnTheBusASenderStaysPassive) {
+TEST(CanBusModel, ASenderAloneOnTheBusStaysPassive) {
   CanBusModel bus({});
   CanNodeOptions silent;
   silent.silent = true;
@@ -210,7 +210,7 @@ TEST(CanBusModel, AloneOnTheBusASenderStaysPassive) {
   EXPECT_EQ(bus.traffic().at(0x100).frames, 1U);
 }
 
-TEST(CanBusModel, TwoNodesWithOneIdGoBusOffUnlessTheySayTheSame) {
+TEST(CanBusModel, TwoNodesWithOneIdGoBusOffUnlessTheirFramesAreEqual) {
   Bench bench;
   const int one = bench.sender();
   const int two = bench.sender();
@@ -246,7 +246,7 @@ TEST(CanBusModel, ABabblingNodeStarvesOnlyLowerPriorities) {
   EXPECT_GT(bench.bus.load(), 0.999);
 }
 
-TEST(CanBusModel, TheSameSeedIsTheSameRun) {
+TEST(CanBusModel, TheSameSeedGivesTheSameRun) {
   const auto run = [](std::uint64_t seed) {
     CanBusOptions options;
     options.seed = seed;
@@ -264,7 +264,7 @@ TEST(CanBusModel, TheSameSeedIsTheSameRun) {
   EXPECT_GT(run(1).size(), 400U);
 }
 
-TEST(CanBusModel, AnFdFrameSwitchesItsRate) {
+TEST(CanBusModel, AnFdFrameSwitchesToTheDataRate) {
   CanBusOptions options;
   options.rate = {1000000, 5000000};
   Bench bench(options);

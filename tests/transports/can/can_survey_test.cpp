@@ -54,7 +54,7 @@ struct Bus {
   std::uint32_t now_us = 0xFFFF0000;  // wraps during the test
 };
 
-TEST(CanSurvey, TellsIdsOfR4FromIdsOfAnotherProtocol) {
+TEST(CanSurvey, DistinguishesR4IdsFromThoseOfAnotherProtocol) {
   Bus bus;
   CanFrame frame{};
   frame.size = 8;
@@ -126,7 +126,7 @@ TEST(CanSurvey, StatesForAWatcherDoNotProveAHost) {
   EXPECT_FALSE(bus.survey.board(3).connected);
 }
 
-TEST(CanSurvey, TellsWhyABoardIsSafe) {
+TEST(CanSurvey, ReportsWhyABoardIsSafe) {
   Bus bus;
   bus.heartbeat(5, 900, SafeReason::stop);
   EXPECT_EQ(bus.survey.board(3).reason, SafeReason::stop);
@@ -144,7 +144,7 @@ TEST(CanSurvey, TellsWhyABoardIsSafe) {
   EXPECT_EQ(bus.survey.board(3).reason, SafeReason::fault);
 }
 
-TEST(CanSurvey, TellsOfAnEmergencyStop) {
+TEST(CanSurvey, ReportsAnEmergencyStop) {
   Bus bus;
   CanFrame frame{};
   frame.id = emergency_stop_id;
@@ -174,7 +174,7 @@ TEST(CanSurvey, CountsTheBitsOfEveryId) {
             traffic.at(0x555).busy_ns + traffic.at(CanSurvey::extended_ids).busy_ns);
 }
 
-TEST(CanSurvey, GarbageIsCountedAndKeepsNothing) {
+TEST(CanSurvey, CountsGarbageAndThenReadsStatesAgain) {
   Bus bus;
   CanFrame frame{};
   frame.id = telemetry_id(3);

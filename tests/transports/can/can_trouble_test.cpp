@@ -10,7 +10,7 @@ using namespace std::chrono_literals;
 
 const CanTrouble::Time trouble_start{std::chrono::hours{1}};
 
-TEST(CanTrouble, TakesFramesWithoutADatagramForAnotherProtocol) {
+TEST(CanTrouble, ReportsFramesWithoutADatagramAsAnotherProtocol) {
   CanTrouble trouble;
   for (auto after = 0ms; after < 500ms; after += 10ms) {
     trouble.on_host_frame(trouble_start + after);
@@ -23,7 +23,7 @@ TEST(CanTrouble, TakesFramesWithoutADatagramForAnotherProtocol) {
   EXPECT_EQ(trouble.now(trouble_start + 1500ms), TransportTrouble::none) << "the frames have ended";
 }
 
-TEST(CanTrouble, TakesAHostThatIsHeldUpOrEndsForNoOtherProtocol) {
+TEST(CanTrouble, AHostThatPausesOrEndsIsNotAnotherProtocol) {
   CanTrouble trouble;
   trouble.on_host_frame(trouble_start);
   trouble.on_host_datagram(trouble_start + 1ms);
@@ -35,7 +35,7 @@ TEST(CanTrouble, TakesAHostThatIsHeldUpOrEndsForNoOtherProtocol) {
   EXPECT_TRUE(trouble.hears_host(trouble_start + 900ms));
 }
 
-TEST(CanTrouble, TakesAHostForNoOtherProtocol) {
+TEST(CanTrouble, AHostIsNotAnotherProtocol) {
   CanTrouble trouble;
   for (auto after = 0ms; after < 5s; after += 100ms) {
     trouble.on_host_frame(trouble_start + after);
@@ -46,7 +46,7 @@ TEST(CanTrouble, TakesAHostForNoOtherProtocol) {
   EXPECT_FALSE(trouble.hears_host(trouble_start + 6s));
 }
 
-TEST(CanTrouble, TellsOfFramesThatComeTooLateWhileTheBoardIsHeard) {
+TEST(CanTrouble, ReportsLateFramesOnlyWhileTheBoardIsHeard) {
   CanTrouble trouble;
   trouble.on_late(2, trouble_start);
   trouble.on_board(trouble_start);

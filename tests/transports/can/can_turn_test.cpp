@@ -18,7 +18,7 @@ void talk(CanTurn& turn, CanTurn::Time from, std::chrono::milliseconds duration)
   for (auto at = from; at <= from + duration; at += 100ms) turn.on_own(at);
 }
 
-TEST(CanTurn, IsOursWhenNobodyElseIsHeard) {
+TEST(CanTurn, IsOursIfNoOtherHostIsHeard) {
   CanTurn turn(1);
   turn.listen(start);
   EXPECT_FALSE(turn.ours(start + 119ms));
@@ -28,7 +28,7 @@ TEST(CanTurn, IsOursWhenNobodyElseIsHeard) {
   EXPECT_TRUE(turn.ours(start + 1h));
 }
 
-TEST(CanTurn, AHostThatComesLaterIsSilentUntilTheOtherHasGone) {
+TEST(CanTurn, ALaterHostIsSilentUntilTheOtherEnds) {
   CanTurn turn(1);
   turn.listen(start);
   auto heard = start + 99ms;
@@ -42,14 +42,14 @@ TEST(CanTurn, AHostThatComesLaterIsSilentUntilTheOtherHasGone) {
   EXPECT_TRUE(turn.ours(heard + CanTurn::silence + CanTurn::most_chance));
 }
 
-TEST(CanTurn, AHostThatHasTheTurnGoesOn) {
+TEST(CanTurn, AHostThatHasTheTurnKeepsIt) {
   CanTurn turn(1);
   talk(turn, start, 0ms);
   EXPECT_FALSE(turn.on_other(start + 50ms));
   EXPECT_TRUE(turn.ours(start + 50ms));
 }
 
-TEST(CanTurn, AHostThatHasJustBegunGivesWay) {
+TEST(CanTurn, AHostThatHasJustBegunYields) {
   CanTurn turn(1);
   turn.on_own(start);
   EXPECT_TRUE(turn.on_other(start + 49ms));
@@ -69,7 +69,7 @@ TEST(CanTurn, AHostThatWasSilentForASecondIsANewcomer) {
   EXPECT_FALSE(early.on_other(start + 10s + 999ms));
 }
 
-TEST(CanTurn, ListensAgainWhenTheBusComesBack) {
+TEST(CanTurn, ListensAgainWhenTheBusIsUpAgain) {
   CanTurn turn(1);
   talk(turn, start, 1s);
   turn.listen(start + 1100ms);
@@ -80,7 +80,7 @@ TEST(CanTurn, ListensAgainWhenTheBusComesBack) {
 
 // Two hosts that begin in the same millisecond both fall silent. One of them returns first and
 // keeps the turn.
-TEST(CanTurn, OfTwoThatBeginTogetherOneGetsIt) {
+TEST(CanTurn, GoesToOneOfTwoHostsThatBeginTogether) {
   for (std::uint32_t seed = 1; seed <= 100; ++seed) {
     CanTurn turns[] = {CanTurn(seed), CanTurn(seed + 1000)};
     int sent[2] = {};

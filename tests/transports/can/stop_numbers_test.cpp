@@ -19,13 +19,13 @@ std::string stopped_by(std::uint32_t number) {
                   ";AN:0123456789abcdef;");
 }
 
-TEST(StopNumbers, GiveAHeartbeatTheNumberThatTheHostKnows) {
+TEST(StopNumbers, RestoreTheFullNumberInAHeartbeat) {
   StopNumbers numbers;
   numbers.add(3000000001, 5);
   EXPECT_EQ(in_full(numbers, stopped_by(5)), stopped_by(3000000001));
 }
 
-TEST(StopNumbers, LeaveEverythingElseAsItIs) {
+TEST(StopNumbers, ChangeNothingElse) {
   StopNumbers numbers;
   EXPECT_EQ(in_full(numbers, stopped_by(5)), stopped_by(5)) << "no stop is known yet";
   numbers.add(3000000001, 5);
@@ -37,7 +37,7 @@ TEST(StopNumbers, LeaveEverythingElseAsItIs) {
   }
 }
 
-TEST(StopNumbers, AreKnownOfTheNewestSixteenStops) {
+TEST(StopNumbers, KeepTheNewestSixteenStops) {
   StopNumbers numbers;
   for (std::uint32_t i = 0; i <= StopNumbers::most; ++i) numbers.add(1000 + i, i);
   std::uint32_t carried = 0;

@@ -38,12 +38,12 @@ TEST(LineFraming, ALineEndsWithCarriageReturnLineFeedOrBoth) {
   EXPECT_EQ(lines_of("a\rb\nc\r\nd\n\re\r\n"), (Lines{"a", "b", "c", "d", "e"}));
 }
 
-TEST(LineFraming, EmptyLinesArePassedOver) {
+TEST(LineFraming, SkipsEmptyLines) {
   EXPECT_EQ(lines_of("\n\n\r\r\r\n\na\n\n\nb\r\r\n\n"), (Lines{"a", "b"}));
   EXPECT_EQ(lines_of("\r\n"), Lines{});
 }
 
-TEST(LineFraming, AnUnfinishedLineWaits) {
+TEST(LineFraming, KeepsAnUnfinishedLine) {
   LineFraming framing;
   EXPECT_EQ(lines_of(framing, "abc"), Lines{});
   EXPECT_EQ(framing.pending(), 3U);
@@ -53,7 +53,7 @@ TEST(LineFraming, AnUnfinishedLineWaits) {
   EXPECT_EQ(framing.pending(), 0U);
 }
 
-TEST(LineFraming, NothingPushedChangesNothing) {
+TEST(LineFraming, AnEmptyPushChangesNothing) {
   LineFraming framing;
   framing.push(nullptr, 0, [](Text) { FAIL(); });
   EXPECT_EQ(framing.pending(), 0U);
@@ -70,12 +70,12 @@ TEST(LineFraming, AWholeLineIsPassedInPlace) {
   EXPECT_EQ(lines, 1);
 }
 
-TEST(LineFraming, BytesThatAreNoTextAreLeftToTheReader) {
+TEST(LineFraming, PassesBytesThatAreNotText) {
   const std::string line("\0\xFF\x7F;^", 5);
   EXPECT_EQ(lines_of(line + "\n"), Lines{line});
 }
 
-TEST(LineFraming, TheLongestLinePassesAndOneByteMoreDoesNot) {
+TEST(LineFraming, PassesTheLongestLineAndDropsALongerOne) {
   const std::string longest(max_datagram, 'x');
   for (const std::size_t piece : {std::size_t{1}, std::size_t{7}, max_datagram, 2 * max_datagram}) {
     LineFraming framing;
@@ -87,7 +87,7 @@ TEST(LineFraming, TheLongestLinePassesAndOneByteMoreDoesNot) {
   }
 }
 
-TEST(LineFraming, TenMegabytesWithoutATerminatorCostOneLine) {
+TEST(LineFraming, TenMegabytesWithoutATerminatorAreOneTooLongLine) {
   const std::string noise(10 * 1024 * 1024, '\x55');
   const std::string good = captured_state();
   for (const std::size_t piece : {std::size_t{1021}, noise.size()}) {
@@ -101,7 +101,7 @@ TEST(LineFraming, TenMegabytesWithoutATerminatorCostOneLine) {
   }
 }
 
-TEST(LineFraming, TellsOnceHowALineBeginsThatIsTooLong) {
+TEST(LineFraming, ReportsTheBeginningOfATooLongLineOnce) {
   std::string longer;
   for (int i = 0; i < 3000; ++i) longer += static_cast<char>('a' + i % 26);
   const std::string stream = "first\n" + longer + "\nlast\n";
@@ -131,7 +131,7 @@ TEST(LineFraming, ForgetsAnUnfinishedLineOnReset) {
   EXPECT_EQ(framing.oversize(), 1U) << "the counters are kept";
 }
 
-TEST(LineFraming, TheSameLinesHoweverTheStreamIsCut) {
+TEST(LineFraming, GivesTheSameLinesForPiecesOfAnySize) {
   std::string stream;
   for (const test::CapturedLine& line : test::paper_capture()) stream += line.bytes + "\r\n";
   stream.insert(stream.size() / 2, std::string(1500, 'n') + "\n\r\n");
@@ -148,7 +148,7 @@ TEST(LineFraming, TheSameLinesHoweverTheStreamIsCut) {
   }
 }
 
-TEST(LineFraming, TheSameLinesHoweverTheStreamIsCutAtRandom) {
+TEST(LineFraming, GivesTheSameLinesForRandomPieces) {
   std::mt19937 random(1);
   for (int round = 0; round < 300; ++round) {
     std::string stream;

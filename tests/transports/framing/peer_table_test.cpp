@@ -26,7 +26,7 @@ TEST(PeerTable, NumbersEverySenderOnce) {
   EXPECT_EQ(*peers.find(first), 0);
 }
 
-TEST(PeerTable, GivesTheNextThePlaceOfTheOneSilentLongestAndNoNumberTwice) {
+TEST(PeerTable, ReplacesThePeerSilentLongestAndNeverReusesANumber) {
   Peers peers;
   std::set<std::uint32_t> numbers;
   for (int i = 0; i < Peers::capacity; ++i) numbers.insert(peers.heard(i));
@@ -39,7 +39,7 @@ TEST(PeerTable, GivesTheNextThePlaceOfTheOneSilentLongestAndNoNumberTwice) {
   EXPECT_EQ(numbers.size(), static_cast<std::size_t>(Peers::capacity + 2));
 }
 
-TEST(PeerTable, MakesNoPlaceForWhatIsNoDatagram) {
+TEST(PeerTable, AddsNoPeerForAnInvalidDatagram) {
   Peers peers;
   const std::uint32_t host = peers.heard(owner, Text(with_crc("H:ROS2-R4;")));
   ASSERT_NE(host, Peers::nobody);
@@ -54,7 +54,7 @@ TEST(PeerTable, MakesNoPlaceForWhatIsNoDatagram) {
   EXPECT_EQ(peers.heard(owner, Text(with_crc("H:ROS2-R4;"))), host);
 }
 
-TEST(PeerTable, KeepsThePlaceOfTheHostInControlInAFlood) {
+TEST(PeerTable, KeepsTheControllingHostInAFlood) {
   Peers peers;
   const std::uint32_t number = peers.heard(owner);
   peers.hold(number);
@@ -63,7 +63,7 @@ TEST(PeerTable, KeepsThePlaceOfTheHostInControlInAFlood) {
   EXPECT_EQ(peers.heard(owner), number);
 }
 
-TEST(PeerTable, SendsWhatIsForEveryoneToTheHostInControlWhateverOthersSend) {
+TEST(PeerTable, AddressesTheControllingHostWhateverOthersSend) {
   Peers peers;
   const std::uint32_t number = peers.heard(owner);
   const std::uint32_t stranger = peers.heard(1);
@@ -83,7 +83,7 @@ TEST(PeerTable, SendsWhatIsForEveryoneToTheHostInControlWhateverOthersSend) {
   EXPECT_EQ(peers.heard(owner), number) << "the host may come back";
 }
 
-TEST(PeerTable, WhoOnlyWatchesIsNoAudience) {
+TEST(PeerTable, AWatcherIsNotAddressed) {
   const std::string watch = with_crc("W:50;PNum:5;T:0;");
   const std::string heartbeat = with_crc("H:ROS2-R4;");
   Peers peers;
@@ -100,7 +100,7 @@ TEST(PeerTable, WhoOnlyWatchesIsNoAudience) {
   EXPECT_EQ(peers.audience(), watcher) << "the watcher became a host";
 }
 
-TEST(PeerTable, NobodyMakesAWatcherOfTheHostInControl) {
+TEST(PeerTable, ALeaseRequestDoesNotMakeTheControllingHostAWatcher) {
   Peers peers;
   const std::uint32_t host = peers.heard(owner, Text(with_crc("H:ROS2-R4;")));
   peers.hold(host);
@@ -108,7 +108,7 @@ TEST(PeerTable, NobodyMakesAWatcherOfTheHostInControl) {
   EXPECT_FALSE(peers.watches(host)) << "the address of the watcher's datagram was forged";
 }
 
-TEST(PeerTable, KeepsEachPlaceOfTheHostInControlUntilAnotherIsHeld) {
+TEST(PeerTable, KeepsEveryPeerOfTheControllingHost) {
   Peers peers;
   const std::uint32_t first = peers.heard(1);
   const std::uint32_t second = peers.heard(2);
@@ -140,7 +140,7 @@ TEST(PeerTable, LetsANewHostInDuringAFlood) {
   EXPECT_EQ(peers.heard(owner), number);
 }
 
-TEST(PeerTable, FreesThePlaceOfTheOneBeforeWhenAnotherIsHeld) {
+TEST(PeerTable, ReleasesTheEarlierHostWhenAnotherTakesControl) {
   Peers peers;
   const std::uint32_t before = peers.heard(owner);
   peers.hold(before);

@@ -86,14 +86,14 @@ TEST(Impairment, HasTheStatedEffectsAndRepeatsThemForTheSameSeed) {
             arrivals("loss=5%,delay=20ms±10,seed=8", 1000, counters));
 }
 
-TEST(Impairment, OfNothingPassesAllAtOnce) {
+TEST(Impairment, WithoutEffectsPassesEverythingAtOnce) {
   ImpairmentCounters counters;
   const std::vector<OnItsWay> all = arrivals("seed=3", 1000, counters);
   ASSERT_EQ(all.size(), 1000U);
   EXPECT_EQ(all[500].at, 500ms);
 }
 
-TEST(Impairment, IsCutForAWhile) {
+TEST(Impairment, CutsTheLinkForAWhile) {
   ImpairmentCounters counters;
   const std::vector<OnItsWay> all = arrivals("cut=0.1s+0.2s", 1000, counters);
   EXPECT_EQ(counters.cut, 200U);
@@ -101,7 +101,7 @@ TEST(Impairment, IsCutForAWhile) {
   EXPECT_EQ(all[100].at, 300ms);
 }
 
-TEST(Impairment, HoldsNoMoreThanItMay) {
+TEST(Impairment, DropsDatagramsAboveItsLimit) {
   ImpairedDirection direction(Impairment::parse("delay=3600s"), 1, 0ms);
   for (int i = 0; i < 10'000; ++i) direction.put(0ms, {"x", 0, 0});
   EXPECT_EQ(direction.counters().overflow, 10'000 - ImpairedDirection::most_on_their_way);
@@ -128,7 +128,7 @@ TEST(Impairment, RefusesInvalidText) {
   EXPECT_EQ(link.cut_for, 1s);
 }
 
-TEST(ImpairedCarrier, IsATransportWhoseDatagramsComeLate) {
+TEST(ImpairedCarrier, DelaysAndLosesDatagrams) {
   asio::io_context io;
   auto [a, b] = make_memory_pair(io);
   const auto slow =

@@ -190,7 +190,7 @@ TEST_F(SerialPtyTest, SeesTheHostCloseAndOpenAgain) {
   EXPECT_TRUE(wait_for(at_board, "still working"));
 }
 
-TEST_F(SerialPtyTest, SeesTheBoardGoAndComeBackByItsPath) {
+TEST_F(SerialPtyTest, ReconnectsToABoardThatReturnsAtItsPath) {
   const std::string link = folder / "board";
   open_board("pty:" + link);
   EXPECT_EQ(board->name(), "pty:" + link);
@@ -222,7 +222,7 @@ TEST_F(SerialPtyTest, SeesTheBoardGoAndComeBackByItsPath) {
   EXPECT_TRUE(wait_for(at_board, "works again"));
 }
 
-TEST_F(SerialPtyTest, ReportsOnceWhyADeviceThatIsBackCannotBeOpened) {
+TEST_F(SerialPtyTest, ReportsOnceWhyAReturnedDeviceCannotBeOpened) {
   const std::string link = folder / "board";
   open_board("pty:" + link);
   open_host("serial://" + link);
@@ -238,7 +238,7 @@ TEST_F(SerialPtyTest, ReportsOnceWhyADeviceThatIsBackCannotBeOpened) {
   EXPECT_TRUE(run_until(io, [&] { return at_host.count(Kind::up) == 2; }));
 }
 
-TEST_F(SerialPtyTest, WritesNothingWhileNobodyReads) {
+TEST_F(SerialPtyTest, WritesNothingWithoutAReader) {
   open_board();
   EXPECT_FALSE(board->up());
   EXPECT_EQ(board->send("stale", Priority::normal), SendResult::down);
@@ -257,7 +257,7 @@ TEST_F(SerialPtyTest, WritesNothingWhileNobodyReads) {
   EXPECT_EQ(at_host.datagrams.size(), 1U);
 }
 
-TEST_F(SerialPtyTest, FindsItsFeetAfterNoise) {
+TEST_F(SerialPtyTest, ReadsLinesAfterNoise) {
   const Terminal far;
   open_host("serial://" + far.device);
   std::string noise;
@@ -269,7 +269,7 @@ TEST_F(SerialPtyTest, FindsItsFeetAfterNoise) {
   EXPECT_TRUE(at_host.has("good 1") && at_host.has("cut in the middle") && at_host.has("good 2"));
 }
 
-TEST_F(SerialPtyTest, TakesALineThatIsTooLongForOneBadLine) {
+TEST_F(SerialPtyTest, CountsATooLongLineOnce) {
   open_board();
   const FileDescriptor host_end = open_raw(board->name().substr(4));
   ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
@@ -280,7 +280,7 @@ TEST_F(SerialPtyTest, TakesALineThatIsTooLongForOneBadLine) {
   EXPECT_EQ(at_board.oversize, std::vector<std::string>{std::string(1024, 'x')});
 }
 
-TEST_F(SerialPtyTest, GivesAStalledReaderAYoungStateFirst) {
+TEST_F(SerialPtyTest, GivesAStalledReaderARecentStateFirst) {
   open_board();
   const FileDescriptor reader = open_raw(board->name().substr(4));
   ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
@@ -391,7 +391,7 @@ TEST_F(SerialPtyTest, SaysThatADeviceIsInUse) {
   host->open(at_host);
 }
 
-TEST_F(SerialPtyTest, CanBeTakenFromAProgramThatYieldsWhichThenReadsAndSendsNothing) {
+TEST_F(SerialPtyTest, AYieldingProgramLosesTheDeviceAndIsSilent) {
   const Terminal terminal;
   const Url url = Url::parse("serial://" + terminal.device);
   int lost_first = 0;
@@ -426,7 +426,7 @@ TEST_F(SerialPtyTest, CanBeTakenFromAProgramThatYieldsWhichThenReadsAndSendsNoth
   EXPECT_EQ(read_all(terminal.master), "");
 }
 
-TEST_F(SerialPtyTest, CanBeTakenFromAProgramThatWantsToSend) {
+TEST_F(SerialPtyTest, ASendReportsThatTheDeviceWasTaken) {
   const Terminal terminal;
   const Url url = Url::parse("serial://" + terminal.device);
   const auto one = claimed(url, {true, false}, at_host);
@@ -438,7 +438,7 @@ TEST_F(SerialPtyTest, CanBeTakenFromAProgramThatWantsToSend) {
   EXPECT_TRUE(run_until(io, [&] { return !one->up(); }));
 }
 
-TEST_F(SerialPtyTest, SaysWhichDeviceIsMissingOrNotASerialPort) {
+TEST_F(SerialPtyTest, NamesAMissingDeviceAndOneThatIsNotASerialPort) {
   std::ofstream(folder / "file") << "text";
   const std::string missing = "there is no such device";
   const std::string other = "it is not a serial port";
@@ -532,7 +532,7 @@ TEST_F(SerialPtyTest, LeaksNoDescriptorsOver30Reopenings) {
 }
 
 // The program may control a board, so it must continue and try again.
-TEST_F(SerialPtyTest, ARefusedWaitIsAnErrorOfTheHostAndAWarningOfTheBoard) {
+TEST_F(SerialPtyTest, ARefusedWatchIsAHostErrorAndABoardWarning) {
   in_a_thread_of_its_own([&] {
     open_board();
     refuse(no_watches);

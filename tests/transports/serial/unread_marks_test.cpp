@@ -8,7 +8,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-TEST(UnreadMarks, TellWhenTheOldestUnreadBytesWereWritten) {
+TEST(UnreadMarks, GiveTheWriteTimeOfTheOldestUnreadBytes) {
   UnreadMarks marks;
   const UnreadMarks::Time start{};
   EXPECT_FALSE(marks.any());
@@ -24,7 +24,7 @@ TEST(UnreadMarks, TellWhenTheOldestUnreadBytesWereWritten) {
   EXPECT_FALSE(marks.any());
 }
 
-TEST(UnreadMarks, AreNeverTooYoungHoweverManyAreWritten) {
+TEST(UnreadMarks, AreNeverNewerThanTheOldestUnreadBytes) {
   UnreadMarks marks;
   UnreadMarks::Time now{};
   for (int i = 0; i < 100'000; ++i) {

@@ -74,7 +74,7 @@ class ShareHolderTest : public SharedTransportTest {
   const std::string stop = datagram_of("E", "STOP");
 };
 
-TEST_F(ShareHolderTest, LosesCopiesToAProgramThatSleepsAndTellsItTheNewestAfterwards) {
+TEST_F(ShareHolderTest, DropsStatesForASleepingProgramAndLaterSendsTheNewest) {
   const auto holder = opened(BoardRole::control);
   asio::io_context asleep;
   const auto sleeper = opened_in(asleep, BoardRole::watch);
@@ -111,7 +111,7 @@ TEST_F(ShareHolderTest, DisconnectsAProgramThatMissesAnEventOfTheTransport) {
   EXPECT_FALSE(until_the_end(sleeper).empty());
 }
 
-TEST_F(ShareHolderTest, LetsNothingButAStopThroughToTheBoard) {
+TEST_F(ShareHolderTest, PassesOnlyStopsToTheBoard) {
   const auto holder = opened(BoardRole::control);
   struct Case {
     Letter kind;
@@ -143,7 +143,7 @@ TEST_F(ShareHolderTest, LetsNothingButAStopThroughToTheBoard) {
   EXPECT_TRUE(holder->carrier->up()) << "a controlling program keeps the transport";
 }
 
-TEST_F(ShareHolderTest, TellsASeventeenthWhyAndServesItOnceAPlaceIsFree) {
+TEST_F(ShareHolderTest, RefusesASeventeenthProgramUntilAnotherEnds) {
   const auto holder = opened(BoardRole::control);
   std::vector<FileDescriptor> sharers = raw_watchers(ShareHolder::most_served);
   const auto one_too_many = opened_in(io, BoardRole::watch);
@@ -160,7 +160,7 @@ TEST_F(ShareHolderTest, TellsASeventeenthWhyAndServesItOnceAPlaceIsFree) {
   EXPECT_FALSE(one_too_many->has("not for it"));
 }
 
-TEST_F(ShareHolderTest, ObeysTheStopOfASeventeenthAndLetsItHearThatTheBoardObeys) {
+TEST_F(ShareHolderTest, PassesAndConfirmsTheStopOfASeventeenthProgram) {
   const auto holder = opened(BoardRole::control);
   const auto sharers = raw_watchers(ShareHolder::most_served);
   // r4 stop does the same.
@@ -176,7 +176,7 @@ TEST_F(ShareHolderTest, ObeysTheStopOfASeventeenthAndLetsItHearThatTheBoardObeys
   ASSERT_TRUE(run_until(io, [&] { return late->carrier->up(); }));
 }
 
-TEST_F(ShareHolderTest, ObeysAStopHoweverManyProgramsAreThereAndWithoutAHello) {
+TEST_F(ShareHolderTest, PassesAStopWithoutAHelloFromAnyNumberOfPrograms) {
   const auto holder = opened(BoardRole::control);
   const auto sharers = raw_watchers(ShareHolder::most_served);
   std::vector<FileDescriptor> others;
@@ -188,7 +188,7 @@ TEST_F(ShareHolderTest, ObeysAStopHoweverManyProgramsAreThereAndWithoutAHello) {
   }
 }
 
-TEST_F(ShareHolderTest, TurnsStrangersAwayOneAtATimeWithAPauseAfterEach) {
+TEST_F(ShareHolderTest, RefusesStrangersOneAtATimeWithPauses) {
   if (::geteuid() != 0) GTEST_SKIP() << "needs root, to act as another user";
   const auto holder = opened(BoardRole::control);
   std::vector<FileDescriptor> strangers;
@@ -204,7 +204,7 @@ TEST_F(ShareHolderTest, TurnsStrangersAwayOneAtATimeWithAPauseAfterEach) {
 }
 
 // If the system refuses a call, the program must not end, because it may control a board.
-TEST_F(ShareHolderTest, GoesOnWhereTheLoopCannotWaitForAProgramThatComes) {
+TEST_F(ShareHolderTest, ContinuesIfTheSystemRefusesToWatchANewProgram) {
   in_a_thread_of_its_own([&] {
     const auto holder = opened(BoardRole::control);
     const auto watcher = opened(BoardRole::watch);

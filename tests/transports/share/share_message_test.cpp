@@ -10,7 +10,7 @@ namespace {
 
 using Letter = ShareMessage::Kind;
 
-TEST(ShareMessage, BringsAnEventWhole) {
+TEST(ShareMessage, PreservesAnEvent) {
   const Problem problem{ErrorKind::permission, "/dev/ttyACM0", "permission denied", "join dialout"};
   for (const auto kind :
        {CarrierEvent::Kind::up, CarrierEvent::Kind::down, CarrierEvent::Kind::warning}) {
@@ -33,7 +33,7 @@ TEST(ShareMessage, CutsTextsThatAreTooLong) {
   EXPECT_GT(message->event.problem.fix.size(), 300U);
 }
 
-TEST(ShareMessage, BringsADatagramOfAnyBytes) {
+TEST(ShareMessage, PreservesADatagramOfAnyBytes) {
   const std::string packet("r\0\xff;", 4);
   const auto message = read_share_message(packet);
   ASSERT_TRUE(message);

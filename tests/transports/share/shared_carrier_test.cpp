@@ -26,7 +26,7 @@ class SharedCarrier : public SharedTransportTest {
       fmt::format("the program that holds it (pid {}) does not answer", ::getpid());
 };
 
-TEST_F(SharedCarrier, IsHeldByTheFirstProgramUntilThatCloses) {
+TEST_F(SharedCarrier, IsHeldByTheFirstProgramUntilItCloses) {
   const auto only = opened_in(io, BoardRole::control);
   EXPECT_TRUE(only->carrier->up());
   EXPECT_EQ(only->carrier->name(), "device:");
@@ -38,7 +38,7 @@ TEST_F(SharedCarrier, IsHeldByTheFirstProgramUntilThatCloses) {
   EXPECT_FALSE(connect_to_holder(share, BoardRole::control));
 }
 
-TEST_F(SharedCarrier, LetsProgramsThatWatchHearBothDirections) {
+TEST_F(SharedCarrier, WatchersHearBothDirections) {
   const auto driver = opened(BoardRole::control);
   const auto one = opened(BoardRole::watch);
   const auto two = opened(BoardRole::watch);
@@ -60,7 +60,7 @@ TEST_F(SharedCarrier, LetsProgramsThatWatchHearBothDirections) {
   EXPECT_TRUE(driver->heard.overheard.empty());
 }
 
-TEST_F(SharedCarrier, LetsProgramsThatWatchHearNoSecret) {
+TEST_F(SharedCarrier, WatchersHearNoSecret) {
   const auto driver = opened(BoardRole::control);
   const auto watcher = opened(BoardRole::watch);
   const std::string setting = with_crc("C:password,letmein!;PNum:1;T:2;");
@@ -96,7 +96,7 @@ TEST_F(SharedCarrier, ServesItsOwnProgramBeforeOthers) {
   EXPECT_TRUE(hear());
 }
 
-TEST_F(SharedCarrier, LetsAllHearAnotherHostAndDatagramsThatAreTooLong) {
+TEST_F(SharedCarrier, EveryProgramHearsOtherHostsAndTooLongDatagrams) {
   const auto driver = opened(BoardRole::control);
   const auto watcher = opened(BoardRole::watch);
   device.overhear("O:358,1,1;");
@@ -110,7 +110,7 @@ TEST_F(SharedCarrier, LetsAllHearAnotherHostAndDatagramsThatAreTooLong) {
   EXPECT_EQ(watcher->carrier->counters().rx_oversize, 1U);
 }
 
-TEST_F(SharedCarrier, LetsAProgramThatWatchesStopTheBoardAtOnceAndSayNothingElse) {
+TEST_F(SharedCarrier, AWatcherMayStopTheBoardAtOnceAndSendNothingElse) {
   const auto driver = opened(BoardRole::control);
   const auto watcher = opened_in(io, BoardRole::watch);  // not served yet
   EXPECT_TRUE(watcher->carrier->is_shared());
@@ -124,7 +124,7 @@ TEST_F(SharedCarrier, LetsAProgramThatWatchesStopTheBoardAtOnceAndSayNothingElse
   EXPECT_EQ(driver->heard.overheard, std::vector<std::string>{stop});
 }
 
-TEST_F(SharedCarrier, RefusesASecondProgramThatIsToControlAndNamesTheFirst) {
+TEST_F(SharedCarrier, RefusesASecondControllingProgramAndNamesTheFirst) {
   auto driver = opened(BoardRole::control);
   const auto second = program(BoardRole::control, io);
   const Problem problem = problem_of([&] { second->open(); });
@@ -141,7 +141,7 @@ TEST_F(SharedCarrier, RefusesASecondProgramThatIsToControlAndNamesTheFirst) {
   EXPECT_TRUE(second->carrier->up());
 }
 
-TEST_F(SharedCarrier, GivesTheTransportToAProgramThatControls) {
+TEST_F(SharedCarrier, WatchersYieldTheTransportToAControllingProgram) {
   const auto one = opened(BoardRole::watch);
   const auto two = opened(BoardRole::watch);
   const auto driver = opened_in(io, BoardRole::control);
@@ -156,7 +156,7 @@ TEST_F(SharedCarrier, GivesTheTransportToAProgramThatControls) {
   for (const auto& each : {one.get(), two.get()}) EXPECT_EQ(each->heard.count(Kind::down), 0U);
 }
 
-TEST_F(SharedCarrier, GivesControlToAProgramThatWatchesAndTakesItBack) {
+TEST_F(SharedCarrier, AWatcherMayTakeAndReleaseControl) {
   const auto one = opened(BoardRole::watch);
   const auto two = opened(BoardRole::watch);
   for (const auto* each : {two.get(), one.get()}) {  // as a served program, then as the holder
@@ -178,7 +178,7 @@ TEST_F(SharedCarrier, GivesControlToAProgramThatWatchesAndTakesItBack) {
   EXPECT_EQ(device.sent.size(), 2U);
 }
 
-TEST_F(SharedCarrier, RefusesControlToAProgramThatWatchesAndLeavesItWatching) {
+TEST_F(SharedCarrier, AWatcherThatIsRefusedControlKeepsWatching) {
   const auto driver = opened(BoardRole::control);
   const auto watcher = opened(BoardRole::watch);
   const Problem problem = problem_of([&] { watcher->carrier->change_role(BoardRole::control); });
@@ -218,7 +218,7 @@ TEST_F(SharedCarrier, ChangesItsRoleInAnyCallback) {
   }
 }
 
-TEST_F(SharedCarrier, IsTakenOverByAnotherProgramWhenTheHolderEnds) {
+TEST_F(SharedCarrier, AnotherProgramBecomesHolderWhenTheHolderEnds) {
   std::vector<std::unique_ptr<Program>> programs;
   for (int i = 0; i < 4; ++i) programs.push_back(opened(BoardRole::watch));
   while (programs.size() > 1) {
@@ -248,7 +248,7 @@ TEST_F(SharedCarrier, ReportsEventsOfTheTransportToAllPrograms) {
   EXPECT_EQ(late->carrier->counters().downs, 0U) << "the transport was down before it opened";
 }
 
-TEST_F(SharedCarrier, MayBeClosedByAProgramThatHearsAStopOfAnother) {
+TEST_F(SharedCarrier, MayBeClosedInTheCallbackForAnOverheardStop) {
   const auto driver = opened(BoardRole::control);
   const auto watcher = opened(BoardRole::watch);
   driver->heard.then_overheard = [&] { driver->carrier->close(); };
@@ -258,7 +258,7 @@ TEST_F(SharedCarrier, MayBeClosedByAProgramThatHearsAStopOfAnother) {
 }
 
 // When a board with a link to a pty restarts, the link leads to a new device.
-TEST_F(SharedCarrier, RestartsWhenADeviceThatIsKnownByItsPathIsGone) {
+TEST_F(SharedCarrier, ReopensWhenADeviceNamedByItsPathIsUnplugged) {
   share.is_path = true;
   const auto one = opened(BoardRole::watch);
   const auto two = opened(BoardRole::watch);
@@ -275,7 +275,7 @@ TEST_F(SharedCarrier, RestartsWhenADeviceThatIsKnownByItsPathIsGone) {
 
 // --- a holder that does not answer
 
-TEST_F(SharedCarrier, NamesAHolderThatDoesNotAnswerIfTheTransportCannotBeOpened) {
+TEST_F(SharedCarrier, NamesASilentHolderIfTheTransportCannotBeOpened) {
   asio::io_context stopped;  // runs only in goes_on()
   const auto holder = opened_in(stopped, BoardRole::watch);
   const auto watcher = opened_in(io, BoardRole::watch);
@@ -298,7 +298,7 @@ TEST_F(SharedCarrier, NamesAHolderThatDoesNotAnswerIfTheTransportCannotBeOpened)
   EXPECT_EQ(watcher->heard.count(Kind::down), 2U);
 }
 
-TEST_F(SharedCarrier, IsOpenedBesideAHolderThatDoesNotAnswer) {
+TEST_F(SharedCarrier, IsOpenedNextToASilentHolder) {
   device.exclusive = false;
   asio::io_context hanging;
   const auto holder = opened_in(hanging, BoardRole::watch);
@@ -322,7 +322,7 @@ TEST_F(SharedCarrier, IsOpenedBesideAHolderThatDoesNotAnswer) {
   EXPECT_EQ(watcher->heard.count(Kind::down), 0U);
 }
 
-TEST_F(SharedCarrier, IsTakenFromAHolderThatDoesNotAnswerAndOnlyWatches) {
+TEST_F(SharedCarrier, IsTakenFromASilentHolderThatOnlyWatches) {
   device.may_be_taken = true;
   asio::io_context hanging;
   const auto holder = opened_in(hanging, BoardRole::watch);
@@ -343,7 +343,7 @@ TEST_F(SharedCarrier, IsTakenFromAHolderThatDoesNotAnswerAndOnlyWatches) {
   EXPECT_EQ(watcher->heard.count(Kind::down) + holder->heard.count(Kind::down), 0U);
 }
 
-TEST_F(SharedCarrier, StaysWithAHolderThatDoesNotAnswerButControls) {
+TEST_F(SharedCarrier, StaysWithASilentHolderThatControls) {
   device.may_be_taken = true;
   asio::io_context hanging;
   const auto holder = opened_in(hanging, BoardRole::control);
@@ -355,7 +355,7 @@ TEST_F(SharedCarrier, StaysWithAHolderThatDoesNotAnswerButControls) {
   EXPECT_EQ(device.opened, 1);
 }
 
-TEST_F(SharedCarrier, PassesOverAStoppedHolderAtOnce) {
+TEST_F(SharedCarrier, IgnoresASuspendedHolderAtOnce) {
   const pid_t holder = ::fork();
   if (holder == 0) {
     const FileDescriptor name = take_share_name(share, BoardRole::watch);
@@ -371,7 +371,7 @@ TEST_F(SharedCarrier, PassesOverAStoppedHolderAtOnce) {
   ::waitpid(holder, &status, 0);
 }
 
-TEST_F(SharedCarrier, PassesOverAHolderForWhichManyProgramsWait) {
+TEST_F(SharedCarrier, IgnoresAHolderWithAFullConnectionQueue) {
   device.exclusive = false;
   asio::io_context hanging;
   const auto holder = opened_in(hanging, BoardRole::watch);
@@ -380,7 +380,7 @@ TEST_F(SharedCarrier, PassesOverAHolderForWhichManyProgramsWait) {
   EXPECT_EQ(device.opened, 3);
 }
 
-TEST_F(SharedCarrier, LooksAgainSlowlyIfTheHolderEndsTheConnection) {
+TEST_F(SharedCarrier, ReconnectsSlowlyIfTheHolderEndsTheConnection) {
   const FileDescriptor unkind = take_share_name(share, BoardRole::watch);
   const auto watcher = opened_in(io, BoardRole::watch);
   int came = 0;
@@ -401,7 +401,7 @@ TEST_F(SharedCarrier, IsNotForOtherUsers) {
             0);
 }
 
-TEST_F(SharedCarrier, IsForTheMembersOfTheGroupThatTheHolderNames) {
+TEST_F(SharedCarrier, IsSharedWithTheGroupThatTheHolderNames) {
   // A user whose only group is that of user nobody (65534).
   const auto stop_it = [&](const ShareGroup& of) {
     return run_unprivileged([&] {
@@ -426,7 +426,7 @@ TEST_F(SharedCarrier, IsForTheMembersOfTheGroupThatTheHolderNames) {
 }
 
 // Any user may bind the name of a holder.
-TEST_F(SharedCarrier, IsOpenedThoughAStrangerHasTakenItsNames) {
+TEST_F(SharedCarrier, OpensEvenIfAnotherUserHasTakenItsNames) {
   if (::geteuid() != 0) GTEST_SKIP() << "needs root, to act as another user";
   device.exclusive = false;
   const FileDescriptor squatters[] = {foreign_socket(BoardRole::control, true),

@@ -129,7 +129,7 @@ std::string answer_from(asio::io_context& io, const char* asked, const std::stri
   return all;
 }
 
-TEST_F(UdpCarrierTest, AnswersFromTheAddressThatWasAsked) {
+TEST_F(UdpCarrierTest, AnswersFromTheAddressOfTheQuestion) {
   for (const char* const url : {"udp://0.0.0.0:0", "udp://[::]:0"}) {
     board = open_carrier(io, url, Role::board, at_board);
     for (const char* const asked : {"127.0.0.1", "127.0.0.2", "127.0.0.3"}) {
@@ -152,7 +152,7 @@ TEST_F(UdpCarrierTest, ServesIpv4HostsOnAnIpv6Socket) {
   ASSERT_TRUE(wait_for(at_board, "question"));
 }
 
-TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostHeardLast) {
+TEST_F(UdpCarrierTest, SendsStatesToTheHostHeardLast) {
   open_board();
   EXPECT_EQ(board->send("nobody is there", Priority::state), SendResult::down);
   Recorder at_second;
@@ -177,7 +177,7 @@ TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostHeardLast) {
   EXPECT_TRUE(board->up());
 }
 
-TEST_F(UdpCarrierTest, AnswersThePapersClientWhereItListensAndWhereItAsks) {
+TEST_F(UdpCarrierTest, AnswersThePaperClientOnBothOfItsPorts) {
   Socket listening(io, "127.0.0.1");
   Socket asking(io, "127.0.0.1");
   open_board("?peer=127.0.0.1:" + listening.port());
@@ -216,7 +216,7 @@ TEST_F(UdpCarrierTest, HearsOnlyTheBoardFromAnyOfItsPorts) {
   EXPECT_EQ(host->counters().rx_datagrams, 1U);
 }
 
-TEST_F(UdpCarrierTest, DropsDatagramsThatAreTooLongAndShowsTheHostTheirBeginning) {
+TEST_F(UdpCarrierTest, DropsTooLongDatagramsAndReportsTheirBeginning) {
   open_board();
   open_host();
   const std::string listen = host->name().substr(host->name().find("listen=") + 7);
@@ -238,7 +238,7 @@ TEST_F(UdpCarrierTest, DropsDatagramsThatAreTooLongAndShowsTheHostTheirBeginning
   EXPECT_EQ(host->counters().tx_errors, 1U);
 }
 
-TEST_F(UdpCarrierTest, SendsForEveryoneToTheHostInControlAlthoughAnotherWasHeardLast) {
+TEST_F(UdpCarrierTest, SendsStatesToTheControllingHostNotToTheHostHeardLast) {
   open_board();
   Socket owner(io, "127.0.0.1");
   Socket stranger(io, "127.0.0.1");
@@ -289,7 +289,7 @@ TEST_F(UdpCarrierTest, SaysWhyItCannotBeOpened) {
   }
 }
 
-TEST_F(UdpCarrierTest, IsOnePathHoweverTheAddressIsWritten) {
+TEST_F(UdpCarrierTest, EquivalentUrlsHaveOneShareName) {
   const auto path = [](const char* url) { return udp_share_name(Url::parse(url)).text; };
   EXPECT_EQ(path("udp://localhost"), path("udp://127.0.0.1:2018?listen=2390"));
   EXPECT_EQ(path("udp://LocalHost"), path("udp://localhost"));
@@ -314,7 +314,7 @@ TEST_F(UdpCarrierTest, SaysThatAPortIsNotPermitted) {
   EXPECT_EQ(status, first_free > 1 ? 0 : 1);
 }
 
-TEST_F(UdpCarrierTest, TakesABoardThatIsOffForAQuietOne) {
+TEST_F(UdpCarrierTest, StaysUpIfTheBoardIsOff) {
   std::string port;
   {
     Socket gone(io, "127.0.0.1");
@@ -332,7 +332,7 @@ TEST_F(UdpCarrierTest, TakesABoardThatIsOffForAQuietOne) {
   EXPECT_TRUE(wait_for(at_board, "now"));
 }
 
-TEST_F(UdpCarrierTest, HandsOverAWholeBurstAndReportsItsEnd) {
+TEST_F(UdpCarrierTest, DeliversABurstAndReportsItsEnd) {
   open_board();
   Socket raw(io, "127.0.0.1");
   for (int i = 0; i < 100; ++i) raw.send(std::to_string(i), port_of(*board));
@@ -425,7 +425,7 @@ class UdpTwoBoardsTest : public testing::Test {
   Link links[2];
 };
 
-TEST_F(UdpTwoBoardsTest, AreToldApartByTheirAddress) {
+TEST_F(UdpTwoBoardsTest, AreDistinguishedByTheirAddress) {
   open_board(links[0], "127.0.0.1");
   open_board(links[1], "127.0.0.2");
   for (Link& link : links) open_host(link);
@@ -441,7 +441,7 @@ TEST_F(UdpTwoBoardsTest, AreToldApartByTheirAddress) {
   EXPECT_FALSE(links[1].at_host.has("other port of the second"));
 }
 
-TEST_F(UdpTwoBoardsTest, AreToldApartByTheirPortAtOneAddressInEitherOrder) {
+TEST_F(UdpTwoBoardsTest, AreDistinguishedByTheirPortAtOneAddress) {
   for (Link& link : links) open_board(link, "127.0.0.1");
   for (const std::size_t first : {0U, 1U}) {
     open_host(links[first]);
@@ -458,7 +458,7 @@ TEST_F(UdpTwoBoardsTest, AreToldApartByTheirPortAtOneAddressInEitherOrder) {
   }
 }
 
-TEST_F(UdpTwoBoardsTest, OfWhichOneClosesAndOpensAgain) {
+TEST_F(UdpTwoBoardsTest, OneMayCloseAndReopen) {
   for (Link& link : links) open_board(link, "127.0.0.1");
   for (Link& link : links) open_host(link);
   talk("both", 1);
@@ -478,7 +478,7 @@ TEST_F(UdpTwoBoardsTest, OfWhichOneClosesAndOpensAgain) {
 
 // A datagram of the second board that arrives before its host is open does not go to the first
 // host.
-TEST_F(UdpTwoBoardsTest, OfWhichTheSecondSpeaksBeforeItIsOpened) {
+TEST_F(UdpTwoBoardsTest, EarlyDatagramsOfTheSecondDoNotReachTheFirst) {
   for (Link& link : links) open_board(link, "127.0.0.1");
   open_host(links[0]);
   Socket raw(io, "127.0.0.1");
@@ -489,7 +489,7 @@ TEST_F(UdpTwoBoardsTest, OfWhichTheSecondSpeaksBeforeItIsOpened) {
   EXPECT_TRUE(links[0].at_host.datagrams.empty());
 }
 
-TEST_F(UdpTwoBoardsTest, MustNotBeTheSame) {
+TEST_F(UdpTwoBoardsTest, RefuseTheSameBoardTwice) {
   open_board(links[0], "127.0.0.1");
   open_host(links[0]);
   const Problem problem =
@@ -524,7 +524,7 @@ TEST_F(UdpTwoBoardsTest, KeepThePortFromOtherPrograms) {
 }
 
 // The system reports to a connected socket that its board is off. This must not cost a datagram.
-TEST_F(UdpTwoBoardsTest, OfWhichTheSecondIsOff) {
+TEST_F(UdpTwoBoardsTest, TheFirstLosesNothingIfTheSecondIsOff) {
   open_board(links[0], "127.0.0.1");
   open_host(links[0]);
   const std::string port = Socket(io, "127.0.0.1").port();
@@ -544,7 +544,7 @@ TEST_F(UdpTwoBoardsTest, OfWhichTheSecondIsOff) {
 }
 
 // Each host has a loop and a thread, as in r4::Board.
-TEST_F(UdpTwoBoardsTest, OpenAndCloseInThreadsOfTheirOwn) {
+TEST_F(UdpTwoBoardsTest, OpenAndCloseInSeparateThreads) {
   const auto worker = [this](const char* address) {
     asio::io_context own;
     Recorder at_board, at_host;

@@ -95,7 +95,7 @@ class UdpNameTest : public testing::Test {
   int questions = 0;
 };
 
-TEST_F(UdpNameTest, IsKnownWhenOpenReturnsOutsideOfTheLoop) {
+TEST_F(UdpNameTest, IsResolvedByOpenOutsideOfTheLoop) {
   host = make();
   host->open(at_host);
   EXPECT_TRUE(host->up());
@@ -105,7 +105,7 @@ TEST_F(UdpNameTest, IsKnownWhenOpenReturnsOutsideOfTheLoop) {
   EXPECT_EQ(names.asked(), 1);
 }
 
-TEST_F(UdpNameTest, IsWaitedForOnlySoLong) {
+TEST_F(UdpNameTest, OpenFailsIfTheNameServerDoesNotAnswerInTime) {
   names.hang(true);
   lookup.patience = milliseconds(20);
   host = make();
@@ -135,7 +135,7 @@ TEST_F(UdpNameTest, DoesNotBlockTheLoop) {
   expect_link();
 }
 
-TEST_F(UdpNameTest, IsAskedForUntilItIsKnown) {
+TEST_F(UdpNameTest, LookupIsRepeatedUntilItSucceeds) {
   names.set("");
   open_in_loop();
   ASSERT_TRUE(run_until(io, [&] { return names.asked() >= 5; }));
@@ -148,7 +148,7 @@ TEST_F(UdpNameTest, IsAskedForUntilItIsKnown) {
   expect_link();
 }
 
-TEST_F(UdpNameTest, IsLookedUpAgainWhenTheBoardIsSilentAndFollowed) {
+TEST_F(UdpNameTest, IsLookedUpAgainWhenTheBoardIsSilent) {
   host = make();
   host->open(at_host);
   expect_link();
@@ -166,7 +166,7 @@ TEST_F(UdpNameTest, IsLookedUpAgainWhenTheBoardIsSilentAndFollowed) {
   EXPECT_TRUE(run_until(io, [&] { return at_host.has("answer"); }));
 }
 
-TEST_F(UdpNameTest, StaysWhileTheNameIsGone) {
+TEST_F(UdpNameTest, KeepsItsAddressIfTheNameDisappears) {
   host = make();
   host->open(at_host);
   names.set("");
@@ -196,7 +196,7 @@ TEST_F(UdpNameTest, IsNotLookedUpAgainWhileTheBoardIsHeard) {
   EXPECT_GE(names.asked(), 2);
 }
 
-TEST_F(UdpNameTest, IsForgottenWithTheCarrier) {
+TEST_F(UdpNameTest, CloseCancelsTheLookup) {
   names.hang(true);
   open_in_loop();
   ASSERT_TRUE(run_until(io, [&] { return names.asked() == 1; }));
@@ -209,7 +209,7 @@ TEST_F(UdpNameTest, IsForgottenWithTheCarrier) {
   EXPECT_TRUE(run_until(io, [&] { return host->up(); }));
 }
 
-TEST_F(UdpNameTest, MayBeAnsweredWhenNothingIsLeft) {
+TEST_F(UdpNameTest, AnAnswerAfterTheLoopIsDestroyedIsHarmless) {
   names.hang(true);
   {
     asio::io_context own;
@@ -221,7 +221,7 @@ TEST_F(UdpNameTest, MayBeAnsweredWhenNothingIsLeft) {
   names.hang(false);
 }
 
-TEST_F(UdpNameTest, OfThisComputerIsKnownToTheSystem) {
+TEST_F(UdpNameTest, ResolvesLocalhost) {
   host = open_carrier(io, "udp://localhost:" + port + "?listen=0", Role::host, at_host);
   expect_link();
 }

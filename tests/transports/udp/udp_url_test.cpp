@@ -8,14 +8,14 @@
 namespace r4::test {
 namespace {
 
-TEST(UdpUrl, OfAHostWithItsOwnPortKeepsTheOneItNames) {
+TEST(UdpUrl, WithOwnPortKeepsANamedPort) {
   EXPECT_EQ(with_own_port("udp://robot"), "udp://robot?listen=0");
   EXPECT_EQ(with_own_port("udp:?id=left-arm"), "udp:?id=left-arm&listen=0");
   EXPECT_EQ(with_own_port("udp://robot?listen=2391"), "udp://robot?listen=2391");
   EXPECT_EQ(with_own_port("serial:auto"), "serial:auto");
 }
 
-TEST(UdpUrl, OfAHostOnAnyPortForgetsTheOneItNames) {
+TEST(UdpUrl, WithAnyPortReplacesANamedPort) {
   EXPECT_EQ(with_any_port("udp://robot"), "udp://robot?listen=0");
   EXPECT_EQ(with_any_port("udp://robot?listen=2391"), "udp://robot?listen=0");
   EXPECT_EQ(with_any_port("udp:?listen=2391&id=listen=1"), "udp:?listen=0&id=listen=1");
@@ -23,7 +23,7 @@ TEST(UdpUrl, OfAHostOnAnyPortForgetsTheOneItNames) {
   EXPECT_EQ(with_any_port("serial:auto?listen=1"), "serial:auto?listen=1");
 }
 
-TEST(UdpUrl, NamesABoardOnlyAsOneMayBeCalled) {
+TEST(UdpUrl, AcceptsOnlyValidBoardNames) {
   EXPECT_EQ(UdpUrl(Url::parse("udp:?id=left-arm"), Role::host).called, "left-arm");
   for (const std::string& id : {std::string(), std::string("a%20b"), std::string("%3D1"),
                                 std::string("%1B[2J"), std::string(65, 'n')}) {
@@ -31,7 +31,7 @@ TEST(UdpUrl, NamesABoardOnlyAsOneMayBeCalled) {
   }
 }
 
-TEST(UdpUrl, OfAHostMayNameAnAddressOfThisComputer) {
+TEST(UdpUrl, MayNameAnAddressOfThisComputer) {
   const auto local = [](const char* url) {
     return UdpUrl(Url::parse(url), Role::host).local.to_string();
   };

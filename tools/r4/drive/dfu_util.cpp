@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <string_view>
@@ -48,9 +49,17 @@ int run_dfu_util(std::vector<const char*> arguments,
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDERR_FILENO);
+  // An interrupted write would leave half a sketch on the board. So neither Ctrl-C nor the end of
+  // this program ends dfu-util.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  const auto on_broken_pipe = std::signal(SIGPIPE, SIG_IGN);
   pid_t pid = 0;
-  const int error = ::posix_spawnp(&pid, "dfu-util", &actions, nullptr,
+  const int error = ::posix_spawnp(&pid, "dfu-util", &actions, &attributes,
                                    const_cast<char* const*>(arguments.data()), environ);
+  std::signal(SIGPIPE, on_broken_pipe);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0) {
     throw Error(ErrorKind::unsupported, "dfu-util",
@@ -72,12 +81,18 @@ int run_dfu_util(std::vector<const char*> arguments,
   return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
 }
 
-// Finds the percentages in dfu-util's bar: "Download	[=====     ]  20%        24576 bytes".
+// Finds the percentages in dfu-util's bar: "Download	[=====     ]  20%        24576 bytes". The bar
+// "Erase" comes before it.
 class Progress {
  public:
   explicit Progress(const std::function<void(int)>& on_percent) : on_percent_(on_percent) {}
   void take(std::string_view text) {
+    constexpr std::string_view title = "Download";
     for (const char c : text) {
+      if (matched_ < title.size()) {
+        matched_ = c == title[matched_] ? matched_ + 1 : c == title[0] ? 1 : 0;
+        continue;
+      }
       if (c >= '0' && c <= '9') {
         number_ = std::min(number_ * 10 + (c - '0'), 1000);
         continue;
@@ -89,6 +104,7 @@ class Progress {
 
  private:
   const std::function<void(int)>& on_percent_;
+  std::size_t matched_ = 0;  // characters of the bar's title
   int number_ = 0;
   int told_ = -1;
 };
@@ -106,11 +122,14 @@ std::string last_line(std::string_view text) {
 
 }  // namespace
 
-BootLoaders look_for_boot_loader() {
+BootLoaders look_for_boot_loaders() {
   std::string text;
   run_dfu_util({"-l", "-d", boot_loader_id}, [&](std::string_view part) { text += part; });
+  BootLoaders found;
+  found.denied = text.find("LIBUSB_ERROR_ACCESS") != std::string::npos ||
+                 text.find("Cannot open DFU device 2341:0366") != std::string::npos;
   // A boot loader has several memories, a line for each; one board has one path.
-  std::vector<std::string> paths;
+  std::vector<std::string>& paths = found.usb_paths;
   for (std::size_t at = text.find("Found DFU: [2341:0366]"); at != std::string::npos;
        at = text.find("Found DFU: [2341:0366]", at + 1)) {
     const std::string line = text.substr(at, text.find('\n', at) - at);
@@ -120,24 +139,21 @@ BootLoaders look_for_boot_loader() {
                                   : line.substr(path + 6, line.find('"', path + 6) - path - 6);
     if (std::find(paths.begin(), paths.end(), where) == paths.end()) paths.push_back(where);
   }
-  if (paths.size() > 1) return BootLoaders::several;
-  if (paths.size() == 1) return BootLoaders::one;
-  const bool denied = text.find("LIBUSB_ERROR_ACCESS") != std::string::npos ||
-                      text.find("Cannot open DFU device 2341:0366") != std::string::npos;
-  return denied ? BootLoaders::not_permitted : BootLoaders::none;
+  return found;
 }
 
-void write_by_dfu(const std::string& path, const std::function<void(int)>& on_percent) {
+void write_by_dfu(const std::string& path, const std::string& usb_path,
+                  const std::function<void(int)>& on_percent) {
   constexpr std::size_t most_kept = 4096;
   std::string end;
   Progress progress(on_percent);
-  const int code =
-      run_dfu_util({"-d", boot_loader_id, "-a", "0", "-s", sketch_address, "-D", path.c_str()},
-                   [&](std::string_view part) {
-                     progress.take(part);
-                     end += part;
-                     if (end.size() > most_kept) end.erase(0, end.size() - most_kept);
-                   });
+  const int code = run_dfu_util({"-d", boot_loader_id, "-p", usb_path.c_str(), "-a", "0", "-s",
+                                 sketch_address, "-D", path.c_str()},
+                                [&](std::string_view part) {
+                                  progress.take(part);
+                                  end += part;
+                                  if (end.size() > most_kept) end.erase(0, end.size() - most_kept);
+                                });
   // Some versions report an error if the board starts the sketch before it has answered.
   const bool written = end.find("File downloaded successfully") != std::string::npos;
   if (code != 0 && !written) {

@@ -5,16 +5,21 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 namespace r4::tool {
 
-// The boot loaders that this computer sees.
-enum class BootLoaders { none, one, several, not_permitted };
+struct BootLoaders {
+  std::vector<std::string> usb_paths;  // of those that this computer may open: "1-2"
+  bool denied = false;                 // one may not be opened
+};
 // Throws Error{unsupported} if dfu-util is not installed.
-BootLoaders look_for_boot_loader();
+BootLoaders look_for_boot_loaders();
 
-// Writes the image at `path`. Calls `on_percent` with 0 to 100, in order. The board then starts the
-// sketch. Throws Error{open} with the last line of dfu-util if it fails.
-void write_by_dfu(const std::string& path, const std::function<void(int)>& on_percent);
+// Writes the image at `path` by the boot loader at `usb_path`. Calls `on_percent` with 0 to 100, in
+// order. The board then starts the sketch. If this program is interrupted, dfu-util still writes
+// the rest. Throws Error{open} with the last line of dfu-util if it fails.
+void write_by_dfu(const std::string& path, const std::string& usb_path,
+                  const std::function<void(int)>& on_percent);
 
 }  // namespace r4::tool

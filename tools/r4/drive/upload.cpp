@@ -6,15 +6,18 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -138,6 +141,14 @@ class Port {
     const int ready = TIOCM_DTR;
     ::ioctl(number_, TIOCMBIS, &ready);  // a pseudo-terminal has no such line
     std::this_thread::sleep_for(held);
+    ::ioctl(number_, TIOCMBIC, &ready);  // also if a program has set the port to keep it
+  }
+  // The place of the port's device: "1-2", as dfu-util names it. Empty: not at USB.
+  std::string usb_path() const {
+    std::error_code ignored;
+    const std::filesystem::path name = std::filesystem::path(path_).filename();
+    const auto interface = std::filesystem::canonical("/sys/class/tty" / name / "device", ignored);
+    return interface.parent_path().filename().string();  // …/1-2/1-2:1.0
   }
 
  private:
@@ -173,21 +184,20 @@ void switch_off(const UploadOptions& options) {
   report(options, {{"type", "stopped"}}, "the board reports that its outputs are off");
 }
 
-void wait_for_boot_loader(Clock::time_point deadline) {
+// The place of the boot loader to write: `usb_path`, or if that is empty, the only one.
+std::string wait_for_boot_loader(const std::string& usb_path, Clock::time_point deadline) {
   constexpr std::chrono::milliseconds pause{200};
   for (;;) {
-    switch (look_for_boot_loader()) {
-      case BootLoaders::one:
-        return;
-      case BootLoaders::several:
-        throw Error(ErrorKind::usage, "the boot loader", "several boards wait in it",
-                    "unplug all boards but one");
-      case BootLoaders::not_permitted:
-        throw Error(
-            ErrorKind::permission, "the boot loader (USB 2341:0366)", "permission denied",
-            "install the udev rules, which r4 doctor --udev-rules prints, or run it as root");
-      case BootLoaders::none:
-        break;
+    const auto [usb_paths, denied] = look_for_boot_loaders();
+    if (std::find(usb_paths.begin(), usb_paths.end(), usb_path) != usb_paths.end()) return usb_path;
+    if (usb_path.empty() && usb_paths.size() == 1) return usb_paths.front();
+    if (usb_path.empty() && usb_paths.size() > 1) {
+      throw Error(ErrorKind::usage, "the boot loader", "several boards wait in it",
+                  "unplug all boards but one");
+    }
+    if (denied) {
+      throw Error(ErrorKind::permission, "the boot loader (USB 2341:0366)", "permission denied",
+                  "install the udev rules, which r4 doctor --udev-rules prints, or run it as root");
     }
     if (Clock::now() >= deadline) {
       throw Error(ErrorKind::open, "the boot loader (USB 2341:0366)", "it was not found",
@@ -197,9 +207,9 @@ void wait_for_boot_loader(Clock::time_point deadline) {
   }
 }
 
-void write(const UploadOptions& options) {
+void write(const UploadOptions& options, const std::string& usb_path) {
   const bool bar = !options.json && ::isatty(STDOUT_FILENO) == 1;
-  write_by_dfu(options.file, [&](int percent) {
+  write_by_dfu(options.file, usb_path, [&](int percent) {
     if (options.json) {
       print_line({{"type", "progress"}, {"percent", percent}});
     } else if (bar) {
@@ -223,8 +233,7 @@ void wait_for_board(const UploadOptions& options, Clock::time_point deadline) {
       return report(
           options,
           {{"type", "identity"}, {"firmware", identity.firmware}, {"id", identity.board_id}},
-          fmt::format("the board runs firmware {}, id {}; its outputs are off", identity.firmware,
-                      identity.board_id));
+          fmt::format("the board runs firmware {}, id {}", identity.firmware, identity.board_id));
     } catch (const Error&) {
       if (Clock::now() >= deadline) break;
     }
@@ -237,9 +246,11 @@ void wait_for_board(const UploadOptions& options, Clock::time_point deadline) {
 int upload(const UploadOptions& options) {
   check_image(options.file);
   const std::optional<std::string> port = port_of(options.url);
-  if (port) const Port free(*port);  // before anything is stopped
-  const bool waits = look_for_boot_loader() != BootLoaders::none;
-  if (port && waits) {
+  // A port that cannot be opened is an error before anything is stopped.
+  const std::string usb_path = port ? Port(*port).usb_path() : std::string();
+  const BootLoaders waiting = look_for_boot_loaders();
+  const bool waits = waiting.denied || !waiting.usb_paths.empty();
+  if (port && usb_path.empty() && waits) {
     throw Error(
         ErrorKind::usage, "the boot loader", "another board waits in it",
         fmt::format("unplug that board to write the one at {}, or the other way round", *port));
@@ -252,8 +263,7 @@ int upload(const UploadOptions& options) {
     switch_off(options);
     Port(*port).ask_for_upload();
   }
-  wait_for_boot_loader(Clock::now() + options.timeout);
-  write(options);
+  write(options, wait_for_boot_loader(usb_path, Clock::now() + options.timeout));
   wait_for_board(options, Clock::now() + options.timeout);
   return 0;
 }
@@ -262,8 +272,8 @@ constexpr const char* upload_footer =
     R"(FILE is what the Arduino IDE makes by Sketch > Export Compiled Binary. The command stops the board,
 starts its boot loader (1200 baud), writes the sketch with dfu-util, and waits until the board reports
 its version. With serial:auto and no running board at USB, the board that waits in its boot loader (reset
-button pressed twice) is written at once. Keep the wheels off the ground: a sketch that is not R4's may
-drive outputs.
+button pressed twice) is written at once. Ctrl-C does not end a write that has begun. Keep the wheels off
+the ground: a sketch that is not R4's may drive outputs.
 
 Examples:
   r4 upload R4Board.ino.bin

@@ -28,7 +28,7 @@ std::string error_of(const std::string& text) {
   return "";
 }
 
-TEST(Script, ReadsWhatHappensToDevices) {
+TEST(Script, ReadsDeviceEvents) {
   const Script script = Script::parse(
       "1 userbus held\n1 userbus cut\n1 userbus stretched\n1 userbus free\n2 device mpu6050 off\n"
       "2 device ina219 reset",
@@ -102,7 +102,7 @@ TEST(Script, NamesEveryAnalogInput) {
   }
 }
 
-TEST(Script, PutsStepsInTheOrderOfTimeAndKeepsTheOrderOfLinesWithin) {
+TEST(Script, SortsStepsByTimeAndKeepsTheOrderOfLines) {
   const Script script = Script::parse("2 enc 1 1\n1 enc 1 2\n2 enc 1 3\n", "x");
   ASSERT_EQ(script.steps().size(), 3U);
   EXPECT_EQ(script.steps()[0].value, 2);
@@ -115,7 +115,7 @@ TEST(Script, IsEmptyWithoutSteps) {
   EXPECT_TRUE(Script::parse("# nothing\n\n  \n", "x").steps().empty());
 }
 
-TEST(Script, SaysWhereWhatAndHowToMendIt) {
+TEST(Script, AnErrorNamesTheLineTheMistakeAndTheFix) {
   EXPECT_EQ(error_of("1 handle held\n2 handle open\n"),
             "bench.txt:2: 'open' is nothing a handle can be; write held or released");
   EXPECT_EQ(error_of("1 us 5 10"),
@@ -124,7 +124,7 @@ TEST(Script, SaysWhereWhatAndHowToMendIt) {
             "bench.txt:1: 'us' has too few or too many words; write TIME us SENSOR CM|off");
 }
 
-TEST(Script, RefusesWhatItDoesNotUnderstand) {
+TEST(Script, RefusesInvalidLines) {
   for (const char* line : {
            "handle held",           // no time
            "-1 handle held",        // before the start
@@ -155,7 +155,7 @@ TEST(Script, RefusesWhatItDoesNotUnderstand) {
   }
 }
 
-TEST(Script, IsReadFromAFile) {
+TEST(Script, AnErrorInAFileNamesTheFileAndTheLine) {
   const std::string path = testing::TempDir() + "r4_script_test.txt";
   std::ofstream(path) << "1 reboot\n2 fall over\n";
   try {
@@ -167,7 +167,7 @@ TEST(Script, IsReadFromAFile) {
   std::remove(path.c_str());
 }
 
-TEST(Script, SaysWhichFileCannotBeRead) {
+TEST(Script, NamesAFileThatCannotBeRead) {
   for (const std::string path : {"/nonexistent/bench.txt", "/"}) {
     try {
       Script::load(path);
@@ -179,7 +179,7 @@ TEST(Script, SaysWhichFileCannotBeRead) {
   }
 }
 
-TEST(Script, ReadsTroubleWithChipsBusAndLoop) {
+TEST(Script, ReadsChipBusAndLoopFaults) {
   const Script script = Script::parse(
       "1 chip dac off\n"
       "2 chip osmc reset\n"
@@ -215,7 +215,7 @@ TEST(Script, ReadsTroubleWithChipsBusAndLoop) {
             "chip, i2c, userbus, device, uart, gpio, hang, fault, watchdog or reboot");
 }
 
-TEST(Script, AFileThatDoesNotEndIsNoScenario) {
+TEST(Script, RefusesAnEndlessFile) {
   try {
     Script::load("/dev/zero");
     FAIL() << "the file was read";

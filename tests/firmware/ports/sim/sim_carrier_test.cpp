@@ -53,14 +53,14 @@ std::string url_error(const std::string& url) {
   return "";
 }
 
-TEST(SimCarrier, HasABoardAtTheOtherEnd) {
+TEST(SimCarrier, ConnectsToASimulatedBoard) {
   EXPECT_EQ(identity_of("sim:"),
             "I:R4," R4LINK_VERSION ",sim-1,sim+leave+group+watch+i2c+uart+dac");
   EXPECT_EQ(identity_of("sim:?node=31&seed=4"),
             "I:R4," R4LINK_VERSION ",sim-31,sim+leave+group+watch+i2c+uart+dac");
 }
 
-TEST(SimCarrier, SaysWhatIsWrongWithItsUrl) {
+TEST(SimCarrier, RefusesAnInvalidUrl) {
   for (const char* url :
        {"sim:?node=32", "sim:?node=-1", "sim:?node=x", "sim:?seed=x", "sim:?colour=red",
         "sim:/dev/ttyACM0", "sim://host", "sim:?script=/nonexistent/script.txt"}) {

@@ -276,7 +276,7 @@ TEST_F(SimulatedBoardTest, EveryOutputRegisterIsSafeInTimeWhenTheHostFallsSilent
   }
 }
 
-TEST_F(SimulatedBoardTest, TellsOfWhatItRefuses) {
+TEST_F(SimulatedBoardTest, ReportsARefusedCommand) {
   build();
   connect();
   command("O:5000,1,1");
@@ -319,7 +319,7 @@ TEST_F(SimulatedBoardTest, FollowsItsScriptToTheMillisecond) {
   EXPECT_EQ(event_ms_ - start, 900U);
 }
 
-TEST_F(SimulatedBoardTest, ARebootForgetsTheHostAndTurnsTheClock) {
+TEST_F(SimulatedBoardTest, ARebootForgetsTheHostAndChangesTheClock) {
   SimulatedBoard::Options options;
   options.script = Script::parse("0.05 reboot", "test");
   build(std::move(options));
@@ -361,7 +361,7 @@ TEST_F(SimulatedBoardTest, GoesSafeAtOnceWhenTheHostsCarrierCloses) {
   EXPECT_EQ(events_, (Lines{"up", "outputs 358", "ACTIVE none"}));
 }
 
-TEST_F(SimulatedBoardTest, SameSeedSameTrace) {
+TEST_F(SimulatedBoardTest, TheSameSeedGivesTheSameTrace) {
   Lines traces[2];
   for (Lines& trace : traces) {
     clock_ms_ = 0;
@@ -378,7 +378,7 @@ TEST_F(SimulatedBoardTest, SameSeedSameTrace) {
   EXPECT_EQ(traces[0], traces[1]);
 }
 
-TEST_F(SimulatedBoardTest, AnotherSeedStartsTheClockElsewhere) {
+TEST_F(SimulatedBoardTest, AnotherSeedStartsTheClockAtAnotherTime) {
   SimulatedBoard::Options options;
   options.seed = 1;
   build(std::move(options));
@@ -400,7 +400,7 @@ TEST_F(SimulatedBoardTest, StopsAndStartsAgain) {
   EXPECT_EQ(board_->application().state(), BoardState::connecting);
 }
 
-TEST_F(SimulatedBoardTest, AnswersWhoItIs) {
+TEST_F(SimulatedBoardTest, AnswersIdentify) {
   SimulatedBoard::Options options;
   options.board_id = "bench-3";
   options.firmware_version = "9.9";
@@ -418,7 +418,7 @@ TEST_F(SimulatedBoardTest, RefusesAFifthCarrier) {
   EXPECT_THROW(board_->add_carrier(make_memory_pair(io_).first), Error);
 }
 
-TEST_F(SimulatedBoardTest, EveryChannelReachesItsPinAndComesBack) {
+TEST_F(SimulatedBoardTest, EveryChannelReachesItsPinAndIsReportedBack) {
   build();
   connect();
   test::expect_every_channel({
@@ -475,7 +475,7 @@ class TroubledBoardTest : public SimulatedBoardTest {
   }
 };
 
-TEST_F(TroubledBoardTest, AChipThatStopsAnsweringIsAFaultUntilItIsBackAndCleared) {
+TEST_F(TroubledBoardTest, ASilentChipIsAFaultUntilItAnswersAndIsCleared) {
   drive("0.3 chip dac off\n2 chip dac on\n");
   run_alive(500);
   EXPECT_EQ(events_, (Lines{"no acknowledge", "outputs 0", "SAFE fault"}));
@@ -492,7 +492,7 @@ TEST_F(TroubledBoardTest, AChipThatStopsAnsweringIsAFaultUntilItIsBackAndCleared
   expect_drives_after_clear();
 }
 
-TEST_F(TroubledBoardTest, AHeldBusIsAFaultAndTheLoopGoesOn) {
+TEST_F(TroubledBoardTest, AHeldBusIsAFaultAndTheLoopContinues) {
   drive("0.3 i2c held\n1 i2c free\n");
   listener_.heard.clear();
   run_alive(700);
@@ -504,7 +504,7 @@ TEST_F(TroubledBoardTest, AHeldBusIsAFaultAndTheLoopGoesOn) {
   expect_drives_after_clear();
 }
 
-TEST_F(TroubledBoardTest, AHangingLoopLosesItsOutputsBeforeTheWatchdogBites) {
+TEST_F(TroubledBoardTest, AHungLoopGoesSafeBeforeTheWatchdogResetsIt) {
   drive("0.3 hang 0.3\n");
   run_alive(300);
   const std::uint32_t hung = board_->now_ms();
@@ -523,7 +523,7 @@ TEST_F(TroubledBoardTest, AHangingLoopLosesItsOutputsBeforeTheWatchdogBites) {
   expect_drives_after_clear();
 }
 
-TEST_F(TroubledBoardTest, ALoopThatDoesNotComeBackIsReset) {
+TEST_F(TroubledBoardTest, TheWatchdogResetsALoopThatStaysHung) {
   drive("0.3 hang 5\n");
   run(1000);
   EXPECT_EQ(events_, (Lines{"outputs 0", "CONNECTING none", "CONNECTING watchdog"}));

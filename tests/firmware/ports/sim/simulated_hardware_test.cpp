@@ -63,7 +63,7 @@ firmware::Outputs osmc(int channel, std::uint16_t pwm, Direction direction) {
   return outputs;
 }
 
-TEST(SimulatedHardware, StandsOnTheBenchAsInTheCaptureAtFirst) {
+TEST(SimulatedHardware, StartsWithTheInputsOfTheCapture) {
   HardwareBench bench;
   EXPECT_TRUE(bench.hardware.hal().ready());
   EXPECT_FALSE(bench.hardware.hal().fault().any());
@@ -103,7 +103,7 @@ TEST(SimulatedHardware, AnalogInputsTakeTheValuesOfTheCapture) {
   EXPECT_EQ(simulated, captured);
 }
 
-TEST(SimulatedHardware, GivesTheSameInputsForTheSameSeedHoweverOftenItIsAsked) {
+TEST(SimulatedHardware, GivesTheSameInputsForTheSameSeed) {
   HardwareBench a(3);
   HardwareBench b(3);
   HardwareBench other(4);
@@ -137,7 +137,7 @@ TEST(SimulatedHardware, TheHandlesVoltageFollowsTheHandle) {
   EXPECT_GT(bench.volts(Analog::aindmh), 1100);
 }
 
-TEST(SimulatedHardware, APinnedAnalogInputStaysWithinWhatTheDividerCarries) {
+TEST(SimulatedHardware, APinnedAnalogInputStaysWithinTheRangeOfItsDivider) {
   HardwareBench bench;
   bench.board.pin_analog(Analog::ain24, 2150);
   bench.board.pin_analog(Analog::ain12, 2'000'000'000);
@@ -169,7 +169,7 @@ TEST(SimulatedHardware, AStepperMovesAtItsSpeedAndStopsAtItsTarget) {
 
 // --- motors
 
-TEST(SimulatedHardware, WithoutSupplyNoMotorTurnsWhateverItsDriverIsTold) {
+TEST(SimulatedHardware, NoMotorTurnsWithoutSupply) {
   HardwareBench bench;
   firmware::Outputs outputs = osmc(1, 4095, Direction::forward);
   outputs.dhb12[0] = Drive{4095, Direction::reverse};
@@ -210,7 +210,7 @@ TEST(SimulatedHardware, WithoutSupplyNoMotorTurnsWhateverItsDriverIsTold) {
   expect_that_all_stand();
 }
 
-TEST(SimulatedHardware, AMotorTurnsItsEncoderAsFastAsItsDutySays) {
+TEST(SimulatedHardware, AMotorTurnsItsEncoderInProportionToItsDuty) {
   HardwareBench bench;
   bench.hardware.hal().apply(osmc(2, 2048, Direction::forward));
   bench.run(2000);  // until the motor has its full speed
@@ -229,7 +229,7 @@ TEST(SimulatedHardware, AMotorTurnsItsEncoderAsFastAsItsDutySays) {
   EXPECT_TRUE(beyond >= 0 && beyond < 1000) << beyond;
 }
 
-TEST(SimulatedHardware, AMotorRunsOutInTheSafeState) {
+TEST(SimulatedHardware, AMotorCoastsToAStopInTheSafeState) {
   HardwareBench bench;
   bench.hardware.hal().apply(osmc(1, 4095, Direction::forward));
   bench.run(2000);
@@ -266,7 +266,7 @@ TEST(SimulatedHardware, TheSteeringMotorMovesTheSteeringFromEndToEnd) {
   EXPECT_NEAR((bench.run(2000), bench.mean(Analog::ainsteer)), 100, 10);
 }
 
-TEST(SimulatedHardware, AShaftIsTurnedByHandToAnyCount) {
+TEST(SimulatedHardware, AnEncoderCanBeTurnedByHandToAnyCount) {
   HardwareBench bench;
   bench.board.turn_encoder(2, 2500);
   bench.board.turn_encoder(3, -0x7fffffff - 1);
@@ -283,7 +283,7 @@ TEST(SimulatedHardware, AShaftIsTurnedByHandToAnyCount) {
 
 // --- ultrasonic sensors
 
-TEST(SimulatedHardware, EachSensorIsHeardInItsTurn) {
+TEST(SimulatedHardware, EachSensorMeasuresInItsTurn) {
   HardwareBench bench;
   for (int channel = 1; channel <= ultrasonic_channels; ++channel) {
     bench.board.set_ultrasonic(channel, static_cast<std::uint16_t>(100 * channel));
@@ -309,7 +309,7 @@ TEST(SimulatedHardware, ASensorWithoutItsCableIsBlind) {
   EXPECT_EQ(bench.sample().ultrasonic_cm[2], 42);
 }
 
-TEST(SimulatedHardware, PowerOnStartsAfreshButTheSurroundingsStay) {
+TEST(SimulatedHardware, PowerOnResetsTheBoardButNotItsSurroundings) {
   HardwareBench bench;
   bench.hardware.hal().apply(osmc(1, 4095, Direction::forward));
   bench.board.turn_encoder(2, 5);

@@ -220,7 +220,7 @@ void expect_stops(const ControllerOptions& options, std::uint64_t frames_between
 
 TEST(BridgeStop, IsNextOnTheBusAfterTheFrameInProgress) { expect_stops({}, 0); }
 
-TEST(BridgeStop, WaitsBesidesForWhatAFifoHasTaken) {
+TEST(BridgeStop, WaitsForTheFramesAlreadyInAFifo) {
   expect_stops({.queue = CanQueue::fifo, .room = 3, .kept = 1}, 3);
 }
 

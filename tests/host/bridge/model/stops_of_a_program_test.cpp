@@ -98,7 +98,7 @@ class ProgramOnABus : public testing::Test, private Carrier::Handler {
   std::vector<std::unique_ptr<Carrier>> hosts_;
 };
 
-TEST_F(ProgramOnABus, StopsOfOneTurnOfItsLoopAreOneOnTheBusAndEachIsConfirmedByItsOwnNumber) {
+TEST_F(ProgramOnABus, StopsOfSeveralBoardsInOneTurnShareOneStopOnTheBus) {
   stop(0, 3000000001);
   stop(1, 77);
   EXPECT_EQ(stops(), (Texts{"bare", "numbered"}));
@@ -106,7 +106,7 @@ TEST_F(ProgramOnABus, StopsOfOneTurnOfItsLoopAreOneOnTheBusAndEachIsConfirmedByI
   EXPECT_EQ(confirmed_by(4), Texts{heartbeat(77)});
 }
 
-TEST_F(ProgramOnABus, AStopOfALaterTurnIsAnotherOne) {
+TEST_F(ProgramOnABus, AStopOfALaterTurnIsSentSeparately) {
   stop(0, 1);
   EXPECT_EQ(stops(), (Texts{"bare", "numbered"}));
   const std::uint32_t first = number_;
@@ -118,7 +118,7 @@ TEST_F(ProgramOnABus, AStopOfALaterTurnIsAnotherOne) {
       << "the report names the stop of another host";
 }
 
-TEST_F(ProgramOnABus, TwoStopsOfOneBoardAreTwoAlsoInOneTurn) {
+TEST_F(ProgramOnABus, TwoStopsOfOneBoardInOneTurnAreBothSent) {
   stop(0, 1);
   stop(0, 2);
   EXPECT_EQ(stops(), (Texts{"bare", "bare", "numbered", "numbered"}))
@@ -126,7 +126,7 @@ TEST_F(ProgramOnABus, TwoStopsOfOneBoardAreTwoAlsoInOneTurn) {
   EXPECT_EQ(confirmed_by(3), Texts{heartbeat(2)});
 }
 
-TEST_F(ProgramOnABus, ARepetitionHasNoBareFrameAndTheSameNumber) {
+TEST_F(ProgramOnABus, ARepeatedStopIsOneNumberedFrameWithTheSameNumber) {
   stop(0, 1);
   EXPECT_EQ(stops(), (Texts{"bare", "numbered"}));
   const std::uint32_t first = number_;

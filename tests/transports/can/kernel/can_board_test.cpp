@@ -26,7 +26,7 @@ TEST(CanBoard, EveryChannelReachesItsPinAndComesBack) {
 
 // An emulated computer takes longer for a datagram than a real one, and the reported error includes
 // that.
-TEST(CanSampledTime, IsWithinItsErrorAlways) {
+TEST(CanSampledTime, IsAlwaysWithinItsErrorBound) {
   using namespace std::chrono_literals;
   BoardInAThread simulated("can://vcan0?node=9");
   const SampledTruth found = look_at_sampled(simulated, simulated.url(), 1500us);

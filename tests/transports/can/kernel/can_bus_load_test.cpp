@@ -87,7 +87,7 @@ constexpr int most_runs = 20;  // attempts, because this computer may stand stil
 
 class CanBusLoad : public CanBusTest {};
 
-TEST_F(CanBusLoad, ReportsFramesThatWaitedAndSendsThemAllInOrder) {
+TEST_F(CanBusLoad, ReportsDelayedFramesAndSendsAllInOrder) {
   const SlowBus slow(16000);
   Talker talker(bus, CanBus::ahead);
   bus->send();
@@ -108,7 +108,7 @@ TEST_F(CanBusLoad, ReportsFramesThatWaitedAndSendsThemAllInOrder) {
 const std::string in_two_frames = "0123456789";
 
 // All first frames together occupy the bus for longer than the time limit of each answer.
-TEST_F(CanBusLoad, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
+TEST_F(CanBusLoad, ADelayedFirstFrameStillHasItsFullAnswerTime) {
   constexpr std::size_t hosts = 16;
   const SlowBus slow(64000);
   bool in_time = false;
@@ -134,7 +134,7 @@ TEST_F(CanBusLoad, AFirstFrameThatWaitedForTheBusHasAllOfItsTimeToBeAnswered) {
   EXPECT_TRUE(in_time);
 }
 
-TEST_F(CanBusLoad, AFirstFrameThatNobodyAnswersTimesOutThoughOthersKeepTheBusFull) {
+TEST_F(CanBusLoad, AnUnansweredFirstFrameTimesOutOnAFullBus) {
   Link link(io, node);
   link.board->close();
   run_for(soon);
@@ -148,7 +148,7 @@ TEST_F(CanBusLoad, AFirstFrameThatNobodyAnswersTimesOutThoughOthersKeepTheBusFul
 }
 
 // A board that always has a state to send must still detect that an answer is missing.
-TEST_F(CanBusLoad, AnUnansweredDatagramTimesOutAfterAStateThatOccupiesTheBusLong) {
+TEST_F(CanBusLoad, AnUnansweredDatagramTimesOutNextToALongState) {
   Recorder told;
   const auto board = make_can_carrier(io, Link::url(near_end, node), Role::board);
   board->open(told);
@@ -160,7 +160,7 @@ TEST_F(CanBusLoad, AnUnansweredDatagramTimesOutAfterAStateThatOccupiesTheBusLong
 }
 
 // The time stamp of the frame is in time, so it does not matter when this process reads the frame.
-TEST_F(CanBusLoad, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
+TEST_F(CanBusLoad, ObeysTimelyFlowControlThatIsReadLate) {
   bool in_time = false;
   for (int run = 0; run < most_runs && !in_time; ++run) {
     Link link(io, node);
@@ -189,7 +189,7 @@ TEST_F(CanBusLoad, FlowControlThatCameInTimeIsObeyedHoweverLateItIsRead) {
   EXPECT_TRUE(in_time) << "this computer stood still in every run";
 }
 
-TEST_F(CanBusLoad, DropsFramesThatTheBusDoesNotTakeForLong) {
+TEST_F(CanBusLoad, DropsFramesThatTheBusDoesNotAcceptInTime) {
   Talker talker(bus, CanBus::ahead);
   const auto start = CanBus::Clock::now();
   {
@@ -255,7 +255,7 @@ class CanBusTimes : public CanBusTest {
   std::vector<Sending> sendings;
 };
 
-TEST_F(CanBusTimes, AreWhenFramesCameHoweverLateTheyAreRead) {
+TEST_F(CanBusTimes, AreTheArrivalTimesOfFramesThatAreReadLate) {
   constexpr std::chrono::milliseconds gap{25};  // six gaps are longer than N_Cr
   ASSERT_EQ(frames.size(), 7U);
   bool in_time = false;
@@ -282,7 +282,7 @@ TEST_F(CanBusTimes, AreWhenFramesCameHoweverLateTheyAreRead) {
   EXPECT_EQ(datagrams.datagrams.size(), 1U) << timed_out() << " timed out";
 }
 
-TEST_F(CanBusTimes, ShowAPauseOfTheSenderThoughAllIsReadTogether) {
+TEST_F(CanBusTimes, ShowAPauseOfTheSenderInFramesReadTogether) {
   send(2, {});
   send(1, n_cr * 3 / 2);
   send(frames.size() - 3, {});
@@ -316,7 +316,7 @@ class CanBusOverflow : public CanBusTest {
   const std::uint64_t came_before = came();
 };
 
-TEST_F(CanBusOverflow, IsCountedToTheFrameAlsoWhenTheInterfaceWasDownMeanwhile) {
+TEST_F(CanBusOverflow, IsCountedExactlyEvenIfTheInterfaceWasDown) {
   flood();
   const std::uint64_t first = missed();
   EXPECT_GT(first, 0U);

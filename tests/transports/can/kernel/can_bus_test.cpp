@@ -24,7 +24,7 @@ constexpr const char* look = "check wiring, termination and bit rate";
 using Told = std::vector<std::pair<Kind, std::string>>;
 using Bytes = std::vector<std::uint8_t>;
 
-TEST_F(CanBusTest, BusOffIsDownWithTheWayOutAndARestartIsUp) {
+TEST_F(CanBusTest, BusOffIsDownWithAFixAndARestartIsUp) {
   Witness member(bus);
   local.send(error(CAN_ERR_BUSOFF));
   ASSERT_TRUE(run_until([&] { return member.events.size() == 1; }));
@@ -39,7 +39,7 @@ TEST_F(CanBusTest, BusOffIsDownWithTheWayOutAndARestartIsUp) {
   EXPECT_TRUE(bus->up());
 }
 
-TEST_F(CanBusTest, OtherProcessesOfThisMachineDoNotProveThatTheControllerIsBack) {
+TEST_F(CanBusTest, FramesOfThisComputerDoNotProveThatTheControllerIsBack) {
   Witness member(bus);
   local.send(error(CAN_ERR_BUSOFF));
   ASSERT_TRUE(run_until([&] { return !bus->up(); }));
@@ -66,7 +66,7 @@ TEST_F(CanBusTest, AStopOfThisMachineIsHeardDuringBusOff) {
   EXPECT_FALSE(bus->up());
 }
 
-TEST_F(CanBusTest, TroubleIsToldOnceUntilItChangesAndWhenItIsOver) {
+TEST_F(CanBusTest, TroubleIsReportedOnceUntilItChangesOrEnds) {
   Witness member(bus);
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING));
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_WARNING));
@@ -103,7 +103,7 @@ TEST_F(CanBusTest, NoAcknowledgeIsAWarningUntilAnotherNodeIsHeard) {
   EXPECT_EQ(member.events.back().second, lonely);
 }
 
-TEST_F(CanBusTest, NoAcknowledgeIsNotToldOfAControllerInTroubleNorEndsIt) {
+TEST_F(CanBusTest, NoAcknowledgeIsNotReportedOfAControllerInTrouble) {
   Witness member(bus);
   local.send(error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
   local.send(error(CAN_ERR_ACK));
@@ -117,7 +117,7 @@ TEST_F(CanBusTest, NoAcknowledgeIsNotToldOfAControllerInTroubleNorEndsIt) {
 
 // --- a host that comes later
 
-TEST_F(CanBusTest, AHostThatOpensABusThatIsDownIsToldSoAndThenThatItIsUp) {
+TEST_F(CanBusTest, AHostOnABusThatIsDownGetsADownAndLaterAnUpEvent) {
   Witness first(bus);
   local.send(error(CAN_ERR_BUSOFF));
   ASSERT_TRUE(run_until([&] { return !bus->up(); }));
@@ -134,7 +134,7 @@ TEST_F(CanBusTest, AHostThatOpensABusThatIsDownIsToldSoAndThenThatItIsUp) {
   EXPECT_TRUE(carrier->up());
 }
 
-TEST_F(CanBusTest, AHostThatOpensABusInTroubleIsToldOfIt) {
+TEST_F(CanBusTest, AHostThatOpensABusInTroubleGetsAWarning) {
   become_passive();
   Recorder told;
   const auto carrier = host();
@@ -155,7 +155,7 @@ TEST_F(CanBusTest, AHostThatClosesInTheUpEventGetsNoOtherEvent) {
   EXPECT_FALSE(carrier->up());
 }
 
-TEST_F(CanBusTest, AHostThatOpensInsideAnEventIsToldOfItOnce) {
+TEST_F(CanBusTest, AHostThatOpensInsideAnEventGetsItOnce) {
   Witness first(bus);
   Recorder told;
   const auto carrier = host();
@@ -167,7 +167,7 @@ TEST_F(CanBusTest, AHostThatOpensInsideAnEventIsToldOfItOnce) {
 }
 
 // Netlink fails here because the process has no free descriptor.
-TEST_F(CanBusTest, AnInterfaceOfWhichTheSystemTellsNothingIsNotSaidToBeMissing) {
+TEST_F(CanBusTest, AnUnreadableInterfaceIsNotReportedAsMissing) {
   r4::CanSocket socket(near_end, false);
   rlimit before{};
   ASSERT_EQ(0, ::getrlimit(RLIMIT_NOFILE, &before));
@@ -186,7 +186,7 @@ TEST_F(CanBusTest, AnInterfaceOfWhichTheSystemTellsNothingIsNotSaidToBeMissing) 
 }
 
 // The kernel refuses a socket that has more ids than the kernel has filters for.
-TEST_F(CanBusTest, ABusWhoseFiltersTheKernelRefusesIsDownUntilItTakesThem) {
+TEST_F(CanBusTest, IsDownUntilTheKernelAcceptsItsFilters) {
   Witness member(bus);
   Witness greedy(bus);
   std::vector<std::uint32_t> ids(0x700);
@@ -207,7 +207,7 @@ TEST_F(CanBusTest, ABusWhoseFiltersTheKernelRefusesIsDownUntilItTakesThem) {
   EXPECT_EQ(member.frames, (Bytes{7}));
 }
 
-TEST_F(CanBusTest, AnInterfaceThatGoesDownAndThenAwayIsToldOfTwiceAndItsReturnOnce) {
+TEST_F(CanBusTest, ReportsDownThenMissingThenUpOnceEach) {
   Witness member(bus);
   ASSERT_EQ(0, std::system("ip link set vxcan7 down"));
   ASSERT_TRUE(run_until([&] { return !bus->up(); }));
@@ -239,7 +239,7 @@ TEST_F(CanBusTest, CountsFramesThatTheControllerLost) {
   EXPECT_EQ(carrier->counters().rx_overflows, 1U) << "the counter stays after close()";
 }
 
-TEST_F(CanBusTest, MembersMayLeaveInsideADownEventAndNobodyIsSkipped) {
+TEST_F(CanBusTest, MembersMayLeaveInsideADownEvent) {
   Witness first(bus), second(bus), third(bus), fourth(bus);
   second.in_event = [&] {
     first.leave();   // was called already
@@ -256,7 +256,7 @@ TEST_F(CanBusTest, MembersMayLeaveInsideADownEventAndNobodyIsSkipped) {
   EXPECT_EQ(first.events.size() + second.events.size() + third.events.size(), 2U);
 }
 
-TEST_F(CanBusTest, MembersMayLeaveInsideAFrameAndNobodyIsSkipped) {
+TEST_F(CanBusTest, MembersMayLeaveInsideAFrame) {
   Witness first(bus), second(bus), third(bus), fourth(bus);
   second.in_frame = [&] {
     first.leave();
@@ -287,7 +287,7 @@ TEST_F(CanBusTest, TheLastMemberMayLeaveInsideACall) {
   EXPECT_EQ(member->events.size(), 1U);
 }
 
-TEST_F(CanBusTest, AMemberThatJoinsInsideACallIsCalledFromThenOn) {
+TEST_F(CanBusTest, AMemberMayJoinInsideACallback) {
   Witness first(bus);
   std::unique_ptr<Witness> second;
   first.in_frame = [&] {

@@ -54,7 +54,7 @@ TEST(CanFleet, IsStoppedByOneFrameAndEachBoardConfirmsIt) {
 }
 
 // The other host keeps its board; the other boards are free.
-TEST(CanFleet, AHostOfAnotherComputerThatDrivesOneBoardConcernsNoOther) {
+TEST(CanFleet, AHostOfOneBoardDoesNotBlockTheOtherBoards) {
   std::vector<std::unique_ptr<BoardInAThread>> boards;
   for (int node = 24; node < 28; ++node) {
     boards.push_back(std::make_unique<BoardInAThread>("can://vcan0?node=" + std::to_string(node)));

@@ -61,7 +61,7 @@ class CanUtils : public testing::TestWithParam<Form> {};
 INSTANTIATE_TEST_SUITE_P(, CanUtils, testing::Values(forms[1], forms[3]),
                          [](const auto& form) { return form.param.name; });
 
-TEST_P(CanUtils, IsotprecvPrintsWhatTheEngineSends) {
+TEST_P(CanUtils, IsotprecvPrintsDatagramsOfTheEngine) {
   RawCan bus(flow_control_id);
   IsotpSenderOptions options = sender_of(GetParam());
   options.n_bs_us = 100000;
@@ -82,7 +82,7 @@ TEST_P(CanUtils, IsotprecvPrintsWhatTheEngineSends) {
   }
 }
 
-TEST_P(CanUtils, IsotpsendSendsTheEngineWhatItReads) {
+TEST_P(CanUtils, IsotpsendSendsDatagramsToTheEngine) {
   RawCan bus(data_id);
   std::string buffer(1024, '\0');
   IsotpReceiverOptions options = receiver_of(GetParam());

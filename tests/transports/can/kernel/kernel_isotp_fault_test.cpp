@@ -95,7 +95,7 @@ TEST(KernelIsotpFaults, KernelReportsMissingPadding) {
 constexpr std::uint32_t damaged_size = 174;
 constexpr unsigned last_frame = 24;
 
-TEST(KernelIsotpFaults, LostFrameFromTheEngineCostsItsDatagramOnly) {
+TEST(KernelIsotpFaults, ALostFrameOfTheEngineCostsOnlyItsDatagram) {
   KernelIsotp kernel(data_id, flow_control_id, kernel_of(classic));
   RawCan bus(flow_control_id);
   IsotpSender sender(hasty_sender());
@@ -112,7 +112,7 @@ TEST(KernelIsotpFaults, LostFrameFromTheEngineCostsItsDatagramOnly) {
   }
 }
 
-TEST(KernelIsotpFaults, LostFrameFromTheKernelCostsItsDatagramOnly) {
+TEST(KernelIsotpFaults, ALostFrameOfTheKernelCostsOnlyItsDatagram) {
   KernelIsotp kernel(flow_control_id, data_id, kernel_of(classic));
   RawCan bus(data_id);
   IsotpReceiverOptions options = receiver_of(classic);
@@ -133,7 +133,7 @@ TEST(KernelIsotpFaults, LostFrameFromTheKernelCostsItsDatagramOnly) {
   EXPECT_EQ(engine.receiver.counters().datagrams, last_frame);
 }
 
-TEST(KernelIsotpFaults, EngineTellsThatTheKernelHasNoRoom) {
+TEST(KernelIsotpFaults, EngineReportsThatTheKernelHasNoRoom) {
   KernelIsotp kernel(data_id, flow_control_id, kernel_of(classic));
   RawCan bus(flow_control_id);
   IsotpSender sender(sender_of(classic));
@@ -142,7 +142,7 @@ TEST(KernelIsotpFaults, EngineTellsThatTheKernelHasNoRoom) {
   EXPECT_EQ(course.frames, 1U);
 }
 
-TEST(KernelIsotpFaults, KernelTellsThatTheEngineHasNoRoom) {
+TEST(KernelIsotpFaults, KernelReportsThatTheEngineHasNoRoom) {
   KernelIsotp kernel(flow_control_id, data_id, kernel_of(classic));
   RawCan bus(data_id);
   EngineReceiver engine(receiver_of(classic));
@@ -156,7 +156,7 @@ TEST(KernelIsotpFaults, KernelTellsThatTheEngineHasNoRoom) {
   EXPECT_TRUE(engine.received() == content_of(capacity));
 }
 
-TEST(KernelIsotpFaults, EngineEndsWithN_BsWhenNobodyAnswers) {
+TEST(KernelIsotpFaults, EngineEndsWithN_BsWithoutAnAnswer) {
   RawCan bus(flow_control_id);
   IsotpSender sender(hasty_sender());
   const Course course = drive(bus, sender, content_of(100));

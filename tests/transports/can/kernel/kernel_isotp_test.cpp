@@ -89,7 +89,7 @@ TEST_P(KernelIsotpForms, SendsEveryLengthToTheEngine) {
   EXPECT_EQ(faults(link.receiver.counters()), 0U);
 }
 
-TEST_P(KernelIsotpForms, ListensToTheEngineSendingWithoutFlowControl) {
+TEST_P(KernelIsotpForms, ReceivesFromTheEngineWithoutFlowControl) {
   IsotpSenderOptions options = sender_of(GetParam());
   options.flow_control = false;
   KernelIsotpOptions listening = kernel_of(GetParam());
@@ -106,7 +106,7 @@ TEST_P(KernelIsotpForms, ListensToTheEngineSendingWithoutFlowControl) {
   EXPECT_FALSE(link.bus.receive(frame, clock_us())) << "the listener sent a frame";
 }
 
-TEST_P(KernelIsotpForms, IsHeardByTheEngineListeningToItsBroadcast) {
+TEST_P(KernelIsotpForms, BroadcastsToTheListeningEngine) {
   KernelIsotpOptions broadcasting = kernel_of(GetParam());
   broadcasting.flags |= CAN_ISOTP_CF_BROADCAST;
   IsotpReceiverOptions listening = receiver_of(GetParam());
@@ -194,7 +194,7 @@ TEST(KernelIsotp, KeepsTheBlockSizeAndTheGapThatTheEngineAsksFor) {
   }
 }
 
-TEST(KernelIsotp, WaitsForAsLongAsTheEngineTellsItTo) {
+TEST(KernelIsotp, WaitsAsLongAsTheEngineRequests) {
   IsotpReceiverOptions options = receiver_of(classic);
   options.wait_gap_us = 10000;
   options.max_waits = 100;

@@ -105,7 +105,7 @@ CanFrame any_frame() {
   return frame;
 }
 
-TEST(CanBits, OfAClassicFrameAreThePublishedOnes) {
+TEST(CanBits, MatchThePublishedBitsOfAClassicFrame) {
   // Tindell, Burns: "Guaranteeing message latencies on CAN"; Davis, Burns, Bril, Lukkien:
   // "Controller Area Network (CAN) schedulability analysis", equations 1 and 2: 55 + 10 n bits with
   // 11-bit ids, 80 + 10 n with 29-bit ids.
@@ -119,7 +119,7 @@ TEST(CanBits, OfAClassicFrameAreThePublishedOnes) {
   EXPECT_EQ(total(worst_can_bits(8, false, true)), 160U);
 }
 
-TEST(CanBits, OfFramesCountedByHand) {
+TEST(CanBits, MatchFramesCountedByHand) {
   CanFrame frame{};
   // 34 zeros, because the CRC is also 0: a stuff bit after every five.
   EXPECT_EQ(total(can_bits(frame)), 47U + 6U);
@@ -159,7 +159,7 @@ RC_GTEST_PROP(CanBits, AreNeverMoreThanTheWorstOrFewerThanTheLeast, ()) {
   RC_ASSERT((exact.data != 0) == (frame.fd && switches));
 }
 
-TEST(CanBits, TheWorstHeaderOfAnFdFrameExists) {
+TEST(CanBits, ARealFdFrameHasTheWorstHeader) {
   CanFrame frame{};
   frame.fd = true;
   frame.id = 0x078;  // 0 0000 [1] 1111 [0] 000 0
@@ -167,7 +167,7 @@ TEST(CanBits, TheWorstHeaderOfAnFdFrameExists) {
   EXPECT_EQ(worst_can_bits(64, true, false).data, least_can_bits(64, true, false).data + 129U);
 }
 
-TEST(CanBits, TakeTheirTime) {
+TEST(CanBits, ConvertToTime) {
   EXPECT_EQ(time_ns(CanBits{135, 0}, at_one_mbit), 135000U);
   EXPECT_EQ(time_ns(CanBits{135, 0}, half_mbit), 270000U);
   EXPECT_EQ(time_ns(CanBits{30, 100}, one_and_five_mbit), 50000U);
@@ -194,7 +194,7 @@ std::uint64_t worst_ns(std::size_t size, std::uint8_t tx_dl, CanBitRate rate) {
   return sum;
 }
 
-TEST(CanBits, OfADatagramGiveTheCapacityOfABus) {
+TEST(CanBits, GiveTheLongestTimeOfADatagram) {
   EXPECT_EQ(worst_ns(170, 8, at_one_mbit), 3420000U) << "25 frames and a flow control";
   EXPECT_EQ(worst_ns(170, 8, half_mbit), 6840000U);
   EXPECT_EQ(1000000000U / worst_ns(170, 8, at_one_mbit), 292U) << "datagrams a second";

@@ -12,7 +12,7 @@ namespace {
 static_assert(emergency_stop_id == 0x010, "known when compiling");
 static_assert(classify(telemetry_id(5)).node == 5, "known when compiling");
 
-TEST(CanIds, AreThoseOfThePlan) {
+TEST(CanIds, HaveTheDocumentedValues) {
   EXPECT_EQ(went_safe_id(0), 0x020U);
   EXPECT_EQ(went_safe_id(31), 0x03FU);
   EXPECT_EQ(command_id(0), 0x180U);
@@ -25,7 +25,7 @@ TEST(CanIds, AreThoseOfThePlan) {
   EXPECT_EQ(watch_id(31), 0x61FU);
 }
 
-TEST(CanIds, WhatIsUrgentWinsTheBus) {
+TEST(CanIds, UrgentFramesWinTheBus) {
   EXPECT_LT(emergency_stop_id, went_safe_id(0));
   EXPECT_LT(went_safe_id(31), command_id(0));
   EXPECT_LT(command_id(31), reply_id(0));
@@ -33,7 +33,7 @@ TEST(CanIds, WhatIsUrgentWinsTheBus) {
   EXPECT_LT(telemetry_id(31), watch_id(0));
 }
 
-TEST(CanIds, EveryIdMeansWhatWasMadeForItAndNothingElse) {
+TEST(CanIds, EveryIdHasExactlyOneMeaning) {
   std::map<std::uint32_t, std::pair<CanIdKind, int>> plan{
       {emergency_stop_id, {CanIdKind::emergency_stop, 0}}};
   for (std::uint32_t node = 0; node < can_nodes; ++node) {
@@ -54,7 +54,7 @@ TEST(CanIds, EveryIdMeansWhatWasMadeForItAndNothingElse) {
   }
 }
 
-TEST(CanIds, FramesOfForeignFormatMeanNothing) {
+TEST(CanIds, IgnoreFramesOfAnotherFormat) {
   CanFrame frame{};
   frame.id = emergency_stop_id;
   EXPECT_EQ(classify(frame).kind, CanIdKind::emergency_stop);
@@ -66,7 +66,7 @@ TEST(CanIds, FramesOfForeignFormatMeanNothing) {
   EXPECT_EQ(classify(0x800 + emergency_stop_id).kind, CanIdKind::other);
 }
 
-TEST(CanFrame, SizesAreThoseThatAFrameCanHave) {
+TEST(CanFrame, AcceptsOnlyValidFrameSizes) {
   const int sizes[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
   int at = 0;
   for (int size = 0; size <= 64; ++size) {

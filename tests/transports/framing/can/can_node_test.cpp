@@ -56,7 +56,7 @@ const std::string command_line = with_crc("O:358,1,1;PNum:2147483650;T:81234;");
 const std::string answer_line = with_crc("N:2147483650,RANGE;PNum:78;T:81240;");
 const std::string heartbeat_line = with_crc("H:R4-ROS2;PNum:79;T:81300;");
 
-TEST(CanNodeStop, IsTheEmergencyFrameBareOrWithANumberBehindItsId) {
+TEST(CanNodeStop, IsAnEmergencyFrameWithOrWithoutANumber) {
   CanNode board(CanEnd::board, 3, false);
   CanNode host(CanEnd::host, 3, false);
   CanFrame frame{};
@@ -76,7 +76,7 @@ TEST(CanNodeStop, IsTheEmergencyFrameBareOrWithANumberBehindItsId) {
   EXPECT_TRUE(board.on_frame(frame, 0).empty()) << "a remote request is not a stop";
 }
 
-TEST(CanNodeWatch, AsksForStatesByOneFrameOfItsOwnId) {
+TEST(CanNodeWatch, AsksForStatesWithOneWatchFrame) {
   NodeBus bus;
   bus.host.ask_for_states();
   bus.settle();
@@ -111,7 +111,7 @@ INSTANTIATE_TEST_SUITE_P(ClassicAndFd, CanNodeForms,
                                          std::pair(true, false), std::pair(true, true)));
 
 // A board uses the form of the newest datagram that it received from its host.
-TEST(CanNode, ABoardAnswersAHostThatWritesPlainTextInPlainText) {
+TEST(CanNode, ABoardAnswersATextHostInText) {
   NodeBus bus;
   bus.board.use_packed_form(true);
   const auto packed_at_host = [&](const std::string& line) {
@@ -146,7 +146,7 @@ TEST(CanNode, ABoardAnswersAHostThatWritesPlainTextInPlainText) {
   EXPECT_FALSE(packed_at_host(state_line)) << "garbage is not a packed datagram";
 }
 
-TEST(CanNode, AHostPacksForABoardThatDoesNot) {
+TEST(CanNode, AHostMayPackForABoardThatSendsText) {
   NodeBus bus;
   bus.host.use_packed_form(true);
   for (const std::string& line : {state_line, answer_line}) {
@@ -172,7 +172,7 @@ TEST(CanNode, AnEmergencyFrameDoesNotChangeTheForm) {
   EXPECT_EQ(bus.host.counters().unpacked, 1U);
 }
 
-TEST(CanNode, StatesAndAnswersHaveIdsOfTheirOwn) {
+TEST(CanNode, StatesAndAnswersHaveSeparateIds) {
   NodeBus bus;
   bus.board.begin(state_line, bus.now_us);
   bus.settle();
@@ -200,7 +200,7 @@ TEST(CanNode, TelemetryGoesOnWhileAnAnswerWaitsForFlowControl) {
   EXPECT_EQ(bus.board.sent(CanLane::dialogue).flow_control_timeout, 1U);
 }
 
-TEST(CanNode, EveryLostFrameCostsOneDatagramAndNoMore) {
+TEST(CanNode, ALostFrameCostsExactlyOneDatagram) {
   NodeBus whole;
   whole.board.begin(state_line, whole.now_us);
   whole.settle();
@@ -217,7 +217,7 @@ TEST(CanNode, EveryLostFrameCostsOneDatagramAndNoMore) {
 }
 
 // The process of a host can be held up for longer than a bus.
-TEST(CanNode, ACommandIsTakenIfItsFramesAreLateByLessThan100Ms) {
+TEST(CanNode, AcceptsACommandWithFramesLessThan100MsLate) {
   for (const std::uint32_t late_us : {99999U, 100000U}) {
     CanNode board(CanEnd::board, 3, false);
     CanNode host(CanEnd::host, 3, false);
@@ -256,7 +256,7 @@ TEST(CanNode, AnEmergencyFrameOfAnyContentIsAStop) {
   }
 }
 
-TEST(CanNode, ABoardThatGoesSafeSaysSoAheadInOneFrame) {
+TEST(CanNode, ABoardThatGoesSafeReportsItFirstInOneFrame) {
   NodeBus bus;
   const auto beat = [&](const std::string& end) {
     bus.ids.clear();
@@ -273,7 +273,7 @@ TEST(CanNode, ABoardThatGoesSafeSaysSoAheadInOneFrame) {
   EXPECT_EQ(bus.at_host.size(), 6U);
 }
 
-TEST(CanNode, AReasonThatTheBusDidNotTakeIsToldLater) {
+TEST(CanNode, AnUnsentSafeReasonIsSentLater) {
   NodeBus bus;
   const std::string safe = with_crc("H:R4-ROS2;PNum:79;T:81300;SAFE:2;");
   bus.board.begin(safe, bus.now_us);
@@ -284,7 +284,7 @@ TEST(CanNode, AReasonThatTheBusDidNotTakeIsToldLater) {
   EXPECT_EQ(bus.at_host, (std::vector<std::string>{safe}));
 }
 
-TEST(CanNode, TakesNothingWhileALaneIsBusyAndNothingTooLong) {
+TEST(CanNode, RefusesADatagramOnABusyLaneOrOfInvalidLength) {
   NodeBus bus;
   EXPECT_TRUE(bus.board.begin(state_line, bus.now_us));
   EXPECT_FALSE(bus.board.begin(heartbeat_line, bus.now_us));

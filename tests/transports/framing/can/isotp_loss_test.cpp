@@ -118,7 +118,7 @@ class LossyLine {
 // frames over a border, after which the numbers fit. Its length is the number of frames of a
 // datagram, less 16 (32 …) if the datagram has more. 18 frames are the worst case: two lost frames
 // are enough.
-TEST(IsotpLoss, OnlyARunOfLostFramesOverABorderJoinsTwoDatagrams) {
+TEST(IsotpLoss, SeldomJoinsTwoDatagrams) {
   const struct {
     Stream stream;
     std::array<double, 3> most_per_million;  // at 1, 5 and 10 % loss

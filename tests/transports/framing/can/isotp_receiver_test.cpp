@@ -120,7 +120,7 @@ TEST(IsotpReceiver, TakesSingleFramesOfEveryForm) {
   }
 }
 
-TEST(IsotpReceiver, KnowsThatAClassicFrameHasNoMoreThanEightBytes) {
+TEST(IsotpReceiver, RefusesAClassicFrameOfMoreThanEightBytes) {
   Receiver receiver(controlled());
   CanFrame frame = frame_of(id, "00 0A " + counting(10));
   frame.fd = false;
@@ -128,7 +128,7 @@ TEST(IsotpReceiver, KnowsThatAClassicFrameHasNoMoreThanEightBytes) {
 }
 
 // 9.6.3.2
-TEST(IsotpReceiver, IgnoresFirstFramesThatCannotBe) {
+TEST(IsotpReceiver, IgnoresInvalidFirstFrames) {
   const struct {
     std::string frame;
     bool good;
@@ -156,7 +156,7 @@ TEST(IsotpReceiver, IgnoresFirstFramesThatCannotBe) {
   }
 }
 
-TEST(IsotpReceiver, JoinsFramesAndAnswersAsItWasTold) {
+TEST(IsotpReceiver, JoinsFramesAndSendsItsConfiguredFlowControl) {
   IsotpReceiverOptions options = controlled();
   options.block_size = 2;
   options.stmin = 0xF3;
@@ -175,7 +175,7 @@ TEST(IsotpReceiver, JoinsFramesAndAnswersAsItWasTold) {
   expect_counters_add_up(receiver.isotp);
 }
 
-TEST(IsotpReceiver, FlowControlLooksAsTheChannelSays) {
+TEST(IsotpReceiver, FlowControlUsesThePaddingAndFormatOfTheChannel) {
   IsotpReceiverOptions options = controlled();
   options.channel.padding = true;
   options.channel.padding_byte = 0xAA;
@@ -188,7 +188,7 @@ TEST(IsotpReceiver, FlowControlLooksAsTheChannelSays) {
   EXPECT_TRUE(frame.fd);
 }
 
-TEST(IsotpReceiver, SaysNothingWhenItListensOnly) {
+TEST(IsotpReceiver, SendsNothingWhenItOnlyListens) {
   Receiver receiver(listening(), 20);
   receiver.take("10 14 01 02 03 04 05 06");
   EXPECT_EQ(receiver.answer(), "");
@@ -252,7 +252,7 @@ TEST(IsotpReceiver, AnyOtherSequenceNumberEndsTheTransfer) {
 
 // The end of one transfer and the beginning of the next are lost. The sequence numbers fit again,
 // except the number of the short frame between them.
-TEST(IsotpReceiver, AShortFrameOfAnotherNumberEndsTheTransferToo) {
+TEST(IsotpReceiver, AShortFrameWithAWrongNumberEndsTheTransfer) {
   Receiver receiver(listening());
   receiver.take("10 19 61 61 61 61 61 61");
   receiver.take("21 61 61 61 61 61 61 61");
@@ -317,7 +317,7 @@ TEST(IsotpReceiver, AMalformedFrameDoesNotInterrupt) {
 
 // A frame that arrives in time may be read late, and the receiver may be asked for a frame to send
 // before.
-TEST(IsotpReceiver, DoesNotGiveUpForBeingAskedForAFrameTooLate) {
+TEST(IsotpReceiver, ALatePollDoesNotTimeOutTheTransfer) {
   Receiver receiver(controlled());
   receiver.take("10 0A 01 02 03 04 05 06");
   EXPECT_EQ(receiver.answer(), "30 00 00");
@@ -330,7 +330,7 @@ TEST(IsotpReceiver, DoesNotGiveUpForBeingAskedForAFrameTooLate) {
 }
 
 // 9.8.2, N_Cr: from the flow control or the last consecutive frame.
-TEST(IsotpReceiver, GivesUpWhenFramesStayAway) {
+TEST(IsotpReceiver, TimesOutWhenConsecutiveFramesAreMissing) {
   for (const IsotpReceiverOptions& options : {controlled(), listening()}) {
     for (int frames = 0; frames < 3; ++frames) {
       Receiver receiver(options);
@@ -355,7 +355,7 @@ TEST(IsotpReceiver, GivesUpWhenFramesStayAway) {
   }
 }
 
-TEST(IsotpReceiver, AFrameThatComesTooLateIsToldOfTheTimeOutFirst) {
+TEST(IsotpReceiver, ALateFrameReportsTheTimeoutFirst) {
   Receiver receiver(listening());
   receiver.take("10 0A 01 02 03 04 05 06");
   receiver.now = n_cr_us;
@@ -371,7 +371,7 @@ TEST(IsotpReceiver, AFrameThatComesTooLateIsToldOfTheTimeOutFirst) {
 }
 
 // 9.8.2, N_Ar.
-TEST(IsotpReceiver, GivesUpWhenTheBusDoesNotAcceptItsFlowControl) {
+TEST(IsotpReceiver, TimesOutWhenTheBusDoesNotAcceptItsFlowControl) {
   Receiver receiver(controlled());
   receiver.take("10 0A 01 02 03 04 05 06");
   CanFrame frame;
@@ -385,7 +385,7 @@ TEST(IsotpReceiver, GivesUpWhenTheBusDoesNotAcceptItsFlowControl) {
 }
 
 // 9.6.3.2
-TEST(IsotpReceiver, RefusesWhatIsLongerThanItsBuffer) {
+TEST(IsotpReceiver, RefusesADatagramLongerThanItsBuffer) {
   const struct {
     std::string frame, answer;
   } cases[] = {
@@ -406,7 +406,7 @@ TEST(IsotpReceiver, RefusesWhatIsLongerThanItsBuffer) {
   }
 }
 
-TEST(IsotpReceiver, AnOverflowInterruptsAndIsForgottenByTheNextTransfer) {
+TEST(IsotpReceiver, AnOverflowEndsATransferAndDoesNotAffectTheNext) {
   Receiver receiver(controlled(), 20);
   receiver.take("10 0A 61 62 63 64 65 66");
   EXPECT_EQ(receiver.take("10 15 01 02 03 04 05 06"), IsotpError::interrupted);
@@ -426,7 +426,7 @@ TEST(IsotpReceiver, AnOverflowInterruptsAndIsForgottenByTheNextTransfer) {
 }
 
 // 9.7, 9.8.4
-TEST(IsotpReceiver, TellsTheSenderToWaitWhileItIsHeld) {
+TEST(IsotpReceiver, AsksTheSenderToWaitWhileItIsHeld) {
   IsotpReceiverOptions options = controlled();
   options.max_waits = 2;
   Receiver receiver(options);
@@ -454,7 +454,7 @@ TEST(IsotpReceiver, TellsTheSenderToWaitWhileItIsHeld) {
   expect_counters_add_up(receiver.isotp);
 }
 
-TEST(IsotpReceiver, PassesOverFramesThatAreNotForIt) {
+TEST(IsotpReceiver, IgnoresFramesThatAreNotForIt) {
   Receiver receiver(controlled());
   EXPECT_EQ(receiver.take(frame_of(id + 1, "01 01")), IsotpError::none);
   CanFrame frame = frame_of(id, "01 01");

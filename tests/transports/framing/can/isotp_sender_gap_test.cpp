@@ -60,7 +60,7 @@ TEST(IsotpSender, KeepsTheGapThatTheReceiverAsksFor) {
   }
 }
 
-TEST(IsotpSender, KeepsItsOwnGapWithoutFlowControlAndTheLongerOneWith) {
+TEST(IsotpSender, KeepsTheLongerOfItsOwnAndTheRequestedGap) {
   IsotpSenderOptions options = burst();
   options.separation_us = 300;
   Sender sender(options);
@@ -80,7 +80,7 @@ TEST(IsotpSender, KeepsItsOwnGapWithoutFlowControlAndTheLongerOneWith) {
 }
 
 // 9.6.5.4: STmin is the gap between any two consecutive frames, whatever frames are between them.
-TEST(IsotpSender, KeepsTheGapOverTheBorderOfABlock) {
+TEST(IsotpSender, KeepsTheGapBetweenTwoBlocks) {
   const struct {
     std::uint32_t answered_us;  // after the last frame
     std::uint32_t due_us;
@@ -109,7 +109,7 @@ TEST(IsotpSender, KeepsTheGapOverTheBorderOfABlock) {
 
 // The time stamps of received frames may be ahead of our clock. So an answer may have an earlier
 // stamp than the frame that it answers.
-TEST(IsotpSender, KeepsTheGapAlsoIfFlowControlIsStampedBeforeTheFrameThatItFollows) {
+TEST(IsotpSender, KeepsTheGapAfterFlowControlWithAnEarlyTimeStamp) {
   Sender sender(classic(), 1000);
   sender.start(counted(30));
   sender.take();
@@ -121,7 +121,7 @@ TEST(IsotpSender, KeepsTheGapAlsoIfFlowControlIsStampedBeforeTheFrameThatItFollo
 }
 
 // A gap that begins before a frame is on the bus would be too short on the wire.
-TEST(IsotpSender, BeginsTheGapAnewWhenItsFrameGotToTheBusLate) {
+TEST(IsotpSender, RestartsTheGapWhenItsFrameIsSentLate) {
   Sender sender(classic());
   sender.start(counted(40));
   sender.take();
@@ -139,7 +139,7 @@ TEST(IsotpSender, BeginsTheGapAnewWhenItsFrameGotToTheBusLate) {
   EXPECT_EQ(sender.deadline().at_us, 300000U);
 }
 
-TEST(IsotpSender, TheByteForAGapIsTheNextLongerOne) {
+TEST(IsotpSender, RoundsAGapUpToTheNextStMin) {
   const struct {
     std::uint32_t us;
     std::uint8_t stmin;

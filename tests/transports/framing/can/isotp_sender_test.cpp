@@ -13,7 +13,7 @@ namespace r4::test {
 namespace {
 
 // 9.6.2.1, 10.4.2: a short datagram is one frame, in the shortest form.
-TEST(IsotpSender, ASingleFrameHoldsWhatFits) {
+TEST(IsotpSender, SendsADatagramThatFitsAsASingleFrame) {
   IsotpSenderOptions padded = classic();
   padded.channel.padding = true;
   IsotpSenderOptions zeros = padded;
@@ -45,7 +45,7 @@ TEST(IsotpSender, ASingleFrameHoldsWhatFits) {
 }
 
 // 9.6.3.1: 12 bits of length, the escape for more than 4095.
-TEST(IsotpSender, AFirstFrameTellsTheLength) {
+TEST(IsotpSender, AFirstFrameHoldsTheLength) {
   const struct {
     IsotpSenderOptions options;
     std::size_t size;
@@ -80,7 +80,7 @@ TEST(IsotpSender, ConsecutiveFramesCountModuloSixteen) {
   EXPECT_EQ(sender.counters().frames, 19U);
 }
 
-TEST(IsotpSender, ALongestFrameThatNoFrameCanHaveIsRoundedUp) {
+TEST(IsotpSender, RoundsAnInvalidFrameSizeToAValidOne) {
   const struct {
     bool fd;
     std::uint8_t asked, size;
@@ -98,7 +98,7 @@ TEST(IsotpSender, ALongestFrameThatNoFrameCanHaveIsRoundedUp) {
   }
 }
 
-TEST(IsotpSender, BeginsOneTransferAtATimeAndNoEmptyOne) {
+TEST(IsotpSender, RefusesASecondOrEmptyTransfer) {
   Sender sender(classic());
   EXPECT_FALSE(sender.begin(Text(""), 0));
   EXPECT_TRUE(sender.begin(Text("abc"), 0));
@@ -127,7 +127,7 @@ TEST(IsotpSender, OffersTheSameFrameUntilItIsAccepted) {
 }
 
 // 9.8.2, N_As.
-TEST(IsotpSender, GivesUpAFrameThatTheBusDoesNotAccept) {
+TEST(IsotpSender, TimesOutWhenTheBusDoesNotAcceptAFrame) {
   for (const int accepted : {0, 1, 2}) {
     Sender sender(burst());
     sender.now = 0xFFFFF000;  // the time wraps during the transfer
@@ -152,7 +152,7 @@ TEST(IsotpSender, GivesUpAFrameThatTheBusDoesNotAccept) {
 
 // Flow control that arrives in time may be read late, and the sender may be asked for a frame
 // before.
-TEST(IsotpSender, DoesNotGiveUpForBeingAskedForAFrameTooLate) {
+TEST(IsotpSender, ALatePollDoesNotTimeOutTheTransfer) {
   Sender sender(classic());
   sender.start(counted(10));
   EXPECT_EQ(sender.take().size(), 1U);
@@ -166,7 +166,7 @@ TEST(IsotpSender, DoesNotGiveUpForBeingAskedForAFrameTooLate) {
 
 // 9.6.5.3: flow control after the first frame and after each block of BS frames, but not after the
 // last block.
-TEST(IsotpSender, SendsBlocksAsLongAsTheReceiverSays) {
+TEST(IsotpSender, SendsBlocksOfTheRequestedSize) {
   const struct {
     std::string flow_control;
     std::vector<std::size_t> blocks;  // consecutive frames between two flow controls
@@ -192,7 +192,7 @@ TEST(IsotpSender, SendsBlocksAsLongAsTheReceiverSays) {
 }
 
 // 9.8.2, N_Bs.
-TEST(IsotpSender, GivesUpWithoutFlowControl) {
+TEST(IsotpSender, TimesOutWithoutFlowControl) {
   Sender sender(classic());
   sender.start(counted(30));
   sender.take();
@@ -211,7 +211,7 @@ TEST(IsotpSender, GivesUpWithoutFlowControl) {
   EXPECT_EQ(sender.counters().unexpected_frame, 1U);
 }
 
-TEST(IsotpSender, WaitsAnewWhenItsFrameGotToTheBusLate) {
+TEST(IsotpSender, RestartsItsTimeoutWhenItsFrameIsSentLate) {
   Sender sender(classic());
   sender.start(counted(30));
   sender.take();
@@ -225,7 +225,7 @@ TEST(IsotpSender, WaitsAnewWhenItsFrameGotToTheBusLate) {
 }
 
 // 9.7, 9.8.4.
-TEST(IsotpSender, WaitsWhenToldToButNotForEver) {
+TEST(IsotpSender, WaitsOnRequestALimitedNumberOfTimes) {
   IsotpSenderOptions options = classic();
   options.max_waits = 3;
   Sender sender(options);
@@ -251,7 +251,7 @@ TEST(IsotpSender, WaitsWhenToldToButNotForEver) {
 }
 
 // 9.6.5.1, 9.6.5.2, 9.8.3, 10.4.3.
-TEST(IsotpSender, TellsBadFlowControlApart) {
+TEST(IsotpSender, DistinguishesInvalidFlowControl) {
   const struct {
     std::string flow_control;
     IsotpError error;
@@ -284,7 +284,7 @@ TEST(IsotpSender, TellsBadFlowControlApart) {
   }
 }
 
-TEST(IsotpSender, IgnoresFlowControlThatItDoesNotWaitFor) {
+TEST(IsotpSender, IgnoresUnexpectedFlowControl) {
   Sender sender(classic());
   EXPECT_EQ(sender.answer("30 00 00"), IsotpError::unexpected_frame);
   sender.start(counted(30));
@@ -298,7 +298,7 @@ TEST(IsotpSender, IgnoresFlowControlThatItDoesNotWaitFor) {
   EXPECT_EQ(sender.counters().unexpected_frame, 3U);
 }
 
-TEST(IsotpSender, PassesOverFramesThatAreNotForIt) {
+TEST(IsotpSender, IgnoresFramesThatAreNotForIt) {
   Sender sender(classic());
   sender.start(counted(30));
   sender.take();
@@ -338,7 +338,7 @@ TEST(IsotpSender, CanBeCancelledAtAnyPoint) {
   }
 }
 
-TEST(IsotpError, EveryOneHasItsOwnText) {
+TEST(IsotpError, HasAnOwnTextForEveryError) {
   std::vector<std::string> texts;
   for (int i = 0; i <= static_cast<int>(IsotpError::malformed) + 1; ++i) {
     const Text text = to_text(static_cast<IsotpError>(i));

@@ -293,7 +293,7 @@ RC_GTEST_PROP(Isotp, AListenerInALossyStreamHearsWhatWasSentOrNothing, ()) {
 }
 
 // The exception that the header describes: the numbers fit again over the border of two transfers.
-TEST(Isotp, WithoutFlowControlLossOverABorderCanJoinTwoDatagrams) {
+TEST(Isotp, LossWithoutFlowControlCanJoinTwoDatagrams) {
   const struct {
     std::size_t size, kept;
     std::size_t lost;  // consecutive frames, including the second first frame

@@ -87,7 +87,7 @@ State busy_state() {
 
 // --- the capture
 
-TEST(PackedForm, EveryCapturedStateFits25BytesAndComesBack) {
+TEST(PackedForm, RestoresEveryCapturedStateFrom25Bytes) {
   std::vector<std::size_t> states;
   for (const test::CapturedLine& line : paper_capture()) {
     const Bytes bytes = packed_bytes(line.bytes);
@@ -105,7 +105,7 @@ TEST(PackedForm, EveryCapturedStateFits25BytesAndComesBack) {
   EXPECT_EQ(states.back(), 25U);              // the actual size
 }
 
-TEST(PackedForm, IsTheDocumentsExampleByteForByte) {
+TEST(PackedForm, MatchesTheDocumentedExampleByteForByte) {
   EXPECT_EQ(hex(packed_bytes(test::captured_state())),
             "911d0a134f297c4bc2004bb10671fff03212c77d0ff07cfd9a");
 }
@@ -169,7 +169,7 @@ TEST(PackedForm, EveryKindOfDatagramIsCompact) {
   }
 }
 
-TEST(PackedForm, BytesOfDevicesAreTheSameAgain) {
+TEST(PackedForm, RestoresDeviceBytes) {
   for (std::size_t count = 0; count <= 66; ++count) {
     std::string bytes;
     for (std::size_t i = 0; i < count; ++i) bytes += "0f";
@@ -185,7 +185,7 @@ TEST(PackedForm, BytesOfDevicesAreTheSameAgain) {
 
 // --- the table
 
-TEST(PackedForm, TheTableHasEveryNameAndWordOfTheProtocol) {
+TEST(PackedForm, TableHasEveryNameAndWordOfTheProtocol) {
   const auto known = [](const std::string& word) {
     return packed::code_of(word) != packed::no_word;
   };
@@ -232,7 +232,7 @@ TEST(PackedForm, EveryWordHasOneCode) {
 
 // --- datagrams that travel as plain text
 
-TEST(PackedForm, WhatIsNotExactlyADatagramAsWritersPrintItTravelsPlain) {
+TEST(PackedForm, SendsANonCanonicalDatagramAsText) {
   const std::string good = "O:358,1,1;PNum:66;T:1699276044383;";
   for (const std::string& datagram : {std::string(),
                                       std::string("O"),
@@ -260,12 +260,12 @@ TEST(PackedForm, WhatIsNotExactlyADatagramAsWritersPrintItTravelsPlain) {
   EXPECT_FALSE(packed_bytes("ANameOf14Bytes:1;" + good + "^0x7fefae81^").empty());
 }
 
-TEST(PackedForm, WhatWouldNotGetShorterTravelsPlain) {
+TEST(PackedForm, SendsADatagramAsTextIfPackingDoesNotShortenIt) {
   EXPECT_TRUE(packed_bytes("abc:def;^0x1^").empty());
   EXPECT_TRUE(packed_bytes("a:" + std::string(900, 'x') + ";^0x1^").empty());
 }
 
-TEST(PackedForm, ATooSmallBufferMeansPlainAndIsNotOverrun) {
+TEST(PackedForm, DoesNotOverrunATooSmallBuffer) {
   for (const test::CapturedLine& line : {paper_capture()[0], paper_capture()[6]}) {
     const std::size_t size = packed_bytes(line.bytes).size();
     for (std::size_t capacity = 0; capacity < size + 3; ++capacity) {
@@ -279,7 +279,7 @@ TEST(PackedForm, ATooSmallBufferMeansPlainAndIsNotOverrun) {
 
 // --- limits of values
 
-TEST(PackedForm, ValuesAtTheEdgesOfTheirFormsComeBack) {
+TEST(PackedForm, RestoresValuesAtTheLimitsOfTheirForms) {
   const std::string long_enough = "AIN6:1.00;RXOK:100000000;RXLOST:100000000;RXDUP:1000000;";
   for (const std::string field : {"AIN24:0.00",
                                   "AIN24:38.39",
@@ -455,7 +455,7 @@ RC_GTEST_PROP(PackedForm, AnyBytesUnpackSafelyToTheGrammarOrARefusal, ()) {
   }
 }
 
-TEST(PackedForm, MalformedBytesAreRefusedWithTheirReason) {
+TEST(PackedForm, RefusesMalformedBytesWithAReason) {
   const auto error = [](const Bytes& bytes, std::size_t capacity = max_datagram) {
     char out[max_datagram];
     return unpack(bytes.data(), bytes.size(), out, capacity).error;
@@ -480,7 +480,7 @@ TEST(PackedForm, MalformedBytesAreRefusedWithTheirReason) {
   EXPECT_EQ(error(Bytes(good.begin(), good.end() - 1)), UnpackError::syntax);
 }
 
-TEST(PackedForm, FullOfWordsItDoesNotUnpackToMoreThanADatagram) {
+TEST(PackedForm, NeverUnpacksToMoreThanADatagram) {
   Bytes bytes{0x80, 0x44};                                                   // F:
   while (bytes.size() < 600) bytes.insert(bytes.end(), {0xF1, 0xEF, 0x1E});  // SERVO12POS
   char out[max_datagram];
@@ -500,7 +500,7 @@ Fate fate_of(const Bytes& damaged, const std::string& original) {
   return read_datagram(Text(out, result.size), datagram) ? Fate::other : Fate::refused;
 }
 
-TEST(PackedForm, NoOneOrTwoDamagedBitsMakeAnotherDatagram) {
+TEST(PackedForm, DetectsOneOrTwoDamagedBits) {
   int same = 0;
   int tried = 0;
   for (const std::string& line :
@@ -544,7 +544,7 @@ RC_GTEST_PROP(PackedForm, NoDamageMakesAnotherDatagram, ()) {
 }
 
 // Lost frames on a bus can join the beginning of one datagram and the end of another.
-TEST(PackedForm, NoTwoDatagramsSplicedAtAFrameMakeAThird) {
+TEST(PackedForm, DetectsTwoDatagramsSplicedAtAFrame) {
   std::vector<std::string> lines;
   for (const test::CapturedLine& line : paper_capture()) {
     if (line.from_board) lines.push_back(line.bytes);

@@ -85,7 +85,7 @@ int lose_and_regain_the_network() {
   return set_loopback(true) && run_until(io, [&] { return at_host.count(Kind::up) == 3; }) ? 0 : 27;
 }
 
-TEST(UdpNetwork, IsReportedWhenLostAndComesBackByItself) {
+TEST(UdpNetwork, IsReportedWhenLostAndRecoversByItself) {
   EXPECT_EQ(run_in_child(lose_and_regain_the_network), 0);
 }
 
@@ -124,7 +124,7 @@ int lose_the_network_of_the_second() {
   return answers(0, "again") && answers(1, "again") ? 0 : 19;
 }
 
-TEST(UdpNetwork, OfASecondBoardIsLostAndTheFirstIsHeardAllTheWhile) {
+TEST(UdpNetwork, LossForASecondBoardDoesNotAffectTheFirst) {
   EXPECT_EQ(run_in_child(lose_the_network_of_the_second), 0);
 }
 
@@ -145,7 +145,7 @@ int lose_the_address_that_is_sent_from() {
   return run_until(io, [&] { return at_host.count(Kind::up) == 2; }) ? 0 : 15;
 }
 
-TEST(UdpNetwork, TellsWhichAddressOfThisComputerIsGone) {
+TEST(UdpNetwork, NamesTheLostAddressOfThisComputer) {
   EXPECT_EQ(run_in_child(lose_the_address_that_is_sent_from), 0);
 }
 
@@ -179,7 +179,7 @@ int follow_the_board_out_of_a_lost_network() {
   return host->up() && host->counters().downs == 1 && at_host.count(Kind::down) == 1 ? 0 : 16;
 }
 
-TEST(UdpNetwork, OfABoardThatHasMovedIsLostOnce) {
+TEST(UdpNetwork, LossIsReportedOnceIfTheBoardMoves) {
   EXPECT_EQ(run_in_child(follow_the_board_out_of_a_lost_network), 0);
 }
 #endif

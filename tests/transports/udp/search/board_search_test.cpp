@@ -59,7 +59,7 @@ TEST(BoardSearch, ReportsTheAnswerAndTheAddressOfEachBoard) {
   }
 }
 
-TEST(BoardSearch, AsksThreeTimesSoThatTwoQuestionsMayBeLost) {
+TEST(BoardSearch, FindsABoardAfterTwoLostQuestions) {
   AnsweringBoards boards;
   boards.add("0.2", {identity("late")}, 3);
   const BoardSearch search = boards.search();
@@ -85,7 +85,7 @@ TEST(BoardSearch, SendsOnlyTheIdentityQuestion) {
   EXPECT_NE(from.port(), 2390) << "the search must leave that port to other programs";
 }
 
-TEST(BoardSearch, IgnoresEverythingButAnswersOfBoards) {
+TEST(BoardSearch, IgnoresDatagramsThatAreNotAnswersOfBoards) {
   AnsweringBoards boards;
   std::string damaged = identity("damaged");
   damaged[5] = 'S';
@@ -102,14 +102,14 @@ TEST(BoardSearch, IgnoresEverythingButAnswersOfBoards) {
   EXPECT_FALSE(found.boards[0].busy);
 }
 
-TEST(BoardSearch, TakesAnAnswerFromTheBoardsPortAlone) {
+TEST(BoardSearch, AcceptsAnswersFromTheBoardPortOnly) {
   AnsweringBoards boards;
   boards.add("0.2", {identity("one")});
   boards.add_elsewhere("0.2", identity("other"));
   EXPECT_EQ(ids(boards.search().run()), std::vector<std::string>{"one"});
 }
 
-TEST(BoardSearch, KeepsOnly64OfACrowdAndSaysSo) {
+TEST(BoardSearch, KeepsOnly64BoardsAndReportsThatThereAreMore) {
   AnsweringBoards boards;
   for (int i = 1; i <= 100; ++i) {
     boards.add("1." + std::to_string(i), {identity("crowd-" + std::to_string(i))});
@@ -125,7 +125,7 @@ TEST(BoardSearch, KeepsOnly64OfACrowdAndSaysSo) {
   EXPECT_EQ(one.others, BoardSearch::most_boards) << "the count of other boards has a limit";
 }
 
-TEST(BoardSearch, KeepsTheFirstAnswerOfEachAddressAndEndsInTimeHoweverMuchComes) {
+TEST(BoardSearch, KeepsTheFirstAnswerOfEachAddressAndEndsInTime) {
   AnsweringBoards boards;
   std::vector<std::string> answers(20000, identity("flood"));
   answers.front() = identity("first");
@@ -136,7 +136,7 @@ TEST(BoardSearch, KeepsTheFirstAnswerOfEachAddressAndEndsInTimeHoweverMuchComes)
   EXPECT_LT(Clock::now() - begun, std::chrono::seconds(2));
 }
 
-TEST(BoardSearch, CountsABoardOnceThatListensOnAllAddressesOfThisComputer) {
+TEST(BoardSearch, CountsABoardOnAllAddressesOfThisComputerOnce) {
   AnsweringBoards boards;
   boards.add("0.2", {identity("sim-1")});
   boards.add("0.3", {identity("sim-1")});
@@ -169,7 +169,7 @@ TEST(BoardSearch, ReportsWhyItCannotAsk) {
       << none.problem->reason;
 }
 
-TEST(BoardSearch, KnowsTheLoopbackOfThisComputer) {
+TEST(BoardSearch, IncludesTheLoopbackOfThisComputer) {
   const auto networks = BoardSearch::networks_of_this_computer();
   const bool has_loopback =
       std::any_of(networks.begin(), networks.end(), [](const BoardSearch::Network& network) {
@@ -178,7 +178,7 @@ TEST(BoardSearch, KnowsTheLoopbackOfThisComputer) {
   EXPECT_TRUE(has_loopback);
 }
 
-TEST(FindBoard, ListsSeveralWithTheirUrls) {
+TEST(FindBoard, ListsSeveralBoardsWithTheirUrls) {
   AnsweringBoards boards;
   boards.add("0.2", {identity("one", "NAME:left;")});
   boards.add("0.3", {identity("two")});
@@ -193,7 +193,7 @@ TEST(FindBoard, ListsSeveralWithTheirUrls) {
   }
 }
 
-TEST(FindBoard, FindsItByNameAndById) {
+TEST(FindBoard, FindsABoardByNameAndById) {
   AnsweringBoards boards;
   boards.add("0.2", {identity("one", "NAME:left;")});
   boards.add("0.3", {identity("two", "NAME:right;")});
@@ -211,7 +211,7 @@ TEST(FindBoard, FindsItByNameAndById) {
   EXPECT_NE(none.problem->fix.find("udp://"), std::string::npos) << none.problem->fix;
 }
 
-TEST(FindBoard, DoesNotChooseBetweenTwoOfOneName) {
+TEST(FindBoard, RefusesAnAmbiguousNameUnlessTheLastIdIsKnown) {
   AnsweringBoards boards;
   boards.add("0.2", {identity("one", "NAME:left;")});
   boards.add("0.3", {identity("two", "NAME:left;")});
@@ -225,7 +225,7 @@ TEST(FindBoard, DoesNotChooseBetweenTwoOfOneName) {
   EXPECT_EQ(again.addresses.at(0).to_string(), "127.0.0.3");
 }
 
-TEST(FindBoard, TheOnlyOneIsNotReplacedByAnotherButABoardOfThatNameIs) {
+TEST(FindBoard, ReplacesABoardByOneOfItsNameButNotByAnother) {
   AnsweringBoards boards;
   boards.add("0.2", {identity("one", "NAME:left;")});
   EXPECT_TRUE(find_board(boards.search(), {"", "gone"}).problem);

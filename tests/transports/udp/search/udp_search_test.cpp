@@ -82,7 +82,7 @@ TEST_F(UdpSearchTest, SaysThatThereIsNoBoardOrMoreThanOne) {
   EXPECT_TRUE(contains(several.fix, "udp:?id=one"));
 }
 
-TEST_F(UdpSearchTest, InAHandlerOfTheLoopItIsDownUntilTheBoardIsThere) {
+TEST_F(UdpSearchTest, OpenedInAHandlerIsDownUntilTheBoardAnswers) {
   boards.add("0.9", {identity("elsewhere")});
   make("udp:auto");
   open_in_loop();
@@ -96,7 +96,7 @@ TEST_F(UdpSearchTest, InAHandlerOfTheLoopItIsDownUntilTheBoardIsThere) {
   EXPECT_TRUE(has_link("one"));
 }
 
-TEST_F(UdpSearchTest, ABoardThatMovesIsFollowedAndSaidToHaveMoved) {
+TEST_F(UdpSearchTest, FollowsABoardThatMovesAndReportsIt) {
   boards.add("0.2", {identity("one", "NAME:left;")});
   for (const char* url : {"udp:auto", "udp:?id=left"}) {
     SCOPED_TRACE(url);
@@ -117,7 +117,7 @@ TEST_F(UdpSearchTest, ABoardThatMovesIsFollowedAndSaidToHaveMoved) {
   }
 }
 
-TEST_F(UdpSearchTest, AnotherBoardThatComesIsNotTakenForIt) {
+TEST_F(UdpSearchTest, IsNotReplacedByAnotherBoard) {
   boards.add("0.2", {identity("one")});
   make("udp:auto");
   host->open(at_host);

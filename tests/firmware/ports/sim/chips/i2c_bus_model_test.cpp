@@ -52,7 +52,7 @@ struct I2cBusModelBench {
   Memory chip{0x11};
 };
 
-TEST(I2cBusModel, ATransferTakesItsClocksAt400Kilohertz) {
+TEST(I2cBusModel, ATransferTakesItsTimeAt400Kilohertz) {
   I2cBusModelBench bench;
   EXPECT_EQ(bench.write({1, 2}), I2cResult::ok);
   const test::BusLog::Transfer write = bench.log.transfers().back();
@@ -69,7 +69,7 @@ TEST(I2cBusModel, ATransferTakesItsClocksAt400Kilohertz) {
   EXPECT_EQ(bench.chip.stops, 2);
 }
 
-TEST(I2cBusModel, NobodyAtAnAddressIsNoAcknowledge) {
+TEST(I2cBusModel, AnUnusedAddressIsNotAcknowledged) {
   I2cBusModelBench bench;
   EXPECT_EQ(bench.write({1}, 0x12), I2cResult::no_acknowledge);
   EXPECT_EQ(bench.log.transfers().back().bytes, 1U);
@@ -77,7 +77,7 @@ TEST(I2cBusModel, NobodyAtAnAddressIsNoAcknowledge) {
   EXPECT_EQ(bench.bus.write_read(0x12, nullptr, 0, &in, 1), I2cResult::no_acknowledge);
 }
 
-TEST(I2cBusModel, RefusesAfterAsManyBytesAsAsked) {
+TEST(I2cBusModel, RefusesAfterTheSetNumberOfBytes) {
   I2cBusModelBench bench;
   bench.bus.refuse(0x11, 0);
   EXPECT_EQ(bench.write({1, 2, 3}), I2cResult::no_acknowledge);
@@ -107,7 +107,7 @@ TEST(I2cBusModel, MayBeHeldInTheMiddleOfATransfer) {
   EXPECT_EQ(bench.chip.stops, 0);
 }
 
-TEST(I2cBusModel, AChipThatIsResetInATransferIsOutOfIt) {
+TEST(I2cBusModel, AChipResetDuringATransferLeavesTheTransfer) {
   I2cBusModelBench bench;
   bench.bus.reset_after(bench.chip, 2);
   EXPECT_EQ(bench.write({1, 2, 3}), I2cResult::no_acknowledge);
@@ -120,7 +120,7 @@ TEST(I2cBusModel, AChipThatIsResetInATransferIsOutOfIt) {
   EXPECT_EQ(in[1], 0xFF);  // no chip pulls SDA low
 }
 
-TEST(I2cBusModel, TheStopOfARecoveryReachesTheChipThatWasCutOff) {
+TEST(I2cBusModel, ARecoverySendsAStopConditionToTheCutOffChip) {
   I2cBusModelBench bench;
   bench.bus.hold_after(2, 2);
   EXPECT_EQ(bench.write({1, 2, 3}), I2cResult::timeout);
@@ -130,7 +130,7 @@ TEST(I2cBusModel, TheStopOfARecoveryReachesTheChipThatWasCutOff) {
   EXPECT_EQ(bench.chip.stops, 1);
 }
 
-TEST(I2cBusModel, ATransferInTheMiddleOfAnotherCutsItShort) {
+TEST(I2cBusModel, AnInterruptingTransferCutsATransferShort) {
   I2cBusModelBench bench;
   Memory other(0x22);
   bench.bus.attach(other);
@@ -156,7 +156,7 @@ TEST(I2cBusModel, ATransferInTheMiddleOfAnotherCutsItShort) {
   EXPECT_EQ(bench.chip.stops, 2);
 }
 
-TEST(I2cBusModel, AReadIsCutShortToo) {
+TEST(I2cBusModel, AnInterruptingTransferCutsAReadShort) {
   I2cBusModelBench bench;
   const std::uint8_t out = 1;
   std::uint8_t in[3] = {};
@@ -168,7 +168,7 @@ TEST(I2cBusModel, AReadIsCutShortToo) {
   EXPECT_EQ(bench.chip.bytes, (std::deque<std::uint8_t>{1, 5}));
 }
 
-TEST(I2cBusModel, OfSeveralChipsAtAnAddressTheInterruptCutsOffAll) {
+TEST(I2cBusModel, AnInterruptCutsOffEveryChipAtAnAddress) {
   I2cBusModelBench bench;
   Memory twin(0x11);
   bench.bus.attach(twin);
@@ -195,7 +195,7 @@ struct ProcessorModel final : I2cProcessor {
   std::function<void()> on_wait;
 };
 
-TEST(I2cBusModel, NoInterruptComesWithinAByteButBetweenTwo) {
+TEST(I2cBusModel, InterruptsComeOnlyBetweenBytes) {
   I2cBusModelBench bench;
   ProcessorModel processor;
   bench.bus.set_processor(&processor);
@@ -205,7 +205,7 @@ TEST(I2cBusModel, NoInterruptComesWithinAByteButBetweenTwo) {
   EXPECT_EQ(processor.held, 6);  // begin, START, three bytes, end
 }
 
-TEST(I2cBusModel, AProcessorWaitsAsLongAsTheWireIsBusyAndNotForTimeThatPassesOtherwise) {
+TEST(I2cBusModel, TheProcessorWaitsOnlyWhileTheBusIsBusy) {
   I2cBusModelBench bench;
   ProcessorModel processor;
   bench.bus.set_processor(&processor);
@@ -227,7 +227,7 @@ TEST(I2cBusModel, AnInterruptWhileTheProcessorWaitsCutsTheTransferShort) {
   EXPECT_EQ(bench.chip.bytes, (std::deque<std::uint8_t>{7}));
 }
 
-TEST(I2cBusModel, TakesAsManyChipsAndErrorsAsItSays) {
+TEST(I2cBusModel, RefusesMoreChipsAndErrorsThanItsMaximum) {
   I2cBusModel bus;
   std::deque<Memory> chips;
   for (std::uint8_t i = 0; i <= I2cBusModel::max_chips; ++i) {

@@ -33,7 +33,7 @@ TEST(Mcp23017Model, IsAllInputsAfterPowerOn) {
   EXPECT_EQ(bench.chip.driven(0), 0);
 }
 
-TEST(Mcp23017Model, CountsUpAndRollsOverToZero) {
+TEST(Mcp23017Model, TheAddressIncrementsAndRollsOverToZero) {
   Mcp23017ModelBench bench;
   bench.write({0x14, 0x0F, 0xF0, 0x00, 0x33});
   EXPECT_EQ(bench.chip.reg(0, Register::olat), 0x0F);
@@ -67,7 +67,7 @@ TEST(Mcp23017Model, BankSeparatesThePorts) {
   EXPECT_EQ(bench.read(0x15, 1), Bytes{0x22});
 }
 
-TEST(Mcp23017Model, InputsArePulledUpAndInvertedAsToldAndWritesToThePortAreToTheLatch) {
+TEST(Mcp23017Model, FollowsPullUpsInversionAndWritesToThePort) {
   Mcp23017ModelBench bench;
   bench.chip.set_outside(0, 0x05);
   EXPECT_EQ(bench.read(0x12, 1), Bytes{0x05});

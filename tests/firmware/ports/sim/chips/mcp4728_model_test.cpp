@@ -27,7 +27,7 @@ struct Mcp4728ModelBench {
   Mcp4728Model chip;
 };
 
-TEST(Mcp4728Model, SequentialWriteOfTheDataSheetsExample) {
+TEST(Mcp4728Model, FollowsTheSequentialWriteExampleOfTheDataSheet) {
   // Figure 7-4: A VDD/2, B VDD full, C 2.048 V reference gain 2 half, D full.
   Mcp4728ModelBench bench;
   EXPECT_EQ(bench.write({0x50, 0x08, 0x00, 0x0F, 0xFF, 0x98, 0x00, 0x9F, 0xFF}), I2cResult::ok);
@@ -90,7 +90,7 @@ TEST(Mcp4728Model, ReferenceGainAndPowerDownHaveTheirOwnCommands) {
   EXPECT_EQ(bench.chip.output(3).power_down, 0);
 }
 
-TEST(Mcp4728Model, GeneralCallResetLoadsTheEepromAndTheAddressStays) {
+TEST(Mcp4728Model, AGeneralCallResetLoadsTheEepromAndKeepsTheAddress) {
   Mcp4728ModelBench bench;
   bench.write({0x40, 0x0F, 0xFF});
   EXPECT_EQ(bench.write({0x06}, 0), I2cResult::ok);

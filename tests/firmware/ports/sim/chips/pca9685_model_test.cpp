@@ -45,7 +45,7 @@ TEST(Pca9685Model, HasTheDataSheetsValuesAfterPowerOn) {
   for (std::size_t i = 0; i < leds.size(); ++i) EXPECT_EQ(leds[i], i % 4 == 3 ? 0x10 : 0);
 }
 
-TEST(Pca9685Model, CountsUpOnlyWithAutoIncrementAndWrapsAtBothEnds) {
+TEST(Pca9685Model, TheAddressIncrementsOnlyWithAutoIncrementAndWraps) {
   Pca9685ModelBench bench;
   bench.write({0x06, 0x01, 0x02, 0x03});
   EXPECT_EQ(bench.chip.reg(0x06), 0x03);
@@ -59,7 +59,7 @@ TEST(Pca9685Model, CountsUpOnlyWithAutoIncrementAndWrapsAtBothEnds) {
   EXPECT_EQ(bench.chip.reg(0x00), 0x35);
 }
 
-TEST(Pca9685Model, TurnsOnAutoIncrementWithinTheTransferThatWritesIt) {
+TEST(Pca9685Model, AutoIncrementAppliesWithinTheTransferThatSetsIt) {
   Pca9685ModelBench bench;
   bench.write({0x00, 0x31, 0x14});
   EXPECT_EQ(bench.chip.reg(0x01), 0x14);
@@ -71,7 +71,7 @@ TEST(Pca9685Model, RefusesReservedRegisters) {
   EXPECT_EQ(bench.write({0xF9, 1}), I2cResult::no_acknowledge);
 }
 
-TEST(Pca9685Model, TakesThePrescaleOnlyInSleepAndNotBelowThree) {
+TEST(Pca9685Model, AcceptsAPrescaleOnlyInSleepAndAtLeastThree) {
   Pca9685ModelBench bench;
   bench.write({0xFE, 0x79});
   EXPECT_EQ(bench.chip.reg(0xFE), 0x79);
@@ -115,7 +115,7 @@ TEST(Pca9685Model, OutputsChangeOnStopOrOnAcknowledge) {
   EXPECT_EQ(bench.chip.duty(0), 4096);
 }
 
-TEST(Pca9685Model, NothingRunsInSleepNorHalfAMillisecondAfter) {
+TEST(Pca9685Model, OutputsAreOffInSleepAndForHalfAMillisecondAfter) {
   Pca9685ModelBench bench;
   bench.write({0x00, 0x31});
   bench.write({0x06, 0x00, 0x10, 0x00, 0x00});
@@ -151,7 +151,7 @@ TEST(Pca9685Model, AnOrderlyShutdownLeavesNothingToRestart) {
   EXPECT_EQ(bench.read(0x00, 1), Bytes{0x31});
 }
 
-TEST(Pca9685Model, AnswersToAllCallAndToSubAddressesAsItIsTold) {
+TEST(Pca9685Model, AnswersAllCallAndSubAddressesAsConfigured) {
   Pca9685ModelBench bench;
   EXPECT_EQ(bench.write({0xFD, 0x10}, 0x70), I2cResult::ok);
   EXPECT_EQ(bench.write({0xFD, 0x10}, 0x71), I2cResult::no_acknowledge);
@@ -164,7 +164,7 @@ TEST(Pca9685Model, AnswersToAllCallAndToSubAddressesAsItIsTold) {
   EXPECT_EQ(bench.write({0xFD, 0x10}, 0x74), I2cResult::ok);
 }
 
-TEST(Pca9685Model, SoftwareResetIsOneByteByTheGeneralCall) {
+TEST(Pca9685Model, ASoftwareResetIsOneByteToTheGeneralCall) {
   Pca9685ModelBench bench;
   bench.write({0xFE, 0x79});
   EXPECT_EQ(bench.write({0x07}, 0), I2cResult::no_acknowledge);
@@ -184,7 +184,7 @@ TEST(Pca9685Model, InvertedOutputsAreOnWhenTheyAreTurnedOff) {
   EXPECT_EQ(bench.chip.duty(0), 0);
 }
 
-TEST(Pca9685Model, WithoutItsClockItKeepsItsOutputsUntilItIsReset) {
+TEST(Pca9685Model, KeepsItsOutputsWithoutAClockUntilAReset) {
   Pca9685ModelBench bench;
   bench.wake();
   bench.write({0x06, 0x00, 0x00, 0x34, 0x02});

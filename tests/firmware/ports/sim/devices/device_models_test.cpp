@@ -44,7 +44,7 @@ TEST_F(UserDeviceModels, Mpu6050SleepsUntilItIsWoken) {
   EXPECT_EQ(read(0x68, {0x6B}, 1), Bytes{0x40});
 }
 
-TEST_F(UserDeviceModels, Mpu6050FeelsWhatItIsToldAndDoesNotOverflow) {
+TEST_F(UserDeviceModels, Mpu6050ReportsTheSetMotionWithoutOverflow) {
   write(0x68, {0x6B, 0x00});
   devices.mpu6050.feel({-1000, 500, 3000}, {100, -250, 0}, 3653);
   EXPECT_EQ(read(0x68, {0x3B}, 14),

@@ -94,7 +94,7 @@ TEST_F(OptionalDeviceModels, Bno055TakesItsTimeToChangeItsMode) {
   EXPECT_EQ(read(0x28, {0x0C}, 2), (Bytes{0xD5, 0x03})) << "11 ms";
 }
 
-TEST_F(OptionalDeviceModels, Vl53l0xRangesEach33MillisecondsOnceItIsTold) {
+TEST_F(OptionalDeviceModels, Vl53l0xMeasuresEvery33MillisecondsOnceStarted) {
   EXPECT_EQ(read(0x29, {0xC0}, 3), (Bytes{0xEE, 0xAA, 0x10}));
   EXPECT_EQ(read(0x29, {0x14}, 12), Bytes(12));
   write(0x29, {0x00, 0x02});
