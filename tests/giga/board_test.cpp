@@ -171,6 +171,31 @@ TEST(GigaUsb, APortClosedDuringAPacketServesTheNextProgram) {
   }
 }
 
+TEST(GigaUsb, APortThatIsClosedAndOpenedWithinATurnBeginsANewSession) {
+  GigaBench bench;
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  bench.giga.usb_reads = false;
+  bench.run_ms(50, host, bench.usb());
+  bench.giga.usb_send("an unfinished line");
+  bench.turn();
+  bench.giga.usb_close_under_way();
+  bench.giga.usb_open = true;
+  bench.giga.usb_reads = true;
+  bench.giga.usb_host.clear();
+  const std::uint32_t opened_ms = giga::BoardClock::now_ms();
+  PlainHost next;
+  bench.usb()(next.heartbeat(bench.giga.now_ms()));
+  bench.run_ms(50);
+  EXPECT_TRUE(bench.pins().is_safe()) << "the session of the old program has ended";
+  const std::vector<std::string> lines = bench.usb_lines();
+  ASSERT_GE(lines.size(), 2U) << "the first line of the new program is lost";
+  Datagram first;
+  ASSERT_TRUE(read_datagram(Text(lines[0].data(), lines[0].size()), first)) << lines[0];
+  EXPECT_GE(static_cast<std::uint32_t>(first.time_ms()), opened_ms) << "a waiting line";
+}
+
 TEST(GigaUsb, OpensItsEndpointOnlyWhenConfigured) {
   GigaBench bench;
   bench.boot();

@@ -16,6 +16,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "firmware/ports/sim/simulated_board.hpp"
@@ -46,13 +47,19 @@ class End {
   }
   void finish() {
     const std::lock_guard lock(mutex_);
-    received_ = nullptr;
+    closed_ = std::exchange(received_, nullptr);
     ++closings;
   }
   template <class... Parts>
   void hand_over(Parts... parts) {
     const std::lock_guard lock(mutex_);
     if (received_) received_(parts...);
+  }
+  // The reader of a closed opening may end late.
+  template <class... Parts>
+  void hand_over_late(Parts... parts) {
+    const std::lock_guard lock(mutex_);
+    if (closed_) closed_(parts...);
   }
   void may_throw() const {
     if (fails) throw std::runtime_error("the modem is gone");
@@ -66,6 +73,7 @@ class End {
  private:
   std::mutex mutex_;
   Received received_;
+  Received closed_;  // of the opening that was closed last
 };
 
 struct Modem final : OwnTransport, End<OwnTransport::Received> {
@@ -230,6 +238,59 @@ TEST(OwnTransports, APathThatCannotBeOpenedAtFirstJoinsLater) {
   EXPECT_NO_THROW(board.send("O:358,1,1"));
   late->opens = false;
   EXPECT_TRUE(comes([&] { return late->sent > 0; }));
+}
+
+// A carrier on a modem, whose loop the test runs.
+struct HeardModem final : Carrier::Handler {
+  void on_datagram(std::string_view bytes, Peer) override { heard.emplace_back(bytes); }
+  void on_carrier_event(const CarrierEvent&) override {}
+  bool opens() {
+    try {
+      carrier->open(*this);
+      return true;
+    } catch (const Error&) {
+      return false;
+    }
+  }
+  template <class Condition>
+  bool polls_until(Condition condition) {
+    return comes([&] {
+      io.restart();
+      io.poll();
+      return condition();
+    });
+  }
+
+  asio::io_context io;
+  BoardLoop loop{io};
+  std::shared_ptr<Modem> modem = std::make_shared<Modem>();
+  std::unique_ptr<Carrier> carrier = make_own_carrier(loop, modem);
+  std::vector<std::string> heard;
+};
+
+TEST(OwnTransports, APathThatJoinsLaterDoesNotDeliverWhatWasReceivedBefore) {
+  HeardModem host;
+  host.modem->opens = true;
+  EXPECT_FALSE(host.opens());
+  host.modem->opens = false;
+  ASSERT_TRUE(comes([&] { return host.modem->openings == 1; }));
+  host.modem->hand_over("old");
+  ASSERT_TRUE(comes([&] { return host.carrier->up() || host.opens(); }));
+  host.modem->hand_over("new");
+  EXPECT_TRUE(host.polls_until([&] { return !host.heard.empty() && host.heard.back() == "new"; }));
+  EXPECT_EQ(host.heard, std::vector<std::string>{"new"});
+}
+
+TEST(OwnTransports, AReopenedTransportDeliversNothingOfTheEarlierOpening) {
+  HeardModem host;
+  ASSERT_TRUE(host.opens());
+  host.modem->fails = true;
+  host.carrier->send("lost", Priority::normal);
+  ASSERT_TRUE(comes([&] { return host.modem->openings == 2; }));
+  host.modem->hand_over_late("old");
+  host.modem->hand_over("new");
+  EXPECT_TRUE(host.polls_until([&] { return !host.heard.empty() && host.heard.back() == "new"; }));
+  EXPECT_EQ(host.heard, std::vector<std::string>{"new"});
 }
 
 TEST(OwnTransports, ASendThatDoesNotReturnDoesNotBlockTheBoard) {

@@ -52,12 +52,15 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
   // --- on the loop
 
   // The first call starts the thread, and waits until open() has returned or thrown. After that the
-  // thread reopens the transport by itself. Throws Error if the transport is not up.
+  // thread reopens the transport by itself. Throws Error if the transport is not up. A later call
+  // drops the items that were received before it.
   void start() {
     std::unique_lock lock(mutex_);
     if (!thread_.joinable()) {
       thread_ = std::thread([self = this->shared_from_this()] { self->run(); });
       changed_.wait(lock, [this] { return state_ != State::opening; });
+    } else {
+      inbox_.clear();
     }
     if (state_ != State::up) throw Error(problem_);
   }
@@ -119,9 +122,10 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
 
   // --- on any thread
 
-  void received(Item item) {
+  // Ignores an item of an earlier opening.
+  void received(std::uint64_t opening, Item item) {
     const std::lock_guard lock(mutex_);
-    if (ending_) return;
+    if (ending_ || opening != opening_) return;
     if (inbox_.size() == most_received) {
       ++overflows_;
       return;
@@ -161,9 +165,10 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
   bool open(std::unique_lock<std::mutex>& lock) {
     inbox_.clear();
     outbox_->clear();
-    return call(lock, [this] {
-      own_->open([weak = this->weak_from_this()](Item item) {
-        if (const auto self = weak.lock()) self->received(std::move(item));
+    const std::uint64_t opening = ++opening_;
+    return call(lock, [this, opening] {
+      own_->open([weak = this->weak_from_this(), opening](Item item) {
+        if (const auto self = weak.lock()) self->received(opening, std::move(item));
       });
     });
   }
@@ -198,6 +203,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
   State state_ = State::opening;
   bool ending_ = false;
   Problem problem_{ErrorKind::open, "", "", ""};
+  std::uint64_t opening_ = 0;  // the number of calls of open()
   std::deque<Item> inbox_;
   std::uint64_t sent_ = 0;
   std::uint64_t overflows_ = 0;

@@ -175,6 +175,7 @@ void BoardProgram::receive(std::uint8_t port, std::uint32_t peer, Text datagram)
 void BoardProgram::hear() {
   const bool can_lost =
       can_.receive([this](Text datagram) { receive(can_number_, everyone, datagram); });
+  if (usb_.begin_turn()) application_.port_down(usb_number_, BoardClock::now_ms());
   usb_.receive([this](Text line) { hear_usb(line); });
   const bool udp_lost = udp_.receive(
       [this](std::uint32_t peer, Text datagram) { receive(udp_number_, peer, datagram); });

@@ -29,8 +29,8 @@ namespace r4 {
 // Moves whole datagrams of at most max_datagram (1024) bytes, of any content.
 class R4LINK_API OwnTransport {
  public:
-  // Passes on a received datagram. Any thread, any time. Never waits; does nothing after the end of
-  // the link. Throws Error{usage} for more than max_datagram bytes.
+  // Passes on a received datagram. Any thread, any time. Never waits; does nothing after the next
+  // open() or the end of the link. Throws Error{usage} for more than max_datagram bytes.
   using Received = std::function<void(std::string_view datagram)>;
 
   virtual ~OwnTransport() = default;

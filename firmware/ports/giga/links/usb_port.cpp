@@ -49,16 +49,24 @@ void UsbPort::send_packet() {
   packet_sent_ += taken;
 }
 
+void UsbPort::forget_lines() {
+  framing_.reset();
+  lines_.clear();
+  packet_sent_ = packet_used_;
+}
+
+bool UsbPort::begin_turn() {
+  const bool reopened = keep_usb_sending();
+  connected_ = _SerialUSB.connected();
+  const bool next_program = reopened && open_ && connected_;
+  if (next_program) forget_lines();
+  return next_program;
+}
+
 bool UsbPort::poll(std::uint32_t now_ms) {
-  keep_usb_sending();
-  const bool open = _SerialUSB.connected();
-  const bool closed = open_ && !open;
-  if (open != open_) {  // old data is not for the next program
-    framing_.reset();
-    lines_.clear();
-    packet_sent_ = packet_used_;
-  }
-  open_ = open;
+  const bool closed = open_ && !connected_;
+  if (connected_ != open_) forget_lines();  // old data is not for the next program
+  open_ = connected_;
   lines_.poll(now_ms);
   send_packet();
   return closed;

@@ -36,6 +36,10 @@ class UsbPort final : public firmware::Port {
   bool take_in();
   bool has_received() const { return !received_.empty(); }
 
+  // Call it before receive(). True: since the last turn, a program closed the port and the next
+  // program opened it.
+  bool begin_turn();
+
   // Calls `on_line(Text)` for each line.
   template <class OnLine>
   void receive(OnLine&& on_line) {
@@ -66,6 +70,7 @@ class UsbPort final : public firmware::Port {
   std::uint32_t dropped() const { return lines_.dropped(); }
 
  private:
+  void forget_lines();
   void fill_packet();
   void send_packet();
 
@@ -76,6 +81,7 @@ class UsbPort final : public firmware::Port {
   firmware::StopDetector detector_;
   bool heard_open_ = false;
 
+  bool connected_ = false;  // when the turn began
   bool open_ = false;
   bool upload_asked_ = false;
   std::uint8_t packet_[packet_size];

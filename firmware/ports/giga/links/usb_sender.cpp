@@ -59,10 +59,10 @@ void open(std::uint32_t number) {
 
 }  // namespace
 
-void keep_usb_sending() {
+bool keep_usb_sending() {
   const std::uint32_t number = Inside::endpoint();
-  if ((in_endpoint(number).DIEPCTL & diepctl_active) != 0) return;
-  if (!PluggableUSBD().configured()) return;
+  if ((in_endpoint(number).DIEPCTL & diepctl_active) != 0) return false;
+  if (!PluggableUSBD().configured()) return false;
   PluggableUSBD().lock();
   if (Inside::sending()) {  // the port was opened again, and a packet given to the closed endpoint
     Inside::set_connected(false);
@@ -71,6 +71,7 @@ void keep_usb_sending() {
   forget_packet(number);
   open(number);
   PluggableUSBD().unlock();
+  return true;
 }
 
 }  // namespace giga

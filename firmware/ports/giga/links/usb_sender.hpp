@@ -8,8 +8,9 @@ namespace r4 {
 namespace giga {
 
 // Call it in each turn of the loop. Opens the endpoint again if the core has closed it (RM0399,
-// chapter OTG_HS: DIEPCTL), and forgets the packet that was under way.
-void keep_usb_sending();
+// chapter OTG_HS: DIEPCTL), and forgets the packet that was under way. True if it opened the
+// endpoint: a program has closed the port, even if the next program has opened it since.
+bool keep_usb_sending();
 
 }  // namespace giga
 }  // namespace r4
