@@ -130,7 +130,7 @@ Words disarm_words(DisarmCause cause) {
     case DisarmCause::proximity:
       return {"something came nearer than a proximity threshold", "clear the way, "};
     case DisarmCause::watchdog:
-      return {"a duty of the board's firmware missed its deadline", "find out why, "};
+      return {"a task of the board's firmware missed its deadline", "find out why, "};
     case DisarmCause::fault:
       return {"the board found a fault in itself", "check its chips and wiring, "};
     case DisarmCause::link:
@@ -144,7 +144,7 @@ Words disarm_words(DisarmCause cause) {
     case DisarmCause::earlier_stop:
       return {"stopped before this program began", clear_on_purpose};
     case DisarmCause::earlier_watchdog:
-      return {"a duty of the board's firmware missed its deadline before this program began",
+      return {"a task of the board's firmware missed its deadline before this program began",
               clear_on_purpose};
     case DisarmCause::earlier_fault:
       return {"the board found a fault in itself before this program began", clear_on_purpose};

@@ -129,7 +129,7 @@ enum class DisarmCause : std::uint8_t {
   stop,
   handle,
   proximity,  // something came nearer than a threshold
-  watchdog,   // a duty of the board missed its deadline
+  watchdog,   // a task of the firmware missed its deadline
   fault,      // the board found a fault of its own
   link,       // the link was lost, and the board did not restore its outputs
   restart,
@@ -197,7 +197,8 @@ struct RefusedPost {
 };
 
 // A field that a datagram lacks keeps its value, until the board restarts: then all values are
-// forgotten. Heartbeats update `safe` too. Every other value is as old as age().
+// forgotten. The values in `present` are as old as age(), the others are older: if a program asks
+// for other fields, a field keeps its last value. Heartbeats update `safe` too.
 struct ReceivedState : State {
   using Clock = std::chrono::steady_clock;
 

@@ -58,7 +58,7 @@ enum class SafeReason : std::uint8_t {
   stop = 2,       // E:STOP, until E:CLEAR
   handle = 3,     // the dead-man's handle is released
   proximity = 4,  // an ultrasonic sensor sees something nearer than its threshold
-  watchdog = 5,   // a duty of the board missed its deadline
+  watchdog = 5,   // a task of the firmware missed its deadline
   fault = 6,      // a chip does not answer, or the firmware found a fault of its own
 };
 constexpr int safe_reason_count = 7;

@@ -38,17 +38,21 @@ SKETCH = struct.pack('<II', 0x24080000, 0x080402c1) + bytes(1000)
 WRITE = '-d 2341:0366 -p 1-2 -a 0 -s 0x08040000:leave -D '
 
 
-@pytest.fixture(name='place')
-def fake_dfu_util(tmp_path, monkeypatch):
-    program = tmp_path / 'bin' / 'dfu-util'
+def write_fake_dfu_util(folder, usb_paths):
+    program = folder / 'bin' / 'dfu-util'
     program.parent.mkdir()
     program.write_text(DFU_UTIL)
     program.chmod(0o755)
-    monkeypatch.setenv('PATH', f'{program.parent}:{os.environ["PATH"]}')
+    (folder / 'there').write_text('2')
+    (folder / 'paths').write_text(usb_paths)
+    (folder / 'sketch.bin').write_bytes(SKETCH)
+
+
+@pytest.fixture(name='place')
+def fake_dfu_util(tmp_path, monkeypatch):
+    write_fake_dfu_util(tmp_path, '1-2')
+    monkeypatch.setenv('PATH', f'{tmp_path}/bin:{os.environ["PATH"]}')
     monkeypatch.setenv('R4_TEST_DFU', str(tmp_path))
-    (tmp_path / 'there').write_text('2')
-    (tmp_path / 'paths').write_text('1-2')
-    (tmp_path / 'sketch.bin').write_bytes(SKETCH)
     return tmp_path
 
 

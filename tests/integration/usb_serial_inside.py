@@ -9,17 +9,20 @@ import os
 import pathlib
 import pty
 import queue
+import re
 import signal
 import socket
 import statistics
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import tty
 
 from machine import account
 from r4_process import PATIENCE_S, Running, driving, free_port, is_link, is_state, monitor, objects, run, send, stop_takes_ms, watch
+from test_upload import write_fake_dfu_util
 from test_usb_serial import carry
 from host_on_paths import HostOnPaths
 
@@ -173,11 +176,26 @@ def one_of_two_paths(terminal, commands):
             assert second.process.poll() is None
 
 
+def uploads_to_the_board_that_it_stopped():
+    """Another board waits in its boot loader, too. A board is known by its place at USB."""
+    place = re.search(r'/(\d+-[\d.]+)/\1:', os.path.realpath('/sys/class/tty/ttyUSB0'))[1]
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder)
+        write_fake_dfu_util(path, f'9-9 {place}')
+        os.environ.update(PATH=f'{path}/bin:{os.environ["PATH"]}', R4_TEST_DFU=folder)
+        done = run('upload', f'{folder}/sketch.bin', f'serial://{PORT}', '--json')
+        assert done.returncode == 0, done
+        assert [each['type'] for each in objects(done.stdout)][::len(objects(done.stdout)) - 1] == ['stopped', 'identity']
+        assert f' -p {place} ' in (path / 'calls').read_text().splitlines()[-1]
+    assert send(f'serial://{PORT}', '--timeout', '20', 'E:CLEAR').returncode == 0
+
+
 account.begin()
 TERMINAL = other_path()
 listed_with_who_controls_it()
 streams_at_the_boards_rate()
 shared_by_programs()
+uploads_to_the_board_that_it_stopped()
 unplugged_and_plugged_in_again('serial:?sn=R4-0001', times=2)
 unplugged_and_plugged_in_again(f'serial://{PORT}', times=1)
 one_of_two_paths(TERMINAL, pathlib.Path(sys.argv[1]))

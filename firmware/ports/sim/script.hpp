@@ -20,7 +20,7 @@
 //     2   gpio 3 low            that spare input is pulled down, until high
 //     2   hang 0.3              the firmware's loop stands still for 0.3 s; arriving data is lost
 //     3   fault                 the board itself fails
-//     3   watchdog              a duty of the board missed its deadline
+//     3   watchdog              a task of the firmware missed its deadline
 //     4   reboot                power off and on again
 //
 // Lines may be in any order; lines of the same time happen in their order.

@@ -62,7 +62,7 @@ class SafeReason(Word):
     STOP = 'stop', 'an emergency stop came; it lasts until Command.clear() or arm()'
     HANDLE = 'handle', "the dead-man's handle is released"
     PROXIMITY = 'proximity', 'an ultrasonic sensor measures less than its threshold'
-    WATCHDOG = 'watchdog', "a duty of the board's firmware missed its deadline"
+    WATCHDOG = 'watchdog', "a task of the board's firmware missed its deadline"
     FAULT = 'fault', 'a chip stopped answering, or the firmware found a fault in itself'
 
 
@@ -99,7 +99,7 @@ class DisarmCause(Word):
     STOP = 'stop', 'an emergency stop came'
     HANDLE = 'handle', "the dead-man's handle was released"
     PROXIMITY = 'proximity', 'an ultrasonic sensor measured less than its threshold'
-    WATCHDOG = 'watchdog', "a duty of the board's firmware missed its deadline"
+    WATCHDOG = 'watchdog', "a task of the board's firmware missed its deadline"
     FAULT = 'fault', 'the board found a fault in itself'
     LINK = 'link', 'the link was lost, and the board did not restore its outputs'
     RESTART = 'restart', 'the board restarted'

@@ -147,8 +147,11 @@ class Port {
   std::string usb_path() const {
     std::error_code ignored;
     const std::filesystem::path name = std::filesystem::path(path_).filename();
-    const auto interface = std::filesystem::canonical("/sys/class/tty" / name / "device", ignored);
-    return interface.parent_path().filename().string();  // …/1-2/1-2:1.0
+    auto folder = std::filesystem::canonical("/sys/class/tty" / name / "device", ignored);
+    while (folder.has_relative_path() && !std::filesystem::exists(folder / "idVendor")) {
+      folder = folder.parent_path();
+    }
+    return folder.filename().string();
   }
 
  private:
