@@ -23,9 +23,13 @@ constexpr std::uint32_t i2c_wire_us(std::size_t bytes, std::size_t starts = 1) {
   return static_cast<std::uint32_t>((bytes * 9 + starts + 1) * 5 / 2);
 }
 
-// The longest time of a call: two attempts on the wire, and all that they wait.
+// The longest time of recover(): nine clocks and a STOP at 100 kHz, with SCL stretched each time.
+constexpr std::uint32_t i2c_recovery_us = 450;
+
+// The longest time of a transfer: two attempts on the wire, all that they wait, and a recovery
+// between them.
 constexpr std::uint32_t i2c_most_us(std::size_t bytes, std::size_t starts = 1) {
-  return 2 * i2c_wire_us(bytes, starts) + i2c_timeout_us;
+  return 2 * i2c_wire_us(bytes, starts) + i2c_timeout_us + i2c_recovery_us;
 }
 
 class I2cBus {

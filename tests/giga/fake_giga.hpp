@@ -45,7 +45,10 @@ class I2cPeripheral {
   void refuse_after(int bytes) { refuse_after_ = bytes; }
   // The peripheral reports a false bus error after `bytes` more bytes (ES0430 2.15.2).
   void report_bus_error_after(int bytes) { bus_error_after_ = bytes; }
-  // Another device pulls SDA low after `bytes` more bytes, in each of `transfers` transfers.
+  // After `bytes` more bytes, a disturbance looks like a STOP: the chips leave the transfer.
+  void disturb_after(int bytes) { disturbed_after_ = bytes; }
+  // Another device pulls SDA low after `bytes` more bytes, in each of `transfers` transfers. A chip
+  // that is cut off while it sends a byte holds SDA for nine clocks.
   void lose_after(int bytes, int transfers) {
     lose_after_ = bytes;
     losses_ = transfers;
@@ -71,6 +74,8 @@ class I2cPeripheral {
   void refuse();
   void shift();
   void count_byte();
+  void stop_chips();
+  void cut_off_chips();
 
   I2C_TypeDef* registers_ = nullptr;
   std::vector<sim::I2cChipModel*> chips_;
@@ -89,6 +94,7 @@ class I2cPeripheral {
   bool scl_held_ = false;
   int refuse_after_ = -1;
   int bus_error_after_ = -1;
+  int disturbed_after_ = -1;
   int lose_after_ = 0;
   int losses_ = 0;
   int sent_ = 0;  // bytes sent in this transfer

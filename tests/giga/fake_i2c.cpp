@@ -32,10 +32,9 @@ void I2cPeripheral::connect(I2C_TypeDef& registers, std::vector<sim::I2cChipMode
   registers_->CR1.on_write = [this](std::uint32_t value) {
     registers_->CR1.value = value;
     if ((value & 1U) != 0) return;
-    step_ = Step::idle;
+    cut_off_chips();
     flags_ = 0;
     txdr_.reset();
-    taking_part_.clear();
   };
   registers_->CR2.on_write = [this](std::uint32_t value) {
     if ((value & cr2_start) != 0 && (registers_->CR1.value & 1U) != 0) start(value);
@@ -82,10 +81,26 @@ void I2cPeripheral::start(std::uint32_t cr2) {
 
 void I2cPeripheral::count_byte() {
   if (bus_error_after_ >= 0 && bus_error_after_-- == 0) flags_ |= berr;
+  if (disturbed_after_ >= 0 && disturbed_after_-- == 0) {
+    flags_ |= berr;
+    stop_chips();
+  }
   if (hold_after_ < 0) return;
   if (hold_after_-- > 0) return;
   sda_held_ = hold_clocks_;
   hold_after_ = -1;
+}
+
+void I2cPeripheral::stop_chips() {
+  for (sim::I2cChipModel* chip : taking_part_) chip->stop();
+  taking_part_.clear();
+}
+
+void I2cPeripheral::cut_off_chips() {
+  const bool in_byte = step_ == Step::read && (flags_ & rxne) == 0 && !taking_part_.empty();
+  if (in_byte) sda_held_ = 9;
+  step_ = Step::idle;
+  taking_part_.clear();
 }
 
 // Moves the byte in TXDR to the wire, which makes room for the next byte (RM0399, chapter I2C,
@@ -118,9 +133,8 @@ void I2cPeripheral::progress() {
   if (giga().now_ns() < due_ns_) return;
   if (losses_ > 0 && step_ != Step::idle && sent_++ == lose_after_) {
     --losses_;
-    taking_part_.clear();
+    cut_off_chips();
     flags_ |= arlo;
-    step_ = Step::idle;
     return;
   }
   const bool reading = (cr2_ & cr2_read) != 0;
@@ -128,11 +142,11 @@ void I2cPeripheral::progress() {
     case Step::address: {
       const auto address = static_cast<std::uint8_t>(cr2_ >> 1 & 0x7F);
       log.push_back({static_cast<std::uint8_t>(address << 1 | (reading ? 1 : 0))});
-      count_byte();
       taking_part_.clear();
       for (sim::I2cChipModel* chip : chips_) {
         if (chip->start(address, reading)) taking_part_.push_back(chip);
       }
+      count_byte();
       if (taking_part_.empty()) {
         refuse();
       } else if (left_ == 0) {
@@ -167,13 +181,12 @@ void I2cPeripheral::progress() {
     }
     case Step::read:
       if ((flags_ & rxne) != 0) return;
-      in_ = taking_part_.front()->read();
+      in_ = taking_part_.empty() ? 0xFF : taking_part_.front()->read();
       count_byte();
       flags_ |= rxne;
       return;
     case Step::stop:
-      for (sim::I2cChipModel* chip : taking_part_) chip->stop();
-      taking_part_.clear();
+      stop_chips();
       flags_ |= stopf;
       step_ = Step::idle;
       return;

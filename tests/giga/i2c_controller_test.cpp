@@ -29,10 +29,22 @@ class Bus {
     took_us = now_us() - began_us_;
     return result;
   }
+  // Reads MODE1 of 0x40, which after power-up repeats the register for each byte.
+  I2cResult read(Bytes& in) {
+    const std::uint8_t mode1 = 0x00;
+    began_us_ = now_us();
+    const I2cResult result = bus.write_read(0x40, &mode1, 1, in.data(), in.size());
+    took_us = now_us() - began_us_;
+    return result;
+  }
   std::uint64_t now_us() const { return chip.now_ns() / 1000; }
   // Writes four bytes to 0x40, with one interrupt after `at_us`. Empty if the write ended before.
   std::optional<I2cResult> write_interrupted(std::uint64_t at_us,
                                              const std::function<void()>& interrupt) {
+    return interrupted(at_us, interrupt, [&] { return write(0x40, {0x06, 0x00, 0x10, 0x00}); });
+  }
+  std::optional<I2cResult> interrupted(std::uint64_t at_us, const std::function<void()>& interrupt,
+                                       const std::function<I2cResult()>& transfer) {
     bool interrupted = false;
     chip.ticker.period_ns = ~0ULL / 4;
     chip.ticker.next_ns = chip.now_ns() + at_us * 1000;
@@ -40,7 +52,7 @@ class Bus {
       interrupted = true;
       interrupt();
     };
-    const I2cResult result = write(0x40, {0x06, 0x00, 0x10, 0x00});
+    const I2cResult result = transfer();
     return interrupted ? std::optional(result) : std::nullopt;
   }
   // All outputs of the chips off: the interrupts of the tests write this.
@@ -135,7 +147,7 @@ TEST(I2cController, ARecoveryOfAFreeBusSendsOnlyAStopCondition) {
 
 TEST(I2cController, AHeldLineTimesOutWithinTheLimit) {
   Bus bus;
-  bus.chip.i2c.hold_sda(9);
+  bus.chip.i2c.hold_sda(1000);
   for (const std::size_t size : {0U, 1U, 5U, 65U}) {
     EXPECT_EQ(bus.write(0x40, Bytes(size)), I2cResult::timeout);
     EXPECT_LE(bus.took_us, firmware::i2c_most_us(1 + size)) << size;
@@ -145,7 +157,7 @@ TEST(I2cController, AHeldLineTimesOutWithinTheLimit) {
 TEST(I2cController, ALineHeldDuringATransferTimesOutWithinTheLimit) {
   Bus bus;
   for (int after = 0; after < 6; ++after) {
-    bus.chip.i2c.hold_after(after, 9);
+    bus.chip.i2c.hold_after(after, 15);
     EXPECT_EQ(bus.write(0x40, {0x06, 0, 0, 0, 0}), I2cResult::timeout) << after;
     EXPECT_LE(bus.took_us, firmware::i2c_most_us(6)) << after;
     EXPECT_TRUE(bus.bus.recover()) << after;
@@ -158,6 +170,8 @@ TEST(I2cController, FreesAChipThatWasCutOffWithNineClocks) {
   bus.chip.i2c.hold_sda(9);
   EXPECT_TRUE(bus.bus.recover());
   EXPECT_EQ(bus.write(0x40, {0x00}), I2cResult::ok);
+  bus.chip.i2c.hold_sda(9);
+  EXPECT_EQ(bus.write(0x40, {0x00}), I2cResult::ok) << "freed before the second attempt";
   bus.chip.i2c.hold_sda(40);
   EXPECT_FALSE(bus.bus.recover());
   EXPECT_EQ(bus.write(0x40, {0x00}), I2cResult::timeout);
@@ -194,6 +208,53 @@ TEST(I2cController, IgnoresAFalseBusError) {
   }
 }
 
+// The third byte on the wire is the address of the read.
+TEST(I2cController, AReadWhoseChipLeftTheBusIsRepeated) {
+  for (int after = 2; after < 5; ++after) {
+    Bus bus;
+    Bytes in(2);
+    bus.chip.i2c.disturb_after(after);
+    EXPECT_EQ(bus.read(in), I2cResult::ok) << after;
+    EXPECT_EQ(in, Bytes(2, 0x11)) << after;
+    EXPECT_EQ(bus.chip.i2c.log.size(), 4U) << after << ": two attempts";
+  }
+}
+
+TEST(I2cController, AWriteWhoseChipLeftTheBusIsNotAcknowledged) {
+  for (int after = 0; after < 3; ++after) {
+    Bus bus;
+    bus.chip.i2c.disturb_after(after);
+    EXPECT_EQ(bus.write(0x40, {0x06, 0x00}), I2cResult::no_acknowledge) << after;
+  }
+}
+
+// A chip that was cut off within a byte holds SDA.
+TEST(I2cController, AReadThatLostTheBusIsRepeatedOnAFreeBus) {
+  for (int after = 0; after < 5; ++after) {
+    Bus bus;
+    Bytes in(4);
+    bus.chip.i2c.lose_after(after, 1);
+    EXPECT_EQ(bus.read(in), I2cResult::ok) << after;
+    EXPECT_EQ(in, Bytes(4, 0x11)) << after;
+    EXPECT_LE(bus.took_us, firmware::i2c_most_us(7, 2)) << after;
+    bus.chip.i2c.lose_after(after, 2);
+    EXPECT_EQ(bus.read(in), I2cResult::timeout) << after;
+    EXPECT_LE(bus.took_us, firmware::i2c_most_us(7, 2)) << after;
+    EXPECT_EQ(bus.read(in), I2cResult::ok) << after;
+  }
+}
+
+TEST(I2cController, AReadThatTimedOutIsRepeatedOnAFreeBus) {
+  for (int after = 0; after < 7; ++after) {
+    Bus bus;
+    Bytes in(4);
+    bus.chip.i2c.hold_after(after, 9);
+    EXPECT_EQ(bus.read(in), I2cResult::ok) << after;
+    EXPECT_EQ(in, Bytes(4, 0x11)) << after;
+    EXPECT_LE(bus.took_us, firmware::i2c_most_us(7, 2)) << after;
+  }
+}
+
 TEST(I2cController, RepeatsATransferOnceAfterALostArbitration) {
   for (int after = 0; after < 4; ++after) {
     Bus bus;
@@ -210,7 +271,7 @@ TEST(I2cController, RepeatsATransferOnceAfterALostArbitration) {
 // An interrupt at every microsecond of two attempts switches everything off. The second attempt
 // must not undo that.
 TEST(I2cController, DoesNotRepeatATransferAfterAnInterruptUsedTheBus) {
-  for (std::uint64_t at_us = 1; at_us < 260; ++at_us) {
+  for (std::uint64_t at_us = 1;; ++at_us) {
     Bus bus;
     bus.chip.i2c.lose_after(3, 1);
     const auto result = bus.write_interrupted(at_us, [&] {
@@ -222,6 +283,29 @@ TEST(I2cController, DoesNotRepeatATransferAfterAnInterruptUsedTheBus) {
       EXPECT_TRUE(bus.chip.i2c.log.empty()) << at_us << ": nothing was sent afterwards";
     }
   }
+}
+
+// Also while SDA is being freed for the second attempt.
+TEST(I2cController, AReadThatWasTakenOverIsNotRepeated) {
+  int taken_over = 0;
+  for (std::uint64_t at_us = 1;; ++at_us) {
+    Bus bus;
+    Bytes in(4);
+    bus.chip.i2c.lose_after(3, 1);
+    const auto off = [&] {
+      EXPECT_EQ(bus.write_off(), I2cResult::ok) << at_us;
+      bus.chip.i2c.log.clear();
+    };
+    const auto result = bus.interrupted(at_us, off, [&] { return bus.read(in); });
+    if (!result) break;
+    if (result == I2cResult::timeout) {
+      ++taken_over;
+      EXPECT_TRUE(bus.chip.i2c.log.empty()) << at_us << ": nothing was sent afterwards";
+    }
+    EXPECT_EQ(bus.read(in), I2cResult::ok) << at_us;
+    EXPECT_EQ(in, Bytes(4, 0x11)) << at_us;
+  }
+  EXPECT_GT(taken_over, 300);
 }
 
 // An interrupt at every microsecond of a transfer recovers the bus and uses it.

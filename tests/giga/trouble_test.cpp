@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The firmware's reaction when it, its hardware or its supply fails, and the data that it keeps.
 #include "bench.hpp"
+#include "firmware/ports/giga/pins.hpp"
 #include "tests/giga/core/registers.hpp"
 
 namespace r4::test {
@@ -130,6 +131,40 @@ TEST(GigaFault, AFaultDuringATransferTurnsAllOutputsOff) {
     bench.usb()(host.command("E:CLEAR"));
     bench.run_ms(20);
   }
+}
+
+// docs/reference/safety.md, "How long it takes".
+TEST(GigaFault, AChipThatHoldsTheBusStopsTheSteppersWithin23Ms) {
+  std::uint64_t longest_us = 0;
+  for (std::uint64_t after_us = 0; after_us < 21000; after_us += 237) {
+    GigaBench bench;
+    bench.boot();
+    PlainHost host;
+    bench.run_ms(150, host, bench.usb());
+    bench.usb()(host.command("P:1000000,20000,1"));
+    bench.run_ms(60, host, bench.usb());
+    const giga::Pin pin = giga::step_pins[0];
+    const std::uint64_t held_ns = bench.giga.now_ns() + after_us * 1000;
+    std::uint64_t last_step_ns = 0;
+    int steps = 0;
+    const std::function<void()> watch = [&] {
+      const int now = bench.giga.rises(pin.port, pin.number);
+      if (now != steps) last_step_ns = bench.giga.now_ns();
+      steps = now;
+      bench.giga.at(bench.giga.now_ns() + 20000, watch);
+    };
+    bench.giga.at(held_ns, [&] {
+      bench.giga.i2c.hold_sda(1'000'000);
+      watch();
+    });
+    bench.run_ms(50, host, bench.usb());
+    ASSERT_EQ(bench.reason(), SafeReason::fault) << after_us;
+    ASSERT_GT(last_step_ns, held_ns) << after_us;
+    longest_us = std::max(longest_us, (last_step_ns - held_ns) / 1000);
+  }
+  std::printf("a chip holds the bus: the steppers stop after %d us\n",
+              static_cast<int>(longest_us));
+  EXPECT_LE(longest_us, 23000U);
 }
 
 TEST(GigaFault, AnErrorOfTheCoreResetsTheBoard) {

@@ -17,6 +17,7 @@ constexpr std::uint32_t isr_byte = 1U << 2;        // RXNE
 constexpr std::uint32_t isr_refused = 1U << 4;     // NACKF
 constexpr std::uint32_t isr_stopped = 1U << 5;     // STOPF
 constexpr std::uint32_t isr_complete = 1U << 6;    // TC
+constexpr std::uint32_t isr_bus_error = 1U << 8;   // BERR
 constexpr std::uint32_t isr_lost = 1U << 9;        // ARLO: another device pulls SDA down
 constexpr std::uint32_t isr_busy = 1U << 15;
 constexpr std::uint32_t icr_all = 0x3F38;
@@ -29,6 +30,11 @@ constexpr std::uint32_t cr2_for(std::uint8_t address, std::size_t size) {
 constexpr std::uint32_t half_clock_us = 5;
 constexpr std::uint32_t stretch_us = 20;
 constexpr int recovery_clocks = 9;
+// A wait ends at most 1 us late.
+static_assert((stretch_us + half_clock_us + 2) +
+                      (recovery_clocks + 1) * (stretch_us + 3 * half_clock_us + 4) <=
+                  firmware::i2c_recovery_us,
+              "a recovery takes longer than promised");
 
 }  // namespace
 
@@ -64,6 +70,7 @@ void I2cController::start(std::uint32_t kernel_hz) {
 
 // `attempt(transfer)` returns the result of one attempt. A second attempt follows a timeout, unless
 // another transfer took over the bus in the meantime: then it could undo what that transfer did.
+// Before the second attempt, a chip that was cut off within a byte must release SDA.
 template <class Attempt>
 I2cResult I2cController::transfer(std::size_t bytes, std::size_t starts, Attempt attempt) {
   constexpr std::uint32_t clean_up_us = 20;
@@ -75,6 +82,7 @@ I2cResult I2cController::transfer(std::size_t bytes, std::size_t starts, Attempt
       firmware::i2c_wire_us(bytes, starts) + firmware::i2c_timeout_us / attempts - clean_up_us;
   I2cResult result = I2cResult::timeout;
   for (int i = 0; i < attempts && result == I2cResult::timeout; ++i) {
+    if (i > 0 && transfer.recovery == recoveries_) free_lines();
     transfer.began_us = clock_();
     result = wait_until_free(transfer);  // at once a timeout if the bus was taken over
     if (result == I2cResult::ok) result = attempt(transfer);
@@ -134,6 +142,7 @@ I2cResult I2cController::send(const Transfer& transfer, std::uint8_t address,
   }
 }
 
+// A bus error may mean that the chip left the bus, and that the bytes are those of an idle bus.
 I2cResult I2cController::receive(const Transfer& transfer, std::uint8_t address,
                                  std::uint8_t* bytes, std::size_t size) {
   if (!request(transfer, cr2_for(address, size) | cr2_read | cr2_then_stop)) {
@@ -146,6 +155,7 @@ I2cResult I2cController::receive(const Transfer& transfer, std::uint8_t address,
     if ((status & isr_byte) != 0 && received < size) {
       bytes[received++] = static_cast<std::uint8_t>(registers_.RXDR);
     } else if ((status & isr_stopped) != 0) {
+      if ((status & isr_bus_error) != 0) return I2cResult::timeout;
       return received == size ? I2cResult::ok : I2cResult::no_acknowledge;
     }
     if (!alive(transfer)) return I2cResult::timeout;
@@ -204,10 +214,15 @@ bool I2cController::release_scl() {
   return true;
 }
 
-// Drives the pins, because the peripheral does not drive a busy bus. Clocks SCL only while SDA is
-// held (UM10204 3.1.16): a chip that was being written to would read a clock as a bit.
 bool I2cController::recover() {
   recoveries_ = recoveries_ + 1;
+  return free_lines();
+}
+
+// Drives the pins, because the peripheral does not drive a busy bus. Clocks SCL only while SDA is
+// held (UM10204 3.1.16): a chip that was being written to would read a clock as a bit. A recovery
+// in an interrupt may come at any moment: the rest is at most a START and a STOP on a free bus.
+bool I2cController::free_lines() {
   registers_.CR1 = 0;
   giga::write(scl_, true);
   giga::write(sda_, true);

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // An I2C peripheral of the STM32H747 as master at up to 400 kHz (RM0399, chapter I2C). Fulfils
-// drivers/i2c_bus.hpp. A transfer that lost the bus or timed out is repeated once, so that one
-// disturbance does not stop the robot; a bus error (BERR) is ignored, because as master the
-// peripheral reports bus errors that did not occur (ST errata ES0430 2.15.2). recover() or
-// another transfer may interrupt a transfer, also from a fault handler: the interrupted transfer
-// then returns timeout. The core's library (Wire) waits 36 ms for each byte on a hung bus.
+// drivers/i2c_bus.hpp. A transfer that lost the bus or timed out is repeated once, on a freed bus,
+// so that one disturbance does not stop the robot. A read with a bus error (BERR) is repeated, too:
+// its chip may have left the bus. A write ignores bus errors: a chip that left does not
+// acknowledge, and as master the peripheral reports bus errors that did not occur (ST errata ES0430
+// 2.15.2). recover() or another transfer may interrupt a transfer, also from a fault handler: the
+// interrupted transfer then returns timeout. The core's library (Wire) waits 36 ms for each byte on
+// a hung bus.
 #pragma once
 
 #include <cstddef>
@@ -67,6 +69,7 @@ class I2cController final : public firmware::I2cBus {
   void restart();
   void pause_us(std::uint32_t us) const;
   bool release_scl();
+  bool free_lines();
 
   I2C_TypeDef& registers_;
   const Line scl_;
