@@ -15,8 +15,9 @@
 
 namespace r4 {
 
+// Not 0, so that a program can return it as its exit code.
 enum class ErrorKind : std::uint8_t {
-  data,         // an invalid datagram, recording or file
+  data = 1,     // an invalid datagram, recording or file
   usage,        // a wrong URL, option or command
   refused,      // the board refused, or did not confirm in time
   open,         // the transport cannot be opened or is down
