@@ -94,5 +94,27 @@ TEST(Settings, OtherKeysAreUnknown) {
   }
 }
 
+// A setting that operator== or the storage forgets is lost at the next start of a Giga.
+TEST(Settings, EachSettingIsComparedAndStored) {
+  const std::string values[] = {
+      "60",       "2000",         "2",         "rearm",       "0",
+      "9600:8E1", "40:x00:1:100", "somewhere", "192.168.0.2", "1:" + std::string(64, 'a')};
+  for (const SettingRow& row : setting_rows) {
+    bool found = false;
+    for (const std::string& value : values) {
+      Settings changed;
+      if (set(changed, row.key, value) != Refusal::none || changed == Settings()) continue;
+      found = true;
+      char text[max_settings_text];
+      Text written;
+      ASSERT_TRUE(write_settings(changed, text, sizeof text, written)) << str(row.key);
+      Settings again;
+      read_settings(written, again);
+      EXPECT_EQ(again, changed) << str(row.key) << " is not stored";
+    }
+    EXPECT_TRUE(found) << str(row.key) << ": no value changes it, or operator== forgets it";
+  }
+}
+
 }  // namespace
 }  // namespace r4
