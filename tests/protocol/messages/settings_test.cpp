@@ -5,8 +5,12 @@
 
 #include <string>
 
+#include "tests/support/datagrams.hpp"
+
 namespace r4 {
 namespace {
+
+using test::str;
 
 Refusal set_text(Settings& settings, const std::string& key, const std::string& value) {
   return set(settings, key, value);
