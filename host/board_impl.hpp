@@ -118,7 +118,7 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   asio::steady_timer look_timer{io};
   bool held_for_callback = false;
 
-  // Shared by all threads, under the lock. A change of the state or the link is news.
+  // Shared by all threads, under the lock. A change of the state or the link notifies `news`.
   std::string name;  // of the transports
   std::vector<std::string> path_names;
   ReceivedState state;

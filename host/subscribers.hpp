@@ -62,7 +62,7 @@ class Subscribers {
     std::shared_ptr<Function> function_;
   };
 
-  // An empty function is not a callback: its handle has ended.
+  // An empty function adds no callback and returns an ended handle.
   Subscription add(Function function) {
     if (!function) return {};
     const auto one = std::make_shared<One>(std::move(function));

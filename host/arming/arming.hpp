@@ -48,7 +48,7 @@ class ArmingMachine {
   // This computer slept: a new session begins, for which any cause may be an earlier one.
   void on_sleep();
   void on_outage() { outage_ = true; }
-  // A state of a board that is not safe shows relay 1.
+  // Call for each state that shows relay 1 while the board is not in the safe state.
   void on_supply(bool closed);
 
   void begin();

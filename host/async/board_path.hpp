@@ -82,7 +82,7 @@ class BoardPaths {
     for (const auto& path : paths_) counters_ += path->carrier->counters();
     return counters_;
   }
-  // The trouble that all transports have: one path without trouble is enough.
+  // The trouble of the last path; none if at least one path has no trouble.
   TransportTrouble trouble() const {
     TransportTrouble common = TransportTrouble::none;
     for (const auto& path : paths_) {

@@ -143,8 +143,8 @@ class BlockingLoop {
   // Runs `shut` on the loop unless it is closed, and joins the thread. Idempotent.
   void close(std::function<void()> shut);
 
-  // `shut` begins with this: nothing is put on the loop afterwards. False: closed before. Calls
-  // `last` under the lock.
+  // The first step of `shut`: nothing is put on the loop afterwards. Returns false if the loop was
+  // already closed; otherwise calls `last` under the lock.
   template <class Last>
   bool mark_closed(Last last) {
     {

@@ -66,7 +66,8 @@ class PendingCommands {
  public:
   static constexpr std::size_t max_slots = 128;
 
-  // At most max_slots together. Stops have their own slots, so commands cannot keep a stop out.
+  // `commands` + `stops` is at most max_slots. Stops have their own slots, so commands cannot keep
+  // a stop out.
   PendingCommands(std::size_t commands, std::size_t stops)
       : slots_(commands + stops), commands_(commands), stops_(stops) {
     slots_[0] = std::make_unique<PendingCommand>();

@@ -133,8 +133,9 @@ class AsyncBoard {
     if (command.kind != CommandKind::stop) require_timeout("async_send()", timeout);
     return initiate<&AsyncBoard::start_send<Command>, Token>(token, command, timeout);
   }
-  // void(CommandResult). As Board::send() of a group: CommandResult::at, executed. Throws
-  // Error{usage} for an empty group, and for a timeout that is not above 0.
+  // void(CommandResult). Sends a group as Board::send() does; if a command of the group fails,
+  // CommandResult::at and CommandResult::executed say which. Throws Error{usage} for an empty
+  // group, and for a timeout that is not above 0.
   template <class Token>
   auto async_send(const Setpoints& setpoints, Duration timeout, Token&& token) {
     require_sendable(setpoints);

@@ -96,15 +96,16 @@ class BoardLink {
   // ACTIVE -> LOST. The ids of the last left_memory hosts that left cannot begin a session again.
   void leave(std::uint32_t now_ms);
 
-  // The board's own heartbeats are regular. A missing echo causes another every echo_retry_ms, and
-  // entering ACTIVE or LOST sends one at once. heartbeat_sent() takes the T of a sent heartbeat.
+  // The board's own heartbeats are regular. While an echo is missing, a heartbeat is also due every
+  // echo_retry_ms. Entering ACTIVE or LOST makes a heartbeat due at once. heartbeat_sent() takes
+  // the T of a sent heartbeat.
   bool heartbeat_due(std::uint32_t now_ms) const;
   void heartbeat_sent(std::uint32_t t_ms);
   // A heartbeat with this T was sent to some peer, so the T can be echoed.
   void shown(std::uint32_t t_ms);
   void send_soon() { send_now_ = true; }
-  // The T of a heartbeat that answers one peer. Answers within answer_spacing_ms share it, so that
-  // frequent requests do not push a T that another host will echo out of the memory.
+  // The T of a heartbeat that answers one peer. Answers within answer_spacing_ms share a T.
+  // Otherwise frequent requests would remove from memory a T that another host may still echo.
   std::uint32_t answer_time(std::uint32_t t_ms) const;
 
   // Milliseconds until poll() or heartbeat_due() may return true; 0 is now.

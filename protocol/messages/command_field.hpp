@@ -24,7 +24,7 @@ bool stop_number(const Datagram& datagram, std::uint32_t& out);
 // type). `out` is written only on Refusal::none; its texts are views of `field`. settings.hpp
 // checks ranges of settings, and parse_fields() checks names of fields.
 Refusal parse_command(const Field& field, Command& out);
-// The same for a command of that row, given as its values without the word.
+// Reads a command of the kind `row` from its values: `texts`, without the letter or word.
 Refusal read_values(const CommandRow& row, const Text* texts, std::size_t count, Command& out);
 
 // Appends the command's field: "O:358,1,1;".

@@ -55,7 +55,7 @@ class End {
     const std::lock_guard lock(mutex_);
     if (received_) received_(parts...);
   }
-  // The reader of a closed opening may end late.
+  // A reader may still deliver data after its transport was closed.
   template <class... Parts>
   void hand_over_late(Parts... parts) {
     const std::lock_guard lock(mutex_);

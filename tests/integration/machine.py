@@ -12,8 +12,9 @@ import time
 
 # Sanitizers make programs slower and bigger; promises about time and memory are for release builds.
 SANITIZED = 'R4_SANITIZER' in os.environ
-# True if promises of milliseconds can be kept: not in the guest of tools/with-can, which emulates its processor.
-# If false, a test asserts only the order of events, and that none comes too early.
+# True if a test can rely on bounds of milliseconds. False with a sanitizer, and in the guest of
+# tools/with-can, which emulates its processor: then a test asserts only the order of events, and
+# that no event comes too early.
 PROMPT = not SANITIZED and 'R4_CAN_GUEST' not in os.environ
 LOOK_S = 0.1  # the wait between the last look and the end of a program is not counted
 

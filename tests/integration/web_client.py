@@ -35,6 +35,10 @@ class Web(Running):
                               .encode())
         return int(answer.split()[1]), answer
 
+    def cpu_s(self):
+        with open(f'/proc/{self.process.pid}/stat', encoding='ascii') as stat:
+            return sum(map(int, stat.read().rpartition(')')[2].split()[11:13])) / os.sysconf('SC_CLK_TCK')
+
     def resident_kib(self):
         with open(f'/proc/{self.process.pid}/status', encoding='ascii') as status:
             return next(int(line.split()[1]) for line in status if line.startswith('VmRSS'))

@@ -227,7 +227,7 @@ class World : public firmware::Hal, public firmware::Observer {
   void handle(const Event& event);
   void at(std::uint64_t time_us, Event::Kind kind, int index, std::uint32_t generation = 0);
   std::uint32_t board_ms() const;
-  // When, after its boot, the board's clock shows this time.
+  // The simulation's time, in us, at which the clock of the running board reaches `t_ms`.
   std::uint64_t when_board_shows(std::uint32_t t_ms) const;
   void mix(const void* data, std::size_t size);
   void note(const std::string& line);

@@ -25,7 +25,7 @@ World::Host& World::watcher(int number) {
   return *hosts_[static_cast<std::size_t>(schedule_.hosts) + 1 + static_cast<std::size_t>(number)];
 }
 
-// Some watchers are at the place of a host, as on a bus.
+// Some watchers share a host's peer, as on a bus.
 void World::add_watchers() {
   for (int i = 0; i < schedule_.watchers; ++i) {
     hosts_.push_back(std::make_unique<Host>(*this, schedule_.hosts + 1 + i));

@@ -139,7 +139,8 @@ class OwnCanMedium final : public CanMedium {
     problem.thing = source_->name;
     return problem;
   }
-  // Reports a failure before frames: after frames, CanBus waits for the next news.
+  // Check for a failure before taking frames: after frames, CanBus waits for the next event, so it
+  // would report the failure late.
   int receive(std::array<Received, batch>& frames) override {
     eventfd_t ignored = 0;
     ::eventfd_read(source_->news.get(), &ignored);

@@ -21,7 +21,7 @@
 
 namespace r4 {
 
-// Takes the holder's name of that role. None, with errno: EADDRINUSE if another program has it.
+// Binds the name of the holder for `role`. None, with errno: EADDRINUSE if another program has it.
 FileDescriptor take_share_name(const ShareName& name, BoardRole role);
 // Connects to a holder. None, with errno: ECONNREFUSED (no holder), would_block() (too many wait).
 FileDescriptor connect_to_holder(const ShareName& name, BoardRole role);

@@ -50,8 +50,8 @@ void drive(r4::Board& board) {
   // From here on this program must show that it is alive. If it hangs for 300 ms, the heartbeats
   // stop and the board switches its outputs off.
   board.watchdog(300ms);
-  // Closes relay 1: the motors have supply now. Until here, and after whatever has made the outputs
-  // safe, it is open, and commands that drive an output are refused.
+  // Closes relay 1, which gives the motors their supply. Before arm(), and again after a safe
+  // state, relay 1 is open, and commands that drive an output are refused.
   board.arm(250ms);
   board.feed();
   for (const double duty : {0.0, 0.1, 0.2, 0.3, 0.2, 0.1, 0.0}) {

@@ -61,7 +61,7 @@ class Pilot {
   void on_joy(std::span<const float> axes, std::span<const std::int32_t> buttons, Time now,
               std::uint64_t from = 0);
   void on_cmd_vel(const r4::control::Twist& twist, Time now);
-  // Why the goal is not taken; empty if it is.
+  // The reason for refusing the goal; empty if the goal is accepted.
   std::string on_goal(const Waypoint& goal, const r4::control::Pose& from, Time now);
 
   // The board is armed, and the loop begins: of what came until now only a stop counts.

@@ -41,7 +41,7 @@ class Scout:
     def __init__(self) -> None:
         self._drive = control.FourWheelDrive(TRACK, SLIP, max_wheel=TOP_SPEED * 0.9)
         self._wheels = [control.Wheel(n, COUNTS_A_TURN, WHEEL_RADIUS) for n in ENCODERS]
-        # Each wheel by itself: 1.2 m/s at full duty, after 0.15 s (docs/how-to/control.md, Tuning).
+        # For each wheel: 1.2 m/s at full duty, tau 0.15 s (docs/how-to/control.md, Tuning).
         self._pids = [control.Pid(0.6, 4.0, feed_forward=0.5, rate=10) for _ in ENCODERS]
         self.odometry = control.Odometry(turn_per_rad=0.02)  # it slips to turn
 

@@ -74,7 +74,7 @@ class BoardProgram {
     return started_ && application_.guard().tick(clock_.now_ms());
   }
 
-  // For a received stop. In an interrupt: timer 1's follows at once.
+  // For a received stop. Call in an interrupt: the interrupt of timer 1 then follows at once.
   void on_stop() {
     application_.guard().stop();
     pend(Irq::timer1);

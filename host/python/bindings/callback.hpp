@@ -44,7 +44,7 @@ class KeptThreadState {
   std::unique_ptr<py::gil_scoped_acquire> kept_;
 };
 
-// Any thread copies, calls and destroys it. sys.unraisablehook reports its exceptions.
+// Any thread may copy, call and destroy a Callback. sys.unraisablehook reports its exceptions.
 class Callback {
  public:
   struct Held {

@@ -143,7 +143,7 @@ class Port {
     std::this_thread::sleep_for(held);
     ::ioctl(number_, TIOCMBIC, &ready);  // also if a program has set the port to keep it
   }
-  // The place of the port's device: "1-2", as dfu-util names it. Empty: not at USB.
+  // The USB path of the port's device, as dfu-util names it: "1-2". Empty if it is not on USB.
   std::string usb_path() const {
     std::error_code ignored;
     const std::filesystem::path name = std::filesystem::path(path_).filename();

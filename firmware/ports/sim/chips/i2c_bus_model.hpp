@@ -76,7 +76,7 @@ class I2cBusModel final : public firmware::I2cBus {
   void advance(std::uint64_t us);
   std::uint32_t transfers() const { return transfers_; }
 
-  // Errors; false if there are max_errors of that kind already. Refuses `address` after
+  // Adds an error: false if max_errors of its kind are pending. Refuses `address` after
   // `after_bytes` bytes of data (0: the address itself), `times` times.
   bool refuse(std::uint8_t address, std::size_t after_bytes = 0, int times = 1);
   // A chip holds SDA: transfers time out until `recoveries` calls of recover().

@@ -159,7 +159,7 @@ TEST_F(CanBusLoad, AnUnansweredDatagramTimesOutNextToALongState) {
   EXPECT_TRUE(bus->full()) << "the state must occupy the bus until the time-out";
 }
 
-// The time stamp of the frame is in time, so it does not matter when this process reads the frame.
+// The frame's time stamp is before the timeout, so this process may read the frame later.
 TEST_F(CanBusLoad, ObeysTimelyFlowControlThatIsReadLate) {
   bool in_time = false;
   for (int run = 0; run < most_runs && !in_time; ++run) {

@@ -67,7 +67,7 @@ inline IsotpReceiverOptions receiver_of(const Form& form) {
   return options;
 }
 
-// The kernel checks every frame of our engine: padded to the byte, or as short as possible.
+// The kernel checks the length of each frame of our engine and, in a padded form, the padding.
 inline KernelIsotpOptions kernel_of(const Form& form) {
   KernelIsotpOptions options;
   options.tx_dl = form.tx_dl;
