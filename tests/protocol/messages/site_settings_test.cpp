@@ -221,6 +221,14 @@ TEST(KeptSettings, TheLongestSettingsFit) {
   set_text(settings.site, "host", "255.255.255.255");
   set_text(settings.site, "port", "65535");
   set_text(settings.site, "node", "31");
+  for (int slot = 1; slot <= i2c_slots; ++slot) {
+    EXPECT_EQ(set(settings, "i2c" + std::to_string(slot), std::string("119:xffff:32:60000")),
+              Refusal::none);
+  }
+  for (int uart = 1; uart <= uart_channels; ++uart) {
+    EXPECT_EQ(set(settings, "uart" + std::to_string(uart), std::string("460800:8N1")),
+              Refusal::none);
+  }
   set_text(settings.site, "name", std::string(board_name_max, 'n'));
   for (std::uint16_t& full_scale : settings.site.full_scale_cv) full_scale = 65000;
   for (const char id : {'1', '2', '3', '4'}) {
