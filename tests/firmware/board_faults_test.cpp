@@ -2,6 +2,9 @@
 // The outputs are safe despite interrupts, failing chips and a held bus.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdio>
+
 #include "board_bench.hpp"
 #include "firmware/board_hardware.hpp"
 
@@ -232,8 +235,8 @@ constexpr Disturbance disturbances[] = {
 
 void disturb_chip(Bench& bench, int chip, const Disturbance& by) {
   sim::Pca9685Model* const chips[] = {&bench.board.osmc, &bench.board.dhb12, &bench.board.servo};
-  chips[chip]->disturb_mode1(by.mode1);
-  chips[chip]->disturb_mode2(by.mode2);
+  chips[chip]->disturb(0x00, by.mode1);
+  chips[chip]->disturb(0x01, by.mode2);
 }
 
 TEST(BoardFaults, ResetsAndReportsAChipWithDisturbedModes) {
@@ -254,6 +257,34 @@ TEST(BoardFaults, ResetsAndReportsAChipWithDisturbedModes) {
       EXPECT_EQ(test::outputs_of(bench.board), test::as_pins(full())) << chip;
     }
   }
+}
+
+// docs/reference/safety.md, "How long it takes". Each check reads one of the 16 outputs.
+TEST(BoardFaults, NoticesADisturbedOutputWithin16ChecksAlsoInTheSafeState) {
+  constexpr std::uint8_t full = 0x10;
+  int longest_ms = 0;
+  for (int chip = 0; chip < 3; ++chip) {
+    for (int channel = 0; channel < 16; channel += 2) {
+      Bench bench;
+      bench.boot();
+      bench.hardware.make_safe();
+      bench.run(20);
+      sim::Pca9685Model* const chips[] = {&bench.board.osmc, &bench.board.dhb12,
+                                          &bench.board.servo};
+      const int first = 0x06 + 4 * channel;
+      chips[chip]->disturb(static_cast<std::uint8_t>(first + 1), full);  // always on
+      chips[chip]->disturb(static_cast<std::uint8_t>(first + 3), full);  // not always off
+      ASSERT_TRUE(chips[chip]->high(channel));
+      int ms = 0;
+      for (; chips[chip]->duty(channel) != 0 && ms < 2000; ++ms) bench.run(1);
+      longest_ms = std::max(longest_ms, ms);
+      EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::wrong_register) << chip;
+      EXPECT_EQ(bench.hardware.fault().address, 0x40 + chip);
+      EXPECT_TRUE(bench.board.pins().is_safe()) << chip << ' ' << channel;
+    }
+  }
+  std::printf("a disturbed output is off after %d ms\n", longest_ms);
+  EXPECT_LE(longest_ms, 1602);
 }
 
 TEST(BoardFaults, TheSafeStateAlsoTurnsOffAChipWithDisturbedModes) {

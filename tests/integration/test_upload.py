@@ -1,14 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """r4 upload with a dfu-util of our own, and a board at a pseudo-terminal."""
+import contextlib
 import fcntl
+import json
 import os
 import pty
+import re
+import signal
 import struct
+import subprocess
+import threading
 import tty
+import zlib
 
 import pytest
 
-from r4_process import ERROR, Board, objects, run
+from r4_process import ERROR, R4, Board, objects, run
 
 # Its boot loader is there after a board has been opened at 1200 baud, or if the test says so.
 DFU_UTIL = '''#!/bin/bash
@@ -27,7 +34,9 @@ case "$*" in
 *)
   printf 'Erase\\t[============] 100%%        65536 bytes\\n'
   printf 'Download\\t[            ]   0%%            0 bytes\\rDownload\\t[=====       ]  45%%        24576 bytes\\r'
+  [[ ! -p $R4_TEST_DFU/go ]] || read -r <"$R4_TEST_DFU/go"
   printf 'Download\\t[============] 100%%        65536 bytes\\nDownload done.\\n'
+  [[ ! -p $R4_TEST_DFU/ended ]] || echo ended >"$R4_TEST_DFU/ended"
   [[ ! -e $R4_TEST_DFU/fails ]] || { printf 'dfu-util: \\033[31mverify failed\\n'; exit 74; }
   echo 'File downloaded successfully'
   exit 74
@@ -152,6 +161,44 @@ def test_upload_refuses_a_port_that_another_program_uses(place):
             fcntl.flock(port, fcntl.LOCK_EX)
             done = run('upload', str(place / 'sketch.bin'), board.host_url)
     assert done.returncode == 4 and 'another program uses the port' in done.stderr
+    assert not any(each.startswith(WRITE) for each in calls(place))
+
+
+@pytest.mark.parametrize('stop', [lambda r4: r4.stdout.close(), lambda r4: os.killpg(r4.pid, signal.SIGINT)],
+                         ids=['output closed', 'Ctrl-C'])
+def test_a_write_that_has_begun_is_finished(place, stop):
+    (place / 'there').write_text('1')
+    for name in ('go', 'ended'):
+        os.mkfifo(place / name)
+    with subprocess.Popen([R4, 'upload', place / 'sketch.bin', 'serial:auto', '--json', '--timeout', '0.2'],
+                          stdout=subprocess.PIPE, text=True, start_new_session=True) as r4:
+        while json.loads(r4.stdout.readline())['percent'] != 45:
+            pass
+        stop(r4)
+        (place / 'go').write_text('\n')
+        assert (place / 'ended').read_text() == 'ended\n'
+    assert r4.returncode < 0
+
+
+def test_a_board_that_does_not_confirm_the_stop_is_not_written(place):
+    """It answers questions, but not a stop."""
+    board, port = pty.openpty()
+    tty.setraw(port)
+
+    def answer():
+        with contextlib.suppress(OSError):  # until the terminal is closed
+            while received := os.read(board, 4096):
+                if question := re.search(rb'Q:ID;(SID:[^;]*;)', received):
+                    fields = b'I:R4,0.1.0,deaf,serial;BUSY:0;' + question[1] + b'PNum:1;T:2;^'
+                    os.write(board, fields + b'0x%x^\r\n' % zlib.crc32(fields))
+
+    answering = threading.Thread(target=answer)
+    answering.start()
+    done = run('upload', str(place / 'sketch.bin'), f'serial://{os.ttyname(port)}')
+    os.close(port)
+    answering.join()
+    os.close(board)
+    assert done.returncode == 3 and 'E:STOP' in done.stderr and ERROR.search(done.stderr)
     assert not any(each.startswith(WRITE) for each in calls(place))
 
 

@@ -399,15 +399,15 @@ def test_a_client_with_an_unfinished_request_is_disconnected():
 
 
 def test_hostile_clients_do_not_disturb_the_controlling_page():
-    """A busy machine may hold up the page or r4 web for long enough to lose the board. What a hostile connection costs
-    r4 web in processor time does not depend on that."""
+    """A busy machine may hold up the page or r4 web for long enough to lose the board. Another attempt is allowed only
+    if r4 web itself used little of a processor: then the attack was not the cause."""
     seed = os.environ.get('R4_SEED', '1')
     with one_board() as (board, web), Page(web) as page:
         before, undisturbed = web.resident_kib(), False
-        for _ in range(5):
+        for _ in range(3):
             page.drive()
             board.outputs(motor_is_driven)
-            cpu_s = web.cpu_s()
+            cpu_s, began = web.cpu_s(), time.monotonic()
             # A separate program of low priority, so that it does not prevent the page from reporting that it is alive.
             attack = ['nice', '-n', '19', sys.executable, TESTS / 'integration/hostile_clients.py', str(web.port), seed, str(HOSTILE_S)]
             with subprocess.Popen(attack, stdout=subprocess.PIPE, text=True) as attackers:
@@ -417,11 +417,13 @@ def test_hostile_clients_do_not_disturb_the_controlling_page():
                 except AssertionError as disturbed:
                     print(disturbed)
                 done = int(attackers.communicate()[0])
-            each_ms = 1000 * (web.cpu_s() - cpu_s) / done
-            print(f'{done} hostile connections in {HOSTILE_S:.0f} s, {each_ms:.2f} ms of r4 web each')
+            cpu_s = web.cpu_s() - cpu_s
+            share, each_ms = cpu_s / (time.monotonic() - began), 1000 * cpu_s / done
+            print(f'{done} hostile connections in {HOSTILE_S:.0f} s, {each_ms:.2f} ms of r4 web each, {share:.0%} busy')
             assert each_ms < within_ms(3)
             if undisturbed:
                 break
+            assert share < 0.5 or not PROMPT
         assert undisturbed
         assert done > 20 * HOSTILE_S * HOSTILE_S / within(HOSTILE_S)
         result = page.ask(type='command', board=0, command='O:100,1,1')

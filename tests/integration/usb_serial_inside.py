@@ -181,9 +181,10 @@ def uploads_to_the_board_that_it_stopped():
     place = re.search(r'/(\d+-[\d.]+)/\1:', os.path.realpath('/sys/class/tty/ttyUSB0'))[1]
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder)
+        (path / 'link').symlink_to(PORT)
         write_fake_dfu_util(path, f'9-9 {place}')
         os.environ.update(PATH=f'{path}/bin:{os.environ["PATH"]}', R4_TEST_DFU=folder)
-        done = run('upload', f'{folder}/sketch.bin', f'serial://{PORT}', '--json')
+        done = run('upload', f'{folder}/sketch.bin', f'serial://{folder}/link', '--json')
         assert done.returncode == 0, done
         assert [each['type'] for each in objects(done.stdout)][::len(objects(done.stdout)) - 1] == ['stopped', 'identity']
         assert f' -p {place} ' in (path / 'calls').read_text().splitlines()[-1]

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -62,6 +63,31 @@ TEST(UltrasonicSensors, TakesTurnsSixtyMillisecondsApart) {
     EXPECT_EQ(bench.turns[i].first, (bench.turns[i - 1].first + 1) % 4);
     EXPECT_GE(bench.turns[i].second - bench.turns[i - 1].second, 60000U);
     EXPECT_LE(bench.turns[i].second - bench.turns[i - 1].second, 61000U);
+  }
+}
+
+// docs/reference/safety.md, "How long it takes", without the turn of the application.
+TEST(UltrasonicSensors, SeesAnObstacleOrASilentSensorWithinFourTurnsAndItsEcho) {
+  struct Case {
+    std::uint32_t echo_us;
+    EchoResult result;
+    int most_ms;
+  };
+  for (const Case& c : {Case{58 * 20, EchoResult::distance, 4 * 60 + 3},
+                        Case{58 * 400, EchoResult::distance, 4 * 60 + 25},
+                        Case{0, EchoResult::no_answer, 4 * 60 + 41}}) {
+    int longest_ms = 0;
+    for (int begins_ms = 0; begins_ms < 240; ++begins_ms) {
+      UltrasonicBench bench;
+      bench.echo_us = {38000, 38000, 38000, 38000};
+      bench.run(300 + begins_ms);
+      ASSERT_EQ(bench.sensors.result(1), EchoResult::no_echo);
+      bench.echo_us[1] = c.echo_us;
+      int ms = 0;
+      for (; bench.sensors.result(1) != c.result && ms < 1000; ++ms) bench.run(1);
+      longest_ms = std::max(longest_ms, ms);
+    }
+    EXPECT_LE(longest_ms, c.most_ms) << c.echo_us;
   }
 }
 

@@ -146,7 +146,7 @@ class Port {
   // The USB path of the port's device, as dfu-util names it: "1-2". Empty if it is not on USB.
   std::string usb_path() const {
     std::error_code ignored;
-    const std::filesystem::path name = std::filesystem::path(path_).filename();
+    const auto name = std::filesystem::canonical(path_, ignored).filename();  // not of a link
     auto folder = std::filesystem::canonical("/sys/class/tty" / name / "device", ignored);
     while (folder.has_relative_path() && !std::filesystem::exists(folder / "idVendor")) {
       folder = folder.parent_path();

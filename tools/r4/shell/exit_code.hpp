@@ -2,6 +2,9 @@
 // How `r4` shows an error's kind: its exit code, and its name in JSON (docs/reference/commands.md).
 #pragma once
 
+#include <cstddef>
+#include <iterator>
+
 #include "r4link/error.hpp"
 
 namespace r4::tool {
@@ -20,6 +23,11 @@ inline constexpr ErrorKindRow error_kinds[] = {
     {ErrorKind::permission, 5, "permission"},
     {ErrorKind::unsupported, 6, "unsupported"},
 };
+
+// The program must not compile if a kind lacks its row.
+static_assert(error_kinds[std::size(error_kinds) - 1].kind == ErrorKind::unsupported &&
+                  std::size(error_kinds) == static_cast<std::size_t>(ErrorKind::unsupported),
+              "each kind has a row");
 
 constexpr const ErrorKindRow& row_of(ErrorKind kind) {
   for (const ErrorKindRow& row : error_kinds) {

@@ -24,9 +24,11 @@ class Pca9685Model final : public I2cChipModel {
   double frequency_hz() const { return 25e6 / (4096.0 * (reg(0xFE) + 1)); }
   std::uint8_t reg(std::uint8_t number) const { return registers_[number]; }
 
-  // A disturbance flips bits of a mode register, even bits that cannot be written.
-  void disturb_mode1(std::uint8_t bits) { registers_[0x00] ^= bits; }
-  void disturb_mode2(std::uint8_t bits) { registers_[0x01] ^= bits; }
+  // A disturbance flips bits of a register, even bits that cannot be written.
+  void disturb(std::uint8_t number, std::uint8_t bits) {
+    registers_[number] ^= bits;
+    show();
+  }
 
   void power_on() override;
   bool start(std::uint8_t address, bool read) override;

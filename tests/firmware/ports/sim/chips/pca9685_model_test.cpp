@@ -177,7 +177,7 @@ TEST(Pca9685Model, ASoftwareResetIsOneByteToTheGeneralCall) {
 TEST(Pca9685Model, InvertedOutputsAreOnWhenTheyAreTurnedOff) {
   Pca9685ModelBench bench;
   bench.wake();
-  bench.chip.disturb_mode2(0x10);
+  bench.chip.disturb(0x01, 0x10);
   bench.write({0xFD, 0x10}, 0x70);
   EXPECT_TRUE(bench.chip.high(0));
   bench.write({0x01, 0x04});
@@ -188,7 +188,7 @@ TEST(Pca9685Model, KeepsItsOutputsWithoutAClockUntilAReset) {
   Pca9685ModelBench bench;
   bench.wake();
   bench.write({0x06, 0x00, 0x00, 0x34, 0x02});
-  bench.chip.disturb_mode1(0x40);
+  bench.chip.disturb(0x00, 0x40);
   bench.write({0xFD, 0x10}, 0x70);
   EXPECT_TRUE(bench.chip.high(0)) << "the clock may have stopped while a pulse was high";
   EXPECT_EQ(bench.chip.duty(1), 0);
