@@ -190,6 +190,8 @@ class Page(WebSocket):
 
     def live(self):
         """Reports from now on that the page is alive, until freeze()."""
+        if self._alive:
+            self._alive.set()
         self._alive = threading.Event()
         ended = self._alive
 
@@ -206,6 +208,8 @@ class Page(WebSocket):
         self._alive.set()
 
     def control(self):
+        with self._news:  # what it was told of an earlier control
+            self.messages = [each for each in self.messages if each['type'] != 'control']
         self.say(type='control', want=True)
         self.live()
         return self.next('control', lambda each: each['you'] or each['why'])
