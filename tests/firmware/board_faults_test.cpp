@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdio>
 
 #include "board_bench.hpp"
 #include "firmware/board_hardware.hpp"
@@ -283,7 +282,6 @@ TEST(BoardFaults, NoticesADisturbedOutputWithin16ChecksAlsoInTheSafeState) {
       EXPECT_TRUE(bench.board.pins().is_safe()) << chip << ' ' << channel;
     }
   }
-  std::printf("a disturbed output is off after %d ms\n", longest_ms);
   EXPECT_LE(longest_ms, 1602);
 }
 

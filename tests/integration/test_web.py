@@ -440,7 +440,7 @@ def test_foxglove_reads_records_links_and_events():
             reader = subprocess.Popen(['node', TESTS / 'npm/read_foxglove.cjs', f'ws://127.0.0.1:{web.port}', '200'],
                                       env={**os.environ, 'NODE_PATH': str(NODE_MODULES)}, stdout=subprocess.PIPE,
                                       stderr=subprocess.PIPE, text=True)
-            page.states(100)  # the page receives states while the reader starts
+            assert reader.stdout.readline() == 'reads\n'
             page.ask(type='stop')
             output, errors = reader.communicate(timeout=PATIENCE_S)
             assert reader.returncode == 0, errors

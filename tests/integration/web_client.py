@@ -208,7 +208,7 @@ class Page(WebSocket):
         self._alive.set()
 
     def control(self):
-        with self._news:  # what it was told of an earlier control
+        with self._news:  # drop the messages about an earlier time in control
             self.messages = [each for each in self.messages if each['type'] != 'control']
         self.say(type='control', want=True)
         self.live()

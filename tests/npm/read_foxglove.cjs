@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Subscribes to every channel of a server by npm's @foxglove/ws-protocol, and prints a JSON object: its channels, and
-// the messages of each, as [nanoseconds, object], until so many of the first have come.
+// the messages of each, as [nanoseconds, object], until so many of the first have come. A line before says when the
+// first of all messages came.
 //     node read_foxglove.cjs ws://127.0.0.1:8080 100
 'use strict';
 const { FoxgloveClient } = require('@foxglove/ws-protocol');
@@ -31,6 +32,7 @@ client.on('unadvertise', (ids) => {
   for (const id of ids) channels.delete(id);
 });
 client.on('message', ({ subscriptionId, timestamp, data }) => {
+  if (Object.values(messages).every((each) => each.length === 0)) process.stdout.write('reads\n');
   const topic = topics.get(subscriptionId);
   messages[topic].push([String(timestamp), JSON.parse(new TextDecoder().decode(data))]);
   const records = [...channels.values()].find((channel) => channel.schemaName === 'r4.Record').topic;

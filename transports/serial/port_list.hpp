@@ -17,8 +17,8 @@ struct SerialPort {
   bool is_r4 = false;  // an Arduino Giga R1 with a sketch running, by vid and pid
 };
 
-// Sorted by path. Throws only if memory is used up.
-std::vector<SerialPort> list_serial_ports();
+// Sorted by path. Throws only if memory is used up. `folder`: the kernel's list of terminals.
+std::vector<SerialPort> list_serial_ports(const std::string& folder = "/sys/class/tty");
 
 // The URL of the port: by serial number, which stays valid under any path, else by path.
 std::string url_of(const SerialPort& port);

@@ -2,8 +2,11 @@
 #include "transports/serial/port_list.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <string>
 
 #include "r4link/discovery/url.hpp"
 
@@ -18,6 +21,19 @@ TEST(PortList, NamesEachPortOnceWithItsDevice) {
   }
   EXPECT_TRUE(std::is_sorted(ports.begin(), ports.end(),
                              [](const auto& a, const auto& b) { return a.path < b.path; }));
+}
+
+TEST(PortList, LeavesOutAPortThatIsUnpluggedMeanwhile) {
+  const std::filesystem::path folder =
+      testing::TempDir() + "r4-ports-" + std::to_string(::getpid());
+  std::filesystem::create_directory(folder);
+  // The kernel knows neither port any more.
+  for (const char* const port : {"ttyUSB998", "ttyUSB999"}) {
+    std::filesystem::create_symlink("../../devices/usb1/1-1/ttyUSB/tty", folder / port);
+  }
+  EXPECT_TRUE(list_serial_ports(folder).empty());
+  std::filesystem::remove_all(folder);
+  EXPECT_TRUE(list_serial_ports(folder).empty()) << "without the folder";
 }
 
 TEST(PortList, GivesTheUrlThatFindsAPortAgain) {

@@ -275,7 +275,7 @@ TEST_F(SerialPtyTest, CountsATooLongLineOnce) {
   ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
   write_text(host_end, std::string(3000, 'x') + "\r\ngood\r\n");
   ASSERT_TRUE(wait_for(at_board, "good"));
-  EXPECT_EQ(at_board.datagrams.size(), 1U);
+  EXPECT_EQ(at_board.datagrams.size(), 1U) << at_board.datagrams.front().text;
   EXPECT_EQ(board->counters().rx_oversize, 1U);
   EXPECT_EQ(at_board.oversize, std::vector<std::string>{std::string(1024, 'x')});
 }

@@ -146,7 +146,8 @@ class Port {
   // The USB path of the port's device, as dfu-util names it: "1-2". Empty if it is not on USB.
   std::string usb_path() const {
     std::error_code ignored;
-    const auto name = std::filesystem::canonical(path_, ignored).filename();  // not of a link
+    const auto device = std::filesystem::canonical(path_, ignored);  // path_ may be a link
+    const auto name = device.filename();
     auto folder = std::filesystem::canonical("/sys/class/tty" / name / "device", ignored);
     while (folder.has_relative_path() && !std::filesystem::exists(folder / "idVendor")) {
       folder = folder.parent_path();
