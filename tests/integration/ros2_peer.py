@@ -158,7 +158,11 @@ def armed(*arguments, options=()):
 
 
 def join(ros2, peer, topic, of):
-    """Makes a publisher of the peer, and waits until both ends know it, so that samples are received from then on."""
+    """Makes a publisher of the peer, and waits until both ends know it.
+
+    A sample that is written at once may still be lost: a DDS reader drops samples that precede the writer's first
+    heartbeat. So what is written only once comes after a sample that arrived.
+    """
     peer.writer(f'rt/{topic}', of)
     ros2.logged(f'{topic}: 1 publishers')
 

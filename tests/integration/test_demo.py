@@ -43,7 +43,8 @@ def test_the_demo_succeeds_on_every_transport_within_16_seconds():
         # The measured time begins, at the latest, when the host knew that it had sent its last heartbeat.
         assert each['safe_ms'] <= within_ms(1020)
         assert each['safe_ms'] >= 980 or each['transport'] == 'in process'
-        assert each['lost'] == 0
+        # At a serial port the board drops a state of its 100 Hz that has waited for 30 ms.
+        assert each['lost'] <= (100 * within(0) if each['transport'] == 'serial' else 0)
 
 
 def test_a_killed_demo_leaves_no_board_running():

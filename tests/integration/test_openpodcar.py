@@ -77,7 +77,8 @@ def test_a_restarted_board_still_stops_at_an_obstacle(board):
         podcar.says('press Enter')
         happen(board, 'reboot')  # the restarted board has forgotten the threshold of US 1
         board.next(lambda each: each.get('happened') == 'reboot')
-        board.state('ACTIVE')
+        # The program has noticed the restart when it asks for its state fields again.
+        board.next(lambda each: each.get('executed', {}).get('command', '').startswith('F:'))
         podcar.enter()
         board.next(is_driven)
         happen(board, 'us 1 100')

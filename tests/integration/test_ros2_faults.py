@@ -60,6 +60,7 @@ def test_a_delayed_command_is_not_executed():
     with armed() as (board, ros2, peer):
         peer.read('rt/diagnostics', DIAGNOSTICS)
         join(ros2, peer, 'osmc1/command', FLOAT32)
+        drive(board, peer, 'rt/osmc1/command', float32(0.125), lambda each: pwm(each, 1) == 512)
         ros2.signal(signal.SIGSTOP)
         peer.write('rt/osmc1/command', float32(0.5))
         peer.next(lambda each: each['type'] == 'written')
@@ -91,10 +92,11 @@ def test_the_drive_continues_when_one_of_two_paths_is_unplugged():
 
 
 def test_diagnostics_report_the_cause_of_a_safe_state_at_once():
-    with armed() as (_, ros2, peer):
+    with armed() as (board, ros2, peer):
         peer.read('rt/diagnostics', DIAGNOSTICS)
         peer.sample('rt/diagnostics', lambda payload: health_of(payload)[0] == 0)
         join(ros2, peer, 'R4_Command', STRING)
+        drive(board, peer, 'rt/R4_Command', text('O:358,1,1'), lambda each: pwm(each, 1) == 358)
         peer.write('rt/R4_Command', text('E:STOP'))
         stopped = ros2.logged('E:STOP: confirmed')['came']
 

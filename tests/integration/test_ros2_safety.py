@@ -42,6 +42,7 @@ def test_an_arm_published_before_a_stop_does_not_undo_the_stop(_):
         join(ros2, peer, 'arm', BOOL)
         join(ros2, peer, 'stop', BOOL)
         join(ros2, peer, 'osmc1/command', FLOAT32)
+        drive(board, peer, 'rt/osmc1/command', float32(0.25), lambda each: pwm(each, 1) == 1024)
         peer.write('rt/arm', OFF)
         peer.write('rt/arm', ON)
         peer.write('rt/stop', ON)  # the node takes the stop first if both come in the same turn
@@ -60,8 +61,8 @@ def test_an_arm_during_an_outage_has_no_effect_afterwards():
         def arm():
             peer.write('rt/arm', OFF)
             peer.write('rt/arm', ON)
-        peer.write('rt/R4_Command', text('E:STOP'))
-        ros2.logged('E:STOP: confirmed')
+        again(lambda: peer.write('rt/R4_Command', text('E:STOP')),
+              lambda timeout: ros2.logged('E:STOP: confirmed', timeout=timeout))
         board.signal(signal.SIGSTOP)
         again(arm, lambda timeout: ros2.logged('silent', timeout=timeout))
         ros2.logged('arm: ')
@@ -160,8 +161,7 @@ def test_the_option_arm_does_not_arm_after_an_earlier_stop():
         url, host_url = board.url, board.host_url
     with Peer(domain) as peer, Ros2(domain, host_url, '--arm') as ros2:
         join(ros2, peer, 'stop', BOOL)
-        peer.write('rt/stop', ON)
-        ros2.logged('CUT THE POWER')
+        again(lambda: peer.write('rt/stop', ON), lambda timeout: ros2.logged('CUT THE POWER', timeout=timeout))
         with Board(url) as board:
             ros2.logged('--arm: a stop came first; arm when the danger is over')
             board.state('SAFE', 'stop')
@@ -178,8 +178,8 @@ def test_a_restarted_node_does_not_clear_an_earlier_stop():
             assert not any(each.get('supply') for each in board.log)
             join(ros2, peer, 'R4_Command', STRING)
             join(ros2, peer, 'arm', BOOL)
-            peer.write('rt/R4_Command', text('E:CLEAR'))
-            board.state('ACTIVE')
+            again(lambda: peer.write('rt/R4_Command', text('E:CLEAR')),
+                  lambda timeout: board.state('ACTIVE', timeout=timeout))
             arm(ros2, peer)
 
 
