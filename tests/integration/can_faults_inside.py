@@ -13,7 +13,7 @@ import time
 
 import pytest
 
-from can_inside import SLOWLY, Dump, in_control
+from can_inside import PATIENTLY, SLOWLY, Dump, in_control
 from r4_process import PATIENCE_S, Board, Running, driving, is_link, is_state, lasts, monitor, objects, run, send
 from slcan_bus import SlcanBus
 
@@ -156,7 +156,7 @@ def test_a_host_reports_its_bus_off_and_recovers_by_itself(bus, board):
 
 
 def test_board_and_host_report_bus_errors_and_their_end(bus):
-    with Board(BOARD, options=SLOWLY) as board, monitor(HOST) as host:
+    with Board(BOARD, options=PATIENTLY) as board, monitor(HOST) as host:
         in_control(host)
         for node, where, end in ((0, board_told, board), (1, told, host)):
             for errors, reason in ((100, 'warns of errors'), (130, 'error-passive')):

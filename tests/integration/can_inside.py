@@ -29,19 +29,21 @@ def ip(*arguments):
 # test the rate use a lower one. tests/simulation/can_capacity_test.cpp tests 100 Hz, in virtual time.
 PERIOD_MS = 50
 SLOWLY = ('--set', f'rate,{1000 // PERIOD_MS}')
+# The emulated machine sometimes stands still for a second. Tests that do not test the board's timeout use a longer one.
+PATIENTLY = (*SLOWLY, '--set', 'timeout,5000')
 
 
 def on_vcan():
     """A board on a bus in the kernel; its hosts use plain text."""
-    board = Board(BUS, options=SLOWLY)
+    board = Board(BUS, options=PATIENTLY)
     board.bus, board.packs = 'vcan0', False
     board.host_url = IN_PLAIN_TEXT
     return board
 
 
-def on_controllers():
+def on_controllers(options=PATIENTLY):
     """A board at one of two controllers with their driver; its hosts are at the other and use the packed form."""
-    board = Board('can://can0?node=3', options=SLOWLY)
+    board = Board('can://can0?node=3', options=options)
     board.bus, board.packs = 'can1', True
     board.host_url = 'can://can1?node=3'
     return board
@@ -59,9 +61,15 @@ def beyond_a_controller():
         yield board
 
 
+@pytest.fixture(name='impatient_board')
+def with_its_usual_timeout():
+    with on_controllers(SLOWLY) as board:
+        yield board
+
+
 @pytest.fixture(name='vcan_board')
 def beside_its_hosts():
-    with Board(BUS, options=SLOWLY) as board:
+    with Board(BUS, options=PATIENTLY) as board:
         yield board
 
 
@@ -149,7 +157,8 @@ def test_the_next_host_need_not_wait_for_the_timeout(board):
         board.state('SAFE', 'link')
 
 
-def test_a_suspended_host_recovers_and_a_killed_host_leaves_it_safe(board):
+def test_a_suspended_host_recovers_and_a_killed_host_leaves_it_safe(impatient_board):
+    board = impatient_board
     with monitor(board.host_url) as host:
         in_control(host)
         host.signal(signal.SIGSTOP)
@@ -239,7 +248,7 @@ def test_the_packed_form_and_can_fd_need_fewer_frames(vcan_board):
 
 
 def test_can_fd_needs_three_frames_for_a_plain_state_one_if_packed():
-    with Board('can://vcan0?node=3&fd=1', options=SLOWLY) as board, Dump('vcan0') as dump:
+    with Board('can://vcan0?node=3&fd=1', options=PATIENTLY) as board, Dump('vcan0') as dump:
         with monitor(board.host_url + '&pack=0') as host:
             in_control(host)
             for _ in range(20):
@@ -254,7 +263,8 @@ def test_can_fd_needs_three_frames_for_a_plain_state_one_if_packed():
     assert any(frame == TELEMETRY and re.match('.00..9', data) for frame, data in dump.frames)
 
 
-def test_a_host_reports_an_interface_that_is_down_and_recovers(board):
+def test_a_host_reports_an_interface_that_is_down_and_recovers(impatient_board):
+    board = impatient_board
     with monitor(board.host_url) as host:
         in_control(host)
         ip('link', 'set', board.bus, 'down')
@@ -302,7 +312,7 @@ def test_monitor_and_send_work_in_either_order():
 # Where the bus has two ends, the hosts share no path, as on two computers.
 @pytest.mark.parametrize('url, host_url', [(BUS, BUS), ('can://can0?node=3', 'can://can1?node=3')])
 def test_a_watcher_sends_its_own_frame_only_while_no_host_drives(url, host_url):
-    with Board(url, options=SLOWLY), watch(url) as watcher, Dump(url.split('/')[2].split('?')[0]) as dump:
+    with Board(url, options=PATIENTLY), watch(url) as watcher, Dump(url.split('/')[2].split('?')[0]) as dump:
         watcher.next(is_state)
         assert {(frame, data) for frame, data in dump.frames if frame in (COMMAND, WATCH)} <= {(WATCH, '')}
         with driving(host_url, 'O:358,1,1') as host:
@@ -320,7 +330,7 @@ def test_a_watcher_sends_its_own_frame_only_while_no_host_drives(url, host_url):
 def test_record_includes_datagrams_of_a_host_on_another_computer(tmp_path):
     path = tmp_path / 'drive.r4log'
     said = [re.compile(rf'^[0-9.]+ 1> {what};SID:[0-9a-f]{{16}};PNum:\d+;(T:\d+;)?\^0x', re.MULTILINE) for what in ('H:ROS2-R4', 'Q:ID')]
-    with Board('can://can0?node=3', options=SLOWLY), monitor('can://can0?node=3'), \
+    with Board('can://can0?node=3', options=PATIENTLY), monitor('can://can0?node=3'), \
             Running('record', 'can://can1?node=3', '-o', str(path)) as recorder:
         deadline = time.monotonic() + PATIENCE_S
         while not (path.exists() and all(each.search(path.read_text()) for each in said)):
@@ -387,7 +397,7 @@ def listed_interfaces(is_told):
 
 
 def test_list_and_monitor_show_every_board_of_a_bus(tmp_path):
-    with Board('can://vcan0?node=2-4', listens=3, options=SLOWLY), monitor(IN_PLAIN_TEXT) as host:
+    with Board('can://vcan0?node=2-4', listens=3, options=PATIENTLY), monitor(IN_PLAIN_TEXT) as host:
         in_control(host)
         listed = listed_interfaces(is_told=lambda board: 'board_id' in board)
         boards = listed['vcan0']['boards']
@@ -450,7 +460,7 @@ def test_replay_acts_as_a_board_on_the_bus(tmp_path):
 
 def test_metrics_report_the_busy_time_of_a_bus_for_each_board():
     boards = 'can://vcan0?node=2-3'
-    with Board(boards, listens=2, options=SLOWLY), driving('can://vcan0?node=3', 'O:358,1,1'):
+    with Board(boards, listens=2, options=PATIENTLY), driving('can://vcan0?node=3', 'O:358,1,1'):
         with Running('metrics', boards, '--json', '--listen', '127.0.0.1:0') as metrics:
             url = metrics.next(lambda each: each['type'] == 'listening')['url']
 

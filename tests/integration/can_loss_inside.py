@@ -15,7 +15,7 @@ import zlib
 
 import pytest
 
-from can_inside import EMERGENCY, SLOWLY, Dump, in_control, ip
+from can_inside import EMERGENCY, PATIENTLY, SLOWLY, Dump, in_control, ip
 from r4_process import Board, Running, is_link, is_state, lasts, monitor, objects, run
 
 BOARD, HOST = 'can://vxcan0?node=2', 'can://vxcan1?node=2'
@@ -65,7 +65,7 @@ def agrees_with_the_board(told, commands, log):
 @pytest.mark.parametrize('loss, count', [('1%', 20), ('5%', 20)])
 def test_a_confirmed_command_is_executed_exactly_once(loss, count):
     commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(count)]
-    with netem('loss', loss, 'delay', '2ms'), Board(BOARD, options=SLOWLY) as board, \
+    with netem('loss', loss, 'delay', '2ms'), Board(BOARD, options=PATIENTLY) as board, \
             Dump(f'vxcan1,{COMMAND_OF_2}:7FF') as dump:
         result = run('send', HOST, '--json', '--timeout', '10', *commands, timeout=200)
         log = board.rest()
@@ -103,7 +103,7 @@ NUMBERED_STOPS = f'{EMERGENCY << 18:08x}:{0x7FF << 18:08x}'
 
 
 def test_a_lost_stop_is_repeated_until_the_board_confirms_it():
-    with Board(BOARD, options=SLOWLY) as board, monitor(HOST) as host, \
+    with Board(BOARD, options=PATIENTLY) as board, monitor(HOST) as host, \
             Dump(f'vxcan1,{NUMBERED_STOPS}') as sent, Dump(f'vxcan0,{NUMBERED_STOPS}') as arrived:
         in_control(host)
         with netem('loss', '100%', ends=['vxcan1']):
@@ -142,7 +142,7 @@ class Gateway:
 def test_a_corrupt_command_is_never_executed(form, corrupt):
     host_url = f'can://vcan1?node={NODE}' + ('&pack=0' if form == 'plain' else '')
     commands = [f'S:{1000 + i},{1 + i % 16}' for i in range(400)]
-    with Gateway() as gateway, Board(f'can://vcan0?node={NODE}', options=SLOWLY) as board:
+    with Gateway() as gateway, Board(f'can://vcan0?node={NODE}', options=PATIENTLY) as board:
         with Running('send', host_url, '--timeout', '20', '--json', *commands) as sender, Dump('vcan1') as dump:
             board.executed(commands[0], timeout=20)
             for byte in corrupt:  # of the eight bytes of a frame

@@ -9,7 +9,7 @@ import struct
 import subprocess
 import time
 
-from can_inside import SLOWLY
+from can_inside import PATIENTLY
 from r4_process import Board, Running, is_state, monitor, run, send
 from slcan_bus import SlcanBus
 from host_on_paths import HostOnPaths, Relay, has_joined, has_left
@@ -57,7 +57,7 @@ def of_path(bus, carries):
 
 
 def test_no_state_is_lost_while_one_of_two_buses_is_off():
-    with two_buses(), Board(*URLS, options=SLOWLY) as board, monitor('+'.join(URLS)) as host:
+    with two_buses(), Board(*URLS, options=PATIENTLY) as board, monitor('+'.join(URLS)) as host:
         for bus in BUSES:
             if not any(of_path(bus, True)(each) for each in host.log):
                 host.next(of_path(bus, True))
@@ -112,7 +112,7 @@ def test_a_stop_over_one_of_two_buses_stops_the_board():
 def test_a_session_survives_the_loss_of_its_cable_or_its_bus(tmp_path_factory):
     folder = tmp_path_factory.mktemp('paths')
     with one_bus('vcan8') as bus, \
-            Board(f'pty:{folder}/board', f'can://{bus}?node=3', options=SLOWLY) as board:
+            Board(f'pty:{folder}/board', f'can://{bus}?node=3', options=PATIENTLY) as board:
         cable = Relay('pty', f'{folder}/host', f'{folder}/board')
         try:
             with HostOnPaths([cable.url, f'can://{bus}?node=3'], ['/host', bus]) as host:
@@ -137,7 +137,7 @@ def test_a_session_survives_bus_off_at_the_board_or_at_the_host():
     """can0 and can1 are one bus; the ends of the other bus have error counters and bus-off."""
     boards, hosts = (('can0', 'slcan0'), ('can1', 'slcan1'))
     with SlcanBus(2, 500000) as bus, \
-            Board(*(f'can://{each}?node=3' for each in boards), options=SLOWLY) as board, \
+            Board(*(f'can://{each}?node=3' for each in boards), options=PATIENTLY) as board, \
             HostOnPaths([f'can://{each}?node=3' for each in hosts], [f'//{each}?' for each in hosts]) as host:
         board.next(has_joined(2))
 

@@ -16,7 +16,7 @@ import packed_form
 N_BS_S, N_CR_S = 0.020, 0.100
 EMERGENCY_STOP, WENT_SAFE, TO_BOARD, REPLIES, TELEMETRY = 0x010, 0x020, 0x180, 0x200, 0x400
 FD_SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
-# Refusals that prove that a command was not executed. DUPLICATE alone proves nothing.
+# Refusals that end a command here. DUPLICATE proves nothing. A real host also compares SESSION (protocol.md, rule 13).
 CODES = 'UNKNOWN FORMAT RANGE CHANNEL STALE SAFE BUSY AUTH'.split()
 STATE_PERIOD_S, HEARTBEAT_S, HOST_HEARTBEAT_S, RETRY_S = 0.05, 0.5, 0.1, 0.05
 

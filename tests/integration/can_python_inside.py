@@ -15,8 +15,8 @@ from paper_client import PaperClient
 from r4_process import PATIENCE_S, Board, is_state, monitor, objects, run, send
 
 BOARD_URL, HOST_URL = 'can://vcan0?node=3', 'can://vcan0?node=4'
-# In the emulated machine Python takes half a millisecond for a frame.
-SLOWLY = ('--set', 'rate,20')
+# In the emulated machine Python takes half a millisecond for a frame. The machine sometimes stands still for a second.
+PATIENTLY = ('--set', 'rate,20', '--set', 'timeout,5000')
 
 
 @pytest.fixture(scope='module', autouse=True)
@@ -49,7 +49,7 @@ def python_host(**options):
 
 @pytest.fixture(name='board')
 def running_board():
-    with Board(BOARD_URL, options=SLOWLY) as board:
+    with Board(BOARD_URL, options=PATIENTLY) as board:
         yield board
 
 
@@ -189,7 +189,7 @@ def test_the_papers_client_drives_a_board_over_the_kernels_iso_tp():
 
 @pytest.mark.parametrize('packs', [True, False])
 def test_the_board_answers_an_fd_host_in_fd(packs):
-    with Board(BOARD_URL + '&fd=1', options=SLOWLY) as board, python_host(fd=True, packs=packs) as host:
+    with Board(BOARD_URL + '&fd=1', options=PATIENTLY) as board, python_host(fd=True, packs=packs) as host:
         host.take_control()
         assert host.command('O:358,1,1') == 'done'
         assert host.command('O:358,1,9') == 'CHANNEL'

@@ -40,9 +40,11 @@ KERNEL_ARGUMENTS = ('console=ttyS0 quiet panic=-1 mitigations=off no_timer_check
 # of the guest's time.
 MACHINE = ('-M pc -cpu max,-la57,-smap,-smep,-umip,-pku -m 768M '
            '-nodefaults -no-user-config -vga none -display none -no-reboot -device virtio-serial-pci,max_ports=8').split()
+# One processor, whose instructions take 2 ns each. The guest's clock counts them, and stands still while QEMU has no
+# processor to run them; while the guest waits, its clock is this machine's.
+COUNTED_TIME = '-accel tcg -icount shift=1 -smp 1'.split()
+# For a guest with a cable to a program here: both must have the same clock.
 REAL_TIME = '-accel tcg,thread=multi -smp 2'.split()
-# One processor, whose instructions take 2 ns each. QEMU counts them, and skips the time in which no program runs.
-VIRTUAL_TIME = '-accel tcg -icount shift=1,sleep=off -smp 1'.split()
 CAN = ('-object can-bus,id=bus -device kvaser_pci,canbus=bus '
        '-device kvaser_pci,canbus=bus').split()
 PASSED_ON = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1,
@@ -169,7 +171,7 @@ class Lines:
 class Guest:
     """One run of one command."""
 
-    def __init__(self, command, usb=None, virtual_time=False, limit=None, verbose=False):
+    def __init__(self, command, usb=None, limit=None, verbose=False):
         if shutil.which(QEMU) is None:
             raise Trouble(QEMU, 'it is not installed', 'tools/setup --can')
         if shutil.which('ip', path=os.environ.get('PATH', '') + ':/usr/sbin:/sbin') is None:
@@ -177,7 +179,6 @@ class Guest:
         self._command = command
         self._cable = Cable(usb) if usb else None
         self._kernel = prepared()
-        self._clock = VIRTUAL_TIME if virtual_time else REAL_TIME
         self._limit = limit
         self._limit_passed = False
         self._began = 0.0
@@ -254,7 +255,8 @@ class Guest:
             file.write(self._own_files())
         descriptors = [end.fileno() for end in self._ends] + [initrd]
         self._qemu = subprocess.Popen(
-            [QEMU, *MACHINE, *self._clock, *CAN, '-fsdev', 'local,id=root,path=/,security_model=none,multidevs=remap',
+            [QEMU, *MACHINE, *(REAL_TIME if self._cable else COUNTED_TIME), *CAN,
+             '-fsdev', 'local,id=root,path=/,security_model=none,multidevs=remap',
              '-device', 'virtio-9p-pci,fsdev=root,mount_tag=hostroot', *self._arguments,
              '-kernel', str(self._kernel.vmlinux), '-initrd', f'/proc/self/fd/{initrd}',
              '-append', KERNEL_ARGUMENTS],

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Colours of the Giga's light (docs/how-to/firmware.md):
 //     green, flashing   no host yet                blue            the host is silent or has left
-//     green             a host drives the board    red, flashing   handle or proximity
+//     green             a host is in control       red, flashing   handle or proximity
 //                                                  red             stop, fault or watchdog
 #pragma once
 

@@ -203,7 +203,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return self._core.on_event(self._callback(callback))
 
     def on_restart(self, callback: Callable[[], object]) -> Subscription:
-        """Called when the board has restarted and lost its settings."""
+        """Called when the board has restarted, or this computer slept: thresholds and readings have ended."""
         return self._core.on_restart(self._callback(callback))
 
     def on_arming(self, callback: Callable[[DisarmCause], object]) -> Subscription:

@@ -179,7 +179,7 @@ class FleetEventKind(Word):
     LINK = 'link', 'the link changed: a LinkStatus'
     TRANSPORT = 'transport', 'the transport went up or down, or warns: an Event'
     ARMING = 'arming', 'the board was armed or disarmed: a DisarmCause'
-    RESTART = 'restart', 'the board restarted and has lost its settings: None'
+    RESTART = 'restart', 'the board restarted, or this computer slept: None'
     REFUSED = 'refused', 'a posted command was refused: a RefusedPost'
     MISSED = 'missed', 'events were dropped, because nobody took them: how many'
 

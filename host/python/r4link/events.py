@@ -34,7 +34,7 @@ def log_events(board: Board) -> None:
         f', {each}' for each in ((link.reason,) if link.state is LinkState.SAFE else ()) + link.causes)))
     board.on_path(lambda path: log(logging.INFO if path.state in _QUIET_PATHS else logging.WARNING,
                                    f'path {path.name} {path.state}'))
-    board.on_restart(lambda: log(logging.WARNING, 'the board has restarted, and has lost its settings'))
+    board.on_restart(lambda: log(logging.WARNING, 'the board has restarted'))
     board.on_arming(lambda cause: log(logging.INFO, 'armed' if cause is DisarmCause.NONE else f'not armed: {cause}'))
     board.on_refused(log_refusal)
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The words with a code in the packed form, and the form of each field's values.
-// docs/reference/packed.md has the same tables. They belong to version 1 and change only with the
-// version.
+// docs/reference/packed.md has the same tables. They belong to version 1; after the first release
+// they change only with the version.
 #pragma once
 
 #include <cstdint>
