@@ -11,43 +11,74 @@ constexpr std::uint8_t bit(std::uint8_t number, bool on) {
 }
 
 constexpr Chip pwm_chips[] = {Chip::osmc_pwm, Chip::dhb12_pwm, Chip::servo_pwm};
-constexpr std::uint8_t pca9685_chips = 1U << static_cast<int>(Chip::osmc_pwm) |
-                                       1U << static_cast<int>(Chip::dhb12_pwm) |
-                                       1U << static_cast<int>(Chip::servo_pwm);
 
 // First the brushless motors and the relays, which the all-call does not reach.
 constexpr Chip safe_order[chip_count] = {Chip::dac, Chip::expander, Chip::osmc_pwm, Chip::dhb12_pwm,
                                          Chip::servo_pwm};
 
-}  // namespace
-
-std::uint8_t address_of(Chip chip) {
-  constexpr std::uint8_t addresses[chip_count] = {osmc_pwm_address, dhb12_pwm_address,
-                                                  expander_address, dac_address, servo_pwm_address};
-  return addresses[static_cast<int>(chip)];
+// The bit of a line of the expander, if it is high.
+unsigned level(Place place, bool on) {
+  return place.connected() && on != place.option() ? 1U << place.number() : 0U;
 }
+
+template <int count>
+void set_bridges(Bridge (&bridges)[count], const Drive (&drives)[count]) {
+  for (int i = 0; i < count; ++i) bridges[i].set(drives[i]);
+}
+
+}  // namespace
 
 BoardHardware::BoardHardware(I2cBus& bus, const BoardPins& pins, const Config& config)
     : bus_(bus),
       pins_(pins),
       config_(config),
-      osmc_(bus, osmc_pwm_address, drive_hz, drive_lines),
-      dhb12_(bus, dhb12_pwm_address, drive_hz, drive_lines),
-      expander_(bus, expander_address, brakes_on, 0),
-      dac_(bus, dac_address),
-      servo_(bus, servo_pwm_address, servo_hz),
-      chips_{&osmc_, &dhb12_, &expander_, &dac_, &servo_},
-      steppers_{{*pins.step[0], *pins.direction[0], config.step_tick_hz, stepper_speed_max},
-                {*pins.step[1], *pins.direction[1], config.step_tick_hz, stepper_speed_max},
-                {*pins.step[2], *pins.direction[2], config.step_tick_hz, stepper_speed_max},
-                {*pins.step[3], *pins.direction[3], config.step_tick_hz, stepper_speed_max}},
+      osmc_(bus, config.wiring.chip(Chip::osmc_pwm).number(), drive_hz),
+      dhb12_(bus, config.wiring.chip(Chip::dhb12_pwm).number(), drive_hz),
+      servo_(bus, config.wiring.chip(Chip::servo_pwm).number(), servo_hz),
+      expander_(bus, config.wiring.chip(Chip::expander).number(), connected_bits(),
+                ports_of(Outputs())),
+      dac_(bus, config.wiring.chip(Chip::dac).number()),
+      chips_{&osmc_, &dhb12_, &servo_, &expander_, &dac_},
+      steppers_{
+          {*pins.step[0], *pins.direction[0], config.tick_hz, stepper_speed_max, low_is_forward(1)},
+          {*pins.step[1], *pins.direction[1], config.tick_hz, stepper_speed_max, low_is_forward(2)},
+          {*pins.step[2], *pins.direction[2], config.tick_hz, stepper_speed_max, low_is_forward(3)},
+          {*pins.step[3], *pins.direction[3], config.tick_hz, stepper_speed_max,
+           low_is_forward(4)}},
       ultrasonic_(*pins.trigger[0], *pins.trigger[1], *pins.trigger[2], *pins.trigger[3],
-                  config.ultrasonic_fitted) {}
+                  connected_sensors()) {
+  fault_.trouble = config.wiring_trouble;
+#define R4_DRIVE(kind) \
+  connect_bridges(SignalKind::kind##_pwm, SignalKind::kind##_direction, kind##_bridges_);
+  R4_DRIVES(R4_DRIVE)
+#undef R4_DRIVE
+}
+
+void BoardHardware::connect_bridges(SignalKind pwm, SignalKind direction, Bridge* bridges) {
+  for (int i = 0; i < row_of(pwm).channels; ++i) {
+    const Place line = config_.wiring.at(pwm, i + 1);
+    if (!line.connected()) continue;
+    Pca9685& chip = line.number() < pca9685_lines ? osmc_ : dhb12_;
+    bridges[i].connect(chip, line, config_.wiring.at(direction, i + 1));
+  }
+}
+
+bool BoardHardware::low_is_forward(int stepper) const {
+  return config_.wiring.at(SignalKind::step_direction, stepper).option();
+}
+
+std::uint8_t BoardHardware::connected_sensors() const {
+  std::uint8_t sensors = 0;
+  for (std::uint8_t i = 0; i < ultrasonic_channels; ++i) {
+    sensors |= bit(i, config_.wiring.at(SignalKind::trigger, i + 1).connected());
+  }
+  return sensors;
+}
 
 void BoardHardware::power_up(std::uint32_t now_us) {
   now_us_ = now_us;
   verified_us_ = now_us;
-  if ((config_.chips_fitted & pca9685_chips) != 0) {
+  if (config_.wiring.has_pca9685()) {
     busy_ = true;
     (void)Pca9685::reset_all(bus_);  // the set-up checks the modes
     busy_ = false;
@@ -86,7 +117,7 @@ void BoardHardware::drive_safe() {
 // Returns the chip at which the bus was held, all_chips for the all-call, or nowhere.
 // `held_before`: the result of the try before.
 int BoardHardware::drive_chips_safe(int held_before) {
-  if ((config_.chips_fitted & pca9685_chips) != 0 && held_before != all_chips &&
+  if (config_.wiring.has_pca9685() && held_before != all_chips &&
       Pca9685::all_off(bus_) == I2cResult::timeout) {
     for (int i = 0; i < chip_count; ++i) {
       if (fitted(i)) chips_[i]->note(I2cResult::timeout);
@@ -125,33 +156,46 @@ void BoardHardware::apply(const Outputs& outputs) {
   leave();
 }
 
-template <Chip chip, int count>
-void BoardHardware::set_drives(const DriveLines<chip> (&lines)[count],
-                               const Drive (&drives)[count]) {
-  static_assert((pca9685_chips >> static_cast<int>(chip) & 1) != 0, "the lines are of a PCA9685");
-  Pca9685& pwm = static_cast<Pca9685&>(*chips_[static_cast<int>(chip)]);
-  for (int i = 0; i < count; ++i) {
-    pwm.set_duty(lines[i].pwm, drives[i].pwm);
-    pwm.set_level(lines[i].direction, drives[i].direction == Direction::forward);
+// The lines of the expander that a signal uses.
+std::uint16_t BoardHardware::connected_bits() const {
+  std::uint16_t bits = 0;
+  for (int i = 0; i < signal_count; ++i) {
+    const Place place = config_.wiring.places[i];
+    const bool is_bit = row_of(signal_kind(i)).terminal == Terminal::expander_bit;
+    if (is_bit && place.connected()) bits = static_cast<std::uint16_t>(bits | 1U << place.number());
   }
+  return bits;
+}
+
+// The values of all lines of the expander; those that are not connected are low.
+std::uint16_t BoardHardware::ports_of(const Outputs& outputs) const {
+  const Place* const places = config_.wiring.places;
+  unsigned ports = 0;
+  for (int i = 0; i < bldc_channels; ++i) {
+    const Bldc& bldc = outputs.bldc[i];
+    ports |= level(places[signals::bldc_direction + i], bldc.direction == Direction::forward);
+    ports |= level(places[signals::bldc_brake + i], bldc.brake);
+  }
+  for (int i = 0; i < relay_channels; ++i) {
+    ports |= level(places[signals::relay + i], (outputs.relays >> i & 1) != 0);
+  }
+  return static_cast<std::uint16_t>(ports);
 }
 
 void BoardHardware::set_outputs(const Outputs& outputs) {
-#define R4_DRIVE(kind) set_drives(kind##_lines, outputs.kind);
+#define R4_DRIVE(kind) set_bridges(kind##_bridges_, outputs.kind);
   R4_DRIVES(R4_DRIVE)
+#undef R4_DRIVE
+  const Place* const places = config_.wiring.places;
   for (int i = 0; i < servo_channels; ++i) {
-    servo_.set_pulse_us(servo_lines[i], outputs.servo_us[i]);
+    const Place line = places[signals::servo + i];
+    if (line.connected()) servo_.set_pulse_us(line.number() % pca9685_lines, outputs.servo_us[i]);
   }
-  std::uint8_t port_a = 0;
   for (int i = 0; i < bldc_channels; ++i) {
-    const Bldc& bldc = outputs.bldc[i];
-    port_a |= bit(bldc_lines[i].direction, bldc.direction == Direction::forward);
-    port_a |= bit(bldc_lines[i].brake, bldc.brake);
-    dac_.set_code(bldc_lines[i].speed, bldc.speed);
+    const Place output = places[signals::bldc_speed + i];
+    if (output.connected()) dac_.set_code(output.number(), outputs.bldc[i].speed);
   }
-  std::uint8_t port_b = 0;
-  for (int i = 0; i < relay_channels; ++i) port_b |= bit(relay_bits[i], outputs.relays >> i & 1);
-  expander_.set_ports(port_a, port_b);
+  expander_.set_ports(ports_of(outputs));
   for (int i = 0; i < stepper_channels; ++i) {
     const StepperTarget& target = outputs.stepper[i];
     steppers_[i].go(target.position, target.enabled ? target.speed : 0);
@@ -178,11 +222,16 @@ void BoardHardware::for_each_chip(BusBudget& budget, bool set_up) {
   first_chip_ = 0;
 }
 
+bool BoardHardware::handle_reads_held() const {
+  const Place handle = config_.wiring.at(SignalKind::handle);
+  return !handle.connected() || pins_.handle->read() != handle.option();
+}
+
 void BoardHardware::poll(std::uint32_t now_us) {
   busy_ = true;
   now_us_ = now_us;
 
-  const bool seen = pins_.handle->read() == handle_held_level;
+  const bool seen = handle_reads_held();
   if (!seen || !handle_seen_) held_since_us_ = now_us;
   handle_seen_ = seen;
   handle_held_ = seen && (handle_held_ || now_us - held_since_us_ >= handle_settle_us);
@@ -254,8 +303,8 @@ bool BoardHardware::look_for_trouble() {
     failed_[i] = true;
     failed_us_[i] = now_us_;
     found = true;
-    if (!fault_.any()) {
-      fault_.address = address_of(static_cast<Chip>(i));
+    if (!fault_.any() || fault_.address == 0) {
+      fault_.address = chips_[i]->address();
       fault_.trouble = trouble;
     }
   }
@@ -285,8 +334,10 @@ void BoardHardware::sample(Inputs& inputs) {
     inputs.analog_cv[i] = centivolts_of(pins_.analog[i]->read(), config_.calibration[i]);
   }
   // A released handle counts at once, not at the next poll.
-  if (pins_.handle->read() != handle_held_level) handle_seen_ = handle_held_ = false;
-  inputs.handle_held = handle_held_;
+  if (!handle_reads_held()) handle_seen_ = handle_held_ = false;
+  inputs.handle = !config_.wiring.at(SignalKind::handle).connected() ? Handle::none
+                  : handle_held_                                     ? Handle::held
+                                                                     : Handle::released;
   for (int i = 0; i < stepper_channels; ++i) inputs.stepper_steps[i] = steppers_[i].position();
   for (int i = 0; i < encoder_channels; ++i) {
     inputs.encoder_counts[i] = encoders_[i].count();
@@ -317,15 +368,6 @@ bool BoardHardware::stepping() const {
   return false;
 }
 
-void BoardHardware::fit(std::uint8_t chips) {
-  config_.chips_fitted = chips;
-  fault_ = ChipFault();
-  for (int i = 0; i < chip_count; ++i) {
-    failed_[i] = false;
-    if (!fitted(i)) chips_[i]->begin();  // clears its trouble
-  }
-}
-
 void BoardHardware::calibrate(const std::uint16_t (&full_scale_cv)[analog_channels]) {
   constexpr std::uint16_t full_scale = 0xFFFF;
   for (int i = 0; i < analog_channels; ++i) {
@@ -340,8 +382,22 @@ bool BoardHardware::ready() const {
   return true;
 }
 
+ChipTrouble BoardHardware::trouble_of(WiringSource source) {
+  switch (source) {
+    case WiringSource::plan:
+      return ChipTrouble::not_confirmed;
+    case WiringSource::given:
+      return ChipTrouble::none;
+    case WiringSource::damaged:
+      break;
+  }
+  return ChipTrouble::damaged;
+}
+
 bool BoardHardware::clear_fault() {
-  if (!ready()) return false;
+  const bool lasts = config_.wiring_trouble != ChipTrouble::none &&
+                     config_.wiring_trouble != ChipTrouble::not_confirmed;
+  if (!ready() || lasts) return false;
   const ChipFault before = fault_;
   fault_ = ChipFault();
   if (ready()) return true;

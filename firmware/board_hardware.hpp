@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The R4 board's hardware made of the chip drivers, wired by the table of board_channels.hpp.
+// The R4 board's hardware made of the chip drivers, wired by a Wiring. A signal that is not
+// connected, or whose chip is not fitted, has no effect.
 //
 // Power-up: call power_up() first. It resets the PWM chips, which turns every PWM output off in any
 // mode, and leaves every output in its safe value. poll() then sets the chips up, and ready() is
@@ -9,6 +10,8 @@
 // Safe state (make_safe()): steppers stand, PWM outputs off, DAC codes and outputs 0, brakes on,
 // relays off. It may be called at any time, also in an interrupt or a fault handler during a
 // transfer. It makes at most two bounded attempts (a held bus is recovered once).
+//
+// A wiring that is damaged, or that nobody has confirmed, is a fault from the start.
 //
 // Chip faults: the fault is latched with chip and reason, all outputs are made safe, and apply()
 // has no effect until clear_fault(). Every retry_us the bus is recovered and the chip set up again,
@@ -23,8 +26,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "board_channels.hpp"
 #include "drivers/analog.hpp"
+#include "drivers/bridge.hpp"
 #include "drivers/mcp23017.hpp"
 #include "drivers/mcp4728.hpp"
 #include "drivers/pca9685.hpp"
@@ -33,13 +36,19 @@
 #include "drivers/stepper.hpp"
 #include "drivers/ultrasonic.hpp"
 #include "hal.hpp"
+#include "r4link/wiring/wiring.hpp"
 
 namespace r4 {
 namespace firmware {
 
-std::uint8_t address_of(Chip chip);
+// The PCA9685 allows at most 1526 Hz.
+constexpr std::uint32_t drive_hz = 1000;
+constexpr std::uint32_t servo_hz = 50;
 
-// All pins must be set and outlive the hardware.
+// The kinds of motors on H-bridges: names of members of Outputs.
+#define R4_DRIVES(DRIVE) DRIVE(osmc) DRIVE(dhb12)
+
+// All pins must be set, also those of signals that are not connected, and outlive the hardware.
 struct BoardPins {
   OutputPin* step[stepper_channels];
   OutputPin* direction[stepper_channels];
@@ -53,16 +62,21 @@ struct BoardPins {
 class BoardHardware final : public Hal {
  public:
   struct Config {
-    std::uint8_t chips_fitted = (1U << chip_count) - 1;  // bit: Chip; others are left alone
-    std::uint8_t ultrasonic_fitted = 0;                  // bit n-1: sensor n
-    std::int32_t step_tick_hz = 40000;
+    Wiring wiring = plan_wiring();  // has no fault
+    // not_confirmed: a fault that clear_fault() ends; damaged, other_bus: until the next start.
+    ChipTrouble wiring_trouble = ChipTrouble::none;
+    std::int32_t tick_hz = step_tick_hz;
     AnalogCalibration calibration[analog_channels];
   };
+  static constexpr std::int32_t step_tick_hz = 40000;
   static constexpr std::size_t bus_bytes_per_poll = 48;
   static constexpr std::uint32_t verify_us = 20000;
   static constexpr std::uint32_t retry_us = 100000;
   static constexpr std::uint32_t handle_settle_us = 20000;
   static_assert(bus_bytes_per_poll >= bus_budget_min, "a set-up would never end");
+
+  // The trouble of a wiring from there.
+  static ChipTrouble trouble_of(WiringSource source);
 
   BoardHardware(I2cBus& bus, const BoardPins& pins, const Config& config);
 
@@ -76,12 +90,11 @@ class BoardHardware final : public Hal {
   void zero(int channel) override;
   bool clear_fault() override;  // false while a chip is not ready
 
-  // Ignores chips not in `chips` (bit: Chip) and forgets faults. Call before anything is applied.
-  void fit(std::uint8_t chips);
   // Full scale in hundredths of a volt, in the order of BoardPins::analog.
   void calibrate(const std::uint16_t (&full_scale_cv)[analog_channels]);
 
   bool ready() const;
+  const Wiring& wiring() const { return config_.wiring; }
   ChipFault fault() const { return fault_; }
   ChipTrouble trouble(Chip chip) const { return chips_[static_cast<int>(chip)]->trouble(); }
 
@@ -99,13 +112,17 @@ class BoardHardware final : public Hal {
   static constexpr int nowhere = -1;
   static constexpr int all_chips = chip_count;
 
-  bool fitted(int chip) const { return (config_.chips_fitted >> chip & 1) != 0; }
+  bool fitted(int chip) const { return config_.wiring.chip(static_cast<Chip>(chip)).connected(); }
+  void connect_bridges(SignalKind pwm, SignalKind direction, Bridge* bridges);
+  bool low_is_forward(int stepper) const;
+  std::uint8_t connected_sensors() const;
+  std::uint16_t connected_bits() const;
+  std::uint16_t ports_of(const Outputs& outputs) const;
+  bool handle_reads_held() const;
   void drive_safe();
   int drive_chips_safe(int held_before);
   bool drive_chip_safe(int chip);
   void set_outputs(const Outputs& outputs);
-  template <Chip chip, int count>
-  void set_drives(const DriveLines<chip> (&lines)[count], const Drive (&drives)[count]);
   void for_each_chip(BusBudget& budget, bool set_up);
   void set_up_again();
   void reset_lost_modes();
@@ -118,10 +135,13 @@ class BoardHardware final : public Hal {
   Config config_;
   Pca9685 osmc_;
   Pca9685 dhb12_;
+  Pca9685 servo_;
   Mcp23017 expander_;
   Mcp4728 dac_;
-  Pca9685 servo_;
   ChipDriver* chips_[chip_count];
+#define R4_DRIVE(kind) Bridge kind##_bridges_[row_of(SignalKind::kind##_pwm).channels];
+  R4_DRIVES(R4_DRIVE)
+#undef R4_DRIVE
   Stepper steppers_[stepper_channels];
   QuadratureEncoder encoders_[encoder_channels];
   UltrasonicSensors ultrasonic_;

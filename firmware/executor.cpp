@@ -82,6 +82,7 @@ Refusal carry_out(const Command& command, Setpoints& setpoints) {
     case CommandKind::clear:
     case CommandKind::leave:
     case CommandKind::identify:
+    case CommandKind::ask_wiring:
     case CommandKind::watch:
     case CommandKind::i2c_read:
     case CommandKind::i2c_write:

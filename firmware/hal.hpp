@@ -42,7 +42,7 @@ inline bool operator!=(const Outputs& a, const Outputs& b) { return !(a == b); }
 
 struct Inputs {
   std::int32_t analog_cv[analog_channels] = {};  // hundredths of a volt
-  bool handle_held = false;
+  Handle handle = Handle::released;
   std::int32_t stepper_steps[stepper_channels] = {};
   std::int32_t encoder_counts[encoder_channels] = {};
   std::int32_t encoder_hz[encoder_channels] = {};  // counts per second; negative backwards
@@ -50,6 +50,8 @@ struct Inputs {
   std::uint16_t ultrasonic_cm[ultrasonic_channels] = {};     // 0: no echo
   std::uint8_t ultrasonic_blind = 0;                         // bit n-1: sensor n does not answer
   std::uint8_t gpio = 0;                                     // bit n-1: input n is high
+  // True if the dead-man's handle is held, or if the board has none.
+  bool handle_held() const { return handle != Handle::released; }
   ChipFault fault;  // the first since the last clear_fault()
 };
 

@@ -8,6 +8,9 @@
 #include "commands/command_help.hpp"
 #include "commands/limits.hpp"
 #include "r4link/commands/command_text.hpp"
+#include "r4link/tables/settings.hpp"
+#include "r4link/wiring/wiring_file.hpp"
+#include "r4link/wiring/wiring_value.hpp"
 #include "standard_registry.hpp"
 
 namespace r4 {
@@ -198,6 +201,21 @@ BoardIdentity Board::identify(Duration timeout) {
   const auto impl = impl_;
   impl->execute(Command::identify(), timeout);
   return impl->read(impl->identity);
+}
+
+BoardWiring Board::wiring(Duration timeout) {
+  const auto impl = impl_;
+  impl->execute(Command::ask_wiring(), timeout);
+  return impl->read(impl->identity).wiring.value();
+}
+
+void Board::give_wiring(const Wiring& wiring, Duration timeout) {
+  const WiringCheck found = check(wiring);
+  if (found.fault != WiringFault::none) throw Error(problem_of(wiring, found));
+  char value[max_wiring_value];
+  const Text text = write_wiring_value(wiring, value);
+  const Text key = row_of(Setting::wiring).key;
+  setting({key.data(), key.size()}, {text.data(), text.size()}, timeout);
 }
 
 ReceivedState Board::state() const { return impl_->read(impl_->state); }

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "commands/command_help.hpp"
+#include "explain_safe.hpp"
 #include "r4link/commands/command_text.hpp"
 #include "r4link/link.hpp"
 #include "session/session.hpp"
@@ -11,45 +12,6 @@
 namespace r4 {
 
 namespace {
-
-struct Words {
-  std::string reason;
-  std::string fix;
-};
-
-Words safe_words(const LinkStatus& link) {
-  switch (link.reason) {
-    case SafeReason::link:
-      return {"the board is safe: it does not hear our heartbeats",
-              "check the way from here to the board (firewall, cable); the link comes back by "
-              "itself"};
-    case SafeReason::stop:
-      return {"the board is safe: an emergency stop is latched",
-              "send E:CLEAR when the danger is over"};
-    case SafeReason::handle:
-      return {"the board is safe: the dead-man's handle is released", "hold the handle"};
-    case SafeReason::proximity:
-      return {
-          "the board is safe: something is nearer than a proximity threshold, or its sensor does "
-          "not answer",
-          "look at US1 to US4 of the state (F:DEFAULT,US1,US2,US3,US4), clear the way, or change "
-          "the threshold with U:cm,ch (0 turns it off)"};
-    case SafeReason::watchdog:
-      return {"the board is safe: a duty of its firmware missed its deadline",
-              "find out why, then send E:CLEAR or restart the board"};
-    case SafeReason::fault:
-      if (link.chip.any()) {
-        return {fmt::format("the board is safe: {}: {}", chip_name(link.chip.address),
-                            to_text(link.chip.trouble)),
-                "check that chip's supply and wiring, then send E:CLEAR"};
-      }
-      return {"the board is safe: it found a fault in itself",
-              "check its chips and wiring, then send E:CLEAR or restart it"};
-    case SafeReason::none:
-      break;
-  }
-  return {"the board is safe", "E:CLEAR clears a stop, a fault and a watchdog"};
-}
 
 struct CauseWords {
   const char* name;
@@ -147,7 +109,8 @@ Words disarm_words(DisarmCause cause) {
       return {"a task of the board's firmware missed its deadline before this program began",
               clear_on_purpose};
     case DisarmCause::earlier_fault:
-      return {"the board found a fault in itself before this program began", clear_on_purpose};
+      return {"the board found a fault in itself before this program controlled it",
+              clear_on_purpose};
     case DisarmCause::none:
       break;
   }
@@ -333,6 +296,10 @@ Words outcome_words(const Command* command, const CommandResult& result, const L
       words.fix = "wait until some of them are confirmed";
       break;
     case Outcome::not_armed: {
+      if (result.disarmed == DisarmCause::earlier_fault && is_of_wiring(link)) {
+        const Words why = safe_words(link);
+        return {"not armed: " + why.reason, why.fix};
+      }
       Problem why = explain("", result.disarmed);
       words = {std::move(why.reason), std::move(why.fix)};
       break;

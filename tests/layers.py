@@ -15,8 +15,8 @@ import sys
 
 PUBLIC = {'include/r4link', 'include/r4link/can', 'include/r4link/commands', 'include/r4link/control',
           'include/r4link/devices', 'include/r4link/discovery', 'include/r4link/messages', 'include/r4link/recordings',
-          'include/r4link/simulation', 'include/r4link/tables', 'include/r4link/transports'}
-PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link'}
+          'include/r4link/simulation', 'include/r4link/tables', 'include/r4link/transports', 'include/r4link/wiring'}
+PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link', 'protocol/wiring'}
 FRAMING = PROTOCOL | {'transports/framing', 'transports/framing/can'}
 CARRIERS = {'transports/can', 'transports/impaired', 'transports/own', 'transports/serial', 'transports/share', 'transports/udp',
             'transports/udp/network', 'transports/udp/search'}
@@ -24,7 +24,7 @@ TRANSPORTS = FRAMING | CARRIERS | {'transports'}
 FIRMWARE = FRAMING | {'firmware', 'firmware/application', 'firmware/devices', 'firmware/drivers'}
 MODELS = {'firmware/ports/sim/chips', 'firmware/ports/sim/devices', 'firmware/ports/sim/robot'}
 HOST = TRANSPORTS | {'host', 'host/arming', 'host/async', 'host/blocking', 'host/commands', 'host/control', 'host/devices',
-                     'host/discovery', 'host/link', 'host/measurement', 'host/paths', 'host/recording', 'host/replay', 'host/session', 'host/uart'}
+                     'host/discovery', 'host/link', 'host/measurement', 'host/paths', 'host/recording', 'host/replay', 'host/session', 'host/uart', 'host/wiring'}
 SIMULATED = HOST | FIRMWARE | MODELS | {'firmware/ports/sim'}
 SHELL = PUBLIC | {'tools/r4/boards', 'tools/r4/shell'}
 # Tools use only the public interface. Two rooms may include internal headers: the analysis of frames (bus) and the
@@ -44,10 +44,12 @@ ALLOWED = {
     'include/r4link/simulation': {'include/r4link'},
     'include/r4link/tables': {'include/r4link'},
     'include/r4link/transports': {'include/r4link'},
+    'include/r4link/wiring': {'include/r4link', 'include/r4link/tables'},
     'protocol/datagram': PUBLIC,
     'protocol/keys': PUBLIC | {'protocol/datagram'},
-    'protocol/messages': PUBLIC | {'protocol/datagram', 'protocol/keys'},
+    'protocol/messages': PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/wiring'},
     'protocol/link': PROTOCOL,
+    'protocol/wiring': PUBLIC | {'protocol/datagram'},
     'transports/framing': PROTOCOL,
     'transports/framing/can': FRAMING,
     'transports': FRAMING,
@@ -93,6 +95,7 @@ ALLOWED = {
     'host/paths': TRANSPORTS | {'host/measurement'},
     'host/session': TRANSPORTS | {'host/arming', 'host/commands', 'host/link', 'host/measurement', 'host/paths'},
     'host/uart': HOST,
+    'host/wiring': PUBLIC | {'host', 'protocol/wiring'},
     'host/python/bindings': PUBLIC,
     'host/python/bindings/board': PUBLIC | {'host/python/bindings'},
     'host/python/bindings/transports': PUBLIC | {'host/python/bindings'},
@@ -115,6 +118,7 @@ ALLOWED = {
     'tools/r4/ros2/discovery': SHELL | {'tools/r4/ros2/graph'},
     'tools/r4/ros2': SHELL | {'tools/r4/devices', 'tools/r4/ros2/graph', 'tools/r4/ros2/discovery'},
     'tools/r4/sim': BELOW,
+    'tools/r4/wiring': SHELL,
     'tools/r4/web/server': SHELL,
     'tools/r4/web': SHELL | FORMATS | {'tools/r4/devices', 'tools/r4/watch', 'tools/r4/web/server'},
     'tools/r4': SHELL | {'tools/r4/ros2'},
@@ -135,7 +139,7 @@ PORTABLE = (FIRMWARE - PUBLIC) | {'firmware/ports/sim/chips', 'firmware/ports/si
 PORTABLE_PUBLIC = {f'include/r4link/{name}.hpp' for name in (
     'can/can_bits', 'can/can_frame', 'can/can_ids', 'command', 'config', 'datagram', 'key', 'messages/datagram_writer',
     'messages/message', 'messages/packed_form', 'messages/packet_tracker', 'simulation/simulated_pins', 'state', 'tables/commands',
-    'tables/settings', 'tables/state_fields', 'text', 'vocabulary')} | {'include/r4link/tables/board.def'}
+    'tables/settings', 'tables/state_fields', 'text', 'vocabulary', 'wiring/wiring', 'wiring/wiring_value')} | {'include/r4link/tables/board.def'}
 # Without heap, I/O and clock, and available in GCC 7 with C++14; C headers in both spellings.
 PORTABLE_STANDARD = {
     'algorithm', 'array', 'atomic', 'cassert', 'climits', 'cmath', 'cstddef', 'cstdint', 'cstring',

@@ -30,6 +30,7 @@ Application::Application(Hal& hal, const Config& config, Observer* observer)
       link_(timing_of(config.settings)),
       authentication_(config.chance),
       guard_(hal),
+      wiring_in_use_(crc_of(config.settings.site.wiring)),
       i2c_(config.i2c) {
   for (int i = 0; i < uart_channels; ++i) {
     uarts_[i] = config.uarts[i];

@@ -178,7 +178,8 @@ class Application {
   void fill(State& state) const;
   void transmit(Source to, const std::uint32_t& number, Text datagram, Priority priority);
   void answer(Source to, DatagramWriter& writer, std::uint32_t now_ms);
-  void identify(Source to, const Datagram& question, std::uint32_t now_ms);
+  BoardWiring kept_wiring() const;
+  void identify(Source to, const Datagram& question, bool with_wiring, std::uint32_t now_ms);
   void refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
               std::uint8_t at = 0, std::uint32_t lease = 0);
   bool is_of_owner() const;
@@ -224,7 +225,8 @@ class Application {
   std::uint32_t unread_stops_ = 0;
   std::uint32_t unread_ms_ = 0;
   std::uint32_t answered_ms_ = 0;
-  bool has_answer_ = false;  // still shown in states
+  bool has_answer_ = false;      // still shown in states
+  std::uint32_t wiring_in_use_;  // its checksum
   UserI2c* i2c_;
   UserUart* uarts_[uart_channels];
   std::uint32_t rx_ok_ = 0;

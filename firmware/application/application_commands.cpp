@@ -50,9 +50,12 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
   }
   Command command;
   const Refusal refusal = parse_command(field, command);
-  if (refusal == Refusal::none && command.kind == CommandKind::identify) {
-    identify(from, datagram, now_ms);
-    return;
+  if (refusal == Refusal::none && is_question(command.kind)) {
+    const bool asks_wiring = command.kind == CommandKind::ask_wiring;
+    if (asks_wiring && !ports_[from.port].port->may_configure()) {
+      return refuse(from, datagram, Refusal::auth, now_ms);
+    }
+    return identify(from, datagram, asks_wiring, now_ms);
   }
   if (refusal == Refusal::none && command.kind == CommandKind::watch) {
     on_watch(from, datagram, command, now_ms);

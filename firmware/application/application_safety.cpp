@@ -96,7 +96,7 @@ bool Application::obstacle() const {
 void Application::check_interlocks(std::uint32_t now_ms) {
   hal_.sample(inputs_);
   if (inputs_.fault.any()) enter(SafeReason::fault, now_ms);
-  if (!inputs_.handle_held) {
+  if (!inputs_.handle_held()) {
     enter(SafeReason::handle, now_ms);
   } else {
     safety_.leave(SafeReason::handle);

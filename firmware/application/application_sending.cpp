@@ -68,7 +68,16 @@ void Application::answer(Source to, DatagramWriter& writer, std::uint32_t now_ms
   if (!datagram.empty()) transmit(to, number, datagram, Priority::normal);
 }
 
-void Application::identify(Source to, const Datagram& question, std::uint32_t now_ms) {
+BoardWiring Application::kept_wiring() const {
+  BoardWiring kept;
+  kept.source = settings().site.wiring_source;
+  kept.wiring = settings().site.wiring;
+  kept.in_use = crc_of(kept.wiring) == wiring_in_use_;
+  return kept;
+}
+
+void Application::identify(Source to, const Datagram& question, bool with_wiring,
+                           std::uint32_t now_ms) {
   const bool ours = is_of_owner();
   if (!ours && !questions_.take(now_ms)) return;
   char buffer[max_datagram];
@@ -81,6 +90,8 @@ void Application::identify(Source to, const Datagram& question, std::uint32_t no
   identity.has_asked = question.has_pnum();
   identity.asked = question.pnum();
   identity.sid = question.session_id();
+  char wiring[max_board_wiring];
+  if (with_wiring) identity.wiring = write_board_wiring(kept_wiring(), wiring);
   write_identity(writer, identity);
   writer.more("+").more(leave_capability).more("+").more(group_capability);
   if (authentication_.has_chance()) writer.more("+").more(watch_capability);
@@ -242,7 +253,7 @@ void Application::send_part(Source to, std::uint32_t& pnum, DatagramWriter& writ
 
 void Application::fill(State& state) const {
   for (int i = 0; i < analog_channels; ++i) state.raw.analog_cv[i] = inputs_.analog_cv[i];
-  state.handle_held = inputs_.handle_held;
+  state.handle = inputs_.handle;
 #define R4_OUTPUT(kind, Value, member, channels, ...) \
   for (int i = 0; i < (channels); ++i) state.raw.member[i] = outputs_.member[i];
 #include "r4link/tables/board.def"

@@ -13,9 +13,20 @@ constexpr std::uint8_t olat_a = 0x14;
 
 }  // namespace
 
-void Mcp23017::set_ports(std::uint8_t a, std::uint8_t b) {
-  wanted_[0] = a;
-  wanted_[1] = b;
+Mcp23017::Mcp23017(I2cBus& bus, std::uint8_t address, std::uint16_t outputs, std::uint16_t safe)
+    : ChipDriver(bus, address),
+      inputs_{static_cast<std::uint8_t>(~outputs & 0xFF), static_cast<std::uint8_t>(~outputs >> 8)},
+      safe_{static_cast<std::uint8_t>(safe & 0xFF), static_cast<std::uint8_t>(safe >> 8)},
+      wanted_{safe_[0], safe_[1]} {}
+
+void Mcp23017::set_ports(std::uint16_t ports) {
+  wanted_[0] = static_cast<std::uint8_t>(ports & 0xFF);
+  wanted_[1] = static_cast<std::uint8_t>(ports >> 8);
+}
+
+void Mcp23017::want_safe() {
+  wanted_[0] = safe_[0];
+  wanted_[1] = safe_[1];
 }
 
 I2cResult Mcp23017::make_safe() {
@@ -25,7 +36,7 @@ I2cResult Mcp23017::make_safe() {
   if (result != I2cResult::ok) return result;
   written_[0] = safe_[0];
   written_[1] = safe_[1];
-  const std::uint8_t directions[] = {iodir_a, 0, 0};
+  const std::uint8_t directions[] = {iodir_a, inputs_[0], inputs_[1]};
   return bus_.write(address(), directions, sizeof directions);
 }
 
@@ -49,7 +60,7 @@ bool Mcp23017::set_up(std::uint32_t now_us, BusBudget& budget) {
       return true;
     }
     case Step::directions: {
-      const std::uint8_t bytes[] = {iodir_a, 0, 0, 0, 0};  // then IPOL
+      const std::uint8_t bytes[] = {iodir_a, inputs_[0], inputs_[1], 0, 0};  // then IPOL
       if (!send(bytes, sizeof bytes, budget)) return false;
       step_ = Step::mode;
       return true;
@@ -86,7 +97,7 @@ void Mcp23017::on_verify(BusBudget& budget) {
   std::uint8_t latches[2] = {};
   if (!fetch(iodir_a, directions, sizeof directions, budget)) return;
   if (!fetch(olat_a, latches, sizeof latches, budget)) return;
-  if (directions[0] != 0 || directions[1] != 0) {
+  if (directions[0] != inputs_[0] || directions[1] != inputs_[1]) {
     fail(directions[0] == 0xFF && directions[1] == 0xFF ? ChipTrouble::was_reset
                                                         : ChipTrouble::wrong_register);
   } else if (latches[0] != written_[0] || latches[1] != written_[1]) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Microchip MCP23017: sixteen outputs on two ports (data sheet DS20001952, IOCON.BANK = 0).
+// Microchip MCP23017: up to sixteen outputs on two ports (data sheet DS20001952, IOCON.BANK = 0).
 //
 //     register       value                                        section
 //     00 01 IODIR    1: input; reset FF                            3.5.1
@@ -11,6 +11,7 @@
 // Set-up: first the latches with the safe values, then the directions, so that no pin is driven to
 // an unintended value. Until then the pins float, so their circuits need a pull to the safe side.
 // Pins change at the acknowledge of their port's byte. One transfer writes all changed latches.
+// Pins that are not outputs of the board stay inputs.
 #pragma once
 
 #include <cstdint>
@@ -22,13 +23,13 @@ namespace firmware {
 
 class Mcp23017 final : public ChipDriver {
  public:
-  Mcp23017(I2cBus& bus, std::uint8_t address, std::uint8_t safe_a, std::uint8_t safe_b)
-      : ChipDriver(bus, address), safe_{safe_a, safe_b}, wanted_{safe_a, safe_b} {}
+  // Bits 0-7 are port A, bits 8-15 port B.
+  Mcp23017(I2cBus& bus, std::uint8_t address, std::uint16_t outputs, std::uint16_t safe);
 
-  // From the next write on; bit n is pin n.
-  void set_ports(std::uint8_t a, std::uint8_t b);
+  // From the next write on.
+  void set_ports(std::uint16_t ports);
 
-  void want_safe() override { set_ports(safe_[0], safe_[1]); }
+  void want_safe() override;
   // Latches, then directions: right even for a chip that was reset.
   I2cResult make_safe() override;
 
@@ -40,6 +41,7 @@ class Mcp23017 final : public ChipDriver {
   void on_write_changes(BusBudget& budget) override;
   void on_verify(BusBudget& budget) override;
 
+  std::uint8_t inputs_[2];
   std::uint8_t safe_[2];
   std::uint8_t wanted_[2];
   std::uint8_t written_[2] = {};

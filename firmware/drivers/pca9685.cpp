@@ -33,6 +33,16 @@ constexpr int bridged = 2;
 
 }  // namespace
 
+Pca9685::Pca9685(I2cBus& bus, std::uint8_t address, std::uint32_t frequency_hz)
+    : ChipDriver(bus, address), prescale_(prescale_for(frequency_hz)) {
+  for (std::uint8_t i = 0; i < channels; ++i) partner_[i] = i;
+}
+
+void Pca9685::pair(int a, int b) {
+  partner_[a] = static_cast<std::uint8_t>(b);
+  partner_[b] = static_cast<std::uint8_t>(a);
+}
+
 void Pca9685::set_duty(int channel, std::uint16_t duty) {
   if (duty > duty_on) duty = duty_on;
   if (duty_[channel] == duty) return;
@@ -153,49 +163,66 @@ bool Pca9685::wanted(int index, std::uint8_t& value) const {
   return true;
 }
 
-bool Pca9685::differs(int index) const {
-  std::uint8_t value = 0;
-  return wanted(index, value) && value != written_[index];
+// The registers from `first` to `end` - 1; none if `end` is 0.
+struct Pca9685::Registers {
+  int first = registers;
+  int end = 0;
+  bool any() const { return end != 0; }
+  void take(int index) {
+    if (index < first) first = index;
+    if (index >= end) end = index + 1;
+  }
+};
+
+void Pca9685::take_differing(int channel, Registers& found) const {
+  for (int i = 4 * channel; i < 4 * channel + 4; ++i) {
+    std::uint8_t value = 0;
+    if (wanted(i, value) && value != written_[i]) found.take(i);
+  }
 }
 
-void Pca9685::on_write_changes(BusBudget& budget) {
-  if (changed_ == 0) return;
-  const int step = 4 * group_;
-  const unsigned group_bits = (1U << group_) - 1;
-  int at = 0;
-  while (at < registers) {
-    int first = -1;
-    int end = -1;
-    for (; at < registers; at += step) {
-      if ((changed_ >> at / 4 & group_bits) == 0) continue;
-      int group_first = -1;
-      int group_end = -1;
-      for (int i = at; i < at + step; ++i) {
-        if (!differs(i)) continue;
-        if (group_first < 0) group_first = i;
-        group_end = i + 1;
-      }
-      if (group_first < 0) continue;
-      if (first >= 0) {
-        const bool fits = static_cast<std::size_t>(group_end - first) + 2 <= budget.left();
-        if (group_first - end > bridged || !fits) break;
-      } else {
-        first = group_first;
-      }
-      end = group_end;
+// Collects changed channels with their partners, the lowest first, while their registers are near
+// each other and fit into `most` bytes. Returns the channels, one bit each.
+std::uint16_t Pca9685::next_burst(std::size_t most, Registers& burst) {
+  std::uint16_t taken = 0;
+  for (int i = 0; changed_ >> i != 0; ++i) {
+    if (((changed_ & ~taken) >> i & 1) == 0) continue;
+    const auto both = static_cast<std::uint16_t>(1U << i | 1U << partner_[i]);
+    Registers differing;
+    take_differing(i, differing);
+    if (partner_[i] != i) take_differing(partner_[i], differing);
+    if (differing.any()) {
+      Registers longer = burst;
+      longer.take(differing.first);
+      longer.take(differing.end - 1);
+      const bool fits = static_cast<std::size_t>(longer.end - longer.first) + 2 <= most;
+      if (burst.any() && (differing.first - burst.end > bridged || !fits)) break;
+      burst = longer;
     }
-    if (first < 0) break;
-    std::uint8_t bytes[1 + registers];
-    std::uint8_t size = 0;
-    bytes[size++] = static_cast<std::uint8_t>(led0_on_l + first);
-    for (int i = first; i < end; ++i) {
-      std::uint8_t value = 0;
-      bytes[size++] = wanted(i, value) ? value : written_[i];
-    }
-    if (!send(bytes, size, budget)) return;
-    std::memcpy(written_ + first, bytes + 1, static_cast<std::size_t>(end - first));
+    taken = static_cast<std::uint16_t>(taken | both);
   }
-  changed_ = 0;
+  return taken;
+}
+
+// A register in a burst whose channel waits for a later burst keeps its value.
+void Pca9685::on_write_changes(BusBudget& budget) {
+  while (changed_ != 0) {
+    Registers burst;
+    const std::uint16_t taken = next_burst(budget.left(), burst);
+    if (burst.any()) {
+      std::uint8_t bytes[1 + registers];
+      std::uint8_t size = 0;
+      bytes[size++] = static_cast<std::uint8_t>(led0_on_l + burst.first);
+      for (int i = burst.first; i < burst.end; ++i) {
+        std::uint8_t value = 0;
+        const bool changes = (taken >> i / 4 & 1) != 0 && wanted(i, value);
+        bytes[size++] = changes ? value : written_[i];
+      }
+      if (!send(bytes, size, budget)) return;
+      std::memcpy(written_ + burst.first, bytes + 1, size - std::size_t{1});
+    }
+    changed_ = static_cast<std::uint16_t>(changed_ & ~taken);
+  }
 }
 
 bool Pca9685::check_mode(BusBudget& budget) {

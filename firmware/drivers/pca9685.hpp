@@ -16,7 +16,7 @@
 // registers. The 500 us pass between polls.
 //
 // All outputs of one transfer change together on STOP. A short budget splits a burst of changed
-// registers only between groups of channels, so a motor's duty and direction never part.
+// registers only between pairs of channels (pair()), so the two lines of a motor never part.
 //
 // The chip has no timeout: it keeps driving when the microcontroller fails. all_off() makes all
 // three chips safe in three bytes, but a disturbance can set bits that defeat it: INVRT turns "off"
@@ -25,6 +25,7 @@
 // asks for reset_all().
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "chip_driver.hpp"
@@ -44,11 +45,12 @@ class Pca9685 final : public ChipDriver {
     return static_cast<std::uint8_t>((25000000U + 2048U * hz) / (4096U * hz) - 1U);
   }
 
-  // `frequency_hz`: 24-1526. `group`: so many channels, from channel 0 on, change together; a
-  // divisor of 16, at most 4.
-  Pca9685(I2cBus& bus, std::uint8_t address, std::uint32_t frequency_hz, int group = 1)
-      : ChipDriver(bus, address), prescale_(prescale_for(frequency_hz)), group_(group) {}
+  // `frequency_hz`: 24-1526.
+  Pca9685(I2cBus& bus, std::uint8_t address, std::uint32_t frequency_hz);
 
+  // From now on the channels `a` and `b`, of which one transfer of a poll can write all registers
+  // from one to the other, change together. Each has at most one partner.
+  void pair(int a, int b);
   // Channels 0-15, from the next write on.
   void set_duty(int channel, std::uint16_t duty);  // 0: off; 4095 and more: on; otherwise n/4096
   void set_level(int channel, bool high) { set_duty(channel, high ? duty_on : 0); }
@@ -77,10 +79,12 @@ class Pca9685 final : public ChipDriver {
   void on_verify(BusBudget& budget) override;
   bool check_mode(BusBudget& budget);
   bool wanted(int index, std::uint8_t& value) const;
-  bool differs(int index) const;
+  struct Registers;
+  void take_differing(int channel, Registers& found) const;
+  std::uint16_t next_burst(std::size_t most, Registers& burst);
 
   std::uint8_t prescale_;
-  int group_;
+  std::uint8_t partner_[channels];  // itself: none
   Step step_ = Step::off;
   std::uint32_t awake_us_ = 0;
   std::uint8_t verified_channel_ = 0;

@@ -37,7 +37,7 @@ void Stepper::tick() {
   const Heading heading = distance > 0 ? Heading::forward : Heading::backward;
   if (heading != heading_) {
     heading_ = heading;
-    direction_.write(heading == Heading::forward);
+    direction_.write((heading == Heading::forward) != low_is_forward_);
     part_ = 0;
     return;
   }

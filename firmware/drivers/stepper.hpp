@@ -21,9 +21,12 @@ namespace firmware {
 class Stepper {
  public:
   // Speeds are limited to `speed_limit` steps per second and to half the tick rate.
-  Stepper(OutputPin& step, OutputPin& direction, std::int32_t tick_hz, std::int32_t speed_limit)
+  // `low_is_forward`: the level of the direction pin.
+  Stepper(OutputPin& step, OutputPin& direction, std::int32_t tick_hz, std::int32_t speed_limit,
+          bool low_is_forward = false)
       : step_(step),
         direction_(direction),
+        low_is_forward_(low_is_forward),
         tick_hz_(tick_hz),
         limit_(speed_limit < tick_hz / 2 ? speed_limit : tick_hz / 2) {}
 
@@ -46,6 +49,7 @@ class Stepper {
 
   OutputPin& step_;
   OutputPin& direction_;
+  bool low_is_forward_;
   std::int32_t tick_hz_;
   std::int32_t limit_;
   std::atomic<std::int32_t> speed_{0};  // while it is 0, tick() ignores the target

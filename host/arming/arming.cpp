@@ -73,8 +73,12 @@ DisarmCause earlier_cause_of(SafeReason reason) {
 
 }  // namespace
 
-// The first cause is kept until the next arm(): later causes only follow from it.
+// The first cause is kept until the next arm(): later causes only follow from it. A fault with
+// which a board begins, such as a wiring that nobody has confirmed, waits for a person.
 void ArmingMachine::disarm(DisarmCause cause) {
+  if (cause == DisarmCause::restart) {
+    earlier_ = static_cast<std::uint8_t>(earlier_ | bit(SafeReason::fault));
+  }
   if (armed() || cause_ == DisarmCause::not_yet) cause_ = cause;
 }
 

@@ -18,8 +18,9 @@
 // relay 1, the motor supply (docs/reference/safety.md), in every state. arm() clears the cause that
 // it finds first, and each cause hidden by that one, once. A stop that is pressed meanwhile stays,
 // and ends the arm(), as do a released handle and an obstacle. It never clears a stop, a watchdog
-// or a fault that may be older than the session, because a restarted program would drive off again.
-// A cause may be older until the controlled board was heard without it.
+// or a fault that may be older than the session, because a restarted program would drive off again,
+// nor a fault with which the board begins. A cause may be older until the controlled board was
+// heard without it.
 #pragma once
 
 #include <cstdint>
@@ -71,7 +72,7 @@ class ArmingMachine {
   bool outage_ = false;  // since relay 1 was last known to be closed
   Attempt attempt_ = Attempt::none;
   std::uint8_t cleared_ = 0;     // bit n: this arm() has cleared reason n
-  std::uint8_t earlier_ = 0xFF;  // bit n: reason n may be older than the session
+  std::uint8_t earlier_ = 0xFF;  // bit n: reason n may be older than the session or the boot
 };
 
 }  // namespace r4

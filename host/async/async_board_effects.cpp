@@ -4,6 +4,7 @@
 #include <variant>
 
 #include "async_board_impl.hpp"
+#include "r4link/wiring/wiring_value.hpp"
 
 namespace r4 {
 
@@ -83,6 +84,8 @@ void AsyncBoard::Impl::on_identity(const Identity& fresh) {
   identity.board_id.assign(fresh.board_id.data(), fresh.board_id.size());
   identity.capabilities.assign(fresh.capabilities.data(), fresh.capabilities.size());
   identity.name.assign(fresh.name.data(), fresh.name.size());
+  BoardWiring wiring;
+  if (read_board_wiring(fresh.wiring, wiring)) identity.wiring = wiring;
   if (paths[0].tap.attached()) name_in_recording();
 }
 

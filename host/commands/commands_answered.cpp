@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How the board's datagrams end the commands under way.
 #include "commands_under_way.hpp"
+#include "r4link/tables/commands.hpp"
 #include "r4link/tables/state_fields.hpp"
+#include "r4link/wiring/wiring_value.hpp"
 
 namespace r4 {
 
@@ -27,8 +29,8 @@ void CommandsUnderWay::on_state(Time now) {
   const ReceivedState& state = board_.state();
   const FieldSelection& fields = keeper_.fields();
   for (Pending& pending : pending_.under_way()) {
-    if (!pending.is_out() || pending.kind == CommandKind::stop ||
-        pending.kind == CommandKind::identify || pending.kind == CommandKind::leave) {
+    if (!pending.is_out() || pending.kind == CommandKind::stop || is_question(pending.kind) ||
+        pending.kind == CommandKind::leave) {
       continue;
     }
     if (board_.confirms()) {
@@ -90,7 +92,11 @@ void CommandsUnderWay::on_identity(const Identity& identity, Time now) {
   for (Pending& pending : pending_.under_way()) {
     // A second answer to an earlier question does not answer this question.
     if (identity.has_asked && identity.asked != pending.pnum) continue;
-    if (pending.is_out() && pending.kind == CommandKind::identify) {
+    BoardWiring wiring;
+    const bool answered =
+        pending.kind == CommandKind::identify ||
+        (pending.kind == CommandKind::ask_wiring && read_board_wiring(identity.wiring, wiring));
+    if (pending.is_out() && answered) {
       finish(pending, Outcome::confirmed, Refusal::none, now);
     }
   }

@@ -7,6 +7,7 @@
 
 #include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/site_settings.hpp"
+#include "r4link/tables/commands.hpp"
 
 namespace r4 {
 
@@ -70,6 +71,7 @@ Ticket CommandsUnderWay::send(const Command& command, Time timeout, Time now) {
     case CommandKind::stop:
       return stop(timeout, now);
     case CommandKind::identify:
+    case CommandKind::ask_wiring:
       return send_at_once(command, timeout, now);
     default:
       return queue(allocate(command, timeout, now), now);
@@ -130,7 +132,7 @@ void CommandsUnderWay::transmit(Pending& pending, Time now) {
     outbox_.stamp(writer, pending.kind, pending.pnum, to_ms(now));
     pending.size = writer.size();
     pending.stage = Stage::sent;
-    if (pending.kind == CommandKind::identify) board_.asked(pending.pnum, now);
+    if (is_question(pending.kind)) board_.asked(pending.pnum, now);
   } else {
     ++counts_.retries;
   }
@@ -272,7 +274,7 @@ void CommandsUnderWay::end_all_but_stops(Outcome outcome, Time now) {
 
 void CommandsUnderWay::give_up(Time now) {
   for (Pending& pending : pending_.under_way()) {
-    if (pending.kind == CommandKind::stop || pending.kind == CommandKind::identify) continue;
+    if (pending.kind == CommandKind::stop || is_question(pending.kind)) continue;
     finish(pending, Outcome::cancelled, Refusal::none, now);
   }
 }

@@ -10,6 +10,7 @@
 #include "r4link/commands/command_text.hpp"
 #include "r4link/error.hpp"
 #include "r4link/options.hpp"
+#include "r4link/tables/commands.hpp"
 
 namespace r4 {
 
@@ -48,7 +49,7 @@ void require_control(BoardRole role, std::string_view what) {
 
 void require_control(BoardRole role, const Command& command) {
   if (role == BoardRole::control || command.kind == CommandKind::stop ||
-      command.kind == CommandKind::identify) {
+      is_question(command.kind)) {
     return;
   }
   require_control(role, shown(command));

@@ -177,8 +177,9 @@ class R4LINK_API Board {
   // purpose. Clears a stop, a watchdog or a fault that came while this program controlled the
   // board, then closes relay 1, the motor supply. Throws Error{refused} if the handle is released,
   // a cause cannot be cleared or a stop comes meanwhile. Throws it also if the cause may be older
-  // than this program: clear it on purpose with Command::clear(), so that a restarted program does
-  // not drive off. Not needed with BoardOptions::session.arming = Arming::off.
+  // than this program, or is a fault with which the board began: clear it on purpose with
+  // Command::clear(), so that a restarted program or board does not drive off. Not needed with
+  // BoardOptions::session.arming = Arming::off.
   void arm(Duration timeout = default_timeout);
   // Why output commands are refused; none if armed.
   DisarmCause disarmed_by() const;
@@ -358,6 +359,11 @@ class R4LINK_API Board {
   void link_timing(Duration board_timeout, Duration heartbeat, Duration timeout = default_timeout);
 
   BoardIdentity identify(Duration timeout = default_timeout);
+  // The wiring that the board keeps (docs/reference/wiring.md). Only over the board's own cable.
+  BoardWiring wiring(Duration timeout = default_timeout);
+  // Checks `wiring`, and gives it to the board, which uses it from its next start on. Throws
+  // Error{data} for a wiring with a fault. Only over the board's own cable.
+  void give_wiring(const Wiring& wiring, Duration timeout = default_timeout);
   // The newest state, fields merged over all datagrams since the board started. state().age() is
   // its age, also while the link is lost.
   ReceivedState state() const;

@@ -104,6 +104,8 @@ struct R4LINK_API Command {
   static Command fields(Text list);
   static Command setting(Text key, Text value);
   static Command identify();
+  // Asks how the board is wired; only over its own cable.
+  static Command ask_wiring();
   // The board streams its states to the sender for two seconds, without control; 0 Hz ends that.
   // `list`: the fields; empty: those that the controlling host has chosen.
   static Command watch(std::int32_t rate_hz, Text list = Text());

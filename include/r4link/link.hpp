@@ -18,6 +18,7 @@
 #include "setpoints.hpp"
 #include "state.hpp"
 #include "vocabulary.hpp"
+#include "wiring/wiring.hpp"
 
 namespace r4 {
 
@@ -138,11 +139,11 @@ enum class DisarmCause : std::uint8_t {
   // arm() does not clear these, which may be older than the program; Command::clear() does.
   earlier_stop,
   earlier_watchdog,
-  earlier_fault,
+  earlier_fault,  // or one with which the board began
 };
 // "stop", "not yet", "earlier stop" …
 R4LINK_API const char* to_text(DisarmCause cause);
-// True if the cause may be older than the program.
+// True if arm() does not clear the cause.
 constexpr bool is_earlier(DisarmCause cause) { return cause >= DisarmCause::earlier_stop; }
 
 struct CommandResult {
@@ -231,8 +232,9 @@ struct ReceivedState : State {
 struct BoardIdentity {
   std::string firmware;
   std::string board_id;
-  std::string capabilities;  // words joined by '+': "udp+serial"
-  std::string name;          // set by its owner; may be empty
+  std::string capabilities;             // words joined by '+': "udp+serial"
+  std::string name;                     // set by its owner; may be empty
+  std::optional<BoardWiring> wiring{};  // after Command::ask_wiring()
 };
 
 struct Statistics {

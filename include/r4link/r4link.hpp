@@ -56,3 +56,6 @@
 #include "text.hpp"
 #include "transports/own_transport.hpp"
 #include "vocabulary.hpp"
+#include "wiring/wiring.hpp"
+#include "wiring/wiring_file.hpp"
+#include "wiring/wiring_value.hpp"

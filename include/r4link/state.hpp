@@ -109,7 +109,7 @@ struct State {
   FieldSet present;
   std::uint32_t pnum = 0;
   std::uint32_t t_ms = 0;  // the board's clock; wraps
-  bool handle_held = false;
+  Handle handle = Handle::released;
   std::uint8_t relays = 0;  // bit n-1 is relay n
   SafeReason safe = SafeReason::none;
   std::uint8_t gpio = 0;           // bit n-1 is input n
@@ -125,6 +125,8 @@ struct State {
   I2cAnswer i2c_answer;
   I2cBusReport i2c_bus;
 
+  // True if the dead-man's handle is held, or if the board has none.
+  bool handle_held() const { return handle != Handle::released; }
   // By channel, from 1. A channel that does not exist reads 0.
   double volts(Analog input) const {
     const int i = static_cast<int>(input);

@@ -72,7 +72,16 @@ constexpr SafeReason to_safe_reason(std::uint32_t number) {
 // "none", "link", "stop", "handle", "proximity", "watchdog", "fault"; "unknown" for other numbers.
 R4LINK_API const char* to_text(SafeReason reason);
 
-// --- faults of a chip of the board
+// The dead-man's handle. The number is the value of the DMHSTA field.
+enum class Handle : std::uint8_t {
+  released = 0,  // or its wire is broken
+  held = 1,
+  none = 2,  // the board has no handle: nothing but its relays takes the motors' supply away
+};
+// "released", "held", "none".
+R4LINK_API const char* to_text(Handle handle);
+
+// --- faults of a chip of the board, or of its wiring
 
 // The number is the value of the FAULT field.
 enum class ChipTrouble : std::uint8_t {
@@ -82,6 +91,10 @@ enum class ChipTrouble : std::uint8_t {
   was_reset = 3,       // the chip lost its set-up, so it was reset
   wrong_register = 4,  // a register does not hold the written value
   not_ready = 5,       // not ready in time, or cannot store its power-on values
+  // Of the wiring (docs/reference/safety.md), with address 0:
+  not_confirmed = 6,  // nobody has given a wiring, or confirmed the plan
+  damaged = 7,        // the stored wiring is damaged, or the store cannot be read
+  other_bus = 8,      // the chips answer on the other I2C bus than the wiring says
 };
 // "none", "no acknowledge", "bus stuck" …; "unknown" for other numbers.
 R4LINK_API const char* to_text(ChipTrouble trouble);
@@ -96,7 +109,7 @@ struct ChipFault {
   friend bool operator!=(ChipFault a, ChipFault b) { return !(a == b); }
 };
 
-// The chip at an address (paper, Figure 3): "PCA9685 0x40 (OSMC)"; or "unknown chip".
+// The chip at an address (paper, Figure 3): "PCA9685 0x40 (OSMC)"; 0: "wiring"; or "unknown chip".
 R4LINK_API const char* chip_name(std::uint8_t address);
 
 // --- devices on the user's I2C bus (docs/how-to/devices.md)

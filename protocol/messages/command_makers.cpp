@@ -123,5 +123,6 @@ Command Command::dac(Channel channel, Millivolts voltage) {
   return of_channel(CommandKind::dac, channel, voltage.value);
 }
 Command Command::identify() { return of_kind(CommandKind::identify); }
+Command Command::ask_wiring() { return of_kind(CommandKind::ask_wiring); }
 
 }  // namespace r4

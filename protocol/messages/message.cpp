@@ -21,6 +21,7 @@ constexpr Text lease_name("LEASE");
 constexpr Text board_name("NAME");
 constexpr Text busy_name("BUSY");
 constexpr Text asked_name("ASKED");
+constexpr Text wiring_name("WIRING");
 constexpr Text at_name("AT");
 
 template <class Number>
@@ -142,6 +143,7 @@ bool read_identity(const Datagram& datagram, Identity& out) {
   out.busy = busy == Text("1");
   out.has_busy = out.busy || busy == Text("0");
   out.has_asked = parse_number(datagram.find(asked_name).values(), out.asked);
+  out.wiring = datagram.find(wiring_name).values();
   out.sid = datagram.session_id();
   return true;
 }
@@ -168,6 +170,7 @@ void write_identity_fields(DatagramWriter& writer, const Identity& identity) {
   if (!identity.name.empty()) writer.field(board_name).value(identity.name);
   if (identity.has_busy) writer.field(busy_name).value(identity.busy ? Text("1") : Text("0"));
   if (identity.has_asked) writer.field(asked_name).value(identity.asked);
+  if (!identity.wiring.empty()) writer.field(wiring_name).values(identity.wiring);
   writer.session(identity.sid);
 }
 

@@ -130,7 +130,11 @@ void read_settings(Text text, Settings& settings) {
       const std::size_t line = position(rest, '\n');
       const std::size_t comma = position(rest, ',');
       if (comma < line) {
-        set(settings, rest.substr(0, comma), rest.substr(comma + 1, line - comma - 1));
+        const Text key = rest.substr(0, comma);
+        const Refusal refusal = set(settings, key, rest.substr(comma + 1, line - comma - 1));
+        if (refusal != Refusal::none && key == row_of(Setting::wiring).key) {
+          settings.site.lose_wiring();
+        }
       }
       rest = line == rest.size() ? Text() : rest.substr(line + 1);
     }

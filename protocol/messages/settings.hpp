@@ -36,10 +36,10 @@ inline bool operator!=(const Settings& a, const Settings& b) { return !(a == b);
 Refusal set(Settings& settings, Text key, Text value);
 
 // Lines "key,value", each ended by a line feed, for storage. False if `capacity` is too small.
-constexpr std::size_t max_settings_text = 1200;
+constexpr std::size_t max_settings_text = 1440;
 bool write_settings(const Settings& settings, char* out, std::size_t capacity, Text& text);
 // Reads such lines, in any order. Skips unknown and invalid lines, because the text may be from an
-// older or newer firmware.
+// older or newer firmware. An invalid wiring is damaged: the board must not guess.
 void read_settings(Text text, Settings& settings);
 
 // The secret part of a command's text ("C:password,letmein!", "C:key,1:5a…"): the digits of a key,

@@ -131,6 +131,24 @@ Refusal set_key(Key (&keys)[max_keys], Text value) {
   return Refusal::none;
 }
 
+Refusal set_wiring(SiteSettings& settings, Text value) {
+  if (value == off_word) {
+    settings.wiring = plan_wiring();
+    settings.wiring_source = WiringSource::plan;
+    return Refusal::none;
+  }
+  const Refusal refusal = read_wiring_value(value, settings.wiring);
+  if (refusal == Refusal::none) settings.wiring_source = WiringSource::given;
+  return refusal;
+}
+
+// A damaged wiring stays damaged until another is given.
+Text write_wiring(const SiteSettings& settings, char (&out)[max_wiring_value]) {
+  if (settings.wiring_source == WiringSource::given)
+    return write_wiring_value(settings.wiring, out);
+  return settings.wiring_source == WiringSource::plan ? off_word : Text("damaged");
+}
+
 bool has_key(const SettingRow& row, int number, Text key) {
   if (row.setting == Setting::full_scale)
     return name_of(state_field(FieldKind::analog, number)) == key;
@@ -176,7 +194,8 @@ bool operator==(const SiteSettings& a, const SiteSettings& b) {
   }
   return std::strcmp(a.network, b.network) == 0 && std::strcmp(a.password, b.password) == 0 &&
          a.host == b.host && a.udp_port == b.udp_port && a.can_node == b.can_node &&
-         a.chips == b.chips && std::strcmp(a.name, b.name) == 0;
+         std::strcmp(a.name, b.name) == 0 && a.wiring_source == b.wiring_source &&
+         a.wiring == b.wiring;
 }
 
 bool is_board_name(Text text) {
@@ -231,10 +250,10 @@ Refusal set(SiteSettings& settings, FoundSetting found, Text value) {
       return set_number(settings.udp_port, row, value);
     case Setting::node:
       return set_number(settings.can_node, row, value);
-    case Setting::chips:
-      return set_number(settings.chips, row, value);
     case Setting::name:
       return set_name(settings, value);
+    case Setting::wiring:
+      return set_wiring(settings, value);
     case Setting::full_scale:
       return set_full_scale(settings.full_scale_cv[found.number - 1], value);
     case Setting::key:
@@ -285,7 +304,7 @@ bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_sit
       value = encode(settings.name, out);
       break;
     default:
-      value = write(out, std::uint32_t{settings.chips});
+      value = write_wiring(settings, out);
       break;
   }
   return true;

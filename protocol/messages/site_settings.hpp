@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The settings of one board at its site: its wiring and its network. Keys, ranges and defaults:
+// The settings of one board at its site. Keys, ranges and defaults:
 // r4link/tables/settings.hpp; meanings: docs/reference/protocol.md, section 3. Only a host on a
 // cable of the board's own may change them (Port::may_configure()).
 // In a name or password, bytes outside the grammar are written as in URLs: %2C is a comma, %25 a
 // percent sign, %6Fff the network that is called "off".
-// network, password, host, port, name, key and analog inputs take effect at once, the other
-// settings at the board's next start.
+// network, password, host, port, name, key and analog inputs take effect at once, node and wiring
+// at the board's next start.
 #pragma once
 
 #include <cstddef>
@@ -16,6 +16,7 @@
 #include "r4link/tables/settings.hpp"
 #include "r4link/text.hpp"
 #include "r4link/vocabulary.hpp"
+#include "r4link/wiring/wiring_value.hpp"
 
 namespace r4 {
 
@@ -30,12 +31,19 @@ struct SiteSettings {
   std::uint32_t host = 0;  // a.b.c.d, a in the highest byte; 0: off
   std::uint16_t udp_port = row_of(Setting::port).standard;
   std::uint8_t can_node = row_of(Setting::node).standard;
-  std::uint8_t chips = row_of(Setting::chips).standard;
   char name[board_name_max + 1] = {};  // ends in NUL; empty: off
+  Wiring wiring = plan_wiring();
+  WiringSource wiring_source = WiringSource::plan;
   std::uint16_t full_scale_cv[analog_channels] = {standard_full_scale_cv, standard_full_scale_cv,
                                                   standard_full_scale_cv, standard_full_scale_cv,
                                                   standard_full_scale_cv, standard_full_scale_cv};
   Key keys[max_keys];  // used entries come first
+
+  // The stored wiring cannot be read.
+  void lose_wiring() {
+    wiring = Wiring();
+    wiring_source = WiringSource::damaged;
+  }
 };
 bool operator==(const SiteSettings& a, const SiteSettings& b);
 
@@ -68,8 +76,9 @@ Refusal set_number(Number& member, const SettingRow& row, Text value) {
 // As set() in settings.hpp. Refusal::unknown for any other setting.
 Refusal set(SiteSettings& settings, FoundSetting found, Text value);
 
-// The longest value: each byte of a password as %XX.
-constexpr std::size_t max_site_value = 3 * password_max;
+// The longest value: a wiring, or each byte of a password as %XX.
+constexpr std::size_t max_site_value =
+    max_wiring_value > 3 * password_max ? max_wiring_value : 3 * password_max;
 // Setting `index`, from 0: its key, and its value as set() takes it. False if there is none. Only
 // for storage, because secrets are included.
 bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_site_value],

@@ -107,8 +107,8 @@ bool parse_entry(Text text, const Entry& entry, State& state) {
   switch (entry.form) {
     case Form::volts:
       return parse_hundredths(text, member<std::int32_t>(state, entry));
-    case Form::flag:
-      return parse_into(text, 1, member<bool>(state, entry));
+    case Form::handle:
+      return parse_into(text, 2, member<Handle>(state, entry));
     case Form::drive:
       return parse_drive(text, member<Drive>(state, entry));
     case Form::bldc:
@@ -176,8 +176,8 @@ void write_field(DatagramWriter& writer, StateField field, const State& state) {
     case Form::volts:
       writer.hundredths(member<std::int32_t>(state, entry));
       break;
-    case Form::flag:
-      writer.value(static_cast<std::uint32_t>(member<bool>(state, entry)));
+    case Form::handle:
+      writer.value(static_cast<std::uint32_t>(member<Handle>(state, entry)));
       break;
     case Form::drive: {
       const Drive& drive = member<Drive>(state, entry);

@@ -28,8 +28,8 @@ StateNumbers numbers_of(const State& state, StateField field) {
   switch (kind_row_of(field).form) {
     case Form::volts:
       return numbers(member<std::int32_t>(state, field) / 100.0);
-    case Form::flag:
-      return numbers(member<bool>(state, field));
+    case Form::handle:
+      return numbers(member<Handle>(state, field));
     case Form::drive: {
       const Drive& drive = member<Drive>(state, field);
       return numbers(drive.pwm, drive.direction);

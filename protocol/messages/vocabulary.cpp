@@ -23,6 +23,18 @@ const char* to_text(SafeReason reason) {
   return "unknown";
 }
 
+const char* to_text(Handle handle) {
+  switch (handle) {
+    case Handle::released:
+      return "released";
+    case Handle::held:
+      return "held";
+    case Handle::none:
+      break;
+  }
+  return "none";
+}
+
 const char* to_text(I2cOutcome outcome) {
   switch (outcome) {
     case I2cOutcome::done:
@@ -51,12 +63,20 @@ const char* to_text(ChipTrouble trouble) {
       return "wrong register";
     case ChipTrouble::not_ready:
       return "not ready";
+    case ChipTrouble::not_confirmed:
+      return "not confirmed";
+    case ChipTrouble::damaged:
+      return "damaged";
+    case ChipTrouble::other_bus:
+      return "other bus";
   }
   return "unknown";
 }
 
 const char* chip_name(std::uint8_t address) {
   switch (address) {
+    case 0:
+      return "wiring";
     case 0x20:
       return "MCP23017 0x20 (relays, BLDC direction and brake)";
     case 0x40:

@@ -143,9 +143,11 @@ struct ChipAt {
 };
 constexpr ChipAt chips_at[] = {{Chip::osmc_pwm, 0x40},
                                {Chip::dhb12_pwm, 0x41},
+                               {Chip::servo_pwm, 0x42},
                                {Chip::expander, 0x20},
-                               {Chip::dac, 0x61},
-                               {Chip::servo_pwm, 0x42}};
+                               {Chip::dac, 0x61}};
+
+std::uint8_t address_of(Chip chip) { return plan_wiring().chip(chip).number(); }
 
 TEST(BoardHardware, ASilentChipIsReportedByNameAndAllOutputsGoSafe) {
   for (const ChipAt& at : chips_at) {
@@ -191,9 +193,7 @@ TEST(BoardHardware, NoticesAChipResetWithinOneVerificationCycle) {
     Bench bench;
     bench.boot();
     bench.apply(full());
-    sim::I2cChipModel* chips[] = {&bench.board.osmc, &bench.board.dhb12, &bench.board.expander,
-                                  &bench.board.dac, &bench.board.servo};
-    chips[static_cast<int>(at.chip)]->power_on();
+    bench.board[at.chip].power_on();
     bench.run(chip_count * 20 + 2);
     EXPECT_EQ(bench.hardware.fault().address, address_of(at.chip));
     EXPECT_EQ(bench.hardware.fault().trouble, ChipTrouble::was_reset)
@@ -209,9 +209,7 @@ TEST(BoardHardware, AChipResetAtAnyByteIsNoticedOrHarmless) {
     for (const ChipAt& at : chips_at) {
       Bench bench;
       bench.boot();
-      sim::I2cChipModel* chips[] = {&bench.board.osmc, &bench.board.dhb12, &bench.board.expander,
-                                    &bench.board.dac, &bench.board.servo};
-      bench.board.bus.reset_after(*chips[static_cast<int>(at.chip)], after);
+      bench.board.bus.reset_after(bench.board[at.chip], after);
       bench.apply(full(), 240);
       if (bench.hardware.fault().any()) {
         EXPECT_TRUE(bench.board.pins().is_safe());

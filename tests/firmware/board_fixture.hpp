@@ -21,7 +21,7 @@ namespace r4::test {
 
 class MemoryHal final : public firmware::Hal {
  public:
-  MemoryHal() { inputs.handle_held = true; }
+  MemoryHal() { inputs.handle = Handle::held; }
 
   void apply(const firmware::Outputs& wanted) override {
     outputs = wanted;

@@ -188,7 +188,7 @@ TEST(BoardHardware, TheSafeStateTakesTheDocumentedBusTime) {
 
 TEST(BoardHardware, DoesNotAccessAChipThatIsNotFitted) {
   BoardHardware::Config config;
-  config.chips_fitted = 1U << static_cast<int>(Chip::osmc_pwm);
+  for (int i = signals::osmc_chip + 1; i <= signals::dac_chip; ++i) config.wiring.places[i] = {};
   Bench bench(config);
   bench.boot();
   bench.apply(full());
@@ -199,6 +199,46 @@ TEST(BoardHardware, DoesNotAccessAChipThatIsNotFitted) {
   EXPECT_FALSE(bench.hardware.fault().any());
 }
 
+TEST(BoardHardware, AWiringThatNobodyHasConfirmedIsAFaultUntilItIsCleared) {
+  BoardHardware::Config config;
+  config.wiring_trouble = ChipTrouble::not_confirmed;
+  Bench bench(config);
+  bench.hardware.power_up(bench.now());
+  bench.run(20);
+  EXPECT_EQ(bench.hardware.fault(), (ChipFault{0, ChipTrouble::not_confirmed}));
+  bench.apply(full());
+  EXPECT_TRUE(bench.board.pins().is_safe());
+  EXPECT_TRUE(bench.hardware.clear_fault());
+  bench.apply(full());
+  EXPECT_EQ(test::outputs_of(bench.board), test::as_pins(full()));
+  bench.board.bus.refuse(0x40, 0, 1000);
+  bench.run(110);
+  EXPECT_EQ(bench.hardware.fault().address, 0x40);
+}
+
+TEST(BoardHardware, AChipsFaultIsReportedBeforeThatOfTheWiring) {
+  BoardHardware::Config config;
+  config.wiring_trouble = ChipTrouble::not_confirmed;
+  Bench bench(config);
+  bench.board.bus.refuse(0x61, 0, 1000);
+  bench.hardware.power_up(bench.now());
+  bench.run(20);
+  EXPECT_EQ(bench.hardware.fault(), (ChipFault{0x61, ChipTrouble::no_acknowledge}));
+}
+
+TEST(BoardHardware, ADamagedWiringConnectsNothingAndCannotBeCleared) {
+  BoardHardware::Config config;
+  config.wiring = Wiring();
+  config.wiring_trouble = ChipTrouble::damaged;
+  Bench bench(config);
+  bench.hardware.power_up(bench.now());
+  bench.run(200);
+  bench.apply(full());
+  EXPECT_TRUE(bench.log.transfers().empty());
+  EXPECT_FALSE(bench.hardware.clear_fault());
+  EXPECT_EQ(bench.hardware.fault(), (ChipFault{0, ChipTrouble::damaged}));
+}
+
 TEST(BoardHardware, DebouncesAHeldHandleButNoticesAReleaseAtOnce) {
   Bench bench;
   bench.boot();
@@ -206,23 +246,26 @@ TEST(BoardHardware, DebouncesAHeldHandleButNoticesAReleaseAtOnce) {
   bench.board.handle.high = true;
   bench.run(15);
   bench.hardware.sample(inputs);
-  EXPECT_FALSE(inputs.handle_held);
+  EXPECT_FALSE(inputs.handle_held());
   bench.run(10);
   bench.hardware.sample(inputs);
-  EXPECT_TRUE(inputs.handle_held);
+  EXPECT_TRUE(inputs.handle_held());
   bench.board.handle.high = false;
   bench.hardware.sample(inputs);
-  EXPECT_FALSE(inputs.handle_held);
+  EXPECT_FALSE(inputs.handle_held());
   bench.run(1);
   bench.board.handle.high = true;
   bench.run(15);
   bench.hardware.sample(inputs);
-  EXPECT_FALSE(inputs.handle_held);
+  EXPECT_FALSE(inputs.handle_held());
 }
 
 TEST(BoardHardware, InputsComeFromPinsAndInterrupts) {
   BoardHardware::Config config;
-  config.ultrasonic_fitted = 0b0100;
+  for (const int other : {1, 2, 4}) {
+    config.wiring.at(SignalKind::trigger, other) = {};
+    config.wiring.at(SignalKind::echo, other) = {};
+  }
   Bench bench(config);
   bench.boot();
   bench.board.analog[0].counts = 31733;
@@ -283,7 +326,7 @@ TEST(BoardHardware, ChangesTakeTheDocumentedBusTime) {
   EXPECT_EQ(calls - 1, 4);
   const test::BusCost everything = test::cost(bench.log);
   EXPECT_EQ(everything.bytes, 146U);
-  EXPECT_EQ(everything.us, 3325);
+  EXPECT_EQ(everything.us, 3320);
   const auto cost_of = [&](Drive drive) {
     outputs.osmc[0] = drive;
     bench.log.clear();

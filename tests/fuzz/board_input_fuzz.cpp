@@ -274,7 +274,7 @@ class World final : public firmware::Hal, public firmware::Observer {
     const int value = payload.size() > 2 ? static_cast<unsigned char>(payload[2]) : 0;
     switch (payload.size() > 1 ? payload[1] : 0) {
       case 'h':
-        inputs_.handle_held = value % 2 == 0;
+        inputs_.handle = value % 2 == 0 ? Handle::held : Handle::released;
         break;
       case 'u':
         inputs_.ultrasonic_cm[value & 3] = static_cast<std::uint16_t>(value);
@@ -441,7 +441,7 @@ class World final : public firmware::Hal, public firmware::Observer {
 
   static firmware::Inputs held() {
     firmware::Inputs inputs;
-    inputs.handle_held = true;
+    inputs.handle = Handle::held;
     return inputs;
   }
 };

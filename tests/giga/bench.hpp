@@ -14,6 +14,7 @@
 #include "fake_giga.hpp"
 #include "firmware/ports/giga/chip/timers.hpp"
 #include "firmware/ports/giga/system.hpp"
+#include "r4link/wiring/wiring_value.hpp"
 #include "tests/support/datagrams.hpp"
 #include "transports/framing/can/can_node.hpp"
 
@@ -46,20 +47,34 @@ class GigaBench {
  public:
   using Send = std::function<void(const std::string&)>;
 
-  GigaBench() {
-    giga.set_pin('I', 15, true);  // the handle is held
+  // A board that is wired so, and keeps that wiring.
+  explicit GigaBench(const Wiring& wired = plan_wiring()) : giga(wired) {
+    hold_handle(true);
     giga.usb_open = true;
+    store("", wired);
     giga.can.on_sent = [this](const CanFrame& frame) { on_can(frame); };
   }
   ~GigaBench() { system.reset(); }
 
+  // The settings that the next boot finds: these lines, and a wiring, so that the board drives.
+  void store(const std::string& lines) { store(lines, giga.chips.wiring); }
+  void store(const std::string& lines, const Wiring& wiring) {
+    char value[max_wiring_value];
+    giga.stored["r4-settings"] = lines + "wiring," + str(write_wiring_value(wiring, value)) + "\n";
+  }
+  void hold_handle(bool held) {
+    const Place handle = giga.chips.wiring.at(SignalKind::handle);
+    if (!handle.connected()) return;
+    const giga::Pin pin = giga::pin_of(handle);
+    giga.set_pin(pin.port, pin.number, held != handle.option());
+  }
   void boot() {
     system = std::make_unique<giga::System>();
     system->boot();
   }
   // Boots with a network in its settings. True if the board has joined the network.
   bool boot_in_network() {
-    giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
+    store("network,lab\npassword,correct%20horse\n");
     boot();
     return run_until([this] {
       const std::lock_guard<std::mutex> lock(giga.mutex);

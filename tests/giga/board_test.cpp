@@ -14,8 +14,9 @@ TEST(GigaPowerUp, SwitchesEveryOutputOffBeforeAnythingElse) {
   const auto& log = bench.giga.i2c.log;
   bench.boot();
   ASSERT_GE(log.size(), 6U);
-  EXPECT_EQ(log[0], (std::vector<std::uint8_t>{0, 0x06})) << "first the reset of all PWM chips";
-  EXPECT_EQ(log[1], (std::vector<std::uint8_t>{0x70 << 1, 0xFD, 0x10})) << "then all off";
+  EXPECT_EQ(log[0][0], 0x70 << 1 | 1) << "first a read: are there PWM chips";
+  EXPECT_EQ(log[1], (std::vector<std::uint8_t>{0, 0x06})) << "then the reset of all PWM chips";
+  EXPECT_EQ(log[2], (std::vector<std::uint8_t>{0x70 << 1, 0xFD, 0x10})) << "then all off";
   const auto first_set_up = std::find_if(log.begin(), log.end(), [](const auto& transfer) {
     return transfer.size() > 1 && (transfer[0] >> 1 == 0x40) && transfer[1] == 0xFE;
   });
@@ -30,8 +31,13 @@ TEST(GigaPowerUp, SwitchesEveryOutputOffBeforeAnythingElse) {
 TEST(GigaPowerUp, StepAndTriggerPinsAreLow) {
   GigaBench bench;
   bench.boot();
-  for (const giga::Pin pin : giga::step_pins) EXPECT_FALSE(bench.giga.pin(pin.port, pin.number));
-  for (const giga::Pin pin : giga::trigger_pins) {
+  const Wiring wiring = plan_wiring();
+  for (int i = 1; i <= stepper_channels; ++i) {
+    const giga::Pin pin = giga::pin_of(wiring.at(SignalKind::step, i));
+    EXPECT_FALSE(bench.giga.pin(pin.port, pin.number));
+  }
+  for (int i = 1; i <= ultrasonic_channels; ++i) {
+    const giga::Pin pin = giga::pin_of(wiring.at(SignalKind::trigger, i));
     EXPECT_EQ(r4_fake_gpio[pin.port - 'A'].MODER.value >> (2 * pin.number) & 3U, 1U);
   }
 }
@@ -250,7 +256,7 @@ TEST(GigaUsb, EndsNoBurstWithAFullPacket) {
 
 TEST(GigaUsb, StoresAndReportsItsName) {
   GigaBench bench;
-  bench.giga.stored["r4-settings"] = "name,left-arm\n";
+  bench.store("name,left-arm\n");
   bench.boot();
   PlainHost host;
   const auto says = [&](const std::string& text) {
@@ -359,7 +365,7 @@ TEST(GigaWiFi, JoinsTheNetworkThatIsSetOverUsbAndAnswersThere) {
 TEST(GigaWiFi, JoinsAnOpenNetwork) {
   GigaBench bench;
   bench.giga.air_password = "";
-  bench.giga.stored["r4-settings"] = "network,lab\n";
+  bench.store("network,lab\n");
   bench.boot();
   EXPECT_TRUE(bench.run_until([&] {
     const std::lock_guard<std::mutex> lock(bench.giga.mutex);
@@ -370,7 +376,7 @@ TEST(GigaWiFi, JoinsAnOpenNetwork) {
 TEST(GigaWiFi, AThreadThatHangsInTheLibraryDoesNotDisturbTheLoop) {
   GigaBench bench;
   bench.giga.wifi_hangs = true;
-  bench.giga.stored["r4-settings"] = "network,lab\n";
+  bench.store("network,lab\n");
   bench.boot();
   PlainHost host;
   bench.drive(host, bench.usb());
@@ -382,7 +388,7 @@ TEST(GigaWiFi, AThreadThatHangsInTheLibraryDoesNotDisturbTheLoop) {
 
 TEST(GigaWiFi, RejoinsALostNetworkAndRetriesAWrongPassword) {
   GigaBench bench;
-  bench.giga.stored["r4-settings"] = "network,lab\npassword,wrong-one\n";
+  bench.store("network,lab\npassword,wrong-one\n");
   bench.boot();
   const auto joins = [&] {
     const std::lock_guard<std::mutex> lock(bench.giga.mutex);
@@ -436,7 +442,7 @@ TEST(GigaWiFi, LosingTheNetworkMakesTheOutputsSafeAtOnce) {
 
 TEST(GigaWiFi, ANewCalibrationDoesNotDropTheNetwork) {
   GigaBench bench;
-  bench.giga.stored["r4-settings"] = "network,lab\npassword,correct%20horse\n";
+  bench.store("network,lab\npassword,correct%20horse\n");
   bench.boot();
   const auto joins = [&] {
     const std::lock_guard<std::mutex> lock(bench.giga.mutex);
@@ -503,11 +509,12 @@ TEST(GigaReport, MatchesFigure3OfThePaper) {
       "Starting Wifi UDP - 0 means failed: 1, port 2018",
       "CAN: node 1, active, errors sent 0, received 0, bus-offs 0",
       "Settings: kept in the key-value store",
+      "Wiring: given by its owner",
       "PCA9685 0x40 (OSMC): ok",
       "PCA9685 0x41 (DHB12): ok",
+      "PCA9685 0x42 (servos): ok",
       "MCP23017 0x20 (relays, BLDC direction and brake): ok",
       "MCP4728 0x61 (BLDC speed): ok",
-      "PCA9685 0x42 (servos): ok",
       "Deadlines missed: 0",
       "Interrupt stacks: the core's 264 of 1024, ours 0 of 4096",
       "Last boot ended by: power or reset",

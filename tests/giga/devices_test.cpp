@@ -69,10 +69,10 @@ TEST(UserI2cTiming, KeepsTheLimitsOfStandardModeForEveryClock) {
 // From variants/GIGA of ArduinoCore-mbed, commit 2080938: I2C_SDA1 PH_12, I2C_SCL1 PB_6_ALT0, both
 // I2C4.
 TEST(GigaPins, TheUsersBusIsTheCoresWire1) {
-  EXPECT_TRUE(giga::user_scl_pin == (giga::Pin{'B', 6}));
-  EXPECT_TRUE(giga::user_sda_pin == (giga::Pin{'H', 12}));
-  EXPECT_EQ(giga::user_scl_function, 6U);
-  EXPECT_EQ(giga::user_sda_function, 4U);
+  EXPECT_TRUE(giga::i2c_scl_pins[1] == (giga::Pin{'B', 6}));
+  EXPECT_TRUE(giga::i2c_sda_pins[1] == (giga::Pin{'H', 12}));
+  EXPECT_EQ(giga::i2c_scl_functions[1], 6U);
+  EXPECT_EQ(giga::i2c_sda_functions[1], 4U);
 }
 
 TEST_F(GigaDevices, AreReadAtTheirRateOnTheirOwnBus) {
@@ -205,9 +205,9 @@ TEST(GigaPins, TheDacOutputsAreA12AndA13) {
 TEST(GigaPins, TheSpareInputsAreD6AndD44AndD8ToD13) {
   const giga::Pin pins_of_variant[] = {{'D', 13}, {'G', 10}, {'B', 8},  {'B', 9},
                                        {'K', 1},  {'J', 10}, {'J', 11}, {'H', 6}};
-  ASSERT_EQ(std::size(giga::gpio_pins), std::size(pins_of_variant));
-  for (std::size_t i = 0; i < std::size(pins_of_variant); ++i) {
-    EXPECT_TRUE(giga::gpio_pins[i] == pins_of_variant[i]) << "input " << i + 1;
+  for (int i = 1; i <= gpio_channels; ++i) {
+    const giga::Pin pin = giga::pin_of(plan_wiring().at(SignalKind::gpio, i));
+    EXPECT_TRUE(pin == pins_of_variant[i - 1]) << "input " << i;
   }
 }
 

@@ -196,7 +196,8 @@ int TDBStore::get(const char* key, void* buffer, std::size_t buffer_size, std::s
                   std::size_t) {
   const std::lock_guard<std::mutex> lock(giga().mutex);
   const auto found = giga().stored.find(key);
-  if (found == giga().stored.end()) return -1;
+  if (giga().flash_damaged) return -1;
+  if (found == giga().stored.end()) return MBED_ERROR_ITEM_NOT_FOUND;
   *actual_size = std::min(buffer_size, found->second.size());
   std::memcpy(buffer, found->second.data(), *actual_size);
   return MBED_SUCCESS;

@@ -72,7 +72,7 @@ void clear_registers() {
 
 Giga& giga() { return *the_giga; }
 
-Giga::Giga() {
+Giga::Giga(const Wiring& wired) : chips(wired) {
   the_giga = this;
   r4_fake_rtc.BKP20R.clear();
   r4_fake_rcc.RSR.clear();
@@ -104,9 +104,9 @@ void Giga::connect_registers() {
         rises_[static_cast<std::size_t>(i)][line] += static_cast<int>(risen >> line & 1U);
       }
       const bool scl = i == 'H' - 'A' && (port.MODER.value >> 8 & 3U) == 1;  // PH4 as an output
-      if (scl && (before & 1U << 4) == 0 && (port.ODR.value & 1U << 4) != 0) i2c.scl_rose();
-      const bool user_scl = i == 'B' - 'A' && (port.MODER.value >> 12 & 3U) == 1;  // PB6
-      if (user_scl && (risen & 1U << 6) != 0) user_i2c.scl_rose();
+      if (scl && (risen & 1U << 4) != 0) at_bus(0).scl_rose();
+      const bool scl1 = i == 'B' - 'A' && (port.MODER.value >> 12 & 3U) == 1;  // PB6
+      if (scl1 && (risen & 1U << 6) != 0) at_bus(1).scl_rose();
     };
     port.IDR.on_read = [this, i, &port] {
       std::uint32_t levels = 0;
@@ -118,18 +118,23 @@ void Giga::connect_registers() {
                     : driven    ? (outside_[static_cast<std::size_t>(i)] >> line & 1U) != 0
                     : mode == 2 ? true
                                 : pull == 1;
-        if (i == 'B' - 'A' && line == 11 && i2c.sda_low()) high = false;
-        if (i == 'H' - 'A' && line == 4 && i2c.scl_low()) high = false;
-        if (i == 'H' - 'A' && line == 12 && user_i2c.sda_low()) high = false;
-        if (i == 'B' - 'A' && line == 6 && user_i2c.scl_low()) high = false;
+        if (i == 'B' - 'A' && line == 11 && at_bus(0).sda_low()) high = false;
+        if (i == 'H' - 'A' && line == 4 && at_bus(0).scl_low()) high = false;
+        if (i == 'H' - 'A' && line == 12 && at_bus(1).sda_low()) high = false;
+        if (i == 'B' - 'A' && line == 6 && at_bus(1).scl_low()) high = false;
         levels |= (high ? 1U : 0U) << line;
       }
       return levels;
     };
   }
-  i2c.connect(r4_fake_i2c2, {&chips.osmc, &chips.dhb12, &chips.servo, &chips.expander, &chips.dac},
-              2500);
-  user_i2c.connect(r4_fake_i2c4, {&devices.mpu6050, &devices.ina219}, 10000);
+  std::vector<sim::I2cChipModel*> fitted;
+  for (int i = 0; i < chip_count; ++i) {
+    const Chip chip = static_cast<Chip>(i);
+    if (chips.wiring.chip(chip).connected()) fitted.push_back(&chips[chip]);
+  }
+  const bool first = &at_bus(0) == &i2c;
+  i2c.connect(first ? r4_fake_i2c2 : r4_fake_i2c4, std::move(fitted), 2500);
+  user_i2c.connect(first ? r4_fake_i2c4 : r4_fake_i2c2, {&devices.mpu6050, &devices.ina219}, 10000);
   uart[0].connect(r4_fake_usart2);
   uart[1].connect(r4_fake_uart4);
   can.connect();
@@ -157,6 +162,10 @@ void Giga::connect_registers() {
   };
 }
 
+I2cPeripheral& Giga::at_bus(int bus) {
+  return chips.wiring.at(SignalKind::chip_bus).number() == bus ? i2c : user_i2c;
+}
+
 // ADC1: ready as soon as it is on. A conversion has ended when the firmware looks again.
 void Giga::connect_converter() {
   constexpr std::uint32_t on = 1U << 0;
@@ -165,8 +174,8 @@ void Giga::connect_converter() {
   constexpr std::uint32_t converted = 1U << 2;
   ADC_TypeDef& adc = r4_fake_adc1;
   adc.CR.on_write = [this](std::uint32_t value) {
-    static const std::map<std::uint32_t, int> pins = {{4, 0x24}, {5, 0x11},  {8, 0x25},
-                                                      {9, 0x10}, {12, 0x22}, {13, 0x23}};
+    static const std::map<std::uint32_t, int> pins = {
+        {4, 0x24}, {5, 0x11}, {8, 0x25}, {9, 0x10}, {10, 0x20}, {12, 0x22}, {13, 0x23}, {16, 0x00}};
     if (converter_hangs) return;
     const bool was_on = (adc.CR.value & on) != 0;
     adc.CR.value = (adc.CR.value | value) & ~convert;

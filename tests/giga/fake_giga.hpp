@@ -172,7 +172,7 @@ struct Datagram {
 
 class Giga {
  public:
-  Giga();
+  explicit Giga(const Wiring& wired = plan_wiring());
   ~Giga();
   Giga(const Giga&) = delete;
   Giga& operator=(const Giga&) = delete;
@@ -194,9 +194,9 @@ class Giga {
   std::uint64_t watchdog_fed_ns = 0;
   int watchdog_feeds = 0;
 
-  // --- the board
+  // --- the board, as it is wired
   sim::BoardChips chips;
-  I2cPeripheral i2c;
+  I2cPeripheral i2c;         // of the bus with the chips
   sim::UserDevices devices;  // on the user's I2C bus
   I2cPeripheral user_i2c;
   UartPeripheral uart[uart_channels];
@@ -239,6 +239,7 @@ class Giga {
   // --- flash
   bool has_partition = true;
   std::atomic<bool> flash_hangs{false};
+  bool flash_damaged = false;  // what is stored cannot be read
   std::uint64_t partition_size = 1024 * 1024;
   std::map<std::string, std::string> stored;
   int writes = 0;
@@ -269,6 +270,8 @@ class Giga {
 
  private:
   void connect_converter();
+  // 0: SDA and SCL, 1: SDA1 and SCL1.
+  I2cPeripheral& at_bus(int bus);
   void run_pending();
   void let_happen();
   std::uint64_t now_ns_ = 0;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "fake_giga.hpp"
+#include "firmware/ports/giga/buses.hpp"
 #include "firmware/ports/giga/chip/board_clock.hpp"
 #include "firmware/ports/giga/pins.hpp"
 #include "tests/giga/core/registers.hpp"
@@ -62,9 +63,7 @@ class Bus {
   }
 
   fake::Giga chip;
-  giga::I2cController bus{
-      {I2C2, giga::i2c_scl_pin, giga::i2c_sda_pin, giga::i2c_function, giga::i2c_function},
-      &giga::BoardClock::now_us};
+  giga::I2cController bus{giga::parts_of_bus(0), &giga::BoardClock::now_us};
   std::uint64_t took_us = 0;
 
  private:
@@ -139,9 +138,9 @@ TEST(I2cController, ARefusedTransferLeavesNoByteForTheNext) {
 
 TEST(I2cController, ARecoveryOfAFreeBusSendsOnlyAStopCondition) {
   Bus bus;
-  const int before = bus.chip.rises(giga::i2c_scl_pin.port, giga::i2c_scl_pin.number);
+  const int before = bus.chip.rises(giga::i2c_scl_pins[0].port, giga::i2c_scl_pins[0].number);
   EXPECT_TRUE(bus.bus.recover());
-  EXPECT_LE(bus.chip.rises(giga::i2c_scl_pin.port, giga::i2c_scl_pin.number) - before, 2)
+  EXPECT_LE(bus.chip.rises(giga::i2c_scl_pins[0].port, giga::i2c_scl_pins[0].number) - before, 2)
       << "SCL is released, then STOP";
 }
 

@@ -143,7 +143,7 @@ TEST(GigaFault, AChipThatHoldsTheBusStopsTheSteppersWithin23Ms) {
     bench.run_ms(150, host, bench.usb());
     bench.usb()(host.command("P:1000000,20000,1"));
     bench.run_ms(60, host, bench.usb());
-    const giga::Pin pin = giga::step_pins[0];
+    const giga::Pin pin = giga::pin_of(plan_wiring().at(SignalKind::step));
     const std::uint64_t held_ns = bench.giga.now_ns() + after_us * 1000;
     std::uint64_t last_step_ns = 0;
     int steps = 0;
@@ -192,7 +192,7 @@ TEST(GigaFault, AWarningOfTheCoreChangesNothing) {
 
 TEST(GigaFault, TheNextBootSkipsASettingsStoreThatFailed) {
   GigaBench bench;
-  bench.giga.stored["r4-settings"] = "rate,20\n";
+  bench.store("rate,20\n");
   bench.giga.flash_hangs = true;
   bench.giga.step_timer.period_ns = 1000000000;
   bench.giga.step_timer.next_ns = bench.giga.now_ns() + 50000000;
@@ -216,7 +216,7 @@ TEST(GigaFault, TheNextBootSkipsASettingsStoreThatFailed) {
 
 TEST(GigaFault, AFaultAfterTheStoreStartedKeepsTheSettings) {
   GigaBench bench;
-  bench.giga.stored["r4-settings"] = "rate,20\n";
+  bench.store("rate,20\n");
   bench.boot();
   EXPECT_TRUE(bench.giga.reset_by([] { r4_fake_core_error(-5, 0x08040000); }));
   bench.restart();
@@ -324,7 +324,7 @@ TEST(GigaSettings, AreNotStoredOnAPartitionForUserFiles) {
 
 TEST(GigaSettings, AreNotOverwrittenIfTheyCouldNotBeRead) {
   GigaBench bench;
-  bench.giga.stored["r4-settings"] = "network,mine\nrate,20\n";
+  bench.store("network,mine\nrate,20\n");
   bench.giga.flash_hangs = true;
   const std::uint64_t before_ms = bench.giga.now_ms();
   bench.boot();
@@ -387,19 +387,6 @@ TEST(GigaReport, ReportsHowManyPathsTheSessionHas) {
   bench.can()(with_crc(named + "PNum:2;" + echo));
   bench.run_ms(20);
   EXPECT_TRUE(has_line(bench.report(), "Paths: 2; joined 1, lost 0"));
-}
-
-TEST(GigaSettings, SelectTheFittedChips) {
-  GigaBench bench;
-  bench.giga.stored["r4-settings"] = "chips,17\n";  // OSMC and servos
-  bench.boot();
-  PlainHost host;
-  bench.drive(host, bench.usb());
-  bench.giga.i2c.log.clear();
-  bench.run_ms(200, host, bench.usb());
-  for (const auto& transfer : bench.giga.i2c.log) {
-    EXPECT_TRUE(transfer[0] >> 1 == 0x40 || transfer[0] >> 1 == 0x42) << int{transfer[0]};
-  }
 }
 
 TEST(GigaSettings, NetworkSettingsAreRefusedOverCan) {

@@ -75,6 +75,27 @@ TEST_F(DrivenBoard, SetsThePinOfEveryChannelAndReadsItBack) {
   expect_every_channel(controlled(simulated, board));
 }
 
+TEST(BoardAtACable, KeepsAWiringForItsNextStart) {
+  BoardInAThread simulated("pty");
+  Board board(simulated.url(), at_will());
+  board.wait_active();
+  BoardWiring kept = board.wiring();
+  EXPECT_EQ(kept.source, WiringSource::plan);
+  EXPECT_TRUE(kept.in_use);
+  EXPECT_EQ(kept.wiring, plan_wiring());
+  Wiring wiring = plan_wiring();
+  wiring.at(SignalKind::handle).byte = 53;
+  board.give_wiring(wiring);
+  kept = board.wiring();
+  EXPECT_EQ(kept.source, WiringSource::given);
+  EXPECT_FALSE(kept.in_use);
+  EXPECT_EQ(kept.wiring, wiring);
+  wiring.at(SignalKind::handle).byte = 20;
+  EXPECT_THROW(board.give_wiring(wiring), Error);
+  EXPECT_EQ(board.wiring().wiring.at(SignalKind::handle).number(), 53);
+  EXPECT_EQ(board.identify().wiring->source, WiringSource::given) << "the newest answer";
+}
+
 TEST_P(BoardOver, StopsUntilCleared) {
   BoardInAThread simulated(GetParam());
   Board board(simulated.url(), at_will());

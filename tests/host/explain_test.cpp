@@ -57,6 +57,28 @@ TEST(LinkCauses, CanBeSetAndCleared) {
   }
 }
 
+TEST(Explain, AWiringWithATroubleHasItsOwnFix) {
+  std::set<std::string> fixes;
+  for (const ChipTrouble trouble :
+       {ChipTrouble::not_confirmed, ChipTrouble::damaged, ChipTrouble::other_bus}) {
+    LinkStatus link = well_but_for({});
+    link.state = HostLinkState::safe;
+    link.reason = SafeReason::fault;
+    link.chip = {0, trouble};
+    const Problem problem = explain("serial:auto", link);
+    EXPECT_NE(problem.reason.find("wir"), std::string::npos) << problem.reason;
+    EXPECT_NE(problem.fix.find("r4 wiring "), std::string::npos) << problem.fix;
+    fixes.insert(problem.fix);
+    CommandResult result;
+    result.outcome = Outcome::not_armed;
+    result.disarmed = DisarmCause::earlier_fault;
+    const Problem not_armed = explain("arm()", result, link);
+    EXPECT_EQ(not_armed.reason, "not armed: " + problem.reason);
+    EXPECT_EQ(not_armed.fix, problem.fix);
+  }
+  EXPECT_EQ(fixes.size(), 3U);
+}
+
 TEST(Explain, HasAnOwnReasonForEachCause) {
   ASSERT_EQ(all_causes().size(), 13U);
   EXPECT_EQ(all_causes().back(), LinkCause::other_board);

@@ -56,7 +56,7 @@ TEST(SimulatedRobot, ReleasesTheHandleAndShowsThatTheMotorsAreOff) {
   robot.happen("handle released");
   EXPECT_FALSE(await(board, [](const State& state) {
                  return state.safe == SafeReason::handle;
-               }).handle_held);
+               }).handle_held());
   const auto now = await(board, robot, [](const auto& look) { return look.pins.is_safe(); });
   EXPECT_FALSE(now.motors_have_supply || now.handle_held);
   robot.happen("handle held");

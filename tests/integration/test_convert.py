@@ -53,7 +53,7 @@ def test_pandas_reads_csv_with_the_right_types(native, tmp_path):
     assert f'73 records; left out are {73 - len(table)} that are not states' in said
     kinds = {name: kind.kind for name, kind in table.dtypes.items()}
     assert kinds['time [s]'] == kinds['AIN24 [V]'] == 'f'
-    for name in ('path', 'PNum', 'T [ms]', 'DMHSTA [0/1]', 'OSMC1 pwm [0-4095]', 'STEP1POS [steps]'):
+    for name in ('path', 'PNum', 'T [ms]', 'DMHSTA [0/1/2]', 'OSMC1 pwm [0-4095]', 'STEP1POS [steps]'):
         assert kinds[name] == 'i', name
     first = table.iloc[0]
     assert (first['board'], first['PNum'], first['AIN24 [V]']) == ('left-arm', 7434, 24.28)

@@ -42,7 +42,7 @@ TEST(BoardState, ReportsEveryInputExactly) {
   board.host.execute(Command::stepper(3, Steps(50), StepsPerSecond(5000)));
   board.host.run_alive_ms(700);  // long enough to read every sensor
   const State& state = board.state();
-  EXPECT(state.handle_held && state.raw.stepper_steps[2] == 50);
+  EXPECT(state.handle_held() && state.raw.stepper_steps[2] == 50);
   for (int i = 0; i < analog_channels; ++i) EXPECT(state.raw.analog_cv[i] == 100 * (i + 1) + i);
   for (int channel = 1; channel <= 4; ++channel) {
     EXPECT(state.raw.ultrasonic_cm[channel - 1] == 50 * channel);
@@ -82,10 +82,10 @@ TEST(BoardState, AReleasedHandleSwitchesEverythingOff) {
   on_target::say_number("us from the handle's release to safe", after_us);
   EXPECT(board.host.safe() && after_us <= 12000);
   EXPECT(board.host.reason() == SafeReason::handle);
-  EXPECT(board.state().safe == SafeReason::handle && !board.state().handle_held);
+  EXPECT(board.state().safe == SafeReason::handle && !board.state().handle_held());
   board.host.model().hold_handle(true);
   board.host.run_alive_ms(100);
-  EXPECT(board.host.reason() == SafeReason::none && board.state().handle_held);
+  EXPECT(board.host.reason() == SafeReason::none && board.state().handle_held());
   EXPECT(board.host.chips_are_safe());  // until the next command
   board.host.execute(Command::relay(1, true));
   EXPECT(board.host.pins().relays == 1);

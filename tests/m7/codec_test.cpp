@@ -29,7 +29,7 @@ Text whole(char* buffer, std::size_t capacity) {
   state.raw.analog_cv[2] = 511;
   state.raw.analog_cv[3] = 1219;
   state.raw.analog_cv[4] = 103;
-  state.handle_held = true;
+  state.handle = Handle::held;
   for (const StateField field : FieldSet::paper_default()) write_field(writer, field, state);
   return writer.finish(22, 79146);
 }
@@ -79,7 +79,7 @@ TEST(StateDatagram, MatchesTheCapture) {
   Datagram seen;
   State state;
   EXPECT(read_datagram(datagram, seen));
-  EXPECT(read_state(seen, state) && state.raw.analog_cv[0] == 2428 && state.handle_held);
+  EXPECT(read_state(seen, state) && state.raw.analog_cv[0] == 2428 && state.handle_held());
   EXPECT(state.pnum == 22 && state.t_ms == 79146);
 }
 

@@ -71,7 +71,7 @@ class Hal final : public firmware::Hal {
  public:
   void apply(const firmware::Outputs& outputs) override { pwm_ = outputs.osmc[0].pwm; }
   void make_safe() override { pwm_ = 0; }
-  void sample(firmware::Inputs& inputs) override { inputs.handle_held = true; }
+  void sample(firmware::Inputs& inputs) override { inputs.handle = Handle::held; }
   void zero(int) override {}
   bool clear_fault() override { return true; }
   std::uint16_t pwm() const { return pwm_; }
@@ -114,7 +114,7 @@ State captured() {
   state.raw.analog_cv[2] = 511;
   state.raw.analog_cv[3] = 1219;
   state.raw.analog_cv[4] = 103;
-  state.handle_held = true;
+  state.handle = Handle::held;
   return state;
 }
 
@@ -184,7 +184,7 @@ std::uint32_t command_instructions(firmware::Hal& hal, std::uint32_t first, Sess
 std::uint32_t with_drivers() {
   static Bus bus;
   static sim::BoardModel around(1);
-  static firmware::BoardHardware hardware(bus, around.microcontroller_pins(), {});
+  static firmware::BoardHardware hardware(bus, around.microcontroller_pins(plan_wiring()), {});
   hardware.power_up(0);
   for (std::uint32_t ms = 1; ms <= 100; ++ms) {
     bus.pass_millisecond();

@@ -115,7 +115,7 @@ TEST(PaperCapture, TheFirstStateHasThePrintedValues) {
   EXPECT_EQ(state.raw.analog_cv[static_cast<int>(Analog::ain5)], 512);
   EXPECT_EQ(state.raw.analog_cv[static_cast<int>(Analog::aindmh)], 1211);
   EXPECT_EQ(state.raw.analog_cv[static_cast<int>(Analog::ainsteer)], 103);
-  EXPECT_TRUE(state.handle_held);
+  EXPECT_TRUE(state.handle_held());
   EXPECT_EQ(state.raw.dhb12[0], (Drive{4095, Direction::forward}));
   EXPECT_EQ(state.raw.osmc[0], (Drive{400, Direction::forward}));
   EXPECT_EQ(state.raw.stepper_steps[0], -100);

@@ -91,7 +91,7 @@ def test_copied_values_keep_their_contents(sim, board):
         fleet.wait_active()
         values = [board.state, board.next_state(), board.link, board.statistics, board.carrier_counters, board.identify(),
                   *board.paths, r4link.Command.osmc(1, pwm=5), *fleet.health(), *fleet.stop(), sim.look(),
-                  r4link.Device('bno055@0x29'),
+                  r4link.Device('bno055@0x29'), r4link.Wiring.plan(),
                   r4link.ServoCalibration(us=(1000, 2000), degrees=(-45, 45))]
         events = []
         board.on_event(events.append)

@@ -22,7 +22,6 @@ namespace r4::simulation {
 namespace {
 
 using firmware::BoardState;
-using firmware::Chip;
 
 // The incidents, and the cause that the board reports for each.
 enum class Incident {
@@ -46,7 +45,7 @@ std::uint32_t limit_ms(Incident incident) {
   switch (incident) {
     case Incident::chip_off:
     case Incident::chip_reset:
-      return firmware::chip_count * firmware::BoardHardware::verify_us / 1000 + 2;
+      return chip_count * firmware::BoardHardware::verify_us / 1000 + 2;
     case Incident::bus_held:
       return firmware::BoardHardware::verify_us / 1000 + 2;
     case Incident::handle:
@@ -114,7 +113,7 @@ class Day final : private firmware::Port {
     const SafeReason reason = reasons[static_cast<int>(incident)];
     drive();
     live(random_.below(2) == 0 ? random_.between(0, 4) : random_.between(100, 2000));
-    const Chip chip = static_cast<Chip>(random_.below(firmware::chip_count));
+    const Chip chip = static_cast<Chip>(random_.below(chip_count));
     begin(incident, chip);
     const std::uint64_t began_ms = passed_ms_;
     do {  // the stop of a stepper shows one millisecond later

@@ -71,7 +71,7 @@ class Crowd final : public firmware::Hal, public firmware::Port, public firmware
   // firmware::Hal
   void apply(const firmware::Outputs& outputs) override { outputs_ = outputs; }
   void make_safe() override { outputs_ = firmware::Outputs(); }
-  void sample(firmware::Inputs& inputs) override { inputs.handle_held = true; }
+  void sample(firmware::Inputs& inputs) override { inputs.handle = Handle::held; }
   void zero(int) override {}
   bool clear_fault() override { return true; }
   // firmware::Port

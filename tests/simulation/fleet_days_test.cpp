@@ -216,7 +216,7 @@ class FleetLink final : firmware::Hal, firmware::Port, test::DrivenSession::Hand
   // firmware::Hal
   void apply(const firmware::Outputs&) override {}
   void make_safe() override {}
-  void sample(firmware::Inputs& inputs) override { inputs.handle_held = true; }
+  void sample(firmware::Inputs& inputs) override { inputs.handle = Handle::held; }
   void zero(int) override {}
   bool clear_fault() override { return true; }
   // firmware::Port

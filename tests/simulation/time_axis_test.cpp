@@ -121,7 +121,7 @@ class AxisLink final : public firmware::Hal,
   // firmware::Hal
   void apply(const firmware::Outputs&) override {}
   void make_safe() override {}
-  void sample(firmware::Inputs& inputs) override { inputs.handle_held = true; }
+  void sample(firmware::Inputs& inputs) override { inputs.handle = Handle::held; }
   void zero(int) override {}
   bool clear_fault() override { return true; }
   // firmware::Port

@@ -118,7 +118,7 @@ void World::lose_port(std::uint8_t port) {
 }
 
 void World::sample(firmware::Inputs& inputs) {
-  inputs.handle_held = handle_held_;
+  inputs.handle = handle_held_ ? Handle::held : Handle::released;
   for (auto& cm : inputs.ultrasonic_cm) cm = 200;
   inputs.ultrasonic_cm[0] = distance_cm_;
 }

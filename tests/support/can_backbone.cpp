@@ -51,7 +51,7 @@ class Voice {
     for (int i = 0; i < analog_channels; ++i) {
       state.raw.analog_cv[i] = volts[i] + static_cast<std::int32_t>(random_.below(7)) - 3;
     }
-    state.handle_held = true;
+    state.handle = Handle::held;
     for (Drive& drive : state.raw.dhb12) drive = any_drive();
     for (Drive& drive : state.raw.osmc) drive = any_drive();
     for (std::int32_t& steps : state.raw.stepper_steps) steps = moving(20000);

@@ -51,7 +51,7 @@ void expect_inputs(const ControlledBoard& board) {
   const State again = await(board, [&](const State& s) {  // every sensor was read after the change
     return s.t_ms - state.t_ms > 250;
   });
-  EXPECT_TRUE(again.handle_held);
+  EXPECT_TRUE(again.handle_held());
   for (int i = 0; i < analog_channels; ++i) EXPECT_EQ(again.raw.analog_cv[i], 100 * (i + 1) + i);
   for (int channel = 1; channel <= encoder_channels; ++channel) {
     EXPECT_EQ(again.encoder(channel), turns_of(channel) + part_of(channel));
@@ -172,10 +172,10 @@ void expect_interlocks(const ControlledBoard& board) {
   }
   drive(board);
   board.at_board([](sim::SimulatedBoard& at) { at.model().hold_handle(false); });
-  await(board, [](const State& s) { return s.safe == SafeReason::handle && !s.handle_held; });
+  await(board, [](const State& s) { return s.safe == SafeReason::handle && !s.handle_held(); });
   EXPECT_TRUE(pins_of(board).is_safe());
   board.at_board([](sim::SimulatedBoard& at) { at.model().hold_handle(true); });
-  await(board, [](const State& s) { return s.safe == SafeReason::none && s.handle_held; });
+  await(board, [](const State& s) { return s.safe == SafeReason::none && s.handle_held(); });
   expect_that_nothing_came_back(board);
   drive(board);
 }

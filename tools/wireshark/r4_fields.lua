@@ -5,7 +5,7 @@
 
 -- The types in Wireshark of a form's values (FieldForm), and of a command's value (ValueRole).
 local types = {
-  volts = { "double" }, flag = { "uint8" }, drive = { "uint16", "uint8" }, bldc = { "uint16", "uint8", "uint8" },
+  volts = { "double" }, handle = { "uint8" }, drive = { "uint16", "uint8" }, bldc = { "uint16", "uint8", "uint8" },
   servo = { "uint16" }, u8 = { "uint8" }, u16 = { "uint16" }, i32 = { "int32" }, u32 = { "uint32" },
   reason = { "uint32" }, fault = { "uint8", "uint8" }, reading = { "uint32", "uint32", "string" },
   answer = { "uint32", "uint8", "string" }, bus = { "uint8", "uint32", "uint32" },

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The six analog inputs, converted in turn, one per poll. Never waits; from the loop only. The core
-// sets up pins and converter and reads each input once. Then this class uses the registers of ADC1
-// (RM0399, chapter ADC). The core would wait up to 10 ms for a conversion, and end the boot if the
-// converter does not switch on. Here a dead converter reads 0, and motors can still be driven.
+// The connected analog inputs, converted in turn, one per poll; the others read 0. Never waits;
+// from the loop only. The core sets up pins and converter and reads each input once. Then this
+// class uses the registers of ADC1 (RM0399, chapter ADC). The core would wait up to 10 ms for a
+// conversion, and end the boot if the converter does not switch on. Here a dead converter reads 0,
+// and motors can still be driven.
 #pragma once
 
 #include <cstdint>
 
 #include "chip/chip.hpp"
+#include "late.hpp"
 #include "pins.hpp"
 
 namespace r4 {
@@ -29,15 +31,12 @@ class AnalogValue final : public firmware::AnalogPin {
 class AnalogInputs {
  public:
   // Construct before any interrupt that must be in time is enabled.
-  explicit AnalogInputs(AnalogValue (&values)[analog_channels]) : values_(values) {
-    for (int i = 0; i < analog_channels; ++i) values_[i].newest = converters_[i].read_u16();
-    for (const std::uint32_t input : adc_inputs) {
-      ADC1->PCSEL |= 1U << input;
-      if (input < 10) {
-        ADC1->SMPR1 = (ADC1->SMPR1 & ~(7U << 3 * input)) | sampling_time << 3 * input;
-      } else {
-        ADC1->SMPR2 = (ADC1->SMPR2 & ~(7U << 3 * (input - 10))) | sampling_time << 3 * (input - 10);
-      }
+  AnalogInputs(AnalogValue (&values)[analog_channels], const Wiring& wiring) : values_(values) {
+    for (int i = 0; i < analog_channels; ++i) {
+      const Place place = wiring.at(SignalKind::analog, i + 1);
+      if (!place.connected()) continue;
+      values_[i].newest = converters_[i].make(pin_name(pin_of(place))).read_u16();
+      set_up(inputs_[i] = adc1_inputs[place.number() - first_analog_pin]);
     }
   }
 
@@ -53,6 +52,13 @@ class AnalogInputs {
   }
 
  private:
+  static void set_up(std::uint32_t input) {
+    ADC1->PCSEL |= 1U << input;
+    auto& times = input < 10 ? ADC1->SMPR1 : ADC1->SMPR2;
+    const std::uint32_t shift = 3 * (input % 10);
+    times = (times & ~(7U << shift)) | sampling_time << shift;
+  }
+
   // True if a conversion was finished.
   bool convert() {
     const std::uint32_t control = ADC1->CR;
@@ -71,7 +77,10 @@ class AnalogInputs {
       values_[next_].newest = static_cast<std::uint16_t>(ADC1->DR);
       next_ = (next_ + 1) % analog_channels;
     }
-    ADC1->SQR1 = adc_inputs[next_] << 6;
+    for (int i = 0; i < analog_channels && !converters_[next_].made(); ++i) {
+      next_ = (next_ + 1) % analog_channels;
+    }
+    ADC1->SQR1 = inputs_[next_] << 6;
     command(cr_convert);
     step_ = Step::converting;
     return converted;
@@ -92,10 +101,8 @@ class AnalogInputs {
   }
 
   AnalogValue (&values_)[analog_channels];
-  static_assert(analog_channels == 6, "as below");
-  mbed::AnalogIn converters_[analog_channels] = {
-      {pin_name(analog_pins[0])}, {pin_name(analog_pins[1])}, {pin_name(analog_pins[2])},
-      {pin_name(analog_pins[3])}, {pin_name(analog_pins[4])}, {pin_name(analog_pins[5])}};
+  Late<mbed::AnalogIn> converters_[analog_channels];
+  std::uint32_t inputs_[analog_channels] = {};  // of ADC1
   int next_ = 0;
   int late_ = 0;
   Step step_ = Step::idle;

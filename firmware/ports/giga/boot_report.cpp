@@ -63,6 +63,18 @@ Text fate_of_settings(const SettingsStore& store) {
                                : Text("not kept: the key-value store cannot be written");
 }
 
+Text fate_of_wiring(WiringSource source) {
+  switch (source) {
+    case WiringSource::plan:
+      return "the plan, which nobody has confirmed (r4 wiring confirm serial:auto)";
+    case WiringSource::given:
+      return "given by its owner";
+    case WiringSource::damaged:
+      break;
+  }
+  return "damaged: give it again (r4 wiring give FILE serial:auto)";
+}
+
 void write_last_boot(LineWriter& line, const FaultNote& note) {
   line.text("Last boot ended by: ");
   switch (note.kind) {
@@ -94,12 +106,23 @@ Text BootReport::scan(char (&out)[max_line]) {
 }
 
 Text BootReport::chip(char (&out)[max_line]) {
-  const auto chip = static_cast<firmware::Chip>(chip_++);
+  static constexpr struct {
+    Text part;
+    Text function;
+  } names[chip_count] = {{"PCA9685", "OSMC"},
+                         {"PCA9685", "DHB12"},
+                         {"PCA9685", "servos"},
+                         {"MCP23017", "relays, BLDC direction and brake"},
+                         {"MCP4728", "BLDC speed"}};
+  const auto& name = names[chip_];
+  const auto chip = static_cast<Chip>(chip_++);
+  const Place address = sources_.hardware->wiring().chip(chip);
   LineWriter line(out);
-  const bool fitted = (sources_.settings->site.chips >> static_cast<int>(chip) & 1) != 0;
-  line.words(chip_name(firmware::address_of(chip))).text(": ");
+  line.text(name.part);
+  if (address.connected()) line.text(" ").hex(address.number());
+  line.text(" (").text(name.function).text("): ");
   const firmware::ChipTrouble trouble = sources_.hardware->trouble(chip);
-  if (!fitted) {
+  if (!address.connected()) {
     line.text("not fitted");
   } else if (trouble == firmware::ChipTrouble::none) {
     line.text("ok");
@@ -209,15 +232,17 @@ Text BootReport::next(char (&out)[max_line]) {
       chip_ = 0;
       return line.text("Settings: ").text(fate_of_settings(*sources_.store)).done();
     case 21:
-      if (chip_ + 1 < firmware::chip_count) --step_;
-      return chip(out);
+      return line.text("Wiring: ").text(fate_of_wiring(settings.site.wiring_source)).done();
     case 22:
-      return line.text("Deadlines missed: ").number(sources_.guard->missed()).done();
+      if (chip_ + 1 < chip_count) --step_;
+      return chip(out);
     case 23:
-      return stacks(out);
+      return line.text("Deadlines missed: ").number(sources_.guard->missed()).done();
     case 24:
-      return keys(out);
+      return stacks(out);
     case 25:
+      return keys(out);
+    case 26:
       return paths(out);
     default:
       step_ = 0;

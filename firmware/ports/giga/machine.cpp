@@ -8,51 +8,21 @@ namespace giga {
 
 namespace {
 
-firmware::BoardHardware::Config hardware_config() {
+firmware::BoardHardware::Config config_of(const Wiring& wiring, ChipTrouble trouble) {
   firmware::BoardHardware::Config config;
-  // A missing sensor is blind: with a threshold it counts as an obstacle.
-  config.ultrasonic_fitted = (1U << ultrasonic_channels) - 1;
-  config.step_tick_hz = static_cast<std::int32_t>(step_tick_hz);
+  config.wiring = wiring;
+  config.wiring_trouble = trouble;
+  static_assert(firmware::BoardHardware::step_tick_hz == step_tick_hz, "the rate of the timer");
   return config;
 }
 
-I2cController::Wiring bus_wiring() {
-  I2cController::Wiring wiring;
-  wiring.registers = I2C2;
-  wiring.scl = i2c_scl_pin;
-  wiring.sda = i2c_sda_pin;
-  wiring.scl_function = i2c_function;
-  wiring.sda_function = i2c_function;
-  return wiring;
-}
-
-I2cController::Wiring user_wiring() {
-  I2cController::Wiring wiring;
-  wiring.registers = I2C4;
-  wiring.scl = user_scl_pin;
-  wiring.sda = user_sda_pin;
-  wiring.scl_function = user_scl_function;
-  wiring.sda_function = user_sda_function;
-  return wiring;
-}
-
-void start_user_bus(UserI2cController& bus) {
-  constexpr std::uint32_t rcc_i2c4_on = 1U << 7;
-  {
-    const InterruptLock lock;
-    RCC->APB4ENR |= rcc_i2c4_on;
-    static_cast<void>(static_cast<std::uint32_t>(RCC->APB4ENR));
-  }
-  bus.start(HAL_RCCEx_GetD3PCLK1Freq());  // default clock of I2C4 (RCC_D3CCIPR)
-}
-
-UserUartController::Wiring uart_wiring(int channel) {
-  UserUartController::Wiring wiring;
-  wiring.registers = channel == 1 ? USART2 : UART4;
-  wiring.tx = uart_tx_pins[channel - 1];
-  wiring.rx = uart_rx_pins[channel - 1];
-  wiring.function = uart_functions[channel - 1];
-  return wiring;
+UserUartController::Parts parts_of_uart(int channel) {
+  UserUartController::Parts parts;
+  parts.registers = channel == 1 ? USART2 : UART4;
+  parts.tx = uart_tx_pins[channel - 1];
+  parts.rx = uart_rx_pins[channel - 1];
+  parts.function = uart_functions[channel - 1];
+  return parts;
 }
 
 void start_uarts(UserUartController& first, UserUartController& second) {
@@ -67,72 +37,96 @@ void start_uarts(UserUartController& first, UserUartController& second) {
   second.start(HAL_RCC_GetPCLK1Freq());
 }
 
-GpioInput spare_input(int channel) {
-  return GpioInput(line_of(gpio_pins[channel - 1]), LinePull::up);
+GpioOutput output(const Wiring& wiring, SignalKind kind, int channel) {
+  return GpioOutput(line_of(wiring.at(kind, channel)));
 }
 
-void start_bus(I2cController& bus) {
-  constexpr std::uint32_t rcc_i2c2_on = 1U << 22;
-  {
-    const InterruptLock lock;
-    RCC->APB1LENR |= rcc_i2c2_on;
-    static_cast<void>(static_cast<std::uint32_t>(RCC->APB1LENR));
-  }
-  bus.start(HAL_RCC_GetPCLK1Freq());  // default clock of I2C1-3 (RCC_D2CCIP2R)
+GpioInput spare_input(const Wiring& wiring, int channel) {
+  return GpioInput(line_of(wiring.at(SignalKind::gpio, channel)), LinePull::up);
+}
+
+// A broken wire reads as released.
+GpioInput handle_input(Place place) {
+  return GpioInput(line_of(place), place.option() ? LinePull::up : LinePull::down);
 }
 
 }  // namespace
 
-Machine::Encoder::Encoder(Pin a_pin, Pin b_pin, Pin index_pin)
-    : a(line_of(a_pin)),
-      b(line_of(b_pin)),
-      index(line_of(index_pin), LinePull::down),
-      a_edge(pin_name(a_pin), PullUp),
-      b_edge(pin_name(b_pin), PullUp) {}
+void Machine::Encoder::connect(const Wiring& wiring, int channel) {
+  const Place index_place = wiring.at(SignalKind::encoder_index, channel);
+  const Place a_place = wiring.at(SignalKind::encoder_a, channel);
+  const Place b_place = wiring.at(SignalKind::encoder_b, channel);
+  index = line_of(index_place);
+  make_input(index, LinePull::down);
+  a = line_of(a_place);
+  b = line_of(b_place);
+  if (!a_place.connected()) return;  // both or none
+  a_edge.make(pin_name(pin_of(a_place)), PullUp);
+  b_edge.make(pin_name(pin_of(b_place)), PullUp);
+}
+
+void Machine::Encoder::start(firmware::QuadratureEncoder& with) {
+  counter = &with;
+  if (!a_edge.made()) return;
+  on_edge();
+  for (mbed::InterruptIn* edge : {&*a_edge, &*b_edge}) {
+    edge->rise(mbed::callback(this, &Encoder::on_edge));
+    edge->fall(mbed::callback(this, &Encoder::on_edge));
+  }
+}
 
 // The core calls non-const methods. NOLINTBEGIN(readability-make-member-function-const)
 void Machine::Encoder::on_edge() { counter->sample(read(a), read(b)); }
-
-Machine::Echo::Echo(Pin pin) : line(line_of(pin)), edge(pin_name(pin), PullDown) {}
-
 void Machine::Echo::on_edge() { sensors->echo(sensor, read(line), BoardClock::now_us()); }
 // NOLINTEND(readability-make-member-function-const)
 
-Machine::OutputsOff::OutputsOff(I2cController& bus, firmware::BoardHardware& hardware) {
-  start_bus(bus);
+void Machine::Echo::connect(Place place) {
+  line = line_of(place);
+  if (place.connected()) edge.make(pin_name(pin_of(place)), PullDown);
+}
+
+void Machine::Echo::start(firmware::UltrasonicSensors& with, int number) {
+  sensors = &with;
+  sensor = number;
+  if (!edge.made()) return;
+  edge->rise(mbed::callback(this, &Echo::on_edge));
+  edge->fall(mbed::callback(this, &Echo::on_edge));
+}
+
+Machine::OutputsOff::OutputsOff(firmware::BoardHardware& hardware) {
   hardware.power_up(BoardClock::now_us());
 }
 
-Machine::Machine()
-    : bus_(bus_wiring(), &BoardClock::now_us),
-      step_{GpioOutput(line_of(step_pins[0])), GpioOutput(line_of(step_pins[1])),
-            GpioOutput(line_of(step_pins[2])), GpioOutput(line_of(step_pins[3]))},
-      direction_{GpioOutput(line_of(direction_pins[0])), GpioOutput(line_of(direction_pins[1])),
-                 GpioOutput(line_of(direction_pins[2])), GpioOutput(line_of(direction_pins[3]))},
-      trigger_{GpioOutput(line_of(trigger_pins[0])), GpioOutput(line_of(trigger_pins[1])),
-               GpioOutput(line_of(trigger_pins[2])), GpioOutput(line_of(trigger_pins[3]))},
-      handle_(line_of(handle_pin), LinePull::down),
-      gpio_{spare_input(1), spare_input(2), spare_input(3), spare_input(4),
-            spare_input(5), spare_input(6), spare_input(7), spare_input(8)},
+Machine::Machine(const Wiring& wiring, ChipTrouble wiring_trouble, Buses& buses)
+    : choice_(firmware::choose_bus(wiring, buses.answers(), wiring_trouble)),
+      bus_(buses[choice_.chips]),
+      step_{output(wiring, SignalKind::step, 1), output(wiring, SignalKind::step, 2),
+            output(wiring, SignalKind::step, 3), output(wiring, SignalKind::step, 4)},
+      direction_{output(wiring, SignalKind::step_direction, 1),
+                 output(wiring, SignalKind::step_direction, 2),
+                 output(wiring, SignalKind::step_direction, 3),
+                 output(wiring, SignalKind::step_direction, 4)},
+      trigger_{output(wiring, SignalKind::trigger, 1), output(wiring, SignalKind::trigger, 2),
+               output(wiring, SignalKind::trigger, 3), output(wiring, SignalKind::trigger, 4)},
+      handle_(handle_input(wiring.at(SignalKind::handle))),
+      gpio_{spare_input(wiring, 1), spare_input(wiring, 2), spare_input(wiring, 3),
+            spare_input(wiring, 4), spare_input(wiring, 5), spare_input(wiring, 6),
+            spare_input(wiring, 7), spare_input(wiring, 8)},
       dac_{DacOutput(1), DacOutput(2)},
-      hardware_(bus_, pins(), hardware_config()),
-      outputs_off_(bus_, hardware_),
-      analog_(analog_values_),
-      user_bus_(user_wiring()),
+      hardware_(bus_, pins(), config_of(wiring, choice_.wiring_trouble)),
+      outputs_off_(hardware_),
+      analog_(analog_values_, wiring),
+      user_bus_(parts_of_bus(1 - choice_.chips)),
       user_i2c_(user_bus_),
-      uart1_(uart_wiring(1)),
-      uart2_(uart_wiring(2)),
-      uarts_{firmware::UserUart(uart1_), firmware::UserUart(uart2_)},
-      encoder1_(encoder_a_pins[0], encoder_b_pins[0], index_pins[0]),
-      encoder2_(encoder_a_pins[1], encoder_b_pins[1], index_pins[1]),
-      encoder3_(encoder_a_pins[2], encoder_b_pins[2], index_pins[2]),
-      encoder4_(encoder_a_pins[3], encoder_b_pins[3], index_pins[3]),
-      echo1_(echo_pins[0]),
-      echo2_(echo_pins[1]),
-      echo3_(echo_pins[2]),
-      echo4_(echo_pins[3]) {
+      uart1_(parts_of_uart(1)),
+      uart2_(parts_of_uart(2)),
+      uarts_{firmware::UserUart(uart1_), firmware::UserUart(uart2_)} {
+  for (int i = 0; i < encoder_channels; ++i) encoders_[i].connect(wiring, i + 1);
+  for (int i = 0; i < ultrasonic_channels; ++i) {
+    echoes_[i].connect(wiring.at(SignalKind::echo, i + 1));
+  }
   // Before the application starts: readings that are kept as settings need both.
-  start_user_bus(user_bus_);
+  user_bus_.start(start_bus_clock(1 - choice_.chips));
   start_uarts(uart1_, uart2_);
 }
 
@@ -151,29 +145,15 @@ firmware::BoardPins Machine::pins() {
 }
 
 void Machine::add_devices(firmware::Application::Config& config) {
-  config.i2c = &user_i2c_;
+  if (choice_.user_may) config.i2c = &user_i2c_;
   for (int i = 0; i < uart_channels; ++i) config.uarts[i] = &uarts_[i];
 }
 
 void Machine::start(firmware::Guard& guard) {
   guard_ = &guard;
   step_duty_ = guard.add_duty(step_limit_ms);
-  for (int i = 0; i < encoder_channels; ++i) {
-    Encoder& encoder = *encoders_[i];
-    encoder.counter = &hardware_.encoder(i + 1);
-    encoder.on_edge();
-    for (mbed::InterruptIn* line : {&encoder.a_edge, &encoder.b_edge}) {
-      line->rise(mbed::callback(&encoder, &Encoder::on_edge));
-      line->fall(mbed::callback(&encoder, &Encoder::on_edge));
-    }
-  }
-  for (int i = 0; i < ultrasonic_channels; ++i) {
-    Echo& echo = *echoes_[i];
-    echo.sensors = &hardware_.ultrasonic();
-    echo.sensor = i;
-    echo.edge.rise(mbed::callback(&echo, &Echo::on_edge));
-    echo.edge.fall(mbed::callback(&echo, &Echo::on_edge));
-  }
+  for (int i = 0; i < encoder_channels; ++i) encoders_[i].start(hardware_.encoder(i + 1));
+  for (int i = 0; i < ultrasonic_channels; ++i) echoes_[i].start(hardware_.ultrasonic(), i);
   start_step_timer(*this);
 }
 
@@ -190,7 +170,7 @@ void Machine::step_tick() {
   uart1_.tick(sends);
   uart2_.tick(sends);
   for (int i = 0; i < encoder_channels; ++i) {
-    hardware_.encoder(i + 1).index(encoders_[i]->index.read());
+    hardware_.encoder(i + 1).index(read(encoders_[i].index));
   }
 }
 

@@ -18,6 +18,7 @@ namespace {
 constexpr int partition_number = 3;
 constexpr const char* key = "r4-settings";
 constexpr std::chrono::milliseconds pause(100);
+constexpr std::uint16_t unreadable = 0xFFFF;  // size of a record
 
 }  // namespace
 
@@ -44,8 +45,9 @@ void SettingsStore::serve() {
   }
   Record record = {};
   std::size_t size = 0;
-  if (store.get(key, record.text, sizeof record.text, &size) == MBED_SUCCESS) {
-    record.size = static_cast<std::uint16_t>(size);
+  const int found = store.get(key, record.text, sizeof record.text, &size);
+  if (found != MBED_ERROR_ITEM_NOT_FOUND) {
+    record.size = found == MBED_SUCCESS ? static_cast<std::uint16_t>(size) : unreadable;
     from_store_.put(record);
   }
   started(StoreState::ready);
@@ -57,14 +59,15 @@ void SettingsStore::serve() {
   }
 }
 
-bool SettingsStore::loaded(Settings& settings) {
-  keeps_ = state() == StoreState::ready;
+void SettingsStore::load(Settings& settings) {
+  const StoreState now = state();
+  keeps_ = now == StoreState::ready;
+  if (now == StoreState::loading || now == StoreState::avoided) settings.site.lose_wiring();
   Record record;
   std::uint32_t version = 0;
-  if (!keeps_ || !from_store_.take(version, record) || record.size > sizeof record.text)
-    return false;
+  if (!keeps_ || !from_store_.take(version, record)) return;
+  if (record.size == unreadable) return settings.site.lose_wiring();
   read_settings(Text(record.text, record.size), settings);
-  return true;
 }
 
 void SettingsStore::keep(const Settings& settings) {

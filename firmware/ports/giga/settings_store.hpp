@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Keeps the settings over a restart, as text (settings.hpp) in the core's key-value store on
 // partition 3 of the QSPI flash. Has its own thread, because an erase takes 0.1 s or more.
-//     loading ---> ready     the store works; loaded() returns the settings, if there are any
+//     loading ---> ready     the store works; load() reads the settings, if there are any
 //             ---> absent    partition 3 is missing or does not hold a store
 //     avoided                the store ended the last boot, because the core gives up for good
 //                            when worn-out flash cannot be erased
@@ -30,9 +30,10 @@ class SettingsStore {
   void start();
   void avoid() { state_.store(StoreState::avoided, std::memory_order_relaxed); }
   StoreState state() const { return state_.load(std::memory_order_acquire); }
-  // Reads the stored settings. Call once, after loading. False: there are none. If the caller
-  // does not wait until then, nothing is stored later either: it would overwrite the old settings.
-  bool loaded(Settings& settings);
+  // Reads the stored settings. Call once, after loading; the defaults stay if there are none. If
+  // the caller does not wait until then, the wiring is lost: the stored one is not known. Then
+  // nothing is stored later either, because it would overwrite the old settings.
+  void load(Settings& settings);
   // Stores them soon, on the thread.
   void keep(const Settings& settings);
   bool keeps() const { return keeps_; }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "system.hpp"
 
-#include <new>
-
 #include "chip/board_clock.hpp"
 #include "chip/fault.hpp"
 #include "chip/interrupt_stack.hpp"
@@ -22,12 +20,8 @@ std::uint32_t random_number() {
 
 }  // namespace
 
-System::~System() {
-  if (board_ != nullptr) board_->~BoardProgram();
-}
-
 void System::boot() {
-  guard_against_faults(machine_.hardware());
+  guard_against_faults();
   mark_interrupt_stacks();
   const FaultNote last_boot = take_fault_note();
   BoardClock::start(random_number());
@@ -40,18 +34,19 @@ void System::boot() {
   const std::uint32_t began_us = BoardClock::now_us();
   while (store_.state() == StoreState::loading &&
          BoardClock::now_us() - began_us < settings_limit_us) {
-    machine_.poll();
     Watchdog::feed();
     rtos::ThisThread::sleep_for(std::chrono::milliseconds(1));
   }
   Settings settings;
-  store_.loaded(settings);
-  machine_.hardware().fit(settings.site.chips);
+  store_.load(settings);
+  const SiteSettings& site = settings.site;
+  Machine& machine =
+      machine_.make(site.wiring, firmware::BoardHardware::trouble_of(site.wiring_source), buses_);
+  guard_outputs(machine.hardware());
 
   // Above the network's thread, which then cannot delay the loop.
   osThreadSetPriority(osThreadGetId(), osPriorityAboveNormal);
-  board_ = new (board_place_) BoardProgram(machine_, store_, settings, last_boot);
-  board_->start();
+  board_.make(machine, store_, settings, last_boot).start();
 }
 
 }  // namespace giga

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The whole firmware.
-//     System()   starts the watchdog; every output off
-//     boot()     guards against faults, reads the settings (at most 2 s), starts everything else
+//     System()   starts the watchdog; every PWM output and voltage off
+//     boot()     guards against faults, reads the settings (at most 2 s), switches all other
+//                outputs off, starts everything else
 //     poll()     one turn of the loop
 #pragma once
 
 #include <cstdint>
 
 #include "board_program.hpp"
+#include "buses.hpp"
 #include "chip/watchdog.hpp"
+#include "late.hpp"
 #include "machine.hpp"
 #include "settings_store.hpp"
 
@@ -18,7 +21,6 @@ namespace giga {
 class System {
  public:
   System() = default;
-  ~System();
   System(const System&) = delete;
   System& operator=(const System&) = delete;
 
@@ -33,10 +35,10 @@ class System {
   };
 
   WatchdogOn watchdog_on_;  // must be first
-  Machine machine_;
+  Buses buses_;
   SettingsStore store_;
-  alignas(BoardProgram) unsigned char board_place_[sizeof(BoardProgram)];
-  BoardProgram* board_ = nullptr;
+  Late<Machine> machine_;
+  Late<BoardProgram> board_;
 };
 
 }  // namespace giga

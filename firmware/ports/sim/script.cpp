@@ -9,13 +9,13 @@
 #include <utility>
 
 #include "../../../protocol/datagram/numbers.hpp"
-#include "../../board_hardware.hpp"
 #include "devices/optional_devices.hpp"
 #include "devices/user_devices.hpp"
 #include "r4link/error.hpp"
 #include "r4link/state.hpp"
 #include "r4link/tables/state_fields.hpp"
 #include "r4link/vocabulary.hpp"
+#include "r4link/wiring/wiring.hpp"
 #include "robot/board_model.hpp"
 
 namespace r4::sim {
@@ -130,11 +130,10 @@ std::int32_t supply_of(const Line& line, const char* what) {
 }
 
 void read_chip(const Line& line, ScriptStep& step) {
-  static constexpr std::string_view chips[firmware::chip_count] = {"osmc", "dhb", "expander", "dac",
-                                                                   "servo"};
+  static constexpr std::string_view chips[chip_count] = {"osmc", "dhb", "servo", "expander", "dac"};
   const auto* const chip = std::find(std::begin(chips), std::end(chips), line.words[1]);
   if (chip == std::end(chips)) {
-    fail(line, line.words[1], "is not a chip", "write osmc, dhb, expander, dac or servo");
+    fail(line, line.words[1], "is not a chip", "write osmc, dhb, servo, expander or dac");
   }
   step.channel = static_cast<int>(chip - std::begin(chips));
   step.value = supply_of(line, "chip");

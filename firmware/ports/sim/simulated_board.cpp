@@ -23,7 +23,7 @@ std::uint64_t random_seed() {
 SimulatedBoard::SimulatedBoard(asio::io_context& io, Options options)
     : options_(std::move(options)),
       seed_(options_.seed ? *options_.seed : random_seed()),
-      model_(seed_),
+      model_(seed_, options_.wired),
       timer_(io) {}
 
 SimulatedBoard::~SimulatedBoard() { stop(); }
@@ -82,9 +82,12 @@ void SimulatedBoard::reset_microcontroller() {
   hangs_until_ = watchdog_fed_ = passed_;
   told_pins_.reset();
   told_fault_ = false;
-  hardware_.emplace(model_);
+  const SiteSettings& site = options_.settings.site;
+  const bool confirmed = options_.plan_confirmed && site.wiring_source == WiringSource::plan;
+  hardware_.emplace(
+      model_, site.wiring,
+      confirmed ? ChipTrouble::none : firmware::BoardHardware::trouble_of(site.wiring_source));
   hardware_->power_up();
-  hardware_->hal().fit(options_.settings.site.chips);
   hardware_->hal().calibrate(options_.settings.site.full_scale_cv);
 
   firmware::Application::Config config;
@@ -194,7 +197,7 @@ void SimulatedBoard::take(const ScriptStep& step) {
       model_.stall_motor(step.channel, step.value != 0);
       break;
     case ScriptStep::Kind::chip: {
-      I2cChipModel& chip = model_.chips()[static_cast<firmware::Chip>(step.channel)];
+      I2cChipModel& chip = model_.chips()[static_cast<Chip>(step.channel)];
       const auto supply = static_cast<ScriptStep::Supply>(step.value);
       if (supply == ScriptStep::Supply::reset) {
         chip.power_on();
@@ -308,7 +311,10 @@ void SimulatedBoard::on_outputs(std::uint32_t, const firmware::Outputs&) { tell_
 
 void SimulatedBoard::on_executed(std::uint32_t t_ms, std::uint32_t pnum, const Command& command) {
   if (command.kind == CommandKind::setting) {
-    hardware_->hal().calibrate(application_->settings().site.full_scale_cv);
+    const SiteSettings& site = application_->settings().site;
+    hardware_->hal().calibrate(site.full_scale_cv);
+    options_.settings.site.wiring = site.wiring;  // kept for the next start
+    options_.settings.site.wiring_source = site.wiring_source;
   }
   if (options_.events.on_executed) options_.events.on_executed(t_ms, pnum, command);
 }

@@ -56,6 +56,8 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
     std::string capabilities = "sim";
     Script script;
     Settings settings;
+    Wiring wired = plan_wiring();  // how the board is wired, whatever its settings say
+    bool plan_confirmed = true;    // false: without a wiring in its settings, as from the box
     Events events;
     // A clock in ms, for tests: then the board has no timer, and the caller calls poll().
     std::function<std::uint32_t()> clock_ms;

@@ -6,6 +6,7 @@
 
 #include "../../application/application.hpp"
 #include "../../board_hardware.hpp"
+#include "../../bus_choice.hpp"
 #include "robot/board_model.hpp"
 
 namespace r4 {
@@ -13,7 +14,9 @@ namespace sim {
 
 class SimulatedHardware final : private BoardModel::Interrupts {
  public:
-  explicit SimulatedHardware(BoardModel& board);
+  // `wiring`: what the firmware believes; `trouble`: BoardHardware::Config::wiring_trouble.
+  explicit SimulatedHardware(BoardModel& board, const Wiring& wiring = plan_wiring(),
+                             ChipTrouble trouble = ChipTrouble::none);
 
   // Outputs off, then the set-up of the chips, in at most boot_ms of the board's time.
   void power_up();
@@ -23,7 +26,7 @@ class SimulatedHardware final : private BoardModel::Interrupts {
   firmware::BoardHardware& hal() { return hardware_; }
   firmware::UserI2c& i2c() { return i2c_; }
   void add_devices(firmware::Application::Config& config) {
-    config.i2c = &i2c_;
+    if (choice_.user_may) config.i2c = &i2c_;
     for (int i = 0; i < uart_channels; ++i) config.uarts[i] = &uarts_[i];
   }
 
@@ -31,18 +34,15 @@ class SimulatedHardware final : private BoardModel::Interrupts {
   static constexpr int boot_ms = 100;
 
  private:
-  void on_encoder(int channel, bool a, bool b, bool index) override {
-    hardware_.encoder(channel).sample(a, b);
-    hardware_.encoder(channel).index(index);
-  }
-  void on_echo(int channel, bool high, std::uint32_t at_us) override {
-    hardware_.ultrasonic().echo(channel - 1, high, at_us);
-  }
+  void on_edge(const firmware::InputPin& pin, bool high, std::uint32_t at_us) override;
 
   BoardModel& board_;
+  const firmware::BusChoice choice_;
   firmware::BoardHardware hardware_;
   firmware::UserI2c i2c_;
   firmware::UserUart uarts_[uart_channels];
+  firmware::InputPin *a_[encoder_channels], *b_[encoder_channels], *index_[encoder_channels];
+  firmware::InputPin* echo_[ultrasonic_channels];
   std::uint32_t now_us_ = 0;  // of the microcontroller's clock; wraps
 };
 

@@ -33,6 +33,7 @@ void bind_bridge(py::module_& module);
 void bind_recording(py::module_& module);
 void bind_servo(py::module_& module);
 void bind_simulation(py::module_& module);
+void bind_wiring(py::module_& module);
 
 // For a board and a fleet.
 BoardOptions options_of(BoardRole role, bool arming, const std::string& fields,

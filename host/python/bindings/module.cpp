@@ -16,6 +16,7 @@ PYBIND11_MODULE(_core, module) {
   r4::python::bind_calls(module);
   r4::python::bind_recording(module);
   r4::python::bind_simulation(module);
+  r4::python::bind_wiring(module);
   r4::python::bind_fleet(module);
   r4::python::bind_bridge(module);
 }

@@ -216,8 +216,8 @@ const char* type_of(StateField field, int which) {
   switch (kind_row_of(field).form) {
     case FieldForm::volts:
       return "f8";
-    case FieldForm::flag:
-      return "?";
+    case FieldForm::handle:
+      return "u1";
     case FieldForm::drive:
       return which == 0 ? "u2" : "u1";
     case FieldForm::bldc:

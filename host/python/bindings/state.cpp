@@ -15,8 +15,8 @@ py::object value_of(const State& state, F field) {
   switch (kind_row_of(field).form) {
     case FieldForm::volts:
       return py::float_(numbers[0]);
-    case FieldForm::flag:
-      return py::bool_(numbers[0] != 0);
+    case FieldForm::handle:
+      return state.handle == Handle::none ? py::object(py::none()) : py::bool_(state.handle_held());
     case FieldForm::drive:
       return to_python(Drive{whole(0), static_cast<Direction>(whole(1))});
     case FieldForm::bldc:
@@ -62,6 +62,8 @@ StateNumbers numbers_from(F field, const py::handle& value) {
       }
       return numbers;
     }
+    case FieldForm::handle:
+      return {1, {value.is_none() ? 2.0 : static_cast<double>(value.cast<bool>())}};
     case FieldForm::reason:
       return {1, {static_cast<double>(value.cast<SafeReason>())}};
     case FieldForm::u32:

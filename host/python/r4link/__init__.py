@@ -7,9 +7,9 @@ if _importlib.find_spec('r4link._core') is None:
                       'build --target r4_python) and put build/python first on PYTHONPATH, or: pip install .')
 
 from . import aio, control, devices  # pylint: disable=wrong-import-position
-from ._core import (FIELDS, BoardHealth, CarrierCounters, Command, Discovery, Event, FoundBoard, Identity, LinkStatus,
-                    Recording, RefusedPost, SearchedBus, SearchedNetwork, SearchedPort, ServoCalibration, Setpoints,
-                    State, Statistics, Subscription, PathStatus, discover, __version__)
+from ._core import (FIELDS, BoardHealth, BoardWiring, CarrierCounters, Command, Discovery, Event, FoundBoard, Identity,
+                    LinkStatus, Recording, RefusedPost, SearchedBus, SearchedNetwork, SearchedPort, ServoCalibration, Setpoints,
+                    State, Statistics, Subscription, PathStatus, Wiring, discover, __version__)
 from .board import Board, States
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
 from .channels import BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, StepperChannel, Uart
@@ -28,7 +28,7 @@ FORWARD = Direction.FORWARD
 REVERSE = Direction.REVERSE
 
 __all__ = [
-    'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'BoardRole', 'Bridge', 'BridgeCounters', 'BridgeEnd',
+    'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'BoardRole', 'BoardWiring', 'Bridge', 'BridgeCounters', 'BridgeEnd',
     'BridgeStatus', 'CanTransport', 'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'DataError', 'DeniedError',
     'Device', 'DeviceReading', 'DeviceRole', 'Direction', 'DisarmCause', 'Discovery', 'Drive', 'DriveChannel',
     'Error', 'Event', 'EventKind', 'FIELDS', 'FORWARD', 'Fleet', 'FleetEvent', 'FleetEventKind', 'FleetResults',
@@ -38,5 +38,5 @@ __all__ = [
     'RecordedEvent', 'Recording', 'Refusal', 'RefusedError', 'RefusedPost', 'RelayChannel', 'SafeReason',
     'SearchedBus', 'SearchedNetwork', 'SearchedPort', 'ServoCalibration', 'ServoChannel', 'Setpoints', 'SimBoard',
     'State', 'States', 'Statistics', 'StepperChannel', 'Subscription', 'Transport', 'Uart', 'UartBytes', 'UartData',
-    'UnsupportedError', 'UsageError', 'aio', 'control', 'devices', 'discover', 'read', 'with_link', '__version__',
+    'UnsupportedError', 'UsageError', 'Wiring', 'aio', 'control', 'devices', 'discover', 'read', 'with_link', '__version__',
 ]

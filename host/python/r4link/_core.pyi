@@ -217,7 +217,7 @@ class State:
     @property
     def fault(self) -> str | None: ...
     @property
-    def dmhsta(self) -> bool:
+    def dmhsta(self) -> bool | None:
         """True if the dead-man's handle is held."""
     def relay(self, channel: int) -> bool:
         """True if the relay is closed. `channel`: 1 to 8."""
@@ -384,6 +384,50 @@ class ServoCalibration:
         """The nearest whole microsecond. Raises UsageError for an angle beyond an end."""
     def degrees(self, *, us: int) -> float | None:
         """The angle of a pulse, also beyond an end. None for 0: the servo is off."""
+
+class Wiring:
+    """Which pin or line serves each signal of a board (docs/reference/wiring.md). `signal`: a name of SIGNALS, such as
+    'stepper 1 step'. Places are written as in a wiring file: 'D2', 'D42 low', 'none'.
+
+        wiring = Wiring.load('robot.wiring')
+        wiring['stepper 1 step'] = 'D47'
+        wiring.check()
+        pathlib.Path('robot.wiring').write_text(str(wiring))
+    """
+    SIGNALS: tuple[str, ...]
+    @staticmethod
+    def plan() -> Wiring:
+        """The wiring of a board without one of its own."""
+    @staticmethod
+    def read(text: str, name: str = 'wiring') -> Wiring:
+        """Reads and checks the text of a wiring file; `name` is for errors. Raises DataError."""
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> Wiring:
+        """Reads and checks a wiring file. Raises DataError, OpenError or DeniedError."""
+    def __getitem__(self, signal: str) -> str: ...
+    def __setitem__(self, signal: str, place: str) -> None:
+        """Raises DataError for a place that the signal cannot have. check() finds what only the whole shows."""
+    def check(self) -> None:
+        """Raises DataError, with the reason, if no board can be wired so."""
+    @property
+    def setting(self) -> str:
+        """The value of the setting `wiring`."""
+    def differences(self, other: Wiring) -> list[tuple[str, str, str]]:
+        """Signal, place here, place there."""
+    def __str__(self) -> str:
+        """The text of a wiring file, with comments."""
+    def __eq__(self, other: object) -> bool: ...
+
+class BoardWiring(_Record):
+    """The wiring that a board keeps."""
+    @property
+    def source(self) -> str:
+        """'plan': nobody has given one, or confirmed the plan; 'given'; 'damaged': nothing is connected."""
+    @property
+    def in_use(self) -> bool:
+        """False: it counts from the board's next start on."""
+    @property
+    def wiring(self) -> Wiring: ...
 
 class Subscription:
     def cancel(self) -> None:
@@ -637,6 +681,7 @@ class Board:
     def stop_async(self) -> None: ...
     def link_timing(self, timeout: int, heartbeat: int, ms: int, /) -> None: ...
     def identify(self, ms: int, /) -> Identity: ...
+    def wiring(self, ms: int, /) -> BoardWiring: ...
     def state(self) -> State: ...
     def next_state(self, ms: int, /) -> State: ...
     def link(self) -> LinkStatus: ...
@@ -673,6 +718,7 @@ class Calls:
     def stop(self, ms: int, /) -> Call: ...
     def arm(self, ms: int, /) -> Call: ...
     def identify(self, ms: int, /) -> Call: ...
+    def wiring(self, ms: int, /) -> Call: ...
     def transfer(self, text: str, ms: int, /) -> Call: ...
     def attach(self, device: Device, ms: int, /) -> Call: ...
     def link_timing(self, timeout: int, heartbeat: int, ms: int, /) -> Call: ...

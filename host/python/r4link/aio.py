@@ -20,7 +20,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Callable, Coroutine, Iterable, Type
 
 from . import _core, board as blocking, channels
-from ._core import Discovery, Identity, State, Subscription
+from ._core import BoardWiring, Discovery, Identity, State, Subscription
 from .any_board import AnyBoard
 from .channels import _ms
 from .errors import ClosedError
@@ -185,6 +185,11 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
         """Asks the board for its identity. `timeout`: seconds to wait for the answer."""
         identity: Coroutine[Any, Any, Identity] = self._call(lambda core: core.identify(_ms(timeout)))
         return identity
+
+    def wiring(self, timeout: float = 1.0) -> Coroutine[Any, Any, BoardWiring]:
+        """The wiring that the board keeps; only over its own cable. `timeout`: seconds to wait for the answer."""
+        wiring: Coroutine[Any, Any, BoardWiring] = self._call(lambda core: core.wiring(_ms(timeout)))
+        return wiring
 
     @property
     def i2c(self) -> channels.I2c[Coroutine[Any, Any, None], Coroutine[Any, Any, bytes], Coroutine[Any, Any, list[int]]]:

@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from typing import Any, Callable, Generic
 
 from ._core import (Board as Core, CarrierCounters, Command, Event, LinkStatus, PathStatus, Recording, RefusedPost,
-                    Setpoints, State, Statistics, Subscription)
+                    Setpoints, State, Statistics, Subscription, Wiring)
 from .channels import BldcChannel, DriveChannel, RelayChannel, Sent, ServoChannel, StepperChannel, _ms
 from .devices import Device
 from .enums import BoardRole, DisarmCause, PostResult
@@ -75,8 +75,8 @@ class AnyBoard(ABC, Generic[Sent]):
         outputs went safe, except after a lost link.
 
         Clears a stop, a watchdog or a fault that came while this program controlled the board, and
-        closes relay 1. A cause that may be older than the program is not cleared: it raises
-        NotArmedError, and Command.clear() clears it.
+        closes relay 1. A cause that may be older than the program, or a fault with which the board
+        began, is not cleared: it raises NotArmedError, and Command.clear() clears it.
         """
         sent: Sent = self._call(lambda core: core.arm(_ms(timeout)))
         return sent
@@ -136,6 +136,12 @@ class AnyBoard(ABC, Generic[Sent]):
     def setting(self, key: str, value: str, timeout: float = 1.0) -> Sent:
         """Changes a setting of the board (docs/reference/protocol.md): setting('rate', '50')."""
         return self.send(f'C:{key},{value}', timeout)
+
+    def give_wiring(self, wiring: Wiring, timeout: float = 1.0) -> Sent:
+        """Checks `wiring` and gives it to the board, which uses it from its next start on; only over its own cable.
+        Raises DataError for a wiring with a fault."""
+        wiring.check()
+        return self.setting('wiring', wiring.setting, timeout)
 
     def attach(self, device: Device, timeout: float = 1.0) -> Sent:
         """Sets up a described device (r4link.devices): checks its identity, writes its settings,

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, Type
 
 from . import _core
-from ._core import Identity, State
+from ._core import BoardWiring, Identity, State
 from .any_board import AnyBoard
 from .channels import I2c, Uart, Uarts, _ms
 from .enums import BoardRole
@@ -158,6 +158,10 @@ class Board(AnyBoard[None]):
     def identify(self, timeout: float = 1.0) -> Identity:
         """Asks the board for its identity. `timeout`: seconds to wait for the answer."""
         return self._core.identify(_ms(timeout))
+
+    def wiring(self, timeout: float = 1.0) -> BoardWiring:
+        """The wiring that the board keeps; only over its own cable. `timeout`: seconds to wait for the answer."""
+        return self._core.wiring(_ms(timeout))
 
     def next_state(self, timeout: float = 1.0) -> State:
         """Waits up to `timeout` seconds for a state."""

@@ -44,6 +44,7 @@ struct Identity {
   bool has_asked = false;
   std::uint32_t asked = 0;     // packet number of the question
   SessionId sid = no_session;  // of the asking host
+  Text wiring = Text();        // only in the answer to Q:WIRING: read_board_wiring()
 };
 // False if the datagram's I field is not of that form; `out` is only written on success.
 R4LINK_API bool read_identity(const Datagram& datagram, Identity& out);

@@ -177,5 +177,9 @@ constexpr bool drives_output(CommandKind kind) {
   constexpr std::uint32_t kinds = kinds_that_move(CommandEffect::device);
   return (kinds >> static_cast<unsigned>(kind) & 1U) != 0;
 }
+// True if an answer of its own (`I`) confirms the command, and no control is needed.
+constexpr bool is_question(CommandKind kind) {
+  return kind == CommandKind::identify || kind == CommandKind::ask_wiring;
+}
 
 }  // namespace r4

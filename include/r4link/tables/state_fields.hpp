@@ -34,7 +34,7 @@ constexpr int field_kind_count = static_cast<int>(FieldKind::count);
 // The form of a field's values on the wire, and their type in State.
 enum class FieldForm : std::uint8_t {
   volts,   // int32 in hundredths: "24.28"
-  flag,    // bool: 0 or 1
+  handle,  // Handle: 0 to 2
   drive,   // Drive: pwm,direction
   bldc,    // Bldc: speed,direction,brake
   servo,   // uint16, 0-2500

@@ -99,12 +99,12 @@ TEST_F(ApplicationGroup, IsExecutedOnceAndInOrder) {
 }
 
 TEST_F(ApplicationGroup, IsRefusedAsAWholeWhileTheOutputsAreSafe) {
-  board.hal.inputs.handle_held = false;
+  board.hal.inputs.handle = Handle::released;
   board.run(10);
   const std::uint32_t number = host.command("O:1,1,1;Z:1");
   EXPECT_EQ(refusals(), Lines{"SAFE"});
   EXPECT_EQ(board.hal.zeroed, std::vector<int>());
-  board.hal.inputs.handle_held = true;
+  board.hal.inputs.handle = Handle::held;
   board.run(10);
   host.resend("O:1,1,1;Z:1", number);
   EXPECT_EQ(refusals(), Lines{"SAFE"}) << "the number of the group is used up";

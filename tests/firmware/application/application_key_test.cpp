@@ -298,9 +298,9 @@ TEST_F(ApplicationKey, ChangesItsNonceForEachCauseOfTheSafeState) {
   host.connect();
   const std::string first = host.nonce;
   const std::string before = host.signed_fields(host.fields("O:358,1,1", 1));
-  board.hal.inputs.handle_held = false;
+  board.hal.inputs.handle = Handle::released;
   board.run(20);
-  board.hal.inputs.handle_held = true;
+  board.hal.inputs.handle = Handle::held;
   board.run(20);
   ASSERT_EQ(board.reason(), SafeReason::none);
   board.receive(before, host.at);

@@ -194,12 +194,12 @@ TEST_F(ApplicationPaths, ADuplicateOfARefusedCommandGetsTheSameAnswer) {
   host.connect();
   host.run(1000);
   forget();
-  board.hal.inputs.handle_held = false;
+  board.hal.inputs.handle = Handle::released;
   board.run(1);
   host.command("O:358,1,1");
   host.command("C:rate,5000");
   host.command("C:network,home");
-  board.hal.inputs.handle_held = true;
+  board.hal.inputs.handle = Handle::held;
   host.run(150);
   const Lines first = answers(0);
   ASSERT_EQ(first.size(), 3U);

@@ -31,7 +31,7 @@ struct ApplicationSafety : testing::Test {
     board.run(10);
   }
   void handle(bool held) {
-    board.hal.inputs.handle_held = held;
+    board.hal.inputs.handle = held ? Handle::held : Handle::released;
     board.run(10);
   }
   // E:CLEAR by the controlling host, which has heard the cause to clear.
@@ -409,13 +409,13 @@ TEST_F(ApplicationSafety, TheBoardIsSafeUntilTheHandleIsHeldAgain) {
 
 TEST_F(ApplicationSafety, AReleasedHandleIsNoticedWithin10Ms) {
   board.run(3);
-  board.hal.inputs.handle_held = false;
+  board.hal.inputs.handle = Handle::released;
   board.run(10);
   EXPECT_TRUE(board.safe());
 }
 
 TEST_F(ApplicationSafety, AHandleReleasedSinceTheLastPollBlocksACommand) {
-  board.hal.inputs.handle_held = false;
+  board.hal.inputs.handle = Handle::released;
   host.command("O:400,1,1");
   EXPECT_TRUE(board.safe());
   EXPECT_EQ(board.reason(), SafeReason::handle);
@@ -423,7 +423,7 @@ TEST_F(ApplicationSafety, AHandleReleasedSinceTheLastPollBlocksACommand) {
 
 TEST_F(ApplicationSafety, AHandleReleasedBeforeConnectingKeepsTheBoardSafe) {
   TestBoard fresh;
-  fresh.hal.inputs.handle_held = false;
+  fresh.hal.inputs.handle = Handle::released;
   fresh.run(20);
   TestHost first(fresh, our_session);
   first.connect();
@@ -444,7 +444,7 @@ TEST_F(ApplicationSafety, AHandleReleasedDuringAnOutageRestoresNoOutputs) {
 
 TEST_F(ApplicationSafety, AHandleReleasedAtRecoveryRestoresNoOutputs) {
   board.run(1500);
-  board.hal.inputs.handle_held = false;
+  board.hal.inputs.handle = Handle::released;
   const int changes = board.log.outputs;
   host.echo();
   EXPECT_TRUE(board.safe());

@@ -2,6 +2,9 @@
 // The effect of each setting, when it begins, and how long it lasts.
 #include <gtest/gtest.h>
 
+#include <optional>
+
+#include "r4link/wiring/wiring_value.hpp"
 #include "tests/firmware/board_fixture.hpp"
 
 namespace r4 {
@@ -9,6 +12,7 @@ namespace {
 
 using firmware::BoardState;
 using test::another_session;
+using test::Heard;
 using test::our_session;
 using test::TestBoard;
 using test::TestHost;
@@ -148,6 +152,49 @@ TEST_F(ApplicationSetting, TheNameIsSetOnlyOverTheBoardsOwnCable) {
   EXPECT_NE(identity().find(";NAME:left;"), std::string::npos);
   host.command("C:name,off");
   EXPECT_EQ(identity().find("NAME"), std::string::npos);
+}
+
+TEST_F(ApplicationSetting, TheWiringIsGivenAndToldOnlyOverTheBoardsOwnCable) {
+  Wiring wiring = plan_wiring();
+  wiring.at(SignalKind::handle).byte = 53;
+  char value[max_wiring_value];
+  const std::string give = "C:wiring," + test::str(write_wiring_value(wiring, value));
+  const auto kept = [this] {
+    board.take();
+    board.receive("Q:WIRING;PNum:7;T:1;", Source{0, 99});
+    const std::vector<Heard> heard = board.take(MessageKind::identity);
+    Datagram datagram;
+    Identity identity;
+    BoardWiring told;
+    if (heard.size() == 1) {
+      const std::string& bytes = heard[0].bytes;
+      EXPECT_TRUE(read_datagram(bytes, datagram) && read_identity(datagram, identity));
+      EXPECT_TRUE(read_board_wiring(identity.wiring, told)) << bytes;
+      EXPECT_EQ(identity.asked, 7U);
+    }
+    return heard.size() == 1 ? std::optional(told) : std::nullopt;
+  };
+  host.command(give);
+  EXPECT_NE(board.log.refused.back().find("AUTH"), std::string::npos);
+  EXPECT_FALSE(kept());
+  EXPECT_NE(board.log.refused.back().find("AUTH"), std::string::npos);
+
+  board.ports[0].cable = true;
+  ASSERT_TRUE(kept());
+  EXPECT_EQ(kept()->source, WiringSource::plan);
+  EXPECT_EQ(kept()->wiring, plan_wiring());
+  EXPECT_TRUE(kept()->in_use);
+  host.command(give);
+  EXPECT_EQ(board.log.executed.size(), 1U);
+  EXPECT_EQ(kept()->source, WiringSource::given);
+  EXPECT_EQ(kept()->wiring, wiring);
+  EXPECT_FALSE(kept()->in_use) << "it counts from the next start on";
+  wiring.at(SignalKind::handle).byte = 20;
+  host.command("C:wiring," + test::str(write_wiring_value(wiring, value)));
+  EXPECT_NE(board.log.refused.back().find("RANGE"), std::string::npos);
+  EXPECT_EQ(kept()->wiring.at(SignalKind::handle).number(), 53) << "it keeps the one it had";
+  board.receive("Q:ID;", Source{0, 99});
+  EXPECT_EQ(board.take(MessageKind::identity).at(0).bytes.find("WIRING"), std::string::npos);
 }
 
 TEST_F(ApplicationSetting, TheNetworkIsSetOnlyOverTheBoardsOwnCable) {

@@ -25,7 +25,7 @@ struct Mcp23017Bench {
   }
   Lines write(std::uint8_t a, std::uint8_t b) {
     log.clear();
-    expander.set_ports(a, b);
+    expander.set_ports(static_cast<std::uint16_t>(b << 8 | a));
     BusBudget budget(48);
     expander.write_changes(budget);
     return test::lines(log);
@@ -38,7 +38,7 @@ struct Mcp23017Bench {
   sim::I2cBusModel bus;
   test::BusLog log{bus};
   Mcp23017Model chip{0x20};
-  Mcp23017 expander{bus, 0x20, safe_a, safe_b};
+  Mcp23017 expander{bus, 0x20, 0xFFFF, safe_b << 8 | safe_a};
 };
 
 TEST(Mcp23017, WritesTheLatchesBeforeTheDirections) {

@@ -9,6 +9,7 @@
 
 #include "bus_log.hpp"
 #include "firmware/ports/sim/chips/pca9685_model.hpp"
+#include "r4link/wiring/wiring.hpp"
 
 namespace r4::firmware {
 namespace {
@@ -19,9 +20,7 @@ using Lines = std::vector<std::string>;
 
 // A chip, its driver and the bus between them.
 struct Pca9685Bench {
-  explicit Pca9685Bench(std::uint32_t hz = 1000, int group = 1) : pwm(bus, 0x40, hz, group) {
-    bus.attach(chip);
-  }
+  explicit Pca9685Bench(std::uint32_t hz = 1000) : pwm(bus, 0x40, hz) { bus.attach(chip); }
   void set_up() {
     pwm.begin();
     test::run(pwm, bus, 5);
@@ -129,9 +128,29 @@ TEST(Pca9685, WritesNeighbouringChannelsInOneBurst) {
   EXPECT_EQ(bench.write(), (Lines{"40 <- 08 11 01 00 00 22 02", "40 <- 2C 33 03"}));
 }
 
-TEST(Pca9685, DutyAndDirectionOfAGroupChangeInOneTransfer) {
-  Pca9685Bench bench(1000, 2);
+TEST(Pca9685, TheChannelsOfAPairChangeInOneTransferHoweverFarApart) {
+  Pca9685Bench bench;
   bench.set_up();
+  bench.pwm.pair(2, 12);
+  bench.pwm.pair(3, 13);
+  for (const int first : {2, 3}) {
+    bench.pwm.set_duty(first, 0x123);
+    bench.pwm.set_level(first + 10, true);
+  }
+  constexpr std::size_t one_pair = 2 + 4 * partner_lines;
+  EXPECT_EQ(bench.write(one_pair).size(), 1U);
+  EXPECT_EQ(bench.chip.duty(2), 0x123);
+  EXPECT_TRUE(bench.chip.high(12));
+  EXPECT_EQ(bench.chip.duty(3), 0) << "a channel in between waits for its partner";
+  EXPECT_EQ(bench.write(one_pair).size(), 1U);
+  EXPECT_EQ(bench.chip.duty(3), 0x123);
+  EXPECT_TRUE(bench.chip.high(13));
+}
+
+TEST(Pca9685, DutyAndDirectionOfAPairChangeInOneTransfer) {
+  Pca9685Bench bench;
+  bench.set_up();
+  bench.pwm.pair(2, 3);
   bench.pwm.set_duty(2, 0x800);
   bench.pwm.set_level(3, true);
   bench.write();
@@ -142,9 +161,10 @@ TEST(Pca9685, DutyAndDirectionOfAGroupChangeInOneTransfer) {
   EXPECT_FALSE(bench.chip.high(3));
 }
 
-TEST(Pca9685, ASmallBudgetSplitsOnlyBetweenGroups) {
-  Pca9685Bench bench(1000, 2);
+TEST(Pca9685, ASmallBudgetSplitsOnlyBetweenPairs) {
+  Pca9685Bench bench;
   bench.set_up();
+  for (int i = 0; i < 8; i += 2) bench.pwm.pair(i, i + 1);
   for (int i = 0; i < 8; i += 2) {
     bench.pwm.set_duty(i, 0x0FF);
     bench.pwm.set_level(i + 1, true);
@@ -277,9 +297,13 @@ TEST(Pca9685, DistinguishesAHeldBusFromASilentChip) {
 
 RC_GTEST_PROP(Pca9685, PinsAreWhatTheyWereToldWhateverTheBudget,
               (const std::vector<std::array<std::uint16_t, 3>>& changes)) {
-  const int group = *rc::gen::element(1, 2, 4);
-  const auto budget = *rc::gen::inRange<std::size_t>(20, 80);
-  Pca9685Bench bench(1000, group);
+  const int distance = *rc::gen::inRange(0, partner_lines);
+  const auto least = static_cast<std::size_t>(4 * (distance + 1) + 2);
+  const auto budget = *rc::gen::inRange<std::size_t>(std::max<std::size_t>(least, 20), 80);
+  Pca9685Bench bench;
+  for (int i = 0; i + distance < Pca9685::channels; ++i) {
+    if (i / std::max(distance, 1) % 2 == 0) bench.pwm.pair(i, i + distance);
+  }
   bench.set_up();
   std::array<int, Pca9685::channels> duty{};
   for (const auto& [channel, value, kind] : changes) {

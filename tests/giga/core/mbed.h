@@ -55,6 +55,7 @@ bool mbed_get_error_in_progress();
 std::int32_t mbed_set_error_hook(void (*hook)(const mbed_error_ctx*));
 }
 #define MBED_SUCCESS 0
+#define MBED_ERROR_ITEM_NOT_FOUND (-2)
 #define MBED_CONF_TARGET_BOOT_STACK_SIZE 0x400
 
 namespace mbed {

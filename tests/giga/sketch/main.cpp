@@ -15,6 +15,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "r4link/wiring/wiring_value.hpp"
 #include "tests/giga/fake_giga.hpp"
 #include "tests/support/datagrams.hpp"
 
@@ -38,6 +39,9 @@ void expect(bool is_so, const char* what) {
 int main() {
   static r4::fake::Giga giga;
   giga.set_pin('I', 15, true);
+  char value[r4::max_wiring_value];
+  giga.stored["r4-settings"] =
+      "wiring," + r4::test::str(r4::write_wiring_value(r4::plan_wiring(), value)) + "\n";
   giga.usb_open = true;
   setup();
   expect(giga.chips.pins().is_safe(), "outputs are off after setup()");

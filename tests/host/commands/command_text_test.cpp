@@ -48,6 +48,7 @@ TEST(CommandText, ParsesWritesAndDescribesEveryKind) {
       {"C:rate,50", "setting rate 50"},
       {"C:key,1:off", "setting key 1:off"},
       {"Q:ID", "ask who the board is"},
+      {"Q:WIRING", "ask how the board is wired"},
       {"W:0", "stop watching"},
       {"W:10", "watch at 10 Hz"},
       {"W:10,ENC1,ENC2", "watch at 10 Hz, fields ENC1,ENC2"},

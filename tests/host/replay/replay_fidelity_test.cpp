@@ -85,6 +85,7 @@ TEST(ReplayFidelity, HasTheSameStatesEventsAndStatisticsAsLive) {
   board.async_send(Command::fields("DEFAULT,ENC1,SAFE,RXOK"), 1s, ignore);
   board.async_send(Command::relay(1, true), 1s, ignore);
   board.async_send(Command::osmc(1, Pwm(358), Direction::forward), 1s, ignore);
+  io.run_for(1s);
   for (int i = 0; i < 100 && live.states.size() <= 80; ++i) io.run_for(100ms);
   board.async_send(Command::stop(), 1s, ignore);
   io.run_for(300ms);
@@ -128,7 +129,7 @@ TEST(ReplayFidelity, HasTheSameStatesEventsAndStatisticsAsLive) {
   EXPECT_EQ(now.packets.restarts, then.packets.restarts);
   EXPECT_GT(then.packets.lost, 0U);
   EXPECT_GT(then.packets.duplicate, 0U);
-  EXPECT_NEAR(now.state_rate_hz, then.state_rate_hz, 10);
+  EXPECT_NEAR(now.state_rate_hz, then.state_rate_hz, 20);
 }
 
 }  // namespace

@@ -45,7 +45,7 @@ struct RobotOnPaths::Board final : firmware::Hal, firmware::Observer {
 
   void apply(const firmware::Outputs&) override {}
   void make_safe() override {}
-  void sample(firmware::Inputs& inputs) override { inputs.handle_held = true; }
+  void sample(firmware::Inputs& inputs) override { inputs.handle = Handle::held; }
   void zero(int) override {}
   bool clear_fault() override { return true; }
   void on_state(std::uint32_t, firmware::BoardState state, SafeReason) override {

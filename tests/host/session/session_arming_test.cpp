@@ -271,6 +271,15 @@ TEST_F(EarlierCause, CanBeAWatchdogOrAFault) {
   EXPECT_EQ(link.count('E') + link.count('R'), 0U);
 }
 
+TEST_F(EarlierCause, CanBeAFaultWithWhichTheBoardBegins) {
+  begin(SafeReason::none);
+  link.reboot();
+  link.boot_heartbeat();
+  begin(SafeReason::fault);
+  EXPECT_EQ(arm().disarmed, DisarmCause::earlier_fault);
+  EXPECT_EQ(link.count('E') + link.count('R'), 0U);
+}
+
 TEST_F(EarlierCause, AllowsArmingAfterAnExplicitClear) {
   begin(SafeReason::stop);
   link.session.send(Command::clear(), 1s, link.now);

@@ -12,17 +12,19 @@ namespace {
 
 TEST(ChipFault, EveryChipOfTheBoardHasItsName) {
   std::set<std::string> names;
-  for (int i = 0; i < firmware::chip_count; ++i) {
-    names.insert(chip_name(firmware::address_of(static_cast<firmware::Chip>(i))));
+  for (int i = 0; i < chip_count; ++i) {
+    names.insert(chip_name(plan_wiring().chip(static_cast<Chip>(i)).number()));
   }
-  EXPECT_EQ(names.size(), static_cast<std::size_t>(firmware::chip_count));
+  EXPECT_EQ(names.size(), static_cast<std::size_t>(chip_count));
   EXPECT_EQ(names.count("unknown chip"), 0U);
   EXPECT_STREQ(chip_name(0x70), "unknown chip");
+  EXPECT_STREQ(chip_name(0), "wiring");
 }
 
 TEST(ChipFault, EachTroubleNumberHasItsText) {
-  const char* const texts[] = {"none",           "no acknowledge", "bus stuck", "was reset",
-                               "wrong register", "not ready",      "unknown"};
+  const char* const texts[] = {"none",           "no acknowledge", "bus stuck",     "was reset",
+                               "wrong register", "not ready",      "not confirmed", "damaged",
+                               "other bus",      "unknown"};
   for (std::uint8_t i = 0; i < std::size(texts); ++i) {
     EXPECT_STREQ(to_text(static_cast<ChipTrouble>(i)), texts[i]);
   }

@@ -55,7 +55,7 @@ TEST(Command, EveryCommandIsReadAndWrittenAgain) {
         "R:8,Off",   "E:STOP",        "E:CLEAR",       "E:CLEAR,0",       "E:CLEAR,2147483647",
         "E:LEAVE",   "P:-100,2000,4", "Z:4",           "B:4095,1,0,4",    "B:0,0,1,1",
         "U:400,4",   "F:DEFAULT",     "F:AIN24,OSMC1", "C:recovery,last", "C:rate,100",
-        "Q:ID",      "W:0",           "W:1000",        "W:10,AIN24,ENC1"}) {
+        "Q:ID",      "Q:WIRING",      "W:0",           "W:1000",          "W:10,AIN24,ENC1"}) {
     EXPECT_EQ(again(text), text);
   }
   EXPECT_EQ(again("W:1001"), "RANGE");
@@ -104,6 +104,7 @@ TEST(Command, EachFactoryMakesItsCommandText) {
   EXPECT_EQ(written(Command::fields("DEFAULT,SAFE,CMD")), "F:DEFAULT,SAFE,CMD");
   EXPECT_EQ(written(Command::setting("rate", "50")), "C:rate,50");
   EXPECT_EQ(written(Command::identify()), "Q:ID");
+  EXPECT_EQ(written(Command::ask_wiring()), "Q:WIRING");
 }
 
 // A command whose first value has a range; its text is made from this value and the channel.
@@ -292,7 +293,7 @@ TEST(Command, SevenCommandsDriveOutputs) {
   const std::string driving = "ODSRPBZ";
   for (const std::string text :
        {"O:1,1,1", "D:1,1,1", "S:1,1", "R:1,On", "P:1,1", "B:1,1,1,1", "Z:1", "H:ROS2-R4", "E:STOP",
-        "E:CLEAR", "U:1,1", "F:ALL", "C:rate,1", "Q:ID"}) {
+        "E:CLEAR", "U:1,1", "F:ALL", "C:rate,1", "Q:ID", "Q:WIRING"}) {
     Field field;
     ASSERT_TRUE(read_field(text, field));
     Command command;

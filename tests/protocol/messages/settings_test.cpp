@@ -100,9 +100,18 @@ TEST(Settings, OtherKeysAreUnknown) {
 
 // A setting that operator== or the storage forgets is lost at the next start of a Giga.
 TEST(Settings, EachSettingIsComparedAndStored) {
-  const std::string values[] = {
-      "60",       "2000",         "2",         "rearm",       "0",
-      "9600:8E1", "40:x00:1:100", "somewhere", "192.168.0.2", "1:" + std::string(64, 'a')};
+  char wiring[max_wiring_value];
+  const std::string values[] = {"60",
+                                "2000",
+                                "2",
+                                "rearm",
+                                "0",
+                                "9600:8E1",
+                                "40:x00:1:100",
+                                "somewhere",
+                                "192.168.0.2",
+                                "1:" + std::string(64, 'a'),
+                                str(write_wiring_value(Wiring(), wiring))};
   for (const SettingRow& row : setting_rows) {
     bool found = false;
     for (const std::string& value : values) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "protocol/messages/settings.hpp"
+#include "tests/support/datagrams.hpp"
 
 namespace r4 {
 namespace {
@@ -83,9 +84,6 @@ TEST(SiteSettings, AcceptsValidFormsAndRefusesInvalidForms) {
       {"node", "0", Refusal::none},
       {"node", "31", Refusal::none},
       {"node", "32", Refusal::range},
-      {"chips", "0", Refusal::none},
-      {"chips", "31", Refusal::none},
-      {"chips", "32", Refusal::range},
       {"name", "a", Refusal::none},
       {"name", "left-Arm_2", Refusal::none},
       {"name", std::string(31, 'n'), Refusal::none},
@@ -166,7 +164,7 @@ TEST(SiteSettings, PasswordAndKeysAreSecret) {
 
 TEST(SiteSettings, AreDistinguishedFromOtherSettings) {
   for (const char* key :
-       {"network", "password", "host", "port", "node", "chips", "name", "AINDMH", "key"}) {
+       {"network", "password", "host", "port", "node", "name", "wiring", "AINDMH", "key"}) {
     EXPECT_TRUE(is_site_setting(Text(key, std::string(key).size()))) << key;
   }
   for (const char* key : {"rate", "heartbeat", "timeout", "recovery", "pack", "DMHSTA", ""}) {
@@ -186,7 +184,6 @@ TEST(KeptSettings, RoundTripThroughText) {
   set_text(settings.site, "host", "10.0.200.255");
   set_text(settings.site, "port", "2019");
   set_text(settings.site, "node", "7");
-  set_text(settings.site, "chips", "5");
   set_text(settings.site, "name", "left-arm");
   set_text(settings.site, "AINSTEER", "3.3");
   set_text(settings.site, "key", "2:00ff" + std::string(60, 'a'));
@@ -230,6 +227,7 @@ TEST(KeptSettings, TheLongestSettingsFit) {
               Refusal::none);
   }
   set_text(settings.site, "name", std::string(board_name_max, 'n'));
+  settings.site.wiring_source = WiringSource::given;
   for (std::uint16_t& full_scale : settings.site.full_scale_cv) full_scale = 65000;
   for (const char id : {'1', '2', '3', '4'}) {
     set_text(settings.site, "key", std::string(1, id) + ":" + std::string(64, 'f'));
@@ -240,6 +238,45 @@ TEST(KeptSettings, TheLongestSettingsFit) {
   char small[100];
   Text text;
   EXPECT_FALSE(write_settings(settings, small, sizeof small, text));
+}
+
+TEST(SiteSettings, AWiringIsGivenReplacedAndForgotten) {
+  SiteSettings settings;
+  EXPECT_EQ(settings.wiring_source, WiringSource::plan);
+  EXPECT_EQ(settings.wiring, plan_wiring());
+  Wiring wiring = plan_wiring();
+  wiring.at(SignalKind::handle).byte = 53;
+  char value[max_wiring_value];
+  EXPECT_EQ(set_text(settings, "wiring", test::str(write_wiring_value(wiring, value))),
+            Refusal::none);
+  EXPECT_EQ(settings.wiring_source, WiringSource::given);
+  EXPECT_EQ(settings.wiring, wiring);
+  wiring.at(SignalKind::handle).byte = 20;
+  EXPECT_EQ(set_text(settings, "wiring", test::str(write_wiring_value(wiring, value))),
+            Refusal::range);
+  EXPECT_EQ(set_text(settings, "wiring", "1:00"), Refusal::format);
+  EXPECT_EQ(settings.wiring.at(SignalKind::handle).number(), 53) << "it keeps the one it had";
+  EXPECT_EQ(set_text(settings, "wiring", "off"), Refusal::none);
+  EXPECT_TRUE(settings == SiteSettings());
+}
+
+TEST(KeptSettings, ADamagedWiringIsNotGuessed) {
+  Settings settings;
+  settings.site.wiring_source = WiringSource::given;
+  const std::string text = written(settings);
+  const std::size_t at = text.find("wiring,1:") + 20;
+  ASSERT_LT(at, text.size());
+  std::string damaged = text;
+  damaged[at] = damaged[at] == '0' ? '1' : '0';
+  Settings read;
+  read_settings(Text(damaged), read);
+  EXPECT_EQ(read.site.wiring_source, WiringSource::damaged);
+  EXPECT_EQ(read.site.wiring, Wiring()) << "nothing is connected";
+  Settings again;
+  read_settings(Text(written(read)), again);
+  EXPECT_EQ(again.site.wiring_source, WiringSource::damaged) << "until another is given";
+  read_settings(Text(text), read);
+  EXPECT_TRUE(read == settings);
 }
 
 TEST(KeptSettings, UnknownLinesAreSkipped) {

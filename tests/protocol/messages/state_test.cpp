@@ -48,7 +48,7 @@ std::vector<StateField> every_field() {
 State numbered_state() {
   State state;
   for (int i = 0; i < analog_channels; ++i) state.raw.analog_cv[i] = 1001 + i;
-  state.handle_held = true;
+  state.handle = Handle::held;
   for (int i = 0; i < dhb12_channels; ++i) {
     state.raw.dhb12[i] = {static_cast<std::uint16_t>(2001 + i), Direction::forward};
   }
@@ -296,7 +296,7 @@ TEST(State, AnInvalidValueRefusesTheWholeDatagram) {
                                   "AIN24:+1.00",
                                   "AIN24: 1.00",
                                   "AIN24:20000000.00",
-                                  "DMHSTA:2",
+                                  "DMHSTA:3",
                                   "DMHSTA:",
                                   "DMHSTA:1,1",
                                   "DHB1A:4096,1",

@@ -29,10 +29,11 @@ std::string one_state(const std::string& fields) {
 TEST(Csv, HasARowForEachStateAndAColumnForEachValue) {
   const Converted csv = converted(recorded_capture(), ".r4log", ".csv");
   const std::vector<std::string> lines = lines_of(csv.bytes);
-  EXPECT_EQ(lines[0],
-            "time [s],path,board,PNum,T [ms],AIN24 [V],AIN12 [V],AIN5 [V],AINDMH [V],DMHSTA [0/1],"
-            "AINSTEER [V],DHB1A pwm [0-4095],DHB1A direction [0/1],OSMC1 pwm [0-4095],"
-            "OSMC1 direction [0/1],STEP1POS [steps],SERVO1POS [us]");
+  EXPECT_EQ(
+      lines[0],
+      "time [s],path,board,PNum,T [ms],AIN24 [V],AIN12 [V],AIN5 [V],AINDMH [V],DMHSTA [0/1/2],"
+      "AINSTEER [V],DHB1A pwm [0-4095],DHB1A direction [0/1],OSMC1 pwm [0-4095],"
+      "OSMC1 direction [0/1],STEP1POS [steps],SERVO1POS [us]");
   EXPECT_EQ(lines[1],
             "1795468293.414765,1,left-arm,7434,79090,24.28,12.12,5.12,12.11,1,1.03,4095,1,400,1,"
             "-100,2000");

@@ -98,7 +98,7 @@ class Speaker {
       const std::uint32_t cv = longest_ ? 3839 : between(centivolts[i] - 3, centivolts[i] + 3);
       state.raw.analog_cv[i] = static_cast<std::int32_t>(cv);
     }
-    state.handle_held = true;
+    state.handle = Handle::held;
     for (Drive& drive : state.raw.dhb12) drive = any_drive();
     for (Drive& drive : state.raw.osmc) drive = any_drive();
     for (std::int32_t& steps : state.raw.stepper_steps) steps = position(20000);

@@ -183,6 +183,8 @@ Health BoardNode::health() const {
   add("chip fault", link.chip.any() ? fmt::format("{}: {}", chip_name(link.chip.address),
                                                   to_text(link.chip.trouble))
                                     : "none");
+  const State& state = board_.state();
+  if (state.present.has(StateField::dmhsta)) add("dead-man's handle", to_text(state.handle));
   add("state rate (Hz)", fmt::format("{:.1f}", statistics.state_rate_hz));
   add("state age (ms)", fmt::format("{:.1f}", statistics.state_age_us / 1e3));
   add("round trip (ms)", fmt::format("{:.2f}", statistics.round_trip_us / 1e3));

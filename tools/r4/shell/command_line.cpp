@@ -43,7 +43,7 @@ constexpr std::array subcommands = std::to_array<Subcommand>({
     {"demo", add_demo},       {"encode", add_encode},
     {"decode", add_decode},   {"completion", add_completion},
     {"man", add_man},         {"devices", add_devices},
-    {"upload", add_upload},
+    {"upload", add_upload},   {"wiring", add_wiring},
 });
 
 // Adds only the subcommand that the first argument names, else all: declaring the options of all

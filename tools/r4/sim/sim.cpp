@@ -22,6 +22,7 @@
 #include "r4link/config.hpp"
 #include "r4link/discovery/url_pattern.hpp"
 #include "r4link/vocabulary.hpp"
+#include "r4link/wiring/wiring_file.hpp"
 #include "sim_log.hpp"
 #include "transports/impaired/impaired_carrier.hpp"
 #include "transports/registry.hpp"
@@ -41,6 +42,9 @@ struct SimOptions {
   std::string board_id;
   std::vector<std::string> settings;
   std::vector<std::string> devices;
+  std::string wiring;
+  std::string wired;
+  bool as_new = false;
   std::optional<Impairment> link;
 };
 
@@ -160,6 +164,13 @@ class ServedBoard {
     check_id(plan.id);
     board_options.board_id = plan.id;
     board_options.settings = read_settings(options.settings);
+    SiteSettings& site = board_options.settings.site;
+    if (!options.wiring.empty()) {
+      site.wiring = load_wiring(options.wiring);
+      site.wiring_source = WiringSource::given;
+    }
+    board_options.wired = options.wired.empty() ? site.wiring : load_wiring(options.wired);
+    board_options.plan_confirmed = !options.as_new;
     board_options.firmware_version = R4LINK_VERSION;
     board_options.events = log_.events();
     return board_options;
@@ -256,6 +267,7 @@ Examples:
   r4 sim --link loss=5%,delay=20ms±10          over a bad WiFi
   r4 sim --stdin                               and type: us 1 15
   r4 sim --device bno055                       with a BNO055 on the user's I2C bus
+  r4 sim --wiring robot.wiring                 a board that is wired like that file
   r4 sim udp://0.0.0.0:2018 pty:/tmp/r4        two transports at once; open the second with
                                                r4 monitor serial:///tmp/r4
   r4 sim 'udp://127.0.0.1:2018?peer=127.0.0.1:2390'   streams to that port, as the paper's board
@@ -291,6 +303,12 @@ void add_sim(CLI::App& root, Action& chosen) {
   add_repeated(*command, "--device", options->devices,
                "icm20948, bno055, vl53l0x or as5600, on the user's I2C bus (can be given again)",
                "NAME");
+  add_text(*command, "--wiring", options->wiring,
+           "how the board is wired, as r4 wiring template writes it (default: the plan)",
+           file_type);
+  add_text(*command, "--wired", options->wired,
+           "how it is wired in truth; its firmware believes --wiring", file_type);
+  add_flag(*command, "--new", options->as_new, "as from the box: nobody has confirmed the plan");
   add_text(
       *command, "--link",
       [options](const std::string& text) { options->link = Impairment::parse(text); },

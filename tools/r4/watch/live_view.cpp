@@ -41,6 +41,7 @@ class LiveView final : public MonitorView {
     }
     State state;
     fault_ = read_state(datagram, state) ? state.fault : ChipFault();
+    if (state.present.has(StateField::dmhsta)) has_handle_ = state.handle != Handle::none;
     pnum_ = datagram.pnum();
     t_ms_ = datagram.time_ms();
   }
@@ -111,6 +112,7 @@ class LiveView final : public MonitorView {
     add_paths(lines);
     lines.push_back(fmt::format("PNum {}   T {} ms   states {}   heartbeats {} in, {} out", pnum_,
                                 t_ms_, now.states, heartbeats_, now.heartbeats));
+    if (!has_handle_) lines.emplace_back("the board has no dead-man's handle");
     if (fault_.any()) {
       lines.push_back(fmt::format("{}: {}", chip_name(fault_.address), to_text(fault_.trouble)));
     }
@@ -152,6 +154,7 @@ class LiveView final : public MonitorView {
   std::map<std::pair<int, std::string>, std::map<std::string, std::string>> readings_;
   std::deque<std::string> notes_;
   ChipFault fault_;
+  bool has_handle_ = true;
   std::uint32_t pnum_ = 0;
   std::uint64_t t_ms_ = 0;
   std::uint64_t heartbeats_ = 0;

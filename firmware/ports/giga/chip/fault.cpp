@@ -118,8 +118,10 @@ void mbed_die() {
 }
 }
 
-void guard_against_faults(firmware::Hal& hal) {
-  guarded = &hal;
+void guard_outputs(firmware::Hal& hal) { guarded = &hal; }
+
+void guard_against_faults() {
+  guarded = nullptr;
   store_is_starting(false);
   const auto entry = reinterpret_cast<std::uintptr_t>(&r4_giga_fault_entry);
   for (const IRQn_Type fault :

@@ -27,8 +27,9 @@ struct FaultNote {
   bool in_store = false;        // the settings store was starting
 };
 
+void guard_against_faults();
 // Call before any output is switched on. A fault then switches off the outputs of `hal`.
-void guard_against_faults(firmware::Hal& hal);
+void guard_outputs(firmware::Hal& hal);
 
 // From any thread. If the boot ends meanwhile, its note has in_store.
 void store_is_starting(bool starting);

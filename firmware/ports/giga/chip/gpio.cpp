@@ -8,6 +8,9 @@ namespace {
 
 constexpr std::uint32_t all_ports = 0x7FF;  // GPIOAEN … GPIOKEN of RCC_AHB4ENR
 
+// Memory in place of the registers of a port.
+GPIO_TypeDef no_port;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
+
 // Writes `value` into field `index` of a register whose fields are `bits` wide.
 template <class Register>
 void set_field(Register& field, std::uint32_t index, std::uint32_t bits, std::uint32_t value) {
@@ -37,6 +40,8 @@ Line line_of(Pin pin) {
                                  GPIOG, GPIOH, GPIOI, GPIOJ, GPIOK};
   return Line{ports[pin.port - 'A'], pin.number};
 }
+
+Line unconnected_line() { return Line{&no_port, 0}; }
 
 void set_mode(Line line, LineMode mode) {
   set_field(line.port->MODER, line.number, 2, static_cast<std::uint32_t>(mode));

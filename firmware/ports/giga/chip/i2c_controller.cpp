@@ -51,13 +51,13 @@ std::uint32_t i2c_timing(std::uint32_t kernel_hz) {
          (ticks(high_ns) - 1) << 8 | (ticks(low_ns) - 1);
 }
 
-I2cController::I2cController(const Wiring& wiring, Clock clock)
-    : registers_(*wiring.registers),
-      scl_(line_of(wiring.scl)),
-      sda_(line_of(wiring.sda)),
+I2cController::I2cController(const Parts& parts, Clock clock)
+    : registers_(*parts.registers),
+      scl_(line_of(parts.scl)),
+      sda_(line_of(parts.sda)),
       clock_(clock) {
-  prepare_open_drain(scl_, wiring.scl_function);
-  prepare_open_drain(sda_, wiring.sda_function);
+  prepare_open_drain(scl_, parts.scl_function);
+  prepare_open_drain(sda_, parts.sda_function);
 }
 
 void I2cController::start(std::uint32_t kernel_hz) {

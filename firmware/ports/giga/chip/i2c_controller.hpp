@@ -24,7 +24,7 @@ std::uint32_t i2c_timing(std::uint32_t kernel_hz);
 
 class I2cController final : public firmware::I2cBus {
  public:
-  struct Wiring {
+  struct Parts {
     I2C_TypeDef* registers;
     Pin scl;
     Pin sda;
@@ -34,7 +34,7 @@ class I2cController final : public firmware::I2cBus {
   // In microseconds that wrap. Must also run in interrupts and fault handlers.
   using Clock = std::uint32_t (*)();
 
-  I2cController(const Wiring& wiring, Clock clock);
+  I2cController(const Parts& parts, Clock clock);
 
   void start(std::uint32_t kernel_hz);  // the peripheral's clock, already on
 

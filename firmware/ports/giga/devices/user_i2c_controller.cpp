@@ -35,10 +35,10 @@ std::uint32_t user_i2c_timing(std::uint32_t kernel_hz) {
          (ticks(high_ns) - 1) << 8 | (ticks(low_ns) - 1);
 }
 
-UserI2cController::UserI2cController(const I2cController::Wiring& wiring)
-    : registers_(*wiring.registers), scl_(line_of(wiring.scl)), sda_(line_of(wiring.sda)) {
-  prepare_open_drain(scl_, wiring.scl_function);
-  prepare_open_drain(sda_, wiring.sda_function);
+UserI2cController::UserI2cController(const I2cController::Parts& parts)
+    : registers_(*parts.registers), scl_(line_of(parts.scl)), sda_(line_of(parts.sda)) {
+  prepare_open_drain(scl_, parts.scl_function);
+  prepare_open_drain(sda_, parts.sda_function);
 }
 
 void UserI2cController::start(std::uint32_t kernel_hz) {

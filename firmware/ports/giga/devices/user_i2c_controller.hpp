@@ -21,7 +21,7 @@ std::uint32_t user_i2c_timing(std::uint32_t kernel_hz);
 
 class UserI2cController final : public firmware::UserI2cPort {
  public:
-  explicit UserI2cController(const I2cController::Wiring& wiring);
+  explicit UserI2cController(const I2cController::Parts& parts);
 
   void start(std::uint32_t kernel_hz);  // the peripheral's clock, already on
   void tick() {                         // in the step timer's interrupt

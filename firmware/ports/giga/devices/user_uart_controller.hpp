@@ -24,17 +24,17 @@ UartTiming user_uart_timing(std::uint32_t kernel_hz, std::uint32_t baud);
 
 class UserUartController final : public firmware::UserUartPort {
  public:
-  struct Wiring {
+  struct Parts {
     USART_TypeDef* registers;
     Pin tx;
     Pin rx;
     std::uint32_t function;
   };
-  explicit UserUartController(const Wiring& wiring)
-      : registers_(*wiring.registers),
-        tx_(line_of(wiring.tx)),
-        rx_(line_of(wiring.rx)),
-        function_(wiring.function) {}
+  explicit UserUartController(const Parts& parts)
+      : registers_(*parts.registers),
+        tx_(line_of(parts.tx)),
+        rx_(line_of(parts.rx)),
+        function_(parts.function) {}
 
   void start(std::uint32_t kernel_hz);  // the peripheral's clock, already on
   // In the step timer's interrupt. `sends`: false until the loop has handled a safe state.

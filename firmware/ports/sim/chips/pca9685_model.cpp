@@ -58,13 +58,11 @@ bool Pca9685Model::start(std::uint8_t address, bool read) {
     phase_ = Phase::general_call;
     return !read;
   }
-  bool mine = address == address_;
-  if (!read) {
-    mine = mine || ((modes & all_call) != 0 && is(all_call_address));
-    for (int i = 0; i < 3; ++i) {  // SUB1 is bit 3, SUB3 bit 1
-      mine =
-          mine || ((modes >> (3 - i) & 1) != 0 && is(static_cast<std::uint8_t>(sub_address_1 + i)));
-    }
+  // The shared addresses are acknowledged by reads, too (7.1.2, 7.1.3).
+  bool mine = address == address_ || ((modes & all_call) != 0 && is(all_call_address));
+  for (int i = 0; i < 3; ++i) {  // SUB1 is bit 3, SUB3 bit 1
+    mine =
+        mine || ((modes >> (3 - i) & 1) != 0 && is(static_cast<std::uint8_t>(sub_address_1 + i)));
   }
   phase_ = !mine ? Phase::idle : read ? Phase::data : Phase::control;
   return mine;

@@ -43,6 +43,9 @@ std::int32_t pick(const Level (&levels)[N], std::uint64_t random) {
   return levels[N - 1].centivolts;
 }
 
+constexpr SignalKind encoder_signals[] = {SignalKind::encoder_a, SignalKind::encoder_b,
+                                          SignalKind::encoder_index};
+
 constexpr std::int32_t steering_span_cv = 300;  // from end to end
 constexpr std::int32_t battery_mohm = 20;
 
@@ -62,12 +65,15 @@ bool operator==(const Pins& a, const Pins& b) {
   return static_cast<const ChipPins&>(a) == static_cast<const ChipPins&>(b);
 }
 
-BoardModel::BoardModel(std::uint64_t seed) : seed_(seed) {
+BoardModel::BoardModel(std::uint64_t seed, const Wiring& wiring) : seed_(seed), chips_(wiring) {
   for (int i = 0; i < analog_channels; ++i) {
     converters_[i].model = this;
     converters_[i].input = i;
   }
-  for (InputPinModel& pin : gpio_) pin.set(true);  // pulled up
+  for (int i = 1; i <= gpio_channels; ++i) set_gpio(i, true);  // pulled up
+  for (int i = 0; i < stepper_channels; ++i) {
+    steppers_[i].driver.set_forward_level(!wiring.at(SignalKind::step_direction, i + 1).option());
+  }
   hold_handle(true);
 }
 
@@ -87,8 +93,15 @@ void BoardModel::power_on() {
 
 void BoardModel::hold_handle(bool held) {
   handle_held_ = held;
-  handle_.set(held == firmware::handle_held_level);
+  input(SignalKind::handle, 1).set(held != chips_.wiring.at(SignalKind::handle).option());
   convert_again();
+}
+
+bool BoardModel::motors_have_supply() const {
+  const Wiring& wiring = chips_.wiring;
+  return (handle_held_ || !wiring.at(SignalKind::handle).connected()) &&
+         (chips_.relay_closed(supply_relay) ||
+          !wiring.at(SignalKind::relay, supply_relay).connected());
 }
 
 void BoardModel::turn_encoder(int channel, std::int32_t counts) {
@@ -102,22 +115,61 @@ void BoardModel::pin_analog(Analog input, std::int32_t centivolts) {
   convert_again();
 }
 
-firmware::BoardPins BoardModel::microcontroller_pins() {
+// The signal of this board at a pin of the Giga; signals::count: none.
+int BoardModel::signal_at(Place place) const {
+  if (!place.connected()) return signals::count;
+  for (int i = first_pin; i <= last_pin; ++i) {
+    const Place& each = chips_.wiring.places[i];
+    if (each.connected() && each.number() == place.number()) return i;
+  }
+  return signals::count;
+}
+
+firmware::InputPin& BoardModel::input_at(Place place) {
+  const int signal = signal_at(place);
+  return signal == signals::count ? open_input_ : pins_[signal - first_pin];
+}
+
+firmware::OutputPin& BoardModel::output_at(Place place) {
+  const int signal = signal_at(place);
+  if (signal == signals::count) return open_output_;
+  const SignalKind kind = signal_kind(signal);
+  const int index = signal - row_of(kind).first;
+  if (kind == SignalKind::step) return steppers_[index].driver.step();
+  if (kind == SignalKind::step_direction) return steppers_[index].driver.direction();
+  if (kind == SignalKind::trigger) return sensors_[index].trigger();
+  return open_output_;
+}
+
+firmware::AnalogPin& BoardModel::analog_at(Place place) {
+  const int signal = signal_at(place);
+  if (signal < signals::analog || signal > signals::analog_last) return open_analog_;
+  return converters_[signal - signals::analog];
+}
+
+firmware::BoardPins BoardModel::microcontroller_pins(const Wiring& wiring) {
   firmware::BoardPins pins{};
   for (int i = 0; i < stepper_channels; ++i) {
-    pins.step[i] = &steppers_[i].driver.step();
-    pins.direction[i] = &steppers_[i].driver.direction();
+    pins.step[i] = &output_at(wiring.at(SignalKind::step, i + 1));
+    pins.direction[i] = &output_at(wiring.at(SignalKind::step_direction, i + 1));
   }
-  for (int i = 0; i < ultrasonic_channels; ++i) pins.trigger[i] = &sensors_[i].trigger();
-  for (int i = 0; i < analog_channels; ++i) pins.analog[i] = &converters_[i];
-  pins.handle = &handle_;
+  for (int i = 0; i < ultrasonic_channels; ++i) {
+    pins.trigger[i] = &output_at(wiring.at(SignalKind::trigger, i + 1));
+  }
+  for (int i = 0; i < analog_channels; ++i) {
+    pins.analog[i] = &analog_at(wiring.at(SignalKind::analog, i + 1));
+  }
+  pins.handle = &input_at(wiring.at(SignalKind::handle));
   for (int i = 0; i < dac_channels; ++i) pins.dac[i] = &dac_[i];
-  for (int i = 0; i < gpio_channels; ++i) pins.gpio[i] = &gpio_[i];
+  for (int i = 0; i < gpio_channels; ++i) {
+    pins.gpio[i] = &input_at(wiring.at(SignalKind::gpio, i + 1));
+  }
   return pins;
 }
 
 void BoardModel::pass_millisecond(std::uint32_t now_us, Interrupts& interrupts) {
   ++time_ms_;
+  now_us_ = now_us;
   chips_.bus.advance(1000);
   devices_.pass_millisecond();
   const bool supplied = motors_have_supply();
@@ -128,8 +180,11 @@ void BoardModel::pass_millisecond(std::uint32_t now_us, Interrupts& interrupts) 
     if (supplied) steer(chips_.dhb12_drive(1));
   }
   for (int i = 0; i < ultrasonic_channels; ++i) {
-    sensors_[i].pass(
-        now_us, [&](bool high, std::uint32_t at_us) { interrupts.on_echo(i + 1, high, at_us); });
+    sensors_[i].pass(now_us, [&](bool high, std::uint32_t at_us) {
+      InputPinModel& pin = input(SignalKind::echo, i + 1);
+      pin.set(high);
+      interrupts.on_edge(pin, high, at_us);
+    });
   }
   for (Stepper& stepper : steppers_) {
     stepper.driver.supply_motor(supplied);
@@ -187,20 +242,34 @@ void BoardModel::turn(int channel, std::int32_t counts, Interrupts& interrupts) 
     counts -= step;
     count = static_cast<std::int32_t>(static_cast<std::uint32_t>(count) +
                                       static_cast<std::uint32_t>(step));
-    tell_levels(channel, interrupts);
+    const bool levels[] = {input(SignalKind::encoder_a, channel).read(),
+                           input(SignalKind::encoder_b, channel).read(),
+                           input(SignalKind::encoder_index, channel).read()};
+    set_encoder_levels(channel);
+    int i = 0;
+    for (const SignalKind kind : encoder_signals) {
+      InputPinModel& pin = input(kind, channel);
+      if (pin.read() != levels[i++]) interrupts.on_edge(pin, pin.read(), now_us_);
+    }
   }
 }
 
 // Forward: A leads B, 00 10 11 01.
-void BoardModel::tell_levels(int channel, Interrupts& interrupts) {
+void BoardModel::set_encoder_levels(int channel) {
   const std::int32_t count = shafts_[channel - 1].count;
   const unsigned quarter = static_cast<unsigned>(count) & 3U;
-  interrupts.on_encoder(channel, quarter == 1 || quarter == 2, quarter == 2 || quarter == 3,
-                        count % counts_a_turn == 0);
+  input(SignalKind::encoder_a, channel).set(quarter == 1 || quarter == 2);
+  input(SignalKind::encoder_b, channel).set(quarter == 2 || quarter == 3);
+  input(SignalKind::encoder_index, channel).set(count % counts_a_turn == 0);
 }
 
 void BoardModel::tell_levels(Interrupts& interrupts) {
-  for (int i = 0; i < encoder_channels; ++i) tell_levels(i + 1, interrupts);
+  for (int i = 1; i <= encoder_channels; ++i) {
+    set_encoder_levels(i);
+    for (const SignalKind kind : encoder_signals) {
+      interrupts.on_edge(input(kind, i), input(kind, i).read(), now_us_);
+    }
+  }
 }
 
 void BoardModel::steer(Drive drive) {

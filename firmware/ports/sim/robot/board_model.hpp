@@ -6,7 +6,8 @@
 // the bench's supply, handle and steppers:
 //
 //     supply      of the motors: on while the dead-man's handle is held and relay 1 is closed
-//                 (docs/reference/safety.md). Without it no motor turns.
+//                 (docs/reference/safety.md). Without it no motor turns. A handle or relay that the
+//                 board does not have interrupts nothing.
 //     OSMC 1-4    a motor each, whose shaft turns encoder 1-4: 4000 counts a second at full duty;
 //                 the index line is high for one of the 1000 counts of a turn, count 0
 //     DHB1A       the steering motor; AINSTEER is its position: 1 V, where forward ends, to 4 V,
@@ -14,6 +15,9 @@
 //     battery     AIN24 sags with the current of the OSMC motors (20 mOhm)
 //     US 1-4      ultrasonic sensors with nothing in sight
 //     steppers    a motor each that takes a step at each pulse
+//
+// Its wiring is that of the real board, whatever the firmware believes. A pin of the Giga to which
+// nothing is connected reads low, with a pull-up high.
 //
 // Analog inputs take the values of the capture as often as they occur there. The choice depends on
 // seed and time only, so the same seed gives the same trace.
@@ -33,11 +37,10 @@ namespace sim {
 
 class BoardModel {
  public:
-  // Edges that interrupt the microcontroller. Channels count from 1.
+  // Edges that interrupt the microcontroller.
   class Interrupts {
    public:
-    virtual void on_encoder(int channel, bool a, bool b, bool index) = 0;
-    virtual void on_echo(int channel, bool high, std::uint32_t at_us) = 0;
+    virtual void on_edge(const firmware::InputPin& pin, bool high, std::uint32_t at_us) = 0;
 
    protected:
     ~Interrupts() = default;
@@ -47,7 +50,7 @@ class BoardModel {
   static constexpr std::int32_t counts_a_turn = 1000;
   static constexpr int supply_relay = 1;  // its contact is in the motors' supply
 
-  explicit BoardModel(std::uint64_t seed);
+  explicit BoardModel(std::uint64_t seed, const Wiring& wiring = plan_wiring());
 
   // Motors stand, counters are at 0. The surroundings stay.
   void power_on();
@@ -57,14 +60,17 @@ class BoardModel {
   void pass_millisecond(std::uint32_t now_us, Interrupts& interrupts);
 
   BoardChips& chips() { return chips_; }
+  const BoardChips& chips() const { return chips_; }
   UserDevices& devices() { return devices_; }
-  firmware::BoardPins microcontroller_pins();
+  // The pins of the Giga that firmware with this wiring uses.
+  firmware::BoardPins microcontroller_pins(const Wiring& wiring);
+  firmware::InputPin& input_at(Place place);
   Pins pins() const;
   // False if pins() cannot have changed: the bus is idle and all steppers stand. This saves time.
   bool pins_may_differ();
   // The chips were changed without a transfer.
   void disturb_pins() { disturbed_ms_ = time_ms_; }
-  bool motors_have_supply() const { return handle_held_ && chips_.relay_closed(supply_relay); }
+  bool motors_have_supply() const;
   // Counts of an encoder's shaft since power came.
   std::int32_t shaft_count(int channel) const { return shafts_[channel - 1].count; }
 
@@ -77,7 +83,7 @@ class BoardModel {
   // The surroundings. Channels count from 1. A RobotModel decides on its motors and encoders.
   void hold_handle(bool held);
   bool handle_held() const { return handle_held_; }
-  void set_gpio(int channel, bool high) { gpio_[channel - 1].set(high); }
+  void set_gpio(int channel, bool high) { input(SignalKind::gpio, channel).set(high); }
   std::uint16_t dac_mv(int channel) const { return dac_[channel - 1].millivolts(); }
   // `cm`: distance; 0: nothing.
   void set_ultrasonic(int channel, std::uint16_t cm) { sensors_[channel - 1].set_distance(cm); }
@@ -105,6 +111,9 @@ class BoardModel {
     std::uint32_t pulses = 0;
     std::uint32_t pause_ms = stepper_pause_ms;
   };
+  struct OpenAnalogPin final : firmware::AnalogPin {
+    std::uint16_t read() override { return 0; }
+  };
   struct Converter final : firmware::AnalogPin {
     std::uint16_t read() override;
     const BoardModel* model = nullptr;
@@ -117,7 +126,13 @@ class BoardModel {
   void pass_millisecond_of(RobotModel& robot, Interrupts& interrupts);
   void turn_bench_motors(Interrupts& interrupts);
   void turn(int channel, std::int32_t counts, Interrupts& interrupts);
-  void tell_levels(int channel, Interrupts& interrupts);
+  void set_encoder_levels(int channel);
+  int signal_at(Place place) const;
+  firmware::OutputPin& output_at(Place place);
+  firmware::AnalogPin& analog_at(Place place);
+  InputPinModel& input(SignalKind kind, int channel) {
+    return pins_[signal_index(kind, channel) - first_pin];
+  }
   void steer(Drive drive);
   void convert_again();
 
@@ -125,6 +140,7 @@ class BoardModel {
   RobotModel* robot_ = nullptr;
   RobotModel::Senses senses_;
   std::uint32_t time_ms_ = 0;
+  std::uint32_t now_us_ = 0;  // of the microcontroller's clock
   BoardChips chips_;
   UserDevices devices_;
   Stepper steppers_[stepper_channels];
@@ -132,10 +148,15 @@ class BoardModel {
   std::int32_t steering_ = 0;  // from the end of forward
   UltrasonicModel sensors_[ultrasonic_channels];
   bool handle_held_ = true;
-  InputPinModel handle_;
+  // The levels of the signals that end at a pin of the Giga; those of outputs are not used.
+  static constexpr int first_pin = signals::handle;
+  static constexpr int last_pin = signals::gpio_last;
+  InputPinModel pins_[last_pin - first_pin + 1];
+  InputPinModel open_input_;
+  OutputPinModel open_output_;
   AnalogOutputPinModel dac_[dac_channels];
-  InputPinModel gpio_[gpio_channels];
   Converter converters_[analog_channels];
+  OpenAnalogPin open_analog_;
   std::int32_t pinned_cv_[analog_channels] = {};
   std::uint32_t bus_transfers_ = 0;  // at the last pins_may_differ()
   std::uint32_t disturbed_ms_ = 0;   // last time that pins may have changed

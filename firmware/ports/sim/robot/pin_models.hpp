@@ -49,7 +49,9 @@ class StepperDriverModel {
 
   firmware::OutputPin& step() { return step_; }
   firmware::OutputPin& direction() { return direction_; }
-  bool forward() const { return direction_.high(); }
+  // The level of the direction pin that means forward; high unless set.
+  void set_forward_level(bool high) { forward_level_ = high; }
+  bool forward() const { return direction_.high() == forward_level_; }
 
   void power_on() { position_ = shaft_ = 0; }
   void supply_motor(bool supplied) { supplied_ = supplied; }
@@ -78,6 +80,7 @@ class StepperDriverModel {
 
   StepPin step_;
   OutputPinModel direction_;
+  bool forward_level_ = true;
   std::uint32_t position_ = 0;
   std::uint32_t shaft_ = 0;
   bool supplied_ = false;

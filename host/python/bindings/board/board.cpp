@@ -195,6 +195,8 @@ void bind_board(py::module_& module) {
           Released())
       .def(
           "identify", [](PyBoard& board, int ms) { return board->identify(Ms(ms)); }, Released())
+      .def(
+          "wiring", [](PyBoard& board, int ms) { return board->wiring(Ms(ms)); }, Released())
       .def("state", [](PyBoard& board) { return board->state(); })
       .def(
           "next_state", [](PyBoard& board, int ms) { return board->next_state(Ms(ms)); },

@@ -28,7 +28,7 @@
 namespace r4::python {
 namespace {
 
-using Value = std::variant<std::monostate, BoardIdentity, I2cAnswer>;
+using Value = std::variant<std::monostate, BoardIdentity, BoardWiring, I2cAnswer>;
 
 class Call {
  public:
@@ -65,6 +65,7 @@ class Call {
   py::object result() const {
     if (error_) std::rethrow_exception(error_);
     if (const auto* identity = std::get_if<BoardIdentity>(&value_)) return py::cast(*identity);
+    if (const auto* wiring = std::get_if<BoardWiring>(&value_)) return py::cast(*wiring);
     if (const auto* answer = std::get_if<I2cAnswer>(&value_)) {
       return py::bytes(reinterpret_cast<const char*>(answer->data.bytes), answer->data.size);
     }
@@ -140,16 +141,25 @@ class Calls {
       board.async_arm(Ms(ms), std::move(handler));
     });
   }
-  CallPtr identify(int ms) {
+  // `answer(board)`: the value, when the board has answered.
+  template <class Answer>
+  CallPtr ask(const Command& question, int ms, Answer answer) {
     return begin(
-        OwnCommand(Command::identify()),
-        [ms](AsyncBoard& board, auto handler) {
-          board.async_send(Command::identify(), Ms(ms), std::move(handler));
+        OwnCommand(question),
+        [question, ms](AsyncBoard& board, auto handler) {
+          board.async_send(question, Ms(ms), std::move(handler));
         },
-        [](const OwnCommand& command, const AsyncBoard& board, const CommandResult& result) {
+        [answer](const OwnCommand& command, const AsyncBoard& board, const CommandResult& result) {
           confirmed(command, board, result);
-          return Value(board.identity());
+          return Value(answer(board));
         });
+  }
+  CallPtr identify(int ms) {
+    return ask(Command::identify(), ms, [](const AsyncBoard& board) { return board.identity(); });
+  }
+  CallPtr wiring(int ms) {
+    return ask(Command::ask_wiring(), ms,
+               [](const AsyncBoard& board) { return board.identity().wiring.value(); });
   }
   CallPtr transfer(std::string_view text, int ms) {
     const OwnCommand command = parse_command_text(text);
@@ -243,6 +253,7 @@ void bind_calls(py::module_& module) {
       .def("stop", &Calls::stop, Keep(), Released())
       .def("arm", &Calls::arm, Keep(), Released())
       .def("identify", &Calls::identify, Keep(), Released())
+      .def("wiring", &Calls::wiring, Keep(), Released())
       .def("transfer", &Calls::transfer, Keep(), Released())
       .def("attach", &Calls::attach, Keep(), Released())
       .def("link_timing", &Calls::link_timing, Keep(), Released())

@@ -191,9 +191,9 @@ TEST(Script, ReadsChipBusAndLoopFaults) {
   const auto& steps = script.steps();
   ASSERT_EQ(steps.size(), 6U);
   EXPECT_EQ(steps[0].kind, Kind::chip);
-  EXPECT_EQ(steps[0].channel, static_cast<int>(firmware::Chip::dac));
+  EXPECT_EQ(steps[0].channel, static_cast<int>(Chip::dac));
   EXPECT_EQ(steps[0].value, static_cast<int>(ScriptStep::Supply::off));
-  EXPECT_EQ(steps[1].channel, static_cast<int>(firmware::Chip::osmc_pwm));
+  EXPECT_EQ(steps[1].channel, static_cast<int>(Chip::osmc_pwm));
   EXPECT_EQ(steps[1].value, static_cast<int>(ScriptStep::Supply::reset));
   EXPECT_EQ(steps[2].kind, Kind::i2c);
   EXPECT_EQ(steps[2].value, 1);
@@ -203,7 +203,7 @@ TEST(Script, ReadsChipBusAndLoopFaults) {
   EXPECT_EQ(steps[5].value, ScriptStep::off);
 
   EXPECT_EQ(error_of("1 chip eeprom off"),
-            "bench.txt:1: 'eeprom' is not a chip; write osmc, dhb, expander, dac or servo");
+            "bench.txt:1: 'eeprom' is not a chip; write osmc, dhb, servo, expander or dac");
   EXPECT_EQ(error_of("1 chip dac broken"),
             "bench.txt:1: 'broken' cannot happen to a chip; write off, on or reset");
   EXPECT_EQ(error_of("1 i2c stuck"),

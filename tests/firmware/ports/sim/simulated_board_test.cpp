@@ -33,8 +33,7 @@ struct BoardListener final : Carrier::Handler {
 // A board, a host at the other end of a pair of memory carriers, and the time.
 class SimulatedBoardTest : public testing::Test {
  protected:
-  // `link` is the name of the board's end. A name that begins with pty: is a cable.
-  void build(SimulatedBoard::Options options = {}, const std::string& link = "memory:") {
+  void build(SimulatedBoard::Options options = {}) {
     options.seed = options.seed.value_or(5);
     options.clock_ms = [this] { return clock_ms_; };
     options.events.on_state = [this](std::uint32_t t_ms, BoardState state, SafeReason reason) {
@@ -59,7 +58,7 @@ class SimulatedBoardTest : public testing::Test {
       events_.push_back(event.kind == CarrierEvent::Kind::up ? "up" : "down");
     };
     board_ = std::make_unique<SimulatedBoard>(io_, std::move(options));
-    auto [host_end, board_end] = make_memory_pair(io_, link);
+    auto [host_end, board_end] = make_memory_pair(io_, "memory:");
     host_ = std::move(host_end);
     board_->add_carrier(std::move(board_end));
     host_->open(listener_);
@@ -166,6 +165,8 @@ bool driven(const Pca9685Model& chip, int channel) {
   return !off(chip, channel) && chip.duty(channel) != 0;
 }
 
+constexpr std::uint8_t brakes_on = 0b10101010;  // by the plan
+
 // The first register that does not have its safe value, or an empty text.
 std::string unsafe_register(BoardChips& chips) {
   for (const Pca9685Model* chip : {&chips.osmc, &chips.dhb12, &chips.servo}) {
@@ -174,7 +175,7 @@ std::string unsafe_register(BoardChips& chips) {
     }
   }
   using Expander = Mcp23017Model::Register;
-  if (chips.expander.reg(0, Expander::olat) != firmware::brakes_on) return "OLATA";
+  if (chips.expander.reg(0, Expander::olat) != brakes_on) return "OLATA";
   if (chips.expander.reg(1, Expander::olat) != 0) return "OLATB";
   for (int port = 0; port < Mcp23017Model::ports; ++port) {
     if (chips.expander.reg(port, Expander::iodir) != 0) return "IODIR";
@@ -198,6 +199,55 @@ void expect_all_driven(BoardChips& chips) {
   for (int i = 0; i < Mcp4728Model::channels; ++i) EXPECT_NE(chips.dac.output(i).code, 0) << i;
 }
 
+// --- the wiring
+
+class WiredBoardTest : public SimulatedBoardTest {
+ protected:
+  void start_again() {
+    board_->happen(Script::parse_now("reboot", "test").value());
+    run(600);  // a heartbeat of the new start
+    connect();
+    run_alive(300);
+  }
+  SafeReason reason() const { return board_->application().reason(); }
+  // The duty of OSMC 1 after a command for it.
+  int driven() {
+    command("O:358,1,1");
+    run_alive(100);
+    return board_->model().pins().osmc[0].pwm;
+  }
+};
+
+TEST_F(WiredBoardTest, UsesTheWiringOfItsSettings) {
+  for (const bool knows : {false, true}) {
+    SimulatedBoard::Options options;
+    options.wired.at(SignalKind::osmc_chip).byte = 0x44;
+    options.wired.at(SignalKind::handle).byte = 53 | Place::option_bit;
+    if (knows) {
+      options.settings.site.wiring = options.wired;
+      options.settings.site.wiring_source = WiringSource::given;
+    }
+    build(std::move(options));
+    start_again();
+    EXPECT_EQ(reason(), knows ? SafeReason::none : SafeReason::fault);
+    EXPECT_EQ(driven(), knows ? 358 : 0);
+  }
+}
+
+TEST_F(WiredBoardTest, AnUnconfirmedPlanIsAFaultAtEachStartUntilItIsCleared) {
+  SimulatedBoard::Options options;
+  options.plan_confirmed = false;
+  build(std::move(options));
+  for (int start = 0; start < 2; ++start) {
+    start_again();
+    EXPECT_EQ(reason(), SafeReason::fault);
+    EXPECT_EQ(states().back().fault, (ChipFault{0, ChipTrouble::not_confirmed}));
+    EXPECT_EQ(driven(), 0);
+    command(clear_field());
+    EXPECT_EQ(driven(), 358) << "its host has said so, for this start";
+  }
+}
+
 TEST_F(SimulatedBoardTest, WaitsForAHostAndThenStreamsTheInputsOfTheBench) {
   build();
   run(1000);
@@ -212,7 +262,7 @@ TEST_F(SimulatedBoardTest, WaitsForAHostAndThenStreamsTheInputsOfTheBench) {
   const std::vector<State> seen = states();
   ASSERT_EQ(seen.size(), 100U);
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    EXPECT_TRUE(seen[i].handle_held);
+    EXPECT_TRUE(seen[i].handle_held());
     EXPECT_GE(seen[i].raw.analog_cv[0], 2413);
     EXPECT_LE(seen[i].raw.analog_cv[0], 2456);
     if (i > 0) {

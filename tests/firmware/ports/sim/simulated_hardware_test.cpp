@@ -70,7 +70,7 @@ TEST(SimulatedHardware, StartsWithTheInputsOfTheCapture) {
   EXPECT_TRUE(bench.board.pins().is_safe());
   bench.run(250);
   const firmware::Inputs inputs = bench.sample();
-  EXPECT_TRUE(inputs.handle_held);
+  EXPECT_TRUE(inputs.handle_held());
   EXPECT_EQ(inputs.ultrasonic_blind, 0);
   for (const std::uint16_t cm : inputs.ultrasonic_cm) EXPECT_EQ(cm, 0);
   for (const std::int32_t counts : inputs.encoder_counts) EXPECT_EQ(counts, 0);
@@ -128,12 +128,12 @@ TEST(SimulatedHardware, TheHandlesVoltageFollowsTheHandle) {
   HardwareBench bench;
   EXPECT_GT(bench.volts(Analog::aindmh), 1100);
   bench.board.hold_handle(false);
-  EXPECT_FALSE(bench.sample().handle_held);
+  EXPECT_FALSE(bench.sample().handle_held());
   EXPECT_LT(bench.volts(Analog::aindmh), 10);
   bench.board.hold_handle(true);
-  EXPECT_FALSE(bench.sample().handle_held);  // the button may still bounce
+  EXPECT_FALSE(bench.sample().handle_held());  // the button may still bounce
   bench.run(30);
-  EXPECT_TRUE(bench.sample().handle_held);
+  EXPECT_TRUE(bench.sample().handle_held());
   EXPECT_GT(bench.volts(Analog::aindmh), 1100);
 }
 
@@ -325,7 +325,7 @@ TEST(SimulatedHardware, PowerOnResetsTheBoardButNotItsSurroundings) {
   again.hal().sample(inputs);
   EXPECT_EQ(inputs.encoder_counts[0], 0);
   EXPECT_EQ(inputs.encoder_counts[1], 0);
-  EXPECT_FALSE(inputs.handle_held);
+  EXPECT_FALSE(inputs.handle_held());
   EXPECT_EQ(inputs.ultrasonic_cm[3], 20);
 }
 

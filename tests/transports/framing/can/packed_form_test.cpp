@@ -62,7 +62,7 @@ State busy_state() {
   State state;
   const std::int32_t volts[] = {2631, 1207, 503, 1198, 97, 330};
   std::copy(std::begin(volts), std::end(volts), state.raw.analog_cv);
-  state.handle_held = true;
+  state.handle = Handle::held;
   for (int i = 0; i < 4; ++i) {
     state.raw.dhb12[i] = {static_cast<std::uint16_t>(4095 - i), Direction::forward};
     state.raw.osmc[i] = {static_cast<std::uint16_t>(358 * i), Direction::reverse};

@@ -15,6 +15,7 @@ export function put(node, text) { if (node.textContent !== text) node.textConten
 export function value_text(value, unit) {
   if (Number.isNaN(value)) return '–';
   if (unit === 'V') return value.toFixed(2);
+  if (unit === '0/1/2' && value === 2) return 'none';  // there is no dead-man's handle
   return String(Number.isInteger(value) ? value : Number(value.toPrecision(5)));
 }
 

@@ -155,6 +155,9 @@ TEST(Pca9685Model, AnswersAllCallAndSubAddressesAsConfigured) {
   Pca9685ModelBench bench;
   EXPECT_EQ(bench.write({0xFD, 0x10}, 0x70), I2cResult::ok);
   EXPECT_EQ(bench.write({0xFD, 0x10}, 0x71), I2cResult::no_acknowledge);
+  std::uint8_t byte = 0;
+  EXPECT_EQ(bench.bus.write_read(0x70, nullptr, 0, &byte, 1), I2cResult::ok);
+  EXPECT_EQ(bench.bus.write_read(0x71, nullptr, 0, &byte, 1), I2cResult::no_acknowledge);
   bench.write({0x00, 0x18});  // SUB1, no ALLCALL
   EXPECT_EQ(bench.write({0xFD, 0x10}, 0x70), I2cResult::no_acknowledge);
   EXPECT_EQ(bench.write({0xFD, 0x10}, 0x71), I2cResult::ok);

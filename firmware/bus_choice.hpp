@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which of the two I2C buses has the board's chips. At a start both are asked, by a read, for the
+// address that all PCA9685 share. If only the other bus answers than the wiring says, the chips are
+// driven there, to keep them off, and the board stays in a fault. A board without a PCA9685 leaves
+// the other bus to the user.
+#pragma once
+
+#include <cstdint>
+
+#include "r4link/vocabulary.hpp"
+#include "r4link/wiring/wiring.hpp"
+
+namespace r4 {
+namespace firmware {
+
+struct BusChoice {
+  int chips;                   // 0 or 1; the other bus is the user's
+  ChipTrouble wiring_trouble;  // for BoardHardware::Config
+  bool user_may;               // false: transfers of the user could reach the chips
+};
+
+// `answers`: bit n, a PCA9685 answers on bus n; `trouble`: that of the wiring otherwise.
+inline BusChoice choose_bus(const Wiring& wiring, unsigned answers, ChipTrouble trouble) {
+  const int told = wiring.at(SignalKind::chip_bus).number();
+  const bool is_lost = trouble == ChipTrouble::damaged;
+  const bool elsewhere = (answers >> told & 1U) == 0 && (answers >> (1 - told) & 1U) != 0;
+  if (!elsewhere || !(is_lost || wiring.has_pca9685())) return {told, trouble, true};
+  return {1 - told, is_lost ? trouble : ChipTrouble::other_bus, false};
+}
+
+}  // namespace firmware
+}  // namespace r4

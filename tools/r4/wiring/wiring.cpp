@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// r4 wiring: files that describe how a board is wired.
+#include "r4link/wiring/wiring.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "../shell/json.hpp"
+#include "../shell/options.hpp"
+#include "../shell/output.hpp"
+#include "../shell/subcommands.hpp"
+#include "r4link/board.hpp"
+#include "r4link/commands/command_text.hpp"
+#include "r4link/error.hpp"
+#include "r4link/wiring/wiring_file.hpp"
+
+namespace r4::tool {
+namespace {
+
+struct WiringOptions {
+  std::string action;
+  std::string first;
+  std::string second;
+  bool json = false;
+};
+
+void require(const std::string& argument, const char* what, const char* usage) {
+  if (argument.empty()) throw Error(ErrorKind::usage, what, "is missing", usage);
+}
+
+void require_none(const std::string& argument, const char* usage) {
+  if (argument.empty()) return;
+  throw Error(ErrorKind::usage, argument, "one argument too many", usage);
+}
+
+constexpr std::chrono::seconds patience{5};
+
+BoardWiring ask(const std::string& url) {
+  require_cable(url, "the wiring of a board");
+  BoardOptions options;
+  options.role = BoardRole::watch;
+  return Board(url, options).wiring(patience);
+}
+
+void give(const std::string& url, const Wiring& wiring) {
+  require_cable(url, "a wiring");
+  Board(url).give_wiring(wiring, patience);  // the safe state does not matter
+}
+
+// A file, the URL of a board, or the plan.
+Wiring wiring_of(const std::string& source) {
+  if (is_url(source)) return ask(source).wiring;
+  return source == "plan" ? plan_wiring() : load_wiring(source);
+}
+
+std::string_view words_of(WiringSource source) {
+  switch (source) {
+    case WiringSource::plan:
+      return "The plan, which nobody has confirmed: r4 wiring confirm";
+    case WiringSource::given:
+      return "Given by the owner of the board";
+    case WiringSource::damaged:
+      break;
+  }
+  return "The stored wiring is damaged: nothing is connected";
+}
+
+struct Count {
+  int connected = 0;
+  int as_planned = 0;
+};
+
+Count count(const Wiring& wiring) {
+  const Wiring plan = plan_wiring();
+  Count count;
+  for (int i = 0; i < signal_count; ++i) {
+    count.connected += wiring.places[i].connected() ? 1 : 0;
+    count.as_planned += wiring.places[i] == plan.places[i] ? 1 : 0;
+  }
+  return count;
+}
+
+int check_file(const WiringOptions& options) {
+  constexpr const char* usage = "r4 wiring check FILE";
+  require(options.first, "FILE", usage);
+  require_none(options.second, usage);
+  const auto [connected, as_planned] = count(load_wiring(options.first));
+  if (options.json) {
+    print_line({{"type", "wiring"},
+                {"file", options.first},
+                {"signals", signal_count},
+                {"connected", connected},
+                {"as_planned", as_planned}});
+  } else {
+    print_text("{}: a board can be wired so: {} of {} signals are connected, {} as in the plan\n",
+               options.first, connected, signal_count, as_planned);
+  }
+  return 0;
+}
+
+int print_template(const WiringOptions& options) {
+  constexpr const char* usage = "r4 wiring template > FILE";
+  require_none(options.first, usage);
+  print_text("{}", write_wiring(plan_wiring()));
+  return 0;
+}
+
+int diff(const WiringOptions& options) {
+  constexpr const char* usage = "r4 wiring diff FILE FILE, or the URL of a board, or plan";
+  require(options.first, "FILE", usage);
+  require(options.second, "second FILE", usage);
+  const Wiring a = wiring_of(options.first);
+  const Wiring b = wiring_of(options.second);
+  for (int i = 0; i < signal_count; ++i) {
+    if (a.places[i] == b.places[i]) continue;
+    const std::string from = place_name(i, a.places[i]);
+    const std::string to = place_name(i, b.places[i]);
+    if (options.json) {
+      print_line({{"type", "difference"}, {"signal", signal_name(i)}, {"a", from}, {"b", to}});
+    } else {
+      print_text("{}: {} -> {}\n", signal_name(i), from, to);
+    }
+  }
+  return a == b ? 0 : static_cast<int>(ErrorKind::data);
+}
+
+int give_file(const WiringOptions& options) {
+  constexpr const char* usage = "r4 wiring give FILE serial:auto";
+  require(options.first, "FILE", usage);
+  require(options.second, "URL", usage);
+  give(options.second, load_wiring(options.first));
+  print_text(
+      "the board keeps this wiring, and uses it from its next start on\n"
+      "outputs off first:   r4 stop {}\n"
+      "then press reset, or take the power away\n",
+      options.second);
+  return 0;
+}
+
+int show(const WiringOptions& options) {
+  constexpr const char* usage = "r4 wiring show serial:auto";
+  require(options.first, "URL", usage);
+  require_none(options.second, usage);
+  const BoardWiring kept = ask(options.first);
+  if (options.json) {
+    Json places;
+    for (int i = 0; i < signal_count; ++i) {
+      places[signal_name(i)] = place_name(i, kept.wiring.places[i]);
+    }
+    print_line({{"type", "wiring"},
+                {"source", to_text(kept.source)},
+                {"in_use", kept.in_use},
+                {"places", places}});
+    return 0;
+  }
+  print_text("{}\n# {}{}\n", write_wiring(kept.wiring), words_of(kept.source),
+             kept.in_use ? "" : ". The board uses another wiring until its next start");
+  return 0;
+}
+
+int confirm(const WiringOptions& options) {
+  constexpr const char* usage = "r4 wiring confirm serial:auto";
+  require(options.first, "URL", usage);
+  require_none(options.second, usage);
+  const BoardWiring kept = ask(options.first);
+  switch (kept.source) {
+    case WiringSource::given:
+      print_text("the board has a wiring that its owner gave: there is nothing to confirm\n");
+      return 0;
+    case WiringSource::damaged:
+      throw Error(ErrorKind::refused, options.first, "its stored wiring is damaged",
+                  "give it again: r4 wiring give FILE " + options.first);
+    case WiringSource::plan:
+      break;
+  }
+  give(options.first, kept.wiring);
+  print_text(
+      "the board keeps the plan as its wiring: from its next start on it drives its outputs\n"
+      "until then, after each start: r4 send {} E:CLEAR\n",
+      options.first);
+  return 0;
+}
+
+struct WiringAction {
+  std::string_view name;
+  int (*run)(const WiringOptions&);
+};
+constexpr WiringAction actions[] = {{"check", check_file}, {"template", print_template},
+                                    {"diff", diff},        {"give", give_file},
+                                    {"show", show},        {"confirm", confirm}};
+
+int run(const WiringOptions& options) {
+  for (const WiringAction& each : actions) {
+    if (each.name == options.action) return each.run(options);
+  }
+  throw Error(ErrorKind::usage, options.action, "is nothing to be done with a wiring",
+              "use check, template, diff, give, show or confirm");
+}
+
+constexpr const char* wiring_footer =
+    R"(A wiring file says which pin of the Giga, or which line of a chip, serves each signal of a board
+(docs/reference/wiring.md). The paper does not say it: the wiring without a file is our plan. A new
+board keeps its outputs off until it was given a wiring, or its owner has confirmed the plan.
+  check FILE        a fault is reported with its line, the reason and what to do
+  template          prints the plan as a file, to be compared with your board's schematic
+  diff FILE FILE    prints what is different in the second; in place of a file: plan, or a URL
+  give FILE URL     the board keeps it, and uses it from its next start on
+  show URL          prints the wiring that the board keeps, as a file
+  confirm URL       the owner of the board has compared the plan with it: the plan is its wiring
+A board takes and shows its wiring over USB only.
+
+Examples:
+  r4 wiring template > robot.wiring
+  r4 wiring check robot.wiring
+  r4 wiring diff plan robot.wiring
+  r4 wiring give robot.wiring serial:auto
+  r4 wiring confirm serial:auto
+  r4 sim --wiring robot.wiring         a simulated board that is wired so
+
+Exit codes: 0 done; 1 a wiring is not possible, or diff found a difference; 2 usage, also a URL that is not
+a cable; 3 the board did not take it; 4, 5 a file or the transport cannot be opened.)";
+
+}  // namespace
+
+void add_wiring(CLI::App& root, Action& chosen) {
+  const auto options = std::make_shared<WiringOptions>();
+  CLI::App* const command = add_subcommand(
+      root, chosen, "wiring", "Check and set how a board is wired", wiring_footer, options, run);
+  add_text(*command, "ACTION", options->action, "what to do: see below",
+           "check|template|diff|give|show|confirm", Need::required);
+  add_text(*command, "FILE", options->first, "a wiring file, or a URL", file_type);
+  add_text(*command, "SECOND", options->second, "diff: the second; give: the URL", file_type);
+  add_json(*command, options->json, "print the result as JSON, one object a line");
+}
+
+}  // namespace r4::tool
