@@ -21,11 +21,11 @@ struct BusChoice {
 
 // `answers`: bit n, a PCA9685 answers on bus n; `trouble`: that of the wiring otherwise.
 inline BusChoice choose_bus(const Wiring& wiring, unsigned answers, ChipTrouble trouble) {
-  const int told = wiring.at(SignalKind::chip_bus).number();
+  const int named = wiring.at(SignalKind::chip_bus).number();
   const bool is_lost = trouble == ChipTrouble::damaged;
-  const bool elsewhere = (answers >> told & 1U) == 0 && (answers >> (1 - told) & 1U) != 0;
-  if (!elsewhere || !(is_lost || wiring.has_pca9685())) return {told, trouble, true};
-  return {1 - told, is_lost ? trouble : ChipTrouble::other_bus, false};
+  const bool elsewhere = (answers >> named & 1U) == 0 && (answers >> (1 - named) & 1U) != 0;
+  if (!elsewhere || !(is_lost || wiring.has_pca9685())) return {named, trouble, true};
+  return {1 - named, is_lost ? trouble : ChipTrouble::other_bus, false};
 }
 
 }  // namespace firmware

@@ -41,7 +41,8 @@ constexpr std::pair<std::string_view, std::string_view> remarks[] = {
     {"bldc",
      "BLDC drivers: outputs VOUTA to VOUTD of the chip dac, lines GPA0 to GPB7 of the expander.\n"
      "# Direction 'inverted': low is forward. Brake 'inverted': low is on."},
-    {"relay", "Relays. 1 is in the supply of the motors. 'inverted': low closes the relay."},
+    {"relay",
+     "Relays. 1 is in the circuit of the dead-man's handle. 'inverted': low closes the relay."},
 };
 
 std::string_view trimmed(std::string_view text) {

@@ -76,7 +76,7 @@ R4LINK_API const char* to_text(SafeReason reason);
 enum class Handle : std::uint8_t {
   released = 0,  // or its wire is broken
   held = 1,
-  none = 2,  // the board has no handle: nothing but its relays takes the motors' supply away
+  none = 2,  // the board has no handle
 };
 // "released", "held", "none".
 R4LINK_API const char* to_text(Handle handle);

@@ -124,6 +124,7 @@ bool write_settings(const Settings& settings, char* out, std::size_t capacity, T
 }
 
 void read_settings(Text text, Settings& settings) {
+  settings.site.lose_wiring();
   // Twice, because a heartbeat interval may need the longer timeout of a later line.
   for (int round = 0; round < 2; ++round) {
     for (Text rest = text; !rest.empty();) {

@@ -39,7 +39,7 @@ Refusal set(Settings& settings, Text key, Text value);
 constexpr std::size_t max_settings_text = 1440;
 bool write_settings(const Settings& settings, char* out, std::size_t capacity, Text& text);
 // Reads such lines, in any order. Skips unknown and invalid lines, because the text may be from an
-// older or newer firmware. An invalid wiring is damaged: the board must not guess.
+// older or newer firmware. A missing or invalid wiring is damaged: the board must not guess.
 void read_settings(Text text, Settings& settings);
 
 // The secret part of a command's text ("C:password,letmein!", "C:key,1:5a…"): the digits of a key,

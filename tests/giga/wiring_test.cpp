@@ -138,6 +138,17 @@ TEST_P(AnyWiring, AnEchoBelongsToTheTriggeredSensor) {
   }
 }
 
+TEST(GigaWiring, WithoutAnalogInputsTheConverterRestsAndAllRead0) {
+  Wiring wiring = plan_wiring();
+  for (int i = 1; i <= analog_channels; ++i) wiring.at(SignalKind::analog, i) = {};
+  GigaBench bench(wiring);
+  bench.boot();
+  PlainHost host;
+  bench.drive(host, bench.usb());
+  EXPECT_TRUE(has_line(bench.usb_lines(), "AIN24:0.00;"));
+  EXPECT_EQ(static_cast<std::uint32_t>(ADC1->CR), 0U);
+}
+
 // --- a wiring that is not known
 
 TEST(GigaWiringFault, ANewBoardWaitsForItsOwner) {

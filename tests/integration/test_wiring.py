@@ -44,7 +44,7 @@ def test_a_template_is_the_plan(tmp_path):
     path = tmp_path / 'plan.wiring'
     path.write_text(run('wiring', 'template').stdout)
     assert run('wiring', 'check', str(path)).stdout == (
-        f'{path}: a board can be wired so: 101 of 101 signals are connected, 101 as in the plan\n')
+        f'{path}: a valid wiring: 101 of 101 signals are connected, 101 as in the plan\n')
     same = run('wiring', 'diff', 'plan', str(path))
     assert (same.returncode, same.stdout) == (0, '')
 

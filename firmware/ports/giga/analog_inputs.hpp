@@ -37,12 +37,14 @@ class AnalogInputs {
       if (!place.connected()) continue;
       values_[i].newest = converters_[i].make(pin_name(pin_of(place))).read_u16();
       set_up(inputs_[i] = adc1_inputs[place.number() - first_analog_pin]);
+      any_ = true;
     }
   }
 
   // Takes the finished conversion and starts the next. If the converter stops, all inputs read 0,
   // because an old voltage would pass for a measured one.
   void poll() {
+    if (!any_) return;
     if (convert()) {
       late_ = 0;
     } else if (++late_ >= patience) {
@@ -77,9 +79,7 @@ class AnalogInputs {
       values_[next_].newest = static_cast<std::uint16_t>(ADC1->DR);
       next_ = (next_ + 1) % analog_channels;
     }
-    for (int i = 0; i < analog_channels && !converters_[next_].made(); ++i) {
-      next_ = (next_ + 1) % analog_channels;
-    }
+    while (!converters_[next_].made()) next_ = (next_ + 1) % analog_channels;
     ADC1->SQR1 = inputs_[next_] << 6;
     command(cr_convert);
     step_ = Step::converting;
@@ -103,6 +103,7 @@ class AnalogInputs {
   AnalogValue (&values_)[analog_channels];
   Late<mbed::AnalogIn> converters_[analog_channels];
   std::uint32_t inputs_[analog_channels] = {};  // of ADC1
+  bool any_ = false;                            // an input is connected
   int next_ = 0;
   int late_ = 0;
   Step step_ = Step::idle;

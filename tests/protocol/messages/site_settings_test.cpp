@@ -264,19 +264,30 @@ TEST(KeptSettings, ADamagedWiringIsNotGuessed) {
   Settings settings;
   settings.site.wiring_source = WiringSource::given;
   const std::string text = written(settings);
-  const std::size_t at = text.find("wiring,1:") + 20;
-  ASSERT_LT(at, text.size());
-  std::string damaged = text;
-  damaged[at] = damaged[at] == '0' ? '1' : '0';
+  const std::size_t first = text.find("\nwiring,1:");
+  ASSERT_NE(first, std::string::npos);
   Settings read;
-  read_settings(Text(damaged), read);
-  EXPECT_EQ(read.site.wiring_source, WiringSource::damaged);
-  EXPECT_EQ(read.site.wiring, Wiring()) << "nothing is connected";
+  for (std::size_t at = first; at <= text.find('\n', first + 1); ++at) {
+    std::string damaged = text;
+    damaged[at] = static_cast<char>(damaged[at] ^ 1);
+    read_settings(Text(damaged), read = Settings());
+    EXPECT_EQ(read.site.wiring_source, WiringSource::damaged) << damaged;
+    EXPECT_EQ(read.site.wiring, Wiring()) << "nothing is connected";
+  }
   Settings again;
   read_settings(Text(written(read)), again);
   EXPECT_EQ(again.site.wiring_source, WiringSource::damaged) << "until another is given";
   read_settings(Text(text), read);
   EXPECT_TRUE(read == settings);
+}
+
+TEST(KeptSettings, AMissingWiringIsNotGuessed) {
+  const std::string texts[] = {"", "rate,50\n", "rate,50\nwirinh,off\n"};
+  for (const std::string& text : texts) {
+    Settings read;
+    read_settings(Text(text), read);
+    EXPECT_EQ(read.site.wiring_source, WiringSource::damaged) << text;
+  }
 }
 
 TEST(KeptSettings, UnknownLinesAreSkipped) {

@@ -28,15 +28,6 @@ struct WiringOptions {
   bool json = false;
 };
 
-void require(const std::string& argument, const char* what, const char* usage) {
-  if (argument.empty()) throw Error(ErrorKind::usage, what, "is missing", usage);
-}
-
-void require_none(const std::string& argument, const char* usage) {
-  if (argument.empty()) return;
-  throw Error(ErrorKind::usage, argument, "one argument too many", usage);
-}
-
 constexpr std::chrono::seconds patience{5};
 
 BoardWiring ask(const std::string& url) {
@@ -85,9 +76,6 @@ Count count(const Wiring& wiring) {
 }
 
 int check_file(const WiringOptions& options) {
-  constexpr const char* usage = "r4 wiring check FILE";
-  require(options.first, "FILE", usage);
-  require_none(options.second, usage);
   const auto [connected, as_planned] = count(load_wiring(options.first));
   if (options.json) {
     print_line({{"type", "wiring"},
@@ -96,23 +84,18 @@ int check_file(const WiringOptions& options) {
                 {"connected", connected},
                 {"as_planned", as_planned}});
   } else {
-    print_text("{}: a board can be wired so: {} of {} signals are connected, {} as in the plan\n",
+    print_text("{}: a valid wiring: {} of {} signals are connected, {} as in the plan\n",
                options.first, connected, signal_count, as_planned);
   }
   return 0;
 }
 
-int print_template(const WiringOptions& options) {
-  constexpr const char* usage = "r4 wiring template > FILE";
-  require_none(options.first, usage);
+int print_template(const WiringOptions& /*options*/) {
   print_text("{}", write_wiring(plan_wiring()));
   return 0;
 }
 
 int diff(const WiringOptions& options) {
-  constexpr const char* usage = "r4 wiring diff FILE FILE, or the URL of a board, or plan";
-  require(options.first, "FILE", usage);
-  require(options.second, "second FILE", usage);
   const Wiring a = wiring_of(options.first);
   const Wiring b = wiring_of(options.second);
   for (int i = 0; i < signal_count; ++i) {
@@ -129,9 +112,6 @@ int diff(const WiringOptions& options) {
 }
 
 int give_file(const WiringOptions& options) {
-  constexpr const char* usage = "r4 wiring give FILE serial:auto";
-  require(options.first, "FILE", usage);
-  require(options.second, "URL", usage);
   give(options.second, load_wiring(options.first));
   print_text(
       "the board keeps this wiring, and uses it from its next start on\n"
@@ -142,9 +122,6 @@ int give_file(const WiringOptions& options) {
 }
 
 int show(const WiringOptions& options) {
-  constexpr const char* usage = "r4 wiring show serial:auto";
-  require(options.first, "URL", usage);
-  require_none(options.second, usage);
   const BoardWiring kept = ask(options.first);
   if (options.json) {
     Json places;
@@ -163,9 +140,6 @@ int show(const WiringOptions& options) {
 }
 
 int confirm(const WiringOptions& options) {
-  constexpr const char* usage = "r4 wiring confirm serial:auto";
-  require(options.first, "URL", usage);
-  require_none(options.second, usage);
   const BoardWiring kept = ask(options.first);
   switch (kept.source) {
     case WiringSource::given:
@@ -187,17 +161,25 @@ int confirm(const WiringOptions& options) {
 
 struct WiringAction {
   std::string_view name;
+  std::string_view arguments;
+  int count;  // of the arguments
   int (*run)(const WiringOptions&);
 };
-constexpr WiringAction actions[] = {{"check", check_file}, {"template", print_template},
-                                    {"diff", diff},        {"give", give_file},
-                                    {"show", show},        {"confirm", confirm}};
+constexpr WiringAction actions[] = {
+    {"check", "FILE", 1, check_file}, {"template", "> FILE", 0, print_template},
+    {"diff", "FILE FILE", 2, diff},   {"give", "FILE URL", 2, give_file},
+    {"show", "URL", 1, show},         {"confirm", "URL", 1, confirm}};
 
 int run(const WiringOptions& options) {
   for (const WiringAction& each : actions) {
-    if (each.name == options.action) return each.run(options);
+    if (each.name != options.action) continue;
+    const int given = options.first.empty() ? 0 : options.second.empty() ? 1 : 2;
+    if (given == each.count) return each.run(options);
+    throw Error(ErrorKind::usage, options.action,
+                given < each.count ? "an argument is missing" : "it has an argument too many",
+                fmt::format("use r4 wiring {} {}", each.name, each.arguments));
   }
-  throw Error(ErrorKind::usage, options.action, "is nothing to be done with a wiring",
+  throw Error(ErrorKind::usage, options.action, "there is no such action",
               "use check, template, diff, give, show or confirm");
 }
 
