@@ -408,7 +408,7 @@ class Wiring:
     def __setitem__(self, signal: str, place: str) -> None:
         """Raises DataError for a place that the signal cannot have. check() finds what only the whole shows."""
     def check(self) -> None:
-        """Raises DataError, with the reason, if no board can be wired so."""
+        """Raises DataError, with the reason, if the wiring breaks a rule."""
     @property
     def setting(self) -> str:
         """The value of the setting `wiring`."""

@@ -144,7 +144,7 @@ struct WiringCheck {
   std::uint8_t signal = no_signal;  // index in Wiring
   std::uint8_t other = no_signal;
 };
-// WiringFault::none: a board can be wired so, and the firmware can drive it.
+// WiringFault::none: it breaks no rule of docs/reference/wiring.md.
 R4LINK_API WiringCheck check(const Wiring& wiring);
 
 }  // namespace r4
