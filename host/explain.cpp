@@ -49,7 +49,7 @@ CauseWords words_of(LinkCause cause) {
       return {"board has no key", "the board has no key, so it obeys anyone: refused",
               "give it ours over USB (r4 key give FILE URL), or open it without a key"};
     case LinkCause::key_needed:
-      return {"key needed", "the board obeys only who has its key",
+      return {"key needed", "the board obeys only hosts that have its key",
               "open it with the key: --key FILE or R4_KEY of r4, SessionOptions::key in a "
               "program"};
     case LinkCause::key_not_taken:

@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The transport of docs/reference/transports.md, section "Writing another", between a Board and a
-// simulated board.
+// The transport of docs/examples/own_transport between a Board and a simulated board.
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 
 #include <asio/executor_work_guard.hpp>
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
-#include <filesystem>
-#include <fstream>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <thread>
 
@@ -84,20 +80,6 @@ TEST(OwnTransport, IsDownWhenTheOtherProgramCloses) {
   board.wait_active();
   simulated.switch_off();
   EXPECT_EQ(down.get(), "the other end was closed");
-}
-
-TEST(OwnTransport, DocumentationShowsTheTestedCode) {
-  const auto text_of = [](const char* path) {
-    const std::filesystem::path root =
-        std::filesystem::path(__FILE__).parent_path().parent_path().parent_path();
-    std::ostringstream text;
-    text << std::ifstream(root / path).rdbuf();
-    return text.str();
-  };
-  const std::string code = text_of("docs/examples/own_transport/socket_carrier.hpp");
-  ASSERT_FALSE(code.empty());
-  EXPECT_NE(text_of("docs/reference/transports.md").find("```cpp\n" + code + "```\n"),
-            std::string::npos);
 }
 
 }  // namespace

@@ -104,7 +104,7 @@ def test_the_documentation_shows_the_printed_output():
     with open(os.path.join(DOCS, 'how-to', 'can.md'), encoding='utf-8') as file:
         text = file.read()
     examples = re.findall(r'^    \$ r4 bus(?! can:)(.*)\n((?:    .*\n|\n(?=    (?!\$)))*)', text, re.MULTILINE)
-    assert len(examples) >= 2
+    assert examples
     for arguments, shown in examples:
         printed = run('bus', *arguments.split())
         lines = [line.removeprefix('    ').rstrip() for line in shown.rstrip('\n').split('\n')]

@@ -225,9 +225,10 @@ Findings check_udev_rules(const Machine& machine, std::string_view rules) {
   const bool modems = is_running(machine, "ModemManager");
   const bool keeps_off = installed && installed->find("ID_MM_DEVICE_IGNORE") != std::string::npos;
   finding.severity = Severity::warning;
-  finding.reason = installed ? "the rules for udev are those of another version of r4"
-                             : "the rules for udev are missing: who may open a board, and that "
-                               "nobody takes it for a modem";
+  finding.reason = installed
+                       ? "the rules for udev are those of another version of r4"
+                       : "the rules for udev are missing, which let you open a board and keep "
+                         "programs from taking it for a modem";
   finding.fix =
       fmt::format("r4 doctor --udev-rules | {}",
                   machine.as_root(fmt::format(
