@@ -3,26 +3,27 @@
 # Each makes an OBJECT library; cmake/library.cmake joins their objects into the library.
 
 # Asio without Boost, its code compiled once (transports/asio.cpp). Whether Asio finds
-# std::aligned_alloc depends on what was included before it: unless that is switched off, objects
-# disagree on how handler memory is freed. Whoever uses r4link::asio needs all of these.
+# std::aligned_alloc depends on the headers included before. The last definition switches it off, because
+# otherwise object files would free handler memory in different ways. A program that links r4link::asio
+# needs all of these definitions.
 set(R4_ASIO_DEFINITIONS ASIO_STANDALONE ASIO_SEPARATE_COMPILATION ASIO_NO_DEPRECATED
     ASIO_DISABLE_STD_ALIGNED_ALLOC)
 
-# Our warnings, for our own targets only. Asio, CLI11 and the like are system headers.
+# The warnings for targets of this project. Headers of other projects are system headers.
 function(r4_warnings target)
-  # clang has -Wsign-conversion in -Wconversion, and calls libstdc++'s own stable_sort() deprecated.
+  # clang's -Wconversion includes -Wsign-conversion, and clang reports a deprecation inside libstdc++'s stable_sort().
   set(warnings -Wall -Wextra -Wconversion -Wshadow)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
     list(APPEND warnings -Wno-sign-conversion -Wno-deprecated-declarations)
   endif()
-  # On 32-bit ARM, GCC notes in every use of std::sort that its calls are not those of GCC 6.
+  # On 32-bit ARM, GCC reports at each std::sort that the calling convention differs from GCC 6.
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_SYSTEM_PROCESSOR MATCHES "^arm")
     list(APPEND warnings -Wno-psabi)
   endif()
   target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:CXX>:${warnings}>")
 endfunction()
 
-# Finds the package that an option of ours needs. `needs_it` and `debian` are for people.
+# Finds the package that an option needs. `needs_it` and `debian` are for the error message.
 macro(r4_find_optional option package needs_it debian)
   find_package(${package} CONFIG QUIET)
   if(NOT ${package}_FOUND)
@@ -32,7 +33,7 @@ macro(r4_find_optional option package needs_it debian)
   endif()
 endmacro()
 
-# install(), unless another project has taken the tree in: it installs what it wants.
+# install(), unless another project includes the tree: that project decides what it installs.
 function(r4_install)
   if(R4_INSTALL)
     install(${ARGV})
@@ -54,17 +55,17 @@ function(r4_layer target)
   add_library(${target} OBJECT ${ARGN})
   r4_warnings(${target})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/include)
-  # A symbol that is unique in a process could not be local to the library.
+  # A symbol that is unique in the process (STB_GNU_UNIQUE) cannot be local to the library.
   target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
-  # Nobody replaces our functions from a shared library: they may be inlined nevertheless.
+  # -fno-semantic-interposition: no program replaces functions of the shared library, so the compiler may inline them.
   set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON
                         CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
   target_compile_options(${target} PRIVATE -fno-semantic-interposition)
   set_property(GLOBAL APPEND PROPERTY R4_LAYERS ${target})
 endfunction()
 
-# The files of a room are one for the compiler, which takes it 40 % less time: what is local to a file needs a name of
-# its own in its room. r4_unity_by_room(TARGET FILES...): of the others each is compiled alone.
+# r4_unity_by_room(TARGET FILES...): compiles FILES of one room (folder) as one source, which takes 40 % less time. So
+# names that are local to a file must be unique in their room. Each other file of TARGET is compiled alone.
 function(r4_unity_by_room target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${R4_UNITY} UNITY_BUILD_MODE GROUP)
   foreach(source IN LISTS ARGN)
@@ -75,7 +76,7 @@ function(r4_unity_by_room target)
   endforeach()
 endfunction()
 
-# What also compiles for the board: C++14 as GCC 7 has it, no exceptions, no RTTI.
+# Code that also compiles for the board: C++14 of GCC 7, without exceptions and RTTI.
 function(r4_portable_layer target)
   r4_layer(${target} ${ARGN})
   if(TARGET ${target})
@@ -85,17 +86,17 @@ function(r4_portable_layer target)
   endif()
 endfunction()
 
-# What only a computer runs: C++20 on standalone Asio.
+# Code that only a computer runs: C++20 with standalone Asio.
 function(r4_host_layer target)
   r4_layer(${target} ${ARGN})
   if(TARGET ${target})
     set_target_properties(${target} PROPERTIES CXX_STANDARD 20 CXX_STANDARD_REQUIRED ON
                           CXX_EXTENSIONS OFF)
-    # Asio makes itself visible otherwise, whatever the library exports.
+    # Without ASIO_DISABLE_VISIBILITY the library would export Asio's symbols.
     target_compile_definitions(${target} PRIVATE ${R4_ASIO_DEFINITIONS} ASIO_DISABLE_VISIBILITY)
     target_link_libraries(${target} PRIVATE Threads::Threads)
-    # Read once instead of in every file; the files include what they need nevertheless, and clang-tidy sees
-    # them without it.
+    # Compiled once instead of for each file. Each file still includes the headers that it needs, and clang-tidy reads
+    # the files without the precompiled header.
     target_precompile_headers(${target} PRIVATE <algorithm> <asio/io_context.hpp> <chrono> <functional>
                               <memory> <optional> <string> <vector>)
     r4_unity_by_room(${target} ${ARGN})

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The installed library, in three forms of the same objects:
 #
-#   r4link::r4link   libr4link.a: everything but what R4LINK_API is on is local to it, Asio too, so that it
-#                    meets no Asio of the program's own. What include/r4link offers but async_*.hpp.
+#   r4link::r4link   libr4link.a: include/r4link without async_*.hpp. Only symbols with R4LINK_API are global. The
+#                    library's Asio is local, so it does not conflict with an Asio of the program.
 #   r4link::shared   libr4link.so: the same as a shared library
-#   r4link::asio     libr4link-asio.a: AsyncBoard and async_discover() as well, for programs with Asio; theirs is used
+#   r4link::asio     libr4link-asio.a: also AsyncBoard and async_discover(). It uses the program's Asio.
 #
-# A program links one of them. find_package(r4link), or pkg-config r4link and r4link-asio.
+# A program links one of the three, by find_package(r4link), or by pkg-config r4link and r4link-asio.
 include(CMakePackageConfigHelpers)
 
 get_property(layers GLOBAL PROPERTY R4_LAYERS)
@@ -17,7 +17,7 @@ endforeach()
 set(needed fmt::fmt PkgConfig::libserialport PkgConfig::libnl-route PkgConfig::libdeflate
     PkgConfig::libzstd)
 
-# COMDAT groups would let the linker take another object's copy of what is local.
+# With COMDAT groups the linker could use a copy from another object instead of the local symbol.
 set(joined ${PROJECT_BINARY_DIR}/r4link.o)
 add_custom_command(
   OUTPUT ${joined}

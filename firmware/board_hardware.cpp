@@ -124,7 +124,8 @@ int BoardHardware::drive_chips_safe(int held_before) {
     }
     return all_chips;
   }
-  // One acknowledge of the all-call hides chips that did not hear it: each is addressed, too.
+  // One acknowledge of the all-call hides chips that did not hear it, so each chip is also
+  // addressed.
   for (const Chip chip : safe_order) {
     const int i = static_cast<int>(chip);
     if (i != held_before && !drive_chip_safe(i)) return i;
@@ -273,7 +274,7 @@ void BoardHardware::set_up_again() {
   }
 }
 
-// A chip with changed modes may drive although commanded off. Its reset reaches other chips, too.
+// A chip with changed modes may drive although commanded off. Its reset also reaches other chips.
 void BoardHardware::reset_lost_modes() {
   const bool lost = osmc_.lost_mode() || dhb12_.lost_mode() || servo_.lost_mode();
   if (!lost || Pca9685::reset_all(bus_) != I2cResult::ok) return;

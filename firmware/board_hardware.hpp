@@ -102,7 +102,7 @@ class BoardHardware final : public Hal {
   void step_tick() {
     for (Stepper& stepper : steppers_) stepper.tick();
   }
-  // True if a stepper moves. If not, the ticks may pause from the next one on.
+  // True if a stepper moves. If not, the ticks may pause.
   bool stepping() const;
   QuadratureEncoder& encoder(int channel) { return encoders_[channel - 1]; }
   UltrasonicSensors& ultrasonic() { return ultrasonic_; }

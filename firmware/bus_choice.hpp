@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which of the two I2C buses has the board's chips. At a start both are asked, by a read, for the
-// address that all PCA9685 share. If only the other bus answers than the wiring says, the chips are
-// driven there, to keep them off, and the board stays in a fault. A board without a PCA9685 leaves
-// the other bus to the user.
+// Which of the two I2C buses has the board's chips. At a start the board reads from the address
+// that all PCA9685 share, on both buses. If only the bus answers that the wiring does not name, the
+// board drives the chips there, to keep them off, and stays in a fault. A board without a PCA9685
+// leaves the other bus to the user.
 #pragma once
 
 #include <cstdint>

@@ -3,7 +3,7 @@
 // (docs/reference/safety.md).
 //
 //     cause      enters                                   leaves                      setpoints
-//     link       owner silent, or its transport failed    the owner is back           kept
+//     link       owner silent, or its transport failed    the owner reconnects        kept
 //     handle     dead-man's handle released               it is held again            cleared
 //     proximity  obstacle nearer than a threshold, or     5 cm beyond it for 500 ms,  cleared
 //                a sensor with a threshold is blind       or threshold off
@@ -29,7 +29,7 @@ class Safety {
   bool enter(SafeReason cause);
   // A latched cause has come again: it gets a new number.
   void again() { newest_ = newest_ == INT32_MAX ? 1 : newest_ + 1; }
-  // True if the cause was there.
+  // True if the cause was active.
   bool leave(SafeReason cause);
   // E:CLEAR: ends the reported cause if it is stop, fault or watchdog.
   void clear();

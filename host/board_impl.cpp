@@ -177,7 +177,7 @@ void Board::Impl::on_callback_end(Clock::duration busy) {
   const auto ms = std::chrono::duration_cast<Duration>(busy).count();
   asio::post(io, [this, ms] {
     const auto next = callbacks.busy_for();
-    if (next && *next >= callback_limit) return;  // it hangs, too: its end releases the heartbeats
+    if (next && *next >= callback_limit) return;  // also hangs; its end releases the heartbeats
     if (!std::exchange(held_for_callback, false)) return;
     async.hold_heartbeats(false);
     callbacks.notify(CarrierEvent{

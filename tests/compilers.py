@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compiles the product with other compilers than the default one: tests/compilers.py FOLDER [JOBS] [COMPILER...]
+"""Compiles the product with compilers other than the default: tests/compilers.py FOLDER [JOBS] [COMPILER...]
 
 All warnings are errors. No code is generated, so warnings of the optimizer come only in the build. Without a COMPILER
 (such as g++-11) the oldest installed GCC reads all sources, and the newest GCC and the oldest clang read the public

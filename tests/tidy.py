@@ -29,7 +29,7 @@ class Source:
 
     def __init__(self, files):
         self.files = files
-        self.lines = []  # of a joined source: (file, number in it)
+        self.lines = []  # for each line of a joined source: (file, line number)
 
     def write(self, path):
         with path.open("w") as out:

@@ -12,9 +12,10 @@ import pathlib
 import re
 import sys
 
-ROOMS = ('include', 'protocol', 'transports', 'firmware', 'host', 'tools', 'tests')
+ROOMS = ('include', 'protocol', 'transports', 'firmware', 'host', 'tools', 'tests', 'docs/examples', 'cmake')
 COMMENT = {'.hpp': re.compile(r'(?:^|\s)//+ ?(.*)'), '.py': re.compile(r'(?:^|\s)# (.*)')}
 COMMENT['.cpp'] = COMMENT['.hpp']
+COMMENT['.txt'] = COMMENT['.cmake'] = COMMENT['.py']  # CMakeLists.txt
 MOST_COLUMNS = 100
 IS_NO = re.compile(r'\b(?!there\b)(\w+) (?:is|are) no\b(?! (?:longer|more|less)\b)', re.IGNORECASE)
 WHO = re.compile(r'(?:^|[.:;] )(?:Who|Whoever|What|Whatever) (?!(?!.*[.]).*\?)[^?]*?(?:[.;]|$)')
@@ -45,7 +46,7 @@ def faults_of_source(path):
         comment = match[1] if match and not any(match[1] in each for each in texts) else ''
         for reason in (*faults_of_text(comment), *(each for text in texts for each in faults_of_text(text))):
             yield number, reason
-        if product and path.suffix != '.py' and comment and len(line) > MOST_COLUMNS:
+        if product and path.suffix in ('.cpp', '.hpp') and comment and len(line) > MOST_COLUMNS:
             yield number, f'a comment of {len(line)} columns, {MOST_COLUMNS} at most'
         if product and comment.rstrip().endswith('?'):
             yield number, 'a question as a comment'

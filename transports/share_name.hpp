@@ -10,7 +10,7 @@
 
 namespace r4 {
 
-// A group of the system (group(5)) whose members share the transport, too.
+// A group of the system (group(5)) whose members also share the transport.
 struct ShareGroup {
   std::string name;  // empty: programs of the same user only
   gid_t id = 0;

@@ -102,7 +102,7 @@ void Application::identify(Source to, const Datagram& question, bool with_wiring
   answer(to, writer, now_ms);
 }
 
-// `at`: the command of a group, from 1; 0: none. `lease`: what a W must echo; 0: none.
+// `at`: the command of a group, from 1; 0: none. `lease`: the number that a W must echo; 0: none.
 void Application::refuse(Source to, const Datagram& datagram, Refusal code, std::uint32_t now_ms,
                          std::uint8_t at, std::uint32_t lease) {
   if (!known_) ++rx_refused_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus, not that of the board's chips (docs/how-to/devices.md). Nothing waits: poll()
-// begins what is due and looks how far it is.
+// The user's I2C bus, not that of the board's chips (docs/how-to/devices.md). No call waits: poll()
+// begins a transfer that is due, and checks if the current transfer has ended.
 //
 //            begins a transfer              it has ended
 //     idle --------------------> transfer ----------------> idle

@@ -60,7 +60,8 @@ class ChipDriver {
   void begin();
   // Does the next steps of the set-up; once ready, writes the registers that change.
   void poll(std::uint32_t now_us, BusBudget& budget);
-  // Both do nothing unless ready(). verify() compares the chip's registers with what was written.
+  // write_changes() and verify() do nothing unless ready(). verify() compares the chip's registers
+  // with what was written.
   void write_changes(BusBudget& budget);
   void verify(BusBudget& budget);
   // All outputs are off from the next write on. Sends nothing.

@@ -73,7 +73,7 @@ bool Mcp4728::set_up(std::uint32_t now_us, BusBudget& budget) {
         set_ready();
         return true;
       }
-      if (eeprom_writes_ != 0) {  // it does not keep its contents: do not wear it out
+      if (eeprom_writes_ != 0) {  // the EEPROM failed: more writes wear it out
         fail(ChipTrouble::not_ready);
         return false;
       }

@@ -27,8 +27,8 @@ constexpr int on_h = 1;
 constexpr int off_l = 2;
 constexpr int off_h = 3;
 
-// A burst continues over a gap of at most so many unchanged registers between two groups: a new
-// burst would cost as much.
+// The longest gap of unchanged registers inside a burst: over a longer gap, a new burst takes less
+// time.
 constexpr int bridged = 2;
 
 }  // namespace

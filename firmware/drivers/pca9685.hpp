@@ -48,8 +48,8 @@ class Pca9685 final : public ChipDriver {
   // `frequency_hz`: 24-1526.
   Pca9685(I2cBus& bus, std::uint8_t address, std::uint32_t frequency_hz);
 
-  // From now on the channels `a` and `b`, of which one transfer of a poll can write all registers
-  // from one to the other, change together. Each has at most one partner.
+  // From now on the channels `a` and `b` change together. One transfer of a poll must be able to
+  // write all registers from `a` to `b`. Each channel has at most one partner.
   void pair(int a, int b);
   // Channels 0-15, from the next write on.
   void set_duty(int channel, std::uint16_t duty);  // 0: off; 4095 and more: on; otherwise n/4096

@@ -24,7 +24,7 @@ enum class EchoResult : std::uint8_t {
   none_yet,
   distance,    // distance_cm() is valid
   no_echo,     // nothing within range
-  no_answer,   // the echo line never rose: no sensor, or a broken one
+  no_answer,   // the echo line never rose: no sensor, or a broken sensor
   line_stuck,  // the echo line was high before the trigger
 };
 
@@ -38,7 +38,7 @@ class UltrasonicSensors {
   static constexpr std::uint32_t us_per_cm = 58;
   static constexpr std::uint16_t range_cm = 400;
 
-  // Bit n of `fitted`: sensor n is there; a missing sensor has no turn.
+  // Bit n of `fitted`: sensor n is fitted; a missing sensor gets no turn.
   UltrasonicSensors(OutputPin& trigger_0, OutputPin& trigger_1, OutputPin& trigger_2,
                     OutputPin& trigger_3, std::uint8_t fitted)
       : trigger_{&trigger_0, &trigger_1, &trigger_2, &trigger_3}, fitted_(fitted) {}

@@ -46,7 +46,7 @@ class ArmingMachine {
   void on_reason(SafeReason reason);
   // The board, under this session's control, reports that reason.
   void on_heard(SafeReason reason);
-  // This computer slept: a new session begins, for which any cause may be an earlier one.
+  // This computer slept: a new session begins, and any cause may be from before that session.
   void on_sleep();
   void on_outage() { outage_ = true; }
   // Call for each state that shows relay 1 while the board is not in the safe state.

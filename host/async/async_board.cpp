@@ -106,7 +106,7 @@ void AsyncBoard::start_wait_active(Duration timeout, CompletionPtr completion) {
   });
 }
 
-// Sends one setting after the other. The user's handler gets the result of the last one.
+// Sends one setting after the other. The user's handler gets the result of the last setting.
 class AsyncBoard::TimingSteps final : public Impl::Sequence {
  public:
   TimingSteps(Impl& impl, std::vector<LinkTimingStep> steps, Time timeout, CompletionPtr completion)

@@ -67,8 +67,8 @@ void AsyncBoard::Impl::warn_of_hold_up(Time late) {
   const Inside inside(depth);
   const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(late).count();
   warn({ErrorKind::refused, "the event loop",
-        "it was held up: what was due went out " + std::to_string(ms) + " ms late, heartbeats too",
-        "a handler on this loop must return at once; where none is slow, the "
+        "it stood still: datagrams, also heartbeats, were sent " + std::to_string(ms) + " ms late",
+        "handlers on this loop must return at once; if none is slow, the "
         "computer had no time for this program"});
 }
 

@@ -13,7 +13,7 @@ namespace r4 {
 namespace {
 
 // The session ends every command at the deadline of the call. If a call that has begun has not
-// ended by this time after its deadline, the loop is held up.
+// ended by this time after its deadline, the loop hangs.
 constexpr BlockingLoop::Duration grace{500};
 
 constexpr BlockingLoop::Duration patience{1000};
@@ -163,7 +163,7 @@ void BlockingLoop::close(std::function<void()> shut) {
 
 void BlockingLoop::end_loop() {
   work_.reset();
-  // Posted twice: commands that begin() finds closed end after the first turn.
+  // Posted twice: begin() may still post the end of a command on a closed board.
   asio::post(io, [this] { asio::post(io, [this] { io.stop(); }); });
 }
 

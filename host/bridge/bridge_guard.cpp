@@ -36,7 +36,7 @@ void BridgeGuard::on_board_datagram(const Datagram& datagram, MessageKind kind, 
   told_ = now;
 }
 
-// As the host estimates it (Signer), but never behind: the host hears each T later.
+// The same estimate as the host's (Signer), but never lower: the host receives each T later.
 std::uint32_t BridgeGuard::board_ms(Time now) const {
   const Time::duration passed = now - told_;
   return t_ms_ + ms_of(passed - passed / 32);

@@ -29,7 +29,7 @@ class BridgeGuard {
   // Why datagrams that need a signature do not pass.
   enum class Trouble : std::uint8_t {
     none,
-    board_has_no_key,  // and the bridge has one
+    board_has_no_key,  // the bridge has a key, and the board has none
     key_needed,        // the board has a key, and the bridge has none
   };
 

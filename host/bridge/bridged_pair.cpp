@@ -15,7 +15,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// A board that was silent for so long may have restarted, with another clock.
+// After a longer silence the board may have restarted, with another clock.
 constexpr milliseconds clock_lifetime{1500};
 
 std::string_view view(Text text) { return {text.data(), text.size()}; }

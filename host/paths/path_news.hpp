@@ -26,7 +26,7 @@ class PathNews {
   void on_number(std::size_t index, std::uint32_t pnum);
   // An answer is always new. It counts once a state or a heartbeat has come.
   void on_answer(std::size_t index, std::uint32_t pnum);
-  // The next number is unrelated to the last one.
+  // The next number is unrelated to the last number.
   void restart(std::size_t index);
 
   // --- whether a datagram is new: each of these functions also counts it

@@ -110,7 +110,7 @@ Paths::Admission Paths::admit_identity(std::size_t index, const Identity& identi
   path.questions.answered = true;
   path.questions.unanswered = 0;
   path.questions.round_trip = now - *asked;
-  // The later of two boots is the one that answered a question from after the other's answer.
+  // Of two boots, the later one answers a question that was asked after the answer of the earlier.
   const bool later = *asked > proven_;
   // The answer was sent between the question and now, which bounds its T closely.
   const bool same = clock_.known() ? clock_.fits(t_ms, *asked, now, PathClock::restart_tolerance_ms)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What pytest loads where r4link is installed: the plugin r4link.pytest_plugin, if it can be loaded.
+"""The entry point for pytest: loads the plugin r4link.pytest_plugin, if that is possible.
 
-Pytest loads it in every project of the machine. Where r4link cannot be imported, for a library is missing or it was built
-for another Python, only the projects that use its fixtures may fail: the others see a warning.
+If r4link is installed, pytest loads this module in every project of the machine. r4link cannot be imported if a library
+is missing, or if it was built for another Python. Then only projects that use its fixtures fail; all other projects get
+a warning.
 """
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ def pytest_addoption(pluginmanager: pytest.PytestPluginManager) -> None:
         _trouble.append(f'r4link: its pytest plugin cannot be loaded: {type(error).__name__}: {error}; '
                         'install r4link anew, or leave it out: -p no:r4link')
         return
-    if not pluginmanager.is_registered(pytest_plugin):  # by -p
+    if not pluginmanager.is_registered(pytest_plugin):  # if not loaded already by -p
         pluginmanager.register(pytest_plugin, 'r4link.pytest_plugin')
 
 

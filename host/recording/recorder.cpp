@@ -172,7 +172,7 @@ void Recorder::report(const Problem& trouble, bool is_problem) {
   ++news_count_;
 }
 
-// Writes records up to written_until_. Newer records wait, because earlier ones may still come.
+// Writes records up to written_until_. Newer records wait, because earlier records may still come.
 void Recorder::write() {
   order_.clear();
   put_in_order(unsettled_);

@@ -15,7 +15,7 @@ namespace r4 {
 
 class RecordingTap {
  public:
-  // Records into `recorder` instead of an earlier one. `url` is that of the path.
+  // Records into `recorder` instead of an earlier recorder. `url`: of the path.
   void attach(std::shared_ptr<Recorder> recorder, const std::string& url);
   void detach() { recorder_.reset(); }
   bool attached() const { return recorder_ != nullptr; }

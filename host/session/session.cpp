@@ -114,7 +114,7 @@ void Session::on_sleep(Time now) {
   refresh(now);
 }
 
-// The board's next T cannot be compared with earlier ones.
+// The board's next T cannot be compared with earlier T.
 void Session::forget_board(Time now) {
   link_.begin_anew();
   paths_.on_sleep(now);

@@ -195,7 +195,7 @@ class AsyncBoard {
   // If the board knows no groups, posts one by one, up to the first that is not sent.
   PostResult post(const Setpoints& setpoints);
 
-  // The newest values; after close(), the last ones.
+  // The newest values; after close(), the last values.
   const ReceivedState& state() const;
   const LinkStatus& link() const;
   // True if the link is up and the board takes our commands: they are sent at once.
@@ -211,7 +211,7 @@ class AsyncBoard {
 
   // Any number of callbacks of each kind, called in the order of adding; the handle ends one.
   // Unlike those of Board, they get only later events: read state(), link() and disarmed_by()
-  // first. After the event loop was held up for more than 50 ms, on_state gets only the newest
+  // first. After the event loop was delayed by more than 50 ms, on_state gets only the newest
   // waiting state. on_nack gets each refusal once, but no DUPLICATE for a retry.
   Subscription on_state(std::function<void(const ReceivedState&, const Datagram&)> callback);
   Subscription on_board_heartbeat(std::function<void(const Datagram&)> callback);

@@ -377,7 +377,7 @@ class R4LINK_API Board {
   CarrierCounters carrier_counters() const;
   // The transports' names for people. One may change when a USB board is plugged in again.
   std::string name() const;
-  // The state of each path, in the order of the URLs; after close(), the last one.
+  // The state of each path, in the order of the URLs; after close(), its last state.
   std::vector<PathStatus> paths() const;
 
   // Any number of callbacks of each kind, called in the order of adding. Each first gets what is

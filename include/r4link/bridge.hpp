@@ -29,7 +29,7 @@ struct BridgeCounters {
   std::uint64_t kept_out = 0;     // from hosts that are not served: docs/how-to/bridge.md
   std::uint64_t refused =
       0;                   // an unsigned command that must be signed, or a setting for a cable only
-  std::uint64_t late = 0;  // the bridge was held up: may have waited for more than 100 ms
+  std::uint64_t late = 0;  // may have waited for more than 100 ms: the bridge was delayed
   std::uint64_t undelivered = 0;  // the other side is down or full, or its peer is not known
   // Of `passed`: replaced by a newer state while it waited, or dropped after 100 ms.
   std::uint64_t outdated = 0;
@@ -87,7 +87,7 @@ class R4LINK_API Bridge {
   void close();
 
   std::size_t size() const;  // number of boards
-  // The status of each pair, in order; after close(), the last one.
+  // The status of each pair, in order; after close(), its last status.
   std::vector<BridgeStatus> status() const;
 
  private:

@@ -3,7 +3,7 @@
 // datagrams as UDP does: it may lose and reorder them, never blocks and never corrupts them
 // silently (the receiver checks their CRC). It is used on the thread of its event loop (Loop or
 // io_context) only. The first open() throws if the transport cannot be opened. Later trouble is an
-// event, and the carrier reopens when the device is back.
+// event, and the carrier reopens when the device returns.
 #pragma once
 
 #include <cstdint>
@@ -168,7 +168,7 @@ class R4LINK_API Carrier {
   // unless it is a stop. A host sends to its only board: `everyone`.
   virtual SendResult send(std::string_view bytes, Priority priority, Peer to = everyone) = 0;
 
-  // True if the board cannot tell one host from another: on a bus, or through a program that shares
+  // True if the board cannot distinguish its hosts: on a bus, or through a program that shares
   // its transport. A watcher sends only stops and leases there.
   virtual bool is_shared() const { return false; }
   // Changes to control or watch. If programs of this computer share the transport, one can control:
@@ -177,7 +177,7 @@ class R4LINK_API Carrier {
   virtual void change_role(BoardRole role) { static_cast<void>(role); }
 
   virtual bool up() const = 0;
-  // Why datagrams do not pass although the transport is up, as far as it can tell.
+  // Why datagrams do not pass although the transport is up, as far as the transport knows.
   virtual TransportTrouble trouble() const { return TransportTrouble::none; }
   // For people: the URL, with the device that `auto` found.
   virtual const std::string& name() const = 0;

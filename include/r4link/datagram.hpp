@@ -115,7 +115,7 @@ class R4LINK_API Datagram {
 
   // Of all bytes up to and including the first `^`, as the datagram gives it.
   std::uint32_t checksum() const { return checksum_; }
-  // PNum and T, if they are there. A host heartbeat may lack PNum.
+  // PNum and T, if present. A host heartbeat may lack PNum.
   bool has_pnum() const { return has_pnum_; }
   std::uint32_t pnum() const { return pnum_; }
   bool has_time() const { return has_time_; }

@@ -93,7 +93,7 @@ enum class PathState : std::uint8_t {
   down,         // the transport is down, or could not be opened yet
   asking,       // the transport is up, and the board's identity is not known yet
   other_board,  // the path leads to another board: only stops are sent on it
-  silent,       // the board is there, but was silent for the timeout
+  silent,       // the board was heard before, but was silent for the timeout
   carrying,
 };
 // "down", "asking", "other board", "silent", "carrying".

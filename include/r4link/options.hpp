@@ -47,7 +47,8 @@ struct SessionOptions {
   // Period of Q:ID; 0: never. Then the round trip and ReceivedState::sampled_error stay unknown,
   // and on one path identity() too, unless the program calls identify() or sends a group.
   std::chrono::milliseconds identify_interval{1000};
-  // The board's key. Each host needs an id of its own: a shared one makes the slower host a replay.
+  // The board's key. Each host needs a separate id: with a shared id the slower host looks like a
+  // replay.
   std::optional<Key> key;
   // Start of the session's clock, us since 1970. A restarted host must continue above used values.
   Time clock_start{0};
@@ -70,8 +71,9 @@ struct BoardOptions {
 //     options.session.key = r4::load_key("/home/me/.r4-key");
 //     r4::Board board("udp://192.168.0.125", options);
 //
-// Throws Error: open if it cannot be read, permission if other users than its owner may read or
-// write it, data if it holds no key. The group of a file of root's may read it, as for a service.
+// Throws Error: open if it cannot be read, permission if users other than its owner may read or
+// write it, data if it holds no key. If root owns the file, its group may read it, as for a
+// service.
 R4LINK_API Key load_key(const std::string& path);
 
 }  // namespace r4

@@ -41,7 +41,7 @@ class R4LINK_API SimulatedRobot {
   void happen(std::string_view words);
 
   struct Look {
-    bool open = false;  // a link to the board is open; false: the values are the last ones
+    bool open = false;  // a link to the board is open; if not, these are the last values
     Pins pins;
     bool motors_have_supply = false;
     bool handle_held = true;

@@ -74,7 +74,7 @@ class HostLink {
   bool watchdog_expired(std::uint32_t now_ms) const {
     return watchdog_ms_ != 0 && (hung_ || now_ms - fed_ms_ > watchdog_ms_);
   }
-  // Stops the heartbeats for another reason, until a call with false.
+  // hold(true) stops the heartbeats for a reason other than the watchdog, until hold(false).
   void hold(bool held) { held_ = held; }
   bool gated(std::uint32_t now_ms) const { return held_ || watchdog_expired(now_ms); }
 

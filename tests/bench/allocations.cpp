@@ -34,8 +34,8 @@ void* or_throw(void* memory) {
 
 }  // namespace
 
-// The array forms of the standard library call these operators. Its nothrow forms do so, too, but
-// those of the sanitizers do not, and their memory would be freed here.
+// The array forms of the standard library call these operators, and so do its nothrow forms. But
+// the nothrow forms of the sanitizers do not, and their memory would be freed here.
 void* operator new(std::size_t size) { return or_throw(allocate(size)); }
 void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return allocate(size); }
 void* operator new(std::size_t size, std::align_val_t alignment) {

@@ -49,7 +49,7 @@ rm -f "$copy"/root/etc/dpkg/dpkg.cfg.d/*
 
 env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 chroot "$copy/root" /tmp/packages/packages_inside.sh
 
-# The tools of the system themselves write lists of packages, of libraries and of manual pages.
+# The lists that the tools of the system write (of packages, libraries and manual pages) may stay.
 left=$(cd "$copy/changed" && find . \( -type f -o -type l \) ! -path './var/lib/dpkg/*' ! -path './var/log/*' \
   ! -path './var/cache/*' ! -path './etc/ld.so.cache' ! -path './etc/.pwd.lock' ! -path './root/*')
 if [[ -n "$left" ]]; then

@@ -98,7 +98,7 @@ class Peer:
         else:
             self.bus = can.Bus(interface='socketcan', channel=interface, fd=True, can_filters=filters)
         self.receivers = {}
-        self.flow_control = None  # the newest one, while we wait for it
+        self.flow_control = None  # the newest flow control, while a sender waits for it
         self.failed_sends = 0
 
     def close(self):
@@ -268,7 +268,7 @@ class Host(Peer):
         assert self.command('F:DEFAULT,SAFE,CMD') == 'done'
 
     def command(self, fields):
-        """Returns 'done', or the code of the refusal. After STALE (overtaken), sends the command as a new one."""
+        """Returns 'done', or the code of the refusal. After STALE (overtaken), sends it again with a new number."""
         answer = {'N': 'STALE'}
         while answer.get('N', '').endswith('STALE'):
             pnum, self.newest_command = self.send(fields)

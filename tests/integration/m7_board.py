@@ -108,7 +108,7 @@ class Watcher:
 
 
 class LineWatcher:
-    """The end of the board's serial line, to which the board's broadcasts go, too."""
+    """The end of the board's serial line, to which the board's broadcasts also go."""
 
     def __init__(self, url):
         self.file = os.open(url[len('serial://'):], os.O_RDWR | os.O_NOCTTY)

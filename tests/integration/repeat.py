@@ -12,7 +12,7 @@ from _pytest.runner import runtestprotocol
 from machine import account
 
 LONGEST_S = 80  # longer tests run in the guest, which repeats its tests one by one
-STANDSTILL_S = 0.2  # shorter ones are allowed for by machine.py; a link is lost after 0.5 s
+STANDSTILL_S = 0.2  # machine.py allows for shorter standstills; a link is lost after 0.5 s
 REPEATS = pathlib.Path(__file__).resolve().parents[2] / 'build/results/repeats.txt'
 
 

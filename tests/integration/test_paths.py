@@ -212,7 +212,7 @@ def test_a_board_has_a_path_for_each_interface_of_this_computer():
                 host.loses(place, gone)
                 host.goes_on()
                 host.has_again(place, there)
-                host.goes_on(50)  # until the board has joined the paths, too
+                host.goes_on(50)  # until the board has also joined the paths
             host.ends(board)
 
 

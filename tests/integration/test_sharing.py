@@ -181,7 +181,7 @@ def test_a_resumed_holder_takes_no_bytes_from_the_new_holder(folder):
                 holder.skip_past()
                 for _ in range(20):
                     holder.next(drives(358))
-                holder.signal(signal.SIGSTOP)  # it shares a transport now, so its stop holds up no other program
+                holder.signal(signal.SIGSTOP)  # it shares the transport, so a stopped process delays no other program
                 assert recorder.end() == 0, recorder.errors
             numbers = [number for _, number, _ in received(path)]
             assert len(numbers) > 20 and numbers == sorted(set(numbers))

@@ -17,7 +17,7 @@ import pytest
 
 from r4_process import ERROR, R4, Board, objects, run
 
-# Its boot loader is there after a board has been opened at 1200 baud, or if the test says so.
+# Its boot loader runs after a board has been opened at 1200 baud, or if the test says so.
 DFU_UTIL = '''#!/bin/bash
 echo "$*" >>"$R4_TEST_DFU/calls"
 case "$*" in

@@ -399,7 +399,7 @@ def test_a_client_with_an_unfinished_request_is_disconnected():
 
 
 def test_hostile_clients_do_not_disturb_the_controlling_page():
-    """A busy machine may hold up the page or r4 web for long enough to lose the board. Another attempt is allowed only
+    """A busy machine may delay the page or r4 web for long enough to lose the board. Another attempt is allowed only
     if r4 web itself used little of a processor: then the attack was not the cause."""
     seed = os.environ.get('R4_SEED', '1')
     with one_board() as (board, web), Page(web) as page:

@@ -155,7 +155,7 @@ def one_of_two_paths(terminal, commands):
     with gateway() as first, HostOnPaths([f'serial://{PORT}', f'udp://127.0.0.2:{port}?listen=0'],
                                        [PORT, '127.0.0.2']) as host:
         def both():
-            host.goes_on(50)  # until the board has joined both paths, too
+            host.goes_on(50)  # until the board has also joined both paths
 
         both()
         for _ in range(2):
@@ -177,7 +177,7 @@ def one_of_two_paths(terminal, commands):
 
 
 def uploads_to_the_board_that_it_stopped():
-    """Another board waits in its boot loader, too. A board is known by its place at USB."""
+    """Another board also waits in its boot loader. A board is known by its place at USB."""
     place = re.search(r'/(\d+-[\d.]+)/\1:', os.path.realpath('/sys/class/tty/ttyUSB0'))[1]
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder)

@@ -36,8 +36,8 @@ struct CrowdReport {
   std::uint64_t hash = 0xcbf29ce484222325U;
   std::uint32_t strangers_sent = 0;
   std::uint32_t renumbered = 0;  // hosts without control that got a new number because of the crowd
-  // The time until the host was in control. For the second host it counts from when that host was
-  // there and the first host had left.
+  // The time until the host was in control. For the second host it counts from when that host had
+  // begun and the first host had left.
   std::uint32_t first_ms = 0;
   std::uint32_t second_ms = 0;
 };

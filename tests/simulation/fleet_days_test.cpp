@@ -48,7 +48,7 @@ struct Packet {
   std::array<char, 512> bytes;
 };
 
-// The datagrams under way, and those that wait for a host that is held up for half a minute.
+// The datagrams under way, and those that wait for a host that hangs for half a minute.
 class Path {
   auto later() const {
     return [this](std::uint8_t a, std::uint8_t b) {

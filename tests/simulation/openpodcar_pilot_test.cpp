@@ -456,7 +456,7 @@ TEST(OpenPodcarPilot, RefusesInputsThatAreNotNumbers) {
   run.cmd_vel = Twist{0.5, std::numeric_limits<double>::infinity()};
   EXPECT_FALSE(run.moves_within(1000));
   for (const double wrong : {nan_number, 1e300, -std::numeric_limits<double>::infinity()}) {
-    EXPECT_EQ(run.to_goal(wrong, 0), "it is too far away, or no place");
+    EXPECT_EQ(run.to_goal(wrong, 0), "it is too far away, or not a position");
   }
   run.hold = true;
   run.speed_axis = std::numeric_limits<float>::quiet_NaN();

@@ -170,7 +170,7 @@ class World : public firmware::Hal, public firmware::Observer {
     std::uint32_t incarnation = 0;  // of the host when the datagram was sent
     bool intact = true;
     bool heartbeat = false;
-    bool recorded = false;  // an hour ago
+    bool recorded = false;  // replayed from an hour ago
     bool stop = false;
     std::uint32_t pnum = 0;
     std::uint64_t t = 0;
@@ -303,7 +303,7 @@ class World : public firmware::Hal, public firmware::Observer {
   void check_lost();
 
   Random random_;
-  Random loop_random_;  // of the standstills: the other events stay the same with and without them
+  Random loop_random_;  // only for standstills, so that these do not change the other events
   Schedule schedule_;
   Report report_;
   bool keep_trace_;

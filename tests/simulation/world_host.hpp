@@ -104,7 +104,7 @@ struct World::Host final : test::DrivenSession::Handler {
   World& world;
   int index;
   std::uint32_t incarnation = 0;
-  std::uint32_t began_as = 0;  // the incarnation when this process began; a sleep ends it, too
+  std::uint32_t began_as = 0;  // the incarnation when this process began; a sleep also ends it
   bool alive = false;
   bool frozen = false;
   bool suspended = false;  // the process does not run

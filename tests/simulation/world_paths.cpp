@@ -181,10 +181,10 @@ bool World::serves_since(std::uint64_t at_us) const {
   });
 }
 
-// True if a good path was in use when the command was asked for, and long enough before that the
-// host knows that it has control: no earlier BUSY counts any more, and its F has been confirmed.
-// The command goes to that path, and the state that confirms it, or the answer to a duplicate,
-// comes back.
+// True if a good path was in use when the command was requested, and for long enough before, so
+// that the host knows that it has control: earlier BUSY have expired, and its F was confirmed. Then
+// the command arrives on that path, and so does the state that confirms it, or the answer to a
+// duplicate.
 bool World::should_be_confirmed(const Sent& sent) const {
   const std::uint64_t there_and_back_us =
       2 * most_delay_us + schedule_.settings.state_period_ms() * 1000U;
@@ -199,7 +199,7 @@ void World::check_paths() {
                           host.farewell_ticket == 0 && controls({0, host.incarnation});
   if (serves_since(now_us_)) report_.served_us += now_us_ - looked_us_;
   looked_us_ = now_us_;
-  // Another path that both ends have used so long that this path had time to join.
+  // True if both ends have used another path for long enough that this path had time to join.
   const bool alone = !serves_since(now_us_ - std::min(now_us_, used_again_us));
   const bool crowded = schedule_.attack_interval_us != 0;
   for (int w = 0; w < schedule_.paths(); ++w) {

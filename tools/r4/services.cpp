@@ -31,7 +31,7 @@ std::vector<std::string> command_line() {
 
 [[noreturn]] void become_services() {
   std::vector<std::string> arguments = command_line();
-  std::vector<char*> pointers(arguments.size() + 1, nullptr);  // the last one ends them
+  std::vector<char*> pointers(arguments.size() + 1, nullptr);  // ends with a null pointer
   std::transform(arguments.begin(), arguments.end(), pointers.begin(),
                  [](std::string& each) { return each.data(); });
   std::error_code error;

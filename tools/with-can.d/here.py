@@ -17,7 +17,7 @@ TIME_LIMIT_EXIT = 124  # as timeout(1)
 INTERFACES = {'vcan0': 'link add dev vcan0 type vcan',
               'vxcan0': 'link add dev vxcan0 type vxcan peer name vxcan1'}
 UP = 'mtu 72 txqueuelen 1000 up'
-SI_KERNEL = 0x80  # origin of a signal from a terminal, which the command gets, too
+SI_KERNEL = 0x80  # origin of a signal from a terminal, which the command also gets
 PASSED_ON = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1,
              signal.SIGUSR2}
 

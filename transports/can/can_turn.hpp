@@ -21,7 +21,8 @@ class CanTurn {
   static constexpr Duration listening{120};
   // Two hosts that begin within this time have not heard each other, and both fall silent.
   static constexpr Duration settling{50};
-  // As long as a board waits for its host, plus a random time, so one of two hosts is back first.
+  // The time that a board waits for its host. A random time is added, so that one of two hosts is
+  // first.
   static constexpr Duration silence{1000};
   static constexpr Duration most_chance{250};
 

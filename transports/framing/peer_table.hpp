@@ -48,7 +48,7 @@ class PeerTable {
     audience_ = held_[0] = number;
     held_count_ = 1;
   }
-  // The controlling host has that place, too.
+  // The controlling host also has that place.
   void also_hold(std::uint32_t number) {
     if (!in_control_ || number == nobody || held_count_ == most_held || is_held(number)) return;
     held_[held_count_++] = number;

@@ -28,7 +28,7 @@ struct Impairment {
   Time cut_for{0};
   std::uint64_t seed = 1;
 
-  // "loss=5%,delay=20ms±10,duplicate=1%,corrupt=0.1%,cut=10s+2s,seed=7"; +- means ±, too. Throws
+  // "loss=5%,delay=20ms±10,duplicate=1%,corrupt=0.1%,cut=10s+2s,seed=7"; +- also means ±. Throws
   // Error{usage}.
   static Impairment parse(std::string_view text);
 };

@@ -36,7 +36,7 @@ class LineCarrier : public Carrier {
 
   // --- implemented by the ends
 
-  // Looks for the device, and starts the stream if the device is there.
+  // Looks for the device, and starts the stream if the device exists.
   virtual void look() = 0;
   // The stream has ended: errno, or 0 for an end of file. Returns the problem to report.
   virtual Problem on_lost(int error) = 0;

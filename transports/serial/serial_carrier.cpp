@@ -68,7 +68,7 @@ class SerialCarrier final : public LineCarrier {
   const Url url_;
   const unsigned baud_;
   SerialPort device_;     // the device that has been open
-  std::string obstacle_;  // why it cannot be opened again though it is there
+  std::string obstacle_;  // why the port cannot be reopened although it exists
   int obstructed_ = 0;    // consecutive looks with that obstacle
   const Claim claim_;
   PortLock lock_;
@@ -161,7 +161,7 @@ void SerialCarrier::look() {
     open_device(path);
   } catch (const Error& error) {
     look_later();
-    // A missing device was reported. A device that is there but cannot be opened needs help.
+    // A missing device was reported. A device that exists but cannot be opened needs help.
     const bool there = !path.empty() && ::access(path.c_str(), F_OK) == 0;
     if (!there || error.what() != obstacle_) obstructed_ = 0;
     obstacle_ = error.what();

@@ -84,7 +84,7 @@ class SharedCarrier final : public Carrier,
   std::vector<CarrierEvent> standing() const override;
   void on_stop_of_another(std::string_view datagram) override;
   void on_asked() override;
-  // From the holder that serves this program.
+  // Called by the connection to the holder that serves this program.
   void on_message(const ShareMessage& message) override;
   void on_all_heard() override { handler_->on_drained(); }
   void on_no_help(const Problem& why) override;
@@ -186,7 +186,7 @@ void SharedCarrier::require_control() {
     if (const auto problem = out_of_resources(name_, errno)) throw Error(*problem);
     other = connect_to_holder(share_, BoardRole::control);
   }
-  // A stranger with this name prevents nothing.
+  // If another user's program has this name, it does not block the transport.
   if (other && !is_one_of_us(other.get(), share_)) return holder_.release();
   const pid_t process = other ? process_of(other.get()) : 0;
   const bool stopped = is_stopped(process);

@@ -5,7 +5,7 @@
 //      |   ^                                |                       |
 //      |   +---- the holder ends, or does not answer in time -------+
 //      |   |
-//      |   +---- a program that controls asks for the transport, or takes it; the role is another
+//      |   +---- a controlling program asks for the transport, or takes it; or the role changes
 //      |   |
 //      +-> holding, with the carrier open: no program holds it, or the holder was passed over
 //

@@ -40,7 +40,7 @@ class UdpEnd : public Carrier {
   // A packet from sender_.
   virtual void received(std::string_view bytes) = 0;
   virtual Outcome transmit(std::string_view bytes, Peer to) = 0;
-  // 0 if the network is there, else errno.
+  // 0 if the network is up, else errno.
   virtual int probe(const std::vector<OwnAddress>& own) = 0;
   virtual void close_socket() noexcept;
   // The socket is bound: begins to receive.
@@ -84,7 +84,7 @@ class UdpEnd : public Carrier {
   std::array<char, max_datagram> received_;
 
  private:
-  // True if another packet is there already.
+  // True if another packet already waits.
   bool begin_to_receive();
   void send_waiting();
   void lose_network(int error);

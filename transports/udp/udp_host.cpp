@@ -94,7 +94,7 @@ void UdpHost::watch() {
                [this](const FoundHost& answer) { found(answer); });
 }
 
-// The question does not use this object, which may be gone before the answer comes.
+// The question does not use this object, which may be destroyed before the answer arrives.
 HostWatch::Question UdpHost::question() const {
   if (url_.search) {
     return [search = search_, wanted = wanted_] { return find_board(search, wanted); };

@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What the action does: vcan0 if this kernel can have it, else what the guest needs; then the commands. It takes a
-# Debian or an Ubuntu. WITH_CAN_RUN are the commands, WITH_CAN_OPTIONS the options of tools/with-can.
+# The steps of the action: makes vcan0 if this kernel supports it, else installs the packages for the guest; then runs
+# the commands. Needs Debian or Ubuntu. WITH_CAN_RUN has the commands, WITH_CAN_OPTIONS the options of tools/with-can.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)
 as_root=()

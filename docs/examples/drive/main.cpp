@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drives OSMC channel 1 up and down again, says what happens and how far the motor has turned, and
-// stops.
+// Accelerates OSMC channel 1 and slows it down again, prints the events and the counts of the
+// motor's encoder, and stops.
 //
 //     drive [URL]        sim: without a URL; udp://192.168.0.125, serial:auto …
 //
@@ -16,7 +16,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-// Called on the callbacks' thread.
+// Runs on the callbacks' thread.
 void print_link(const r4::LinkStatus& link) {
   std::printf("link: %s%s%s%s\n", r4::to_text(link.state),
               link.state == r4::HostLinkState::safe ? ", reason " : "",
@@ -43,11 +43,11 @@ void drive(r4::Board& board) {
   std::printf("board %s, firmware %s, on %s\n", who.board_id.c_str(), who.firmware.c_str(),
               board.name().c_str());
 
-  // The board is to tell what encoder 1, on the motor's shaft, counts.
+  // Asks for the count of encoder 1, which is on the motor's shaft.
   board.fields("DEFAULT,ENC1");
   const std::int32_t from = board.next_state().encoder(1);
 
-  // From here on this program must show that it is alive. If it hangs for 300 ms, the heartbeats
+  // This program must call feed() from here on. If it hangs for 300 ms, the heartbeats
   // stop and the board switches its outputs off.
   board.watchdog(300ms);
   // Closes relay 1, which gives the motors their supply. Before arm(), and again after a safe
@@ -55,14 +55,14 @@ void drive(r4::Board& board) {
   board.arm(250ms);
   board.feed();
   for (const double duty : {0.0, 0.1, 0.2, 0.3, 0.2, 0.1, 0.0}) {
-    board.osmc(1).set(duty, 250ms);  // the board's state has confirmed it
+    board.osmc(1).set(duty, 250ms);  // returns when a state confirms the command
     board.feed();
     std::this_thread::sleep_for(50ms);
   }
 
   std::printf("motor 1 has turned by %d counts\n", board.next_state(250ms).encoder(1) - from);
 
-  board.stop();  // every output safe, the motors without supply; latched until E:CLEAR
+  board.stop();  // all outputs safe, motors without supply; latched until E:CLEAR
   const r4::Statistics statistics = board.statistics();
   std::printf("%llu states, %.1f a second, %.0f us round trip, %.1f %% lost\n",
               static_cast<unsigned long long>(statistics.states), statistics.state_rate_hz,

@@ -12,12 +12,12 @@
 namespace {
 
 constexpr double search_step_m = 0.02;
-constexpr double search_ahead_m = 1.5;  // so that the eight's crossing is no short cut
-constexpr double near_m = 0.05;         // the end
+constexpr double search_ahead_m = 1.5;  // shorter than the way back to the eight's crossing
+constexpr double near_m = 0.05;         // distance at which the end is reached
 constexpr double braking_m_s2 = 0.4;
 constexpr double slowest_m_s = 0.15;
 constexpr double turning_m =
-    2.5;  // the radius; wider than the narrowest, so that there is something to correct with
+    2.5;  // radius, above the smallest possible one to leave steering for corrections
 constexpr double turning_step_rad = 0.05;
 
 }  // namespace
@@ -56,7 +56,8 @@ Course Course::towards(const Waypoint& goal, const r4::control::Pose& from) {
   const double dy = goal.y_m - from.y_m;
   const double ahead_m = along_x * dx + along_y * dy;
   const double left_m = along_x * dy - along_y * dx;
-  // It turns to the side of the goal. What lies within that circle is reached by the one on the other side.
+  // The circle is on the side of the goal. If the goal is inside that circle, the circle is on the
+  // other side.
   double side = left_m < 0 ? -1 : 1;
   if (std::hypot(ahead_m, side * left_m - turning_m) < turning_m) side = -side;
   // The tangent from the circle to the goal, seen from the circle's middle.
@@ -80,7 +81,7 @@ double Course::heading_rad() const {
   return std::atan2(waypoints_[1].y_m - waypoints_[0].y_m, waypoints_[1].x_m - waypoints_[0].x_m);
 }
 
-// Beyond the end it goes straight on.
+// Beyond the end the course continues straight.
 Waypoint Course::at(double way_m) const {
   const auto next = std::upper_bound(lengths_.begin() + 1, lengths_.end() - 1, way_m);
   const auto i = static_cast<std::size_t>(std::distance(lengths_.begin(), next));

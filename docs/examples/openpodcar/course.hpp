@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A course of waypoints, and the motion that follows it: pure pursuit (Coulter, Implementation of the Pure Pursuit Path
-// Tracking Algorithm, CMU-RI-TR-92-01), slower towards its end.
+// A course of waypoints, and the motion along it by pure pursuit (Coulter, Implementation of the
+// Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01). The motion is slower near the end of the
+// course.
 #pragma once
 
 #include <r4link/control/kinematics.hpp>
@@ -14,22 +15,22 @@ struct Waypoint {
 
 class Course {
  public:
-  // It begins at the first waypoint; two at least.
+  // The course begins at the first waypoint. At least two waypoints.
   explicit Course(std::vector<Waypoint> waypoints, double lookahead_m = 1.5);
-  // Bernoulli's lemniscate through the origin, `reach` to each side: it bends evenly more towards its ends, where the
-  // radius is a third of that.
+  // Bernoulli's lemniscate through the origin, `reach_m` to each side. Its curvature grows evenly
+  // towards both ends, where the radius is a third of `reach_m`.
   static Course figure_of_eight(double reach_m);
-  // From there to a goal anywhere: along a circle until it looks at the goal, and straight on. Throws if that is where
-  // it stands.
+  // From `from` to any goal: along a circle until the vehicle faces the goal, then straight. Throws
+  // if the vehicle stands at the goal.
   static Course towards(const Waypoint& goal, const r4::control::Pose& from);
 
-  // How to move from there; nothing once the end is reached.
+  // The motion at `pose`; standstill after the end of the course.
   r4::control::Twist wish(const r4::control::Pose& pose, double cruise_m_s);
   bool finished() const { return finished_; }
   double length_m() const { return lengths_.back(); }
-  // How far beside the course that place is, near to where wish() was asked last. To the left: above 0.
+  // Distance of a place from the course, near the last call of wish(). Positive to the left.
   double deviation_m(double x_m, double y_m) const;
-  // The direction in which it begins.
+  // The direction at the beginning of the course.
   double heading_rad() const;
 
  private:
@@ -37,8 +38,8 @@ class Course {
   double nearest(double x_m, double y_m, double from_m, double to_m) const;
 
   std::vector<Waypoint> waypoints_;
-  std::vector<double> lengths_;  // of the way to each
+  std::vector<double> lengths_;  // from the start to each waypoint
   double lookahead_m_;
-  double way_m_ = 0;  // done
+  double way_m_ = 0;  // travelled along the course
   bool finished_ = false;
 };

@@ -15,12 +15,12 @@ std::optional<r4::Setpoints> follow(Podcar& podcar, Course& course, const r4::St
                                     double dt_s) {
   if (!podcar.sense(state)) {
     throw r4::Error(r4::ErrorKind::refused, "AINSTEER",
-                    "the steering sensor tells of an angle that there is not",
+                    "the steering sensor shows an angle that the steering cannot have",
                     "look at its cable, and at podcar_steering");
   }
   if (!podcar.obeys()) {
     throw r4::Error(r4::ErrorKind::refused, "the vehicle",
-                    "steering or speed is not as it was told",
+                    "steering or speed is not as commanded",
                     "look at DHB1A, AINSTEER and encoder 1: does forward steer to the left "
                     "and count upwards?");
   }

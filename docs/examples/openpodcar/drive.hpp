@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a drive begins and goes on, for the programs and their tests.
+// The beginning and the steps of a drive, for both programs and their tests.
 #pragma once
 
 #include <optional>
@@ -12,15 +12,15 @@
 
 inline constexpr double podcar_cruise_m_s = 1.0;
 
-// Has the board go safe for what US 1 sees. A board that begins again forgets it.
+// The board goes safe if US 1 sees an obstacle. A board that restarts forgets this threshold.
 void guard_podcar(r4::Board& board);
 
-// Arms the board, and sets its guard behind that: if it has begun again since, it is not armed any more, and the loop
-// does not begin. So nothing drives without the guard, however long it was ago that somebody set it. Throws r4::Error
-// where the board refuses.
+// Arms the board, then calls guard_podcar(). If the board restarts after that, it is disarmed and
+// the loop does not begin. So the vehicle never drives without the guard. Throws r4::Error if the
+// board refuses.
 void arm_podcar(r4::Board& board);
 
-// What to post for this state along the course; nothing once it has arrived and stands. Throws r4::Error if the vehicle
-// does not know its steering, or does not obey.
+// The setpoints for this state along the course; none after the vehicle has arrived and stands.
+// Throws r4::Error if the steering angle is unknown, or if the vehicle does not obey.
 std::optional<r4::Setpoints> follow(Podcar& podcar, Course& course, const r4::State& state,
                                     double dt_s);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drives an OpenPodcar along a course, while somebody holds the dead-man's handle.
+// Drives an OpenPodcar along a course, while a person holds the dead-man's handle.
 //
-//     openpodcar [URL] [X,Y …]     metres, from where it stands: x forward, y to the left. Without waypoints a figure of
-//                                  eight; without a URL a simulated board with a model of the vehicle behind it
+//     openpodcar [URL] [X,Y …]     metres from its place: x forward, y to the left. Without
+//                                  waypoints: a figure of eight. Without a URL: a simulated board
+//                                  and a model of the vehicle
 //
-// Enter begins, Ctrl-C ends. Exit code: 0 arrived, 2 usage, 3 it stopped on its way or was refused, 4 no such transport,
-// 5 permission, 6 not supported.
+// Enter begins, Ctrl-C ends. Exit code: 0 arrived, 2 usage, 3 the vehicle stopped before the end,
+// or the board refused a command, 4 no such transport, 5 permission, 6 not supported.
 #include <termios.h>
 #include <unistd.h>
 
@@ -47,9 +48,9 @@ void say(double time_s, const Podcar& podcar, const Course& course) {
               course.deviation_m(pose.x_m, pose.y_m));
 }
 
-// False if it is not to begin.
+// False if the user ends the program before the drive.
 bool wait_for_enter(const Course& course) {
-  tcflush(STDIN_FILENO, TCIFLUSH);  // what was typed before is no answer
+  tcflush(STDIN_FILENO, TCIFLUSH);  // earlier input is not an answer
   std::printf("hold the handle, and press Enter to drive %.1f m\n", course.length_m());
   int key = std::getchar();
   while (key != '\n' && key != EOF) key = std::getchar();
@@ -58,7 +59,7 @@ bool wait_for_enter(const Course& course) {
 
 int drive(r4::Board& board, Course& course, const r4::control::Pose& start) {
   board.wait_active();
-  guard_podcar(board);  // so that it is not armed where something is in the way already
+  guard_podcar(board);  // then an obstacle prevents arming
   if (!wait_for_enter(course)) return 0;
   arm_podcar(board);
 
@@ -88,11 +89,11 @@ int main(int argc, char** argv) {
   struct sigaction action {};
   action.sa_handler = [](int) {
     ended = 1;
-  };  // without SA_RESTART: it ends the wait for Enter, too
+  };  // without SA_RESTART: a signal also ends the wait for Enter
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction before {};
     sigaction(signal, nullptr, &before);
-    if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);  // nohup ignores SIGHUP
+    if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);  // nohup: stays ignored
   }
   try {
     std::string url;
@@ -103,7 +104,7 @@ int main(int argc, char** argv) {
       } else if (i == 1) {
         url = argv[i];
       } else {
-        throw r4::Error(r4::ErrorKind::usage, argv[i], "it is no waypoint",
+        throw r4::Error(r4::ErrorKind::usage, argv[i], "it is not a waypoint",
                         "give metres: 5,0 7.5,-2");
       }
     }

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drives an OpenPodcar as ROS 2 asks, while somebody holds the dead-man's handle: by a joystick, by cmd_vel, or to the
-// goals of RViz (pilot.hpp says who of them drives). ROS itself need not be installed.
+// Drives an OpenPodcar by ROS 2, while a person holds the dead-man's handle: by a joystick, by
+// cmd_vel, or to goals of RViz (pilot.hpp says which source drives). ROS itself need not be
+// installed.
 //
-//     openpodcar_ros2 [URL]        without a URL a simulated board with a model of the vehicle behind it
+//     openpodcar_ros2 [URL]     without a URL: a simulated board and a model of the vehicle
 //
-// The joystick's start arms; whatever ends the drive, it is pressed once more. Ctrl-C ends. Exit code: 0 ended, 2 usage,
-// 3 refused, 4 no such transport or graph, 5 permission, 6 not supported.
+// The joystick's start button arms. After the end of a drive, press it again. Ctrl-C ends the
+// program. Exit code: 0 ended, 2 usage, 3 refused, 4 no such transport or graph, 5 permission, 6
+// not supported.
 #include <chrono>
 #include <csignal>
 #include <cstdint>
@@ -30,8 +32,9 @@ namespace {
 
 volatile std::sig_atomic_t ended = 0;
 
-// False if it was ended before. run_loop() ends when the board restarts, so the first state after a
-// restart comes here. `restarts`: those of the board that are known.
+// False if the program is ended before start is pressed. run_loop() ends when the board restarts,
+// so this function gets the first state after a restart. `restarts`: the known restarts of the
+// board.
 bool wait_for_start(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topics,
                     std::uint32_t& restarts) {
   r4::States states = board.states();
@@ -45,7 +48,7 @@ bool wait_for_start(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topi
   return ended == 0;
 }
 
-// Until something ends it. Why, pilot.why() says.
+// Returns at the end of the drive; pilot.why() has the reason.
 void drive(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topics) {
   arm_podcar(board);
   podcar.begin_drive();
@@ -54,16 +57,16 @@ void drive(r4::Board& board, Podcar& podcar, Pilot& pilot, Topics& topics) {
   const auto report = r4::control::run_loop(
       board, podcar_loop(), [&](const r4::control::LoopStep& step) -> std::optional<r4::Setpoints> {
         topics.take(pilot, podcar.pose());
-        if (!begun) pilot.begin(Pilot::Time::clock::now());  // what waited until now is too old
+        if (!begun) pilot.begin(Pilot::Time::clock::now());  // earlier messages are too old
         begun = true;
         const bool steering_is_known = podcar.sense(step.state);
-        if (!steering_is_known) pilot.end("AINSTEER tells of an angle that there is not");
-        if (!podcar.obeys()) pilot.end("steering or speed is not as it was told");
+        if (!steering_is_known) pilot.end("AINSTEER shows an angle that the steering cannot have");
+        if (!podcar.obeys()) pilot.end("steering or speed is not as commanded");
         if (ended != 0) pilot.end("it was ended");
         topics.publish(podcar, step.state);
         const auto wish = pilot.wish(podcar.pose(), Pilot::Time::clock::now());
         if (wish) return podcar.drive(*wish, step.dt_s);
-        board.stop_async();  // the motors' supply is off at once, and the parking brake springs on
+        board.stop_async();  // cuts the motors' supply at once, which applies the parking brake
         return std::nullopt;
       });
   board.stop_async();
@@ -75,13 +78,13 @@ void run(r4::Board& board) {
   Podcar podcar;
   Pilot pilot;
   board.wait_active();
-  guard_podcar(board);  // so that it is not armed where something is in the way already
+  guard_podcar(board);  // then an obstacle prevents arming
   std::puts("hold the handle, and press the joystick's start");
   std::uint32_t restarts = 0;
   while (wait_for_start(board, podcar, pilot, topics, restarts)) {
     try {
       drive(board, podcar, pilot, topics);
-    } catch (const r4::Error& error) {  // the board is not there, or refuses
+    } catch (const r4::Error& error) {  // no answer of the board, or a refusal
       board.stop_async();
       pilot.end(error.what());
     }
@@ -95,7 +98,7 @@ void run(r4::Board& board) {
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-    // nohup ignores SIGHUP, and it stays so.
+    // A signal that is ignored at the start, as SIGHUP under nohup, stays ignored.
     if (std::signal(signal, [](int) { ended = 1; }) == SIG_IGN) std::signal(signal, SIG_IGN);
   }
   try {

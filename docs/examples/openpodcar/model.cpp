@@ -24,7 +24,7 @@ void PodcarModel::move(double duty, bool supplied) {
   const double holding =
       rolling_force_n + (without_supply_ms_ > brake_delay_ms ? brake_force_n : 0);
   const double driven = place_.speed_m_s + motor / mass_kg * dt_s;
-  // Friction takes speed away, and never turns it round.
+  // Friction reduces the speed, but never reverses it.
   const double lost = holding / mass_kg * dt_s;
   place_.speed_m_s = std::abs(driven) <= lost ? 0 : driven - std::copysign(lost, driven);
 }
@@ -51,7 +51,7 @@ void PodcarModel::pass_millisecond(const r4::sim::ChipPins& pins, bool motors_ha
   counts_part_ -= counts;
   senses.encoder_turned[podcar_wheel.encoder - 1] = static_cast<std::int32_t>(counts);
 
-  // The potentiometer is restless by 10 mV.
+  // The potentiometer has noise of 10 mV.
   noise_ = noise_ * 6364136223846793005U + 1442695040888963407U;
   const auto noise_cv = static_cast<std::int32_t>(noise_ >> 33) % 3 - 1;
   const r4::control::SteeringSensor sensor(podcar_steering);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A model of the vehicle, behind a simulated board (docs/how-to/simulation.md, Tests of your own robot): mass, motor, brake,
-// steering actuator with its potentiometer, wheels, encoder, and what the sensor in front sees. Its wheels do not slip.
+// A model of the vehicle, for a simulated board (docs/how-to/simulation.md, Tests of your own
+// robot): mass, motor, brake, steering actuator with its potentiometer, wheels, encoder, and the
+// distance that the front sensor measures. The wheels do not slip.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +22,7 @@ class PodcarModel final : public r4::sim::RobotModel {
   static constexpr double stall_force_n = 400;  // of the motor at the rims, at full duty
   static constexpr double rolling_force_n = 20;
   static constexpr double brake_force_n =
-      300;  // of the parking brake, which springs on without supply
+      300;  // of the parking brake, which holds without supply
   static constexpr int brake_delay_ms = 30;
   static constexpr double steering_rad_s = 0.3;  // of the actuator at full duty
   static constexpr double steering_lag_s = 0.05;
@@ -32,16 +33,16 @@ class PodcarModel final : public r4::sim::RobotModel {
   void pass_millisecond(const r4::sim::ChipPins& pins, bool motors_have_supply,
                         Senses& senses) override;
 
-  // For who calls pass_millisecond(), or while nobody does.
+  // Not while another thread calls pass_millisecond().
   const PodcarPlace& place() const { return place_; }
   void put(const PodcarPlace& place) { place_ = place; }
-  // A wall across the x axis, for one that drives along it.
+  // A wall across the x axis; only for a vehicle that drives along the x axis.
   void set_wall(double x_m) { wall_x_m_ = x_m; }
   double travelled_m() const { return travelled_m_; }
 
-  // From that speed to a standstill without supply.
+  // The way to a standstill if the supply is cut.
   static double braking_distance_m(double speed_m_s);
-  // The same with its motor shorted: commanded 0, while it has a supply.
+  // The way to a standstill with supply and duty 0: the motor is shorted.
   static double coasting_distance_m(double speed_m_s);
 
  private:

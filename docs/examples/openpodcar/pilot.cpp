@@ -16,7 +16,7 @@ void Pilot::on_joy(std::span<const float> axes, std::span<const std::int32_t> bu
   const bool whole = buttons.size() > std::max({map_.hold, map_.start, map_.stop}) &&
                      axes.size() > std::max(map_.speed_axis, map_.steering_axis) &&
                      std::abs(axes[map_.speed_axis]) <= 1 &&
-                     std::abs(axes[map_.steering_axis]) <= 1;  // false for what is no number
+                     std::abs(axes[map_.steering_axis]) <= 1;  // false for NaN
   if (!whole) return;
   if (from != from_) {
     if (now - heard_ <= joy_timeout) end("there are two joysticks");
@@ -24,7 +24,7 @@ void Pilot::on_joy(std::span<const float> axes, std::span<const std::int32_t> bu
     start_was_up_ = false;
   }
 
-  // A press is what was seen to come: not a button that is down when the joystick begins to be heard.
+  // A press is a change from up to down. A button that is down in the first message is not a press.
   const bool started = is_down(map_.start) && start_was_up_ && now - heard_ <= joy_timeout;
   start_was_up_ = !is_down(map_.start);
   heard_ = now;
@@ -51,7 +51,7 @@ std::string Pilot::on_goal(const Waypoint& goal, const r4::control::Pose& from, 
   if (mode_ == Mode::manual) return "the joystick drives; press start to give it back";
   if (commanded(now)) return "cmd_vel drives";
   const double distance_m = std::hypot(goal.x_m - from.x_m, goal.y_m - from.y_m);
-  if (!(distance_m <= farthest_goal_m)) return "it is too far away, or no place";
+  if (!(distance_m <= farthest_goal_m)) return "it is too far away, or not a position";
   if (distance_m < nearest_goal_m) return "it is where the vehicle stands";
   course_ = Course::towards(goal, from);
   return {};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Who drives: a person with a joystick, a program with cmd_vel, or a goal, in this order. Without I/O and clock, so that
-// a test asks it as the program does.
+// Selects the source that drives: a joystick, else cmd_vel, else a goal. No I/O and no clock, so
+// tests call it as the program does.
 //
 //                start pressed                 hold pressed
 //      ┌─────┐ ───────────────► ┌───────────┐ ──────────────► ┌────────┐
@@ -10,12 +10,15 @@
 //         ▲                                                       │
 //         └───────────────────────────────────────────────────────┘ end()
 //
-//     off         nobody: the loop does not run, and nothing that comes is kept
-//     automatic   cmd_vel, as long as it comes; else the goal; else it stands
-//     manual      the joystick while hold is held; else it stands. What a person has taken over is given back by start
+//     off         the loop does not run, and all messages are dropped
+//     automatic   cmd_vel while its messages arrive; else the goal; else the vehicle stands
+//     manual      the joystick while hold is held; else the vehicle stands. Start ends manual
 //
-// end() is called by the stop button, by a joystick that is silent, for then nobody can stop it from afar, by Topics
-// where a stop may be lost, and by the program when its loop ends. It forgets goal and commands.
+// end() drops the goal and the commands. It is called
+//     by the stop button,
+//     if the joystick is silent, because the person could not stop the vehicle,
+//     by Topics if a stop may be lost,
+//     by the program at the end of its loop.
 #pragma once
 
 #include <chrono>
@@ -29,7 +32,8 @@
 #include "course.hpp"
 #include "podcar.hpp"
 
-// Where they are in sensor_msgs/Joy: here of an Xbox pad with joy_node. `ros2 topic echo /joy` shows yours.
+// Indexes in sensor_msgs/Joy. These are for an Xbox pad with joy_node; `ros2 topic echo /joy` shows
+// yours.
 struct JoyMap {
   std::size_t hold = 4;           // LB: the joystick drives while it is held
   std::size_t start = 7;          // Start
@@ -43,35 +47,37 @@ class Pilot {
   using Time = std::chrono::steady_clock::time_point;
   enum class Mode { off, automatic, manual };
 
-  // joy_node repeats itself 20 times a second.
+  // joy_node repeats its message 20 times a second.
   static constexpr std::chrono::milliseconds joy_timeout{300};
   static constexpr std::chrono::milliseconds cmd_vel_timeout{500};
   static constexpr double to_goal_m_s = 0.8;
-  static constexpr double backwards_m_s = 0.5;  // at most: no sensor looks there
+  static constexpr double backwards_m_s = 0.5;  // slow, because no sensor looks backwards
   static constexpr double farthest_goal_m = 100;
   static constexpr double nearest_goal_m = 0.3;
-  static constexpr double most_beside_m = 1.5;  // of the way to a goal
+  static constexpr double most_beside_m = 1.5;  // distance from the course to a goal
 
   explicit Pilot(const JoyMap& map = {}) : map_(map) {}
 
-  // What comes from outside, and when. Numbers that are none, and a joystick without these axes and buttons, count as
-  // if they had not come; but for its stop button.
-  // `from` tells publishers apart: two joysticks at a time end the drive, for a start that is held on the one looks
-  // like one that is pressed again and again, and the other would be heard when the one that drives is not.
+  // A message, and its time of arrival. A message with NaN or without these axes and buttons is
+  // ignored, except for its stop button. `from` identifies the publisher. Two joysticks at a time
+  // end the drive: start held on one would look like repeated presses, and a silent joystick would
+  // be hidden by the messages of the other joystick.
   void on_joy(std::span<const float> axes, std::span<const std::int32_t> buttons, Time now,
               std::uint64_t from = 0);
   void on_cmd_vel(const r4::control::Twist& twist, Time now);
   // The reason for refusing the goal; empty if the goal is accepted.
   std::string on_goal(const Waypoint& goal, const r4::control::Pose& from, Time now);
 
-  // The board is armed, and the loop begins: of what came until now only a stop counts.
+  // Call it when the board is armed and the loop begins. Of the earlier messages only a stop
+  // counts.
   void begin(Time now);
-  // How to move, within the limits of podcar_geometry. Nothing: stop at once, why() says why.
+  // The motion, within the limits of podcar_geometry. If there is none, stop at once; why() has the
+  // reason.
   std::optional<r4::control::Twist> wish(const r4::control::Pose& pose, Time now);
   void end(std::string why);
 
   Mode mode() const { return mode_; }
-  // Of the last end.
+  // The reason of the last end().
   const std::string& why() const { return why_; }
 
  private:
@@ -84,8 +90,8 @@ class Pilot {
   Mode mode_ = Mode::off;
   std::string why_;
 
-  Time heard_;              // when the joystick was
-  std::uint64_t from_ = 0;  // which one that was
+  Time heard_;              // time of the newest joystick message
+  std::uint64_t from_ = 0;  // its publisher
   bool start_was_up_ = false;
   bool held_ = false;
   r4::control::Twist stick_;

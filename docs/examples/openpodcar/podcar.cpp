@@ -5,12 +5,12 @@
 
 namespace {
 
-constexpr double steering_tolerance_rad = 0.004;  // nearer than this the actuator rests
+constexpr double steering_tolerance_rad = 0.004;  // closer to the goal, the actuator rests
 constexpr double standing_m_s = 0.02;
-constexpr double driven_rad = 0.05;  // farther than this the actuator is driven with all it has
+constexpr double driven_rad = 0.05;  // farther away, the actuator has full duty
 constexpr double moved_rad = 0.02;
 constexpr double most_stuck_s = 0.5;
-constexpr double runaway = 1.5;  // times the greatest speed
+constexpr double runaway = 1.5;  // factor above the highest allowed speed
 
 }  // namespace
 
@@ -39,7 +39,7 @@ bool Podcar::sense(const r4::State& state) {
   const std::optional<double> angle = sensor_.angle_rad(state);
   if (!angle) return false;
   const double length = wheel_.advance(state);
-  // The angle of the middle of the way.
+  // The mean angle between the two states.
   const double steering = (*angle + steering_rad_) / 2;
   odometry_.advance(length, length * std::tan(steering) / podcar_geometry.wheelbase_m);
   steering_rad_ = *angle;
@@ -53,7 +53,7 @@ r4::Setpoints Podcar::drive(const r4::control::Twist& wish, double dt_s) {
     speed_.reset();
     drive = 0;
   }
-  // Standing, it keeps the wheels as they are.
+  // At standstill the wheels are not turned.
   const double turn =
       command.speed_m_s == 0 ? 0 : steering_.step(command.steering_rad, steering_rad_, dt_s);
   const double off_rad = std::abs(command.steering_rad - steering_rad_);

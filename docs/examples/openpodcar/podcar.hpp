@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The vehicle: what is connected to which channel, how it is controlled, and where it is. Without I/O and clock, so that
-// a test drives it as the program does.
+// The vehicle: its channels, its controllers and its position. No I/O and no clock, so tests drive
+// it as the program does.
 //
 //     OSMC 1    the motor of the rear axle, which turns encoder 1
 //     DHB1A     the linear actuator of the steering; forward steers to the left
 //     AINSTEER  the actuator's potentiometer
-//     relay 1   the motors' supply, in series with the dead-man's handle; without it the parking brake holds
+//     relay 1   the motors' supply, in series with the dead-man's handle; without supply the
+//               parking brake holds
 //     US 1      looks forward
 #pragma once
 
@@ -26,27 +27,28 @@ inline constexpr r4::control::WheelGeometry podcar_wheel{
 inline constexpr r4::control::SteeringSensor::Calibration podcar_steering{
     .left_volts = 1, .left_rad = 0.5, .right_volts = 4, .right_rad = -0.5};
 inline constexpr const char* podcar_fields = "OSMC1,DHB1A,ENC1,AINSTEER,DMHSTA,US1";
-// The board goes safe when US 1 sees something nearer: more than it rolls in the quarter of a second until the sensor's
-// turn, and then to a standstill.
+// If US 1 sees a nearer obstacle, the board goes safe. The distance covers the quarter of a second
+// until the sensor's next reading, and the way to a standstill.
 inline constexpr int podcar_clearance_cm = 150;
 
-// What run_loop() has to look after.
+// The fields and limits that run_loop() supervises.
 r4::control::LoopOptions podcar_loop();
 
 class Podcar {
  public:
-  // It is there, before the first state.
+  // Sets the position, before the first state.
   void begin_at(const r4::control::Pose& pose) { odometry_.reset(pose); }
-  // The board is armed: nothing is left of the drive before.
+  // Call it when the board is armed: clears what the controllers learned in the previous drive.
   void begin_drive();
-  // The board has restarted: its counter begins at 0, which is no movement.
+  // Call it when the board has restarted: its counter begins at 0 without any movement.
   void on_restart() { wheel_.reset(); }
-  // A state has come. False if the steering sensor cannot be believed: do not drive then.
+  // Call it for each state. False if the steering sensor is not plausible: do not drive then.
   bool sense(const r4::State& state);
-  // What to post for this motion. After sense().
+  // The setpoints for this motion. Call it after sense().
   r4::Setpoints drive(const r4::control::Twist& wish, double dt_s);
-  // Does it do what drive() told it? False if the steering does not follow for half a second, or if the vehicle is much
-  // faster than it may be, as one whose encoder counts the wrong way: do not drive then.
+  // True if the vehicle does what drive() commanded. False if the steering does not follow for half
+  // a second, or if the vehicle is much too fast, as with an encoder that counts backwards: do not
+  // drive then.
   bool obeys() const;
 
   const r4::control::Pose& pose() const { return odometry_.pose(); }
@@ -62,10 +64,10 @@ class Podcar {
   r4::control::Odometry odometry_;
   // 2.5 m/s at full duty, after 0.8 s; docs/how-to/control.md, Tuning.
   r4::control::Pid speed_{{.kp = 0.9, .ki = 1.1, .feed_forward = 0.16, .rate = 2}};
-  // The actuator is an integrator, so proportional is enough.
+  // The actuator is an integrator, so a proportional controller is enough.
   r4::control::Pid steering_{{.kp = 30, .rate = 20}};
   double steering_rad_ = 0;
   double stuck_at_rad_ = 0,
          stuck_s_ =
-             0;  // where the steering is held to be, though it is told to move, and since when
+             0;  // the angle at which the driven steering does not move, and for how long
 };

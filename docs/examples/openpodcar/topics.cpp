@@ -20,8 +20,8 @@ namespace {
 
 using Time = Pilot::Time;
 
-// So many wait while the board is armed: three seconds of them where no stick moves, else less, for joy_node tells of
-// each move. Of more the newest are kept.
+// The messages that can wait while the board is armed: three seconds while no stick moves, and less
+// while one moves, because joy_node publishes each change. If there are more, the newest are kept.
 constexpr int most_joys = 64;
 constexpr const char* this_computer =
     R"(<Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>)"
@@ -37,13 +37,13 @@ dds_domainid_t domain_id() {
   dds_domainid_t id = 0;
   const auto [end, error] = std::from_chars(text.begin(), text.end(), id);
   if (!text.empty() && (error != std::errc() || end != text.end() || id > 232)) {
-    throw r4::Error(r4::ErrorKind::usage, "ROS_DOMAIN_ID", "it is no domain",
+    throw r4::Error(r4::ErrorKind::usage, "ROS_DOMAIN_ID", "it is not a domain",
                     "set it to a number from 0 to 232");
   }
   return id;
 }
 
-// Cyclone's configuration. GenerateKeyhash: without it Fast DDS does not see who leaves.
+// Cyclone's configuration. Fast DDS needs GenerateKeyhash to notice a publisher that leaves.
 std::string configuration() {
   const bool network = environment("ROS_AUTOMATIC_DISCOVERY_RANGE") == "SUBNET";
   return std::string("<CycloneDDS><Domain><General>") + (network ? "" : this_computer) +
@@ -82,7 +82,7 @@ Qos qos_with(const std::string& user_data) {
   return qos;
 }
 
-// ROS 2 writes XCDR1. Nobody waits for who reads slowly.
+// ROS 2 writes XCDR1. A write never waits for a slow reader.
 Qos qos_of(const Topic& topic, dds_reliability_kind_t reliability, int depth) {
   Qos qos = qos_with(std::string("typehash=RIHS01_") + topic.hash + ";");
   constexpr dds_data_representation_id_t xcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
@@ -92,7 +92,7 @@ Qos qos_of(const Topic& topic, dds_reliability_kind_t reliability, int depth) {
   return qos;
 }
 
-// use(message, publisher). How many they were.
+// Calls use(message, publisher) for each waiting message. Returns the number of messages.
 template <class Message, class Use>
 int take_each(dds_entity_t reader, const Use& use) {
   void* samples[most_joys] = {};
@@ -113,7 +113,7 @@ Topics::Topics() {
   if (environment("CYCLONEDDS_URI").empty()) {
     domain_ = made(dds_create_domain(id, configuration().c_str()), "the ROS domain");
   }
-  const Qos ours = qos_with("enclave=/;");  // so that ROS takes it for one of its own
+  const Qos ours = qos_with("enclave=/;");  // marks a participant of ROS 2
   participant_ = made(dds_create_participant(id, ours.get(), nullptr), "the ROS domain");
 
   const auto created = [&](const Topic& topic) {
@@ -124,7 +124,8 @@ Topics::Topics() {
     const Qos qos = qos_of(topic, reliability, depth);
     return made(dds_create_reader(participant_, created(topic), qos.get(), nullptr), topic.name);
   };
-  // What is lost of the first two is not sent again, and too late: a newer one comes. But a goal is sent once.
+  // A lost message of /joy or /cmd_vel is not repeated, because a newer message follows. A goal is
+  // sent only once, so it must be reliable.
   joy_ = reader(joy_topic, DDS_RELIABILITY_BEST_EFFORT, most_joys);
   cmd_vel_ = reader(cmd_vel_topic, DDS_RELIABILITY_BEST_EFFORT, 1);
   goal_pose_ = reader(goal_pose_topic, DDS_RELIABILITY_RELIABLE, 1);
@@ -180,5 +181,5 @@ void Topics::publish(const Podcar& podcar, const r4::ReceivedState& state) {
   std::copy(covariance.begin(), covariance.end(), message.pose.covariance);
   message.twist.twist.linear.x = podcar.speed_m_s();
   message.twist.twist.angular.z = podcar.turn_rad_s();
-  dds_write(odom_, &message);  // one that is not written is not missed
+  dds_write(odom_, &message);  // a failed write is harmless: the next state follows
 }

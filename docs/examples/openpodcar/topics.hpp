@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The vehicle's topics in a ROS 2 graph, by Cyclone DDS alone. Whoever is in the graph may drive: it is this computer,
-// unless ROS_AUTOMATIC_DISCOVERY_RANGE is SUBNET, or CYCLONEDDS_URI says something else; its number is ROS_DOMAIN_ID.
+// The vehicle's topics in a ROS 2 graph, through Cyclone DDS without ROS. Every program in the
+// graph may drive. The graph is limited to this computer, unless ROS_AUTOMATIC_DISCOVERY_RANGE is
+// SUBNET or CYCLONEDDS_URI has other interfaces. ROS_DOMAIN_ID is the number of the graph.
 //
-// No thread of DDS calls anything here: what has come waits in its readers until take().
+// No thread of DDS calls this class: messages wait in the readers until take().
 #pragma once
 
 #include <dds/dds.h>
@@ -20,9 +21,9 @@ class Topics {
   Topics(const Topics&) = delete;
   Topics& operator=(const Topics&) = delete;
 
-  // What has come since the last call, to the pilot: /joy, /cmd_vel and /goal_pose. Does not wait.
+  // Gives the pilot the messages since the last call: /joy, /cmd_vel and /goal_pose. Does not wait.
   void take(Pilot& pilot, const r4::control::Pose& pose);
-  // /odom, of this state. Does not wait.
+  // Publishes /odom for this state. Does not wait.
   void publish(const Podcar& podcar, const r4::ReceivedState& state);
 
  private:

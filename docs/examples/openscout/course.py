@@ -43,7 +43,7 @@ class Course:
         return self._places[-1]
 
     def deviation(self, x: float, y: float) -> float:
-        """How far that place is beside the course, near to where it is followed."""
+        """Distance of a place from the course, near the last call of twist()."""
         return min(math.dist((x, y), each) for each in self._places[max(0, self._at - 50):self._at + 50])
 
     def twist(self, pose: control.Pose) -> control.Twist:

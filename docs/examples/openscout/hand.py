@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Somebody drives: by the keyboard, or by a gamepad as the kernel has it (evdev, /dev/input/event*)."""
+"""Manual driving by the keyboard, or by a gamepad through the kernel's evdev (/dev/input/event*)."""
 import contextlib
 import fcntl
 import os
@@ -16,21 +16,21 @@ from scout import ARM_REST, Wish
 
 SPEED = 0.5  # m/s
 TURN = 1.5  # rad/s
-ARM_STEP = 20  # microseconds a key
-HOLD = 0.7  # a key that is held is repeated by the terminal, the first time after half a second
+ARM_STEP = 20  # microseconds per key press
+HOLD = 0.7  # s; the terminal repeats a held key, the first time after 0.5 s
 
 
 class Hand(Protocol):
-    ended: bool  # it wants no more, or is gone
-    stop: bool  # an emergency stop was asked for
+    ended: bool  # the person ended the drive, or the device is disconnected
+    stop: bool  # an emergency stop is requested
 
-    def begin(self) -> None: ...  # it is armed: of what came until now only a stop counts
+    def begin(self) -> None: ...  # the board is armed; of the earlier input only a stop counts
 
     def wish(self) -> Wish: ...
 
 
 class Keyboard:
-    """w s a d drive, as long as a key is held; u j, i k, o l move the arm; space stops; q ends."""
+    """w s a d drive, while a key is held; u j, i k, o l move the arm; space stops; q ends."""
     KEYS = {'w': control.Twist(SPEED), 's': control.Twist(-SPEED), 'a': control.Twist(0, TURN),
             'd': control.Twist(0, -TURN)}
     ARM = {'u': (0, 1), 'j': (0, -1), 'i': (1, 1), 'k': (1, -1), 'o': (2, 1), 'l': (2, -1)}
@@ -46,7 +46,7 @@ class Keyboard:
 
     def close(self) -> None:
         if self._before:
-            with contextlib.suppress(termios.error):  # the terminal is gone
+            with contextlib.suppress(termios.error):  # the terminal is closed
                 termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
     def begin(self) -> None:
@@ -71,9 +71,9 @@ class Gamepad:
     """The left stick drives while the right shoulder button is held; the right stick and the triggers' cross move the
     arm; the lower button (A) stops, Start ends.
 
-    Where the kernel had no room for what the pad said, it tells of it by SYN_DROPPED, and what comes until the next
-    SYN_REPORT is not whole (Documentation/input/event-codes.rst). Whether the button is still held nobody knows then:
-    it counts once it is pressed anew, and the axes once they move."""
+    If the kernel's buffer overflows, the kernel sends SYN_DROPPED, and the events until the next SYN_REPORT are
+    incomplete (Documentation/input/event-codes.rst). The position of the shoulder button is then unknown: the button
+    counts as released until it is pressed again, and each axis as centred until it moves."""
     EVENT = struct.Struct('llHHi')  # input_event of the kernel
     EV_SYN, EV_KEY, EV_ABS = 0, 1, 3
     SYN_REPORT, SYN_DROPPED = 0, 3
@@ -115,9 +115,9 @@ class Gamepad:
         elif kind == self.EV_ABS and code in self._ranges:
             low, high = self._ranges[code]
             share = max(-1.0, min(1.0, 2 * (value - low) / (high - low) - 1))
-            self._axes[code] = share if abs(share) > 0.1 else 0.0  # a stick never rests at 0 quite
+            self._axes[code] = share if abs(share) > 0.1 else 0.0  # the rest position of a stick is never exactly 0
         elif kind == self.EV_KEY:
-            if code == self.SHOULDER and value != 2:  # 2 repeats
+            if code == self.SHOULDER and value != 2:  # 2: a repeat
                 self._held = value == 1
             self.stop = self.stop or (code == self.LOWER and value == 1)
             self.ended = self.ended or (code == self.START and value == 1)
@@ -126,7 +126,7 @@ class Gamepad:
         try:
             while len(event := os.read(self._file, self.EVENT.size)) == self.EVENT.size:
                 self._take(*self.EVENT.unpack(event)[2:])
-            self.ended = True  # its end
+            self.ended = True  # end of the file
         except BlockingIOError:
             pass
         except OSError:  # unplugged

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A model of the robot: wheel motors, encoders, and a body that slips to turn. And a thread that puts it behind a
-simulated board: what the pins do goes to the motors, what the wheels do to the encoders, every 10 ms."""
+"""A model of the robot: wheel motors, encoders, and a body that slips to turn. A thread connects it to a simulated
+board: every 10 ms the outputs go to the motors, and the counts of the wheels to the encoder inputs."""
 import math
 import threading
 import time
@@ -12,7 +12,7 @@ import scout
 TIME_CONSTANT = 0.15  # s, of a wheel with its motor and its share of the mass
 FRICTION = 3.0  # m/s^2, of the gears, without a supply
 STEP = 0.001
-LONGEST = 0.02  # s at once: while a busy machine holds up the thread, the robot stands still
+LONGEST = 0.02  # s, longest step: if a busy machine delays the thread, the robot stands still meanwhile
 METRES_A_COUNT = 2 * math.pi * scout.WHEEL_RADIUS / scout.COUNTS_A_TURN
 
 
@@ -53,7 +53,7 @@ class ScoutModel:
 
 
 class Behind:
-    """`with Behind(sim) as model:` the board's robot is that model."""
+    """`with Behind(sim) as model:` connects the model to the simulated board."""
 
     def __init__(self, sim: r4link.SimBoard, yaw: float = 0) -> None:
         self._sim = sim

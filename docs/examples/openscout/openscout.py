@@ -4,11 +4,11 @@
 
     openscout.py URL                                    w s a d drive, u j i k o l move the arm, space stops, q ends
     openscout.py URL --gamepad /dev/input/event5
-    openscout.py URL --course 2,0 2,1                   metres from where it stands: x forward, y to the left
+    openscout.py URL --course 2,0 2,1                   metres from its place: x forward, y to the left
     openscout.py URL --eight 1.5
 
-`model` for URL is a simulated board in this process with a model of the robot behind it. Exit code: 0 ended as asked,
-3 it stopped by itself, others as of r4.
+If URL is `model`, the program uses a simulated board in this process with a model of the robot. Exit code: 0 the end of
+the course or of the keys, 3 the robot stopped before, other codes as in r4.
 """
 import argparse
 import contextlib
@@ -66,12 +66,12 @@ def run(options: argparse.Namespace, course: Course | None, ends: contextlib.Exi
         ends.callback(hand.close)
     board.wait_active()
     board.arm()
-    # Behind arm(): a board that begins again forgets it, and is not armed any more either.
+    # After arm(): a board that restarts forgets the threshold, but is then also disarmed.
     board.proximity(1, cm=CLEARANCE_CM)
     if hand:
         hand.begin()
     print('armed: it drives', flush=True)
-    # The eight begins straight ahead, whatever way that is.
+    # The start of the figure of eight is straight ahead of the robot.
     start = control.Pose(0, 0, course.heading) if course and not options.course else None
     report = drive(board, hand, course, start)
     print(report.why, flush=True)

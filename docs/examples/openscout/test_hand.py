@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What gamepad and keyboard say."""
+"""The wishes that follow from the events of a gamepad and from keys."""
 import os
 import pty
 import struct
@@ -16,7 +16,7 @@ from hand import Gamepad, Keyboard
 
 @pytest.fixture(name='plugged')
 def make_plugged(tmp_path):
-    """A gamepad, what makes it say something, and what unplugs it."""
+    """A gamepad, a function that sends its events, and a function that unplugs it."""
     events = tmp_path / 'event0'
     os.mkfifo(events)
     pad = Gamepad(str(events))
@@ -30,7 +30,7 @@ def test_the_gamepad_drives_while_its_shoulder_button_is_held(plugged):
     happens(3, Gamepad.ABS_Y, -32768)
     assert pad.wish().twist == (0, 0)
     happens(1, Gamepad.SHOULDER, 1)
-    pad.begin()  # it is armed now: pressed before
+    pad.begin()  # pressed before arming: does not count
     assert pad.wish().twist == (0, 0)
     happens(1, Gamepad.SHOULDER, 0)
     happens(1, Gamepad.SHOULDER, 1)
@@ -54,9 +54,9 @@ def test_the_gamepad_stops_when_the_kernel_drops_events(plugged):
     happens(1, Gamepad.SHOULDER, 1)
     happens(0, 0, 0)
     assert pad.wish().twist.forward > 0
-    happens(0, 3, 0)  # SYN_DROPPED: that the button was let go is lost
+    happens(0, 3, 0)  # SYN_DROPPED: the release of the button is lost
     assert pad.wish().twist == (0, 0)
-    happens(1, Gamepad.SHOULDER, 1)  # is not whole
+    happens(1, Gamepad.SHOULDER, 1)  # before SYN_REPORT: dropped
     happens(3, Gamepad.ABS_Y, -32768)
     assert pad.wish().twist == (0, 0)
     happens(0, 0, 0)
@@ -71,7 +71,7 @@ def test_the_gamepad_stops_when_the_kernel_drops_events(plugged):
 
 
 class Terminal:
-    """A keyboard at a terminal, and the clock by which a key is held."""
+    """A keyboard at a terminal, with a clock that the test moves."""
 
     def __init__(self, monkeypatch):
         self._keys, terminal = pty.openpty()

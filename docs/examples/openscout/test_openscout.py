@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well it keeps to a course, in no time, on the model alone; and, as a process against a simulated board with the
-model behind it, the same courses, the keys, and how far it rolls when something happens."""
+"""Two kinds of tests. On the model alone, in virtual time: how closely the robot follows a course. As a process with a
+simulated board and the model: the same courses, the keys, and the way to a standstill after a failure."""
 import contextlib
 import math
 import os
@@ -31,7 +31,7 @@ PROGRAM = pathlib.Path(__file__).with_name('openscout.py')
 
 
 class Pins:
-    """What the program commanded two states ago, for the link takes its time."""
+    """The command of two states ago: models the delay of the link."""
 
     def __init__(self):
         self._under_way = [(0.0,) * 4] * 2
@@ -42,7 +42,7 @@ class Pins:
 
 
 def follow(course, start):
-    """Drives the course on the model, 100 states a second; how far beside it at most, and the model at its end."""
+    """Drives the course on the model, 100 states a second. Returns the largest deviation, and the model at the end."""
     robot, model, pins, worst = scout.Scout(), ScoutModel(), Pins(), 0.0
     model.yaw = start.yaw
     robot.odometry.reset(start)
@@ -89,7 +89,7 @@ def running(*arguments, **options):
 
 
 class Relay:
-    """The way to a board on UDP, that can be cut."""
+    """A UDP relay to a board, which can be cut."""
 
     def __init__(self, url):
         host, port = re.match(r'udp://([^:]+):(\d+)', url).groups()
@@ -119,7 +119,7 @@ class Relay:
     def __exit__(self, *_):
         for each in (self._near, self._far):
             with contextlib.suppress(OSError):
-                each.shutdown(socket.SHUT_RDWR)  # ends what waits for it
+                each.shutdown(socket.SHUT_RDWR)  # ends the waiting recv()
         for each in self._threads:
             each.join()
         self._near.close()
@@ -127,27 +127,28 @@ class Relay:
 
 
 def drive(arguments, course):
-    """The program along that course: what it said, its exit code, how far beside the course, and from its end."""
+    """Runs the program along a course. Returns its output, its exit code, the largest deviation, and the distance from
+    the end."""
     worst = 0.0
     with r4link.SimBoard('udp://127.0.0.1:0') as sim, Behind(sim, course.heading) as model:
         with running(sim.url, *arguments) as program:
             def has_ended():
                 nonlocal worst
-                course.twist(control.Pose(model.x, model.y, model.yaw))  # tells the course how far it is
+                course.twist(control.Pose(model.x, model.y, model.yaw))  # moves the course's position forward
                 worst = max(worst, course.deviation(model.x, model.y))
                 return program.poll() is not None
             until(has_ended, 3 * PATIENCE_S)
             return program.stdout.read(), program.returncode, worst, math.dist((model.x, model.y), course.end)
 
 
-# Short ones: how well it keeps to a long one is tested above, in no time.
+# Short courses: long courses are tested above, in virtual time.
 @pytest.mark.parametrize('arguments, places', [(('--eight', '0.7'), figure_of_eight(0.7)),
                                                (('--course', '0.5,0', '0.8,0.4'), [(0, 0), (0.5, 0), (0.8, 0.4)])],
                          ids=['eight', 'course'])
 def test_the_robot_keeps_its_course_with_a_simulated_board(arguments, places):
     for _ in range(3):
         told, code, worst, left = drive(arguments, Course(places, CRUISE))
-        if 'newest state' not in told:  # as where this machine stood still
+        if 'newest state' not in told:  # a busy machine delayed the states: try again
             break
     assert code == 0, told
     print(f'{worst:.3f} m beside it at most, {left:.3f} m from its end')
@@ -163,8 +164,8 @@ class Scene(NamedTuple):
 
 @contextlib.contextmanager
 def at_speed(url, model):
-    """The program when it drives at speed. It stops if a busy machine holds the states up; then it is started again, at
-    most twice."""
+    """The program while it drives at full speed. If a busy machine delays the states, the program stops; it is then
+    restarted, at most twice."""
     for _ in range(3):
         with running(url, '--course', '50,0') as program:
             until(lambda: model.speed > 0.9 * CRUISE or program.poll() is not None)
@@ -231,5 +232,5 @@ def test_keys_move_the_wheels_and_the_arm():
 
 
 def is_near(pulses, wanted):
-    """A chip counts in 4.88 microseconds."""
+    """True if the pulses are equal within the chip's step of 4.88 us."""
     return all(abs(pulse - each) < 5 for pulse, each in zip(pulses, wanted))

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A transport of your own: datagrams over one end of a socketpair() of type SOCK_SEQPACKET, whose
-// other end the driver of a radio has.
+// A transport of your own: datagrams over one end of a socketpair() of type SOCK_SEQPACKET. The
+// driver of a radio has the other end.
 #pragma once
 
 #include <sys/socket.h>
@@ -26,7 +26,7 @@ class SocketCarrier final : public r4::Carrier {
     opening_.reset();
     up_ = false;
     if (!reader_.joinable()) return;
-    ::shutdown(socket_, SHUT_RDWR);  // ends the reader's wait, and the use of this socket
+    ::shutdown(socket_, SHUT_RDWR);  // ends the reader's wait; the socket cannot be used afterwards
     reader_.join();
   }
   r4::SendResult send(std::string_view bytes, r4::Priority, r4::Peer) override {
@@ -40,7 +40,8 @@ class SocketCarrier final : public r4::Carrier {
   const r4::CarrierCounters& counters() const override { return counters_; }
 
  private:
-  // On a thread of its own, which may wait. The loop does the rest, unless it has been closed.
+  // Runs on a separate thread, which may wait. Posts each datagram to the loop, which drops it
+  // after close().
   void read(const std::weak_ptr<int>& opening) {
     char bytes[r4::max_datagram];
     for (ssize_t size = 1; size > 0;) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The program under test: a robot that goes forward until something is near, and then back. Usage: patrol.py URL"""
+"""The program under test: a robot that drives forward until an obstacle is near, then backward. Usage: patrol.py URL"""
 import sys
 
 import r4link
@@ -11,8 +11,8 @@ NEAR_CM = 40
 def patrol(url: str, turns: int = 1) -> None:
     with r4link.Board(url, fields='DEFAULT,US1') as board:
         board.wait_active()
-        board.arm(timeout=3)  # nothing turns yet; from here on a program that hangs stops the robot
-        board.watchdog(0.3)
+        board.arm(timeout=3)  # no motor turns yet
+        board.watchdog(0.3)  # from here on, a hang of this program stops the robot
         duty = DUTY
         board.osmc(1).set(duty, timeout=0.25)
         for state in board.states():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several boards on a CAN bus that is one: pytest -m can, where there is an interface (README.md)."""
+"""Several boards on one CAN bus. Usage: pytest -m can, with a CAN interface (README.md)."""
 import socket
 import struct
 
@@ -11,7 +11,7 @@ EMERGENCY_STOP = 0x010  # docs/reference/can.md: any content, obeyed by every bo
 
 @pytest.fixture(name='button')
 def a_stop_button(request):
-    """What a stop button with a CAN controller does, without any of our software."""
+    """Sends the stop as a stop button with a CAN controller does, without R4 software."""
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as controller:
         controller.bind((request.config.getoption('--r4-interface'),))
         yield lambda: controller.send(struct.pack('=IB3x8s', EMERGENCY_STOP, 0, b''))

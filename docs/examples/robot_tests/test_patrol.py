@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a team has in its repository: pytest finds the fixtures by itself where r4link is installed."""
+"""Tests as in the repository of a robot team. If r4link is installed, pytest finds the fixtures by itself."""
 import threading
 import time
 
@@ -57,7 +57,7 @@ def test_the_motors_are_off_while_the_link_is_cut(r4_link):
     r4_link.osmc(1).set_pwm(300, timeout=3)
     until(lambda: r4_link.robot.look().osmc[0] == (300, 1))
     until(lambda: r4_link.robot.look().is_safe, within=5)
-    until(lambda: r4_link.robot.look().osmc[0] == (300, 1))  # the same program is back (recovery=last)
+    until(lambda: r4_link.robot.look().osmc[0] == (300, 1))  # the link resumes with the last setpoints (recovery=last)
 
 
 @pytest.mark.r4(transport='pty', link='corrupt=10%,seed=3')

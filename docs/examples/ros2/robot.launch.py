@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A robot on two motors that drives by cmd_vel: ros2 launch robot.launch.py
+"""A robot with two motors that obeys cmd_vel. Usage: ros2 launch robot.launch.py
 
-No --arm: what is respawned would drive again by itself. When you have looked:
+Without --arm, because a respawned process must not drive by itself. After a look at the robot, arm it:
 ros2 topic pub --once /robot/arm std_msgs/msg/Bool '{data: true}'
 """
 from launch import LaunchDescription

@@ -16,13 +16,13 @@ WHEEL_SEPARATION = 0.42  # m
 WHEEL_RADIUS = 0.05  # m
 FULL_SPEED = 30.0  # rad/s of a wheel at full duty
 CMD_VEL_TIMEOUT = 0.5  # s
-SIGNS = (1, -1)  # left, right: the right motor is mounted the other way round, and its encoder with it
+SIGNS = (1, -1)  # left, right: the right motor and its encoder are mounted the other way round
 
 
 class Wheel:
-    """Duty by the wanted speed, corrected by what is missing (PI)."""
+    """Duty from the wanted speed, corrected by the error of the speed (PI)."""
 
-    P, I = 0.02, 0.1  # duty for a rad/s; for a rad/s that lasts a second
+    P, I = 0.02, 0.1  # duty per rad/s of error; per rad/s during 1 s
 
     def __init__(self):
         self.integral = 0.0
@@ -33,7 +33,7 @@ class Wheel:
             return 0.0
         missing = wanted - measured
         duty = wanted / FULL_SPEED + self.P * missing + self.integral
-        if abs(duty) < 1 or duty * missing < 0:  # at its limit it learns nothing
+        if abs(duty) < 1 or duty * missing < 0:  # anti-windup: no integration at the limit
             self.integral += self.I * missing * seconds
         return max(-1.0, min(1.0, duty))
 
@@ -45,12 +45,12 @@ class Base:
         self.heard = self.updated = -math.inf
 
     def command(self, linear, angular, now):
-        """m/s ahead, rad/s to the left."""
+        """`linear`: m/s forward; `angular`: rad/s to the left."""
         if not (math.isfinite(linear) and math.isfinite(angular)):
             return
         turn = angular * WHEEL_SEPARATION / 2
         speeds = (linear - turn) / WHEEL_RADIUS, (linear + turn) / WHEEL_RADIUS
-        scale = min(1.0, FULL_SPEED / max(map(abs, (*speeds, FULL_SPEED))))  # the curve stays what it is
+        scale = min(1.0, FULL_SPEED / max(map(abs, (*speeds, FULL_SPEED))))  # the radius of the curve stays the same
         self.wanted = tuple(speed * scale for speed in speeds)
         self.heard = now
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Keys as they are pressed, without the Enter key.
+// Single key presses, without the Enter key.
 #pragma once
 
 #include <termios.h>
@@ -16,7 +16,8 @@ class Keyboard {
   Keyboard(const Keyboard&) = delete;
   Keyboard& operator=(const Keyboard&) = delete;
 
-  // The newest key, waiting at most that long for one; no key, or nobody there any more: at_end().
+  // The newest key; waits at most this long. Empty if there is none, or if the input has ended:
+  // at_end().
   std::optional<char> key(std::chrono::milliseconds at_most);
   bool at_end() const { return at_end_; }
 

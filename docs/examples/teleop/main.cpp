@@ -8,8 +8,8 @@
 //     w s     forward, backward      a d     turn left, right        as long as the key is held
 //     space   emergency stop         q       stop and end            any other key: stand still
 //
-// Whatever makes the board safe needs another e. Exit code: 0 done, 2 usage, 3 refused, timed out or
-// the stop was not confirmed (then cut the power), 4 no such transport, 5 permission, 6 not supported.
+// After each safe state press e again. Exit code: 0 done, 2 usage, 3 refused, timed out or the stop
+// was not confirmed (then cut the power), 4 no such transport, 5 permission, 6 not supported.
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -27,11 +27,11 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double speed = 0.15;  // of full speed
 constexpr auto period = 20ms;
-// A key that is held is repeated by the terminal, the first time after about half a second.
+// The terminal repeats a held key, the first time after about half a second.
 constexpr auto hold = 700ms;
-// This program hangs for so long: its heartbeats stop, and the board switches off.
+// If this program hangs for longer, its heartbeats stop and the board switches its outputs off.
 constexpr auto watchdog = 500ms;
-constexpr auto patience = 300ms;  // with the board, within the watchdog's time
+constexpr auto patience = 300ms;  // longest wait for the board, below the watchdog's time
 
 volatile std::sig_atomic_t ended = 0;
 
@@ -40,7 +40,7 @@ struct Setpoint {
   double right = 0;
 };
 
-// What the hand on the keys asks for; nothing once it has let go of them.
+// The setpoint that the pressed keys ask for; none after the keys are released.
 class Hand {
  public:
   void press(char key, Clock::time_point now) {
@@ -70,8 +70,8 @@ class Hand {
   Clock::time_point until_;
 };
 
-// Sends the newest setpoints once, both motors together. What cannot be sent is dropped, not kept:
-// the next ones, 20 ms later, are newer.
+// Sends the newest setpoints of both motors once, as a group. If they cannot be sent, they are
+// dropped: newer setpoints follow after 20 ms.
 r4::PostResult post(r4::Board& board, const Setpoint& setpoint) {
   return board.post(r4::Setpoints{r4::Command::osmc(1, r4::Duty(setpoint.left)),
                                   r4::Command::osmc(2, r4::Duty(setpoint.right))});
@@ -89,7 +89,7 @@ void say_why(r4::Board& board, r4::PostResult result) {
   }
 }
 
-// `act` may fail: the handle is released, something is in the way …
+// `act` may fail, for example because the handle is released or an obstacle is near.
 template <class Act>
 void attempt(Act act) {
   try {
@@ -105,12 +105,12 @@ void stop(r4::Board& board) {
 }
 
 void teleoperate(r4::Board& board, Keyboard& keyboard) {
-  // Called on a thread of its own.
+  // The callback runs on a separate thread.
   board.on_refused([](const r4::RefusedPost& refused) {
     std::printf("refused by the board or on the way: OSMC %d\n", refused.command.channel);
   });
-  board.next_state(3s);  // it is there, though a stop may be latched
-  // After a lost link nothing comes back by itself: who holds the keys may not see the robot.
+  board.next_state(3s);  // the board is connected; a stop may be latched
+  // After a lost link the motors stay off until e, because the driver may not see the robot.
   board.setting("recovery", "rearm");
   board.watchdog(watchdog);
   std::printf("e arms, q ends\n");
@@ -145,7 +145,7 @@ void teleoperate(r4::Board& board, Keyboard& keyboard) {
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-    // nohup ignores SIGHUP, and it stays so.
+    // A signal that is ignored at the start, as SIGHUP under nohup, stays ignored.
     if (std::signal(signal, [](int) { ended = 1; }) == SIG_IGN) std::signal(signal, SIG_IGN);
   }
   try {

@@ -29,7 +29,7 @@ class System {
   BoardProgram& board() { return *board_; }  // only after boot()
 
  private:
-  static constexpr std::uint32_t settings_limit_us = 2000000;  // then the defaults
+  static constexpr std::uint32_t settings_limit_us = 2000000;  // after that, the defaults apply
   struct WatchdogOn {
     WatchdogOn() { Watchdog::start(); }
   };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A value that belongs to one process. A fork of that process must leave it alone: its threads are
-// missing, its locks may be held for ever, and its path is the parent's.
+// A value that belongs to one process. A forked child must not use it: in the child the value's
+// threads are missing, its locks may be held for ever, and its path belongs to the parent.
 #pragma once
 
 #include <unistd.h>

@@ -20,7 +20,7 @@ from . import _core
 from .channels import _ms
 
 if TYPE_CHECKING:
-    from typing_extensions import Self  # since Python 3.11 in typing
+    from typing_extensions import Self  # in typing since Python 3.11
 
 _open: weakref.WeakSet[Bridge] = weakref.WeakSet()
 
@@ -40,7 +40,7 @@ class BridgeCounters(NamedTuple):
     misdirected: int  # a datagram that only a board sends, from the hosts, or the reverse
     kept_out: int  # from hosts that are not served: docs/how-to/bridge.md
     refused: int  # a missing signature, or a setting that only a cable may change
-    late: int  # may have waited for more than 100 ms: the bridge was held up
+    late: int  # may have waited for more than 100 ms, because the bridge was delayed
     undelivered: int  # the other side is down, full, or has no known peer
     # Of `passed`: replaced by a newer state at the other side, or waited there for 100 ms.
     outdated: int

@@ -88,12 +88,12 @@ class R4LINK_API LoopGuard {
   explicit LoopGuard(LoopOptions options);
 
   void start(Clock::time_point now);
-  // Call it for each state. If a step is due, returns the seconds since the last one.
+  // Call it for each state. If a step is due, returns the seconds since the last step.
   std::optional<double> on_state(const ReceivedState& state, DisarmCause disarmed,
                                  Clock::time_point now);
   // The step's commands. A motor that they do not name keeps its last command.
   void on_commanded(const Setpoints& setpoints);
-  // Call it by deadline(), and when the link or the arming changes. none: continue.
+  // Call it at deadline(), and when the link or the arming changes. LoopEnd::none: continue.
   LoopEnd check(HostLinkState link, DisarmCause disarmed, Clock::time_point now);
   // When the states will be late, if none comes before.
   Clock::time_point deadline() const { return deadline_; }

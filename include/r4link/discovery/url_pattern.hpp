@@ -36,7 +36,7 @@ constexpr std::size_t most_pattern_urls = 10'000;
 // The URLs that a pattern stands for, in order; a URL stands for itself. Throws Error{usage} for
 // invalid braces and ranges, for more than most_pattern_urls, and if a result is not a valid URL.
 R4LINK_API std::vector<PatternUrl> expand_urls(std::string_view pattern);
-// The same for several texts. Throws Error{usage}, too, if two of them name the same URL.
+// The same for several texts. Also throws Error{usage} if two of them name the same URL.
 R4LINK_API std::vector<PatternUrl> expand_urls(const std::vector<std::string>& patterns);
 
 // The URLs that a text joins. They are not checked.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The states in a recording's datagrams, each path's merged.
+// The states in a recording's datagrams. A state keeps the older fields of its path.
 #pragma once
 
 #include <cstdint>

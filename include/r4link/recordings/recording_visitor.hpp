@@ -37,7 +37,7 @@ class RecordingVisitor {
   // Comes again when the path's name is known. After a new header a path number may mean another
   // path.
   virtual void on_path(const RecordedPath& path) { static_cast<void>(path); }
-  // The device at that place of that path from now on, until a header. Device::parse() reads it.
+  // A device in a slot of a path. It applies until the next header. Device::parse() reads it.
   virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
   // A recording begins or continues here: one file may hold several.
   virtual void on_header() {}

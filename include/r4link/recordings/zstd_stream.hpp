@@ -18,7 +18,7 @@ class R4LINK_API ZstdWriter {
  public:
   ZstdWriter();
   // Appends to `out` everything that a reader needs to read all of `bytes`. `end_frame` ends the
-  // frame, so that later bytes can be read without the earlier ones.
+  // frame, so that later bytes can be read without the earlier bytes.
   void write(std::string_view bytes, bool end_frame, std::string& out);
 
  private:
@@ -47,7 +47,7 @@ class R4LINK_API ZstdReader {
   const char* problem() const;
   // True if the frame needs more memory than this reader takes: zstd --long=31 unpacks it.
   bool window_too_large() const { return window_too_large_; }
-  // True between two frames: the last one is complete.
+  // True between two frames: the last frame is complete.
   bool between_frames() const { return !in_frame_; }
 
  private:

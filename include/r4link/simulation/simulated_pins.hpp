@@ -15,7 +15,7 @@ namespace sim {
 struct R4LINK_API ChipPins {
   Drive osmc[osmc_channels];
   Drive dhb12[dhb12_channels];
-  std::uint16_t servo_us[servo_channels] = {};  // to the nearest; a chip counts in 4.88 us
+  std::uint16_t servo_us[servo_channels] = {};  // rounded; a chip's step is 4.88 us
   std::uint8_t relays = 0;                      // bit n-1: relay n
   Bldc bldc[bldc_channels];
 

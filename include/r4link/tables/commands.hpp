@@ -33,11 +33,11 @@ enum class CommandEffect : std::uint8_t {
 enum class ValueRole : std::uint8_t {
   channel,
   value,
-  address,  // Command::value; 0x68 is read, too
+  address,  // Command::value; readers also accept 0x68
   speed,
   direction,
   on,
-  on_off,  // Command::on, as On or Off; 1 and 0 are read, too
+  on_off,  // Command::on, as On or Off; readers also accept 1 and 0
   count,
   period_ms,
   bytes,  // Command::text, as "x3B00". From here on, a range is one of sizes
@@ -159,7 +159,7 @@ static_assert(has_values_that_fit(),
               "a value fits into its member; one may be left out; a list is the last");
 static_assert(encoder_channels == stepper_channels, "Z sets both");
 
-// A bit for each kind with at least that effect, so that no table is needed at run time.
+// A bit mask of the kinds with at least this effect, so that no table is needed at run time.
 constexpr std::uint32_t kinds_that_move(CommandEffect least) {
   std::uint32_t kinds = 0;
   for (const CommandRow& row : command_rows) {

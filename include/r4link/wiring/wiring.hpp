@@ -134,7 +134,7 @@ enum class WiringFault : std::uint8_t {
   apart,           // `other`, its partner, is on another chip or more than partner_lines away
 };
 
-// The two lines of a motor change in one transfer, which carries so many lines at most.
+// The two lines of a motor change in one transfer. A transfer carries at most this many lines.
 constexpr int partner_lines = 11;
 
 // The first fault of a wiring.

@@ -143,7 +143,7 @@ TEST(Fleet, ReportsASilentBoardAndDrivesTheOtherBoards) {
 }
 
 TEST(Fleet, RepeatsAStopAfterItsCallHasReturned) {
-  const std::string url = BoardInAThread("udp").url();  // the board does not run any more
+  const std::string url = BoardInAThread("udp").url();  // the board has ended
   Fleet fleet({url}, at_will());
   EXPECT_EQ(fleet.stop(50ms).failed(), Boards{0});
   BoardInAThread late(url.substr(0, url.find('?')));

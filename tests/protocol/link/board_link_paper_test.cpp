@@ -71,8 +71,8 @@ TEST_F(BoardLinkTest, APaperHostWithoutNumbersIsServed) {
   EXPECT_EQ(numberless(79701), HeartbeatEffect::fed);
 }
 
-// The board cannot distinguish this host from one that restarted during the outage and counts from
-// 0 again.
+// The board cannot distinguish this host from a host that restarted during the outage and counts
+// from 0 again.
 TEST_F(BoardLinkTest, APaperHostWithoutNumbersBeginsANewSessionAfterALoss) {
   numberless(79201);
   command(5000, paper);

@@ -50,7 +50,7 @@ struct Step {
 class Play final : World::Script {
  public:
   // `confirmed`: the number of commands that are confirmed without faults, if that is known.
-  // `always_pushed`: check `pushed` without strangers, too.
+  // `always_pushed`: check `pushed` also without strangers.
   Play(const Story& story, std::vector<Fault> faults, bool keep_trace,
        std::optional<std::uint32_t> confirmed = {}, bool always_pushed = false);
 

@@ -27,7 +27,7 @@ TEST(PortList, LeavesOutAPortThatIsUnpluggedMeanwhile) {
   const std::filesystem::path folder =
       testing::TempDir() + "r4-ports-" + std::to_string(::getpid());
   std::filesystem::create_directory(folder);
-  // The kernel knows neither port any more.
+  // Both ports have been removed from the kernel.
   for (const char* const port : {"ttyUSB998", "ttyUSB999"}) {
     std::filesystem::create_symlink("../../devices/usb1/1-1/ttyUSB/tty", folder / port);
   }

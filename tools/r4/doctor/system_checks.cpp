@@ -33,7 +33,7 @@ void check_receive_buffer(const Machine& machine, Findings& findings) {
   if (bytes >= least_receive_buffer) return;
   findings.push_back(
       found(Severity::warning, "network.buffer", "net.core.rmem_max",
-            fmt::format("{} bytes: what comes while a program is held up is lost", bytes),
+            fmt::format("{} bytes: datagrams that arrive while a program stands still are lost", bytes),
             machine.as_root(fmt::format("sysctl -w net.core.rmem_max={}", least_receive_buffer)),
             Mending::automatic));
 }

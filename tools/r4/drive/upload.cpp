@@ -53,7 +53,7 @@ std::uint32_t word(const std::array<unsigned char, 8>& bytes, std::size_t at) {
 // A sketch for the Giga's M7 begins with the top of its stack and its first instruction.
 void check_image(const std::string& path) {
   constexpr std::uint32_t flash = 0x08040000;
-  constexpr std::uint32_t flash_size = 1966080;  // of the core's boards.txt
+  constexpr std::uint32_t flash_size = 1966080;  // from boards.txt of the core
   const auto refuse = [&](const std::string& reason) {
     throw Error(
         ErrorKind::data, path, reason,

@@ -22,7 +22,7 @@ class NoteView final : public MonitorView {
   std::string& note_;
 };
 
-// "; udp://10.0.0.7:2018: silent": with several paths, the ones that do not carry.
+// "; udp://10.0.0.7:2018: silent": with several paths, the paths that do not carry.
 std::string lost_paths(const AsyncBoard& board) {
   const std::vector<PathStatus> paths = board.paths();
   std::string text;

@@ -83,7 +83,8 @@ class IsotpSender {
     return state_ < State::offered || !reached(now_us, deadline_us_) ? IsotpError::none
                                                                      : time_out();
   }
-  // Ends a transfer, because the interface is down. The offered frame and later ones are not sent.
+  // Ends a transfer, because the interface is down. The offered frame and later frames are not
+  // sent.
   void cancel();
 
   IsotpDeadline deadline() const { return {busy(), deadline_us_}; }

@@ -401,7 +401,7 @@ TEST_F(SimulatedBoardTest, GoesSafeAtOnceWhenTheHostsCarrierCloses) {
   EXPECT_EQ(events_, (Lines{"down", "outputs 0", "SAFE link"}));
   EXPECT_TRUE(board_->model().pins().is_safe());
 
-  // The board is active again as soon as the host is back.
+  // The board is active as soon as the host reconnects.
   events_.clear();
   listener_.heard.clear();
   host_->open(listener_);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CanBus that accepts frames slowly, and a CanBus whose reader is held up: frames that wait, that
+// A CanBus that accepts frames slowly, and a CanBus whose reader is delayed: frames that wait, that
 // are late, and that are lost.
 #include <algorithm>
 #include <fstream>
@@ -178,7 +178,7 @@ TEST_F(CanBusLoad, ObeysTimelyFlowControlThatIsReadLate) {
     far.send(go);
     in_time = CanBus::now_us() - began_us < 20000;
     if (!in_time) continue;
-    std::this_thread::sleep_for(std::chrono::milliseconds(40));  // held up for twice N_Bs
+    std::this_thread::sleep_for(std::chrono::milliseconds(40));  // delayed for twice N_Bs
     EXPECT_EQ(link.host->send(in_two_frames, Priority::normal), SendResult::sent);
     CanFrame second{};
     io.restart();
@@ -210,7 +210,7 @@ TEST_F(CanBusLoad, DropsFramesThatTheBusDoesNotAcceptInTime) {
 
 // --- time stamps of frames
 
-// A datagram of the board in seven frames, which arrive while the reader in this thread is held up.
+// A datagram of the board in seven frames, which arrive while the reader in this thread is delayed.
 class CanBusTimes : public CanBusTest {
  protected:
   static constexpr std::chrono::milliseconds n_cr{100};  // docs/reference/can.md

@@ -125,7 +125,7 @@ TEST_P(KernelIsotpForms, BroadcastsToTheListeningEngine) {
 
 TEST(KernelIsotp, AgreesWithTheEngineOnEveryFrameSizeOfFd) {
   constexpr std::uint8_t frame_sizes[] = {12, 16, 20, 24, 32, 48};
-  // three frames of the longest kind, and more of the shorter ones
+  // three frames of the longest size, and more frames of each shorter size
   constexpr std::uint32_t longest = 150;
   for (const std::uint8_t tx_dl : frame_sizes) {
     const Form form{"", tx_dl, false};

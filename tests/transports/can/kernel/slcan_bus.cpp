@@ -16,7 +16,7 @@
 // a return from bus-off after 128 times 11 recessive bits. The controller has three mailboxes,
 // lowest id first. While they are full, the pty is not read, and frames wait in the kernel.
 //
-// The bus (support/can_bus_model.hpp) follows the clock. If the process was held up, it catches up:
+// The bus (support/can_bus_model.hpp) follows the clock. If the process was delayed, it catches up:
 // frames on the bus keep their correct times, whenever the process computes them.
 //
 // The process reports to the kernel what a hardware controller reports to its driver. It sends

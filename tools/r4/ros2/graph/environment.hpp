@@ -5,7 +5,7 @@
 //     ROS_AUTOMATIC_DISCOVERY_RANGE   LOCALHOST (ours by default), SUBNET, OFF, SYSTEM_DEFAULT
 //     ROS_LOCALHOST_ONLY              1: LOCALHOST; 0: SUBNET; older releases; overrides the range
 //     ROS_STATIC_PEERS                addresses of further computers, separated by semicolons
-//     CYCLONEDDS_URI                  Cyclone's own configuration: overrides all but the domain
+//     CYCLONEDDS_URI                  Cyclone's own configuration: overrides all except the domain
 #pragma once
 
 #include <cstdint>

@@ -76,7 +76,7 @@ class Inbox {
   enum class Kind : std::uint8_t {
     sample,
     urgent,      // never dropped for another sample
-    publishers,  // newest list of publishers, after the samples of departed ones
+    publishers,  // newest list of publishers, after the samples of departed publishers
   };
   struct Waiting {
     std::uint64_t order = 0;

@@ -4,8 +4,8 @@
 //
 // An id has 24 bytes up to Humble and 16 since Iron, under the same type name, and the wrong size
 // makes a receiver throw. So nothing is published until another participant appears, whose writer's
-// type hash shows its release. With two releases in one graph the first one counts; ROS does not
-// mix them either.
+// type hash shows its release. If a graph has two releases, the first one counts; ROS does not
+// support such a mix either.
 #pragma once
 
 #include <cstddef>

@@ -46,7 +46,8 @@ class Access {
         token_(std::move(token)),
         origins_(std::move(origins)) {}
 
-  // For every request. An empty origin is allowed: for a foreign page browsers always send it.
+  // Call it for every request. An empty origin is allowed, because browsers always send the origin
+  // of a foreign page.
   Verdict check(std::string_view host, std::string_view origin) const;
   // The same for read-only clients of the Foxglove protocol.
   Verdict check_reader(std::string_view host, std::string_view origin) const;

@@ -148,8 +148,8 @@ TEST(I2cBusModel, AnInterruptingTransferCutsATransferShort) {
   const auto& all = bench.log.transfers();
   ASSERT_EQ(all.size(), 4U);
   EXPECT_EQ(all.back().result, I2cResult::timeout);
-  // Its duration is that of the other transfers and of its two bytes. There is no wait for a held
-  // line.
+  // The interrupted transfer takes the time of the other transfers and of its two bytes. It does
+  // not wait for a held line.
   EXPECT_EQ(all.back().duration_ns,
             all[0].duration_ns + all[1].duration_ns + all[2].duration_ns + (9 + 1) * 2500U);
   EXPECT_EQ(bench.write({4}), I2cResult::ok);
