@@ -99,9 +99,6 @@ inline void run_for(asio::io_context& io, Clock::duration time) {
   const auto never = [] { return false; };
   static_cast<void>(run_until(io, never, time));
 }
-inline void run_to(asio::io_context& io, Clock::time_point time) {
-  run_for(io, time - Clock::now());
-}
 
 inline double in_milliseconds(Clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();

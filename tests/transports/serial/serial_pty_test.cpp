@@ -284,31 +284,27 @@ TEST_F(SerialPtyTest, GivesAStalledReaderARecentStateFirst) {
   open_board();
   const FileDescriptor reader = open_raw(board->name().substr(4));
   ASSERT_TRUE(run_until(io, [&] { return board->up(); }));
-  std::vector<Clock::time_point> sent;
-  double oldest = 0;
+  // Ages count in states, not in time: a machine that stands still sends none.
+  constexpr int period_ms = 10;
+  std::size_t sent = 0;
+  std::size_t oldest = 0;
   // Stalls of different lengths and phases; a state every 10 ms, a heartbeat every 50 ms.
   for (const int stall_ms : {5, 35, 41, 47, 53, 120, 250, 503}) {
-    const auto start = Clock::now();
-    for (int i = 0; milliseconds(10 * i) < milliseconds(stall_ms); ++i) {
-      run_to(io, start + milliseconds(10 * i));
-      if (i % 5 == 0) board->send("heartbeat", Priority::normal);
-      board->send("state " + std::to_string(sent.size()) + std::string(150, '.'), Priority::state);
-      sent.push_back(Clock::now());
+    for (int left_ms = stall_ms; left_ms > 0; left_ms -= period_ms) {
+      if (sent % 5 == 0) board->send("heartbeat", Priority::normal);
+      board->send("state " + std::to_string(sent++) + std::string(150, '.'), Priority::state);
+      run_for(io, milliseconds(std::min(left_ms, period_ms)));
     }
-    run_to(io, start + milliseconds(stall_ms));
     pollfd readable{reader.get(), POLLIN, 0};
     ASSERT_EQ(::poll(&readable, 1, 1000), 1);
-    const auto woke = Clock::now();
     const auto lines = lines_of(read_all(reader));
     const auto first = std::find_if(lines.begin(), lines.end(),
                                     [](const std::string& l) { return l.starts_with("state "); });
     ASSERT_NE(first, lines.end());
     EXPECT_EQ(first->find('.') + 150, first->size()) << "the first line was cut";
-    const auto index = static_cast<std::size_t>(std::stoul(first->substr(6)));
-    oldest = std::max(oldest, in_milliseconds(woke - sent[index]));
+    oldest = std::max(oldest, sent - std::stoul(first->substr(6)));
   }
-  std::printf("[ first state after a stall: at most %.1f ms old ]\n", oldest);
-  EXPECT_LE(oldest, 50);
+  EXPECT_LE(oldest, 50U / period_ms);
   EXPECT_GT(board->counters().tx_dropped, 0U);
 }
 
