@@ -2,10 +2,9 @@
 # How a layer is built: r4_portable_layer(NAME FILES...) and r4_host_layer(NAME FILES...).
 # Each makes an OBJECT library; cmake/library.cmake joins their objects into the library.
 
-# Asio without Boost, its code compiled once (transports/asio.cpp). Whether Asio finds
-# std::aligned_alloc depends on the headers included before. The last definition switches it off, because
-# otherwise object files would free handler memory in different ways. A program that links r4link::asio
-# needs all of these definitions.
+# Asio without Boost, its code compiled once (transports/asio.cpp). Whether Asio finds std::aligned_alloc depends on the
+# headers included before; the last definition switches it off, because object files would free handler memory in
+# different ways. A program that links r4link::asio needs all of these definitions.
 set(R4_ASIO_DEFINITIONS ASIO_STANDALONE ASIO_SEPARATE_COMPILATION ASIO_NO_DEPRECATED
     ASIO_DISABLE_STD_ALIGNED_ALLOC)
 
@@ -95,8 +94,7 @@ function(r4_host_layer target)
     # Without ASIO_DISABLE_VISIBILITY the library would export Asio's symbols.
     target_compile_definitions(${target} PRIVATE ${R4_ASIO_DEFINITIONS} ASIO_DISABLE_VISIBILITY)
     target_link_libraries(${target} PRIVATE Threads::Threads)
-    # Compiled once instead of for each file. Each file still includes the headers that it needs, and clang-tidy reads
-    # the files without the precompiled header.
+    # Compiled once, not for each file. Each file still includes what it needs: clang-tidy reads it without this header.
     target_precompile_headers(${target} PRIVATE <algorithm> <asio/io_context.hpp> <chrono> <functional>
                               <memory> <optional> <string> <vector>)
     r4_unity_by_room(${target} ${ARGN})

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The installed library, in three forms of the same objects:
-#
 #   r4link::r4link   libr4link.a: include/r4link without async_*.hpp. Only symbols with R4LINK_API are global. The
 #                    library's Asio is local, so it does not conflict with an Asio of the program.
 #   r4link::shared   libr4link.so: the same as a shared library

@@ -124,8 +124,7 @@ int BoardHardware::drive_chips_safe(int held_before) {
     }
     return all_chips;
   }
-  // One acknowledge of the all-call hides chips that did not hear it, so each chip is also
-  // addressed.
+  // An acknowledge of the all-call hides chips that did not hear it: address each chip, too.
   for (const Chip chip : safe_order) {
     const int i = static_cast<int>(chip);
     if (i != held_before && !drive_chip_safe(i)) return i;
@@ -157,7 +156,6 @@ void BoardHardware::apply(const Outputs& outputs) {
   leave();
 }
 
-// The lines of the expander that a signal uses.
 std::uint16_t BoardHardware::connected_bits() const {
   std::uint16_t bits = 0;
   for (int i = 0; i < signal_count; ++i) {

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The R4 board's hardware made of the chip drivers, wired by a Wiring. A signal that is not
-// connected, or whose chip is not fitted, has no effect.
+// The R4 board's chip drivers, wired by a Wiring. A signal without a place or chip has no effect.
 //
 // Power-up: call power_up() first. It resets the PWM chips, which turns every PWM output off in any
 // mode, and leaves every output in its safe value. poll() then sets the chips up, and ready() is
-// true when all are. Outputs applied earlier wait until then, so that no motor runs before its
-// brake works.
+// true when all are. Outputs applied earlier wait until then: no motor runs before its brake works.
 //
 // Safe state (make_safe()): steppers stand, PWM outputs off, DAC codes and outputs 0, brakes on,
 // relays off. It may be called at any time, also in an interrupt or a fault handler during a
-// transfer. It makes at most two bounded attempts (a held bus is recovered once).
-//
-// A wiring that is damaged, or that nobody has confirmed, is a fault from the start.
+// transfer. It makes at most two bounded attempts (a held bus is recovered once). A wiring that is
+// damaged, or that nobody has confirmed, is a fault from the start.
 //
 // Chip faults: the fault is latched with chip and reason, all outputs are made safe, and apply()
 // has no effect until clear_fault(). Every retry_us the bus is recovered and the chip set up again,
@@ -75,7 +72,6 @@ class BoardHardware final : public Hal {
   static constexpr std::uint32_t handle_settle_us = 20000;
   static_assert(bus_bytes_per_poll >= bus_budget_min, "a set-up would never end");
 
-  // The trouble of a wiring from there.
   static ChipTrouble trouble_of(WiringSource source);
 
   BoardHardware(I2cBus& bus, const BoardPins& pins, const Config& config);

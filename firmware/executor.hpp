@@ -19,10 +19,9 @@ struct Setpoints {
   Settings settings;
 };
 
-// Carries out `command` completely, or changes nothing and returns the reason. The caller has used
-// check_command(), so only names of fields and settings, and channels, are refused here. Heartbeat,
-// stop, clear, leave, identify, watch and the X commands other than X:DAC change nothing here: the
-// application handles them.
+// Carries out `command` completely, or changes nothing and returns the reason. After
+// check_command() only names of fields and settings, and channels, can be refused. Commands that
+// the application handles (heartbeat, stop, X other than X:DAC …) change nothing here.
 Refusal carry_out(const Command& command, Setpoints& setpoints);
 
 }  // namespace firmware

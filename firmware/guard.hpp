@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Watches the application from outside its loop. A timer interrupt calls tick() every millisecond,
 // so the outputs become safe in time even if the loop hangs.
-//
 //     event                     detected by                        reaction
 //     the host falls silent     the link's deadline has passed     outputs safe, cause link
 //     E:STOP has arrived        stop() was called                  outputs safe, cause stop
@@ -14,8 +13,7 @@
 //                                                                  that duty would be unwatched
 //
 // A duty is work that must repeat: a turn of the loop, of a thread, of another interrupt. It checks
-// in each time. tick() runs in an interrupt, on the core that it interrupts; check_in() in any
-// thread.
+// in each time, in any thread. tick() runs in an interrupt, on the core that it interrupts.
 #pragma once
 
 #include <atomic>

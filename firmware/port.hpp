@@ -17,16 +17,14 @@ class Port {
   virtual void send(Text datagram, Priority priority, Peer peer) = 0;
   // The longest datagram the port carries: 508 on the Giga's WiFi, 1024 elsewhere.
   virtual std::size_t max_size() const = 0;
-  // `peer` is in control and keeps its number, however many peers send, until another peer is held.
-  // If the transport cannot reach everyone at once (UDP), datagrams for everyone go to `peer`.
-  // `everyone`: no peer on this port is in control.
+  // `peer` is in control and keeps its number until another is held; everyone: no peer is. Where a
+  // transport cannot reach everyone at once (UDP), datagrams for everyone go to `peer`.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
   // Also holds `peer`, until hold(): a session may have several paths here (session_paths.hpp).
   virtual void also_hold(Peer peer) { static_cast<void>(peer); }
   // True if `peer` receives datagrams for everyone.
   virtual bool reaches(Peer peer) const { return peer == everyone; }
-  // True: send the packed form, if the port has one (CAN) and the host uses it. Wanted with the
-  // setting `pack` while a host is in control.
+  // The port (CAN) sends the packed form if the host uses it. Wanted with the setting `pack`.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
   // True for a bus (CAN): every program on it hears what the port sends, and no other program does.
   // So a watcher need not prove its peer.

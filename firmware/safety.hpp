@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Why the outputs are safe: causes, each latched until its own condition ends it
-// (docs/reference/safety.md).
-//
+// Why the outputs are safe: causes, each latched until its own end (docs/reference/safety.md).
 //     cause      enters                                   leaves                      setpoints
 //     link       owner silent, or its transport failed    the owner reconnects        kept
 //     handle     dead-man's handle released               it is held again            cleared

@@ -157,8 +157,7 @@ void Board::Impl::take_name() {
   for (const PathStatus& path : paths) path_names.push_back(path.name);
 }
 
-// Heartbeats mean that the robot is attended. The next look is due when the running callback, or a
-// callback that starts now, reaches the limit.
+// Heartbeats mean that the robot is attended. Looks again when a callback may reach the limit.
 void Board::Impl::look_at_callbacks() {
   const auto busy = callbacks.busy_for();
   const bool hangs = busy && *busy >= callback_limit;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The implementation of a Board: the link's thread, the callbacks' thread, and calls that wait.
-//
 //     a thread of the program       the link's thread            the callbacks' thread
 //     send() -- Call, post() -->    AsyncBoard on its loop  -->  callback_thread.hpp
 //            <-- ended, news --
@@ -81,7 +80,6 @@ struct Board::Impl final : BlockingLoop, std::enable_shared_from_this<Board::Imp
   void calibrate_servo(int channel, const ServoCalibration& calibration);
   ServoCalibration servo_calibration(int channel);
 
-  // Keeps a recording of this board until another recording replaces it.
   void keep(std::unique_ptr<Recording> own);
 
   // --- on the loop

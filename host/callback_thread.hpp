@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The thread on which the callbacks of a Board run, beside the thread of its link.
-//
 //     the link's loop --notify()--> notices, 64 at most --> the callbacks, one at a time
 //
 // A callback may take long and may wait for the board: heartbeats and commands continue. But a
 // callback that hangs leaves the robot unattended, so it must end in the safe state: after a limit
 // of busy_for() the loop stops the heartbeats.
 //
-// The link does not wait for callbacks. A newer state replaces a state that waits. While 32 notices
-// wait, refusals and warnings are dropped. While 64 wait, each new notice replaces the oldest.
-// notify() allocates nothing.
+// The link does not wait for callbacks. A newer state replaces a waiting one. While 32 notices
+// wait, refusals and warnings are dropped; while 64 wait, the oldest. notify() allocates nothing.
 #pragma once
 
 #include <atomic>

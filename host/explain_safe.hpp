@@ -13,7 +13,6 @@ struct Words {
 };
 // Why a board is safe, and how that ends.
 Words safe_words(const LinkStatus& link);
-// True if the board is safe because of its wiring.
 bool is_of_wiring(const LinkStatus& link);
 
 }  // namespace r4

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A bounded queue of commands from any thread to a loop, which wakes once for all waiting commands.
-// After construction it allocates only for commands with texts.
+// A bounded queue of commands from any thread to a loop. Allocates only for commands with texts.
 #pragma once
 
 #include <asio/bind_allocator.hpp>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The implementation of States: a bounded queue from the link's thread, which does not wait, to a
-// thread of the program.
+// The implementation of States: a bounded queue to a thread of the program; the link does not wait.
 #pragma once
 
 #include <fmt/format.h>

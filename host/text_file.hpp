@@ -6,8 +6,7 @@
 
 namespace r4 {
 
-// The first `most` + 1 bytes of a file, so that a parser can reject a longer or endless file.
-// Throws Error{open}, or Error{permission}, with `fix`.
+// The first `most` + 1 bytes, to reject a longer file. Throws Error{open}, {permission} with `fix`.
 std::string read_text_file(const std::string& path, std::size_t most, const char* fix);
 
 }  // namespace r4

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decides whether to poll for the next arrival or to sleep. Polls if the last silence of the same
-// kind was short, as Linux's haltpoll governor does. Between programs of one computer, the next
-// frame often comes sooner than a process sleeps and wakes. The caller must yield the processor
-// between two polls. No I/O.
+// Decides whether to poll for the next arrival or to sleep: polls if the last silence of the same
+// kind was short, as Linux's haltpoll governor does, because a frame often comes sooner than a
+// process sleeps and wakes. The caller must yield the processor between two polls. No I/O.
 #pragma once
 
 #include <array>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Functions of a transport that only boards use: the peers in control (UDP), the packed form (CAN)
-// and the board's own cable (pty). For a carrier that is not a BoardEnd, board_end_of() returns an
-// end whose functions do nothing.
+// Functions of a transport that only boards use. For a carrier that is not a BoardEnd,
+// board_end_of() returns an end whose functions do nothing.
 #pragma once
 
 #include "r4link/carrier.hpp"

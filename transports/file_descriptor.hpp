@@ -93,7 +93,6 @@ auto with_system_errors(const std::string& thing, Action action) {
   }
 }
 
-// As socket.open(protocol, error), also for an acceptor.
 template <class Socket, class ErrorCode>
 void open_close_on_exec(Socket& socket, const typename Socket::protocol_type& protocol,
                         ErrorCode& error) {
@@ -107,7 +106,6 @@ void open_close_on_exec(Socket& socket, const typename Socket::protocol_type& pr
   if (error) ::close(descriptor);
 }
 
-// For a descriptor that Asio has opened itself.
 inline void close_on_exec(int descriptor) { ::fcntl(descriptor, F_SETFD, FD_CLOEXEC); }
 
 }  // namespace r4

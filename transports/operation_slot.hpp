@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Memory and cancellation for one asynchronous operation that is started repeatedly. A carrier has
-// one slot for each kind of wait: readable, writable, timer. The operation lives in the slot's
-// memory, so waiting uses no heap. After cancel() or the slot's destruction, the handler is never
-// called. For one thread, like a carrier.
+// Memory and cancellation for one asynchronous operation that is started repeatedly: a carrier has
+// a slot for each kind of wait, so that waiting uses no heap. After cancel() or the slot's
+// destruction, the handler is never called. For one thread, like a carrier.
 #pragma once
 
 #include <asio/basic_waitable_timer.hpp>
@@ -99,8 +98,7 @@ class OperationSlot {
   OperationSlot& operator=(const OperationSlot&) = delete;
   ~OperationSlot() { cancel(); }
 
-  // A completion handler for Asio that calls `function()`, or `function(error, size)` after a
-  // transfer. Cancels the previous operation.
+  // Calls `function()`, or `function(error, size)` after a transfer. Cancels the earlier operation.
   template <class Function>
   Operation<Function> handler(Function function) {
     ++memory_->started;

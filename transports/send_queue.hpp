@@ -41,7 +41,6 @@ class SendQueue {
 
   // The entry to send next, or null. Drops expired entries.
   const Entry* front(Time now);
-  // Removes the entry that front() returned.
   void pop();
 
   bool empty() const;

@@ -139,8 +139,7 @@ std::uint32_t Application::waited_ms(std::uint8_t port, std::uint32_t now_ms) co
   return ports_[port].behind ? now_ms - ports_[port].waiting_ms : 0;
 }
 
-// Without a key, every datagram is authentic. So is every datagram on a cable of the board's own,
-// because a host there can set the key.
+// A host on a cable of the board's own can set the key, so it needs none.
 Verdict Application::judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
                            std::uint32_t now_ms) {
   if (!authentication_.required() || ports_[port].port->may_configure()) return Verdict::authentic;

@@ -3,14 +3,12 @@
 // no thread, clock or socket. The port calls receive() for each datagram, poll() as time passes,
 // port_down() when a transport fails, and guard().tick() in a timer interrupt. Setpoints reach the
 // hardware only in update_outputs(); every cause of the safe state goes through Safety.
-//
 //     CONNECTING   no host yet: outputs safe, `H:R4-ROS2;PNum:0;T:0;` each heartbeat interval
 //     ACTIVE       a host is in control and there is no cause: outputs follow the setpoints
 //     SAFE         there is a cause (safety.hpp): outputs safe; with cause `link` heartbeats only
 //
 // A session has one to four paths (session_paths.hpp), and each gets states and heartbeats. Packet
-// numbers count per port; answers to hosts not in control have separate numbers. All times are ms
-// of the board's clock, which wraps.
+// numbers count per port; answers to hosts not in control have their own. Times are ms, and wrap.
 #pragma once
 
 #include <cstddef>
@@ -43,8 +41,7 @@ class Application {
     // Authentication::chance_size random bytes, different at each boot. Without them, a board with
     // a key obeys only a host on a cable of its own.
     const std::uint8_t* chance = nullptr;
-    // The user's devices must outlive the application; UARTs all or none. nullptr: commands
-    // unknown.
+    // The devices must outlive the application; UARTs all or none. nullptr: commands unknown.
     UserI2c* i2c = nullptr;
     UserUart* uarts[uart_channels] = {};
   };
@@ -53,20 +50,17 @@ class Application {
 
   Application(Hal& hal, const Config& config, Observer* observer = nullptr);
 
-  // Call before start(). Returns the port's number, or no_port if there are max_ports already: the
-  // port is not served.
+  // Call before start(). Returns the port's number; no_port, for more than max_ports: not served.
   std::uint8_t add_port(Port& port);
   // Makes the outputs safe and sends the first heartbeat.
   void start(std::uint32_t now_ms);
 
-  // Takes a datagram of any content from `peer`; ignores a port that was not added. After a pause
-  // longer than standstill_ms, the datagram may have waited since the last turn of the loop (a call
-  // of this or poll()). A heartbeat then counts from that turn, until the port is drained or the
-  // loop has turned for catch_up_ms.
+  // Ignores a port that was not added. After a pause longer than standstill_ms, the datagram may
+  // have waited since the last turn of the loop (a call of this or poll()). A heartbeat then counts
+  // from that turn, until the port is drained or the loop has turned for catch_up_ms.
   void receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms);
   // All that had arrived on `port` is handed over, so its next heartbeat has not waited.
   void drained(std::uint8_t port);
-  // The transport of `port` has failed.
   void port_down(std::uint8_t port, std::uint32_t now_ms);
   // The board itself has failed: cause is fault or watchdog.
   void fail(SafeReason cause, std::uint32_t now_ms);

@@ -188,9 +188,8 @@ void Application::bring_about(std::uint32_t now_ms) {
 }
 
 // A stop that is not authentic uses up no number: otherwise CMD would confirm a command that was
-// not executed. A stop whose number is not the next uses up no number either: another program at
-// the owner's peer (a bus, or a shared port) has random numbers, which must not replace the
-// owner's.
+// not executed. Nor does a stop whose number is not the next: another program at the owner's peer
+// (a bus, or a shared port) has random numbers, which must not replace the owner's.
 void Application::emergency_stop(Source from, const Datagram& datagram, Verdict verdict,
                                  std::uint32_t now_ms) {
   const bool repeated = safety_.has(SafeReason::stop);

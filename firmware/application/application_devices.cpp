@@ -79,7 +79,6 @@ void Application::poll_devices(std::uint32_t now_ms) {
   answered_ms_ = now_ms;
 }
 
-// The answer is shown even if its field is not selected.
 void Application::add_device_answer(FieldSet& fields, std::uint32_t t_ms) const {
   if (has_answer_ && reached(answered_ms_ + answer_shown_ms, t_ms)) {
     fields.add(StateField::i2cx);

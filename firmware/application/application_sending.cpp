@@ -56,8 +56,7 @@ bool Application::reaches(Source watcher) const {
   return audience(watcher.port) == everyone && ports_[watcher.port].port->reaches(watcher.peer);
 }
 
-// True if the watcher receives the datagrams for everyone and so shares the port's numbers; never
-// in CONNECTING.
+// A watcher that hears all shares the port's numbers; never in CONNECTING.
 bool Application::hears_all(Source watcher) const {
   return link_.state() != BoardLinkState::connecting && reaches(watcher);
 }

@@ -25,7 +25,6 @@ class Observer {
   virtual void on_refused(std::uint32_t t_ms, std::uint32_t pnum, Refusal code) = 0;
   // A heartbeat or command was dropped: its signature is wrong or missing.
   virtual void on_rejected(std::uint32_t t_ms, Verdict verdict) = 0;
-  // A path joined the session, or left it.
   virtual void on_path(std::uint32_t t_ms, Source path, bool joined) {
     static_cast<void>(t_ms);
     static_cast<void>(path);

@@ -11,7 +11,6 @@ namespace firmware {
 
 class StateSchedule {
  public:
-  // The first state is due at once.
   void start(std::uint32_t now_ms, std::uint32_t period_ms) {
     next_ms_ = now_ms;
     period_ms_ = period_ms;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The user's I2C bus, not that of the board's chips (docs/how-to/devices.md). No call waits: poll()
 // begins a transfer that is due, and checks if the current transfer has ended.
-//
 //            begins a transfer              it has ended
 //     idle --------------------> transfer ----------------> idle
 //      ^                            | lost, or not ended after transfer_limit_ms
@@ -13,8 +12,7 @@
 //      +- - - - - - - - - - - -   held        every request fails at once
 //
 // Single transfers go before readings, readings before the next address of a scan. Due readings
-// take turns. A reading is skipped if it is due while its previous transfer is under way. All times
-// are ms of the board's clock, which wraps.
+// take turns; one whose previous transfer is under way is skipped. Times are ms, and wrap.
 #pragma once
 
 #include <cstdint>

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A UART of the user's: bytes out by command, bytes in as a field of the state
-// (docs/how-to/devices.md).
+// A UART of the user's (docs/how-to/devices.md).
 //
 // Received bytes are kept in order and counted. A state takes up to 64 new bytes. In front of them,
 // if there is room, it repeats bytes that were new in the state before:
-//
 //     kept        … 100                               164          190
 //     a state              |--------- new ------------|
 //     the next             |---- again ----|--- new (26) ---|          position 126, 64 bytes

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Volts at the board's input from the converter's counts: counts x gain + offset, calibrated for
-// each input's divider (paper sections 2 and 8.5). Within 0.01 V of the exact line for counts of
-// 0-65535 and up to 50 V.
+// Volts at the board's input: counts x gain + offset, calibrated for each input's divider (paper
+// sections 2 and 8.5). Within 0.01 V of the exact line for counts of 0-65535 and up to 50 V.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // An H-bridge on two lines of a PCA9685, which change in one transfer:
-//
 //     form              first line             second line
 //     pwm, direction    duty                   high: forward
 //     two-pwm           duty forward           duty in reverse

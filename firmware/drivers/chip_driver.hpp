@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Base of the I2C chip drivers: set-up without waiting, writes of changes, and register checks.
-//
 //           begin()             poll(), over and over
 //     new ----------> setting up ----------------------> ready
 //                        ^   |                             |  a transfer failed, or verify() found
@@ -8,8 +7,7 @@
 //                        |   v                             v
 //                      trouble <---------------------------+
 //
-// Setting up begins with the outputs off. A driver in trouble makes no transfers until begin().
-// Times are microseconds of a clock that wraps.
+// A driver in trouble makes no transfers until begin(). Times are us of a clock that wraps.
 #pragma once
 
 #include <cstddef>
@@ -60,8 +58,7 @@ class ChipDriver {
   void begin();
   // Does the next steps of the set-up; once ready, writes the registers that change.
   void poll(std::uint32_t now_us, BusBudget& budget);
-  // write_changes() and verify() do nothing unless ready(). verify() compares the chip's registers
-  // with what was written.
+  // These do nothing unless ready(). verify() compares the chip's registers with what was written.
   void write_changes(BusBudget& budget);
   void verify(BusBudget& budget);
   // All outputs are off from the next write on. Sends nothing.

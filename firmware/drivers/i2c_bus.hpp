@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The I2C bus for the chip drivers (NXP UM10204). Every call is bounded: it returns within
-// i2c_most_us, so a port must not use a library that waits longer. Each transfer ends with STOP,
-// even after an error.
+// The I2C bus for the chip drivers (NXP UM10204). Every call returns within i2c_most_us, so a port
+// must not use a library that waits longer. Each transfer ends with STOP, even after an error.
 #pragma once
 
 #include <cstddef>
@@ -26,8 +25,7 @@ constexpr std::uint32_t i2c_wire_us(std::size_t bytes, std::size_t starts = 1) {
 // The longest time of recover(): nine clocks and a STOP at 100 kHz, with SCL stretched each time.
 constexpr std::uint32_t i2c_recovery_us = 450;
 
-// The longest time of a transfer: two attempts on the wire, all that they wait, and a recovery
-// between them.
+// The longest time of a transfer: two attempts, all that they wait, and a recovery between them.
 constexpr std::uint32_t i2c_most_us(std::size_t bytes, std::size_t starts = 1) {
   return 2 * i2c_wire_us(bytes, starts) + i2c_timeout_us + i2c_recovery_us;
 }
@@ -40,9 +38,8 @@ class I2cBus {
   // After an error the contents of `in` are undefined.
   virtual I2cResult write_read(std::uint8_t address, const std::uint8_t* out, std::size_t out_size,
                                std::uint8_t* in, std::size_t in_size) = 0;
-  // Nine clocks and a STOP (UM10204 section 3.1.16), so that a chip cut off in mid-byte releases
-  // SDA. True if both lines are high then. May interrupt a transfer, even from a fault handler:
-  // that transfer, if resumed, returns timeout.
+  // Nine clocks and a STOP (UM10204 3.1.16): a chip cut off in mid-byte releases SDA. True if both
+  // lines are high then. May interrupt a transfer, even in a fault handler: that returns timeout.
   virtual bool recover() = 0;
 
  protected:

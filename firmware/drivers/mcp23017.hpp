@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Microchip MCP23017: up to sixteen outputs on two ports (data sheet DS20001952, IOCON.BANK = 0).
-//
 //     register       value                                        section
 //     00 01 IODIR    1: input; reset FF                            3.5.1
 //     02 03 IPOL     input polarity; reset 0                       3.5.2

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Microchip MCP4728: four 12-bit voltage outputs A-D with power-on values in EEPROM (data sheet
 // DS22187). Used with the supply, 5 V, as reference: code / 4096 x 5 V.
-//
 //     command              bytes                                                   section
 //     multi-write          01000 ch1 ch0 UDAC | VREF PD1 PD0 Gx D11-8 | D7-0, …    5.6.2
 //     sequential write     01010 ch1 ch0 UDAC, then 2 bytes a channel up to D;     5.6.3
@@ -14,9 +13,8 @@
 // low. They include reference, power-down and gain, so a changed channel is right even after an
 // unnoticed reset. The fast write is a third shorter but depends on both.
 //
-// Set-up: zeros to all outputs. Unless the EEPROM holds zeros with the supply as reference, it is
-// written, once; new chips have other values. The outputs stay at zero meanwhile, because the chip
-// ignores other writes.
+// Set-up: zeros to all outputs, and once to an EEPROM that does not hold zeros with the supply as
+// reference; new chips do not. Meanwhile the chip ignores other writes.
 #pragma once
 
 #include <cstdint>

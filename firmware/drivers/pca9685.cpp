@@ -27,8 +27,7 @@ constexpr int on_h = 1;
 constexpr int off_l = 2;
 constexpr int off_h = 3;
 
-// The longest gap of unchanged registers inside a burst: over a longer gap, a new burst takes less
-// time.
+// Unchanged registers inside a burst, at most: over a longer gap a new burst takes less time.
 constexpr int bridged = 2;
 
 }  // namespace
@@ -144,8 +143,7 @@ bool Pca9685::set_up(std::uint32_t now_us, BusBudget& budget) {
   return false;
 }
 
-// The value that a register must have. False if any value will do: off needs only the full-off bit,
-// on the two full bits.
+// False if any value will do: off needs only the full-off bit, on the two full bits.
 bool Pca9685::wanted(int index, std::uint8_t& value) const {
   const std::uint16_t duty = duty_[index / 4];
   const int offset = index % 4;

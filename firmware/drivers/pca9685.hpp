@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // NXP PCA9685: sixteen 12-bit PWM outputs of one frequency (data sheet Rev. 4).
-//
 //     register          value                                                   section
 //     00 MODE1          RESTART 80, EXTCLK 40, AI 20, SLEEP 10, SUB1-3 0E,       7.3.1
 //                       ALLCALL 01; reset 11
@@ -11,9 +10,8 @@
 //     FE PRE_SCALE      25 MHz / (4096 f), rounded, - 1; at least 3; written     7.3.5
 //                       only in SLEEP
 //
-// Set-up: all outputs off, SLEEP with AI and ALLCALL, PRE_SCALE, awake, RESTART 500 us later
-// (7.3.1.1), all sixteen off again (undefined after an orderly shutdown), then a check of the
-// registers. The 500 us pass between polls.
+// Set-up: all outputs off, SLEEP with AI and ALLCALL, PRE_SCALE, awake, RESTART in a poll 500 us
+// later (7.3.1.1), all off again (undefined after an orderly shutdown), a check of the registers.
 //
 // All outputs of one transfer change together on STOP. A short budget splits a burst of changed
 // registers only between pairs of channels (pair()), so the two lines of a motor never part.
@@ -59,8 +57,7 @@ class Pca9685 final : public ChipDriver {
 
   void want_safe() override;
   I2cResult make_safe() override;
-  // Every output of every PCA9685 off by the all-call address: 70 <- FD 10. An acknowledge means
-  // that at least one chip heard it.
+  // Every output of every PCA9685 off: 70 <- FD 10. An acknowledge: at least one chip heard it.
   static I2cResult all_off(I2cBus& bus);
   // Software reset (7.6): 00 <- 06. Turns all outputs of every PCA9685 off. Resets every chip that
   // knows the general call, the MCP4728 too: all need their set-up.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A quadrature encoder with an index or reference switch: four counts per cycle.
-//
 //     A  __/~~\__/~~\__      forward: A leads B, counts up
 //     B  ___/~~\__/~~\_
 //

@@ -2,14 +2,12 @@
 // Up to four ultrasonic sensors HC-SR04, in turn so that no sensor hears another's burst (data
 // sheet: trigger at least 10 us, echo pulse of 58 us per centimetre, about 38 ms without echo, at
 // least 60 ms between triggers).
-//
 //           poll()                 10 us later           echo fell, or 40 ms passed
 //     waiting ----------> trigger ------------> listening ----------> done
 //        ^                                                              |
 //        +---------------- 60 ms after the trigger: next sensor --------+
 //
-// Each of four sensors is read about four times per second. Nothing waits: an interrupt calls
-// echo(). Poll about every millisecond.
+// Each of four is read about four times a second. An interrupt calls echo(). Poll each millisecond.
 #pragma once
 
 #include <atomic>

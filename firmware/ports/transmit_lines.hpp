@@ -25,7 +25,6 @@ class TransmitLines {
   void put(Text datagram) {
     if (stalled_ || !put_line(datagram)) ++dropped_;
   }
-  // A later state may replace it.
   void put_state(Text datagram) {
     if (waiting_size_ != 0) ++dropped_;
     waiting_size_ = 0;

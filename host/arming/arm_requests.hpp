@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The calls of arm() that have not ended, and whether the program may drive outputs. Without I/O.
-//
 //     add() --> waiting --in control, and no stop, E:CLEAR or step is under way--> next_step()
 //                  ^                                                                  |
 //                  +---- the board has executed the step (E:CLEAR or R:1,On) ---------+
@@ -9,8 +8,7 @@
 //     when arming is impossible, or a cause has come that is newer than the call; timed_out,
 //     cancelled and closed like a command.
 //
-// Several calls share their steps, and end together. Later output commands wait
-// for the calls to end.
+// Several calls share their steps, and end together. Later output commands wait for them to end.
 #pragma once
 
 #include <cstddef>
@@ -63,7 +61,6 @@ class ArmRequests {
 
   void disarm(DisarmCause cause);
   void on_sleep() { machine_.on_sleep(); }
-  // A session begins disarmed.
   void begin_anew();
   void on_link(bool up, bool in_control, bool safe, SafeReason reason);
   void on_supply(bool closed) { machine_.on_supply(closed); }

@@ -87,8 +87,7 @@ void ArmingMachine::on_reason(SafeReason reason) {
   if (cause != DisarmCause::none && armed()) cause_ = cause;
 }
 
-// The board reports the gravest of its reasons, so it has no graver reason. A reason that only
-// E:CLEAR ends may hide less grave ones.
+// The board reports its gravest reason. One that only E:CLEAR ends may hide less grave reasons.
 void ArmingMachine::on_heard(SafeReason reason) {
   switch (reason) {
     case SafeReason::stop:

@@ -3,7 +3,6 @@
 // state may end by itself (a handle is held again, an obstacle is gone, a board has restarted), or
 // by another program's E:CLEAR. A program that streams setpoints would then drive off without
 // intention. So output commands are refused until the program calls arm():
-//
 //     cause_      any -------------- R:1,On of an arm() is confirmed ------------> none: armed
 //                  ^                                                                 |
 //                  +-- a cause other than the link; a restart; relay 1 seen open ----+
@@ -18,9 +17,8 @@
 // relay 1, the motor supply (docs/reference/safety.md), in every state. arm() clears the cause that
 // it finds first, and each cause hidden by that one, once. A stop that is pressed meanwhile stays,
 // and ends the arm(), as do a released handle and an obstacle. It never clears a stop, a watchdog
-// or a fault that may be older than the session, because a restarted program would drive off again,
-// nor a fault with which the board begins. A cause may be older until the controlled board was
-// heard without it.
+// or a fault that may be older than the session (until the board was heard without it), because a
+// restarted program would drive off again, nor a fault with which the board begins.
 #pragma once
 
 #include <cstdint>

@@ -48,7 +48,6 @@ struct AsyncBoard::Impl final : BoardPath::Owner, std::enable_shared_from_this<A
   };
 
   // From `leaving` on, nothing is reported to the user and the user starts nothing.
-  //
   //     made --open()--> open --async_close()--> leaving --confirmed, or time is up--> closed
   //                        +-------------------- close() -------------------------------^
   enum class Phase : std::uint8_t { made, open, leaving, closed };

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The datagrams that came while a program stood still: of the states in a backlog only the newest
 // is reported. Datagrams from before a sleep of this computer are dropped.
-//
 //     live --the program stands still--> in backlog --the transport is drained--> live
 //     any  --sleep----> waking     --drained, or the timer rang twice--> live
 #pragma once

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The thread on which the links of a Board or a Fleet run, and the calls that wait for it.
-//
 //     a thread of the program           the loop's thread
 //     run(call) ---- posted ---->       begin(): each board starts its part, with the time left
 //        waits  <--- end() ------       each part ends

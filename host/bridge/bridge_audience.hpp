@@ -2,13 +2,11 @@
 // The peers, besides served hosts, that hear a board through a bridge: watchers
 // (docs/reference/protocol.md, 4.8), and for a second each peer that stopped the board, asks for
 // control, or needs the nonce.
-//
 //     W:rate --> is sent a LEASE --W:rate that echoes it--> hears everything for two seconds
 //                                                           after each W
 //
-// A peer is streamed to only after it has echoed a random number that was sent to it. So a W with a
-// forged sender address cannot make a bridge flood a third party. For the same reason, peers that
-// have echoed nothing get few answers.
+// A peer is streamed to only after it has echoed a random number: a W with a forged sender address
+// cannot make a bridge flood a third party. Peers that have echoed nothing get few answers.
 #pragma once
 
 #include <array>
@@ -37,7 +35,6 @@ class BridgeAudience {
 
   void listen(Peer from, Time now) { place_of(from, now).listens_until = now + curiosity; }
 
-  // The peer sent the board a datagram with that number, if any, and that session.
   void on_question(Peer from, std::optional<std::uint32_t> pnum, SessionId sid, Time now);
   // An answer to a session goes only to a peer that named its id.
   std::optional<Peer> asker_of(std::optional<std::uint32_t> pnum, SessionId sid, Time now) const;

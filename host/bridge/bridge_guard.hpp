@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Decides by keys which host datagrams a bridge may pass to its board. A board obeys its own cable
 // without a signature, and a bridge must not lend that trust to its hosts:
-//
 //     keys    board                        heartbeats and commands pass
 //     given   any                          if they are signed for this board, once, within 250 ms
 //     none    at no cable, or open to all  always; the board itself checks signatures

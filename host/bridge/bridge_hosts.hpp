@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The hosts of a bridge, by their session ids, and which of them the bridge serves.
-//
 //                 heartbeat             no BUSY of the board for `patience` after a
 //                                       heartbeat that the board judges
 //     unknown ---------------> asking ------------------------------------------> served
@@ -14,10 +13,8 @@
 // hosts share a budget (bridged_pair.hpp).
 //
 // A served host keeps its place while it is heard. After a silence it is served again at once,
-// unless another served host needed the place.
-//
-// A paper host has no session id, so the board cannot distinguish two of them behind one bridge.
-// Only one passes at a time.
+// unless another served host needed the place. A paper host has no session id, so the board cannot
+// distinguish two of them behind one bridge: only one passes at a time.
 #pragma once
 
 #include <array>
@@ -58,8 +55,7 @@ class BridgeHosts {
   bool is_served_at(Peer peer) const;
   // True if a heartbeat of this host passed at most a timeout ago.
   bool knows(Peer from, SessionId sid, Time now) const;
-  // True if datagrams of this host pass at once, over every path of its session: it is served, or
-  // was served before a silence.
+  // Datagrams of this host pass at once, over every path: it is served, or was before a silence.
   bool trusts(Peer from, SessionId sid, Time now) const;
   bool serves(SessionId sid, Time now) const;
   // The number of the first heartbeat of this host that passed, or passed after a silence.

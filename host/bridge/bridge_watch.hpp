@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A bridge that serves no host watches its board (docs/reference/protocol.md, 4.8), for the
-// watchers at the hosts' side, and for programs that share the board's transport with the bridge.
-// It requests the rate and fields of its newest watcher. Without a watcher it requests a few states
-// a second, a small load for a bus of many boards.
+// watchers at the hosts' side and programs that share the board's transport, at the rate and fields
+// of its newest watcher, else at a few states a second: a small load for a bus of many boards.
 #pragma once
 
 #include <chrono>

@@ -203,8 +203,7 @@ bool BridgedPair::is_judged(const Datagram& heartbeat) const {
          milliseconds(std::abs(std::int64_t{ago})) <= timeout_;
 }
 
-// When the set of served hosts changes, the carrier gets the new set, so that it keeps the numbers
-// of their peers while other peers send.
+// The carrier keeps the numbers of the served hosts' peers while other peers send.
 void BridgedPair::follow_hosts(Time now) {
   if (!known_.poll(now)) return;
   const std::vector<Peer>& served = known_.served();

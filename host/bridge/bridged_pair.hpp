@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Joins two carriers of one loop: one hears hosts, the other leads to their board.
-//
 //     hosts --> E:STOP                 first of all, of any peer, however old
 //               heartbeats, commands   if they are signed as they must be (bridge_guard.hpp): of
 //                                      served hosts (bridge_hosts.hpp) at once, of other hosts
@@ -48,8 +47,7 @@
 
 namespace r4 {
 
-// More than 15 members: the two sides, a class for each rule that a datagram passes, and the
-// board's newest number and clock.
+// More than 15 members: the two sides, and a class for each rule that a datagram passes.
 class BridgedPair {
  public:
   using Time = std::chrono::steady_clock::time_point;

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The longest time that a datagram may have waited to be read.
-//
-// Carriers do not report when a datagram came. But a datagram read now came after the input was
-// last empty: when the carrier said so, or one tick ago, because everything that waits at one tick
-// is read before the next. A process that was stopped (Ctrl-Z), or got no processor, misses ticks.
+// The longest time that a datagram may have waited to be read. It came after the input was last
+// empty: when the carrier said so, or one tick ago, because everything that waits at one tick is
+// read before the next. A process that was stopped (Ctrl-Z), or got no processor, misses ticks.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How commands begin, are sent, and end by time or by the program. commands_answered.cpp ends them
-// by the board's answers.
+// How commands begin, are sent, and end by time or by the program (see commands_answered.cpp).
 #include "commands_under_way.hpp"
 
 #include <algorithm>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The commands of a session from the call to their end: sent when the session has control, and
 // repeated until the board's answer or state proves how they ended. Without I/O.
-//
 //     queued --control--> sent --CMD == PNum in the board's state--> confirmed
 //                          |  ^                  N:…,<code>  ------> refused
 //                          +--+ the same bytes   deadline    ------> timed out
@@ -11,9 +10,8 @@
 // the board can execute it only once. When CMD has moved past a command, the retry's answer
 // (DUPLICATE: executed, STALE: not) decides. The board forgets over an outage, so a refusal proves
 // that the command was not executed only if it names a session that began before the command was
-// sent. With a key, AUTH proves only that one duplicate was refused: another duplicate may have
-// been executed. A board without CMD (the paper's release) confirms a command by the value that its
-// state shows.
+// sent. With a key, AUTH proves only that one duplicate was refused, not all. A board without CMD
+// (the paper's release) confirms a command by the value that its state shows.
 //
 // If the board executes groups (../link/group_support.hpp), a group is one datagram and one pending
 // command. Otherwise its commands go one after the other, and later commands wait.

@@ -33,8 +33,7 @@ void require_watchdog(std::chrono::milliseconds period);
 // The longest time of a callback: up to an hour; 0 for no limit.
 void require_callback_limit(std::chrono::milliseconds limit);
 
-// The board's timeout and heartbeat interval for a host that sends a heartbeat every `ours`: two of
-// the host's heartbeats must fit into the timeout.
+// For a host that sends a heartbeat every `ours`: two must fit into the board's timeout.
 void require_link_timing(std::chrono::milliseconds timeout, std::chrono::milliseconds heartbeat,
                          std::chrono::milliseconds ours);
 

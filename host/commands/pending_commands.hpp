@@ -17,14 +17,12 @@
 namespace r4 {
 
 // One command, from send() until it ends. The times are the session's.
-//
 //     queued --control--> sent --CMD is past it--> overtaken
 //                          |                           |
 //                          +-------DUPLICATE-----------+--> executed
 //
 // It may end in any of these states. It is confirmed when CMD names it, or CMD is past it and it
 // was executed. A confirmed stop has ended for the program, but stays for a while:
-//
 //     sent --the board reports it--> lingering --the time is over, another stop, an E:CLEAR--> free
 //
 // A group is one command if the board takes it as one datagram. Otherwise its commands go through
@@ -66,8 +64,7 @@ class PendingCommands {
  public:
   static constexpr std::size_t max_slots = 128;
 
-  // `commands` + `stops` is at most max_slots. Stops have their own slots, so commands cannot keep
-  // a stop out.
+  // At most max_slots in all. Stops have their own slots, so commands cannot keep a stop out.
   PendingCommands(std::size_t commands, std::size_t stops)
       : slots_(commands + stops), commands_(commands), stops_(stops) {
     slots_[0] = std::make_unique<PendingCommand>();
@@ -96,8 +93,7 @@ class PendingCommands {
     command.stage = PendingCommand::Stage::free;
   }
 
-  // The present commands, oldest first. Commands added during a walk are not visited, and removed
-  // commands are skipped.
+  // Oldest first. Commands added during a walk are not visited, and removed commands are skipped.
   class Walk {
    public:
     class Iterator {

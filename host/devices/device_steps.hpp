@@ -44,8 +44,7 @@ std::chrono::milliseconds longest(const Device& device, std::chrono::millisecond
 std::optional<Problem> trouble_with(const Device& device, const DeviceStep& step,
                                     const I2cAnswer& answer);
 
-// The chosen fields (as in F) plus the device's. Empty if `chosen` has them already, or is empty
-// and leaves the choice to the board.
+// The chosen fields (as in F) plus the device's. Empty if `chosen` has them already or is empty.
 std::string fields_with(const std::string& chosen, const Device& device);
 
 }  // namespace r4

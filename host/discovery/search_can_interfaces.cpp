@@ -33,7 +33,6 @@ constexpr milliseconds listening{700};
 constexpr milliseconds longest{1300};
 constexpr milliseconds look_again{20};
 
-// Asks one board for its identity, unless a host controls it.
 class NodeQuestion final : private Carrier::Handler {
  public:
   NodeQuestion(asio::io_context& io, FoundBoard& board)
@@ -61,8 +60,7 @@ class NodeQuestion final : private Carrier::Handler {
   bool answered() const { return is_known(board_); }
 
  private:
-  // The carrier sends only after it has heard no other host for a new host's listening time. `busy`
-  // without foreign frames means another host.
+  // The carrier first listens for other hosts. `busy` without foreign frames means another host.
   void ask() {
     if (board_.identity) return;
     const SendResult result = carrier_->send(identity_question(), Priority::normal);

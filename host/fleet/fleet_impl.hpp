@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The implementation of a Fleet: its boards on one loop, the loop's thread, and calls that wait.
-//
 //     a thread of the program          the links' thread
 //     send(), post() -- a Call -->     every AsyncBoard in turn, in one pass
 //            <-- results --            the end of each board's part

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The state fields that a session requests, and whether the board answers. Without I/O.
-//
 //                  CMD comes, in control                five F without any answer
 //     satisfied <------------------------- asking ----------------------------------> unheard
 //         |                                ^    ^                                        |

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether the board executes a group of commands together: the capability `group` in its answer to
-// Q:ID. A part of a session, without I/O.
-//
+// Whether the board executes a group together: the capability `group` in its answer to Q:ID.
 //               I:… with the word
 //     unknown ----------------------> together
 //      ^   |                             ^

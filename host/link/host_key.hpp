@@ -25,7 +25,6 @@ class HostKey {
 
   void on_heartbeat(const Datagram& heartbeat);
   void on_board_time(std::uint32_t t_ms, Time now);
-  // The board has a host: this host or another.
   void on_host_seen(Time now) {
     in_vain_ = 0;
     host_seen_ = now;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The role of this host at its board. A part of a session, without I/O.
-//
 //                        CMD names a command of this session
 //     asking ----------------------------------------------------> controlling
 //      ^  |                                                          |     |

@@ -2,9 +2,8 @@
 // Keeps the link of a session alive: sends heartbeats or a watcher's leases, requests the state
 // fields that the session needs, and decides whether commands may be sent.
 //
-// It joins machines that have their own diagrams: the link (protocol/link/host_link.hpp), the role
-// (host_role.hpp), the fields (field_selection.hpp), the key (host_key.hpp), and a watcher's leases
-// (../paths/lease.hpp).
+// It joins machines with their own diagrams: protocol/link/host_link.hpp, host_role.hpp,
+// field_selection.hpp, host_key.hpp, and a watcher's leases (../paths/lease.hpp).
 #pragma once
 
 #include <cstddef>

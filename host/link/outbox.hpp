@@ -67,7 +67,6 @@ class Outbox {
 class Delivery {
  public:
   void begin(Outbox::Sent sent);
-  // True if the result is for this datagram.
   bool on_sent(const Sending& sending, SendResult result);
   bool failed() const { return open_ == 0 && result_ != SendResult::sent; }
   // `sent` once a path has taken it; before that, the first path's answer.

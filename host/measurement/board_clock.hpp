@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The board's clock in terms of the host's clock, without I/O. Two facts bound it:
-//
 //     a datagram with T came at r:                  the board's clock showed T before r
 //     a question asked at a was answered with T:    it showed T + 1 ms after a
 //

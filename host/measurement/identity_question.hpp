@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The newest eight questions Q:ID and their answers. Without I/O. Each question is one machine:
-//
 //     idle --asked--> open --I:… names it--> idle: the round trip is known
 //                      |
 //                      +-- eight newer ones --> forgotten

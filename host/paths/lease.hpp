@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Keeps a watcher's lease at a board. A part of a session, without I/O.
-//
 //         +--+ STALE: its LEASE is echoed
 //         v  |          states come
 //        asking ------------------------> watching <--states come-- full, unknown
@@ -41,7 +40,6 @@ class Lease {
     state_ = State::watching;
     heard_ = now;
   }
-  // The board refused a W of this program.
   void on_refusal(const Nack& nack, Time now) {
     if (nack.lease != 0) {
       echo_ = nack.lease;

@@ -15,8 +15,7 @@ namespace r4 {
 using PathSet = std::uint8_t;
 constexpr PathSet path_bit(std::size_t index) { return static_cast<PathSet>(1U << index); }
 
-// The board's T, extrapolated from a received T. It lags by that datagram's delay, and is never
-// ahead of the board's clock.
+// The board's T, extrapolated from a received T: late by that datagram's delay, never ahead.
 class PathClock {
  public:
   bool known() const { return known_; }
@@ -30,8 +29,7 @@ class PathClock {
   std::int32_t ahead(std::uint32_t t_ms, Time at) const {
     return static_cast<std::int32_t>(t_ms - (board_ms_ + (to_ms(at) - at_ms_)));
   }
-  // True if a T that was sent after `since` and arrives now may be of this boot: at most `late_ms`
-  // late, and not from the future.
+  // True if a T after `since` may be of this boot: at most `late_ms` late, not from the future.
   bool fits(std::uint32_t t_ms, Time since, Time now, std::int32_t late_ms) const {
     return ahead(t_ms, since) >= -late_ms && ahead(t_ms, now) <= tolerance_ms;
   }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Separates a session's new datagrams from duplicates, and counts lost ones (paths.hpp). T orders
-// the datagrams of different paths, whose packet numbers differ. Numbers order those of one path
-// within a millisecond.
+// Separates new datagrams from duplicates, and counts lost ones (paths.hpp). T orders datagrams of
+// different paths, packet numbers those of one path within a millisecond.
 #pragma once
 
 #include <array>

@@ -188,8 +188,7 @@ void Paths::begin_boot(std::uint32_t t_ms, Time now) {
   clock_.set(t_ms, now);
 }
 
-// An answer has set the clock. A path that cannot be asked and whose clock differs leads to another
-// board, or has yet to bring a datagram of this boot.
+// A path that cannot be asked, with another clock, leads to another board or shows an earlier boot.
 void Paths::compare_those_that_listen(std::uint32_t t_ms, Time now) {
   anew_ = false;
   for (Path& each : paths_) {

@@ -2,7 +2,6 @@
 // Decides over which paths a session sends, and which datagrams it admits
 // (docs/how-to/redundancy.md). A part of a session, without I/O. Among the other parts only
 // LinkKeeper uses the number of paths, to send a lease over each.
-//
 //             up           its board answers Q:ID             a datagram comes
 //     down -------> asking -----------------------> silent <-------------------> carrying
 //                    |  ^                                    none for the timeout
@@ -14,9 +13,8 @@
 // and a bus on which this program may not ask, skip `asking`: there is no board to compare with.
 //
 // Before its board has answered, a path carries only the question and stops, and its datagrams are
-// dropped. The first board that answers is the session's board, unless all other paths lead to
-// another board. The session begins when all paths that are up have answered, or 300 ms after the
-// first answer.
+// dropped. The first board that answers is the session's, unless all other paths lead to another.
+// The session begins when all paths that are up have answered, or 300 ms after the first answer.
 //
 // Packet numbers differ between paths, so the board's time T decides which datagram is newest. Each
 // path keeps the board's clock as that path shows it. A datagram whose T does not fit is late, or
@@ -60,8 +58,7 @@ class Paths {
   bool all_down() const {
     return those([](const Path& path) { return path.up; }) == 0;
   }
-  // This computer slept, or the board was silent for days: its clock is unknown on every path. The
-  // boards' ids stay known.
+  // A sleep, or days of silence: the board's clock is unknown on every path. The ids stay known.
   void on_sleep(Time now);
 
   // --- sending

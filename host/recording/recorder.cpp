@@ -21,8 +21,7 @@ constexpr std::chrono::milliseconds interval{250};
 // The smallest change of the wall clock to record. Smaller changes add up.
 constexpr Time clock_step{std::chrono::milliseconds{100}};
 
-// Blocks all signals in this thread, because they are for the program's threads. SIGXFSZ (file size
-// limit) comes to the writing thread and would end the program.
+// Blocks all signals: they are for the program's threads; SIGXFSZ (file size limit) would end it.
 class NoSignals {
  public:
   NoSignals() {

@@ -37,8 +37,7 @@ Error cannot_be_read(const std::string& path, int error) {
           denied ? "allow reading it: chmod +r" : "name a recording, or - for standard input"};
 }
 
-// False if another program has locked the file. Always true on a file system without locks, such as
-// some network file systems.
+// False if another program has locked the file. True on a file system without locks (a network's).
 bool lock_alone(int file) {
   while (::flock(file, LOCK_EX | LOCK_NB) != 0) {
     if (errno != EINTR) return errno != EWOULDBLOCK;

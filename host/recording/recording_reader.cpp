@@ -12,7 +12,6 @@ namespace {
 
 constexpr std::size_t magic_size = 4;  // of zstd
 
-// Moves bytes from the front of `bytes` to `beginning`. True if `beginning` has `wanted` bytes.
 bool complete(std::string& beginning, std::string_view& bytes, std::size_t wanted) {
   const std::size_t taken = std::min(bytes.size(), wanted - beginning.size());
   beginning += bytes.substr(0, taken);

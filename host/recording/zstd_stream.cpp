@@ -15,8 +15,7 @@ constexpr std::string_view magic = "\x28\xb5\x2f\xfd";
 // Last three bytes of a skippable frame's magic number; the first is 0x50 to 0x5F (RFC 8878,
 // 3.1.2). Files of pzstd and seekable archives start with one.
 constexpr std::string_view skippable = "\x2a\x4d\x18";
-// The largest window to read: 128 MiB, as `zstd -d` without options. Only zstd --long and --ultra
-// need it. A small frame takes less memory.
+// The largest window to read: 128 MiB, as `zstd -d` without options. A small frame takes less.
 constexpr int window_log = 27;
 constexpr int level = 3;
 // Window of written frames; a longer window gains nothing.
@@ -104,7 +103,6 @@ void ZstdReader::search(std::string_view& bytes, bool from_found) {
   last_.clear();
 }
 
-// Takes the bytes before the next frame, and its magic number. False: no frame yet.
 bool ZstdReader::find_frame(std::string_view& bytes) {
   while (!bytes.empty()) {
     found_ += bytes.front();

@@ -216,8 +216,7 @@ void Session::cancel(Ticket ticket, Time now) {
   advance_arming(now);
 }
 
-// Also while it is unknown whether the board knows farewells: a board that confirms commands
-// refuses an unknown farewell.
+// Also while it is unknown: a board that confirms commands refuses an unknown farewell.
 bool Session::may_say_farewell() const {
   return keeper_.is_up() && !watches() && board_.may_know_leave();
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The host's side of one board, without I/O: datagrams and time in, effects out
-// (../link/effects.hpp). Each datagram is written once and signed for each path (outbox.hpp). Of
-// duplicates only the first counts, and the newest datagram has the newest T (paths.hpp).
+// (../link/effects.hpp). Each datagram is written once and signed for each path (outbox.hpp).
 //
 //   datagram --> Paths --> HostLink, HeardBoard --> LinkKeeper --> ArmRequests --> CommandsUnderWay
 //                admits    the board's state        control        arming          ends of
@@ -42,8 +41,7 @@ namespace r4 {
 // More than 40 functions: most are its interface, and call one part each.
 class Session {
  public:
-  // `random` returns 64 random bits at each call; the default asks the system. Throws Error{usage}
-  // if options.fields are not state fields.
+  // `random`: 64 random bits a call; default: the system's. Throws Error{usage} for invalid fields.
   explicit Session(SessionOptions options, BoardRole role = BoardRole::control,
                    std::size_t paths = 1, std::function<std::uint64_t()> random = {});
   Session(const Session&) = delete;
@@ -54,7 +52,6 @@ class Session {
   static constexpr std::size_t max_stops = CommandsUnderWay::max_stops;
 
   // --- effects
-
   // After each call that takes a time, perform the sendings, then the reports. Give the result of
   // each sending to on_sent().
   Effects& effects() { return effects_; }
@@ -63,8 +60,7 @@ class Session {
   // --- events. poll() is needed after each of these.
 
   void receive(std::size_t path, std::string_view bytes, Time now);
-  // The transport of a path is up or down; at first each is down. `can_ask`: false if a watcher may
-  // not send questions (a bus).
+  // At first each path's transport is down. `can_ask`: false if a watcher may not ask (a bus).
   void on_transport(std::size_t path, bool up, Time now, bool can_ask = true);
   void on_trouble(TransportTrouble trouble) { keeper_.on_transport_trouble(trouble); }
   // This computer slept for longer than the board waits for its host, while `now` stood still. A
@@ -92,8 +88,7 @@ class Session {
   // 0 if no board hears it, or the board knows no farewells. Afterwards only stops are sent.
   Ticket leave(Time timeout, Time now);
   bool leaving() const { return keeper_.is_leaving(); }
-  // The same, but the commands end as cancelled. When the farewell has ended, change_role() may let
-  // the session watch.
+  // The same, but the commands end as cancelled. After it, change_role() may let the session watch.
   Ticket release_control(Time timeout, Time now);
   // Makes the session control or watch. It is disarmed, has a new id, and every command under way
   // but stops is cancelled. on_transport() must follow for each path that is up.
@@ -102,8 +97,7 @@ class Session {
   void cancel(Ticket ticket, Time now);
   void end_all(Time now);
 
-  // Sends a command once, without waiting for its end. PostRefused reports a refusal. After `sent`,
-  // perform the effects, then posted() returns the final result.
+  // Sends once; PostRefused reports a refusal. After `sent`, perform the effects; ask posted().
   PostResult post(const Command& command, Time now);
   // no_link also while it is unknown whether the board executes groups.
   PostResult post(const Setpoints& group, Time now);
@@ -113,8 +107,7 @@ class Session {
 
   // --- gates
 
-  // The application watchdog: after `period` without feed() the heartbeats stop, so the board goes
-  // safe, and commands are held back. 0 turns it off.
+  // The application watchdog: without feed() for `period` heartbeats and commands stop. 0: off.
   void watchdog(std::chrono::milliseconds period, Time now);
   void feed(Time now);
   // Holds back heartbeats and commands until it is called with false.
@@ -125,7 +118,6 @@ class Session {
   BoardRole board_role() const { return outbox_.role(); }
   const LinkStatus& link() const { return status_; }
   bool in_control(Time now) const { return keeper_.in_control(now); }
-  // Why the session is not armed; none if it is armed.
   DisarmCause disarmed_by() const { return arming_.cause(); }
   // True if the board has reported the cause that an E:CLEAR must name. Without it, an E:CLEAR
   // names the first cause that the board reports.

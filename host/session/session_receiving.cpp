@@ -51,8 +51,7 @@ void Session::on_state(std::size_t path, const Datagram& datagram, Time now) {
 
   const SafeReason reason = fresh.present.has(StateField::safe) ? fresh.safe : SafeReason::none;
   statistics_.on_state(fresh.t_ms, now);
-  // Heartbeats overtake states in a queue. An overtaken state is still the newest state, but the
-  // heartbeat's reason is newer.
+  // An overtaken state is still the newest state, but the heartbeat's reason is newer.
   const bool newest = paths_.is_newest(path, t_ms, now);
   if (newest) {
     link_.on_reason(reason, to_ms(now));
@@ -134,8 +133,7 @@ void Session::on_identity(std::size_t path, const Datagram& datagram, Time now) 
   commands_.on_identity(identity, now);
 }
 
-// True if the answer is numbered with the states. Answers to hosts without control have numbers of
-// their own.
+// True if it is numbered with the states. Answers to hosts without control have their own numbers.
 bool Session::counts(const Identity& identity) const {
   const bool to_watcher = watches() && identity.sid == no_session;
   return to_watcher || !(identity.has_busy && identity.busy);

@@ -52,7 +52,6 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(blanks) - first + 1);
 }
 
-// With one space between words.
 std::string single_spaced(std::string_view text) {
   std::string words;
   for (const char c : trimmed(text)) {

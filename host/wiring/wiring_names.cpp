@@ -51,7 +51,6 @@ std::string name_of(Terminal terminal, int number) {
   return fmt::format("GP{}{}", number < 8 ? 'A' : 'B', number % 8);
 }
 
-// The places that a signal of this terminal may name.
 const char* expected(Terminal terminal) {
   switch (terminal) {
     case Terminal::bus:

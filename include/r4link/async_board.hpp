@@ -81,16 +81,14 @@ class AsyncBoard {
   AsyncBoard(asio::io_context& io, std::vector<std::unique_ptr<Carrier>> carriers,
              BoardOptions options = {})
       : AsyncBoard(io.get_executor(), std::move(carriers), std::move(options)) {}
-  // Calls close().
   ~AsyncBoard();
   AsyncBoard(const AsyncBoard&) = delete;
   AsyncBoard& operator=(const AsyncBoard&) = delete;
 
   executor_type get_executor() const noexcept;
 
-  // Opens the transports and starts the link: the first heartbeat is sent at once. If one of
-  // several paths cannot be opened, on_event() reports why, and it is tried again every second.
-  // Throws Error if no path can be opened. Can be called once only.
+  // The first heartbeat is sent at once. A path that cannot be opened is reported by on_event(),
+  // and tried again every second. Throws Error if no path can be opened. Can be called once only.
   void open();
   // Cancels commands under way (outcome closed), sends one farewell and closes the transports. The
   // board goes safe when it hears the farewell, or by its timeout. No callback follows. Idempotent.
@@ -133,9 +131,8 @@ class AsyncBoard {
     if (command.kind != CommandKind::stop) require_timeout("async_send()", timeout);
     return initiate<&AsyncBoard::start_send<Command>, Token>(token, command, timeout);
   }
-  // void(CommandResult). Sends a group as Board::send() does; if a command of the group fails,
-  // CommandResult::at and CommandResult::executed say which. Throws Error{usage} for an empty
-  // group, and for a timeout that is not above 0.
+  // void(CommandResult). As Board::send(); CommandResult::at and CommandResult::executed say which
+  // command failed. Throws Error{usage} for an empty group, and for a timeout that is not above 0.
   template <class Token>
   auto async_send(const Setpoints& setpoints, Duration timeout, Token&& token) {
     require_sendable(setpoints);

@@ -78,7 +78,6 @@ struct StatesOptions {
 //     r4::States states = board.states({.lossless = true});
 //     while (const auto state = states.take(1s)) …
 //
-// One state for each datagram, however slow the callbacks are. (AsyncBoard::on_state() gets each.)
 // Movable; may outlive its board. Only one thread may call take().
 class R4LINK_API States {
  public:
@@ -123,8 +122,7 @@ class R4LINK_API Board {
   explicit Board(const std::vector<CarrierMaker>& makers, BoardOptions options = {},
                  BoardCallbacks callbacks = {});
   // Opens the only board that discover() finds (discovery/discover.hpp). Blocks for at most 1.3 s.
-  // Throws Error{open} if there is no board, and Error{usage} with their URLs if there are several
-  // boards.
+  // Throws Error{open} for no board, and Error{usage} with their URLs for several.
   static Board first(BoardOptions options = {}, const DiscoveryOptions& where = {});
   ~Board();
   Board(const Board&) = delete;

@@ -75,9 +75,8 @@ struct BridgeOptions {
 // any E:STOP passes. Waits for a missing device. Cable-only settings (C:key …) never pass.
 class R4LINK_API Bridge {
  public:
-  // `hosts`: the URL to listen on, as for r4 sim; `board`: the board's URL. Patterns of equal size
-  // (docs/reference/transports.md) are paired in order. Throws Error: usage, permission, and as the
-  // transports do.
+  // `hosts`: the URL to listen on, as for r4 sim. Patterns of equal size are paired in order
+  // (docs/reference/transports.md). Throws Error: usage, permission, and as the transports do.
   Bridge(std::string_view hosts, std::string_view board, BridgeOptions options = {});
   ~Bridge();
   Bridge(const Bridge&) = delete;

@@ -139,9 +139,8 @@ class R4LINK_API Carrier {
     // `bytes` are valid during the call. A host has one board: there `from` is `everyone`.
     virtual void on_datagram(std::string_view bytes, Peer from) = 0;
     virtual void on_carrier_event(const CarrierEvent& event) = 0;
-    // All datagrams that have arrived were passed on. After a delay, a handler knows by it which
-    // state is the newest. After a long burst on a byte stream, it may come only with the next
-    // datagram.
+    // All arrived datagrams were passed on, so the newest state is known after a delay. After a
+    // long burst on a byte stream, it may come only with the next datagram.
     virtual void on_drained() {}
     // A datagram that another program sent to the board, if the transport can hear it.
     virtual void on_overheard(std::string_view bytes) { static_cast<void>(bytes); }

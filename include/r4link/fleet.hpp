@@ -180,7 +180,6 @@ class R4LINK_API Fleet {
   // Waits for the next event, oldest first; empty if none comes. Keeps the newest 4096.
   std::optional<FleetEvent> next_event(Duration timeout = Duration{0});
 
-  // Records every datagram of every board, from now on.
   void record(Recording& recording);
 
   // As Board::watchdog(): without feed() for `period`, all boards go safe.

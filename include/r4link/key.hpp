@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A key that a board and its hosts share (docs/reference/protocol.md "Authentication"), and its
-// text:
+// A key that a board and its hosts share (docs/reference/protocol.md "Authentication"), as text:
 //
 //     <id>:<64 hexadecimal digits>      "1:00112233…", the id 1-9
 //

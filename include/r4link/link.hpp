@@ -87,8 +87,7 @@ class LinkCauses {
   std::uint32_t bits_ = 0;
 };
 
-// The state of one path (docs/how-to/redundancy.md). A board's only path is never asking or
-// other_board.
+// docs/how-to/redundancy.md. A board's only path is never asking or other_board.
 enum class PathState : std::uint8_t {
   down,         // the transport is down, or could not be opened yet
   asking,       // the transport is up, and the board's identity is not known yet
@@ -197,14 +196,12 @@ struct RefusedPost {
   std::uint8_t group = 1;  // number of commands in the group
 };
 
-// A field that a datagram lacks keeps its value, until the board restarts: then all values are
-// forgotten. The values in `present` are as old as age(), the others are older: if a program asks
-// for other fields, a field keeps its last value. Heartbeats update `safe` too.
+// A field that a datagram lacks keeps its value, until the board restarts. The values in `present`
+// are as old as age(), the others older. Heartbeats update `safe` too.
 struct ReceivedState : State {
   using Clock = std::chrono::steady_clock;
 
-  // The fields that have a value from the board: reported since it started. A field that is not
-  // among them reads 0.
+  // Reported since the board started. Any other field reads 0.
   FieldSet reported;
   // When its newest datagram arrived.
   Clock::time_point received = never;
@@ -296,7 +293,6 @@ R4LINK_API Problem explain(std::string_view name, const LinkStatus& link);
 // Which path leads to another board, and the fix.
 R4LINK_API Problem explain(const std::vector<PathStatus>& paths);
 
-// Describes the cause, and the fix.
 R4LINK_API Problem explain(LinkCause cause);
 
 // Why the session is not armed, and the fix. Not for none. `what`: the request that failed.

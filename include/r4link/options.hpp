@@ -47,8 +47,7 @@ struct SessionOptions {
   // Period of Q:ID; 0: never. Then the round trip and ReceivedState::sampled_error stay unknown,
   // and on one path identity() too, unless the program calls identify() or sends a group.
   std::chrono::milliseconds identify_interval{1000};
-  // The board's key. Each host needs a separate id: with a shared id the slower host looks like a
-  // replay.
+  // Each host needs a separate id: with a shared id the slower host looks like a replay.
   std::optional<Key> key;
   // Start of the session's clock, us since 1970. A restarted host must continue above used values.
   Time clock_start{0};

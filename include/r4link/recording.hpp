@@ -50,13 +50,11 @@ class R4LINK_API Recording {
   // Opens the file, compressed if its name ends in .zst; an existing recording is continued. Throws
   // Error: open, permission, data for a file with other content, usage for wrong options.
   explicit Recording(const std::string& path, RecordingOptions options = {});
-  // Calls close().
   ~Recording();
   Recording(const Recording&) = delete;
   Recording& operator=(const Recording&) = delete;
 
-  // Writes the buffer and ends the file; waits for the disk. Ignores later datagrams. Any thread;
-  // idempotent.
+  // Writes the buffer; waits for the disk. Ignores later datagrams. Any thread; idempotent.
   void close();
 
   // Why the recording ended early; empty: no problem. Kind `data`: it continues, but the file was

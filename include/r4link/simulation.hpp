@@ -64,9 +64,8 @@ class R4LINK_API SimulatedRobot {
 //
 //     r4::Board board(r4::sim::with_link(robot.url(), "loss=5%,delay=20ms±10,seed=7"));
 //
-// docs/how-to/simulation.md lists the words; unknown words throw Error{usage}. The same seed does
-// the same to the same datagrams at the same times. A watcher needs its own URL: `?listen=0` on
-// UDP.
+// docs/how-to/simulation.md lists the words; others throw Error{usage}. The same seed does the same
+// to the same datagrams at the same times. A watcher needs its own URL: `?listen=0` on UDP.
 R4LINK_API CarrierMaker with_link(std::string_view url, std::string_view link);
 
 }  // namespace r4::sim

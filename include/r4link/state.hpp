@@ -132,8 +132,7 @@ struct State {
     const int i = static_cast<int>(input);
     return i < analog_channels ? raw.analog_cv[i] / 100.0 : 0.0;
   }
-  // dhb12(), osmc(), servo_us(), bldc(), dac_mv(): the setpoint as the board drives the channel:
-  // off in the safe state.
+  // dhb12(), osmc(), servo_us(), bldc(), dac_mv(): what the board drives: off in the safe state.
 #define R4_OUTPUT(kind, Value, member, channels, ...) \
   Value member(int channel) const { return reading(raw.member, channel); }
 #include "tables/board.def"

@@ -174,8 +174,7 @@ constexpr int dac_channels = 2;
 constexpr std::int32_t dac_max_mv = 3300;
 constexpr int gpio_channels = 8;  // inputs
 
-// Received bytes of a UART in one state. If there is room, a state repeats the new bytes of the
-// previous state, so the loss of a single state loses no bytes.
+// If there is room, a state repeats the new bytes of the previous one: its loss loses no bytes.
 struct UartBytes {
   std::uint32_t position =
       0;  // of data's first byte, in all bytes kept since the board started; wraps

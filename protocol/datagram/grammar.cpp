@@ -98,9 +98,8 @@ Separators separators(Text block) {
 
 namespace {
 
-// For each bit of `starts`, which lies in a run of set bits of `run`: the bit after the end of that
-// run. The addition carries a start through its run and no further. `carry` continues a run in bit
-// 0 of the next word.
+// For each bit of `starts`, within a run of set bits of `run`: the bit after that run. The addition
+// carries a start through its run. `carry` continues a run in bit 0 of the next word.
 std::uint64_t run_ends(std::uint64_t run, std::uint64_t starts, std::uint64_t& carry) {
   const std::uint64_t sum = run + (starts | carry);
   carry = sum < run ? 1 : 0;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The bytes allowed in names and values (grammar: datagram.hpp), and the search for fields. Reader
-// and writer share these tables, so they cannot disagree.
+// The bytes allowed in names and values (grammar: datagram.hpp), for reader and writer alike.
 #pragma once
 
 #include <cstddef>

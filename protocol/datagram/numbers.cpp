@@ -14,7 +14,6 @@ constexpr bool is_digit(char c) { return digit_of(c) <= 9; }
 // One to nine digits always fit, and need no 64-bit arithmetic.
 constexpr bool fits_32_bits(std::size_t digits) { return digits - 1 < 9; }
 
-// Reads one to nine digits; false for anything else.
 inline bool parse_short(const char* at, const char* end, std::uint32_t& out) {
   std::uint32_t value = 0;
   do {

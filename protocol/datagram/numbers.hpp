@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads numbers from text and writes them to text; all code uses these functions.
-// Reading is strict: the whole text must be the number, without blanks and '+'. Every reader
-// returns false and leaves `out` unchanged if the text or the value is not valid for the type.
+// Numbers from text and to text; all code uses these functions. The whole text must be the number,
+// without blanks and '+'. Every reader returns false and leaves `out` unchanged if it is not valid.
 #pragma once
 
 #include <cstddef>

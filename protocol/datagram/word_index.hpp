@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds a word in a table by its hash. The compiler builds the index. If a word is in the table
-// twice, the first is found.
+// Finds a word in a table by its hash. The compiler builds the index. The first duplicate counts.
 #pragma once
 
 #include <cstddef>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Comparisons of 32-bit numbers and times that wrap (serial-number arithmetic, RFC 1982).
-// They are right for two values less than 2^31 apart: 24.8 days in ms, 35 minutes in us. A time
-// that is kept for longer must be moved by keep_near().
+// Comparisons of 32-bit numbers and times that wrap (RFC 1982): right for values less than 2^31
+// apart, 24.8 days in ms, 35 minutes in us. keep_near() moves a time that is kept for longer.
 #pragma once
 
 #include <cstdint>

@@ -45,13 +45,11 @@ class Authentication {
  public:
   static constexpr std::size_t chance_size = 32;
   static constexpr std::uint32_t age_limit_ms = 250;
-  // The newest counters of all keys together are remembered. A counter below a forgotten one counts
-  // as used. Each path of a session uses its own counters. So with r datagrams a second over p
-  // paths, a path may lag by 112 / (p r) s.
+  // Of all keys together. A counter below a forgotten one counts as used. Each path of a session
+  // has its own counters: with r datagrams a second over p paths, a path may lag by 112 / (p r) s.
   static constexpr int counters_remembered = 112;
 
-  // `chance`: random bytes, different at each boot, for the nonces. If nullptr, the board sends no
-  // nonce, and nothing is authentic.
+  // `chance`: random bytes, different at each boot; nullptr: no nonce, and nothing is authentic.
   explicit Authentication(const std::uint8_t* chance);
 
   // Sets the board's keys; an id of 0 means no key. Takes a new nonce.
@@ -62,8 +60,7 @@ class Authentication {
   Text nonce() const { return Text(nonce_, has_nonce_ ? nonce_size : 0); }
   // Takes another nonce: earlier signatures become invalid, and counters restart.
   void renew();
-  // For a bridge, which checks in place of the board that sends this nonce. If empty, nothing is
-  // authentic. With another nonce, counters restart.
+  // For a bridge: its board's nonce; empty: nothing is authentic. Another restarts the counters.
   void follow(Text nonce);
 
   bool has_chance() const { return has_chance_; }
@@ -115,7 +112,6 @@ class Signer {
   bool on_nonce(Text nonce);
   // The T of the board's newest datagram. `now_ms`: the host's clock, which wraps.
   void on_board_time(std::uint32_t t_ms, std::uint32_t now_ms);
-  // True if a nonce was heard: nothing can be signed before.
   bool ready() const { return has_nonce_; }
 
   // Writes the field A after all other fields; call finish() of the writer next. Call only while

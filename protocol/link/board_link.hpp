@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's end of the link: which host controls the board, whether that host is alive, and which
-// of its commands may be executed (paper section 4.3; docs/reference/protocol.md "The link",
-// docs/reference/safety.md).
-//
+// The board's end of the link: which host controls the board, whether it is alive, and which of its
+// commands may be executed (paper section 4.3; docs/reference/protocol.md "The link", safety.md).
 //                 heartbeat that may begin a session      the host is silent for the timeout,
 //     CONNECTING ------------------------------> ACTIVE -- leaves, or all its paths are gone ---+
 //       (boot)                                     ^                                            v
@@ -96,9 +94,8 @@ class BoardLink {
   // ACTIVE -> LOST. The ids of the last left_memory hosts that left cannot begin a session again.
   void leave(std::uint32_t now_ms);
 
-  // The board's own heartbeats are regular. While an echo is missing, a heartbeat is also due every
-  // echo_retry_ms. Entering ACTIVE or LOST makes a heartbeat due at once. heartbeat_sent() takes
-  // the T of a sent heartbeat.
+  // The board's own heartbeats are regular, but also due every echo_retry_ms while an echo is
+  // missing, and at once on entering ACTIVE or LOST. heartbeat_sent() takes the T of a sent one.
   bool heartbeat_due(std::uint32_t now_ms) const;
   void heartbeat_sent(std::uint32_t t_ms);
   // A heartbeat with this T was sent to some peer, so the T can be echoed.
@@ -119,9 +116,8 @@ class BoardLink {
   std::uint32_t fed_ms() const { return fed_ms_; }
   // When the link is lost if the host stays silent. Valid only while ACTIVE.
   std::uint32_t deadline_ms() const { return fed_ms_ + timing_.timeout_ms; }
-  // The number of the heartbeat that began this host's session. A refusal reports it, so that the
-  // host knows that the board remembers all later commands. False for another host, or if its
-  // heartbeats have no numbers.
+  // The number of the heartbeat that began this host's session: the board remembers all its later
+  // commands. False for another host, or if its heartbeats have no numbers.
   bool first_heartbeat(HostId host, std::uint32_t& pnum) const;
   // The number of the last command executed in this session (CMD); 0 before the first.
   std::uint32_t last_executed() const { return last_executed_; }

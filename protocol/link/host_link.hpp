@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The host's end of the link: heartbeats, their gate, and the known state of the board (paper
-// section 4.3; docs/reference/protocol.md "The link").
-//
+// The host's end of the link (paper section 4.3; docs/reference/protocol.md "The link").
 //     connecting --> active <--> safe        active, safe --> lost --> active, safe, connecting
 //
 //     connecting  nothing heard yet, or the board is booting (it sends `PNum:0;T:0`)
@@ -42,7 +40,6 @@ class HostLink {
   void on_heartbeat(std::uint32_t t_ms);
   // The field SAFE of the newest state or heartbeat; none without that field.
   void on_reason(SafeReason reason, std::uint32_t now_ms);
-  // Any datagram of the board.
   void on_heard(std::uint32_t now_ms);
   // The board reports that it is booting, so it knows no session.
   void on_booting(SafeReason reason, std::uint32_t now_ms);
@@ -67,8 +64,7 @@ class HostLink {
   // The T for the next heartbeat: the T of the board's newest heartbeat, 0 before the first.
   std::uint32_t echo() const { return echo_; }
 
-  // The application watchdog: heartbeats stop if feed() is not called for `period_ms`, until the
-  // next call. 0 turns it off.
+  // Heartbeats stop if feed() is not called for `period_ms`, until the next call. 0: off.
   void watchdog(std::uint32_t period_ms, std::uint32_t now_ms);
   void feed(std::uint32_t now_ms);
   bool watchdog_expired(std::uint32_t now_ms) const {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The paths of a session: where its host is heard, and where the board's datagrams go
-// (docs/reference/protocol.md "Paths").
+// The paths by which a session's host is heard and reached (docs/reference/protocol.md "Paths").
 //     unknown -- heartbeat of the session with a fresh echo --> path
 //     path    -- silent for the timeout, or its port gone ----> unknown
 // The echo proves a path: its sender has received a heartbeat of the board, and knows the session's

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The watchers' leases, up to four (docs/reference/protocol.md "Watching").
-//
 //     free --W:rate that echoes its token--> watching --lease_ms without one, or W:0--> free
 //       |  ^                                   |  ^
 //       +--+ any other W: send a token         +--+ W:rate that echoes the token: renewed
 //
-// Nothing streams to a source before it has echoed the random token that was sent to it. So a
-// forged source cannot make the board flood a stranger. The board's clock cannot be the token,
-// because any peer can get it. Answers with a token are limited. All times are the board's clock in
-// ms, which wraps.
+// Nothing streams to a source before it has echoed the random token that was sent to it, so a
+// forged source cannot make the board flood a stranger. The board's clock cannot be the token: any
+// peer can get it. Answers with a token are limited. Times are ms of the board's clock, and wrap.
 #pragma once
 
 #include <cstdint>
@@ -51,8 +49,7 @@ class Watchers {
     ignored,   // a token was sent just before, or W:0 ends no lease
     full,      // other watchers have all the places
   };
-  // `W:rate` of a source; 0 ends its lease. `echo`: its T. `proven`: no echo is needed, because the
-  // source cannot be forged (a bus).
+  // 0 Hz ends the lease. `echo`: the T of W. `proven`: the source cannot be forged (a bus).
   Effect on_lease(Source from, std::uint32_t rate_hz, std::uint64_t echo, bool proven,
                   std::uint32_t now_ms);
   // This secret token was sent to that source. It is valid for lease_ms, then as long as the lease.
@@ -63,7 +60,6 @@ class Watchers {
   // The source controls the board and receives everything, so its lease ends.
   void end_of(Source at);
 
-  // The lease of that source; null if it has none.
   Watcher* find(Source at);
   bool any() const;
 

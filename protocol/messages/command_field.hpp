@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Commands as fields of a datagram (paper section 4.2; docs/reference/protocol.md). The board, the
-// host's `r4 send` and the tests share this parser, so each side accepts what the other sends.
+// Commands as fields of a datagram (paper section 4.2; docs/reference/protocol.md), for both ends.
 #pragma once
 
 #include <cstdint>

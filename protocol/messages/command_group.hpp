@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A group: several commands in one datagram, executed completely or not at all
-// (docs/reference/protocol.md).
+// A group: commands in one datagram, executed all or none (docs/reference/protocol.md).
 //     O:358,1,1;O:358,1,2;PNum:2147488900;T:1699276044383;^0xc5a5ff80^
 #pragma once
 
@@ -38,8 +37,7 @@ struct CommandGroup {
   Command commands[max_group];
 };
 
-// Reads the commands of a datagram. If they cannot be executed together, `at` is the first wrong
-// command, counted from 1.
+// If they cannot be executed together, `at` is the first wrong command, from 1.
 Refusal read_group(const Datagram& datagram, CommandGroup& out, std::uint8_t& at);
 
 }  // namespace r4

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Commands for connected devices: X, the I2C bus, UARTs and DAC (docs/reference/protocol.md,
-// docs/how-to/devices.md). Bytes are x and two hexadecimal digits each, "x3B00", to differ from
-// numbers; "x" is not valid.
+// Commands for connected devices: X, the I2C bus, UARTs and DAC (docs/reference/protocol.md). Bytes
+// are x and two hexadecimal digits each, "x3B00", to differ from numbers; "x" is not valid.
 #pragma once
 
 #include <cstdint>
@@ -44,8 +43,7 @@ constexpr bool is_device_command(CommandKind kind) {
 // The poll of a valid X:POLL or X:OFF.
 I2cPoll poll_of(const Command& command);
 
-// A setting's value, "104:x3B:14:10" or "off". Refusal::format or ::range; `out` is written only on
-// Refusal::none.
+// "104:x3B:14:10" or "off". Refusal::format or ::range; `out` is written only on Refusal::none.
 Refusal parse_poll(Text value, I2cPoll& out);
 // "255:xFFFF:32:60000"
 constexpr std::size_t max_poll_text = 24;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// State fields of connected devices: I2C1 … I2C8, I2CX, I2CBUS, UART1, UART2
-// (docs/reference/protocol.md).
+// State fields of devices: I2C1 … I2C8, I2CX, I2CBUS, UART1, UART2 (docs/reference/protocol.md).
 #pragma once
 
 #include "r4link/messages/datagram_writer.hpp"

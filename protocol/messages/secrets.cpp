@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds the secret of a setting, and removes secrets from datagrams (secret_in() of settings.hpp,
-// without_secrets() of r4link/messages/message.hpp).
+// Finds the secret of a setting (settings.hpp), and removes secrets (r4link/messages/message.hpp).
 #include <cstring>
 
 #include "../datagram/crc32.hpp"

@@ -31,8 +31,7 @@ struct Settings {
 bool operator==(const Settings& a, const Settings& b);
 inline bool operator!=(const Settings& a, const Settings& b) { return !(a == b); }
 
-// Refusal::unknown for an unknown key, ::format for a value of the wrong form, ::range outside the
-// range. `settings` changes only on Refusal::none.
+// Refusal::unknown (key), ::format or ::range. `settings` changes only on Refusal::none.
 Refusal set(Settings& settings, Text key, Text value);
 
 // Lines "key,value", each ended by a line feed, for storage. False if `capacity` is too small.
@@ -42,9 +41,8 @@ bool write_settings(const Settings& settings, char* out, std::size_t capacity, T
 // older or newer firmware. A missing or invalid wiring is damaged: the board must not guess.
 void read_settings(Text text, Settings& settings);
 
-// The secret part of a command's text ("C:password,letmein!", "C:key,1:5a…"): the digits of a key,
-// or the network's password. Empty if there is none. The value of an unknown setting counts as
-// secret, because its name may be misspelled.
+// The secret part of a command's text ("C:password,letmein!", "C:key,1:5a…"); empty: none. The
+// value of an unknown setting counts as secret, because its name may be misspelled.
 Text secret_in(Text command);
 
 }  // namespace r4

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The settings of one board at its site. Keys, ranges and defaults:
-// r4link/tables/settings.hpp; meanings: docs/reference/protocol.md, section 3. Only a host on a
-// cable of the board's own may change them (Port::may_configure()).
+// The settings of one board at its site (r4link/tables/settings.hpp; docs/reference/protocol.md,
+// section 3). Only a host on a cable of the board's own may change them (Port::may_configure()).
 // In a name or password, bytes outside the grammar are written as in URLs: %2C is a comma, %25 a
-// percent sign, %6Fff the network that is called "off".
-// network, password, host, port, name, key and analog inputs take effect at once, node and wiring
-// at the board's next start.
+// percent sign, %6Fff the network that is called "off". Node and wiring take effect at the board's
+// next start, all others at once.
 #pragma once
 
 #include <cstddef>
@@ -79,8 +77,7 @@ Refusal set(SiteSettings& settings, FoundSetting found, Text value);
 // The longest value: a wiring, or each byte of a password as %XX.
 constexpr std::size_t max_site_value =
     max_wiring_value > 3 * password_max ? max_wiring_value : 3 * password_max;
-// Setting `index`, from 0: its key, and its value as set() takes it. False if there is none. Only
-// for storage, because secrets are included.
+// From 0: its key, its value as set() takes it. False: none. Includes secrets: only for storage.
 bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_site_value],
          Text& value);
 

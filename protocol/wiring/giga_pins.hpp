@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The pins D0-D102 of the Arduino Giga R1 (the core's variants/GIGA/variant.cpp), and which of them
-// something else needs. A8-A11 have no D number. Pin number n of each port has interrupt line n
-// (RM0399, chapter EXTI).
+// The pins D0-D102 of the Arduino Giga R1 (the core's variants/GIGA/variant.cpp) and their other
+// users. A8-A11 have no D number. Pin n of each port has interrupt line n (RM0399, chapter EXTI).
 #pragma once
 
 #include <cstdint>

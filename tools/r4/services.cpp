@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 leaves the subcommand ros2 to r4-services, a program of its own: Cyclone DDS takes several
-// times as long to load as all the rest, and a stop must not wait for it. r4 has read the command
-// line, and becomes r4-services, which reads it again: the process stays the same one.
+// r4 ros2: Cyclone DDS takes several times as long to load as all the rest, and a stop must not
+// wait for it. So r4 becomes r4-services, in the same process, which reads the command line again.
 #include <unistd.h>
 
 #include <algorithm>

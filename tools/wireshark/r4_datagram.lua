@@ -8,8 +8,8 @@ local bxor4 = bit32 and bit32.bxor or load("return function(a, b, c, d) return a
 
 local M = { longest = 1024 }
 
--- CRC-32 four bytes at a time: table k has what a byte does that k more bytes follow. (Tables for two bytes at once are
--- slower: they do not fit a processor's first cache.)
+-- CRC-32 four bytes at a time: table k has the effect of a byte that k more bytes follow. (Tables for two bytes at once
+-- are slower: they do not fit a processor's first cache.)
 local t0, t1, t2, t3 = {}, {}, {}, {}
 for i = 0, 255 do
   local crc = i
@@ -54,8 +54,7 @@ end
 
 local field = "^([!-+%-./0-9<-\\%]_-~]+):([ -:<-\\%]_-~]*);"
 
--- The fields of `text`: each has its name, its values and where it is. Then where the trailer begins and ends, the
--- checksum that stands there and the one that is right. What is wrong is told by `error` and `at`.
+-- The fields of `text` (name, values, place), the place of the trailer, its checksum and the right one; `error` and `at`.
 function M.read(text)
   local result = {}
   local caret = find(text, "^", 1, true)

@@ -81,7 +81,6 @@ for _, row in ipairs(rows.COMMAND) do
   end
 end
 
--- What else a board says, field by field.
 local answers = {
   N = { title = "refusal", { "pnum", "uint32" }, { "code", "string" } },
   I = { title = "identity", { "kind", "string" }, { "firmware", "string" }, { "id", "string" },

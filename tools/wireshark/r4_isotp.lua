@@ -1,6 +1,5 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
--- ISO-TP (ISO 15765-2) as R4 uses it (docs/reference/can.md): frames of one id are joined to
--- messages, once, when a capture is read. What each frame was is kept for when it is shown again.
+-- ISO-TP (ISO 15765-2) as R4 uses it (docs/reference/can.md): joins frames of one id, once, when a capture is read.
 
 local M = {}
 
@@ -85,9 +84,8 @@ local function flow_control(data)
   return { kind = "flow", flow = data:byte(1) % 16, block = data:byte(2), gap = data:byte(3) }
 end
 
--- What frame `number` of a capture is, which holds `data`: a table with `kind` ("single", "first", "consecutive",
--- "flow" or nil), `payload` if the message is whole, `frames` that it came in, `failed` if it is not what it should be.
--- `key` tells apart buses and ids; `visited`: it has been seen before.
+-- What frame `number` of a capture, with `data`, is: a table with `kind` ("single", "first", "consecutive", "flow" or nil),
+-- `payload` if the message is whole, its `frames`, and `failed`. `key`: bus and id; `visited`: it has been seen before.
 function M.look(key, data, number, time, visited)
   if visited and frames[number] then
     return frames[number]

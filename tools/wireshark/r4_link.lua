@@ -214,8 +214,7 @@ end
 -- watcher, who is not heard while another program drives the board over a shared transport.
 local answers = { refusal = true, identity = true }
 
--- A checked datagram: `fields` with kind, from and pnum (or nil). `key` is of the board and
--- its host, `bus` of the transport.
+-- A checked datagram: `fields` with kind, from and pnum (or nil). `key`: of board and host; `bus`: of the transport.
 function M.look(key, bus, fields, frame, time)
   local link = links[key]
   if not link then

@@ -82,7 +82,6 @@ function Digits:word()
   return words[self:number(2)] or error("no such code", 0)
 end
 
--- A name, and the form of its values.
 function Digits:name()
   if self.digits:sub(self.at, self.at) ~= "e" then
     local word = self:word()
@@ -115,8 +114,7 @@ local function plain(number)
   return ("%.0f"):format(number)
 end
 
--- The decimal digits of up to 14 hexadecimal ones: more than a double can count. Halved, if `halved`: the odd rest
--- counts as another half.
+-- The decimal digits of up to 14 hexadecimal ones, too many for a double. Halved, if `halved`: an odd rest counts a half.
 local function decimal(hex, halved)
   if #hex <= 13 then
     local number = hex == "" and 0 or tonumber(hex, 16)
@@ -136,7 +134,6 @@ local function decimal(hex, halved)
   return ("%.0f%09.0f"):format(high, low)
 end
 
--- The digits of a count.
 function Digits:count()
   local size = self:number(1)
   if size == 15 then

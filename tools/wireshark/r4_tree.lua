@@ -146,8 +146,7 @@ local function add_values(tree, tvb, entry, text, at)
   return good and (index > #parts or parts[index].last == true)
 end
 
--- Puts a field of the datagram into the tree. `at`: where the datagram begins in `tvb`. Returns false if its values are
--- none of its form, nil if nobody knows the field.
+-- Puts a field into the tree; the datagram begins at `at`. False: values of another form; nil: an unknown field.
 function M.add_field(tree, tvb, at, field, from_host)
   local range = tvb(at + field.first - 1, field.size)
   local name = field.name

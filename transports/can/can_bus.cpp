@@ -114,8 +114,7 @@ void CanBus::clear_places() {
     hear();
 }
 
-// If the kernel refuses the filters, the bus goes down. The loop reports that later, because a
-// member may just be joining or leaving.
+// If the kernel refuses the filters, the bus goes down, later: a member may be joining or leaving.
 void CanBus::hear() {
   if (medium_->number() < 0 || set_filters()) return;
   asio::post(io_, deafness_.handler([this, error = errno] {
@@ -123,7 +122,6 @@ void CanBus::hear() {
   }));
 }
 
-// False, with errno, if the kernel refuses the filters.
 bool CanBus::set_filters() {
   std::vector<std::uint32_t> ids;
   for (const Place& place : members_) {

@@ -82,7 +82,6 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   void leave(Member& member) noexcept;
   bool has(const Member* member) const;
 
-  // To be called when a member has a frame to offer.
   void send();
   // Hands over the frames that have arrived; true if there were any. Call it before acting on a
   // time-out: a delayed loop may find the time-out and the frame together.
@@ -94,7 +93,6 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   const std::optional<CarrierEvent>& standing() const { return standing_; }
   // True if frames wait for the interface. Members are asked again when it has taken all of them.
   bool full() const { return out_count_ != 0; }
-  // True if a waiting frame fulfils `predicate`.
   template <class Predicate>
   bool holds(Predicate predicate) const {
     const auto end = out_.begin() + static_cast<std::ptrdiff_t>(out_count_);

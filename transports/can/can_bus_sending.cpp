@@ -14,8 +14,7 @@ constexpr std::chrono::milliseconds retry_interval{1};
 
 }  // namespace
 
-// Flow control must not wait for a whole datagram of telemetry: on a slow bus it would be late. A
-// frame that finds no room is offered again by offer().
+// Flow control must not wait for a whole datagram of telemetry: on a slow bus it would be late.
 void CanBus::send_urgent(std::uint32_t now_us) {
   CanFrame frame;
   for (const Place& place : members_) {
@@ -45,7 +44,6 @@ bool CanBus::refill(std::uint32_t now_us) {
   return out_count_ != 0;
 }
 
-// The interface has taken the first `count` frames of the queue.
 void CanBus::have_left(std::size_t count) {
   if (count != 0) progress_ = Clock::now();
   for (std::size_t i = 0; late_ && i < count; ++i) {

@@ -211,8 +211,7 @@ bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
   return true;
 }
 
-// All watchers send the same frame, so it does not collide. Without a board the lease has no
-// effect, and for a host the board streams anyway.
+// The same frame from all watchers, so it does not collide. Without a board it has no effect.
 SendResult CanCarrier::send_lease() {
   const Clock::time_point now = Clock::now();
   if (!trouble_.hears_board(now) || trouble_.hears_host(now)) return SendResult::down;
@@ -221,8 +220,7 @@ SendResult CanCarrier::send_lease() {
   return SendResult::sent;
 }
 
-// Notes frames of this board and commands of other hosts. Ignores flow control, which looks the
-// same from all hosts, and frames of other boards, which the shared bus brings.
+// Ignores flow control, which looks the same from all hosts, and frames of other boards.
 void CanCarrier::listen_for_others(const CanFrame& frame) {
   const CanIdMeaning meaning = classify(frame);
   if (is_.role != Role::host || meaning.node != is_.node) return;
@@ -249,7 +247,6 @@ TransportTrouble CanCarrier::trouble() const {
   return is_.role == Role::host && up() ? trouble_.now(Clock::now()) : TransportTrouble::none;
 }
 
-// Begins the next datagram of each idle lane. True if there was one.
 bool CanCarrier::begin_waiting(std::uint32_t now_us) {
   bool any = false;
   for (Lane& each : lanes_) {

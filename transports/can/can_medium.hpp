@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CanBus's medium: a SocketCAN socket or a program's own bus. For one thread; only the
-// first open() of a program's own bus waits.
+// A SocketCAN socket or a program's own bus, whose first open() may wait. For one thread.
 #pragma once
 
 #include <array>

@@ -17,7 +17,6 @@
 
 namespace r4 {
 
-// The problem, and the fix if known, for an errno of a socket on that interface.
 Problem can_problem(const std::string& interface, int error);
 
 class CanSocket final : public CanMedium {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reports to a host whether its board and other hosts are heard on a CAN bus, and why datagrams do
-// not pass although the bus is up. No I/O.
+// Whether a board and other hosts are heard on a CAN bus, and why datagrams do not pass. No I/O.
 //     foreign frames   frames came on the board's command id for host_completes, but no whole
 //                      datagram. A host sends ten heartbeats a second: another protocol uses the id
 //     late frames      the board is heard, but late_transfers transfers within late_within were not
@@ -33,7 +32,6 @@ class CanTrouble {
     if (now - host_heard_ > frames_over || !incomplete()) frames_since_ = now;
     host_heard_ = now;
   }
-  // Such frames have completed a datagram.
   void on_host_datagram(Time now) { host_completed_ = now; }
   // `count`: the total of transfers that were not answered in time.
   void on_late(std::uint64_t count, Time now) {
@@ -57,7 +55,6 @@ class CanTrouble {
   static std::size_t place(std::uint64_t count) {
     return static_cast<std::size_t>(count % late_transfers);
   }
-  // True if frames have come since the newest datagram.
   bool incomplete() const { return frames_since_ > host_completed_; }
   bool hears_foreign_frames(Time now) const {
     return now - host_heard_ < frames_over && incomplete() &&

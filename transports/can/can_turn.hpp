@@ -2,8 +2,7 @@
 // Decides which host sends on a board's command id (docs/reference/can.md, "Several hosts"). All
 // hosts answer a heartbeat at once: on one id their frames would mix and, on real wires, drive
 // hosts bus-off. So a host listens before it sends, and the later host is silent until it has not
-// heard the other host for a second. The emergency stop needs no turn: all hosts send the same
-// frame.
+// heard the other for a second. The emergency stop needs no turn: all hosts send the same frame.
 #pragma once
 
 #include <chrono>
@@ -21,8 +20,7 @@ class CanTurn {
   static constexpr Duration listening{120};
   // Two hosts that begin within this time have not heard each other, and both fall silent.
   static constexpr Duration settling{50};
-  // The time that a board waits for its host. A random time is added, so that one of two hosts is
-  // first.
+  // As long as a board waits for its host. A random time is added, so that one of two is first.
   static constexpr Duration silence{1000};
   static constexpr Duration most_chance{250};
 
@@ -41,7 +39,6 @@ class CanTurn {
     return state_ == State::ours;
   }
   bool others() const { return state_ == State::others; }
-  // A datagram of this host has begun.
   void on_own(Time now) {
     if (!speaking(now)) since_ = now;
     speaking_ = true;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The numbers of one host's stops on a bus. A stop is confirmed by its packet number of 32 bits. On
-// the bus it has a number of 18 bits, which a board reports in the heartbeat field STOP. Keeps the
-// newest 16 stops, as many as a session repeats at a time.
+// The numbers of one host's stops on a bus: 18 bits, which a board reports in the heartbeat field
+// STOP, for the packet number of 32 bits. Keeps the newest 16, as many as a session repeats.
 #pragma once
 
 #include <cstddef>

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Numbers for the hosts that send to a board over UDP.
-// Each sender of a valid datagram gets a place; other bytes give none. The table is bounded: a new
-// sender takes the place of the sender that was silent longest. The controlling host keeps its
-// place, because with another number it would be another host to the board. It is also the audience
-// of datagrams for all, and no other host's datagram changes that. A watcher never becomes the
-// audience, because its lease brings it everything. A number is never given twice.
+// Each sender of a valid datagram gets a place; if none is free, that of the sender that was silent
+// longest. The controlling host keeps its place, because with another number it would be another
+// host to the board. It is the audience of datagrams for all. A watcher never becomes the audience,
+// because its lease brings it everything. A number is never given twice.
 #pragma once
 
 #include <cstdint>
@@ -61,8 +60,7 @@ class PeerTable {
     }
     return nullptr;
   }
-  // The receiver of datagrams for all: the controlling host, else the newest sender that does not
-  // watch; nobody before the first.
+  // The controlling host, else the newest sender that does not watch; nobody before the first.
   std::uint32_t audience() const { return audience_; }
 
  private:

@@ -86,7 +86,6 @@ class Impaired final : public ImpairedCarrier, public BoardEnd, private Carrier:
     }
   }
 
-  // Sends the datagrams that are due, and waits for the next one.
   void pass() {
     while (const auto item = out_->take(now())) {
       below_->send(item->bytes, static_cast<Priority>(item->priority), item->peer);

@@ -16,7 +16,6 @@ namespace {
       "write a link as in loss=5%,delay=20ms±10,duplicate=1%,corrupt=0.1%,cut=10s+2s,seed=7");
 }
 
-// Removes a number from the beginning of `text`.
 double number(std::string_view part, std::string_view& text, double most) {
   double value = 0;
   const auto [end, error] =

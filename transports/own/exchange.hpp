@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Connects a program's own transport, whose calls may wait, to the loop of a link: a thread makes
-// the calls, and items wait in both directions.
-//
+// Connects a program's own transport, whose calls may wait, to a link's loop, by a thread.
 //     opening ──────────────▶ up ────────────────────────▶ down ─────────▶ ended
 //        │   open() returns   ▲   send() throws, or end()  ▲ │    end()
 //        │                    └──── open() returns ────────┼─┘
@@ -40,8 +38,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
   static constexpr std::chrono::milliseconds pause{200};  // between two attempts to open it
   static constexpr std::chrono::seconds end_patience{1};
 
-  // `news()`: items wait for take(), or the transport went up or down. On any thread, under the
-  // lock.
+  // `news()`: items wait for take(), or it went up or down. On any thread, under the lock.
   Exchange(std::string name, std::unique_ptr<Own> own, std::unique_ptr<Outbox> outbox,
            std::function<void()> news)
       : name_(std::move(name)),
@@ -114,7 +111,6 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
     const std::lock_guard lock(mutex_);
     return outbox_->dropped;
   }
-  // The number of received items that found no room.
   std::uint64_t overflows() const {
     const std::lock_guard lock(mutex_);
     return overflows_;

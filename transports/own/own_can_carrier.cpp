@@ -36,7 +36,6 @@ struct FrameOutbox {
   using Lane = std::deque<Item>;
   static constexpr std::size_t most = 8;
 
-  // False if the lane is full.
   static bool push(Lane& lane, const CanFrame& frame) {
     if (lane.size() == most) return false;
     lane.push_back({frame, CanMedium::Clock::now()});
@@ -103,8 +102,7 @@ struct FrameCalls {
 
 using FrameExchange = Exchange<FrameCalls, FrameOutbox>;
 
-// An exchange of frames, and the descriptor by which a loop waits for its news. Throws
-// std::system_error.
+// An exchange and the descriptor by which a loop waits for its news. Throws std::system_error.
 struct FrameSource {
   explicit FrameSource(std::shared_ptr<OwnCanBus> bus)
       : name(bus->name()),
@@ -139,8 +137,7 @@ class OwnCanMedium final : public CanMedium {
     problem.thing = source_->name;
     return problem;
   }
-  // Check for a failure before taking frames: after frames, CanBus waits for the next event, so it
-  // would report the failure late.
+  // Failures first: after frames, CanBus waits for the next event and would report a failure late.
   int receive(std::array<Received, batch>& frames) override {
     eventfd_t ignored = 0;
     ::eventfd_read(source_->news.get(), &ignored);

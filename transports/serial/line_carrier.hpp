@@ -31,7 +31,6 @@ class LineCarrier : public Carrier {
   const CarrierCounters& counters() const override { return counters_; }
 
  protected:
-  // look_later() calls look() after `look_interval`.
   LineCarrier(asio::io_context& io, std::string name, std::chrono::milliseconds look_interval);
 
   // --- implemented by the ends

@@ -10,9 +10,8 @@
 
 namespace r4 {
 
-// libserialport opens a device with an entry in sysfs, Asio any other device (a pty). Low latency
-// is set if the driver has it. Earlier input is discarded. The result does not block: EAGAIN means
-// no data, 0 bytes a hang-up.
+// libserialport opens a device with an entry in sysfs, Asio any other (a pty). Low latency is set
+// if the driver has it; earlier input is discarded. EAGAIN means no data, 0 bytes a hang-up.
 //
 // A second opening fails: `lock` excludes other r4 programs, TIOCEXCL all programs. TIOCEXCL is not
 // set for a pty, because the simulated board could not count its host's unread bytes. Nor is it set

@@ -16,7 +16,6 @@ class UnreadMarks {
   static constexpr std::chrono::milliseconds grain{2};
 
   void wrote(std::size_t bytes, Time now);
-  // At most that many written bytes are unread.
   void unread_at_most(std::size_t bytes);
   void clear() { count_ = 0; }
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The end of a shared transport in the program that holds it. It sends a copy of every datagram to
-// the other programs, and obeys a stop of any program. It serves the first most_served programs
-// that say hello. A program that has stopped the board is served beyond that limit, so that it
-// hears whether the board obeys. A slow program loses copies.
+// the first most_served programs that say hello, and obeys a stop of any program. It serves such a
+// program beyond that limit: it hears whether the board obeys. A slow program loses copies.
 #pragma once
 
 #include <asio/io_context.hpp>

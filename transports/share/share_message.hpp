@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The messages between programs that share a transport (docs/how-to/sharing.md). Each is one packet
-// of a local socket: a letter, then the content. No I/O.
+// The messages between programs that share a transport (docs/how-to/sharing.md), one a packet.
 //     hello     h VERSION     to the holder: asks for copies of all datagrams, or if it is alive
 //     ask       c VERSION     to the holder: asks for the transport, to control; answer: disconnect
 //     welcome   w VERSION     the answer to hello, and to an invalid message

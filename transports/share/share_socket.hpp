@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The local sockets of programs that share a transport. The kernel keeps their abstract names
-// (unix(7)): a name is free once its program has ended. Like UDP ports, names belong to a network
-// namespace. A transport has two names: one for the controlling program, and one for a watching
-// program that holds the transport while no program controls the board. A name contains the user's
-// number or the sharing group's name. Any user can take a name, so both ends ask the kernel for the
-// user at the other end. No call blocks.
+// (unix(7)), in a network namespace, until the program ends. A transport has two names: one for the
+// controlling program, one for a watching program that holds it while no program controls the
+// board. A name contains the user's number or the sharing group's name. Any user can take a name,
+// so both ends ask the kernel for the user at the other end. No call blocks.
 #pragma once
 
 #include <sys/types.h>
@@ -35,7 +34,6 @@ bool is_one_of_us(int connection, const ShareName& name);
 pid_t process_of(int connection);
 // The program's name, as in "r4"; "another program" if it cannot be read.
 std::string program_of(pid_t process);
-// True if the process is stopped, by Ctrl-Z for example.
 bool is_stopped(pid_t process);
 
 // 0, or errno.

@@ -256,7 +256,6 @@ void SharedCarrier::pass_over(const Problem& why) {
   if (!search_.no_help) search_.no_help = why;
 }
 
-// Stops holding or sharing the transport.
 void SharedCarrier::lose() {
   seek();
   holder_.release();  // after seek(): the transport is free before other programs look for a holder

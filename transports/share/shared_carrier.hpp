@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A transport that a user's programs share (docs/how-to/sharing.md). Wraps the carrier of a URL.
-//
 //     seeking ----a program holds it----> asking ----welcome----> joined
 //      |   ^                                |                       |
 //      |   +---- the holder ends, or does not answer in time -------+
@@ -9,12 +8,11 @@
 //      |   |
 //      +-> holding, with the carrier open: no program holds it, or the holder was passed over
 //
-// The controlling program holds the transport, so its datagrams never wait for another program. It
-// also holds a separate name, so a second controlling program is refused at once. Watching programs
-// hear all datagrams, and send stops. A program that takes control first takes that name. If it is
-// refused, nothing changes. Else it reopens the transport, because a controlling program opens it
-// differently (DeviceClaim). The programs that it served seek the holder again, as after any
-// holder's end.
+// The controlling program holds the transport, so its datagrams never wait for another program, and
+// a separate name, so a second controlling program is refused at once. Watching programs hear all
+// datagrams, and send stops. A program that takes control first takes that name; if refused,
+// nothing changes. Else it reopens the transport, because a controlling program opens it
+// differently (DeviceClaim), and the programs that it served seek the holder again.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -26,9 +24,8 @@
 
 namespace r4 {
 
-// Reports the same as `own`, whichever program holds the transport. `claim`: how `own` opens its
-// device. open() does not wait; it throws Error{refused} if another program controls the board, or
-// an error of `own`.
+// Reports the same as `own`, whichever program holds the transport. open() does not wait; it throws
+// Error{refused} if another program controls the board, or an error of `own`.
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
                                              Claim claim, FindShareName find, BoardRole role);
 

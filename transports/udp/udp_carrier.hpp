@@ -31,12 +31,10 @@
 
 namespace r4 {
 
-// Throws Error{usage} for a URL that UDP does not take. A host whose claim yields listens at any
-// free port, unless the URL names one.
+// Throws Error{usage} for a wrong URL. A host that yields takes any port, if the URL has none.
 std::unique_ptr<Carrier> make_udp_carrier(asio::io_context& io, const Url& url, Role role,
                                           Claim claim);
 
-// The same with another lookup and search.
 std::unique_ptr<Carrier> make_udp_carrier_with(asio::io_context& io, const Url& url, Role role,
                                                HostLookup lookup, BoardSearch search = {},
                                                Claim claim = std::make_shared<DeviceClaim>());

@@ -64,8 +64,7 @@ bool has_one_of(const fs::path& process, const std::vector<std::string>& sockets
   return false;
 }
 
-// The program that has a UDP port of this computer, as far as this user may see it (proc(5)):
-// "r4 (pid 123)", or "another program".
+// "r4 (pid 123)", or "another program", as far as this user may see it (proc(5)).
 std::string user_of_udp_port(std::uint16_t port) {
   const std::vector<std::string> sockets = sockets_of(port);
   std::error_code error;

@@ -37,7 +37,6 @@ class UdpEnd : public Carrier {
 
   // --- implemented by the ends
 
-  // A packet from sender_.
   virtual void received(std::string_view bytes) = 0;
   virtual Outcome transmit(std::string_view bytes, Peer to) = 0;
   // 0 if the network is up, else errno.

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The socket with which a host hears one board. The boards of a program share the port of hosts.
-// The first socket has the port alone, so that another program at that port is noticed. It is not
-// connected, and hears all ports of its board. A further socket is bound to the same port and
-// connected to its board, so the kernel gives it packets from that board's port only. A packet in
-// the microseconds between bind and connect may be lost.
+// The first socket has the port alone, so another program at that port is noticed, and hears all
+// ports of its board. A further socket is bound to the same port and connected, so the kernel gives
+// it packets from its board's port only. A packet in the microseconds between may be lost.
 #pragma once
 
 #include <asio/error_code.hpp>
@@ -27,8 +26,7 @@ class UdpHostSocket {
   UdpHostSocket& operator=(const UdpHostSocket&) = delete;
   ~UdpHostSocket() { close(); }
 
-  // Binds the open socket to `local` (port 0: any free port), to hear `board`. Fails with
-  // asio::error::already_open if this program hears that board there already.
+  // Port 0: any free port. Fails with already_open if this program hears that board there already.
   asio::error_code bind(const Endpoint& local, const Endpoint& board);
   // Closes the socket. Can be called twice.
   void close() noexcept;

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The connected analog inputs, converted in turn, one per poll; the others read 0. Never waits;
-// from the loop only. The core sets up pins and converter and reads each input once. Then this
-// class uses the registers of ADC1 (RM0399, chapter ADC). The core would wait up to 10 ms for a
-// conversion, and end the boot if the converter does not switch on. Here a dead converter reads 0,
-// and motors can still be driven.
+// The connected analog inputs, converted in turn, one per poll; the others read 0. From the loop
+// only. The core sets up pins and converter. Then this class uses the registers of ADC1 (RM0399,
+// chapter ADC), and never waits: the core would wait up to 10 ms for a conversion, and end the boot
+// if the converter does not switch on. Here a dead converter reads 0, and motors can be driven.
 #pragma once
 
 #include <cstdint>

@@ -194,7 +194,6 @@ void BoardProgram::hear_usb(Text line) {
   }
 }
 
-// One line a turn, when USB has room for it.
 void BoardProgram::tell_report() {
   if (!usb_.open() || (waiting_line_.empty() && !report_.running())) return;
   if (waiting_line_.empty()) waiting_line_ = report_.next(report_line_);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The application between its transports and its hardware. Constructed once, when the settings are
-// known.
+// The application between its transports and its hardware, made when the settings are known.
 #pragma once
 
 #include <cstdint>

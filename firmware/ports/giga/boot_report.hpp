@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report of the paper's Figure 3, sent on request, one line a turn. After the paper's lines
-// come chips, CAN, settings, keys, paths and how the last boot ended. Labels are spelled as in the
-// paper. The scan of the I2C bus asks one address a turn, so the loop waits for at most one
-// transfer.
+// The report of the paper's Figure 3, with its labels, sent on request, one line a turn; then
+// chips, CAN, settings, keys, paths and how the last boot ended. The scan of the I2C bus asks one
+// address a turn, so the loop waits for at most one transfer.
 #pragma once
 
 #include <cstdint>

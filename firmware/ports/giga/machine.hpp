@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's hardware, as it is wired: chips on the I2C bus, pins, converters, and the interrupts
-// that read them.
+// The board's hardware, as it is wired: chips, pins, converters, and the interrupts that read them.
 #pragma once
 
 #include <cstdint>
@@ -24,8 +23,7 @@ namespace giga {
 
 class Machine final : public StepTick {
  public:
-  // Sets up pins and chips. Every output of the board is off when it returns. `wiring` is without a
-  // fault of check().
+  // When it returns, every output is off. `wiring` must be without a fault of check().
   Machine(const Wiring& wiring, ChipTrouble wiring_trouble, Buses& buses);
   // Starts the edge interrupts and the step timer, which becomes a duty of the guard.
   void start(firmware::Guard& guard);
@@ -63,8 +61,7 @@ class Machine final : public StepTick {
 
   firmware::BoardPins pins();
 
-  // Members are constructed in the order of power-up: pins at rest, chips' outputs off; then
-  // everything that takes longer.
+  // In the order of power-up: pins at rest, chips' outputs off; then everything that takes longer.
   const firmware::BusChoice choice_;
   I2cController& bus_;
   GpioOutput step_[stepper_channels];

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The pins of the Giga that no wiring can change, and the pin of a place in a wiring. Comments give
-// the names printed on the Giga.
+// The Giga's pins that no wiring can change, with the names printed on it, and the pin of a place.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Links a board with CAN, UART and all chip drivers for `tools/m7 --size`. Cannot run as a board:
-// no Cortex-M machine of QEMU has a CAN controller or the chips.
+// A board with CAN, UART and all chips, to link for `tools/m7 --size`: QEMU has no such machine.
 #include "../../../transports/framing/can/can_node.hpp"
 #include "../../application/application.hpp"
 #include "../../board_hardware.hpp"

@@ -69,7 +69,6 @@ constexpr std::uint32_t watchdog_lock = watchdog_base + 0xC00;
 constexpr std::uint32_t nmi = 2;
 constexpr std::uint32_t memory_fault = 4;
 
-// Protects 2^`log_size` bytes from `base` as region `number`.
 void protect(std::uint32_t number, std::uint32_t base, std::uint32_t log_size,
              std::uint32_t attributes) {
   constexpr std::uint32_t valid = 0x10;

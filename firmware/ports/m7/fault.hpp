@@ -33,7 +33,6 @@ std::uint32_t boots();  // since power-up
 
 [[noreturn]] void halt();  // switches all outputs off and resets
 
-// Ends the boot `ms` after the last feed_watchdog().
 void start_watchdog(std::uint32_t ms);
 void feed_watchdog();
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From reset to main(), and the linker script's symbols. The image defines main() and the handlers
-// of the interrupts that it enables.
+// From reset to main(); the linker script's symbols. The image defines main() and its handlers.
 #pragma once
 
 #include <cstdint>

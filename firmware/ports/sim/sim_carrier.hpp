@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A simulated board in the host's process: `sim:[?node=1&seed=N&script=FILE&robot=N]`.
-//
 //     node    0-31, default 1: the board's id is sim-<node>
 //     seed    makes the board's clock and analog inputs repeatable
 //     script  what happens to the board and when (script.hpp)

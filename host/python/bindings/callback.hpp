@@ -18,8 +18,7 @@ inline bool interpreter_ends() {
 #endif
 }
 
-// The interpreter's state of a foreign thread, kept until the thread ends: making one for each call
-// costs more than the call.
+// A foreign thread's state, kept until the thread ends: making one for each call costs more.
 class KeptThreadState {
  public:
   KeptThreadState() = default;

@@ -36,15 +36,13 @@ class PythonEnum {
  public:
   using WordOf = std::string (*)(std::uint8_t number);
 
-  // Throws if Python has no member for a C++ enumerator. A number without an enumerator has the
-  // text of 255, so the texts show which numbers are enumerators.
+  // Throws if Python has no member for an enumerator. A number without one has the text of 255.
   PythonEnum(const char* name, WordOf word_of);
 
   // Newer firmware may send a number without an enumerator: throws if no member has its text.
   pybind11::handle member(std::uint8_t number) const;
   // Takes a member or its text. Throws for anything else.
   std::uint8_t number(pybind11::handle word) const;
-  // In the order of their numbers.
   pybind11::tuple members() const;
 
  private:

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Values that can be pickled and copied. Only the same version of R4 link reads a pickle, so it is
-// good for other processes of a program, not for storage.
+// Values that can be pickled, for other processes of a program: only the same version reads them.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +17,6 @@
 
 namespace r4::python {
 
-// Visits the members of a value, to write their bytes or to read them.
 class Pickle {
  public:
   Pickle() = default;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The boards on a CAN bus, their datagrams and the load of the bus, from its frames only. It never
-// sends, so it may be used beside hosts that drive.
+// The boards on a CAN bus, their datagrams and its load, by listening only: safe beside any host.
 //
 //     CanSurvey survey({1000000, 0});
 //     survey.on_datagram([](std::uint8_t node, const Datagram& datagram) { … });
@@ -66,9 +65,8 @@ class CanSurvey {
 
   R4LINK_API void on_frame(const CanFrame& frame, std::uint32_t at_us);
 
-  // True for the emergency stop, for a command id that has carried R4 datagrams, and for the other
-  // ids of a node whose board has sent R4 datagrams. Otherwise the id is not R4's, or has carried
-  // no R4 datagram yet.
+  // True for the emergency stop, a command id that has carried R4 datagrams, and the other ids of a
+  // node whose board has sent some. False: not R4's, or no R4 datagram yet.
   R4LINK_API bool is_r4(std::uint32_t id) const;
   const HeardNode& board(std::uint8_t node) const { return boards_[node % can_nodes]; }
   const std::map<std::uint32_t, CanTraffic>& traffic() const { return traffic_; }

@@ -69,8 +69,7 @@ struct LoopOptions {
   Setpoints rest = {};
   // If the board does not confirm `rest` within this time, it is stopped (E:STOP).
   std::chrono::milliseconds rest_timeout{200};
-  // If a step does not return within this time, the heartbeats stop and the board goes safe
-  // (Board::watchdog()). 0: no watchdog here; the program may feed its own.
+  // If a step takes longer, the heartbeats stop: the board goes safe (Board::watchdog()). 0: off.
   std::chrono::milliseconds watchdog{300};
 };
 

@@ -41,7 +41,6 @@ class R4LINK_API Pid {
   // The output, `dt_s` seconds after the last step; unchanged if dt_s is not above 0. Throws
   // Error{data} for a value that is not finite.
   double step(double setpoint, double measured, double dt_s);
-  // The newest output.
   double output() const { return output_; }
   // Its integral term, in units of the output.
   double integral() const { return integral_; }

@@ -28,7 +28,6 @@ namespace r4 {
 //     range   distance in m, with its range
 //     angle   angle in rad
 enum class DeviceRole : std::uint8_t { none, imu, power, range, angle };
-// "none", "imu" …
 R4LINK_API const char* to_text(DeviceRole role);
 
 // Read and compared before anything is written, to identify the device.

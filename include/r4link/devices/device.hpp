@@ -69,7 +69,6 @@ class R4LINK_API Device {
   DeviceReading reading(const State& state, std::size_t value) const;
   // Throws Error{usage} if the device has no value of that name.
   DeviceReading reading(const State& state, std::string_view value) const;
-  // The readings of all its values.
   std::vector<DeviceReading> readings(const State& state) const;
 
  private:

@@ -97,9 +97,8 @@ struct Discovery {
   std::vector<SearchedNetwork> networks;
   bool more = false;  // more than `most_answers` boards have answered by UDP
 
-  // The only board. A board found once by each of several transports, with one board id, is one
-  // board: its first URL. Throws Error: open if there is no board, with the places searched; usage
-  // if there are several boards, with their URLs.
+  // The only board; one found by several transports, with one board id, is one: its first URL.
+  // Throws Error: open for no board, with the places searched; usage for several, with their URLs.
   R4LINK_API FoundBoard only() const;
 };
 

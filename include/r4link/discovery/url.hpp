@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The place of a board: the URL grammar of every transport (docs/reference/transports.md has the
-// table).
+// The place of a board: the URL grammar of every transport (docs/reference/transports.md).
 //
 //     url    = scheme ":" ["//" authority] [path] ["?" key "=" value *("&" key "=" value)]
 //     scheme = udp | serial | pty | sim | …        authority = HOST[:PORT] | [IPv6][:PORT]

@@ -84,8 +84,7 @@ class R4LINK_API DatagramWriter {
   DatagramWriter& packet(std::uint32_t pnum);
   // Writes PNum and T: the last fields of any other datagram, except a signature.
   DatagramWriter& stamp(std::uint32_t pnum, std::uint64_t t_ms);
-  // Ends the datagram with PNum, T and the CRC. Empty if anything did not fit or was not allowed,
-  // or if the datagram is longer than max_datagram.
+  // Adds PNum, T and the CRC. Empty if anything did not fit or was not allowed, or is too long.
   Text finish(std::uint32_t pnum, std::uint64_t t_ms);
   // Ends the datagram with the CRC only: the caller has written PNum and T.
   Text finish();

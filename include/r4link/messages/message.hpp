@@ -60,8 +60,7 @@ struct SafeReport {
   std::uint32_t stop = 0;
 };
 
-// The report of a board heartbeat, or the reason of a state. An unreadable SAFE counts as a fault,
-// an unreadable CAUSE or STOP as none.
+// The report of a heartbeat or a state. An invalid SAFE is a fault, an invalid CAUSE or STOP none.
 R4LINK_API SafeReport heartbeat_report(const Datagram& datagram);
 // True if the board waits for a host (CONNECTING): PNum is 0, and T too without a nonce.
 R4LINK_API bool is_connecting_heartbeat(const Datagram& datagram);

@@ -52,8 +52,7 @@ struct UnpackResult {
   explicit operator bool() const { return error == UnpackError::none; }
 };
 
-// Unpacks into `out`, at most `capacity` bytes. Safe for any bytes. After an error `out` is
-// undefined. The checksum is copied, not checked: read_datagram() checks it.
+// Safe for any bytes. After an error `out` is undefined. read_datagram() checks the checksum.
 R4LINK_API UnpackResult unpack(const std::uint8_t* bytes, std::size_t size, char* out,
                                std::size_t capacity);
 

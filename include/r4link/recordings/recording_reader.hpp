@@ -22,14 +22,12 @@ namespace r4 {
 
 // Reads the lines of the native format, in a file of any format. Successive recordings in one file,
 // each after its header, are accepted. Mixed ones, as `sort -m`, `mergecap` and `mcap merge` make
-// them, are refused: a path number means another board in each, so states would be shown for the
-// wrong board. The signs of a mixture are
+// them, are refused: a path number means another board in each. The signs of a mixture are
 // - a header that follows a header, or a record that follows the end of the recording,
 // - a path whose URL changes without a header,
 // - lines, or datagrams of one path, from another stream (an interface of a capture, a channel of
 //   MCAP) without a new header or path.
-// After damage, which may explain such a sign, reading continues, and the visitor gets damage_line,
-// so that a copy of the file can be read too.
+// After damage, which may explain such a sign, reading continues; the visitor gets damage_line.
 class R4LINK_API RecordingLines {
  public:
   static constexpr std::string_view damage_line = "# damage: a part before this could not be read";

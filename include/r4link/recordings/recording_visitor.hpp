@@ -33,9 +33,8 @@ class RecordingVisitor {
   virtual void on_record(const Record& record) = 0;
   // Reading continues after the damage.
   virtual void on_damage(const RecordingDamage& damage) = 0;
-  // Usually comes before the first record of that path; a damaged or foreign file may lack it.
-  // Comes again when the path's name is known. After a new header a path number may mean another
-  // path.
+  // Usually before the first record of that path (not in a damaged or foreign file); again when its
+  // name is known. After a new header a path number may mean another path.
   virtual void on_path(const RecordedPath& path) { static_cast<void>(path); }
   // A device in a slot of a path. It applies until the next header. Device::parse() reads it.
   virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The commands of the board (docs/reference/protocol.md, section 3): a row for each kind, with
-// values that have rows of their own, from board.def. Read by protocol/messages/command.cpp and
-// host/commands/.
+// values that have rows of their own, from board.def.
 //
 //     r4::row_of(r4::CommandKind::servo).channels                // 16
 //     r4::row_of(r4::CommandValue::pulse).max                    // 2500, microseconds

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The settings of a board (`C:key,value`; docs/reference/protocol.md, section 3): keys, ranges,
-// defaults.
+// The settings of a board (`C:key,value`; docs/reference/protocol.md, section 3).
 #pragma once
 
 #include <cstddef>

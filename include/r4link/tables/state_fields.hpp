@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state fields (docs/reference/protocol.md), made of the rows of board.def in two tables: for
-// each field its kind and channel, and for each kind the form, units and State member of its
-// values.
+// The state fields (docs/reference/protocol.md), from board.def: for each field its kind and
+// channel, for each kind the form, units and State member of its values.
 //
 //     for (const StateFieldRow& row : state_fields) …   in the order of the wire
 //     state_field(FieldKind::osmc, 2)                   StateField::osmc2

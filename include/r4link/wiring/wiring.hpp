@@ -115,7 +115,6 @@ enum class WiringSource : std::uint8_t {
 // "plan", "given", "damaged".
 R4LINK_API const char* to_text(WiringSource source);
 
-// The wiring that a board keeps.
 struct BoardWiring {
   WiringSource source = WiringSource::plan;
   bool in_use = false;  // false: it counts from the board's next start on

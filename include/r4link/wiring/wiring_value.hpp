@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A wiring as the value of the setting `wiring`, sent and stored: `1:<two hexadecimal digits for
-// each signal>:<CRC-32 of all before this colon>`. The number is the version of the list of
-// signals.
+// A wiring as the value of the setting `wiring`, sent and stored, with the version of the list of
+// signals first: `1:<two hexadecimal digits for each signal>:<CRC-32 of all before this colon>`.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The boards of a command on one event loop:
-//
 //     BoardSet boards(options.urls, watching(options.key));
 //     for (SetBoard& each : boards) each.board.on_state(…);
 //     boards.open();

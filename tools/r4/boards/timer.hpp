@@ -11,8 +11,7 @@
 
 namespace r4::tool {
 
-// One task at a time. A cancelled or replaced task never runs, and neither does the task of a
-// destroyed timer, even if its time had already come.
+// One task at a time. A cancelled or replaced task never runs, nor does one of a destroyed timer.
 class Timer {
  public:
   using Clock = std::chrono::steady_clock;

@@ -84,7 +84,6 @@ class Report {
     }
   }
 
-  // Prints only ends with changed counters.
   void counters(const std::vector<BridgeStatus>& all) {
     for (std::size_t i = 0; i < all.size(); ++i) {
       tell_counters(BridgeSide::hosts, all[i].hosts, told_[i].hosts);

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decodes a candump log: joins the frames of each node to datagrams with the ISO-TP receivers of
-// boards and hosts, and emits them and raw frames as JSON (`r4 decode --candump`,
-// docs/reference/can.md).
+// Decodes a candump log to datagrams and raw frames (`r4 decode --candump`, docs/reference/can.md).
 #pragma once
 
 #include <cstdint>

@@ -240,7 +240,6 @@ std::uint32_t most_boards(BusPlan plan, double limit) {
   return plan.boards;
 }
 
-// Only the load of the states depends on their rate.
 std::uint32_t highest_rate(BusPlan plan, double limit) {
   plan.states_hz = 1;
   const BusLoad load = load_of(plan);

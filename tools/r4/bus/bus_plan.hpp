@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The load of a planned CAN bus. Every datagram of the link is written, packed unless `packed` is
-// false, cut into frames, and the bits of the frames are counted.
+// The load of a planned CAN bus, from the bits of all frames of the link.
 //
 // Average: typical datagrams of driving boards, bit by bit. Worst: the longest datagrams with the
 // most stuff bits; a bus with room for these never delays datagrams by its load.

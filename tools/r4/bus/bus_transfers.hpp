@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Joins recorded CAN frames to datagrams with the ISO-TP receivers of boards and hosts
-// (docs/reference/can.md).
+// Joins recorded CAN frames to datagrams, as boards and hosts do (docs/reference/can.md).
 //
-// Only listens: one receiver for each interface, node and lane that occurs. Uses the recording's
-// time. Memory is bounded by max_interfaces for any input.
+// Only listens, in the recording's time. Memory is bounded by max_interfaces for any input.
 #pragma once
 
 #include <array>
@@ -60,9 +58,7 @@ class BusTransfers {
   explicit BusTransfers(Handler& handler) : handler_(handler) {}
 
   enum class Frame : std::uint8_t { taken, other, too_many_interfaces };
-  // `other`: a frame of another protocol.
   Frame on_frame(std::string_view interface, const CanFrame& frame, const Place& place);
-  // Advances the time, which may end transfers.
   void pass_time(const std::optional<std::uint64_t>& time_us);
 
   std::vector<const Lane*> unfinished() const;

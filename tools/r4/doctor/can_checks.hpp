@@ -18,7 +18,6 @@ Findings check_can_interface(const Machine& machine, const CanInterface& interfa
 // Frames of other protocols on an id of that board.
 Findings check_foreign_frames(const CanSurvey& survey, const std::string& interface,
                               std::uint8_t node);
-// `load`: bus load, 0 to 1 of the bit rate.
 Findings check_can_load(const std::string& interface, double load);
 
 }  // namespace r4::tool

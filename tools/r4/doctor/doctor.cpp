@@ -67,8 +67,7 @@ std::vector<std::string> ports_of(const Machine& machine, const Discovery& found
   return ports.empty() ? likely_ports(machine) : ports;
 }
 
-// The serial ports of this computer and the programs that share them. Asks the boards at `urls`,
-// and at ports with a board's USB id, for their identity.
+// Asks the boards at `urls`, and at ports with a board's USB id, for their identity.
 Discovery search_ports(const std::vector<Url>& urls) {
   DiscoveryOptions options;
   options.can = options.udp = false;
@@ -96,7 +95,6 @@ Findings check_ports(const Machine& machine, const Discovery& found,
   return findings;
 }
 
-// Checks the transports of `urls`, or all of them if there are no URLs.
 Findings check_machine(const Machine& machine, const std::vector<Url>& urls) {
   Findings findings;
   std::vector<std::string> ports;

@@ -31,11 +31,11 @@ void check_receive_buffer(const Machine& machine, Findings& findings) {
   if (!text) return;
   const long bytes = std::strtol(text->c_str(), nullptr, 10);
   if (bytes >= least_receive_buffer) return;
-  findings.push_back(
-      found(Severity::warning, "network.buffer", "net.core.rmem_max",
-            fmt::format("{} bytes: datagrams that arrive while a program stands still are lost", bytes),
-            machine.as_root(fmt::format("sysctl -w net.core.rmem_max={}", least_receive_buffer)),
-            Mending::automatic));
+  findings.push_back(found(
+      Severity::warning, "network.buffer", "net.core.rmem_max",
+      fmt::format("{} bytes: datagrams that arrive while a program stands still are lost", bytes),
+      machine.as_root(fmt::format("sysctl -w net.core.rmem_max={}", least_receive_buffer)),
+      Mending::automatic));
 }
 
 void check_power_saving(const Machine& machine, Findings& findings) {

@@ -49,8 +49,7 @@ int run_dfu_util(std::vector<const char*> arguments,
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDERR_FILENO);
-  // An interrupted write would leave half a sketch on the board. So neither Ctrl-C nor the end of
-  // this program ends dfu-util.
+  // An interrupted write leaves half a sketch: neither Ctrl-C nor our own end may end dfu-util.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
@@ -81,8 +80,7 @@ int run_dfu_util(std::vector<const char*> arguments,
   return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
 }
 
-// Finds the percentages in dfu-util's bar: "Download	[=====     ]  20%        24576 bytes". The bar
-// "Erase" comes before it.
+// The bar "Download	[=====     ]  20%        24576 bytes" comes after a bar "Erase".
 class Progress {
  public:
   explicit Progress(const std::function<void(int)>& on_percent) : on_percent_(on_percent) {}

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The program dfu-util, which writes a sketch by the Giga's boot loader (USB Device Firmware
-// Upgrade 1.1, with ST's extension DfuSe).
+// The program dfu-util: USB Device Firmware Upgrade 1.1, with ST's extension DfuSe.
 #pragma once
 
 #include <functional>
@@ -16,9 +15,8 @@ struct BootLoaders {
 // Throws Error{unsupported} if dfu-util is not installed.
 BootLoaders look_for_boot_loaders();
 
-// Writes the image at `path` by the boot loader at `usb_path`. Calls `on_percent` with 0 to 100, in
-// order. The board then starts the sketch. If this program is interrupted, dfu-util still writes
-// the rest. Throws Error{open} with the last line of dfu-util if it fails.
+// Calls `on_percent` with 0 to 100, in order. The board then starts the sketch. If this program is
+// interrupted, dfu-util still writes the rest. Throws Error{open} with dfu-util's last line.
 void write_by_dfu(const std::string& path, const std::string& usb_path,
                   const std::function<void(int)>& on_percent);
 

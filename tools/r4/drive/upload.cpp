@@ -107,7 +107,6 @@ std::optional<std::string> port_of(const std::string& url) {
   return path;
 }
 
-// Opens the port for this program alone.
 class Port {
  public:
   explicit Port(std::string path)

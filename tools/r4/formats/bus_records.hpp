@@ -2,8 +2,7 @@
 // Converts frames of CAN buses to records. Each node of each interface is a path,
 // can://can0?node=3, numbered as first heard. A datagram gets the time of its last frame.
 //
-// An emergency stop is an event without a path, "stop can0". A board that goes safe is an event of
-// its path, "link safe stop".
+// Events: an emergency stop, "stop can0", without a path; a board that goes safe, "link safe stop".
 #pragma once
 
 #include <cstdint>

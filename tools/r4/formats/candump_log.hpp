@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // .log, the output of `candump -L`, one frame a line, as a source and a sink:
-//
 //     (1436509052.249713) vcan0 244#2A366C2B
 //
 // Times are relative to 1970; with candump -tz to the first frame, which the user may date.
@@ -26,7 +25,6 @@ class CandumpSource final : public Source {
   CandumpSource(RecordingVisitor& visitor, std::string name,
                 std::optional<Time> start = std::nullopt)
       : visitor_(visitor), records_(visitor), name_(std::move(name)), start_(start) {}
-  // True if the line is a valid line of a log.
   static bool recognises(std::string_view line);
   void feed(std::string_view bytes) override;
   void finish() override;

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Interfaces of `r4 convert` to every format: a source reads a file, a sink writes one. Memory is
-// constant for any length of recording.
-//
+// `r4 convert`, in constant memory: a source reads a file of any format, a sink writes one.
 //     file --> Source --(RecordingVisitor)--> Conversion --> Sink --> Output
 #pragma once
 
@@ -17,8 +15,7 @@
 
 namespace r4::tool {
 
-// Reports the content of a file to a RecordingVisitor. Unreadable parts are reported as damage
-// (line 0 if the format has no lines), and reading continues.
+// Reports unreadable parts as damage (line 0 if the format has no lines), and continues.
 class Source {
  public:
   virtual ~Source() = default;

@@ -78,7 +78,6 @@ void CsvSink::on_header() {
   states_.clear();
 }
 
-// Null for a record without state fields.
 const State* CsvSink::read(const Record& record) {
   const State* const state = states_.take(record);
   return state != nullptr && !state->present.empty() ? state : nullptr;

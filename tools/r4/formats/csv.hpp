@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // .csv: one row for each state, one column for each value, with its unit in the header (RFC 4180).
-//
 //     time [s],path,board,PNum,T [ms],AIN24 [V],OSMC1 pwm [0-4095],OSMC1 direction [0/1]
 //     1795468293.405588,1,left-arm,7434,79090,24.28,400,1
 #pragma once
@@ -21,7 +20,6 @@ class CsvSink final : public Sink {
  public:
   // Device values get columns too: of `devices`, or else of the recording's devices.
   explicit CsvSink(Output& output, std::vector<Device> devices = {});
-  // Columns are the surveyed fields, or all fields if nothing was surveyed.
   bool wants_survey() const override { return true; }
   void survey(const RecordedPath& path) override { names_.on_path(path); }
   void survey(const RecordedDevice& device) override;

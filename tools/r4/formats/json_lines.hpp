@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // .jsonl: one JSON object for each record, its datagram as in `r4 decode`.
-//
 //     {"time":1795468293.405588,"path":1,"board":"arm","from":"board","ok":true,"type":"state",…}
 //     {"time":1795468293.404765,"path":1,"board":"arm","type":"event","event":"up udp://10.0.0.7"}
 #pragma once
@@ -34,7 +33,6 @@ class MeasuredJson {
 
 class JsonLinesSink final : public Sink {
  public:
-  // Adds values of `devices`, or else of the recording's devices.
   explicit JsonLinesSink(Output& output, std::vector<Device> devices = {})
       : output_(output), devices_(std::move(devices)) {}
   bool wants_survey() const override { return true; }

@@ -107,7 +107,6 @@ std::string body_of(const std::vector<std::string>& lines) {
   return out;
 }
 
-// The footer of the help, split into man page sections.
 struct Footer {
   std::vector<std::string> description;
   std::vector<std::string> examples;

@@ -245,9 +245,8 @@ FilePointer make_plan(const Curves& curves, const std::vector<Wanted>& wanted,
   return input;
 }
 
-// Runs plot.py and returns its exit code; empty if that Python does not exist. Runs in the root
-// directory: Python imports modules from the working directory, and matplotlib reads its settings
-// there, so downloaded files could be executed.
+// Returns the exit code; empty if that Python does not exist. Runs in /: Python imports modules,
+// and matplotlib reads settings, from the working directory, which may hold downloaded files.
 std::optional<int> run_python(const char* python, const FilePointer& plan,
                               const FilePointer& picture) {
   std::rewind(plan.get());

@@ -9,8 +9,7 @@
 
 namespace r4::tool {
 
-// Reads a file of any format; "-" is standard input. Calls `advance` with the number of bytes of
-// each read. Throws Error if the file cannot be read or has an unknown format.
+// "-" is standard input. `advance` gets the number of bytes of each read. Throws Error.
 void read_file(const std::string& path, RecordingVisitor& visitor,
                const SourceOptions& options = {},
                const std::function<void(std::size_t)>& advance = {});

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Subscriptions and services of a board: R4_Command, a topic for each output component, cmd_vel,
-// stop, arm.
+// Subscriptions and services of a board: R4_Command, a topic for each output, cmd_vel, stop, arm.
 //
-// Runs on the boards' loop. Setpoints are collected until the inbox is drained, the newest of each
-// channel, and sent in as few datagrams as possible. A sample older than 250 ms is dropped, and so
-// is every sample without a link: nothing is kept for later. A lost link ends a running arm(). A
-// stop is never too old.
+// Runs on the boards' loop. Of the setpoints of an inbox the newest of each channel is sent, in as
+// few datagrams as possible. A sample older than 250 ms, or without a link, is dropped: nothing is
+// kept for later. A lost link ends a running arm(). A stop is never too old.
 #pragma once
 
 #include <asio/cancellation_signal.hpp>
@@ -50,7 +48,6 @@ class BoardCommands {
 
  private:
   using Clock = std::chrono::steady_clock;
-  // maximum age of a command when it is sent
   static constexpr std::chrono::milliseconds oldest{250};
   struct Setpoint {
     Command command;
@@ -80,7 +77,6 @@ class BoardCommands {
   template <class Message, class Value>
   void add(Inbox& inbox, const std::string& topic,
            Inbox::Subscription<Message, Value> subscription);
-  // The action of a service; `text` is the text of the request.
   using Act =
       std::function<void(const std::optional<std::string>& text, const Origin&, const Done&)>;
   struct Room {

@@ -58,7 +58,6 @@ BoardTopics::BoardTopics(Graph& graph, std::size_t node, const NodeOptions& opti
   }
 }
 
-// The topic of a component; 0 if the field has none.
 dds_entity_t BoardTopics::make_topic(Graph& graph, std::size_t node, const StateFieldRow& row) {
   const char* const kind = row_of(row.kind).name;
   switch (row.kind) {

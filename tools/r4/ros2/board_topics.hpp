@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The topics of a board: the paper's three strings (section 8.8), one topic for each component in
-// ROS units, joints, battery, ranges and diagnostics. After construction only the outbox's thread
-// uses it.
+// The topics of a board: the paper's three strings (section 8.8), components in ROS units, joints,
+// battery, ranges and diagnostics. After construction only the outbox's thread uses it.
 //
 // The strings are published with every datagram, joints with every state. A component is published
 // when it changes and once a second, for late subscribers. Missing fields are not repeated.
@@ -52,7 +51,6 @@ class BoardTopics {
     dds_entity_t writer = 0;
     std::optional<Value> last;
     Clock::time_point sent{};
-    // True if the value must be published now.
     bool is_due(const Value& value, Clock::time_point now) {
       if (writer == 0 || (last == value && now - sent < std::chrono::seconds(1))) return false;
       last = value;

@@ -29,7 +29,6 @@ struct BridgeOptions {
   bool json = false;
 };
 
-// Runs until a signal or the end of `duration`; returns the exit code.
 int run_bridge(const BridgeOptions& options);
 
 }  // namespace r4::tool::ros2

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measurements of described devices as imu, battery, range or joint_states below the device's name,
-// depending on its role. Each reading is published once, with the board's time of reading. After
-// construction only the outbox's thread uses it.
+// Measurements of described devices by role: imu, battery, range, or joint_states below its name.
+// Each once, with the board's time of reading. After construction only for the outbox's thread.
 #pragma once
 
 #include <chrono>

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tracks the publisher that drives each output, and publishers that have disappeared.
-//
 //     free --a command that drives--> driven --a command that stops, or its publisher--> stopping
 //      ^                                 ^     has gone or is silent for the deadline        |
 //      |                                 +----------- a command that drives -----------------+
 //      +----------------------------- stopped, the board has confirmed it -------------------+
 //
 // A stop might be lost, so it is repeated until confirmed. A stopped output is as in the safe
-// state: motors at 0, brushless drivers at 0 with brakes on, servos without pulses, relays open,
-// steppers standing, voltages at 0. Relay 1, the motors' supply, belongs to arming. A stepper's
-// position is kept for a while, because only one of a state's datagrams has it. The caller passes
-// in the time, which continues while this computer sleeps.
+// state, except relay 1, the motors' supply, which belongs to arming. A stepper's position is kept
+// for a while, because only one of a state's datagrams has it. The caller passes in the time, which
+// continues while this computer sleeps.
 #pragma once
 
 #include <array>
@@ -48,7 +46,6 @@ class Drivers {
   // `source`: the topic; `publisher`: of that topic.
   void on_sent(const Command& command, const void* source, std::uint64_t publisher, Time now);
   void on_state(const State& state, Time sampled);
-  // The remaining publishers of a topic.
   void on_publishers(const void* source, const std::vector<std::uint64_t>& there);
   // Call when the outputs were made safe otherwise.
   void forget();

@@ -51,7 +51,6 @@ DifferentialDrive differential_drive(std::string_view channels, double separatio
 // with the board. Counts before the first state after a restart are lost.
 class Position {
  public:
-  // `boot` changes when the board has restarted.
   std::int64_t advance(std::int32_t count, std::uint32_t boot);
 
  private:

@@ -25,12 +25,10 @@ Json fields_json(const Datagram& datagram);
 // {"error":"crc","position":…,"expected":"0x…","found":"0x…"}; the last two for crc only.
 Json bad_datagram_json(const ReadResult& result);
 
-// Adds to `object` the content of a plain datagram: `ok`; `type`, `pnum`, `t` and `fields`, or
-// `error` and its position; `text`. Returns true if the datagram is valid.
+// Adds `ok`; `type`, `pnum`, `t` and `fields`, or `error` and its position; `text`. True if valid.
 bool add_datagram_json(Json& object, std::string_view bytes);
 
-// {"type":"error","kind":…,"thing":…,"reason":…,"fix":…}; for a command also "outcome", and "code"
-// if the board refused it.
+// {"type":"error","kind":…,"thing":…,"reason":…,"fix":…}; of a command also "outcome" and "code".
 Json problem_json(const Problem& problem);
 
 // {"wrong_sequence":…,"timed_out":…,"overflow":…,"interrupted":…,"cancelled":…,"unexpected":…,

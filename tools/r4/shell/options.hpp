@@ -39,7 +39,6 @@ void add_texts(CLI::App& command, const std::string& name, std::vector<std::stri
 void add_text(CLI::App& command, const std::string& name,
               const std::function<void(const std::string&)>& take, const std::string& meaning,
               const char* type, Need need);
-// The option's name is repeated before each value.
 void add_repeated(CLI::App& command, const std::string& name, std::vector<std::string>& out,
                   const std::string& meaning, const char* type);
 
@@ -57,7 +56,6 @@ CLI::Option* add_json(CLI::App& command, bool& out, const std::string& meaning);
 
 // '+' joins the URLs of several paths to one board (r4link/discovery/url_pattern.hpp). For
 // add_paths(), which takes one board, each URL is a path; for add_boards() each URL is a board:
-//
 //     r4 stop serial:auto udp://192.168.0.125   =   r4 stop serial:auto+udp://192.168.0.125
 CLI::Option* add_paths(CLI::App& command, std::vector<std::string>& out);
 CLI::Option* add_boards(CLI::App& command, std::vector<std::string>& out);

@@ -29,7 +29,6 @@ void print_text(fmt::format_string<First, Rest...> format, First&& first, Rest&&
 }
 // Prints the bytes unchanged: our own text with cursor control, and bytes for programs.
 void print_raw(std::string_view text);
-// A printable() line for people on standard error.
 void print_trouble(std::string_view text);
 template <class First, class... Rest>
 void print_trouble(fmt::format_string<First, Rest...> format, First&& first, Rest&&... rest) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A simulated board in its own process, for the demonstration: this program run as `r4 sim URL
-// --json`, with its events read through a pipe.
+// A simulated board in its own process: this program as `r4 sim URL --json`, read through a pipe.
 #pragma once
 
 #include <sys/types.h>

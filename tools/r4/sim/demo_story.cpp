@@ -85,7 +85,6 @@ StoryResult Story::run() {
   return result_;
 }
 
-// Runs the loop until is_so() is true; returns false on timeout.
 bool Story::wait_until(const std::function<bool()>& is_so, Milliseconds at_most) {
   const Clock::time_point end = Clock::now() + at_most;
   while (!is_so()) {

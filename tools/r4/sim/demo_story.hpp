@@ -39,7 +39,6 @@ struct BoardLog {
 
 class Story {
  public:
-  // `say` prints an explanation, `show` a datagram.
   struct Teller {
     std::function<void(std::string_view)> say;
     std::function<void(std::string_view)> show;

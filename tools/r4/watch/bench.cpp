@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // r4 bench: measures the quality of the link to a board, in four phases:
-//
 //     wait for control | listen: rate, loss, jitter | ask: round trips | command: confirmations
 //                             2/5 of the time             2/5                 1/5
 #include <fmt/format.h>

@@ -141,8 +141,7 @@ class Monitor {
     on_paths(board, [&view](const PathStatus& path) { view.on_path(path); });
   }
 
-  // Devices are set up by the host in control: this program, if no other host controls the board.
-  // Otherwise show the devices that the other host has set up.
+  // The host in control sets devices up: this program, if no other host controls the board.
   void set_devices_up() {
     AsyncBoard& board = boards_[0].board;
     setup_.emplace(boards_.io(), board, devices_,

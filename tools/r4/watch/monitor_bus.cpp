@@ -27,7 +27,6 @@ constexpr Milliseconds bus_tick{100};
 constexpr Milliseconds plain_interval{1000};
 // A board without a host sends twice a second.
 constexpr Milliseconds bus_patience{5000};
-// Any rate will do, because the bus load is not used here (see `r4 bus`).
 constexpr CanBitRate any_rate{1000000, 0};
 
 class BusMonitor {

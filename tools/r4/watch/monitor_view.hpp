@@ -36,7 +36,6 @@ class MonitorView {
 
   virtual void on_state(const ReceivedState&, const Datagram&) {}
   virtual void on_heartbeat(const Datagram&) {}
-  // New values of a described device, from one of its polls.
   virtual void on_reading(const DeviceNews&) {}
   virtual void on_device_trouble(const Problem&) {}
   virtual void on_end() {}

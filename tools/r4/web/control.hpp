@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Decides which browser controls the boards, and for how long: without a browser no motor turns.
-//
 //      free --take()--> held --release() of its holder, or expired()--> leaving --left()--> free
 //
 // The holder sends alive() ten times a second, with the newest server time it has received. Control

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Connects the boards with the clients of the server. Runs on the boards' loop. Client messages
-// arrive there one by one, already parsed, so they cost little.
+// Connects the boards and the server's clients, whose messages come parsed, on the boards' loop.
 #pragma once
 
 #include <chrono>

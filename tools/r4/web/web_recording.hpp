@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A recording started from a page. A thread of its own waits for the disk.
-//
 //     off --begin()--> opening --opened--> on --end(), or the disk is full--> off
 //                         |                     end() during opening: as soon as it is on
 //                         +--it cannot be opened--> off
@@ -34,7 +33,6 @@ class WebRecording {
   // No effect while recording.
   void begin(Client client);
   void end();
-  // True if this client started the current recording.
   bool is_of(Client client) const { return stage_ != Stage::off && client_ == client; }
   // Call once a second: updates the size, and detects the end after a full disk.
   void look();

@@ -64,7 +64,6 @@ class StuffedBits {
   std::uint32_t last_ = 2;  // neither 0 nor 1
 };
 
-// SOF, the id, and the bits between its parts; `request` is RTR, or RRS in an FD frame.
 void write_arbitration(StuffedBits& out, const CanFrame& frame, std::uint32_t request) {
   out.bit(0);
   if (frame.extended) {

@@ -103,7 +103,6 @@ bool CanNode::begin(Text datagram, std::uint32_t now_us) {
   return sender(lane).begin(bytes, static_cast<std::uint32_t>(size), now_us);
 }
 
-// A board that goes safe reports it in its next heartbeat, which is sent at once.
 void CanNode::note_reason(Text heartbeat) {
   Datagram datagram;
   if (!read_datagram(heartbeat, datagram)) return;

@@ -3,10 +3,9 @@
 // whole datagrams on one side, frames on the other.
 //     dialogue    host to board, and the board's answers (N, I): ISO-TP with flow control
 //     telemetry   the board's states and heartbeats: ISO-TP without, for any number of listeners
-// Three raw frames are added. The board's end turns an emergency stop into E:STOP. It sends the
-// reason when a heartbeat first reports that the board went safe. A watcher requests states.
-// Datagrams are received plain and packed, and sent packed on request. A board answers a plain-text
-// host in plain text.
+// Three raw frames are added: the emergency stop, which the board's end turns into E:STOP; the
+// reason when a board goes safe; a watcher's request for states. Datagrams are received plain and
+// packed, and sent packed on request; a board answers a plain-text host in plain text.
 // Driven like its ISO-TP ends (isotp.hpp). Sans-I/O, no heap, about 4.5 KB. A queue before it
 // chooses the next datagram. Not thread-safe.
 #pragma once
@@ -49,12 +48,10 @@ class CanNode {
   // A host's datagrams go to the dialogue, a board's by their kind.
   CanLane lane_of(Text datagram) const;
   bool idle(CanLane lane) const;
-  // Copies a datagram of at most max_datagram bytes. False without effect if its lane is not idle,
-  // or if it is empty or too long.
+  // Copies a datagram. False without effect if its lane is not idle, or it is empty or too long.
   bool begin(Text datagram, std::uint32_t now_us);
 
-  // Writes the most urgent frame to send: the same until frame_sent() or a more urgent one. False
-  // if none.
+  // Writes the most urgent frame: the same until frame_sent() or a more urgent one. False if none.
   bool offer(std::uint32_t now_us, CanFrame& frame);
   // As offer(), but only frames that may overtake all accepted ones: flow control, for which the
   // other end waits, and the reason for going safe.

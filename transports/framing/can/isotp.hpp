@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams on a CAN bus: ISO 15765-2:2016 with normal addressing ("ISO-TP"). Both ends share this
-// file; isotp_sender.hpp cuts a datagram into frames, isotp_receiver.hpp joins them.
-//
+// Datagrams on a CAN bus: ISO 15765-2:2016 with normal addressing ("ISO-TP"), what both ends share.
 //     single frame       0L data…               up to 7 bytes; 00 LL data… in a longer FD frame
 //     first frame        1L LL data…            8–4095 bytes; 10 00 LL LL LL LL data… for more
 //     consecutive frame  2S data…               S counts 1 … 15, 0, 1 …
@@ -15,8 +13,7 @@
 //     deadline()             when to call poll() and offer() again, so that a loop needs one timer
 //     poll(now)              ends a timed-out transfer; so do on_frame(), and offer() for its frame
 // Call frame_sent() before handing in later arrivals. A full queue costs time, but never a frame
-// within a transfer. Time is in us and wraps; all calls of one object use one clock. Time-outs must
-// be below 2^31 us. Not thread-safe.
+// within a transfer. Time is us of one clock and wraps; time-outs: below 2^31 us. Not thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -103,8 +103,7 @@ IsotpArrival IsotpReceiver::on_consecutive(const CanFrame& frame, std::uint32_t 
   const bool follows = (frame.data[0] & 0xF) == sequence_;
   // Only the last frame may be shorter than the first frame (9.6.4.1).
   if (frame.size > rx_dl_ || frame.size <= chunk || !follows) {
-    // A wrong number proves a loss, whatever the length. If the frame were ignored, a frame of the
-    // next transfer could take the place of the lost one.
+    // A wrong number proves a loss: else a frame of the next transfer could replace the lost one.
     if (follows) return malformed();
     return {false, fail(IsotpError::wrong_sequence_number, counters_.wrong_sequence_number)};
   }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Joins ISO-TP frames to datagrams (ISO 15765-2:2016, 9.2 and 9.3), in the caller's buffer.
-//
 //           first frame           offer()            frame_sent(): clear to send
 //     idle -------------> owing ----------> offered ------------------------------> receiving
 //       |                 ^   ^                |                                    |   |   ^
@@ -28,9 +27,8 @@
 // within N_Cr. Then the datagram is made of both. If both have n frames, n frames in a row must be
 // lost, or n - 16, n - 32 …, but at least 2. Examples: 4 if both have 4, 9 if both have 25, 2 if
 // both have 18. An N_Cr below the pause between transfers excludes it.
-// With flow control, a flow control must arrive after N_Bs, after the datagram's sender has given
-// up and begun another transfer. The first frame of that transfer must also be lost. The datagram's
-// CRC detects both cases.
+// With flow control, one must arrive after N_Bs, when the sender has given up and begun another
+// transfer, whose first frame must also be lost. The datagram's CRC detects both cases.
 #pragma once
 
 #include <cstdint>

@@ -143,8 +143,7 @@ IsotpError IsotpSender::on_flow_control(const CanFrame& frame, std::uint32_t now
       block_left_ = frame.data[1];
       waits_ = 0;
       state_ = State::ready;
-      // The gap also holds between two blocks. If the frame was accepted after this flow control
-      // arrived, the time of sending is the later one.
+      // The gap also holds between two blocks, from the acceptance of a frame if that is later.
       const std::uint32_t due_us = sent_us_ + gap_us_;
       deadline_us_ = any_consecutive_ && !reached(now_us, due_us) ? due_us : now_us;
       return IsotpError::none;

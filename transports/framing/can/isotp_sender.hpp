@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Cuts datagrams, one after the other, into ISO-TP frames (ISO 15765-2:2016, 9.2 and 9.3).
-//
 //              begin()             its time comes           N_As: send_timeout
 //      idle ------------> ready ------------------> offered ------------------> idle
 //                          ^  ^                        |
@@ -74,8 +73,7 @@ class IsotpSender {
   // Writes the frame to send; false if there is none. Constant time.
   bool offer(std::uint32_t now_us, CanFrame& frame);
   void frame_sent(std::uint32_t now_us);
-  // Accepted frames reached the bus only now: restarts N_Bs if flow control is awaited, or the gap
-  // to the next consecutive frame.
+  // Accepted frames reached the bus only now: restarts N_Bs, or the gap to the next frame.
   void wait_anew(std::uint32_t now_us);
   // Takes flow control and ignores other frames. Returns the first error.
   IsotpError on_frame(const CanFrame& frame, std::uint32_t now_us);
@@ -83,8 +81,7 @@ class IsotpSender {
     return state_ < State::offered || !reached(now_us, deadline_us_) ? IsotpError::none
                                                                      : time_out();
   }
-  // Ends a transfer, because the interface is down. The offered frame and later frames are not
-  // sent.
+  // Ends a transfer, because the interface is down. Later frames are not sent.
   void cancel();
 
   IsotpDeadline deadline() const { return {busy(), deadline_us_}; }

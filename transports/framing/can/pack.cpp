@@ -262,7 +262,6 @@ bool is_session(const Field& field, Numbers& numbers) {
   return field.name() == Text("SID") && parse_session_id(field.values(), numbers.sid);
 }
 
-// The last field in [begin, end), where `end` is after its semicolon.
 Field last_field(const char* begin, const char* end) {
   const char* at = end - 1;
   const char* colon = at;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The words with a code in the packed form, and the form of each field's values.
-// docs/reference/packed.md has the same tables. They belong to version 1; after the first release
-// they change only with the version.
+// The words with a code in the packed form, and the form of each field's values: the tables of
+// docs/reference/packed.md, version 1. After the first release they change only with the version.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +9,7 @@
 
 namespace r4 {
 
-// The packed form of a field's values. A text that differs from what the form writes is sent as
-// text, after an F.
+// A text that differs from what the form writes is sent as text, after an F.
 enum class PackedForm : std::uint8_t {
   text,
   flag,        // 0-14 in 1 digit

@@ -277,7 +277,6 @@ struct Numbers {
   SessionId sid = no_session;
 };
 
-// SID and T if the layout has them, and PNum.
 void put_numbers(Layout layout, const Numbers& numbers, Characters& out) {
   if (has_session(layout)) {
     out.put("SID:", 4);

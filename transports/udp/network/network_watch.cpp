@@ -57,7 +57,6 @@ void NetworkWatch::wait() {
 }
 
 // Looks up all addresses, because reports may be lost, and one change may cause many reports.
-// Unread reports wait for the next turn.
 void NetworkWatch::tell() {
   std::array<char, 4096> report;
   for (int i = 0; i < most_in_a_turn; ++i) {

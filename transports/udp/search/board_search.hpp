@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Finds the boards on this computer's networks by IPv4 broadcast. A board answers every host.
-//
 //     on each network:  socket at our address, any free port --- Q:ID, 3 times ---> broadcast:2018
 //                                     <--- I:R4,…;NAME:…;BUSY:… --- each board, from its :2018
 //
@@ -32,7 +31,6 @@ struct AnsweredBoard : IdentityAnswer {
 };
 
 struct BoardSearch {
-  // A network of this computer, by one of its addresses.
   struct Network {
     std::string interface;
     unsigned index = 0;  // of the interface; 0: as the system routes it
@@ -49,8 +47,7 @@ struct BoardSearch {
     std::size_t others = 0;  // boards of another id and name
     bool more = false;       // more boards have answered than are kept
   };
-  // Blocks for `patience`. Throws only if memory is used up. `called`: keeps only the boards with
-  // that id or name; empty: all boards.
+  // Blocks for `patience`. Throws only if memory is used up. `called`: an id or name; empty: all.
   Result run(std::string_view called = {}) const;
 
   static constexpr std::size_t most_boards = Discovery::most_answers;

@@ -68,8 +68,7 @@ bool is_stack(const std::uint32_t* frame) {
   return in_dtcm || in_ram;
 }
 
-// Called for warnings too. Does not continue to mbed_die(), because the core prints first and may
-// wait.
+// Called for warnings too. mbed_die() would print first and may wait.
 void on_core_error(const mbed_error_ctx* context) {
   if (!mbed_get_error_in_progress()) return;
   FaultNote note;

@@ -63,8 +63,7 @@ class Fdcan {
   bool send_urgent(const CanFrame& frame);
 
   enum class Event : std::uint8_t { none, bus_off, stale };
-  // bus_off: the controller has left the bus; stale: nothing was sent for stale_us. Both drop all
-  // waiting frames.
+  // bus_off: the bus was left; stale: nothing was sent for stale_us. Both drop all waiting frames.
   Event poll(std::uint32_t now_us);
   // In the controller's interrupt, which it clears. True: an emergency stop waits in FIFO 1.
   bool on_interrupt();

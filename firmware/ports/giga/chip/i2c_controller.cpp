@@ -68,9 +68,8 @@ void I2cController::start(std::uint32_t kernel_hz) {
   registers_.CR1 = cr1_on;
 }
 
-// `attempt(transfer)` returns the result of one attempt. A second attempt follows a timeout, unless
-// another transfer took over the bus in the meantime: then it could undo that transfer.
-// Before the second attempt, a chip that was interrupted within a byte must release SDA.
+// A second attempt follows a timeout, after a chip that was interrupted within a byte has released
+// SDA; not if another transfer took over the bus in the meantime: it could undo that transfer.
 template <class Attempt>
 I2cResult I2cController::transfer(std::size_t bytes, std::size_t starts, Attempt attempt) {
   constexpr std::uint32_t clean_up_us = 20;

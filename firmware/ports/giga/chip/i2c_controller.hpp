@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An I2C peripheral of the STM32H747 as master at up to 400 kHz (RM0399, chapter I2C). Fulfils
-// drivers/i2c_bus.hpp. A transfer that lost the bus or timed out is repeated once, on a freed bus,
-// so that one disturbance does not stop the robot. A read with a bus error (BERR) is repeated, too:
-// its chip may have left the bus. A write ignores bus errors: a chip that left does not
-// acknowledge, and as master the peripheral reports bus errors that did not occur (ST errata ES0430
-// 2.15.2). recover() or another transfer may interrupt a transfer, also from a fault handler: the
-// interrupted transfer then returns timeout. The core's library (Wire) waits 36 ms for each byte on
-// a hung bus.
+// An I2C peripheral of the STM32H747 as master at up to 400 kHz (RM0399, chapter I2C). A transfer
+// that lost the bus or timed out is repeated once, on a freed bus, so that one disturbance does not
+// stop the robot. So is a read with a bus error (BERR): its chip may have left the bus. A write
+// ignores bus errors: a chip that left does not acknowledge, and as master the peripheral reports
+// bus errors that did not occur (ST errata ES0430 2.15.2). An interrupted transfer returns timeout.
+// The core's library (Wire) waits 36 ms for each byte on a hung bus.
 #pragma once
 
 #include <cstddef>

@@ -15,8 +15,7 @@
 namespace r4 {
 namespace giga {
 
-// TIMINGR for a kernel clock of 8 to 250 MHz, rounded up: SCL low 5.0 us, high 4.7 us, data hold
-// 0.25 us, set-up 1.25 us.
+// TIMINGR for 8 to 250 MHz, rounded up: SCL low 5.0 us, high 4.7 us, hold 0.25 us, set-up 1.25 us.
 std::uint32_t user_i2c_timing(std::uint32_t kernel_hz);
 
 class UserI2cController final : public firmware::UserI2cPort {

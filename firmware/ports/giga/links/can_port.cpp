@@ -22,7 +22,6 @@ void CanPort::send(Text datagram, Priority priority, std::uint32_t) {
   pump();
 }
 
-// Starts the oldest datagram of `queue`. False: none, or the lane is busy.
 bool CanPort::begin_next(CanLane lane, DatagramRing<queue_bytes>& queue) {
   if (!node_.idle(lane)) return false;
   DatagramNote note;

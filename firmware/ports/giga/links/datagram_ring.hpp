@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A queue of whole datagrams with a note for each. One thread puts, the same or another takes.
-// Without locks; neither side waits.
+// A queue of whole datagrams, each with a note, between two threads: no locks, no waits.
 #pragma once
 
 #include <cstddef>

@@ -31,7 +31,6 @@ class UdpPeers {
   void hold(std::uint32_t peer) { hosts_.hold(peer); }
   void also_hold(std::uint32_t peer) { hosts_.also_hold(peer); }
 
-  // Fills `to` with the addresses of `peer`. Returns their number.
   static constexpr int most_places = 2;
   int find(std::uint32_t peer, UdpAddress (&to)[most_places]) const {
     to[1].ip = host_;

@@ -2,9 +2,8 @@
 // USB serial as a port of the application: one datagram a line, and the line `report` for the
 // board. The core's Serial.write() waits for ever if a program opens the port and does not read. So
 // lines go out by send_nb(), one packet at a time, whole or not at all, and the newest state wins
-// (transmit_lines.hpp). An interrupt of low priority takes input from the core and detects a stop
-// while the loop is busy. When its ring is full, more input waits at the host. Only take_in() and
-// listen() may be called outside the loop.
+// (transmit_lines.hpp). An interrupt of low priority takes input and detects a stop while the loop
+// is busy; a full ring lets input wait at the host. From the loop, except take_in() and listen().
 #pragma once
 
 #include <cstdint>
@@ -36,8 +35,7 @@ class UsbPort final : public firmware::Port {
   bool take_in();
   bool has_received() const { return !received_.empty(); }
 
-  // Call it before receive(). True: since the last turn, a program closed the port and the next
-  // program opened it.
+  // Before receive(). True: since the last turn a program closed the port and the next opened it.
   bool begin_turn();
 
   // Calls `on_line(Text)` for each line.
@@ -63,7 +61,6 @@ class UsbPort final : public firmware::Port {
   // boot loader when the port closes, at least 200 ms later, at any speed.
   bool upload_asked();
 
-  // Sends a line of the report. False: no room.
   bool say(Text line);
 
   bool open() const { return open_; }

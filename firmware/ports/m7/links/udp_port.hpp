@@ -18,7 +18,6 @@ namespace m7 {
 class UdpPort final : public firmware::Port {
  public:
   UdpPort(std::uint32_t address, std::uint16_t port) : frames_(address, port) {}
-  // False: there is no Ethernet.
   bool start() {
     if (!chip_.start()) return false;
     frames_.set_mac(chip_.mac());

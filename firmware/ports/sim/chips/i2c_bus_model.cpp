@@ -238,7 +238,6 @@ I2cResult I2cBusModel::fetch_byte(Transfer& transfer, std::uint8_t& byte) {
   return I2cResult::ok;
 }
 
-// The refusal of `address` after `first` to `last` bytes; nullptr if there is none.
 I2cBusModel::Refusal* I2cBusModel::refusal_of(std::uint8_t address, std::size_t first,
                                               std::size_t last) {
   for (Refusal& refusal : refusals_) {

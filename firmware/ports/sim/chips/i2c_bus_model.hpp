@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A simulated I2C bus at 400 kHz: chip models behind the drivers' interface, the time of each
-// transfer, and errors on request. Transfers and advance() let time pass. Only an I2cProcessor
-// really waits.
+// A simulated I2C bus at 400 kHz: chip models behind the drivers' interface, and errors on request.
+// Transfers and advance() let time pass. Only an I2cProcessor really waits.
 //
 // An interrupt may make transfers during a transfer. That transfer then ends with `timeout` and
 // leaves the chips alone. An I2cProcessor keeps each byte whole, as the wire does.
@@ -81,7 +80,6 @@ class I2cBusModel final : public firmware::I2cBus {
   bool refuse(std::uint8_t address, std::size_t after_bytes = 0, int times = 1);
   // A chip holds SDA: transfers time out until `recoveries` calls of recover().
   void hold(int recoveries = 1);
-  // Holds the bus after `after_bytes` more bytes.
   void hold_after(std::size_t after_bytes, int recoveries = 1);
   // `chip` loses power for a moment after `after_bytes` more bytes on the bus.
   bool reset_after(I2cChipModel& chip, std::size_t after_bytes);

@@ -8,7 +8,6 @@ namespace sim {
 
 class I2cChipModel {
  public:
-  // Every register gets its reset value.
   virtual void power_on() = 0;
   // START (or repeated START). True if the chip acknowledges and takes part.
   virtual bool start(std::uint8_t address, bool read) = 0;
@@ -17,7 +16,6 @@ class I2cChipModel {
   // The end of a transfer in which the chip took part.
   virtual void stop() {}
 
-  // Uses `now_ns` as the chip's clock from now on.
   void follow(const std::uint64_t& now_ns) { clock_ = &now_ns; }
 
  protected:

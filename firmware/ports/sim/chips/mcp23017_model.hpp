@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The MCP23017 by its data sheet (DS20001952). Not modelled: interrupts (their registers store
-// values, INTF and INTCAP read 0).
+// The MCP23017 by its data sheet (DS20001952), without interrupts (INTF and INTCAP read 0).
 #pragma once
 
 #include <cstdint>

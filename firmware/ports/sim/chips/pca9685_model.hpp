@@ -24,7 +24,6 @@ class Pca9685Model final : public I2cChipModel {
   double frequency_hz() const { return 25e6 / (4096.0 * (reg(0xFE) + 1)); }
   std::uint8_t reg(std::uint8_t number) const { return registers_[number]; }
 
-  // A disturbance flips bits of a register, even bits that cannot be written.
   void disturb(std::uint8_t number, std::uint8_t bits) {
     registers_[number] ^= bits;
     show();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus of the simulated board: a controller at 100 kHz, the devices on its two lines,
-// and their faults. A transfer takes its time on the wire; it reads what the devices held when it
-// began.
+// The user's I2C bus of the simulated board: a controller at 100 kHz, the devices, and their
+// faults. A transfer takes its time on the wire; it reads what the devices held when it began.
 #pragma once
 
 #include <cstdint>

@@ -90,7 +90,6 @@ Drive BoardChips::dhb12_drive(int channel) const {
   return drive(SignalKind::dhb12_pwm, SignalKind::dhb12_direction, channel);
 }
 
-// True if the line of the expander is driven to the level that means on, or forward.
 bool BoardChips::is_driven(SignalKind kind, int channel) const {
   const Place place = wiring.at(kind, channel);
   if (!place.connected()) return false;

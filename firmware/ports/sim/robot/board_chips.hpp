@@ -14,7 +14,6 @@
 namespace r4 {
 namespace sim {
 
-// The chips that are fitted, with their outputs at the functions of the board.
 struct BoardChips {
   explicit BoardChips(const Wiring& wired = plan_wiring());
   BoardChips(const BoardChips&) = delete;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The calls of r4link.aio.Board. The loop never needs the GIL, and no thread waits for a call.
-//
 //     the thread of Python            the board's loop
 //     Calls.arm(…) ---- posted ---->  AsyncBoard::async_arm()
 //     Call, whose descriptor  <-----  its handler

@@ -28,8 +28,7 @@ auto staying(Code code) {
   }
 }
 
-// `call()`: a call of the C API that returns a new reference and may run Python code. Throws
-// py::error_already_set.
+// `call()` returns a new reference and may run Python code. Throws py::error_already_set.
 template <class Call>
 py::object from_python(Call call) {
   auto result = py::reinterpret_steal<py::object>(staying(call));

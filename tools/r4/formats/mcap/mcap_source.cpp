@@ -25,7 +25,6 @@ constexpr std::size_t compression_at = mcap::record_head + 28;
 constexpr std::string_view zstd_mark{"\x04\0\0\0zstd", 8};
 constexpr std::string_view lz4_mark{"\x03\0\0\0lz4", 7};
 
-// Unpacks into `out`. False if the bytes are not LZ4 frames of `size` unpacked bytes.
 bool unpack_lz4(std::string_view bytes, std::uint64_t size, std::string& out) {
   LZ4F_dctx* context = nullptr;
   if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) {
@@ -187,7 +186,6 @@ void McapSource::on_chunk(std::string_view content) {
   }
 }
 
-// Unpacks into chunk_. False if the chunk is not valid.
 bool McapSource::unpack(std::string_view compression, std::string_view bytes, std::uint64_t size) {
   chunk_.clear();
   if (compression.empty()) {

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads .mcap files of McapSink sequentially, without the index. A damaged chunk is reported, and
-// reading continues with the next chunk.
-//
-// Other tools may have copied the file: with another chunk size, compression or profile, without
-// some topics, or with foreign topics, which are ignored.
+// Reads .mcap files sequentially, without the index. After a damaged chunk it continues with the
+// next. Other tools may have copied the file: with another chunk size, compression or profile,
+// without some topics, or with foreign topics, which are ignored.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Converts packets of a network or a CAN bus to records: UDP datagrams to and from a board's port,
-// CAN frames of boards, and PcapngSink's output. Other packets are ignored. A capture without any
-// record is refused, with a summary of its content.
+// CAN frames of boards, and PcapngSink's output. A capture without any record is refused.
 //
 // A packet captured on two interfaces of the computer (tcpdump -i any) is reported once.
 #pragma once

@@ -59,7 +59,6 @@ void PcapSource::take(bool at_end) {
   waiting_.erase(0, waiting_.size() - rest.size());
 }
 
-// Detects the format. Throws Error for any other format.
 void PcapSource::begin(std::string_view bytes) {
   for (const ByteOrder order : {ByteOrder::little, ByteOrder::big}) {
     order_ = order;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads .pcapng and .pcap: captures of UDP or SocketCAN by tcpdump and Wireshark, and recordings
-// converted by PcapngSink. After damage, pcapng continues with the next block; the rest of a pcap
-// file cannot be read.
+// Reads .pcapng and .pcap: captures of UDP or SocketCAN, and PcapngSink's recordings. After damage,
+// pcapng continues with the next block; the rest of a pcap file cannot be read.
 #pragma once
 
 #include <cstdint>

@@ -51,8 +51,7 @@ std::optional<Mismatch> wrong_policy(const OwnEndpoint& ours, const Announced& o
                   ours.name, policy, other.owner_text())};
 }
 
-// True for requests in the form of rmw_fastrtps, without a client id (docs/how-to/ros2.md,
-// Services).
+// Requests in the form of rmw_fastrtps, without a client id (docs/how-to/ros2.md, Services).
 bool cannot_be_answered(const OwnEndpoint& ours, const Announced& other) {
   return other.kind == EndpointKind::writer && ours.name.starts_with("~/") &&
          other.user_data.find("clientid=") == std::string::npos;

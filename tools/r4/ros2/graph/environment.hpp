@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Selects the ROS 2 graph and its reach by the environment variables of ROS. Default: loopback.
-//
 //     ROS_DOMAIN_ID                   0-232; 0
 //     ROS_AUTOMATIC_DISCOVERY_RANGE   LOCALHOST (ours by default), SUBNET, OFF, SYSTEM_DEFAULT
 //     ROS_LOCALHOST_ONLY              1: LOCALHOST; 0: SUBNET; older releases; overrides the range

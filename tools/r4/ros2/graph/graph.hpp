@@ -2,9 +2,8 @@
 // Our part of the ROS 2 graph: nodes with their topics and services.
 //
 // Cyclone DDS numbers a participant's entities with 14 bits, so 64 nodes share a participant.
-// Create nodes before list_nodes(). Readers may be created later, on the reading thread. leave()
-// removes the nodes from all lists at once; the destructor waits until that has been sent. A killed
-// process stays listed for 10 s.
+// Create nodes before list_nodes(); readers also later, on the reading thread. leave() removes all
+// nodes at once; the destructor waits until that is sent. A killed process stays listed for 10 s.
 #pragma once
 
 #include <chrono>
@@ -75,7 +74,6 @@ class Graph {
 
   dds_entity_t participant() const { return members_.front().participant.get(); }
   std::vector<dds_entity_t> participants() const;
-  // Lists our nodes from now on, in the format of the other participants.
   void list_nodes(const std::string& distro);
   // On the reading thread.
   void on_announced(const Announced& announced);

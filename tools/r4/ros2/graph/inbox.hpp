@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads samples from the graph on its own thread and passes them to the boards' loop.
 //
-// The thread waits for samples, validates them and queues a few, where newer samples of a
-// subscription replace older ones. The loop takes them at once, but on average at most every 10 ms,
-// so a flood delays heartbeats by only a few turns. Urgent samples, which are stops, are taken
-// immediately.
+// Newer samples of a subscription replace waiting ones. The loop takes them at once, but on average
+// at most every 10 ms, so a flood delays heartbeats by only a few turns. Urgent samples, which are
+// stops, are taken immediately.
 #pragma once
 
 #include <dds/dds.h>
@@ -39,8 +38,7 @@ struct Origin {
 
 class Inbox {
  public:
-  // Calls `on_drained` on the loop after all waiting samples have been taken. A participant must
-  // exist.
+  // Calls `on_drained` on the loop when no sample waits any more. A participant must exist.
   Inbox(asio::io_context& io, Transit::Clocks clocks, std::function<void()> on_drained);
   ~Inbox() { stop(); }
   Inbox(const Inbox&) = delete;

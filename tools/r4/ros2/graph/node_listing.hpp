@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Supports `ros2 node list`: on ros_discovery_info each participant publishes its nodes with their
-// readers and writers.
-//
-// An id has 24 bytes up to Humble and 16 since Iron, under the same type name, and the wrong size
-// makes a receiver throw. So nothing is published until another participant appears, whose writer's
-// type hash shows its release. If a graph has two releases, the first one counts; ROS does not
-// support such a mix either.
+// readers and writers. An id has 24 bytes up to Humble and 16 since Iron, under the same type name,
+// and the wrong size makes a receiver throw. So nothing is published until the type hash of another
+// participant's writer shows its release. ROS does not support two releases: the first counts.
 #pragma once
 
 #include <cstddef>
@@ -36,10 +33,8 @@ class NodeListing {
   NodeListing(dds_entity_t participant, std::vector<Node> nodes, const std::string& distro);
 
   void on_announced(const Announced& announced);
-  // The readers or writers of node `index` have changed.
   void change(std::size_t index, const Node& node);
 
-  // Publishes an empty list.
   void leave();
 
  private:

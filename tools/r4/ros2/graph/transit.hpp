@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Estimates the transit time of samples. In a graph of one computer the common clock measures it.
-// The clocks of two computers differ, so the delay is relative to the publisher's fastest sample.
-// Clocks may drift by 0.02 %, but by at most 0.5 s between two samples: otherwise a sample held
-// back after a long silence would seem fresh. After a clock was set, all samples seem slow. The new
-// offset is accepted when, for at least ten seconds, ten samples a second apart were all slow. A
-// publisher's first sample has no reference.
+// The clocks of two computers differ, so the delay is relative to the publisher's fastest sample;
+// its first sample has no reference. Clocks may drift by 0.02 %, but by at most 0.5 s between two
+// samples: else a sample held back after a long silence would seem fresh. After a clock was set,
+// all samples seem slow: the new offset is accepted after ten slow samples a second apart.
 #pragma once
 
 #include <algorithm>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Escape always stops. Space stops everywhere while this page controls, else where it has no other
-// meaning; after a click on a button it is meant for the robot. Enter presses buttons and
-// ticks boxes.
+// meaning; after a click on a button it is meant for the robot. Enter presses buttons, ticks boxes.
 
 const takes_space = (target) => target.closest('button, input, select, a, [role=group], [role=log]') !== null;
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Access control of the HTTP server. A browser reports the name typed by its user (Host) and the
-// requesting page (Origin). This keeps out pages of other sites, also with DNS rebinding. A token,
-// if set, is required as well.
+// Access control of the HTTP server, by the name typed by the user (Host) and the requesting page
+// (Origin): keeps out pages of other sites, also with DNS rebinding. A token, if set, is required.
 #pragma once
 
 #include <cstdint>
@@ -36,9 +35,8 @@ const char* to_text(Verdict verdict);
 
 class Access {
  public:
-  // `hosts`: NAME or NAME:PORT accepted besides the listening address `host`, for names of this
-  // computer or of a proxy. Empty `token`: not required. `origins`: foreign pages that may read by
-  // the Foxglove protocol.
+  // `hosts`: NAME or NAME:PORT accepted besides `host`, names of this computer or of a proxy. Empty
+  // `token`: not required. `origins`: foreign pages that may read by the Foxglove protocol.
   Access(std::string host, std::vector<std::string> hosts, std::string token,
          std::vector<std::string> origins)
       : host_(std::move(host)),
@@ -46,13 +44,11 @@ class Access {
         token_(std::move(token)),
         origins_(std::move(origins)) {}
 
-  // Call it for every request. An empty origin is allowed, because browsers always send the origin
-  // of a foreign page.
+  // For every request. An empty origin is allowed: browsers always send a foreign page's origin.
   Verdict check(std::string_view host, std::string_view origin) const;
   // The same for read-only clients of the Foxglove protocol.
   Verdict check_reader(std::string_view host, std::string_view origin) const;
-  // For requests about the robot. The token may be in the header `authorization`, in the query of
-  // `target`, or in the WebSocket subprotocols `protocols`.
+  // For requests about the robot. The token is in `authorization`, `target`'s query or `protocols`.
   Verdict check_token(std::string_view authorization, std::string_view target,
                       const std::vector<std::string>& protocols) const;
 

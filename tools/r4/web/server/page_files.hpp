@@ -27,8 +27,7 @@ struct PageFile {
 using PageFiles = std::map<std::string, PageFile, std::less<>>;
 PageFiles page_files();
 PageFile page_file(std::string_view name, std::string_view content);
-// A regular file of the folder. Empty for the folder itself, for hidden files, for files in
-// subfolders or outside, and for files that are too large.
+// Empty unless it is a regular file directly in the folder, not hidden and not too large.
 std::optional<PageFile> page_file_in(const std::string& folder, std::string_view path);
 
 }  // namespace r4::tool::web
