@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -29,8 +30,9 @@ using namespace std::chrono_literals;
 // Everything that a program receives from the board.
 struct ToldOfABoard {
   explicit ToldOfABoard(AsyncBoard& board) {
-    board.on_state(
-        [this](const ReceivedState& state, const Datagram&) { states.push_back(text_of(state)); });
+    board.on_state([this](const ReceivedState& state, const Datagram&) {
+      states[state.pnum] = text_of(state);
+    });
     board.on_board_heartbeat(
         [this](const Datagram& datagram) { heartbeats.push_back(text_of(datagram)); });
     board.on_bad_datagram([this](const ReadResult& result, std::string_view bytes) {
@@ -66,7 +68,8 @@ struct ToldOfABoard {
     return present + std::string(text.data(), text.size());
   }
 
-  std::vector<std::string> states, heartbeats, damaged, events, links;
+  std::map<std::uint32_t, std::string> states;  // by packet number
+  std::vector<std::string> heartbeats, damaged, events, links;
   int restarts = 0;
 };
 
@@ -107,7 +110,15 @@ TEST(ReplayFidelity, HasTheSameStatesEventsAndStatisticsAsLive) {
   std::filesystem::remove(path);
 
   EXPECT_GT(live.states.size(), 80U);
-  EXPECT_EQ(played.states, live.states);
+  // After a standstill of this program, live or in the replay, the newest state alone is reported.
+  std::size_t in_both = 0;
+  for (const auto& [number, state] : played.states) {
+    const auto same = live.states.find(number);
+    if (same == live.states.end()) continue;
+    ++in_both;
+    EXPECT_EQ(state, same->second);
+  }
+  EXPECT_GT(in_both, live.states.size() / 2);
   EXPECT_EQ(played.heartbeats, live.heartbeats);
   EXPECT_GT(live.damaged.size(), 3U);
   EXPECT_EQ(played.damaged, live.damaged);
