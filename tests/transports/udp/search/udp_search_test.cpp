@@ -134,12 +134,12 @@ TEST_F(UdpSearchTest, IsNotReplacedByAnotherBoard) {
 
 TEST_F(UdpSearchTest, DoesNotSearchWhileTheBoardIsHeard) {
   boards.add("0.2", {identity("one")});
-  lookup.silence = milliseconds(100);
+  lookup.silence = milliseconds(400);
   make("udp:auto");
   host->open(at_host);
   const int before = boards.asked("0.2");
   int sent = 0;
-  for (; sent < 50; ++sent) {
+  for (; sent < 60; ++sent) {
     host->send(with_crc("Q:ID;"), Priority::normal);
     run_for(io, milliseconds(10));
   }
