@@ -13,7 +13,7 @@ import pathlib
 import re
 import sys
 
-PUBLIC = {'include/r4link', 'include/r4link/can', 'include/r4link/commands', 'include/r4link/control',
+PUBLIC = {'include/r4link', 'include/r4link/can', 'include/r4link/commands', 'include/r4link/commissioning', 'include/r4link/control',
           'include/r4link/devices', 'include/r4link/discovery', 'include/r4link/messages', 'include/r4link/recordings',
           'include/r4link/simulation', 'include/r4link/tables', 'include/r4link/transports', 'include/r4link/wiring'}
 PROTOCOL = PUBLIC | {'protocol/datagram', 'protocol/keys', 'protocol/messages', 'protocol/link', 'protocol/wiring'}
@@ -36,6 +36,7 @@ ALLOWED = {
     'include/r4link': PUBLIC,
     'include/r4link/can': {'include/r4link', 'include/r4link/discovery', 'include/r4link/messages'},
     'include/r4link/commands': {'include/r4link'},
+    'include/r4link/commissioning': {'include/r4link', 'include/r4link/wiring'},
     'include/r4link/control': {'include/r4link'},
     'include/r4link/devices': {'include/r4link'},
     'include/r4link/discovery': {'include/r4link'},
@@ -84,6 +85,7 @@ ALLOWED = {
     'host/blocking': TRANSPORTS | {'host/commands', 'host/measurement'},
     'host/bridge': HOST,
     'host/commands': TRANSPORTS | {'host/arming', 'host/link', 'host/measurement', 'host/paths'},
+    'host/commissioning': PUBLIC | {'host'},
     'host/control': PUBLIC,
     'host/devices': HOST,
     'host/discovery': HOST,
@@ -119,6 +121,7 @@ ALLOWED = {
     'tools/r4/ros2': SHELL | {'tools/r4/devices', 'tools/r4/ros2/graph', 'tools/r4/ros2/discovery'},
     'tools/r4/sim': BELOW,
     'tools/r4/wiring': SHELL,
+    'tools/r4/commission': SHELL,
     'tools/r4/web/server': SHELL,
     'tools/r4/web': SHELL | FORMATS | {'tools/r4/devices', 'tools/r4/watch', 'tools/r4/web/server'},
     'tools/r4': SHELL | {'tools/r4/ros2'},

@@ -11,7 +11,7 @@ from r4_process import DATA, objects, run
 
 COMMANDS = ['monitor', 'send', 'stop', 'list', 'doctor', 'bridge', 'bus', 'bench', 'record', 'info', 'convert', 'plot',
             'replay', 'metrics', 'web', 'ros2', 'sim', 'key', 'demo', 'encode', 'decode', 'completion', 'man', 'devices',
-            'upload', 'wiring']
+            'upload', 'wiring', 'commission']
 
 
 def test_the_option_version_prints_the_version():

@@ -36,6 +36,8 @@ HAPPENINGS = [
     ('us 1 off', safe('proximity'), 'us 1 0'),
     ('enc 2 100', lambda sim, board: now(board, 'enc2', 100) and sim.look().encoder[1] == 100, ''),
     ('analog AIN24 21.5', volts, ''),
+    ('divider AIN24 0.5', lambda _, board: board.next_state().ain24 < 13, 'divider AIN24 1'),
+    ('defect handle on', safe('handle'), 'defect handle off'),
     ('motor 1 stalled', lambda sim, board: board.osmc(1).post(1) and sim.look().volts[0] < 24, 'motor 1 free'),
     *((f'chip {name} off', fault_of(chip), f'chip {name} on') for name, chip in (
         ('osmc', 'PCA9685 0x40'), ('dhb', 'PCA9685 0x41'), ('servo', 'PCA9685 0x42'), ('expander', 'MCP23017 0x20'),

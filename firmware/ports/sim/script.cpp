@@ -112,6 +112,41 @@ void read_analog(const Line& line, ScriptStep& step) {
   }
 }
 
+void read_divider(const Line& line, ScriptStep& step) {
+  constexpr std::int32_t most = 1000;  // ten times
+  read_analog(line, step);
+  if (step.value > most) {
+    fail(line, line.words[2], "is not a factor", "write 0 to 10, such as 0.5");
+  }
+}
+
+// "enc1a", "relay8", "handle".
+std::string name_of_defect(int index) {
+  static constexpr std::string_view single[] = {"handle", "bypass", "servos", "store"};
+  const auto numbered = [index](std::string_view word, int first) {
+    return std::string(word) + std::to_string(index - first + 1);
+  };
+  if (index < defects::encoder_b) return numbered("enc", defects::encoder_a) + "a";
+  if (index < defects::echo) return numbered("enc", defects::encoder_b) + "b";
+  if (index < defects::relay) return numbered("echo", defects::echo);
+  if (index < defects::handle) return numbered("relay", defects::relay);
+  return std::string(single[index - defects::handle]);
+}
+
+void read_defect(const Line& line, ScriptStep& step) {
+  while (step.channel < defects::count && name_of_defect(step.channel) != line.words[1]) {
+    ++step.channel;
+  }
+  if (step.channel == defects::count) {
+    fail(line, line.words[1], "is nothing that can be broken",
+         "write enc1a … enc4b, echo1 …, relay1 …, handle, bypass, servos or store");
+  }
+  if (line.words[2] != "on" && line.words[2] != "off") {
+    fail(line, line.words[2], "is nothing a defect can be", "write on or off");
+  }
+  step.value = line.words[2] == "on" ? 1 : 0;
+}
+
 void read_motor(const Line& line, ScriptStep& step) {
   step.channel = channel_of(line, osmc_channels, "motor");
   if (line.words[2] != "stalled" && line.words[2] != "free") {
@@ -203,6 +238,8 @@ constexpr Form forms[] = {
     {"us", 3, "us SENSOR CM|off", ScriptStep::Kind::ultrasonic, read_ultrasonic},
     {"enc", 3, "enc ENCODER COUNTS", ScriptStep::Kind::encoder, read_encoder},
     {"analog", 3, "analog NAME VOLTS", ScriptStep::Kind::analog, read_analog},
+    {"divider", 3, "divider NAME FACTOR", ScriptStep::Kind::divider, read_divider},
+    {"defect", 3, "defect NAME on|off", ScriptStep::Kind::defect, read_defect},
     {"motor", 3, "motor MOTOR stalled|free", ScriptStep::Kind::motor, read_motor},
     {"chip", 3, "chip NAME off|on|reset", ScriptStep::Kind::chip, read_chip},
     {"i2c", 2, "i2c held|free", ScriptStep::Kind::i2c, read_i2c},

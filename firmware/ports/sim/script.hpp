@@ -7,6 +7,11 @@
 //     1   us 1 off              its cable is off: no answer, until a line gives a distance
 //     1   enc 2 100             encoder 2 is turned to 100 counts, 1000 counts per millisecond
 //     1   analog AIN24 21.5     that input stays at 21.5 V
+//     1   divider AIN24 0.5     its divider gives half of what it should, until 1
+//     1   defect enc1a on       broken, until off: encoder channels enc1a … enc4b (stay low), echo1
+//                               … echo4 (float), relay1 … relay8 (stay open), handle (its wire),
+//                               bypass (relay 1 is not in the motors' supply), servos (no supply),
+//                               store (settings are not kept over a reboot)
 //     1   motor 1 stalled       the motor of OSMC 1 is held fast, until free
 //     2   chip dac off          the chip (osmc, dhb, servo, expander, dac) acknowledges nothing,
 //                               until on; reset: it loses its supply for a moment
@@ -40,6 +45,8 @@ struct ScriptStep {
     ultrasonic,
     encoder,
     analog,
+    divider,
+    defect,
     motor,
     chip,
     i2c,
@@ -57,11 +64,12 @@ struct ScriptStep {
 
   Kind kind = Kind::handle;
   std::uint32_t at_ms = 0;
-  // ultrasonic, encoder, motor, uart, gpio: 1 …; analog: an Analog; chip: a Chip; device: a
-  // UserDevice, then an index into OptionalDevices
+  // ultrasonic, encoder, motor, uart, gpio: 1 …; analog, divider: an Analog; defect: one of
+  // defects::Index; chip: a Chip; device: a UserDevice, then an index into OptionalDevices
   int channel = 0;
-  // 1: held, stalled or high; ultrasonic: cm or off; encoder: counts; analog: hundredths of a volt;
-  // chip, device: a Supply; hang: ms; user_bus: a UserBusModel::Fault; uart: a UartPeer
+  // 1: held, stalled, high or broken; ultrasonic: cm or off; encoder: counts; analog: hundredths of
+  // a volt; divider: hundredths; chip, device: a Supply; hang: ms; user_bus: a UserBusModel::Fault;
+  // uart: a UartPeer
   std::int32_t value = 0;
   std::string text;  // the line without its time, "handle released"
 };

@@ -193,6 +193,12 @@ void SimulatedBoard::take(const ScriptStep& step) {
     case ScriptStep::Kind::analog:
       model_.pin_analog(static_cast<Analog>(step.channel), step.value);
       break;
+    case ScriptStep::Kind::divider:
+      model_.set_divider(static_cast<Analog>(step.channel), step.value);
+      break;
+    case ScriptStep::Kind::defect:
+      model_.set_defect(step.channel, step.value != 0);
+      break;
     case ScriptStep::Kind::motor:
       model_.stall_motor(step.channel, step.value != 0);
       break;
@@ -313,8 +319,10 @@ void SimulatedBoard::on_executed(std::uint32_t t_ms, std::uint32_t pnum, const C
   if (command.kind == CommandKind::setting) {
     const SiteSettings& site = application_->settings().site;
     hardware_->hal().calibrate(site.full_scale_cv);
-    options_.settings.site.wiring = site.wiring;  // kept for the next start
-    options_.settings.site.wiring_source = site.wiring_source;
+    if (!model_.is_broken(defects::store)) {  // kept for the next start
+      options_.settings.site.wiring = site.wiring;
+      options_.settings.site.wiring_source = site.wiring_source;
+    }
   }
   if (options_.events.on_executed) options_.events.on_executed(t_ms, pnum, command);
 }

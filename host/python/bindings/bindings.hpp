@@ -25,6 +25,7 @@ void bind_values(py::module_& module);
 void bind_state(py::module_& module);
 void bind_board(py::module_& module);
 void bind_calls(py::module_& module);
+void bind_commissioning(py::module_& module);
 void bind_control(py::module_& module);
 void bind_devices(py::module_& module);
 void bind_discovery(py::module_& module);

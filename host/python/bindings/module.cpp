@@ -14,6 +14,7 @@ PYBIND11_MODULE(_core, module) {
   r4::python::bind_discovery(module);
   r4::python::bind_board(module);
   r4::python::bind_calls(module);
+  r4::python::bind_commissioning(module);
   r4::python::bind_recording(module);
   r4::python::bind_simulation(module);
   r4::python::bind_wiring(module);

@@ -6,13 +6,14 @@ if _importlib.find_spec('r4link._core') is None:
     raise ImportError(f'r4link: {__path__[0]} has the sources alone, without the compiled module; build it (cmake --build '
                       'build --target r4_python) and put build/python first on PYTHONPATH, or: pip install .')
 
-from . import aio, control, devices  # pylint: disable=wrong-import-position
+from . import aio, commissioning, control, devices  # pylint: disable=wrong-import-position
 from ._core import (FIELDS, BoardHealth, BoardWiring, CarrierCounters, Command, Discovery, Event, FoundBoard, Identity,
                     LinkStatus, Recording, RefusedPost, SearchedBus, SearchedNetwork, SearchedPort, ServoCalibration, Setpoints,
                     State, Statistics, Subscription, PathStatus, Wiring, discover, __version__)
 from .board import Board, States
 from .bridge import Bridge, BridgeCounters, BridgeEnd, BridgeStatus
 from .channels import BldcChannel, DriveChannel, I2c, RelayChannel, ServoChannel, StepperChannel, Uart
+from .commissioning import Commissioning
 from .devices import Device, DeviceReading
 from .enums import (BoardRole, DeviceRole, Direction, DisarmCause, EventKind, FleetEventKind, I2cOutcome, LinkCause,
                     LinkState, Outcome, PathState, PostResult, Refusal, SafeReason)
@@ -29,7 +30,7 @@ REVERSE = Direction.REVERSE
 
 __all__ = [
     'Bldc', 'BldcChannel', 'Board', 'BoardHealth', 'BoardRole', 'BoardWiring', 'Bridge', 'BridgeCounters', 'BridgeEnd',
-    'BridgeStatus', 'CanTransport', 'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'DataError', 'DeniedError',
+    'BridgeStatus', 'CanTransport', 'CancelledError', 'CarrierCounters', 'ClosedError', 'Command', 'Commissioning', 'DataError', 'DeniedError',
     'Device', 'DeviceReading', 'DeviceRole', 'Direction', 'DisarmCause', 'Discovery', 'Drive', 'DriveChannel',
     'Error', 'Event', 'EventKind', 'FIELDS', 'FORWARD', 'Fleet', 'FleetEvent', 'FleetEventKind', 'FleetResults',
     'FoundBoard', 'I2c', 'I2cAnswer', 'I2cBusReport', 'I2cOutcome', 'I2cReading', 'Identity', 'LinkCause',
@@ -38,5 +39,5 @@ __all__ = [
     'RecordedEvent', 'Recording', 'Refusal', 'RefusedError', 'RefusedPost', 'RelayChannel', 'SafeReason',
     'SearchedBus', 'SearchedNetwork', 'SearchedPort', 'ServoCalibration', 'ServoChannel', 'Setpoints', 'SimBoard',
     'State', 'States', 'Statistics', 'StepperChannel', 'Subscription', 'Transport', 'Uart', 'UartBytes', 'UartData',
-    'UnsupportedError', 'UsageError', 'Wiring', 'aio', 'control', 'devices', 'discover', 'read', 'with_link', '__version__',
+    'UnsupportedError', 'UsageError', 'Wiring', 'aio', 'commissioning', 'control', 'devices', 'discover', 'read', 'with_link', '__version__',
 ]

@@ -36,6 +36,7 @@ void add_plot(CLI::App& root, Action& chosen);
 void add_upload(CLI::App& root, Action& chosen);
 void add_key_command(CLI::App& root, Action& chosen);
 void add_wiring(CLI::App& root, Action& chosen);
+void add_commission(CLI::App& root, Action& chosen);
 void add_demo(CLI::App& root, Action& chosen);
 void add_completion(CLI::App& root, Action& chosen);
 void add_man(CLI::App& root, Action& chosen);

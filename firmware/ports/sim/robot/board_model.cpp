@@ -93,20 +93,32 @@ void BoardModel::power_on() {
 
 void BoardModel::hold_handle(bool held) {
   handle_held_ = held;
-  input(SignalKind::handle, 1).set(held != chips_.wiring.at(SignalKind::handle).option());
+  const bool low_is_held = chips_.wiring.at(SignalKind::handle).option();
+  input(SignalKind::handle, 1).set(held != low_is_held && !is_broken(defects::handle));
   convert_again();
 }
 
 bool BoardModel::motors_have_supply() const {
   const Wiring& wiring = chips_.wiring;
   return (handle_held_ || !wiring.at(SignalKind::handle).connected()) &&
-         (chips_.relay_closed(supply_relay) ||
+         (relay_contact_closed(supply_relay) || is_broken(defects::bypass) ||
           !wiring.at(SignalKind::relay, supply_relay).connected());
 }
 
 void BoardModel::turn_encoder(int channel, std::int32_t counts) {
   shafts_[channel - 1].by_hand = true;
   shafts_[channel - 1].hand_count = counts;
+}
+
+void BoardModel::set_divider(Analog input, std::int32_t hundredths) {
+  divider_[static_cast<int>(input)] = hundredths;
+  convert_again();
+}
+
+void BoardModel::set_defect(int index, bool broken) {
+  const std::uint32_t bit = 1U << index;
+  defects_ = broken ? defects_ | bit : defects_ & ~bit;
+  hold_handle(handle_held_);
 }
 
 void BoardModel::pin_analog(Analog input, std::int32_t centivolts) {
@@ -180,6 +192,11 @@ void BoardModel::pass_millisecond(std::uint32_t now_us, Interrupts& interrupts) 
     if (supplied) steer(chips_.dhb12_drive(1));
   }
   for (int i = 0; i < ultrasonic_channels; ++i) {
+    if (is_broken(defects::echo + i)) {
+      constexpr std::uint64_t range_cm = 400;
+      sensors_[i].set_distance(
+          static_cast<std::uint16_t>(1 + scramble(seed_ ^ time_ms_) % range_cm));
+    }
     sensors_[i].pass(now_us, [&](bool high, std::uint32_t at_us) {
       InputPinModel& pin = input(SignalKind::echo, i + 1);
       pin.set(high);
@@ -258,8 +275,11 @@ void BoardModel::turn(int channel, std::int32_t counts, Interrupts& interrupts) 
 void BoardModel::set_encoder_levels(int channel) {
   const std::int32_t count = shafts_[channel - 1].count;
   const unsigned quarter = static_cast<unsigned>(count) & 3U;
-  input(SignalKind::encoder_a, channel).set(quarter == 1 || quarter == 2);
-  input(SignalKind::encoder_b, channel).set(quarter == 2 || quarter == 3);
+  const int i = channel - 1;
+  const bool a = (quarter == 1 || quarter == 2) && !is_broken(defects::encoder_a + i);
+  const bool b = (quarter == 2 || quarter == 3) && !is_broken(defects::encoder_b + i);
+  input(SignalKind::encoder_a, channel).set(a);
+  input(SignalKind::encoder_b, channel).set(b);
   input(SignalKind::encoder_index, channel).set(count % counts_a_turn == 0);
 }
 
@@ -315,8 +335,9 @@ void BoardModel::convert_again() {
 std::uint16_t BoardModel::Converter::read() {
   if (converted && at_ms == model->time_ms_) return counts;
   constexpr std::int32_t range_cv = 5000;
-  const std::int32_t cv = model->analog_cv(static_cast<Analog>(input));
-  const std::int32_t within = cv < 0 ? 0 : cv > range_cv ? range_cv : cv;
+  const std::int64_t cv =
+      std::int64_t{model->analog_cv(static_cast<Analog>(input))} * model->divider_[input] / 100;
+  const auto within = static_cast<std::int32_t>(cv < 0 ? 0 : cv > range_cv ? range_cv : cv);
   counts = static_cast<std::uint16_t>((within * 65535 + range_cv / 2) / range_cv);
   at_ms = model->time_ms_;
   converted = true;

@@ -35,6 +35,21 @@
 namespace r4 {
 namespace sim {
 
+// Defects around the board: numbers of bits.
+namespace defects {
+enum Index : std::uint8_t {
+  encoder_a,                                 // encoder 1 … : the line stays low
+  encoder_b = encoder_a + encoder_channels,  // likewise
+  echo = encoder_b + encoder_channels,       // sensor 1 … : the line floats
+  relay = echo + ultrasonic_channels,        // relay 1 … : the contact stays open
+  handle = relay + relay_channels,           // its wire is broken
+  bypass,                                    // relay 1 is not in the motors' supply
+  servos,                                    // they have no supply
+  store,                                     // the board keeps no settings over a reboot
+  count
+};
+}  // namespace defects
+
 class BoardModel {
  public:
   // Edges that interrupt the microcontroller.
@@ -92,6 +107,14 @@ class BoardModel {
   void turn_encoder(int channel, std::int32_t counts);
   void stall_motor(int channel, bool stalled) { shafts_[channel - 1].stalled = stalled; }
   void pin_analog(Analog input, std::int32_t centivolts);
+  // The divider of an input gives so many hundredths of what it should.
+  void set_divider(Analog input, std::int32_t hundredths);
+  // `index`: of defects::Index.
+  void set_defect(int index, bool broken);
+  bool is_broken(int index) const { return (defects_ >> index & 1U) != 0; }
+  bool relay_contact_closed(int channel) const {
+    return chips_.relay_closed(channel) && !is_broken(defects::relay + channel - 1);
+  }
   std::int32_t analog_cv(Analog input) const;
   const UltrasonicModel& ultrasonic(int channel) const { return sensors_[channel - 1]; }
 
@@ -160,7 +183,9 @@ class BoardModel {
   std::int32_t pinned_cv_[analog_channels] = {};
   std::uint32_t bus_transfers_ = 0;  // at the last pins_may_differ()
   std::uint32_t disturbed_ms_ = 0;   // last time that pins may have changed
-  std::uint8_t pinned_ = 0;          // bit n: analog input n stays at pinned_cv_[n]
+  std::int32_t divider_[analog_channels] = {100, 100, 100, 100, 100, 100};
+  std::uint32_t defects_ = 0;
+  std::uint8_t pinned_ = 0;  // bit n: analog input n stays at pinned_cv_[n]
 };
 
 }  // namespace sim

@@ -33,12 +33,12 @@ class UltrasonicModel {
       phase_ = Phase::burst;
       next_us_ = now_us + burst_us;
     }
-    if (phase_ == Phase::burst && reached(now_us, next_us_)) {
+    if (phase_ == Phase::burst && is_due(now_us)) {
       on_edge(true, next_us_);
       phase_ = Phase::echo;
-      next_us_ += cm_ == 0 ? nothing_us : cm_ * us_per_cm;
+      next_us_ += cm_ == 0 || cm_ * us_per_cm > nothing_us ? nothing_us : cm_ * us_per_cm;
     }
-    if (phase_ == Phase::echo && reached(now_us, next_us_)) {
+    if (phase_ == Phase::echo && is_due(now_us)) {
       on_edge(false, next_us_);
       phase_ = Phase::quiet;
     }
@@ -46,6 +46,11 @@ class UltrasonicModel {
 
  private:
   enum class Phase : std::uint8_t { quiet, burst, echo };
+
+  // Also true if the clock began anew, because the microcontroller was reset.
+  bool is_due(std::uint32_t now_us) const {
+    return reached(now_us, next_us_) || next_us_ - now_us > nothing_us;
+  }
 
   OutputPinModel trigger_;
   std::uint16_t cm_ = 0;

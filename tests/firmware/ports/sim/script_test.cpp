@@ -8,6 +8,7 @@
 
 #include "firmware/board_hardware.hpp"
 #include "firmware/ports/sim/devices/user_devices.hpp"
+#include "firmware/ports/sim/robot/board_model.hpp"
 #include "r4link/error.hpp"
 #include "r4link/state.hpp"
 
@@ -211,8 +212,39 @@ TEST(Script, ReadsChipBusAndLoopFaults) {
   EXPECT_EQ(error_of("1 hang long"),
             "bench.txt:1: 'long' is not a valid time; write for how long, in seconds such as 0.3");
   EXPECT_EQ(error_of("1 dance"),
-            "bench.txt:1: 'dance' is nothing that can happen; use handle, us, enc, analog, motor, "
-            "chip, i2c, userbus, device, uart, gpio, hang, fault, watchdog or reboot");
+            "bench.txt:1: 'dance' is nothing that can happen; use handle, us, enc, analog, "
+            "divider, defect, motor, chip, i2c, userbus, device, uart, gpio, hang, fault, watchdog "
+            "or reboot");
+}
+
+TEST(Script, ReadsDefects) {
+  const Script script = Script::parse(
+      "1 divider AIN12 0.5\n"
+      "2 defect enc1a on\n"
+      "3 defect enc4b off\n"
+      "4 defect echo3 on\n"
+      "5 defect relay8 on\n"
+      "6 defect store on\n",
+      "bench.txt");
+  const auto& steps = script.steps();
+  EXPECT_EQ(steps.at(0).kind, Kind::divider);
+  EXPECT_EQ(steps.at(0).channel, static_cast<int>(Analog::ain12));
+  EXPECT_EQ(steps.at(0).value, 50);
+  EXPECT_EQ(steps.at(1).channel, sim::defects::encoder_a);
+  EXPECT_EQ(steps.at(1).value, 1);
+  EXPECT_EQ(steps.at(2).channel, sim::defects::encoder_b + 3);
+  EXPECT_EQ(steps.at(2).value, 0);
+  EXPECT_EQ(steps.at(3).channel, sim::defects::echo + 2);
+  EXPECT_EQ(steps.at(4).channel, sim::defects::relay + 7);
+  EXPECT_EQ(steps.at(5).channel, sim::defects::store);
+
+  EXPECT_EQ(error_of("1 divider AIN24 11"),
+            "bench.txt:1: '11' is not a factor; write 0 to 10, such as 0.5");
+  EXPECT_EQ(error_of("1 defect enc5a on"),
+            "bench.txt:1: 'enc5a' is nothing that can be broken; write enc1a … enc4b, echo1 …, "
+            "relay1 …, handle, bypass, servos or store");
+  EXPECT_EQ(error_of("1 defect handle held"),
+            "bench.txt:1: 'held' is nothing a defect can be; write on or off");
 }
 
 TEST(Script, RefusesAnEndlessFile) {

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "r4link/commissioning/commissioning.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <utility>
+
+#include "check_functions.hpp"
+#include "r4link/error.hpp"
+#include "r4link/tables/state_fields.hpp"
+#include "r4link/wiring/wiring_file.hpp"
+
+namespace r4::commissioning {
+namespace {
+
+using namespace std::chrono_literals;
+
+// A wiring that was learnt agrees with the one that the board had then.
+void take_wiring(const BoardWiring& kept, Report& report) {
+  const bool changed = !report.wiring_source.empty() && kept.wiring != report.wiring;
+  report.wiring_source = to_text(kept.source);
+  report.wiring = kept.wiring;
+  if (!changed) return;
+  for (CheckResult& each : report.checks) {
+    if (each.learnt.empty()) continue;
+    each = CheckResult{each.id};
+    each.note = "the wiring of the board has changed since";
+  }
+}
+
+// Asks for the board's identity and wiring. A text that it does not answer stays empty.
+void identify(BoardUnderTest& board, Report& report) {
+  board.wait_heard();
+  try {
+    const BoardIdentity identity = board.identify();
+    if (!report.board_id.empty() && report.board_id != identity.board_id) {
+      throw Error(ErrorKind::usage, report.board_id,
+                  "the report is of another board than " + identity.board_id,
+                  "begin a report for this board");
+    }
+    report.board_id = identity.board_id;
+    report.board_name = identity.name;
+    report.firmware = identity.firmware;
+    report.capabilities = identity.capabilities;
+  } catch (const Error& error) {
+    if (error.kind() != ErrorKind::refused) throw;
+    return;
+  }
+  try {
+    take_wiring(board.wiring(), report);
+  } catch (const Error& error) {  // not on its own cable
+    if (error.kind() != ErrorKind::refused) throw;
+  }
+}
+
+void require_section(Checking& c) {
+  if (c.check.section == Section::supply_off) {
+    return c.require(Topic::supply_off,
+                     "The motor supply is OFF: its plug is out, or its switch is off. The carrier "
+                     "and the Giga have their supply. Confirm.",
+                     "the motor supply was not off");
+  }
+  c.require(
+      Topic::wheels_off_ground,
+      "From here on motors turn. The wheels are OFF THE GROUND, nobody touches the robot, the "
+      "emergency switch is within reach, and the Giga is not supplied by USB alone. Confirm.",
+      "the wheels were not off the ground");
+}
+
+bool is_done(const CheckResult& result) {
+  return result.status == Status::passed || result.status == Status::found;
+}
+
+std::string differences(const Wiring& before, const Wiring& after) {
+  std::string text;
+  for (int i = 0; i < signal_count; ++i) {
+    if (before.places[i] == after.places[i]) continue;
+    text += fmt::format("{}{}: {} -> {}", text.empty() ? "" : "; ", signal_name(i),
+                        place_name(i, before.places[i]), place_name(i, after.places[i]));
+  }
+  return text;
+}
+
+double shown_volts(Checking& c, int input) {
+  c.board.forget_states();
+  double sum = 0;
+  const auto states = c.collect(200ms);
+  for (const State& state : states) sum += state.volts(static_cast<Analog>(input - 1));
+  return sum / static_cast<double>(states.size());
+}
+
+void set_full_scale(Checking& c, int input, double volts) {
+  const Text name = r4::name_of(state_field(FieldKind::analog, input));
+  const std::string value = fmt::format("{:.2f}", volts);
+  c.send(Command::setting(name, Text(value)));
+}
+
+// The board does not report its full scale: it follows from what it shows with a known one.
+void give_full_scale(Checking& c, const Learnt& learnt) {
+  constexpr double known = 50;
+  const int input = learnt.signal - signals::analog + 1;
+  const Text name = r4::name_of(state_field(FieldKind::analog, input));
+  c.select_fields(std::string(name.data(), name.size()));
+  const double before = shown_volts(c, input);
+  set_full_scale(c, input, known);
+  const double with_known = shown_volts(c, input);
+  const double present = with_known > 0 ? known * before / with_known : known;
+  set_full_scale(c, input, present * learnt.factor);
+  c.measured(std::string(name.data(), name.size()) + ", full scale", present * learnt.factor, "V");
+}
+
+// Called when it was given.
+void forget_learnt(Report& report, bool full_scales) {
+  for (CheckResult& check : report.checks) {
+    std::erase_if(check.learnt, [&](const Learnt& each) {
+      return (each.what == Learnt::What::full_scale) == full_scales;
+    });
+  }
+}
+
+// True if the plan, which nobody has confirmed, agrees with everything that was to be checked.
+bool confirms_plan(const Report& report) {
+  const auto is_reached = [&](const Check& check) {
+    return std::any_of(report.checks.begin(), report.checks.end(), [&](const CheckResult& each) {
+      return each.id == check.id && each.status != Status::not_done;
+    });
+  };
+  return report.wiring_source == to_text(WiringSource::plan) && report.found().empty() &&
+         std::all_of(checks().begin(), checks().end(), is_reached);
+}
+
+void offer_wiring(Checking& c, Report& report) {
+  if (report.wiring_source.empty()) return;
+  const Wiring learnt = learnt_wiring(report);
+  const bool as_planned = learnt == report.wiring;
+  if (as_planned && !confirms_plan(report)) return;
+  const WiringCheck fault = r4::check(learnt);
+  if (fault.fault != WiringFault::none) {
+    return c.say("The learnt wiring is not whole yet: " + problem_of(learnt, fault).text() +
+                 ". Check the others of its kind, too.");
+  }
+  if (!c.confirms(Topic::give_wiring,
+                  as_planned ? "All checks agree with the plan. Shall the board keep the "
+                               "plan as its wiring? It then drives without E:CLEAR."
+                             : "Shall the board keep the learnt wiring? " +
+                                   differences(report.wiring, learnt) +
+                                   ". It counts from the board's next start on.")) {
+    return;
+  }
+  c.board.give_wiring(learnt);
+  const BoardWiring kept = c.wiring_after_restart();
+  if (kept.source != WiringSource::given || !kept.in_use || kept.wiring != learnt) {
+    return c.found(Finding::not_kept);
+  }
+  c.note("the board keeps the wiring, and uses it" +
+         (as_planned ? std::string(": the plan") : ": " + differences(report.wiring, learnt)));
+  report.wiring_source = to_text(kept.source);
+  report.wiring = kept.wiring;
+  forget_learnt(report, false);
+}
+
+void offer_settings(Checking& c, Report& report) {
+  std::vector<Learnt> scales;
+  for (const CheckResult& result : report.checks) {
+    std::copy_if(result.learnt.begin(), result.learnt.end(), std::back_inserter(scales),
+                 [](const Learnt& each) { return each.what == Learnt::What::full_scale; });
+  }
+  if (scales.empty() || report.wiring_source.empty()) return;
+  std::string list;
+  for (const Learnt& each : scales) {
+    list += fmt::format("{}{} x {:.4f}", list.empty() ? "" : ", ", signal_name(each.signal),
+                        each.factor);
+  }
+  if (!c.confirms(Topic::give_settings,
+                  "Shall the board keep the calibration of its analog inputs, new full scale = "
+                  "present one x factor? " +
+                      list + ".")) {
+    return;
+  }
+  for (const Learnt& each : scales) give_full_scale(c, each);
+  forget_learnt(report, true);
+}
+
+}  // namespace
+
+Commissioning::Commissioning(BoardUnderTest& board, Person& person, Report begun)
+    : board_(board), person_(person), report_(std::move(begun)) {
+  report_.software = R4LINK_VERSION;
+}
+
+CheckResult& Commissioning::result_of(const Check& check) {
+  const auto place_of = [](std::string_view id) {
+    return std::find_if(checks().begin(), checks().end(),
+                        [&](const Check& each) { return each.id == id; });
+  };
+  const auto own = place_of(check.id);
+  auto at = report_.checks.begin();
+  while (at != report_.checks.end() && place_of(at->id) < own) ++at;
+  if (at == report_.checks.end() || at->id != check.id) at = report_.checks.insert(at, {check.id});
+  return *at;
+}
+
+Commissioning::End Commissioning::run(std::string_view id) { return run(check_named(id)); }
+
+// Does `work`, and sets the status of its result. Returns what the person wants instead, if
+// anything.
+std::optional<Answer::Kind> Commissioning::carry_out(CheckResult& result,
+                                                     const std::function<void()>& work) {
+  try {
+    work();
+    result.status = result.found.empty() ? Status::passed : Status::found;
+  } catch (const Ended& ended) {
+    result = CheckResult{result.id};
+    result.status = Status::skipped;
+    return ended.kind;
+  } catch (const NotDone& not_done) {
+    result.status = result.found.empty() ? not_done.status : Status::found;
+    result.note = not_done.note;
+  } catch (const Error& error) {
+    if (error.kind() != ErrorKind::refused || !is_heard(board_.link().state)) throw;
+    result.status = result.found.empty() ? Status::not_done : Status::found;
+    result.note = error.problem().text();
+  }
+  return std::nullopt;
+}
+
+Commissioning::End Commissioning::run(const Check& check) {
+  if (!identified_) identify(board_, report_);
+  identified_ = true;
+  bool& ready = ready_[static_cast<int>(check.section)];
+  for (;;) {
+    CheckResult result{check.id};
+    const auto instead = carry_out(result, [&] {
+      Checking checking(board_, person_, check, report_, result);
+      if (!ready) require_section(checking);
+      ready = true;
+      checking.say(check.about);
+      function_of(check)(checking, check.channel);
+    });
+    if (instead == Answer::Kind::leave) return End::left;
+    if (instead == Answer::Kind::repeat) continue;
+    result_of(check) = result;
+    if (on_result) on_result(result);
+    return End::done;
+  }
+}
+
+Commissioning::End Commissioning::run_all(const std::vector<std::string>& only) {
+  for (const std::string& id : only) check_named(id);
+  for (const Check& check : checks()) {
+    const bool named = std::find(only.begin(), only.end(), check.id) != only.end();
+    const auto done =
+        std::find_if(report_.checks.begin(), report_.checks.end(),
+                     [&](const CheckResult& each) { return each.id == check.id && is_done(each); });
+    if (only.empty() ? done != report_.checks.end() : !named) continue;
+    if (run(check) == End::left) return End::left;
+  }
+  return End::done;
+}
+
+Commissioning::End Commissioning::offer() {
+  const Check check{"offer", Section::supply_off, "", "", 0, 1};
+  CheckResult result{check.id};
+  const auto instead = carry_out(result, [&] {
+    Checking checking(board_, person_, check, report_, result);
+    offer_settings(checking, report_);
+    offer_wiring(checking, report_);
+  });
+  if (instead == Answer::Kind::leave) return End::left;
+  const bool given = !result.note.empty() || !result.measured.empty() || !result.found.empty();
+  if (!given) return End::done;
+  std::erase_if(report_.checks, [&](const CheckResult& each) { return each.id == check.id; });
+  report_.checks.push_back(result);
+  if (on_result) on_result(result);
+  return End::done;
+}
+
+}  // namespace r4::commissioning

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The things that a person tells apart, and their signals in a wiring: the parts of a motor, such
+// as pwm and direction, are consecutive kinds of signals.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "r4link/wiring/wiring.hpp"
+
+namespace r4::commissioning {
+
+struct Thing {
+  SignalKind first;  // its first signal
+  int channel;       // from 1
+  int signal() const { return signal_index(first, channel); }
+  friend bool operator==(const Thing&, const Thing&) = default;
+};
+// "osmc 1".
+std::string name_of(Thing thing);
+// The thing of an index in Wiring.
+Thing thing_of(int signal);
+// How many signals it has.
+int parts_of(SignalKind first);
+// Those among which one may answer in place of another: of one kind, or motors on H-bridges.
+std::vector<Thing> alike(SignalKind first);
+
+}  // namespace r4::commissioning

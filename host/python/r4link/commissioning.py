@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checks a board step by step with a person, and learns how it is wired (docs/how-to/commissioning.md).
+
+    class AtMyBench(r4link.commissioning.Person):
+        def ask(self, question): ...
+
+    with r4link.Board('serial:auto') as board:
+        work = r4link.Commissioning(board, AtMyBench())
+        work.run('osmc 1')
+        pathlib.Path('robot.html').write_text(work.report.html)
+
+Nothing moves before it was announced and the person holds the key.
+"""
+from __future__ import annotations
+
+import json
+from typing import Any, NamedTuple, Sequence
+
+from . import _core
+from ._core import Wiring
+from .board import Board
+from .enums import Word
+from .errors import UsageError
+
+
+class Action(Word):
+    """In place of an answer."""
+    SKIP = 'skip', 'leaves out this check'
+    REPEAT = 'repeat', 'begins this check again'
+    LEAVE = 'leave', 'ends the run, which can be resumed'
+
+
+class Question(NamedTuple):
+    check: str  # its id, 'osmc 1'
+    topic: str  # what it is about, for scripts: 'which', 'forward', 'meter' …
+    text: str
+    answer: str  # 'yes_no', 'number' or 'choice'
+    choices: tuple[str, ...]  # for a choice
+    unit: str  # of a number
+
+
+class Movement(NamedTuple):
+    check: str
+    text: str
+    command: str  # 'O:410,1,1'; relay 1 closes before it
+    most: float  # seconds; it ends by then
+
+
+class Person:
+    """Derive from it. `say` prints; the other functions must be there."""
+
+    def say(self, check: str, text: str) -> None:
+        """`text` is for the person."""
+        print(f'{check}: {text}')
+
+    def ask(self, question: Question) -> bool | float | str | Action:
+        """Waits for the answer: a bool, a number, one of the choices, or an Action."""
+        raise NotImplementedError
+
+    def await_key(self, movement: Movement) -> Action | None:
+        """Announces the movement, and waits until the person holds the key; or returns an Action."""
+        raise NotImplementedError
+
+    def holds_key(self) -> bool:
+        """Asked every 20 ms while something moves; False stops it. Must not wait."""
+        raise NotImplementedError
+
+
+class Check(NamedTuple):
+    id: str
+    section: str  # 'motor supply off' or 'wheels off the ground'
+    moves: str  # what moves; '': nothing
+    about: str
+
+
+class Measured(NamedTuple):
+    what: str
+    value: float
+    unit: str
+
+
+class Found(NamedTuple):
+    thing: str  # 'osmc 1'
+    finding: str  # 'reversed'; does not change with the version
+    detail: str
+    wrong: str  # a sentence
+    fix: str
+
+
+class CheckResult(NamedTuple):
+    id: str
+    status: str  # 'not done', 'passed', 'found', 'skipped' or 'unsupported'
+    note: str
+    measured: tuple[Measured, ...]
+    found: tuple[Found, ...]
+
+
+class Report:
+    """The checks, their measurements and findings, and the learnt wiring. `json` is what Commissioning(resume=…) takes; `html` is one page."""
+
+    def __init__(self, text: str, page: str) -> None:
+        self.json = text
+        self.html = page
+        self._data: dict[str, Any] = json.loads(text)
+
+    @property
+    def checks(self) -> tuple[CheckResult, ...]:
+        """The checks that were done or tried, in their order."""
+        return tuple(CheckResult(each['id'], each['status'], each['note'],
+                                 tuple(Measured(**value) for value in each['measured']),
+                                 tuple(Found(**found) for found in each['found']))
+                     for each in self._data['checks'])
+
+    @property
+    def found(self) -> tuple[Found, ...]:
+        """All that is wrong."""
+        return tuple(found for each in self.checks for found in each.found)
+
+    @property
+    def learnt_wiring(self) -> Wiring:
+        """The board's wiring with what was learnt. Raises DataError while it is no whole wiring: then more checks of
+        one kind are needed."""
+        return Wiring.read(self._data['learnt_wiring'], 'learnt wiring')
+
+
+class _Asked:
+    """Turns what a Person returns into what the core takes."""
+    _ACTIONS = {Action.SKIP: 1, Action.REPEAT: 2, Action.LEAVE: 3}
+
+    def __init__(self, person: Person) -> None:
+        self._person = person
+        self.say = person.say
+        self.holds_key = person.holds_key
+
+    def ask(self, check: str, topic: str, text: str, kind: str, choices: list[str], unit: str) -> tuple[int, bool, float, int]:
+        question = Question(check, topic, text, kind, tuple(choices), unit)
+        answer = self._person.ask(question)
+        if isinstance(answer, Action):
+            return self._ACTIONS[answer], False, 0.0, 0
+        if kind == 'yes_no' and isinstance(answer, bool):
+            return 0, answer, 0.0, 0
+        if kind == 'number' and isinstance(answer, (int, float)) and not isinstance(answer, bool):
+            return 0, False, float(answer), 0
+        if kind == 'choice' and answer in choices:
+            return 0, False, 0.0, choices.index(str(answer))
+        raise UsageError(f'{check}: {answer!r}', f'it does not answer {topic!r}',
+                         f'return {"one of " + ", ".join(choices) if choices else kind}, or an Action')
+
+    def await_key(self, check: str, text: str, command: str, most: float) -> tuple[int, bool, float, int]:
+        action = self._person.await_key(Movement(check, text, command, most))
+        return (0 if action is None else self._ACTIONS[action]), False, 0.0, 0
+
+
+class Commissioning:
+    """Checks `board`, which must be in control, with `person`. `others`: URLs that lead to the same board.
+    `resume`: Report.json of an earlier run. The board is used by nobody else meanwhile."""
+
+    checks: tuple[Check, ...] = tuple(Check(*each) for each in _core.commissioning_checks())
+
+    def __init__(self, board: Board, person: Person, *, others: Sequence[str] = (), resume: str = '') -> None:
+        self._board = board
+        self._core = _core.Commissioning(board._core, _Asked(person), list(others), resume)
+
+    def run(self, check: str) -> CheckResult | None:
+        """Does one check, by its id, also again. None: the person left. Raises UsageError if there is no such check,
+        RefusedError if the link is lost."""
+        if not self._core.run(check):
+            return None
+        return next(each for each in self.report.checks if each.id == check)
+
+    def run_all(self, only: Sequence[str] = ()) -> bool:
+        """Does all checks that were not done yet, or those in `only`. False: the person left."""
+        return self._core.run_all(list(only))
+
+    def offer(self) -> bool:
+        """Asks whether the board may keep what was learnt, and gives it. False: the person left."""
+        return self._core.offer()
+
+    @property
+    def report(self) -> Report:
+        """The report so far."""
+        return Report(self._core.json(), self._core.html())
+
+
+__all__ = ['Action', 'Check', 'CheckResult', 'Commissioning', 'Found', 'Measured', 'Movement', 'Person', 'Question',
+           'Report']

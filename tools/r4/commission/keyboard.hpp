@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Standard input byte by byte, without waiting for a line. A terminal is put back as it was at the
+// end. SIGINT, SIGTERM and SIGHUP end the input, so that what moves is stopped in order. Ctrl-Z has
+// no effect.
+#pragma once
+
+#include <termios.h>
+
+#include <chrono>
+#include <csignal>
+#include <optional>
+
+namespace r4::tool {
+
+class Keyboard {
+ public:
+  static constexpr int nothing = -1;  // came in time
+  static constexpr int ended = -2;
+  static constexpr std::chrono::hours a_while{1};
+
+  Keyboard();
+  ~Keyboard();
+  Keyboard(const Keyboard&) = delete;
+  Keyboard& operator=(const Keyboard&) = delete;
+
+  // The next byte, nothing or ended.
+  int next(std::chrono::milliseconds timeout);
+  // Forgets what was typed so far at a terminal: it was no answer to what comes.
+  void forget();
+
+ private:
+  static constexpr int signals[] = {SIGINT, SIGTERM, SIGHUP, SIGTSTP};
+
+  std::optional<termios> before_;
+  struct sigaction handled_before_[4] = {};
+};
+
+}  // namespace r4::tool
