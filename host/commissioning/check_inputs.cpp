@@ -149,7 +149,8 @@ void check_supply(Checking& c, int input) {
     if (shown < 0.1) return c.found(Finding::no_voltage);
     c.found(Finding::divider_wrong, fmt::format("{:.2f} V in place of {:.2f} V", shown, meter));
   }
-  if (meter > 0) c.learnt({Learnt::What::full_scale, thing.signal(), 0, {}, meter / shown});
+  if (meter > 0 && shown >= 0.1)
+    c.learnt({Learnt::What::full_scale, thing.signal(), 0, {}, meter / shown});
 }
 
 void check_handle(Checking& c, int) {

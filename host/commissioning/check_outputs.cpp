@@ -36,21 +36,21 @@ struct EncoderTravel {
 // Backward first: with a wiring that says pwm and direction, a driver with an input for each
 // direction would go forward as commanded at nearly full speed in reverse.
 void check_motor(Checking& c, Thing commanded, MakeCommand make) {
-  const std::string name = name_of(commanded);
   const Pwm low = Duty(0.1).pwm();
   // In reverse, as in the safe state: forward may be a line that is high, which drives a driver
   // with an input for each direction.
   const Command rest = make(commanded.channel, Pwm(0), Direction::reverse);
-  const auto move = [&](Direction direction, const char* way, EncoderTravel& travel) {
+  const auto move = [&](Thing turning, Direction direction, const char* way,
+                        EncoderTravel& travel) {
     c.move(fmt::format("Relay 1 closes (a click), then {} turns {} for half a second, at a tenth "
                        "of full duty.",
-                       name, way),
+                       name_of(turning), way),
            make(commanded.channel, low, direction), rest, half_a_second,
            [&](const ReceivedState& state) { travel.take(state); });
   };
   c.select_fields("DEFAULT,ENC1,ENC2,ENC3,ENC4");
   EncoderTravel backward, forward;
-  move(Direction::reverse, "BACKWARD", backward);
+  move(commanded, Direction::reverse, "BACKWARD", backward);
   const auto seen = c.which(commanded, "Which motor has turned?");
   if (!seen) return c.found(Finding::does_not_move);
   if (c.confirms(Topic::forward, "Did it turn FORWARD? (It should have turned backward.)")) {
@@ -67,7 +67,7 @@ void check_motor(Checking& c, Thing commanded, MakeCommand make) {
     return c.learnt(
         {Learnt::What::option, commanded.signal() + row_of(commanded.first).channels, 0, {}, 1});
   }
-  move(Direction::forward, "FORWARD", forward);
+  move(*seen, Direction::forward, "FORWARD", forward);
   forward.report(c);
   if (!c.confirms(Topic::forward, "Did the same motor turn FORWARD, as slowly as before?")) {
     c.found(Finding::one_way);
@@ -138,13 +138,11 @@ void check_bldc(Checking& c, int channel) {
 
 void check_stepper(Checking& c, int channel) {
   constexpr std::int32_t steps = 100;
-  c.select_fields(fmt::format("STEP{}POS", channel));
-  const std::int32_t here = c.collect(50ms).back().steps(channel);
   c.move(fmt::format("Relay 1 closes (a click), then stepper {} takes {} steps FORWARD in half a "
                      "second.",
                      channel, steps),
-         Command::stepper(channel, Steps(here + steps), StepsPerSecond(2 * steps)),
-         Command::zero(channel), half_a_second);
+         Command::stepper(channel, Steps(steps), StepsPerSecond(2 * steps)), Command::zero(channel),
+         half_a_second);
   const auto seen = c.which({SignalKind::step, channel}, "Which stepper has turned?");
   if (!seen) return c.found(Finding::does_not_move);
   if (c.confirms(Topic::forward, "Did it turn FORWARD?")) return;

@@ -90,7 +90,10 @@ void Checking::send(const Command& command) { board.send(command, 1s); }
 
 void Checking::drive(const Command& command) { board.send(command, longest_gap); }
 
-void Checking::select_fields(const std::string& names) { send(Command::fields(Text(names))); }
+void Checking::select_fields(const std::string& names) {
+  send(Command::fields(Text(names)));
+  board.forget_states();  // a field that was not selected reads 0
+}
 
 std::vector<ReceivedState> Checking::states_since_forget() { return collect(0ms); }
 
@@ -100,7 +103,8 @@ std::vector<ReceivedState> Checking::collect(Duration time) {
   for (;;) {
     const auto state = board.next_state(time == 0ms ? 0ms : 1s);
     if (!state) {
-      if (time == 0ms || board.link().reason == SafeReason::link) return states;
+      if (time == 0ms) return states;
+      if (!states.empty() && board.link().reason == SafeReason::link) return states;
       throw Error(explain(check.id, board.link()));
     }
     if (states.empty()) began_ms = state->t_ms;
@@ -173,16 +177,21 @@ void Checking::make_ready() {
 
 void Checking::hold(const Movement& movement, const std::optional<Command>& rest,
                     const std::function<void()>& act) {
-  make_ready();
-  const Answer answer = person_.await_key(movement);
-  if (answer.kind != Answer::Kind::given) throw Ended{answer.kind};
+  do {  // again if the board went safe while the person read: arm() would clear a stop
+    make_ready();
+    const Answer answer = person_.await_key(movement);
+    if (answer.kind != Answer::Kind::given) throw Ended{answer.kind};
+  } while (board.link().state != HostLinkState::active);
   StopUnlessEnded guard(board);
   board.arm();
   board.forget_states();
   act();
-  if (board.link().reason == SafeReason::none) {  // else all outputs are off
-    if (rest) send(*rest);
-    send(Command::relay(1, false));
+  const SafeReason reason = board.link().reason;
+  // With recovery=last the next heartbeat would bring the outputs back: the guard stops the board.
+  if (reason == SafeReason::link) return;
+  if (reason == SafeReason::none) {  // else all outputs are off
+    if (rest) drive(*rest);
+    drive(Command::relay(1, false));
   }
   guard.end();
 }
@@ -207,6 +216,7 @@ void Checking::move(const std::string& text, const Command& command,
     hold({check.id, text, command, most}, rest, [&] {
       ReceivedState state;
       if (!watch(state)) return;
+      if (rest) drive(*rest);
       drive(command);
       board.forget_states();
       std::optional<std::uint32_t> began_ms;

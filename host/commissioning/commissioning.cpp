@@ -21,6 +21,10 @@ using namespace std::chrono_literals;
 // A wiring that was learnt agrees with the one that the board had then.
 void take_wiring(const BoardWiring& kept, Report& report) {
   const bool changed = !report.wiring_source.empty() && kept.wiring != report.wiring;
+  if (kept.source == WiringSource::given && !kept.in_use) {
+    throw Error(ErrorKind::usage, "the board", "it keeps a wiring that it does not use yet",
+                "press its reset button, and begin again");
+  }
   report.wiring_source = to_text(kept.source);
   report.wiring = kept.wiring;
   if (!changed) return;
@@ -46,7 +50,7 @@ void identify(BoardUnderTest& board, Report& report) {
     report.firmware = identity.firmware;
     report.capabilities = identity.capabilities;
   } catch (const Error& error) {
-    if (error.kind() != ErrorKind::refused) throw;
+    if (error.kind() != ErrorKind::refused || !report.board_id.empty()) throw;
     return;
   }
   try {
@@ -105,9 +109,13 @@ void give_full_scale(Checking& c, const Learnt& learnt) {
   const Text name = r4::name_of(state_field(FieldKind::analog, input));
   c.select_fields(std::string(name.data(), name.size()));
   const double before = shown_volts(c, input);
+  if (before < 1) {
+    return c.say("There is no voltage at " + std::string(name.data(), name.size()) +
+                 " now: do its check again, and leave the voltage there.");
+  }
   set_full_scale(c, input, known);
   const double with_known = shown_volts(c, input);
-  const double present = with_known > 0 ? known * before / with_known : known;
+  const double present = known * before / with_known;
   set_full_scale(c, input, present * learnt.factor);
   c.measured(std::string(name.data(), name.size()) + ", full scale", present * learnt.factor, "V");
 }
@@ -121,33 +129,39 @@ void forget_learnt(Report& report, bool full_scales) {
   }
 }
 
-// True if the plan, which nobody has confirmed, agrees with everything that was to be checked.
-bool confirms_plan(const Report& report) {
-  const auto is_reached = [&](const Check& check) {
-    return std::any_of(report.checks.begin(), report.checks.end(), [&](const CheckResult& each) {
-      return each.id == check.id && each.status != Status::not_done;
-    });
-  };
-  return report.wiring_source == to_text(WiringSource::plan) && report.found().empty() &&
-         std::all_of(checks().begin(), checks().end(), is_reached);
+// How many outputs were seen to agree with the plan, which nobody has confirmed. 0: something
+// disagrees, or was not reached.
+int outputs_as_planned(const Report& report) {
+  if (report.wiring_source != to_text(WiringSource::plan) || !report.found().empty()) return 0;
+  int outputs = 0;
+  for (const Check& check : checks()) {
+    const auto result = std::find_if(report.checks.begin(), report.checks.end(),
+                                     [&](const CheckResult& each) { return each.id == check.id; });
+    if (result == report.checks.end() || result->status == Status::not_done) return 0;
+    if (result->status == Status::passed && !check.moves.empty()) ++outputs;
+  }
+  return outputs;
 }
 
 void offer_wiring(Checking& c, Report& report) {
   if (report.wiring_source.empty()) return;
   const Wiring learnt = learnt_wiring(report);
   const bool as_planned = learnt == report.wiring;
-  if (as_planned && !confirms_plan(report)) return;
+  const int outputs = outputs_as_planned(report);
+  if (as_planned && outputs == 0) return;
   const WiringCheck fault = r4::check(learnt);
   if (fault.fault != WiringFault::none) {
     return c.say("The learnt wiring is not whole yet: " + problem_of(learnt, fault).text() +
                  ". Check the others of its kind, too.");
   }
   if (!c.confirms(Topic::give_wiring,
-                  as_planned ? "All checks agree with the plan. Shall the board keep the "
-                               "plan as its wiring? It then drives without E:CLEAR."
-                             : "Shall the board keep the learnt wiring? " +
-                                   differences(report.wiring, learnt) +
-                                   ". It counts from the board's next start on.")) {
+                  as_planned ? fmt::format("{} checks of outputs agree with the plan, and none "
+                                           "disagrees. Shall the board {} keep the plan as its "
+                                           "wiring? It then drives without E:CLEAR.",
+                                           outputs, report.board_id)
+                             : fmt::format("Shall the board {} keep the learnt wiring? {}. It "
+                                           "counts from the board's next start on.",
+                                           report.board_id, differences(report.wiring, learnt)))) {
     return;
   }
   c.board.give_wiring(learnt);
@@ -180,8 +194,8 @@ void offer_settings(Checking& c, Report& report) {
                       list + ".")) {
     return;
   }
+  forget_learnt(report, true);  // a factor is of the present full scale, which changes now
   for (const Learnt& each : scales) give_full_scale(c, each);
-  forget_learnt(report, true);
 }
 
 }  // namespace
@@ -231,6 +245,7 @@ Commissioning::End Commissioning::run(const Check& check) {
   if (!identified_) identify(board_, report_);
   identified_ = true;
   bool& ready = ready_[static_cast<int>(check.section)];
+  ready_[1 - static_cast<int>(check.section)] = false;  // the supply may have been switched since
   for (;;) {
     CheckResult result{check.id};
     const auto instead = carry_out(result, [&] {
@@ -262,6 +277,8 @@ Commissioning::End Commissioning::run_all(const std::vector<std::string>& only) 
 }
 
 Commissioning::End Commissioning::offer() {
+  if (!identified_) identify(board_, report_);
+  identified_ = true;
   const Check check{"offer", Section::supply_off, "", "", 0, 1};
   CheckResult result{check.id};
   const auto instead = carry_out(result, [&] {

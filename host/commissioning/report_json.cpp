@@ -100,11 +100,18 @@ Learnt learnt_in(const JsonValue& json, const std::string& name) {
   learnt.signal = signal_named(json["signal"].text());
   if (learnt.what == Learnt::What::serves) {
     learnt.other = signal_named(json["other"].text());
+    const std::vector<Thing> things = alike(thing_of(learnt.signal).first);
+    for (const int each : {learnt.signal, learnt.other}) {
+      if (std::find(things.begin(), things.end(), thing_of(each)) == things.end()) {
+        fail(name, "it exchanges things of different kinds");
+      }
+    }
   } else if (learnt.what == Learnt::What::place) {
     learnt.place = place_named(learnt.signal, json["place"].text());
   } else if (learnt.what == Learnt::What::full_scale) {
     learnt.factor = json["factor"].number();
-    if (thing_of(learnt.signal).first != SignalKind::analog || learnt.factor <= 0) {
+    if (thing_of(learnt.signal).first != SignalKind::analog ||
+        !(learnt.factor > 0 && learnt.factor <= 1000)) {
       fail(name, "a full scale is not possible");
     }
   }

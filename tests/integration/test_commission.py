@@ -196,6 +196,7 @@ def test_a_terminal_takes_numbers_and_choices_and_can_be_left(board, tmp_path):
         terminal.answer("'abc' is not one of these", '24.2\x7f23\n')
         terminal.until('meter: 24.23 V')
         terminal.answer('clear the fault', 'y')
+        terminal.until('HOLD the space bar[^$]*leave: ')
         terminal.until('9 relay 7[^$]*leave: ', typing=' ')
         terminal.type('5\n')
         terminal.answer('wheels are OFF', 'q')

@@ -16,6 +16,7 @@
 #include "r4link/error.hpp"
 #include "r4link/wiring/wiring_file.hpp"
 #include "simulated_person.hpp"
+#include "tests/support/problems.hpp"
 
 namespace r4::simulation {
 namespace {
@@ -335,6 +336,51 @@ TEST(Commissioning, StopsWhenTheHandleIsReleasedOrTheLinkIsLost) {
   bench.on_millisecond = [&] { on_ms += bench.model().pins().is_safe() ? 0 : 1; };
   bench.pass(5000);
   EXPECT_EQ(on_ms, 0) << "the outputs do not come back with the link";
+}
+
+TEST(Commissioning, AsksAgainIfTheBoardIsStoppedWhileThePersonReads) {
+  Bench bench({});
+  SimulatedPerson person(bench);
+  person.before_key = [&] { bench.stop(); };
+  int cleared = 0;
+  person.otherwise = [&](const commissioning::Question& question) {
+    cleared += question.topic == commissioning::Topic::clear ? 1 : 0;
+    return std::nullopt;
+  };
+  Commissioning commissioning(bench, person);
+  commissioning.run("relay 2");
+  EXPECT_EQ(cleared, 1);
+  EXPECT_EQ(person.movements, 2) << "announced again";
+  expect_that_nothing_moved_unannounced(person);
+}
+
+TEST(Commissioning, BringsNothingBackAfterItStoodStillAndThePersonLetGo) {
+  Bench bench({});
+  SimulatedPerson person(bench);
+  person.lets_go_after_ms = 200;
+  person.hangs_ms = 3000;  // the board has gone safe for the link, with its setpoints kept
+  person.otherwise =
+      [&](const commissioning::Question& question) -> std::optional<commissioning::Answer> {
+    if (question.topic != commissioning::Topic::clear) return std::nullopt;
+    return answer_of(commissioning::Answer::Kind::leave);
+  };
+  Commissioning commissioning(bench, person);
+  EXPECT_EQ(commissioning.run("osmc 1"), Commissioning::End::left);
+  int on_ms = 0;
+  bench.on_millisecond = [&] { on_ms += bench.model().pins().is_safe() ? 0 : 1; };
+  bench.pass(3000);
+  EXPECT_EQ(on_ms, 0);
+}
+
+TEST(Commissioning, OffersNothingToAnotherBoard) {
+  Bench bench({.wired = wired({{"relay 2", "GPB4"}, {"relay 5", "GPB1"}})});
+  SimulatedPerson person(bench);
+  Commissioning commissioning(bench, person);
+  commissioning.run_all({"relay 2", "relay 5"});
+  commissioning::Report of_another = commissioning.report();
+  of_another.board_id = "sim-2";
+  EXPECT_EQ(test::problem_of([&] { Commissioning(bench, person, of_another).offer(); }).kind,
+            ErrorKind::usage);
 }
 
 TEST(Commissioning, CanBeSkippedRepeatedLeftAndResumed) {

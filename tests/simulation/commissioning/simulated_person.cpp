@@ -83,6 +83,7 @@ void SimulatedPerson::say(std::string_view, std::string_view) { moving_ = holds_
 Answer SimulatedPerson::await_key(const commissioning::Movement&) {
   moving_ = false;
   bench_.pass(reaction_ms);
+  if (before_key) std::exchange(before_key, nullptr)();
   seen_.clear();
   clicks_.clear();
   supplied_ = false;
@@ -96,6 +97,7 @@ bool SimulatedPerson::holds_key() {
   if (holds_ && lets_go_after_ms && bench_.now_ms() - held_since_ms_ >= *lets_go_after_ms) {
     holds_ = false;
     lets_go_after_ms.reset();
+    bench_.pass(std::exchange(hangs_ms, 0));
     let_go_ms_ = bench_.now_ms();
   }
   return holds_;

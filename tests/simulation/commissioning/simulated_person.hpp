@@ -27,6 +27,8 @@ class SimulatedPerson final : public commissioning::Person {
   // Answers in place of the usual one, if it returns one.
   std::function<std::optional<commissioning::Answer>(const commissioning::Question&)> otherwise;
   std::optional<std::uint32_t> lets_go_after_ms;  // in the next movement
+  std::function<void()> before_key;               // called once, while the next movement is read
+  std::uint32_t hangs_ms = 0;                     // holds_key() takes so long when it becomes false
 
   // Promises that were broken, in milliseconds.
   int unannounced_ms = 0;  // an output was on, and nothing was announced

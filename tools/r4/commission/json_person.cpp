@@ -100,6 +100,11 @@ Answer JsonPerson::ask(const Question& question) {
 }
 
 Answer JsonPerson::await_key(const commissioning::Movement& movement) {
+  key_ = false;
+  for (Json early = next_line(0ms); !early.is_null(); early = next_line(0ms)) {
+    if (const auto action = action_in(early))
+      return *action;  // a key before the announcement is not one
+  }
   print_line({{"type", "movement"},
               {"check", movement.check},
               {"text", movement.text},
