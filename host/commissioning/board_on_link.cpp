@@ -12,7 +12,7 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t states_kept = 6000;  // a minute at 100 Hz
 constexpr BoardUnderTest::Duration supervision = 500ms;
-constexpr BoardUnderTest::Duration answer = 1s;
+constexpr BoardUnderTest::Duration answer_time = 1s;
 constexpr BoardUnderTest::Duration scan_answer = 2s;
 constexpr BoardUnderTest::Duration patience = 10s;  // a board that restarts
 
@@ -49,13 +49,13 @@ void BoardOnLink::forget_states() {
 }
 
 LinkStatus BoardOnLink::link() { return board_.link(); }
-BoardIdentity BoardOnLink::identify() { return board_.identify(answer); }
-BoardWiring BoardOnLink::wiring() { return board_.wiring(answer); }
-void BoardOnLink::give_wiring(const Wiring& wiring) { board_.give_wiring(wiring, answer); }
+BoardIdentity BoardOnLink::identify() { return board_.identify(answer_time); }
+BoardWiring BoardOnLink::wiring() { return board_.wiring(answer_time); }
+void BoardOnLink::give_wiring(const Wiring& wiring) { board_.give_wiring(wiring, answer_time); }
 std::vector<std::uint8_t> BoardOnLink::scan() { return board_.i2c().scan(scan_answer); }
 void BoardOnLink::send(const Command& command, Duration timeout) { board_.send(command, timeout); }
-void BoardOnLink::arm() { board_.arm(answer); }
-void BoardOnLink::stop() { board_.stop(answer); }
+void BoardOnLink::arm() { board_.arm(answer_time); }
+void BoardOnLink::stop() { board_.stop(answer_time); }
 
 void BoardOnLink::supervise(bool supervised) {
   supervised_ = supervised;
@@ -83,7 +83,7 @@ BoardUnderTest::Quality BoardOnLink::measure(std::size_t transport, Duration tim
   const auto measured = [time](Board& board) {
     const Statistics before = board.statistics();
     const auto end = std::chrono::steady_clock::now() + time;
-    while (std::chrono::steady_clock::now() < end) board.next_state(answer);
+    while (std::chrono::steady_clock::now() < end) board.next_state(answer_time);
     const Statistics after = board.statistics();
     Quality quality;
     const auto states = static_cast<double>(after.states - before.states);
@@ -102,10 +102,10 @@ BoardUnderTest::Quality BoardOnLink::measure(std::size_t transport, Duration tim
 }
 
 void BoardOnLink::stop_over(std::size_t transport) {
-  if (transport == 0) return board_.stop(answer);
+  if (transport == 0) return board_.stop(answer_time);
   BoardOptions options;
   options.role = BoardRole::watch;
-  Board(others_.at(transport - 1), options).stop(answer);
+  Board(others_.at(transport - 1), options).stop(answer_time);
 }
 
 }  // namespace r4::commissioning

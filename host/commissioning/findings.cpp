@@ -8,7 +8,7 @@
 namespace r4::commissioning {
 namespace {
 
-constexpr std::array<FindingText, static_cast<std::size_t>(Finding::count)> texts{{
+constexpr std::array<FindingText, static_cast<std::size_t>(Finding::count)> finding_texts{{
     {"wiring damaged", "The stored wiring cannot be read: nothing is connected.",
      "Give it again: r4 wiring give FILE URL."},
     {"not kept", "The board does not keep what it was given over a restart.",
@@ -79,16 +79,18 @@ constexpr std::array<FindingText, static_cast<std::size_t>(Finding::count)> text
     {"stop too slow", "The outputs were not off in time after a stop.",
      "Look at the transport: r4 bench URL."},
 }};
-static_assert(!texts.back().fix.empty(), "each Finding has its text");
+static_assert(!finding_texts.back().fix.empty(), "each Finding has its text");
 
 }  // namespace
 
-const FindingText& text_of(Finding finding) { return texts.at(static_cast<std::size_t>(finding)); }
+const FindingText& text_of(Finding finding) {
+  return finding_texts.at(static_cast<std::size_t>(finding));
+}
 
 Finding finding_named(std::string_view name) {
-  const auto* const found =
-      std::find_if(texts.begin(), texts.end(), [&](const auto& each) { return each.name == name; });
-  return static_cast<Finding>(found - texts.begin());
+  const auto* const found = std::find_if(finding_texts.begin(), finding_texts.end(),
+                                         [&](const auto& each) { return each.name == name; });
+  return static_cast<Finding>(found - finding_texts.begin());
 }
 
 }  // namespace r4::commissioning
