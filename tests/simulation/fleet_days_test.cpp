@@ -29,13 +29,13 @@ namespace {
 using firmware::BoardState;
 
 constexpr std::size_t fleet_size = 100;
-constexpr std::uint64_t second_us = 1'000'000;
-constexpr std::uint64_t silence_limit_us = 1'020'000;           // the timeout and 20 ms
-constexpr std::uint64_t comes_back_within_us = 15 * second_us;  // although datagrams are lost
+constexpr std::uint64_t one_second_us = 1'000'000;
+constexpr std::uint64_t silence_limit_us = 1'020'000;               // the timeout and 20 ms
+constexpr std::uint64_t comes_back_within_us = 15 * one_second_us;  // although datagrams are lost
 // A board that has restarted is active when a host echoes its second heartbeat, after half a
 // second. If that heartbeat is lost, the first connection ends after a second, and the next
 // connection starts at once.
-constexpr std::uint64_t connecting_us = 2 * second_us;
+constexpr std::uint64_t connecting_us = 2 * one_second_us;
 constexpr double lost = 0.1, twice = 0.01, damaged = 0.001;
 
 struct Packet {
@@ -140,7 +140,7 @@ class FleetLink final : firmware::Hal, firmware::Port, test::DrivenSession::Hand
   std::uint64_t fault_ends_us() const {
     return std::max({cut_until_us_, held_until_us_, restarted_us_});
   }
-  Time time() const { return Time{static_cast<std::int64_t>(now_us_ + second_us)}; }
+  Time time() const { return Time{static_cast<std::int64_t>(now_us_ + one_second_us)}; }
   std::uint32_t board_ms() const {
     return boot_ms_ + static_cast<std::uint32_t>((now_us_ - boot_us_) / 1000);
   }
@@ -164,7 +164,7 @@ class FleetLink final : firmware::Hal, firmware::Port, test::DrivenSession::Hand
   }
   void poll_host() {
     const Time due = session_->poll(time());
-    host_due_us_ = std::max(now_us_ + 1, static_cast<std::uint64_t>(due.count()) - second_us);
+    host_due_us_ = std::max(now_us_ + 1, static_cast<std::uint64_t>(due.count()) - one_second_us);
   }
   // Checks how the board handles the silence.
   void look() {
@@ -261,12 +261,12 @@ TEST(FleetDays, MemoryDoesNotGrowAndFalseTripsAreRare) {
   std::uint64_t faults = 0, restarts = 0;
   std::size_t heap = 0;
   for (std::uint64_t now = 1; now <= seconds; ++now) {
-    for (const auto& link : fleet) link->run_until(now * second_us);
+    for (const auto& link : fleet) link->run_until(now * one_second_us);
     if (now == seconds / 2) heap = ::mallinfo2().uordblks;
     if (now % interval == interval / 2) {
       ++faults;
       const bool held_up = random.chance(0.5);
-      const std::uint64_t length_us = random.between(2, 30) * second_us;
+      const std::uint64_t length_us = random.between(2, 30) * one_second_us;
       for (const auto& link : fleet) held_up ? link->hold_up(length_us) : link->cut(length_us);
     }
     for (const auto& link : fleet) {
@@ -275,7 +275,7 @@ TEST(FleetDays, MemoryDoesNotGrowAndFalseTripsAreRare) {
       if (!link->random().chance(1.0 / static_cast<double>(interval))) continue;
       ++faults;
       if (link->random().chance(0.5)) {
-        link->cut(link->random().between(2, 30) * second_us);
+        link->cut(link->random().between(2, 30) * one_second_us);
       } else {
         ++restarts;
         link->restart_board();
