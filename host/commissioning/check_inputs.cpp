@@ -132,7 +132,6 @@ void check_supply(Checking& c, int input) {
   std::string names;
   for (int i = 1; i <= analog_channels; ++i) names += (i == 1 ? "" : ",") + analog_name(i);
   c.select_fields(names);
-  c.board.forget_states();
   const States states = c.collect(300ms);
   const double shown = mean_volts(states, input);
   c.measured("shown", shown, "V");

@@ -172,6 +172,8 @@ def test_a_keyboard_is_enough_and_letting_go_of_the_space_bar_stops(board, tmp_p
         terminal.answer('wheels are OFF THE GROUND', 'y')
         terminal.answer('does the meter show', 'n')
         terminal.answer('clear the fault', 'y')
+        with pytest.raises(AssertionError):  # a key that is held already begins nothing
+            terminal.until('HOLD the space bar', typing=' ', timeout=0.7)
         terminal.until('HOLD the space bar[^$]*leave: ')
         board.skip_past()
         terminal.type(' ')
@@ -207,7 +209,7 @@ def test_a_terminal_takes_numbers_and_choices_and_can_be_left(board, tmp_path):
 
 
 @pytest.mark.parametrize('arguments, code', [
-    ([], 2), (['sim:', '--only', 'osmc 9'], 2), (['sim:', '--report', 'x.txt'], 2), (['sim:', '--resume', '/nowhere'], 4),
+    ([], 2), (['sim:'], 2), (['sim:', '--only', 'osmc 9'], 2), (['sim:', '--report', 'x.txt'], 2), (['sim:', '--resume', '/nowhere'], 4),
     (['sim:', '--resume', '/dev/null'], 1), (['sim:', '--report', '/nowhere/x.html'], 4)])
 def test_a_wrong_use_says_what_is_right(arguments, code, tmp_path):
     result = run('commission', *arguments, cwd=tmp_path)

@@ -138,11 +138,11 @@ void read_defect(const Line& line, ScriptStep& step) {
     ++step.channel;
   }
   if (step.channel == defects::count) {
-    fail(line, line.words[1], "is nothing that can be broken",
+    fail(line, line.words[1], "is not a defect",
          "write enc1a … enc4b, echo1 …, relay1 …, handle, bypass, servos or store");
   }
   if (line.words[2] != "on" && line.words[2] != "off") {
-    fail(line, line.words[2], "is nothing a defect can be", "write on or off");
+    fail(line, line.words[2], "is not on or off", "write on or off");
   }
   step.value = line.words[2] == "on" ? 1 : 0;
 }

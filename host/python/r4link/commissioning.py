@@ -96,7 +96,8 @@ class CheckResult(NamedTuple):
 
 
 class Report:
-    """The checks, their measurements and findings, and the learnt wiring. `json` is what Commissioning(resume=…) takes; `html` is one page."""
+    """The checks, their measurements and findings, and the learnt wiring. Commissioning(resume=…) takes `json`; `html`
+    is one page."""
 
     def __init__(self, text: str, page: str) -> None:
         self.json = text
@@ -118,8 +119,8 @@ class Report:
 
     @property
     def learnt_wiring(self) -> Wiring:
-        """The board's wiring with what was learnt. Raises DataError while it is no whole wiring: then more checks of
-        one kind are needed."""
+        """The board's wiring with what was learnt. Raises DataError while it is not a whole wiring: then more
+        checks of one kind are needed."""
         return Wiring.read(self._data['learnt_wiring'], 'learnt wiring')
 
 
@@ -162,8 +163,8 @@ class Commissioning:
         self._core = _core.Commissioning(board._core, _Asked(person), list(others), resume)
 
     def run(self, check: str) -> CheckResult | None:
-        """Does one check, by its id, also again. None: the person left. Raises UsageError if there is no such check,
-        RefusedError if the link is lost."""
+        """Does one check, by its id, again if it was done. Returns None if the person left. Raises UsageError if there
+        is no such check, RefusedError if the link is lost."""
         if not self._core.run(check):
             return None
         return next(each for each in self.report.checks if each.id == check)

@@ -54,8 +54,6 @@ TEST(Commissioning, FindsNothingWrongAtARightBoard) {
   EXPECT_EQ(findings_of(commissioning.report()), std::vector<std::string>{});
   for (const auto& each : commissioning.report().checks) {
     EXPECT_EQ(each.status, commissioning::Status::passed) << each.id << ": " << each.note;
-    for (const auto& m : each.measured)
-      fmt::print("{}: {} {} {}\n", each.id, m.what, m.value, m.unit);
   }
   EXPECT_EQ(commissioning.report().checks.size(), commissioning::checks().size());
   EXPECT_GT(person.movements, 50);
@@ -370,6 +368,65 @@ TEST(Commissioning, BringsNothingBackAfterItStoodStillAndThePersonLetGo) {
   bench.on_millisecond = [&] { on_ms += bench.model().pins().is_safe() ? 0 : 1; };
   bench.pass(3000);
   EXPECT_EQ(on_ms, 0);
+}
+
+TEST(Commissioning, TakesNoEarlierPositionForAMovement) {
+  Bench bench({});
+  SimulatedPerson person(bench);
+  bench.arm();
+  bench.send(Command::stepper(1, Steps(-300), StepsPerSecond(2000)), Bench::Duration(1000));
+  bench.model().turn_encoder(2, 5000);
+  bench.pass(3000);
+  Commissioning commissioning(bench, person);
+  commissioning.run_all({"encoder 1", "stepper 1"});
+  person.lets_go_after_ms = 100;
+  commissioning.run("stepper 1");
+  EXPECT_EQ(findings_of(commissioning.report()), std::vector<std::string>{});
+}
+
+TEST(Commissioning, AsksForTheSupplyAgainAfterMotorsHaveTurned) {
+  Bench bench({});
+  SimulatedPerson person(bench);
+  int asked = 0;
+  person.otherwise = [&](const commissioning::Question& question) {
+    asked += question.topic == commissioning::Topic::supply_off ? 1 : 0;
+    return std::nullopt;
+  };
+  Commissioning commissioning(bench, person);
+  for (const char* check : {"relay 2", "encoder 1", "osmc 1", "encoder 1"})
+    commissioning.run(check);
+  EXPECT_EQ(asked, 2);
+}
+
+TEST(Commissioning, DoesNotJudgeABoardThatHasYetToUseItsWiring) {
+  Bench bench({});
+  SimulatedPerson person(bench);
+  bench.give_wiring(wired({{"relay 2", "GPB4"}, {"relay 5", "GPB1"}}));
+  Commissioning commissioning(bench, person);
+  EXPECT_EQ(test::problem_of([&] { commissioning.run("relay 2"); }).kind, ErrorKind::usage);
+  EXPECT_EQ(person.movements, 0);
+}
+
+TEST(Commissioning, OffersThePlanOnlyIfAnOutputWasSeenToAgree) {
+  for (const bool seen : {false, true}) {
+    Bench bench({.new_board = true});
+    SimulatedPerson person(bench);
+    int offered = 0;
+    person.otherwise = [&](const commissioning::Question& question) {
+      offered += question.topic == commissioning::Topic::give_wiring ? 1 : 0;
+      return std::nullopt;
+    };
+    commissioning::Report begun;
+    begun.wiring_source = "plan";
+    begun.wiring = plan_wiring();
+    for (const auto& check : commissioning::checks()) {
+      begun.checks.push_back({check.id, commissioning::Status::skipped});
+    }
+    Commissioning commissioning(bench, person, begun);
+    if (seen) commissioning.run("osmc 1");
+    commissioning.offer();
+    EXPECT_EQ(offered, seen ? 1 : 0);
+  }
 }
 
 TEST(Commissioning, OffersNothingToAnotherBoard) {

@@ -2,6 +2,7 @@
 // r4 commission: checks a board step by step with a person, and learns how it is wired.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
@@ -145,6 +146,10 @@ int commission(const CommissionOptions& options) {
   const ReportFiles files(options);
   const Report begun = begin(options);
   files.write(begun);  // before the work: the folder may not be writable
+  if (!options.json && ::isatty(STDIN_FILENO) == 0) {
+    throw Error(ErrorKind::usage, "standard input", "is not a terminal, so nobody can hold a key",
+                "run it in a terminal; for a script there is --json");
+  }
 
   Board board(options.urls.front(), with_key(options.key));
   commissioning::BoardOnLink tested(board, {options.urls.begin() + 1, options.urls.end()});

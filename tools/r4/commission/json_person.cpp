@@ -101,9 +101,9 @@ Answer JsonPerson::ask(const Question& question) {
 
 Answer JsonPerson::await_key(const commissioning::Movement& movement) {
   key_ = false;
+  // A key that came before the announcement does not count.
   for (Json early = next_line(0ms); !early.is_null(); early = next_line(0ms)) {
-    if (const auto action = action_in(early))
-      return *action;  // a key before the announcement is not one
+    if (const auto action = action_in(early)) return *action;
   }
   print_line({{"type", "movement"},
               {"check", movement.check},

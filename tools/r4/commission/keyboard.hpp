@@ -25,7 +25,7 @@ class Keyboard {
 
   // The next byte, nothing or ended.
   int next(std::chrono::milliseconds timeout);
-  // Forgets what was typed so far at a terminal: it was no answer to what comes.
+  // Forgets what was typed so far at a terminal: it does not answer the next question.
   void forget();
 
  private:

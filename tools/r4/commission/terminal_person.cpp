@@ -114,7 +114,8 @@ Answer TerminalPerson::ask(const Question& question) {
 }
 
 Answer TerminalPerson::await_key(const commissioning::Movement& movement) {
-  while (keyboard_.next(repeat_within) == ' ') {  // still held from the movement before
+  // A key that is still held from the movement before must be let go first.
+  while (keyboard_.next(repeat_within) == ' ') {
   }
   keyboard_.forget();
   print_text("{}\n  HOLD the space bar to begin, let go to end it; s skip, r repeat, q leave: ",

@@ -241,10 +241,10 @@ TEST(Script, ReadsDefects) {
   EXPECT_EQ(error_of("1 divider AIN24 11"),
             "bench.txt:1: '11' is not a factor; write 0 to 10, such as 0.5");
   EXPECT_EQ(error_of("1 defect enc5a on"),
-            "bench.txt:1: 'enc5a' is nothing that can be broken; write enc1a … enc4b, echo1 …, "
+            "bench.txt:1: 'enc5a' is not a defect; write enc1a … enc4b, echo1 …, "
             "relay1 …, handle, bypass, servos or store");
   EXPECT_EQ(error_of("1 defect handle held"),
-            "bench.txt:1: 'held' is nothing a defect can be; write on or off");
+            "bench.txt:1: 'held' is not on or off; write on or off");
 }
 
 TEST(Script, RefusesAnEndlessFile) {
