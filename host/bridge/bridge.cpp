@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4::Bridge: its pairs on one loop, and the loop's thread.
+// r4::Bridge runs its pairs on one loop, in one thread.
 #include <asio/io_context.hpp>
 #include <asio/post.hpp>
 #include <asio/use_future.hpp>
@@ -20,13 +20,13 @@
 namespace r4 {
 namespace {
 
-// A device may be plugged in later. A listening port exists, or its URL is a mistake.
+// True for a device, which may be plugged in later. A listening port must exist at once.
 bool is_device(const std::string& url) {
   const std::string scheme = Url::parse(url).scheme();
   return scheme == "serial" || scheme == "can";
 }
 
-// True if a board obeys every datagram of that transport without a signature.
+// True if a board obeys every datagram of its transport without a signature.
 bool is_cable(const std::string& board) { return Url::parse(board).scheme() == "serial"; }
 
 }  // namespace
@@ -68,7 +68,7 @@ struct Bridge::Impl {
 
   ~Impl() { close(); }
 
-  // For a bridge without a key, to a board that obeys its cable.
+  // Throws unless a bridge without a key may serve these hosts. Warns if it is open to everyone.
   void permit(const BridgedUrls& urls, bool open) {
     const std::string danger = "everyone who reaches it may drive the board at " + urls.board +
                                ", which asks for no key at its cable";
@@ -83,7 +83,7 @@ struct Bridge::Impl {
     on_event({pairs.size(), BridgeSide::hosts, {CarrierEvent::Kind::warning, warning}});
   }
 
-  // On the loop, so that resolving one name does not delay the other pairs.
+  // Opens the pairs on the loop, so that resolving one name does not delay other pairs.
   void open() {
     tick_later();
     thread = std::thread([this] { io.run(); });
@@ -122,7 +122,7 @@ struct Bridge::Impl {
     return all;
   }
 
-  // Waits until `action` is done on the loop: at most one turn of the loop.
+  // Runs `action` on the loop and waits for its end, at most one turn of the loop.
   template <class Action>
   std::invoke_result_t<Action> on_loop(Action action) {
     return asio::post(io, asio::use_future(std::move(action))).get();
@@ -137,12 +137,12 @@ struct Bridge::Impl {
   }
 
   const std::function<void(const BridgeEvent&)> on_event;
-  // Other threads only post to it, so the reactor needs no locks.
+  // Other threads only post to the loop, so the reactor needs no locks.
   asio::io_context io{ASIO_CONCURRENCY_HINT_UNSAFE_IO};
   LoopTimer timer{io};
   OperationSlot ticking;
   std::vector<std::unique_ptr<BridgedPair>> pairs;
-  std::mutex mutex;  // between callers in other threads
+  std::mutex mutex;  // between callers in different threads
   std::vector<BridgeStatus> last;
   std::thread thread;
 };

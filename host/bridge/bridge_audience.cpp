@@ -40,7 +40,7 @@ std::optional<Peer> BridgeAudience::asker_of(std::optional<std::uint32_t> pnum, 
   return newest->from;
 }
 
-// A new peer takes a free place, or that of the longest silent peer other than a watcher.
+// A new peer takes a free place, or the place of the longest silent peer that does not watch.
 BridgeAudience::Place& BridgeAudience::place_of(Peer peer, Time now) {
   Place* best = nullptr;
   for (Place& place : places_) {
@@ -51,7 +51,7 @@ BridgeAudience::Place& BridgeAudience::place_of(Peer peer, Time now) {
     if (now < place.watches_until) continue;
     if (best == nullptr || place.heard < best->heard) best = &place;
   }
-  if (best == nullptr) best = places_.data();  // there are more places than watchers
+  if (best == nullptr) best = places_.data();  // cannot occur: there are more places than watchers
   *best = Place();
   best->peer = peer;
   best->heard = now;

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The peers, besides served hosts, that hear a board through a bridge: watchers
-// (docs/reference/protocol.md, 4.8), and for a second each peer that stopped the board, asks for
-// control, or needs the nonce.
-//     W:rate --> is sent a LEASE --W:rate that echoes it--> hears everything for two seconds
-//                                                           after each W
+// The peers, besides served hosts, to which a bridge sends a board's datagrams:
+//     watchers     get states and heartbeats (docs/reference/protocol.md, 4.8)
+//     listeners    get heartbeats for a second: after a stop, to request control, for the nonce
 //
-// A peer is streamed to only after it has echoed a random number: a W with a forged sender address
-// cannot make a bridge flood a third party. Peers that have echoed nothing get few answers.
+//     W:rate --> is sent a LEASE --W:rate that echoes the LEASE--> watches for two seconds
+//                                                                  after each W
+//
+// A peer gets states only after it has echoed a random number. Otherwise a W with a forged sender
+// address could make a bridge flood a third party. A peer without an echo gets few answers.
 #pragma once
 
 #include <array>
@@ -29,14 +30,14 @@ class BridgeAudience {
   static constexpr int most_watchers = 4;
 
   enum class Effect : std::uint8_t { watching, unproven, full };
-  // A `W` of a peer, with its T. `ends`: its rate is 0, which ends the lease.
+  // `echo`: the T of the peer's `W`. `ends`: the rate is 0, which ends the lease.
   Effect on_lease(Peer from, bool ends, std::uint64_t echo, Time now);
   std::uint32_t new_token(Peer to, Time now);
 
   void listen(Peer from, Time now) { place_of(from, now).listens_until = now + curiosity; }
 
   void on_question(Peer from, std::optional<std::uint32_t> pnum, SessionId sid, Time now);
-  // An answer to a session goes only to a peer that named its id.
+  // An answer to a session goes only to a peer that named the session's id.
   std::optional<Peer> asker_of(std::optional<std::uint32_t> pnum, SessionId sid, Time now) const;
 
   template <class Call>
@@ -45,8 +46,8 @@ class BridgeAudience {
       if (now < place.watches_until) call(place.peer);
     }
   }
-  // Calls `call(peer)` for each peer that hears heartbeats only. Each call begins with another
-  // peer, so that a small budget reaches every peer in turn.
+  // Calls `call(peer)` for each listener. Each round begins with another listener, so that a small
+  // budget reaches every listener in turn.
   template <class Call>
   void for_each_listener(Time now, Call call) {
     ++turn_;

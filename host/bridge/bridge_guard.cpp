@@ -8,7 +8,7 @@
 namespace r4 {
 namespace {
 
-// A clock that goes back by more than this is a new clock: the board has restarted.
+// If the board's clock goes back by more than this, the board has restarted.
 constexpr std::int32_t restarted_ms = -1500;
 
 }  // namespace
@@ -30,13 +30,13 @@ void BridgeGuard::on_board_datagram(const Datagram& datagram, MessageKind kind, 
   if (!authentication_.required() || !datagram.has_time()) return;
   const auto t_ms = static_cast<std::uint32_t>(datagram.time_ms());
   const auto ahead = static_cast<std::int32_t>(t_ms - board_ms(now));
-  if (has_clock_ && ahead < 0 && ahead > restarted_ms) return;  // it was delayed
+  if (has_clock_ && ahead < 0 && ahead > restarted_ms) return;  // the datagram was delayed
   has_clock_ = true;
   t_ms_ = t_ms;
   told_ = now;
 }
 
-// The same estimate as the host's (Signer), but never lower: the host receives each T later.
+// Estimates as the host does (Signer), and never lower, because the host receives each T later.
 std::uint32_t BridgeGuard::board_ms(Time now) const {
   const Time::duration passed = now - told_;
   return t_ms_ + ms_of(passed - passed / 32);

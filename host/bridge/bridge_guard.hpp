@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Decides by keys which host datagrams a bridge may pass to its board. A board obeys its own cable
-// without a signature, and a bridge must not lend that trust to its hosts:
+// without a signature. A bridge must not give its hosts the same right:
 //     keys    board                        heartbeats and commands pass
 //     given   any                          if they are signed for this board, once, within 250 ms
 //     none    at no cable, or open to all  always; the board itself checks signatures
@@ -8,8 +8,8 @@
 //     none    at a cable, has a key        never: the bridge cannot check signatures
 //     none    at a cable, not heard yet    never
 //
-// The rule is the board's (protocol/keys/authentication.hpp), with the nonce and the clock that the
-// board reports. E:STOP, Q:ID and W need no signature, neither here nor at the board.
+// A bridge checks as the board does (protocol/keys/authentication.hpp), with the nonce and clock
+// that the board reports. E:STOP, Q:ID and W need no signature, as at the board.
 #pragma once
 
 #include <chrono>
@@ -37,11 +37,11 @@ class BridgeGuard {
   BridgeGuard(const std::vector<Key>& keys, bool trusted);
 
   void on_board_datagram(const Datagram& datagram, MessageKind kind, Time now);
-  // The board's transport is down. It may lead to another board when it comes back.
+  // The board's transport is down. It may reconnect to another board.
   void on_board_gone() { heard_ = false; }
 
   Verdict judge(const Datagram& datagram, Time now);
-  // Counts a verdict other than authentic. True if it may be answered.
+  // Counts a verdict other than authentic. True if the datagram may be answered.
   bool may_answer(Verdict verdict);
 
   Trouble trouble() const;
@@ -52,7 +52,7 @@ class BridgeGuard {
   Authentication authentication_;
   const bool trusted_;
   bool heard_ = false;
-  bool asks_ = false;  // its newest heartbeat asks for signatures
+  bool asks_ = false;  // the board's newest heartbeat requests signatures
   bool has_clock_ = false;
   std::uint32_t t_ms_ = 0;  // the board's clock at told_
   Time told_;

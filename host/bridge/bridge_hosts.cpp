@@ -35,7 +35,7 @@ BridgeHosts::Host* BridgeHosts::place_for(Peer from, SessionId sid, Time now) {
     place = hosts_.data();
     if (place->heard != Time() && now - place->heard < timeout_ + paper_margin) return nullptr;
   } else {
-    // Hosts that were never served give way first, then the host that was silent longest.
+    // Replaces a host that was never served, else the host that was silent longest.
     const auto rank = [now](const Host& host) {
       return std::pair(now >= host.served_from, host.heard);
     };

@@ -12,9 +12,9 @@
 // not refuse is in control. Only served hosts get states, and their datagrams pass at once. Other
 // hosts share a budget (bridged_pair.hpp).
 //
-// A served host keeps its place while it is heard. After a silence it is served again at once,
-// unless another served host needed the place. A paper host has no session id, so the board cannot
-// distinguish two of them behind one bridge: only one passes at a time.
+// A served host keeps its place while its heartbeats come. After a silence it is served again at
+// once, unless another served host needed the place. A paper host has no session id, so the board
+// cannot distinguish two paper hosts behind one bridge. Only one paper host passes at a time.
 #pragma once
 
 #include <array>
@@ -38,14 +38,14 @@ class BridgeHosts {
   // The board must have lost a silent paper host before another paper host passes.
   static constexpr std::chrono::milliseconds paper_margin{500};
 
-  // `timeout`: the board's.
+  // `timeout`: of the board.
   explicit BridgeHosts(std::chrono::milliseconds timeout);
 
-  // `judged`: the board begins or feeds a session by that heartbeat, or answers BUSY. False if it
-  // must not pass: there is another paper host, or `most` other hosts are served.
+  // `judged`: the board begins or feeds a session by this heartbeat, or answers BUSY. False if the
+  // heartbeat must not pass: there is another paper host, or `most` other hosts are served.
   bool on_heartbeat(Peer from, const Datagram& heartbeat, bool judged, Time now);
   void on_busy(SessionId sid, Time now);
-  // The board reports that it has no host, so it refuses none.
+  // The board reports that it has no host, so it refuses no host.
   void on_board_free();
   // True if served() has changed.
   bool poll(Time now);
@@ -55,10 +55,11 @@ class BridgeHosts {
   bool is_served_at(Peer peer) const;
   // True if a heartbeat of this host passed at most a timeout ago.
   bool knows(Peer from, SessionId sid, Time now) const;
-  // Datagrams of this host pass at once, over every path: it is served, or was before a silence.
+  // True if this host is served, or was served before a silence. Its datagrams pass at once, over
+  // every path.
   bool trusts(Peer from, SessionId sid, Time now) const;
   bool serves(SessionId sid, Time now) const;
-  // The number of the first heartbeat of this host that passed, or passed after a silence.
+  // The number of this host's first heartbeat that passed since the last silence.
   std::optional<std::uint32_t> first_heartbeat(Peer from, SessionId sid) const;
   template <class Call>
   void for_each_path(SessionId sid, Time now, Call call) const {

@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* other_side = "name the board's own transport as the second one";
 
-// True for an address of this machine: only those can be bound.
+// True for an address of this computer. Other addresses cannot be bound.
 bool is_ours(const std::string& host) {
   asio::error_code error;
   const auto address = asio::ip::make_address(host == "localhost" ? "127.0.0.1" : host, error);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The two URLs or patterns of a bridge as pairs of URLs.
+// Expands the two URLs or patterns of a bridge to pairs of URLs.
 #pragma once
 
 #include <string>
@@ -14,10 +14,10 @@ struct BridgedUrls {
 };
 
 // Throws Error{usage} for patterns of different lengths, a side of several paths, a side joined to
-// itself, and a transport that cannot be that side.
+// itself, and a transport that cannot serve its side.
 std::vector<BridgedUrls> pair_urls(std::string_view hosts, std::string_view board);
 
-// True if only programs of this computer, or devices plugged into it, reach the side of hosts.
+// True if only programs of this computer, or devices plugged into it, reach the hosts' side.
 bool is_of_this_computer(const std::string& hosts);
 
 }  // namespace r4

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A bridge that serves no host watches its board (docs/reference/protocol.md, 4.8), for the
-// watchers at the hosts' side and programs that share the board's transport, at the rate and fields
-// of its newest watcher, else at a few states a second: a small load for a bus of many boards.
+// While a bridge serves no host, it watches its board (docs/reference/protocol.md, 4.8). Watchers
+// at the hosts' side and programs that share the board's transport get the states. The bridge
+// requests the rate and fields of its newest watcher. Without a watcher it requests a few states a
+// second, a small load for a bus of many boards.
 #pragma once
 
 #include <chrono>
@@ -39,10 +40,10 @@ class BridgeWatch {
     return write_lease(writer, "0");
   }
 
-  // True for an answer to a W of this bridge, which names no session.
+  // True if the refusal answers a W of this bridge. Such a W names no session.
   bool on_refusal(const Nack& nack, SteadyTime now) {
     if (nack.sid != no_session || next_pnum_ - 1 - nack.pnum >= remembered) return false;
-    if (nack.lease == 0) wish_nothing();  // the board does not take it
+    if (nack.lease == 0) wish_nothing();  // the board rejects the wish
     lease_.on_refusal(nack, time(now));
     return true;
   }

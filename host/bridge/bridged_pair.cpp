@@ -15,7 +15,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// After a longer silence the board may have restarted, with another clock.
+// After a longer silence the board may have restarted its clock.
 constexpr milliseconds clock_lifetime{1500};
 
 std::string_view view(Text text) { return {text.data(), text.size()}; }
@@ -30,7 +30,7 @@ bool is_single(const Datagram& datagram, Text name) {
   return datagram.command_count() == 1 && datagram.command().name() == name;
 }
 
-// True if one of its commands is a setting that a board takes only from its own cable.
+// True if a command is a setting that a board accepts only from its own cable.
 bool has_site_setting(const Datagram& datagram) {
   for (const Field& field : datagram) {
     if (field.name() != "C") continue;
@@ -159,7 +159,7 @@ void BridgedPair::on_host_datagram(const Datagram& datagram, Peer from, Time now
     ++hosts_.counters.kept_out;
     return answer(datagram, Refusal::busy, 0, from, now);  // as the board does
   }
-  if (!trusted) audience_.listen(from, now);  // to a heartbeat of the board, which it can echo
+  if (!trusted) audience_.listen(from, now);  // to get a heartbeat of the board for its echo
   pass_on(datagram, from, trusted, now);
   follow_hosts(now);
 }
@@ -172,16 +172,16 @@ void BridgedPair::on_command(const Datagram& datagram, Peer from, Time now) {
   const bool asks_who = is_single(datagram, Text("Q")) && command.values() == "ID";
   if (!asks_who && !is_allowed(datagram, MessageKind::command, from, now)) return;
   if (!asks_who && !known_.knows(from, sid, now)) {
-    ++hosts_.counters.kept_out;  // its heartbeat comes first, and is answered
+    ++hosts_.counters.kept_out;  // without an answer, because its heartbeats are answered
     return;
   }
   if (!trusted && !may_ask(now)) return;
-  // The answer names the session, so its host may believe it: no duplicate has passed.
+  // The answer has SESSION, so it proves that the command is not executed. No duplicate has passed.
   if (has_site_setting(datagram)) {
     ++hosts_.counters.refused;
     return answer(datagram, Refusal::auth, 0, from, now, known_.first_heartbeat(from, sid));
   }
-  // The answer does not distinguish a paper host from a program that only asks.
+  // Without SID, the answer to Q:ID may be for a paper host or for a program that only asks.
   pass_on(datagram, from, trusted && !(asks_who && sid == no_session), now);
 }
 
@@ -191,9 +191,9 @@ bool BridgedPair::may_ask(Time now) {
   return false;
 }
 
-// True if the board begins or feeds a session by that heartbeat, or answers BUSY: the heartbeat
-// echoes one of the board, as a session must, or is a paper host's. BUSY needs a packet number, so
-// a paper host without numbers cannot be refused, and is served only if no other host is.
+// True if the board begins or feeds a session by this heartbeat, or answers BUSY. The heartbeat of
+// a session must echo a heartbeat of the board. BUSY needs a packet number, so the board cannot
+// refuse a paper host without numbers. Such a host is served only if no other host is served.
 bool BridgedPair::is_judged(const Datagram& heartbeat) const {
   if (heartbeat.session_id() == no_session) return heartbeat.has_pnum() || known_.served().empty();
   const auto board_t = static_cast<std::uint32_t>(board_t_);
@@ -203,7 +203,7 @@ bool BridgedPair::is_judged(const Datagram& heartbeat) const {
          milliseconds(std::abs(std::int64_t{ago})) <= timeout_;
 }
 
-// The carrier keeps the numbers of the served hosts' peers while other peers send.
+// The carrier keeps the peers of served hosts while other peers send.
 void BridgedPair::follow_hosts(Time now) {
   if (!known_.poll(now)) return;
   const std::vector<Peer>& served = known_.served();
@@ -213,8 +213,8 @@ void BridgedPair::follow_hosts(Time now) {
   std::array<char, max_datagram> buffer;
   DatagramWriter writer(buffer.data(), buffer.size());
   const Text farewell = watch_.write_end(writer);
-  // The board streams to the served host without a lease. On a bus, other programs may watch, so
-  // there the lease runs out.
+  // The board sends states to the served host without a lease. On a shared transport other programs
+  // may watch, so the bridge lets the lease run out.
   if (!board_.carrier->is_shared()) send(board_, view(farewell), Priority::normal, everyone);
 }
 
@@ -226,12 +226,12 @@ bool BridgedPair::is_allowed(const Datagram& datagram, MessageKind kind, Peer fr
   if (kind == MessageKind::command) {
     answer(datagram, Refusal::auth, 0, from, now);
   } else {
-    audience_.listen(from, now);  // the board's heartbeat has the nonce
+    audience_.listen(from, now);  // the board's heartbeat carries the nonce
   }
   return false;
 }
 
-// To the board the bridge is one watcher, so each watcher has its lease here.
+// The board sees the bridge as one watcher, so the bridge keeps the lease of each watcher.
 void BridgedPair::on_lease(const Datagram& datagram, Peer from, Time now) {
   Command command;
   FieldSet fields;
@@ -309,7 +309,7 @@ void BridgedPair::deliver_to_hosts(const Datagram& datagram, bool is_state, Time
   });
 }
 
-// Delivers to each path of the named session if it is served, else to the peer that asked.
+// Delivers to each path of the named session if the session is served, else to the peer that asked.
 void BridgedPair::on_answer(const Datagram& answer, MessageKind kind, Time now) {
   const SessionId sid = answer.session_id();
   std::optional<Peer> asker;
@@ -363,7 +363,7 @@ void BridgedPair::report_trouble() {
   on_event_(BridgeSide::board, {CarrierEvent::Kind::warning, problem});
 }
 
-// Answers for the board. `session`: as in the board's refusal.
+// Answers in place of the board. `session`: the SESSION of a refusal.
 void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t lease, Peer to,
                          Time now, std::optional<std::uint32_t> session) {
   if (!asked.has_pnum() || !board_known_ || now - board_heard_ > clock_lifetime) return;
@@ -382,7 +382,7 @@ void BridgedPair::answer(const Datagram& asked, Refusal code, std::uint32_t leas
   send(hosts_, view(text), Priority::normal, to);
 }
 
-// Delivers to the board. The answer to an untrusted host goes to the peer that it asked from.
+// Delivers to the board. The answer to an untrusted host goes to the peer `from`.
 void BridgedPair::pass_on(const Datagram& datagram, Peer from, bool trusted, Time now) {
   if (!trusted) {
     std::optional<std::uint32_t> pnum;

@@ -1,25 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Joins two carriers of one loop: one hears hosts, the other leads to their board.
-//     hosts --> E:STOP                 first of all, of any peer, however old
-//               heartbeats, commands   if they are signed as they must be (bridge_guard.hpp): of
-//                                      served hosts (bridge_hosts.hpp) at once, of other hosts
-//                                      within a budget
-//               Q:ID                   of any peer, likewise
-//     board --> heartbeats             to served hosts and watchers (bridge_audience.hpp), and for
-//                                      a second to each other host
+// Joins two carriers of one loop. The first leads to hosts, the second to their board.
+//     hosts --> E:STOP                 before all other datagrams, from any peer, of any age
+//               heartbeats, commands   if their signature suffices (bridge_guard.hpp): from served
+//                                      hosts (bridge_hosts.hpp) at once, from other hosts within a
+//                                      budget
+//               Q:ID                   from served hosts at once, from other peers within a budget
+//     board --> heartbeats             to served hosts, watchers, listeners (bridge_audience.hpp)
 //               states                 to served hosts and watchers
-//               N, I                   to the session that they name if it is served, else to the
-//                                      peer that asked
+//               N, I                   to the named session if it is served, else to the peer that
+//                                      asked
 //
-// The bytes stay as they are. A datagram that may have waited for longer than `oldest` before it
-// was read is dropped, unless it is a stop: a delayed datagram must not be executed, or keep a
-// board alive. The carriers' queues bound the time before sending likewise. Settings that a board
-// takes only from its own cable (site_settings.hpp) never pass. Otherwise a bridge would turn
-// everyone who reaches it into that cable, and would carry keys and passwords over a network.
+// The bytes do not change. A datagram is dropped if it may have waited for longer than `oldest`
+// before it was read. A delayed datagram must not be executed, or keep a board active. A stop is
+// not dropped. The carriers' queues limit the time before sending in the same way. Settings that a
+// board accepts only from its own cable (site_settings.hpp) never pass. Otherwise every host of the
+// bridge could change them, and the bridge would carry keys and passwords over a network.
 //
-// A bridge makes no heartbeat. It answers BUSY to a host that is kept out, AUTH to a datagram that
-// must not pass, and LEASE to a watcher, because all of a bridge's watchers are one peer to the
-// board. While no host is served, the bridge itself watches the board (bridge_watch.hpp).
+// A bridge sends no heartbeat of its own. It answers BUSY to a host that is kept out, and AUTH to a
+// datagram that must not pass. It answers LEASE to a watcher, because all watchers of a bridge are
+// one peer to the board. While no host is served, the bridge watches the board (bridge_watch.hpp).
 #pragma once
 
 #include <array>
@@ -57,12 +56,12 @@ class BridgedPair {
   struct Setup {
     std::unique_ptr<Carrier> hosts;
     std::unique_ptr<Carrier> board;
-    // True if the side of hosts may be absent at first, as a device may. A listening port may not.
+    // True if the hosts' side may be absent at first: a device may, a listening port may not.
     bool hosts_may_be_away = false;
     std::chrono::milliseconds timeout{1000};  // the board's
     std::vector<Key> keys;                    // the board's
     bool trusted = false;                     // as in BridgeGuard
-    // Counts while this computer sleeps, so that datagrams from before the sleep are old.
+    // Advances while this computer sleeps, so that datagrams from before the sleep are old.
     std::function<Time()> now = [] { return Time(BootClock::now().time_since_epoch()); };
     std::function<void(BridgeSide, const CarrierEvent&)> on_event;
   };
@@ -72,7 +71,7 @@ class BridgedPair {
   BridgedPair(const BridgedPair&) = delete;
   BridgedPair& operator=(const BridgedPair&) = delete;
 
-  // Throws Error for a fault that does not end by itself.
+  // Throws Error for a permanent fault.
   void open();
   void close() noexcept;
   // Call it every WaitingTime::tick_interval.
@@ -93,11 +92,11 @@ class BridgedPair {
     const std::unique_ptr<Carrier> carrier;
     BoardEnd& end;
     bool opened = false;
-    std::string obstacle;  // why it could not be opened, as last reported
+    std::string obstacle;  // why it could not be opened, as reported last
     Time tried;
     WaitingTime waiting;
     BridgeCounters counters;
-    std::uint64_t refused = 0;  // datagrams that its carrier dropped because it did not take them
+    std::uint64_t refused = 0;  // datagrams that its carrier did not accept, and counts as dropped
   };
 
   void on_host_datagram(const Datagram& datagram, Peer from, Time now);
@@ -133,10 +132,10 @@ class BridgedPair {
   BridgeGuard guard_;
   BridgeAudience audience_;
   BridgeWatch watch_;
-  // For peers that have proved nothing: datagrams to the board, answers to W, and heartbeats.
+  // Budgets for untrusted peers: datagrams to the board, answers to W, and heartbeats.
   AnswerBudget asking_, leases_, copies_;
   BridgeGuard::Trouble reported_ = BridgeGuard::Trouble::none;
-  // The board's newest number and clock, for answers in its place.
+  // The board's newest packet number and clock, for answers in place of the board.
   bool board_known_ = false;
   std::uint32_t board_pnum_ = 0;
   std::uint64_t board_t_ = 0;

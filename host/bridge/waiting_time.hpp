@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The longest time that a datagram may have waited to be read. It came after the input was last
-// empty: when the carrier said so, or one tick ago, because everything that waits at one tick is
-// read before the next. A process that was stopped (Ctrl-Z), or got no processor, misses ticks.
+// The longest time that a datagram may have waited to be read. The datagram came after the input
+// was last empty: when the carrier reported so, or at the previous tick. All input that waits at
+// one tick is read before the next tick. A process that was stopped (Ctrl-Z), or got no processor,
+// misses ticks.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 
 namespace r4 {
 
-// For the machines of protocol/, whose milliseconds wrap.
+// For protocol/, whose milliseconds wrap.
 inline std::uint32_t ms_of(std::chrono::steady_clock::duration time) {
   return static_cast<std::uint32_t>(
       std::chrono::duration_cast<std::chrono::milliseconds>(time).count());

@@ -14,7 +14,7 @@ constexpr std::size_t states_kept = 6000;  // a minute at 100 Hz
 constexpr BoardUnderTest::Duration supervision = 500ms;
 constexpr BoardUnderTest::Duration answer_time = 1s;
 constexpr BoardUnderTest::Duration scan_answer = 2s;
-constexpr BoardUnderTest::Duration patience = 10s;  // a board that restarts
+constexpr BoardUnderTest::Duration patience = 10s;  // for a board that restarts
 
 }  // namespace
 
@@ -32,7 +32,7 @@ void BoardOnLink::wait_heard() {
 std::optional<ReceivedState> BoardOnLink::next_state(Duration timeout) {
   if (supervised_ && !silent_) {
     const auto now = std::chrono::steady_clock::now();
-    // No feeding: with the heartbeats the board could bring its outputs back.
+    // Does not feed, because heartbeats could make the board restore its outputs.
     if (now - fed_ > supervision) {
       throw Error(ErrorKind::refused, board_.name(),
                   "this program stood still while something moved", "resume");
@@ -67,7 +67,7 @@ void BoardOnLink::be_silent(bool silent) {
   set_watchdog();
 }
 
-// An application watchdog that nobody feeds ends the heartbeats.
+// If the application watchdog is not fed, the heartbeats end.
 void BoardOnLink::set_watchdog() {
   fed_ = std::chrono::steady_clock::now();
   board_.watchdog(silent_ ? Duration(1) : supervised_ ? supervision : Duration(0));

@@ -14,7 +14,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// The chip at that address; signals::count: none.
+// The chip at the address; signals::count if there is none.
 int chip_at(const Wiring& wiring, std::uint8_t address) {
   for (int i = signals::osmc_chip; i <= signals::dac_chip; ++i) {
     if (wiring.places[i].connected() && wiring.places[i].number() == address) return i;
@@ -69,7 +69,7 @@ void check_settings(Checking& c, int) {
 void check_chips(Checking& c, int) {
   LinkStatus link = c.board.link();
   if (link.reason == SafeReason::fault && link.chip.trouble == ChipTrouble::not_confirmed) {
-    c.make_ready();  // this fault hides those of the chips
+    c.make_ready();  // this fault hides the faults of the chips
     link = c.board.link();
   }
   if (link.reason != SafeReason::fault || !link.chip.any()) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The checks, one function each. The table that names them is in checks.cpp.
+// One function for each check. The table of checks is in checks.cpp.
 #pragma once
 
 #include "checking.hpp"

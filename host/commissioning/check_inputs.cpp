@@ -33,7 +33,7 @@ bool agree(double shown, double meter, double share) {
   return std::abs(shown - meter) <= 0.03 + share * std::abs(meter);
 }
 
-// The input that shows the voltage of `input` in its place; 0: there is none, or there are several.
+// The input that shows the voltage of `input`; 0 if no input or several inputs show it.
 int exchanged_with(const Checking& c, const States& states, int input, double meter) {
   int other = 0;
   for (int i = 1; i <= analog_channels; ++i) {
@@ -54,7 +54,7 @@ int exchanged_with(const Checking& c, const States& states, int input, double me
 struct Range {
   std::int32_t least = 0;
   std::int32_t most = 0;
-  std::int32_t travelled = 0;  // from the first to the last
+  std::int32_t travelled = 0;  // from the first to the last state
 };
 template <class Read>
 Range range_of(const States& states, Read read) {
@@ -68,7 +68,7 @@ Range range_of(const States& states, Read read) {
   return range;
 }
 
-// The states since forget_states(), and those of a moment more.
+// The states since forget_states(), and of 100 ms more.
 States states_until_now(Checking& c) {
   States states = c.states_since_forget();
   const States more = c.collect(100ms);
@@ -76,8 +76,8 @@ States states_until_now(Checking& c) {
   return states;
 }
 
-// By the board's clock, from the first state with the handle released to the first in the safe
-// state. Below 0: unknown.
+// Time by the board's clock from the first state with a released handle to the first state that
+// reports safe. Below 0: unknown.
 double ms_to_safe(const States& states) {
   const auto first = [&](auto is) { return std::find_if(states.begin(), states.end(), is); };
   const auto released = first([](const State& state) { return state.handle == Handle::released; });
@@ -86,7 +86,6 @@ double ms_to_safe(const States& states) {
   return static_cast<std::int32_t>(safe->t_ms - released->t_ms);
 }
 
-// The handle follows no input, or a spare one.
 void find_handle(Checking& c, const State& held, const State& released) {
   const unsigned changed = held.gpio ^ released.gpio;
   for (int i = 1; i <= gpio_channels; ++i) {
@@ -105,7 +104,7 @@ void find_handle(Checking& c, const State& held, const State& released) {
   c.found(low ? Finding::handle_missing : Finding::handle_stuck);
 }
 
-// The distances of a sensor over some readings, 4 a second.
+// Distances of a sensor over some readings, at 4 readings a second.
 struct Sight {
   Range range;
   bool near = false;  // always between 5 and 50 cm
@@ -141,7 +140,7 @@ void check_supply(Checking& c, int input) {
   if (!agree(shown, meter, 0.1)) {
     if (const int other = exchanged_with(c, states, input, meter)) {
       c.found(Finding::exchanged, analog_name(other) + " shows its voltage");
-      // The place of the other input gets this voltage.
+      // The voltage is at the place of the other input.
       return c.learnt(
           {Learnt::What::serves, Thing{SignalKind::analog, other}.signal(), thing.signal(), {}, 1});
     }
@@ -214,7 +213,7 @@ void check_encoder(Checking& c, int channel) {
 }
 
 void check_ultrasonic(Checking& c, int channel) {
-  constexpr Duration readings = 800ms;  // three of each sensor
+  constexpr Duration readings = 800ms;  // three readings of each sensor
   c.select_fields("US1,US2,US3,US4");
   c.require(
       Topic::hand_before_sensor,
@@ -222,7 +221,7 @@ void check_ultrasonic(Checking& c, int channel) {
                   "while you hold it.",
                   channel),
       "no hand was before the sensor");
-  c.collect(300ms);  // a reading of each sensor since then
+  c.collect(300ms);  // time for one reading of each sensor
   c.board.forget_states();
   const States with_hand = c.collect(readings);
   c.require(Topic::hand_away, "Take your hand away: the way is free for 1 m. Confirm.",

@@ -15,7 +15,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// An OSMC motor that was seen to turn with the encoder of its number; 0: there is none.
+// An OSMC motor that turned the encoder of its number; 0 if there is none.
 int motor_with_encoder(const Report& report) {
   for (int i = 1; i <= osmc_channels; ++i) {
     const auto result =
@@ -48,11 +48,12 @@ void check_transports(Checking& c, int) {
   }
 }
 
-// The board ends its states when it goes safe for the link: the time of the last is measured.
+// When the board goes safe because of the link, it ends its states. The time of the last state is
+// measured.
 void check_silence(Checking& c, int) {
-  constexpr Duration longest = 1500ms;  // the default timeout, and the time to see it
+  constexpr Duration longest = 1500ms;  // the default timeout plus a margin
   constexpr std::int32_t expected_ms = 1030;
-  constexpr Duration coasting = 2s;  // of a motor without current
+  constexpr Duration coasting = 2s;  // time for a motor without current to stop
   constexpr int states_to_speed = 30;
   const int motor = motor_with_encoder(c.report);
   std::string text = "Relay 1 closes (a click). ";
@@ -80,11 +81,11 @@ void check_silence(Checking& c, int) {
     bool held = true;
     try {
       while (held && Duration(last.t_ms - began.t_ms) < longest) held = c.watch(last);
-    } catch (const Error&) {  // the states have ended: the next heartbeat says why
+    } catch (const Error&) {  // the states have ended, and the next heartbeat reports the cause
       c.board.next_state(1s);
       by_itself = c.board.link().reason == SafeReason::link;
     }
-    c.board.stop();  // clears the setpoints, which the end of the silence would bring back
+    c.board.stop();  // clears the setpoints, which the next heartbeat would restore
     c.board.be_silent(false);
     if (held && !by_itself) c.found(Finding::silence_too_long);
   });

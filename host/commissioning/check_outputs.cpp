@@ -33,11 +33,11 @@ struct EncoderTravel {
   }
 };
 
-// Backward first: with a wiring that says pwm and direction, a driver with an input for each
-// direction would go forward as commanded at nearly full speed in reverse.
+// Moves in reverse first. A driver may have an input for each direction, while the wiring has pwm
+// and direction. A slow forward command would drive it at nearly full speed in reverse.
 void check_motor(Checking& c, Thing commanded, MakeCommand make) {
   const Pwm low = Duty(0.1).pwm();
-  // In reverse, as in the safe state: forward may be a line that is high, which drives a driver
+  // Rests in reverse, as in the safe state. Forward may be a high line, which would drive a driver
   // with an input for each direction.
   const Command rest = make(commanded.channel, Pwm(0), Direction::reverse);
   const auto move = [&](Thing turning, Direction direction, const char* way,
@@ -74,7 +74,7 @@ void check_motor(Checking& c, Thing commanded, MakeCommand make) {
   }
 }
 
-// Its brake is on while it rests, as in the safe state.
+// While the motor rests, its brake is on, as in the safe state.
 Command bldc_at(Channel channel, Pwm speed, Direction direction) {
   return Command::bldc(channel, speed, direction, speed.value == 0);
 }

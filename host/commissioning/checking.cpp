@@ -14,13 +14,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Duration turn = 20ms;          // how often a held key is looked at
-constexpr Duration longest_gap = 200ms;  // without news while something moves
+constexpr Duration turn = 20ms;          // how often a held key is checked
+constexpr Duration longest_gap = 200ms;  // without a state or an answer during a movement
 constexpr int most_tries = 3;
 constexpr std::string_view supply = "motor supply";
 
-// Stops the board unless what moves was ended in order. No heartbeat is sent before the board has
-// confirmed the stop: with recovery=last it would bring the outputs back.
+// Stops the board unless the movement was ended in order. No heartbeat is sent before the board has
+// confirmed the stop: with recovery=last a heartbeat would restore the outputs.
 class StopUnlessEnded {
  public:
   explicit StopUnlessEnded(BoardUnderTest& board) : board_(board) { board.supervise(true); }
@@ -33,7 +33,7 @@ class StopUnlessEnded {
       board_.stop();
       end();
       board_.be_silent(false);
-    } catch (...) {  // the heartbeats stay away: the board goes safe by its timeout
+    } catch (...) {  // without heartbeats the board goes safe by its timeout
     }
   }
   void end() {
@@ -92,7 +92,7 @@ void Checking::drive(const Command& command) { board.send(command, longest_gap);
 
 void Checking::select_fields(const std::string& names) {
   send(Command::fields(Text(names)));
-  board.forget_states();  // a field that was not selected reads 0
+  board.forget_states();  // earlier states report 0 for a new field
 }
 
 std::vector<ReceivedState> Checking::states_since_forget() { return collect(0ms); }
@@ -121,13 +121,13 @@ BoardWiring Checking::wiring_after_restart() {
     board.wait_heard();
     try {
       return board.wiring();
-    } catch (const Error& error) {  // it still starts
+    } catch (const Error& error) {  // the board is starting
       if (error.kind() != ErrorKind::refused || tries == most_tries) throw;
     }
   }
 }
 
-// A cause that only a person may clear. False if it cannot be cleared.
+// Clears a cause that only a person may clear. False if the cause cannot be cleared.
 bool Checking::clear_cause(const LinkStatus& link) {
   const bool unconfirmed =
       link.reason == SafeReason::fault && link.chip.trouble == ChipTrouble::not_confirmed;
@@ -177,7 +177,7 @@ void Checking::make_ready() {
 
 void Checking::hold(const Movement& movement, const std::optional<Command>& rest,
                     const std::function<void()>& act) {
-  do {  // again if the board went safe while the person read: arm() would clear a stop
+  do {  // repeat if the board went safe meanwhile, because arm() would clear a stop
     make_ready();
     const Answer answer = person_.await_key(movement);
     if (answer.kind != Answer::Kind::given) throw Ended{answer.kind};
@@ -187,7 +187,7 @@ void Checking::hold(const Movement& movement, const std::optional<Command>& rest
   board.forget_states();
   act();
   const SafeReason reason = board.link().reason;
-  // With recovery=last the next heartbeat would bring the outputs back: the guard stops the board.
+  // With recovery=last the next heartbeat would restore the outputs, so the guard stops the board.
   if (reason == SafeReason::link) return;
   if (reason == SafeReason::none) {  // else all outputs are off
     if (rest) drive(*rest);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A check while it runs: its person, its board and its result. Functions that do not return as
-// usual throw Ended or NotDone, which Commissioning::run() catches.
+// A running check: its person, its board and its result. A function that ends the check early
+// throws Ended or NotDone, which Commissioning::run() catches.
 #pragma once
 
 #include <functional>
@@ -38,30 +38,30 @@ class Checking {
   // Gives up unless the person confirms. `otherwise`: the note.
   void require(Topic topic, std::string text, const char* otherwise);
   double number(Topic topic, std::string text, std::string unit);
-  // The thing that moved or clicked. Nothing: it is `finding`, or nothing is connected (gives up).
+  // The thing that moved or clicked; no value if nothing did. Gives up if nothing is connected.
   std::optional<Thing> which(Thing commanded, std::string text);
 
   // --- the board
 
   void send(const Command& command);
-  // For the output that moves: the key is not looked at meanwhile, so it may take 200 ms at most.
+  // Commands the moving output. The key is not checked meanwhile, so this takes at most 200 ms.
   void drive(const Command& command);
   void select_fields(const std::string& names);
   std::vector<ReceivedState> states_since_forget();
   std::vector<ReceivedState> collect(Duration time);
-  // The person presses reset; then the wiring that the board keeps.
+  // The wiring that the board keeps after the person has pressed reset.
   BoardWiring wiring_after_restart();
-  // Nothing keeps the board safe, or gives up.
+  // Brings the board out of the safe state, or gives up.
   void make_ready();
   // Moves an output until `most` has passed, then sets it to `rest`, if any, and opens relay 1.
   void move(const std::string& text, const Command& command, const std::optional<Command>& rest,
             Duration most, const std::function<void(const ReceivedState&)>& on_state = {});
   // Calls `act` with relay 1 closed and the key held, then sets the output to `rest`, if any, and
-  // opens relay 1. `act` returns when watch() is false or the movement has ended.
+  // opens relay 1. `act` must return when watch() is false or the movement has ended.
   void hold(const Movement& movement, const std::optional<Command>& rest,
             const std::function<void()>& act);
-  // Waits for the next state while something moves. False if the person let go, or the board went
-  // safe. Throws Error if no state comes.
+  // Waits for the next state while something moves. False if the person released the key, or the
+  // board went safe. Throws Error if no state comes.
   bool watch(ReceivedState& state);
 
   // --- the result
@@ -70,7 +70,7 @@ class Checking {
   void found(Finding finding, std::string detail = {});
   void found_at(std::string thing, Finding finding, std::string detail = {});
   void learnt(const Learnt& learnt) { result_.learnt.push_back(learnt); }
-  // The places of the one serve the other: found and learnt.
+  // Adds the finding, and learns that the places of `places_of` serve `served`.
   void learnt_exchange(Thing places_of, Thing served);
   void note(std::string text) { result_.note = std::move(text); }
   [[noreturn]] static void give_up(Status status, std::string note);
@@ -87,7 +87,7 @@ class Checking {
   CheckResult& result_;
 };
 
-// True if the report names that finding.
+// True if the report has a finding of the check.
 bool has_found(const Report& report, std::string_view check);
 
 }  // namespace r4::commissioning

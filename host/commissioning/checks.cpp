@@ -17,7 +17,7 @@ constexpr auto wheels = Section::wheels_off_ground;
 
 struct CheckRow {
   std::string_view name;
-  int channels;  // 0: a thing of which there is one
+  int channels;  // 0: the board has only one
   Section section;
   std::string_view moves;
   std::string_view about;

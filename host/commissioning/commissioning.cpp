@@ -18,7 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A wiring that was learnt agrees with the one that the board had then.
+// If the board's wiring has changed, results that learnt something are discarded.
 void take_wiring(const BoardWiring& kept, Report& report) {
   const bool changed = !report.wiring_source.empty() && kept.wiring != report.wiring;
   if (kept.source == WiringSource::given && !kept.in_use) {
@@ -35,7 +35,7 @@ void take_wiring(const BoardWiring& kept, Report& report) {
   }
 }
 
-// Asks for the board's identity and wiring. A text that it does not answer stays empty.
+// Requests the board's identity and wiring. A text stays empty if the board does not report it.
 void identify(BoardUnderTest& board, Report& report) {
   board.wait_heard();
   try {
@@ -55,7 +55,7 @@ void identify(BoardUnderTest& board, Report& report) {
   }
   try {
     take_wiring(board.wiring(), report);
-  } catch (const Error& error) {  // not on its own cable
+  } catch (const Error& error) {  // the board reports it only on its own cable
     if (error.kind() != ErrorKind::refused) throw;
   }
 }
@@ -102,7 +102,7 @@ void set_full_scale(Checking& c, int input, double volts) {
   c.send(Command::setting(name, Text(value)));
 }
 
-// The board does not report its full scale: it follows from what it shows with a known one.
+// The board does not report its full scale. The shown voltage with a known full scale gives it.
 void give_full_scale(Checking& c, const Learnt& learnt) {
   constexpr double known = 50;
   const int input = learnt.signal - signals::analog + 1;
@@ -120,7 +120,7 @@ void give_full_scale(Checking& c, const Learnt& learnt) {
   c.measured(std::string(name.data(), name.size()) + ", full scale", present * learnt.factor, "V");
 }
 
-// Called when it was given.
+// Discards the learnt full scales, or everything else that was learnt.
 void forget_learnt(Report& report, bool full_scales) {
   for (CheckResult& check : report.checks) {
     std::erase_if(check.learnt, [&](const Learnt& each) {
@@ -129,8 +129,8 @@ void forget_learnt(Report& report, bool full_scales) {
   }
 }
 
-// How many outputs were seen to agree with the plan, which nobody has confirmed. 0: something
-// disagrees, or was not reached.
+// The number of outputs that agree with the unconfirmed plan. 0 if a check disagrees or was not
+// done.
 int outputs_as_planned(const Report& report) {
   if (report.wiring_source != to_text(WiringSource::plan) || !report.found().empty()) return 0;
   int outputs = 0;
@@ -194,7 +194,7 @@ void offer_settings(Checking& c, Report& report) {
                       list + ".")) {
     return;
   }
-  forget_learnt(report, true);  // a factor is of the present full scale, which changes now
+  forget_learnt(report, true);  // a factor refers to the present full scale, which changes now
   for (const Learnt& each : scales) give_full_scale(c, each);
 }
 
@@ -219,8 +219,8 @@ CheckResult& Commissioning::result_of(const Check& check) {
 
 Commissioning::End Commissioning::run(std::string_view id) { return run(check_named(id)); }
 
-// Does `work`, and sets the status of its result. Returns what the person wants instead, if
-// anything.
+// Runs `work`, and sets the status of the result. Returns the person's choice to skip, repeat or
+// leave, if any.
 std::optional<Answer::Kind> Commissioning::carry_out(CheckResult& result,
                                                      const std::function<void()>& work) {
   try {

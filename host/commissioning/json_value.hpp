@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A small reader of JSON (RFC 8259), for the reports that write_json() has written. Escapes \uXXXX
-// above 0x7F are not read: they are not written.
+// A small reader of JSON (RFC 8259), for the reports of write_json(). Does not read escapes \uXXXX
+// above 0x7F, because write_json() does not write them.
 #pragma once
 
 #include <map>
@@ -17,7 +17,7 @@ class JsonValue {
   static JsonValue read(std::string_view text, const std::string& name);
 
   // The member of an object, the text, the number or the elements. A value that is absent or of
-  // another type reads as nothing: {}, "", 0, {}.
+  // another type reads as empty: {}, "", 0, {}.
   const JsonValue& operator[](const std::string& key) const;
   std::string text() const;
   double number() const;

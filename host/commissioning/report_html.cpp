@@ -11,7 +11,7 @@
 namespace r4::commissioning {
 namespace {
 
-// All that did not come from us is foreign: printable, and without a meaning in HTML.
+// Makes foreign text printable, and escapes it for HTML.
 std::string shown(std::string_view text) {
   std::string out;
   for (const char c : printable(text)) {

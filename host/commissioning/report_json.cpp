@@ -18,7 +18,6 @@ namespace {
 
 constexpr std::string_view learnt_words[] = {"serves", "option", "place", "full scale"};
 
-// A JSON string. Of foreign text only what is printable() is left, line by line.
 std::string quoted(std::string_view text) {
   std::string out = "\"";
   while (!text.empty()) {
@@ -37,7 +36,6 @@ std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{:.6g}", value) : "null";
 }
 
-// "[…, …]", each element written by `write`.
 template <class Elements, class Write>
 std::string list(const Elements& elements, Write write) {
   std::string out = "[";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The things that a person tells apart, and their signals in a wiring: the parts of a motor, such
-// as pwm and direction, are consecutive kinds of signals.
+// The things that a person can distinguish, and their signals in a wiring. The parts of a motor,
+// such as pwm and direction, are consecutive kinds of signals.
 #pragma once
 
 #include <optional>
@@ -17,13 +17,13 @@ struct Thing {
   int signal() const { return signal_index(first, channel); }
   friend bool operator==(const Thing&, const Thing&) = default;
 };
-// "osmc 1".
+// Such as "osmc 1".
 std::string name_of(Thing thing);
-// The thing of an index in Wiring.
+// The thing of a signal. `signal`: an index in Wiring.
 Thing thing_of(int signal);
-// How many signals it has.
+// The number of signals of a thing.
 int parts_of(SignalKind first);
-// Those among which one may answer in place of another: of one kind, or motors on H-bridges.
+// The things that can be exchanged with each other: of one kind, or motors on H-bridges.
 std::vector<Thing> alike(SignalKind first);
 
 }  // namespace r4::commissioning

@@ -12,7 +12,8 @@
 
 namespace r4 {
 
-// The steps of a device, then its fields. The handler gets the last result, or the first failure:
+// Sends the steps of a device, then its fields. The handler gets the last result, or the first
+// failure:
 //     command --confirmed--> answer --as described--> pause --over--> next command
 //        |                                                                ^
 //        +---- confirmed, without an answer (X:POLL, F) ------------------+
@@ -39,7 +40,7 @@ class AsyncBoard::AttachSteps final : public Impl::Sequence {
   void complete(const CommandResult& result, How how) override {
     if (result.outcome != Outcome::confirmed) return fail(result, how);
     CommandResult failure = result;
-    if (impl_.boots != boots_) {  // the board has lost the steps before
+    if (impl_.boots != boots_) {  // the board has lost the earlier steps
       failure.outcome = Outcome::cancelled;
       return fail(failure, how);
     }

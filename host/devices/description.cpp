@@ -28,7 +28,7 @@ std::optional<double> DeviceValue::decode(const std::uint8_t* bytes, std::size_t
   if (static_cast<std::size_t>(at) + static_cast<std::size_t>(size) > count) return std::nullopt;
   std::uint32_t raw = 0;
   for (int i = 0; i < size; ++i) raw = raw << 8 | bytes[big_endian ? at + i : at + size - 1 - i];
-  // Shift up and down again, to fill in the sign or zeros.
+  // Shifts left and then right, to fill in the sign or zeros.
   raw <<= 31 - high_bit;
   const int down = 31 - high_bit + low_bit;
   const double read = is_signed ? static_cast<double>(static_cast<std::int32_t>(raw) >> down)

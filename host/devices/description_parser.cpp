@@ -22,7 +22,7 @@ constexpr std::size_t longest_name = 32;
 constexpr std::size_t longest_unit = 16;
 constexpr std::size_t most_addresses = 16;
 constexpr int longest_wait_ms = 5000;
-constexpr double largest_factor = 1e30;  // its inverse is the smallest; both fit a float
+constexpr double largest_factor = 1e30;  // its inverse is the smallest factor; both fit a float
 
 std::string_view trimmed(std::string_view line) {
   constexpr std::string_view blanks = " \t\r";
@@ -352,7 +352,7 @@ int DescriptionParser::number(std::string_view word, int least, int most, const 
   return static_cast<int>(value);
 }
 
-// "9.80665/16384", "pi/180/131", "-40".
+// Reads "9.80665/16384", "pi/180/131" or "-40".
 double DescriptionParser::factor(std::string_view word, const char* what) {
   double result = 1;
   char joined = '*';

@@ -12,7 +12,7 @@
 //           [only VALUE NUMBER]
 //     ready VALUE [NUMBER]
 //
-// '#' starts a comment. BYTES: x and two hex digits for each. S, O: numbers and pi with * and /.
+// '#' starts a comment. BYTES: x and two hex digits a byte. S, O: numbers and pi with * and /.
 #pragma once
 
 #include <cstddef>
@@ -59,7 +59,7 @@ class DescriptionParser {
   [[noreturn]] void fail(const std::string& reason, const std::string& fix) const;
 
   std::string source_;
-  int line_ = 0;  // 0: the error is in no single line
+  int line_ = 0;  // 0: the error does not belong to one line
   DeviceDescription result_;
 };
 

@@ -20,7 +20,7 @@ const I2cReading& read_for(const Device& device, const State& state, std::size_t
   return state.raw.i2c[static_cast<std::size_t>(device.first_slot() - 1) + poll];
 }
 
-// True if the value is `number` within rounding of its scale.
+// True if the value equals `number`, within the rounding of its scale.
 bool is_number(const Device& device, const State& state, std::size_t value, double number) {
   const auto is = device.reading(state, value).number;
   const double step = std::abs(device.description().values[value].scale);

@@ -31,15 +31,15 @@ std::vector<DeviceStep> steps_of(const Device& device) {
     step.count = static_cast<int>(check.expected.size());
     step.expected = check.expected;
   }
-  if (description.checks.empty()) {  // a device must answer
+  if (description.checks.empty()) {  // without a check, the device must at least answer
     add(CommandKind::i2c_read, description.polls.front().register_bytes).count =
         description.polls.front().count;
   }
   for (const DeviceWrite& write : description.writes) {
     add(CommandKind::i2c_write, write.bytes).wait = write.wait;
     if (&write != &description.writes.front()) continue;
-    // Empty the slots until the set-up ends, because a reading during it is not a measurement. The
-    // first write has shown that the device may be set up.
+    // Empties the slots until the set-up ends, because a reading during the set-up is not a
+    // measurement. The confirmed first write shows that the device may be set up.
     for (int slot = device.first_slot(); slot <= device.last_slot(); ++slot) {
       add(CommandKind::i2c_poll, {}).slot = slot;
     }
@@ -121,7 +121,7 @@ Problem explain(const Device& device, const CommandResult& result, const LinkSta
               Outcome::timed_out};
     }
     problem = explain(step.command(), result, link);
-  } else {  // after the steps
+  } else {  // the command for the fields failed
     problem = explain(Command::fields(device.fields()), result, link);
   }
   problem.thing = device.text() + ": " + problem.thing;

@@ -17,7 +17,7 @@
 
 namespace r4 {
 
-// "x3b00", as in commands.
+// Writes bytes as in commands: "x3b00".
 template <class Bytes>
 std::string hex_of(const Bytes& bytes) {
   return fmt::format("x{:02x}", fmt::join(bytes.begin(), bytes.end(), ""));
@@ -28,23 +28,24 @@ struct DeviceStep {
   int address = 0;
   std::string bytes;  // register, or bytes to write: "x3b00"
   int count = 0;
-  std::vector<std::uint8_t> expected;        // i2c_read; empty: anything
-  std::chrono::milliseconds wait{0};         // i2c_write, afterwards
-  int slot = 0;                              // i2c_poll, whose count 0 empties it
+  std::vector<std::uint8_t> expected;        // i2c_read; empty: any bytes
+  std::chrono::milliseconds wait{0};         // after an i2c_write
+  int slot = 0;                              // i2c_poll; a poll with count 0 empties the slot
   std::chrono::milliseconds poll_period{0};  // i2c_poll
-  bool is_answered() const { return kind != CommandKind::i2c_poll; }  // by I2CX
+  bool is_answered() const { return kind != CommandKind::i2c_poll; }  // by the field I2CX
   Command command() const;                                            // refers to `bytes`
 };
 
 std::vector<DeviceStep> steps_of(const Device& device);
 
-// The longest time of all steps, if each has `timeout`.
+// The longest time of all steps if each step may take `timeout`.
 std::chrono::milliseconds longest(const Device& device, std::chrono::milliseconds timeout);
 
 std::optional<Problem> trouble_with(const Device& device, const DeviceStep& step,
                                     const I2cAnswer& answer);
 
-// The chosen fields (as in F) plus the device's. Empty if `chosen` has them already or is empty.
+// The chosen fields (as in F) plus the device's fields. Empty if `chosen` is empty or has all these
+// fields.
 std::string fields_with(const std::string& chosen, const Device& device);
 
 }  // namespace r4

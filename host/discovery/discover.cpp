@@ -23,12 +23,12 @@ void append(std::vector<Each>& to, std::vector<Each> more) {
   std::move(more.begin(), more.end(), std::back_inserter(to));
 }
 
-// "udp" of "udp:?id=left-arm".
+// Returns "udp" for "udp:?id=left-arm".
 std::string_view scheme_of(const FoundBoard& board) {
   return std::string_view(board.url).substr(0, board.url.find(':'));
 }
 
-// True if all are one board, found once by each transport.
+// True if all entries are one board, which each transport found once.
 bool are_one(const std::vector<FoundBoard>& boards) {
   std::set<std::string_view> schemes;
   return std::all_of(boards.begin(), boards.end(), [&](const FoundBoard& each) {
@@ -39,7 +39,7 @@ bool are_one(const std::vector<FoundBoard>& boards) {
   });
 }
 
-// "/dev/ttyACM0, can0 (the interface is down), lo".
+// The searched places: "/dev/ttyACM0, can0 (the interface is down), lo".
 std::string searched(const Discovery& all) {
   std::vector<std::string> places;
   const auto add = [&](const std::string& name, const std::optional<Problem>& trouble) {

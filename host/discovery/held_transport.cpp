@@ -8,7 +8,7 @@
 namespace r4 {
 
 void take(FoundBoard& board, IdentityAnswer answer) {
-  // An answer to the holder says that no other host is in control.
+  // An answer to the controlling holder reports only that no other host is in control.
   if (!board.holder_controls) board.busy = answer.busy;
   board.identity = std::move(answer);
 }

@@ -29,7 +29,7 @@ using std::chrono::milliseconds;
 
 // A board sends heartbeats twice a second without a host, states with a host.
 constexpr milliseconds listening{700};
-// A host asks for its board's identity each second.
+// A host requests its board's identity each second.
 constexpr milliseconds longest{1300};
 constexpr milliseconds look_again{20};
 
@@ -44,13 +44,13 @@ class NodeQuestion final : private Carrier::Handler {
       carrier_->open(*this);
       ask();
     } catch (const Error&) {
-      carrier_.reset();  // the interface is gone; its listener reports that
+      carrier_.reset();  // the interface has disconnected, which its listener reports
     }
   }
   ~NodeQuestion() {
     if (carrier_) carrier_->close();
   }
-  // Frames on the bus outweigh the board's answer.
+  // Frames of another host override the board's answer.
   void end() {
     if (other_host_) board_.busy = true;
   }
@@ -73,7 +73,7 @@ class NodeQuestion final : private Carrier::Handler {
       if (!error) ask();
     });
   }
-  void on_datagram(std::string_view, Peer) override {}  // the listener of the bus hears it too
+  void on_datagram(std::string_view, Peer) override {}  // the listener of the bus receives it too
   void on_carrier_event(const CarrierEvent&) override {}
 
   FoundBoard& board_;
@@ -105,7 +105,7 @@ class BusQuestion {
     listener_->survey().on_datagram(
         [this](std::uint8_t node, const Datagram& datagram) { hear(node, datagram.bytes()); });
   }
-  // Also adds boards of which only damaged datagrams were heard.
+  // Also adds boards of which only damaged datagrams were received.
   void put_into(Discovery& found) {
     for (const auto& [node, question] : questions_) question->end();
     for (std::uint8_t node = 0; listener_ && node < can_nodes; ++node) {

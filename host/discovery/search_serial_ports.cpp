@@ -23,7 +23,7 @@
 namespace r4 {
 namespace {
 
-// A program that has the port open asks each second.
+// A program that holds the port requests the board's identity each second.
 constexpr std::chrono::milliseconds patience{1300};
 
 class PortQuestion final : private Carrier::Handler {
@@ -43,7 +43,7 @@ class PortQuestion final : private Carrier::Handler {
     if (carrier_) carrier_->close();
   }
 
-  // `named`: opens the port whatever its USB id is.
+  // `named`: opens the port with any USB id.
   void begin(bool named) {
     const bool open = port_.is_r4 || named;
     try {

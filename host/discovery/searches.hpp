@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The search of each transport for discover(). Each blocks, then returns boards and places.
+// The search of each transport for discover(). Each search blocks, then returns boards and places.
 #pragma once
 
 #include <chrono>
@@ -14,7 +14,7 @@ namespace r4 {
 constexpr std::chrono::milliseconds between_questions{150};
 constexpr int most_questions = 3;
 
-// Asks ports with a board's USB id, and `besides` whatever their USB id is. Takes at most 1.3 s.
+// Asks ports with a board's USB id, and the ports `besides` with any USB id. Takes at most 1.3 s.
 Discovery search_serial_ports(const std::vector<std::string>& besides);
 // Takes 0.7 s, or 1.3 s if a board that was heard does not answer.
 Discovery search_can_interfaces();

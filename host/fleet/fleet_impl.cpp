@@ -12,7 +12,8 @@ namespace r4 {
 
 namespace {
 
-// Each datagram would wake the thread. In a busy window it pauses first, and then takes several.
+// Each datagram would wake the thread. In a busy window the thread pauses first, and then takes
+// several datagrams.
 constexpr std::chrono::milliseconds window{10};
 constexpr std::size_t busy_window = 200;
 constexpr std::chrono::microseconds breather{200};
@@ -29,7 +30,7 @@ std::vector<std::string> urls_of(const std::vector<std::string>& patterns) {
 }  // namespace
 
 Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options)
-    // Other threads only post to it, so its reactor needs no locks.
+    // Other threads only post to the loop, so its reactor needs no locks.
     : BlockingLoop({"fleet", "see that this computer has time for it"},
                    ASIO_CONCURRENCY_HINT_UNSAFE_IO, std::exchange(options.on_wait, nullptr)),
       role(options.role),
@@ -43,7 +44,7 @@ Fleet::Impl::Impl(const std::vector<std::string>& patterns, BoardOptions options
   }
   start([this] { run(); });
   try {
-    // On the loop, so that resolving a name does not delay open boards.
+    // Opens the boards on the loop, so that resolving a name does not delay open boards.
     asio::post(io, asio::use_future([this] {
                  for (const auto& board : boards) board->open();
                }))
@@ -188,7 +189,7 @@ Fleet::Boards Fleet::Impl::wait_active(const Boards& which, Duration timeout) {
   };
   const SleepWatch slept;
   if (wait_for_news([] { return "wait_active()"; }, timeout, all_active)) return {};
-  // The deadline stands still while this computer sleeps.
+  // The deadline does not advance while this computer sleeps.
   return slept.time() > bounded(timeout) ? which : missing;
 }
 
@@ -214,7 +215,7 @@ FleetResults Fleet::Impl::stop(const Boards& which, Duration timeout) {
   const Command stop = Command::stop();
   FleetResults results = execute(shown(stop), which, std::max(timeout, Duration{1}),
                                  start_of(OwnCommand(stop)), why_of(stop), true);
-  // The stop must not be lost when its caller stops waiting.
+  // The stop must continue after its caller stops waiting.
   if (!results.all_confirmed()) stop_async(results.failed());
   return results;
 }

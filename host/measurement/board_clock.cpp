@@ -7,7 +7,8 @@
 
 namespace r4 {
 
-// Microseconds of the board's clock. Also for an older T, because datagrams overtake each other.
+// Microseconds of the board's clock since the first datagram. t_ms may be older than the newest T,
+// because datagrams overtake each other.
 double BoardClock::since_first(std::uint32_t t_ms) const {
   const auto later = static_cast<std::int32_t>(t_ms - newest_t_ms_);
   return static_cast<double>(newest_board_ms_ + later) * 1000;
@@ -25,8 +26,8 @@ void BoardClock::limit(Side& side, std::uint32_t t_ms, Time host, Time margin) {
     newest_t_ms_ = t_ms;
   }
   if (place(side, t_ms, host, margin)) return;
-  // No clock with a drift of 100 ppm satisfies all limits: one clock was set, or stood still while
-  // the computer slept. The newest limit is true.
+  // No drift up to 100 ppm satisfies all limits: a clock was set, or paused while the computer
+  // slept. Only the newest limit is kept.
   restart();
   limit(side, t_ms, host, margin);
 }
@@ -38,7 +39,7 @@ bool BoardClock::place(Side& side, std::uint32_t t_ms, Time host, Time margin) {
   fresh.second = static_cast<std::int64_t>(std::floor(fresh.at / 1e6));
   fresh.offset = static_cast<double>((host - first_ + margin).count()) - fresh.at;
   if (!is_upper(side)) fresh.offset = -fresh.offset;
-  if (is_old(fresh.second)) return false;  // no datagram travels for so long
+  if (is_old(fresh.second)) return false;  // no datagram is delayed for a minute
   if (fresh.offset < -highest(is_upper(side) ? lower_ : upper_, fresh.at)) return false;
   if (fresh.second > newest_second_) next_second(fresh.second);
   Limit& kept = side.limits[slot_of(fresh.second)];
@@ -48,7 +49,7 @@ bool BoardClock::place(Side& side, std::uint32_t t_ms, Time host, Time margin) {
   return true;
 }
 
-// The ended second narrows the drift, and the oldest second is forgotten.
+// Narrows the drift by the ended second, and forgets the oldest second.
 void BoardClock::next_second(std::int64_t second) {
   narrow_drift(std::exchange(newest_second_, second));
   const double at = static_cast<double>(second) * 1e6;
@@ -57,7 +58,8 @@ void BoardClock::next_second(std::int64_t second) {
   }
 }
 
-// A line between an upper and a lower limit cannot be steeper than the line through both.
+// The offset stays below the upper limit and above the lower limit, so the line through both limits
+// bounds its slope.
 void BoardClock::Slopes::narrow(const Limit& upper, const Limit& lower) {
   if (lower.at == upper.at) return;
   const double slope = (-lower.offset - upper.offset) / (lower.at - upper.at);
@@ -83,7 +85,7 @@ void BoardClock::take_slopes(std::int64_t second) {
   }
 }
 
-// Takes the second before the ended one again, because an answer may have come late.
+// Takes the previous second again, because a late answer may have changed its limits.
 void BoardClock::narrow_drift(std::int64_t second) {
   take_slopes(second - 1);
   take_slopes(second);
@@ -94,7 +96,7 @@ void BoardClock::narrow_drift(std::int64_t second) {
     slowest_ = std::max(slowest_, each.slowest);
     fastest_ = std::min(fastest_, each.fastest);
   }
-  if (slowest_ > fastest_) slowest_ = fastest_ = (slowest_ + fastest_) / 2;  // by rounding
+  if (slowest_ > fastest_) slowest_ = fastest_ = (slowest_ + fastest_) / 2;  // only by rounding
 }
 
 double BoardClock::moved(const Side& side, const Limit& limit, double later) const {

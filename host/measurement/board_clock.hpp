@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's clock in terms of the host's clock, without I/O. Two facts bound it:
+// Estimates the board's clock in the host's time, without I/O. Two facts limit the estimate:
 //     a datagram with T came at r:                  the board's clock showed T before r
-//     a question asked at a was answered with T:    it showed T + 1 ms after a
+//     a question asked at a was answered with T:    the board's clock showed T + 1 ms after a
 //
 // Each fact limits the offset (the host's time less the board's) at one T, from above or from
-// below. The clocks drift apart along a straight line of at most 100 ppm, and every line between
-// the limits is possible. The tightest limits of each second are kept for the last minute. So the
-// memory is constant, and the estimate follows a drift that changes with the temperature.
+// below. The offset drifts along a straight line, by at most 100 ppm. Every line between the limits
+// is possible. The tightest limits of each second are kept for the last minute. So the memory is
+// constant, and the estimate follows a drift that changes with the temperature.
 //
-// The estimate is the middle of the remaining range: right if the fastest datagrams of both
-// directions take equally long. Without answers (a watcher may not be able to ask) the estimate is
-// the upper limit, and its error is unknown.
+// The estimate is the middle of the remaining range. It is exact if the fastest datagrams take
+// equally long in both directions. Without answers (a watcher may not be able to ask) the estimate
+// is the upper limit, and its error is unknown.
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ namespace r4 {
 class BoardClock {
  public:
   void heard(std::uint32_t t_ms, Time now) { limit(upper_, t_ms, now, Time{0}); }
-  // `asked`: when the question was asked that this T answers.
+  // `asked`: when the question was first sent.
   void answered(std::uint32_t t_ms, Time asked) {
     limit(lower_, t_ms, asked, std::chrono::milliseconds{-1});
   }
@@ -34,19 +34,19 @@ class BoardClock {
 
   struct Instant {
     Time at;
-    std::optional<Time> error;  // the truth is at most this far away; no value: unknown
+    std::optional<Time> error;  // largest error of `at`; no value: unknown
   };
-  // When the board's clock began to show t_ms. Call it only after a datagram has come.
+  // When the board's clock began to show t_ms. Call it only after heard() or answered().
   Instant at(std::uint32_t t_ms) const;
 
-  // How much slower the board's clock runs than the host's, and the error of that; ppm.
+  // How much slower the board's clock runs than the host's clock, and the error of this drift; ppm.
   double drift_ppm() const { return (slowest_ + fastest_) / 2 * 1e6; }
   double drift_error_ppm() const { return (fastest_ - slowest_) / 2 * 1e6; }
 
   static constexpr double most_drift = 100e-6;
 
  private:
-  // Microseconds since the first datagram.
+  // `at`: microseconds of the board's clock since the first datagram. `offset`: microseconds.
   struct Limit {
     std::int64_t second = none;  // of the board's clock; none: no limit
     double at = 0;
@@ -58,11 +58,11 @@ class BoardClock {
   // The lower side negates each offset, so one algorithm serves both sides.
   struct Side {
     std::array<Limit, seconds> limits;
-    // The tightest limit at present. Later it is looser by the drift.
+    // The tightest limit at present. The drift loosens it with time.
     Limit front{none, 0, std::numeric_limits<double>::infinity()};
   };
 
-  // The slopes of the lines between the limits of one second and those of that or later seconds.
+  // The slopes of lines from the limits of one second to limits of the same or a later second.
   struct Slopes {
     std::int64_t second = none;
     double slowest = -most_drift;
@@ -82,7 +82,7 @@ class BoardClock {
   }
   bool is_old(std::int64_t second) const { return second + seconds <= newest_second_; }
   bool is_upper(const Side& side) const { return &side == &upper_; }
-  // A side's limit at that time of the board: by the front, and by all its limits.
+  // A side's limit at the board's time `at`: from its front, and from all its limits.
   double highest(const Side& side, double at) const;
   double highest_of_all(const Side& side, double at) const;
   double moved(const Side& side, const Limit& limit, double later) const;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The newest eight questions Q:ID and their answers. Without I/O. Each question is one machine:
+// The newest eight questions Q:ID and their answers, without I/O. Each question is a state machine:
 //     idle --asked--> open --I:… names it--> idle: the round trip is known
 //                      |
 //                      +-- eight newer ones --> forgotten
 //
-// The answer names its question (ASKED). If a board does not name it, the round trip counts from
-// the newest question, and the answer closes all questions. It may belong to an older question, so
+// An answer names its question (ASKED). Without ASKED the round trip counts from the newest
+// question, and the answer closes all questions. Such an answer may belong to an older question, so
 // it does not limit the board's clock (board_clock.hpp).
 #pragma once
 
@@ -23,12 +23,12 @@ namespace r4 {
 class IdentityQuestion {
  public:
   void asked(std::uint32_t pnum, Time now) {
-    // A repeated question may get the answer to its first sending.
+    // A repetition keeps the time of the first sending, because the answer may be to the first.
     const auto same = [pnum](const Asked& each) { return each.open && each.pnum == pnum; };
     if (std::any_of(open_.begin(), open_.end(), same)) return;
     open_[count_++ % open_.size()] = {pnum, now, true};
   }
-  // Returns when the answered question was first sent; no value if none is open.
+  // Returns when the answered question was first sent; no value if it is not open.
   std::optional<Time> answered(const Identity& identity) {
     for (std::size_t i = 1; i <= open_.size(); ++i) {
       Asked& asked = open_[(count_ - i) % open_.size()];

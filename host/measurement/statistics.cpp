@@ -44,7 +44,7 @@ Statistics StatisticsCollector::report(std::chrono::microseconds now) const {
   for (const Bucket& each : rate_) {
     if (each.slot > now / bucket_width - buckets) in_window += each.states;
   }
-  // The window covers nine whole buckets and a part of the newest.
+  // The window covers nine whole buckets and a part of the newest bucket.
   const auto window =
       std::min((buckets - 1) * bucket_width + now % bucket_width, now - first_state_);
   if (window.count() > 0) {

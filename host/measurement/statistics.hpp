@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Gathers the values that Statistics reports.
+// Collects the counters and measurements of Statistics (link.hpp).
 #pragma once
 
 #include <array>
@@ -10,12 +10,12 @@
 
 namespace r4 {
 
-// Constant time and no heap.
+// Each call takes constant time and no heap.
 class StatisticsCollector {
  public:
   void on_state(std::uint32_t t_ms, std::chrono::microseconds now);
   void on_round_trip(std::chrono::microseconds duration);
-  // Other parts of the session increment plain counters directly.
+  // Other parts of the session increment the plain counters directly.
   Statistics counts;
 
   Statistics report(std::chrono::microseconds now) const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Converts the host's time (r4::Time) to the wrapping milliseconds of the machines in protocol/.
+// Converts the host's time (r4::Time) to the wrapping milliseconds of protocol/.
 #pragma once
 
 #include <chrono>

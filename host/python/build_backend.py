@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the Python package (PEP 517) with nothing but cmake and Python itself, so also without a network.
+"""Builds the Python package (PEP 517) with only cmake and Python, so without a network.
 
-The module links libraries of the system (tools/setup --python), so this wheel is for the same system; tools/wheel makes
-one that carries its libraries. R4_BUILD=FOLDER takes the package from that build folder, and builds it there if needed.
+The module links libraries of the system (tools/setup --python), so this wheel is for the same system. tools/wheel makes
+a wheel that carries its libraries. R4_BUILD=FOLDER takes the package from this build folder, and builds it if needed.
 """
 import base64
 import hashlib
@@ -43,7 +43,7 @@ def _run(*command):
 
 
 def configure(folder):
-    """A build of the package alone. No folder's name is left in it."""
+    """Configures a build of the package alone. The build contains no folder names."""
     folder = pathlib.Path(folder).resolve()
     flags = f'{os.environ.get("CXXFLAGS", "")} -ffile-prefix-map={ROOT}/= -ffile-prefix-map={folder}/='
     _run('cmake', '-S', str(ROOT), '-B', str(folder), '-G', 'Ninja', '-DCMAKE_BUILD_TYPE=Release', '-DR4_TOOLS=OFF',
@@ -51,13 +51,13 @@ def configure(folder):
 
 
 def _built():
-    """The package's files: (name, content)."""
+    """Yields the package's files: (name, content)."""
     given = os.environ.get('R4_BUILD')
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(given or temporary)
         if not given:
             configure(folder)
-        elif 'R4_PYTHON:BOOL=ON' not in (folder / 'CMakeCache.txt').read_text():  # what tools/build leaves out
+        elif 'R4_PYTHON:BOOL=ON' not in (folder / 'CMakeCache.txt').read_text():  # tools/build leaves the package out
             _run('cmake', '-DR4_PYTHON=ON', str(folder))
         _run('cmake', '--build', str(folder), '--target', 'r4_python')
         package = folder / 'python'
@@ -67,7 +67,7 @@ def _built():
 
 
 def contents():
-    """The content of a wheel, but for its tag: {name: content}."""
+    """The content of a wheel without its tag: {name: content}."""
     entries = ''.join(f'[{group}]\n' + ''.join(f'{name} = {where}\n' for name, where in each.items())
                       for group, each in PROJECT['entry-points'].items())
     return {**dict(_built()), f'{INFO}/entry_points.txt': entries.encode(), f'{INFO}/METADATA': METADATA.encode(),
@@ -75,7 +75,7 @@ def contents():
 
 
 def write_wheel(folder, files, platform):
-    """The same files give the same bytes, if SOURCE_DATE_EPOCH is the same; without it they are of 1980."""
+    """The same files and SOURCE_DATE_EPOCH give the same bytes. Without SOURCE_DATE_EPOCH the files are of 1980."""
     python = f'cp{sys.version_info.major}{sys.version_info.minor}'
     tag = f'{python}-{python}-{platform}'
     about = f'Wheel-Version: 1.0\nGenerator: r4link\nRoot-Is-Purelib: false\nTag: {tag}\n'
@@ -85,7 +85,7 @@ def write_wheel(folder, files, platform):
         digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b'=').decode()
         record += f'{name},sha256={digest},{len(content)}\n'
     files[f'{INFO}/RECORD'] = f'{record}{INFO}/RECORD,,\n'.encode()
-    epoch = max(int(os.environ.get('SOURCE_DATE_EPOCH', 0)), 315532800)  # a zip begins in 1980
+    epoch = max(int(os.environ.get('SOURCE_DATE_EPOCH', 0)), 315532800)  # 1980, the earliest time in a zip
     wheel = f'{NAME}-{tag}.whl'
     with zipfile.ZipFile(pathlib.Path(folder) / wheel, 'w', zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         for name, content in sorted(files.items()):

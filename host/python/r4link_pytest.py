@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The entry point for pytest: loads the plugin r4link.pytest_plugin, if that is possible.
+"""The entry point for pytest: loads the plugin r4link.pytest_plugin, if possible.
 
 If r4link is installed, pytest loads this module in every project of the machine. r4link cannot be imported if a library
-is missing, or if it was built for another Python. Then only projects that use its fixtures fail; all other projects get
+is missing, or if it was built for another Python. Then only projects that use its fixtures fail. Other projects get
 a warning.
 """
 from __future__ import annotations

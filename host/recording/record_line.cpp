@@ -45,7 +45,7 @@ void append(std::string& out, std::string_view bytes, bool escapes_blanks) {
   }
 }
 
-// "# path 1 WORD". Escapes spaces, which separate words.
+// Appends "# path 1 WORD". Escapes spaces within WORD, because spaces separate words.
 void append_of_path(std::string& out, std::string_view words, std::uint16_t path,
                     std::string_view word) {
   out.append(words).append(std::to_string(path)) += ' ';
@@ -78,7 +78,7 @@ bool read_time(std::string_view text, Time& out) {
   return true;
 }
 
-// Takes the number at the front of `text`, and `end` after it.
+// Removes the number at the front of `text`, and `end` after the number.
 bool take_number(std::string_view& text, char end, std::uint32_t limit, std::uint32_t& out) {
   const std::size_t size = text.find(end);
   const std::string_view digits = text.substr(0, size);
@@ -89,7 +89,7 @@ bool take_number(std::string_view& text, char end, std::uint32_t limit, std::uin
 
 constexpr std::uint32_t max_path = std::numeric_limits<std::uint16_t>::max();
 
-// "1 WORD" or "1 WORD OTHER".
+// Reads "1 WORD" or "1 WORD OTHER".
 bool read_of_path(std::string_view text, std::uint16_t& path, std::string& word,
                   std::string& other) {
   std::uint32_t number = 0;
@@ -119,7 +119,7 @@ LineKind read_comment(std::string_view line, RecordLine& out) {
     if (!read_of_path(line, out.path.number, out.path.url, out.path.name)) {
       return damaged(out, "no path is written so");
     }
-    // Keeps only a valid board name, because names become cells, topics or labels elsewhere.
+    // Drops an invalid board name, because programs use names as table cells, topics or labels.
     if (!is_board_id(Text(out.path.name))) out.path.name.clear();
     return LineKind::path;
   }
@@ -184,7 +184,7 @@ bool append_unescaped(std::string& out, std::string_view text) {
 
 Record without_secrets(Record record, RecordRoom& room) {
   record.bytes = record.bytes.substr(0, max_record_bytes);
-  // The only event that holds bytes of a path.
+  // Only this event contains received bytes.
   constexpr std::string_view oversize = "oversize ";
   std::size_t before = 0;
   if (record.kind == RecordKind::event) {
@@ -248,7 +248,7 @@ std::string record_time_text(Time time) {
                      clock.minutes().count(), clock.seconds().count(), clock.subseconds().count());
 }
 
-// Writes the result again and compares, which finds every invalid character and number.
+// Formats the result and compares it with `text`, to find every invalid character and number.
 std::optional<Time> read_record_time(std::string_view text) {
   constexpr std::string_view form = "0000-00-00T00:00:00.000000Z";
   constexpr std::size_t whole_seconds = 19;

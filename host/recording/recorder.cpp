@@ -16,12 +16,13 @@
 namespace r4 {
 namespace {
 
-// A crash loses the records of this time and of the disk's delay: less than a second.
+// A crash loses the records of this interval plus the disk's delay: less than a second.
 constexpr std::chrono::milliseconds interval{250};
-// The smallest change of the wall clock to record. Smaller changes add up.
+// Smallest recorded change of the wall clock. Smaller changes add up.
 constexpr Time clock_step{std::chrono::milliseconds{100}};
 
-// Blocks all signals: they are for the program's threads; SIGXFSZ (file size limit) would end it.
+// Blocks all signals, because signals are for the program's threads. SIGXFSZ (file size limit)
+// would end the program.
 class NoSignals {
  public:
   NoSignals() {
@@ -171,7 +172,7 @@ void Recorder::report(const Problem& trouble, bool is_problem) {
   ++news_count_;
 }
 
-// Writes records up to written_until_. Newer records wait, because earlier records may still come.
+// Writes records up to written_until_. Newer records wait, because earlier records may follow.
 void Recorder::write() {
   order_.clear();
   put_in_order(unsettled_);
@@ -210,7 +211,7 @@ void Recorder::record_dropped() {
   recorded_dropped_ = all;
 }
 
-// A moved file is not a problem(), because nothing is lost.
+// A moved file is not a problem(), because no record is lost.
 void Recorder::record_new_file() {
   const std::optional<Problem> trouble = writer_.take_trouble();
   if (!trouble) return;

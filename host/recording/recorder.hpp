@@ -2,8 +2,9 @@
 // Implements Recording. Boards add records from any thread without waiting for the disk.
 //     record() -- at most 4 MiB --> the writer's thread --> RecordingWriter --> the disk
 //
-// The threads share a lock while a datagram is copied. Times are those of the steady clock, started
-// at the wall clock's time. If the wall clock is set, no record moves; an event reports the change.
+// The threads share a lock while a datagram is copied. A record's time is the wall clock's time at
+// the start plus the steady clock's time since the start. If the wall clock is set, an event
+// reports the change.
 #pragma once
 
 #include <atomic>
@@ -34,10 +35,10 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
 
   std::uint16_t add_path(std::string url);
-  // `name` is that of the path's board.
+  // `name`: of the path's board.
   void name_path(std::uint16_t path, std::string name);
   void add_device(RecordedDevice device);
-  // Copies `bytes`, at most max_record_bytes, without allocating. `at` is by the steady clock.
+  // Copies `bytes`, at most max_record_bytes, without allocating. `at`: by the steady clock.
   // Records are written in order of time if each arrives at most `settled` after its time.
   void record(std::uint16_t path, RecordKind kind, std::string_view bytes, Time at);
   void record(std::uint16_t path, RecordKind kind, std::string_view bytes) {
@@ -51,7 +52,7 @@ class Recorder {
   bool ended() const { return ended_.load(std::memory_order_acquire); }
   std::optional<Problem> problem() const;
   // Reports that the file was restarted, or that the recording has ended by itself. `known`: the
-  // news count that the caller has seen; updated.
+  // news count that the caller has seen. This call updates `known`.
   std::optional<Problem> news(unsigned& known) const;
   unsigned news_count() const { return news_count_.load(std::memory_order_acquire); }
   std::uint64_t records() const { return records_; }

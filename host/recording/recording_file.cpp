@@ -37,7 +37,7 @@ Error cannot_be_read(const std::string& path, int error) {
           denied ? "allow reading it: chmod +r" : "name a recording, or - for standard input"};
 }
 
-// False if another program has locked the file. True on a file system without locks (a network's).
+// False if another program has locked the file. True on a file system without locks.
 bool lock_alone(int file) {
   while (::flock(file, LOCK_EX | LOCK_NB) != 0) {
     if (errno != EINTR) return errno != EWOULDBLOCK;
@@ -49,7 +49,7 @@ bool lock_alone(int file) {
 
 RecordingFile::RecordingFile(std::string path) : path_(std::move(path)) {
   struct stat status {};
-  // Do not even open a device: a terminal may lead to a board.
+  // Do not open a device, because a terminal may lead to a board.
   if (::stat(path_.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
     throw Error(ErrorKind::open, path_,
                 S_ISDIR(status.st_mode) ? "is a directory" : "is not a file",
@@ -89,7 +89,7 @@ void RecordingFile::append(std::string_view bytes) {
       bytes.remove_prefix(static_cast<std::size_t>(n));
     } else if (errno != EINTR) {
       const int error = errno;
-      // Half a line is useless. If it cannot be removed, a reader skips it.
+      // Removes the incomplete line. If this fails, a reader skips the line.
       [[maybe_unused]] const int removed = ::ftruncate(file_.get(), static_cast<off_t>(size_));
       throw cannot_be_written(path_, error);
     }

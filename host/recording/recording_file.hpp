@@ -16,14 +16,14 @@ class RecordingFile {
   // Changes by another program since the file was opened.
   enum class Fate : std::uint8_t { here, moved, removed, truncated };
 
-  // Opens or creates the file and locks it against other programs. Continues a recording. Throws
-  // Error for a file that cannot be written or is not a recording.
+  // Opens or creates the file and locks it against other programs. Continues an existing
+  // recording. Throws Error for a file that cannot be written or is not a recording.
   explicit RecordingFile(std::string path);
 
-  // Writes all bytes to the disk. If it throws Error, the file is unchanged.
+  // Writes all bytes to the disk. Throws Error. Removes the bytes of an incomplete write.
   void append(std::string_view bytes);
 
-  // moved: the path leads to another file, or to none.
+  // moved: the path leads to another file or to no file.
   Fate fate() const;
 
   std::uint64_t size() const { return size_; }

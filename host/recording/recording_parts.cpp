@@ -16,9 +16,9 @@ namespace r4 {
 namespace {
 
 constexpr std::uint64_t least_kept = 1 << 20;
-constexpr std::uint64_t least_parts = 4;  // files within keep_bytes
+constexpr std::uint64_t least_parts = 4;  // keep_bytes has room for at least four files
 
-// Position of the number: before the endings that name the format.
+// Position of the file's number, which precedes the ending of the format.
 std::size_t ending_of(std::string_view path) {
   for (const std::string_view ending : {".r4log.zst", ".r4log", ".zst"}) {
     if (path.ends_with(ending)) return path.size() - ending.size();
@@ -72,7 +72,7 @@ std::string RecordingParts::next() {
 std::vector<RecordingParts::Part> RecordingParts::found() const {
   namespace fs = std::filesystem;
   std::vector<Part> parts;
-  // A folder that cannot be listed counts as empty. Opening a file there reports the reason.
+  // A folder that cannot be listed counts as empty. Opening a file in it reports the reason.
   std::error_code error;
   const fs::path stem(stem_);
   const std::string prefix = stem.filename().string() + "-";
@@ -96,7 +96,7 @@ std::vector<RecordingParts::Part> RecordingParts::found() const {
 void RecordingParts::make_room() {
   if (options_.keep_bytes == 0) return;
   const std::vector<Part> parts = found();
-  std::uint64_t sum = most_bytes_;  // of the next file
+  std::uint64_t sum = most_bytes_;  // room for the next file
   for (const Part& part : parts) sum += part.size;
   for (const Part& part : parts) {
     if (sum <= options_.keep_bytes) return;

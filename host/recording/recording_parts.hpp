@@ -18,10 +18,10 @@ class RecordingParts {
 
   // The path of the next file: `path` itself if there are no limits.
   std::string next();
-  // Removes the oldest files until there is room for another. Throws Error.
+  // Removes the oldest files until there is room for another file. Throws Error.
   void make_room();
 
-  // Limit of one file, given or derived from keep_bytes; 0: none.
+  // Size limit of one file, given or derived from keep_bytes; 0: no limit.
   std::uint64_t most_bytes() const { return most_bytes_; }
 
  private:

@@ -30,7 +30,7 @@ const char* RecordingLines::on_line(std::string_view line, std::uint32_t stream)
   // In a record CR is written as \xNN, so this CR belongs to the line's end.
   while (line.ends_with('\r')) line.remove_suffix(1);
   if (line.empty()) return nullptr;
-  // Another format may carry any bytes as a line.
+  // Another file format may carry any bytes as one line.
   const bool one = !line.starts_with('#') || line.find('\n') == std::string_view::npos;
   if (!one || !read_record_line(line, read_)) {
     on_damage();
@@ -121,7 +121,7 @@ void RecordingReader::on_compressed(std::string_view bytes) {
     const std::size_t before = bytes.size();
     const ZstdReader::Step step = zstd_->step(bytes);
     if (step == ZstdReader::Step::damaged) {
-      // The next text does not continue this line.
+      // The text after the damage does not continue this line.
       if (part_size_ != 0) end_line({});
       if (zstd_->window_too_large() && !lines_.recognised()) {
         throw Error(ErrorKind::data, name_, ZstdReader::window_problem,
@@ -137,7 +137,6 @@ void RecordingReader::on_compressed(std::string_view bytes) {
   if (!lines_.recognised() && taken_ > patience) fail_as_none();
 }
 
-// Checks at the beginning whether the text may be a recording.
 void RecordingReader::on_text(std::string_view text) {
   if (text_beginning_.size() < form_bytes) {
     if (!complete(text_beginning_, text, form_bytes)) return;

@@ -20,13 +20,13 @@ void RecordingTap::attach(std::shared_ptr<Recorder> recorder, const std::string&
 
 std::optional<Problem> RecordingTap::take_news() {
   if (!recorder_) return std::nullopt;
-  const bool ended = recorder_->ended();  // first: no news follows the end
+  const bool ended = recorder_->ended();  // read first, because no news follows the end
   std::optional<Problem> news = recorder_->news(known_news_);
   if (ended) recorder_.reset();
   return news;
 }
 
-// An event, because the kept beginning could look like a whole datagram.
+// Records an event, because the kept beginning could look like a whole datagram.
 void RecordingTap::on_oversize(std::string_view beginning) {
   if (recorder_) record(RecordKind::event, "oversize " + std::string(beginning));
 }
@@ -52,7 +52,7 @@ void RecordingTap::on_packets(const PacketCounters& packets) {
   if (recorder_ && packets.lost > lost_) {
     record(RecordKind::event, fmt::format("lost {}", packets.lost - lost_));
   }
-  lost_ = packets.lost;  // falls if a datagram came late
+  lost_ = packets.lost;  // decreases when a late datagram comes
 }
 
 void RecordingTap::on_name(std::string_view name) {

@@ -19,7 +19,7 @@ class RecordingTap {
   void attach(std::shared_ptr<Recorder> recorder, const std::string& url);
   void detach() { recorder_.reset(); }
   bool attached() const { return recorder_ != nullptr; }
-  // Returns once why the recording has ended or was restarted. Detaches an ended recording.
+  // Returns, once, why the recording has ended or was restarted. Detaches an ended recording.
   std::optional<Problem> take_news();
 
   // `at`: when the datagram came, by the steady clock.

@@ -10,9 +10,9 @@
 namespace r4 {
 namespace {
 
-// Limit of waiting text.
+// Limit of waiting text in bytes.
 constexpr std::size_t most_text = 65536;
-// Text of one frame. If the frame's beginning is damaged, the whole frame is lost.
+// Bytes of text in one frame. If the frame's beginning is damaged, the whole frame is lost.
 constexpr std::size_t frame_text = 1 << 20;
 
 }  // namespace
@@ -31,7 +31,7 @@ void RecordingWriter::begin_file() {
   if (path_.ends_with(".zst")) zstd_.emplace();
   frame_ = 0;
   begun_.reset();
-  // The last writer ended within a line; that line stays separate.
+  // Ends the last line, which an earlier writer left incomplete.
   if (file_->torn()) text_ += '\n';
   write_record_header(text_);
   for (const auto& [number, path] : paths_) write_path(text_, path);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Writes records to files: compressed for names in .zst, several files if there are limits. Blocks
-// while the disk is slow. Has no clock: time is that of the records.
+// while the disk is slow. Has no clock, and uses the records' times.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,7 @@ class RecordingWriter {
 
   // Call before a path's first record, and again when its name is known.
   void declare(const RecordedPath& path);
-  // For this file and later files. Replaces the device at that place of that path.
+  // Declares a device in this and later files. Replaces the device at the same place of the path.
   void declare(const RecordedDevice& device);
   // Appends a record without its secrets. Throws Error if the file cannot be written.
   void append(const Record& record);
@@ -37,7 +37,8 @@ class RecordingWriter {
   void close();  // as flush(), and ends the compressed frame
 
   const std::string& path() const { return path_; }
-  // Why the file was restarted since the last call, if it was. Kind `data`: its content is lost.
+  // Why the file was restarted since the last call; no value if it was not restarted. Kind `data`:
+  // the content is lost.
   std::optional<Problem> take_trouble() { return std::exchange(trouble_, std::nullopt); }
 
  private:

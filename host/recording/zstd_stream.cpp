@@ -20,10 +20,11 @@ constexpr int window_log = 27;
 constexpr int level = 3;
 // Window of written frames; a longer window gains nothing.
 constexpr int frame_window_log = 20;
-// Bytes read at once. Damage may also cost the undamaged bytes of a slice.
+// Bytes read at once. Damage also loses the undamaged bytes of its slice.
 constexpr std::size_t slice = 512;
 
-// The bytes before a possible next frame; at least one, because an endless frame is read whole.
+// Returns the bytes before a possible next frame, at least one byte. The decoder would read the
+// next frame as a part of a frame without an end.
 std::string_view until_a_frame(std::string_view bytes) {
   std::size_t size = std::min(bytes.size(), bytes.find(magic, 1));
   for (std::size_t left = 1; left < magic.size() && size == bytes.size() && left < size; ++left) {
@@ -92,7 +93,7 @@ ZstdReader::Step ZstdReader::step(std::string_view& bytes) {
   return Step::text;
 }
 
-// If the frame has no end, the next frame may start in bytes that were already taken.
+// After a frame without an end, the next frame may start in bytes that were already taken.
 void ZstdReader::search(std::string_view& bytes, bool from_found) {
   ZSTD_DCtx_reset(context_.get(), ZSTD_reset_session_only);
   searching_ = true;

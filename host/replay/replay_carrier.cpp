@@ -105,7 +105,7 @@ class ReplayCarrier final : public Carrier {
     if (handler_ != nullptr) wait();
   }
 
-  // False: reported the end.
+  // False if the recording has ended, which is then reported.
   bool continue_reading() {
     Problem end{ErrorKind::open, name_, "the recording has ended", "open it again"};
     try {
@@ -153,7 +153,7 @@ class ReplayCarrier final : public Carrier {
   CarrierCounters counters_;
 
   std::optional<ReplayRecords> records_;
-  Time first_{0};  // of the played records
+  Time first_{0};  // of the first played record
   SteadyTime began_;
 };
 

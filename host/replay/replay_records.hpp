@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The datagrams of one board of a recording, and the events of its transport, in order.
+// The datagrams of one board in a recording, and the events of its transport, in order.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@
 namespace r4 {
 
 struct ReplayStart {
-  Time time{0};           // after the first record, or
-  bool absolute = false;  // by the clock of the recording
+  Time time{0};  // after the first record; if `absolute`, by the recording's clock
+  bool absolute = false;
 
   // Seconds "12.5", or UTC "2026-11-23T21:20:00". Throws Error{usage} about `thing`.
   static ReplayStart of(const std::string& thing, const std::string& text);
@@ -29,15 +29,15 @@ class ReplayRecords final : private RecordingVisitor {
     std::string bytes;
   };
 
-  // Reads to the first record of that path from `start` on. Takes only regular files, because
+  // Reads up to the first record of `path` at or after `start`. Accepts only regular files, because
   // reading must not wait. Throws Error about `thing`.
   ReplayRecords(const std::string& thing, const std::string& file, std::uint16_t path,
                 const ReplayStart& start);
 
-  // The next item, if it has been read: then call take().
+  // The next item, which take() removes; null if it was not read yet.
   const Item* next() const { return waiting_.empty() ? nullptr : &waiting_.front(); }
   Item take();
-  // Reads at most 16 KiB more. False: end of the file. Throws Error.
+  // Reads at most 16 KiB more. False if the file has ended and no item waits. Throws Error.
   bool read_on();
 
  private:
@@ -50,8 +50,8 @@ class ReplayRecords final : private RecordingVisitor {
   RecordingInput input_;
   RecordingReader reader_;
   bool ended_ = false;
-  std::optional<Time> passed_over_;  // latest skipped record of that path
-  std::optional<Time> latest_;       // of the items so far
+  std::optional<Time> passed_over_;  // of the latest skipped record of `path`
+  std::optional<Time> latest_;       // of the latest item
   std::deque<Item> waiting_;
 };
 

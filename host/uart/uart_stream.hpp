@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Joins the bytes that a UART received from states, which may be missing, late or duplicates
+// Joins the received bytes of a UART from states. A state may be missing, late or a duplicate
 // (firmware/devices/user_uart.hpp).
 #pragma once
 
@@ -15,10 +15,10 @@ class UartStream {
  public:
   static constexpr std::size_t capacity = std::size_t{64} * 1024;
 
-  // Call this when the board has restarted: it counts from 0.
+  // Call it when the board has restarted, because the board then counts from 0.
   void restart() { begun_ = false; }
 
-  // Appends new bytes and losses to each of `outs`. True if there are any.
+  // Appends new bytes and losses to each of `outs`. True if it appended any.
   template <class... Outs>
   bool take(const UartBytes& field, Outs&... outs) {
     if (!begun_) {

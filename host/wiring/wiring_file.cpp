@@ -24,7 +24,7 @@ constexpr std::string_view introduction =
     "# Compare each line with the board's schematic (docs/reference/wiring.md).\n"
     "#     SIGNAL = PLACE [OPTION]     'none' as the place: not connected, or not fitted\n";
 
-// The remarks above the signals of a name.
+// The remark above the signals of each name.
 constexpr std::pair<std::string_view, std::string_view> remarks[] = {
     {"chip", "I2C bus of the chips, D20/D21 or SDA1/SCL1, and the addresses of the chips."},
     {"handle", "Dead-man's handle: 'low' if its input is low while it is held."},
@@ -144,10 +144,10 @@ class Reader {
   int line_ = 0;
   bool begun_ = false;
   Wiring wiring_;
-  std::array<int, signal_count> lines_;  // where each signal is; 0: not yet
+  std::array<int, signal_count> lines_;  // the line of each signal; 0: not read yet
 };
 
-// The field of the state in which a channel appears under a name of its own.
+// A comment with the state field, if the field's name differs from the signal's.
 std::string field_of(int signal) {
   const SignalKind kind = signal_kind(signal);
   const int channel = signal - row_of(kind).first + 1;

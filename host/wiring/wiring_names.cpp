@@ -78,7 +78,7 @@ const char* expected(Terminal terminal) {
   return "a line of the MCP23017, GPA0 to GPA7 or GPB0 to GPB7, or none";
 }
 
-// Numbers from here on name no place.
+// The first number that is not a place.
 int end_of_numbers(Terminal terminal) {
   switch (terminal) {
     case Terminal::bus:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The module r4link._core: r4::Board for Python, with times in milliseconds. The public interface
 // is r4link/*.py, above this module. The link's thread never takes the GIL. The callbacks' thread,
-// and that of a transport in Python, take it for each call.
+// and the thread of a transport in Python, take the GIL for each call.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -36,13 +36,12 @@ void bind_servo(py::module_& module);
 void bind_simulation(py::module_& module);
 void bind_wiring(py::module_& module);
 
-// For a board and a fleet.
 BoardOptions options_of(BoardRole role, bool arming, const std::string& fields,
                         const std::optional<std::string>& key, int watch_rate_hz, int heartbeat_ms,
                         int timeout_ms, int command_retry_ms, int stop_retry_ms, int stop_linger_ms,
                         int identify_interval_ms, int callback_limit_ms);
 
-// From r4link.Transport objects, which the makers keep.
+// Makers for r4link.Transport objects. The makers keep the objects.
 std::vector<CarrierMaker> makers_of(const py::list& transports);
 
 // For error_of() of r4link/errors.py.

@@ -17,7 +17,7 @@ namespace r4::python {
 namespace {
 
 using Released = py::call_guard<py::gil_scoped_release>;
-// The name, whether it is up, and the counters in their order.
+// The members of BridgeEnd, with the counters in the order of BridgeCounters.
 using End = std::tuple<std::string, bool, std::vector<std::uint64_t>>;
 
 End end_of(const BridgeEnd& end) {

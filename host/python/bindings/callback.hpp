@@ -9,7 +9,7 @@
 
 namespace r4::python {
 
-// True if no other thread can get the GIL: then the remaining Python objects are left alone.
+// True if no other thread can get the GIL. Then Python objects must not be destroyed.
 inline bool interpreter_ends() {
 #if PY_VERSION_HEX >= 0x030D0000
   return Py_IsInitialized() == 0 || Py_IsFinalizing() != 0;
@@ -18,7 +18,7 @@ inline bool interpreter_ends() {
 #endif
 }
 
-// A foreign thread's state, kept until the thread ends: making one for each call costs more.
+// A foreign thread's state, kept until the thread ends, because a state for each call costs more.
 class KeptThreadState {
  public:
   KeptThreadState() = default;
@@ -33,7 +33,7 @@ class KeptThreadState {
     const py::gil_scoped_acquire gil;
     kept_.reset();
   }
-  // With the GIL.
+  // Call it with the GIL.
   static void of_this_thread() {
     static thread_local KeptThreadState state;
     if (!state.kept_) state.kept_ = std::make_unique<py::gil_scoped_acquire>();
@@ -47,7 +47,7 @@ class KeptThreadState {
 class Callback {
  public:
   struct Held {
-    py::object function;  // none after clear() by the garbage collector
+    py::object function;  // null after clear() by the garbage collector
   };
 
   explicit Callback(py::object function)

@@ -31,7 +31,7 @@ using Ms = std::chrono::milliseconds;
 using Pair = std::tuple<double, double>;
 using Clock = LoopGuard::Clock;
 
-// `seconds`: as time.monotonic().
+// `seconds`: as from time.monotonic().
 Clock::time_point at(double seconds) {
   return Clock::time_point(
       std::chrono::round<Clock::duration>(std::chrono::duration<double>(seconds)));

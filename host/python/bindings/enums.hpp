@@ -12,7 +12,7 @@
 #include "r4link/devices/description.hpp"
 #include "r4link/fleet.hpp"
 
-// The class in Python and the type in C++. The value() of a PostResult is converted.
+// EACH(class in Python, type in C++). Of a PostResult, the value() is converted.
 #define R4_ENUMS(EACH)                       \
   EACH(BoardRole, r4::BoardRole)             \
   EACH(DeviceRole, r4::DeviceRole)           \
@@ -36,10 +36,12 @@ class PythonEnum {
  public:
   using WordOf = std::string (*)(std::uint8_t number);
 
-  // Throws if Python has no member for an enumerator. A number without one has the text of 255.
+  // Throws if Python has no member for an enumerator. A number without an enumerator has the text
+  // of 255.
   PythonEnum(const char* name, WordOf word_of);
 
-  // Newer firmware may send a number without an enumerator: throws if no member has its text.
+  // Throws if no member has the number's text. Newer firmware may send a number without an
+  // enumerator.
   pybind11::handle member(std::uint8_t number) const;
   // Takes a member or its text. Throws for anything else.
   std::uint8_t number(pybind11::handle word) const;
@@ -48,7 +50,7 @@ class PythonEnum {
  private:
   pybind11::handle class_;
   std::string other_;                      // the text of a number without an enumerator
-  std::vector<pybind11::handle> members_;  // they live as long as the interpreter
+  std::vector<pybind11::handle> members_;  // kept as long as the interpreter
 };
 
 inline std::string word_of(Refusal refusal) {

@@ -47,7 +47,6 @@ std::vector<BoardSetpoints> setpoints_of(
   return setpoints;
 }
 
-// By the event's kind.
 py::object subject_of(const FleetEvent& event) {
   switch (event.kind) {
     case FleetEvent::Kind::link:
@@ -81,7 +80,7 @@ void bind_fleet(py::module_& module) {
       .def_readonly("paths", &BoardHealth::paths)
       .def_property_readonly("well", &BoardHealth::well);
 
-  // r4link/fleet.py makes the Error of a board that did not confirm.
+  // r4link/fleet.py makes the Error for a board that did not confirm.
   py::class_<FleetResult>(module, "FleetResult")
       .def(pickled<FleetResult>("FleetResult"))
       .def_readonly("board", &FleetResult::board)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Values that can be pickled, for other processes of a program: only the same version reads them.
+// Pickles values for other processes of a program. Only the same version reads them.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A value that belongs to one process. A forked child must not use it: in the child the value's
+// A value that belongs to one process. A forked child must not use the value. In the child its
 // threads are missing, its locks may be held for ever, and its path belongs to the parent.
 #pragma once
 
@@ -17,12 +17,12 @@ namespace r4::python {
 template <class Value>
 class OfThisProcess {
  public:
-  // `what` names it in errors: "the board".
+  // `what`: the value's name in errors, "the board".
   OfThisProcess(const char* what, std::unique_ptr<Value> value)
       : what_(what), value_(std::move(value)) {}
   OfThisProcess(OfThisProcess&&) noexcept = default;
   OfThisProcess& operator=(OfThisProcess&&) = delete;
-  // The GIL is held, and released while the value ends.
+  // Call it with the GIL, which is released while the value is destroyed.
   ~OfThisProcess() {
     if (!value_) return;
     if (!is_here()) {

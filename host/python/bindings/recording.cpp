@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Recordings: written, and read into columns of numbers.
+// Writes recordings, and reads recordings into columns of numbers.
 #include "r4link/recording.hpp"
 
 #include <pybind11/numpy.h>
@@ -29,7 +29,7 @@
 namespace r4::python {
 namespace {
 
-// One number of a field, in all states. Before the first state with the field it is 0.
+// One number of a field, in all states. 0 before the first state with the field.
 struct Column {
   StateField field;
   int which;
@@ -43,10 +43,10 @@ struct Measured {
   std::size_t value;
   std::string value_name, name;  // "gyro_z", and the column's name
   std::vector<double> numbers;
-  bool here = true;  // no other device has replaced it
+  bool here = true;  // false if another device has replaced it
 };
 
-// For one board, whose bus has 112 addresses.
+// The measured values of one board, whose bus has 112 addresses.
 constexpr std::size_t most_measured = 1000;
 
 struct RecordedBoard {
@@ -66,7 +66,8 @@ std::int32_t kept(double number, FieldForm form) {
   return static_cast<std::int32_t>(std::llround(form == FieldForm::volts ? 100 * number : number));
 }
 
-// "bno055_gyro_z"; for a second device of that kind, with its address: "bno055_29_gyro_z".
+// The name "bno055_gyro_z". A second device of a kind has its address in the name:
+// "bno055_29_gyro_z".
 std::string column_of(const Device& device, const DeviceValue& value,
                       const std::vector<Measured>& others) {
   const std::string& kind = device.description().name;
@@ -116,7 +117,7 @@ class Columns final : public RecordingVisitor {
           std::find_if(board.measured.begin(), board.measured.end(), [&](const Measured& each) {
             return each.value_name == values[i].name && each.device->text() == text;
           });
-      if (known != board.measured.end()) {  // perhaps in other slots
+      if (known != board.measured.end()) {  // its slots may differ
         known->device = device;
         known->value = i;
         known->here = true;
@@ -188,7 +189,7 @@ class Columns final : public RecordingVisitor {
   std::vector<std::string> damage_;
 };
 
-// Without a copy of the numbers.
+// Does not copy the numbers.
 template <class Number>
 py::array_t<Number> to_array(std::vector<Number>&& numbers) {
   auto owned = std::make_unique<std::vector<Number>>(std::move(numbers));
@@ -200,12 +201,12 @@ py::array_t<Number> to_array(std::vector<Number>&& numbers) {
   return py::array_t<Number>(static_cast<py::ssize_t>(all.size()), all.data(), owner);
 }
 
-// "osmc1_pwm": the field and one of its numbers.
+// The name of a field and one of its numbers: "osmc1_pwm".
 std::string column_of(StateField field, int which) {
   const std::string_view value = kind_row_of(field).values[which].name;
   std::string name = attribute_of(field);
   if (value.empty()) return name;
-  // Python has shorter or clearer names for these.
+  // In Python these values have shorter or clearer names.
   if (value == "direction") return name + "_dir";
   if (value == "t") return name + "_t_ms";
   if (value == "command") return name + "_pnum";

@@ -108,7 +108,7 @@ bool has_value(const ReceivedState& state, F field) {
   return state.reported.has(field) || field == F::fault;
 }
 
-// Throws AttributeError for a field that the board has not reported: its value would be 0.
+// Throws AttributeError for a field that the board has not reported, because its value would be 0.
 void require(const ReceivedState& state, F field) {
   if (has_value(state, field)) return;
   const Text name = name_of(field);

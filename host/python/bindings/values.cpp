@@ -22,7 +22,7 @@ Duty duty_of(const py::object& duty) {
   return checked_duty(value);
 }
 
-// A motor takes a duty, or the board's own value and a direction.
+// A motor command takes a duty, or a pwm and a direction.
 void bind_drive(py::class_<OwnCommand>& commands, const char* name,
                 Command (*by_duty)(Channel, Duty), Command (*by_pwm)(Channel, Pwm, Direction)) {
   commands.def_static(

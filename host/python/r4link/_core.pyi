@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""host/python/bindings: times in milliseconds. For programs: the names in r4link/__init__.py."""
+"""The module of host/python/bindings, with times in milliseconds. Programs use the names in r4link/__init__.py."""
 import os
 from datetime import datetime
 from types import TracebackType
@@ -35,15 +35,15 @@ class LinkStatus(_Record):
         """The gravest cause."""
     @property
     def busy(self) -> bool:
-        """Another host controls the board."""
+        """True if another host controls the board."""
     @property
     def gated(self) -> bool:
-        """Heartbeats and commands are held back: the watchdog was not fed, or a callback hangs."""
+        """True if heartbeats and commands are held back: the watchdog was not fed, or a callback hangs."""
     @property
     def in_control(self) -> bool: ...
     @property
     def carrying(self) -> tuple[int, ...]:
-        """The paths that carry, from 0."""
+        """The numbers of the paths that carry datagrams, from 0."""
     @property
     def chip(self) -> str | None:
         """The chip with a fault, and the fault."""
@@ -66,13 +66,13 @@ class PathStatus(_Record):
     def loss(self) -> float: ...
     @property
     def copies(self) -> int:
-        """Datagrams that another path brought first."""
+        """Duplicates: datagrams received before on this or another path."""
     @property
     def round_trip_us(self) -> float:
-        """0: unknown."""
+        """The round trip of the newest question and answer; 0: unknown."""
     @property
     def age_us(self) -> float:
-        """Since the newest datagram; 0: none."""
+        """Microseconds since the newest datagram; 0: no datagram yet."""
 
 class Identity(_Record):
     @property
@@ -85,7 +85,7 @@ class Identity(_Record):
     def name(self) -> str: ...
 
 class Statistics(_Record):
-    """Of the link: include/r4link/link.hpp."""
+    """The counts and measurements of a link: include/r4link/link.hpp."""
     @property
     def received(self) -> int: ...
     @property
@@ -103,7 +103,7 @@ class Statistics(_Record):
     def late(self) -> int: ...
     @property
     def old(self) -> int:
-        """Too late to know whether they are duplicates."""
+        """Datagrams that came too late to be recognised as duplicates."""
     @property
     def restarts(self) -> int: ...
     @property
@@ -122,8 +122,8 @@ class Statistics(_Record):
     def state_age_us(self) -> float: ...
     @property
     def clock_drift_ppm(self) -> float:
-        """How much slower the board's clock is than this computer's; with its error 0 until
-        known."""
+        """How much slower the board's clock runs than this computer's clock. The drift and its error
+        are 0 until known."""
     @property
     def clock_drift_error_ppm(self) -> float: ...
     @property
@@ -189,8 +189,8 @@ class State:
     """A state of the board.
 
     A field that the board has not reported since it started raises AttributeError: request it by
-    `Board.fields()`. `present` names the fields of the newest datagram; another field has the
-    value of an earlier datagram. `fault` is always there; None: no fault.
+    `Board.fields()`. `present` names the fields of the newest datagram. Another field has the
+    value of an earlier datagram. `fault` is always present; None: no fault.
     """
     @property
     def pnum(self) -> int: ...
@@ -199,13 +199,13 @@ class State:
         """The board's clock; wraps at 2^32."""
     @property
     def received(self) -> float | None:
-        """When it came, by time.monotonic(); None if there is no state."""
+        """When the state came, by time.monotonic(); None if there is no state."""
     @property
     def sampled(self) -> float | None:
-        """When the board sampled it, by the board's clock and round trips, as time.monotonic()."""
+        """When the board sampled the state, from the board's clock and round trips; as time.monotonic()."""
     @property
     def sampled_error(self) -> float | None:
-        """The largest error of `sampled` in seconds; None: unknown, then it is the latest time."""
+        """The largest error of `sampled` in seconds. None: unknown, and `sampled` is the latest time."""
     @property
     def sampled_utc(self) -> datetime | None:
         """`sampled` by the present setting of the calendar's clock."""
@@ -224,7 +224,7 @@ class State:
     def as_dict(self) -> dict[str, Any]:
         """The fields that the newest datagram carries, with `pnum` and `t_ms`."""
     def __bool__(self) -> bool: ...
-    # One attribute a field of docs/reference/protocol.md, in its unit.
+    # One attribute for each field of docs/reference/protocol.md, in its unit.
     ain24: float
     ain12: float
     ain5: float
@@ -369,13 +369,13 @@ class Setpoints:
     """
     def __init__(self, *commands: Command) -> None: ...
     def add(self, command: Command, /) -> Setpoints:
-        """Returns these setpoints, with the command."""
+        """Adds the command, and returns these setpoints."""
     def __len__(self) -> int: ...
 
 class ServoCalibration:
     """Maps the pulse of a servo linearly to its angle. `us` and `degrees`: the two ends of its
-    travel, in the same order. Raises UsageError for a pulse that is not 1 to 2500, and unless both
-    differ.
+    travel, in the same order. Raises UsageError for a pulse that is not 1 to 2500, and for ends with
+    the same pulse or angle.
 
         arm = ServoCalibration(us=(1000, 2000), degrees=(-45, 45))
     """
@@ -386,7 +386,7 @@ class ServoCalibration:
         """The angle of a pulse, also beyond an end. None for 0: the servo is off."""
 
 class Wiring:
-    """Which pin or line serves each signal of a board (docs/reference/wiring.md). `signal`: a name of SIGNALS, such as
+    """The pin or line of each signal of a board (docs/reference/wiring.md). `signal`: a name of SIGNALS, such as
     'stepper 1 step'. Places are written as in a wiring file: 'D2', 'D42 low', 'none'.
 
         wiring = Wiring.load('robot.wiring')
@@ -397,7 +397,7 @@ class Wiring:
     SIGNALS: tuple[str, ...]
     @staticmethod
     def plan() -> Wiring:
-        """The wiring of a board without one of its own."""
+        """The wiring of a board to which no wiring was given."""
     @staticmethod
     def read(text: str, name: str = 'wiring') -> Wiring:
         """Reads and checks the text of a wiring file; `name` is for errors. Raises DataError."""
@@ -406,14 +406,14 @@ class Wiring:
         """Reads and checks a wiring file. Raises DataError, OpenError or DeniedError."""
     def __getitem__(self, signal: str) -> str: ...
     def __setitem__(self, signal: str, place: str) -> None:
-        """Raises DataError for a place that the signal cannot have. check() finds what only the whole shows."""
+        """Raises DataError for a place that the signal cannot have. check() finds the faults of a whole wiring."""
     def check(self) -> None:
         """Raises DataError, with the reason, if the wiring breaks a rule."""
     @property
     def setting(self) -> str:
         """The value of the setting `wiring`."""
     def differences(self, other: Wiring) -> list[tuple[str, str, str]]:
-        """Signal, place here, place there."""
+        """For each difference: the signal, its place here, and its place in `other`."""
     def __str__(self) -> str:
         """The text of a wiring file, with comments."""
     def __eq__(self, other: object) -> bool: ...
@@ -422,16 +422,16 @@ class BoardWiring(_Record):
     """The wiring that a board keeps."""
     @property
     def source(self) -> str:
-        """'plan': nobody has given one, or confirmed the plan; 'given'; 'damaged': nothing is connected."""
+        """'plan': no wiring was given, and the plan was not confirmed; 'given'; 'damaged': nothing is connected."""
     @property
     def in_use(self) -> bool:
-        """False: it counts from the board's next start on."""
+        """False: the board uses this wiring from its next start on."""
     @property
     def wiring(self) -> Wiring: ...
 
 class Subscription:
     def cancel(self) -> None:
-        """Ends the callback. After this returns it does not run, unless it called this itself."""
+        """Ends the callback. After cancel() returns, the callback does not run, unless it called cancel() itself."""
 
 class Recording:
     """A recording of one or several boards (docs/how-to/recordings.md). A new file begins after
@@ -446,7 +446,7 @@ class Recording:
                  trace: TracebackType | None) -> None: ...
     @property
     def problem(self) -> str | None:
-        """Why it ended early; or that its file was removed or truncated, and restarted."""
+        """Why the recording ended early; or that its file was removed or truncated, and restarted."""
     @property
     def records(self) -> int: ...
     @property
@@ -485,13 +485,13 @@ class FoundBoard(_Record):
         """CAN: its number on the bus, 0 to 31."""
     @property
     def identity(self) -> Identity | None:
-        """None: it did not report its identity."""
+        """None: the board did not report its identity."""
     @property
     def busy(self) -> bool | None:
         """True if a host controls it; None: unknown."""
     @property
     def holder(self) -> Program | None:
-        """Serial and CAN: the program of this computer on the transport. Name '': no answer."""
+        """Serial and CAN: the program of this computer that holds the transport. Name '': no answer."""
     @property
     def holder_controls(self) -> bool:
         """False: the holder watches."""
@@ -532,7 +532,7 @@ class SearchedBus(_Record):
     def has_controller(self) -> bool: ...
     @property
     def state(self) -> str:
-        """Of the controller: 'error-active' …; '': unknown."""
+        """The state of the controller: 'error-active' …; '': unknown."""
     @property
     def bit_rate(self) -> int:
         """In bit/s; 0: unknown."""
@@ -565,12 +565,12 @@ class Discovery:
         """True if more than 64 boards have answered by UDP."""
     def only(self) -> FoundBoard:
         """The only board, even on several transports. Raises OpenError without a board, and
-        UsageError with the URLs of several."""
+        UsageError with the URLs of several boards."""
 
 def discover(*, serial: bool = True, can: bool = True, udp: bool = True, serial_ports: Sequence[str] = (),
              udp_port: int = 2018) -> Discovery:
     """The boards that this computer reaches, as `r4 list` shows them. Blocks for up to 1.3 s.
-    `serial_ports`: paths of ports to ask, whatever their USB id. `udp_port`: 1 to 65535, where
+    `serial_ports`: paths of ports to ask, with any USB id. `udp_port`: 1 to 65535, where
     boards listen."""
 
 def shipped_devices() -> list[str]: ...
@@ -753,10 +753,10 @@ class BoardHealth:
     def board(self) -> int: ...
     @property
     def url(self) -> str:
-        """The URL that opened it."""
+        """The URL that opened the board."""
     @property
     def identity(self) -> Identity:
-        """Empty until it has answered."""
+        """Empty until the board has answered."""
     @property
     def link(self) -> LinkStatus: ...
     @property
@@ -770,7 +770,7 @@ class BoardHealth:
         """One status for each of several paths; empty for a single path."""
     @property
     def well(self) -> bool:
-        """True if ACTIVE and in control: commands can be sent."""
+        """True if the link is ACTIVE and in control, so commands can be sent."""
 
 class FleetResult:
     """The result of a command at one board."""

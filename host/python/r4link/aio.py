@@ -40,7 +40,7 @@ async def _result(call: _core.Call) -> Any:
         await ended
     finally:
         loop.remove_reader(call.fileno())
-        call.cancel()  # no effect if it has ended
+        call.cancel()  # no effect after the call's end
     return call.result()
 
 
@@ -51,7 +51,7 @@ def _end(ended: asyncio.Future[None]) -> None:
 
 class States:
     """The states of a board from now on: `async for state in board.states(): …`, until the board is
-    closed. The link queues the states itself, so slow callbacks lose none."""
+    closed. The link queues the states, so slow callbacks lose no state."""
 
     def __init__(self, states: blocking.States, news: asyncio.Event, subscription: Subscription) -> None:
         self._states = states
@@ -62,7 +62,7 @@ class States:
         return self
 
     async def __anext__(self) -> State:
-        await asyncio.sleep(0)  # lets other tasks run, however many states wait
+        await asyncio.sleep(0)  # lets other tasks run while many states wait
         while True:
             self._news.clear()
             state = self._states.take()
@@ -132,8 +132,8 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
     def __init__(self, url: str | Transport | Iterable[str] | Iterable[Transport], **options: Any) -> None:
         self._board = blocking.Board(url, **options)
         self._core = self._board._core
-        self._calls: Any = _core.Calls(self._core)  # each returns at once
-        self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of loops
+        self._calls: Any = _core.Calls(self._core)  # each call returns at once
+        self._news: weakref.WeakSet[asyncio.Event] = weakref.WeakSet()  # of `async for` loops
 
     def _call(self, call: Callable[[_core.Board], Any],
               then: Callable[[Any], Any] = lambda result: result) -> Any:
@@ -147,7 +147,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
         return coroutine
 
     def stop(self, timeout: float = 1.0) -> Coroutine[Any, Any, None]:
-        """As r4link.Board.stop(). The stop begins with this call, even if the coroutine never runs
+        """As r4link.Board.stop(). The stop begins with this call, even if the coroutine does not run
         or is cancelled. `timeout`: seconds to wait for the confirmation."""
         stop: _core.Call = self._calls.stop(_ms(timeout))
         coroutine: Coroutine[Any, Any, None] = self._call(lambda core: stop)
@@ -179,7 +179,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
         try:
             return await asyncio.wait_for(anext(self.states()), _ms(timeout) / 1000)
         except (asyncio.TimeoutError, StopAsyncIteration):
-            return self._core.next_state(1)  # raises the reason
+            return self._core.next_state(1)  # raises the error
 
     def identify(self, timeout: float = 1.0) -> Coroutine[Any, Any, Identity]:
         """Asks the board for its identity. `timeout`: seconds to wait for the answer."""
@@ -187,7 +187,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
         return identity
 
     def wiring(self, timeout: float = 1.0) -> Coroutine[Any, Any, BoardWiring]:
-        """The wiring that the board keeps; only over its own cable. `timeout`: seconds to wait for the answer."""
+        """The wiring that the board keeps. Needs the board's own cable. `timeout`: seconds to wait for the answer."""
         wiring: Coroutine[Any, Any, BoardWiring] = self._call(lambda core: core.wiring(_ms(timeout)))
         return wiring
 
@@ -210,7 +210,7 @@ class Board(AnyBoard[Coroutine[Any, Any, None]]):
 
 
 async def discover(**options: Any) -> Discovery:
-    """As r4link.discover(). Cancelling the task does not end the search, at most 1.3 s."""
+    """As r4link.discover(). The search takes at most 1.3 s. Cancelling the task does not end it."""
     return await asyncio.get_running_loop().run_in_executor(None, lambda: _core.discover(**options))
 
 

@@ -38,15 +38,15 @@ class AnyBoard(ABC, Generic[Sent]):
 
     def take_control(self) -> Sent:
         """Makes this program control the board; callbacks and recordings stay. It begins disarmed:
-        call wait_active() and arm(). If another program of this computer controls the board, it
-        raises RefusedError with the `holder`, and this program continues to watch."""
+        call wait_active() and arm(). If another program of this computer controls the board,
+        take_control() raises RefusedError with the `holder`, and this program continues to watch."""
         sent: Sent = self._call(lambda core: core.take_control())
         return sent
 
     def release_control(self, timeout: float = 1.0) -> Sent:
-        """Disarms, and sends the farewell until the board has answered: it is then safe and free.
-        Afterwards this program watches. Without an answer the board goes safe by its own timeout,
-        and NotConfirmedError is raised. Commands that wait in other threads raise
+        """Disarms, and sends the farewell until the board has answered. The board is then safe and
+        free, and this program watches. Without an answer the board goes safe by its own timeout,
+        and release_control() raises NotConfirmedError. Commands that wait in other threads raise
         CancelledError."""
         sent: Sent = self._call(lambda core: core.release_control(_ms(timeout)))
         return sent
@@ -75,8 +75,8 @@ class AnyBoard(ABC, Generic[Sent]):
         outputs went safe, except after a lost link.
 
         Clears a stop, a watchdog or a fault that came while this program controlled the board, and
-        closes relay 1. A cause that may be older than the program, or a fault with which the board
-        began, is not cleared: it raises NotArmedError, and Command.clear() clears it.
+        closes relay 1. Does not clear a cause that may be older than the program, or a fault with
+        which the board began. arm() then raises NotArmedError, and Command.clear() clears the cause.
         """
         sent: Sent = self._call(lambda core: core.arm(_ms(timeout)))
         return sent
@@ -87,7 +87,8 @@ class AnyBoard(ABC, Generic[Sent]):
         return self._core.disarmed_by()
 
     def stop(self, timeout: float = 1.0) -> Sent:
-        """All outputs safe at once: repeated until confirmed, latched until Command.clear()."""
+        """Makes all outputs safe at once. The stop is repeated until confirmed, and latched until
+        Command.clear()."""
         sent: Sent = self._call(lambda core: core.stop(_ms(timeout)))
         return sent
 
@@ -120,8 +121,8 @@ class AnyBoard(ABC, Generic[Sent]):
         return BldcChannel(self, channel)
 
     def dac(self, channel: int, *, millivolts: int, timeout: float = 1.0) -> Sent:
-        """Sets a voltage: `channel` 1 or 2, `millivolts` 0 to 3300; 0 in the safe state. An output
-        command, so arm() is needed. Command.dac() can be posted, and can be one of Setpoints."""
+        """Sets a voltage: `channel` 1 or 2, `millivolts` 0 to 3300; 0 in the safe state. This is an
+        output command, so arm() is needed. Command.dac() can be posted, and can be one of Setpoints."""
         return self.send(Command.dac(channel, millivolts=millivolts), timeout)
 
     def proximity(self, channel: int, *, cm: int, timeout: float = 1.0) -> Sent:
@@ -138,8 +139,8 @@ class AnyBoard(ABC, Generic[Sent]):
         return self.send(f'C:{key},{value}', timeout)
 
     def give_wiring(self, wiring: Wiring, timeout: float = 1.0) -> Sent:
-        """Checks `wiring` and gives it to the board, which uses it from its next start on; only over its own cable.
-        Raises DataError for a wiring with a fault."""
+        """Checks `wiring` and gives it to the board, which uses it from its next start on. Works only over the board's
+        own cable. Raises DataError for a wiring with a fault."""
         wiring.check()
         return self.setting('wiring', wiring.setting, timeout)
 
@@ -147,8 +148,8 @@ class AnyBoard(ABC, Generic[Sent]):
         """Sets up a described device (r4link.devices): checks its identity, writes its settings,
         which needs arm(), and starts the board's readings until this session ends. `timeout`: for
         each step. Raises RefusedError if the device does not answer or is another device. Raises
-        UsageError if a device of another address or name has one of the slots: i2c.poll_off() frees
-        a slot. Call it again after on_restart() and a lost link."""
+        UsageError if a device with another address or name has one of the slots: i2c.poll_off()
+        frees a slot. Call it again after on_restart() and a lost link."""
         sent: Sent = self._call(lambda core: core.attach(device._core, _ms(timeout)))
         return sent
 
@@ -158,7 +159,7 @@ class AnyBoard(ABC, Generic[Sent]):
         sent: Sent = self._call(lambda core: core.link_timing(_ms(board_timeout), _ms(heartbeat), _ms(timeout)))
         return sent
 
-    # --- what the board reports
+    # --- reports of the board
 
     @property
     def state(self) -> State:
@@ -201,7 +202,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return self._core.on_link(self._callback(callback))
 
     def on_path(self, callback: Callable[[PathStatus], object]) -> Subscription:
-        """Called when a path begins or ceases to carry."""
+        """Called when a path begins or ceases to carry datagrams."""
         return self._core.on_path(self._callback(callback))
 
     def on_event(self, callback: Callable[[Event], object]) -> Subscription:
@@ -209,7 +210,7 @@ class AnyBoard(ABC, Generic[Sent]):
         return self._core.on_event(self._callback(callback))
 
     def on_restart(self, callback: Callable[[], object]) -> Subscription:
-        """Called when the board has restarted, or this computer slept: thresholds and readings have ended."""
+        """Called when the board has restarted, or this computer slept. Thresholds and readings have then ended."""
         return self._core.on_restart(self._callback(callback))
 
     def on_arming(self, callback: Callable[[DisarmCause], object]) -> Subscription:
@@ -232,9 +233,10 @@ class AnyBoard(ABC, Generic[Sent]):
 
     def watchdog(self, period: float) -> None:
         """After `period` seconds without feed() the heartbeats stop and the board goes safe; 0:
-        off. Feed where the robot is attended: callbacks and an event loop do not feed it."""
+        off. Call feed() where the program controls the robot. Callbacks and an event loop do not
+        feed the watchdog."""
         self._core.watchdog(_ms(period))
 
     def feed(self) -> None:
-        """Restarts the period of watchdog(): the program is well."""
+        """Reports that the program works, which restarts the period of watchdog()."""
         self._core.feed()

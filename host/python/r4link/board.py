@@ -30,14 +30,14 @@ _open: weakref.WeakSet[_core.Board] = weakref.WeakSet()
 
 @atexit.register
 def _close_all() -> None:
-    """Sends the farewells while the interpreter is whole."""
+    """Sends the farewells before the interpreter ends."""
     for board in list(_open):
         board.close()
 
 
 class States:
     """The states of a board from now on: `for state in board.states(): …`, until the board is
-    closed. Keeps it open. `most`: 1 or more states wait."""
+    closed. Keeps the board open. `most`: 1 or more states wait."""
 
     def __init__(self, board: Board, most: int | None, timeout: float, lossless: bool) -> None:
         if most is not None and most < 1:
@@ -55,7 +55,7 @@ class States:
         while (state := self._board.take(self._states, self._timeout_ms)) is None:
             if self._states.ended:
                 raise StopIteration
-            self._board.next_state(1)  # raises the reason
+            self._board.next_state(1)  # raises the error
         return state
 
     def take(self) -> State | None:
@@ -77,7 +77,7 @@ class Board(AnyBoard[None]):
     """A board, opened by URL (docs/reference/transports.md), or with_link(). See the options in
     include/r4link/options.hpp.
 
-    Returns without waiting for the board: wait_active(). `role` is BoardRole.CONTROL or
+    Does not wait for the board: call wait_active(). `role` is BoardRole.CONTROL or
     BoardRole.WATCH. A watcher only reads states, and may stop the board, until take_control().
     `key` is the path of a key file (`~` is your home). Raises UsageError, OpenError, DeniedError.
 
@@ -87,7 +87,7 @@ class Board(AnyBoard[None]):
             board.osmc(1).set(0.1)      # the board's own state has confirmed it
 
     Several URLs are paths to one board (docs/how-to/redundancy.md): r4link.Board(['serial:auto',
-    'udp://192.168.0.125']). It also takes one Transport of your own, or several, instead of URLs.
+    'udp://192.168.0.125']). Board also takes one or several Transports of your own, instead of URLs.
 
     `watch_rate_hz`: 1 to 1000 states a second for a watcher. `heartbeat`: seconds between
     heartbeats. `timeout`: seconds of silence after which the link is lost. `command_retry`,
@@ -120,7 +120,7 @@ class Board(AnyBoard[None]):
     @classmethod
     def first(cls, **options: Any) -> Self:
         """Opens the only board that r4link.discover() finds within 1.3 s. Raises OpenError without
-        a board, and UsageError with the URLs if there are several."""
+        a board, and UsageError with the URLs of several boards."""
         return cls(_core.discover().only().url, **options)
 
     def _call(self, call: Callable[[_core.Board], Any],
@@ -160,7 +160,7 @@ class Board(AnyBoard[None]):
         return self._core.identify(_ms(timeout))
 
     def wiring(self, timeout: float = 1.0) -> BoardWiring:
-        """The wiring that the board keeps; only over its own cable. `timeout`: seconds to wait for the answer."""
+        """The wiring that the board keeps. Needs the board's own cable. `timeout`: seconds to wait for the answer."""
         return self._core.wiring(_ms(timeout))
 
     def next_state(self, timeout: float = 1.0) -> State:
@@ -168,8 +168,8 @@ class Board(AnyBoard[None]):
         return self._core.next_state(_ms(timeout))
 
     def states(self, most: int | None = None, timeout: float = 1.0, *, lossless: bool = False) -> States:
-        """The states from now on, for a loop, which waits up to `timeout` seconds for each. By
-        default only the newest state waits. With `most`, up to that number (1 or more) wait, and
-        newer states replace the oldest. With `lossless`, `most` states wait (default: 65536, eleven
-        minutes at 100 Hz), and a loss raises DataError at its place."""
+        """The states from now on, for a loop that waits up to `timeout` seconds for each state. By
+        default only the newest state waits. With `most`, up to that number of states (1 or more)
+        wait, and newer states replace the oldest. With `lossless`, `most` states wait (default:
+        65536, eleven minutes at 100 Hz), and a loss raises DataError at its place."""
         return States(self, most, timeout, lossless)

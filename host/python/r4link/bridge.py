@@ -5,7 +5,7 @@
         ...
         print(bridge.status()[0].hosts.counters)
 
-It runs on its own thread, which never takes the GIL.
+The bridge runs on its own thread, which never takes the GIL.
 """
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ class BridgeCounters(NamedTuple):
     refused: int  # a missing signature, or a setting that only a cable may change
     late: int  # may have waited for more than 100 ms, because the bridge was delayed
     undelivered: int  # the other side is down, full, or has no known peer
-    # Of `passed`: replaced by a newer state at the other side, or waited there for 100 ms.
+    # Of `passed`: at the other side, replaced by a newer state or dropped after 100 ms.
     outdated: int
 
 
 class BridgeEnd(NamedTuple):
     name: str  # of the transport
     up: bool
-    counters: BridgeCounters  # of the datagrams that came from there
+    counters: BridgeCounters  # of the datagrams from this side
 
 
 class BridgeStatus(NamedTuple):
@@ -61,12 +61,12 @@ class BridgeStatus(NamedTuple):
 class Bridge:
     def __init__(self, hosts: str, board: str, *, timeout: float = 1.0,
                  key: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (), open: bool = False) -> None:
-        """`hosts`: where hosts are heard, 'udp://0.0.0.0:2018'. `board`: as Board takes it.
-        Patterns for the same number of boards are joined in order. After `timeout` seconds without
-        a heartbeat of the served host, another host may pass: at least the board's timeout. `key`:
-        key files of the board (`~`: your home); only datagrams signed with one of them pass.
-        Between a network and a board at a serial port, `key` is required unless `open` lets
-        everyone drive."""
+        """`hosts`: the transport of the hosts, 'udp://0.0.0.0:2018'. `board`: the board's URL, as for
+        Board. Patterns for the same number of boards are joined in order. After `timeout` seconds
+        without a heartbeat of the served host, another host may pass. Give at least the board's
+        timeout. `key`: key files of the board (`~`: your home). Only datagrams signed with one of
+        these keys pass. Between a network and a board at a serial port, `key` is required unless
+        `open` lets everyone drive."""
         files = [key] if isinstance(key, (str, os.PathLike)) else key
         self._core = _core.Bridge(hosts, board, timeout=_ms(timeout), open=open,
                                   keys=[os.path.expanduser(os.fspath(each)) for each in files])

@@ -18,11 +18,11 @@ from .values import UartData
 if TYPE_CHECKING:
     from .any_board import AnyBoard
 
-# The results of waiting calls for a command, for bytes, and for addresses, or coroutines of them.
+# The result of a waiting call for a command, bytes or addresses: the value or its coroutine.
 Sent = TypeVar('Sent')
 Read = TypeVar('Read')
 Scanned = TypeVar('Scanned')
-AnyUart = TypeVar('AnyUart')  # of a blocking or an asynchronous board
+AnyUart = TypeVar('AnyUart')  # the UART of a blocking or an asynchronous board
 _MOST_S = 24 * 3600.0
 
 
@@ -88,7 +88,7 @@ class ServoChannel(_Channel[Sent]):
     def set(self, *, us: int | None = None, degrees: float | None = None, timeout: float = 1.0) -> Sent:
         """Takes either `us`, the pulse width up to 2500 microseconds (0: no pulses), or `degrees`,
         an angle between the two ends of the calibration. Raises UsageError for an angle beyond
-        them, or before calibrate()."""
+        these ends, or before calibrate()."""
         return self._board.send(self._command(us, degrees), timeout)
 
     @overload
@@ -122,11 +122,11 @@ class RelayChannel(_Channel[Sent]):
 
 
 class StepperChannel(_Channel[Sent]):
-    """A stepper."""
+    """A stepper motor."""
 
     def move_to(self, position: int, *, speed: int = 1000, timeout: float = 1.0) -> Sent:
         """`position`: the target in steps, a signed 32-bit number. `speed`: 1 to 20000 steps a
-        second. Returns when the board has taken the target, before the stepper has reached it."""
+        second. Returns when the board has accepted the target, before the stepper has reached it."""
         return self._board.send(Command.stepper(self._channel, position=position, speed=speed), timeout)
 
     def post(self, position: int, *, speed: int = 1000) -> PostResult:
@@ -186,12 +186,12 @@ class I2c(Generic[Sent, Read, Scanned]):
 
     def poll(self, slot: int, address: int, register: int | bytes, count: int, period: float,
              timeout: float = 1.0) -> Sent:
-        """Makes the board read by itself every `period` seconds (0.005 to 60), into that slot:
+        """Makes the board read by itself every `period` seconds (0.005 to 60), into the slot:
         state.i2c1, after fields('DEFAULT,I2C1')."""
         return self._board.send(f'X:POLL,{address},{_register(register)},{count},{_ms(period)},{slot}', timeout)
 
     def poll_off(self, slot: int, timeout: float = 1.0) -> Sent:
-        """Ends the board's readings of that slot."""
+        """Ends the board's readings of the slot."""
         return self._board.send(f'X:OFF,{slot}', timeout)
 
     def _transfer(self, text: str, timeout: float, then: Callable[[bytes], object] = bytes) -> Any:
@@ -206,12 +206,13 @@ class UartChannel(Generic[Sent]):
         self._board, self._channel = board, channel
 
     def write(self, data: bytes, timeout: float = 1.0) -> Sent:
-        """Writes 1 to 48 bytes; returns when the board has all. May move something: needs arm()."""
+        """Writes 1 to 48 bytes; returns when the board has all bytes. May move something, so arm() is
+        needed."""
         return self._board.send(f'X:UART,{self._channel},x{bytes(data).hex()}', timeout)
 
     def on_bytes(self, callback: Callable[[UartData], object]) -> Subscription:
-        """Adds a callback for later bytes, besides read(): each byte once, in order, and the number
-        of missing bytes. It runs on the thread of the board's other callbacks."""
+        """Adds a callback for later bytes, independent of read(). The callback gets each byte once,
+        in order, and the number of missing bytes. It runs on the thread of the board's callbacks."""
         return self._board._core.uart_on_bytes(self._channel, self._board._callback(callback))
 
 
@@ -224,7 +225,7 @@ class Uart(UartChannel[None]):
 
     def read(self, timeout: float = 0.0) -> UartData:
         """The bytes since the last read(), at most 64 KB: older bytes count as lost. Waits up to
-        `timeout` seconds for bytes, then returns none."""
+        `timeout` seconds for bytes, then returns no bytes."""
         return self._board._core.uart_read(self._channel, _ms(timeout))
 
     def __iter__(self) -> Iterator[UartData]:
@@ -249,5 +250,5 @@ class Uarts(Generic[AnyUart]):
 
 
 def _register(register: int | bytes) -> str:
-    """As in a command: 'x3b00'."""
+    """The register as in a command: 'x3b00'."""
     return 'x' + (register.to_bytes(1, 'big') if isinstance(register, int) else bytes(register)).hex()

@@ -9,7 +9,7 @@
         work.run('osmc 1')
         pathlib.Path('robot.html').write_text(work.report.html)
 
-Nothing moves before it was announced and the person holds the key.
+Each movement is announced, and begins only when the person holds the key.
 """
 from __future__ import annotations
 
@@ -24,33 +24,33 @@ from .errors import UsageError
 
 
 class Action(Word):
-    """In place of an answer."""
+    """The person's choice in place of an answer."""
     SKIP = 'skip', 'leaves out this check'
     REPEAT = 'repeat', 'begins this check again'
     LEAVE = 'leave', 'ends the run, which can be resumed'
 
 
 class Question(NamedTuple):
-    check: str  # its id, 'osmc 1'
-    topic: str  # what it is about, for scripts: 'which', 'forward', 'meter' …
+    check: str  # the check's id, 'osmc 1'
+    topic: str  # the subject, for scripts: 'which', 'forward', 'meter' …
     text: str
     answer: str  # 'yes_no', 'number' or 'choice'
-    choices: tuple[str, ...]  # for a choice
-    unit: str  # of a number
+    choices: tuple[str, ...]  # of a 'choice'
+    unit: str  # of a 'number'
 
 
 class Movement(NamedTuple):
     check: str
     text: str
     command: str  # 'O:410,1,1'; relay 1 closes before it
-    most: float  # seconds; it ends by then
+    most: float  # seconds in which the movement ends
 
 
 class Person:
-    """Derive from it. `say` prints; the other functions must be there."""
+    """A base class. `say` prints; define the other functions."""
 
     def say(self, check: str, text: str) -> None:
-        """`text` is for the person."""
+        """Shows `text` to the person."""
         print(f'{check}: {text}')
 
     def ask(self, question: Question) -> bool | float | str | Action:
@@ -58,18 +58,18 @@ class Person:
         raise NotImplementedError
 
     def await_key(self, movement: Movement) -> Action | None:
-        """Announces the movement, and waits until the person holds the key; or returns an Action."""
+        """Announces the movement, and waits until the person holds the key or chooses an Action."""
         raise NotImplementedError
 
     def holds_key(self) -> bool:
-        """Asked every 20 ms while something moves; False stops it. Must not wait."""
+        """Called every 20 ms during a movement; False stops the movement. Must not wait."""
         raise NotImplementedError
 
 
 class Check(NamedTuple):
     id: str
     section: str  # 'motor supply off' or 'wheels off the ground'
-    moves: str  # what moves; '': nothing
+    moves: str  # the moving thing; '': nothing
     about: str
 
 
@@ -81,7 +81,7 @@ class Measured(NamedTuple):
 
 class Found(NamedTuple):
     thing: str  # 'osmc 1'
-    finding: str  # 'reversed'; does not change with the version
+    finding: str  # 'reversed'; the same in all versions
     detail: str
     wrong: str  # a sentence
     fix: str
@@ -114,18 +114,18 @@ class Report:
 
     @property
     def found(self) -> tuple[Found, ...]:
-        """All that is wrong."""
+        """All findings."""
         return tuple(found for each in self.checks for found in each.found)
 
     @property
     def learnt_wiring(self) -> Wiring:
-        """The board's wiring with what was learnt. Raises DataError while it is not a whole wiring: then more
-        checks of one kind are needed."""
+        """The board's wiring with the learnt changes. Raises DataError while the wiring is not complete: then
+        more checks of one kind are needed."""
         return Wiring.read(self._data['learnt_wiring'], 'learnt wiring')
 
 
 class _Asked:
-    """Turns what a Person returns into what the core takes."""
+    """Converts the results of a Person for the core."""
     _ACTIONS = {Action.SKIP: 1, Action.REPEAT: 2, Action.LEAVE: 3}
 
     def __init__(self, person: Person) -> None:
@@ -154,7 +154,7 @@ class _Asked:
 
 class Commissioning:
     """Checks `board`, which must be in control, with `person`. `others`: URLs that lead to the same board.
-    `resume`: Report.json of an earlier run. The board is used by nobody else meanwhile."""
+    `resume`: Report.json of an earlier run. No other program may use the board meanwhile."""
 
     checks: tuple[Check, ...] = tuple(Check(*each) for each in _core.commissioning_checks())
 
@@ -163,18 +163,18 @@ class Commissioning:
         self._core = _core.Commissioning(board._core, _Asked(person), list(others), resume)
 
     def run(self, check: str) -> CheckResult | None:
-        """Does one check, by its id, again if it was done. Returns None if the person left. Raises UsageError if there
+        """Does the check with this id, even if it was done. Returns None if the person left. Raises UsageError if there
         is no such check, RefusedError if the link is lost."""
         if not self._core.run(check):
             return None
         return next(each for each in self.report.checks if each.id == check)
 
     def run_all(self, only: Sequence[str] = ()) -> bool:
-        """Does all checks that were not done yet, or those in `only`. False: the person left."""
+        """Does all checks that were not done yet, or the checks in `only`. False: the person left."""
         return self._core.run_all(list(only))
 
     def offer(self) -> bool:
-        """Asks whether the board may keep what was learnt, and gives it. False: the person left."""
+        """Asks whether the board may keep the learnt wiring and calibration, and sends them. False: the person left."""
         return self._core.offer()
 
     @property

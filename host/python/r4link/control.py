@@ -3,7 +3,7 @@
 ends itself.
 
 Metres, radians, seconds; x forward, y and angles to the left, as in ROS (REP 103). The classes are
-those of C++ (include/r4link/control/); none of them reads a clock.
+those of C++ (include/r4link/control/), and do not read a clock.
 """
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Pid:
     output is limited (`minimum`, `maximum`, `rate` a second). The derivative is of the measured
     value, low-passed.
 
-    `setpoint` and `measured` are in one unit, any. `output`, `minimum` and `maximum` are in units
+    `setpoint` and `measured` are in the same unit. `output`, `minimum` and `maximum` are in units
     of the output, such as -1 to 1 for a duty. `kp`: units of the output per unit of error; `ki`:
     per unit and second; `kd`: per unit a second; `feed_forward`: per unit of the setpoint.
     `derivative_filter`: seconds, the time constant of the low pass; 0: none. `dt`: seconds.
@@ -63,7 +63,7 @@ class Pid:
         self._core = _core.Pid(kp, ki, kd, feed_forward, minimum, maximum, rate, derivative_filter)
 
     def step(self, setpoint: float, measured: float, dt: float) -> float:
-        """The output, `dt` seconds after the last step. Raises DataError unless all are finite."""
+        """The output, `dt` seconds after the last step. Raises DataError unless all values are finite."""
         return self._core.step(setpoint, measured, dt)
 
     def reset(self) -> None:
@@ -96,11 +96,11 @@ class Wheel:
         self._core = _core.Wheel(encoder, counts_a_turn, radius, reversed, max(0, _ms(window)), max_speed)
 
     def advance(self, state: State) -> float:
-        """The metres that it has rolled since the last state, by ENCn."""
+        """The metres that the wheel has rolled since the last state, by ENCn."""
         return self._core.advance(state)
 
     def measured(self, state: State) -> float:
-        """Its speed in m/s as the board measures it, by ENCnHZ: new ten times a second."""
+        """The wheel's speed in m/s as the board measures it (ENCnHZ): new ten times a second."""
         return self._core.measured(state)
 
     def reset(self) -> None:
@@ -109,20 +109,19 @@ class Wheel:
 
     @property
     def speed(self) -> float:
-        """In m/s, by the counts of the last `window`: new with each state."""
+        """The wheel's speed in m/s by the counts of the last `window`: new with each state."""
         return self._core.speed
 
 
 class SteeringSensor:
-    """The angle by AINSTEER, linear between two ends, (volts, radians) each. `margin`: volts beyond
-    the ends that are still an angle. `angle`: radians."""
+    """The steering angle by AINSTEER, linear between two ends, each (volts, radians). `margin`: volts
+    beyond an end that count as an angle. `angle`: radians."""
 
     def __init__(self, left: tuple[float, float], right: tuple[float, float], margin: float = 0.3) -> None:
         self._core = _core.SteeringSensor(left, right, margin)
 
     def angle(self, state: State) -> float | None:
-        """In radians; None if a cable is off, because the voltage is impossible. Do not drive
-        then."""
+        """In radians. None if the voltage is impossible, because a cable is off: then do not drive."""
         return self._core.angle(state)
 
     def volts(self, angle: float) -> float:
@@ -132,7 +131,7 @@ class SteeringSensor:
 
 class DifferentialDrive:
     """Two driven wheels, `separation` metres apart. If a wheel would be faster than `max_wheel`
-    m/s, the robot is slowed down on the same path."""
+    m/s, the robot slows down on the same curve."""
 
     def __init__(self, separation: float, max_wheel: float = math.inf) -> None:
         self._core = _core.DifferentialDrive(separation, max_wheel)
@@ -148,8 +147,8 @@ class DifferentialDrive:
 
 class FourWheelDrive:
     """Four driven wheels that slip to turn, as if `track`, in metres from left to right, were wider
-    by the ratio `slip`. If a wheel would be faster than `max_wheel` m/s, the robot is slowed down
-    on the same path."""
+    by the ratio `slip`. If a wheel would be faster than `max_wheel` m/s, the robot slows down on
+    the same curve."""
 
     def __init__(self, track: float, slip: float = 1.5, max_wheel: float = math.inf) -> None:
         self._core = _core.FourWheelDrive(track, slip, max_wheel)
@@ -171,7 +170,7 @@ class Ackermann:
         self._core = _core.Ackermann(wheelbase, track, max_steering, max_speed)
 
     def command(self, twist: Twist) -> CarCommand:
-        """For a turn on the spot, which is impossible, the car stands."""
+        """For a turn on the spot, which is impossible, the speed is 0."""
         return CarCommand(*self._core.command(*twist))
 
     def twist(self, command: CarCommand) -> Twist:
@@ -200,7 +199,7 @@ class Odometry:
         self._core = _core.Odometry(length_per_m, turn_per_m, turn_per_rad)
 
     def advance(self, length: float, turn: float) -> None:
-        """The robot has gone `length` metres (below 0: backwards) and turned by `turn` radians."""
+        """The robot has moved by `length` metres (below 0: backwards) and turned by `turn` radians."""
         self._core.advance(length, turn)
 
     def reset(self, pose: Pose = Pose(0.0, 0.0, 0.0), covariance: Sequence[float] = (0.0,) * 9) -> None:
@@ -209,22 +208,22 @@ class Odometry:
 
     @property
     def pose(self) -> Pose:
-        """Where the robot is."""
+        """The position and heading of the robot."""
         return Pose(*self._core.pose)
 
     @property
     def covariance(self) -> tuple[float, ...]:
-        """Of x, y and yaw, row by row."""
+        """The covariance of x, y and yaw, row by row."""
         return self._core.covariance
 
     def ros_covariance(self, unknown: float = 1e6) -> tuple[float, ...]:
         """The 36 numbers of geometry_msgs/PoseWithCovariance. `unknown`: the variance of z (m^2)
-        and of the rotations about x and y (rad^2), which odometry on the ground cannot know."""
+        and of the rotations about x and y (rad^2), which odometry on the ground cannot measure."""
         return self._core.ros_covariance(unknown)
 
 
 class Standstill(NamedTuple):
-    """A motor with an encoder: at `pwm` or more, it turns by more than `counts` in `time` s."""
+    """A motor with an encoder. At `pwm` or more, it turns by more than `counts` in `time` seconds."""
     encoder: int = 1
     channel: int = 1
     drive: Literal['osmc', 'dhb12', 'bldc'] = 'osmc'
@@ -236,7 +235,7 @@ class Standstill(NamedTuple):
 class LoopReport(NamedTuple):
     end: LoopEnd
     why: str
-    at_rest: bool  # the outputs are as in `rest`, or safe; if not, `why` says what to do
+    at_rest: bool  # the outputs are as in `rest`, or safe; if not, `why` has the fix
     steps: int
 
 
@@ -249,7 +248,7 @@ def _options(fields: str, late: float, first: float, standstill: Sequence[Stands
 
 
 class LoopGuard:
-    """Ends a loop of your own, such as one with asyncio. `late`, `first`: seconds, as in
+    """Ends a loop of your own, such as a loop with asyncio. `late`, `first`: seconds, as in
     run_loop(). `now`: seconds of time.monotonic()."""
 
     def __init__(self, *, fields: str = '', late: float = 0.1, first: float = 1.0,
@@ -257,7 +256,7 @@ class LoopGuard:
         self._core = _core.LoopGuard(_options(fields, late, first, standstill, Setpoints(), 0.2, 0.3))
 
     def start(self, now: float) -> None:
-        """The loop begins."""
+        """Call it when the loop begins."""
         self._core.start(now)
 
     def on_state(self, state: State, disarmed_by: DisarmCause | str, now: float) -> float | None:
@@ -265,7 +264,7 @@ class LoopGuard:
         return self._core.on_state(state, disarmed_by, now)
 
     def on_commanded(self, setpoints: Setpoints) -> None:
-        """The commands of the step. A motor that is not among them keeps its earlier command."""
+        """Call it with the commands of the step. A motor without a command keeps its earlier command."""
         self._core.on_commanded(setpoints)
 
     def check(self, link: LinkState | str, disarmed_by: DisarmCause | str, now: float) -> LoopEnd:
@@ -274,7 +273,7 @@ class LoopGuard:
 
     @property
     def deadline(self) -> float:
-        """When states will be late if none comes before: seconds of time.monotonic()."""
+        """When the loop is late if no state comes before: seconds of time.monotonic()."""
         return self._core.deadline
 
     @property
@@ -291,14 +290,14 @@ class LoopGuard:
 def run_loop(board: Board, step: Callable[[State, float], Setpoints | None], *, rest: Setpoints, fields: str = '',
              late: float = 0.1, first: float = 1.0, standstill: Sequence[Standstill] = (), rest_timeout: float = 0.2,
              watchdog: float = 0.3, arming: bool = True) -> LoopReport:
-    """Runs a loop on this thread until it ends: `step(state, dt)` for each new state that has all
-    `fields`, with the seconds since the last step on the board's clock. Its result is posted; None
-    ends the loop. Then the outputs are set to `rest`. Exceptions of the step, and Ctrl-C, are
-    raised after that. `arming`: as in Board.
+    """Runs a loop on this thread until it ends. Calls `step(state, dt)` for each new state that has
+    all `fields`. `dt`: seconds since the last step on the board's clock. The result of the step is
+    posted; None ends the loop. Then the outputs are set to `rest`, and after that exceptions of the
+    step and Ctrl-C are raised. `arming`: as in Board.
 
     `late`: seconds after which the newest state is too old. `first`: seconds that the first state
-    may take. `rest_timeout`: seconds in which the board must confirm `rest`; otherwise it is
-    stopped. `watchdog`: seconds that a step may take, as in Board.watchdog(); 0: the program feeds
+    may take. `rest_timeout`: seconds in which the board must confirm `rest`; otherwise the board
+    is stopped. `watchdog`: seconds that a step may take, as in Board.watchdog(); 0: the program feeds
     the watchdog itself, or has none.
     """
     options = _options(fields, late, first, standstill, rest, rest_timeout, watchdog, arming)

@@ -3,7 +3,7 @@
 (docs/how-to/described-devices.md).
 
     imu = r4link.Device('bno055@0x28')
-    board.arm()                            # setting it up may write to it
+    board.arm()                            # the set-up may write to the device
     board.attach(imu)
     imu.reading(board.next_state(), 'gyro_z').number    # rad/s
 """
@@ -19,17 +19,17 @@ from .enums import DeviceRole
 class DeviceReading(NamedTuple):
     number: float | None  # in the value's unit; None without a measurement
     t_ms: int  # the board's clock at the reading
-    errors: int  # failed readings since it was set up
+    errors: int  # failed readings since the device was set up
 
 
 class Device:
-    """A described device at an address. Its readings are in consecutive slots of the board's eight,
-    from `first_slot`, 1 to 8.
+    """A described device at an address. Its readings are in consecutive slots of the board, from
+    `first_slot`, 1 to 8.
 
     `text`: 'NAME[@ADDRESS[:SLOT]]'. NAME is one of shipped(), or the path of a file:
-    './mine.device@0x40'. Raises UsageError for an unknown device or one that does not fit,
-    DataError with the line for a wrong file, and OpenError and DeniedError for a file that cannot
-    be read.
+    './mine.device@0x40'. Raises UsageError for a device that is unknown or does not fit,
+    and DataError with the line for a wrong file. Raises OpenError and DeniedError for a file that
+    cannot be read.
     """
 
     def __init__(self, text: str, first_slot: int = 1) -> None:
@@ -53,41 +53,41 @@ class Device:
 
     @property
     def name(self) -> str:
-        """The name in its description: 'bno055'."""
+        """The name in the description: 'bno055'."""
         return self._core.name
 
     @property
     def title(self) -> str:
-        """Its title in words."""
+        """The title in words."""
         return self._core.title
 
     @property
     def role(self) -> DeviceRole:
-        """Its role for a robot."""
+        """The role for a robot."""
         return self._core.role
 
     @property
     def address(self) -> int:
-        """On the I2C bus, 0x08 to 0x77."""
+        """The address on the I2C bus, 0x08 to 0x77."""
         return self._core.address
 
     @property
     def fields(self) -> str:
-        """Its state fields: 'I2C1,I2C2'."""
+        """The state fields of the device: 'I2C1,I2C2'."""
         return self._core.fields
 
     @property
     def units(self) -> dict[str, str]:
-        """The units of its values, by name; '' is none."""
+        """The units of the values, by name; '': no unit."""
         return self._core.units
 
     def is_set_up(self, state: State) -> bool | None:
-        """False if the device was reset: its values are not measurements, so attach it again. None
-        if not read yet, or not shown."""
+        """False if the device was reset: attach it again, because its values are not measurements.
+        None if it was not read yet, or does not show a reset."""
         return self._core.is_set_up(state)
 
     def reading(self, state: State, value: str) -> DeviceReading:
-        """Raises UsageError if the device has no such value."""
+        """The newest reading of a value. Raises UsageError if the device has no such value."""
         return DeviceReading(*self._core.reading(state, value))
 
     def readings(self, state: State) -> dict[str, DeviceReading]:

@@ -30,7 +30,7 @@ class Word(str, enum.Enum):
 
     @classmethod
     def _missing_(cls, value: object) -> NoReturn:
-        from .errors import UsageError  # errors.py has members of these enumerations
+        from .errors import UsageError  # imported here, because errors.py imports this module
         *first, last = (f"'{each}'" for each in cls)
         raise UsageError(repr(value), f'it is not a valid {cls.__name__}', f'give {", ".join(first)} or {last}')
 
@@ -175,7 +175,7 @@ class EventKind(Word):
 
 
 class FleetEventKind(Word):
-    """The kind of an event of a board in a fleet, and so of `FleetEvent.what`."""
+    """The kind of a fleet's event, which also gives the type of `FleetEvent.what`."""
     LINK = 'link', 'the link changed: a LinkStatus'
     TRANSPORT = 'transport', 'the transport went up or down, or warns: an Event'
     ARMING = 'arming', 'the board was armed or disarmed: a DisarmCause'

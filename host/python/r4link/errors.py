@@ -9,8 +9,8 @@
         CancelledError     given up by the program, or because a stop or a newer cause came first
         ClosedError        the board was closed, or belongs to another process
         NotArmedError      not sent: it drives an output, and the program is not armed: arm()
-      OpenError            the transport cannot be opened or is gone (also an OSError)
-      DeniedError          the system denies it (also an OSError)
+      OpenError            the transport cannot be opened or has disconnected (also an OSError)
+      DeniedError          the system denies access (also an OSError)
       UnsupportedError     kernel support or an interface is missing
 """
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Program(NamedTuple):
 class Error(Exception):
     """An error (`thing`, `reason`) and its fix (`fix`, '' if unknown).
 
-    `outcome`: how a command ended. `refusal`: why the board refused it. `at`: which command of a
-    group, from 1 (0: none in particular). `holder`: the program that already controls the board, if
-    that is the reason.
+    `outcome`: how a command ended. `refusal`: why the board refused the command. `at`: the number of
+    the command in a group, from 1 (0: no command in particular). `holder`: the program that already
+    controls the board, if this control is the reason.
     """
 
     def __init__(self, thing: str, reason: str, fix: str = '', *, outcome: Outcome | str = Outcome.NONE,
@@ -88,11 +88,11 @@ class NotArmedError(RefusedError):
 
 
 class OpenError(Error, OSError):
-    """The transport cannot be opened or is gone."""
+    """The transport cannot be opened or has disconnected."""
 
 
 class DeniedError(Error, OSError):
-    """The system denies it."""
+    """The system denies access."""
 
 
 class UnsupportedError(Error):
@@ -107,7 +107,7 @@ _OF_OUTCOME = {Outcome.TIMED_OUT: NotConfirmedError, Outcome.CANCELLED: Cancelle
 def error_of(kind: str, thing: str, reason: str, fix: str, outcome: Outcome, refusal: Refusal, at: int,
              holder: tuple[int, str] | None = None) -> Error:
     """The error for a problem of C++ (include/r4link/error.hpp). `kind`: the name of the class, if
-    the outcome has none. `at`: from 1; 0: no command in particular."""
+    the outcome has no class. `at`: from 1; 0: no command in particular."""
     made = _OF_OUTCOME.get(outcome, _OF_KIND.get(kind, Error))
     return made(thing, reason, fix, outcome=outcome, refusal=refusal, at=at,
                 holder=None if holder is None else Program(*holder))

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .board import Board
 
 _logger = logging.getLogger('r4link')
-_logger.addHandler(logging.NullHandler())  # the program decides where the texts go
+_logger.addHandler(logging.NullHandler())  # a program chooses where its logs go
 
 _LINK_LEVELS = {LinkState.SAFE: logging.WARNING, LinkState.LOST: logging.ERROR}
 _QUIET_PATHS = (PathState.ASKING, PathState.CARRYING)
@@ -40,5 +40,5 @@ def log_events(board: Board) -> None:
 
 
 def _printable(text: str) -> str:
-    """Control characters could forge lines of the log."""
+    """Replaces control characters, which could forge lines of the log."""
     return ''.join(each if each.isprintable() else '?' for each in text)

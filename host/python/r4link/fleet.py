@@ -33,7 +33,7 @@ _open: weakref.WeakSet[Fleet] = weakref.WeakSet()
 
 @atexit.register
 def _close_all() -> None:
-    """Sends the farewells while the interpreter is whole."""
+    """Sends the farewells before the interpreter ends."""
     for fleet in list(_open):
         fleet.close()
 
@@ -42,11 +42,12 @@ class FleetEvent(NamedTuple):
     """An event of one board."""
     kind: FleetEventKind
     board: int
-    what: LinkStatus | Event | DisarmCause | None | RefusedPost | int  # by its kind
+    what: LinkStatus | Event | DisarmCause | None | RefusedPost | int  # by `kind`
 
 
 class FleetResults(Sequence[FleetResult]):
-    """The results of a command at several boards, in the given order. True if all confirmed it."""
+    """The results of a command at several boards, in the given order. True if all boards confirmed
+    the command."""
 
     def __init__(self, results: list[FleetResult]) -> None:
         self._results = results
@@ -87,10 +88,10 @@ class Fleet:
                  heartbeat: float = 0.1, timeout: float = 1.0,
                  command_retry: float = 0.05, stop_retry: float = 0.02, stop_linger: float = 0.2,
                  identify_interval: float = 1.0) -> None:
-        """Opens all transports and begins the links; returns without waiting for the boards.
+        """Opens all transports and begins the links. Does not wait for the boards.
 
-        Each of `urls` is a URL or a pattern of many: 'can://can0?node=0-7'. Raises UsageError,
-        OpenError or DeniedError if one of them cannot be opened. The options are those of Board:
+        Each of `urls` is a URL or a pattern of many URLs: 'can://can0?node=0-7'. Raises UsageError,
+        OpenError or DeniedError if a URL cannot be opened. The options are those of Board:
         `watch_rate_hz` is 1 to 1000 states a second; `heartbeat`, `command_retry`, `stop_retry`,
         `stop_linger` and `identify_interval` are seconds.
         """
@@ -167,7 +168,7 @@ class Fleet:
 
     def stop(self, timeout: float = 1.0) -> FleetResults:
         """Makes every output of every board safe at once; on a CAN bus by one frame. Does not raise
-        if boards do not confirm: then cut the power."""
+        if boards do not confirm the stop: then cut the power."""
         return FleetResults(self._core.stop(_ms(timeout)))
 
     def stop_async(self) -> None:
@@ -180,7 +181,7 @@ class Fleet:
         return self._core.post(self._pairs(setpoints))
 
     def next_event(self, timeout: float = 0.0) -> FleetEvent | None:
-        """The oldest event that was not taken yet; None if there is none in time."""
+        """The oldest event that was not taken yet; None if no event comes within `timeout`."""
         event = self._core.next_event(_ms(timeout))
         return None if event is None else FleetEvent(*event)
 
@@ -190,7 +191,7 @@ class Fleet:
             yield event
 
     def record(self, recording: Recording) -> None:
-        """Adds every datagram of every board to that recording."""
+        """Adds every datagram of every board to `recording`."""
         self._core.record(recording)
 
     def watchdog(self, period: float) -> None:
@@ -198,7 +199,7 @@ class Fleet:
         self._core.watchdog(_ms(period))
 
     def feed(self) -> None:
-        """Restarts the period of watchdog(): the program is well."""
+        """Reports that the program works, which restarts the period of watchdog()."""
         self._core.feed()
 
     def _indices(self, boards: Iterable[int | str] | None) -> list[int] | None:

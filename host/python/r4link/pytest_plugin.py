@@ -7,8 +7,8 @@
     r4_link     a board behind a bad link: @pytest.mark.r4(link='loss=5%,delay=20ms±10,seed=7');
                 a failing test reports the link
 
-The transport is that of the mark, @pytest.mark.r4(transport='udp'), or of --r4-transport: sim (in
-this process), udp, pty, can (a bus in the kernel, --r4-interface).
+The mark, @pytest.mark.r4(transport='udp'), or --r4-transport names the transport: sim (in this
+process), udp, pty, can (a bus in the kernel, --r4-interface).
 """
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def r4_board(request: pytest.FixtureRequest, r4_robot: Robot) -> Iterator[TestBo
 
 @pytest.fixture
 def r4_link(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[TestBoard]:
-    """A board behind the mark's bad link, or one with a little loss and delay and a random seed."""
+    """A board behind the mark's bad link, or behind a link with a little loss, delay and a random seed."""
     link = _marked(request).get('link') or f'loss=2%,delay=5ms±5,seed={random.randrange(1 << 32)}'
     request.node.add_report_section('setup', 'r4_link', f"@pytest.mark.r4(link='{link}')")
     with _robot(request, tmp_path, 0, link) as robot, _board(request, robot) as board:
@@ -101,7 +101,7 @@ def r4_link(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[
 
 @pytest.fixture
 def r4_bus(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> Iterator[list[TestBoard]]:
-    """Several boards under control of the test: two, or as the mark says."""
+    """Several boards under control of the test: two, or the number in the mark."""
     with contextlib.ExitStack() as stack:
         yield [stack.enter_context(_board(request, stack.enter_context(_robot(request, tmp_path, number))))
                for number in range(_marked(request).get('boards', 2))]

@@ -19,7 +19,7 @@ class RecordedEvent(NamedTuple):
 
 class RecordedDatagram(NamedTuple):
     time: np.datetime64
-    direction: str  # '<' from the board, '>' to it
+    direction: str  # '<' from the board, '>' to the board
     data: bytes
 
 
@@ -30,8 +30,8 @@ class RecordedBoard(NamedTuple):
     board's), `pnum`, and a column for each number of each field: volts, `osmc1_pwm` (0-4095),
     `osmc1_dir` (1: forward), `safe` (0: none, as SAFE). A field that a state does not carry keeps
     its last value; before the first value it is 0. Each value of a recorded described device has a
-    column in its unit, `bno055_gyro_z`, with nan if it is not a measurement. A second device of
-    that kind has its address in the name: `bno055_29_gyro_z`.
+    column in its unit, `bno055_gyro_z`, with nan where there is no measurement. A second device of
+    the same kind has its address in the name: `bno055_29_gyro_z`.
     """
     url: str
     name: str  # the board's name or id; '' if unknown
@@ -81,7 +81,7 @@ def read(path: str | os.PathLike[str], datagrams: bool = False) -> Log:
         kinds: list[Any] = [('time', 'datetime64[us]'), ('t_ms', 'u4'), ('pnum', 'u4')]
         taken = {name for name, _ in kinds}
         for i, (column, kind, numbers) in enumerate(columns):
-            while column in taken:  # a description may name its values freely
+            while column in taken:  # a description may use any names
                 column += '_'
             taken.add(column)
             columns[i] = (column, kind, numbers)

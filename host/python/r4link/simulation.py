@@ -57,7 +57,7 @@ class SimBoard:
         sim = r4link.SimBoard()
         with r4link.Board(sim.url) as board:
             board.wait_active()
-            sim.happen('handle released')       # a line of a scenario (docs/how-to/simulation.md), no time
+            sim.happen('handle released')       # a line of a scenario (docs/how-to/simulation.md), without its time
             sim.look().osmc[0].pwm
 
     With a URL to listen on, in its own process until close(), for any program: 'udp://127.0.0.1:0'
@@ -84,7 +84,7 @@ class SimBoard:
 
     @property
     def url(self) -> str:
-        """The URL for a host. In this process: for one link at a time, while this object lives."""
+        """The URL for a host. In this process: for one link at a time, while this object exists."""
         return self._url
 
     def close(self) -> None:
@@ -106,10 +106,11 @@ class SimBoard:
         return self._robot.look()
 
     def happen(self, words: str) -> None:
-        """'us 1 15', 'handle released', 'chip dac off'. Raises DataError for unknown words."""
+        """Simulates an event: 'us 1 15', 'handle released', 'chip dac off'. Raises DataError for
+        unknown words."""
         if not isinstance(self._robot, _core.SimulatedRobot):
             try:
-                _core.SimulatedRobot().happen(words)  # the process would report it later
+                _core.SimulatedRobot().happen(words)  # the process would report wrong words later
             except DataError as error:
                 raise DataError(words, error.reason, error.fix) from None
         self._robot.happen(words)
@@ -121,11 +122,11 @@ class SimBoard:
         self.happen(f'handle {"held" if held else "released"}')
 
     def obstacle(self, sensor: int, cm: int | None) -> None:
-        """Sets ultrasonic `sensor`, 1 to 4, to `cm` centimetres; 0: nothing; None: cable off."""
+        """Sets ultrasonic `sensor`, 1 to 4, to `cm` centimetres; 0: no obstacle; None: cable off."""
         self.happen(f'us {sensor} {"off" if cm is None else cm}')
 
     def turn(self, encoder: int, counts: int) -> None:
-        """Turns `encoder`, 1 to 4, to that number of `counts`, 1000 a millisecond."""
+        """Turns `encoder`, 1 to 4, to the position `counts`, at 1000 counts a millisecond."""
         self.happen(f'enc {encoder} {counts}')
 
     def analog(self, name: str, volts: float) -> None:
@@ -138,7 +139,7 @@ class SimBoard:
 
     def chip(self, name: Literal['osmc', 'dhb', 'servo', 'expander', 'dac'],
              supply: Literal['off', 'on', 'reset']) -> None:
-        """A chip that is off acknowledges nothing. `reset`: it loses its supply for a moment."""
+        """A chip that is off acknowledges nothing. `reset`: the chip loses its supply for a moment."""
         self.happen(f'chip {name} {supply}')
 
     def i2c(self, held: bool) -> None:

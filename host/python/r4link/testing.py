@@ -86,7 +86,7 @@ class SimProcess:
         return self._url
 
     def happen(self, words: str) -> None:
-        """A line of a scenario (docs/how-to/simulation.md), no time. Raises DataError if it has ended."""
+        """A line of a scenario (docs/how-to/simulation.md), without its time. Raises DataError if `r4 sim` has ended."""
         assert self._process.stdin
         self._require_own()
         try:
@@ -95,10 +95,10 @@ class SimProcess:
             raise DataError('r4 sim', 'it has ended', f'exit code {self._process.poll()}') from error
 
     def look(self) -> Look:
-        """The last values of its pins, and sensor values that are at most 10 ms old."""
+        """The last values of the pins, and sensor values that are at most 10 ms old."""
         self._require_own()
         deadline = time.monotonic() + 5
-        while not self._outputs or not self._sensors:  # the first line of each
+        while not self._outputs or not self._sensors:  # waits for the first line of each kind
             if time.monotonic() > deadline:
                 raise OpenError('r4 sim', 'it tells nothing', 'is it stopped?')
             time.sleep(0.002)
@@ -115,7 +115,7 @@ class SimProcess:
                     volts=tuple(senses['analog'].values()))
 
     def close(self) -> None:
-        """Ends the process. Idempotent. No effect in a fork: the process is the parent's."""
+        """Ends the process. Idempotent. No effect in a fork, because the process belongs to the parent."""
         if os.getpid() != self._parent:
             return
         self._process.kill()
@@ -154,8 +154,8 @@ class SimProcess:
 
 def make_robot(transport: str, folder: pathlib.Path, *, interface: str = 'vcan0', node: int = 1,
                link: str = '') -> Robot:
-    """A simulated robot: 'sim' in this process, else as a process on UDP, a pty in `folder` or a
-    CAN bus, behind a `link` as in r4 sim --link. `node`: 0 to 31, its number on the bus."""
+    """A simulated robot: 'sim' in this process, else a process on UDP, a pty in `folder` or a CAN
+    bus. `link`: as in r4 sim --link. `node`: 0 to 31, its number on the bus."""
     if link and transport == 'sim':
         raise UsageError(f'link {link!r}', "transport 'sim' has no link", "use 'udp', 'pty' or 'can'")
     if transport == 'sim':

@@ -2,13 +2,13 @@
 """Transports of your own: a subclass of Transport moves datagrams, and CanTransport takes any bus
 of python-can.
 
-open(), send() and close() are called on a thread of their own. They may wait: the link continues.
+open(), send() and close() are called on a thread of their own. They may wait, because the link continues meanwhile.
 
 The heartbeats on such a transport need the interpreter. If a program keeps the interpreter busy for
 a second, the link is lost, and the board goes safe.
 
-If a method raises, the transport is down: on_event() reports the exception, close() is called, and
-open() is called five times a second until it returns.
+If a method raises, the transport is down. on_event() reports the exception, and close() is called.
+Then open() is called five times a second until it returns.
 """
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from typing import Any, Callable
 
 from .errors import UsageError
 
-_BUS_PATIENCE = 0.1  # seconds for which a bus may take no frame
+_BUS_PATIENCE = 0.1  # seconds that a frame may wait for the bus
 
 
 class Transport:
@@ -52,15 +52,15 @@ class Transport:
         OpenError."""
 
     def send(self, datagram: bytes) -> None:
-        """Sends one datagram. Later datagrams wait for it: 100 ms, a stop without a limit."""
+        """Sends one datagram. A later datagram waits for 100 ms at most, a stop without a limit."""
         raise NotImplementedError(f'{type(self).__name__} has no send()')
 
     def close(self) -> None:
         """Undoes open(). Not called after an open() that raised. Board.close() waits 1 s for it."""
 
     def received(self, datagram: bytes) -> None:
-        """Call it with each received datagram, from any thread. It does not wait, and does nothing
-        while the transport is closed. Raises UsageError for more than 1024 bytes."""
+        """Call it with each received datagram, from any thread. Does not wait. Does nothing while the
+        transport is closed. Raises UsageError for more than 1024 bytes."""
         receive = self._receive
         if receive is not None:
             receive(memoryview(datagram).tobytes())
@@ -89,7 +89,7 @@ class CanTransport(Transport):
 
     `bus`: a can.BusABC. `node`: the board's number on the bus, 0 to 31. `fd`: sends CAN FD frames.
     `pack`: sends and requests the packed form; False: text. The bus stays open when the board is
-    closed. While the board is open, nothing else may call bus.recv(). For an interface of Linux
+    closed. While the board is open, no other code may call bus.recv(). For an interface of Linux
     prefer its URL, can://can0, which does not need the interpreter.
     """
 
@@ -130,7 +130,7 @@ class CanTransport(Transport):
                     continue
                 receive(message.arbitration_id, bytes(message.data), message.is_extended_id, message.is_fd)
         except Exception as error:  # pylint: disable=broad-except
-            self._failure = error  # raised at the next frame: a host sends about ten a second
+            self._failure = error  # raised at the next frame: a host sends about ten frames a second
 
     def _send_frame(self, can_id: int, data: bytes, extended: bool, fd: bool) -> None:
         if self._failure is not None:
@@ -142,7 +142,7 @@ class CanTransport(Transport):
             try:
                 self.bus.send(message, timeout=_BUS_PATIENCE)
                 return
-            except self._can.CanOperationError:  # its queue is full
+            except self._can.CanOperationError:  # the bus's queue is full
                 if time.monotonic() >= deadline:
                     raise
                 time.sleep(0.001)

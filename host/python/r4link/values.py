@@ -24,7 +24,7 @@ class Bldc(NamedTuple):
 
 
 class I2cReading(NamedTuple):
-    """A reading that the board took by itself on the user's bus; t_ms: the board's clock then."""
+    """A reading that the board took by itself on the user's bus; t_ms: the board's clock at the reading."""
     t_ms: int
     errors: int
     data: bytes
@@ -45,14 +45,14 @@ class I2cBusReport(NamedTuple):
 
 
 class UartBytes(NamedTuple):
-    """A UART in one state: the position of its first byte in all kept bytes, the number of bytes
-    that the board has lost, and the bytes. Some of them may be in the state before."""
+    """A UART in one state: the position of the first byte in all kept bytes, the number of bytes that
+    the board has lost, and the bytes. Some bytes may also be in the previous state."""
     position: int
     lost: int
     data: bytes
 
 
 class UartData(NamedTuple):
-    """Bytes of a UART, each once, in order; `lost`: how many are missing before or among them."""
+    """Bytes of a UART, each once, in order; `lost`: the number of missing bytes before or among these."""
     data: bytes
     lost: int

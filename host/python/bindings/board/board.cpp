@@ -21,7 +21,7 @@ namespace {
 
 using PyStates = OfThisProcess<States>;
 
-// None until the constructor has made one.
+// Null until the constructor has made a board.
 PyBoard* board_in(PyObject* self) {
   auto* const instance = reinterpret_cast<py::detail::instance*>(self);
   return instance->simple_layout ? static_cast<PyBoard*>(instance->simple_value_holder[0])
@@ -36,7 +36,7 @@ void collect_garbage(PyHeapTypeObject* heap) {
     const PyBoard* const board = board_in(self);
     return board != nullptr ? board->traverse(visit, arg) : 0;
   };
-  // Untrack first: the garbage collector must not visit a partly destroyed object.
+  // Untracks first, because the garbage collector must not visit a partly destroyed object.
   type.tp_dealloc = [](PyObject* self) {
     PyObject_GC_UnTrack(self);
     py::detail::pybind11_object_dealloc(self);
@@ -223,7 +223,7 @@ void bind_board(py::module_& module) {
           "watchdog", [](PyBoard& board, int ms) { board->watchdog(Ms(ms)); }, Released())
       .def("feed", [](PyBoard& board) { board->feed(); })
       .def("run_loop", &run_loop)
-      // Its on_wait() is the board's, and is called in take() only.
+      // The states use the board's on_wait(), and call it in take() only.
       .def("states",
            [](PyBoard& board, bool lossless, std::size_t most) {
              return PyStates("the states",

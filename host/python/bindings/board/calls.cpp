@@ -38,7 +38,7 @@ class Call {
   Call(const Call&) = delete;
   Call& operator=(const Call&) = delete;
 
-  // On the loop, or before the loop knows the call. `end` returns the value, or throws.
+  // Call it on the loop, or before the call is posted. `end` returns the value, or throws.
   template <class End>
   void end_with(End end) {
     try {
@@ -60,7 +60,7 @@ class Call {
           [self](AsyncBoard&) { self->cancelled_.emit(asio::cancellation_type::terminal); });
     });
   }
-  // Only after the end.
+  // Call it only after the end.
   py::object result() const {
     if (error_) std::rethrow_exception(error_);
     if (const auto* identity = std::get_if<BoardIdentity>(&value_)) return py::cast(*identity);
@@ -72,7 +72,7 @@ class Call {
   }
 
  private:
-  PyBoard& board_;  // Python keeps it as long as this
+  PyBoard& board_;  // Python keeps it alive as long as this object
   const int news_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   std::atomic<bool> ended_{false};  // publishes the result
   std::exception_ptr error_;
@@ -98,8 +98,8 @@ class Calls {
  public:
   explicit Calls(PyBoard& board) : board_(board) {}
 
-  // `start(board, handler)` begins the call on the loop. `end(request, board, result)` returns its
-  // value, or throws. The request names the call in errors.
+  // `start(board, handler)` begins the call on the loop. `end(request, board, result)` returns the
+  // call's value, or throws. The request names the call in errors.
   template <class Request, class Start, class End = decltype(confirmed)>
   CallPtr begin(Request request, Start start, End end = confirmed) {
     auto call = std::make_shared<Call>(board_);
@@ -140,7 +140,7 @@ class Calls {
       board.async_arm(Ms(ms), std::move(handler));
     });
   }
-  // `answer(board)`: the value, when the board has answered.
+  // `answer(board)` returns the value after the board has answered.
   template <class Answer>
   CallPtr ask(const Command& question, int ms, Answer answer) {
     return begin(
@@ -221,7 +221,7 @@ class Calls {
   }
 
  private:
-  PyBoard& board_;  // Python keeps it as long as this
+  PyBoard& board_;  // Python keeps it alive as long as this object
 };
 
 }  // namespace
@@ -232,7 +232,7 @@ void bind_calls(py::module_& module) {
       .def("cancel", &Call::cancel, Released())
       .def("result", &Call::result);
 
-  using Keep = py::keep_alive<0, 1>;  // a call keeps its board
+  using Keep = py::keep_alive<0, 1>;  // a call keeps its board alive
   py::class_<Calls>(module, "Calls")
       .def(py::init<PyBoard&>(), py::keep_alive<1, 2>())
       .def(

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board, as Python holds it.
 #pragma once
 
 #include <chrono>
@@ -49,7 +48,7 @@ class PyBoard {
     });
   }
 
-  // If a signal has come, this throws, which ends the waiting call on its thread.
+  // Throws after a signal, which ends the waiting call on its thread.
   static void on_wait() {
     const py::gil_scoped_acquire gil;
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -82,8 +81,8 @@ class PyBoard {
   }
 
  private:
-  std::vector<std::weak_ptr<Callback::Held>> callbacks_;  // with the GIL
-  std::optional<OfThisProcess<Board>> board_;  // destroyed first: its threads use the rest
+  std::vector<std::weak_ptr<Callback::Held>> callbacks_;  // guarded by the GIL
+  std::optional<OfThisProcess<Board>> board_;  // destroyed first: its threads use the other members
 };
 
 }  // namespace r4::python

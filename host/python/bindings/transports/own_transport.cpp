@@ -17,8 +17,8 @@ namespace r4::python {
 namespace {
 
 // Returns code(), which may wait for the GIL. Until 3.13, CPython ends a thread that waits for the
-// GIL while the interpreter ends. The thread would destroy Python objects without the GIL on its
-// way out, so it stays here instead. `code` must not own Python objects.
+// GIL while the interpreter ends. The ending thread would destroy Python objects without the GIL,
+// so the thread pauses here for ever. `code` must not own Python objects.
 template <class Code>
 auto staying(Code code) {
   try {
@@ -36,7 +36,7 @@ py::object from_python(Call call) {
   return result;
 }
 
-// The methods of a r4link.Transport, for a thread without a state of the interpreter.
+// The methods of an r4link.Transport, for a thread without a state of the interpreter.
 class Methods {
  public:
   explicit Methods(const py::object& transport)
@@ -48,7 +48,7 @@ class Methods {
         }) {}
 
   const std::string& name() const { return name_; }
-  // `arguments()` makes them, with the GIL. An exception of the method becomes an Error.
+  // `arguments()` returns the arguments, with the GIL. An exception of the method becomes an Error.
   template <class Arguments>
   void call(const char* method, Arguments arguments) const {
     std::optional<py::gil_scoped_acquire> gil;
