@@ -16,7 +16,7 @@ constexpr Chip pwm_chips[] = {Chip::osmc_pwm, Chip::dhb12_pwm, Chip::servo_pwm};
 constexpr Chip safe_order[chip_count] = {Chip::dac, Chip::expander, Chip::osmc_pwm, Chip::dhb12_pwm,
                                          Chip::servo_pwm};
 
-// The bit of a line of the expander, if it is high.
+// The bit of an expander line that is high, otherwise 0.
 unsigned level(Place place, bool on) {
   return place.connected() && on != place.option() ? 1U << place.number() : 0U;
 }
@@ -115,7 +115,7 @@ void BoardHardware::drive_safe() {
 }
 
 // Returns the chip at which the bus was held, all_chips for the all-call, or nowhere.
-// `held_before`: the result of the try before.
+// `held_before`: the result of the previous attempt.
 int BoardHardware::drive_chips_safe(int held_before) {
   if (config_.wiring.has_pca9685() && held_before != all_chips &&
       Pca9685::all_off(bus_) == I2cResult::timeout) {
@@ -124,7 +124,7 @@ int BoardHardware::drive_chips_safe(int held_before) {
     }
     return all_chips;
   }
-  // An acknowledge of the all-call hides chips that did not hear it: address each chip, too.
+  // One acknowledge of the all-call hides chips that did not receive it, so address each chip, too.
   for (const Chip chip : safe_order) {
     const int i = static_cast<int>(chip);
     if (i != held_before && !drive_chip_safe(i)) return i;
@@ -166,7 +166,7 @@ std::uint16_t BoardHardware::connected_bits() const {
   return bits;
 }
 
-// The values of all lines of the expander; those that are not connected are low.
+// The values of all lines of the expander; unconnected lines are low.
 std::uint16_t BoardHardware::ports_of(const Outputs& outputs) const {
   const Place* const places = config_.wiring.places;
   unsigned ports = 0;
@@ -202,7 +202,7 @@ void BoardHardware::set_outputs(const Outputs& outputs) {
   for (int i = 0; i < dac_channels; ++i) pins_.dac[i]->write(outputs.dac_mv[i]);
 }
 
-// Begins where the budget ran out last time. Ends at a held bus: one timeout is enough.
+// Begins at the chip where the budget last ran out. Ends at a held bus: one timeout is enough.
 void BoardHardware::for_each_chip(BusBudget& budget, bool set_up) {
   for (int n = 0; n < chip_count; ++n) {
     const int i = (first_chip_ + n) % chip_count;
@@ -240,7 +240,7 @@ void BoardHardware::poll(std::uint32_t now_us) {
   set_up_again();
   BusBudget budget(bus_bytes_per_poll);
   if (modes_to_check_ != 0) {
-    // make_safe() may set it between these two lines.
+    // make_safe() may set modes_to_check_ between these two lines.
     const int at = modes_to_check_ - 1;
     modes_to_check_ = static_cast<std::uint8_t>(at);
     const int chip = static_cast<int>(pwm_chips[at]);
@@ -272,7 +272,7 @@ void BoardHardware::set_up_again() {
   }
 }
 
-// A chip with changed modes may drive although commanded off. Its reset also reaches other chips.
+// A chip with changed modes may drive outputs that are off. Its reset also reaches other chips.
 void BoardHardware::reset_lost_modes() {
   const bool lost = osmc_.lost_mode() || dhb12_.lost_mode() || servo_.lost_mode();
   if (!lost || Pca9685::reset_all(bus_) != I2cResult::ok) return;
@@ -281,8 +281,8 @@ void BoardHardware::reset_lost_modes() {
   }
 }
 
-// make_safe() may interrupt a transfer, or write registers that a driver is comparing. Trouble that
-// the driver then finds says nothing about its chip, so the chip is set up again without a fault.
+// make_safe() may interrupt a transfer, or write registers that a driver is comparing. The driver
+// then finds trouble without a fault of its chip, so the chip is set up again and no fault latched.
 void BoardHardware::set_up_what_was_cut_off() {
   for (int i = 0; i < chip_count; ++i) {
     if (chips_[i]->trouble() != ChipTrouble::none && !failed_[i]) chips_[i]->begin();
@@ -310,8 +310,9 @@ bool BoardHardware::look_for_trouble() {
   return found;
 }
 
-// Each function that uses the bus ends with this. New trouble makes everything safe. An
-// interrupting make_safe() may have been undone by the function's last write, so it is repeated.
+// Each function that uses the bus ends with leave(). New trouble makes all outputs safe. The
+// function's last write may have undone an interrupting make_safe(), so outputs are made safe
+// again.
 void BoardHardware::leave() {
   if (!interrupted_ && look_for_trouble()) {
     reset_lost_modes();
@@ -325,7 +326,7 @@ void BoardHardware::leave() {
     if (!interrupted_) look_for_trouble();
   }
   busy_ = false;
-  interrupted_ = false;  // a later make_safe() drove everything safe itself
+  interrupted_ = false;  // a later make_safe() made all outputs safe itself
 }
 
 void BoardHardware::sample(Inputs& inputs) {

@@ -2,22 +2,23 @@
 // The R4 board's chip drivers, wired by a Wiring. A signal without a place or chip has no effect.
 //
 // Power-up: call power_up() first. It resets the PWM chips, which turns every PWM output off in any
-// mode, and leaves every output in its safe value. poll() then sets the chips up, and ready() is
-// true when all are. Outputs applied earlier wait until then: no motor runs before its brake works.
+// mode, and leaves every output in its safe value. poll() then sets the chips up. ready() is true
+// when all chips are set up. Outputs applied earlier wait until then: no motor runs before its
+// brake works.
 //
-// Safe state (make_safe()): steppers stand, PWM outputs off, DAC codes and outputs 0, brakes on,
-// relays off. It may be called at any time, also in an interrupt or a fault handler during a
-// transfer. It makes at most two bounded attempts (a held bus is recovered once). A wiring that is
-// damaged, or that nobody has confirmed, is a fault from the start.
+// Safe state (make_safe()): steppers stopped, PWM outputs off, DAC codes and outputs 0, brakes on,
+// relays off. make_safe() may be called at any time, also in an interrupt or a fault handler during
+// a transfer. It makes at most two bounded attempts (a held bus is recovered once). A damaged or
+// unconfirmed wiring is a fault from the start.
 //
 // Chip faults: the fault is latched with chip and reason, all outputs are made safe, and apply()
 // has no effect until clear_fault(). Every retry_us the bus is recovered and the chip set up again,
-// outputs off first. If a disturbance changed the modes of a PCA9685, all chips that hear the
-// general call are reset first. Until then its outputs may be on.
+// outputs off first. If a disturbance changed the modes of a PCA9685, all chips that obey the
+// general call are reset first. Until the reset, the outputs of that PCA9685 may be on.
 //
-// A reset chip is noticed within chip_count x verify_us plus one poll; the PCA9685 are verified
-// first after a safe state. Each poll() and each apply() sends at most bus_bytes_per_poll bytes;
-// the rest follows in the next polls. Nothing waits.
+// The reset of a chip is detected within chip_count x verify_us plus one poll; the PCA9685 are
+// verified first after a safe state. Each poll() and each apply() sends at most bus_bytes_per_poll
+// bytes; later polls send the rest. No call waits.
 #pragma once
 
 #include <cstddef>
@@ -45,7 +46,7 @@ constexpr std::uint32_t servo_hz = 50;
 // The kinds of motors on H-bridges: names of members of Outputs.
 #define R4_DRIVES(DRIVE) DRIVE(osmc) DRIVE(dhb12)
 
-// All pins must be set, also those of signals that are not connected, and outlive the hardware.
+// Set all pins, also those of unconnected signals. The pins must outlive the hardware.
 struct BoardPins {
   OutputPin* step[stepper_channels];
   OutputPin* direction[stepper_channels];
@@ -142,13 +143,13 @@ class BoardHardware final : public Hal {
   QuadratureEncoder encoders_[encoder_channels];
   UltrasonicSensors ultrasonic_;
 
-  Outputs waiting_outputs_;  // before every chip was ready
+  Outputs waiting_outputs_;  // applied before every chip was ready
   bool waiting_ = false;
   ChipFault fault_;
   bool failed_[chip_count] = {};
   std::uint32_t failed_us_[chip_count] = {};
-  int first_chip_ = 0;                        // begins the next poll
-  int verified_chip_ = 0;                     // next to verify
+  int first_chip_ = 0;                        // the first chip of the next poll
+  int verified_chip_ = 0;                     // next chip to verify
   volatile std::uint8_t modes_to_check_ = 0;  // PWM chips left to check after a safe state
   std::uint32_t verified_us_ = 0;
   std::uint32_t now_us_ = 0;
@@ -156,7 +157,7 @@ class BoardHardware final : public Hal {
   bool handle_seen_ = false;           // the pin read held at the last poll
   bool handle_held_ = false;           // the pin has read held for handle_settle_us
   volatile bool busy_ = false;         // the bus is in use: in poll(), apply() or make_safe()
-  volatile bool interrupted_ = false;  // make_safe() came in between
+  volatile bool interrupted_ = false;  // make_safe() interrupted that use
 };
 
 }  // namespace firmware

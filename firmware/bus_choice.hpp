@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which of the two I2C buses has the board's chips. At a start the board reads from the address
-// that all PCA9685 share, on both buses. If only the bus answers that the wiring does not name, the
-// board drives the chips there, to keep them off, and stays in a fault. A board without a PCA9685
-// leaves the other bus to the user.
+// Chooses the I2C bus that has the board's chips. At a start the board reads from the address that
+// all PCA9685 share, on both buses. A PCA9685 may answer only on the bus that the wiring does not
+// name. Then the board drives the chips on that bus, to keep them off, and stays in a fault. A
+// board without a PCA9685 leaves the other bus to the user.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ struct BusChoice {
   bool user_may;               // false: transfers of the user could reach the chips
 };
 
-// `answers`: bit n, a PCA9685 answers on bus n; `trouble`: that of the wiring otherwise.
+// `answers`: bit n: a PCA9685 answers on bus n. `trouble`: of the wiring, before this choice.
 inline BusChoice choose_bus(const Wiring& wiring, unsigned answers, ChipTrouble trouble) {
   const int named = wiring.at(SignalKind::chip_bus).number();
   const bool is_lost = trouble == ChipTrouble::damaged;

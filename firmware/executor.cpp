@@ -32,8 +32,8 @@ void set(Bldc& output, const Command& command) {
   output.brake = command.on;
 }
 
-// Called before the relay of the motors' supply closes. Then no motor may start by a command that
-// came without supply or that a network delayed. A voltage may be a motor's throttle.
+// Called before the relay of the motors' supply closes. A command that arrived without supply, or
+// that a network delayed, must not start a motor. A voltage may be a motor's throttle.
 void stop_motors(Outputs& outputs) {
 #define R4_OUTPUT(kind, Value, member, channels, motor) \
   for (auto& channel : outputs.member) {                \

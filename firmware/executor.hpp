@@ -14,14 +14,14 @@ namespace firmware {
 // The application decides whether the outputs reach the hardware.
 struct Setpoints {
   Outputs outputs;
-  std::uint16_t proximity_cm[ultrasonic_channels] = {};  // 0: the sensor stops nothing
+  std::uint16_t proximity_cm[ultrasonic_channels] = {};  // 0: no threshold
   FieldSet fields = FieldSet::paper_default();
   Settings settings;
 };
 
 // Carries out `command` completely, or changes nothing and returns the reason. After
 // check_command() only names of fields and settings, and channels, can be refused. Commands that
-// the application handles (heartbeat, stop, X other than X:DAC …) change nothing here.
+// the application handles (heartbeat, stop, X other than X:DAC …) have no effect here.
 Refusal carry_out(const Command& command, Setpoints& setpoints);
 
 }  // namespace firmware

@@ -32,24 +32,24 @@ class Guard {
 
   explicit Guard(Hal& hal) : hal_(hal) {}
 
-  // A duty that checks in at least every `limit_ms` (1 …). Call before the first tick(). If there
-  // are max_duties already, returns no_duty, and the outputs stay safe for good.
+  // Adds a duty that checks in at least every `limit_ms` (1 …). Call before the first tick(). If
+  // there are max_duties already, returns no_duty, and the outputs stay safe.
   Duty add_duty(std::uint32_t limit_ms);
   void check_in(Duty duty) {
     if (duty < max_duties) duties_[duty].seen.store(true, std::memory_order_relaxed);
   }
 
-  // The outputs become safe at `deadline_ms`, unless arm() puts it off or disarm() ends it.
+  // The outputs become safe at `deadline_ms`, unless arm() moves the deadline or disarm() ends it.
   void arm(std::uint32_t deadline_ms);
   void disarm() { armed_.store(false, std::memory_order_relaxed); }
 
   // E:STOP has arrived in an interrupt or a thread that does not wait for the loop
   // (stop_detector.hpp). The next tick(), which may follow at once, makes the outputs safe.
   void stop() { stops_heard_.fetch_add(1, std::memory_order_release); }
-  // Calls of stop() since boot; wraps. The application must find as many datagrams.
+  // Calls of stop() since boot; wraps. The application must read as many stop datagrams.
   std::uint32_t stops_heard() const { return stops_heard_.load(std::memory_order_acquire); }
 
-  // True if every duty has checked in since the last true: the hardware watchdog may be fed.
+  // True if every duty has checked in since tick() last returned true: the watchdog may be fed.
   bool tick(std::uint32_t now_ms);
 
   // True if the guard has made the outputs safe since the last take().
@@ -59,7 +59,7 @@ class Guard {
 
   std::uint32_t missed() const { return missed_.load(std::memory_order_relaxed); }
 
-  // Each miss adds miss_cost to a debt, and each millisecond takes 1 off. A debt above the credit
+  // Each miss adds miss_cost to a debt, and each millisecond subtracts 1. A debt above the credit
   // trips the guard: 5 misses at once, or more than 2 a second.
   static constexpr std::uint32_t miss_cost = 500;
   static constexpr std::uint32_t credit = 4 * miss_cost;

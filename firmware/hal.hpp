@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hardware as the application needs it: channel values. Each port implements it. Nothing waits.
+// The hardware as the application needs it: channel values. Each port implements it. No call waits.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace firmware {
 struct StepperTarget {
   std::int32_t position = 0;                   // steps
   std::int32_t speed = stepper_speed_default;  // steps per second
-  bool enabled = false;                        // false: stays where it is
+  bool enabled = false;                        // false: does not move
   friend bool operator==(const StepperTarget& a, const StepperTarget& b) {
     return a.position == b.position && a.speed == b.speed && a.enabled == b.enabled;
   }
@@ -59,10 +59,10 @@ class Hal {
  public:
   // Called when a setpoint changed. Writes only differences.
   virtual void apply(const Outputs& outputs) = 0;
-  // Every output off, at once, in any state; a fault handler may call it at any time.
+  // Switches every output off, at once, in any state. A fault handler may call it at any time.
   virtual void make_safe() = 0;
   virtual void sample(Inputs& inputs) = 0;
-  // Encoder and stepper `channel` (1 …) restart at zero; the stepper holds.
+  // Encoder and stepper `channel` (1 …) restart at zero; the stepper stops.
   virtual void zero(int channel) = 0;
   // Allows outputs after a fault. False if the fault persists.
   virtual bool clear_fault() = 0;

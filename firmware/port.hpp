@@ -17,19 +17,20 @@ class Port {
   virtual void send(Text datagram, Priority priority, Peer peer) = 0;
   // The longest datagram the port carries: 508 on the Giga's WiFi, 1024 elsewhere.
   virtual std::size_t max_size() const = 0;
-  // `peer` is in control and keeps its number until another is held; everyone: no peer is. Where a
-  // transport cannot reach everyone at once (UDP), datagrams for everyone go to `peer`.
+  // `peer` is in control and keeps its number until another peer is held; everyone: no peer is in
+  // control. If a transport cannot reach everyone at once (UDP), datagrams for everyone go to
+  // `peer`.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
-  // Also holds `peer`, until hold(): a session may have several paths here (session_paths.hpp).
+  // Also holds `peer`, until hold(): a port may have several paths (session_paths.hpp).
   virtual void also_hold(Peer peer) { static_cast<void>(peer); }
   // True if `peer` receives datagrams for everyone.
   virtual bool reaches(Peer peer) const { return peer == everyone; }
-  // The port (CAN) sends the packed form if the host uses it. Wanted with the setting `pack`.
+  // `wanted` is the setting `pack`: the port (CAN) sends the packed form if the host uses it.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
-  // True for a bus (CAN): every program on it hears what the port sends, and no other program does.
-  // So a watcher need not prove its peer.
+  // True for a bus (CAN): all programs on the bus receive what the port sends, and no other program
+  // does. So a watcher need not prove its peer.
   virtual bool is_bus() const { return false; }
-  // True for a cable of the board's own, from which site settings are accepted (site_settings.hpp).
+  // True for the board's own cable, from which site settings are accepted (site_settings.hpp).
   virtual bool may_configure() const { return false; }
 
  protected:

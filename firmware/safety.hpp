@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Why the outputs are safe: causes, each latched until its own end (docs/reference/safety.md).
 //     cause      enters                                   leaves                      setpoints
-//     link       owner silent, or its transport failed    the owner reconnects        kept
+//     link       host silent, or its transport failed     the host reconnects         kept
 //     handle     dead-man's handle released               it is held again            cleared
 //     proximity  obstacle nearer than a threshold, or     5 cm beyond it for 500 ms,  cleared
 //                a sensor with a threshold is blind       or threshold off
@@ -9,9 +9,9 @@
 //     fault      a chip or the firmware failed            E:CLEAR                     cleared
 //     watchdog   a duty missed its deadline               E:CLEAR                     cleared
 //
-// The outputs are safe while there is a cause. The board reports the gravest: stop, fault,
-// watchdog, handle, proximity, link. E:CLEAR ends only the reported cause, which the host has seen,
-// and names the number of the newest cause, so that no host clears a later cause.
+// The outputs are safe while there is a cause. The board reports the gravest cause: stop, fault,
+// watchdog, handle, proximity, link. E:CLEAR ends only the reported cause, which the host has seen.
+// It names the number of the newest cause, so that no host clears a later cause.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ class Safety {
  public:
   // True if the cause is new.
   bool enter(SafeReason cause);
-  // A latched cause has come again: it gets a new number.
+  // A latched cause has occurred again, so it gets a new number.
   void again() { newest_ = newest_ == INT32_MAX ? 1 : newest_ + 1; }
   // True if the cause was active.
   bool leave(SafeReason cause);
@@ -36,7 +36,7 @@ class Safety {
   bool has(SafeReason cause) const { return (causes_ & bit(cause)) != 0; }
   SafeReason reason() const;
 
-  // Different at each boot, so that no E:CLEAR from before the boot fits.
+  // Different at each boot, so that an E:CLEAR from before the boot is refused.
   void count_from(std::uint32_t number) {
     newest_ = static_cast<std::int32_t>(number & 0x3FFFFFFFU);
   }

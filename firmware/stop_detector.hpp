@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Detects E:STOP in an interrupt where datagrams arrive, so that Guard::stop() makes the outputs
-// safe without waiting for the loop. The datagram itself goes its usual way.
+// safe without waiting for the loop. The loop also gets the datagram.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 namespace r4 {
 namespace firmware {
 
-// True for a valid datagram with E:STOP among its fields. Quick for any other.
+// True for a valid datagram with E:STOP among its fields. Quick for any other datagram.
 bool is_stop(Text datagram);
 
 // Takes bytes of lines. A stop in a line longer than max_line is left to the loop.

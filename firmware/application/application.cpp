@@ -57,7 +57,7 @@ void Application::tell_ports() {
 
 void Application::start(std::uint32_t now_ms) {
   hal_.make_safe();
-  safety_.count_from(now_ms);  // numbers differ at each boot: the clock starts at random
+  safety_.count_from(now_ms);  // the clock starts at a random value, so numbers differ at each boot
   turned_ms_ = now_ms;
   tell_ports();
   begin_devices(now_ms);
@@ -119,7 +119,7 @@ void Application::receive(std::uint8_t port, std::uint32_t peer, Text bytes, std
 void Application::turn(std::uint32_t now_ms) {
   if (now_ms - turned_ms_ > standstill_ms) {
     for (PortSlot& slot : ports_) {
-      if (!slot.behind) slot.waiting_ms = turned_ms_;  // else earlier datagrams may still wait
+      if (!slot.behind) slot.waiting_ms = turned_ms_;  // otherwise earlier datagrams may wait
       slot.behind = true;
     }
     any_behind_ = true;
@@ -139,7 +139,7 @@ std::uint32_t Application::waited_ms(std::uint8_t port, std::uint32_t now_ms) co
   return ports_[port].behind ? now_ms - ports_[port].waiting_ms : 0;
 }
 
-// A host on a cable of the board's own can set the key, so it needs none.
+// A host on the board's own cable can set the key, so the host needs no key.
 Verdict Application::judge(std::uint8_t port, MessageKind kind, const Datagram& datagram,
                            std::uint32_t now_ms) {
   if (!authentication_.required() || ports_[port].port->may_configure()) return Verdict::authentic;
@@ -147,13 +147,13 @@ Verdict Application::judge(std::uint8_t port, MessageKind kind, const Datagram& 
   return of_host ? authentication_.verify(datagram, now_ms) : Verdict::missing;
 }
 
-// Reports a dropped datagram. True if it gets an answer.
+// Reports a dropped datagram. True if the board must answer.
 bool Application::rejected(Verdict verdict, std::uint32_t now_ms) {
   if (observer_ != nullptr) observer_->on_rejected(now_ms, verdict);
   return authentication_.rejected(verdict);
 }
 
-// The ports keep the peers of the session's paths, whatever other peers send.
+// The ports keep the peers of the session's paths, even if many other peers send.
 void Application::hold_paths() {
   for (std::uint8_t i = 0; i < port_count_; ++i) {
     bool held = false;

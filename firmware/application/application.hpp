@@ -2,13 +2,14 @@
 // The R4 board's application: datagrams in, outputs and datagrams out (paper sections 2-4). It owns
 // no thread, clock or socket. The port calls receive() for each datagram, poll() as time passes,
 // port_down() when a transport fails, and guard().tick() in a timer interrupt. Setpoints reach the
-// hardware only in update_outputs(); every cause of the safe state goes through Safety.
+// hardware only in update_outputs(); Safety holds every cause of the safe state.
 //     CONNECTING   no host yet: outputs safe, `H:R4-ROS2;PNum:0;T:0;` each heartbeat interval
 //     ACTIVE       a host is in control and there is no cause: outputs follow the setpoints
 //     SAFE         there is a cause (safety.hpp): outputs safe; with cause `link` heartbeats only
 //
-// A session has one to four paths (session_paths.hpp), and each gets states and heartbeats. Packet
-// numbers count per port; answers to hosts not in control have their own. Times are ms, and wrap.
+// A session has one to four paths (session_paths.hpp), and each path gets states and heartbeats.
+// Packet numbers count per port; answers to hosts that are not in control have their own numbers.
+// Times are ms, and wrap.
 #pragma once
 
 #include <cstddef>
@@ -39,9 +40,10 @@ class Application {
     Identity identity;  // the texts must outlive the application
     Settings settings;
     // Authentication::chance_size random bytes, different at each boot. Without them, a board with
-    // a key obeys only a host on a cable of its own.
+    // a key obeys only a host on the board's own cable.
     const std::uint8_t* chance = nullptr;
-    // The devices must outlive the application; UARTs all or none. nullptr: commands unknown.
+    // The devices must outlive the application. Set all UARTs or none. Commands for a missing
+    // device (nullptr) are refused as unknown.
     UserI2c* i2c = nullptr;
     UserUart* uarts[uart_channels] = {};
   };
@@ -50,24 +52,24 @@ class Application {
 
   Application(Hal& hal, const Config& config, Observer* observer = nullptr);
 
-  // Call before start(). Returns the port's number; no_port, for more than max_ports: not served.
+  // Call before start(). Returns the port's number, or no_port beyond max_ports ports: not served.
   std::uint8_t add_port(Port& port);
   // Makes the outputs safe and sends the first heartbeat.
   void start(std::uint32_t now_ms);
 
   // Ignores a port that was not added. After a pause longer than standstill_ms, the datagram may
-  // have waited since the last turn of the loop (a call of this or poll()). A heartbeat then counts
-  // from that turn, until the port is drained or the loop has turned for catch_up_ms.
+  // have waited since the last turn of the loop (a call of receive() or poll()). A heartbeat then
+  // counts from that turn, until the port is drained or the loop has run for catch_up_ms.
   void receive(std::uint8_t port, std::uint32_t peer, Text bytes, std::uint32_t now_ms);
-  // All that had arrived on `port` is handed over, so its next heartbeat has not waited.
+  // All datagrams that arrived on `port` were handed over, so its next heartbeat has not waited.
   void drained(std::uint8_t port);
   void port_down(std::uint8_t port, std::uint32_t now_ms);
-  // The board itself has failed: cause is fault or watchdog.
+  // The board itself has failed: `cause` is fault or watchdog.
   void fail(SafeReason cause, std::uint32_t now_ms);
   // Does everything that is due. Returns the milliseconds until the next call, at most 10.
   std::uint32_t poll(std::uint32_t now_ms);
 
-  // Part of poll(). Call at least once per millisecond, so that a transfer can begin in each.
+  // Part of poll(). Call at least once per millisecond: each call can begin one transfer.
   void poll_devices(std::uint32_t now_ms);
 
   // For the timer interrupt. poll() checks in the first duty, loop_duty.
@@ -87,15 +89,16 @@ class Application {
   static constexpr std::uint32_t interlock_period_ms = 10;
   // The guard counts a longer turn of the loop as missed.
   static constexpr std::uint32_t loop_limit_ms = 20;
-  // A longer pause between two turns is a standstill. A heartbeat may look younger by this much.
+  // A longer pause between two turns is a standstill. A heartbeat may count as this much newer.
   static constexpr std::uint32_t standstill_ms = 15;
-  // Ports hold no more datagrams than are read in this time.
+  // A port holds at most as many datagrams as the loop reads in this time.
   static constexpr std::uint32_t catch_up_ms = 50;
-  // The cause proximity ends when the obstacle is this far beyond the threshold for this long: two
-  // turns of each sensor (drivers/ultrasonic.hpp), because one turn may miss an echo.
+  // The cause proximity ends when the obstacle is this far beyond the threshold for this long. The
+  // time is two turns of each sensor (drivers/ultrasonic.hpp), because one turn may miss an echo.
   static constexpr int proximity_hysteresis_cm = 5;
   static constexpr std::uint32_t proximity_clear_ms = 500;
-  // How long states include the answer to a single transfer on the user's bus, selected or not.
+  // States include the answer to a single transfer on the user's bus for this long, selected or
+  // not.
   static constexpr std::uint32_t answer_shown_ms = 1000;
 
  private:
@@ -189,7 +192,7 @@ class Application {
   SessionPaths paths_;
   Watchers watchers_;
   Authentication authentication_;
-  AnswerBudget questions_;  // of hosts not in control
+  AnswerBudget questions_;  // of hosts that are not in control
   Guard guard_;
   Safety safety_;
   StateSchedule schedule_;
@@ -204,22 +207,23 @@ class Application {
   std::uint32_t turned_ms_ = 0;
   std::uint32_t went_on_ms_ = 0;   // the first turn after a standstill
   std::uint32_t obstacle_ms_ = 0;  // when an obstacle was last seen
-  std::uint32_t caused_ms_ = 0;    // when a cause other than link last came
-  // Of the datagram being read: its host, and whether another path brought it before.
+  std::uint32_t caused_ms_ = 0;    // when a cause other than link last began
+  // Of the datagram being read: its host, and whether another path delivered it before.
   HostId speaker_;
   bool known_ = false;
   bool outputs_live_ = false;  // outputs_ follow the setpoints
-  // The newest stop while it lasts: its sender, and its number if it had one.
+  // The newest stop while it lasts: its sender, and its number if it has one.
   bool has_stop_number_ = false;
   bool stop_of_a_key_ = false;
   std::uint32_t stop_number_ = 0;
   HostId stop_from_;
-  // Stops that the guard heard, how many of their datagrams are unread, and when the newest came.
+  // Stops that the guard received, the number of their unread datagrams, and the time of the
+  // newest.
   std::uint32_t stops_heard_ = 0;
   std::uint32_t unread_stops_ = 0;
   std::uint32_t unread_ms_ = 0;
   std::uint32_t answered_ms_ = 0;
-  bool has_answer_ = false;      // still shown in states
+  bool has_answer_ = false;      // shown in states
   std::uint32_t wiring_in_use_;  // its checksum
   UserI2c* i2c_;
   UserUart* uarts_[uart_channels];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Command datagrams: whether they are executed, and their effects.
+// Command datagrams: admission, execution and effects.
 #include "../../protocol/messages/command_field.hpp"
 #include "../../protocol/messages/command_group.hpp"
 #include "../../protocol/messages/device_command.hpp"
@@ -8,8 +8,8 @@
 namespace r4 {
 namespace firmware {
 
-// True if the sender and the time allow a command datagram. Otherwise it is answered or dropped.
-// `refusal`: the result of parsing it; `at`: the command of a group that caused it.
+// True if the sender and the time allow a command datagram. Otherwise the datagram is answered or
+// dropped. `refusal`: the result of parsing; `at`: the command of a group that caused it.
 bool Application::admit(Source from, const Datagram& datagram, Verdict verdict, Refusal refusal,
                         std::uint8_t at, std::uint32_t now_ms) {
   if (verdict != Verdict::authentic) {
@@ -20,7 +20,7 @@ bool Application::admit(Source from, const Datagram& datagram, Verdict verdict, 
     }
     return false;
   }
-  if (!datagram.has_pnum()) {  // without a number it cannot be executed just once, or answered
+  if (!datagram.has_pnum()) {  // a command needs a number to be executed once, and to be answered
     ++rx_refused_;
     return false;
   }
@@ -39,7 +39,7 @@ void Application::on_command(Source from, const Datagram& datagram, Verdict verd
                              std::uint32_t now_ms) {
   const int count = datagram.command_count();
   const Field& field = datagram.command();
-  // A stop is obeyed even beside other commands. A single command of another letter is not a stop.
+  // A stop is obeyed even among other commands. A single command of another letter is not a stop.
   if ((count != 1 || field.name() == "E") && asks_to_stop(datagram)) {
     emergency_stop(from, datagram, verdict, now_ms);
     return;
@@ -104,7 +104,7 @@ void Application::on_group(Source from, const Datagram& datagram, Verdict verdic
   bring_about(now_ms);
 }
 
-// Needs no key, even on a board with a key: states are not secret, and watching commands nothing.
+// Needs no key, even on a board with a key: states are not secret, and a watcher commands nothing.
 void Application::on_watch(Source from, const Datagram& datagram, const Command& command,
                            std::uint32_t now_ms) {
   const bool proven = ports_[from.port].port->is_bus();
@@ -116,7 +116,7 @@ void Application::on_watch(Source from, const Datagram& datagram, const Command&
     const Refusal refusal = parse_fields(command.text, fields);
     if (refusal != Refusal::none) return refuse(from, datagram, refusal, now_ms);
   }
-  if (link_.has_owner() && paths_.has(from)) return;  // the path gets all states anyway
+  if (link_.has_owner() && paths_.has(from)) return;  // the path gets all states already
   const std::uint32_t rate_hz = static_cast<std::uint32_t>(command.value);
   switch (watchers_.on_lease(from, rate_hz, datagram.time_ms(), proven, now_ms)) {
     case Watchers::Effect::watching: {
@@ -187,20 +187,21 @@ void Application::bring_about(std::uint32_t now_ms) {
   report_state(now_ms);
 }
 
-// A stop that is not authentic uses up no number: otherwise CMD would confirm a command that was
-// not executed. Nor does a stop whose number is not the next: another program at the owner's peer
-// (a bus, or a shared port) has random numbers, which must not replace the owner's.
+// A stop of the controlling host uses up its number only if the stop is authentic and the number is
+// one of the next. Otherwise CMD would confirm a command that was not executed. Another program at
+// the host's peer (a bus, or a shared port) has random numbers, which must not replace the host's
+// numbers.
 void Application::emergency_stop(Source from, const Datagram& datagram, Verdict verdict,
                                  std::uint32_t now_ms) {
   const bool repeated = safety_.has(SafeReason::stop);
   std::uint32_t number = 0;
   const bool has_number = stop_number(datagram, number);
-  // The owner's own stop does not repeat a stop that was sent without a key under its number.
+  // A stop with a key does not repeat a stop with the same number that was sent without a key.
   const bool of_a_key =
       verdict == Verdict::authentic || verdict == Verdict::replayed || verdict == Verdict::old;
   const bool same = has_number && has_stop_number_ && number == stop_number_ &&
                     speaker_ == stop_from_ && (stop_of_a_key_ || !of_a_key);
-  // An E:CLEAR under way does not know of this stop.
+  // An E:CLEAR that is under way must not end this stop.
   if (repeated && !same) safety_.again();
   if (unread_stops_ != 0) --unread_stops_;
   if (!repeated || !same) stop_of_a_key_ = of_a_key;
@@ -216,7 +217,7 @@ void Application::emergency_stop(Source from, const Datagram& datagram, Verdict 
     link_.executed(datagram.pnum());
   }
   if (observer_ != nullptr) observer_->on_executed(now_ms, datagram.pnum(), Command::stop());
-  // Everyone is notified once, the sender each time.
+  // Notify all hosts once, and the sender each time.
   if (!repeated) send_heartbeats(now_ms);
   if (repeated || !owner) answer_heartbeat(from, now_ms);
 }

@@ -37,14 +37,14 @@ void Application::drop_device_writes() {
   }
 }
 
-// Bytes that came while no host listened are outdated.
+// Bytes that arrived while no host listened are outdated.
 void Application::forget_uarts() {
   for (UserUart* uart : uarts_) {
     if (uart != nullptr) uart->forget();
   }
 }
 
-// A session begins with the readings kept as settings, and nothing of the session before.
+// A session begins with the readings that are settings, and without data of the previous session.
 void Application::begin_devices(std::uint32_t now_ms) {
   has_answer_ = false;
   for (UserUart* uart : uarts_) {

@@ -5,7 +5,7 @@
 namespace r4 {
 namespace firmware {
 
-// Notices a silent host, and what the guard found while the loop was busy.
+// Handles a silent host, and a cause that the guard found while the loop was busy.
 void Application::look_at_time(std::uint32_t now_ms) {
   bool lost = link_.poll(now_ms);
   if (guard_.tripped()) {
@@ -18,7 +18,7 @@ void Application::look_at_time(std::uint32_t now_ms) {
   if (lost) enter(SafeReason::link, now_ms);
 }
 
-// A stop that an interrupt has heard applies at once. Its datagram shows later whether it is a
+// A stop that an interrupt has received applies at once. Its datagram shows later whether it is a
 // repetition. If a port had no room for the datagram, the stop counts as a new cause.
 void Application::look_at_stops(std::uint32_t now_ms) {
   const std::uint32_t heard = guard_.stops_heard();
@@ -54,12 +54,12 @@ void Application::enter(SafeReason cause, std::uint32_t now_ms) {
   report_state(now_ms);
 }
 
-// A host must not clear a cause that came while E:CLEAR was on its way, so E:CLEAR names the newest
-// cause. An E:CLEAR without that number must come later than the timeout after the cause, because
-// no earlier datagram is held back for longer. Without a latched cause, every E:CLEAR is accepted.
+// A host must not clear a cause that began while E:CLEAR was under way, so E:CLEAR names the newest
+// cause. An E:CLEAR without a number must arrive at least the timeout after the cause, because
+// older datagrams are not delayed for longer. Without a latched cause, every E:CLEAR is accepted.
 Refusal Application::judge_clear(const Command& command, std::uint32_t waited_ms,
                                  std::uint32_t now_ms) const {
-  if (unread_stops_ != 0) return Refusal::stale;  // the sender cannot know their numbers
+  if (unread_stops_ != 0) return Refusal::stale;  // their numbers are unknown to the sender
   if (command.value != Command::unnamed_cause) {
     const bool named = command.value == safety_.newest() || !safety_.latched();
     return named ? Refusal::none : Refusal::stale;
@@ -68,7 +68,6 @@ Refusal Application::judge_clear(const Command& command, std::uint32_t waited_ms
   return settled || !safety_.latched() ? Refusal::none : Refusal::stale;
 }
 
-// A fault that persists stays.
 void Application::clear() {
   if (safety_.reason() != SafeReason::fault || hal_.clear_fault()) safety_.clear();
 }
@@ -80,7 +79,7 @@ bool Application::any_threshold() const {
   return false;
 }
 
-// A sensor with a threshold counts as an obstacle if it does not answer.
+// If a sensor with a threshold does not answer, it counts as an obstacle.
 bool Application::obstacle() const {
   const int margin = safety_.has(SafeReason::proximity) ? proximity_hysteresis_cm : 0;
   for (int i = 0; i < ultrasonic_channels; ++i) {
@@ -109,7 +108,7 @@ void Application::check_interlocks(std::uint32_t now_ms) {
   }
 }
 
-// Sets until when the guard leaves the outputs live without a heartbeat.
+// Sets how long the guard leaves the outputs live without a heartbeat.
 void Application::expect_host() {
   if (outputs_live_) {
     guard_.arm(link_.deadline_ms());

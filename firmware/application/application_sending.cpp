@@ -17,7 +17,7 @@ constexpr std::size_t safe_fields_size = 22;
 
 }  // namespace
 
-// The controlling host's peer on this port, otherwise everyone.
+// The controlling host's peer on this port; everyone if it has no path here.
 std::uint32_t Application::audience(std::uint8_t port) const {
   for (int i = 0; link_.has_owner() && i < paths_.size(); ++i) {
     if (paths_[i].port == port) return paths_[i].peer;
@@ -25,7 +25,7 @@ std::uint32_t Application::audience(std::uint8_t port) const {
   return everyone;
 }
 
-// Paths on one port share its numbers, so each of them gets every datagram that has one.
+// Paths on one port share the port's numbers, so each path gets every datagram with such a number.
 void Application::transmit(Source to, const std::uint32_t& number, Text datagram,
                            Priority priority) {
   PortSlot& slot = ports_[to.port];
@@ -41,8 +41,8 @@ void Application::transmit(Source to, const std::uint32_t& number, Text datagram
 
 bool Application::is_of_owner() const { return link_.has_owner() && link_.is_session_of(speaker_); }
 
-// A watcher has its own numbers. A sender that hears everything on the port gets the port's. Other
-// hosts have separate numbers, because they may be behind the same bridge.
+// A watcher has its own numbers. A sender that receives everything on the port gets the port's
+// numbers. Other hosts have separate numbers, because they may use the same bridge.
 std::uint32_t& Application::number_for(Source to) {
   Watcher* const watcher = watchers_.find(to);
   if (watcher != nullptr && !hears_all(to)) return watcher->pnum;
@@ -56,7 +56,8 @@ bool Application::reaches(Source watcher) const {
   return audience(watcher.port) == everyone && ports_[watcher.port].port->reaches(watcher.peer);
 }
 
-// A watcher that hears all shares the port's numbers; never in CONNECTING.
+// True if the watcher receives all datagrams of its port, and so shares the port's numbers. Never
+// true in CONNECTING.
 bool Application::hears_all(Source watcher) const {
   return link_.state() != BoardLinkState::connecting && reaches(watcher);
 }
@@ -121,7 +122,7 @@ void Application::refuse(Source to, const Datagram& datagram, Refusal code, std:
   answer(to, writer, now_ms);
 }
 
-// The time in a heartbeat. An echo of 0 means that its host has heard nothing, so 0 is skipped.
+// The time in a heartbeat. An echo of 0 means that its host has received no T, so 0 is skipped.
 std::uint32_t Application::heartbeat_time(std::uint32_t now_ms) {
   return now_ms != 0 ? now_ms : 0xFFFFFFFFU;
 }
@@ -149,7 +150,7 @@ void Application::send_heartbeats(std::uint32_t now_ms) {
   link_.heartbeat_sent(heartbeat_time(now_ms));
 }
 
-// For a sender that has nothing to echo yet: it can echo this heartbeat, even in CONNECTING.
+// For a sender without a T to echo: it can echo this heartbeat, even in CONNECTING.
 void Application::answer_heartbeat(Source to, std::uint32_t now_ms) {
   write_heartbeat(to, number_for(to), link_.answer_time(heartbeat_time(now_ms)), safe_report());
 }
@@ -179,7 +180,7 @@ void Application::write_heartbeat(Source to, std::uint32_t& pnum, std::uint32_t 
            Priority::normal);
 }
 
-// A board that has had no host reports `link` to watchers, like one that has lost its host.
+// A board that has had no host reports `link` to watchers, like a board that has lost its host.
 SafeReport Application::shown_to_watchers() const {
   SafeReport report = safe_report();
   if (report.reason == SafeReason::none && !link_.has_owner()) report.reason = SafeReason::link;

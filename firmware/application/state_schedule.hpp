@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// When the next state is due: on a fixed time grid, so that delays do not add up.
+// Schedules states on a fixed time grid, so that delays do not add up.
 #pragma once
 
 #include <cstdint>

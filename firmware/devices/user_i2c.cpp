@@ -99,7 +99,7 @@ bool UserI2c::begin_due(std::uint32_t now_ms) {
   return false;
 }
 
-// Stays on the grid of its period; periods that have passed are skipped.
+// The slot stays on the grid of its period. Periods that have passed are skipped.
 void UserI2c::next_time(Slot& slot, std::uint32_t now_ms) {
   const std::uint32_t period = slot.poll.period_ms;
   slot.due_ms += (1 + (now_ms - slot.due_ms) / period) * period;
@@ -152,7 +152,7 @@ void UserI2c::end_reading(int slot, I2cOutcome outcome) {
   std::memcpy(reading.data.bytes, received_, reading.data.size);
 }
 
-// A scan asks one address after the other. An address without answer is a result, not an error.
+// A scan probes one address after the other. An address without answer is not an error.
 void UserI2c::end_scan_step(I2cOutcome outcome) {
   if (outcome == I2cOutcome::bus_stuck) return answer(outcome);
   if (outcome == I2cOutcome::done) found_.bytes[found_.size++] = address_;
@@ -187,7 +187,7 @@ void UserI2c::recover(std::uint32_t now_ms) {
 
 void UserI2c::recover_step(std::uint32_t now_ms) {
   since_ms_ = now_ms;
-  // SDA is free: a device being written to would take more clocks for bits of a byte.
+  // If SDA is high, send STOP: a device that is being written to would take more clocks for bits.
   const bool may_stop = half_clock_ % 2 == 0 && half_clock_ < half_clocks - 3;
   if (may_stop && port_.sda_is_high()) half_clock_ = half_clocks - 3;
   if (half_clock_ < half_clocks - 3) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus, not that of the board's chips (docs/how-to/devices.md). No call waits: poll()
-// begins a transfer that is due, and checks if the current transfer has ended.
+// The user's I2C bus, which is not the bus of the board's chips (docs/how-to/devices.md). No call
+// waits: poll() begins a transfer that is due, and checks if the current transfer has ended.
 //            begins a transfer              it has ended
 //     idle --------------------> transfer ----------------> idle
 //      ^                            | lost, or not ended after transfer_limit_ms
@@ -11,8 +11,9 @@
 //      |       free_after_ms        v
 //      +- - - - - - - - - - - -   held        every request fails at once
 //
-// Single transfers go before readings, readings before the next address of a scan. Due readings
-// take turns; one whose previous transfer is under way is skipped. Times are ms, and wrap.
+// Single transfers have priority over readings, and readings over the next address of a scan. Due
+// readings take turns. A reading whose previous transfer is under way is skipped. Times are ms, and
+// wrap.
 #pragma once
 
 #include <cstdint>
@@ -28,13 +29,13 @@ class UserI2c {
  public:
   explicit UserI2c(UserI2cPort& port) : port_(port) {}
 
-  // The valid commands X:READ, X:WRITE and X:SCAN. False if one has not ended yet.
+  // Begins a valid X:READ, X:WRITE or X:SCAN. False if the previous command has not ended.
   bool ask(std::uint32_t pnum, const Command& command);
-  // Slots count from 1; a poll that is not on ends the slot. Discards its last reading.
+  // Slots count from 1; a poll that is not on ends the slot. Discards the slot's last reading.
   void poll_slot(int slot, const I2cPoll& poll, std::uint32_t now_ms);
   // Cancels a write that has not begun, because the board is safe.
   void drop_write();
-  // A session begins: cancels requests and answers of the session before.
+  // A session begins: cancels requests and answers of the previous session.
   void drop_all();
 
   void poll(std::uint32_t now_ms);
@@ -50,7 +51,8 @@ class UserI2c {
     return answered;
   }
 
-  // Longer than 32 bytes each way at 100 kHz, and than a device may stretch the clock (SMBus).
+  // Longer than a transfer of 32 bytes each way at 100 kHz, and than SMBus lets a device stretch
+  // the clock.
   static constexpr std::uint32_t transfer_limit_ms = 35;
   static constexpr std::uint32_t free_after_ms = 100;  // until a held bus is clocked again
 
@@ -82,11 +84,11 @@ class UserI2c {
   UserI2cPort& port_;
   Stage stage_ = Stage::idle;
   int slot_ = no_slot;
-  std::uint8_t first_slot_ = 0;  // looked at first next time
-  bool abandoned_ = false;       // the result of the transfer is not wanted
+  std::uint8_t first_slot_ = 0;  // the first slot to check next time
+  bool abandoned_ = false;       // the result of the transfer is not needed
   std::uint8_t half_clock_ = 0;
   std::uint32_t since_ms_ = 0;  // start of the stage; recovering: last half clock
-  // Of the transfer under way, independent of new requests.
+  // Buffers of the transfer under way, independent of new requests.
   std::uint8_t sent_[i2c_max_bytes];
   std::uint8_t received_[i2c_max_bytes];
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The user's I2C bus as its driver needs it. Nothing waits.
+// The user's I2C bus as its driver needs it. No call waits.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,8 @@
 namespace r4 {
 namespace firmware {
 
-// Sends `out`, then reads `in` after a repeated START. Either may be empty; with both empty it
-// tests whether a device answers.
+// Sends `out`, then reads `in` after a repeated START. Either may be empty. With both empty, the
+// transfer tests whether a device answers.
 struct UserTransfer {
   std::uint8_t address = 0;
   const std::uint8_t* out = nullptr;
@@ -24,14 +24,14 @@ class UserI2cPort {
     busy,
     done,
     refused,  // no device answered, or a byte was refused; the bus is free
-    lost,     // the wire did not follow what was sent
+    lost,     // the lines did not follow the controller
   };
 
   // The buffers are in use until progress() is not busy, or until release().
   virtual void begin(const UserTransfer& transfer) = 0;
   virtual Progress progress() = 0;
 
-  // Gives up the transfer. Until resume(), drive() sets the lines, which are high first.
+  // Aborts the transfer and releases both lines. Until resume(), drive() sets the lines.
   virtual void release() = 0;
   // Open drain: high releases a line, and a device may hold it low.
   virtual void drive(bool scl, bool sda) = 0;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A UART of the user's (docs/how-to/devices.md).
+// A UART for the user (docs/how-to/devices.md).
 //
-// Received bytes are kept in order and counted. A state takes up to 64 new bytes. In front of them,
-// if there is room, it repeats bytes that were new in the state before:
+// Received bytes are kept in order and counted. A state takes up to 64 new bytes. If there is room,
+// it first repeats bytes that were new in the previous state:
 //     kept        … 100                               164          190
 //     a state              |--------- new ------------|
 //     the next             |---- again ----|--- new (26) ---|          position 126, 64 bytes
 //
-// So a single lost state loses no bytes if at most 32 bytes come in a period. Otherwise the loss
-// shows: the next state's position is after the end of the last state.
+// If at most 32 bytes arrive in a period, a single lost state loses no bytes. A larger loss is
+// visible: the next state's position is after the end of the last state.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,7 @@ class UserUart {
  public:
   explicit UserUart(UserUartPort& port) : port_(port) {}
 
-  // The same setting again changes nothing.
+  // An unchanged mode has no effect.
   void set_up(const UartMode& mode);
   bool on() const { return mode_.on(); }
   bool write(const std::uint8_t* bytes, std::size_t size) { return port_.send(bytes, size); }
@@ -39,8 +39,8 @@ class UserUart {
   void next_state();
   void tell(UartBytes& out) const;
 
-  // Holds a burst of 530 bytes at 115200 baud, because 100 states per second already carry half of
-  // it. Bytes beyond the backlog are lost and counted.
+  // Holds a burst of 530 bytes at 115200 baud: meanwhile 100 states per second carry over half of
+  // the bytes. Bytes beyond the backlog are lost and counted.
   static constexpr std::uint32_t capacity = 344;
   static constexpr std::uint32_t backlog = capacity - uart_max_bytes;
   static constexpr std::size_t bytes_a_turn = 64;

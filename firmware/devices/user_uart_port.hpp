@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A UART of the user's as its driver needs it. Nothing waits.
+// A UART for the user, as its driver needs it. No call waits.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ class UserUartPort {
   virtual std::size_t receive(std::uint8_t* out, std::size_t size) = 0;
   // Bytes that were damaged or found no room since the last call.
   virtual std::uint32_t take_lost() = 0;
-  // All or nothing. False if there is no room now.
+  // Sends all bytes or none. False if there is no room now.
   virtual bool send(const std::uint8_t* bytes, std::size_t size) = 0;
   // Drops queued bytes; the byte on the wire is completed.
   virtual void drop() = 0;

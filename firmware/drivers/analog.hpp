@@ -12,8 +12,8 @@ struct AnalogCalibration {
   std::int32_t gain_q24 = 1280019;  // hundredths of a volt per count, times 2^24: 50.00 V at 65535
   std::int32_t offset_q8 = 0;       // hundredths of a volt, times 256
 
-  // The line through two readings. False, with nothing changed, if no divider has such a line: no
-  // distance, falling, or steeper than 650 V of full range.
+  // The line through two readings. Returns false and changes nothing for equal counts or volts, a
+  // falling line, or a gain or offset above about 42 kV of full range: no divider has such a line.
   bool set(std::uint16_t counts_1, std::int32_t centivolts_1, std::uint16_t counts_2,
            std::int32_t centivolts_2);
 };

@@ -18,7 +18,7 @@ namespace firmware {
 
 class Bridge {
  public:
-  // Without a call of connect() nothing is driven. The chip must outlive this.
+  // Before connect(), the bridge drives nothing. The chip must outlive the bridge.
   void connect(Pca9685& chip, Place pwm, Place direction) {
     chip_ = &chip;
     first_ = pwm.number() % pca9685_lines;
@@ -27,7 +27,7 @@ class Bridge {
     inverted_ = direction.option();
     chip.pair(first_, second_);
   }
-  // From the next write of the chip on.
+  // Takes effect at the chip's next write.
   void set(Drive drive) {
     if (chip_ == nullptr) return;
     const bool forward = (drive.direction == Direction::forward) != inverted_;

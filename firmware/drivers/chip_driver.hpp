@@ -21,7 +21,7 @@ namespace firmware {
 
 using r4::ChipTrouble;
 
-// Bytes that the bus may still carry in this poll, addresses included.
+// Bytes that the bus can carry in the rest of this poll, addresses included.
 class BusBudget {
  public:
   explicit BusBudget(std::size_t bytes) : left_(bytes) {}
@@ -42,7 +42,7 @@ class BusBudget {
   bool exhausted_ = false;
 };
 
-// The smallest budget of a poll: some steps of a set-up need that much at once.
+// The smallest budget of a poll: some steps of a set-up need this many bytes at once.
 constexpr std::size_t bus_budget_min = 36;
 
 class ChipDriver {
@@ -58,12 +58,12 @@ class ChipDriver {
   void begin();
   // Does the next steps of the set-up; once ready, writes the registers that change.
   void poll(std::uint32_t now_us, BusBudget& budget);
-  // These do nothing unless ready(). verify() compares the chip's registers with what was written.
+  // Both do nothing unless ready(). verify() compares the chip's registers with the written values.
   void write_changes(BusBudget& budget);
   void verify(BusBudget& budget);
   // All outputs are off from the next write on. Sends nothing.
   virtual void want_safe() = 0;
-  // All outputs off at once, in any state. Leaves trouble() alone: the caller decides with note().
+  // All outputs off at once, in any state. Does not change trouble(): the caller uses note().
   virtual I2cResult make_safe() = 0;
   // Takes the result of a transfer that was made for this driver.
   bool note(I2cResult result);

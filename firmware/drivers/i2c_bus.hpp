@@ -25,7 +25,7 @@ constexpr std::uint32_t i2c_wire_us(std::size_t bytes, std::size_t starts = 1) {
 // The longest time of recover(): nine clocks and a STOP at 100 kHz, with SCL stretched each time.
 constexpr std::uint32_t i2c_recovery_us = 450;
 
-// The longest time of a transfer: two attempts, all that they wait, and a recovery between them.
+// The longest time of a transfer: two attempts, their waits, and a recovery between them.
 constexpr std::uint32_t i2c_most_us(std::size_t bytes, std::size_t starts = 1) {
   return 2 * i2c_wire_us(bytes, starts) + i2c_timeout_us + i2c_recovery_us;
 }
@@ -39,7 +39,8 @@ class I2cBus {
   virtual I2cResult write_read(std::uint8_t address, const std::uint8_t* out, std::size_t out_size,
                                std::uint8_t* in, std::size_t in_size) = 0;
   // Nine clocks and a STOP (UM10204 3.1.16): a chip cut off in mid-byte releases SDA. True if both
-  // lines are high then. May interrupt a transfer, even in a fault handler: that returns timeout.
+  // lines are high afterwards. May interrupt a transfer, even in a fault handler; the transfer then
+  // returns timeout.
   virtual bool recover() = 0;
 
  protected:

@@ -8,9 +8,9 @@
 //     14 15 OLAT     output latches; reset 0                       3.5.11
 //
 // Set-up: first the latches with the safe values, then the directions, so that no pin is driven to
-// an unintended value. Until then the pins float, so their circuits need a pull to the safe side.
-// Pins change at the acknowledge of their port's byte. One transfer writes all changed latches.
-// Pins that are not outputs of the board stay inputs.
+// an unintended value. Until then the pins float, so each circuit needs a pull resistor to its safe
+// level. Pins change at the acknowledge of their port's byte. One transfer writes all changed
+// latches. Pins that are not outputs of the board stay inputs.
 #pragma once
 
 #include <cstdint>
@@ -25,11 +25,11 @@ class Mcp23017 final : public ChipDriver {
   // Bits 0-7 are port A, bits 8-15 port B.
   Mcp23017(I2cBus& bus, std::uint8_t address, std::uint16_t outputs, std::uint16_t safe);
 
-  // From the next write on.
+  // Takes effect at the next write.
   void set_ports(std::uint16_t ports);
 
   void want_safe() override;
-  // Latches, then directions: right even for a chip that was reset.
+  // Latches, then directions, because the chip may have been reset.
   I2cResult make_safe() override;
 
  private:

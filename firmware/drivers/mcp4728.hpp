@@ -11,10 +11,10 @@
 //
 // Only multi-writes with UDAC = 0 are used, so the output changes even if the LDAC pin is not wired
 // low. They include reference, power-down and gain, so a changed channel is right even after an
-// unnoticed reset. The fast write is a third shorter but depends on both.
+// unnoticed reset. The fast write is a third shorter, but depends on LDAC and the registers.
 //
-// Set-up: zeros to all outputs, and once to an EEPROM that does not hold zeros with the supply as
-// reference; new chips do not. Meanwhile the chip ignores other writes.
+// Set-up: zeros to all outputs. If the EEPROM does not hold zeros with the supply as reference, as
+// in a new chip, it is written once. Meanwhile the chip ignores other writes.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,7 @@ class Mcp4728 final : public ChipDriver {
 
   Mcp4728(I2cBus& bus, std::uint8_t address) : ChipDriver(bus, address) {}
 
-  // From the next write on. Channels 0-3 are A-D; codes above 4095 become 4095.
+  // Takes effect at the next write. Channels 0-3 are A-D; codes above 4095 become 4095.
   void set_code(int channel, std::uint16_t code);
   // Since power-up: 0 or 1.
   int eeprom_writes() const { return eeprom_writes_; }

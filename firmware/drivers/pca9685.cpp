@@ -27,7 +27,7 @@ constexpr int on_h = 1;
 constexpr int off_l = 2;
 constexpr int off_h = 3;
 
-// Unchanged registers inside a burst, at most: over a longer gap a new burst takes less time.
+// At most this many unchanged registers in a burst: over a longer gap a new burst takes less time.
 constexpr int bridged = 2;
 
 }  // namespace
@@ -143,7 +143,7 @@ bool Pca9685::set_up(std::uint32_t now_us, BusBudget& budget) {
   return false;
 }
 
-// False if any value will do: off needs only the full-off bit, on the two full bits.
+// False if any value is right: off needs only the full-off bit, on needs both full bits.
 bool Pca9685::wanted(int index, std::uint8_t& value) const {
   const std::uint16_t duty = duty_[index / 4];
   const int offset = index % 4;

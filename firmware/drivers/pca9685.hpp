@@ -14,13 +14,13 @@
 // later (7.3.1.1), all off again (undefined after an orderly shutdown), a check of the registers.
 //
 // All outputs of one transfer change together on STOP. A short budget splits a burst of changed
-// registers only between pairs of channels (pair()), so the two lines of a motor never part.
+// registers only between pairs of channels (pair()), so the two lines of a motor change together.
 //
 // The chip has no timeout: it keeps driving when the microcontroller fails. all_off() makes all
-// three chips safe in three bytes, but a disturbance can set bits that defeat it: INVRT turns "off"
+// three chips safe in three bytes, but a disturbance can set bits that defeat it. INVRT turns "off"
 // into "on", and with EXTCLK the outputs wait for a missing clock. Only a reset clears EXTCLK. So
 // the modes are read back after a safe state. If EXTCLK or MODE2 is not as written, lost_mode()
-// asks for reset_all().
+// requests reset_all().
 #pragma once
 
 #include <cstddef>
@@ -36,7 +36,7 @@ class Pca9685 final : public ChipDriver {
   static constexpr int channels = 16;
   static constexpr std::uint8_t all_call_address = 0x70;
   static constexpr std::uint32_t oscillator_us = 500;
-  // Counted from the beginning of the poll that woke the chip, which may use the bus for 1500 us.
+  // From the beginning of the poll that wakes the chip. That poll may use the bus for 1500 us.
   static constexpr std::uint32_t wake_wait_us = oscillator_us + 1500;
 
   static constexpr std::uint8_t prescale_for(std::uint32_t hz) {
@@ -46,10 +46,10 @@ class Pca9685 final : public ChipDriver {
   // `frequency_hz`: 24-1526.
   Pca9685(I2cBus& bus, std::uint8_t address, std::uint32_t frequency_hz);
 
-  // From now on the channels `a` and `b` change together. One transfer of a poll must be able to
+  // After this call, channels `a` and `b` change together. One transfer of a poll must be able to
   // write all registers from `a` to `b`. Each channel has at most one partner.
   void pair(int a, int b);
-  // Channels 0-15, from the next write on.
+  // Channels 0-15. Changes take effect at the next write.
   void set_duty(int channel, std::uint16_t duty);  // 0: off; 4095 and more: on; otherwise n/4096
   void set_level(int channel, bool high) { set_duty(channel, high ? duty_on : 0); }
   // `us`: microseconds, to the nearest count (4.88 us at 50 Hz); 0: no pulses.
@@ -57,12 +57,12 @@ class Pca9685 final : public ChipDriver {
 
   void want_safe() override;
   I2cResult make_safe() override;
-  // Every output of every PCA9685 off: 70 <- FD 10. An acknowledge: at least one chip heard it.
+  // Every output of every PCA9685 off: 70 <- FD 10. An acknowledge: at least one chip received it.
   static I2cResult all_off(I2cBus& bus);
   // Software reset (7.6): 00 <- 06. Turns all outputs of every PCA9685 off. Resets every chip that
-  // knows the general call, the MCP4728 too: all need their set-up.
+  // obeys the general call, the MCP4728 too. All these chips then need their set-up.
   static I2cResult reset_all(I2cBus& bus);
-  // True if the modes had bits that change what "off" means. Ends with begin().
+  // True if the modes had bits that change what "off" means. False again after begin().
   bool lost_mode() const { return lost_mode_; }
 
  private:

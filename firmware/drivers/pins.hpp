@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The microcontroller's pins and converters. No call waits; all may be made in an interrupt.
+// The microcontroller's pins and converters. No call waits. Interrupts may make all calls.
 #pragma once
 
 #include <cstdint>

@@ -4,8 +4,8 @@
 //     B  ___/~~\__/~~\_
 //
 // sample() takes the levels at every edge (interrupt), or faster than the edges. If both lines
-// changed, an edge was missed and nothing is counted. sample() and index() may run in an interrupt,
-// the other functions in the code that it interrupts, on one core.
+// changed, an edge was missed and the count does not change. sample() and index() may run in an
+// interrupt, the other functions in the code that it interrupts, on one core.
 #pragma once
 
 #include <atomic>
@@ -20,7 +20,7 @@ class QuadratureEncoder {
 
   void sample(bool a, bool b);
   void index(bool active);
-  // Counts from here on, the index's count too.
+  // Makes this position 0, also for the index's count.
   void zero() { zero_at_ = travelled_.load(std::memory_order_relaxed); }
 
   // Counts since zero, forward positive; wraps at 32 bits.
@@ -43,7 +43,7 @@ class QuadratureEncoder {
   }
 
   std::atomic<std::uint32_t> travelled_{0};  // counts since power-up
-  std::atomic<std::uint32_t> index_at_{0};   // likewise, at the last rising edge of the index line
+  std::atomic<std::uint32_t> index_at_{0};   // the same at the last rising edge of the index line
   std::atomic<bool> index_seen_{false};
   std::uint32_t zero_at_ = 0;
   // Used by sample() and index() only.

@@ -26,7 +26,7 @@ void Stepper::tick() {
   }
   const std::int32_t speed = speed_.load(std::memory_order_relaxed);
   const std::int32_t position = position_.load(std::memory_order_relaxed);
-  // The distance wraps like the positions: the shorter way.
+  // The distance wraps like the positions, so the motor turns in the shorter direction.
   const auto distance = static_cast<std::int32_t>(
       static_cast<std::uint32_t>(target_.load(std::memory_order_relaxed)) -
       static_cast<std::uint32_t>(position));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A stepper motor driver with step and direction inputs (Microstep M542: steps at the rising edge,
-// pulses of at least 2.5 us, direction at least 5 us before).
+// A stepper motor driver with step and direction inputs (Microstep M542). It steps at rising edges
+// of pulses of at least 2.5 us. The direction must be set at least 5 us before.
 //
 // Call tick() tick_hz times per second, at least 40 kHz for the board's 20000 steps per second. A
 // pulse lasts one tick, and a new direction gets a tick before the next step, so a tick must be 5
@@ -30,7 +30,7 @@ class Stepper {
         tick_hz_(tick_hz),
         limit_(speed_limit < tick_hz / 2 ? speed_limit : tick_hz / 2) {}
 
-  // At `speed` steps per second; 0 or less: stays where it is.
+  // At `speed` steps per second; 0 or less: does not move.
   void go(std::int32_t position, std::int32_t speed);
   // A pulse that has begun ends with the next tick.
   void stop() { speed_.store(0, std::memory_order_relaxed); }

@@ -33,7 +33,7 @@ void UltrasonicSensors::poll(std::uint32_t now_us) {
         const std::uint32_t cm = length_us / us_per_cm;
         if (length_us >= echo_limit_us || cm > range_cm) {
           finish(EchoResult::no_echo, 0);
-        } else {  // 0 means that nothing is there
+        } else {  // 0 would mean no obstacle
           finish(EchoResult::distance, static_cast<std::uint16_t>(cm > 0 ? cm : 1));
         }
       } else if (passed_us >= listen_us) {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Up to four ultrasonic sensors HC-SR04, in turn so that no sensor hears another's burst (data
-// sheet: trigger at least 10 us, echo pulse of 58 us per centimetre, about 38 ms without echo, at
-// least 60 ms between triggers).
+// Up to four ultrasonic sensors HC-SR04, in turn so that no sensor receives another sensor's burst.
+// Data sheet: trigger at least 10 us, echo pulse of 58 us per centimetre, about 38 ms without echo,
+// at least 60 ms between triggers.
 //           poll()                 10 us later           echo fell, or 40 ms passed
 //     waiting ----------> trigger ------------> listening ----------> done
 //        ^                                                              |
 //        +---------------- 60 ms after the trigger: next sensor --------+
 //
-// Each of four is read about four times a second. An interrupt calls echo(). Poll each millisecond.
+// Each of four sensors is read about four times a second. An interrupt calls echo(). Poll each ms.
 #pragma once
 
 #include <atomic>
@@ -48,7 +48,7 @@ class UltrasonicSensors {
   // Centimetres, 1-400; 0: nothing in range, or unknown.
   std::uint16_t distance_cm(int sensor) const { return distance_cm_[sensor]; }
   EchoResult result(int sensor) const { return result_[sensor]; }
-  // True if distance_cm() reports what is before the sensor.
+  // True if distance_cm() is a measured distance, or 0 because nothing is in range.
   bool sees(int sensor) const {
     return result_[sensor] == EchoResult::distance || result_[sensor] == EchoResult::no_echo;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Bytes from one context to another, of which one may be an interrupt handler. Lock-free, because
-// each index has one writer.
+// Passes bytes from one context to another; one of the two may be an interrupt handler. Lock-free,
+// because each index has one writer.
 #pragma once
 
 #include <atomic>
@@ -19,7 +19,6 @@ class ByteRing {
   std::uint32_t room() const { return capacity - size(); }
   bool empty() const { return size() == 0; }
 
-  // False if the ring is full; nothing is put.
   bool put(char byte) {
     if (room() == 0) return false;
     const std::uint32_t at = load(put_);
@@ -27,7 +26,7 @@ class ByteRing {
     put_.store(at + 1, std::memory_order_release);
     return true;
   }
-  // All or nothing. The taker sees all bytes at once.
+  // Puts all bytes or none. The taker sees all bytes at once.
   bool put(const char* data, std::uint32_t size) {
     if (room() < size) return false;
     const std::uint32_t at = load(put_);
@@ -49,7 +48,7 @@ class ByteRing {
     return count;
   }
 
-  // The byte that take() returns after `offset` others; offset < size().
+  // The byte that take() returns after `offset` other bytes; offset < size().
   char peek(std::uint32_t offset) const { return bytes_[(load(taken_) + offset) % capacity]; }
   // Removes the newest bytes until `size` are left. Only while the taker does not run.
   void cut(std::uint32_t size) { put_.store(load(taken_) + size, std::memory_order_release); }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The send queue of a serial port: it never waits, and the newest state wins. Each line enters the
-// ring whole or not at all. A state without room waits outside, where a newer state replaces it.
-// The last part of the ring is for heartbeats and answers. If no byte leaves for `stale_ms` (the
-// host does not read), lines not begun are dropped and only the newest state is kept.
+// The send queue of a serial port: it never waits, and the newest state replaces older states. Each
+// line enters the ring whole or not at all. A state without room waits outside the ring, where a
+// newer state replaces it. The last part of the ring is for heartbeats and answers. If no byte
+// leaves for `stale_ms` (the host does not read), lines not begun are dropped and only the newest
+// state is kept.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +22,6 @@ class TransmitLines {
   static constexpr std::uint32_t kept_for_answers = 512;
   static constexpr std::uint32_t stale_ms = 100;
 
-  // Dropped if there is no room.
   void put(Text datagram) {
     if (stalled_ || !put_line(datagram)) ++dropped_;
   }
@@ -32,7 +32,7 @@ class TransmitLines {
     std::memcpy(waiting_, datagram.data(), datagram.size());
     waiting_size_ = datagram.size();
   }
-  // Moves the waiting state into the ring if there is room. With the taker's interrupt off.
+  // Moves the waiting state into the ring if there is room. Call with the taker's interrupt off.
   void poll(std::uint32_t now_ms) {
     if (ring_.size() == 0 || taken_ != taken_before_) {
       taken_before_ = taken_;
@@ -53,7 +53,7 @@ class TransmitLines {
     stalled_ = false;
   }
 
-  // Next byte for the port, in its interrupt or with that off. False if there is none.
+  // Next byte for the port, in its interrupt or with the interrupt off. False if there is none.
   bool take(char& byte) {
     if (!ring_.take(byte)) return false;
     taken_ = taken_ + 1;
@@ -75,7 +75,7 @@ class TransmitLines {
     return !stalled_ && ring_.room() >= datagram.size() + line_end.size() + kept_for_answers &&
            put_line(datagram);
   }
-  // Drops all lines after the first, which has begun.
+  // Drops all lines after the first line, which has begun.
   void cut() {
     std::uint32_t size = 0;
     while (size < ring_.size() && ring_.peek(size) != line_end[line_end.size() - 1]) ++size;
@@ -87,7 +87,7 @@ class TransmitLines {
   ByteRing<capacity> ring_;
   char waiting_[max_datagram];
   std::size_t waiting_size_ = 0;
-  volatile std::uint32_t taken_ = 0;  // bytes, ever
+  volatile std::uint32_t taken_ = 0;  // bytes so far; wraps
   std::uint32_t taken_before_ = 0;
   std::uint32_t progress_ms_ = 0;
   bool stalled_ = false;

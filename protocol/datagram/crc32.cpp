@@ -31,7 +31,7 @@ std::uint32_t crc32_table(Text bytes, std::uint32_t crc) {
     crc = (crc >> 8) ^ table.of[(crc ^ static_cast<unsigned char>(c)) & 0xFFU];
   };
   const char* at = bytes.begin();
-  // Unrolled by four: a loop for each byte would cost half as much again.
+  // Unrolled by four: a loop over single bytes takes 50 % longer.
   for (; bytes.end() - at >= 4; at += 4) {
     add(at[0]);
     add(at[1]);

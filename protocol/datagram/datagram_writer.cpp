@@ -45,7 +45,7 @@ DatagramWriter& DatagramWriter::field(const FieldName& name) {
   if (static_cast<std::size_t>(end_ - at_) < sizeof name.text_) return field(name.name());
   if (!ok_) return *this;
   const std::size_t skip = open_ ? 0 : 1;
-  // All of text_, because its size is known; later bytes overwrite the excess.
+  // Copies all of text_, because the compiler knows its size. Later bytes overwrite the excess.
   std::memcpy(at_, name.text_ + skip, sizeof name.text_ - 1);
   at_ += name.size_ + 2 - skip;
   open_ = true;

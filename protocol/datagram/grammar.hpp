@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The bytes allowed in names and values (grammar: datagram.hpp), for reader and writer alike.
+// The bytes allowed in names and values (grammar: datagram.hpp), for reader and writer.
 #pragma once
 
 #include <cstddef>
@@ -48,8 +48,9 @@ constexpr std::size_t separators_block = 64;
 Separators separators(Text block);
 
 // Marks in `ends` the colon after each name and the semicolon after each field. Marks in
-// `short_names` the colons one, three or four bytes after a field's beginning. One word holds 64
-// bytes. False if the fields break the grammar. The time does not depend on their number.
+// `short_names` the colons one, three or four bytes after a field's beginning. Each word has one
+// bit for each of 64 bytes. False if the fields break the grammar. The time does not depend on the
+// number of fields.
 bool mark_fields(Text fields, std::uint64_t* ends, std::uint64_t* short_names);
 
 }  // namespace r4

@@ -29,7 +29,7 @@ inline bool parse_digits(const char* at, const char* end, std::uint64_t limit, s
   constexpr std::uint32_t e9 = 1000000000;
   if (at == end) return false;
   std::uint64_t value = 0;
-  if (end - at <= 18) {  // always fits 64 bits: the last nine digits, and those before them
+  if (end - at <= 18) {  // always fits 64 bits: two parts of at most nine digits
     std::uint32_t high = 0;
     std::uint32_t low = 0;
     const char* const last_nine = end - at > 9 ? end - 9 : at;
@@ -93,7 +93,7 @@ char* put_8_digits(char* out, std::uint32_t value) {
   return out + 8;
 }
 
-// A table, not branches: the digits of a CRC cannot be predicted.
+// A table, because a processor cannot predict branches on the digits of a CRC.
 struct HexDigits {
   static constexpr std::uint8_t none = 0x80;
   std::uint8_t of[256] = {};

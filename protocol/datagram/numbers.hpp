@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Numbers from text and to text; all code uses these functions. The whole text must be the number,
-// without blanks and '+'. Every reader returns false and leaves `out` unchanged if it is not valid.
+// without blanks and '+'. If the text is not valid, a reader returns false and, unless noted,
+// leaves `out` unchanged.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +16,7 @@ bool parse_number(Text text, std::uint32_t& out);
 bool parse_number(Text text, std::uint64_t& out);
 bool parse_number(Text text, std::int32_t& out);
 
-// True for digits of any count after an optional '-': separates out of range from wrong form.
+// True for any number of digits after an optional '-': distinguishes out of range from wrong form.
 bool is_whole_number(Text text);
 
 // A decimal such as "24.28", "-0.5" or "12" in hundredths of its unit (2428, -50, 1200). Further

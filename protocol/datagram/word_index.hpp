@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds a word in a table by its hash. The compiler builds the index. The first duplicate counts.
+// Finds a word in a table by its hash. The compiler builds the index. If the table has a word
+// twice, find() returns the first entry.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +27,7 @@ class WordIndex {
     }
   }
 
-  // The index of the entry with that word, or no_index. Constant time.
+  // The index of the entry with `word`, or no_index. Constant time.
   unsigned find(Text word) const {
     if (word.size() > longest_) return no_index;
     for (unsigned slot = slot_of(word);; slot = (slot + 1) % slot_count) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Comparisons of 32-bit numbers and times that wrap (RFC 1982): right for values less than 2^31
-// apart, 24.8 days in ms, 35 minutes in us. keep_near() moves a time that is kept for longer.
+// apart, 24.8 days in ms, 35 minutes in us. A time that is kept for longer needs keep_near().
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,11 @@ constexpr bool reached(std::uint32_t now, std::uint32_t at) {
   return static_cast<std::int32_t>(now - at) >= 0;
 }
 
-// A past time farther back than this counts as this long ago.
+// keep_near() moves an older time to this distance.
 constexpr std::uint32_t long_ago = std::uint32_t{1} << 30;
 
-// Moves a past time, so that comparisons stay right; a future time stays as it is. Call it more
-// often than every 12 days.
+// Keeps a past time within long_ago of `now`, so that comparisons stay right. Does not change a
+// future time. Call it more often than every 12 days.
 inline void keep_near(std::uint32_t& past, std::uint32_t now) {
   if (newer(now - long_ago, past)) past = now - long_ago;
 }

@@ -205,8 +205,8 @@ void Signer::on_board_time(std::uint32_t t_ms, std::uint32_t now_ms) {
   heard_ms_ = now_ms;
 }
 
-// Estimates the board's clock from its newest T. A 32nd of the time since then is left out: the
-// host's clock may be up to 3 % faster, and the board refuses a T ahead of its clock.
+// Estimates the board's clock from its newest T. The estimate leaves out a 32nd of the time since
+// then, because the host's clock may be up to 3 % faster. The board refuses a T ahead of its clock.
 std::uint32_t Signer::board_time(std::uint32_t now_ms) const {
   const std::uint32_t passed = now_ms - heard_ms_;
   return passed == 0 ? t_ms_ : t_ms_ + (passed - passed / 32 - 1);

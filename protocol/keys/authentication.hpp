@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Proves that a datagram is from a host with the board's key, made just now and not seen before
+// Proves that a datagram is from a host with the board's key, is recent and was not received before
 // (docs/reference/protocol.md "Authentication"). Only hosts sign.
 // The board sends a nonce in its heartbeats, 64 random bits as `AN:<16 hex digits>;`. The host
 // signs with the last field of its datagrams:
 //     A:<key id>,<counter>,<board T>,<tag>;
 // The tag is 64 bits of keyed BLAKE2s over "R4A1", the digits of AN and every byte of the datagram
 // before the tag. It is 11 characters of base64url without padding (RFC 4648, 5).
-// It neither hides anything nor proves that a board's datagram is authentic.
+// Datagrams are not encrypted, and a board's datagrams are not signed.
 #pragma once
 
 #include <cstddef>
@@ -35,7 +35,7 @@ enum class Verdict : std::uint8_t {
   missing,      // the last field is not a valid A
   unknown_key,  // no key with that id
   wrong_tag,    // changed, other key, or other nonce
-  replayed,     // the counter was used, or may be a forgotten used one
+  replayed,     // the counter was used, or is not above a forgotten counter
   old,          // the board T is over 250 ms old, or in the future
 };
 constexpr int verdict_count = 6;
@@ -45,11 +45,11 @@ class Authentication {
  public:
   static constexpr std::size_t chance_size = 32;
   static constexpr std::uint32_t age_limit_ms = 250;
-  // Of all keys together. A counter below a forgotten one counts as used. Each path of a session
+  // Shared by all keys. A counter below a forgotten counter counts as used. Each path of a session
   // has its own counters: with r datagrams a second over p paths, a path may lag by 112 / (p r) s.
   static constexpr int counters_remembered = 112;
 
-  // `chance`: random bytes, different at each boot; nullptr: no nonce, and nothing is authentic.
+  // `chance`: random bytes, different at each boot; nullptr: no nonce, no authentic datagram.
   explicit Authentication(const std::uint8_t* chance);
 
   // Sets the board's keys; an id of 0 means no key. Takes a new nonce.
@@ -60,7 +60,8 @@ class Authentication {
   Text nonce() const { return Text(nonce_, has_nonce_ ? nonce_size : 0); }
   // Takes another nonce: earlier signatures become invalid, and counters restart.
   void renew();
-  // For a bridge: its board's nonce; empty: nothing is authentic. Another restarts the counters.
+  // For a bridge: takes its board's nonce. A new nonce restarts the counters. With an empty nonce,
+  // no datagram is authentic.
   void follow(Text nonce);
 
   bool has_chance() const { return has_chance_; }
@@ -69,8 +70,8 @@ class Authentication {
 
   // Checks the signature. If its tag is valid, its counter is used up.
   Verdict verify(const Datagram& datagram, std::uint32_t now_ms);
-  // Counts a datagram without the valid signature that it needs. True if it must be answered: a
-  // datagram that the network repeated or held back is not.
+  // Counts a datagram whose required signature is missing or not valid. True if the board must
+  // answer. It does not answer a datagram that the network repeated or delayed.
   bool rejected(Verdict verdict);
   std::uint32_t rejections(Verdict verdict) const {
     return rejections_[static_cast<std::size_t>(verdict)];
@@ -108,15 +109,15 @@ class Signer {
  public:
   explicit Signer(const Key& key) : key_(signing_key(key)), id_(key.id) {}
 
-  // The nonce of the board's newest heartbeat; empty: the board has no key. True if it is new.
+  // The newest heartbeat's nonce; empty: the board has no key. True if the nonce is new.
   bool on_nonce(Text nonce);
   // The T of the board's newest datagram. `now_ms`: the host's clock, which wraps.
   void on_board_time(std::uint32_t t_ms, std::uint32_t now_ms);
   bool ready() const { return has_nonce_; }
 
   // Writes the field A after all other fields; call finish() of the writer next. Call only while
-  // ready(). `counter_floor`, in microseconds since 1970, is the least counter. So a restarted host
-  // continues above its used counters.
+  // ready(). `counter_floor`, in microseconds since 1970, is the least counter, so that a restarted
+  // host continues above its used counters.
   void sign(DatagramWriter& writer, std::uint64_t counter_floor, std::uint32_t now_ms);
 
  private:

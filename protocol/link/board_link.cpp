@@ -47,7 +47,7 @@ HeartbeatEffect BoardLink::on_heartbeat(const HostHeartbeat& heartbeat, std::uin
   const bool paper = heartbeat.host.sid == no_session;
   const bool ours = is_session_of(heartbeat.host);
   const Freshness freshness = judge(heartbeat, now_ms);
-  // The earliest possible arrival: after the sending of its echo, and after the previous heartbeat.
+  // The earliest possible arrival: after the echoed T was sent, and after the previous heartbeat.
   std::uint32_t waited_ms = heartbeat.waited_ms;
   if (freshness == Freshness::fresh) {
     const std::uint32_t echo_ms = now_ms - static_cast<std::uint32_t>(heartbeat.t);
@@ -109,16 +109,17 @@ void BoardLink::feed(const HostHeartbeat& heartbeat, std::uint32_t at_ms) {
   if (clock_ == Clock::unknown && heartbeat.t != 0) clock_ = known ? Clock::echo : Clock::own;
   if (!heartbeat.has_pnum) return;
   newest_heartbeat_ = heartbeat.pnum;
-  // The marks cover late_limit_ms at any heartbeat rate; heartbeats between two marks count as
-  // arrived at the earlier one. When the oldest is dropped, the next is itself past the limit.
+  // The marks cover late_limit_ms at any heartbeat rate. A heartbeat between two marks counts as
+  // arrived at the earlier mark. When the oldest mark is dropped, the next mark is already past the
+  // limit.
   constexpr std::uint32_t spacing_ms = late_limit_ms / (mark_count - 1) + 1;
   if (marks_used_ != 0 && at_ms - marks_[marks_used_ - 1].at_ms < spacing_ms) {
     marks_[marks_used_ - 1].pnum = heartbeat.pnum;
     return;
   }
   if (marks_used_ == mark_count) {
-    // Commands from before the oldest mark are late anyway. The window follows that mark, so that a
-    // host without commands for hours stays within it.
+    // Commands from before the oldest mark are late. The window follows the oldest mark, so that
+    // the numbers of a host without commands for hours stay in the window.
     if (has_baseline_ && marks_[0].pnum - newest_ > command_window / 2) spend(marks_[0].pnum);
     for (int i = 1; i < mark_count; ++i) marks_[i - 1] = marks_[i];
     --marks_used_;
@@ -229,7 +230,7 @@ void BoardLink::heartbeat_sent(std::uint32_t t_ms) {
   any_sent_ = true;
   send_now_ = false;
   last_sent_ms_ = t_ms;
-  // A session may last for months, and so may the time without one.
+  // A session, or the time without a session, may last for months.
   keep_near(lost_ms_, t_ms);
   keep_near(newest_echo_ms_, t_ms);
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The board's end of the link: which host controls the board, whether it is alive, and which of its
+// The board's end of the link: which host controls the board, whether the host is alive, and which
 // commands may be executed (paper section 4.3; docs/reference/protocol.md "The link", safety.md).
 //                 heartbeat that may begin a session      the host is silent for the timeout,
-//     CONNECTING ------------------------------> ACTIVE -- leaves, or all its paths are gone ---+
+//     CONNECTING ------------------------------> ACTIVE -- leaves, or all its paths are lost ---+
 //       (boot)                                     ^                                            v
 //                                                  +---- heartbeat that may begin or resume -- LOST
 //
@@ -13,7 +13,7 @@
 //                                   count on arrival. It never resumes a session, because in LOST
 //                                   nothing proves that it is the same host.
 //
-// All times are the board's clock in ms, which wraps; it must start at a random value at boot.
+// All times are the board's clock in ms, which wraps and must start at a random value at boot.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@
 
 namespace r4 {
 
-// Where a datagram came from and where its answer goes: a port of the board, and a peer on it.
+// The origin of a datagram, to which its answer goes: a port of the board, and a peer on it.
 struct Source {
   std::uint8_t port = 0;
   std::uint32_t peer = 0;
@@ -46,9 +46,9 @@ enum class BoardLinkState : std::uint8_t { connecting, active, lost };
 
 enum class HeartbeatEffect : std::uint8_t {
   fed,
-  repeated,     // its path is alive; another path delivered this heartbeat or a newer one before
+  repeated,     // its path is alive, but another path delivered this or a newer heartbeat before
   resumed,      // LOST -> ACTIVE, the same session continues
-  new_session,  // the sender controls the board; nothing of an earlier host may be restored
+  new_session,  // the sender takes control; setpoints of an earlier host must not be restored
   stale,        // no effect: no echo, an old echo, overtaken, or read too late
   unheard,      // no effect; the host may have no fresh T: answer with a heartbeat that it can echo
   busy,
@@ -64,8 +64,9 @@ class BoardLink {
   explicit BoardLink(Timing timing) : timing_(timing) {}
   void set_timing(Timing timing) { timing_ = timing; }
 
-  // `t` is 0 if the heartbeat has none. It arrived at most `waited_ms` before this call, and counts
-  // from then. A heartbeat that may have waited for the timeout is stale.
+  // `t` is 0 if the heartbeat has no T. The heartbeat arrived at most `waited_ms` before this call,
+  // and counts from the earliest possible arrival. A heartbeat that may have waited for the timeout
+  // is stale.
   struct HostHeartbeat {
     HostId host;
     bool has_pnum = false;
@@ -80,29 +81,30 @@ class BoardLink {
   Refusal admit(HostId host, std::uint32_t pnum, std::uint32_t now_ms) const;
   // The session's command was executed: its number and all older numbers are spent.
   void executed(std::uint32_t pnum);
-  // A command was refused, for its content or the safe state. If it is the session's, its number
-  // and all older numbers are spent, so that no duplicate is executed later. A duplicate of one of
-  // the last refused_memory is refused with the same code.
+  // A command was refused because of its content or the safe state. If the session sent the
+  // command, its number and all older numbers are spent, so that no duplicate is executed later. A
+  // duplicate of one of the last refused_memory refused commands is refused with the same code.
   void refused(HostId host, std::uint32_t pnum, Refusal code);
   // True if this is one of the next `memory` numbers of the session.
   bool is_next(std::uint32_t pnum) const;
 
   // True once, when the controlling host has been silent for the timeout: ACTIVE -> LOST.
   bool poll(std::uint32_t now_ms);
-  // Every path of the session is gone. True if a host was in control: ACTIVE -> LOST.
+  // Every path of the session is lost. True if a host was in control: ACTIVE -> LOST.
   bool lose(std::uint32_t now_ms);
-  // ACTIVE -> LOST. The ids of the last left_memory hosts that left cannot begin a session again.
+  // The host leaves: ACTIVE -> LOST. The session ids of the last left_memory hosts that left cannot
+  // begin a session.
   void leave(std::uint32_t now_ms);
 
-  // The board's own heartbeats are regular, but also due every echo_retry_ms while an echo is
-  // missing, and at once on entering ACTIVE or LOST. heartbeat_sent() takes the T of a sent one.
+  // The board's own heartbeats are due at each interval, every echo_retry_ms while an echo is
+  // missing, and at once on entering ACTIVE or LOST. heartbeat_sent() takes the T that was sent.
   bool heartbeat_due(std::uint32_t now_ms) const;
   void heartbeat_sent(std::uint32_t t_ms);
-  // A heartbeat with this T was sent to some peer, so the T can be echoed.
+  // A heartbeat with this T was sent to a peer, so the T can be echoed.
   void shown(std::uint32_t t_ms);
   void send_soon() { send_now_ = true; }
   // The T of a heartbeat that answers one peer. Answers within answer_spacing_ms share a T.
-  // Otherwise frequent requests would remove from memory a T that another host may still echo.
+  // Otherwise frequent requests would remove from memory a T that another host may echo later.
   std::uint32_t answer_time(std::uint32_t t_ms) const;
 
   // Milliseconds until poll() or heartbeat_due() may return true; 0 is now.
@@ -110,11 +112,11 @@ class BoardLink {
 
   BoardLinkState state() const { return state_; }
   bool has_owner() const { return state_ == BoardLinkState::active; }
-  // True if this host controls the board, or did when the link was lost.
+  // True if this host controls the board, or controlled it when the link was lost.
   bool is_session_of(HostId host) const { return has_session_ && host == host_; }
-  // The controlling host was last heard at this time or later. Valid after the first session began.
+  // The controlling host was last heard at this time or later. Valid once a session has begun.
   std::uint32_t fed_ms() const { return fed_ms_; }
-  // When the link is lost if the host stays silent. Valid only while ACTIVE.
+  // The time at which the link is lost if the host stays silent. Valid only while ACTIVE.
   std::uint32_t deadline_ms() const { return fed_ms_ + timing_.timeout_ms; }
   // The number of the heartbeat that began this host's session: the board remembers all its later
   // commands. False for another host, or if its heartbeats have no numbers.
@@ -128,14 +130,14 @@ class BoardLink {
   static constexpr std::uint32_t late_limit_ms = 250;
   // The largest distance of a command from the newest known number.
   static constexpr std::uint32_t command_window = 65536;
-  // Executed numbers are remembered this far back; there DUPLICATE and STALE are exact.
+  // Executed numbers are remembered this far back. Within it, DUPLICATE and STALE are exact.
   static constexpr std::uint32_t memory = 64;
   static constexpr int refused_memory = 16;
   static constexpr int left_memory = 4;
 
  private:
   enum class Clock : std::uint8_t { unknown, echo, own };         // the meaning of a paper host's T
-  enum class Freshness : std::uint8_t { fresh, stale, no_echo };  // no_echo: none is required
+  enum class Freshness : std::uint8_t { fresh, stale, no_echo };  // no_echo: no echo is required
 
   Freshness judge(const HostHeartbeat& heartbeat, std::uint32_t now_ms) const;
   bool is_echo(std::uint64_t t) const;

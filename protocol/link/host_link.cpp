@@ -17,7 +17,7 @@ const char* to_text(HostLinkState state) {
   return "unknown";
 }
 
-// At once only the first time, because a board that cannot use the answer repeats that T.
+// Answers a T at once only the first time: a board that cannot use the answer repeats the T.
 void HostLink::on_heartbeat(std::uint32_t t_ms) {
   if (t_ms == echo_) return;
   echo_ = t_ms;
@@ -66,8 +66,8 @@ void HostLink::begin_anew() {
   if (state_ != HostLinkState::connecting) state_ = HostLinkState::lost;
 }
 
-// The board may still hold this session, whose setpoints are out of date if the host's clock stood
-// still. In a paused virtual machine only the board's clock shows that.
+// The board may continue this session, whose setpoints are outdated if the host's clock stood
+// still. In a paused virtual machine only the board's clock shows the pause.
 void HostLink::end_session() {
   session_ = no_session;
   first_pnum_ = next_pnum_;

@@ -2,10 +2,10 @@
 // The host's end of the link (paper section 4.3; docs/reference/protocol.md "The link").
 //     connecting --> active <--> safe        active, safe --> lost --> active, safe, connecting
 //
-//     connecting  nothing heard yet, or the board is booting (it sends `PNum:0;T:0`)
+//     connecting  no datagram received yet, or the board is booting (it sends `PNum:0;T:0`)
 //     active      the board streams its state and reports no reason to be safe
 //     safe        the board reports a reason
-//     lost        nothing valid from the board for the timeout
+//     lost        no valid datagram from the board for the timeout
 //
 // Times are the host's clock in ms, which wraps.
 #pragma once
@@ -23,11 +23,11 @@ class HostLink {
   HostLink(LinkTiming timing, std::uint32_t first_pnum)
       : timing_(timing), first_pnum_(first_pnum), next_pnum_(first_pnum) {}
 
-  // The session's id. While wants_session(), send nothing; begin_session() takes a new random id.
+  // The session's id. While wants_session(), do not send; begin_session() takes a new random id.
   SessionId session() const { return session_; }
   bool wants_session() const { return session_ == no_session; }
   void begin_session(SessionId id) { session_ = id; }
-  // Ends control, or requests it anew, with a new session.
+  // Ends control, or requests control again, with a new session.
   void leave_session() {
     end_session();
     forget_boot();
@@ -38,16 +38,16 @@ class HostLink {
 
   // A heartbeat, which heartbeat_due() answers at once. `t_ms`: its T, not older than echo().
   void on_heartbeat(std::uint32_t t_ms);
-  // The field SAFE of the newest state or heartbeat; none without that field.
+  // The field SAFE of the newest state or heartbeat; none if the field is missing.
   void on_reason(SafeReason reason, std::uint32_t now_ms);
   void on_heard(std::uint32_t now_ms);
-  // The board reports that it is booting, so it knows no session.
+  // The board reports that it is booting, so it has no session.
   void on_booting(SafeReason reason, std::uint32_t now_ms);
-  // The board has restarted. Unless it reported its boot (on_booting()), a new session is needed,
-  // because the host's own clock may have stood still instead.
+  // The board has restarted, or the host's clock stood still. A new session is needed unless the
+  // board reported its boot (on_booting()).
   void on_restart();
 
-  // This computer slept: the board counts as restarted, and a new session is needed.
+  // The host's machine slept: the board counts as restarted, and a new session is needed.
   void begin_anew();
 
   // If the transport is down, the link is lost at once. If it is up, a heartbeat is due at once.
@@ -83,11 +83,12 @@ class HostLink {
   std::uint32_t due_in(std::uint32_t now_ms) const;
 
   HostLinkState state() const { return state_; }
-  // True if the host echoed a T of this boot: before, the board executes no command of this host.
+  // True if the host has echoed a T of this boot. Before that, the board executes no command of
+  // this host.
   bool echoed() const { return echoed_; }
   std::uint32_t restarts() const { return restarts_; }
   SafeReason reason() const { return reason_; }
-  // True after 12 days of silence: the board's T has wrapped too far, and begin_anew() is needed.
+  // True after 12 days of silence: the board's T may have wrapped, so begin_anew() is needed.
   bool long_silent(std::uint32_t now_ms) const { return heard_ && now_ms - heard_ms_ > long_ago; }
 
   static constexpr std::uint32_t retry_ms = 20;
@@ -105,7 +106,7 @@ class HostLink {
   std::uint32_t echo_ = 0;
   std::uint32_t heard_ms_ = 0;
   bool heard_ = false;
-  bool booting_ = false;  // the newest report said so
+  bool booting_ = false;  // in the newest report
   std::uint32_t restarts_ = 0;
   std::uint32_t sent_ms_ = 0;
   bool any_sent_ = false;

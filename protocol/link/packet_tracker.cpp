@@ -37,7 +37,7 @@ Arrival PacketTracker::on(std::uint32_t pnum) {
     --counters_.lost;
     return Arrival::late;
   }
-  if (behind < window) {  // sent before the first that arrived
+  if (behind < window) {  // sent before the first datagram that arrived
     suspecting_ = false;
     ++counters_.old;
     return Arrival::old;
@@ -46,7 +46,7 @@ Arrival PacketTracker::on(std::uint32_t pnum) {
     ++counters_.restarts;
     suspecting_ = false;
     newest_ = pnum;
-    seen_ = 3;  // this one and the one that raised the suspicion
+    seen_ = 3;  // this datagram, and the datagram that raised the suspicion
     reach_ = 1;
     return Arrival::restart;
   }

@@ -49,7 +49,7 @@ bool SessionPaths::take_port(std::uint8_t port, Source& left) {
   return false;
 }
 
-// A number that a slow path delivers this late does not mean that the host restarted.
+// A number older than the window comes from a slow path: it does not mean that the host restarted.
 bool SessionPaths::count(Source from, std::uint32_t pnum) {
   constexpr std::uint32_t window = PacketTracker::window;
   const std::uint32_t before = numbers_.newest();

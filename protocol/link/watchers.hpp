@@ -4,9 +4,10 @@
 //       |  ^                                   |  ^
 //       +--+ any other W: send a token         +--+ W:rate that echoes the token: renewed
 //
-// Nothing streams to a source before it has echoed the random token that was sent to it, so a
-// forged source cannot make the board flood a stranger. The board's clock cannot be the token: any
-// peer can get it. Answers with a token are limited. Times are ms of the board's clock, and wrap.
+// The board streams to a source only after the source has echoed a random token, so a forged source
+// cannot make the board flood another device. The board's clock cannot be the token, because any
+// peer can get the time. Answers with a token are limited. Times are ms of the board's clock, and
+// wrap.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +27,7 @@ struct Watcher {
   bool chooses = false;  // true if it chose its fields
   FieldSet fields;
 
-  // True if a state was due at `t_ms`; schedules the next.
+  // True if a state is due at `t_ms`; then schedules the next state.
   bool take(std::uint32_t t_ms) {
     if (!reached(t_ms, next_ms)) return false;
     const std::uint32_t behind = t_ms - next_ms;
@@ -45,14 +46,14 @@ class Watchers {
   enum class Effect : std::uint8_t {
     watching,  // the lease began or was renewed
     ended,
-    unproven,  // send it a token, with tell()
+    unproven,  // send the source a token, with tell()
     ignored,   // a token was sent just before, or W:0 ends no lease
     full,      // other watchers have all the places
   };
   // 0 Hz ends the lease. `echo`: the T of W. `proven`: the source cannot be forged (a bus).
   Effect on_lease(Source from, std::uint32_t rate_hz, std::uint64_t echo, bool proven,
                   std::uint32_t now_ms);
-  // This secret token was sent to that source. It is valid for lease_ms, then as long as the lease.
+  // The secret `token` was sent to `to`. It is valid for lease_ms, then as long as the lease.
   void tell(Source to, std::uint32_t token, std::uint32_t now_ms);
 
   void poll(std::uint32_t now_ms);
@@ -63,7 +64,7 @@ class Watchers {
   Watcher* find(Source at);
   bool any() const;
 
-  // All places, including the free ones (period_ms 0).
+  // All places, including free places (period_ms 0).
   Watcher* begin() { return watchers_; }
   Watcher* end() { return watchers_ + places; }
 

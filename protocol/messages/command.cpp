@@ -12,7 +12,7 @@ namespace {
 constexpr Text stop_word = row_of(CommandKind::stop).word;
 constexpr Text default_fields("DEFAULT");
 constexpr Text all_fields("ALL");
-// Keeps rare cases out of the loop over values, which every setpoint goes through.
+// Keeps rare cases out of the loop over values, which runs for every setpoint.
 #define R4_SELDOM __attribute__((noinline))
 
 constexpr std::size_t most_values = sizeof CommandRow::values / sizeof(CommandValue);
@@ -235,7 +235,7 @@ void write_command(DatagramWriter& writer, const Command& command) {
   if (!row.word.empty()) writer.value(row.word);
   for (const CommandValue each : row) {
     const ValueRow& value = row_of(each);
-    // A missing value within its range, the speed of a stepper, is written.
+    // A missing value is written if its default is in range (the speed of a stepper).
     if (is_missing(command, value) && (is_text(value.role) || value.missing < value.min)) continue;
     if (value.role == ValueRole::list) {
       writer.values(text_of(command, value.role));

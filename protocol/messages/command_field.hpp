@@ -11,17 +11,17 @@
 
 namespace r4 {
 
-// True if E:STOP is among the fields: a stop is obeyed whatever else the datagram contains.
+// True if E:STOP is among the fields: a stop is obeyed even among other fields.
 bool asks_to_stop(const Datagram& datagram);
 
-// The number for confirming a stop: its field STOP, else its PNum. False if it has neither.
+// The number for confirming a stop: its field STOP, else its PNum. False if the stop has neither.
 constexpr Text stop_number_name("STOP");
 bool stop_number(const Datagram& datagram, std::uint32_t& out);
 
 // Reads a command field. Faults in this order: Refusal::unknown (no such letter or word), ::format
-// (number of values, an empty one, not a whole number), ::channel, ::range (also too large for any
-// type). `out` is written only on Refusal::none; its texts are views of `field`. settings.hpp
-// checks ranges of settings, and parse_fields() checks names of fields.
+// (wrong number of values, an empty value, not a whole number), ::channel, ::range (also too large
+// for any type). `out` is written only on Refusal::none; its texts are views of `field`.
+// settings.hpp checks ranges of settings, and parse_fields() checks names of fields.
 Refusal parse_command(const Field& field, Command& out);
 // Reads a command of the kind `row` from its values: `texts`, without the letter or word.
 Refusal read_values(const CommandRow& row, const Text* texts, std::size_t count, Command& out);

@@ -16,8 +16,8 @@ constexpr Text group_capability("group");
 // The rules for the commands of a group, the same at both ends.
 class GroupRules {
  public:
-  // Refusal::none if `command`, valid by itself, may be added. Refusal::format if the group has
-  // max_group commands, it is not an output command, or an earlier command has its channel.
+  // Refusal::none if `command`, valid by itself, may be added. Refusal::format if the group is full
+  // (max_group), `command` is not an output command, or its output is already in the group.
   Refusal add(const Command& command);
 
  private:
@@ -37,7 +37,7 @@ struct CommandGroup {
   Command commands[max_group];
 };
 
-// If they cannot be executed together, `at` is the first wrong command, from 1.
+// If the commands cannot be executed together, `at` is the first wrong command, from 1.
 Refusal read_group(const Datagram& datagram, CommandGroup& out, std::uint8_t& at);
 
 }  // namespace r4

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Command::osmc() and the other functions that make commands.
 #include "r4link/command.hpp"
 
 namespace r4 {

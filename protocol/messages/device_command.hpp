@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Commands for connected devices: X, the I2C bus, UARTs and DAC (docs/reference/protocol.md). Bytes
-// are x and two hexadecimal digits each, "x3B00", to differ from numbers; "x" is not valid.
+// are written as x and two hexadecimal digits each: "x3B00". The x distinguishes bytes from
+// numbers. "x" alone is not valid.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +36,7 @@ inline bool operator==(const UartMode& a, const UartMode& b) {
 }
 inline bool operator!=(const UartMode& a, const UartMode& b) { return !(a == b); }
 
-// True if the user's devices carry it out: it controls or reads them.
+// True if the command controls or reads the user's devices.
 constexpr bool is_device_command(CommandKind kind) {
   return kind >= CommandKind::i2c_write && kind <= CommandKind::i2c_poll_off;
 }
@@ -49,13 +50,13 @@ Refusal parse_poll(Text value, I2cPoll& out);
 constexpr std::size_t max_poll_text = 24;
 Text write_poll(const I2cPoll& poll, char (&buffer)[max_poll_text]);
 
-// A setting's value, "115200:8N1" with always 8 data bits, or "off". Refusals as above.
+// The value of a setting: "115200:8N1" (always 8 data bits) or "off". Refusals as parse_poll().
 Refusal parse_uart_mode(Text value, UartMode& out);
 // "460800:8N1"
 constexpr std::size_t max_uart_text = 16;
 Text write_uart_mode(const UartMode& mode, char (&buffer)[max_uart_text]);
 
-// Bytes as text. Refusal::format if not valid, ::range for more than `most`.
+// Reads bytes from text. Refusal::format if not valid, ::range if longer than `most` bytes.
 Refusal parse_bytes(Text text, std::uint8_t* out, std::size_t most, std::uint8_t& size);
 void write_bytes(DatagramWriter& writer, const std::uint8_t* bytes, std::size_t size);
 

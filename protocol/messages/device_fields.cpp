@@ -13,7 +13,7 @@ bool take_values(Text values, Text (&out)[value_count]) {
   return Field(Text(), values).split(out, value_count) == value_count;
 }
 
-// A number from a newer board is kept; to_text() calls it unknown.
+// Keeps an unknown number, which a newer board may send: to_text() returns "unknown".
 bool parse_outcome(Text text, I2cOutcome& out) {
   std::uint32_t number = 0;
   if (!parse_number(text, number) || number > 0xFF) return false;

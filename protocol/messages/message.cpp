@@ -55,7 +55,7 @@ bool asks_to_watch(const Datagram& datagram) {
 
 MessageKind kind_of(const Datagram& datagram) {
   if (datagram.command_count() == 0) return MessageKind::state;
-  if (datagram.command_count() > 1) return MessageKind::command;  // a group, or refused as one
+  if (datagram.command_count() > 1) return MessageKind::command;  // a group, or refused as a group
   const Field& field = datagram.command();
   if (field.name() == Text("H")) {
     if (field.values() == board_heartbeat_word) return MessageKind::board_heartbeat;

@@ -19,7 +19,7 @@ bool asks_to_watch(const Datagram& datagram);
 // (authentication.hpp).
 Text write_board_heartbeat(char* buffer, std::size_t capacity, std::uint32_t pnum,
                            std::uint32_t t_ms, const SafeReport& safe, Text nonce = Text());
-// Only the reason of heartbeat_report(); none without SAFE.
+// The reason in heartbeat_report(); none if the field SAFE is missing.
 SafeReason heartbeat_reason(const Datagram& datagram);
 // Empty if the heartbeat carries no nonce.
 Text heartbeat_nonce(const Datagram& datagram);
@@ -33,10 +33,10 @@ constexpr Text i2c_capability("i2c");
 // UARTs: X:UART. A DAC and spare inputs: X:DAC, GPIO.
 constexpr Text uart_capability("uart");
 constexpr Text dac_capability("dac");
-// True if `word` is one of the words, which '+' separates.
+// True if `word` is in `capabilities`, whose words are separated by '+'.
 bool has_capability(Text capabilities, Text word);
 void write_identity(DatagramWriter& writer, const Identity& identity);  // the field `I`
 void write_identity_fields(DatagramWriter& writer,
-                           const Identity& identity);  // the fields after it
+                           const Identity& identity);  // the fields after `I`
 
 }  // namespace r4

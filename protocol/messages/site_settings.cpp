@@ -142,7 +142,7 @@ Refusal set_wiring(SiteSettings& settings, Text value) {
   return refusal;
 }
 
-// A damaged wiring stays damaged until another is given.
+// A damaged wiring stays damaged until a valid wiring is set.
 Text write_wiring(const SiteSettings& settings, char (&out)[max_wiring_value]) {
   if (settings.wiring_source == WiringSource::given)
     return write_wiring_value(settings.wiring, out);

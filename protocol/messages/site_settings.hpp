@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The settings of one board at its site (r4link/tables/settings.hpp; docs/reference/protocol.md,
-// section 3). Only a host on a cable of the board's own may change them (Port::may_configure()).
-// In a name or password, bytes outside the grammar are written as in URLs: %2C is a comma, %25 a
-// percent sign, %6Fff the network that is called "off". Node and wiring take effect at the board's
-// next start, all others at once.
+// section 3). Only a host on the board's own cable may change them (Port::may_configure()). In a
+// name or password, bytes outside the grammar are written as in URLs: %2C is a comma, %25 a percent
+// sign, %6Fff the network that is called "off". Node and wiring take effect at the board's next
+// start, all other settings at once.
 #pragma once
 
 #include <cstddef>
@@ -55,7 +55,7 @@ bool is_site_setting(Text key);
 // True for `password` and `key`, whose values are secret.
 bool is_secret_setting(Text key);
 
-// `number`: which of several keys, from 1. `row` is null for an unknown key.
+// `number`: which key of a setting with several keys, from 1. `row` is null for an unknown key.
 struct FoundSetting {
   const SettingRow* row;
   int number;
@@ -71,13 +71,14 @@ Refusal set_number(Number& member, const SettingRow& row, Text value) {
   return refusal;
 }
 
-// As set() in settings.hpp. Refusal::unknown for any other setting.
+// As set() in settings.hpp. Refusal::unknown for a setting that is not of the site.
 Refusal set(SiteSettings& settings, FoundSetting found, Text value);
 
 // The longest value: a wiring, or each byte of a password as %XX.
 constexpr std::size_t max_site_value =
     max_wiring_value > 3 * password_max ? max_wiring_value : 3 * password_max;
-// From 0: its key, its value as set() takes it. False: none. Includes secrets: only for storage.
+// Gets the key of setting `index`, from 0, and its value as set() takes it. False if there is no
+// such setting. Includes secrets, so use it only for storage.
 bool get(const SiteSettings& settings, int index, Text& key, char (&out)[max_site_value],
          Text& value);
 

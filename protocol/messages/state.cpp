@@ -88,7 +88,8 @@ Text next_value(Text& rest) {
   return value;
 }
 
-// The last value is the whole rest: a surplus value leaves a comma, a missing one leaves nothing.
+// The last value is the whole rest, so a surplus value leaves a comma, and a missing value leaves
+// nothing. The parser refuses both.
 bool parse_drive(Text rest, Drive& out) {
   return parse_into(next_value(rest), pwm_max, out.pwm) && parse_into(rest, 1, out.direction);
 }
@@ -229,8 +230,8 @@ void write_field(DatagramWriter& writer, StateField field, const State& state) {
 
 namespace {
 
-// A state before a datagram is read into it. Few datagrams carry the members from `rare_place` on,
-// most of the state, so they are copied only before their first change.
+// A state before a datagram is read into it. Few datagrams contain the members from `rare_place`
+// on, which are most of the state. So these members are copied only before their first change.
 class Before {
  public:
   explicit Before(State& state) : state_(state) { std::memcpy(common_, bytes(), rare_place); }
@@ -287,7 +288,7 @@ bool parse_safe_reason(Text text, SafeReason& out) {
 
 bool read_state(const Datagram& datagram, State& state) {
   if (datagram.has_time() && datagram.time_ms() > 0xFFFFFFFFU) return false;
-  // Read in place and undone on failure: copying a newly written state costs more.
+  // Read in place, and undone on failure, because copying a newly written state takes longer.
   Before before(state);
   if (!read_fields(datagram, state, before)) {
     before.restore();

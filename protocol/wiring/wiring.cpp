@@ -13,7 +13,7 @@ bool is_pin(Terminal terminal) {
 
 bool within(int number, int least, int most) { return number >= least && number <= most; }
 
-// True if there is such a place. Whether it may be used, fault_of() says.
+// True if the place exists. fault_of() decides whether it may be used.
 bool exists(Terminal terminal, int number, bool at_second_bus) {
   constexpr int drive_lines = 2 * pca9685_lines;
   constexpr int all_pca9685 = 0x70;
@@ -88,7 +88,7 @@ Family family_of(Terminal terminal) {
   return Family::expander_bit;
 }
 
-// Both are connected, to places that exist.
+// Both signals must be connected, to places that exist.
 WiringFault clash(const SignalRow& a, Place at_a, const SignalRow& b, Place at_b) {
   if (family_of(a.terminal) != family_of(b.terminal)) return WiringFault::none;
   if (at_a.number() == at_b.number()) return WiringFault::twice;

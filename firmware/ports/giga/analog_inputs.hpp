@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The connected analog inputs, converted in turn, one per poll; the others read 0. From the loop
-// only. The core sets up pins and converter. Then this class uses the registers of ADC1 (RM0399,
-// chapter ADC), and never waits: the core would wait up to 10 ms for a conversion, and end the boot
-// if the converter does not switch on. Here a dead converter reads 0, and motors can be driven.
+// Converts the connected analog inputs in turn, one per poll; unconnected inputs read 0. From the
+// loop only. The core sets up pins and converter. Then this class uses the registers of ADC1
+// (RM0399, chapter ADC), and never waits. The core would wait up to 10 ms for a conversion, and end
+// the boot if the converter does not switch on. With this class a dead converter reads 0, and
+// motors can be driven.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +30,7 @@ class AnalogValue final : public firmware::AnalogPin {
 
 class AnalogInputs {
  public:
-  // Construct before any interrupt that must be in time is enabled.
+  // Construct before any interrupt with a deadline is enabled.
   AnalogInputs(AnalogValue (&values)[analog_channels], const Wiring& wiring) : values_(values) {
     for (int i = 0; i < analog_channels; ++i) {
       const Place place = wiring.at(SignalKind::analog, i + 1);
@@ -41,7 +42,7 @@ class AnalogInputs {
   }
 
   // Takes the finished conversion and starts the next. If the converter stops, all inputs read 0,
-  // because an old voltage would pass for a measured one.
+  // because an old voltage would look like a measured voltage.
   void poll() {
     if (!any_) return;
     if (convert()) {

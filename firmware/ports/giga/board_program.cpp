@@ -76,7 +76,7 @@ void hear_usb_now() {
 void on_usb() { on_own_stack(&hear_usb_now); }
 
 void start_listening(UsbPort& usb) {
-  constexpr std::uint32_t gives_way = 13;  // to all interrupts but the core's scheduler
+  constexpr std::uint32_t gives_way = 13;  // a lower priority than all but the core's scheduler
   listening = &usb;
   NVIC_SetVector(SWPMI1_IRQn, reinterpret_cast<std::uintptr_t>(&on_usb));
   NVIC_SetPriority(SWPMI1_IRQn, gives_way);
@@ -84,7 +84,7 @@ void start_listening(UsbPort& usb) {
   UsbPort::start();
 }
 
-// Asks the board for its report. No datagram is so short.
+// Requests the board's report. Every datagram is longer.
 constexpr Text report_word("report");
 
 SafeReason reason_of(const FaultNote& note) {
@@ -162,7 +162,7 @@ void BoardProgram::poll() {
   light_.show(application_.state(), application_.reason(), now_ms);
 }
 
-// The boot loader does not know the chips: after the reset they would keep driving their outputs.
+// The boot loader does not switch the chips off: they would drive their outputs after the reset.
 void BoardProgram::stay_safe_for_upload() {
   if (usb_.upload_asked()) application_.fail(SafeReason::fault, BoardClock::now_ms());
 }

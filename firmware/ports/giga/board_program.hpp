@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The application between its transports and its hardware, made when the settings are known.
+// The application between its transports and its hardware, constructed after the settings are read.
 #pragma once
 
 #include <cstdint>

@@ -96,7 +96,7 @@ void write_last_boot(LineWriter& line, const FaultNote& note) {
 
 }  // namespace
 
-// Asks one address. Empty if no chip answers.
+// Probes one address. Empty if no chip answers.
 Text BootReport::scan(char (&out)[max_line]) {
   const std::uint8_t address = address_++;
   if (sources_.bus->write(address, nullptr, 0) != firmware::I2cResult::ok) return Text();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report of the paper's Figure 3, with its labels, sent on request, one line a turn; then
-// chips, CAN, settings, keys, paths and how the last boot ended. The scan of the I2C bus asks one
-// address a turn, so the loop waits for at most one transfer.
+// The report of the paper's Figure 3, with its labels, sent on request, one line a turn. Then
+// follow chips, CAN, settings, keys, paths and the end of the last boot. The scan of the I2C bus
+// probes one address a turn, so the loop waits for at most one transfer.
 #pragma once
 
 #include <cstdint>
@@ -48,7 +48,7 @@ class BootReport {
   Text next(char (&out)[max_line]);
 
  private:
-  static constexpr std::uint8_t first_address = 0x08;  // others are reserved (UM10204 3.1.12)
+  static constexpr std::uint8_t first_address = 0x08;  // the rest is reserved (UM10204 3.1.12)
   static constexpr std::uint8_t last_address = 0x77;
 
   Text scan(char (&out)[max_line]);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The two I2C buses of the Giga, of which one has the board's chips: 0 is SDA and SCL (D20, D21), 1
 // is SDA1 and SCL1. Before the wiring is known, the board reads from the address that all PCA9685
-// share, on both buses. If a bus answers, every PWM output on it is switched off.
+// share, on both buses. If a PCA9685 answers, every PWM output on its bus is switched off.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A place for an object that is made later, or never: without a heap.
+// Room for an object that is constructed later, or never, without a heap.
 #pragma once
 
 #include <new>
@@ -17,7 +17,7 @@ class Late {
   ~Late() {
     if (object_ != nullptr) object_->~T();
   }
-  // Once.
+  // Call at most once.
   template <class... Arguments>
   T& make(Arguments&&... arguments) {
     object_ = new (place_) T(std::forward<Arguments>(arguments)...);

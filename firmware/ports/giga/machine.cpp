@@ -60,7 +60,7 @@ void Machine::Encoder::connect(const Wiring& wiring, int channel) {
   make_input(index, LinePull::down);
   a = line_of(a_place);
   b = line_of(b_place);
-  if (!a_place.connected()) return;  // both or none
+  if (!a_place.connected()) return;  // the wiring has both lines or none
   a_edge.make(pin_name(pin_of(a_place)), PullUp);
   b_edge.make(pin_name(pin_of(b_place)), PullUp);
 }
@@ -125,7 +125,7 @@ Machine::Machine(const Wiring& wiring, ChipTrouble wiring_trouble, Buses& buses)
   for (int i = 0; i < ultrasonic_channels; ++i) {
     echoes_[i].connect(wiring.at(SignalKind::echo, i + 1));
   }
-  // Before the application starts: readings that are kept as settings need both.
+  // Before the application starts, because readings that are settings need the bus and the UARTs.
   user_bus_.start(start_bus_clock(1 - choice_.chips));
   start_uarts(uart1_, uart2_);
 }

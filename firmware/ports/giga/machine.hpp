@@ -23,7 +23,7 @@ namespace giga {
 
 class Machine final : public StepTick {
  public:
-  // When it returns, every output is off. `wiring` must be without a fault of check().
+  // After construction every output is off. `wiring` must be without a fault of check().
   Machine(const Wiring& wiring, ChipTrouble wiring_trouble, Buses& buses);
   // Starts the edge interrupts and the step timer, which becomes a duty of the guard.
   void start(firmware::Guard& guard);
@@ -55,7 +55,7 @@ class Machine final : public StepTick {
     void start(firmware::UltrasonicSensors& with, int number);
     void on_edge();
   };
-  // A 40 kHz interrupt that is later than this counts as missed. As long as the loop's limit, so
+  // A 40 kHz interrupt that is later than this counts as missed. The limit is the loop's limit, so
   // that the core may keep interrupts off for a moment.
   static constexpr std::uint32_t step_limit_ms = 20;
 

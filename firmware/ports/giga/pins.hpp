@@ -11,7 +11,7 @@
 namespace r4 {
 namespace giga {
 
-// `place` is connected to a pin.
+// `place` must be connected to a pin.
 inline Pin pin_of(Place place) {
   const GigaPin& pin = giga_pins[place.number()];
   return {pin.port, pin.number};
@@ -40,7 +40,7 @@ constexpr Pin can_tx_pin = {'B', 13};
 constexpr Pin can_rx_pin = {'B', 5};
 constexpr std::uint32_t can_function = 9;
 
-// Lit when low.
+// The lights are on when their pins are low.
 constexpr Pin red_led_pin = {'I', 12};
 constexpr Pin green_led_pin = {'J', 13};
 constexpr Pin blue_led_pin = {'E', 3};

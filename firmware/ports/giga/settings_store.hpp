@@ -3,7 +3,7 @@
 // partition 3 of the QSPI flash. Has its own thread, because an erase takes 0.1 s or more.
 //     loading ---> ready     the store works; load() reads the settings, if there are any
 //             ---> absent    partition 3 is missing or does not hold a store
-//     avoided                the store ended the last boot, because the core gives up for good
+//     avoided                the store ended the last boot, because the core ends the boot
 //                            when worn-out flash cannot be erased
 //
 // Never writes outside that partition (partition 1 holds the WiFi firmware), nor to a partition
@@ -30,11 +30,11 @@ class SettingsStore {
   void start();
   void avoid() { state_.store(StoreState::avoided, std::memory_order_relaxed); }
   StoreState state() const { return state_.load(std::memory_order_acquire); }
-  // Reads the stored settings. Call once, after loading; the defaults stay if there are none. If
-  // the caller does not wait until then, the wiring is lost: the stored one is not known. Then
-  // nothing is stored later either, because it would overwrite the old settings.
+  // Reads the stored settings. Call once. If there are none, the defaults stay. If the store is
+  // loading or avoided, the stored wiring is unknown and counts as damaged. Then nothing is stored
+  // later, because it would overwrite the old settings.
   void load(Settings& settings);
-  // Stores them soon, on the thread.
+  // Stores `settings` soon, on the thread.
   void keep(const Settings& settings);
   bool keeps() const { return keeps_; }
 

@@ -5,8 +5,8 @@
 //     void loop() { R4Link.poll(); }
 //
 // The board is commanded over USB, WiFi or CAN and configured over USB (docs/how-to/firmware.md).
-// Other code in the sketch must finish within milliseconds: a loop later than 20 ms misses a
-// deadline, a longer one makes the outputs safe, and after 400 ms the board resets.
+// Other code in the sketch must finish within milliseconds. A turn of the loop longer than 20 ms
+// misses a deadline, a longer turn makes the outputs safe, and after 400 ms the board resets.
 #pragma once
 
 #if !defined(ARDUINO_GIGA) && !defined(TARGET_GIGA)

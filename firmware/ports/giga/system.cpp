@@ -44,7 +44,7 @@ void System::boot() {
       machine_.make(site.wiring, firmware::BoardHardware::trouble_of(site.wiring_source), buses_);
   guard_outputs(machine.hardware());
 
-  // Above the network's thread, which then cannot delay the loop.
+  // A higher priority than the network's thread, which therefore cannot delay the loop.
   osThreadSetPriority(osThreadGetId(), osPriorityAboveNormal);
   board_.make(machine, store_, settings, last_boot).start();
 }

@@ -34,11 +34,11 @@ class BoardProgram {
     model_.chips().bus.set_processor(&wire_);
   }
 
-  void power_up() {  // first: switches the outputs off
+  void power_up() {  // call first: switches the outputs off
     clock_.start();
     hardware_.power_up();
   }
-  // `cause` of the end of the last boot; none if it was not a fault.
+  // `cause`: the fault or watchdog that ended the last boot; otherwise none.
   void start(SafeReason cause) {
     application_.start(clock_.now_ms());
     if (cause != SafeReason::none) application_.fail(cause, clock_.now_ms());
@@ -60,7 +60,7 @@ class BoardProgram {
     application_.poll(now_ms);
     link_.poll(now_ms);
   }
-  // Sleeps until an interrupt, unless there is work. Interrupts stay off, so that none is missed.
+  // Without work, sleeps until an interrupt. Interrupts stay off, so that no interrupt is missed.
   void rest() {
     const InterruptsHeld held;
     if (!link_.has_received() && !udp_.has_received()) wait_for_interrupt();

@@ -9,12 +9,12 @@ namespace m7 {
 
 namespace {
 
-// Survives a reset, so nothing may initialize it. After power-up its content is random and counts
+// Survives a reset, so no code may initialize it. After power-up its content is random, and valid
 // only with both marks.
 struct Kept {
   std::uint32_t mark;
   std::uint32_t boots;
-  std::uint32_t kind;  // from here as in FaultNote
+  std::uint32_t kind;  // this and the next four as in FaultNote
   std::uint32_t exception;
   std::uint32_t pc;
   std::uint32_t cfsr;
@@ -93,7 +93,7 @@ void protect_memory() {
 }  // namespace
 
 void guard(firmware::Hal& hal) {
-  // Enables separate exceptions, so that a hard fault is only a fault during another.
+  // Enables separate exceptions, so that a hard fault occurs only during another fault.
   constexpr std::uint32_t memory_bus_and_usage = 7U << 16;
   at(scb_shcsr) = memory_bus_and_usage;
   protect_memory();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The simulated bus in real time: a byte takes as long as on a wire; no interrupt comes within it.
+// The simulated bus in real time: a byte takes as long as on a wire; no interrupt divides a byte.
 #pragma once
 
 #include <cstdint>

@@ -24,11 +24,11 @@ class SimulatedRobot::World : public std::enable_shared_from_this<World> {
   Look look() const;
 
   // --- from the board's thread
-  // Throws Error{open} if another board has the robot.
+  // Throws Error{open} if the robot has another board.
   void attach(asio::io_context& io, SimulatedBoard& board);
   void detach() noexcept;
   void note();
-  // Carries out the steps of happen(), if the board is on `io`, whose thread calls.
+  // Carries out the steps of happen(), if the board is on `io`. Call on the thread of `io`.
   void settle(const asio::io_context& io);
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scenario for the simulated board: what happens around it and to it, and when.
+// A scenario for the simulated board: timed events around the board and in it.
 //
 //     # TIME_S what args        '#' begins a comment; seconds since the start, to the millisecond
 //     0.5 handle released       the dead-man's handle: held | released
@@ -23,12 +23,12 @@
 //     2   uart 1 noise          the peer of that user's UART: gnss, lidar, loop (TX joined to RX),
 //                               noise, off
 //     2   gpio 3 low            that spare input is pulled down, until high
-//     2   hang 0.3              the firmware's loop stands still for 0.3 s; arriving data is lost
+//     2   hang 0.3              the firmware's loop hangs for 0.3 s; arriving data is lost
 //     3   fault                 the board itself fails
 //     3   watchdog              a task of the firmware missed its deadline
 //     4   reboot                power off and on again
 //
-// Lines may be in any order; lines of the same time happen in their order.
+// Lines may be in any order. Lines of the same time are carried out in the order of the file.
 #pragma once
 
 #include <cstdint>
@@ -78,7 +78,7 @@ class Script {
  public:
   Script() = default;
 
-  // `name` stands for the file in errors. Throws Error{data} as "FILE:LINE: reason; fix".
+  // `name`: the file's name in errors. Throws Error{data} as "FILE:LINE: reason; fix".
   static Script parse(std::string_view text, const std::string& name);
   // Throws Error{usage} if the file cannot be read, Error{data} if it is longer than 1 MB.
   static Script load(const std::string& path);

@@ -114,7 +114,7 @@ std::array<std::uint8_t, Authentication::chance_size> SimulatedBoard::chance() c
   return bytes;
 }
 
-// `cause`: what ended the boot before.
+// `cause`: the cause that ended the previous boot.
 void SimulatedBoard::boot(SafeReason cause) {
   in_application_ = true;
   application_->start(board_ms(passed_));

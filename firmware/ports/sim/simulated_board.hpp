@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A whole R4 board in a process: the firmware's application and chip drivers on a model of the
-// board, reached through any carriers. Its one timer sleeps until the application needs time; then
+// board, reached through any carriers. Its one timer sleeps until the application needs time. Then
 // the milliseconds that have passed are run, one by one.
 //
 // If the guard prevents feeding for watchdog_ms, a hardware watchdog resets the microcontroller,
-// not the chips. On a slow computer the loop still checks in; only a script's `hang` prevents that.
+// not the chips. The loop checks in even on a slow machine; only a script's `hang` prevents that.
 //
 // Used from the thread of its io_context only. A datagram allocates no heap memory.
 #pragma once
@@ -33,12 +33,12 @@ namespace r4::sim {
 
 class SimulatedBoard final : private firmware::Observer, private CarrierPort::Owner {
  public:
-  // Each may be empty; none may stop the board. `t_ms`: the board's clock, the T of its datagrams.
+  // Each may be empty, and must not stop the board. `t_ms`: the board's clock, as in T.
   struct Events {
     std::function<void(std::uint32_t t_ms, firmware::BoardState, SafeReason)> on_state;
     std::function<void(std::uint32_t t_ms, const Pins&)> on_pins;
     std::function<void(std::uint32_t t_ms, const ScriptStep&)> on_step;  // script or happen()
-    std::function<void()> on_millisecond;                                // has passed on the board
+    std::function<void()> on_millisecond;  // after each millisecond of the board
     std::function<void(std::uint32_t t_ms, ChipFault)> on_fault;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, const Command&)> on_executed;
     std::function<void(std::uint32_t t_ms, std::uint32_t pnum, Refusal)> on_refused;
@@ -56,8 +56,8 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
     std::string capabilities = "sim";
     Script script;
     Settings settings;
-    Wiring wired = plan_wiring();  // how the board is wired, whatever its settings say
-    bool plan_confirmed = true;    // false: without a wiring in its settings, as from the box
+    Wiring wired = plan_wiring();  // how the board is wired, independent of its settings
+    bool plan_confirmed = true;    // false: no wiring in its settings, as in a new board
     Events events;
     // A clock in ms, for tests: then the board has no timer, and the caller calls poll().
     std::function<std::uint32_t()> clock_ms;
@@ -71,13 +71,13 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
 
   // Opens the carriers, and throws Error if that fails. Switches the board on.
   void start();
-  // Outputs off, carriers closed.
+  // Switches the outputs off and closes the carriers.
   void stop() noexcept;
 
   // Does everything that is due; returns the milliseconds until the next call.
   std::uint32_t poll();
 
-  // A step happens now, as if in the script. Only between start() and stop(), and not in an event.
+  // Carries out a step now, as in the script. Only between start() and stop(), and not in an event.
   void happen(const ScriptStep& step);
 
   BoardModel& model() { return model_; }
@@ -138,7 +138,7 @@ class SimulatedBoard final : private firmware::Observer, private CarrierPort::Ow
   bool told_fault_ = false;
   std::size_t next_step_ = 0;
   bool in_application_ = false;  // a carrier may report its end inside a send
-  std::uint32_t downs_ = 0;      // bit n: port n went down meanwhile
+  std::uint32_t downs_ = 0;      // bit n: port n went down inside a send
 
   asio::steady_timer timer_;
   bool armed_ = false;

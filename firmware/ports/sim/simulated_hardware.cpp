@@ -65,7 +65,7 @@ void SimulatedHardware::power_up() {
 void SimulatedHardware::pass_millisecond(bool loop_turns) {
   now_us_ += 1000;
   board_.pass_millisecond(now_us_, *this);
-  // The timer stands while no stepper moves.
+  // While no stepper moves, one tick is enough.
   const int ticks = hardware_.stepping() ? ticks_per_ms : 1;
   for (int i = 0; i < ticks; ++i) hardware_.step_tick();
   if (loop_turns) hardware_.poll(now_us_);

@@ -14,11 +14,11 @@ namespace sim {
 
 class SimulatedHardware final : private BoardModel::Interrupts {
  public:
-  // `wiring`: what the firmware believes; `trouble`: BoardHardware::Config::wiring_trouble.
+  // `wiring`: of the firmware's settings; `trouble`: BoardHardware::Config::wiring_trouble.
   explicit SimulatedHardware(BoardModel& board, const Wiring& wiring = plan_wiring(),
                              ChipTrouble trouble = ChipTrouble::none);
 
-  // Outputs off, then the set-up of the chips, in at most boot_ms of the board's time.
+  // Switches the outputs off and sets the chips up, in at most boot_ms of the board's time.
   void power_up();
   // Runs interrupts, timers, and, if the loop turns, the drivers.
   void pass_millisecond(bool loop_turns = true);

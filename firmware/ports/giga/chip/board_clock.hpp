@@ -13,7 +13,7 @@ class BoardClock {
  public:
   // Starts at `first_ms`: random, so that times of two boots differ.
   static void start(std::uint32_t first_ms);
-  // In the timer interrupt, before the microseconds wrap.
+  // Call in the timer interrupt, before the microseconds wrap.
   static void advance();
 
   static std::uint32_t now_us();

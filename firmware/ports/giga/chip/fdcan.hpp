@@ -65,7 +65,7 @@ class Fdcan {
   enum class Event : std::uint8_t { none, bus_off, stale };
   // bus_off: the bus was left; stale: nothing was sent for stale_us. Both drop all waiting frames.
   Event poll(std::uint32_t now_us);
-  // In the controller's interrupt, which it clears. True: an emergency stop waits in FIFO 1.
+  // Call in the controller's interrupt, which it clears. True: an emergency stop waits in FIFO 1.
   bool on_interrupt();
 
   CanState state() const;
@@ -87,7 +87,7 @@ class Fdcan {
   bool started_ = false;
   bool bus_off_ = false;
   std::uint32_t bus_off_since_us_ = 0;
-  // At the last poll. If `sent` rose, a refilled queue has moved.
+  // Values at the last poll. If `sent` rose, the queue has moved, even if it was refilled.
   std::uint32_t pending_before_ = 0;
   std::uint32_t sent_before_ = 0;
   std::uint32_t moved_us_ = 0;  // when a frame left last

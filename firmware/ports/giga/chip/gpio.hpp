@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Single pins of the STM32H747's ports (RM0399, chapter GPIO). Reads and writes are one access,
-// safe in any interrupt and fault handler. Set-up, of shared registers, runs with interrupts off.
+// safe in any interrupt and fault handler. The set-up changes shared registers with interrupts off.
 #pragma once
 
 #include <cstdint>

@@ -68,8 +68,9 @@ void I2cController::start(std::uint32_t kernel_hz) {
   registers_.CR1 = cr1_on;
 }
 
-// A second attempt follows a timeout, after a chip that was interrupted within a byte has released
-// SDA; not if another transfer took over the bus in the meantime: it could undo that transfer.
+// After a timeout, a chip that was interrupted within a byte releases SDA, and a second attempt
+// follows. If another transfer took over the bus, no attempt follows, because it could undo that
+// transfer.
 template <class Attempt>
 I2cResult I2cController::transfer(std::size_t bytes, std::size_t starts, Attempt attempt) {
   constexpr std::uint32_t clean_up_us = 20;
@@ -83,7 +84,7 @@ I2cResult I2cController::transfer(std::size_t bytes, std::size_t starts, Attempt
   for (int i = 0; i < attempts && result == I2cResult::timeout; ++i) {
     if (i > 0 && transfer.recovery == recoveries_) free_lines();
     transfer.began_us = clock_();
-    result = wait_until_free(transfer);  // at once a timeout if the bus was taken over
+    result = wait_until_free(transfer);  // a timeout at once if the bus was taken over
     if (result == I2cResult::ok) result = attempt(transfer);
     result = finish(transfer, result);
   }
@@ -95,8 +96,8 @@ bool I2cController::alive(const Transfer& transfer) const {
   return transfer.recovery == recoveries_ && clock_() - transfer.began_us < transfer.limit_us;
 }
 
-// request() and put() do nothing if another transfer took over the bus: an interrupted transfer
-// must not restart, nor leave a byte for the next transfer.
+// If another transfer took over the bus, request() and put() have no effect: an interrupted
+// transfer must not restart, or leave a byte for the next transfer.
 bool I2cController::request(const Transfer& transfer, std::uint32_t cr2) {
   const InterruptLock lock;
   if (transfer.recovery != recoveries_) return false;
@@ -141,7 +142,7 @@ I2cResult I2cController::send(const Transfer& transfer, std::uint8_t address,
   }
 }
 
-// A bus error may mean that the chip left the bus, and that the bytes are those of an idle bus.
+// A bus error may mean that the chip left the bus, and that the bytes came from an idle bus.
 I2cResult I2cController::receive(const Transfer& transfer, std::uint8_t address,
                                  std::uint8_t* bytes, std::size_t size) {
   if (!request(transfer, cr2_for(address, size) | cr2_read | cr2_then_stop)) {
@@ -169,8 +170,8 @@ I2cResult I2cController::finish(const Transfer& transfer, I2cResult result) {
   return result;
 }
 
-// Software reset: releases the lines and ends the transfer. It also deletes the byte in TXDR after
-// a refused byte, which the next transfer would otherwise send first.
+// Software reset: releases the lines and ends the transfer. It also deletes a byte that a refusal
+// left in TXDR, which the next transfer would otherwise send first.
 void I2cController::restart() {
   registers_.CR1 = 0;
   for (int i = 0; i < 3; ++i) {  // PE must be low for three APB clocks
@@ -219,8 +220,8 @@ bool I2cController::recover() {
 }
 
 // Drives the pins, because the peripheral does not drive a busy bus. Clocks SCL only while SDA is
-// held (UM10204 3.1.16): a chip that was being written to would read a clock as a bit. A recovery
-// in an interrupt may come at any moment: the rest is at most a START and a STOP on a free bus.
+// held (UM10204 3.1.16), because a chip that was being written to would read a clock as a bit. If a
+// recovery interrupts this function, its rest is at most a START and a STOP on a free bus.
 bool I2cController::free_lines() {
   registers_.CR1 = 0;
   giga::write(scl_, true);

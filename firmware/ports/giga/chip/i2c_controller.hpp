@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // An I2C peripheral of the STM32H747 as master at up to 400 kHz (RM0399, chapter I2C). A transfer
 // that lost the bus or timed out is repeated once, on a freed bus, so that one disturbance does not
-// stop the robot. So is a read with a bus error (BERR): its chip may have left the bus. A write
-// ignores bus errors: a chip that left does not acknowledge, and as master the peripheral reports
-// bus errors that did not occur (ST errata ES0430 2.15.2). An interrupted transfer returns timeout.
-// The core's library (Wire) waits 36 ms for each byte on a hung bus.
+// stop the robot. A read with a bus error (BERR) is also repeated, because its chip may have left
+// the bus. A write ignores bus errors: a chip that left does not acknowledge, and as master the
+// peripheral reports false bus errors (ST errata ES0430 2.15.2). An interrupted transfer returns
+// timeout. The core's library (Wire) waits 36 ms for each byte on a hung bus.
 #pragma once
 
 #include <cstddef>
@@ -34,7 +34,7 @@ class I2cController final : public firmware::I2cBus {
 
   I2cController(const Parts& parts, Clock clock);
 
-  void start(std::uint32_t kernel_hz);  // the peripheral's clock, already on
+  void start(std::uint32_t kernel_hz);  // the peripheral's clock, which must be on
 
   // At most 255 bytes each way, else no_acknowledge. An empty write probes the address.
   firmware::I2cResult write(std::uint8_t address, const std::uint8_t* bytes,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Keeps interrupts off during its life, for a few instructions. Locks may be nested.
+// Keeps interrupts off while it exists, for a few instructions. Locks may be nested.
 #pragma once
 
 #include "chip.hpp"

@@ -89,7 +89,7 @@ void start_guard_timer(firmware::Guard& guard) {
   awake = false;
   loop_flags();
   NVIC_SetVector(MDIOS_IRQn, reinterpret_cast<std::uintptr_t>(&on_stop));
-  NVIC_SetPriority(MDIOS_IRQn, 0);  // as the ticker: neither interrupts the other
+  NVIC_SetPriority(MDIOS_IRQn, 0);  // the ticker's priority: neither handler interrupts the other
   NVIC_EnableIRQ(MDIOS_IRQn);
   ticker.attach(mbed::callback(&on_millisecond), std::chrono::microseconds(1000));
 }
@@ -99,8 +99,8 @@ void stop_at_once() {
   NVIC_SetPendingIRQ(MDIOS_IRQn);
 }
 
-// Sets the flag only once: the core's ticker makes up for late ticks in one interrupt, and more
-// than 16 flags in one interrupt are an error.
+// Sets the flag only once: the core's ticker handles late ticks in one interrupt, and more than 16
+// flags in one interrupt are an error.
 void wake_loop() {
   if (!awake.exchange(true)) loop_flags().set(woken);
 }

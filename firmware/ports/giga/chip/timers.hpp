@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Work on time, even while the loop waits.
+// Runs timed work, even while the loop waits.
 //     1 kHz    mbed::Ticker   clock, guard, watchdog if the guard allows it; wakes the loop
 //     40 kHz   TIM7           stepper steps, encoder index pins
 //     a stop   MDIOS_IRQn     the guard; uses the interrupt of an unused peripheral
 //
-// All run on the stack of interrupt_stack.hpp. A Ticker at 40 kHz would spend most time in the
-// core's timer queue. If the guard withholds permission for starve_ms, the board ends its boot with
-// a note, before the watchdog would reset it without a note.
+// All handlers run on the stack of interrupt_stack.hpp. A Ticker at 40 kHz would spend most time in
+// the core's timer queue. If the guard does not allow feeding for starve_ms, the board ends its
+// boot with a note, before the watchdog resets it without a note.
 #pragma once
 
 #include <cstdint>

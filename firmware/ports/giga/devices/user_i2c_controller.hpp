@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The user's I2C peripheral as master at up to 100 kHz (RM0399, chapter I2C). Uses no interrupt of
 // its own, so noise on the wires cannot cause a storm of interrupts. The step timer's interrupt
-// moves at most one byte each 25 us; a byte takes 90 us on the wire. It reads one register, or none
-// when idle. A peripheral without its next byte waits with SCL low.
+// moves at most one byte each 25 us; a byte takes 90 us on the wire. The interrupt reads one
+// register, or none when the peripheral is idle. A peripheral that waits for its next byte holds
+// SCL low.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +23,7 @@ class UserI2cController final : public firmware::UserI2cPort {
  public:
   explicit UserI2cController(const I2cController::Parts& parts);
 
-  void start(std::uint32_t kernel_hz);  // the peripheral's clock, already on
+  void start(std::uint32_t kernel_hz);  // the peripheral's clock, which must be on
   void tick() {                         // in the step timer's interrupt
     if (stage_ != Stage::idle) step();
   }

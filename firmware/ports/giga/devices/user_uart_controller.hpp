@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A USART for the user (RM0399, chapter USART), with its FIFOs of 16 bytes. Without an interrupt of
-// its own, noise on the wire cannot cause a storm of interrupts. The step timer's interrupt moves
-// up to two bytes in and one out each 25 us, enough for 460800 baud; none while the UART is off.
+// A USART for the user (RM0399, chapter USART), with its FIFOs of 16 bytes. Uses no interrupt of
+// its own, so noise on the wire cannot cause a storm of interrupts. The step timer's interrupt
+// moves up to two bytes in and one out each 25 us, enough for 460800 baud. It moves none while the
+// UART is off.
 #pragma once
 
 #include <cstddef>
@@ -35,7 +36,7 @@ class UserUartController final : public firmware::UserUartPort {
         rx_(line_of(parts.rx)),
         function_(parts.function) {}
 
-  void start(std::uint32_t kernel_hz);  // the peripheral's clock, already on
+  void start(std::uint32_t kernel_hz);  // the peripheral's clock, which must be on
   // In the step timer's interrupt. `sends`: false until the loop has handled a safe state.
   void tick(bool sends) {
     if (runs_) move(sends);

@@ -24,7 +24,7 @@ class DatagramRing {
  public:
   static constexpr std::uint32_t overhead = 12;  // bytes beside the datagram's text
 
-  // False: too long, or less than `keep_free` bytes would stay free.
+  // False if the datagram is too long, or less than `keep_free` bytes would stay free.
   bool put(const DatagramNote& note, Text datagram, std::uint32_t keep_free = 0) {
     if (datagram.size() > max_datagram) return false;
     const std::uint32_t size = overhead + static_cast<std::uint32_t>(datagram.size());

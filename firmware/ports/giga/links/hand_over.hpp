@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Hands the newest value from one thread to another; neither waits. A seqlock: take() fails while
-// the value is written.
+// Hands the newest value from one thread to another; neither thread waits. A seqlock: take() fails
+// while the value is written.
 #pragma once
 
 #include <atomic>
@@ -27,7 +27,8 @@ class HandOver {
     version_.store(before + 2, std::memory_order_release);
   }
 
-  // Takes a value newer than version `known` (0: none); updates `known`. False: none, or not whole.
+  // Takes a value newer than version `known` (0: none); updates `known`. False if there is no newer
+  // value, or the value is being written.
   bool take(std::uint32_t& known, T& value) const {
     const std::uint32_t before = version_.load(std::memory_order_acquire);
     if (before == known || before % 2 != 0) return false;

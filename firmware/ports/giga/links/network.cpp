@@ -45,7 +45,6 @@ void Network::run(Network* network) {
   }
 }
 
-// Rejoins only for another network, password or port.
 void Network::take_settings() {
   const Wanted before = wanted_;
   if (!handed_over_.take(version_, wanted_)) return;
@@ -82,7 +81,7 @@ bool Network::turn() {
 
 void Network::join() {
   const bool open = wanted_.password[0] == '\0';
-  // begin(network) would pass a null password, of which the core copies 64 bytes.
+  // begin(network) would pass a null password, from which the core copies 64 bytes.
   const int status = open ? WiFi.begin(wanted_.network, "", ENC_TYPE_NONE)
                           : WiFi.begin(wanted_.network, wanted_.password);
   tried_ = true;
@@ -129,7 +128,7 @@ bool Network::receive_next() {
   return true;
 }
 
-// The datagram is lost if the stack has no room.
+// If the stack has no room, the datagram is lost.
 bool Network::send_next() {
   std::uint32_t peer = everyone;
   char buffer[max_datagram];

@@ -7,8 +7,9 @@
 //                                      +---+
 //
 // Joining takes up to 7 s. Without WiFi firmware in the flash the library spins for ever, so the
-// thread has the lowest priority. The library's status may be wrong for long, so the network is
-// also rejoined when hosts that were heard have been silent for quiet_ms.
+// thread has a lower priority than our other threads. The library's status may be wrong for a long
+// time, so the network is also rejoined when hosts that sent datagrams have been silent for
+// quiet_ms.
 #pragma once
 
 #include <atomic>
@@ -76,7 +77,7 @@ class Network {
   std::uint32_t tried_ms_ = 0;
   bool heard_ = false;  // a datagram came since the network was joined
   std::uint32_t heard_ms_ = 0;
-  UDPSocket socket_;  // non-blocking: the core's WiFiUDP can wait a second either way
+  UDPSocket socket_;  // non-blocking: the core's WiFiUDP can wait a second to send or to receive
 
   alignas(8) unsigned char stack_[stack_size];
   rtos::Thread thread_{osPriorityBelowNormal, stack_size, stack_, "r4-network"};

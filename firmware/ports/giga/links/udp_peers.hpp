@@ -20,7 +20,7 @@ struct UdpAddress {
 class UdpPeers {
  public:
   static constexpr int capacity = 16;
-  static constexpr std::uint16_t host_port = 2390;  // where the paper's client listens
+  static constexpr std::uint16_t host_port = 2390;  // where the paper's host program listens
 
   // This host also gets datagrams to everyone, at host_port; 0: none.
   void set_host(std::uint32_t ip) { host_ = ip; }
@@ -42,7 +42,7 @@ class UdpPeers {
     const UdpAddress* const at = hosts_.find(peer == everyone ? hosts_.audience() : peer);
     if (at == nullptr) return 0;
     to[0] = *at;
-    // The paper's client sends from another port than it listens on.
+    // The paper's host program sends from another port than it listens on.
     return at->ip == host_ && at->port != host_port && !hosts_.watches(peer) ? 2 : 1;
   }
 

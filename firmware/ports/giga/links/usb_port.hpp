@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // USB serial as a port of the application: one datagram a line, and the line `report` for the
 // board. The core's Serial.write() waits for ever if a program opens the port and does not read. So
-// lines go out by send_nb(), one packet at a time, whole or not at all, and the newest state wins
-// (transmit_lines.hpp). An interrupt of low priority takes input and detects a stop while the loop
-// is busy; a full ring lets input wait at the host. From the loop, except take_in() and listen().
+// lines are sent with send_nb(), one packet at a time, whole or not at all, and the newest state
+// replaces older states (transmit_lines.hpp). An interrupt of low priority takes input and detects
+// a stop while the loop is busy. While the ring is full, input waits at the host. From the loop,
+// except take_in() and listen().
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,7 @@ namespace giga {
 
 class UsbPort final : public firmware::Port {
  public:
-  // A full packet, the most that the core takes at a time. More must follow.
+  // A full packet, the most that the core takes at a time. Another packet must follow it.
   static constexpr std::uint32_t packet_size = 64;
 
   // Per receive(), so that a flood of input does not delay the board.
@@ -31,11 +32,12 @@ class UsbPort final : public firmware::Port {
   static void start();
   // Requests the interrupt for take_in(): SWPMI1_IRQn, otherwise unused. From anywhere.
   static void listen();
-  // In that interrupt. True: E:STOP was received.
+  // Call in that interrupt. True: E:STOP was received.
   bool take_in();
   bool has_received() const { return !received_.empty(); }
 
-  // Before receive(). True: since the last turn a program closed the port and the next opened it.
+  // Call before receive(). True if one program closed the port and another opened it since the last
+  // turn.
   bool begin_turn();
 
   // Calls `on_line(Text)` for each line.
@@ -57,8 +59,8 @@ class UsbPort final : public firmware::Port {
   std::size_t max_size() const override { return max_datagram; }
   bool may_configure() const override { return true; }
 
-  // True if the host has requested new firmware by 1200 baud. From then on the core resets into its
-  // boot loader when the port closes, at least 200 ms later, at any speed.
+  // True if the host has requested a firmware upload (1200 baud). From then on the core resets into
+  // its boot loader when the port closes, at least 200 ms later, at any speed.
   bool upload_asked();
 
   bool say(Text line);

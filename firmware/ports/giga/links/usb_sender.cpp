@@ -19,9 +19,9 @@ constexpr std::uint32_t diepctl_bulk = 2U << 18;
 constexpr std::uint32_t diepctl_first_data = 1U << 28;  // SD0PID
 constexpr std::uint32_t diepint_all = 0xFB7F;           // a write of 1 clears
 constexpr std::uint32_t grstctl_flush = 1U << 5;        // TXFFLSH
-constexpr int flush_turns = 1000;                       // it takes some clocks of the controller
+constexpr int flush_turns = 1000;  // the flush takes some clocks of the controller
 
-// The members that the core keeps for its subclasses.
+// Gives access to protected members of the core's class.
 class Inside final : public arduino::USBSerial {
  public:
   static std::uint32_t endpoint() { return _SerialUSB.*(&Inside::_bulk_in) & 0xFU; }
@@ -41,7 +41,7 @@ USB_OTG_INEndpointTypeDef& in_endpoint(std::uint32_t number) {
   return at<USB_OTG_INEndpointTypeDef>(USB_OTG_IN_ENDPOINT_BASE + number * USB_OTG_EP_REG_SIZE);
 }
 
-// The packet that was under way is still in the FIFO: the next packet must not follow it.
+// The interrupted packet is in the FIFO: the next packet must not follow it.
 void forget_packet(std::uint32_t number) {
   at<USB_OTG_DeviceTypeDef>(USB_OTG_DEVICE_BASE).DIEPEMPMSK &= ~(1U << number);
   in_endpoint(number).DIEPINT = diepint_all;
@@ -64,7 +64,7 @@ bool keep_usb_sending() {
   if ((in_endpoint(number).DIEPCTL & diepctl_active) != 0) return false;
   if (!PluggableUSBD().configured()) return false;
   PluggableUSBD().lock();
-  if (Inside::sending()) {  // the port was opened again, and a packet given to the closed endpoint
+  if (Inside::sending()) {  // the port was reopened, and the closed endpoint got a packet
     Inside::set_connected(false);
     Inside::set_connected(true);
   }

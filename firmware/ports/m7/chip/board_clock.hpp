@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Timer 0 gives the time at 25 MHz; timer 1 wakes the loop each millisecond. SysTick cannot be used
-// under QEMU: its interrupts are lost while the host is busy.
+// under QEMU: its interrupts are lost while QEMU's machine is busy.
 #pragma once
 
 #include <cstdint>

@@ -57,7 +57,7 @@ inline void give_way(Irq irq) {
 
 inline void interrupts_off() { asm volatile("cpsid i" ::: "memory"); }
 inline void interrupts_on() { asm volatile("cpsie i" ::: "memory"); }
-// Keeps interrupts off during its life. May be nested.
+// Keeps interrupts off while it exists. May be nested.
 class InterruptsHeld {
  public:
   InterruptsHeld() : before_(hold()) {}

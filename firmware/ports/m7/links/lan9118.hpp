@@ -14,7 +14,7 @@ class Lan9118 {
  public:
   static constexpr std::size_t max_frame = 1536;
 
-  // False: the chip is missing or not ready. Then nothing is received or sent.
+  // False: the chip is missing or not ready. Then no frame is received or sent.
   bool start();
   Mac mac();
 

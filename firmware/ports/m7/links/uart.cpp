@@ -57,7 +57,7 @@ void Uart::on_transmit_interrupt() {
   fill();
 }
 
-// In the UART's interrupt, or with interrupts off.
+// Call in the UART's interrupt, or with interrupts off.
 void Uart::fill() {
   char byte = 0;
   while ((at(base_ + state) & transmit_full) == 0 && lines_.take(byte)) {

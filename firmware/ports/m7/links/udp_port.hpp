@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // UDP over the LAN9118 as a port of the application. Datagrams to everyone go to the controlling
-// host, or without one to the host that was heard last.
+// host. Without one, they go to the host that was heard last.
 #pragma once
 
 #include <cstdint>

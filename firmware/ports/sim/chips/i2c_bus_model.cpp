@@ -6,7 +6,7 @@ namespace sim {
 
 using firmware::I2cResult;
 
-// Interrupts are off while it lives. At its end, waits for the time that passed on the wire.
+// Keeps interrupts off while it exists. Then waits for the time that passed on the wire.
 class I2cBusModel::Held {
  public:
   explicit Held(const I2cBusModel& bus) : bus_(bus) {
@@ -131,7 +131,7 @@ void I2cBusModel::clear_errors() {
   held_ = 0;
 }
 
-// Cuts a transfer under way short.
+// Aborts a transfer that is under way.
 void I2cBusModel::begin(Transfer& transfer, I2cTransfer::Kind kind, std::uint8_t address) {
   const Held held(*this);
   transfers_ = transfers_ + 1;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A simulated I2C bus at 400 kHz: chip models behind the drivers' interface, and errors on request.
-// Transfers and advance() let time pass. Only an I2cProcessor really waits.
+// A simulated I2C bus at 400 kHz: chip models with the drivers' interface, and errors on request.
+// Transfers and advance() let simulated time pass. Only an I2cProcessor really waits.
 //
-// An interrupt may make transfers during a transfer. That transfer then ends with `timeout` and
-// leaves the chips alone. An I2cProcessor keeps each byte whole, as the wire does.
+// An interrupt may make transfers during a transfer. The interrupted transfer then ends with
+// `timeout` and does not change the chips. An I2cProcessor keeps each byte whole, as the wire does.
 #pragma once
 
 #include <cstddef>
@@ -32,7 +32,7 @@ struct I2cTransfer {
 
 class I2cObserver {
  public:
-  // A transfer has ended. A transfer cut short by an interrupt is reported after the interrupt's.
+  // A transfer has ended. An interrupted transfer is reported after the interrupt's transfer.
   virtual void on_transfer(const I2cTransfer& transfer) = 0;
 
  protected:
@@ -57,7 +57,7 @@ class I2cBusModel final : public firmware::I2cBus {
   static constexpr int max_chips = 8;
   static constexpr int max_errors = 8;  // of each kind at once
 
-  // Powers the chip on; it must outlive the bus. False if there are max_chips already.
+  // Powers the chip on. The chip must outlive the bus. False if there are max_chips already.
   bool attach(I2cChipModel& chip);
   void connect(const I2cChipModel& chip, bool connected);
   void set_observer(I2cObserver* observer) { observer_ = observer; }
@@ -124,7 +124,7 @@ class I2cBusModel final : public firmware::I2cBus {
   Reset resets_[max_errors];
   std::size_t hold_after_ = 0;  // 0: never
   int hold_recoveries_ = 0;
-  int held_ = 0;  // calls of recover() still needed
+  int held_ = 0;  // remaining calls of recover()
   std::uint64_t now_ns_ = 0;
   volatile std::uint32_t transfers_ = 0;
   I2cObserver* observer_ = nullptr;

@@ -30,7 +30,7 @@ class Mcp23017Model final : public I2cChipModel {
 
   // Bit n is pin n.
   std::uint8_t driven(int port) const;  // 1: the chip drives the pin
-  std::uint8_t level(int port) const;   // of driven pins; others as outside
+  std::uint8_t level(int port) const;   // of driven pins; of other pins the outside level
   std::uint8_t reg(int port, Register number) const;
   void set_outside(int port, std::uint8_t levels);
 

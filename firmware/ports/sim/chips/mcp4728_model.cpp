@@ -87,8 +87,8 @@ bool Mcp4728Model::general_call(std::uint8_t byte) {
   }
 }
 
-// Takes the bytes so far; false refuses the last. The transfer's first byte is the command; in
-// repeated parts its bits have no meaning.
+// Handles the bytes received so far; false refuses the last byte. The transfer's first byte is the
+// command; in repeated parts its bits have no meaning.
 bool Mcp4728Model::command_complete() {
   const unsigned command = command_;
   if (command >> 6 == 0) {  // fast write: two bytes per channel, reference and gain stay

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The PCA9685 by its data sheet (Rev. 4). Not modelled: the OE pin (held low), the phase of the
-// pulses, test mode. There is no external clock, as on the board: with EXTCLK the outputs stay as
-// they are, pulses high, the worst case that the data sheet allows.
+// pulses, test mode. As on the board, there is no external clock. With EXTCLK the outputs keep
+// their levels, pulses high: the worst case that the data sheet allows.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ class Pca9685Model final : public I2cChipModel {
 
   explicit Pca9685Model(std::uint8_t address) : address_(address) {}
 
-  int duty(int channel) const;  // 0-4096 of 4096; 0 while the oscillator stands
+  int duty(int channel) const;  // 0-4096 of 4096; 0 while the oscillator is off
   bool high(int channel) const { return duty(channel) == 4096; }
   std::int32_t pulse_ns(int channel) const { return duty(channel) * (reg(0xFE) + 1) * 40; }
   double pulse_us(int channel) const { return pulse_ns(channel) / 1000.0; }

@@ -38,7 +38,7 @@ std::uint16_t As5600Model::setting(int at) const {
   return static_cast<std::uint16_t>((settings_[at] << 8 | settings_[at + 1]) & 0xFFF);
 }
 
-// From ZPOS on, scaled to the range of MPOS or MANG.
+// The angle from ZPOS on, scaled to the range of MPOS or MANG.
 std::uint16_t As5600Model::output() const {
   const int turned = (latched_ - setting(as_zpos)) & 0xFFF;
   int all = setting(as_mang);
@@ -62,7 +62,7 @@ std::uint8_t As5600Model::read_register(std::uint8_t at) {
     case as_angle + 1:
       return byte_of(output(), at - as_angle);
     case as_agc:
-      // At 3.3 V it ends at 128.
+      // At 3.3 V the highest value is 128.
       return magnet_ == Magnet::too_strong ? 0 : magnet_ == Magnet::right ? 0x40 : 0x80;
     case as_magnitude:
     case as_magnitude + 1:

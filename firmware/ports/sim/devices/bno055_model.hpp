@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A BNO055 by its registers (Bosch BST-BNO055-DS000 rev. 1.8, 3.3, 3.6 and 4): sensors and fusion.
-// In CONFIGMODE it is silent, and only there its other settings can be written.
+// In CONFIGMODE its outputs are 0. Only in CONFIGMODE can its other settings be written.
 #pragma once
 
 #include <cstdint>

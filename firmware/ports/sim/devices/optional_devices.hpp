@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Devices that can join those of user_devices.hpp on the user's bus.
+// Devices that can join the devices of user_devices.hpp on the user's bus.
 #pragma once
 
 #include <cstdint>

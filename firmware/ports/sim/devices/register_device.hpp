@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One address, one-byte registers, and a pointer: a write's first byte sets it, each byte moves it.
+// A device with one address, one-byte registers, and a pointer. A write's first byte sets the
+// pointer, and each other byte moves the pointer.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +39,7 @@ class RegisterDevice : public I2cChipModel {
   ~RegisterDevice() = default;
   virtual std::uint8_t read_register(std::uint8_t at) = 0;
   virtual void write_register(std::uint8_t at, std::uint8_t byte) = 0;
-  // Called when a read begins: the bytes of a burst belong together.
+  // Called when a read begins, because the bytes of a burst belong together.
   virtual void latch() {}
   virtual std::uint8_t after(std::uint8_t at) const { return static_cast<std::uint8_t>(at + 1); }
   void set_pointer(std::uint8_t at) { pointer_ = at; }

@@ -44,7 +44,7 @@ UserBusModel::Progress UserBusModel::progress() {
 void UserBusModel::begin(const firmware::UserTransfer& transfer) {
   ++transfers_;
   clocks_ = 0;
-  waits_ = !is_free();  // the controller takes the lines for another controller's, and waits
+  waits_ = !is_free();  // the controller waits, as for another controller's transfer
   if (waits_) return;
   result_ = send(transfer) ? Progress::done : Progress::refused;
   for (int i = 0; i < device_count_; ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The user's I2C bus of the simulated board: a controller at 100 kHz, the devices, and their
-// faults. A transfer takes its time on the wire; it reads what the devices held when it began.
+// faults. A transfer takes as long as on the wire. It reads the devices' values from its beginning.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ class UserBusModel final : public firmware::UserI2cPort {
   enum class Fault : std::uint8_t {
     none,
     held,       // a device holds SDA low
-    cut_off,    // … until it has seen nine clocks: it was cut off in mid-byte
+    cut_off,    // a device cut off in mid-byte holds SDA low until it has received nine clocks
     stretched,  // a device holds SCL low
   };
 

@@ -26,7 +26,7 @@ struct UserDevices {
   I2cChipModel& operator[](UserDevice device) {
     return device == UserDevice::ina219 ? static_cast<I2cChipModel&>(ina219) : mpu6050;
   }
-  // Faults stay.
+  // Does not clear faults.
   void power_on() {
     for (int i = 0; i < user_device_count; ++i) (*this)[static_cast<UserDevice>(i)].power_on();
   }

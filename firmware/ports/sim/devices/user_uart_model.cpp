@@ -118,7 +118,7 @@ void UserUartModel::put_number(std::uint32_t value, int digits) {
   size_ += static_cast<std::size_t>(digits);
 }
 
-// NMEA 0183, of a receiver that stands still.
+// NMEA 0183, of a receiver that does not move.
 void UserUartModel::say_sentence() {
   at_ = size_ = 0;
   const std::uint32_t epoch = now_ms_ / epoch_ms;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A user's UART of the simulated board, and its peer. Bytes take their time on the wire, both ways.
-// If rate or form differ from the board's, the peer's bytes come damaged.
+// A user's UART of the simulated board, and its peer. Bytes take as long as on the wire, both ways.
+// If rate or form differ from the board's, the peer's bytes arrive damaged.
 #pragma once
 
 #include <cstddef>
@@ -62,7 +62,7 @@ class UserUartModel final : public firmware::UserUartPort {
   char text_[longest_text];
   std::size_t size_ = 0;
   std::size_t at_ = 0;
-  int sentence_ = 0;  // of this epoch, next
+  int sentence_ = 0;  // the next sentence of this epoch
   firmware::ByteRing<256> received_;
   firmware::ByteRing<send_capacity> waiting_;
 };

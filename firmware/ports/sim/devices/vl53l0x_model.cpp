@@ -17,7 +17,7 @@ constexpr std::uint64_t vl_range_ns = 33000000;  // the default timing budget
 // In the result, after the status
 constexpr int vl_spads = 2;         // 256ths
 constexpr int vl_signal_rate = 6;   // 128ths of a million counts a second
-constexpr int vl_ambient_rate = 8;  // likewise
+constexpr int vl_ambient_rate = 8;  // 128ths of a million counts a second
 constexpr int vl_range_mm = 10;
 constexpr int vl_range_valid = 11;
 constexpr int vl_no_target = 4;

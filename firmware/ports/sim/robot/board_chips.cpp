@@ -63,7 +63,7 @@ I2cChipModel& BoardChips::operator[](Chip chip) {
   return expander;
 }
 
-// With both lines low nothing turns, and the direction is that of a safe output.
+// With both lines low the motor is off, and the direction is the direction of a safe output.
 Drive BoardChips::drive(SignalKind pwm, SignalKind direction, int channel) const {
   const Place first = wiring.at(pwm, channel);
   const Place second = wiring.at(direction, channel);

@@ -20,7 +20,7 @@ struct BoardChips {
   BoardChips& operator=(const BoardChips&) = delete;
 
   void power_on();
-  // A brake without a line is on while its motor stands.
+  // A brake without a line is on while its motor is stopped.
   ChipPins pins() const;
   // Channels count from 1.
   Drive osmc_drive(int channel) const;

@@ -28,7 +28,7 @@ constexpr Level aindmh_held[] = {{1183, 1},  {1193, 1}, {1208, 2}, {1209, 2}, {1
 constexpr Level ainsteer[] = {{86, 2},  {92, 2},   {94, 2},  {95, 4},  {98, 7},
                               {99, 12}, {100, 10}, {102, 2}, {103, 8}, {105, 10},
                               {106, 1}, {107, 1},  {119, 1}};
-// An undriven input, and that of a released handle.
+// Levels of an undriven input, and of the input of a released handle.
 constexpr Level near_zero[] = {{0, 4}, {1, 2}, {2, 1}};
 
 template <std::size_t N>

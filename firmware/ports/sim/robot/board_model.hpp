@@ -1,26 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The R4 board around its microcontroller: the chips on their bus, the pins, the connected devices,
-// and their time. Portable and in integers, because the image for the Cortex-M7 runs it too.
+// and their time. Portable and in integers, because the image for the Cortex-M7 runs it, too.
 //
-// Connected is the vehicle of the paper's capture (section 4.4) on the bench, or a RobotModel with
+// The vehicle of the paper's capture (section 4.4) on the bench is connected, or a RobotModel with
 // the bench's supply, handle and steppers:
 //
 //     supply      of the motors: on while the dead-man's handle is held and relay 1 is closed
-//                 (docs/reference/safety.md). Without it no motor turns. A handle or relay that the
-//                 board does not have interrupts nothing.
+//                 (docs/reference/safety.md). Without it no motor turns. A missing
+//                 handle or relay does not interrupt the supply.
 //     OSMC 1-4    a motor each, whose shaft turns encoder 1-4: 4000 counts a second at full duty;
 //                 the index line is high for one of the 1000 counts of a turn, count 0
 //     DHB1A       the steering motor; AINSTEER is its position: 1 V, where forward ends, to 4 V,
 //                 1.5 s from end to end at full duty
 //     battery     AIN24 sags with the current of the OSMC motors (20 mOhm)
-//     US 1-4      ultrasonic sensors with nothing in sight
+//     US 1-4      ultrasonic sensors without an obstacle
 //     steppers    a motor each that takes a step at each pulse
 //
-// Its wiring is that of the real board, whatever the firmware believes. A pin of the Giga to which
-// nothing is connected reads low, with a pull-up high.
+// The firmware's settings do not change the model's wiring. An unconnected pin of the Giga reads
+// low, or high with a pull-up.
 //
-// Analog inputs take the values of the capture as often as they occur there. The choice depends on
-// seed and time only, so the same seed gives the same trace.
+// Analog inputs take the values of the capture as often as they occur in the capture. The choice
+// depends on seed and time only, so the same seed gives the same trace.
 #pragma once
 
 #include <cstdint>
@@ -39,7 +39,7 @@ namespace sim {
 namespace defects {
 enum Index : std::uint8_t {
   encoder_a,                                 // encoder 1 … : the line stays low
-  encoder_b = encoder_a + encoder_channels,  // likewise
+  encoder_b = encoder_a + encoder_channels,  // encoder 1 … : the line stays low
   echo = encoder_b + encoder_channels,       // sensor 1 … : the line floats
   relay = echo + ultrasonic_channels,        // relay 1 … : the contact stays open
   handle = relay + relay_channels,           // its wire is broken
@@ -67,7 +67,7 @@ class BoardModel {
 
   explicit BoardModel(std::uint64_t seed, const Wiring& wiring = plan_wiring());
 
-  // Motors stand, counters are at 0. The surroundings stay.
+  // Motors are stopped, counters are at 0. Does not change the surroundings.
   void power_on();
   // Reports the levels of the encoders, as if they had just changed.
   void tell_levels(Interrupts& interrupts);
@@ -81,35 +81,35 @@ class BoardModel {
   firmware::BoardPins microcontroller_pins(const Wiring& wiring);
   firmware::InputPin& input_at(Place place);
   Pins pins() const;
-  // False if pins() cannot have changed: the bus is idle and all steppers stand. This saves time.
+  // False if pins() cannot have changed, which saves time: bus idle, all steppers stopped.
   bool pins_may_differ();
-  // The chips were changed without a transfer.
+  // Call after a change of the chips without a transfer.
   void disturb_pins() { disturbed_ms_ = time_ms_; }
   bool motors_have_supply() const;
-  // Counts of an encoder's shaft since power came.
+  // Counts of an encoder's shaft since power_on().
   std::int32_t shaft_count(int channel) const { return shafts_[channel - 1].count; }
 
-  // Steps of the motor since power came, forward less backward.
+  // Steps of the motor since power_on(), forward less backward.
   std::int32_t stepper_shaft(int channel) const { return steppers_[channel - 1].driver.shaft(); }
 
-  // The robot must outlive this; nullptr: the vehicle on the bench.
+  // The robot must outlive the model; nullptr: the vehicle on the bench.
   void connect(RobotModel* robot);
 
-  // The surroundings. Channels count from 1. A RobotModel decides on its motors and encoders.
+  // The surroundings. Channels count from 1. A RobotModel sets its own motors and encoders.
   void hold_handle(bool held);
   bool handle_held() const { return handle_held_; }
   void set_gpio(int channel, bool high) { input(SignalKind::gpio, channel).set(high); }
   std::uint16_t dac_mv(int channel) const { return dac_[channel - 1].millivolts(); }
-  // `cm`: distance; 0: nothing.
+  // `cm`: distance; 0: no obstacle.
   void set_ultrasonic(int channel, std::uint16_t cm) { sensors_[channel - 1].set_distance(cm); }
   void connect_ultrasonic(int channel, bool connected) { sensors_[channel - 1].connect(connected); }
-  // A hand turns the shaft to `counts` since power came.
+  // A hand turns the shaft to `counts` since power_on().
   void turn_encoder(int channel, std::int32_t counts);
   void stall_motor(int channel, bool stalled) { shafts_[channel - 1].stalled = stalled; }
   void pin_analog(Analog input, std::int32_t centivolts);
-  // The divider of an input gives so many hundredths of what it should.
+  // The divider of an input gives this many hundredths of its nominal voltage.
   void set_divider(Analog input, std::int32_t hundredths);
-  // `index`: of defects::Index.
+  // `index`: a defects::Index.
   void set_defect(int index, bool broken);
   bool is_broken(int index) const { return (defects_ >> index & 1U) != 0; }
   bool relay_contact_closed(int channel) const {
@@ -171,7 +171,7 @@ class BoardModel {
   std::int32_t steering_ = 0;  // from the end of forward
   UltrasonicModel sensors_[ultrasonic_channels];
   bool handle_held_ = true;
-  // The levels of the signals that end at a pin of the Giga; those of outputs are not used.
+  // The levels of the signals that end at a pin of the Giga; levels of outputs are not used.
   static constexpr int first_pin = signals::handle;
   static constexpr int last_pin = signals::gpio_last;
   InputPinModel pins_[last_pin - first_pin + 1];

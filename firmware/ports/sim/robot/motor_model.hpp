@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A brushed DC motor on an H-bridge, in integers: the speed follows the duty with a time constant
-// of 256 ms, the current follows the missing speed.
+// of 256 ms. The current follows the difference between commanded and actual speed.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ class MotorModel {
     const std::int32_t duty = drive.direction == Direction::forward ? drive.pwm : -drive.pwm;
     duty_ = duty;
     const std::int32_t wanted_q12 = duty * (top_speed * 4096 / pwm_max);
-    // The last part is taken whole, so that a motor without current comes to a stand.
+    // The last part is taken whole, so that a motor without current stops.
     const std::int32_t missing_q12 = wanted_q12 - speed_q12_;
     const std::int32_t step = missing_q12 / 256;
     speed_q12_ += step != 0 ? step : missing_q12;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // An ultrasonic sensor HC-SR04 (data sheet): after a trigger pulse its echo line is high for 58 us
-// per centimetre, or 38 ms if nothing is there.
+// per centimetre, or 38 ms without an obstacle.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ class UltrasonicModel {
   static constexpr std::uint32_t nothing_us = 38000;
 
   OutputPinModel& trigger() { return trigger_; }
-  // 0: nothing is in sight.
+  // 0: no obstacle.
   void set_distance(std::uint16_t cm) { cm_ = cm; }
   std::uint16_t distance() const { return cm_; }
   void connect(bool connected) { connected_ = connected; }
@@ -47,7 +47,7 @@ class UltrasonicModel {
  private:
   enum class Phase : std::uint8_t { quiet, burst, echo };
 
-  // Also true if the clock began anew, because the microcontroller was reset.
+  // Also true if the clock restarted, because the microcontroller was reset.
   bool is_due(std::uint32_t now_us) const {
     return reached(now_us, next_us_) || next_us_ - now_us > nothing_us;
   }
