@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decides whether to poll for the next arrival or to sleep: polls if the last silence of the same
-// kind was short, as Linux's haltpoll governor does, because a frame often comes sooner than a
-// process sleeps and wakes. The caller must yield the processor between two polls. No I/O.
+// Decides whether to poll for the next arrival or to sleep. Polls if the last silence of the same
+// kind was short, as Linux's haltpoll governor does. A frame often arrives sooner than a process
+// sleeps and wakes. The caller must yield the processor between two polls. No I/O.
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@ class AdaptivePolling {
     if (silent_) last_[index()] = now - since_;
     silent_ = false;
   }
-  // All frames that had arrived were taken.
+  // Call it when all arrived frames are taken.
   void on_silence(Silence kind, Time now) {
     if (silent_ && kind == kind_) return;
     silent_ = true;

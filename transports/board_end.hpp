@@ -12,13 +12,13 @@ class BoardEnd {
   // Puts `peer` in control; `everyone`: no peer is in control. The peer keeps its number until
   // another peer is held. On UDP, datagrams for `everyone` go to this peer.
   virtual void hold(Peer peer) { static_cast<void>(peer); }
-  // Also holds this peer of the controlling host, until hold() is called.
+  // Holds a further peer of the controlling host, until hold() is called.
   virtual void also_hold(Peer peer) { static_cast<void>(peer); }
   // True if `peer` gets the datagrams for `everyone`.
   virtual bool reaches(Peer peer) const { return peer == everyone; }
   // Chooses packed form or text for sent datagrams. Both forms are always received.
   virtual void use_packed_form(bool wanted) { static_cast<void>(wanted); }
-  // True for the board's own cable, over which the board takes keys, passwords and its node.
+  // True for the board's own cable, over which the board accepts keys, passwords and its node.
   virtual bool is_own_cable() const { return false; }
 
  protected:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // An owned file descriptor, the problem when the system has no resources left, and sockets of Asio
-// that a child process does not inherit. A child would keep the port while it runs.
+// that a child process does not inherit, because the child would keep the port open.
 #pragma once
 
 #include <fcntl.h>
@@ -52,7 +52,7 @@ inline std::optional<Problem> out_of_resources(const std::string& thing, int err
     return Problem{ErrorKind::open, thing, "this computer has no memory left for it",
                    "end some programs"};
   }
-  if (error == ENOSPC) {  // of epoll_ctl(2)
+  if (error == ENOSPC) {  // from epoll_ctl(2)
     return Problem{ErrorKind::open, thing,
                    "the programs of this user wait for as many files and sockets as they may",
                    "end some programs, or allow more: sysctl fs.epoll.max_user_watches shows how "
@@ -68,8 +68,8 @@ inline std::optional<Problem> out_of_resources(const std::string& thing, int err
           std::to_string(4 * limit.rlim_cur)};
 }
 
-// Throws std::system_error if a new event loop could not be woken. Asio does not check that the
-// system lets a loop wait for timers and calls; such a loop would sleep for ever.
+// Throws std::system_error if the system refuses the watches that wake a new event loop for timers
+// and calls. Asio does not check this, and the loop would sleep for ever.
 inline void require_watches() {
   const FileDescriptor epoll(::epoll_create1(EPOLL_CLOEXEC));
   const FileDescriptor events[] = {FileDescriptor(::eventfd(0, EFD_CLOEXEC)),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board's answer to `Q:ID`, which it gives to every host.
+// A board's answer to `Q:ID`, which the board sends to every host.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@ struct IdentityAnswer : BoardIdentity {
   std::optional<bool> busy;
 };
 
-// The question, without a packet number: it is not part of a session.
+// The question, without a packet number, because it is not part of a session.
 std::string identity_question();
 // None if the datagram is not a board's answer.
 std::optional<IdentityAnswer> read_identity_answer(Text bytes);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t normal_entries = 128;
 constexpr std::size_t state_entries = 32;
-constexpr int datagrams_in_a_turn = 64;  // then the other work of the loop has its turn
+constexpr int datagrams_in_a_turn = 64;  // then other work of the loop runs
 
 class MemoryCarrier final : public Carrier {
  public:
@@ -85,7 +85,7 @@ class MemoryCarrier final : public Carrier {
     for (int i = 0; i < datagrams_in_a_turn; ++i) {
       const SendQueue::Entry* const entry = inbox_.front(std::chrono::steady_clock::now());
       if (entry == nullptr) break;
-      // A copy: the handler may send, and a new entry may take this place.
+      // Copied, because the handler may send, and a new entry may replace this entry.
       const std::size_t size = entry->size;
       std::memcpy(datagram_.data(), entry->bytes, size);
       inbox_.pop();

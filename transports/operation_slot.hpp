@@ -28,7 +28,7 @@ class OperationSlot {
   struct Memory {
     alignas(std::max_align_t) std::byte bytes[256];
     bool taken = false;
-    std::uint32_t started = 0;  // counts operations: only the newest one is called
+    std::uint32_t started = 0;  // counts operations: only the newest operation is called
   };
 
   template <class T>
@@ -46,7 +46,7 @@ class OperationSlot {
         return reinterpret_cast<T*>(memory_->bytes);
       }
       return static_cast<T*>(
-          ::operator new(count * sizeof(T)));  // a cancelled operation is still there
+          ::operator new(count * sizeof(T)));  // a cancelled operation uses the memory
     }
     void deallocate(T* at, std::size_t) {
       if (reinterpret_cast<std::byte*>(at) == memory_->bytes) {

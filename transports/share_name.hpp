@@ -20,7 +20,7 @@ struct ShareName {
   // The same for every spelling of a URL.
   std::string text;
   ShareGroup group{};
-  // True for a path, such as a pty's: after the device is gone, another device may get the path.
+  // True for a path, such as a pty's. After the device disappears, another device may get the path.
   bool is_path = false;
 };
 // Throws Error if the transport cannot be found.
@@ -28,7 +28,7 @@ using FindShareName = std::function<ShareName()>;
 
 // How to open an exclusive device: a serial port or the UDP port of hosts. Set before each open().
 struct DeviceClaim {
-  // For a watching program: another program may take the device; then this program neither reads
+  // For a watching program: another program may take the device. Then this program neither reads
   // nor sends. The port of hosts is left to controlling programs.
   bool yields = false;
   // The next opening takes the device from a program that yields.

@@ -90,7 +90,7 @@ std::vector<std::string> numbers_of(std::string_view pattern, std::string_view l
   return numbers;
 }
 
-// The same as expand_urls() for one path.
+// As expand_urls(), for one path.
 std::vector<PatternUrl> expand_path(std::string_view pattern) {
   std::vector<PatternUrl> all{{"", ""}};
   std::string text = with_braces(pattern);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Waits until a descriptor is writable, on a duplicate that is open only during the wait. For a
-// descriptor once asked about, Asio's reactor reports "writable" for ever, which costs a wake-up
-// with each received datagram. A process without a free descriptor polls instead.
+// Waits until a descriptor is writable, on a duplicate that is open only during the wait. After one
+// wait on a descriptor, Asio's reactor reports "writable" for ever, which costs a wake-up per
+// received datagram. A process without a free descriptor polls instead.
 #pragma once
 
 #include <fcntl.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// In the place of services.cpp: of a build with -DR4_ROS2=OFF.
+// Replaces services.cpp in a build with -DR4_ROS2=OFF.
 #include "r4link/error.hpp"
 #include "ros2/bridge.hpp"
 

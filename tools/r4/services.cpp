@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// r4 ros2: Cyclone DDS takes several times as long to load as all the rest, and a stop must not
+// r4 ros2: Cyclone DDS takes several times as long to load as the rest of r4, and a stop must not
 // wait for it. So r4 becomes r4-services, in the same process, which reads the command line again.
 #include <unistd.h>
 
@@ -35,7 +35,7 @@ std::vector<std::string> command_line() {
                  [](std::string& each) { return each.data(); });
   std::error_code error;
   const auto folder = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
-  // Beside r4 in a build, and where both are installed.
+  // r4-services is beside r4 in a build, and at R4_SERVICES_FROM_BIN in an installation.
   for (const char* const place : {"r4-services", R4_SERVICES_FROM_BIN}) {
     const std::filesystem::path program = folder / place;
     ::execv(program.c_str(), pointers.data());

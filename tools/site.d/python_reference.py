@@ -18,9 +18,9 @@ TITLES = {
     'devices': 'Devices of your own', 'recording': 'Recordings', 'simulation': 'Simulated boards',
     'transport': 'Transports of your own', 'aio': 'asyncio: r4link.aio', 'control': 'Control: r4link.control',
     'testing': 'Tests: r4link.testing'}
-# Modules that programs import by name: all their names, and of the others those of r4link.__all__.
+# Modules that programs import by name: all names. Of other modules, only the names in r4link.__all__.
 WHOLE = ('aio', 'control', 'devices', 'testing')
-# The results of waiting calls: these of a blocking board, coroutines of them in r4link.aio.
+# The results of waiting calls of a blocking board. The coroutines of r4link.aio have the same results.
 RESULTS = {'Sent': 'None', 'Read': 'bytes', 'Scanned': 'list[int]'}
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 
@@ -65,7 +65,7 @@ def signature(node, name=None):
 
 
 def members_of(node, trees):
-    """The members of a class by name, those of its base classes first."""
+    """The members of a class by name, after the members of its base classes."""
     members = {}
     for base in node.bases:
         name = getattr(base, 'id', getattr(getattr(base, 'value', None), 'id', ''))

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
--- R4 for Wireshark: the datagrams of R4 boards and their hosts on UDP, on SocketCAN, and in what r4 convert makes of a
--- recording. docs/how-to/wireshark.md tells how to install and use it; docs/reference/protocol.md and can.md tell what is shown.
+-- R4 for Wireshark: shows the datagrams of R4 boards and their hosts on UDP, on SocketCAN, and in recordings from
+-- r4 convert. Installation and use: docs/how-to/wireshark.md. Fields: docs/reference/protocol.md and can.md.
 
--- Wireshark may find this file in several places, the personal folder and that of the package: the first one counts.
+-- Wireshark may find this file in the personal folder and in the package's folder. Only the first file is used.
 if package.loaded.r4_dissector then
   return
 end
@@ -62,7 +62,7 @@ function r4.init()
   link.reset()
 end
 
--- --- what is said of a datagram beside its own fields
+-- --- notes on a datagram, in addition to its fields
 
 local function show_command(item, command, visited)
   if command.answer then
@@ -130,7 +130,7 @@ local function show_checksum(item, tvb, at, read)
   end
 end
 
--- The fields, or the beginning of them, for the list of packets.
+-- The fields for the list of packets, shortened.
 local function summary(text, read)
   local shown = text:sub(1, (read.trailer or #text + 1) - 1)
   if read.error then
@@ -142,7 +142,7 @@ local function summary(text, read)
   return shown
 end
 
--- A datagram, `text`, which is all of `tvb`. `where`: the keys of its link and its bus, its size if it was packed.
+-- `text`: the datagram, all of `tvb`. `where`: the keys of its link and its bus, and the size in packed form.
 local function show_datagram(text, tvb, pinfo, tree, where)
   local read = datagram.read(text)
   local kind, from = "damaged", nil
@@ -191,7 +191,7 @@ end
 
 local function on_udp(text, tvb, pinfo, tree)
   local src, dst = tostring(pinfo.src) .. ":" .. pinfo.src_port, tostring(pinfo.dst) .. ":" .. pinfo.dst_port
-  -- Either way the two are the same link.
+  -- Both directions have the same key.
   local where = { link = src < dst and src .. "|" .. dst or dst .. "|" .. src, bus = "udp" }
   if pinfo.src_port == 2018 then
     where.from = "board"
@@ -317,7 +317,7 @@ local function on_lane(tvb, pinfo, tree, id, node, lane)
   end
 end
 
--- Returns whether the frame is one of ours.
+-- True if the frame belongs to R4.
 local function on_can(tvb, pinfo, tree)
   local id, extended, remote = can_id(), can_extended(), can_remote()
   if not id or (remote and remote.value) then
@@ -348,7 +348,7 @@ local function on_can(tvb, pinfo, tree)
   return true
 end
 
--- --- where it is asked
+-- --- registration
 
 function r4.dissector(tvb, pinfo, tree)
   local size = tvb:len()
@@ -358,7 +358,7 @@ function r4.dissector(tvb, pinfo, tree)
   return size
 end
 
--- Other ports: what has a right checksum.
+-- Other ports: true for a datagram with a right checksum.
 local function is_datagram(tvb, pinfo, tree)
   local size = tvb:len()
   if size < 8 or size > datagram.longest + 2 then

@@ -2,14 +2,14 @@
 -- The grammar of a datagram and its checksum (docs/reference/protocol.md, section 1). Pure Lua, 5.2 to 5.4.
 
 local floor, byte, find = math.floor, string.byte, string.find
--- bit32 is gone from Lua 5.3 on, where operators do it, which 5.2 cannot parse.
+-- Lua 5.3 and later have operators instead of bit32, which Lua 5.2 cannot parse.
 local bxor = bit32 and bit32.bxor or load("return function(a, b) return a ~ b end")()
 local bxor4 = bit32 and bit32.bxor or load("return function(a, b, c, d) return a ~ b ~ c ~ d end")()
 
 local M = { longest = 1024 }
 
--- CRC-32 four bytes at a time: table k has the effect of a byte that k more bytes follow. (Tables for two bytes at once
--- are slower: they do not fit a processor's first cache.)
+-- CRC-32 four bytes at a time: table k has the effect of a byte with k more bytes after it. Tables for two bytes at
+-- once are slower, because they do not fit a processor's first cache.
 local t0, t1, t2, t3 = {}, {}, {}, {}
 for i = 0, 255 do
   local crc = i
@@ -31,7 +31,7 @@ for i = 0, 255 do
   t3[i] = one_more(t2[i])
 end
 
--- Of the first `size` bytes of `text`.
+-- The checksum of the first `size` bytes of `text`.
 function M.crc32(text, size)
   local crc, at = 4294967295, 1
   while at + 3 <= size do
@@ -54,7 +54,8 @@ end
 
 local field = "^([!-+%-./0-9<-\\%]_-~]+):([ -:<-\\%]_-~]*);"
 
--- The fields of `text` (name, values, place), the place of the trailer, its checksum and the right one; `error` and `at`.
+-- The fields of `text` (name, values, position), the position of the trailer, the found and the expected checksum, and
+-- an `error` with its position `at`.
 function M.read(text)
   local result = {}
   local caret = find(text, "^", 1, true)
@@ -92,7 +93,7 @@ function M.read(text)
   return result
 end
 
--- The last field of that name, or nil: what is asked for stands near the end.
+-- The last field with that name, or nil. Searches backwards, because the wanted fields are near the end.
 function M.field(fields, name)
   for index = #fields, 1, -1 do
     if fields[index].name == name then
@@ -120,7 +121,7 @@ local function values_of(field_)
 end
 M.values_of = values_of
 
--- What kind of datagram the fields are, and who says it: "board", "host" or nil.
+-- The kind of the datagram, and its sender: "board", "host" or nil.
 function M.kind(fields)
   local first = fields[1]
   if first.name == "H" then

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
--- The fields of an R4 datagram: the state's in the order of the wire, with the units that r4 convert writes into CSV,
--- and the commands' values, named as in r4 send --help. Both are rows of r4_board.def, which lies beside this file.
+-- The state fields of an R4 datagram, in the order of the datagram, with the units of r4 convert's CSV. Also the values
+-- of the commands, named as in r4 send --help. Both come from r4_board.def, in the same folder.
 -- tests/integration/test_wireshark.py compares them with r4.
 
 -- The types in Wireshark of a form's values (FieldForm), and of a command's value (ValueRole).
@@ -21,7 +21,7 @@ local file = assert(io.open(folder .. "r4_board.def"))
 local text = file:read("*a")
 file:close()
 
--- The arguments of each row, by the name of its macro. Of a string they have what is between its quotes.
+-- The arguments of each row, by the name of its macro; strings without their quotes.
 local rows = {}
 for macro, list in text:gmatch("\nR4_([%u_]+)(%b())") do
   local row, argument, depth, quoted = {}, "", 0, false
@@ -39,7 +39,7 @@ for macro, list in text:gmatch("\nR4_([%u_]+)(%b())") do
   table.insert(rows[macro], row)
 end
 
--- A form is that of a kind: what its values are called ("": the field itself), their types, and their units.
+-- The form of a kind: the names of its values ("": the field itself), their types and their units.
 local state, forms = {}, {}
 for _, row in ipairs(rows.STATE_FIELD) do
   state[#state + 1] = { name = row[2], form = row[3] }
@@ -53,8 +53,8 @@ for _, row in ipairs(rows.FIELD_KIND) do
   forms[row[1]] = form
 end
 
--- A command's values in their order. `last` takes all that are left, one by one; `maybe` may be left out. A letter
--- that needs a word has the words of all its kinds.
+-- A command's values in their order. `last`: repeated for all remaining values. `maybe`: may be omitted. A letter that
+-- needs a word has the words of all its kinds.
 local commands = {
   E = { title = "emergency", { "word", "string" }, { "cause", "uint32", last = true } },
   X = { title = "the user's devices", { "word", "string" }, { "value", "string", last = true } },

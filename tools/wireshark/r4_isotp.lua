@@ -84,8 +84,9 @@ local function flow_control(data)
   return { kind = "flow", flow = data:byte(1) % 16, block = data:byte(2), gap = data:byte(3) }
 end
 
--- What frame `number` of a capture, with `data`, is: a table with `kind` ("single", "first", "consecutive", "flow" or nil),
--- `payload` if the message is whole, its `frames`, and `failed`. `key`: bus and id; `visited`: it has been seen before.
+-- Describes frame `number` of a capture, with `data`: a table with `kind` ("single", "first", "consecutive", "flow" or
+-- nil), `payload` if the datagram is complete, its `frames`, and `failed`. `key`: bus and id. `visited`: true if the
+-- frame was read before.
 function M.look(key, data, number, time, visited)
   if visited and frames[number] then
     return frames[number]

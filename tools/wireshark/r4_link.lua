@@ -1,14 +1,14 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
--- What is told of a datagram by those before and behind it: packet numbers that are missing, late or there twice
--- (docs/reference/protocol.md, 4.5), which datagram confirms which command and how long that took, and when outputs became safe.
--- It is found out once, when a capture is read; notes(frame) is what there is to say when a frame is shown.
+-- Compares a datagram with the datagrams before and after it. Finds packet numbers that are missing, late or duplicated
+-- (docs/reference/protocol.md, 4.5), the datagram that confirms a command, the time from the command, and the moment
+-- when outputs became safe. A capture is analysed once, when it is read. notes(frame) returns the result for a frame.
 
 local datagram = require("r4_datagram")
 
 local M = {}
 
 local window, far = 64, 65536
-local most_sequences = 8 -- of one direction: programs that share a transport, answers to hosts not in control
+local most_sequences = 8 -- of one direction: programs that share a transport, answers to hosts without control
 
 local links, notes, stops = {}, {}, {}
 
@@ -29,7 +29,7 @@ local function note(frame)
   return each
 end
 
-local function ahead(a, b) -- of b; negative: behind
+local function ahead(a, b) -- how far a is after b; negative: before b
   local difference = (a - b) % 4294967296
   return difference < 2147483648 and difference or difference - 4294967296
 end
@@ -47,7 +47,8 @@ local function took(sequence, pnum, frame)
   sequence[pnum % window], sequence.frames[pnum % window] = pnum, frame
 end
 
--- How many of the numbers before `pnum` came in no datagram that is counted beside (see M.look()).
+-- The count of missing numbers before `pnum`, and the first such number. `beside`: numbers that are not missing (see
+-- M.look()).
 local function missing(sequence, pnum, step, beside)
   if step > window then
     return step - 1
@@ -62,8 +63,8 @@ local function missing(sequence, pnum, step, beside)
   return count, from
 end
 
--- A number that continues none of the sequences begins one. `t`: a board's clock. What is later by it, but has a number
--- that went by, is of a board that counts from 1 again, for its host is another.
+-- A number that continues no sequence begins a new sequence. `t`: a board's clock. If a datagram has a later `t` but an
+-- earlier number, the board has a new host and counts from 1 again.
 local function count(sequences, pnum, t, frame, beside, watcher)
   for index = #sequences, 1, -1 do
     local sequence = sequences[index]
@@ -94,10 +95,10 @@ local function count(sequences, pnum, t, frame, beside, watcher)
   sequences[#sequences].watcher, sequences[#sequences].t = watcher, t
 end
 
--- --- commands and what confirms them
+-- --- commands and their confirmations
 
 local drives = { "DHB1A", "DHB1B", "DHB2A", "DHB2B" }
--- The state field in which a command shows, and the values there: for boards that send no CMD.
+-- The state field that shows a command, and its values, for boards that send no CMD.
 local shows = {
   O = function(v) return "OSMC" .. (v[3] or ""), (v[1] or "") .. "," .. (v[2] or "") end,
   D = function(v) return drives[tonumber(v[3])], (v[1] or "") .. "," .. (v[2] or "") end,
@@ -147,7 +148,7 @@ local function on_command(link, fields, frame, time)
   note(frame).command = command
 end
 
--- A board without CMD: the first state that has the values which were commanded.
+-- For a board without CMD: the first state with the commanded values confirms a command.
 local function look_for_values(link, fields, frame, time)
   for index = #link.shown, 1, -1 do
     local command, all = link.shown[index], true
@@ -209,12 +210,12 @@ local function on_board(link, bus, fields, frame, time)
   end
 end
 
--- Answers have a count of their own where their host is not in control, and heartbeats that of the host where states
--- have that of a watcher. So nothing is said of these, but a number that they have is not missing. Nor is one of a
--- watcher, who is not heard while another program drives the board over a shared transport.
+-- Answers to a host without control are counted separately. While states are counted for a watcher, heartbeats have the
+-- numbers of the host. So these datagrams get no notes, but their numbers do not count as missing. A watcher's numbers
+-- never count as missing: a watcher is not heard while another program drives the board over a shared transport.
 local answers = { refusal = true, identity = true }
 
--- A checked datagram: `fields` with kind, from and pnum (or nil). `key`: of board and host; `bus`: of the transport.
+-- Takes a valid datagram: `fields` with kind, from and pnum (or nil). `key`: of board and host; `bus`: of transport.
 function M.look(key, bus, fields, frame, time)
   local link = links[key]
   if not link then
@@ -242,7 +243,7 @@ function M.look(key, bus, fields, frame, time)
   end
 end
 
--- The frame of an emergency stop with a number.
+-- Takes the frame of an emergency stop with a number.
 function M.look_at_stop(bus, number, frame, time)
   local key = bus .. ":" .. number
   local before = stops[key]
@@ -256,7 +257,8 @@ function M.look_at_stop(bus, number, frame, time)
   note(frame).command = stops[key]
 end
 
--- Nobody can say of it whether it was executed: the board tells no CMD, and no field of its states shows it.
+-- True for an unconfirmed command that the board could confirm. A board without CMD does not confirm a command that no
+-- state field shows.
 function M.is_open(command)
   return not command.answer and (command.stop or command.shows ~= nil or command.link.tells_cmd)
 end

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
--- The packed form, back to a datagram (docs/reference/packed.md). The table of words belongs to its version.
+-- Unpacks a datagram from the packed form (docs/reference/packed.md). The table of words belongs to its version.
 
 local M = {}
 
@@ -46,12 +46,12 @@ add("count", "DAC1 DAC2 GPIO")
 add("session", "SID")
 add("text", "LEAVE")
 
-local given = { [2] = 10, [3] = 10, [4] = 0x38 } -- so many names from the first that a layout gives
+local given = { [2] = 10, [3] = 10, [4] = 0x38 } -- by layout: the number of names, from the first, that it implies
 local sizes = { [0] = { 0, 0 }, { 4, 5 }, { 4, 8 }, { 5, 8 }, { 6, 8 }, { 4, 11 }, { 8, 8 }, { 8, 11 } }
 local widths = { flag = 1, short = 3, hundredths = 3, drive = 4, bldc = 4 }
 local text_digits = { a = ".", b = "-", c = "," }
 
--- Reads digits off a string; what is not there is an error, which unpack() catches.
+-- Reads digits of a string. A missing digit is an error, which unpack() catches.
 local Digits = {}
 Digits.__index = Digits
 
@@ -114,7 +114,7 @@ local function plain(number)
   return ("%.0f"):format(number)
 end
 
--- The decimal digits of up to 14 hexadecimal ones, too many for a double. Halved, if `halved`: an odd rest counts a half.
+-- The decimal digits of up to 14 hexadecimal digits, which may not fit a double. `halved`: half the number, rounded up.
 local function decimal(hex, halved)
   if #hex <= 13 then
     local number = hex == "" and 0 or tonumber(hex, 16)
@@ -237,7 +237,7 @@ local function unpack_or_fail(packed)
   return table.concat(fields) .. ("^0x%x^"):format(((a * 256 + b) * 256 + c) * 256 + d)
 end
 
--- The datagram, or nil and what is wrong.
+-- The datagram, or nil and the problem.
 function M.unpack(packed)
   local ok, result = pcall(unpack_or_fail, packed)
   if ok then

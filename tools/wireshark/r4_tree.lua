@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: GPL-3.0-or-later
--- The fields of the protocol in Wireshark, and how a datagram's fields are put into the tree.
+-- The fields of the protocol in Wireshark. Puts a datagram's fields into the tree.
 
 local tables = require("r4_fields")
 local datagram = require("r4_datagram")
@@ -49,7 +49,7 @@ M.response_time = proto_field("time", "r4.response_time", "Time from the command
 M.response_by = proto_field("string", "r4.response_by", "Told by")
 M.copy_of = proto_field("framenum", "r4.copy_of", "Sent before in", frames.DUP_ACK)
 
--- By name: the field of the whole, where it has several values, and the fields of these.
+-- By name: the fields of the values, and for several values the field of the whole.
 local known, commands = {}, {}
 
 local function filter_of(name, value)
@@ -90,7 +90,7 @@ for name, entry in pairs(tables.commands) do
   add_message(commands, name, entry)
 end
 
--- A T has up to 64 bits, more than a number of Lua holds exactly.
+-- T has up to 64 bits, more than a Lua number holds exactly.
 local function uint64(text)
   local digits = text:match("^0*(%d+)$")
   if not digits or #digits > 20 or (#digits == 20 and digits > "18446744073709551615") then
@@ -121,7 +121,7 @@ local function value_of(part, text)
   return datagram.whole(text, limits[kind][1], limits[kind][2])
 end
 
--- Puts the values of a field into the tree, which begin at `at`. Returns whether all of them are of the form.
+-- Puts the values of a field, which begin at `at`, into the tree. True if all values have the form.
 local function add_values(tree, tvb, entry, text, at)
   local parts, good, index, from = entry.parts, true, 1, 1
   if parts[2] and parts[2].maybe and not text:find(",.*,") then
@@ -146,7 +146,7 @@ local function add_values(tree, tvb, entry, text, at)
   return good and (index > #parts or parts[index].last == true)
 end
 
--- Puts a field into the tree; the datagram begins at `at`. False: values of another form; nil: an unknown field.
+-- Puts a field into the tree; the datagram begins at `at`. False: values in another form; nil: an unknown field.
 function M.add_field(tree, tvb, at, field, from_host)
   local range = tvb(at + field.first - 1, field.size)
   local name = field.name

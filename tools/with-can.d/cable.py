@@ -43,7 +43,7 @@ class Cable:
     def __init__(self, path):
         self._far = far_end(path)
         self._name = f'\0r4-usb-{secrets.token_hex(16)}'
-        self.listener = socket.socket(socket.AF_UNIX)  # of QEMU
+        self.listener = socket.socket(socket.AF_UNIX)  # for QEMU
         self.listener.bind(self._name)
         self.listener.listen(1)
         self._near = None

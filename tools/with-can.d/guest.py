@@ -39,10 +39,10 @@ KERNEL_ARGUMENTS = ('console=ttyS0 quiet panic=-1 mitigations=off no_timer_check
 # Page tables of four levels, and no kernel protection that costs time at each access to memory: 25 % less time.
 MACHINE = ('-M pc -cpu max,-la57,-smap,-smep,-umip,-pku -m 768M '
            '-nodefaults -no-user-config -vga none -display none -no-reboot -device virtio-serial-pci,max_ports=8').split()
-# One processor, whose instructions take 2 ns each. The guest's clock counts them, and stands still while QEMU has no
-# processor to run them; while the guest waits, its clock is this machine's.
+# One processor, whose instructions take 2 ns each. The guest's clock counts the instructions, so it stops while QEMU
+# does not run. While the guest waits, its clock runs as this machine's clock.
 COUNTED_TIME = '-accel tcg -icount shift=1 -smp 1'.split()
-# For a guest with a cable to a program here: both must have the same clock.
+# For a guest with a cable to a program here, because both must have the same clock.
 REAL_TIME = '-accel tcg,thread=multi -smp 2'.split()
 CAN = ('-object can-bus,id=bus -device kvaser_pci,canbus=bus '
        '-device kvaser_pci,canbus=bus').split()
@@ -70,7 +70,7 @@ def job(command):
 
 
 def die_with_us():
-    """Lets the kernel kill QEMU if this process ends without ending it."""
+    """Lets the kernel kill QEMU if this process ends without ending QEMU."""
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     if os.getppid() == 1:
         os._exit(1)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs a command on this kernel if it has CAN: makes vcan0 and a vxcan pair if they are missing.
 
-The last program that uses the interfaces removes those that were made.
+The last program that uses the interfaces removes the interfaces that were made.
 """
 import fcntl
 import os

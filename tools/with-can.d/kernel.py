@@ -67,7 +67,7 @@ def prepared():
 
 
 def mark_of_given():
-    """A suffix that distinguishes the kernel of R4_CAN_KERNEL from others, also from an earlier version of the file."""
+    """A suffix that distinguishes the kernel of R4_CAN_KERNEL from other kernels and earlier versions of the file."""
     given = os.environ.get('R4_CAN_KERNEL')
     if not given:
         return ''

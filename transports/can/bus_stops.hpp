@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The emergency stop of a CAN bus, which every board obeys. Its frames overtake all waiting frames.
-// CanBus owns one object, so that several members send one stop.
+// CanBus owns one object, so that its members share one stop.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -19,8 +19,8 @@ class BusStops {
  public:
   // The shortest time between two frames with the same number.
   static constexpr std::chrono::milliseconds spacing{10};
-  // Announcements within this time share a number. A host repeats a confirmed stop for longer, so a
-  // stop that a host clears meanwhile takes effect again.
+  // Announcements within this time share a number. A host repeats a stop for longer, so a further
+  // stop takes effect even if a host clears the first stop meanwhile.
   static constexpr std::chrono::milliseconds together{100};
 
   BusStops(asio::io_context& io, CanMedium& medium);

@@ -21,10 +21,10 @@ namespace {
 
 constexpr const char* check_the_wire = "check wiring, termination and bit rate";
 constexpr std::chrono::milliseconds look_interval{100};
-constexpr int most_looks = 8;  // then the other work of the loop has its turn
-// The time that a program on an emulated processor takes to answer.
+constexpr int most_looks = 8;  // then other work of the loop runs
+// A program on an emulated processor answers within this time.
 constexpr std::chrono::microseconds most_polling{400};
-// After that the loop may sleep, so that a caller of its poll() gets control back.
+// After this time the loop may sleep, so that a caller of its poll() regains control.
 constexpr std::chrono::milliseconds most_awake{10};
 
 Problem filter_problem(Problem problem) {
@@ -114,7 +114,8 @@ void CanBus::clear_places() {
     hear();
 }
 
-// If the kernel refuses the filters, the bus goes down, later: a member may be joining or leaving.
+// If the kernel refuses the filters, the bus goes down in the next turn of the loop, because a
+// member may be joining or leaving.
 void CanBus::hear() {
   if (medium_->number() < 0 || set_filters()) return;
   asio::post(io_, deafness_.handler([this, error = errno] {
@@ -163,7 +164,7 @@ void CanBus::receive() {
                       now);
   const bool tired = now - woken_ >= most_awake;
   if (tired || !polling_.worthwhile(now)) return listen();
-  ::sched_yield();  // to the sender, if they share a processor
+  ::sched_yield();  // the sender may share the processor
   asio::defer(io_, reading_.handler([this] { receive(); }));
 }
 
@@ -198,7 +199,7 @@ void CanBus::hand_over(std::size_t count) {
       // A frame of another node proves that this node is on the bus.
       if (!up() || trouble_ == Trouble::not_acknowledged) come_up();
     } else if (!up() && classify(in_[i].frame).kind != CanIdKind::emergency_stop) {
-      continue;  // it did not reach the bus
+      continue;  // the frame did not reach the bus
     }
     const std::uint32_t at_us = to_us(in_[i].at);
     for_each_member([&](Member& member) { member.on_frame(in_[i].frame, at_us); });
@@ -224,7 +225,7 @@ void CanBus::on_error_frame(const CanMedium::Received& received) {
   }
 }
 
-// Error frames report only changes, so a new socket must ask for the state.
+// Error frames report only changes, so the state must be read for a new socket.
 void CanBus::look_at_controller() {
   const std::string state = medium_->state();
   if (state == "bus-off") return go_bus_off();
@@ -310,7 +311,7 @@ void CanBus::look() {
   look_at_controller();
 }
 
-void CanBus::tell(CarrierEvent event) {  // a copy: standing_ may change in a call
+void CanBus::tell(CarrierEvent event) {  // by value: standing_ may change in a call
   for_each_member([&](Member& member) { member.on_bus(event); });
 }
 

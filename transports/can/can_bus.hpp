@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One CAN medium, which its users in an event loop share: one socket with kernel filters for the
-// ids in use, frames in batches, and the state of the bus as events.
+// A CAN medium that members in one event loop share. It has one socket with kernel filters for the
+// ids in use, passes frames in batches, and reports the state of the bus as events.
 //
-// Each member hears every frame that any member asked for, except frames that members send. Frames
+// A member receives the frames with the ids of all members, except frames that members send. Frames
 // leave in the order of the offers, and no transfer interrupts another member's transfer. The bus
-// takes at most `ahead` frames, and more when the interface has taken all of these. After 100 ms
-// without progress it drops them. Without a wire (vcan, vxcan) it polls briefly before it sleeps.
+// takes at most `ahead` frames, and more when the interface has taken all of these frames. After
+// 100 ms without progress the bus drops the frames. Without a wire (vcan, vxcan), the bus polls
+// briefly before it sleeps.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +29,7 @@
 
 namespace r4 {
 
-// More than 15 members: socket, timers, waiting frames and members all change with every frame.
+// More than 15 data members, because socket, timers, waiting frames and members change together.
 class CanBus : public std::enable_shared_from_this<CanBus> {
  public:
   using Clock = CanMedium::Clock;
@@ -38,18 +39,18 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   class Member {
    public:
     virtual void on_frame(const CanFrame& frame, std::uint32_t at_us) = 0;
-    virtual void on_drained() {}  // all frames that had arrived were handed over
+    virtual void on_drained() {}  // all arrived frames were delivered
     // True during a transfer whose next frame comes from the other end.
     virtual bool awaits_frame() const { return false; }
     // True if there is a frame to send now. The bus accepts it with frame_sent().
     virtual bool offer(std::uint32_t, CanFrame&) { return false; }
-    // The same for a frame that may overtake accepted frames.
+    // As offer(), for a frame that may overtake accepted frames.
     virtual bool offer_urgent(std::uint32_t, CanFrame&) { return false; }
     virtual void frame_sent(std::uint32_t) {}
-    // The interface has taken a frame of this member that had to wait.
+    // The interface has taken a frame of this member after a wait.
     virtual void on_late_frame(const CanFrame&, std::uint32_t) {}
-    virtual void on_sent() {}  // all members were asked for frames: time to set a timer
-    // The bus came up or went down (transfers are over), or the controller is in trouble.
+    virtual void on_sent() {}  // all members had a turn to offer frames: time to set a timer
+    // The bus came up, went down (which ends all transfers), or has a warning.
     virtual void on_bus(const CarrierEvent& event) = 0;
     // The bus took no frame for `patience`: the waiting frames are lost.
     virtual void on_stuck() {}
@@ -58,14 +59,14 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
     ~Member() = default;
   };
 
-  // Microseconds of the clock of members; wraps.
+  // The members' clock, in us; wraps.
   static std::uint32_t to_us(Clock::time_point at) {
     return static_cast<std::uint32_t>(
         std::chrono::duration_cast<std::chrono::microseconds>(at.time_since_epoch()).count());
   }
   static std::uint32_t now_us() { return to_us(Clock::now()); }
 
-  // The bus of that interface in this event loop; opens it if it is not open. Throws Error.
+  // The bus of `interface` in this event loop, opened if it is not open. Throws Error.
   static std::shared_ptr<CanBus> of(asio::io_context& io, const std::string& interface, bool fd);
 
   // A separate bus on `medium`, which is opened. Throws Error.
@@ -76,22 +77,22 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   CanBus(const CanBus&) = delete;
   CanBus& operator=(const CanBus&) = delete;
 
-  // Until it leaves, a member hears the 11-bit `ids`, or with join_all() all frames of every kind.
+  // Until a member leaves, it receives the 11-bit `ids`, or with join_all() frames of every kind.
   void join(Member& member, std::vector<std::uint32_t> ids);
   void join_all(Member& member);
   void leave(Member& member) noexcept;
   bool has(const Member* member) const;
 
   void send();
-  // Hands over the frames that have arrived; true if there were any. Call it before acting on a
-  // time-out: a delayed loop may find the time-out and the frame together.
+  // Delivers the arrived frames; true if there were any. Call it before acting on a time-out,
+  // because a delayed loop may find the time-out and the frame together.
   bool take();
   BusStops& stops() { return stops_; }
 
   bool up() const { return trouble_ != Trouble::down; }
-  // The newest event while it is still true, for a new member.
+  // The newest event, for a new member; none if the event does not apply at present.
   const std::optional<CarrierEvent>& standing() const { return standing_; }
-  // True if frames wait for the interface. Members are asked again when it has taken all of them.
+  // True if frames wait for the interface. When it has taken all of them, members may offer again.
   bool full() const { return out_count_ != 0; }
   template <class Predicate>
   bool holds(Predicate predicate) const {
@@ -149,15 +150,15 @@ class CanBus : public std::enable_shared_from_this<CanBus> {
   OperationSlot deafness_;  // the report that the kernel has refused the filters
 
   std::vector<Place> members_;
-  std::size_t next_ = 0;  // the place of the member whose turn it is
-  int calling_ = 0;       // members are being called: their places stay
+  std::size_t next_ = 0;  // index of the member that offers next
+  int calling_ = 0;       // not 0 while members are called: no place is removed
   bool sending_ = false;
   bool receiving_ = false;
   AdaptivePolling polling_;
   Clock::time_point woken_;
   std::array<CanFrame, ahead> out_;
   std::array<Member*, ahead> out_of_{};  // the member that offered the frame; null: has left
-  bool late_ = false;                    // the interface has refused these frames once
+  bool late_ = false;                    // the interface has refused frames of out_ once
   std::size_t out_count_ = 0;
   Clock::time_point progress_;
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The sending part of CanBus.
 #include <algorithm>
 #include <asio/post.hpp>
 #include <cerrno>
@@ -14,7 +13,7 @@ constexpr std::chrono::milliseconds retry_interval{1};
 
 }  // namespace
 
-// Flow control must not wait for a whole datagram of telemetry: on a slow bus it would be late.
+// On a slow bus, flow control that waited for a whole datagram of telemetry would be late.
 void CanBus::send_urgent(std::uint32_t now_us) {
   CanFrame frame;
   for (const Place& place : members_) {
@@ -26,7 +25,7 @@ void CanBus::send_urgent(std::uint32_t now_us) {
 }
 
 // Takes frames from members, one member's transfer after another. True if there are any. Called
-// only when no frame is left: the longer a member keeps its datagrams, the newer they are.
+// only when no frame is left, so that members offer their newest datagrams.
 bool CanBus::refill(std::uint32_t now_us) {
   std::size_t quiet = 0;
   while (out_count_ < ahead && quiet < members_.size()) {

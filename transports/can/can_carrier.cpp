@@ -31,7 +31,7 @@ constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;
 constexpr std::uint32_t look_again_us = 20000;
 
-// More than 15 members: four are its timer.
+// More than 15 data members: four belong to the timer.
 class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member {
  public:
   CanCarrier(asio::io_context& io, CanCarrierOptions options,
@@ -83,13 +83,13 @@ class CanCarrier final : public Carrier, public BoardEnd, private CanBus::Member
   const CanCarrierOptions is_;
   const std::function<std::shared_ptr<CanBus>()> open_bus_;
   CanNode node_;
-  CanTurn turn_{std::random_device{}()};  // of a host
+  CanTurn turn_{std::random_device{}()};  // for a host
   OverheardLane others_;                  // commands of other hosts to the same board
   mutable CarrierCounters counters_;      // counters() adds the counts of node_ and bus_
   std::array<Lane, 2> lanes_;
   std::shared_ptr<CanBus> bus_;
-  StopNumbers stops_;   // of a host
-  CanTrouble trouble_;  // of a host
+  StopNumbers stops_;   // for a host
+  CanTrouble trouble_;  // for a host
   Handler* handler_ = nullptr;
   LoopTimer timer_;
   OperationSlot timing_;
@@ -148,7 +148,7 @@ void CanCarrier::open(Handler& handler) {
                                                     command_id(is_.node)});
   if (bus->up()) on_bus({CarrierEvent::Kind::up, Problem{ErrorKind::open, is_.name, "", ""}});
   const std::optional<CarrierEvent> standing = bus->standing();
-  if (standing && bus_ == bus) on_bus(*standing);  // not closed meanwhile
+  if (standing && bus_ == bus) on_bus(*standing);  // on_bus() may have closed this carrier
 }
 
 void CanCarrier::close() noexcept {
@@ -211,7 +211,7 @@ bool CanCarrier::begin(std::string_view bytes, std::uint32_t now_us) {
   return true;
 }
 
-// The same frame from all watchers, so it does not collide. Without a board it has no effect.
+// All watchers send the same frame, so the frames do not collide.
 SendResult CanCarrier::send_lease() {
   const Clock::time_point now = Clock::now();
   if (!trouble_.hears_board(now) || trouble_.hears_host(now)) return SendResult::down;
@@ -291,7 +291,7 @@ void CanCarrier::arm() {
   IsotpDeadline deadline = node_.deadline();
   if (handler_ == nullptr || !deadline.armed) return;
   const std::uint32_t now_us = CanBus::now_us();
-  // A due frame waits until the bus asks for it. A later deadline may be a time-out.
+  // A due frame waits until the bus has room. A later deadline may be a time-out.
   if (bus_->full() && reached(now_us, deadline.at_us)) deadline.at_us = now_us + look_again_us;
   if (armed_ && reached(deadline.at_us, armed_for_us_)) return;
   armed_ = true;

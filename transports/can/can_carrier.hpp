@@ -27,7 +27,7 @@ struct CanCarrierOptions {
   Role role = Role::host;
   std::uint8_t node = 1;
   bool fd = false;
-  bool packs = true;  // of a host; a board follows its setting
+  bool packs = true;  // for a host; a board uses its setting
   std::string name;
 };
 

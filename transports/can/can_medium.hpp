@@ -28,8 +28,8 @@ class CanMedium {
 
   enum class Outcome : std::uint8_t {
     done,
-    busy,    // the socket's share of the queue is used up: wait until it is writable
-    full,    // the interface's queue is full: the system does not report when it has room
+    busy,    // the socket's share of the queue is used up: wait until the socket is writable
+    full,    // the interface's queue is full; the system does not report when it has room
     failed,  // with errno
   };
 
@@ -40,10 +40,10 @@ class CanMedium {
 
   // As shown to users: "can://can0".
   virtual const std::string& name() const = 0;
-  // Opens or reopens the medium, which hears nothing yet. Throws Error.
+  // Opens or reopens the medium, which receives no frames before hear(). Throws Error.
   virtual void open() = 0;
   virtual void close() noexcept = 0;
-  // The descriptor, readable after frames have come or the medium has failed; -1 while closed.
+  // The descriptor, readable after frames have arrived or the medium has failed; -1 while closed.
   virtual int number() const = 0;
   // True without a controller and a wire: frames come as fast as programs send them.
   virtual bool simulated() const { return false; }
@@ -54,8 +54,8 @@ class CanMedium {
   // `error`: errno.
   virtual Problem problem(int error) const = 0;
 
-  // Hears these 11-bit ids (the emergency stop's id includes numbered stops), or frames of every
-  // kind. More may be heard. False, with errno, if the kernel refuses; the old filters stay.
+  // Receives these 11-bit ids (the emergency stop's id includes numbered stops), or frames of every
+  // kind. Further frames may arrive. False, with errno, if the kernel refuses; old filters stay.
   [[nodiscard]] virtual bool hear(const std::vector<std::uint32_t>&) { return true; }
   [[nodiscard]] virtual bool hear_everything() { return true; }
 

@@ -24,7 +24,7 @@ namespace r4 {
 namespace {
 
 // Frames in the kernel's queue of an interface can be neither replaced nor overtaken. So a socket
-// keeps few frames there: the kernel's least buffer, about six.
+// keeps few frames there, by the kernel's smallest buffer: about six.
 constexpr int least_send_buffer = 1;
 constexpr int receive_buffer = 1 << 20;
 // The highest priority without a privilege: the first band of pfifo_fast.
@@ -48,7 +48,7 @@ FileDescriptor open_socket(const std::string& interface, int index) {
   sockaddr_can address{};
   address.can_family = AF_CAN;
   address.can_ifindex = index;
-  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): as the sockets have it
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): required by bind(2)
   if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     fail(interface, errno);
   }

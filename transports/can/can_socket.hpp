@@ -48,7 +48,7 @@ class CanSocket final : public CanMedium {
   const std::string name_;
   const bool fd_;
   FileDescriptor descriptor_;
-  FileDescriptor first_;  // has its own priority and queue
+  FileDescriptor first_;  // for send_first(); has its own priority and queue
   bool simulated_ = false;
   bool heard_rate_switch_ = false;
   std::uint32_t overflows_ = 0;

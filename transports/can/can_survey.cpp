@@ -119,7 +119,7 @@ void CanSurvey::take(std::uint8_t node, Text bytes, std::uint32_t at_us) {
       break;
     case MessageKind::host_heartbeat:
     case MessageKind::command:
-      ++board.damaged;  // a host on a board's id
+      ++board.damaged;  // a host sent on a board's id
       return;
   }
   PacketTracker& packets = lanes_[node]->packets;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Whether a board and other hosts are heard on a CAN bus, and why datagrams do not pass. No I/O.
 //     foreign frames   frames came on the board's command id for host_completes, but no whole
-//                      datagram. A host sends ten heartbeats a second: another protocol uses the id
+//                      datagram. A host sends ten heartbeats a second, so another protocol uses it
 //     late frames      the board is heard, but late_transfers transfers within late_within were not
 //                      answered in time (N_Bs, N_Cr): frames are held back, or lost
 #pragma once
@@ -22,7 +22,7 @@ class CanTrouble {
   static constexpr Duration board_silence{3000};  // six heartbeats of a board
   static constexpr Duration host_silence{300};    // three heartbeats of a host
   static constexpr Duration host_completes{500};  // five heartbeats of a host
-  static constexpr Duration frames_over{1000};    // frames after a longer pause are new
+  static constexpr Duration frames_over{1000};    // after a longer pause, host_completes restarts
   static constexpr std::size_t late_transfers = 3;
   static constexpr Duration late_within{2000};
 

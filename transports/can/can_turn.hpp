@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Decides which host sends on a board's command id (docs/reference/can.md, "Several hosts"). All
-// hosts answer a heartbeat at once: on one id their frames would mix and, on real wires, drive
-// hosts bus-off. So a host listens before it sends, and the later host is silent until it has not
-// heard the other for a second. The emergency stop needs no turn: all hosts send the same frame.
+// hosts answer a heartbeat at once. On one id their frames would mix and, on real wires, drive
+// hosts bus-off. So a host listens before it sends. The later host is silent until it has received
+// no frame of the earlier host for a second. The emergency stop needs no turn, because all hosts
+// send the same frame.
 #pragma once
 
 #include <chrono>
@@ -20,7 +21,7 @@ class CanTurn {
   static constexpr Duration listening{120};
   // Two hosts that begin within this time have not heard each other, and both fall silent.
   static constexpr Duration settling{50};
-  // As long as a board waits for its host. A random time is added, so that one of two is first.
+  // A board waits as long for its host. A random time is added, so that one of two hosts is first.
   static constexpr Duration silence{1000};
   static constexpr Duration most_chance{250};
 
@@ -59,7 +60,7 @@ class CanTurn {
 
   std::minstd_rand chance_;
   State state_ = State::ours;
-  Time until_;  // the turn cannot be ours before, unless it is ours
+  Time until_;  // when the turn becomes ours, if it is not ours
   bool speaking_ = false;
   Time since_;  // when this host began to send
   Time last_;   // when this host last sent

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The numbers of one host's stops on a bus: 18 bits, which a board reports in the heartbeat field
-// STOP, for the packet number of 32 bits. Keeps the newest 16, as many as a session repeats.
+// The numbers of one host's stops on a bus. A number has 18 bits and replaces the stop's packet
+// number of 32 bits. A board reports the number in the heartbeat field STOP. Keeps the newest 16
+// stops, as many as a session repeats.
 #pragma once
 
 #include <cstddef>
@@ -22,8 +23,8 @@ class StopNumbers {
   // True if the bus carries a stop of this host under that number.
   bool carries(std::uint32_t carried) const { return stop_of(carried) != nullptr; }
 
-  // A heartbeat that reports one of these stops, with its packet number, written to `room`
-  // (max_datagram bytes). Any other datagram is returned unchanged.
+  // In a heartbeat that reports one of these stops, replaces the number by the packet number. The
+  // result is written to `room` (max_datagram bytes). Returns any other datagram unchanged.
   Text in_full(Text datagram, char* room) const;
 
  private:

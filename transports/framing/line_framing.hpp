@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams on a byte stream, one a line (docs/reference/protocol.md "On a byte stream").
+// Datagrams on a byte stream, one per line (docs/reference/protocol.md "On a byte stream").
 // A line ends with CR, LF or both; sent lines end with CR LF. Empty lines are ignored. A line
 // longer than max_datagram is counted and discarded up to its terminator. So noise, a cut or a
-// wrong baud rate costs only the datagrams that it hits. No heap; memory is one line.
+// wrong baud rate affects only the lines in which it occurs. No heap; memory is one line.
 #pragma once
 
 #include <cstddef>

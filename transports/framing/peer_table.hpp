@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Numbers for the hosts that send to a board over UDP.
-// Each sender of a valid datagram gets a place; if none is free, that of the sender that was silent
-// longest. The controlling host keeps its place, because with another number it would be another
-// host to the board. It is the audience of datagrams for all. A watcher never becomes the audience,
-// because its lease brings it everything. A number is never given twice.
+// Each sender of a valid datagram gets a place. If no place is free, it replaces the sender that
+// was silent longest. The controlling host keeps its place, because the board recognizes the host
+// by its number. Datagrams for everyone go to one sender, the audience, which is the controlling
+// host if there is one. A watcher never becomes the audience, because its lease brings it all
+// datagrams. A number is never given twice.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@ class PeerTable {
   static constexpr int capacity = places;
   static constexpr std::uint32_t nobody = 0;
 
-  // The number of the sender of `bytes`; nobody if they are not a valid datagram.
+  // The number of the sender of `bytes`; `nobody` if `bytes` are not a valid datagram.
   std::uint32_t heard(const Address& from, Text bytes) {
     Datagram datagram;
     if (!read_datagram(bytes, datagram)) return nobody;
@@ -28,10 +29,10 @@ class PeerTable {
                        : one && name == "H" ? Says::heartbeat
                                             : Says::other);
   }
-  // The same for a valid datagram that is not a W.
+  // The number of the sender of a valid datagram that is not a W.
   std::uint32_t heard(const Address& from) { return heard(from, Says::other); }
 
-  // True if that sender asked to watch, and has sent no heartbeat since.
+  // True if the sender of that number has asked to watch, and has sent no heartbeat since.
   bool watches(std::uint32_t number) const {
     for (const Entry& entry : entries_) {
       if (number != nobody && entry.number == number) return entry.watches;
@@ -39,28 +40,28 @@ class PeerTable {
     return false;
   }
 
-  // The host of that number has control and keeps its place until another is held. With nobody, the
-  // host has lost control, and may regain it.
+  // The host of that number has control and keeps its place until another host is held. With
+  // `nobody`, the host has lost control, and may regain it.
   void hold(std::uint32_t number) {
     in_control_ = number != nobody;
     if (!in_control_) return;
     audience_ = held_[0] = number;
     held_count_ = 1;
   }
-  // The controlling host also has that place.
+  // The controlling host also sends from the address of that number.
   void also_hold(std::uint32_t number) {
     if (!in_control_ || number == nobody || held_count_ == most_held || is_held(number)) return;
     held_[held_count_++] = number;
   }
 
-  // The address of that number; null if it has lost its place.
+  // The address of that number; null if the number has no place.
   const Address* find(std::uint32_t number) const {
     for (const Entry& entry : entries_) {
       if (number != nobody && entry.number == number) return &entry.address;
     }
     return nullptr;
   }
-  // The controlling host, else the newest sender that does not watch; nobody before the first.
+  // The controlling host, else the newest sender that does not watch; `nobody` if there is none.
   std::uint32_t audience() const { return audience_; }
 
  private:
@@ -68,7 +69,7 @@ class PeerTable {
     Address address = Address();
     std::uint32_t number = nobody;  // nobody: free
     bool watches = false;
-    std::uint64_t heard = 0;  // turn of its newest datagram
+    std::uint64_t heard = 0;  // turn_ at its newest datagram
   };
   enum class Says : std::uint8_t { other, watch, heartbeat };
 

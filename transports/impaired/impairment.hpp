@@ -39,7 +39,7 @@ struct ImpairmentCounters {
   std::uint64_t duplicated = 0;
   std::uint64_t corrupted = 0;
   std::uint64_t cut = 0;
-  std::uint64_t overflow = 0;  // dropped because too many were on their way
+  std::uint64_t overflow = 0;  // dropped because too many datagrams were on their way
 };
 
 class ImpairedDirection {

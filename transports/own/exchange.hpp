@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Connects a program's own transport, whose calls may wait, to a link's loop, by a thread.
+// Connects a program's own transport to a link's loop by a thread: calls of the transport may wait.
 //     opening ──────────────▶ up ────────────────────────▶ down ─────────▶ ended
 //        │   open() returns   ▲   send() throws, or end()  ▲ │    end()
 //        │                    └──── open() returns ────────┼─┘
@@ -35,10 +35,11 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
   using Clock = std::chrono::steady_clock;
   using Item = typename Outbox::Item;
   static constexpr std::size_t most_received = 1024;
-  static constexpr std::chrono::milliseconds pause{200};  // between two attempts to open it
+  static constexpr std::chrono::milliseconds pause{200};  // between two calls of open()
   static constexpr std::chrono::seconds end_patience{1};
 
-  // `news()`: items wait for take(), or it went up or down. On any thread, under the lock.
+  // `news()` is called when items wait for take(), or the transport went up or down. It is called
+  // on any thread, under the lock.
   Exchange(std::string name, std::unique_ptr<Own> own, std::unique_ptr<Outbox> outbox,
            std::function<void()> news)
       : name_(std::move(name)),
@@ -61,7 +62,7 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
     }
     if (state_ != State::up) throw Error(problem_);
   }
-  // Sends the waiting items and closes the transport. A call that hangs is left to its thread.
+  // Sends the waiting items and closes the transport. A hanging call continues in its thread.
   void end() noexcept {
     if (!thread_.joinable()) return;
     std::unique_lock lock(mutex_);
@@ -82,8 +83,8 @@ class Exchange : public std::enable_shared_from_this<Exchange<Own, Outbox>> {
     changed_.notify_all();
     return true;
   }
-  // At most `most` received items, oldest first. If it returns `most`, news() follows. Returns
-  // nothing while the transport is not up, and nothing from before a failure.
+  // At most `most` received items, oldest first. If it returns `most`, news() follows. Returns no
+  // items while the transport is not up, and no items from before a failure.
   std::vector<Item> take(std::size_t most) {
     const std::lock_guard lock(mutex_);
     if (state_ != State::up) return {};

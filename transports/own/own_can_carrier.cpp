@@ -127,7 +127,7 @@ class OwnCanMedium final : public CanMedium {
   const std::string& name() const override { return source_->name; }
   void open() override {
     source_->exchange->start();
-    source_->wake();  // for what came before this call
+    source_->wake();  // for frames that came before this call
     open_ = true;
   }
   void close() noexcept override { open_ = false; }
@@ -137,7 +137,7 @@ class OwnCanMedium final : public CanMedium {
     problem.thing = source_->name;
     return problem;
   }
-  // Failures first: after frames, CanBus waits for the next event and would report a failure late.
+  // Reports a failure first, because CanBus waits for the next event after frames.
   int receive(std::array<Received, batch>& frames) override {
     eventfd_t ignored = 0;
     ::eventfd_read(source_->news.get(), &ignored);

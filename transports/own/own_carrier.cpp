@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t normal_entries = 32;
 constexpr std::size_t state_entries = 1;
-constexpr std::size_t most_at_once = 32;  // then the other work of the loop has its turn
+constexpr std::size_t most_at_once = 32;  // then other work of the loop runs
 
 struct DatagramOutbox {
   using Item = std::string;
@@ -58,13 +58,13 @@ class OwnCarrier final : public Carrier {
       : loop_(loop), transport_(std::move(transport)), name_(transport_->name()) {}
   ~OwnCarrier() override { close(); }
 
-  // If it throws, the exchange goes on, and a later call succeeds when the transport is up.
+  // If open() throws, the exchange continues, and a later call succeeds when the transport is up.
   void open(Handler& handler) override {
     if (handler_ != nullptr) close();
     if (!exchange_) make_exchange();
     exchange_->start();
     handler_ = &handler;
-    post_take(opening_);  // for what came before this call
+    post_take(opening_);  // for datagrams that came before this call
     report();
   }
   void close() noexcept override {

@@ -67,8 +67,8 @@ void LineCarrier::stop() noexcept {
   stream_.close(ignored);
 }
 
-// Asio reads once before it waits, which on a tty costs half as much as arming a wait. A stream
-// that asks must not be read at once when a stopped program continues.
+// Asio reads once before it waits, which on a tty costs half as much as arming a wait. When a
+// stopped program continues, a stream that `asks` must not be read before may_read().
 void LineCarrier::begin_to_receive() {
   if (asks_) {
     stream_.async_wait(asio::posix::descriptor_base::wait_read,

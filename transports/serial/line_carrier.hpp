@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Datagrams as lines on a tty: the common part of serial_carrier.cpp and pty_carrier.cpp. Each line
 // is one write; a line taken in part is completed first. Waiting lines keep the order of SendQueue.
-// Reads at most 4096 bytes a turn. It is up while the stream is open.
+// Reads at most 4096 bytes a turn. The carrier is up while the stream is open.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@
 
 namespace r4 {
 
-// More than 15 members: the stream with its waits, the line in progress, and the search timer.
+// More than 15 data members: the stream with its waits, the line in progress, the search timer.
 class LineCarrier : public Carrier {
  public:
   void close() noexcept override;
@@ -37,7 +37,7 @@ class LineCarrier : public Carrier {
 
   // Looks for the device, and starts the stream if the device exists.
   virtual void look() = 0;
-  // The stream has ended: errno, or 0 for an end of file. Returns the problem to report.
+  // The stream has ended. `error`: errno, or 0 for an end of file. Returns the problem to report.
   virtual Problem on_lost(int error) = 0;
   // For a stream that `asks`: true if this program may read. Otherwise the end closes the carrier.
   virtual bool may_read() { return true; }

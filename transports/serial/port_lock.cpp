@@ -34,7 +34,7 @@ bool PortLock::lock(int device, const DeviceClaim& claim) {
   while (true) {
     const struct flock other = other_from(device, place);
     if (other.l_type == F_UNLCK) break;
-    // A yielding program takes the port from one program only, or two of them would alternate.
+    // A yielding program takes the port from one program only, or two programs would alternate.
     if (!claim.takes || other.l_len == 0 || (claim.yields && place != 0)) {
       errno = EWOULDBLOCK;
       return false;

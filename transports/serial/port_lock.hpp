@@ -3,8 +3,8 @@
 // from a hanging program. The locks end with the last descriptor of the opening.
 //     bytes   0    1    2    3 …
 //     A       A                   yields: it has one byte
-//     B            B              has taken the port from A; yields, but not to one that yields
-//     C                 C C C …   has taken the port from B; does not yield, so it has the rest
+//     B            B              has taken the port from A; yields, but not to a yielding program
+//     C                 C C C …   has taken the port from B; does not yield: has all later bytes
 // A program has lost the port if a byte after its own is locked: A and B here.
 #pragma once
 
@@ -18,7 +18,7 @@ class PortLock {
  public:
   // False, with errno, if another program has the port and does not yield.
   bool lock(int device, const DeviceClaim& claim);
-  // True if another program has taken the port from this one.
+  // True if another program has taken the port from this program.
   bool is_taken() const;
   // True if the port was free, not taken from another program.
   bool is_first() const { return place_ == 0; }

@@ -33,7 +33,7 @@ constexpr std::chrono::milliseconds stale{30};
 constexpr int countable_bytes = 3500;
 constexpr std::size_t all_bytes = 4096 + 20480;
 
-// True for a link of a board: it leads into /dev/pts, or to nothing.
+// True for a link of a board: its target is in /dev/pts, or missing.
 bool is_our_kind(const std::filesystem::path& link) {
   std::error_code error;
   const std::filesystem::path target = std::filesystem::read_symlink(link, error);
@@ -61,7 +61,7 @@ class PtyCarrier final : public LineCarrier, public BoardEnd {
   const Url url_;
   std::string device_;  // "/dev/pts/5"
   bool linked_ = false;
-  std::string obstacle_;  // why a host that has it open cannot be heard
+  std::string obstacle_;  // why the datagrams of a host cannot be received
   FileDescriptor master_;
   UnreadMarks unread_;
 };
@@ -120,7 +120,7 @@ void PtyCarrier::make_link() {
     throw Error(ErrorKind::open, url_.text(), link.string() + " is there and leads to no pty",
                 "give another path, or remove it");
   }
-  // The new link replaces an old one in one step, so the path always has a link.
+  // The new link replaces an old link in one step, so the path always has a link.
   const fs::path fresh = fmt::format("{}.{}", link.string(), ::getpid());
   fs::create_symlink(device_, fresh, error);
   if (!error) {

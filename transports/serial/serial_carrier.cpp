@@ -67,7 +67,7 @@ class SerialCarrier final : public LineCarrier {
 
   const Url url_;
   const unsigned baud_;
-  SerialPort device_;     // the device that has been open
+  SerialPort device_;     // the device opened last
   std::string obstacle_;  // why the port cannot be reopened although it exists
   int obstructed_ = 0;    // consecutive looks with that obstacle
   const Claim claim_;
@@ -93,7 +93,7 @@ SerialCarrier::SerialCarrier(asio::io_context& io, Url url, Claim claim)
 void SerialCarrier::open(Handler& handler) {
   close();
   open_device(find_device(url_));
-  claim_->takes = false;  // once: at the next opening another program may rightly have it
+  claim_->takes = false;  // at the next opening, another program may have the device rightly
   handler_ = &handler;
   report_up();
 }
@@ -119,7 +119,7 @@ bool SerialCarrier::may_read() {
   return false;
 }
 
-// The path of the device that has been open; some adapters share one serial number.
+// The path of the device opened last. Some adapters share one serial number.
 std::string SerialCarrier::find_again() const {
   if (device_.serial_number.empty()) return find_device(url_);
   std::string path;
@@ -161,7 +161,7 @@ void SerialCarrier::look() {
     open_device(path);
   } catch (const Error& error) {
     look_later();
-    // A missing device was reported. A device that exists but cannot be opened needs help.
+    // A missing device was reported. A device that exists but cannot be opened needs a warning.
     const bool there = !path.empty() && ::access(path.c_str(), F_OK) == 0;
     if (!there || error.what() != obstacle_) obstructed_ = 0;
     obstacle_ = error.what();

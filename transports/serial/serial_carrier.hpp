@@ -4,7 +4,8 @@
 //     serial:auto                            the one R4 board on USB (2341:0266)
 //     serial:?sn=SERIAL                      the USB device with that serial number
 // 8N1, raw, no flow control, locked. Rates below 9600 are refused: 1200 baud orders an Arduino to
-// erase its program. An unplugged port is `down` at once, and looked for by serial number or path.
+// erase its program. If a port is unplugged, the carrier is `down` at once, and searches for the
+// port by serial number or path.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -16,7 +17,7 @@
 
 namespace r4 {
 
-// Throws Error{usage} for a URL that serial does not take.
+// Throws Error{usage} for a URL that serial refuses.
 std::unique_ptr<Carrier> make_serial_carrier(asio::io_context& io, const Url& url, Role role,
                                              Claim claim);
 

@@ -136,7 +136,7 @@ FileDescriptor open_serial_device(asio::io_context& io, const std::string& path,
   FileDescriptor device = real ? open_real(path, real_path, baud) : open_pty(io, real_path, baud);
   if (!lock.lock(device.get(), claim)) fail(path, errno);
   if (real && !claim.yields && lock.is_first()) ::ioctl(device.get(), TIOCEXCL);
-  // libserialport leaves VMIN at 0, where "no data" reads like a hang-up.
+  // libserialport leaves VMIN at 0, and then read(2) returns 0 for "no data" as for a hang-up.
   termios settings{};
   if (::tcgetattr(device.get(), &settings) != 0) fail(path, errno);
   settings.c_cc[VMIN] = 1;

@@ -44,7 +44,7 @@ void ShareClient::receive() {
       owner_.on_all_heard();
       break;
     }
-    // The holder has not read everything; its own messages can still be read.
+    // The holder ended without reading all messages. Its own messages can be read.
     if (size < 0 && errno == ECONNRESET) continue;
     if (size <= 0) {
       leave();

@@ -25,8 +25,8 @@ class ShareClient {
   class Owner {
    public:
     virtual void on_message(const ShareMessage& message) = 0;
-    virtual void on_all_heard() = 0;  // all messages that had arrived were handed over
-    // The holder does not answer, or has another version of R4 link. Repeated until it answers.
+    virtual void on_all_heard() = 0;  // all arrived messages were delivered
+    // The holder does not answer, or has another version of R4 link. Repeated until an answer.
     virtual void on_no_help(const Problem& why) = 0;
     virtual void on_closed() = 0;
 
@@ -66,7 +66,7 @@ class ShareClient {
   std::string thing_;
   pid_t process_ = 0;
   bool heard_ = false;  // since look_for_answer()
-  bool asked_ = false;  // and the holder has not answered
+  bool asked_ = false;  // true until the holder answers
   std::array<char, ShareMessage::max_size + 1> packet_;
 };
 

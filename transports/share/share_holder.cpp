@@ -53,7 +53,7 @@ class ShareHolder::Sharer : public std::enable_shared_from_this<Sharer> {
       const ssize_t size =
           receive_packet(connection_.native_handle(), packet.data(), packet.size());
       if (size < 0 && would_block(errno)) break;
-      // The program has not read everything; its own messages can still be read.
+      // The program ended without reading all messages. Its own messages can be read.
       if (size < 0 && errno == ECONNRESET) continue;
       if (size <= 0) return end();
       holder_.on_message(*this,
@@ -88,7 +88,7 @@ bool ShareHolder::hold(const ShareName& name, BoardRole role) {
   return true;
 }
 
-// Closed, with errno, if the loop cannot wait for it: an exception could end a driving program.
+// Closed, with errno, if the loop cannot wait for it. An exception could end a driving program.
 LoopDescriptor ShareHolder::on_loop(FileDescriptor descriptor) {
   LoopDescriptor waited_for(io_);
   if (!descriptor) return waited_for;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The end of a shared transport in the program that holds it. It sends a copy of every datagram to
-// the first most_served programs that say hello, and obeys a stop of any program. It serves such a
-// program beyond that limit: it hears whether the board obeys. A slow program loses copies.
+// the first most_served programs that send hello, and obeys a stop of any program. A program that
+// stopped the board is served beyond that limit, so it receives whether the board obeys. A slow
+// program loses copies.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -28,14 +29,14 @@ class ShareHolder {
   // Programs of any user that connect repeatedly take at most a few percent of the loop's time.
   static constexpr std::chrono::microseconds between_arrivals{300};
 
-  // Called on the loop's thread. Any of these may release the holder.
+  // Called on the loop's thread. Any of these calls may release the holder.
   class Owner {
    public:
     // The events that a new program must know: whether the transport is up, and its trouble.
     virtual std::vector<CarrierEvent> standing() const = 0;
     // Another program has sent this valid E:STOP.
     virtual void on_stop_of_another(std::string_view datagram) = 0;
-    // A controlling program asks for the transport.
+    // A controlling program requests the transport.
     virtual void on_asked() = 0;
 
    protected:
@@ -48,7 +49,7 @@ class ShareHolder {
   ShareHolder(const ShareHolder&) = delete;
   ShareHolder& operator=(const ShareHolder&) = delete;
 
-  // Takes the name of that role. False, with errno: EADDRINUSE if another program has the name.
+  // Takes the name of `role`. False, with errno: EADDRINUSE if another program has the name.
   bool hold(const ShareName& name, BoardRole role);
   void release() noexcept;
 

@@ -74,8 +74,8 @@ FileDescriptor take_share_name(const ShareName& name, BoardRole role) {
   });
 }
 
-// Another user's programs may keep the holder's queue full: a place is free for microseconds after
-// each accept(). So this tries for about the holder's time between two accept() calls.
+// Another user's programs may keep the holder's queue full. A place is free for microseconds after
+// each accept(), so this function tries for about the time between two accept() calls.
 FileDescriptor connect_to_holder(const ShareName& name, BoardRole role) {
   return local_socket(name, role, [](int local, const sockaddr* address, socklen_t size) {
     constexpr int most_tries = 300;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The local sockets of programs that share a transport. The kernel keeps their abstract names
-// (unix(7)), in a network namespace, until the program ends. A transport has two names: one for the
-// controlling program, one for a watching program that holds it while no program controls the
-// board. A name contains the user's number or the sharing group's name. Any user can take a name,
-// so both ends ask the kernel for the user at the other end. No call blocks.
+// (unix(7)), in a network namespace, until the program ends. A transport has two names. The first
+// is for the controlling program. The second is for a watching program that holds the transport
+// while no program controls the board. A name contains the user's number or the sharing group's
+// name. Any user can take a name, so both ends read the user at the other end from the kernel. No
+// call blocks.
 #pragma once
 
 #include <sys/types.h>
@@ -20,7 +21,7 @@
 
 namespace r4 {
 
-// Binds the name of the holder for `role`. None, with errno: EADDRINUSE if another program has it.
+// Binds the holder's name for `role`. None, with errno: EADDRINUSE if another program has the name.
 FileDescriptor take_share_name(const ShareName& name, BoardRole role);
 // Connects to a holder. None, with errno: ECONNREFUSED (no holder), would_block() (too many wait).
 FileDescriptor connect_to_holder(const ShareName& name, BoardRole role);

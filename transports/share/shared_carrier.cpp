@@ -32,7 +32,7 @@ constexpr milliseconds look_again{5}, look_again_slowly{100};
 // A longer time without a holder is reported.
 constexpr milliseconds take_over_within{100};
 
-// More than 15 members: the carrier, the search and both ends of sharing are one state machine.
+// More than 15 data members: the carrier, the search and both ends of sharing are one machine.
 class SharedCarrier final : public Carrier,
                             private Carrier::Handler,
                             private ShareHolder::Owner,
@@ -120,9 +120,9 @@ class SharedCarrier final : public Carrier,
   Search search_;
   State state_ = State::closed;
   bool up_ = false;
-  std::optional<Problem> trouble_;  // why it is down, or the warning that stands
+  std::optional<Problem> trouble_;  // why the transport is down, or its warning
   Carrier::Handler* handler_ = nullptr;
-  CarrierCounters shared_counters_;  // of datagrams by way of another holder
+  CarrierCounters shared_counters_;  // of datagrams through another holder
   mutable CarrierCounters counted_;
 };
 
@@ -150,7 +150,7 @@ void SharedCarrier::close() noexcept {
   holder_.release();
 }
 
-// Joins or becomes the holder. False: look again soon. Throws Error if the transport fails to open.
+// Joins or becomes the holder. False: look again soon. Throws Error if the transport does not open.
 bool SharedCarrier::take_part() {
   if (!holder_.holds()) share_ = find_();
   const bool controls = role_ == BoardRole::control;
@@ -220,8 +220,8 @@ bool SharedCarrier::is_found() {
   }
 }
 
-// Takes the name of the watching holder. False if another program was faster. A program that wants
-// control takes its name before it looks for this one, so one of the two sees the other.
+// Takes the name of the watching holder. False if another program was faster. A controlling program
+// takes its own name before it looks for this name, so one of the two programs finds the other.
 bool SharedCarrier::hold_to_watch() {
   if (!holder_.hold(share_, BoardRole::watch)) {
     if (const auto problem = out_of_resources(name_, errno)) throw Error(*problem);
@@ -234,7 +234,7 @@ bool SharedCarrier::hold_to_watch() {
   return false;
 }
 
-// If a watching holder was passed over, a device for one program is taken from that holder.
+// If a watching holder was passed over, an exclusive device is taken from that holder.
 void SharedCarrier::open_own() {
   state_ = State::holding;
   try {
@@ -298,7 +298,7 @@ SendResult SharedCarrier::send(std::string_view bytes, Priority priority, Peer t
     if (result == SendResult::sent) holder_.tell(Kind::sent, bytes);
     return result;
   }
-  // The holder passes on only stops: the board would attribute other datagrams to the holder.
+  // The holder sends only stops: the board would attribute other datagrams to the holder.
   if (!is_served() || priority != Priority::stop) return SendResult::down;
   ++shared_counters_.tx_datagrams;
   shared_counters_.tx_bytes += bytes.size();
@@ -331,7 +331,7 @@ void SharedCarrier::on_carrier_event(const CarrierEvent& event) {
   if (is_gone && state_ == State::holding) lose();
 }
 
-// Reports to the served programs, and to this program unless it knows the event already.
+// Reports to the served programs, and to this program unless the event was reported.
 void SharedCarrier::tell(const CarrierEvent& event) {
   const bool up = event.kind == CarrierEvent::Kind::up;
   const bool down = event.kind == CarrierEvent::Kind::down;
@@ -355,7 +355,7 @@ std::vector<CarrierEvent> SharedCarrier::standing() const {
 }
 
 void SharedCarrier::on_stop_of_another(std::string_view datagram) {
-  if (state_ != State::holding) return;  // the other program repeats it until the board obeys
+  if (state_ != State::holding) return;  // the other program repeats the stop until the board obeys
   if (own_->send(datagram, Priority::stop, everyone) != SendResult::sent) return;
   holder_.tell(Kind::sent, datagram);
   handler_->on_overheard(datagram);

@@ -8,11 +8,12 @@
 //      |   |
 //      +-> holding, with the carrier open: no program holds it, or the holder was passed over
 //
-// The controlling program holds the transport, so its datagrams never wait for another program, and
-// a separate name, so a second controlling program is refused at once. Watching programs hear all
-// datagrams, and send stops. A program that takes control first takes that name; if refused,
-// nothing changes. Else it reopens the transport, because a controlling program opens it
-// differently (DeviceClaim), and the programs that it served seek the holder again.
+// The controlling program holds the transport, so its datagrams never wait for another program. It
+// also has a separate name, so a second controlling program is refused at once. Watching programs
+// receive all datagrams, and send stops. A program that takes control first takes the separate
+// name. If the name is refused, nothing changes. Otherwise the program reopens the transport,
+// because a controlling program opens it differently (DeviceClaim). The served programs then seek
+// the holder again.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -24,7 +25,7 @@
 
 namespace r4 {
 
-// Reports the same as `own`, whichever program holds the transport. open() does not wait; it throws
+// Reports the same as `own`, whichever program holds the transport. open() does not wait. It throws
 // Error{refused} if another program controls the board, or an error of `own`.
 std::unique_ptr<Carrier> make_shared_carrier(asio::io_context& io, std::unique_ptr<Carrier> own,
                                              Claim claim, FindShareName find, BoardRole role);

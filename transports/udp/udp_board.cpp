@@ -10,7 +10,7 @@
 namespace r4 {
 namespace {
 
-constexpr int most_packets = 32;  // then the other work of the loop has its turn
+constexpr int most_packets = 32;  // then other work of the loop runs
 
 asio::ip::address mapped_to_v6(const asio::ip::address& address) {
   return asio::ip::make_address_v6(asio::ip::v4_mapped, address.to_v4());

@@ -42,7 +42,6 @@ bool udp_has_own_port(const Url& text) { return UdpUrl(text, Role::host).listen 
 
 ShareName udp_share_name(const Url& text) {
   const UdpUrl url(text, Role::host);
-  // A program that watches listens at that port if the URL names it, else at a port of its own.
   const std::string from = url.local.is_unspecified() ? "" : "/" + url.local.to_string();
   return {fmt::format("udp/{}{}/{}/{}{}", url.search ? "?" : "",
                       url.search ? url.called : spelling_of(url.host), url.port, url.listen, from)};

@@ -27,7 +27,7 @@ constexpr std::size_t normal_entries = 64;
 constexpr std::size_t state_entries = 20;  // four for the host and for each watcher
 constexpr std::chrono::milliseconds probe_interval{200};
 
-// True if the network is not there at the moment; false if only one packet failed.
+// True if the network is lost; false if only one packet failed.
 bool is_network_loss(int error) {
   return error == ENETUNREACH || error == ENETDOWN || error == EHOSTUNREACH ||
          error == EADDRNOTAVAIL || error == ENODEV;
@@ -64,7 +64,7 @@ bool has_one_of(const fs::path& process, const std::vector<std::string>& sockets
   return false;
 }
 
-// "r4 (pid 123)", or "another program", as far as this user may see it (proc(5)).
+// "r4 (pid 123)"; "another program" if this user may not see it (proc(5)).
 std::string user_of_udp_port(std::uint16_t port) {
   const std::vector<std::string> sockets = sockets_of(port);
   std::error_code error;
@@ -148,7 +148,7 @@ void UdpEnd::close() noexcept {
   close_socket();
 }
 
-// Asio first tries to receive at once. If it fills in the sender, there is another packet.
+// Asio first tries to receive at once. If Asio sets the sender, another packet has arrived.
 bool UdpEnd::begin_to_receive() {
   sender_.port(0);
   socket_.async_receive_from(asio::buffer(received_), sender_, MSG_TRUNC,

@@ -20,7 +20,7 @@
 
 namespace r4 {
 
-// More than 15 members: the socket with its timers and waits, the queue, the state of the network.
+// More than 15 data members: the socket with timers and waits, the queue, the network's state.
 class UdpEnd : public Carrier {
  public:
   void close() noexcept override;
@@ -49,7 +49,7 @@ class UdpEnd : public Carrier {
 
   // Opens the socket without binding it. Throws Error.
   void open_socket(const Endpoint& local, bool v6_only);
-  // Closes the socket and throws why it cannot be bound. `fix`: if another program has the port.
+  // Closes the socket and throws why it cannot be bound. `fix`: for a port of another program.
   [[noreturn]] void refuse(const asio::error_code& error, const Endpoint& local,
                            const std::string& fix);
   // The socket is bound: begins to receive, and is up.
@@ -60,7 +60,7 @@ class UdpEnd : public Carrier {
   Outcome transmit_to(std::string_view bytes, const Endpoint& to, bool standing,
                       const asio::ip::address& from = {});
   void set_up(bool up);
-  // Goes up or down by `error`, the result of probe(). Ignores errors other than of the network.
+  // Goes up or down by `error`, the result of probe(). Ignores errors that are not of the network.
   void judge_route(int error);
   void report();
   void warn(const std::string& reason, const std::string& fix);
@@ -79,7 +79,7 @@ class UdpEnd : public Carrier {
   WritableWait writable_;
   CarrierCounters counters_;
   Endpoint sender_;
-  std::string down_reason_;  // why it cannot be opened, as reported last
+  std::string down_reason_;  // why the carrier is not open, as reported last
   std::array<char, max_datagram> received_;
 
  private:
@@ -93,7 +93,7 @@ class UdpEnd : public Carrier {
   LoopTimer probe_timer_;
   OperationSlot probe_;
   bool up_ = false;
-  bool cut_ = false;  // its interface does not work, though the system may take packets
+  bool cut_ = false;  // the interface does not work, though the system may accept packets
   bool reported_up_ = false;
   int down_error_ = 0;
   int refused_error_ = 0;  // why the system refused the last packet; 0 after a success

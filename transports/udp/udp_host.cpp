@@ -88,7 +88,7 @@ void UdpHost::bind(const Endpoint& board) {
 }
 
 void UdpHost::watch() {
-  // Without a name, only a connected socket needs a watch: this computer's address may change.
+  // Without a name, only a connected socket needs a watch, because its own address may change.
   if (!named_ && !host_socket_.connected()) return;
   watch_.start(named_ ? question() : nullptr, socket_.is_open(),
                [this](const FoundHost& answer) { found(answer); });

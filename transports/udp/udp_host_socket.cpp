@@ -12,7 +12,7 @@ namespace r4 {
 namespace {
 
 // The bound sockets of the process, whose boards may have a thread each. Used at open and close
-// only. Never destroyed: a board may be static.
+// only. Never destroyed, because a board may be a static object.
 struct Bound {
   std::mutex mutex;
   std::vector<UdpHostSocket*> sockets;
@@ -45,7 +45,7 @@ asio::error_code UdpHostSocket::bind(const Endpoint& local, const Endpoint& boar
   if (others.empty()) {
     socket_.bind(local_, error);
   } else {
-    // Only for this moment: another program must not share the port.
+    // Only during bind(), because another program must not share the port.
     for (const UdpHostSocket* const each : others) set_reuse(each->descriptor_, true);
     set_reuse(socket_.native_handle(), true);
     for (UdpHostSocket* const each : others) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The socket with which a host hears one board. The boards of a program share the port of hosts.
-// The first socket has the port alone, so another program at that port is noticed, and hears all
-// ports of its board. A further socket is bound to the same port and connected, so the kernel gives
-// it packets from its board's port only. A packet in the microseconds between may be lost.
+// The first socket has the port alone, so another program at that port is noticed. The first socket
+// receives from all ports of its board. A further socket is bound to the same port and connected,
+// so it receives from its board's port only. A packet between bind and connect may be lost.
 #pragma once
 
 #include <asio/error_code.hpp>
@@ -26,7 +26,7 @@ class UdpHostSocket {
   UdpHostSocket& operator=(const UdpHostSocket&) = delete;
   ~UdpHostSocket() { close(); }
 
-  // Port 0: any free port. Fails with already_open if this program hears that board there already.
+  // Port 0: any free port. Fails with already_open if this program has that port for that board.
   asio::error_code bind(const Endpoint& local, const Endpoint& board);
   // Closes the socket. Can be called twice.
   void close() noexcept;
@@ -47,7 +47,7 @@ class UdpHostSocket {
   Endpoint local_;
   Endpoint board_;
   bool connected_ = false;
-  // Another board of this program is, or was, at the same address, so the port distinguishes them.
+  // True if this program has, or had, another board at that address: the port distinguishes them.
   std::atomic<bool> neighbours_{false};
 };
 

@@ -15,7 +15,7 @@ struct UdpUrl {
   static constexpr std::uint16_t board_port = 2018;
   static constexpr std::uint16_t host_port = 2390;
 
-  // Throws Error{usage} for a URL that UDP does not take.
+  // Throws Error{usage} for a URL that UDP refuses.
   UdpUrl(const Url& url, Role role);
 
   std::string text;
@@ -34,7 +34,7 @@ struct UdpUrl {
 
 // The URL of a host. A UDP URL without `listen` gets `listen=0` (any free port).
 std::string with_own_port(std::string url);
-// The same; also replaces the port of `listen`.
+// As with_own_port(), but also replaces the port of `listen`.
 std::string with_any_port(std::string url);
 
 }  // namespace r4

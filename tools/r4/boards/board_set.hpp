@@ -59,7 +59,7 @@ class BoardSet {
     end_.watch(duration);
   }
   void run() { io_.run(); }
-  // Ends run(). Callbacks for datagrams from the same read may still follow.
+  // Ends run(). Callbacks for datagrams from the same read may follow.
   void stop() { io_.stop(); }
   bool stopped() const { return io_.stopped(); }
   // Call after run(). Disconnects all boards at once and waits up to `limit` for their answers. The
@@ -80,7 +80,7 @@ BoardOptions watching(const std::string& key, const std::string& fields = {},
                       const std::vector<Device>& devices = {});
 void ask_for(BoardOptions& options, const std::string& fields, const std::vector<Device>& devices);
 
-// "can0" for can://can0 without a node, which means every board heard there; else empty.
+// "can0" for can://can0 without a node, which means every board heard on the bus; else empty.
 std::string whole_bus(std::string_view url);
 
 }  // namespace r4::tool

@@ -56,7 +56,7 @@ inline Json paths_json(const AsyncBoard& board) {
   return all;
 }
 
-// Reports each path that is down, because a command carried by another path would not mention it.
+// Reports each path that is down, because a command carried by another path does not report it.
 inline void tell_paths_down(const std::vector<PathStatus>& paths, bool json) {
   for (const PathStatus& path : paths) {
     if (paths.size() < 2 || path.state != PathState::down) continue;

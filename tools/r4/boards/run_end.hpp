@@ -12,8 +12,8 @@
 
 namespace r4::tool {
 
-// SIGINT, SIGTERM and SIGHUP stop `io`, so the command ends in good order. A signal that was
-// ignored when the program started stays ignored: nohup and `&` in a shell script rely on it.
+// SIGINT, SIGTERM and SIGHUP stop `io`, so the command ends normally. A signal that was ignored
+// when the program started stays ignored, because nohup and `&` in a shell script rely on it.
 class RunEnd {
  public:
   explicit RunEnd(asio::io_context& io) : io_(io), signals_(io), limit_(io) {}

@@ -11,7 +11,7 @@
 
 namespace r4::tool {
 
-// One task at a time. A cancelled or replaced task never runs, nor does one of a destroyed timer.
+// One task at a time. A cancelled or replaced task never runs. A destroyed timer runs no task.
 class Timer {
  public:
   using Clock = std::chrono::steady_clock;

@@ -23,7 +23,7 @@ PlainForm plain_form(const std::uint8_t* bytes, std::size_t size, UnpackRoom& ro
 
 // Like add_datagram_json() for a packed datagram; adds `packed`, its packed size in bytes.
 bool add_packed_json(Json& object, const std::uint8_t* bytes, std::size_t size);
-// The same for a plain or packed datagram; the first byte decides.
+// Like add_datagram_json() for a plain or packed datagram; the first byte decides.
 bool add_bus_json(Json& object, const std::uint8_t* bytes, std::size_t size);
 
 }  // namespace r4::tool

@@ -77,7 +77,7 @@ class LiveBus {
         live_(!options.json && !options.duration && ::isatty(STDOUT_FILENO) != 0) {}
 
   void run() {
-    // A live table shows only a current problem; a report also shows a past one.
+    // A live table shows only a current problem. A report also shows a past problem.
     listener_.on_event([this](const CarrierEvent& event) {
       if (listener_.in_trouble()) {
         problem_ = event.problem.text();

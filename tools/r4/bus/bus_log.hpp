@@ -20,7 +20,7 @@ class BusLog final : BusTransfers::Handler {
 
   explicit BusLog(Print print) : print_(std::move(print)) {}
 
-  // A line that is not empty. Prints everything that it completes or ends.
+  // Takes a line that is not empty. Prints everything that the line completes or ends.
   void on_line(std::uint64_t number, std::string_view text);
   void on_long_line(std::uint64_t number, std::uint64_t size);
   void finish();

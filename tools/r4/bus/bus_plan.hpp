@@ -2,7 +2,7 @@
 // The load of a planned CAN bus, from the bits of all frames of the link.
 //
 // Average: typical datagrams of driving boards, bit by bit. Worst: the longest datagrams with the
-// most stuff bits; a bus with room for these never delays datagrams by its load.
+// most stuff bits. A bus with room for these datagrams never delays datagrams by its load.
 #pragma once
 
 #include <cstdint>

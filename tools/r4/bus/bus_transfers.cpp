@@ -9,7 +9,7 @@
 namespace r4::tool {
 namespace {
 
-// Limit on a pause: by then every transfer has ended.
+// A longer pause is shortened to this limit, by which every transfer has ended.
 constexpr std::uint64_t longest_pause_us = 10'000'000;
 
 constexpr std::size_t index_of(CanIdKind kind) {
@@ -43,7 +43,7 @@ void BusTransfers::on_lane_frame(Interface& interface, const CanIdMeaning& meani
                                  const CanFrame& frame, const Place& place) {
   if (isotp_frame::is_flow_control(frame) && meaning.kind != CanIdKind::telemetry) {
     ++flow_control_;
-    // A receiver sends flow control on the id of its own datagrams, so this answers the other lane.
+    // A receiver sends flow control on the id of its datagrams: the frame answers the other lane.
     const bool of_board = meaning.kind == CanIdKind::reply;
     lane_of(interface, {of_board ? CanIdKind::command : CanIdKind::reply, meaning.node}).answered =
         true;

@@ -93,7 +93,7 @@ class ReportFiles {
            !commissioning::load_report(path.string()).checks.empty();
   }
 
-  // A run that is killed leaves the earlier file, or the whole new one.
+  // A run that is killed leaves the earlier file or the whole new file.
   static void replace(const std::filesystem::path& path, const std::string& text) {
     const std::filesystem::path fresh = path.string() + ".new";
     std::ofstream file(fresh, std::ios::binary | std::ios::trunc);
@@ -145,7 +145,7 @@ int commission(const CommissionOptions& options) {
   for (const std::string& id : options.only) commissioning::check_named(id);
   const ReportFiles files(options);
   const Report begun = begin(options);
-  files.write(begun);  // before the work: the folder may not be writable
+  files.write(begun);  // before the checks, because the folder may not be writable
   if (!options.json && ::isatty(STDIN_FILENO) == 0) {
     throw Error(ErrorKind::usage, "standard input", "is not a terminal, so nobody can hold a key",
                 "run it in a terminal; for a script there is --json");

@@ -101,7 +101,7 @@ Answer JsonPerson::ask(const Question& question) {
 
 Answer JsonPerson::await_key(const commissioning::Movement& movement) {
   key_ = false;
-  // A key that came before the announcement does not count.
+  // A key before the announcement does not count.
   for (Json early = next_line(0ms); !early.is_null(); early = next_line(0ms)) {
     if (const auto action = action_in(early)) return *action;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A person behind a script: questions and movements are JSON lines on standard output, answers on
-// standard input.
+// A person who answers through a script. Questions and movements are JSON lines on standard output,
+// answers are JSON lines on standard input.
 //
 //     {"type":"question","check":"osmc 1","topic":"which","text":…,"answer":"choice","choices":[…]}
 //         {"answer":"osmc 1"}   of a choice; a number; true or false
@@ -26,7 +26,7 @@ class JsonPerson final : public commissioning::Person {
   bool holds_key() override;
 
  private:
-  // The next line as an object: null if none came in time. At the end of the input: leave.
+  // The next line as an object; null if no line came in time; at the end: {"action":"leave"}.
   Json next_line(std::chrono::milliseconds timeout);
 
   Keyboard keyboard_;

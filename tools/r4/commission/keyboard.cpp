@@ -19,7 +19,7 @@ void on_signal(int) { interrupted = 1; }
 Keyboard::Keyboard() {
   struct sigaction action = {};
   for (std::size_t i = 0; i < std::size(signals); ++i) {
-    action.sa_handler = signals[i] == SIGTSTP ? SIG_IGN : on_signal;  // poll() returns
+    action.sa_handler = signals[i] == SIGTSTP ? SIG_IGN : on_signal;  // interrupts poll()
     ::sigaction(signals[i], &action, &handled_before_[i]);
   }
   termios settings{};

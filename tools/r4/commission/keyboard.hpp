@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Standard input byte by byte, without waiting for a line. A terminal is put back as it was at the
-// end. SIGINT, SIGTERM and SIGHUP end the input, so that what moves is stopped in order. Ctrl-Z has
-// no effect.
+// Standard input byte by byte, without waiting for a line. The destructor restores the settings of
+// a terminal. SIGINT, SIGTERM and SIGHUP end the input, so that moving outputs are stopped in
+// order. Ctrl-Z has no effect.
 #pragma once
 
 #include <termios.h>
@@ -14,7 +14,7 @@ namespace r4::tool {
 
 class Keyboard {
  public:
-  static constexpr int nothing = -1;  // came in time
+  static constexpr int nothing = -1;  // no byte came in time
   static constexpr int ended = -2;
   static constexpr std::chrono::hours a_while{1};
 
@@ -23,9 +23,9 @@ class Keyboard {
   Keyboard(const Keyboard&) = delete;
   Keyboard& operator=(const Keyboard&) = delete;
 
-  // The next byte, nothing or ended.
+  // The next byte, `nothing` or `ended`.
   int next(std::chrono::milliseconds timeout);
-  // Forgets what was typed so far at a terminal: it does not answer the next question.
+  // Discards the bytes typed at a terminal, so that they do not answer the next question.
   void forget();
 
  private:

@@ -9,7 +9,6 @@
 
 namespace r4::tool {
 
-// Lines for people.
 std::string result_text(const commissioning::CheckResult& result);
 
 // {"type":"check","id":…,"status":…,"note":…,"measured":[{"what":…,"value":…,"unit":…},…],

@@ -20,7 +20,7 @@ using commissioning::Question;
 constexpr auto repeat_within = 150ms;     // between two repeats
 constexpr auto first_repeat_within = 1s;  // after the key was pressed
 
-// The answer to any question that this key is.
+// The action of `key`, which answers any question; empty: not an action.
 std::optional<Answer> action_of(int key) {
   Answer answer;
   switch (key) {
@@ -114,7 +114,7 @@ Answer TerminalPerson::ask(const Question& question) {
 }
 
 Answer TerminalPerson::await_key(const commissioning::Movement& movement) {
-  // A key that is still held from the movement before must be let go first.
+  // A key held since the last movement must be released first.
   while (keyboard_.next(repeat_within) == ' ') {
   }
   keyboard_.forget();

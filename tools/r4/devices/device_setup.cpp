@@ -12,7 +12,7 @@ namespace {
 constexpr AsyncBoard::Duration step_timeout{1000};
 constexpr AsyncBoard::Duration look_interval{50};
 constexpr std::chrono::milliseconds retry_interval{2000};
-constexpr std::chrono::milliseconds settle_time{500};  // until a device that was set up measures
+constexpr std::chrono::milliseconds settle_time{500};  // from setup to the first measurement
 
 }  // namespace
 

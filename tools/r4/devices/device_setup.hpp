@@ -22,7 +22,7 @@ namespace r4::tool {
 
 class DeviceSetup {
  public:
-  // `told` gets problems. The board and devices, whose loop this object uses, must outlive it.
+  // `told` gets problems. The board and the devices must outlive this object.
   DeviceSetup(asio::io_context& io, AsyncBoard& board, const std::vector<Device>& devices,
               std::function<void(const Problem&)> told);
   ~DeviceSetup() { give_up(); }

@@ -20,7 +20,7 @@ Finding about(const CanInterface& interface, Severity severity, const char* chec
   return {severity, check, interface.name, "", "", Mending::by_hand, ErrorKind::open};
 }
 
-// A wrong bit rate destroys the frames of all other nodes, so only the owner may choose it.
+// A wrong bit rate destroys the frames of all other nodes, so only the owner may choose the rate.
 Finding down(const Machine& machine, const CanInterface& interface) {
   Finding finding = about(interface, Severity::error, "can.down");
   finding.reason = "the interface is down";

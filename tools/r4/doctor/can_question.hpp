@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Asks one board on a CAN bus for its identity, only while no other host is heard there. All
-// listeners on the bus receive the answer.
+// Requests the identity of one board on a CAN bus, only while no other host is heard on the bus.
+// All listeners on the bus receive the answer.
 #pragma once
 
 #include <asio/io_context.hpp>

@@ -67,7 +67,7 @@ std::vector<std::string> ports_of(const Machine& machine, const Discovery& found
   return ports.empty() ? likely_ports(machine) : ports;
 }
 
-// Asks the boards at `urls`, and at ports with a board's USB id, for their identity.
+// Requests the identity of the boards at `urls`, and at ports with a board's USB id.
 Discovery search_ports(const std::vector<Url>& urls) {
   DiscoveryOptions options;
   options.can = options.udp = false;
@@ -147,7 +147,7 @@ void print(const Findings& findings, bool json) {
   }
 }
 
-// Runs each automatic fix once, and prints its reason. Returns how many succeeded.
+// Runs each automatic fix once, and prints its reason. Returns the number of successful fixes.
 int mend(const Findings& findings, bool json) {
   std::vector<std::string> done;
   int mended = 0;
@@ -173,7 +173,7 @@ int mend(const Findings& findings, bool json) {
   return mended;
 }
 
-// Fixes call r4 by its name, which PATH may not contain.
+// Fixes call r4 by its name, and PATH may not contain its folder.
 void put_r4_into_the_path() {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measures a link as a watcher, for some seconds. The board is asked for its identity, to test both
-// directions; on a CAN bus with another host, that host's questions are used.
+// Measures a link as a watcher, for some seconds. Requests the board's identity, to test both
+// directions. On a CAN bus with another host, the questions of that host are used.
 #pragma once
 
 #include <chrono>

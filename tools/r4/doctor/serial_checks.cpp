@@ -84,7 +84,7 @@ struct Adapter {
 constexpr std::array<Adapter, 4> adapters{
     {{"1a86/7523", "CH340"}, {"10c4/ea60", "CP210x"}, {"403/6001", "FT232"}, {"403/6015", "FT-X"}}};
 
-// True if a rule matches every adapter with that id, without conditions (manufacturer).
+// True if a rule matches every adapter with that id, without a condition such as the manufacturer.
 bool take(const std::string& rules, const Adapter& adapter) {
   std::istringstream lines(rules);
   for (std::string line; std::getline(lines, line);) {

@@ -49,7 +49,7 @@ int run_dfu_util(std::vector<const char*> arguments,
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDERR_FILENO);
-  // An interrupted write leaves half a sketch: neither Ctrl-C nor our own end may end dfu-util.
+  // An interrupted write leaves half a sketch: Ctrl-C or the end of r4 must not end dfu-util.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
@@ -126,7 +126,7 @@ BootLoaders look_for_boot_loaders() {
   BootLoaders found;
   found.denied = text.find("LIBUSB_ERROR_ACCESS") != std::string::npos ||
                  text.find("Cannot open DFU device 2341:0366") != std::string::npos;
-  // A boot loader has several memories, a line for each; one board has one path.
+  // dfu-util prints a line for each memory of a boot loader. Each board has one path.
   std::vector<std::string>& paths = found.usb_paths;
   for (std::size_t at = text.find("Found DFU: [2341:0366]"); at != std::string::npos;
        at = text.find("Found DFU: [2341:0366]", at + 1)) {
@@ -152,7 +152,7 @@ void write_by_dfu(const std::string& path, const std::string& usb_path,
                                   end += part;
                                   if (end.size() > most_kept) end.erase(0, end.size() - most_kept);
                                 });
-  // Some versions report an error if the board starts the sketch before it has answered.
+  // Some versions of dfu-util report an error if the board starts the sketch without an answer.
   const bool written = end.find("File downloaded successfully") != std::string::npos;
   if (code != 0 && !written) {
     throw Error(ErrorKind::open, "dfu-util", last_line(end),

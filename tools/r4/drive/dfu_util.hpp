@@ -9,14 +9,14 @@
 namespace r4::tool {
 
 struct BootLoaders {
-  std::vector<std::string> usb_paths;  // of those that this computer may open: "1-2"
-  bool denied = false;                 // one may not be opened
+  std::vector<std::string> usb_paths;  // of boot loaders that this user may open: "1-2"
+  bool denied = false;                 // this user may not open a boot loader
 };
 // Throws Error{unsupported} if dfu-util is not installed.
 BootLoaders look_for_boot_loaders();
 
 // Calls `on_percent` with 0 to 100, in order. The board then starts the sketch. If this program is
-// interrupted, dfu-util still writes the rest. Throws Error{open} with dfu-util's last line.
+// interrupted, dfu-util writes the rest. Throws Error{open} with dfu-util's last line.
 void write_by_dfu(const std::string& path, const std::string& usb_path,
                   const std::function<void(int)>& on_percent);
 

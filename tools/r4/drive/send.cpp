@@ -94,7 +94,8 @@ std::optional<Milliseconds> setting_of(const Order& order, std::string_view key)
   return Milliseconds(number_in<std::uint32_t>({value.data(), value.size()}).value_or(0));
 }
 
-// Timeout and heartbeat interval in any order: one step, as the board may refuse either alone.
+// Timeout and heartbeat interval, in any order. Sent in one step, because the board may refuse one
+// setting without the other.
 struct LinkTiming {
   Milliseconds timeout{0};
   Milliseconds heartbeat{0};
@@ -111,8 +112,8 @@ std::optional<LinkTiming> link_timing_at(const std::vector<Order>& orders, std::
   return in_order ? in_order : timing(orders[i + 1], orders[i]);
 }
 
-// No arming is needed, because a typed command is deliberate. If a motor is to turn, ask for the
-// state of relay 1. Heartbeats are sent often enough for the shortest timeout among the commands.
+// No arming is needed, because a typed command is deliberate. If a motor is to turn, the state of
+// relay 1 is requested. Heartbeats are sent often enough for the shortest timeout in the commands.
 BoardOptions board_options(const SendOptions& options, const std::vector<Order>& orders) {
   BoardOptions board_options = with_key(options.key);
   board_options.session.arming = Arming::off;

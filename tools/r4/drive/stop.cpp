@@ -74,7 +74,7 @@ int stop(const StopOptions& options) {
   board->async_send(Command::stop(), options.timeout, [&](const CommandResult& r) {
     result = r;
     if (r.outcome != Outcome::confirmed) return io.stop();
-    // Meanwhile the library repeats the stop. Printing waits: a reader of the output may block it.
+    // Meanwhile the library repeats the stop. Prints only afterwards, because the output may block.
     repeating.after(SessionOptions().stop_linger, [&] { io.stop(); });
   });
   io.run();

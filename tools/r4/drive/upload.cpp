@@ -81,7 +81,7 @@ void check_image(const std::string& path) {
 
 // --- the port
 
-// The port of `url`. Empty if any board will do (serial:auto) and none runs.
+// The port of `url`. Empty if any board is accepted (serial:auto) and no board runs.
 std::optional<std::string> port_of(const std::string& url) {
   const Url parsed = Url::parse(url);
   if (parsed.scheme() != "serial") {
@@ -140,7 +140,7 @@ class Port {
     const int ready = TIOCM_DTR;
     ::ioctl(number_, TIOCMBIS, &ready);  // a pseudo-terminal has no such line
     std::this_thread::sleep_for(held);
-    ::ioctl(number_, TIOCMBIC, &ready);  // also if a program has set the port to keep it
+    ::ioctl(number_, TIOCMBIC, &ready);  // even if a program has set the port to keep the line
   }
   // The USB path of the port's device, as dfu-util names it: "1-2". Empty if it is not on USB.
   std::string usb_path() const {
@@ -187,7 +187,7 @@ void switch_off(const UploadOptions& options) {
   report(options, {{"type", "stopped"}}, "the board reports that its outputs are off");
 }
 
-// The place of the boot loader to write: `usb_path`, or if that is empty, the only one.
+// The USB path of the boot loader to write: `usb_path`, or if empty, the only boot loader.
 std::string wait_for_boot_loader(const std::string& usb_path, Clock::time_point deadline) {
   constexpr std::chrono::milliseconds pause{200};
   for (;;) {
@@ -249,7 +249,7 @@ void wait_for_board(const UploadOptions& options, Clock::time_point deadline) {
 int upload(const UploadOptions& options) {
   check_image(options.file);
   const std::optional<std::string> port = port_of(options.url);
-  // A port that cannot be opened is an error before anything is stopped.
+  // First, because a port that cannot be opened must be an error before the board is stopped.
   const std::string usb_path = port ? Port(*port).usb_path() : std::string();
   const BootLoaders waiting = look_for_boot_loaders();
   const bool waits = waiting.denied || !waiting.usb_paths.empty();

@@ -79,7 +79,7 @@ void BusRecords::on_raw_frame(const std::string& interface, const CanIdMeaning& 
   if (meaning.kind == CanIdKind::emergency_stop) {
     return tell({time_of(place), no_path, RecordKind::event, "stop " + interface});
   }
-  if (meaning.kind == CanIdKind::watch) return;  // says nothing about the board
+  if (meaning.kind == CanIdKind::watch) return;  // not from the board
   const std::uint8_t number = frame.size == 0 ? 0 : frame.data[0];
   const SafeReason reason = number == 0 ? SafeReason::fault : to_safe_reason(number);
   const std::string words = fmt::format("link safe {}", to_text(reason));

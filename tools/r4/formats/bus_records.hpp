@@ -16,7 +16,7 @@
 
 namespace r4::tool {
 
-// The URL of that board. A name that a URL cannot hold, such as python-can's /dev/ttyACM0 or
+// The URL of the board. A name that a URL cannot hold, such as python-can's /dev/ttyACM0 or
 // ff15::1, is put in brackets: can://[%2Fdev%2FttyACM0]?node=3.
 std::string bus_url(std::string_view interface, std::uint8_t node);
 std::string bus_interface(const std::string& host);
@@ -31,7 +31,7 @@ class BusRecords final : BusTransfers::Handler {
   void finish();
   // True if a record or damage was reported.
   bool told() const { return told_; }
-  // Reports a path and returns its number. Other sources of the same recording use it too.
+  // Reports a path and returns its number. Also for paths of the recording that are not on CAN.
   std::uint16_t add_path(const std::string& url);
 
  private:

@@ -154,7 +154,7 @@ bool CandumpSink::write_frames(const Place& place, const Record& record) {
       continue;
     }
     (forth ? sender : receiver).frame_sent(now_us);
-    if (classify(frame).kind == CanIdKind::went_safe) continue;  // sent only occasionally
+    if (classify(frame).kind == CanIdKind::went_safe) continue;  // a rare frame of boards
     const Text whole = (forth ? receiver : sender).on_frame(frame, now_us);
     arrived = arrived || (forth && whole == Text(record.bytes));
     const auto us = record.time.count();

@@ -37,7 +37,7 @@ class Output {
 class Sink {
  public:
   virtual ~Sink() = default;
-  // True if survey() should get everything first, if the input can be read twice.
+  // True if survey() should get the whole recording first, which needs an input to read twice.
   virtual bool wants_survey() const { return false; }
   virtual void survey(const RecordedPath& path) { static_cast<void>(path); }
   virtual void survey(const RecordedDevice& device) { static_cast<void>(device); }
@@ -45,7 +45,7 @@ class Sink {
   // A line that begins with #. `time`: of the previous record, else of the first record.
   virtual void on_comment(std::string_view line, Time time) = 0;
   virtual void on_path(const RecordedPath& path, Time time) = 0;
-  // Precedes on_comment() for the same line; so does on_header().
+  // Like on_header(), called before on_comment() for the same line.
   virtual void on_device(const RecordedDevice& device) { static_cast<void>(device); }
   virtual void on_header() {}
   virtual void on_record(const Record& record) = 0;
@@ -85,7 +85,7 @@ class Conversion final : public RecordingVisitor {
   std::uint64_t damage() const { return damage_; }
 
  private:
-  // Lines that may wait for the first record's time. r4 writes no file with more.
+  // Lines that may wait for the first record's time. Files from r4 have fewer such lines.
   static constexpr std::size_t most_waiting = 1000;
   struct Waiting {
     bool is_path;

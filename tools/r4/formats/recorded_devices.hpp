@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Assigns bytes in a recording to its own devices, by path, or to the user's, for every path.
+// Assigns bytes in a recording to the recorded devices of the path, or to the user's devices.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +26,7 @@ class RecordedDevices {
     bool is_of(std::uint16_t number) const { return path == no_path || path == number; }
   };
   const std::vector<Known>& all() const { return all_; }
-  // Why some devices were not accepted, for people; empty: all were.
+  // Why some devices were not accepted, for people; empty: all were accepted.
   const std::string& problems() const { return problems_; }
 
  private:

@@ -53,7 +53,7 @@ std::string escaped(std::string_view text) {
 std::string bold(std::string_view text) { return "\\fB" + escaped(text) + "\\fR"; }
 std::string italic(std::string_view text) { return "\\fI" + escaped(text) + "\\fR"; }
 
-// Filled text. Checkers want at most 80 bytes a line, and a character may take several bytes.
+// Filled text. Checkers require at most 80 bytes a line, and a character may have several bytes.
 std::string filled(std::string_view text) {
   constexpr std::size_t longest = 66;
   std::string out;

@@ -46,8 +46,8 @@ void DetectedSource::finish() {
   source_->finish();
 }
 
-// Keeps the file until its format is known: a native recording is read from its beginning, because
-// it reports the line numbers of damaged compression.
+// Keeps the file until its format is known. A native recording is then read from its beginning,
+// because damaged compression is reported with line numbers.
 void DetectedSource::take_compressed(std::string_view bytes) {
   while (zstd_) {
     const std::size_t before = bytes.size();

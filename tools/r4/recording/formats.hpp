@@ -31,7 +31,7 @@ std::unique_ptr<Source> make_source(const std::string& path, RecordingVisitor& v
                                     const SourceOptions& options = {});
 
 // Throws Error{usage} for an unknown ending, and for `devices` with a format other than .csv,
-// .jsonl and .mcap. These show the values of `devices` instead of the recording's own devices.
+// .jsonl and .mcap. These formats show the values of `devices` instead of the recorded devices.
 std::unique_ptr<Sink> make_sink(const std::string& path, Output& output,
                                 std::vector<Device> devices = {});
 

@@ -65,7 +65,7 @@ class BusListener {
   }
 
  private:
-  // Any rate will do, because the bus load is not used here.
+  // Any rate is valid, because the bus load is not used here.
   static constexpr CanBitRate any_rate{1000000, 0};
 
   const std::string url_;
@@ -114,7 +114,7 @@ class Recorders {
   }
 
  private:
-  // A removed or truncated recording continues in a new file; one that cannot be written has ended.
+  // A removed or truncated recording continues in a new file. Any other problem ends the recording.
   bool has_ended() const {
     const std::optional<Problem> problem = recording_->problem();
     return problem && problem->kind != ErrorKind::data;

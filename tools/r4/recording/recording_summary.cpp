@@ -13,7 +13,7 @@
 namespace r4::tool {
 namespace {
 
-// A badly damaged file may appear to have more paths: they are counted as one.
+// A badly damaged file may appear to have more paths. Further paths are counted as one.
 constexpr std::size_t most_paths = 1000;
 // More devices than a board has slots, for recordings of many parts.
 constexpr std::size_t most_devices = 64;

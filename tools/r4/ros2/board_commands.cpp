@@ -70,7 +70,7 @@ BoardCommands::BoardCommands(AsyncBoard& board, Graph& graph, std::size_t node, 
 BoardCommands::Left BoardCommands::on_publishers(const std::string& topic, Left left) {
   return [this, topic, left = std::move(left)](const std::vector<std::uint64_t>& there) {
     say_(LogLevel::info, fmt::format("{}: {} publishers", topic, there.size()));
-    post_wanted();  // send the last commands of a publisher before it counts as missing
+    post_wanted();  // sends the last commands of a publisher before it counts as missing
     if (left) left(there);
   };
 }

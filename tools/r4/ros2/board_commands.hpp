@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Subscriptions and services of a board: R4_Command, a topic for each output, cmd_vel, stop, arm.
 //
-// Runs on the boards' loop. Of the setpoints of an inbox the newest of each channel is sent, in as
-// few datagrams as possible. A sample older than 250 ms, or without a link, is dropped: nothing is
-// kept for later. A lost link ends a running arm(). A stop is never too old.
+// Runs on the boards' loop. Sends the newest setpoint of each channel, in as few datagrams as
+// possible. Drops a sample that is older than 250 ms, or arrives without a link. A lost link ends a
+// running arm(). A stop is never too old.
 #pragma once
 
 #include <asio/cancellation_signal.hpp>
@@ -41,7 +41,7 @@ class BoardCommands {
   void on_tick();
   using Done = std::function<void(bool done, const std::string& text)>;
   void arm(Done done);
-  // Arms once the board is connected, unless it was stopped before.
+  // Arms once the board is connected, unless a stop came before.
   void arm_at_first();
 
   std::uint64_t stale() const { return stale_; }
@@ -92,14 +92,14 @@ class BoardCommands {
   void warn(const std::string& text) const { say_(LogLevel::warning, text); }
   bool is_stale(const std::string& what, const Origin& origin);
   bool is_overtaken(const Origin& origin) const { return origin.written <= stopped_; }
-  // The reason not to send that command; empty: none.
+  // The reason not to send `command`; empty: none.
   std::string objection_to(const Command& command) const;
   void on_text(const std::string& text, const void* source, const Origin& origin);
   void want(const Command& command, const void* source, const Origin& origin);
   void post_wanted();
   void post(std::size_t first, std::size_t count);
   void tell(const std::string& what, PostResult result);
-  // True if there is no link. Reports it, because nothing is kept for later.
+  // True if this host has no control. Reports the lost command, because it is not kept for later.
   bool is_without_link(const std::string& what, const Done& done) const;
   static AsyncBoard::Duration left_of(const Origin& origin);
   void stop(Done done);

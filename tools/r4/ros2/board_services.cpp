@@ -34,7 +34,7 @@ std::function<void(const CommandResult&)> in_words(const AsyncBoard& board, What
   };
 }
 
-// A request's client and text; no text if it is malformed or the service takes none.
+// A request's client and text; no text if the request is malformed or the service takes no text.
 struct Request {
   std::uint64_t client = 0;
   std::int64_t number = 0;

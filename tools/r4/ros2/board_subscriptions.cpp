@@ -19,7 +19,7 @@ constexpr std::size_t most_others = 4;
 // NOLINTBEGIN(clang-analyzer-cplusplus.NewDeleteLeaks): does not follow a std::function that is
 // moved from a designated initializer.
 
-// Subscribe twice, reliable and best effort: a duplicate stop is harmless, and none is missed.
+// Subscribes twice, reliable and best effort. A duplicate stop is harmless, and no stop is missed.
 void BoardCommands::subscribe_stop(Graph& graph, std::size_t node, Inbox& inbox) {
   for (const bool reliable : {true, false}) {
     Qos qos;
@@ -217,7 +217,7 @@ void BoardCommands::subscribe_drive(Graph& graph, std::size_t node, Inbox& inbox
   subscribe_speed<TwistMessage>(graph, node, inbox, source, [](const TwistMessage& twist) {
     return Speed{twist.linear.x, twist.angular.z, {}};
   });
-  // `ros2 topic echo` cannot show a topic of two types: subscribe to this one on demand.
+  // `ros2 topic echo` cannot show a topic of two types, so this type is subscribed on demand.
   const auto subscribe_stamped = [this, &graph, node, &inbox, stamped_source] {
     subscribe_speed<TwistStampedMessage>(
         graph, node, inbox, stamped_source, [](const TwistStampedMessage& message) {

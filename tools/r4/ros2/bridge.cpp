@@ -75,7 +75,7 @@ struct NamedUrl {
   NodeName name;
 };
 
-// One board is in the namespace itself; several are below it: board1 …, or a pattern's numbers.
+// One board is in the namespace itself. Several boards are below it: board1 …, or pattern numbers.
 std::vector<NamedUrl> named_urls(const BridgeOptions& options) {
   const std::vector<PatternUrl> urls = expand_urls(options.urls);
   const bool numbered = options.urls.size() == 1;

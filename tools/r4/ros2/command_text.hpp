@@ -22,8 +22,8 @@ bool asks_to_stop(std::string_view text);
 // choices of fields, heartbeats, farewells. A text that is not ASCII is not quoted.
 std::vector<OwnCommand> commands_of(std::string_view text);
 
-// Replaces the library's advice, which names its own call and r4 send: the board refuses those
-// while this bridge controls it. A cause older than this program is cleared by a service.
+// Replaces the library's advice to use a library call or r4 send, which the board refuses while
+// this bridge controls it. A cause older than this program is cleared by a service.
 Problem for_a_node(Problem problem, DisarmCause cause);
 
 }  // namespace r4::tool::ros2

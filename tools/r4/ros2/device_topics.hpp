@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measurements of described devices by role: imu, battery, range, or joint_states below its name.
-// Each once, with the board's time of reading. After construction only for the outbox's thread.
+// Measurements of described devices by role: imu, battery, range or joint_states, below the
+// device's name. Each measurement is published once, with the board's time of reading. After
+// construction only the outbox's thread uses this object.
 #pragma once
 
 #include <chrono>
@@ -25,9 +26,9 @@ class DeviceTopics {
  private:
   struct Topic {
     Device device;
-    std::string name;  // device name, with its address if several; also the frame and joint
+    std::string name;  // of device, frame and joint; with the address if not unique
     dds_entity_t writer = 0;
-    std::size_t value = 0;  // always present
+    std::size_t value = 0;  // index of the main value
     std::optional<std::uint32_t> t_ms;
   };
   void publish(const Topic& topic, const State& state, TimeMessage time) const;

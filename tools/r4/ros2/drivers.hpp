@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tracks the publisher that drives each output, and publishers that have disappeared.
 //     free --a command that drives--> driven --a command that stops, or its publisher--> stopping
-//      ^                                 ^     has gone or is silent for the deadline        |
+//      ^                                 ^     has left or is silent for the deadline        |
 //      |                                 +----------- a command that drives -----------------+
 //      +----------------------------- stopped, the board has confirmed it -------------------+
 //
@@ -53,7 +53,7 @@ class Drivers {
   void forget(const Command& command);
 
   // Commands that stop outputs now, at most max_group, repeated until stopped() or a driving
-  // command. A stepper waits for its position; voltages, not on every board, for the other outputs.
+  // command. A stepper waits for its position. Voltages, missing on some boards, are stopped last.
   struct Stop {
     std::vector<Command> commands;
     std::uint64_t sent = 0;  // number of commands sent before

@@ -11,7 +11,7 @@ struct ErrorKindRow {
   const char* name;
 };
 
-// A kind without a row is a warning of the compiler.
+// The compiler warns of a kind without a row.
 constexpr ErrorKindRow row_of(ErrorKind kind) {
   switch (kind) {
     case ErrorKind::data:

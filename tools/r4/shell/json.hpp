@@ -19,7 +19,7 @@ Json value_json(Text value);
 
 Json field_json(const Field& field);
 
-// All fields but PNum and T, by name, in order. A name that occurs twice gets an array of both.
+// All fields except PNum and T, by name, in order. A name that occurs twice has an array of values.
 Json fields_json(const Datagram& datagram);
 
 // {"error":"crc","position":…,"expected":"0x…","found":"0x…"}; the last two for crc only.

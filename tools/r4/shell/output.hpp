@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // All output of r4 goes through here, without buffering. A failed write does not end a command: a
-// stop must reach the board even if the disk is full. require_output() reports it at the end. But
-// a pipe whose reader has closed it ends r4 by SIGPIPE, without a farewell.
+// stop must reach the board even if the disk is full. require_output() reports the failure at the
+// end. If the reader closes a pipe, SIGPIPE ends r4 without a farewell.
 #pragma once
 
 #include <fmt/format.h>

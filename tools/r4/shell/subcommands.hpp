@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The subcommands of r4, one file each. add_…() declares a subcommand below `root`. Parsing the
-// command line stores the action in `chosen`; it returns the exit code or throws Error.
+// command line stores the action in `chosen`. The action returns the exit code or throws Error.
 #pragma once
 
 #include <functional>
@@ -44,7 +44,7 @@ void add_man(CLI::App& root, Action& chosen);
 CLI::App* add_subcommand(CLI::App& root, const char* name, const char* meaning,
                          const std::string& footer, std::function<void()> on_chosen);
 
-// Calls `action` with `options`, which live as long as the command line.
+// Calls `action` with `options`, which exist as long as the command line.
 template <class Options>
 CLI::App* add_subcommand(CLI::App& root, Action& chosen, const char* name, const char* meaning,
                          const std::string& footer, std::shared_ptr<Options> options,

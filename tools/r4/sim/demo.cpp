@@ -124,7 +124,7 @@ struct Stage {
   std::string board_url;  // where the other process listens; empty: none
 };
 
-// Only an interface with a virtual name: other buses may have motors.
+// Only an interface with a virtual name, because other buses may have motors.
 std::string virtual_can() {
   for (const CanInterface& each : list_can_interfaces()) {
     if (each.up && !each.has_controller && each.name.starts_with("vcan")) return each.name;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The demonstration on one board: connect, stream, command, silence, safe state, recovery, stop,
-// clear (paper sections 4.3 and 4.4). The first step that fails ends it.
+// clear (paper sections 4.3 and 4.4). The first step that fails ends the demonstration.
 #pragma once
 
 #include <asio/io_context.hpp>

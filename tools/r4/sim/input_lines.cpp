@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t longest_line = 4096;
 
-// Reopened, so that it is non-blocking for this program only. A socket cannot be reopened.
+// Reopens the input, so that it is non-blocking for this program only. A socket cannot be reopened.
 int open_input() {
   const int own = ::open("/proc/self/fd/0", O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   return own >= 0 ? own : ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);

@@ -39,7 +39,7 @@ struct ReplayOptions {
   bool json = false;
 };
 
-// Records or file pieces handled before other work of the loop gets its turn.
+// Records or file pieces handled before other work of the loop runs.
 constexpr int steps_in_a_turn = 32;
 // Limits of the audience: a peer silent for that long is removed.
 constexpr std::chrono::seconds audience_for{2};

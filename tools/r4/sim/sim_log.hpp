@@ -72,7 +72,7 @@ class SimLog {
 std::string host_url(const std::string& board_url);
 
 // {"osmc":[[pwm,dir],…],"dhb":…,"servo":[us,…],"relays":bits,"bldc":[[speed,dir,brake],…],
-//  "stepper":[[position,stepping],…]}; stepping: 1 forward, -1 backward, 0 standing
+//  "stepper":[[position,stepping],…]}; stepping: 1 forward, -1 backward, 0 at rest
 Json pins_json(const sim::Pins& pins);
 
 // "OSMC1:358,1 SERVO1:2001": differences from the safe state; "all off".

@@ -64,7 +64,7 @@ class Input {
   std::array<char, 65536> buffer_;
 };
 
-// A line packed:HEX from r4 encode --packed. A plain datagram contains a semicolon.
+// A line packed:HEX from r4 encode --packed. Unlike a plain datagram, it contains no semicolon.
 constexpr std::string_view packed_prefix = "packed:";
 
 bool is_packed_line(std::string_view line) {

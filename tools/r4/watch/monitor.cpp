@@ -117,7 +117,7 @@ class Monitor {
  private:
   void listen(AsyncBoard& board, MonitorView& view) {
     board.on_state([this, &view](const ReceivedState& state, const Datagram& datagram) {
-      if (boards_.stopped()) return;  // received together with the last one
+      if (boards_.stopped()) return;  // received together with the last state
       view.on_state(state, datagram);
       tell_readings(state);
       if (++states_ == options_.count) boards_.stop();
@@ -141,7 +141,7 @@ class Monitor {
     on_paths(board, [&view](const PathStatus& path) { view.on_path(path); });
   }
 
-  // The host in control sets devices up: this program, if no other host controls the board.
+  // The controlling host sets devices up, so this program takes control if no other host has it.
   void set_devices_up() {
     AsyncBoard& board = boards_[0].board;
     setup_.emplace(boards_.io(), board, devices_,

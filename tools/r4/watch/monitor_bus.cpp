@@ -70,7 +70,7 @@ class BusMonitor {
   }
 
   void on_datagram(std::uint8_t node, const Datagram& datagram) {
-    if (io_.stopped()) return;  // received together with the last one
+    if (io_.stopped()) return;  // received together with the last state
     if (options_.json) {
       Json object{{"type", to_text(kind_of(datagram))},
                   {"transport", fmt::format("{}?node={}", name(), node)},

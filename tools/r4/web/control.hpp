@@ -3,8 +3,8 @@
 //      free --take()--> held --release() of its holder, or expired()--> leaving --left()--> free
 //
 // The holder sends alive() ten times a second, with the newest server time it has received. Control
-// expires when the newest echoed time is `limit` old, so neither silence nor delayed messages keep
-// it. Messages arrive in order, so no older command is accepted. The caller passes in the time.
+// expires when the newest echoed time is `limit` old, so silence or delayed messages end control.
+// Messages arrive in order, so no older command is accepted. The caller passes in the time.
 #pragma once
 
 #include <chrono>
@@ -23,7 +23,7 @@ class Control {
   bool is_held_by(Client client) const { return holder_ == client; }
   bool leaving() const { return leaving_; }
 
-  // False if another client holds control or is still leaving it.
+  // False if another client holds control or is leaving it.
   bool take(Client client, Time now);
   // False if the client was not the holder.
   bool release(Client client);

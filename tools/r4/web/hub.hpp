@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Connects the boards and the server's clients, whose messages come parsed, on the boards' loop.
+// Connects the boards and the server's clients, whose messages arrive parsed, on the boards' loop.
 #pragma once
 
 #include <chrono>

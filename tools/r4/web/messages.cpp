@@ -71,7 +71,7 @@ std::string hello_text(const Columns& columns, const std::vector<WebBoard*>& boa
                               {"units", columns.units()},
                               {"you", you},
                               {"clock_ms", clock_ms}});
-  // Made once: most of the work, which a crowd of clients must not ask of the loop each time.
+  // Made once, because the channels are most of the work, and many clients would delay the loop.
   static const std::string channels = text_of(channels_json());
   text.pop_back();
   return text + R"(,"channels":)" + channels + '}';

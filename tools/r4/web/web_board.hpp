@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A board in r4 web: watched, and controlled while a browser wants to.
+// A board in r4 web: watched, and controlled while a browser has control.
 #pragma once
 
 #include <asio/io_context.hpp>
@@ -37,11 +37,11 @@ class WebBoard {
   using Done = std::function<void()>;
   using OnResult = std::function<void(const CommandResult&)>;
 
-  // Sets `devices` up while in control. They must outlive it.
+  // Sets `devices` up while in control. The devices must outlive this object.
   WebBoard(asio::io_context& io, SetBoard& board, const std::vector<Device>& devices,
            Events& events);
 
-  // Throws Error on failure; the board is then still watched.
+  // Throws Error on failure, and the board stays watched.
   void take_control();
   // Stops the heartbeats. Calls `done` when the board is free or does not answer.
   void leave_control(Done done);

@@ -47,7 +47,7 @@ class StuffedBits {
   void data(const CanFrame& frame) {
     for (std::uint32_t i = 0; i < frame.size; ++i) bits(frame.data[i], 8);
   }
-  // Sends a stuff bit that is due after the last bit; otherwise only the next bit sends it.
+  // Counts a stuff bit that is due after the last bit; otherwise only the next bit counts it.
   void settle() {
     if (run_ < 5) return;
     ++count_;
@@ -119,7 +119,7 @@ CanBits fd_bits(const CanFrame& frame, bool switches_rate) {
   return split(before_switch, after, switches_rate);
 }
 
-// One after five bits, then one after every four: a stuff bit is the first of the next five.
+// One stuff bit after five bits, then one after every four, because it counts as one of five.
 constexpr std::uint32_t most_stuff_bits(std::uint32_t bits) { return (bits - 1) / 4; }
 
 constexpr std::uint64_t part_ns(std::uint32_t bits, std::uint32_t rate) {

@@ -14,7 +14,7 @@ namespace {
 
 // The meaning of an emergency frame without a number.
 constexpr Text stop_datagram("E:STOP;^0x506f0fbe^");
-// The meaning of a watch frame: 5 Hz, which even a slow bus carries as text, 24 frames each.
+// The meaning of a watch frame: 5 Hz. Even a slow bus carries the states as text, 24 frames each.
 constexpr Text watch_datagram("W:5;^0x414648b3^");
 
 IsotpSenderOptions sender_options(std::uint32_t id, std::uint32_t flow_control_id, bool fd) {
@@ -62,7 +62,7 @@ IsotpReceiverOptions listening_to(CanIdKind lane, std::uint8_t node) {
     options.channel.id = telemetry_id(node);
   } else {
     options.channel.id = lane == CanIdKind::command ? command_id(node) : reply_id(node);
-    // The sender waits for flow control between its first frames; this end does not see it.
+    // After its first frame the sender waits for flow control, which this end does not see.
     options.n_cr_us += IsotpSenderOptions().n_bs_us;
   }
   return options;
@@ -180,7 +180,7 @@ Text CanNode::on_frame(const CanFrame& frame, std::uint32_t now_us) {
   if (end_ == CanEnd::host && meaning.kind == CanIdKind::telemetry) {
     return telemetry_in_.on_frame(frame, now_us).datagram ? plain(telemetry_in_) : Text();
   }
-  // The dialogue's directions share the two ids; each machine ignores frames for the other.
+  // The dialogue's directions share the two ids. Each machine ignores the other direction's frames.
   dialogue_out_.on_frame(frame, now_us);
   if (!dialogue_in_.on_frame(frame, now_us).datagram) return Text();
   const Text datagram = plain(dialogue_in_);

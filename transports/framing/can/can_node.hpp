@@ -2,11 +2,11 @@
 // The traffic between a board and its hosts on a CAN bus (docs/reference/can.md), at either end:
 // whole datagrams on one side, frames on the other.
 //     dialogue    host to board, and the board's answers (N, I): ISO-TP with flow control
-//     telemetry   the board's states and heartbeats: ISO-TP without, for any number of listeners
+//     telemetry   the board's states and heartbeats, for all listeners: ISO-TP without flow control
 // Three raw frames are added: the emergency stop, which the board's end turns into E:STOP; the
 // reason when a board goes safe; a watcher's request for states. Datagrams are received plain and
-// packed, and sent packed on request; a board answers a plain-text host in plain text.
-// Driven like its ISO-TP ends (isotp.hpp). Sans-I/O, no heap, about 4.5 KB. A queue before it
+// packed, and sent packed on request. A board answers a plain-text host in plain text.
+// Driven like its ISO-TP ends (isotp.hpp). Sans-I/O, no heap, about 4.5 KB. The caller's queue
 // chooses the next datagram. Not thread-safe.
 #pragma once
 
@@ -30,10 +30,10 @@ struct CanNodeCounters {
   std::uint32_t bad_form = 0;  // packed datagrams that do not unpack, dropped
 };
 
-// For a third party that only listens to a lane of `node` (command, reply or telemetry).
+// For a program that only listens to a lane of `node` (command, reply or telemetry).
 IsotpReceiverOptions listening_to(CanIdKind lane, std::uint8_t node);
 
-// More than 15 members: two machines for each direction, each with its buffer.
+// More than 15 data members: two machines for each direction, each with its buffer.
 class CanNode {
  public:
   // `node` is 0-31. With `fd`, sends frames of up to 64 bytes; both formats are received.
@@ -48,18 +48,18 @@ class CanNode {
   // A host's datagrams go to the dialogue, a board's by their kind.
   CanLane lane_of(Text datagram) const;
   bool idle(CanLane lane) const;
-  // Copies a datagram. False without effect if its lane is not idle, or it is empty or too long.
+  // Copies a datagram. False without effect if its lane is busy, or the datagram empty or too long.
   bool begin(Text datagram, std::uint32_t now_us);
 
-  // Writes the most urgent frame: the same until frame_sent() or a more urgent one. False if none.
+  // Writes the most urgent frame, until frame_sent() or a more urgent frame. False if none.
   bool offer(std::uint32_t now_us, CanFrame& frame);
-  // As offer(), but only frames that may overtake all accepted ones: flow control, for which the
+  // As offer(), but only frames that may overtake all accepted frames: flow control, for which the
   // other end waits, and the reason for going safe.
   bool offer_urgent(std::uint32_t now_us, CanFrame& frame);
   void frame_sent(std::uint32_t now_us);
   // True for a frame of this end's dialogue, which the other end answers with flow control.
   bool may_be_answered(const CanFrame& frame) const;
-  // Such accepted frames still wait for the bus or just reached it, so answers may come later.
+  // Restarts the wait for these answers, because the frames wait for the bus or just reached it.
   void wait_anew(std::uint32_t now_us) { dialogue_out_.wait_anew(now_us); }
   // Returns the datagram that the frame completes, valid until the next call; otherwise empty.
   Text on_frame(const CanFrame& frame, std::uint32_t now_us);
@@ -70,7 +70,7 @@ class CanNode {
   }
   void poll(std::uint32_t now_us);
   IsotpDeadline deadline() const;
-  // Ends the transfer to the other end, because another host has begun one.
+  // Ends the transfer to the other end, because another host has begun a transfer.
   void stop_commanding() { dialogue_out_.cancel(); }
   void cancel();
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Datagrams on a CAN bus: ISO 15765-2:2016 with normal addressing ("ISO-TP"), what both ends share.
+// Datagrams on a CAN bus: ISO 15765-2:2016 with normal addressing ("ISO-TP"). Part of both ends.
 //     single frame       0L data…               up to 7 bytes; 00 LL data… in a longer FD frame
 //     first frame        1L LL data…            8–4095 bytes; 10 00 LL LL LL LL data… for more
 //     consecutive frame  2S data…               S counts 1 … 15, 0, 1 …
@@ -7,13 +7,13 @@
 //
 // Both ends are driven frame by frame and own no clock, no heap and no bus:
 //     on_frame(frame, now)   a frame arrived; frames of other ids are ignored
-//     offer(now, frame)      true if there is a frame to send; the same one is offered until …
+//     offer(now, frame)      true if there is a frame to send; the same frame is offered until …
 //     frame_sent(now)        … the bus, or the queue before it, has accepted it; no effect
 //                            without an offered frame
 //     deadline()             when to call poll() and offer() again, so that a loop needs one timer
 //     poll(now)              ends a timed-out transfer; so do on_frame(), and offer() for its frame
-// Call frame_sent() before handing in later arrivals. A full queue costs time, but never a frame
-// within a transfer. Time is us of one clock and wraps; time-outs: below 2^31 us. Not thread-safe.
+// Call frame_sent() before on_frame() for later arrivals. A full queue costs time, but never a
+// frame within a transfer. Times are us and wrap; time-outs are below 2^31 us. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@
 
 namespace r4 {
 
-// "Ends" concerns a transfer, "ignored" a frame without effect.
+// "Ends": the error ends a transfer. "Ignored": the frame has no effect.
 enum class IsotpError : std::uint8_t {
   none,
   send_timeout,           // ends: the bus did not accept the frame within N_As or N_Ar (9.8.2)
@@ -52,7 +52,7 @@ struct IsotpChannel {
   std::uint8_t padding_byte = 0xCC;   // also between 8 and the next FD size (10.4.2.3)
 };
 
-// When to call poll() and offer() again. If not armed, only another event needs them.
+// When to call poll() and offer() again. If not armed, no call is needed before another event.
 struct IsotpDeadline {
   bool armed;
   std::uint32_t at_us;

@@ -103,7 +103,7 @@ IsotpArrival IsotpReceiver::on_consecutive(const CanFrame& frame, std::uint32_t 
   const bool follows = (frame.data[0] & 0xF) == sequence_;
   // Only the last frame may be shorter than the first frame (9.6.4.1).
   if (frame.size > rx_dl_ || frame.size <= chunk || !follows) {
-    // A wrong number proves a loss: else a frame of the next transfer could replace the lost one.
+    // A wrong number proves a loss. If ignored, a frame of the next transfer could fill the gap.
     if (follows) return malformed();
     return {false, fail(IsotpError::wrong_sequence_number, counters_.wrong_sequence_number)};
   }
@@ -217,7 +217,7 @@ IsotpError IsotpReceiver::fail(IsotpError error, std::uint32_t& counter) {
   return error;
 }
 
-// No transfer is unfinished, and no flow control is owed.
+// Waits for the next transfer, and owes no flow control.
 void IsotpReceiver::rest() {
   state_ = State::idle;
   status_ = IsotpFlowStatus::clear_to_send;

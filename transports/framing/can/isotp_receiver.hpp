@@ -19,15 +19,15 @@
 //     receiver.poll(now);  // also when the timer expires
 //     if (receiver.offer(now, answer) && bus.push(answer)) receiver.frame_sent(now);
 //     timer.arm(receiver.deadline());
-// A delivered datagram is the sent one; any error is counted and delivers nothing. There is one
-// exception, because ISO-TP distinguishes frames by four bits only. A frame 16 (32, 48 …) places
-// later in the same stream passes for the expected one.
-// Loss alone causes this only without flow control and only across two transfers. The end of one,
-// the first frame of the next, and as many frames after it as the numbers need must be lost, all
-// within N_Cr. Then the datagram is made of both. If both have n frames, n frames in a row must be
-// lost, or n - 16, n - 32 …, but at least 2. Examples: 4 if both have 4, 9 if both have 25, 2 if
-// both have 18. An N_Cr below the pause between transfers excludes it.
-// With flow control, one must arrive after N_Bs, when the sender has given up and begun another
+// A delivered datagram equals the sent datagram. Any error is counted and delivers nothing. There
+// is one exception, because ISO-TP distinguishes frames by four bits only. A frame 16 (32, 48 …)
+// places later in the same stream is accepted as the expected frame.
+// Loss alone causes the exception only without flow control and only across two transfers. The end
+// of one transfer, the first frame of the next, and as many further frames as the numbers need must
+// be lost, all within N_Cr. Then the datagram mixes both transfers. If both have n frames, n (or
+// n - 16, n - 32 …, but at least 2) frames in a row must be lost. Examples: 4 if both have 4
+// frames, 9 if both have 25, 2 if both have 18. An N_Cr below the pause of transfers prevents this.
+// With flow control, a flow control must arrive after N_Bs, when the sender has begun another
 // transfer, whose first frame must also be lost. The datagram's CRC detects both cases.
 #pragma once
 
@@ -53,7 +53,7 @@ struct IsotpReceiverOptions {
 // started == datagrams + busy() + the errors that end a transfer
 // frames == started + consecutive + wrong_sequence_number + overflow + unexpected_frame + malformed
 struct IsotpReceiverCounters {
-  std::uint32_t frames = 0;   // with this id, without flow control
+  std::uint32_t frames = 0;   // with this id, except flow control
   std::uint32_t started = 0;  // single and first frames accepted
   std::uint32_t consecutive = 0;
   std::uint32_t datagrams = 0;
@@ -66,14 +66,14 @@ struct IsotpReceiverCounters {
   std::uint32_t cancelled = 0;
   // These are refused or ignored.
   std::uint32_t overflow = 0;          // a datagram longer than the buffer
-  std::uint32_t refusal_timeout = 0;   // of those, no overflow was sent within N_Ar
+  std::uint32_t refusal_timeout = 0;   // part of `overflow`: not answered within N_Ar
   std::uint32_t unexpected_frame = 0;  // a consecutive frame that belongs to no transfer
   std::uint32_t malformed = 0;
 };
 
 struct IsotpArrival {
   bool datagram;     // data() and size() are valid until the next on_frame()
-  IsotpError error;  // the first one; a datagram can complete in the same call (interrupted)
+  IsotpError error;  // the first error; a datagram can complete in the same call (interrupted)
 };
 
 class IsotpReceiver {

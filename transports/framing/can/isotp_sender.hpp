@@ -32,7 +32,7 @@ struct IsotpSenderOptions {
   IsotpChannel channel;
   std::uint8_t tx_dl = 8;  // longest frame, TX_DL (9.5.1): 8, with FD also 12 … 64
   bool flow_control = true;
-  std::uint32_t separation_us = 0;  // least gap between consecutive frames; a receiver may ask more
+  std::uint32_t separation_us = 0;  // least gap of consecutive frames; a receiver may require more
   std::uint32_t n_as_us = 20000;    // the longest offer of a frame
   std::uint32_t n_bs_us = 20000;    // wait for flow control
   std::uint16_t max_waits = 10;     // waits in a row that are accepted
@@ -73,7 +73,7 @@ class IsotpSender {
   // Writes the frame to send; false if there is none. Constant time.
   bool offer(std::uint32_t now_us, CanFrame& frame);
   void frame_sent(std::uint32_t now_us);
-  // Accepted frames reached the bus only now: restarts N_Bs, or the gap to the next frame.
+  // Restarts N_Bs, or the gap to the next frame, because accepted frames reached the bus only now.
   void wait_anew(std::uint32_t now_us);
   // Takes flow control and ignores other frames. Returns the first error.
   IsotpError on_frame(const CanFrame& frame, std::uint32_t now_us);

@@ -45,7 +45,7 @@ unsigned digits_of(std::uint64_t value) {
   return value == 0 ? 0 : (67 - static_cast<unsigned>(__builtin_clzll(value))) / 4;
 }
 
-// A whole number without leading zeros, as writers print it.
+// True for a whole number without leading zeros, as writers print it.
 bool parse_plain(Text text, std::uint64_t& out) {
   return !text.empty() && (text[0] != '0' || text.size() == 1) && parse_number(text, out);
 }
@@ -71,7 +71,7 @@ bool put_count(DigitWriter& digits, std::uint64_t value) {
 
 bool put_hundredths(DigitWriter& digits, Text text) {
   std::int32_t value = 0;
-  // Exactly two decimals, no sign, no leading zero except the one before the point.
+  // Exactly two decimals, no sign, no leading zero except directly before the point.
   return text.size() >= 4 && *(text.end() - 3) == '.' && (text[0] != '0' || text.size() == 4) &&
          parse_hundredths(text, value) && value >= 0 && text[0] != '-' &&
          put_fixed(digits, static_cast<std::uint64_t>(value), short3_max, 3);
@@ -133,7 +133,7 @@ bool put_session(DigitWriter& digits, SessionId sid) {
          digits.put(sid & 0xFFFFFFFFU, session_id_size / 2);
 }
 
-// In the form of the field; false if the form would write a different text.
+// Writes the value in the form of the field. False if the form would write a different text.
 bool put_in_form(DigitWriter& digits, PackedForm form, Text text) {
   std::uint64_t value = 0;
   std::uint64_t bits = 0;
@@ -171,7 +171,7 @@ unsigned digit_of(char c) {
   return c == '.' ? digit_point : c == '-' ? digit_minus : no_digit;
 }
 
-// The end of bytes without digits: where three digits follow, or digits to the end. Those cost less
+// The end of a run of bytes: where three digits follow, or digits to the end. Such digits cost less
 // than a new run of bytes.
 const char* end_of_bytes(const char* at, const char* end) {
   const char* const limit =
@@ -237,7 +237,7 @@ struct Numbers {
   std::uint64_t time = 0;
   unsigned size = 0;  // index of `sizes`
 
-  // False if these are not PNum and T in a form and size that a layout has.
+  // False if the fields are not PNum and T in a form and size that a layout has.
   bool take(const Field& first, const Field& second) {
     if (first.name() != Text("PNum") || second.name() != Text("T") ||
         !parse_plain(first.values(), pnum) || !parse_plain(second.values(), time)) {
@@ -273,7 +273,7 @@ Field last_field(const char* begin, const char* end) {
                Text(colon + 1, static_cast<std::size_t>(end - 1 - (colon + 1))));
 }
 
-// The layout of a datagram that ends in PNum and T; `end` is where they begin.
+// The layout of a datagram that ends in PNum and T. `end`: where PNum begins.
 Layout layout_of(Fields fields, const char* end) {
   unsigned run = 0;
   Field field;

@@ -12,14 +12,14 @@ class DigitWriter {
  public:
   DigitWriter(std::uint8_t* out, std::uint8_t* end) : at_(out), end_(end) {}
 
-  // The last `digits` hexadecimal digits of `value`; at most 14.
+  // Writes the last `digits` hexadecimal digits of `value`; at most 14.
   bool put(std::uint64_t value, unsigned digits) {
     // Local variables, because the written bytes may alias any member.
     const std::uint64_t pending = pending_ << 4 * digits | value;
     unsigned count = count_ + digits;
     std::uint8_t* at = at_;
     if (end_ - at < static_cast<std::ptrdiff_t>((count + 1) / 2)) {
-      end_ = at;  // permanently: later digits must not fit either
+      end_ = at;  // so that later digits do not fit either
       count_ = 1;
       return false;
     }

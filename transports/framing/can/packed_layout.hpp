@@ -15,7 +15,7 @@ enum class Layout : std::uint8_t {
   plain_fields,     // more: PNum and T, if any, are among them
   fields,           // more, PNum, T
   state,            // the ten default fields of the state, more, PNum, T
-  state_safe_cmd,   // those ten, SAFE, CMD, more, PNum, T
+  state_safe_cmd,   // the ten default fields, SAFE, CMD, more, PNum, T
   full_state,       // all state fields, more, PNum, T
   board_heartbeat,  // H:R4-ROS2, PNum, T, more
   host_heartbeat,   // H:ROS2-R4, SID, PNum, T, more

@@ -38,7 +38,7 @@ constexpr PackedWord words[word_count] = {
     {"SAFE", Form::flag}, {"CMD", Form::count},
     {"RXOK", Form::count}, {"RXCRC", Form::count}, {"RXLOST", Form::count}, {"RXDUP", Form::count},
     {"RXREF", Form::count}, {"LATE", Form::count},
-    // 38: the other names
+    // 38: names of other fields
     {"PNum", Form::count}, {"T", Form::count},
     {"H"}, {"O"}, {"D"}, {"S"}, {"R"}, {"E"}, {"P"}, {"Z"}, {"B"}, {"U"}, {"F"}, {"C"}, {"Q"},
     {"N"}, {"I"}, {"A"}, {"AN"},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The words with a code in the packed form, and the form of each field's values: the tables of
-// docs/reference/packed.md, version 1. After the first release they change only with the version.
+// docs/reference/packed.md, version 1. After the first release, a change needs a new version.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace r4 {
 
-// A text that differs from what the form writes is sent as text, after an F.
+// A value that the form would write differently is sent as text, after an F.
 enum class PackedForm : std::uint8_t {
   text,
   flag,        // 0-14 in 1 digit

@@ -180,7 +180,7 @@ bool take_session(Digits& digits, SessionId& sid) {
   return sid != no_session;
 }
 
-// A value in its form, or as text after an F.
+// Reads a value in its form, or as text after an F.
 bool take_value(Digits& digits, PackedForm form, Characters& out) {
   unsigned first = 0;
   std::uint64_t value = 0;

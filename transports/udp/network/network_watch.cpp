@@ -33,7 +33,7 @@ void NetworkWatch::leave(Member& member) {
   std::replace(members_.begin(), members_.end(), &member, static_cast<Member*>(nullptr));
   if (std::any_of(members_.begin(), members_.end(), [](const Member* each) { return each; }))
     return;
-  // Without members the loop must not wait for anything.
+  // Without members, the watch must not keep the loop running.
   members_.clear();
   waiting_.cancel();
   if (waits_.is_open()) waits_.release();

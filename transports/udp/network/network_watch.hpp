@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Notifies the hosts of a loop when an interface of this computer, its carrier or an address has
-// changed. So a pulled cable is noticed even if nothing is sent. One object per loop. Without
+// changed. So an unplugged cable is noticed even if nothing is sent. One object per loop. Without
 // rtnetlink(7), members are not called, and a failing datagram shows the change later.
 #pragma once
 
@@ -32,7 +32,7 @@ class NetworkWatch final : public asio::execution_context::service {
   static NetworkWatch& of(asio::io_context& io) { return asio::use_service<NetworkWatch>(io); }
 
   void enter(Member& member);
-  // No call of that member follows. Can be called twice.
+  // No call of `member` follows. Can be called twice.
   void leave(Member& member);
 
  private:

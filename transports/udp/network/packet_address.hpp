@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The own address to which a packet was sent and from which its answer leaves. A host hears only
-// that address; a socket bound to all addresses would answer from the route's address.
+// The own address to which a packet was sent and from which its answer leaves. A host accepts only
+// answers from that address. A socket bound to all addresses would answer from the route's address.
 #pragma once
 
 #include <asio/ip/address.hpp>
@@ -19,7 +19,7 @@ bool note_addresses(int socket, const asio::ip::udp& protocol);
 std::optional<std::size_t> receive_packet(int socket, char* out, std::size_t room,
                                           asio::ip::udp::endpoint& from, asio::ip::address& at);
 
-// Sends a packet from `from`, or any address if that is unspecified or gone. 0 if sent, else errno.
+// Sends from `from`, or from any address if `from` is unspecified or lost. 0 if sent, else errno.
 int send_packet(int socket, std::string_view bytes, const asio::ip::udp::endpoint& to,
                 const asio::ip::address& from);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The route to a board: whether the system has one, and whether its interface works. Sends nothing.
+// The route to a board: whether it exists, and whether its interface works. Sends nothing.
 #pragma once
 
 #include <asio/ip/address.hpp>
@@ -13,15 +13,15 @@ struct OwnAddress {
   unsigned interface = 0;
   bool works = false;  // the interface is up and has a carrier (a plugged cable, a joined WiFi)
 };
-// Empty if the system does not report them.
+// Empty if the system does not report its addresses.
 std::vector<OwnAddress> own_addresses();
 
 // 0 if there is a route to `to`, else errno. `from`, if specified: only by its interface.
 int probe_route(const asio::ip::udp::endpoint& to, const asio::ip::address& from,
                 const std::vector<OwnAddress>& own);
 
-// Makes the socket send to that board by the interface of `from`, even if another interface leads
-// there. It receives by any interface. No effect for a board on this computer.
+// Makes the socket send to that board by the interface of `from`, even if another interface has a
+// route to the board. The socket receives by any interface. No effect for a board on this computer.
 void send_by_interface_of(const asio::ip::address& from, int socket,
                           const asio::ip::udp::endpoint& to, const std::vector<OwnAddress>& own);
 

@@ -29,7 +29,7 @@ using Network = BoardSearch::Network;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t most_networks = 64;
-// Datagrams read from one socket before the next socket, and the clock, have their turn.
+// Datagrams read from one socket before the next socket is read and the time checked.
 constexpr int most_at_once = 64;
 constexpr std::size_t most_listed = 8;  // boards in an error; `r4 list` shows all of them
 
@@ -180,7 +180,7 @@ class Round {
 };
 
 Problem nothing_found(const BoardSearch::Result& result, const WantedBoard& wanted) {
-  std::vector<std::string> interfaces;  // each once, though it may have several addresses
+  std::vector<std::string> interfaces;  // each once; an interface may have several addresses
   std::string trouble;
   for (const Network& network : result.networks) {
     if (!network.trouble.empty()) {
@@ -284,8 +284,8 @@ FoundHost find_board(const BoardSearch& search, const WantedBoard& wanted) {
   std::vector<AnsweredBoard> meant = result.boards;
   if (!wanted.called.empty()) meant = called(result.boards, wanted.called);
   if (!wanted.board_id.empty()) {
-    // Of several boards of that name, take the one that was found before. If the URL wants the only
-    // board there is, another board does not replace it.
+    // If several boards have that name, choose the board that was found before. If the URL names no
+    // board, another board does not replace the board that was found before.
     std::vector<AnsweredBoard> same = meant;
     std::erase_if(same,
                   [&](const AnsweredBoard& each) { return each.board_id != wanted.board_id; });

@@ -4,10 +4,10 @@
 //                                     <--- I:R4,…;NAME:…;BUSY:… --- each board, from its :2018
 //
 // One search takes half a second, sends three packets a network, and keeps at most `most_boards`
-// answers. The answers are not signed: any program on the network can answer as any board. Not the
-// search but the link and its keys decide which commands are accepted. Broadcast does not pass a
-// router, and often not a VPN, container network or WiFi with client isolation: a board there is
-// reached by its address. The loopback has no broadcast, so each of its addresses is asked.
+// answers. The answers are not signed, so any program on the network can answer as any board. The
+// link and its keys decide which commands are accepted, not the search. Broadcast does not pass a
+// router, and often not a VPN, container network or WiFi with client isolation. A board there is
+// reached by its address. The loopback has no broadcast, so the search asks each of its addresses.
 #pragma once
 
 #include <asio/ip/address_v4.hpp>
@@ -60,15 +60,15 @@ struct BoardSearch {
 };
 
 struct WantedBoard {
-  std::string called;    // its board id, or its name; empty: the only board there is
-  std::string board_id;  // of the board that was found before; empty: none yet
+  std::string called;    // its board id, or its name; empty: the only board
+  std::string board_id;  // of the board that was found before; empty: none
 };
 
 // The boards with that id; if there is none, the boards with that name.
 std::vector<AnsweredBoard> called(const std::vector<AnsweredBoard>& boards,
                                   std::string_view id_or_name);
 
-// The URL that finds `board` again: by name or id if unique, else by address. `port`: searched.
+// The URL that finds `board` again: by name or id if unique, else by address. `port`: of boards.
 std::string url_of(const AnsweredBoard& board, const std::vector<AnsweredBoard>& boards,
                    std::uint16_t port);
 

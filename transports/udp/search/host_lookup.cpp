@@ -16,7 +16,7 @@
 namespace r4 {
 namespace {
 
-// Calls `done(answer)` in a detached thread, which may outlive everything but the arguments.
+// Calls `done(answer)` in a detached thread, which may outlive all objects except the arguments.
 template <class Question, class Done>
 void ask_in_a_thread(Question question, Done done) {
   // An exception that leaves the thread would end the program, which may be driving.
@@ -84,7 +84,7 @@ bool is_address(const std::string& host) {
   return !error;
 }
 
-// The asker and its loop may be gone before the answer comes.
+// The asker and its loop may be destroyed before the answer arrives.
 struct HostWatch::Asked {
   std::mutex mutex;
   HostWatch* asker = nullptr;
@@ -126,7 +126,7 @@ void HostWatch::ask() {
       HostWatch* const asker = asked->asker;  // only the thread of the loop writes it
       if (asker == nullptr) return;
       asker->asked_.reset();
-      const OnFound on_found = asker->on_found_;  // it may stop the watch
+      const OnFound on_found = asker->on_found_;  // the callback may stop the watch
       on_found(found);
     });
   });
@@ -141,7 +141,7 @@ void HostWatch::wait() {
     wait();
     if (!silent) return;
     if (what_to_ask_) return ask();
-    const OnFound on_found = on_found_;  // it may stop the watch
+    const OnFound on_found = on_found_;  // the callback may stop the watch
     on_found({});
   }));
 }

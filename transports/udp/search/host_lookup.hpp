@@ -60,7 +60,7 @@ class HostWatch {
   // Without a question, `on_found` gets an empty answer when the board is silent.
   void start(Question question, bool known, OnFound on_found);
   void ask_for(Question question) { what_to_ask_ = std::move(question); }
-  // No call follows. An open question goes on in its thread, and its answer is dropped.
+  // No call follows. An open question continues in its thread, and its answer is dropped.
   void stop();
 
   void set_known(bool known) { known_ = known; }

@@ -3,7 +3,7 @@
 //
 // Each board has a topic, /left-arm or /board1, whose messages are its records as JSON, as in
 // .jsonl. Topic /r4log holds the lines of the native format that belong to no board. In file order
-// the two contain the whole recording, so the native file can be restored byte by byte.
+// the messages contain the whole recording, so the native file can be restored byte by byte.
 #pragma once
 
 #include <cstdint>

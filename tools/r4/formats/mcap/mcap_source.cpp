@@ -18,7 +18,7 @@ namespace {
 using mcap::Fields;
 using mcap::Op;
 
-// Largest record and unpacked chunk. Ours have 1 MiB; users of other tools may choose any size.
+// Largest record and unpacked chunk. Chunks of r4 have 1 MiB. Other tools may use any size.
 constexpr std::uint64_t max_record = 256 << 20;
 // Offset of the compression's name in a chunk record. The search after damage finds chunks by it.
 constexpr std::size_t compression_at = mcap::record_head + 28;
@@ -103,7 +103,7 @@ std::size_t McapSource::take_next(std::string_view bytes) {
   const std::string_view content = bytes.substr(mcap::record_head, static_cast<std::size_t>(size));
   if (part_ == Part::header) {
     if (op != Op::header) fail_as_none();
-    // Accept another profile: other tools write their own when they copy a file.
+    // Accepts another profile, because a tool that copies a file writes its own profile.
     ours_ = Fields(content).string() == mcap::profile;
     part_ = Part::data;
   } else if (op == Op::footer) {

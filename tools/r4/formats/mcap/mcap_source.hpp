@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads .mcap files sequentially, without the index. After a damaged chunk it continues with the
-// next. Other tools may have copied the file: with another chunk size, compression or profile,
-// without some topics, or with foreign topics, which are ignored.
+// next chunk. Another tool may have copied the file: with another chunk size, compression or
+// profile, without some topics, or with foreign topics, which are ignored.
 #pragma once
 
 #include <cstdint>

@@ -47,7 +47,7 @@ std::string address_text(int family, std::string_view bytes) {
 
 bool is_vlan_tag(std::uint16_t type) { return type == 0x8100 || type == 0x88A8 || type == 0x9100; }
 
-// True for a possible id: 11 bits unless extended; few classes of errors.
+// True for a possible id: 11 bits unless extended; in an error frame, only the ten error classes.
 bool can_be_id(std::uint32_t id) {
   constexpr std::uint32_t flags = can_extended | can_remote | can_error;
   if ((id & can_error) != 0) return (id & ~flags) < 0x400;
@@ -69,7 +69,7 @@ std::string link_name(std::uint16_t link) {
   }
 }
 
-// The most frequent ones, at most five: "3018, 2390 and 4 more".
+// The most frequent numbers, at most five: "3018, 2390 and 4 more".
 template <class Name>
 std::string listed(const std::map<std::uint16_t, std::uint64_t>& counts, Name name) {
   constexpr std::size_t most = 5;
@@ -169,9 +169,9 @@ void PacketRecords::on_cooked(std::uint16_t protocol, std::string_view bytes,
   on_can(interface, cooked_id(bytes), bytes, packet);
 }
 
-// Byte order of the id in cooked captures: the capturing computer's up to libpcap 1.10.4, network
-// order later. If only one order gives a possible id, it is used; else that of the previous frame.
-// The first frame prefers an 11-bit id, as all frames but numbered stops have.
+// The byte order of the id in cooked captures is the capturing computer's up to libpcap 1.10.4, and
+// network order later. If only one order gives a possible id, that order is used, else the order of
+// the previous frame. The first frame prefers an 11-bit id, because only numbered stops have 29.
 std::uint32_t PacketRecords::cooked_id(std::string_view bytes) {
   const auto big = read_number<std::uint32_t>(bytes, ByteOrder::big);
   const auto little = read_number<std::uint32_t>(bytes, ByteOrder::little);
@@ -198,7 +198,7 @@ void PacketRecords::on_line(const PacketInterface& interface, const Packet& pack
   if (problem != nullptr) damage(packet, problem);
 }
 
-// A datagram of that path from PcapngSink.
+// A datagram from PcapngSink, on the path that `interface` names.
 void PacketRecords::on_own(const PacketInterface& interface, const Packet& packet) {
   const auto path = std::string_view(interface.description).substr(path_interface.size());
   Udp udp;
@@ -262,7 +262,7 @@ void PacketRecords::on_ip(std::string_view bytes, const Packet& packet) {
 }
 
 // True if the same packet was already reported. Different packets differ in the IP id, or in number
-// and time of the datagram. A host that repeats a text takes longer than the limits.
+// and time of the datagram. A host repeats a text only after a time longer than these limits.
 bool PacketRecords::is_repeated(const Udp& udp, Time time) {
   constexpr Time of_an_id{500'000};
   constexpr Time without{5'000};

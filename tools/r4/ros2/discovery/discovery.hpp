@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reports readers and writers of other participants when they come, change or go.
+// Reports readers and writers of other participants when they appear, change or leave.
 #pragma once
 
 #include <array>

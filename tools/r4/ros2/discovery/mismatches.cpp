@@ -84,7 +84,7 @@ std::optional<Mismatch> mismatch_of(const Graph::OwnTopic& own, const Announced&
                                              other.owner_text(), error.problem().text())};
     }
   }
-  const auto ours = counterparts(own, other);  // other_type() may have added one
+  const auto ours = counterparts(own, other);  // other_type() may have added an endpoint
   std::optional<Mismatch> of_policy;
   for (const OwnEndpoint* const each : ours) {
     if (each->type != other.type) continue;

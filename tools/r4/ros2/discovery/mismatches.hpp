@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Finds foreign readers and writers of our topics that do not match: wrong type, wrong quality of
-// service, or a service client that cannot be answered. DDS ignores these silently.
+// service, or a service client that cannot be answered. DDS ignores such endpoints silently.
 #pragma once
 
 #include <functional>
@@ -14,7 +14,7 @@ namespace r4::tool::ros2 {
 
 class Mismatches {
  public:
-  // `who` does not match an endpoint of `node`. Without `mismatch` it matches again or has left.
+  // `who` does not match an endpoint of `node`; no `mismatch`: `who` matches again or has left.
   using Tell = std::function<void(std::size_t node, const EntityId& who,
                                   const std::optional<Mismatch>& mismatch)>;
   Mismatches(const Graph& graph, Tell tell) : graph_(graph), tell_(std::move(tell)) {}

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Finds nodes with our names, such as a second `r4 ros2`. Each of our nodes has the service ~/stop,
-// so another participant that answers it has a node of the same name.
+// so another participant that answers this service has a node of the same name.
 #pragma once
 
 #include <map>

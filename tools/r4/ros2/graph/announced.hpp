@@ -31,7 +31,7 @@ const char* unmatched_policy(const Policies& offered, const Policies& requested)
 struct Announced {
   EndpointKind kind = EndpointKind::writer;
   EntityId id{};
-  bool gone = false;  // the members below are then unknown
+  bool gone = false;  // if true, the members below are unknown
   std::string topic;  // DDS name: "rt/R4"
   std::string type;   // DDS name: "std_msgs::msg::dds_::String_"
   std::string user_data;
@@ -49,7 +49,7 @@ struct Mismatch {
   Weight weight = Weight::warning;
   std::string text;  // begins with the node's name of the topic
 };
-// Handles a writer of another type; may create a reader. Nothing if the type is simply wrong.
+// Handles a writer of another type, and may create a reader. Returns nothing if the type is wrong.
 using OtherType = std::function<std::optional<Mismatch>(const Announced& writer)>;
 
 // "std_msgs/msg/String" for "std_msgs::msg::dds_::String_". Any name becomes printable.

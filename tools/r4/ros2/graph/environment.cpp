@@ -91,7 +91,7 @@ std::string configuration(const std::string& general, const std::vector<std::str
 }  // namespace
 
 std::string process_environment(const char* name) {
-  const char* const value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nobody sets one
+  const char* const value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): r4 sets none
   return value == nullptr ? "" : value;
 }
 

@@ -2,8 +2,9 @@
 // Our part of the ROS 2 graph: nodes with their topics and services.
 //
 // Cyclone DDS numbers a participant's entities with 14 bits, so 64 nodes share a participant.
-// Create nodes before list_nodes(); readers also later, on the reading thread. leave() removes all
-// nodes at once; the destructor waits until that is sent. A killed process stays listed for 10 s.
+// Create nodes before list_nodes(). Readers may also be created later, on the reading thread.
+// leave() removes all nodes at once, and the destructor waits until the removal is sent. A killed
+// process stays listed for 10 s.
 #pragma once
 
 #include <chrono>
@@ -50,7 +51,7 @@ class Graph {
   std::size_t add_node(const NodeName& name);
   const NodeName& node(std::size_t node) const { return nodes_[node].name; }
 
-  // `topic` is the node's name for it (names.hpp). Use the entity only for samples of type Message.
+  // `topic`: the node's name of the topic (names.hpp). Use the entity only for samples of Message.
   template <class Message>
   dds_entity_t publish(std::size_t node, std::string_view topic, const Qos& qos = {}) {
     return make_writer(node, topic, message_type<Message>(), qos);

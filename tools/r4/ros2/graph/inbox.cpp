@@ -8,7 +8,7 @@ namespace r4::tool::ros2 {
 namespace {
 
 constexpr std::chrono::milliseconds turn{10};
-constexpr int turns_saved = 3;                // saved while quiet
+constexpr int turns_saved = 3;                // most turns that a quiet time saves
 constexpr std::size_t most_publishers = 256;  // distinguished publishers of a topic
 
 EntityId writer_of(dds_entity_t reader, dds_instance_handle_t publication) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads samples from the graph on its own thread and passes them to the boards' loop.
 //
-// Newer samples of a subscription replace waiting ones. The loop takes them at once, but on average
-// at most every 10 ms, so a flood delays heartbeats by only a few turns. Urgent samples, which are
-// stops, are taken immediately.
+// Newer samples of a subscription replace waiting samples. The loop takes samples at once, but on
+// average at most every 10 ms, so a flood delays heartbeats by only a few turns. Urgent samples,
+// which are stops, are taken immediately.
 #pragma once
 
 #include <dds/dds.h>
@@ -38,7 +38,7 @@ struct Origin {
 
 class Inbox {
  public:
-  // Calls `on_drained` on the loop when no sample waits any more. A participant must exist.
+  // Calls `on_drained` on the loop when no sample waits. A participant must exist.
   Inbox(asio::io_context& io, Transit::Clocks clocks, std::function<void()> on_drained);
   ~Inbox() { stop(); }
   Inbox(const Inbox&) = delete;
@@ -57,7 +57,7 @@ class Inbox {
     // On the loop, after a publisher has left: the remaining publishers.
     std::function<void(const std::vector<std::uint64_t>&)> left;
   };
-  // Before start(), or on the reading thread.
+  // Call before start(), or on the reading thread.
   template <class Message, class Value>
   void add(Subscription<Message, Value> subscription);
   // Calls `look` on the reading thread while `entity` has data.

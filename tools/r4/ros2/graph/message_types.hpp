@@ -79,7 +79,7 @@ const MessageType& message_type<NodesMessage>();
 template <>
 const MessageType& message_type<NodesBeforeIronMessage>();
 
-// A text for a message, whose strings are not const. Valid while `string` lives.
+// A text for a message, whose strings are not const. Valid while `string` exists.
 inline char* borrowed(const std::string& string) { return const_cast<char*>(string.c_str()); }
 
 inline std::string_view bytes_of(const dds_sequence_octet& string) {

@@ -2,7 +2,8 @@
 // Supports `ros2 node list`: on ros_discovery_info each participant publishes its nodes with their
 // readers and writers. An id has 24 bytes up to Humble and 16 since Iron, under the same type name,
 // and the wrong size makes a receiver throw. So nothing is published until the type hash of another
-// participant's writer shows its release. ROS does not support two releases: the first counts.
+// participant's writer shows its release. ROS does not support a graph of two releases, so the
+// first release found is used.
 #pragma once
 
 #include <cstddef>

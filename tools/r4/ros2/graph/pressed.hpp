@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Publishers whose last message was `true`. A pressed button counts once, even if repeated. A
-// publisher that was unreachable has not released it. Remembers the newest 256.
+// publisher that was unreachable has not released its button. Remembers the newest 256 publishers.
 #pragma once
 
 #include <algorithm>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Estimates the transit time of samples. In a graph of one computer the common clock measures it.
-// The clocks of two computers differ, so the delay is relative to the publisher's fastest sample;
-// its first sample has no reference. Clocks may drift by 0.02 %, but by at most 0.5 s between two
-// samples: else a sample held back after a long silence would seem fresh. After a clock was set,
-// all samples seem slow: the new offset is accepted after ten slow samples a second apart.
+// The clocks of two computers differ, so the delay is relative to the publisher's fastest sample.
+// The first sample has no reference. Clocks may drift by 0.02 %, but by at most 0.5 s between two
+// samples, because a delayed sample after a long silence must not seem fresh. After a clock was
+// set, all samples seem slow. The new offset is accepted after ten slow samples a second apart.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ class Transit {
 
   explicit Transit(Clocks clocks) : clocks_(clocks) {}
 
-  // `written`, `received`: wall clocks. Returns the delay; of two clocks 0 for the fastest.
+  // `written`, `received`: wall clocks. With two clocks, the delay of the fastest sample is 0.
   Duration delay(Duration written, Duration received) {
     const Duration difference = received - written;
     if (clocks_ == Clocks::one) return std::max(difference, Duration(0));
@@ -62,7 +62,7 @@ class Transit {
   const Clocks clocks_;
   Duration last_{0};
   std::optional<Duration> least_;
-  std::optional<Slow> slow_;  // samples since the last fast one
+  std::optional<Slow> slow_;  // samples since the last fast sample
 };
 
 }  // namespace r4::tool::ros2

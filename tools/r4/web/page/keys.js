@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Escape always stops. Space stops everywhere while this page controls, else where it has no other
-// meaning; after a click on a button it is meant for the robot. Enter presses buttons, ticks boxes.
+// Escape always stops. While this page controls, Space stops everywhere, also after a click on a
+// button. Otherwise Space stops where it has no other meaning. Enter presses buttons, ticks boxes.
 
 const takes_space = (target) => target.closest('button, input, select, a, [role=group], [role=log]') !== null;
 

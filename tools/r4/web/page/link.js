@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The WebSocket to r4 web, reopened when lost. While this page controls and is visible, it sends
 // `alive` every 100 ms. Each message echoes the newest `now` of the server, so delayed messages do
-// not count. The timer runs in the page's own thread: a hung page sends nothing.
+// not count. The timer runs in the page's own thread, so a hung page sends nothing.
 
 const ALIVE_MS = 100;
 const SILENCE_MS = 1500;  // the server sends every 100 ms

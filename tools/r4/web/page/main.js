@@ -133,7 +133,7 @@ function stop() {
   at('stop').classList.remove('pressed');
   requestAnimationFrame(() => at('stop').classList.add('pressed'));
 }
-// Reacts to the press, not the release: a finger may slip off.
+// Reacts to the press, not the release, because a finger may slip off.
 at('stop').onpointerdown = stop;
 at('stop').onclick = (click) => { if (click.detail === 0) stop(); };  // keyboard or screen reader
 listen_for_stop(stop, () => link.controls);

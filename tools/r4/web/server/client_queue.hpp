@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Messages that wait for one client. A slow client loses its oldest states, and gets their number.
-// With too many other messages the client is dropped. The caller passes in the time.
+// If too many other messages wait, the client is dropped. The caller passes in the time.
 #pragma once
 
 #include <chrono>

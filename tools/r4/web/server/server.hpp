@@ -26,17 +26,17 @@ struct ServerOptions {
   std::vector<std::string> hosts;    // NAME or NAME:PORT accepted besides the address
   std::string token;                 // empty: not required
   std::vector<std::string> origins;  // foreign pages that may read by the Foxglove protocol
-  std::string page_folder;           // files of the page; empty: the embedded ones
+  std::string page_folder;           // files of the page; empty: the embedded files
 };
 
 // Called on the server's thread.
 class ServerEvents {
  public:
   virtual void on_open(ClientId client, Protocol protocol) = 0;
-  // A text message. The client's next one arrives after Server::read_on().
+  // A text message. The client's next message arrives after Server::read_on().
   virtual void on_message(ClientId client, Protocol protocol, std::string text) = 0;
   virtual void on_closed(ClientId client, Protocol protocol) = 0;
-  // Reply by Server::set_metrics(). Not called again before, nor within `metrics_age` after it.
+  // Reply by Server::set_metrics(). Not called again until `metrics_age` after the reply.
   virtual void on_metrics() = 0;
 
  protected:

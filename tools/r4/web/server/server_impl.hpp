@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The inside of the server, for server.cpp only, which compiles Boost.Beast. Beast uses Boost.Asio,
-// the boards' loop standalone Asio, and no source can include both. The two exchange closures.
+// and the boards' loop uses standalone Asio. No source can include both, so the server and the loop
+// exchange closures.
 #pragma once
 
 #include <array>
