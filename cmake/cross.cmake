@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Toolchain file: Debian's cross compiler for R4_ARCH of the environment (arm64, armhf, amd64), with that architecture's
-# libraries beside this machine's (apt-get install libfmt-dev:arm64). `tools/on debian13/arm64 tools/build` sets both.
+# Toolchain file for Debian's cross compiler. R4_ARCH in the environment is arm64, armhf or amd64. The libraries of
+# R4_ARCH are installed beside this machine's libraries (apt-get install libfmt-dev:arm64).
+# `tools/on debian13/arm64 tools/build` sets R4_ARCH and this file.
 set(CMAKE_SYSTEM_NAME Linux)
 if("$ENV{R4_ARCH}" STREQUAL "arm64")
   set(CMAKE_SYSTEM_PROCESSOR aarch64)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# How a layer is built: r4_portable_layer(NAME FILES...) and r4_host_layer(NAME FILES...).
-# Each makes an OBJECT library; cmake/library.cmake joins their objects into the library.
+# r4_portable_layer(NAME FILES...) and r4_host_layer(NAME FILES...) build a layer as an OBJECT library.
+# cmake/library.cmake joins the objects of all layers into the library.
 
-# Asio without Boost, its code compiled once (transports/asio.cpp). Whether Asio finds std::aligned_alloc depends on the
-# headers included before; the last definition switches it off, because object files would free handler memory in
+# Asio without Boost, compiled once (transports/asio.cpp). Headers that come before Asio decide whether it detects
+# std::aligned_alloc. The last definition switches this off, because object files would free handler memory in
 # different ways. A program that links r4link::asio needs all of these definitions.
 set(R4_ASIO_DEFINITIONS ASIO_STANDALONE ASIO_SEPARATE_COMPILATION ASIO_NO_DEPRECATED
     ASIO_DISABLE_STD_ALIGNED_ALLOC)
@@ -32,14 +32,14 @@ macro(r4_find_optional option package needs_it debian)
   endif()
 endmacro()
 
-# install(), unless another project includes the tree: that project decides what it installs.
+# Calls install() only if R4_INSTALL is on: a project that includes the tree decides what it installs.
 function(r4_install)
   if(R4_INSTALL)
     install(${ARGV})
   endif()
 endfunction()
 
-# Host code: C++20, the tree's root on the include path ("protocol/datagram/crc32.hpp").
+# Host code: C++20, with the tree's root on the include path ("protocol/datagram/crc32.hpp").
 function(r4_host_code target)
   r4_warnings(${target})
   target_compile_features(${target} PRIVATE cxx_std_20)
@@ -85,7 +85,7 @@ function(r4_portable_layer target)
   endif()
 endfunction()
 
-# Code that only a computer runs: C++20 with standalone Asio.
+# Code that only a host runs: C++20 with standalone Asio.
 function(r4_host_layer target)
   r4_layer(${target} ${ARGN})
   if(TARGET ${target})
@@ -94,7 +94,7 @@ function(r4_host_layer target)
     # Without ASIO_DISABLE_VISIBILITY the library would export Asio's symbols.
     target_compile_definitions(${target} PRIVATE ${R4_ASIO_DEFINITIONS} ASIO_DISABLE_VISIBILITY)
     target_link_libraries(${target} PRIVATE Threads::Threads)
-    # Compiled once, not for each file. Each file still includes what it needs: clang-tidy reads it without this header.
+    # These headers are compiled once. Each file must also include the headers that it uses, for clang-tidy.
     target_precompile_headers(${target} PRIVATE <algorithm> <asio/io_context.hpp> <chrono> <functional>
                               <memory> <optional> <string> <vector>)
     r4_unity_by_room(${target} ${ARGN})

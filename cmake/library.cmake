@@ -5,7 +5,7 @@
 #   r4link::shared   libr4link.so: the same as a shared library
 #   r4link::asio     libr4link-asio.a: also AsyncBoard and async_discover(). It uses the program's Asio.
 #
-# A program links one of the three, by find_package(r4link), or by pkg-config r4link and r4link-asio.
+# A program links one of these libraries, by find_package(r4link), or by pkg-config r4link and r4link-asio.
 include(CMakePackageConfigHelpers)
 
 get_property(layers GLOBAL PROPERTY R4_LAYERS)

@@ -4,8 +4,8 @@
 
 All warnings are errors. No code is generated, so warnings of the optimizer come only in the build. Without a COMPILER
 (such as g++-11) the oldest installed GCC reads all sources, and the newest GCC and the oldest clang read the public
-headers. tools/test builds the tree with the default compiler and with the newest clang. FOLDER is where each compiler
-gets a separate configured build.
+headers. tools/test builds the tree with the default compiler and with the newest clang. Each compiler gets a configured
+build in FOLDER.
 """
 import concurrent.futures
 import json
@@ -40,7 +40,7 @@ def installed():
 
 
 def chosen():
-    """The compilers that read all sources, and those that read the headers."""
+    """The compilers for all sources, and the compilers for the public headers."""
     default = version_of('c++')
     gcc, clang = (installed()[kind] for kind in ('g++', 'clang++'))
     sources = [f'g++-{version}' for version in gcc[:1] if ('g++', version) != default]
@@ -56,7 +56,7 @@ def run(command, folder=ROOT):
 
 
 def configured(compiler, build):
-    """The commands by which a build with that compiler reads each source: (folder, command)."""
+    """Yields (folder, command) for each source: the command by which a build with `compiler` reads it."""
     trouble = (run(['cmake', '--preset', 'release', '-B', build, f'-DCMAKE_CXX_COMPILER={compiler}', *OPTIONS]) or
                run(['cmake', '--build', build, '--target', 'r4_ros2_idl_generate']))
     if trouble:

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks the first things a visitor meets. Usage: front_door.py TREE
+"""Checks the first pages and files that a visitor sees. Usage: front_door.py TREE
 
-Workflows, actions and issue forms are valid for GitHub. The tools that they and the pages at the top name exist, and
-know the options. The changelog and the packages have this version. The site can be made: every link has a target, and
+Workflows, actions and issue forms are valid for GitHub. The tools in these files and in the top pages exist, and accept
+the options. The changelog and the packages have this version. The site can be made: every link has a target, and
 Doxygen understands the headers.
 """
 import pathlib

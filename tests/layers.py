@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fails when a source includes a file that its room (folder) may not include. Usage: layers.py TREE
 
-tools > host > transports > protocol, tools > firmware > transports/framing > protocol, and within each of them
-the rooms in the order of ALLOWED; only host/standard_registry.cpp may include firmware/ports/sim. The public
-headers, include/r4link, are below all of them. The portable rooms (protocol, transports/framing, firmware without
-its ports, the chip models), and the public headers that they include, use only headers that a C++14 board has.
+The layers are tools > host > transports > protocol, and tools > firmware > transports/framing > protocol. ALLOWED orders
+the rooms of a layer. Only host/standard_registry.cpp may include firmware/ports/sim. The public headers, include/r4link,
+are below all layers. The portable rooms (protocol, transports/framing, firmware without its ports, the chip models)
+use only headers that a C++14 board has. The same is true for the public headers that they include.
 A room holds at most 20 sources, a source at most 430 lines.
 """
 import collections
@@ -138,12 +138,12 @@ EXCEPTIONS = {
 # room: the files that it may not include although it may include their room
 FORBIDDEN = {room: {'transports/registry.hpp'} for room in CARRIERS}
 PORTABLE = (FIRMWARE - PUBLIC) | {'firmware/ports/sim/chips', 'firmware/ports/sim/devices'}
-# The public headers that the board uses, too.
+# The public headers that the board also uses.
 PORTABLE_PUBLIC = {f'include/r4link/{name}.hpp' for name in (
     'can/can_bits', 'can/can_frame', 'can/can_ids', 'command', 'config', 'datagram', 'key', 'messages/datagram_writer',
     'messages/message', 'messages/packed_form', 'messages/packet_tracker', 'simulation/simulated_pins', 'state', 'tables/commands',
     'tables/settings', 'tables/state_fields', 'text', 'vocabulary', 'wiring/wiring', 'wiring/wiring_value')} | {'include/r4link/tables/board.def'}
-# Without heap, I/O and clock, and available in GCC 7 with C++14; C headers in both spellings.
+# Headers of GCC 7 with C++14 that need no heap, I/O or clock. C headers have both spellings.
 PORTABLE_STANDARD = {
     'algorithm', 'array', 'atomic', 'cassert', 'climits', 'cmath', 'cstddef', 'cstdint', 'cstring',
     'initializer_list', 'iterator', 'limits', 'new', 'numeric', 'type_traits', 'utility',

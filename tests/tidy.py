@@ -18,7 +18,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 CHECKED = tuple(f"{ROOT / folder}/" for folder in ("protocol", "transports", "firmware", "host", "tools"))
 # clang 14 has coroutines, but libstdc++ and Asio do not detect them. The analyzer gets a tenth of its usual limit of
-# paths per function: this takes half the time, and still follows thousands of paths.
+# paths per function: this takes half the time, and follows thousands of paths.
 EXTRA = ["-D__cpp_impl_coroutine=201902L", "-DASIO_HAS_CO_AWAIT", "-DASIO_HAS_STD_COROUTINE",
          "-Xclang", "-analyzer-config", "-Xclang", "max-nodes=20000"]
 UNKNOWN_TO_CLANG = " -fno-gnu-unique"
@@ -39,7 +39,7 @@ class Source:
                     self.lines.append((file, number))
 
     def told(self, path, text):
-        """Returns `text` with the places of the joined source replaced by those in the tree."""
+        """Returns `text` with the places of the joined source replaced by places in the tree."""
         def place(match):
             file, number = self.lines[int(match[1]) - 1]
             return f"{file}:{number}:"

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks what a machine can see of plain English. Usage: words.py TREE [--texts]
+"""Checks the rules of plain English that a program can check. Usage: words.py TREE [--texts]
 
 Faults: a comment of a C++ source over 100 columns; a question as a comment; "X is no Y"; a sentence of a comment or a
 page whose subject is "Who ..." or "What ..."; a page that docs/README.md does not list. Prints the words and the
@@ -30,7 +30,7 @@ def sources(root):
 
 
 def faults_of_text(text):
-    """Yields what is wrong with one line of a comment or a page."""
+    """Yields the faults of one line of a comment or a page."""
     if IS_NO.search(text):
         yield '"is no": write "is not a"'
     if WHO.search(text):
@@ -38,7 +38,7 @@ def faults_of_text(text):
 
 
 def faults_of_source(path):
-    """Yields (line, reason). Comments of tests may be long and may ask."""
+    """Yields (line, reason). Comments of tests may be long, and may be questions."""
     product = 'tests' not in path.parts
     for number, line in enumerate(path.read_text(encoding='utf-8').splitlines(), 1):
         match = COMMENT[path.suffix].search(line)
@@ -63,7 +63,7 @@ def prose_of(page):
 
 
 def reading_ease(page):
-    """Flesch's figure: by words a sentence and syllables a word."""
+    """Flesch's figure, from words per sentence and syllables per word."""
     text = ' '.join(re.sub(r'\]\([^)]*\)', ']', line) for _, line in prose_of(page) if not line.startswith(('|', '#')))
     sentences = max(1, len(re.findall(r'[.:;!?](?=\s|$)', text)))
     words = re.findall(r"[A-Za-z']+", text) or ['x']

@@ -42,7 +42,7 @@ def processor_s():
 
 
 class Count:
-    """The least work of a program with a state: it reads one field."""
+    """Reads one field of each state: the least work of a program."""
 
     def __init__(self):
         self.number = 0

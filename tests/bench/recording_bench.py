@@ -4,8 +4,8 @@
 
     R4=build/r4 tests/bench/recording_bench.py [SECONDS] [ROUNDS]
 
-In each round three programs hear the same eight boards over UDP loopback, one after the other: r4 record into text,
-r4 record into zst, and a reference in C that waits in epoll, reads the datagrams, and does nothing else.
+In each round three programs receive the same eight boards over UDP loopback, one after the other: r4 record into text,
+r4 record into zst, and a reference in C. The reference waits in epoll, reads the datagrams, and does nothing else.
 The kernel's account of the threads gives the processor time of each program, without its start. Prints medians over
 the rounds.
 """

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 ros2 with one simulated board at 100 Hz and a client of Fast DDS: its share of a core, and the time of a command
-through ~/send until the client has the board's confirmation. Each command is sent immediately after the confirmation of
-its predecessor, and so just after a state: that is the longest wait.
+"""The cost of r4 ros2 with one simulated board at 100 Hz and a client of Fast DDS: its share of a core, and the time from
+a command through ~/send to the board's confirmation at the client. Each command is sent immediately after the
+confirmation of the previous command, and so just after a state, which makes its wait the longest.
 
     R4=build/r4 PYTHONPATH=tests/integration /usr/bin/python3 tests/bench/ros2_command_bench.py [COMMANDS, 500]
 
@@ -36,7 +36,7 @@ def share_of_a_core(ros2, seconds=5):
 
 
 def to_confirmation(ros2, peer):
-    """The milliseconds of each command."""
+    """The milliseconds from each command to its confirmation."""
     peer.read('rr/r4/sendReply', SERVICE + '_Response_', user_data='clientid=1;')
     peer.writer('rq/r4/sendRequest', SERVICE + '_Request_', user_data='clientid=1;')
     ros2.logged('~/send: 1 publishers')

@@ -9,11 +9,12 @@ is emulated: the bus vcan0 with a simulated board, and a USB serial port with a 
 a bus of this machine, on which this program simulates a board, or a serial port with a board at its other end.
 
 In each round the program drives alone, then beside five watching programs (r4 monitor, r4 record, and three other
-programs), then alone again: the difference between the two rounds alone is the noise of the machine. Measured from the
-program's own recording: the age of its states when they arrive (relative to the fastest), the intervals of its
-heartbeats, its processor time, and the number of missing packet numbers. With --trouble one of the five is stopped
-(SIGSTOP) all the time, and one is killed half way. Then, beside five such programs, the driving program is killed:
-this measures what r4 record misses of the board. Then r4 stop runs beside all of them, and three r4 send in a row.
+programs), then alone again. The difference between the two times alone is the noise of the machine. The
+benchmark measures the processor time of the program. The program's own recording gives the age of states at their
+arrival (relative to the fastest), the intervals of heartbeats, and the number of missing packet numbers. With --trouble
+one of the five is stopped (SIGSTOP) all the time, and one is killed half way. Then the driving program is killed beside
+five such programs: this measures the states that r4 record misses. Then r4 stop runs beside all programs, and three
+r4 send in a row.
 Prints medians over the rounds, and the sum of all missing packet numbers.
 """
 import argparse
@@ -172,7 +173,7 @@ def killed_holder(board, folder):
     came = [(at, int(re.search('PNum:([0-9]+);', datagram)[1])) for at, what, datagram in datagrams_of(watched)
             if what[-1] == '<' and at > killed - 0.5]
     pairs = list(zip(came, came[1:]))
-    # The packet numbers begin anew while the board has no host.
+    # The packet numbers restart while the board has no host.
     return sum(max(0, b[1] - a[1] - 1) for a, b in pairs), max(b[0] - a[0] for a, b in pairs)
 
 
@@ -181,7 +182,7 @@ def drive(board, seconds, folder, others=False, trouble=False):
     with contextlib.ExitStack() as stack:
         watchers = stack.enter_context(five_watchers(board.url, folder)) if others else []
         if others:
-            time.sleep(2)  # the programs run before the measurement starts
+            time.sleep(2)  # so that all programs run when the measurement starts
         if trouble:
             watchers[0].send_signal(signal.SIGSTOP)
             killer = threading.Timer(seconds / 2, watchers[2].kill)
@@ -214,7 +215,7 @@ def stop_beside_all(board, folder):
 
 
 def run_in_guest(where):
-    """The same in the guest."""
+    """Runs this benchmark in the guest of tools/with-can."""
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
         options, url = [], 'can://vcan0'
         if where == 'usb':

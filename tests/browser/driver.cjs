@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Chromium for tests/integration/browser.py: a request a line on standard input, an answer a line on standard output.
-// A page has a name, and cookies and storage of its own, as if it were in another browser.
+// Drives Chromium for tests/integration/browser.py. Each line of standard input is a request, and each line of standard
+// output is an answer. Each page has a name and its own cookies and storage, as in a separate browser.
 const readline = require('node:readline');
 const puppeteer = require('puppeteer-core');
 
@@ -42,7 +42,7 @@ const does = {
 
 async function main() {
   const args = ['--disable-gpu', '--disable-dev-shm-usage'];
-  if (process.getuid() === 0) args.push('--no-sandbox');  // root cannot have it
+  if (process.getuid() === 0) args.push('--no-sandbox');  // Chromium has no sandbox for root
   const browser = await puppeteer.launch({executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium', headless: true, args});
   for await (const line of readline.createInterface({input: process.stdin})) {
     const {do: what, ...request} = JSON.parse(line);

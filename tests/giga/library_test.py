@@ -25,10 +25,10 @@ FLAGS = ['-std=gnu++14', '-fno-rtti', '-fno-exceptions', '-Os', '-mcpu=cortex-m7
          '-Wall', '-Wextra', '-Wvla', '-Werror']
 # The core itself allows exceptions on the Giga, and will use C++17.
 OTHER_DIALECT = ['-fexceptions', '-std=gnu++17', '-fsyntax-only']
-# Code that needs one of these symbols uses the heap, or can throw.
+# Code that needs such a symbol uses the heap, or can throw.
 FORBIDDEN = re.compile(r'\b(malloc|calloc|realloc|free|_Zn[wa]\w*|_Zd[la]\w*|__cxa_throw\w*|_ZSt\d+__throw\w*)$')
-# The destructor of Mbed's SocketAddress frees its text (delete[]). Only get_ip_address() makes that text, and the
-# library never calls it: _ZNK13SocketAddress14get_ip_addressEv is not among the symbols that the library needs.
+# The destructor of Mbed's SocketAddress frees its text (delete[]). Only get_ip_address() makes the text. The library
+# does not call it: _ZNK13SocketAddress14get_ip_addressEv is not among the symbols that the library needs.
 GIVEN_BACK = {'_ZdaPv': 'firmware/ports/giga/links/network.cpp'}
 TEXT_OF_ADDRESS = '_ZNK13SocketAddress14get_ip_addressEv'
 SHELL = {'library.properties', 'library.json', 'keywords.txt', 'LICENSE', 'src/R4Link.h',
@@ -66,7 +66,7 @@ def refuses_what_it_cannot_do(tree):
 
 
 def compile_all(tree, library, out):
-    """Compiles every source, and the sketch as the IDE does: with Arduino.h in front."""
+    """Compiles every source, and the sketch as the IDE does: after Arduino.h."""
     sketch = out / 'sketch.cpp'
     example = library / 'examples/R4Board/R4Board.ino'
     sketch.write_text(f'#include <Arduino.h>\n#line 1 "{example}"\n{example.read_text()}')
@@ -87,12 +87,12 @@ def compile_all(tree, library, out):
 
 
 def lacking_in(file):
-    """The symbols that the file needs from elsewhere, as the linker names them."""
+    """The undefined symbols of the file, as the linker names them."""
     return [line.split()[-1] for line in run(CROSS + 'nm', '-u', file).splitlines()]
 
 
 def needs(objects, out):
-    """The symbols that the objects together still need, and the object that combines them."""
+    """The undefined symbols of the combined objects, and the combined object."""
     together = out / 'together.o'
     run(CROSS + 'ld', '-r', '-o', together, *(target for _, target in objects))
     return lacking_in(together), together

@@ -17,7 +17,7 @@ LAST_STACK = 768
 EXCEPTION_FRAME = 108  # the processor's frame with the registers of the FPU, aligned
 SWITCH = 8             # run_on(): GCC does not count code in assembler
 CORE_READ = 512        # USBSerial::read() has a buffer of 256 bytes on the stack
-OF_CORE_STACK = 128    # the share of one of our handlers, without the processor's frame
+OF_CORE_STACK = 128    # the share of our handler, without the processor's frame
 
 THROUGH_INTERFACES = [
     ('Guard', 'BoardHardware', 'make_safe'),
@@ -33,7 +33,7 @@ THROUGH_INTERFACES = [
     ('Stepper|UltrasonicSensors', 'GpioOutput', 'write'),
 ]
 TURNS = {'_ZN2r412write_numberEPcy': 3}
-# These continue with another function on another stack.
+# These functions continue with a function on another stack.
 LEAVES = ('_ZN2r44giga12on_own_stackEPFvvE', '_ZN2r44giga13on_last_stackEPFvvE')
 
 
@@ -41,7 +41,7 @@ def stack_bounds(files):
     graph = CallGraph(files, THROUGH_INTERFACES, TURNS, LEAVES)
 
     def depth(*functions):
-        """The depth of the deepest of these functions, which are named without arguments."""
+        """The depth of the deepest of `functions`, which are names without arguments."""
         names = [name for name in graph.frames for function in functions
                  if re.search(rf'(?<=\d){function}(?:E\w*|v)$|^{function}$', name)]
         assert len(names) >= len(functions), f'{functions}: {names}'
@@ -50,8 +50,8 @@ def stack_bounds(files):
     gives_way = depth('hear_usb_now') + CORE_READ
     at_once = depth('pass_millisecond', 'look', 'step', 'hear_can')
     return {
-        # Handlers of the core may interrupt the one that gives way. They need at most the core's own stack. Our other
-        # handlers may interrupt all of them.
+        # Handlers of the core may interrupt our handler that gives way. They need at most the core's own stack. Our other
+        # handlers may interrupt all these handlers.
         'ours': (gives_way + CORE_STACK + EXCEPTION_FRAME + at_once + SWITCH, OWN_STACK),
         'the core\'s, of us': (SWITCH + depth('on_millisecond', 'on_stop', 'on_step_timer', 'on_can', 'on_usb',
                                              'on_edge', 'listen'), OF_CORE_STACK),

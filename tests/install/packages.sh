@@ -1,9 +1,9 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Tests the Debian packages. Usage: packages.sh SOURCE BUILD
-# Makes packages of the build in BUILD, runs lintian, installs the packages into a copy of this system, uses them there
-# (packages_inside.sh), and purges them: no file is left. The copy is an overlay over the files of this system, which
-# needs root or user namespaces.
+# Makes packages of the build in BUILD, runs lintian, and installs the packages into a copy of this system. There it uses
+# them (packages_inside.sh) and purges them: no file may remain. The copy is an overlay over the files of this system,
+# which needs root or user namespaces.
 set -euo pipefail
 
 source_tree=$(realpath "$1")
@@ -44,12 +44,12 @@ ip link set lo up
 mkdir "$copy/root/tmp/packages"
 cp "$build_tree"/packed/*.deb "$source_tree/tests/install/packages_inside.sh" "$copy/root/tmp/packages"
 cp -r "$source_tree/docs/examples/drive" "$copy/root/tmp/packages"
-# Small images configure dpkg to leave manual pages out.
+# Small images configure dpkg to omit manual pages.
 rm -f "$copy"/root/etc/dpkg/dpkg.cfg.d/*
 
 env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 chroot "$copy/root" /tmp/packages/packages_inside.sh
 
-# The lists that the tools of the system write (of packages, libraries and manual pages) may stay.
+# Tools of the system write lists of packages, libraries and manual pages, which may remain.
 left=$(cd "$copy/changed" && find . \( -type f -o -type l \) ! -path './var/lib/dpkg/*' ! -path './var/log/*' \
   ! -path './var/cache/*' ! -path './etc/ld.so.cache' ! -path './etc/.pwd.lock' ! -path './root/*')
 if [[ -n "$left" ]]; then

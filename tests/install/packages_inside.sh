@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Installs the packages in its folder, uses each, and purges them. packages.sh runs it in a copy of the system. clean.sh
-# runs it with --apt in a minimal system, and installs the dependencies and the programs that the steps use.
+# runs it in a minimal system with --apt, which also installs the dependencies and the programs that the steps use.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
@@ -44,7 +44,7 @@ step 'r4-record@.service and r4-bridge@.service are whole, and expose little' un
 udev_rules_are_valid() {
   local rules=/usr/lib/udev/rules.d/70-r4.rules
   grep -q 'MODE="0660"' "$rules"
-  # Since systemd 254.
+  # udevadm has `verify` since systemd 254.
   ! udevadm verify --help >/dev/null || udevadm verify "$rules"
 }
 step 'udev rules' udev_rules_are_valid

@@ -1,10 +1,10 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The installed library is enough for a program outside the tree. Usage: run.sh SOURCE BUILD
-# Installs BUILD into a new prefix, copies docs/examples elsewhere, builds drive with find_package (static)
-# and with pkg-config (shared), openpodcar and teleop with find_package, and runs them. Also runs programs with
-# a separate Asio, and the programs in the documentation. Compiles every installed header alone, and compares the
-# exported symbols of the library with exports.txt.
+# Installs BUILD into a new prefix and copies docs/examples elsewhere. Builds and runs drive with find_package (static)
+# and with pkg-config (shared), and openpodcar and teleop with find_package. Also runs programs with a separate Asio, and
+# the programs in the documentation. Compiles every installed header alone, and compares the exported symbols of the
+# library with exports.txt.
 set -euo pipefail
 
 source_tree=$(realpath "$1")
@@ -56,7 +56,7 @@ cmake --build ../teleop/build >>"$work/cmake.log" || {
 }
 R4=$build_tree/r4 /usr/bin/python3 "$source_tree/tests/install/teleop.py" ../teleop/build/teleop
 
-# r4 finds its part that is a separate program.
+# r4 finds the separate program of r4 ros2.
 ros2=
 grep -q '^R4_ROS2:BOOL=ON' "$build_tree/CMakeCache.txt" && ros2=yes
 [[ -z $ros2 ]] || ROS_LOCALHOST_ONLY=1 "$prefix/bin/r4" ros2 sim: --duration 0.1 >"$work/out" 2>&1 || {
@@ -97,7 +97,7 @@ for program in beside shared_with; do
 done
 echo 'install: an Asio of its own disturbs nobody'
 
-# A project that includes the tree gets only the library: it needs no library of the tools, and installs nothing.
+# A project that includes the tree gets only the library, needs no library of the tools, and does not install the tree.
 without=(CLI11=ON nlohmann_json=ON CycloneDDS=ON GTest=ON rapidcheck=ON)
 cmake -G Ninja -S "$source_tree/tests/install/subproject" -B "$work/subproject" -DR4LINK_SOURCE="$source_tree" \
   -DCMAKE_CXX_COMPILER="$cxx" "${without[@]/#/-DCMAKE_DISABLE_FIND_PACKAGE_}" >"$work/cmake.log" 2>&1 ||
@@ -184,7 +184,6 @@ if [[ $status != 2 ]] || ! grep -q 'udp://HOST' "$work/err"; then
   exit 1
 fi
 
-# Every installed header compiles alone.
 read -ra flags <<<"$(pkg-config --cflags r4link-asio)"
 headers=0
 mapfile -t installed < <(find "$prefix/include/r4link" -name '*.hpp' | sort)
@@ -215,7 +214,7 @@ diff "$source_tree/tests/install/exports.txt" exports.txt || {
   echo 'install: the shared library exports other names than tests/install/exports.txt lists'
   exit 1
 }
-# The static library has no other names, which the linker could confuse with names of the program.
+# The static library has no other names, because these could conflict with names of the program.
 nm -C --defined-only -g "$LD_LIBRARY_PATH/libr4link.a" | grep -E '^[0-9a-f]+ ' | cut -d' ' -f3- |
   grep -vE '^((typeinfo|typeinfo name|vtable|guard variable) for |[a-z]+ )?std::' | LC_ALL=C sort -u >globals.txt
 strangers=$(comm -13 exports.txt globals.txt)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/examples/teleop drives a simulated robot, and is safe. Usage: teleop.py TELEOP; env R4 = the r4 command.
 
-It gets keys through a terminal. The pins of the simulated chips and the encoders show what the robot does."""
+The test sends keys through a terminal. The pins of the simulated chips and the encoders show the robot's movement."""
 import os
 import pathlib
 import pty
@@ -67,7 +67,7 @@ def stands(each):
 def arm_and_drive(teleop, board):
     teleop.press('e')
     while not teleop.says('^armed|handle was released').startswith('armed'):
-        teleop.press('e')  # repeated, because teleop may not know yet that the handle is held
+        teleop.press('e')  # repeated until teleop has received that the handle is held
     board.next(lambda each: each.get('supply') and stands(each))
     teleop.press('w')
     each = board.next(lambda each: 'outputs' in each and not stands(each))
@@ -100,7 +100,7 @@ def main(program):
         teleop.press('w')  # without effect until the board is armed again
         arm_and_drive(teleop, board)
 
-        teleop.press('w ')  # the stop wins over the other key
+        teleop.press('w ')  # the stop has priority over the key w
         teleop.says('^stopped')
         board.next(lambda each: each.get('reason') == 'stop')
         arm_and_drive(teleop, board)
@@ -111,10 +111,10 @@ def main(program):
         teleop.says(r'^not armed')
         arm_and_drive(teleop, board)
 
-        os.close(teleop.keyboard)  # the terminal is closed
+        os.close(teleop.keyboard)
         board.next(lambda each: each.get('reason') == 'stop')
         assert teleop.process.wait(PATIENCE_S) == 0
-        teleop = Teleop(program, board.host_url)  # starts while that stop is latched
+        teleop = Teleop(program, board.host_url)  # starts while the stop is latched
         teleop.says(r'^not armed')
         teleop.press('e')
         teleop.says(r'not armed: stopped before this program began')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests that test_can.py runs where SocketCAN exists: r4 doctor reports and mends interfaces that are set up wrong."""
+"""Tests that test_can.py runs where SocketCAN exists: r4 doctor reports and mends interfaces that are set up wrongly."""
 import pathlib
 import subprocess
 

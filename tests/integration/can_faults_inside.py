@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tests that test_can.py runs where SocketCAN exists: a board and hosts on a bus with bit time and errors.
 
-slcan0, the board's controller, and slcan1, the host's, are nodes of slcan_bus: error frames, error
+slcan0 (the board's controller) and slcan1 (the host's controller) are nodes of slcan_bus. Error frames, error
 counters, bus-off and the states that the kernel reports are those of ISO 11898-1.
 """
 import os
@@ -61,7 +61,7 @@ def goes_safe(board):
 
 
 def drives_again(board, since):
-    """The session resumes by itself, with the outputs that it commanded before."""
+    """The session resumes by itself, with the outputs that it commanded earlier."""
     back = board.outputs(lambda outputs: outputs['osmc'][0] == DRIVING)
     print(f'drives again after {(back["came"] - since) * 1000:.0f} ms')
 
@@ -88,7 +88,7 @@ def test_the_reported_load_equals_the_busy_time_of_the_bus(bus, board):
 
 
 def test_r4_bus_asks_for_a_bit_rate_that_the_adapter_does_not_report():
-    """As after slcand, which sets the bit rate in the adapter but does not report it to the kernel."""
+    """Like slcand, which sets the bit rate only in the adapter, the test reports no bit rate to the kernel."""
     near, far = pty.openpty()
     try:
         name = SlcanBus.attach(os.ttyname(far))
@@ -174,7 +174,7 @@ def test_a_host_alone_on_the_bus_reports_missing_acknowledgements(bus, board):
         bus.order('away', 0)
         lonely = host.next(told('no node acknowledges'))
         assert 'bit rate' in lonely['fields']['fix']
-        bus.state(1, 'passive')  # and never bus-off: ISO 11898-1, 12.1.4.2
+        bus.state(1, 'passive')  # never bus-off: ISO 11898-1, 12.1.4.2
         board.state('SAFE', 'link')
         bus.order('back', 0)
         since = time.monotonic()
@@ -199,10 +199,10 @@ def test_the_bus_repeats_damaged_frames_of_a_datagram(bus):
     failed, frames = (status[each] - before[each] for each in ('failed', 'frames'))
     transfers = next(each['fields'] for each in log if each['type'] == 'transfers')
     print(f'{failed} of {frames} frames damaged, {transfers}')
-    assert frames >= 500 and failed >= 5  # random; five times as many are likely
+    assert frames >= 500 and failed >= 5  # random: five times these numbers are likely
     assert transfers['packed'] >= 100
-    # timed_out and interrupted are not asserted. An end in the guest may stand still for longer than N_Bs (20 ms);
-    # then the other end gives up its transfer and begins the next, with or without noise.
+    # timed_out and interrupted are not asserted. An end in the guest may pause for longer than N_Bs (20 ms). Then the
+    # other end abandons its transfer and begins the next, with or without noise.
     lost = ('wrong_sequence', 'overflow', 'malformed', 'bad_form', 'dropped_frames')
     assert sum(transfers[each] for each in lost) <= failed / 4, transfers
 
@@ -264,7 +264,7 @@ def test_a_stop_overtakes_a_full_queue():
             bus.order('stall', 1)
             flood = subprocess.Popen(['cangen', 'slcan1', '-g', '0', '-i', '-I', f'{FLOOD:X}', '-L', '8'])
             stop = Running('stop', HOST, '--timeout', '20')
-            wait_for_sockets('slcan1', TELEMETRY, 2)  # the driving host's, and that of r4 stop
+            wait_for_sockets('slcan1', TELEMETRY, 2)  # the sockets of the driving host and of r4 stop
             lasts(0.3)
             went_on = time.time()
             bus.order('go', 1)
@@ -278,4 +278,4 @@ def test_a_stop_overtakes_a_full_queue():
             stop.process.stderr.close()
         ids = [frame for at, (frame, _) in zip(dump.times, dump.frames) if at > went_on and frame in OF_HOST]
         print(f'{ids.index(STOP)} frames before the stop')
-        assert ids.index(STOP) <= 4, ids  # before it: three mailboxes and the frame that the driver holds
+        assert ids.index(STOP) <= 4, ids  # three mailboxes and the frame in the driver come first

@@ -26,10 +26,10 @@ def ip(*arguments):
 
 
 # A frame takes the emulated machine about 100 us, and a state in plain text has 25 frames. So tests that do not
-# test the rate use a lower one. tests/simulation/can_capacity_test.cpp tests 100 Hz, in virtual time.
+# test the rate use a lower rate. tests/simulation/can_capacity_test.cpp tests 100 Hz, in virtual time.
 PERIOD_MS = 50
 SLOWLY = ('--set', f'rate,{1000 // PERIOD_MS}')
-# The emulated machine sometimes stands still for a second. Tests that do not test the board's timeout use a longer one.
+# The emulated machine sometimes pauses for a second. Tests that do not test the board's timeout use a longer timeout.
 PATIENTLY = (*SLOWLY, '--set', 'timeout,5000')
 
 
@@ -42,7 +42,7 @@ def on_vcan():
 
 
 def on_controllers(options=PATIENTLY):
-    """A board at one of two controllers with their driver; its hosts are at the other and use the packed form."""
+    """A board at one of two controllers with their driver; its hosts use the other controller and the packed form."""
     board = Board('can://can0?node=3', options=options)
     board.bus, board.packs = 'can1', True
     board.host_url = 'can://can1?node=3'
@@ -84,7 +84,7 @@ def beside(*command, **options):
 
 
 class Dump:
-    """Every frame on an interface, as (id, data), as candump receives it: a program that shares no code with r4.
+    """Every frame on an interface, as (id, data), received by candump, which shares no code with r4.
 
     `times`: when the kernel received each frame, as time.time().
     """
@@ -194,7 +194,7 @@ def test_the_board_obeys_a_stop_frame_from_another_program(board):
 def test_a_second_host_is_refused_while_the_first_has_control(board):
     with monitor(board.host_url) as first:
         in_control(first)
-        # From this computer, and from another on the same bus.
+        # From this computer, and as from another computer on the same bus.
         for command, where, why in (
                 (('send', '--timeout', '2', 'O:358,1,1'), 'can1', f'controlled by r4 (pid {first.process.pid})'),
                 (('send', '--timeout', '2', 'O:358,1,1'), 'can0', 'another host'),
@@ -234,7 +234,7 @@ def test_the_packed_form_and_can_fd_need_fewer_frames(vcan_board):
             for _ in range(10):
                 host.next(is_state)
             count = len([data for frame, data in dump.frames if frame == TELEMETRY])
-            assert host.end() == 0, host.errors  # gives up control, so that the next host can take it
+            assert host.end() == 0, host.errors  # releases control, so that the next host can take it
             return count / 10
 
     plain = frames_a_state(IN_PLAIN_TEXT)
@@ -242,7 +242,7 @@ def test_the_packed_form_and_can_fd_need_fewer_frames(vcan_board):
     measured = objects(run('bench', vcan_board.host_url, '--duration', '1', '--json', timeout=60).stdout)[0]
     assert measured['transfers']['packed'] > 5 and measured['transfers']['bad_form'] == 0
     print(f'{plain:.1f} frames a state plain, {packed:.1f} packed')
-    assert 3 * packed < plain  # about 24 and 5 frames, some of them heartbeats
+    assert 3 * packed < plain  # about 24 and 5 frames, including heartbeats
     assert send(BUS, 'C:pack,0').returncode == 0
     assert 3 * packed < frames_a_state(BUS), 'the board sends the packed form after C:pack,0'
 
@@ -309,7 +309,7 @@ def test_monitor_and_send_work_in_either_order():
         assert send(BUS, 'E:CLEAR', 'O:1,1,1').returncode == 0
 
 
-# Where the bus has two ends, the hosts share no path, as on two computers.
+# At two controllers, the watcher and the host share no path, as on two computers.
 @pytest.mark.parametrize('url, host_url', [(BUS, BUS), ('can://can0?node=3', 'can://can1?node=3')])
 def test_a_watcher_sends_its_own_frame_only_while_no_host_drives(url, host_url):
     with Board(url, options=PATIENTLY), watch(url) as watcher, Dump(url.split('/')[2].split('?')[0]) as dump:
@@ -388,7 +388,7 @@ def test_garbage_on_the_ids_of_the_board_has_no_effect(board):
 
 
 def listed_interfaces(is_told):
-    """Repeats r4 list until `is_told` is true for each board at vcan0: it waits 1.3 s, and the guest may be slower."""
+    """Repeats r4 list until `is_told` is true for each board at vcan0. r4 list waits 1.3 s, and the guest may be slower."""
     deadline = time.monotonic() + PATIENCE_S
     while True:
         listed = {each.get('interface'): each for each in objects(run('list', '--json', timeout=60).stdout)}

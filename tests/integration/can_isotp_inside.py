@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs can_test for test_can.py where SocketCAN exists: our ISO-TP engine against the kernel's and can-utils'.
 
-Fails if a test was not executed; under a sanitizer, only the tests that TESTS names count.
+Fails if a test was not executed. Under a sanitizer, only the tests in TESTS run.
 """
 import os
 import pathlib
@@ -11,7 +11,7 @@ import subprocess
 from r4_process import R4
 
 CAN_TEST = pathlib.Path(os.environ.get('R4_CAN_TEST') or pathlib.Path(R4).parent / 'tests/can_test')
-# The unit tests run the engine under the sanitizers. The code that reads SocketCAN runs only here.
+# The unit tests run the engine under the sanitizers. Only this file runs the code that reads SocketCAN.
 TESTS = '--gtest_filter=' + ('CanBus*' if os.environ.get('R4_SANITIZER') else '*')
 FILTERS = ('GTEST_FILTER', 'GTEST_TOTAL_SHARDS', 'GTEST_SHARD_INDEX', 'GTEST_REPEAT')
 
@@ -26,7 +26,7 @@ def test_every_test_of_can_test_is_executed_and_passes():
                             text=True, check=False)
     print(result.stdout[-20000:])
     assert result.returncode == 0, result.stdout[-20000:] + result.stderr[-20000:]
-    # Further runs repeat the tests that failed while the machine stood still.
+    # Other runs repeat the tests that failed while the machine stood still.
     assert re.findall(r'^\[==========\] (\d+) tests? from \d+ test suites? ran\.', result.stdout,
                       re.MULTILINE)[0] == str(count)
     passed = re.findall(r'^\[  PASSED  \] (\d+) tests?\.', result.stdout, re.MULTILINE)

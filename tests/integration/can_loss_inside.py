@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests that test_can.py runs where SocketCAN exists: lost, late and corrupt frames, and ends that vanish.
+"""Tests that test_can.py runs where SocketCAN exists: lost, late and corrupt frames, and ends that disconnect.
 
 netem loses and delays frames on the pair vxcan0, vxcan1; cangw corrupts frames that it carries from vcan0 to vcan1.
 """
@@ -49,7 +49,7 @@ def told_of(results, commands):
 
 
 def agrees_with_the_board(told, commands, log):
-    """A confirmed command was executed once, an unconfirmed one at most once, and one that was not sent never."""
+    """A confirmed command was executed once, an unconfirmed command at most once, and an unsent command never."""
     pnums = [each['pnum'] for each in executed(log)]
     assert len(pnums) == len(set(pnums))
     times = collections.Counter(each['command'] for each in executed(log))
@@ -70,7 +70,7 @@ def test_a_confirmed_command_is_executed_exactly_once(loss, count):
         result = run('send', HOST, '--json', '--timeout', '10', *commands, timeout=200)
         log = board.rest()
     told = told_of(objects(result.stdout), commands)
-    # The first frames of commands (docs/reference/packed.md, layout 7), except the F that the host sends first.
+    # The first frames of commands (docs/reference/packed.md, layout 7), except the command F that the host sends first.
     firsts = [data for _, data in dump.frames if re.match('10..B8', data)]
     begun = sum(first != firsts[0] for first in firsts)
     print(f'{told.count("confirmed")} of {count} confirmed, begun {begun} times')
@@ -166,7 +166,7 @@ def test_a_corrupt_command_is_never_executed(form, corrupt):
 
 
 class RawHost:
-    """A host on vcan0 that does ISO-TP by hand, so that it can end within a transfer."""
+    """A host on vcan0 with its own ISO-TP, so that it can end within a transfer."""
 
     def __init__(self):
         self.socket = socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
@@ -218,7 +218,7 @@ def test_the_board_accepts_the_datagram_after_an_incomplete_one(break_off):
 def test_a_board_or_host_killed_within_a_transfer_can_be_restarted():
     url = f'can://vcan0?node={NODE}'
     plain = url + '&pack=0'
-    options = ('--set', 'rate,500')  # a state has 26 frames: one is always being sent
+    options = ('--set', 'rate,500')  # a state has 26 frames, so a frame is always in transfer
     with monitor_of_several(url, plain) as host:
         for _ in range(2):
             with Board(url, options=options) as board:

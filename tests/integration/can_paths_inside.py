@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests that test_can.py runs where SocketCAN exists: a board on two buses, one of which is switched off or breaks,
-and a board on a bus and a cable."""
+"""Tests that test_can.py runs where SocketCAN exists: a board on two buses, of which one bus fails, and a board on
+a bus and a cable."""
 import contextlib
 import fcntl
 import signal
@@ -95,7 +95,7 @@ def test_each_command_is_executed_once_while_buses_fail_and_recover():
                 ip('link', 'set', bus, 'down')
                 confirmed(commands[40 * i + 20:40 * i + 40])
                 ip('link', 'set', bus, 'up')
-                board.next(has_joined(2))  # before that the board has only one path, which must not fail
+                board.next(has_joined(2))  # until then the board has only one path, which must not fail
             confirmed(commands[80:])
         executed = [each['executed']['command'] for each in board.rest() if 'executed' in each]
     assert [each for each in executed if each.startswith('S:')] == commands
@@ -154,7 +154,7 @@ def test_a_session_survives_bus_off_at_the_board_or_at_the_host():
         board.next(has_left(1))
         host.has_again('//slcan1', heal(1))
         board.next(has_joined(2))
-        # The host cannot see it: the board's end of the bus is off.
+        # The board's end of the bus is off, which the host cannot detect.
         host.loses_by_silence('//slcan1', lambda: spoil(0))
         board.next(has_left(1))
         host.has_again('//slcan1', heal(0))

@@ -2,7 +2,7 @@
 """A host and a board on a CAN bus, frame by frame on python-can.
 
 A second implementation, written from docs/reference/protocol.md, docs/reference/can.md and
-docs/reference/packed.md: it shares no code with r4. Nothing here sleeps; everything waits for frames until a deadline.
+docs/reference/packed.md: it shares no code with r4. No function sleeps: each waits for frames until a deadline.
 """
 import random
 import threading
@@ -16,7 +16,7 @@ import packed_form
 N_BS_S, N_CR_S = 0.020, 0.100
 EMERGENCY_STOP, WENT_SAFE, TO_BOARD, REPLIES, TELEMETRY = 0x010, 0x020, 0x180, 0x200, 0x400
 FD_SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
-# Refusals that end a command here. DUPLICATE proves nothing. A real host also compares SESSION (protocol.md, rule 13).
+# Refusals that end a command. DUPLICATE does not end a command. A real host also compares SESSION (protocol.md, rule 13).
 CODES = 'UNKNOWN FORMAT RANGE CHANNEL STALE SAFE BUSY AUTH'.split()
 STATE_PERIOD_S, HEARTBEAT_S, HOST_HEARTBEAT_S, RETRY_S = 0.05, 0.5, 0.1, 0.05
 
@@ -86,7 +86,7 @@ class Receiver:
 
 
 class Peer:
-    """One end on a bus: frames in and out, messages in `on_message`."""
+    """One end of a bus, which sends and receives frames. `on_message` gets each whole message."""
 
     def __init__(self, interface, own_id, other_id, ids, fd=False):
         self.fd, self.own_id, self.other_id = fd, own_id, other_id
@@ -111,7 +111,7 @@ class Peer:
                                   data=bytes(data).ljust(size, b'\xcc')))
 
     def send_message(self, identifier, message, flow_control=True):
-        """Sends a whole message, and handles frames that arrive meanwhile. False if no receiver took it."""
+        """Sends a whole message, and handles frames that arrive meanwhile. False if no receiver accepts it."""
         longest = 64 if self.fd else 8
         if len(message) <= 7:
             self.send_frame(identifier, bytes([len(message)]) + message)
@@ -262,13 +262,13 @@ class Host(Peer):
         return self.find(is_it, start)
 
     def take_control(self):
-        """Waits until the board executes commands, which it does after it has received an echo of its T."""
+        """Waits until the board executes commands: it must first receive an echo of its T."""
         self.next(lambda fields: 'AIN24' in fields)
         self.run_until(lambda: self.echoed)
         assert self.command('F:DEFAULT,SAFE,CMD') == 'done'
 
     def command(self, fields):
-        """Returns 'done', or the code of the refusal. After STALE (overtaken), sends it again with a new number."""
+        """Returns 'done', or the code of the refusal. After STALE (overtaken), repeats the command with a new number."""
         answer = {'N': 'STALE'}
         while answer.get('N', '').endswith('STALE'):
             pnum, self.newest_command = self.send(fields)
@@ -281,7 +281,7 @@ class Host(Peer):
 # --- a board
 
 class Board(Peer):
-    """Enough of a board for r4: the link, F, O, Q, E:STOP, E:CLEAR. Runs in a thread as a context."""
+    """The parts of a board that r4 needs: the link, F, O, Q, E:STOP, E:CLEAR. As a context, it runs in a thread."""
 
     def __init__(self, interface, node, fd=False, packs=True, obeys=True, refuses=()):
         super().__init__(interface, REPLIES + node, TO_BOARD + node, [EMERGENCY_STOP, TO_BOARD + node], fd)

@@ -15,7 +15,7 @@ from paper_client import PaperClient
 from r4_process import PATIENCE_S, Board, is_state, monitor, objects, run, send
 
 BOARD_URL, HOST_URL = 'can://vcan0?node=3', 'can://vcan0?node=4'
-# In the emulated machine Python takes half a millisecond for a frame. The machine sometimes stands still for a second.
+# In the emulated machine Python takes half a millisecond for a frame. The machine sometimes pauses for a second.
 PATIENTLY = ('--set', 'rate,20', '--set', 'timeout,5000')
 
 
@@ -171,7 +171,7 @@ def kernel_isotp(hears, own, flags=0):
 
 
 def test_the_papers_client_drives_a_board_over_the_kernels_iso_tp():
-    # The emulated machine takes long for seven commands for each received datagram.
+    # A low rate: for each datagram the client sends seven commands, which take the emulated machine long.
     options, listen_mode, states = ('--set', 'rate,2', '--set', 'timeout,5000'), 1, 6
     with Board(BOARD_URL, options=options) as board, \
             contextlib.closing(kernel_isotp(0x403, 0x7FF, listen_mode)) as telemetry, \
@@ -218,7 +218,7 @@ def test_send_is_confirmed_by_a_python_board(options, url):
         result = send(url, 'O:358,1,1', 'Q:ID')
     assert set(board.heard_packed) == {'pack=0' not in url}
     assert result.returncode == 0 and 'second' in result.stdout, result
-    # The host may ask for fields again if the board's states are late.
+    # If the board's states are late, the host may request the fields again.
     assert board.executed[0] == 'F:DEFAULT,RELAYS,SAFE,CMD'
     assert [each for each in board.executed if not each.startswith('F:')] == ['O:358,1,1']
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One session over several paths that drives all the time (host_on_paths.cpp), while paths are lost and come back."""
+"""A session over several paths (host_on_paths.cpp), which drives while paths are lost and return."""
 import collections
 import pathlib
 import subprocess
@@ -53,7 +53,7 @@ class HostOnPaths(Running):
         self.ended = None
 
     def loses(self, place, take_away, within_s=REPORTED_WITHIN_S):
-        """Asserts a timely report of the loss: from the time that `take_away` returns or, for None, from its call."""
+        """Asserts a timely report of the loss, counted from the time that `take_away` returns or, for None, from its call."""
         self._tells(place, False, take_away, within_s)
 
     def loses_by_silence(self, place, take_away):
@@ -74,7 +74,7 @@ class HostOnPaths(Running):
             self.next(is_command)
 
     def ends(self, board):
-        """No state and no command was missed, no command was executed twice, and the board never went safe."""
+        """Asserts that no state or command was missed, no command was executed twice, and the board never went safe."""
         commands = self.commands_at_its_end()
         log = board.rest()
         require_executed_as_told(commands, log)
@@ -82,7 +82,7 @@ class HostOnPaths(Running):
         assert not safe, safe
 
     def commands_at_its_end(self):
-        """Checks what the host alone can see; returns the commands and their results."""
+        """Checks the log of the host alone; returns the commands and their results."""
         self.goes_on()
         self.ended = time.monotonic()
         self.process.stdin.close()
@@ -106,8 +106,8 @@ class HostOnPaths(Running):
 
 
 def require_executed_as_told(commands, log):
-    """The board has executed each command at most once, and in order: all confirmed commands, and no refused command.
-    `log` is the board's."""
+    """Asserts that the board has executed each command at most once and in order: all confirmed commands, and no refused
+    command. `log` is the log of the board."""
     executed = [each['executed']['command'] for each in log if 'executed' in each]
     executed = collections.deque(each for each in executed if each.startswith('S:'))
     for each in commands:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clients of r4 web that send damaged requests and frames, send slowly, or stop after the beginning, and read nothing.
+"""Clients of r4 web that send damaged requests and frames, send slowly or send only a part, and never read.
 
     python3 hostile_clients.py PORT SEED SECONDS        prints the number of clients
 """

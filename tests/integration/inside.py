@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs test files where SocketCAN exists: in the guest of tools/with-can, or here if this is the guest.
 
-They run nowhere else, because a machine's own CAN interfaces may be connected to motors.
+The tests run nowhere else, because a machine's own CAN interfaces may be connected to motors.
 A run fails if one of the tests was not executed.
 """
 import os
@@ -25,7 +25,7 @@ PLAIN = {**os.environ, 'PYTEST_DISABLE_PLUGIN_AUTOLOAD': '1', 'PYTHONPATH': str(
 
 
 def compile_here(files):
-    """Python compiles the files on this machine: the guest would need ten times as long."""
+    """Compiles the Python files on this machine, because the guest needs ten times as long."""
     environment = {name: value for name, value in PLAIN.items() if name != 'PYTHONDONTWRITEBYTECODE'}
     subprocess.run([*PYTEST, *files, '--collect-only'], env=environment, stdin=subprocess.DEVNULL, capture_output=True,
                    timeout=120, check=False)

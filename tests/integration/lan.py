@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Computers on a separate network: each is a network namespace, with TAP interfaces on one hub.
 
-No frame reaches the networks of this machine. It needs root, or a kernel that lets users make namespaces,
-and /dev/net/tun.
+No frame reaches the networks of this machine. The network needs /dev/net/tun, and root or a kernel that lets users
+make namespaces.
 """
 import contextlib
 import ctypes
@@ -30,10 +30,10 @@ def interface(number):
 
 
 def _be_a_computer(handed_over, *addresses):
-    """Runs in the namespace: makes the interfaces, hands their descriptors over, waits until standard input ends."""
+    """Runs in the namespace: makes the interfaces, passes their descriptors on, and waits until standard input ends."""
     taps = []
     subprocess.run(['ip', 'link', 'set', 'lo', 'up'], check=True)
-    # Each interface answers only for its own address, even if several are on one network.
+    # Each interface answers only for its own address, even if several interfaces are on one network.
     for name, value in ('arp_ignore', '1'), ('arp_announce', '2'):
         pathlib.Path(f'/proc/sys/net/ipv4/conf/all/{name}').write_text(value)
     for number, address in enumerate(addresses):

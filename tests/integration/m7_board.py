@@ -17,7 +17,7 @@ import tty
 from r4_process import PATIENCE_S
 
 M7 = str(pathlib.Path(__file__).resolve().parents[2] / 'tools/m7')
-FIRST_BUILD_S = 240  # includes the packages, if tools/test has not installed them
+FIRST_BUILD_S = 240  # includes the installation of packages, if tools/test has not installed them
 
 
 def m7(*arguments):
@@ -28,7 +28,7 @@ def m7(*arguments):
 def steps_of(states, period_ms):
     """Checks and returns the steps of T, which are multiples of the period. A board that was never late (LATE) leaves
     no state out. On a busy machine the board leaves out each late period. Each late period may cost one more state,
-    because a newer state replaces one that still waits to be sent."""
+    because a newer state replaces a state that waits to be sent."""
     steps = [(later['t'] - earlier['t']) % 2**32 for earlier, later in zip(states, states[1:])]
     assert all(step != 0 and step % period_ms == 0 for step in steps), steps
     missing = sum(steps) // period_ms - len(steps)
@@ -81,7 +81,7 @@ def fields_of(datagram):
 
 
 class Watcher:
-    """A UDP socket that the board has heard: the board's broadcasts go to it."""
+    """A UDP socket that the board has heard, and to which it sends its broadcasts."""
 
     def __init__(self, url):
         address, port = re.match(r'udp://(.+):(\d+)', url).groups()
@@ -108,7 +108,7 @@ class Watcher:
 
 
 class LineWatcher:
-    """The end of the board's serial line, to which the board's broadcasts also go."""
+    """The host's end of the board's serial line, to which the board also sends its broadcasts."""
 
     def __init__(self, url):
         self.file = os.open(url[len('serial://'):], os.O_RDWR | os.O_NOCTTY)
@@ -136,7 +136,7 @@ class LineWatcher:
 
 
 class Relay(threading.Thread):
-    """Relays between a host and the board, and records the board's time at which it last heard the host."""
+    """Relays between a host and the board, and records the board's time at which the board last heard the host."""
 
     def __init__(self, url):
         super().__init__(daemon=True)

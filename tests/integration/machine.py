@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bounds of real time on a machine that also does other work.
 
-A program keeps a promise of milliseconds only while it has a processor. So within() adds to a bound the time that the
-programs of the test waited for a processor. On an idle machine it adds nothing.
+A program can keep a bound of milliseconds only while it has a processor. So within() adds to a bound the time that the
+programs of the test waited for a processor. On an idle machine this time is 0.
 """
 import contextlib
 import math
@@ -10,13 +10,13 @@ import os
 import threading
 import time
 
-# Sanitizers make programs slower and bigger; promises about time and memory are for release builds.
+# Sanitizers make programs slower and bigger, so bounds of time and memory are for release builds.
 SANITIZED = 'R4_SANITIZER' in os.environ
 # True if a test can rely on bounds of milliseconds. False with a sanitizer, and in the guest of
-# tools/with-can, which emulates its processor: then a test asserts only the order of events, and
-# that no event comes too early.
+# tools/with-can, which emulates its processor. If false, a test asserts only the order of events,
+# and that no event comes too early.
 PROMPT = not SANITIZED and 'R4_CAN_GUEST' not in os.environ
-LOOK_S = 0.1  # the wait between the last look and the end of a program is not counted
+LOOK_S = 0.1  # a wait between the last look at a program and its end is not counted
 
 
 def waits_of(process, waits):

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's Python client, as its section 8.6 describes it: it knows only the plain text."""
+"""The paper's Python client, as its section 8.6 describes it: it uses only plain text."""
 import time
 import zlib
 
 
 class PaperClient:
-    """As printed: T before PNum, T from its own clock in whole seconds, checksum by hex(), an answer to
-    each heartbeat, seven commands for each datagram received; it sends from one socket and listens on
-    another. (For the heartbeat, the paper calls a function appendMsg that it does not define; here it
-    is sendMsg.) `send` takes the bytes of a datagram."""
+    """As printed: T comes before PNum, from the client's clock in whole seconds. The checksum is by hex().
+    The client answers each heartbeat, and sends seven commands for each received datagram. It sends from
+    one socket and listens on another. For the heartbeat, the paper calls a function appendMsg that it
+    does not define; here this is sendMsg. `send` takes the bytes of a datagram."""
 
     def __init__(self, send):
         self.send = send

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The r4 command as real processes: run to the end, or kept running while the test awaits its lines.
 
-Nothing here sleeps to wait: everything awaits an event until a deadline.
+Except for lasts(), each wait is for an event until a deadline.
 """
 import contextlib
 import json
@@ -22,7 +22,7 @@ R4 = os.environ['R4']
 DATA = os.environ.get('R4_TEST_DATA', os.path.join(os.path.dirname(__file__), '..', 'data'))
 PATIENCE_S = 10 if PROMPT else 30
 
-# The one shape of an error: thing, reason, fix.
+# The form of every error: thing, reason, fix.
 ERROR = re.compile(r'^r4: .+: .+; .+$', re.MULTILINE)
 
 
@@ -41,7 +41,7 @@ def send(*arguments, timeout=60):
     return result
 
 
-# A separate process measures, because the peak memory of a child includes that of the process that started it.
+# A separate process measures, because the peak memory of a child includes the peak of its parent.
 MEASURE = '''
 import os, sys
 child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ)
@@ -75,7 +75,7 @@ def free_port():
 
 
 def lasts(seconds):
-    """The length of a fault in real time; the test does not wait for an event."""
+    """Sleeps for the length of a fault in real time, and does not wait for an event."""
     time.sleep(seconds)
 
 
@@ -170,7 +170,7 @@ class Running:
             self.lines.get()
 
     def stall(self, seconds):
-        """Stops the program for a time and drops the objects from before; returns the time at which it resumed."""
+        """Stops the program for a time and drops its earlier objects; returns the time at which it resumed."""
         self.signal(signal.SIGSTOP)
         lasts(seconds)
         self.skip_past()
@@ -187,12 +187,12 @@ class Running:
         return self.wait()
 
     def rest(self):
-        """Ends the program; returns all that it has printed."""
+        """Ends the program; returns all objects that it has printed."""
         assert self.end() == 0, self.errors
         return self.left()
 
     def left(self):
-        """Returns all that the program has printed, once it has ended."""
+        """Returns all objects that the program has printed, after its end."""
         while True:
             came, line = self.lines.get()
             if line is None:
@@ -200,7 +200,6 @@ class Running:
             self.log.append({**json.loads(line), 'came': came})
 
     def cpu_seconds(self):
-        """The processor time that the program has used so far, in seconds."""
         with open(f'/proc/{self.process.pid}/stat', encoding='ascii') as stat:
             fields = stat.read().rsplit(')', 1)[1].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
@@ -226,7 +225,7 @@ class Board(Running):
     """A simulated board. `url` is where it listens, `host_url` the URL by which a host opens it."""
 
     def __init__(self, *urls, options=(), listens=None, **process):
-        """`listens`: the number of places at which it listens, if that is not the number of URLs."""
+        """`listens`: the number of places at which it listens, if it differs from the number of URLs."""
         super().__init__('sim', '--json', *urls, *options, **process)
         listening = [self.next(lambda each: each['type'] == 'listening') for _ in range(listens or len(urls))]
         self.url = listening[0]['url']
@@ -235,7 +234,7 @@ class Board(Running):
             self.host_url += '?listen=0'  # the tests have several hosts, which cannot share the standard port of hosts
 
     def state(self, state, reason=None, timeout=PATIENCE_S):
-        """Returns the next event that reports that state."""
+        """Returns the next event that reports `state`."""
         return self.next(lambda each: each.get('state') == state and 'outputs' not in each and
                          reason in (None, each['reason']), timeout)
 

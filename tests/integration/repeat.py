@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs a test once more if it failed while the machine stood still, because links time out then, as they should.
+"""Repeats a test that failed while the machine stood still, because links then time out, as they should.
 
 Each repeat is a line in build/results/repeats.txt, which tests/summary.py shows at the end of a run.
 """

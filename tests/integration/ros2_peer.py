@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Another participant in a ROS 2 graph: ros2_peer (ros2_peer.cpp) on Fast DDS, and CDR by hand."""
+"""Another participant in a ROS 2 graph: ros2_peer (ros2_peer.cpp) on Fast DDS, and a reader of CDR."""
 import contextlib
 import itertools
 import json
@@ -29,7 +29,7 @@ HEAD = bytes((0, 1, 0, 0))  # little-endian XCDR1
 
 
 def own_domain():
-    """The environment of a new graph. Its ports, 7400 + 250 per domain, are below those that Linux assigns."""
+    """The environment of a new graph. Its ports, 7400 + 250 per domain, are below the ports that Linux assigns."""
     return {**ENVIRONMENT, 'ROS_DOMAIN_ID': str(1 + next(DOMAINS) % 100)}
 
 
@@ -62,7 +62,7 @@ class Peer:
         self.process = subprocess.Popen([PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
                                         env=domain)
         self.lines = queue.Queue()
-        self.endpoints = {}  # (kind, topic): the endpoint that exists
+        self.endpoints = {}  # (kind, topic) -> the endpoint
         self.reader = threading.Thread(target=self._read, daemon=True)
         self.reader.start()
 
@@ -86,11 +86,11 @@ class Peer:
         self.say('write', topic, (HEAD + payload).hex())
 
     def write_raw(self, topic, data):
-        """Writes `data` as it is: with or without the four bytes of the encapsulation."""
+        """Writes `data` without a change, with or without the four bytes of the encapsulation."""
         self.say('write', topic, data.hex())
 
     def counted(self, topic):
-        """The fewest samples that a reader of the crowd has received."""
+        """The number of samples that the slowest reader of the crowd has received."""
         self.say('count', topic)
         return self.next(lambda each: each['type'] == 'counted')['least']
 
@@ -158,10 +158,10 @@ def armed(*arguments, options=()):
 
 
 def join(ros2, peer, topic, of):
-    """Makes a publisher of the peer, and waits until both ends know it.
+    """Makes a publisher of the peer, and waits until both ends have matched it.
 
-    A sample that is written at once may still be lost: a DDS reader drops samples that precede the writer's first
-    heartbeat. So what is written only once comes after a sample that arrived.
+    A sample that is written at once may be lost: a DDS reader drops samples that precede the writer's first heartbeat.
+    So a test that writes a sample only once must do so after another sample has arrived.
     """
     peer.writer(f'rt/{topic}', of)
     ros2.logged(f'{topic}: 1 publishers')
@@ -176,7 +176,7 @@ def arm(ros2, peer):
 
 
 def drive(board, peer, topic, payload, is_it):
-    """Repeats the sample until the board has such outputs; returns the time of the last write, and the outputs."""
+    """Repeats the sample until `is_it` is true for the outputs; returns the time of the last write, and the outputs."""
     written, came = again(lambda: peer.write(topic, payload), lambda timeout: board.outputs(is_it, timeout))
     return written, came['outputs']
 
@@ -242,7 +242,7 @@ def twist(linear, angular):
 
 
 def stamped(stamp, payload):
-    """A message that begins with a header, with that stamp in seconds and an empty frame."""
+    """A message that begins with a header: `stamp` in seconds, and an empty frame."""
     return struct.pack('<iIIB3x', int(stamp), int(stamp % 1 * 1e9), 1, 0) + payload
 
 

@@ -71,7 +71,7 @@ class SigningHost:
         return self.pnum, bytes_
 
     def heartbeat(self):
-        if self.nonce is None:  # an unsigned heartbeat asks for the nonce
+        if self.nonce is None:  # an unsigned heartbeat requests the nonce
             bytes_ = closed(self.fields('H:ROS2-R4'))
         else:
             bytes_ = self.signed(self.fields('H:ROS2-R4'))
@@ -79,7 +79,7 @@ class SigningHost:
         return bytes_
 
     def echo_of(self, heartbeat):
-        """The T to echo in our next heartbeat: a heartbeat that reports CONNECTING has none to echo (section 4.2)."""
+        """The T to echo in our next heartbeat: a heartbeat that reports CONNECTING has no T to echo (section 4.2)."""
         connecting = heartbeat['PNum'] == '0' and (heartbeat['T'] == '0' or 'AN' in heartbeat)
         return 0 if connecting else int(heartbeat['T'])
 
@@ -101,7 +101,7 @@ class SigningHost:
             self.state.update(fields)
 
     def run(self, until=lambda: False, seconds=10.0, beats=True):
-        """Takes part in the link until `until()` is true; False if `seconds` passed before."""
+        """Keeps the link until `until()` is true; returns False after `seconds`."""
         deadline = time.monotonic() + seconds
         next_beat = 0
         while not until():
@@ -119,7 +119,7 @@ class SigningHost:
         return True
 
     def executed(self, number, seconds=10.0):
-        """True if the board's state reports that command as executed."""
+        """True if the board's state reports the command as executed."""
         return self.run(lambda: self.state.get('CMD') == str(number), seconds)
 
     def connect(self):

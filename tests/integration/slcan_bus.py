@@ -60,7 +60,6 @@ class SlcanBus:
             (self.states if each['type'] == 'state' else self.answers).put(each)
 
     def order(self, *words):
-        """Sends an order to slcan_bus; returns the answer."""
         self.process.stdin.write(' '.join(map(str, words)) + '\n')
         self.process.stdin.flush()
         answer = self.answers.get(timeout=PATIENCE_S)
@@ -71,7 +70,7 @@ class SlcanBus:
         return self.order('status')
 
     def state(self, node, state, timeout=PATIENCE_S):
-        """Waits until the node changes to that state."""
+        """Waits until the node changes to `state`."""
         deadline = time.monotonic() + timeout
         while True:
             each = self.states.get(timeout=max(0, deadline - time.monotonic()))

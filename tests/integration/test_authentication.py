@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A board with a key: a second implementation drives it, an attacker cannot; r4 with keys."""
+"""A board with a key: a second implementation can drive it, and an attacker cannot. r4 with keys."""
 import os
 import pathlib
 import pwd
@@ -32,7 +32,7 @@ def board():
 def host(board):
     it = SigningHost(board.url, 3, KEY)
     it.connect()
-    it.run(seconds=0.15)  # the first, unsigned heartbeat was answered; after this the board may answer again
+    it.run(seconds=0.15)  # the board has answered the unsigned heartbeat; after this pause it may answer again
     yield it
     it.close()
 
@@ -268,7 +268,7 @@ def test_a_key_file_of_another_user_is_a_permission_error():
         key = write_key(pathlib.Path(folder, 'key'), f'3:{KEY.hex()}')
         program = [R4]
         options = {}
-        if os.geteuid() == 0:  # root may read anything, so another user runs r4 from a folder that it can read
+        if os.geteuid() == 0:  # root may read anything, so another user runs r4 from a folder that this user can read
             program = [shutil.copy(R4, os.path.join(folder, 'r4'))]
             nobody = pwd.getpwnam('nobody')
             options = {'user': nobody.pw_uid, 'group': nobody.pw_gid, 'extra_groups': []}

@@ -10,7 +10,7 @@ from machine import SANITIZED, within
 from paper_client import PaperClient
 from r4_process import ERROR, Board, Running, again, driving, is_state, lasts, monitor, run, watch
 
-# The board's timeout, and the margin that docs/reference/safety.md promises; then a margin for a busy machine.
+# The board's timeout with the margin of docs/reference/safety.md, then a margin for a busy machine.
 SAFE_WITHIN_S = 1.02 + 0.08
 LASTS_S = 2
 
@@ -56,10 +56,10 @@ def test_the_papers_udp_client_drives_a_board_on_a_serial_port(board):
     peer = f'127.0.0.1:{listening.getsockname()[1]}'
     with listening, sending, Bridge(f'udp://127.0.0.1:0?peer={peer}', f'serial://{board.tty}') as bridge:
         port = int(bridge.url.split('?')[0].rsplit(':', 1)[1])
-        # If the machine stands still for a moment, some datagrams are late, but none vanishes.
+        # On a busy machine some datagrams are late, but no datagram is lost.
         fates = ('passed', 'late', 'undelivered', 'kept_out')
         client = PaperClient(lambda data: sending.sendto(data, ('127.0.0.1', port)))
-        # After this the bridge knows that the board has no key.
+        # The first datagram of the board shows the bridge that the board has no key.
         bridge.counters('board', lambda each: each['passed'] or each['undelivered'])
         end = time.monotonic() + LASTS_S
         while time.monotonic() < end:
@@ -76,7 +76,7 @@ def test_the_papers_udp_client_drives_a_board_on_a_serial_port(board):
     assert len(client.states) >= 50 * LASTS_S or SANITIZED
     assert ';DHB1A:1000,1;' in client.states[-1] and ';SERVO1POS:300;' in client.states[-1]
     hosts = [each for each in told if each.get('side') == 'hosts' and each['type'] == 'counters'][-1]
-    # Before the bridge serves the client, up to 16 datagrams of other hosts pass.
+    # The bridge may keep out some datagrams of the client before it serves the client.
     assert hosts['kept_out'] <= 16 or SANITIZED
     assert hosts['passed'] > 0.95 * client.pnum_sent
     assert hosts['damaged'] == hosts['misdirected'] == hosts['refused'] == 0
@@ -122,7 +122,7 @@ def test_the_board_is_safe_in_time_when_host_or_bridge_is_killed(bridge, board, 
 
 
 def test_a_command_that_waited_in_a_suspended_bridge_is_not_executed(bridge, board):
-    """Uses the paper's client: its heartbeats prove nothing, so the board cannot recognise its old datagrams."""
+    """Uses the paper's client: its heartbeats have no echo, so the board cannot recognise its old datagrams."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
         address = ('127.0.0.1', int(bridge.url.rsplit(':', 1)[1]))
         client = PaperClient(lambda data: sending.sendto(data, address))

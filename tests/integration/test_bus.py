@@ -13,7 +13,7 @@ DOCS = os.path.join(os.path.dirname(__file__), '..', '..', 'docs')
 
 
 def planned(*arguments):
-    """Returns the rows of a plan by name, and the exit code."""
+    """Returns the rows of a plan by name, and the ended process."""
     result = run('bus', '--json', *arguments)
     return {each['name']: each for each in objects(result.stdout) if 'name' in each}, result
 

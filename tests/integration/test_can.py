@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The link over CAN: boards and hosts as processes on buses; r4 doctor with interfaces that are set up wrong; r4
-against a host and a board on python-can; buses that lose frames; faults of a bus, of its controllers and of the
-programs at its ends; a board with two buses; r4 bridge; our ISO-TP engine and the code that reads SocketCAN
-(can_test); the pytest plugin; tools/with-can on a kernel that has CAN.
+"""Runs the tests that need SocketCAN: the link over CAN, the tools for CAN, and the pytest plugin.
 
-All tests run in one guest, because its start takes ten seconds. Under a sanitizer only a part of them runs:
+All tests run in one guest, because its start takes ten seconds. Under a sanitizer only a part of the tests runs:
 the other tests assert times that a slow program in a guest does not keep.
 """
 from inside import PACKAGE, run_inside

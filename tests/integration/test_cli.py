@@ -183,7 +183,7 @@ def test_stop_works_while_another_program_has_the_port_of_hosts():
         try:
             other.bind(('0.0.0.0', 2390))
         except OSError:
-            pass  # another program has the port, which also serves the test
+            pass  # another program has the port, as the test requires
         run('stop', f'udp://127.0.0.1:{board.getsockname()[1]}', '--timeout', '0.3')
         # A heartbeat may arrive first.
         assert any(board.recv(2000).startswith(b'E:STOP;') for _ in range(2))
@@ -296,7 +296,7 @@ def test_a_signal_that_was_ignored_at_the_start_stays_ignored(command, tmp_path)
             time.sleep(0.01)
         assert ignored <= signals_of(program.process.pid, 'SigIgn:')
         program.signal(signal.SIGTERM)
-        assert program.wait() in (0, REFUSED), program.errors  # REFUSED: no board was heard
+        assert program.wait() in (0, REFUSED), program.errors  # REFUSED: no board answered
         program.process.stdin.close()
 
 

@@ -33,7 +33,7 @@ def happen(board, words):
 
 
 class Script(Running):
-    """r4 commission --json. `eyes` is the board: what its pins do."""
+    """r4 commission --json with a program that answers its questions."""
 
     def __init__(self, board, *options):
         super().__init__('commission', board.host_url, '--json', *options, stdin=subprocess.PIPE)
@@ -54,7 +54,7 @@ class Script(Running):
         if topic == 'which':
             return question['check']
         if topic == 'forward':
-            return True  # reversed: it was to turn backward
+            return True  # the reversed motor turns forward when it should turn backward
         return topic not in ('supply with relay open', 'two pwm inputs')
 
     def until_the_end(self):
@@ -92,7 +92,7 @@ def test_a_script_commissions_a_board_and_its_report_is_resumed(board, tmp_path)
         refused = run('commission', board.host_url, '--report', str(report), *options)
         assert refused.returncode == 2 and '--resume' in refused.stderr
         assert report.with_suffix('.json').read_text() == text
-    # The board uses the wiring that it was given: the motor is right now.
+    # The board uses the learnt wiring, so the motor turns in the commanded direction.
     with Script(board, '--resume', str(report.with_suffix('.json')), '--only', 'osmc 1') as script:
         script.answer = lambda question: {'which': 'osmc 1', 'forward': len(script.asked) > 2}.get(
             script.asked.append(question['topic']) or question['topic'], True)
@@ -172,12 +172,12 @@ def test_a_keyboard_is_enough_and_letting_go_of_the_space_bar_stops(board, tmp_p
         terminal.answer('wheels are OFF THE GROUND', 'y')
         terminal.answer('does the meter show', 'n')
         terminal.answer('clear the fault', 'y')
-        with pytest.raises(AssertionError):  # a key that is held already begins nothing
+        with pytest.raises(AssertionError):  # a key that is already held starts no movement
             terminal.until('HOLD the space bar', typing=' ', timeout=0.7)
         terminal.until('HOLD the space bar[^$]*leave: ')
         board.skip_past()
         terminal.type(' ')
-        with pytest.raises(AssertionError):  # one press moves nothing
+        with pytest.raises(AssertionError):  # one press moves no motor
             board.outputs(timeout=0.5)
         terminal.type('  ')
         on = board.outputs(lambda outputs: outputs['relays'] == 1)

@@ -61,7 +61,6 @@ def test_pandas_reads_csv_with_the_right_types(native, tmp_path):
 
 
 def tshark(*arguments):
-    """Runs tshark; returns the lines that it prints."""
     result = subprocess.run(['tshark', *map(str, arguments)], capture_output=True, text=True, check=True)
     return result.stdout.splitlines()
 
@@ -266,7 +265,7 @@ def claims(ending):
         '.pcapng': [(section + struct.pack('<II', 6, most) + bytes(100), 'no block of pcapng')],
         '.pcap': [(struct.pack('<IIQIIIIII', 0xA1B2C3D4, 0x40002, 0, most, 228, 1, 0, most, most) + bytes(100),
                    'no packet is that long')],
-        # A frame of that size, a frame with a window of that size, a line of 100 MB.
+        # A frame of 100 GB, a frame with a window of 2 GiB, a line of 100 MB.
         '.r4log.zst': [(begins + frame + b'\xe0' + struct.pack('<Q', much) + bytes(100), 'a zstd frame that needs a window'),
                        (begins + frame + b'\0\xa8' + bytes(100), 'a zstd frame that needs a window'),
                        (endless, 'the last line is not whole')],

@@ -40,10 +40,10 @@ def test_the_demo_succeeds_on_every_transport_within_16_seconds():
     assert [each['transport'] for each in results] == TRANSPORTS
     for each in results:
         assert each['ok'], each
-        # The measured time begins, at the latest, when the host knew that it had sent its last heartbeat.
+        # The measured time begins at the latest when the host has sent its last heartbeat.
         assert each['safe_ms'] <= within_ms(1020)
         assert each['safe_ms'] >= 980 or each['transport'] == 'in process'
-        # At a serial port the board drops a state of its 100 Hz that has waited for 30 ms.
+        # At 100 Hz, the board drops a state that has waited at a serial port for 30 ms.
         assert each['lost'] <= (100 * within(0) if each['transport'] == 'serial' else 0)
 
 

@@ -57,7 +57,7 @@ def test_monitor_sets_up_devices_and_shows_their_values(board, tmp_path):
         assert monitor.next(is_reading('bno055@0x28', 'accel_z'))['fields']['accel_z'] == pytest.approx(9.81)
         assert monitor.next(is_reading('as5600@0x36', 'angle'))['fields']['angle'] == pytest.approx(1.5708, abs=1e-4)
         assert monitor.next(is_reading('mine@0x40', 'volts'))['fields']['volts'] == pytest.approx(12.16)
-        # A second monitor has no control, and shows the devices that the first has set up.
+        # A second monitor has no control, and shows the devices that the first monitor has set up.
         with Running('monitor', board.host_url, *devices, '--json') as beside:
             assert beside.next(is_reading('bno055@0x28', 'heading'))['fields']['heading'] == 270
     wrong = run('monitor', board.host_url, '--device', 'icm20948@0x68', '--duration', '2')

@@ -53,7 +53,7 @@ def asks_to_watch(board):
 
 
 def speak(board):
-    """Sends one state to the host that asks, then many: each fifth is missing, and each seventh is damaged."""
+    """Sends one state to the host, then many states: each fifth is missing, and each seventh is damaged."""
     board.sendto(state(1), asks_to_watch(board))
     host = asks_to_watch(board)
     for number in range(2, 100):

@@ -47,7 +47,7 @@ def test_every_documented_drive_command_turns_a_motor(commands):
 
 
 def test_a_motor_turns_only_while_relay_1_is_closed_and_the_handle_held(tmp_path):
-    """As the sensors of the simulated world report it."""
+    """Uses the reports of the simulated sensors."""
     script = tmp_path / 'script'
     script.write_text('2.5 handle released\n')
     with Board('udp://127.0.0.1:0', options=['--sensors', '0.05', '--script', str(script)]) as board:

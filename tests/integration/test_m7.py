@@ -45,7 +45,7 @@ def test_streams_at_100_hz_with_nothing_lost(url):
 
 
 def test_streams_at_1000_hz_over_udp_with_nothing_lost(urls):
-    """On a busy machine the board leaves states out, and reports it; tests/m7/board_state_test.cpp has the bar."""
+    """On a busy machine the board leaves states out, and reports them. tests/m7/board_state_test.cpp has the exact bound."""
     assert run('send', urls.udp, 'C:rate,1000').returncode == 0
     steps = steps_of(states_of(urls.udp, 2000), 1)
     assert run('send', urls.udp, 'C:rate,100').returncode == 0

@@ -25,7 +25,7 @@ def test_the_instruction_counts_match_the_table():
     result = m7('--instructions')
     print(result.stdout)
     assert result.returncode == 0, result
-    assert m7('--instructions').stdout == result.stdout  # exactly the same number of instructions
+    assert m7('--instructions').stdout == result.stdout  # each run counts the same number of instructions
 
 
 @pytest.fixture(name='tool')

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pins of the board on the emulated M7 (tools/m7 --pins): the chips' registers, not what the board
-reports, by the board's own clock."""
+"""The pins of the board on the emulated M7 (tools/m7 --pins): the chips' registers by the board's own clock, not the
+board's reports."""
 import signal
 
 import pytest
@@ -69,7 +69,7 @@ def test_a_board_is_safe_after_power_on(board):
 
 def test_every_command_sets_its_pins_and_states_report_the_pins(board, link):
     url, listener = link
-    # Opposite signs, because the steppers stay where the other test left them.
+    # Opposite signs, because the steppers keep their positions from the run on the other link.
     table = channels(50 if url == board.serial else -50)
     with listener() as others, drive(url, 'F:ALL', *(command for command, *_ in table)):
         for command, is_done, *_ in table:
@@ -93,7 +93,7 @@ def test_every_output_is_safe_in_time_when_the_host_is_killed(board, link):
         print(f'safe {silence_ms} ms after the last heartbeat, by the board\'s clock')
         assert silence_ms >= TIMEOUT_MS
         assert silence_ms <= within_ms(TIMEOUT_MS + SAFE_WITHIN_MS)
-        # The steppers stand where they were at the start of the safe state.
+        # The steppers keep their positions of the start of the safe state.
         stand = board.pins(lambda event: not any(stepping for _, stepping in event['outputs']['stepper']))
         assert stand['outputs']['stepper'] == [[position, 0] for position, _ in safe['outputs']['stepper']]
         assert stand['safe']
@@ -121,4 +121,4 @@ def test_streams_at_exactly_100_hz_for_20_seconds_with_nothing_lost(streamed):
     states = streamed()
     steps = steps_of(states, 10)
     left_out = states[-1]['fields']['LATE'] - states[0]['fields']['LATE']
-    assert 10 * left_out <= within_ms(10 * len(steps) / 50)  # an idle machine leaves none out
+    assert 10 * left_out <= within_ms(10 * len(steps) / 50)  # an idle machine leaves no state out

@@ -75,9 +75,9 @@ def is_driven(each):
 def test_a_restarted_board_still_stops_at_an_obstacle(board):
     with Podcar(board.host_url) as podcar:
         podcar.says('press Enter')
-        happen(board, 'reboot')  # the restarted board has forgotten the threshold of US 1
+        happen(board, 'reboot')  # the restarted board has lost the threshold of US 1
         board.next(lambda each: each.get('happened') == 'reboot')
-        # The program has noticed the restart when it asks for its state fields again.
+        # When the program requests its state fields again, it has detected the restart.
         board.next(lambda each: each.get('executed', {}).get('command', '').startswith('F:'))
         podcar.enter()
         board.next(is_driven)

@@ -72,7 +72,7 @@ class Scene:
 
     def publish_until(self, is_it, press=False, joystick=True, cmd_vel=None, goal_pose=None, timeout=PATIENCE_S,
                       **buttons):
-        """Repeats the messages until `is_it` is true; collects the lines that the program prints from now on in `said`.
+        """Repeats the messages until `is_it` is true; collects the new lines of the program in `said`.
         `press`: every second message presses start."""
         self.said.clear()
         deadline, start = time.monotonic() + timeout, False
@@ -107,7 +107,7 @@ class Scene:
         assert math.dist(place, (self.odometry.x, self.odometry.y)) < 0.01
 
     def stops(self, why, before, **published):
-        """`published` stops the vehicle that drives by `before`. Repeats this if another reason stopped it first."""
+        """Asserts that `published` stops the vehicle, which `before` drives. Repeats this after a stop for another reason."""
         deadline = time.monotonic() + 3 * PATIENCE_S
         while True:
             self.drives(**before)

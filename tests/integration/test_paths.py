@@ -106,7 +106,7 @@ def test_old_datagrams_of_a_delayed_path_have_no_effect():
         paths[0].signal(signal.SIGCONT)
         back = host.next(is_path(paths[0]))['came'] - went_on
         judge(host, began, f'told of it after {lost * 1e3:.0f} ms, used again after {back * 1e3:.0f} ms')
-        paths[0].pull()  # the other path carries alone
+        paths[0].pull()  # the other path carries all datagrams
         host.next(is_path(paths[0], carries=False))
         judge(host, began, 'the other one pulled')
         board.never('SAFE', 0.2)
@@ -160,7 +160,7 @@ def test_each_command_is_executed_once_while_paths_fail_and_recover():
             paths[0].pull()
             sends.until(120)
             paths[0].plug_in()
-            board.next(has_joined(2))  # before that the board has only one path, which must not fail
+            board.next(has_joined(2))  # until then the board has only one path, which must not fail
             sends.until(190)
             paths[1].signal(signal.SIGSTOP)
             sends.until(260)

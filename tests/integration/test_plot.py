@@ -15,7 +15,7 @@ SVG = '{http://www.w3.org/2000/svg}'
 
 
 def good(fields):
-    """A datagram with those fields and a valid checksum."""
+    """A datagram with `fields` and a valid checksum."""
     return f'{fields}^{hex(zlib.crc32((fields + "^").encode()))}^'
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulated board and hosts as separate processes over a pseudo-terminal, which takes the place of USB."""
+"""A simulated board and hosts as separate processes over a pseudo-terminal, which replaces USB."""
 import os
 import pty
 import random
@@ -226,7 +226,7 @@ class Noise:
                 try:
                     act()
                 except BlockingIOError:
-                    time.sleep(0.001)  # the pause of the device
+                    time.sleep(0.001)
 
     def __exit__(self, *_):
         self.going = False
@@ -269,7 +269,7 @@ def test_a_host_reads_a_fresh_state_after_a_pause(board):
             before = host.next(is_state)
         host.stall(0.7)
         first = host.next(is_state)
-        # Longer than the board's timeout: the board goes safe, and the link comes back.
+        # Longer than the board's timeout: the board goes safe, and the link recovers.
         host.signal(signal.SIGSTOP)
         board.state('SAFE', 'link')
         host.signal(signal.SIGCONT)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recordings: r4 record beside a program that drives, killed, and on a full disk; r4 info on the result."""
+"""r4 record beside a program that drives, killed, and on a full disk, and r4 info on the result."""
 import contextlib
 import datetime
 import re
@@ -234,7 +234,7 @@ def test_record_starts_a_new_file_when_its_file_is_moved_or_removed(board, tmp_p
 
 
 def test_a_full_disk_ends_the_recording_with_a_reason(board, tmp_path):
-    # A file system in a new namespace, with which it ends; if that is refused, unshare reports why.
+    # The file system ends with its new namespace. If the namespace is refused, unshare reports the reason.
     script = ('mount -t tmpfs -o size=16k none "$1" && cd "$1" && "$2" record "$3" -o drive.r4log; echo $?;'
               ' "$2" info drive.r4log')
     full = subprocess.run(['unshare', '--map-root-user', '--mount', 'sh', '-c', script, 'sh', tmp_path, R4,

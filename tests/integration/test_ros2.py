@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 ros2 in a graph with a Fast DDS peer, which knows the bytes of ROS 2's messages."""
+"""r4 ros2 in a graph with a Fast DDS peer, which uses the bytes of ROS 2's messages."""
 import math
 import os
 import pathlib
@@ -73,7 +73,7 @@ def test_commands_in_one_text_are_executed_as_a_group(graph):
     peer.write('rt/R4_Command', text('O:100,1,3;O:5000,1,4'))  # one of two commands is invalid: neither is executed
     _, outputs = drive(board, peer, 'rt/R4_Command', text('O:200,0,3'), lambda each: pwm(each, 3) != 358)
     assert pwm(outputs, 3) == -200
-    peer.say('remove', 'rt/R4_Command')  # its outputs go off
+    peer.say('remove', 'rt/R4_Command')  # the outputs that it drove go off
     outputs = board.outputs(lambda each: pwm(each, 3) == 0)['outputs']
     assert outputs['servo'][1] == 0
 
@@ -86,7 +86,7 @@ def test_outputs_are_commanded_and_reported_in_the_units_of_ros(graph):
     assert pwm(outputs, 1) == -2048
     told = peer.sample('rt/osmc1/state', lambda payload: struct.unpack('<f', payload)[0] < -0.4)
     assert struct.unpack('<f', told)[0] == pytest.approx(-2048 / 4095, abs=1e-6)
-    # A publisher that is silent but exists: off after the deadline of 1 s.
+    # After the deadline of 1 s, the output of a publisher that is silent but exists goes off.
     off = board.outputs(lambda each: pwm(each, 1) == 0)
     assert 0.9 < off['came'] - written < within(1.4)
     for wrong in (math.nan, math.inf, 1.5):
@@ -173,7 +173,7 @@ def test_malformed_samples_change_nothing(graph):
         # Multiples of 4, because shorter samples are padded on the wire.
         bad = [good[:size] for size in range(0, len(good), 4)]
         bad += [good[:-len(text('O:900,1,1'))] + each for each in no_strings if name in ('String', 'AddDiagnostics')]
-        if name == 'AddDiagnostics':  # as rmw_fastrtps asks: the identity of the request is not in the payload
+        if name == 'AddDiagnostics':  # as rmw_fastrtps sends requests: their identity is not in the payload
             bad += [text('O:900,1,1'), text('O:900,1,1;' * 9)]
         for payload in bad:
             peer.write(topic, payload)
@@ -252,7 +252,7 @@ def test_after_a_stop_a_repeated_arm_does_not_arm(graph):
 
 def ask(peer, service, request):
     """Returns the answer of a service: whether the board confirmed, and a text. On a busy machine a request may be too
-    old when it arrives. Then it is sent again, at most twice."""
+    old when it arrives. Then the request is repeated, at most twice."""
     for number in range(7, 10):
         peer.write(f'rq/r4/{service}Request', struct.pack('<Qq', CLIENT, number) + request)
         cdr = Cdr(peer.sample(f'rr/r4/{service}Reply'))
@@ -322,7 +322,7 @@ def test_the_service_send_answers_with_the_boards_result(graph):
 
 @pytest.mark.parametrize('user_data, gid_size', ((NODES_HASH, 16), ('-', 24)))
 def test_the_node_is_listed_for_every_release_of_ros(user_data, gid_size):
-    """`user_data`: the user data that a peer of that release has on its writer of the list of nodes."""
+    """`user_data`: the user data of the peer's writer of the list of nodes, as in one release of ROS."""
     domain = own_domain()
     with Board('udp://127.0.0.1:0') as board, Peer(domain) as peer, \
             Ros2(domain, board.host_url, '--namespace', 'robot') as ros2:
@@ -336,7 +336,7 @@ def test_the_node_is_listed_for_every_release_of_ros(user_data, gid_size):
         raw = bytes.fromhex(peer.endpoint('writer', 'rt/robot/R4')['gid'])
         assert raw.ljust(gid_size, b'\0') in writers
         services = 4
-        assert len(readers) == len(ros2.ready['subscriptions']) + services + 1  # `stop` has two
+        assert len(readers) == len(ros2.ready['subscriptions']) + services + 1  # `stop` has two subscriptions
         assert len(writers) == len(ros2.ready['publishers']) + services
         left = ros2.signal(signal.SIGINT)
         gone = peer.sample('ros_discovery_info', lambda data: data[:16] == listed[:16])
@@ -346,7 +346,7 @@ def test_the_node_is_listed_for_every_release_of_ros(user_data, gid_size):
         def topics_are_gone():
             return not any('/robot/' in topic for _, topic in peer.endpoints)
         if not topics_are_gone():
-            went = peer.next(lambda _: topics_are_gone(), timeout=8)  # the lease takes 10
+            went = peer.next(lambda _: topics_are_gone(), timeout=8)  # the lease takes 10 s
             assert went['came'] - left < within(0.2)
         peer.next(lambda each: each['type'] == 'participant' and each['gone'], timeout=8)
         assert ros2.wait() == 0
@@ -436,7 +436,7 @@ def test_the_wheel_speeds_example_keeps_the_commanded_speeds():
     speeds, now = [0.0, 0.0], 0.0
 
     def drive(seconds, *command):
-        """Motors that reach three quarters of the speed of their duty, and the encoders of both wheels."""
+        """Simulates motors that reach three quarters of the speed of their duty, and the encoders of both wheels."""
         nonlocal now
         for _ in range(int(seconds * 100)):
             now += 0.01
@@ -447,9 +447,9 @@ def test_the_wheel_speeds_example_keeps_the_commanded_speeds():
                 speeds[i] += (duty * 30 * 0.75 - speeds[i]) * 0.1
         return speeds
     assert drive(5, 0.5, 1.0) == pytest.approx([(0.5 - 0.21) / 0.05, -(0.5 + 0.21) / 0.05], rel=0.02)
-    drive(0.1, math.nan, 0)  # no command
+    drive(0.1, math.nan, 0)  # NaN is not a command
     drive(0.6)
-    assert base.update(speeds, now) == [0, 0]  # no new command: off
+    assert base.update(speeds, now) == [0, 0]  # without a new command the wheels are off
     assert drive(10, 9.0, 0.0)[0] == pytest.approx(22.5, rel=0.02)  # the highest speed
     assert drive(5, 0.5, 0.0) == pytest.approx([10, -10], rel=0.05)  # it recovers from saturation
     base.command(1, 0, now)

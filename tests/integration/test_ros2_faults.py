@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 ros2, when it or another participant in its graph is killed, stands still or is late."""
+"""r4 ros2, when it or another participant in its graph is killed, pauses or is late."""
 import signal
 import time
 

@@ -19,7 +19,7 @@ def newest_outputs(board):
 
 
 def test_a_zero_published_once_arrives_over_a_link_with_loss():
-    # Without a deadline only the repeated command can end the drive. About a third of the ten would be lost.
+    # Without a deadline only the command can end the drive. Without repetition, about a third of the ten would be lost.
     with armed('--deadline', '0', options=('--link', 'loss=30%,seed=7')) as (board, ros2, peer):
         join(ros2, peer, 'osmc1/command', FLOAT32)
         for _ in range(10):
@@ -36,7 +36,7 @@ def test_a_transfer_and_a_setpoint_can_share_a_command_text():
             drive(board, peer, 'rt/R4_Command', text('O:0,1,1'), lambda each: pwm(each, 1) == 0)
 
 
-@pytest.mark.parametrize('_', range(3))  # several runs, because the node takes both in one turn only by chance
+@pytest.mark.parametrize('_', range(3))  # several runs, because the node takes both samples in one turn only by chance
 def test_an_arm_published_before_a_stop_does_not_undo_the_stop(_):
     with armed() as (board, ros2, peer):
         join(ros2, peer, 'arm', BOOL)
@@ -45,7 +45,7 @@ def test_an_arm_published_before_a_stop_does_not_undo_the_stop(_):
         drive(board, peer, 'rt/osmc1/command', float32(0.25), lambda each: pwm(each, 1) == 1024)
         peer.write('rt/arm', OFF)
         peer.write('rt/arm', ON)
-        peer.write('rt/stop', ON)  # the node takes the stop first if both come in the same turn
+        peer.write('rt/stop', ON)  # if both samples come in the same turn, the node takes the stop first
         ros2.logged('E:STOP: confirmed')
         again(lambda: peer.write('rt/osmc1/command', float32(0.5)),
               lambda timeout: ros2.logged('not armed (stop)', timeout=timeout))

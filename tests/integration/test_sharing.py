@@ -18,7 +18,7 @@ from machine import within
 from r4_process import (ERROR, PATIENCE_S, R4, Board, Running, driving, free_port, is_state, objects, run, stop_takes_ms,
                         wait_for, watch)
 
-# The other programs take a path over within 100 ms; a busy machine gets as much again.
+# Another program takes a path over within 100 ms; the bound is double for a busy machine.
 TAKEN_OVER_WITHIN_S = 0.2
 
 
@@ -34,7 +34,7 @@ def on_a_path(request, folder):
     url = f'pty:{folder}/tty' if request.param == 'pty' else 'udp://127.0.0.1:0'
     with Board(url) as board:
         if request.param == 'udp':
-            # One port for all hosts, as the standard port of hosts is.
+            # All hosts use one port, as with the standard port of hosts.
             board.host_url = re.sub(r'\?listen=0$', f'?listen={free_port()}', board.host_url)
         yield board
 
@@ -89,7 +89,7 @@ def received(path):
 
 
 def from_to(datagrams, first, last):
-    """The datagrams from the first that has the text `first` to the next that has `last`."""
+    """The datagrams from the first with the text `first` to the next with the text `last`."""
     texts = [datagram for _, _, datagram in datagrams]
     begin = next(i for i, text in enumerate(texts) if first in text)
     return datagrams[begin:next(i for i, text in enumerate(texts) if i > begin and last in text)]
@@ -107,7 +107,7 @@ def test_recorders_lose_no_datagram_when_watchers_hang_or_are_killed(board, fold
             wait_for(path, 'OSMC1:358,1;')
         sleeper.signal(signal.SIGSTOP)
         victim.signal(signal.SIGKILL)
-        board.never('SAFE', 2.5)  # by then the stopped program no longer holds the path
+        board.never('SAFE', 2.5)  # by then the stopped program has lost the path
         sleeper.signal(signal.SIGCONT)
         sleeper.skip_past()
         sleeper.next(drives(358))
@@ -119,7 +119,7 @@ def test_recorders_lose_no_datagram_when_watchers_hang_or_are_killed(board, fold
     for path in paths:
         datagrams = from_to(received(path), 'OSMC1:358,1;', 'SAFE:1;')
         pairs = list(itertools.pairwise(datagrams))
-        # Datagrams were lost only between the death of the holder and the takeover of its path.
+        # Datagrams may be lost only between the death of the holder and the takeover of its path.
         holes = [(a, b) for a, b in pairs if b[1] != a[1] + 1]
         shown = [[(round(at - killed_at, 3), number) for at, number, _ in hole] for hole in holes]
         assert len(holes) <= 1 and all(b[0] > killed_at for _, b in holes), shown
@@ -129,7 +129,7 @@ def test_recorders_lose_no_datagram_when_watchers_hang_or_are_killed(board, fold
 
 
 def with_a_stopped_holder(url, look, watchers=2):
-    """Stops a watcher that holds the transport, with other watchers beside it; calls `look` for each of these."""
+    """Stops a watcher that holds the transport, with other watchers beside it; calls `look` for each other watcher."""
     with watch(url) as holder, contextlib.ExitStack() as running:
         holder.next(is_state)
         others = [running.enter_context(watch(url)) for _ in range(watchers)]
@@ -158,7 +158,7 @@ def test_a_suspended_holder_of_the_only_port_is_named():
 
 
 def test_a_suspended_watching_holder_does_not_block_a_board(folder):
-    # Only one program can open a serial port, so only one takes it over from the stopped program.
+    # Only one program can open a serial port, so only one watcher takes it over from the stopped program.
     for url, watchers in ('udp://127.0.0.1:0', 2), (f'pty:{folder}/tty', 1):
         with Board(url) as board:
             with_a_stopped_holder(board.host_url.removesuffix('?listen=0'), hears_on, watchers)
@@ -181,7 +181,7 @@ def test_a_resumed_holder_takes_no_bytes_from_the_new_holder(folder):
                 holder.skip_past()
                 for _ in range(20):
                     holder.next(drives(358))
-                holder.signal(signal.SIGSTOP)  # it shares the transport, so a stopped process delays no other program
+                holder.signal(signal.SIGSTOP)  # a stopped program that shares the transport delays no other program
                 assert recorder.end() == 0, recorder.errors
             numbers = [number for _, number, _ in received(path)]
             assert len(numbers) > 20 and numbers == sorted(set(numbers))
@@ -201,7 +201,7 @@ def test_two_spellings_of_one_address_share_a_path():
             refused = run('send', other_url, 'O:1,1,1')
             assert refused.returncode == 3, refused
             assert f'controlled by r4 (pid {host.process.pid})' in refused.stderr, refused
-            # An address that only a resolver understands is another path, at the same port.
+            # An address that needs a resolver is another path, at the same port.
             refused = run('send', url.replace('127.0.0.1', '127.1'), 'O:1,1,1')
             assert refused.returncode == 4, refused
             assert f'UDP port {listen} is in use by r4 (pid {host.process.pid})' in refused.stderr, refused
@@ -262,7 +262,7 @@ def test_connections_of_another_user_do_not_delay_the_host_or_a_stop(folder):
     with Board(f'pty:{folder}/tty') as board, driving(board.host_url, 'O:358,1,1') as host, contextlib.ExitStack() as others:
         name = f'r4link/{os.geteuid()}/control/serial/{os.path.realpath(folder + "/tty")}'
         for _ in range(20):
-            # With nice, they fill the queue and leave the board and its host their processor.
+            # With nice, the programs fill the queue but leave the processor to the board and its host.
             other = subprocess.Popen(['nice', '/usr/bin/python3', '-S', '-c', HAMMER, name], user='nobody',
                                      group='nogroup', extra_groups=[], cwd='/')
             others.callback(other.wait)

@@ -56,7 +56,7 @@ def flood(board, rate_hz, datagrams, at_once=0, places=0):
 
 
 def stays_with_its_host_in(board, flooded):
-    """The controlling host keeps the board during the flood; the next host gets control after it has left."""
+    """The controlling host keeps control during the flood; the next host gets control after the first host has left."""
     with monitor(board.host_url) as host:
         host.next(is_link('active'))
         board.state('ACTIVE')
@@ -101,8 +101,8 @@ def test_streams_its_state_at_100_hz(board):
     times = [each['t'] for each in states]
     steps = [later - earlier for earlier, later in zip(times, times[1:])]
     print(f'{len(states)} states in {times[-1] - times[0]} ms of the board')
-    # Heartbeats, two per second, and answers to the host's questions about the board's clock use the same numbers:
-    # ten per second at first, for as long as the clock is uncertain on a busy machine.
+    # Heartbeats (two per second) and answers about the board's clock use the same numbers. At first ten answers come per
+    # second; on a busy machine the clock is uncertain for longer, so the answers continue.
     assert len(states) - 1 <= numbers[-1] - numbers[0] <= len(states) + 4 + 20
     # T stays in the grid of 10 ms; a busy machine may leave periods out, but never shifts the grid.
     assert all(step % 10 == 0 for step in steps)
@@ -215,7 +215,7 @@ def test_the_board_is_safe_in_time_after_its_host_is_killed(board):
 
 
 def test_a_heartbeat_counts_from_its_arrival_at_a_suspended_board():
-    # A host as in the paper: the board knows only that its heartbeats arrive.
+    # A host as in the paper: its heartbeats have no echo, so the board can only count from their arrival.
     with Board('udp://127.0.0.1:0', options=('--set', 'timeout,2000')) as board, \
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as host:
         host.connect(('127.0.0.1', int(board.url.rsplit(':', 1)[1])))
@@ -237,7 +237,7 @@ def test_a_heartbeat_counts_from_its_arrival_at_a_suspended_board():
         safe = board.state('SAFE', 'link')
     after_ms = (safe['came'] - delivered) * 1000
     print(f'SAFE {after_ms:.0f} ms after the heartbeat was delivered')
-    assert 1200 < after_ms <= within_ms(2020)  # longer than 1000, so the program fed the watchdog
+    assert 1200 < after_ms <= within_ms(2020)  # longer than 1000, so the last heartbeat counted
 
 
 def test_control_is_free_after_the_controlling_host_is_killed(board):
@@ -324,7 +324,7 @@ def test_bench_measures_the_link(board):
     assert result.returncode == 0, result
     measured = objects(result.stdout)[0]
     print(result.stdout)
-    # The board leaves out states if the machine is busy.
+    # If the machine is busy, the board leaves states out.
     assert 2 * 97 / within(2) <= measured['state_hz'] <= 103
     assert measured['round_trip_us']['count'] > 20 and measured['unanswered'] == 0
     assert measured['confirmation_us']['count'] > 1 and measured['unconfirmed'] == 0
@@ -400,7 +400,7 @@ def test_a_client_without_heartbeats_is_refused(board):
 
 
 def test_one_process_simulates_a_thousand_boards():
-    last = 21049 if SANITIZED else 21999  # with more, the machine has no time for each board
+    last = 21049 if SANITIZED else 21999  # more boards are too many for the machine
     with Board(f'udp://127.0.0.1:21000-{last}', listens=last - 20999) as boards:
         for port in 21000, 21025, last:
             sent = run('send', f'udp://127.0.0.1:{port}?listen=0', '--timeout', '20', 'O:358,1,1', timeout=30)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 upload with a dfu-util of our own, and a board at a pseudo-terminal."""
+"""r4 upload with a simulated dfu-util, and a board at a pseudo-terminal."""
 import contextlib
 import fcntl
 import json
@@ -17,7 +17,7 @@ import pytest
 
 from r4_process import ERROR, R4, Board, objects, run
 
-# Its boot loader runs after a board has been opened at 1200 baud, or if the test says so.
+# Reports the boot loader from the N-th call with -l on; the file `there` has N. Writes the bit rate of the port to `speed`.
 DFU_UTIL = '''#!/bin/bash
 echo "$*" >>"$R4_TEST_DFU/calls"
 case "$*" in
@@ -181,7 +181,7 @@ def test_a_write_that_has_begun_is_finished(place, stop):
 
 
 def test_a_board_that_does_not_confirm_the_stop_is_not_written(place):
-    """It answers questions, but not a stop."""
+    """The board answers questions, but not a stop."""
     board, port = pty.openpty()
     tty.setraw(port)
 

@@ -129,13 +129,13 @@ def test_a_watcher_on_a_cable_loses_no_state(tmp_path):
             # The watcher's own events, such as a change of its link, have no number.
             numbers = [watcher.next(lambda each: each.get('pnum') is not None)['pnum'] for _ in range(50)]
             steps = [b - a for a, b in itertools.pairwise(numbers)]
-            # At a serial port the board drops a state of its 100 Hz that has waited for 30 ms.
+            # At 100 Hz, the board drops a state that has waited at a serial port for 30 ms.
             waited = 100 * within(0)
             assert max(steps) <= 2 + waited and sum(steps) < 60 + waited, 'more than the numbers of answers are missing'
 
 
 class Stranger:
-    """A watcher with its own port, which asks the board without r4."""
+    """A watcher without r4, with its own port."""
 
     def __init__(self, board):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

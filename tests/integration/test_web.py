@@ -173,7 +173,7 @@ def test_a_stop_while_control_is_given_back_is_not_lost():
 def test_a_stop_under_way_while_control_is_taken_is_not_lost():
     with one_board() as (board, web), Page(web) as page, Page(web) as watcher:
         page.next('board', lambda each: each['why'] == 'nobody controls it')
-        board.signal(signal.SIGSTOP)  # so that nothing confirms it before control is taken
+        board.signal(signal.SIGSTOP)  # so that the board does not confirm the stop before control is taken
         watcher.say(type='stop', request=1)
         assert page.control()['you']
         board.signal(signal.SIGCONT)
@@ -317,7 +317,7 @@ def test_requests_with_a_wrong_host_or_origin_are_refused():
             assert refused.value.status == 403, origin
         assert web.request(b'GET / HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n').split()[1] == b'400'
         assert web.request(b'GET / HTTP/1.1\r\n\r\n').split()[1] == b'400'
-        # As through ssh -L 9999:localhost:8080.
+        # The headers of a browser that uses ssh -L 9999:localhost:8080.
         with WebSocket(web.port, Host='localhost:9999', Origin='http://localhost:9999') as tunnel:
             assert tunnel.protocol == 'r4.web.v1'
 

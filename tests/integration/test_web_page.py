@@ -144,7 +144,7 @@ def test_plots_can_be_paused_zoomed_and_read(browser):
         page.until_text('#pause', 'Go on')
         before = page.evaluate(PICTURES)
         seen = page.evaluate('r4_measured.states')
-        page.until(f'r4_measured.states > {seen} + 20')  # the page keeps the new states meanwhile
+        page.until(f'r4_measured.states > {seen} + 20')  # the paused page keeps the new states
         assert page.evaluate(PICTURES) == before
         page.click('#zoom-in')
         page.until(f'{PICTURES} !== {before!r}')
@@ -179,7 +179,7 @@ def test_the_page_fits_its_screen_in_dark_and_light(browser, width, height, sche
         left, top, right, bottom = page.evaluate(
             '(({left, top, right, bottom}) => [left, top, right, bottom])'
             '(document.querySelector("#stop").getBoundingClientRect())')
-        assert left >= 0 and top >= 0 and right <= width and bottom <= height  # STOP is in sight
+        assert left >= 0 and top >= 0 and right <= width and bottom <= height  # STOP is visible
         assert page.errors() == []
 
 
@@ -272,7 +272,7 @@ def test_the_page_reports_a_lost_server_or_board_and_reconnects(browser):
                 with Web(board.host_url, listen=f'127.0.0.1:{port}'):
                     page.until(f'document.querySelector("#alarm").hidden && r4_measured.states > {seen}')
                     page.until_text('.card .state', 'Safe')
-                    assert page.text('#holder').startswith('Nobody controls')  # control does not come back by itself
+                    assert page.text('#holder').startswith('Nobody controls')  # control does not return by itself
 
 
 def test_a_closed_or_hidden_page_makes_its_board_safe(browser):

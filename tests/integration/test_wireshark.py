@@ -260,7 +260,7 @@ def test_commands_are_those_of_r4_send(shown, tmp_path):
     assert len(forms) >= 12
     for letter, form in forms:
         for value in re.findall(r'[a-z]+', form):
-            words = {'n': 'on', 'ff': 'on'}  # from the help's On and Off of R
+            words = {'n': 'on', 'ff': 'on'}  # the lower-case letters of R's On and Off in the help
             assert f'r4.{letter.lower()}.{words.get(value, value)}' in shown, (letter, form)
     text = 'O:1,0,2;D:3,1,4;S:1500,16;R:8,Off;P:-7,2;P:-7,20,3;Z:1;B:4,1,0,2;PNum:1;T:1;'
     path = write_pcap(tmp_path / 'group.pcap', RAW_IP, [(0, udp('host', datagram(each))) for each in (

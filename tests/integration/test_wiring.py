@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4 wiring, and boards that are wired otherwise than the plan."""
+"""r4 wiring, and boards whose wiring differs from the plan."""
 import re
 import subprocess
 
@@ -77,7 +77,7 @@ def test_a_wrong_use_says_what_is_right(arguments, code):
 
 
 def check_outputs(board):
-    """Each output does what its command says."""
+    """Asserts that each command sets its output."""
     table = channels(50)
     with Running('send', board.host_url, *(command for command, *_ in table), '--hold', '120', '--json') as host:
         for command, is_so, *_ in table:
@@ -97,7 +97,7 @@ INPUTS = [
 
 
 def check_inputs(board):
-    """Each input reports what happens to it."""
+    """Asserts that each input reports its simulated value."""
     fields = 'ALL,GPIO'
     with monitor(board.host_url, '--fields', fields) as host:
         for words, field, value in INPUTS:
@@ -129,7 +129,7 @@ def pty_of_a_board(tmp_path):
 
 
 def test_a_given_wiring_is_used_from_the_next_start_on_in_every_channel(other, cable):
-    """A new board that is wired otherwise than the plan in thirty places: no recompilation, one restart."""
+    """A new board whose wiring differs from the plan in thirty places: no recompilation, one restart."""
     assert len(OTHER) >= 30
     pty, serial = cable
     with Board(pty, 'udp://127.0.0.1:0', listens=2, options=['--wired', other, '--new', '--stdin'],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tools/with-can: a command in its guest behaves as one that runs here, and the guest leaves nothing."""
+"""tools/with-can: a command in its guest behaves as on this machine, and no guest remains after its end."""
 import os
 import pathlib
 import pty
@@ -32,7 +32,7 @@ def children(pid):
 
 
 def await_guest(process):
-    """Returns the process id of QEMU as soon as it runs; it need not have booted."""
+    """Returns the process id of QEMU as soon as QEMU runs; the guest need not have booted."""
     deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
         for pid in children(process.pid):
@@ -104,7 +104,7 @@ def folder_of_the_command(tmp_path_factory):
 
 @pytest.fixture(scope='module', name='result')
 def what_a_command_has_done(folder):
-    """Runs one command for four tests, because a boot takes long. It leaves the output of its programs in `folder`."""
+    """Runs one command for four tests, because a boot takes long. The command leaves the output of its programs in `folder`."""
     (folder / 'frames.sh').write_text(FRAMES)
     return run('sh', '-c', r"""/usr/bin/python3 -S -c "$0" "$@" </dev/null >told 2>&1
 sh frames.sh </dev/null >frames 2>&1; printf 'a\r\n\000b\nc' >&2; cat; exit 255""", NEEDS, *ARGUMENTS, cwd=folder,
@@ -178,7 +178,7 @@ def test_an_ordinary_user_can_run_a_command_with_his_own_ids():
         assert (result.stdout, result.stderr) == (b'%d\n' % os.geteuid(), b'')
         assert result.returncode == 128 + signal.SIGSEGV
         return
-    # Not one of pytest's folders, because every start of pytest closes them to other users.
+    # pytest's folders cannot be used, because every start of pytest closes them to other users.
     with tempfile.TemporaryDirectory(prefix='r4-user-') as name:
         folder = pathlib.Path(name)
         os.chmod(folder, 0o755)
@@ -206,7 +206,7 @@ def test_an_ordinary_user_can_run_a_command_with_his_own_ids():
     (['true'], {'XDG_CACHE_HOME': '{tmp}', 'PATH': '{bin}'}, 6, 'apt-get update'),
 ])
 def test_a_missing_requirement_is_reported_with_a_fix(tmp_path, arguments, environment, code, words):
-    # A Debian whose package lists are empty.
+    # A simulated Debian whose package lists are empty.
     programs = tmp_path / 'bin'
     programs.mkdir()
     for name in ('qemu-system-x86_64', 'ip', 'apt-get', 'dpkg-deb', 'apt-cache', 'true'):

@@ -61,7 +61,7 @@ def is_down(each):
 
 
 def listed(*options):
-    """The port in r4 list. With `--serial`, r4 asks the board at it although its USB id is not that of a board."""
+    """The port in r4 list. With `--serial`, r4 queries the board at the port, although its USB id is not a board's."""
     ports = [each for each in objects(run('list', '--json', *options).stdout) if each['type'] == 'port']
     port = next(each for each in ports if each['path'] == PORT)
     assert (port['usb'], port['serial_number']) == ('0403:6001', 'R4-0001'), port
@@ -177,7 +177,7 @@ def one_of_two_paths(terminal, commands):
 
 
 def uploads_to_the_board_that_it_stopped():
-    """Another board also waits in its boot loader. A board is known by its place at USB."""
+    """Another board also waits in its boot loader. r4 identifies a board by its place at USB."""
     place = re.search(r'/(\d+-[\d.]+)/\1:', os.path.realpath('/sys/class/tty/ttyUSB0'))[1]
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder)

@@ -45,7 +45,7 @@ class Web(Running):
 
 
 class Refused(Exception):
-    """The server refused the handshake; `status` is that of its answer."""
+    """The server refused the handshake; `status` is the status of its answer."""
 
     def __init__(self, status):
         super().__init__(f'the handshake was refused: {status}')
@@ -128,7 +128,7 @@ class Page(WebSocket):
         super().__init__(web.port, **options)
         self.messages = []
         self.newest = 0
-        self.closed = None  # the reason
+        self.closed = None  # the reason, after the connection has closed
         self._news = threading.Condition()
         self._alive = None
         self._write = threading.Lock()
@@ -215,7 +215,6 @@ class Page(WebSocket):
         return self.next('control', lambda each: each['you'] or each['why'])
 
     def ask(self, **message):
-        """Sends a request; returns its result."""
         number = time.monotonic_ns()
         self.say(request=number, **message)
         return self.next('result', lambda each: each['request'] == number)

@@ -18,7 +18,7 @@ WITH_CAN = TOOLS / 'with-can'
 NOBODY = 65534
 PATIENCE_S = 30
 BOOT_ID = '/proc/sys/kernel/random/boot_id'
-# Reports each Ctrl-C, and ends if no second one follows the first.
+# Counts the Ctrl-C signals until 0.5 s pass without a signal.
 COUNTS_CTRL_C = '''
 import signal
 signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
@@ -38,7 +38,7 @@ def run(*command, **options):
 
 
 def index(interface):
-    """The index of the interface: a later one with the same name has another. None if it does not exist."""
+    """The index of the interface, or None if it does not exist. A later interface with the same name has another index."""
     file = pathlib.Path(f'/sys/class/net/{interface}/ifindex')
     return int(file.read_text(encoding='ascii')) if file.exists() else None
 
@@ -89,7 +89,7 @@ def test_ctrl_c_reaches_the_command_once():
             seen += os.read(terminal, 4096)
 
     await_word(b'begun')
-    os.kill(process, signal.SIGSTOP)  # so that a passed-on signal would arrive apart from the terminal's
+    os.kill(process, signal.SIGSTOP)  # so that a signal that the stopped program passes on arrives later
     os.write(terminal, b'\x03')
     await_word(b'one')
     os.kill(process, signal.SIGCONT)

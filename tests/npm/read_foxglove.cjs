@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Subscribes to every channel of a server by npm's @foxglove/ws-protocol, and prints a JSON object: its channels, and
-// the messages of each, as [nanoseconds, object], until so many of the first have come. A line before says when the
-// first of all messages came.
+// Subscribes to every channel of a server by npm's @foxglove/ws-protocol. Prints the line `reads` at the first message.
+// After COUNT messages of the channel of r4.Record, prints a JSON object: the channels, and the messages of each channel
+// as [nanoseconds, object]. Usage, with COUNT 100:
 //     node read_foxglove.cjs ws://127.0.0.1:8080 100
 'use strict';
 const { FoxgloveClient } = require('@foxglove/ws-protocol');

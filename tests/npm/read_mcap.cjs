@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads an MCAP file by npm's @mcap/core, from its beginning and by its indexes: both have to agree, and every
-// checksum, offset and count to be right. Prints a JSON object: its topics, and its messages in the order of the file
+// Reads an MCAP file by npm's @mcap/core, from its beginning and by its indexes. Both readings must agree, and every
+// checksum, offset and count must be right. Prints a JSON object: its topics, and its messages in the order of the file
 // as [topic, microseconds, object].
 'use strict';
 const assert = require('node:assert/strict');
@@ -18,7 +18,7 @@ function decompress(packed, size) {
   return unpacked;
 }
 
-// It checks the checksum of each chunk. A chunk has the channels of its messages, whatever was before.
+// The reader checks the checksum of each chunk. Each chunk must have the channels of its messages.
 function readStream() {
   const reader = new McapStreamReader({ decompressHandlers: { zstd: decompress }, includeChunks: true });
   const records = { Chunk: [], Message: [] };
@@ -37,7 +37,7 @@ function readStream() {
   return records;
 }
 
-// It checks the checksum of the summary.
+// The reader checks the checksum of the summary.
 function openIndexed() {
   const readable = {
     size: async () => BigInt(bytes.length),

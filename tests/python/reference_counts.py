@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Uses the package repeatedly. Run as a program on an interpreter that counts all references, it ends with 1 if their
-number grows. Leaves out r4link.read(), because numpy is built for the other interpreter and would not be counted."""
+"""Uses the package repeatedly, on an interpreter that counts all references. Exit code 1 if their number grows. Leaves
+out r4link.read(), because numpy is not built for this interpreter, so its references are not counted."""
 import gc
 import os
 import sys
@@ -47,7 +47,7 @@ def main():
     sim = r4link.SimBoard()
     counts = []
     grown = None
-    # Caches fill in the first rounds (four in Python 3.13), and a count varies by about ten. If each use loses one
+    # Caches fill in the first rounds (four in Python 3.13), and a count varies by about ten. If each use leaks one
     # reference, every window of three rounds of ten uses grows by 30.
     while len(counts) < MOST_ROUNDS and (grown is None or grown >= 2 * USES):
         for _ in range(USES):

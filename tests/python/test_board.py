@@ -27,7 +27,7 @@ def test_setpoints_reach_the_chips_and_are_reported_in_the_state(sim, board, wai
     board.stepper(1).move_to(100, speed=5000)
     assert board.state.osmc1 == (358, FORWARD) and board.state.osmc1.duty == pytest.approx(358 / 4095)
     assert board.state.relay(1) and not board.state.relay(3)
-    wait(lambda: sim.look().bldc[3].speed == 2000)  # the look is up to 10 ms old
+    wait(lambda: sim.look().bldc[3].speed == 2000)  # sim.look() is up to 10 ms old
     look = sim.look()
     assert look.osmc[0] == (358, FORWARD) and look.dhb12[1] == (700, REVERSE) and look.bldc[3].speed == 2000
     assert look.servo_us[2] == pytest.approx(1500, abs=3) and look.relays[1] and look.supply and not look.is_safe
@@ -326,7 +326,7 @@ def test_takes_control_and_releases_it(sim, wait):
         board.on_state(states.append)
         board.wait_active()
         board.take_control()
-        board.take_control()  # not a change: the board has control already
+        board.take_control()  # no effect: the host already has control
         board.wait_active()
         board.arm()
         board.osmc(1).set_pwm(358)

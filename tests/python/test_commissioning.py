@@ -9,7 +9,7 @@ from r4link.commissioning import Action, Person
 
 
 class Watching(Person):
-    """Sees what the robot does."""
+    """Answers from the outputs of the simulated board."""
 
     def __init__(self, sim, answers):
         self.sim = sim
@@ -74,7 +74,7 @@ def test_a_finding_is_learnt_into_a_wiring(sim):
     with r4link.Board(sim.url) as board:
         work = r4link.Commissioning(board, Watching(sim, {'forward': True}))
         assert [(each.thing, each.finding) for each in work.run('osmc 1').found] == [('osmc 1', 'reversed')]
-        # The simulated board of this process is not on a cable: the plan is what is known.
+        # The simulated board has no cable, so its wiring cannot be read: the learnt wiring starts from the plan.
         assert work.report.learnt_wiring.differences(r4link.Wiring.plan()) == [
             ('osmc 1 direction', 'osmc.1 inverted', 'osmc.1')]
         assert json.loads(work.report.json)['checks'][0]['learnt'] == [{'what': 'option', 'signal': 'osmc 1 direction'}]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""r4link.control: one test per class, as tests/host/control has more for C++, and a control loop on a board."""
+"""r4link.control: one test per class, and a control loop on a board. tests/host/control has more tests, in C++."""
 import math
 import time
 

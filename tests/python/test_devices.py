@@ -70,8 +70,8 @@ def test_a_uart_read_returns_each_byte_once(board):
         board.uart[3].read()
 
 
-# A UART whose ends are joined returns all written bytes. A receiver sends all the time: if a busy machine delays the
-# board, the board loses bytes and reports it.
+# A UART whose ends are joined returns all written bytes. A receiver would send all the time: if a busy machine delayed
+# the board, the board would lose bytes and report this.
 SAID = bytes(range(256)) * 2
 PIECES = [SAID[at:at + 32] for at in range(0, len(SAID), 32)]
 

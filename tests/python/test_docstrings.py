@@ -12,7 +12,7 @@ SOURCES = sorted(path for path in (ROOT / 'host/python/r4link').glob('*.py*')
                  if path.name not in ('__init__.py', 'py.typed', 'pytest_plugin.py'))
 SECONDS = {'timeout', 'within'}  # in the whole package: docs/how-to/python.md
 UNITS = {'us', 'degrees', 'cm', 'millivolts'}  # these names are units
-# One of these must follow the name of a number.
+# A match must follow the name of a number.
 UNIT_OR_RANGE = re.compile(r'\d|FORWARD|\b(seconds?|time\.monotonic|volts?|metres?|m/s|radians?|rad|steps|counts'
                            r'|bytes|index|ratio|per|a (second|metre|turn)|units? of)\b')
 REACH = 160  # characters

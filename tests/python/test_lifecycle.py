@@ -216,7 +216,7 @@ def test_waiting_calls_end_when_another_thread_closes_the_board():
     threads = [threading.Thread(target=call, args=(each,)) for each in calls]
     for each in threads:
         each.start()
-    time.sleep(0.05)  # most threads wait by then; the others end in the same way
+    time.sleep(0.05)  # most threads then wait; other threads end in the same way
     board.close()
     for each in threads:
         each.join(10)

@@ -183,7 +183,7 @@ def test_a_blocked_send_does_not_block_other_calls():
     board.post(r4link.Command.stop())
     assert sending.wait(10)
     assert board.link.state is r4link.LinkState.CONNECTING
-    board.close()  # returns although send() still waits
+    board.close()  # returns although send() waits
     released.set()
 
 
@@ -242,7 +242,7 @@ def test_a_board_is_driven_over_a_python_can_bus(bus, can_board):
         assert can_board.osmc == '358,1'
         board.stop()
         assert can_board.stops > 0 and can_board.heard_packed
-    bus.send(can.Message())  # the bus is still open
+    bus.send(can.Message())  # the bus remains open
 
 
 def test_a_can_transport_waits_while_its_queue_is_full(bus, can_board, monkeypatch):

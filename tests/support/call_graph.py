@@ -6,7 +6,7 @@ regular expressions over mangled names. A caller without a rule is an error, so 
 """
 import re
 
-LIBRARY_FRAME = 64  # for a function of the C library: more than any of them needs
+LIBRARY_FRAME = 64  # for a function of the C library: more than any such function needs
 
 
 def is_of(name, classes):
@@ -29,7 +29,7 @@ class CallGraph:
             if frame:
                 assert frame[2] == 'static', f'{title}: its frame has no bound'
                 self.frames[title.split(':')[-1]] = int(frame[1])
-                self.calls.pop(title, None)  # the calls of a weak function that this one replaces
+                self.calls.pop(title, None)  # the calls of a weak function that this function replaces
         for edge in re.findall(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', text, re.MULTILINE):
             caller, callee = (name.split(':')[-1] for name in edge)
             self.calls.setdefault(caller, set()).add(callee)

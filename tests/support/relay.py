@@ -4,7 +4,7 @@
     relay.py udp PORT         from a new port on 127.0.0.2 to the port of the board on 127.0.0.1
     relay.py pty LINK DEVICE  from a new pty, to which LINK points, to the pty of the board
 
-If the process is killed, the path is unplugged: the system reports that at once for a pty, and never for UDP.
+If the process is killed, the path is unplugged. The system reports this at once for a pty, and never for UDP.
 While the process is stopped (SIGSTOP), the path delivers nothing; when it continues, it delivers old datagrams.
 Prints the URL for a host as soon as the path works.
 """
@@ -34,7 +34,7 @@ def udp(port):
 
 
 def pty(link, device):
-    host, own = os.openpty()  # `own` stays open: a host may leave and come again
+    host, own = os.openpty()  # `own` stays open, because a host may disconnect and reconnect
     tty.setraw(own)
     board = os.open(device, os.O_RDWR | os.O_NOCTTY)
     tty.setraw(board)

@@ -6,7 +6,7 @@
     declaration;  // after it                      ///< …, also on the lines that continue it
     // after the licence, about the file           /// \\file, then the text
 
-Escapes markup, and expands rows of board.def. The number of lines stays the same.
+Escapes markup, and expands the rows of board.def. The number of lines stays the same.
 """
 import pathlib
 import re

@@ -2,7 +2,7 @@
 """The USB cable between the guest's serial port and a tty or a Unix socket here.
 
 The port is a USB device of QEMU, which is plugged in while its socket has a connection. So this module connects and
-disconnects, and copies the bytes. Bytes from the far end are lost while the socket has no connection, as with an
+disconnects, and copies the bytes. While the socket has no connection, bytes from the far end are lost, as with an
 unplugged cable.
 """
 import os
@@ -43,7 +43,7 @@ class Cable:
     def __init__(self, path):
         self._far = far_end(path)
         self._name = f'\0r4-usb-{secrets.token_hex(16)}'
-        self.listener = socket.socket(socket.AF_UNIX)  # for QEMU
+        self.listener = socket.socket(socket.AF_UNIX)  # QEMU connects to it
         self.listener.bind(self._name)
         self.listener.listen(1)
         self._near = None
@@ -87,5 +87,5 @@ class Cable:
                 while read:
                     read = read[os.write(self._far, read):]
         except OSError:
-            pass  # one of the two ends is closed
+            pass  # an end is closed
         near.close()

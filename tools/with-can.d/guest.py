@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs a command in a guest under QEMU whose kernel has CAN, as if it ran here.
+"""Runs a command in a guest under QEMU whose kernel has CAN, as if the command ran on this machine.
 
 The guest sees the host's root file system by 9p. The command's input and outputs go over virtio
-serial ports, each a socket pair between QEMU and here, so that nothing is translated and no file is
-left. `init` is the guest's side, and documents the lines on the control port.
+serial ports. Each is a socket pair between QEMU and here, so that no byte is translated and no
+file is left. `init` is the guest's side, and documents the lines on the control port.
 """
 import ctypes
 import fcntl
@@ -39,10 +39,10 @@ KERNEL_ARGUMENTS = ('console=ttyS0 quiet panic=-1 mitigations=off no_timer_check
 # Page tables of four levels, and no kernel protection that costs time at each access to memory: 25 % less time.
 MACHINE = ('-M pc -cpu max,-la57,-smap,-smep,-umip,-pku -m 768M '
            '-nodefaults -no-user-config -vga none -display none -no-reboot -device virtio-serial-pci,max_ports=8').split()
-# One processor, whose instructions take 2 ns each. The guest's clock counts the instructions, so it stops while QEMU
-# does not run. While the guest waits, its clock runs as this machine's clock.
+# One processor, whose instructions take 2 ns each. The guest's clock counts them, and stops while QEMU has no
+# processor. While the guest waits, its clock is this machine's.
 COUNTED_TIME = '-accel tcg -icount shift=1 -smp 1'.split()
-# For a guest with a cable to a program here, because both must have the same clock.
+# For a guest with a cable to a program of this machine: both must have the same clock.
 REAL_TIME = '-accel tcg,thread=multi -smp 2'.split()
 CAN = ('-object can-bus,id=bus -device kvaser_pci,canbus=bus '
        '-device kvaser_pci,canbus=bus').split()
@@ -52,7 +52,7 @@ HERE = pathlib.Path(__file__).parent
 
 
 def job(command):
-    """The shell script in the guest's own root that becomes the command."""
+    """The text of /job, a shell script in the guest's own root, which becomes the command."""
     variables = dict(os.environb)
     variables[b'PATH'] = b'/run/r4/bin:' + variables.get(b'PATH', os.fsencode(os.defpath))
     variables[b'TMPDIR'] = b'/run/tmp'
@@ -128,7 +128,7 @@ class Output(threading.Thread):
                 selector = selectors.DefaultSelector()
                 selector.register(self._descriptor, selectors.EVENT_WRITE)
                 selector.select()
-            except OSError:  # no reader: the command gets SIGPIPE, as it would here
+            except OSError:  # no reader: the command gets SIGPIPE, as on this machine
                 self._descriptor = None
                 self._on_closed()
 
@@ -214,7 +214,7 @@ class Guest:
         self._woken, self._waking = socket.socketpair()
         self._waking.setblocking(False)
         for number in (*PASSED_ON, signal.SIGWINCH):
-            if signal.getsignal(number) != signal.SIG_IGN:  # it is ignored under nohup, or in the background of a shell
+            if signal.getsignal(number) != signal.SIG_IGN:  # ignored under nohup, or in the background of a shell
                 signal.signal(number, lambda *_: None)
         signal.set_wakeup_fd(self._waking.fileno(), warn_on_full_buffer=False)
 
@@ -366,7 +366,6 @@ class Guest:
         self._deadline = time.monotonic() + KILL_AFTER_S
 
     def _processor_s(self):
-        """The processor time that QEMU has used."""
         with open(f'/proc/{self._qemu.pid}/stat', encoding='ascii') as stat:
             user, system = stat.read().rsplit(')', 1)[1].split()[11:13]
         return (int(user) + int(system)) / os.sysconf('SC_CLK_TCK')

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Debian's kernel, prepared for QEMU once and kept in the user's cache.
 
-apt-get download fetches the package, which needs no root. The cache has the kernel as an ELF file
-(QEMU boots it directly, in half the time) and an initial RAM disk with busybox and the modules.
+apt-get download fetches the package, which needs no root. The cache has the kernel as an ELF file,
+which QEMU boots directly, in half the time. It also has an initial RAM disk with busybox and the
+modules.
 The first program makes them, under a lock, in a folder that gets its name when it is complete.
 """
 import fcntl
@@ -23,7 +24,7 @@ import time
 
 from trouble import Trouble
 
-FORMAT = 2  # of the cached folder: a new number if older programs cannot use it
+FORMAT = 2  # version of the cached folder: a new number if older programs cannot use it
 PACKAGE = 'linux-image-amd64'
 BUSYBOX = '/bin/busybox'
 BASE_MODULES = ('virtio_pci', '9pnet_virtio', '9p', 'virtio_console')
@@ -120,7 +121,7 @@ def fetched(cache):
                       'sudo apt-get update; on another system than Debian set R4_CAN_KERNEL to the '
                       'path of a Debian linux-image-*-amd64 package')
     print(f'with-can: downloading {names[0]} (70 MB, once)', file=sys.stderr)
-    for pause in (5, 15, 30, 0):  # a name that cannot be resolved now may be resolved a minute later
+    for pause in (5, 15, 30, 0):  # a name that cannot be resolved may be resolved a minute later
         done = subprocess.run(['apt-get', '-q', '-o', 'Acquire::Retries=3', 'download', names[0]], cwd=cache,
                               check=False, stdin=subprocess.DEVNULL, capture_output=True, text=True,
                               errors='replace')
@@ -237,7 +238,7 @@ def initial_ram_disk(modules, built_in):
 
 
 class Cpio:
-    """An archive in the "newc" format, as the kernel unpacks it. Several may follow each other."""
+    """An archive in the "newc" format, as the kernel unpacks it. Several archives may follow each other."""
 
     def __init__(self):
         self._bytes = io.BytesIO()

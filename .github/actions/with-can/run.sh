@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# The steps of the action: makes vcan0 if this kernel supports it, else installs the packages for the guest; then runs
-# the commands. Needs Debian or Ubuntu. WITH_CAN_RUN has the commands, WITH_CAN_OPTIONS the options of tools/with-can.
+# Runs the commands in WITH_CAN_RUN, on Debian or Ubuntu. Makes vcan0 if this kernel supports it, else installs the
+# packages for the guest. WITH_CAN_OPTIONS has the options of tools/with-can.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)
 as_root=()
